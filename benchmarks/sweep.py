@@ -16,7 +16,7 @@ import numpy as np
 
 from chutelab.engines.simulation import simulate
 from chutelab.scene import from_dict, load, to_dict
-from chutelab.studies.sweep import REASON, row_of, sweep
+from chutelab.studies.sweep import REASON, TEXTS, row_of, sweep
 
 REPEATS = 3
 SINGLE = 300
@@ -69,7 +69,7 @@ def main(count):
             abs(swept.columns[name][at] / row[name][0] - 1.0)
             for row, at in zip(found, chosen, strict=True)
             for name in row
-            if name not in (REASON, "error", "residual") and row[name][0]
+            if name not in (*TEXTS, "error", "residual") and row[name][0]
         )
         with tempfile.TemporaryDirectory() as folder:
             file_time, _ = timed(lambda at=folder, one=swept: one.to_csv(Path(at) / "rows.csv"))

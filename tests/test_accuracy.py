@@ -135,7 +135,7 @@ def test_the_scene_that_was_promised_too_much():
 def test_steps_are_halved_until_the_witness_is_near(order, monkeypatch):
     """An engine with a made-up error of 0.05 m (dt / 1 ms)^order in the place of its landing."""
     scene = sc.load("belt-landing", ["run.engine=pymunk"])
-    monkeypatch.setattr("chutelab.studies.accuracy.simulate", made_up(scene, order))
+    monkeypatch.setattr("chutelab.studies.accuracy.judged", made_up(scene, order))
     _, found = reach(scene, "1mm")
     halvings = np.ceil(np.log2(50.0) / order)
     assert found.met
@@ -164,7 +164,7 @@ def made_up(scene, order, size=0.05, steps=0.1):
 def test_an_error_that_two_runs_share_is_no_accuracy(monkeypatch):
     """The same wrong answer at every step: nothing but another engine can tell."""
     scene = sc.load("belt-landing", ["run.engine=pymunk"])
-    monkeypatch.setattr("chutelab.studies.accuracy.simulate", made_up(scene, 0.0))
+    monkeypatch.setattr("chutelab.studies.accuracy.judged", made_up(scene, 0.0))
     _, found = reach(scene, "1mm")
     assert not found.met
     assert found.reached == pytest.approx(0.05, rel=1e-9)
@@ -173,7 +173,7 @@ def test_an_error_that_two_runs_share_is_no_accuracy(monkeypatch):
 
 def test_a_search_has_a_bound(monkeypatch):
     scene = sc.load("belt-landing", ["run.engine=pymunk"])
-    monkeypatch.setattr("chutelab.studies.accuracy.simulate", made_up(scene, 1.0, steps=1.0))
+    monkeypatch.setattr("chutelab.studies.accuracy.judged", made_up(scene, 1.0, steps=1.0))
     _, found = reach(scene, "50nm")
     assert not found.met
     assert 1.0 / found.dt <= MOST_STEPS < 2.0 / found.dt

@@ -161,7 +161,7 @@ def test_a_key_at_fault_starts_no_quarrel_with_others():
     said = message(scene.parse, text)
     assert said == (
         '<scene>: particle.radius = "small":'
-        " must be a number from 0 to 1000000 or a range [from, to] with from < to, in m"
+        " must be a number from 1e-09 to 1000000, 0 or a range [from, to] with from < to, in m"
     )
 
 

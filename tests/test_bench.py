@@ -107,7 +107,7 @@ def test_a_planted_error_is_told(monkeypatch):
         faster = scene.model_copy(update={"gravity": scene.gravity * 1.001})
         return replace(simulate(faster, engine, progress), machine=build(scene))
 
-    monkeypatch.setattr(bench, "simulate", wrong)
+    monkeypatch.setattr(bench, "judged", wrong)
     (row,) = measure(load("perpendicular"), ("exact",), repeats=0)
     # y2 = ½ g t2², with the same t2.
     assert 1e-4 < row.error < 2e-3

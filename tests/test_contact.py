@@ -227,7 +227,7 @@ def test_over_the_end_of_a_face_in_second_order(friction):
         surface=[{"name": "floor", "from": [-1.0, 0.0], "to": [edge, 0.0], "friction": friction,
                   "restitution": 0.0}],
         stream={"at": [0.0, r], "velocity": [v, 0.0]},
-        run={"until": 0.8},
+        run={"until": 0.74},
     )  # fmt: skip
     # Without friction it slides on, else it slips until it rolls, at 2 v/3 after v/(3 µ g).
     slip = v / (3.0 * friction * G) if friction else 0.0
@@ -239,8 +239,8 @@ def test_over_the_end_of_a_face_in_second_order(friction):
         left = run(replace(machine, dt=dt))
         told = left.select(Kind.SEPARATION)["t"]
         assert abs(told - leaves).max() < 0.1 * dt
-        fall = left.at([0.79])[0][0, 0, 1] - r
-        assert abs(fall + 0.5 * G * (0.79 - leaves) ** 2) < 20.0 * dt**2, dt
+        fall = left.at([0.73])[0][0, 0, 1] - r
+        assert abs(fall + 0.5 * G * (0.73 - leaves) ** 2) < 20.0 * dt**2, dt
 
 
 def test_carried_by_endless_friction_after_a_blow_it_leaves_where_gravity_takes_it():
@@ -445,7 +445,7 @@ def test_who_finds_no_place_to_the_end_is_never_released():
     started = len(recording.select(Kind.RELEASE))
     assert 3 <= started < 12
     assert (np.diff(recording.offsets) > 0).sum() == started
-    assert {REASONS[k] for k in recording.ended} == {"time"}
+    assert {REASONS[k] for k in recording.ended} == {"time", "unreleased"}
 
 
 # The same bits

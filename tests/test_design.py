@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import shlex
@@ -24,7 +25,7 @@ from chutelab.pictures.plots.design import draw_scan, scan, spread
 from chutelab.studies.design import roots, sensitivity
 from chutelab.studies.design.evaluation import Evaluator, Outcomes, suits
 from chutelab.studies.design.quantities import SHORT, measured, target
-from chutelab.studies.design.uncertainty import spreads
+from chutelab.studies.design.uncertainty import as_dict, spreads
 from chutelab.util.errors import InputError
 
 G, V, R, D, DROP, M = 9.81, 2.0, 0.1, 0.5, 0.5, 0.008
@@ -199,7 +200,7 @@ def test_a_course_between_two_equal_ones_is_not_lost():
     def evaluate(points):
         x = points[:, 0]
         courses = np.select([x < 0.6, x < 0.601, x < 0.9], ["a", "c", "b"], "c").tolist()
-        return Outcomes(points, courses, [""] * len(x))
+        return Outcomes(points, courses, [""] * len(x), courses)
 
     found = roots.scan(evaluate, 0.0, 1.0, 3)
     assert found.complete
@@ -409,7 +410,7 @@ BAD = [
 @pytest.mark.parametrize(("arguments", "said"), BAD)
 def test_bad_questions_are_refused_before_anything_runs(arguments, said, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("chutelab.studies.design.evaluation.simulate", None)
+    monkeypatch.setattr("chutelab.studies.design.evaluation.judged", None)
     monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
     result = CliRunner().invoke(main, [*SOLVE, *arguments, "--out", "out"])
     assert result.exit_code == 2, result.output
@@ -549,6 +550,41 @@ def test_draws_beyond_the_scenes_domain_are_cut_and_said():
     assert "16 % of plate.restitution" in repr(found)
 
 
+def test_kinds_of_outcome_are_told_apart():
+    """A point passes below the plate, `B` long, if it falls farther on the way: ½ g (d1/v)² > B."""
+    b, d1, v, spread_of_v, h, e = 0.45, R + D, 2.0, 0.1, 1.5, 0.5
+    given = machine(plate__below=b, outgoing__drop=h, outgoing__drop_from="top")
+    found = design.uncertainty(given, f"incoming.speed={v}±{spread_of_v}:uniform", samples=1024)
+    slowest = d1 * sqrt(G / (2.0 * b))
+    passes = (slowest - (v - spread_of_v)) / (2.0 * spread_of_v)
+    assert list(found.kinds) == ["plate, outgoing", "outgoing"]
+    hit, missed = found.kinds.values()
+    assert (missed.share, hit.share) == pytest.approx((passes, 1.0 - passes), abs=2e-3)
+    # It falls for T whatever it hits; the plate turns v into -e v at t = d1/v.
+    fall = sqrt(2.0 * h / G)
+    slow, fast = 0.5 * (v - spread_of_v + slowest), 0.5 * (slowest + v + spread_of_v)
+    assert missed.mean[0] == pytest.approx(slow * fall, rel=1e-3)
+    assert hit.mean[0] == pytest.approx(d1 - e * (fast * fall - d1), rel=1e-3)
+    assert hit.deviation[0] < 0.1 * found.deviation[0] > missed.deviation[0]
+    shares = {kind: f"{100.0 * one.share:.1f} % touch {kind}" for kind, one in found.kinds.items()}
+    assert all(line in repr(found) for line in shares.values())
+    assert "2 kinds of outcome" in repr(found)
+    told = as_dict(found)["touches"]["outgoing"]
+    assert told["share"] == missed.share
+    assert told["quantities"]["landing.x"]["mean"] == missed.mean[0]
+    assert set(csv.DictReader(found.csv().splitlines()).fieldnames) > {"touches", "landing.x"}
+    ax = spread(found).axes[0]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == [
+        "touch plate, outgoing", "touch outgoing"
+    ]  # fmt: skip
+
+
+def test_one_kind_of_outcome_is_a_note():
+    found = design.uncertainty(machine(), "restitution=0.5±0.01", samples=64)
+    assert "All samples touch plate, outgoing." in repr(found)
+    assert "% touch" not in repr(found)
+
+
 def test_samples_that_never_land_are_left_out_and_said():
     given = chutelab.load("inclined-60", ["particle.radius=0.004"])  # misses from 68.9° on
     found = design.uncertainty(given, "plate.angle_deg=69±3", ["landing.vx"], samples=64)
@@ -597,7 +633,7 @@ def test_uniform_and_relative_spreads():
     ],
 )
 def test_bad_uncertainties_are_refused_before_anything_runs(given, said, monkeypatch):
-    monkeypatch.setattr("chutelab.studies.design.evaluation.simulate", None)
+    monkeypatch.setattr("chutelab.studies.design.evaluation.judged", None)
     monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
     with pytest.raises(InputError, match=said):
         design.uncertainty(machine(), given)
@@ -642,9 +678,11 @@ def test_sweep_writes_samples_and_picture_of_uncertainties(tmp_path):
     assert shown.endswith(f"wrote {out}\nwrote {plot}\n")
     assert plot.stat().st_size > 10_000
     head, *rows = out.read_text(encoding="utf-8").splitlines()
-    assert head == "plate.restitution,landing.x,belt_work"
+    assert head == "plate.restitution,landing.x,belt_work,touches"
     assert len(rows) == 128
-    epsilon, x, work = map(float, rows[0].split(","))
+    *numbers, touched = next(csv.reader(rows))
+    assert touched == "plate, outgoing"
+    epsilon, x, work = map(float, numbers)
     # Upright plate: vx = -ε v, and the fall to the belt does not depend on ε.
     falls = G * (R + D) / V
     t3 = (sqrt(falls**2 + 2.0 * G * DROP) - falls) / G
@@ -664,7 +702,7 @@ def test_sweep_writes_samples_and_picture_of_uncertainties(tmp_path):
     ],
 )
 def test_sweep_refuses_uncertainties_before_it_runs(given, options, said, monkeypatch, tmp_path):
-    monkeypatch.setattr("chutelab.studies.design.evaluation.simulate", None)
+    monkeypatch.setattr("chutelab.studies.design.evaluation.judged", None)
     monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
     monkeypatch.chdir(tmp_path)
     assert said in propagate(tmp_path, given, *options, code=2).stderr

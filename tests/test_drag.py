@@ -151,7 +151,11 @@ def test_the_share_of_the_weight() -> None:
     floating = weightless.with_values({"gravity": 0.0})
     told = drag(floating, predict(floating), v)
     assert told is not None
-    assert math.isinf(told.share_of_weight)
+    # Without a weight there is no share of it: ½ ρ c_w π r² v² / m is told.
+    assert math.isnan(told.share_of_weight)
+    slowed = force * (told.speed / v) ** 2 / floating.particle.mass
+    assert told.slowing == pytest.approx(slowed, rel=1e-14)
+    assert f"would be a deceleration of {slowed:.2g} m/s² at" in str(told)
 
 
 def test_air_keeps_dust_from_the_plate() -> None:
@@ -172,8 +176,8 @@ def test_summary_report_and_check_tell_it() -> None:
     _, landing = by_scipy(predict(one), r=0.0063, m=0.008, eps=0.5, alpha=0.0)
     assert told["landing_shift"] == pytest.approx(landing, rel=1e-5)
     assert set(told) == {
-        "speed", "reynolds", "coefficient", "share_of_weight", "impact_shift", "landing_shift",
-        "arrives",
+        "speed", "reynolds", "coefficient", "slowing", "share_of_weight", "impact_shift",
+        "landing_shift", "arrives",
     }  # fmt: skip
     run = CliRunner().invoke(main, ["run", "perpendicular"])
     words = " ".join(run.output.split())
@@ -189,9 +193,9 @@ def test_summary_report_and_check_tell_it() -> None:
 
 def test_without_a_closed_form_only_the_share_is_told() -> None:
     free = from_dict(
-        {"stream": {"at": [0.0, 1.0], "velocity": [3.0, 0.0]}, "run": {"until": 0.5}}, "test"
+        {"stream": {"at": [0.0, 1.0], "velocity": [3.0, 0.0]}, "run": {"until": 0.25}}, "test"
     )
     told = summary(simulate(free))["drag"]
-    assert told["speed"] == pytest.approx(math.hypot(3.0, G * 0.5), rel=1e-9)
+    assert told["speed"] == pytest.approx(math.hypot(3.0, G * 0.25), rel=1e-9)
     assert told["landing_shift"] is told["impact_shift"] is None
     assert told["arrives"]

@@ -629,13 +629,67 @@ def test_energy_never_rises_where_nothing_is_driven():
 # Ends, hosts
 
 
-@both
-def test_what_misses_everything_leaves_a_metre_below(engine):
-    recording = lone(engine, (30.0, 1.0), (0.0, 0.0), '"settled"', surface=floor())
+@pytest.mark.parametrize("until", ['"settled"', "6.0"])
+@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk", "reference"])
+def test_what_misses_everything_leaves_a_metre_below(engine, until):
+    vx, vy, begin, lowest = 0.75, 1.5, 1.0, -0.25
+    step = f'[[surface]]\nname = "step"\npoints = [[-1.0, {lowest}], [0.5, {lowest}]]'
+    recording = lone(engine, (30.0, begin), (vx, vy), until, surface=floor() + step)
     (gone,) = recording.select(Kind.EXIT)
-    assert gone["position"][1] == pytest.approx(-1.0, abs=1e-12)
-    assert gone["t"] == pytest.approx(sqrt(2.0 * 2.0 / G), rel=1e-12, abs=0.0)
+    fall = begin - (lowest - 1.0)
+    time = (vy + sqrt(vy**2 + 2.0 * G * fall)) / G
+    assert gone["t"] == pytest.approx(time, rel=1e-12, abs=0.0)
+    assert gone["position"] == pytest.approx([30.0 + vx * time, lowest - 1.0], rel=1e-12, abs=0.0)
+    assert gone["velocity_after"] == pytest.approx([vx, vy - G * time], rel=1e-12, abs=0.0)
     assert REASONS[recording.ended[0]] == "exit"
+    assert recording.track(0)[-1]["t"] == gone["t"]
+    # What it had and what it fell is all that the ledger knows.
+    books = ledger(recording)
+    thrown = 0.5 * M * (vx**2 + vy**2)
+    assert books.kinetic == pytest.approx((thrown, thrown + M * G * fall), rel=1e-12)
+    assert books.potential == pytest.approx((M * G * begin, M * G * (begin - fall)), rel=1e-12)
+    assert abs(books.residual) <= 1e-13 * books.turned_over
+    assert books.belt_work == books.restitution_loss == books.friction_loss == 0.0
+
+
+@pytest.mark.parametrize("until", ['"settled"', "6.0"])
+@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk", "reference"])
+def test_without_gravity_it_leaves_a_metre_outside_the_box_of_all(engine, until):
+    step = '\n[[surface]]\nname = "step"\npoints = [[-1.0, -0.25], [0.5, 0.75]]'
+    without = f"gravity = 0.0\n[stream]\nat = [0.0, 2.0]\nvelocity = [0.5, -0.125]\n{step}"
+    made = build(parse(f"{without}\n[run]\nuntil = {until}"))
+    (gone,) = ran(engine, made).select(Kind.EXIT)
+    assert gone["t"] == pytest.approx((0.5 + 1.0) / 0.5, rel=1e-12, abs=0.0)
+    assert gone["position"] == pytest.approx([1.5, 2.0 - 0.125 * 3.0], rel=1e-12, abs=0.0)
+
+
+@both
+def test_of_a_crowd_each_leaves_where_it_falls_off(engine):
+    # Two meet above the table's end and go apart; a third stays on it, far from both.
+    table = floor(friction=0.0, ends=(-1.0, 0.3))
+    places, velocities = [(0.32, 1.0), (0.38, 1.0), (-0.9, R)], [(1.0, 0.0), (0.0, 0.0), (0.0, 0.0)]
+    machine = released(
+        places, velocities, (0.0, 0.0, 0.0), surface=table, until=5.0, gravity=G, friction=0.0
+    )
+    recording = ran(engine, machine)
+    assert [REASONS[n] for n in recording.ended] == ["exit", "exit", "time"]
+    out = recording.select(Kind.EXIT)
+    # A blow along x leaves the fall as it is.
+    height = pytest.approx([-1.0, -1.0], abs=1e-9)
+    assert out["position"][:, 1] == height
+    assert out["t"] == pytest.approx(np.full(2, sqrt(2.0 * 2.0 / G)), abs=1e-3)
+    books = ledger(recording)
+    assert books.potential[1] == pytest.approx(M * G * (-2.0 + R), rel=1e-9)
+
+
+def test_what_hangs_on_a_string_has_not_left():
+    ball = "at = [3.0, 0.0]\nvelocity = [0.0, 0.0]"
+    string = "[[string]]\nfrom = [0.0, 0.0]"
+    recording = simulated("pymunk", f"[stream]\n{ball}\n{string}\n[run]\nuntil = 1.0")
+    # From the horizontal it is at its lowest, 3 m below, after K(1/2) √(L/g) = 1.854 √(L/g).
+    end = recording.track(0)[-1]
+    assert (REASONS[recording.ended[0]], end["t"]) == ("time", 1.0)
+    assert end["position"][1] < -2.9
 
 
 @both

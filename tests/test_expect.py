@@ -105,8 +105,9 @@ def test_names_are_the_keys_of_the_json_and_give_its_numbers(name):
         first = value[0] if isinstance(value, list) else value
         assert measured == first or (first is None and isnan(measured)), key
         compared += 1
-    # separation, impact, landing, as far as their tables are there; contacts; ended.t; the ledger.
-    columns = 5 * ("incoming" in tables) + 7 * ("plate" in tables) + 7 * ("outgoing" in tables)
+    # separation, impact, landing, arrival, as far as their tables are there; contacts; ended.t;
+    # the ledger.
+    columns = 5 * ("incoming" in tables) + 7 * ("plate" in tables) + 12 * ("outgoing" in tables)
     assert compared == columns + 1 + 1 + 5 + 3 * (len(surfaces) + 1)
     assert set(SYMBOLS) == set(found["theory"]) - {"reason"}
 
@@ -335,10 +336,12 @@ def test_the_closed_forms_among_the_expectations_are_what_they_say():
     lowered = m * (v * v - G * rc)
     entry = "ledger.by_surface.incoming.belt_work"
     assert value_of("low-speed", entry) == pytest.approx(lowered, rel=1e-14, abs=0.0)
-    assert value_of("belt-landing", "belt_work") == pytest.approx(
+    assert value_of("belt-landing", "particles[0].belt_work") == pytest.approx(
         m * v * (v + 1.0), rel=1e-15, abs=0.0
     )
-    assert value_of("belt-landing", "slip_heat") == pytest.approx(0.5 * m * 9.0, rel=1e-15, abs=0.0)
+    assert value_of("belt-landing", "particles[0].slip_heat") == pytest.approx(
+        0.5 * m * 9.0, rel=1e-15, abs=0.0
+    )
     assert value_of("free-fall", "ledger.potential.end") == pytest.approx(
         5 * m * G * r, rel=1e-12, abs=0.0
     )

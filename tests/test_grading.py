@@ -278,6 +278,37 @@ def test_a_child_that_hides_is_ended_too(tmp_path, in_own_tmp):
     assert gone(int(pids.read_text()))
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="orphans come back on Linux only")
+def test_a_daemon_that_a_list_of_processes_misses_is_ended_too(tmp_path, in_own_tmp, monkeypatch):
+    """A list is no snapshot: a process whose parent ends while it is made is not in it."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import itertools, psutil\n"
+        "listed, times = psutil.Process.children, itertools.count()\n"
+        "def children(self, recursive=False):\n"
+        "    return listed(self, recursive) if next(times) % 2 else []\n"
+        "psutil.Process.children = children\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    pids = tmp_path / "pids"
+    daemon = (
+        "import os, time\n"
+        "if os.fork() == 0:\n"
+        "    os.setsid()\n"
+        "    if os.fork() == 0:\n"
+        f"        open({str(pids)!r}, 'w').write(str(os.getpid()))\n"
+        "        time.sleep(600)\n"
+        "    os._exit(0)\n"
+        "os.wait()\n"
+        f"while not os.path.exists({str(pids)!r}) or not os.path.getsize({str(pids)!r}): pass"
+    )
+    for _ in range(2):  # The list after the end is one that misses, or the next one is.
+        pids.unlink(missing_ok=True)
+        file = saved(tmp_path, "daemon.ipynb", OPEN.format("Flo"), daemon)
+        [row] = grade([file], time_limit=20.0)
+        assert (row.marks, row.reason) == ((0, 0, 0, 0), "")
+        assert gone(int(pids.read_text()))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("cell", "remark"),

@@ -23,7 +23,7 @@ from chutelab.classroom.lessons import find, scene_of, shipped_lessons
 from chutelab.classroom.lessons.building import bundle
 from chutelab.classroom.lessons.printing import printed
 from chutelab.classroom.lessons.texts import without_tex, words_for
-from chutelab.engines.simulation import simulate
+from chutelab.engines.simulation import judged
 from chutelab.pictures.animation.files import palette
 from chutelab.pictures.animation.moments import ASK, asked, film, slowness, span
 from chutelab.pictures.animation.stage import lay_out
@@ -52,7 +52,7 @@ def numbers_in(text):
 
 @cache
 def recording(number, name, settings=()):
-    return simulate(scene_of(find(number), name, settings))
+    return judged(scene_of(find(number), name, settings))
 
 
 @cache

@@ -127,3 +127,24 @@ def test_the_old_command_is_gone():
     result = CliRunner().invoke(main, ["page", "perpendicular"])
     assert result.exit_code == 2
     assert "No such command" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes", "said"),
+    [
+        ("perpendicular", ["stream.count=100001"], "stream.count = 100001: a page has room for"),
+        # The belt goes up at 60° and throws at 6 m/s: the impact is higher than the pulley.
+        (
+            "inclined-40",
+            ["incoming.incline_deg=60", "incoming.speed=6", "plate.angle_deg=0", "plate.above=10"],
+            "outgoing.drop = 0.1: more: a page measures the drop from the top",
+        ),
+        ("hopper", ["stream.fill=[[0, 0.5], [0.001, 0.501]]"], "stream.fill = [[0"),
+    ],
+)
+def test_what_the_page_could_not_begin_with_is_refused(scene, changes, said, tmp_path):
+    sets = [word for change in [*changes] for word in ("--set", change)]
+    if scene == "inclined-40":
+        sets += ["--set", "outgoing.drop=0.1"]
+    assert said in call(scene, *sets, "-o", tmp_path / "lab.html", code=2).stderr
+    assert not list(tmp_path.iterdir())

@@ -17,7 +17,7 @@ import pytest
 import chutelab.pictures.live
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
-from chutelab.scene import load, parse
+from chutelab.scene import from_dict, load, parse, to_toml
 
 NODE = shutil.which("node")
 ASSETS = Path(chutelab.pictures.live.__file__).parent / "assets"
@@ -258,11 +258,25 @@ def test_what_cannot_be_says_why_in_the_language(language, comma):
     text = said["fault-range"].format(low=f"0{comma}25", high=f"1{comma}5")
     assert high["fault"] == f"{said['name-plate']}, {said['key-distance']}: {text}"
     assert none["fault"].endswith(said["fault-number"])
-    assert positive["fault"].endswith(said["fault-above"].format(high="1000000"))
+    assert positive["fault"].endswith(said["fault-range"].format(low="1e−9", high="1000000"))
     assert good == {"value": 1.5}
     assert broken["key"] == "plate.distance"
     assert part["fault"].startswith(f"{said['name-surface']} 1, {said['key-to']}: ")
     assert parsed == ["1.5", "-0.25", "0.003", "NaN", "NaN", "NaN", "NaN"]
+
+
+@needs_node
+@pytest.mark.parametrize("name", ["__proto__", "constructor", "toString"])
+def test_a_name_may_be_one_that_every_object_has(name):
+    material = {"name": name, "density": 2000.0, "restitution": 0.5, "friction": 0.3}
+    floor = {"name": name, "from": [-1.0, 0.0], "to": [1.0, 0.0]}
+    given = {
+        "particle": {"material": name}, "material": [material], "surface": [floor],
+        "stream": {"name": name, "at": [0.0, 1.0], "velocity": [0.0, 0.0]},
+    }  # fmt: skip
+    (found,) = ask({"ask": "edited", "given": given, "edits": []})
+    assert "fault" not in found
+    assert parse(found["toml"]) == parse(to_toml(from_dict(given)))
 
 
 def in_address(value):

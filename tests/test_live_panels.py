@@ -16,6 +16,7 @@ import chutelab
 from chutelab.machine import build
 from chutelab.pictures import live
 from chutelab.results import Kind
+from chutelab.results.ledger import ledger
 from chutelab.scene import load
 from live.machines import as_page_has_it, plain
 
@@ -99,6 +100,43 @@ def test_the_time_of_flight_is_told_where_no_plate_is_on_the_way(runs):
     assert told["t"] == pytest.approx(np.sqrt(2.0 * fall / scene.gravity), rel=1e-9)
     _, answer = runs["perpendicular"]
     assert {row["id"]: row["simulated"] for row in answer["numbers"]}["t"] is None
+
+
+@pytest.mark.parametrize("name", ["stream-independent", "stream", "spoon"])
+def test_a_crowds_numbers_are_sums_over_all(runs, name):
+    scene, answer = runs[name]
+    ours, its = chutelab.simulate(scene, engine="contact"), answer["crowd"]
+    first = ours.first(ours.select(Kind.LANDING))
+    x = first["position"][:, 0]
+    assert (its["released"], its["landed"]) == (ours.count, len(x))
+    assert its["mean"] == pytest.approx(x.mean(), rel=1e-13)
+    assert its["spread"] == pytest.approx(x.std(), rel=1e-9)
+    assert its["quantiles"] == pytest.approx(np.quantile(x, [0.02, 0.5, 0.98]), rel=1e-13)
+    # Mass that leaves the pulley in the time of the middle 80 %.
+    left = np.sort(ours.first(ours.select(Kind.SEPARATION, surface="incoming"))["t"])
+    tenth = ours.count // 10
+    middle = left[tenth : ours.count - tenth]
+    flow = (len(middle) - 1) * scene.particle.mass / (middle[-1] - middle[0])
+    assert its["flow"] == pytest.approx(flow, rel=1e-12)
+    books = ledger(ours)
+    assert its["work"] == pytest.approx(books.belt_work, rel=1e-9)
+    lasts = ours.knots["t"].max() - ours.knots["t"].min()
+    assert its["power"] == pytest.approx(books.belt_work / lasts, rel=1e-9)
+    lost = {n: b["restitution_loss"] + b["friction_loss"] for n, b in books.by_surface.items()}
+    assert dict(its["losses"]) == pytest.approx({n: v for n, v in lost.items() if v}, rel=1e-9)
+    assert [v for _, v in its["losses"]] == sorted((v for v in lost.values() if v), reverse=True)
+
+
+def test_a_track_is_drawn_as_the_curve_it_is(runs):
+    scene, answer = runs[str(THROW)]
+    points = np.array(answer["points"])
+    (v, g), fall = (scene.incoming.speed, scene.gravity), np.diff(points[:, 0]) > 0.0
+    top = scene.incoming.pulley_radius + scene.particle.radius
+    middle = 0.5 * (points[1:] + points[:-1])[fall]
+    flies = middle[:, 0] > 0.0
+    x, y = middle[flies].T
+    assert np.abs(y - (top - 0.5 * g * (x / v) ** 2)).max() < 3e-4
+    assert len(points) < 60
 
 
 def test_a_streams_numbers_are_means_over_its_particles(runs):

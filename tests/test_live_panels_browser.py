@@ -118,6 +118,44 @@ def test_a_streams_landings_fill_up_with_time_and_a_lone_particle_has_none(shown
     assert len(times) == 60
     page.evaluate("t => chutelab.lab.seek(t)", 0.5 * (times[29] + times[30]))
     playwright.expect(result).to_have_text(re.compile("^Mittelwert von 30:"))
-    table = page.locator("#numbers").inner_text()
-    assert "Mittel von 60" in table
-    assert "φ₁ Ablösewinkel" in table
+    crowd = page.locator("#numbers .crowd")
+    playwright.expect(crowd).to_contain_text(re.compile("ausgegeben\\s*60 / 60"))
+    playwright.expect(crowd).to_contain_text(re.compile("Landepunkt, Mittelwert ± Streuung\\s*0,4"))
+    # Particle 0 on request.
+    table = page.locator("#numbers table:not(.crowd)")
+    assert table.is_hidden()
+    page.locator("#numbers summary", has_text="Teilchen 0").click()
+    assert "φ₁ Ablösewinkel" in table.inner_text()
+    page = shown("stream-independent", ["stream.count=12"], language="de")
+    assert page.locator("#numbers .crowd").is_hidden()
+    assert "Mittel von 12" in page.locator("#numbers").inner_text()
+
+
+EDGES = """() => { const { view } = chutelab.stage;
+  return [view.worldX(0), view.worldY(view.height), view.worldX(view.width), view.worldY(0)]; }"""
+
+
+def test_the_page_shows_the_machine_not_the_fall_and_what_a_view_says(shown):
+    # It misses the belt, which is far away, and falls to 1 m below all: some of that is shown.
+    small = ["incoming.pulley_radius=0.02", "incoming.length=0.1", "plate.distance=0.05"]
+    small += ["plate.above=0.02", "plate.below=0.03", "outgoing.drop_from=top"]
+    small += ["outgoing.drop=0.1", "outgoing.start=1", "outgoing.length=0.1", "run.until=3"]
+    page = shown("perpendicular", small)
+    assert page.evaluate("chutelab.lab.recording.tracks[0].lowest") == pytest.approx(
+        -1.08, abs=1e-9
+    )
+    left, bottom, right, top = page.evaluate(EDGES)
+    assert left < -0.02
+    assert bottom > -0.5
+    assert right > 0.07
+    page = shown("perpendicular", more="[view]\nfrom = [-0.2, -0.5]\nto = [0.8, 0.3]\n")
+    left, bottom, right, top = page.evaluate(EDGES)
+    assert left <= -0.2 + 1e-9
+    assert bottom <= -0.5 + 1e-9
+    assert right >= 0.8 - 1e-9
+    assert top >= 0.3 - 1e-9
+    assert min((right - left) / 1.0, (top - bottom) / 0.8) == pytest.approx(1.0, rel=1e-9)
+    # A new corner is shown at once.
+    page.evaluate("chutelab.lab.change({ 'view.to': [1.8, 1.3] })")
+    left, bottom, right, top = page.evaluate(EDGES)
+    assert min((right - left) / 2.0, (top - bottom) / 1.8) == pytest.approx(1.0, rel=1e-9)

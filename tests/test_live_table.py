@@ -156,7 +156,7 @@ def test_presets_have_names_of_their_own_and_values_that_their_keys_take():
     rows = '{ name = "Moon", set = { gravity = -1 } }, { name = "Moon", set = { gravity = 1 } }'
     found = faults(f"presets = [{rows}]")
     assert found == {
-        "live.presets[0].set": "gravity = -1: must be a number from 0 to 1000000, in m/s²",
+        "live.presets[0].set": "gravity = -1: must be a number from 1e-09 to 1000000 or 0, in m/s²",
         "live.presets[1].name": "must differ from those of other presets",
     }
     assert "a table of keys" in faults('presets = [{ name = "x" }]')["live.presets[0].set"]

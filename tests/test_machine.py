@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from math import atan2, cos, degrees, hypot, inf, radians, sin, sqrt
+from time import process_time
 
 import numpy as np
 import pytest
@@ -272,6 +273,31 @@ def test_gates_cross_only_what_is_there_while_they_are(bent):
         assert built(surface=[flat | times[0], upright | times[1]]).warnings == warnings
 
 
+@pytest.mark.parametrize("abreast", [1, 3])
+def test_pieces_are_held_against_each_other_some_at_a_time(abreast, monkeypatch):
+    """Two lattices, of rings and of ticks, and a line: each two of them cross, told once."""
+    ring = {"name": "ring", "center": [0.0, 5.0], "radius": 0.3, "repeat": [[3, 0.5, 0.0]]}
+    tick = {"name": "tick", "from": [0.1, 5.1], "to": [0.5, 5.4], "repeat": [[4, 0.45, 0.0]]}
+    line = {"name": "line", "from": [-1.0, 5.2], "to": [3.0, 5.2]}
+    far = {"name": "far", "from": [-1.0, 7.0], "to": [3.0, 7.0], "repeat": [[2, 0.0, 0.1]]}
+    monkeypatch.setattr(machine.parts, "ABREAST", abreast)
+    found = falling(surface=[line, tick, far, ring]).warnings
+    assert found == tuple(
+        machine.Caution(one, crosses=other)
+        for one, other in (("tick", "line"), ("ring", "line"), ("ring", "tick"))
+    )
+
+
+def test_thousands_of_pieces_take_a_moment():
+    """Each of 9,800 crosses thousands of others: all pairs at once were gigabytes, and minutes."""
+    rings = {"center": [0.0, 5.0], "radius": 0.5, "repeat": [[70, 0.001, 0.0], [70, 0.0, -0.001]]}
+    built = falling(surface=[{"name": "a", **rings}, {"name": "b", **rings, "radius": 0.45}])
+    assert len(built.arcs.surface) == 9800
+    began = process_time()
+    assert [str(caution) for caution in built.warnings] == ["b: it crosses a"]
+    assert process_time() - began < 20.0
+
+
 @pytest.mark.parametrize(("below", "hit"), [(0.1, -0.4259), (None, None)])
 def test_a_flight_off_the_finite_plate_is_told_with_its_place(below, hit):
     # the impact lies g (0.5937 / 2)²/2 - r = 0.4259 m below the pulley's top
@@ -288,7 +314,10 @@ def test_the_scene_ends_a_metre_below_or_without_gravity_around_it():
     assert (left, right, top) == pytest.approx((-3.0, 5.0, 1.4), abs=1e-15)
     assert bottom == pytest.approx(R - DROP - 1.0, abs=1e-15)
     bare = built(gravity=0.0, plate=None, outgoing=None).exit_box
-    assert bare == pytest.approx((-2.0, R + 1.0, -R - 1.0, R + 1.0), abs=1e-15)
+    # it is released on the belt, its centre r above
+    assert bare == pytest.approx((-2.0, R + 1.0, -R - 1.0, R + 0.0063 + 1.0), abs=1e-15)
+    low = built(stream={"at": [0.5, -9.0], "velocity": [0.0, 5.0]}, plate=None, outgoing=None)
+    assert low.exit_box == (-inf, inf, -10.0, inf)
     alone = machine.build(
         scene.from_dict({"stream": {"at": [2.0, 3.0], "velocity": [0.0, 0.0]}, "gravity": 0.0})
     )

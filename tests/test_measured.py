@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,10 @@ from scipy.stats import binom
 from chutelab import measured
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
-from chutelab.scene import load
+from chutelab.scene import SceneError, load
+from chutelab.scene.schema import as_written
 from chutelab.studies.measured import MeasuredError
+from chutelab.studies.measured.parameters import numbers, resolve
 from chutelab.studies.measured.result import COLUMNS, advice, plus_minus
 from chutelab.studies.measured.track import best_t0
 
@@ -452,6 +455,17 @@ def test_names_what_the_points_cannot_tell(scene, film):
         with pytest.raises(MeasuredError, match=said) as error:
             measured.fit(scene, film, keys)
         assert str(error.value).startswith(film.source)
+
+
+def test_no_search_reaches_what_cannot_be_run(scene, film):
+    """What the points do not tell is driven to a bound by rounding, another on each processor."""
+    keys = list(numbers(as_written(scene, defaults=True)))
+    positive = [one for key in keys for one in resolve(scene, film, [key]) if one.low > 0.0]
+    assert {"incoming.length", "plate.distance", "particle.mass"} <= {one.key for one in positive}
+    for one in positive:
+        assert one.low >= 1e-6 * one.start
+        with suppress(SceneError):  # Two keys that do not go together: a search may meet that.
+            simulate(scene.with_values({one.key: one.low}))
 
 
 def test_says_when_the_model_is_not_what_was_filmed(scene, film):

@@ -10,7 +10,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+import judge
+from chains import tables
+from chutelab.scene import from_dict
 from chutelab.theory.obstacles import Flight, Obstacles, first_in_flight, first_on_pulley
+from chutelab.theory.prediction import free_surfaces
 
 G = 9.81
 ANGLE = st.floats(-math.pi, math.pi)
@@ -126,3 +130,70 @@ def test_the_first_of_straight_and_round_ones_wins_and_has_its_number() -> None:
     assert both.overlapped(np.array([0.0, 0.11]), 0.02) == 2
     assert both.overlapped(np.array([0.0, -0.99]), 0.02) == 0
     assert both.overlapped(np.array([0.0, 0.0]), 0.02) == -1
+
+
+def flown(seed: int) -> None:
+    """Up to its first contact the start of a chain flies free; there a gap has fallen to zero."""
+    drawn = tables(seed)
+    r, until, start = drawn["particle"]["radius"], drawn["run"]["until"], drawn["stream"]
+    flight = Flight(np.array(start["at"]), np.array(start["velocity"]), drawn["gravity"])
+    obstacles = Obstacles.of(*free_surfaces(from_dict(drawn, "chain")))
+    time, index = first_in_flight(flight, obstacles, r, until)
+    pieces = judge.pieces(drawn)
+    way = flight.at(np.linspace(0.0, min(time, until), 3001))
+    for piece in pieces:
+        assert (piece.distance(way) > r - 1e-9).all(), (seed, piece.name)
+        assert not piece.crossed(way[:-1], way[1:]).any(), (seed, piece.name)
+    if time < math.inf:
+        # It touches, and a little earlier was further away, or is nearer a little later.
+        (piece,) = (p for p in pieces if p.name == obstacles.names[index])
+        before, now, after = piece.distance(flight.at(time + np.array([-1e-6, 0.0, 1e-6]))) - r
+        assert abs(now) < 1e-9, seed
+        assert before > now if time > 1e-6 else after < now, seed
+
+
+def test_flights_into_chains_and_bowls() -> None:
+    for seed in range(120):
+        flown(seed)
+
+
+@pytest.mark.slow
+def test_thousands_of_flights_into_chains_and_bowls() -> None:
+    for seed in range(3000):
+        flown(seed)
+
+
+HIGH = 0.2
+"""m; a throw upwards at 2 m/s against 10 m/s² turns there, after 0.2 s."""
+
+
+@pytest.mark.parametrize(
+    ("lines", "bends", "time"),
+    [
+        ([("ceiling", (-1.0, HIGH + 0.03), (1.0, HIGH + 0.03))], [], 0.2),
+        ([("wall", (0.0, HIGH + 0.03), (0.0, 1.0))], [], 0.2),
+        ([], [("peg", (0.0, HIGH + 0.13), 0.1, 0.0, 2.0 * math.pi)], 0.2),
+        ([], [("dome", (0.0, HIGH - 0.07), 0.1, 0.0, math.pi)], 0.2),
+    ],
+)  # fmt: skip
+def test_a_touch_is_a_contact_and_a_miss_is_none(lines: Any, bends: Any, time: float) -> None:
+    """At the top of a throw it has no speed, and goes back: nothing is crossed."""
+    for less, met in [(0.0, time), (1e-9, math.inf)]:
+        throw = Flight(np.array([0.0, -less]), np.array([0.0, 2.0]), 10.0)
+        found, _ = first_in_flight(throw, Obstacles.of(lines, bends), 0.03, 0.35)
+        assert found == pytest.approx(met, abs=1e-6)
+
+
+def test_what_lies_on_a_surface_touches_it_and_what_leaves_it_does_not() -> None:
+    tilt = np.array([math.cos(0.3), math.sin(0.3)])
+    above = np.array([-tilt[1], tilt[0]])
+    for lines, bends, gap in [
+        ([("slope", -tilt, tilt)], [], 0.02 * above),
+        ([], [("hollow", (0.3, 0.7), 0.3, math.pi, math.pi)], np.array([0.3, 0.7]) - 0.28 * above),
+        ([], [("round", (0.3, 0.7), 0.3, 0.0, math.pi)], np.array([0.3, 0.7]) + 0.32 * above),
+    ]:
+        obstacles = Obstacles.of(lines, bends)
+        for velocity, time in [(0.0 * tilt, 0.0), (-0.1 * above, 0.0), (above, math.inf)]:
+            flight = Flight(gap, velocity, G)
+            found, _ = first_in_flight(flight, obstacles, 0.02, 0.01)
+            assert found == time, (lines, bends, velocity)

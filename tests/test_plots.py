@@ -22,9 +22,11 @@ from PIL import Image
 from chutelab import scene, theory
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.pictures import plots
+from chutelab.pictures import animation, plots
+from chutelab.pictures.animation import animate
 from chutelab.pictures.plots import Window, scenery, style
 from chutelab.results import Kind, Recording
+from chutelab.results.ledger import ledger
 from chutelab.results.recorder import Recorder
 from handmade import (
     BELT_TIME,
@@ -70,7 +72,7 @@ def runs() -> dict[str, Recording]:
 @given(
     v=st.floats(0.5, 4.0),
     radius=st.floats(0.03, 0.3),
-    size=st.floats(0.0, 0.01),
+    size=st.one_of(st.just(0.0), st.floats(1e-9, 0.01)),
     distance=st.floats(0.2, 1.0),
     restitution=st.floats(0.05, 1.0),
 )
@@ -334,6 +336,94 @@ def test_window_is_cropped_to_the_action_but_holds_it() -> None:
     assert window.height < 1.8
 
 
+BOUNCY = """
+[particle]
+radius = {r}
+[stream]
+at = [0.0, 0.3]
+velocity = [0.05, 0.0]
+[[surface]]
+name = "floor"
+points = [[-0.5, 0.0], [9.0, 0.0]]
+restitution = 1.0
+friction = 0.0
+[run]
+until = {until}
+"""
+
+
+@pytest.mark.parametrize("until", [3.0, 29.0])
+def test_a_path_is_drawn_as_the_curve_it_is_however_long_the_run(until: float) -> None:
+    # Hops over an elastic floor: y = h - g τ²/2 from one to the next, τ since the last apex.
+    r, h, vx = 0.01, 0.3, 0.05
+    recording = simulate(scene.parse(BOUNCY.format(r=r, until=until)))
+    ax = axes()
+    ax.set_xlim(0.0, 1.0)
+    plots.draw_tracks(ax, recording, marks=False)
+    drawn = line(ax, "track")
+    assert drawn[0] == pytest.approx((0.0, h), abs=1e-12)
+    assert drawn[-1, 0] == pytest.approx(vx * until, rel=1e-9)
+    period = 2.0 * sqrt(2.0 * (h - r) / G)
+    for share in (0.25, 0.5, 0.75):
+        x, y = (drawn[:-1] + share * np.diff(drawn, axis=0)).T
+        since = (x / vx + 0.5 * period) % period - 0.5 * period
+        off = np.abs(y - (h - 0.5 * G * since**2))
+        # Across a steep flight that is more in height than away from the line.
+        steep = np.hypot(1.0, G * since / vx)
+        assert (off / steep).max() < 3e-4
+
+
+def test_a_particle_that_creeps_leaves_few_points(runs: dict[str, Recording]) -> None:
+    recording = runs["slip"]
+    many, few = (len(scenery.path_of(recording, 0, fine)) for fine in (1e-6, 1e-2))
+    assert few < 0.2 * many
+
+
+STEP = """
+[particle]
+radius = 0.002
+[stream]
+at = [-0.05, 0.03]
+velocity = [0.4, 0.0]
+[[surface]]
+name = "step"
+points = [[-0.06, 0.0], [0.0, 0.0]]
+friction = 0.0
+[run]
+until = 5.0
+"""
+
+
+def test_the_fall_of_what_has_fallen_off_does_not_make_the_machine_a_dot() -> None:
+    recording = simulate(scene.parse(STEP))
+    end = recording.track(0)[-1]
+    assert end["position"][1] == pytest.approx(-1.0, abs=1e-12)
+    window = plots.window_of(recording)
+    machine = [(-0.06, 0.0), (0.0, 0.0), (-0.05, 0.03)]
+    assert window.holds(np.array(machine)).all()
+    # Machine and path up to the edge are 6 cm wide; a good third of that is shown of the fall.
+    assert window.bottom < -0.015
+    assert max(window.width, window.height) < 0.18
+
+
+@pytest.mark.parametrize("place", [(-0.5, -0.5, 0.25, 0.5), (40.0, 3.0, 41.0, 3.5)])
+def test_a_view_is_what_pictures_show(tmp_path: Path, place: tuple[float, ...]) -> None:
+    x0, y0, x1, y1 = place
+    recording = simulate(
+        scene.load("perpendicular", [f"view.from=[{x0}, {y0}]", f"view.to=[{x1}, {y1}]"])
+    )
+    assert plots.window_of(recording) == Window(x0, x1, y0, y1)
+    ax = plots.overlay(recording).axes[0]
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    assert (left, right) == pytest.approx((x0, x1)) or (bottom, top) == pytest.approx((y0, y1))
+    assert left <= x0 < x1 <= right
+    assert bottom <= y0 < y1 <= top
+    # And so does the film, where velocities point out of it.
+    layout = animation.stage.lay_out(recording, width=800, height=450)
+    assert layout.window == Window(x0, x1, y0, y1).fitted(0.675 * 800 / (0.71 * 450))
+    assert animate(recording, tmp_path / "some.gif", fps=5).stat().st_size > 1000
+
+
 def test_a_long_slide_does_not_make_all_else_small(runs: dict[str, Recording]) -> None:
     recording = runs["belt-landing"]
     window = plots.window_of(recording)
@@ -456,8 +546,110 @@ def test_overlay_keeps_what_is_for_experts_to_itself() -> None:
 def test_overlay_of_a_bed_shows_where_its_layers_land() -> None:
     bed = scene.load("stream-independent", "stream.count=50")
     axes = plots.overlay(simulate(bed)).axes
-    (found,) = [ax for ax in axes if ax.get_title("left") == "Where they land"]
+    (found,) = [ax for ax in axes if ax.get_title("left") == "Arrivals"]
     assert {"mean", "lowest", "highest"} <= {one.get_gid() for one in found.lines}
+
+
+# A crowd
+
+
+@pytest.fixture(scope="module")
+def crowd() -> Recording:
+    return simulate(
+        scene.load("stream-independent", ["stream.count=60", "stream.rate=80", "run.until=settled"])
+    )
+
+
+NOMINAL = {"track", "strobe", "impacts", "vx", "vy", "residual"}
+
+
+def gids(figure: Figure) -> set[str]:
+    return {str(one.get_gid()) for ax in figure.axes for one in (*ax.lines, *ax.patches)}
+
+
+def test_the_overlay_of_a_crowd_leads_with_the_crowd(crowd: Recording, tmp_path: Path) -> None:
+    figure = plots.overlay(crowd, path=tmp_path / "crowd.png")
+    titles = {ax.get_title("left").split(":")[0] for ax in figure.axes} - {""}
+    assert titles == {"Arrivals", "Belt power", "Flow", "Energy ledger", "Losses by surface"}
+    assert {"envelope", "median"} <= gids(figure)
+    assert not gids(figure) & NOMINAL
+    # Particle 0 on request.
+    asked = plots.overlay(crowd, details=True)
+    assert gids(asked) >= NOMINAL
+    assert "Velocity of particle 0" in {ax.get_title("left") for ax in asked.axes}
+    assert "envelope" not in gids(asked)
+
+
+@pytest.mark.slow
+def test_an_envelope_ends_where_its_particles_come_to_lie() -> None:
+    # Of a rock box: half of them stay on the ledge, at y = -0.55 m, x = 0.22 to 0.5 m.
+    ax = plots.draw_envelope(axes(), simulate(scene.load("rock-box")))
+    way = line(ax, "median")
+    steps = np.hypot(*np.diff(way, axis=0).T)
+    assert steps.max() < 4.0 * np.median(steps)
+    assert -0.55 < way[-1, 1] < -0.35
+    assert 0.22 < way[-1, 0] < 0.5
+
+
+def test_a_film_of_a_crowd_tells_how_many_come(crowd: Recording) -> None:
+    layout = animation.stage.lay_out(crowd, width=800, height=450)
+    assert layout.shows == {"parabola", "trails", "energy"}
+    asked = animation.stage.lay_out(
+        crowd, width=800, height=450, shows=frozenset(("velocity", "trails"))
+    )
+    assert asked.shows == {"velocity", "trails"}
+    shots = animation.moments.film(crowd, 0.5, 1.0, fps=10, slow=1.0, crowd=True)
+    first = crowd.select(Kind.LANDING)["t"]
+    for shot in shots:
+        # 80 a second from t = 0 on.
+        released = min(60, int(shot.t * 80.0 + 1e-9) + 1)
+        said = f"{released} released, {(first <= shot.t).sum()} arrived"
+        assert (shot.delay, shot.words) == (10 if shot is not shots[-1] else 120, said)
+
+
+def test_no_text_of_a_crowds_overlay_lies_on_another(crowd: Recording) -> None:
+    for recording in (crowd, simulate(scene.load("spoon"))):
+        figure = plots.overlay(recording)
+        figure.canvas.draw()
+        boxes = [(text, text.get_window_extent()) for text in seen(figure)]
+        for i, (text, box) in enumerate(boxes):
+            assert figure.bbox.x0 <= box.x0, text
+            assert box.x1 <= figure.bbox.x1, text
+            for other, near in boxes[:i]:
+                overlap = min(box.x1, near.x1) - max(box.x0, near.x0)
+                above = min(box.y1, near.y1) - max(box.y0, near.y0)
+                assert min(overlap, above) < 1.5, (text, other)
+
+
+def test_the_flow_is_that_of_the_feed(crowd: Recording) -> None:
+    ax = plots.draw_flow(axes(), crowd)
+    # 80 particles a second arrive as they were released: each falls as long as the others of its
+    # layer, and the layers of a bed are mixed.
+    t, number = line(ax, "arrived").T
+    assert number[[0, -1]].tolist() == [0.0, 60.0]
+    assert np.interp(30.0, number, t) == pytest.approx(0.5 * (t[1] + t[-2]), abs=0.03)
+    released = line(ax, "released")
+    assert released[1:-1, 0] == pytest.approx(np.arange(60) / 80.0, abs=1e-12)
+    (said,) = re.findall(r"([\d.]+) t/h arrive, of the slice", ax.get_title("right"))
+    assert float(said) == pytest.approx(3.6 * 80.0 * MASS, rel=0.05)
+
+
+def test_power_and_losses_add_up_to_the_ledger(crowd: Recording) -> None:
+    books = ledger(crowd)
+    ax = plots.draw_power(axes(), crowd)
+    (steps,) = [one for one in ax.patches if one.get_gid() == "power"]
+    power, edges, _ = steps.get_data()
+    factor = {"W": 1.0, "mW": 1e-3}[ax.get_ylabel().removeprefix("power, ")]
+    assert factor * (power * np.diff(edges)).sum() == pytest.approx(books.belt_work, rel=1e-9)
+    ax = plots.draw_losses(axes(), crowd)
+    factor = {"J": 1.0, "mJ": 1e-3}[ax.get_xlabel().removeprefix("loss, ")]
+    for key in ("restitution_loss", "friction_loss"):
+        bars = [one.get_width() for one in ax.patches if one.get_gid() == key]
+        assert factor * sum(bars) == pytest.approx(getattr(books, key), rel=1e-12)
+    assert next(text.get_text() for text in ax.get_yticklabels()) == max(
+        books.by_surface, key=lambda n: sum(books.by_surface[n][k] for k in
+                                           ("restitution_loss", "friction_loss"))
+    )  # fmt: skip
 
 
 def test_given_axes_get_the_scene_and_keep_what_is_theirs(tmp_path: Path) -> None:

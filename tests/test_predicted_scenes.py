@@ -259,7 +259,7 @@ def test_a_stream_in_tonnes_an_hour_says_what_the_outgoing_belt_needs() -> None:
     command = ["run", "perpendicular", "--set", "stream.rate=36 t/h"]
     words = " ".join(CliRunner().invoke(main, command).output.split())
     # It lands at -1 m/s on a belt of 2 m/s: 10 kg/s · 2 · 3.
-    assert "Outgoing belt, steady: P = 60 W at 36 t/h." in words
+    assert "Outgoing belt, steady: P = 60 W at 36 t/h, of the simulated slice." in words
 
 
 def test_quantities_of_mixed_particles_are_each_particles_own() -> None:

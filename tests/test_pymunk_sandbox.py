@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from chutelab.engines.pymunk import run
-from chutelab.machine import Arcs, Thread
+from chutelab.machine import Arcs, Thread, build
 from chutelab.results import REASONS, Kind
+from chutelab.results.recorder import StalledError
+from chutelab.scene import from_dict
 from machines import face, scene_of, thrown
 
 G = 9.81
@@ -644,6 +646,18 @@ def test_a_string_that_is_pulled_tight_takes_the_speed_along_it():
     assert residual(got) < 1e-13
 
 
+def test_a_string_whose_particle_still_rides_the_belt_is_not_tied_when_time_ends():
+    """Tied once the ride is over, after 0.5 s: a run that ends before has a track to its end."""
+    tables = {
+        "incoming": {"speed": 2.0, "pulley_radius": 0.1},
+        "string": [{"from": [0.0, 2.0], "length": 5.0}],
+    }
+    for until, ways in ((0.1, 0.2), (0.7, 1.4)):
+        track = run(build(from_dict({**tables, "run": {"until": until}}))).track(0)
+        assert track["t"][-1] == pytest.approx(until, rel=1e-12)
+        assert track["position"][-1, 0] - track["position"][0, 0] == pytest.approx(ways, rel=1e-12)
+
+
 def test_newtons_cradle_hands_the_blow_to_the_last_ball():
     # Gaps of 1e-4 r: without any all contacts are one blow, and all balls move.
     r, length, up, count = 0.01, 0.2, radians(30.0), 5
@@ -806,3 +820,26 @@ def test_the_angle_of_a_box_is_that_of_its_body():
 def test_disks_have_no_angle_but_the_sum_of_their_spin():
     floor = face("floor", (-1.0, 0.0), (1.0, 0.0))
     assert run(lone((0.0, 1.0), until=0.1, surface=[floor])).angle.shape == (0,)
+
+
+def test_a_bowl_hardly_wider_than_the_disk_is_ridden_round():
+    """Nearer to a circle's centre than 1e-5 m Chipmunk's query has one direction for all places."""
+    radius, wider, speed = 0.05, 5e-6, 1e-4
+    machine = lone([wider, 0.0], [0.0, speed], until=0.3, gravity=0.0, particle={"radius": radius})
+    recording = run(with_arcs(machine, ((0.0, 0.0), radius + wider, 0.0, 2.0 * pi, {})))
+    times = np.linspace(0.0, 0.3, 50)
+    turn = speed * times / wider
+    wanted = wider * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    off = np.hypot(*(recording.at(times)[0][:, 0] - wanted).T) / wider
+    # A step turns it by half a radian, and by as much a cubic is off between two knots.
+    assert off.max() < 0.02
+    assert off[-1] < 1e-4
+
+
+def test_what_goes_round_without_getting_on_is_told(monkeypatch):
+    """In a bowl 50 nm wider than the disk it swings 2,000 times a second."""
+    monkeypatch.setattr("chutelab.engines.pymunk.lone.WINDOW", 3000)
+    machine = lone([0.004, 0.3], particle={"radius": 0.05 - 5e-8, "spin": True})
+    machine = with_arcs(machine, ((0.0, 0.0), 0.05, -pi, pi, {"friction": 0.4}))
+    with pytest.raises(StalledError, match=r"3000 steps gain less than 100 times run\.dt"):
+        run(machine)

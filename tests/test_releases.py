@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tracemalloc
+from time import process_time
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,8 +12,9 @@ from hypothesis import strategies as st
 
 from chutelab import scene
 from chutelab.engines import contact
+from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.machine.releases import DEEP, squeeze
+from chutelab.machine.releases import DEEP, _free_height, squeeze
 from chutelab.results import Kind
 
 G, V, r = 9.81, 2.0, 0.0063
@@ -132,6 +136,120 @@ def test_in_a_bed_with_no_room_everybody_is_due_all_the_same():
     # in two layers' height at most a few find a place, and nobody is put outside the bed
     found = drawn(count=20, rate=2000.0, interact=True, bed_height=0.025)
     assert np.ptp(found.position[:, 1]) <= 0.025
+
+
+def one_after_the_other(rng, dx, dy, reach, bed):
+    """Draw heights until one is free, a thousand at most, of which the last is kept as it is."""
+    for _ in range(1000):
+        height = bed * rng.random()
+        if all(x * x + (y - height) ** 2 >= r * r for x, y, r in zip(dx, dy, reach, strict=True)):
+            break
+    return height
+
+
+@given(seed=st.integers(0, 10_000), many=st.integers(1, 60), bed=st.floats(0.01, 0.5))
+def test_heights_are_those_that_are_drawn_one_after_the_other(seed, many, bed):
+    """A thousandth draw is not looked at, for then the particle waits."""
+    known = np.random.default_rng(seed)
+    dx, dy = known.uniform(-0.012, 0.012, many), known.uniform(-0.01, bed + 0.01, many)
+    reach = known.uniform(0.008, 0.012, many)
+    slow, quick = (np.random.default_rng(seed + 1) for _ in range(2))
+    wanted = one_after_the_other(slow, dx, dy, reach, bed)
+    assert _free_height(dx, dy, reach, bed, quick) == wanted
+    assert quick.random() == slow.random()
+
+
+def packed_at_once(left, bottom, right, top, radius, seed):
+    """All places of a box: rows 2.04 r sqrt(3)/2 apart, every other one shifted by 1.02 r, and
+    each place moved by up to 0.01 r."""
+    places, room = [], 1.01 * radius
+    pitch = 2.04 * radius
+    rise = pitch * np.sqrt(0.75)
+    for row in range(int((top - bottom - 2 * room) // rise) + 1):
+        for column in range(int((right - left - 2 * room) // pitch) + 1):
+            x = left + room + (column * pitch + 0.5 * pitch * (row % 2))
+            if x <= right - room:
+                places.append([x, bottom + room + row * rise])
+    moved = np.random.default_rng(seed).uniform(-1.0, 1.0, (len(places), 2))
+    return np.array(places) + 0.01 * radius * moved
+
+
+@pytest.mark.parametrize("count", [10, 20_000])
+def test_a_box_is_packed_from_below_only_as_far_as_it_takes(count):
+    radius, box = 0.001, [[0.0, 0.0], [1.0, 0.2]]
+    stream = {"count": count, "fill": box, "seed": 7, "interact": True}
+    line = {"name": "line", "from": [0.0, -0.01], "to": [1.0, -0.01]}
+    tables = {"particle": {"radius": radius}, "surface": [line], "stream": stream}
+    found = build(scene.from_dict(tables)).releases.position
+    expected = packed_at_once(0.0, 0.0, 1.0, 0.2, radius, 7)
+    assert len(expected) > 50_000
+    assert np.abs(found - expected[:count]).max() < 1e-15
+
+
+def test_what_is_poured_into_what_was_poured_lies_beside_it():
+    box = [[0.0, 0.0], [0.3, 0.3]]
+    streams = [{"count": 150, "fill": box, "seed": seed, "interact": True} for seed in (1, 2)]
+    particles = [{"name": "a", "radius": 0.004}, {"name": "b", "radius": 0.007}]
+    for one, kind in zip(streams, "ab", strict=True):
+        one["particle"] = kind
+    line = {"name": "line", "from": [0.0, -0.01], "to": [1.0, -0.01]}
+    tables = {"particle": particles, "surface": [line], "stream": streams}
+    machine = build(scene.from_dict(tables))
+    apart = machine.releases.position[:, None] - machine.releases.position
+    radius = machine.particle.radius
+    free = np.hypot(*apart.T) - radius[:, None] - radius + np.eye(300)
+    assert free.min() >= -1e-15
+
+
+@pytest.mark.parametrize(
+    "stream",
+    [
+        {"count": 10, "fill": [[0.0, 0.0], [15.0, 15.0]]},
+        {"count": 2000, "at": [0.0, 0.5], "velocity": [1.0, 0.0], "rate": 1e5, "bed_height": 0.1},
+    ],
+    ids=["box", "bed"],
+)
+def test_places_are_found_at_once(stream):
+    """It took 37 s and 3.5 GB, and 14 s: the bounds are of processor time and of memory."""
+    line = {"name": "line", "from": [0.0, -0.1], "to": [15.0, -0.1]}
+    stream = {**stream, "interact": True}
+    made = scene.from_dict({"particle": {"radius": 0.001}, "surface": [line], "stream": stream})
+    began = process_time()
+    build(made)
+    assert process_time() - began < 3.0
+    if "fill" in stream:
+        tracemalloc.start()
+        build(made)
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert peak < 1e8
+
+
+def test_a_box_is_not_looked_through_for_ever():
+    """One row of 49 million places, all in a line: of them a million are tried."""
+    line = {"name": "line", "from": [0.0, 0.001], "to": [1e5, 0.001]}
+    stream = {"count": 10, "fill": [[0.0, 0.0], [1e5, 0.0025]], "interact": True}
+    tables = {"particle": {"radius": 0.001}, "surface": [line], "stream": stream}
+    with pytest.raises(scene.SceneError, match=r"a larger box, or stream\.count = 0 at most"):
+        build(scene.from_dict(tables))
+
+
+@pytest.mark.parametrize(
+    "stream",
+    [
+        {"at": [0.0, 1.0], "velocity": [0.0, 0.0], "rate": 1e9, "bed_height": 1.0},
+        {"fill": [[0.0, 0.0], [1e5, 10.0]]},
+    ],
+    ids=["bed", "box"],
+)
+def test_seconds_allowed_are_those_of_the_set_up_too(stream):
+    line = {"name": "line", "from": [0.0, -0.1], "to": [15.0, -0.1]}
+    stream = {"count": 2_000_000, "interact": True, **stream}
+    made = scene.from_dict({"surface": [line], "stream": stream})
+    began = process_time()
+    with pytest.raises(scene.SceneError, match=r"stream\.count = 2000000: fewer, or more seconds"):
+        simulate(made, max_seconds=0.1)
+    assert process_time() - began < 2.0
 
 
 def bed(*overrides):

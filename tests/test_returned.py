@@ -145,6 +145,25 @@ def test_the_same_student_twice_and_answers_of_another_are_told(returned):
     ]
 
 
+def test_the_report_keeps_all_files_of_one_name(returned, tmp_path):
+    """Two students may have one name, or one of them has returned twice."""
+    first = returned("1.json", result(words={"explain": "The plate took half."}))
+    returned("2.json", result(" ADA ", answers={"1": -right("Ada")}, words={"explain": "Later."}))
+    returned("3.json", result("Ben"))
+    report = tmp_path / "class.md"
+    marking = ["lesson", "grade", str(tmp_path / "class"), "--report", str(report), "-q"]
+    assert CliRunner().invoke(main, marking).exit_code == 0
+    text = report.read_text(encoding="utf-8").replace("\\", "")
+    assert "2 students, 3 files" in text
+    assert "Ada: several files have this name, and all count" in text
+    assert f"**Ada** (explain, {first}):" in text
+    cells = [row.split(" | ")[1:] for row in text.splitlines() if row.startswith("| 1 ")]
+    assert cells[0] == ["2", "1", "0", "0 |"]
+    assert "The plate took half." in text
+    assert "Later." in text
+    assert "Not counted" not in text
+
+
 def test_only_notebooks_need_a_kernel(returned, monkeypatch):
     monkeypatch.setattr("chutelab.classroom.grading.find_spec", lambda _: None)
     path = returned("x.json", result())

@@ -262,7 +262,9 @@ def check(seed, folder):
         followed = exact.run(machine)
     except exact.CornerError:
         # A disk that turns, held between two surfaces of which one moves: auto takes contact.
-        assert simulate(drawn).engine == "contact"
+        # Where its ledger breaks a law there (see the xfails), it takes the next one and says so.
+        taken = simulate(drawn)
+        assert taken.engine == "contact" or "contact did not keep the laws" in taken.instead
         return
     assert faults(followed) == []
     assert list(differences(followed, run)) == []

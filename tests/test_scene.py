@@ -97,6 +97,7 @@ CONTRACT = {
         "particle": None,
         "count": 1,
         "rate": 200.0,
+        "width": None,
         "start": 0.0,
         "bed_height": 0.0,
         "speed_spread": 0.0,
@@ -111,6 +112,7 @@ CONTRACT = {
     },
     "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001, "align": True},
     "expect": (),
+    "view": None,
     "live": {"predict": False, "controls": None, "panels": None, "ranges": {}, "presets": ()},
 }
 
@@ -129,6 +131,24 @@ def test_free_surfaces_have_the_contract_defaults_and_points():
     assert (hood.name, hood.restitution, hood.friction, hood.speed) == ("hood", 0.3, 0.4, 0.0)
     assert floor.points == ((-1.0, 0.0), (0.0, 0.0), (1.0, 0.5))
     assert floor.speed == 1.0
+
+
+def test_a_view_is_two_corners_the_second_right_of_the_first_and_above_it():
+    view = sc.parse(MACHINE + "[view]\nfrom = [-1, -2]\nto = [1.5, 0.5]").view
+    assert (view.from_, view.to) == ((-1.0, -2.0), (1.5, 0.5))
+    for to in ("[-1, 0.5]", "[1.5, -2.0]", "[-3, 0.5]", "[-0.9999999, 0.5]"):
+        with pytest.raises(sc.SceneError) as told:
+            sc.parse(MACHINE + f"[view]\nfrom = [-1, -2]\nto = {to}", "my.toml")
+        assert "my.toml: view.to = [" in str(told.value)
+        assert "must lie right of view.from = [-1, -2] and above it" in str(told.value)
+    for text, said in (
+        ("from = [-1, nan]\nto = [1, 1]", "view.from[1]"), ("from = [0, 0]", "view.to"),
+        ("from = [0, 0]\nto = [1e9, 1]", "view.to[0]"), ("from = 3\nto = [1, 1]", "view.from"),
+    ):  # fmt: skip
+        with pytest.raises(sc.SceneError) as told:
+            sc.parse(MACHINE + f"[view]\n{text}")
+        (fault,) = told.value.faults
+        assert fault.key == said
 
 
 def test_without_outgoing_belt_a_scene_runs_until_settled():
@@ -202,6 +222,7 @@ def test_windows_files_are_read(tmp_path, encoding):
 # Hypothesis: what goes in comes out.
 
 length = st.floats(1e-6, 1e6)
+least = st.just(0.0) | st.floats(1e-9, 1e6)
 share = st.floats(0.0, 1.0)
 coordinate = st.floats(-1e6, 1e6)
 point = st.tuples(coordinate, coordinate).map(list)
@@ -210,10 +231,10 @@ point = st.tuples(coordinate, coordinate).map(list)
 @given(
     st.fixed_dictionaries(
         {
-            "gravity": st.floats(0.0, 1e6),
+            "gravity": least,
             "particle": st.fixed_dictionaries({"radius": length, "mass": length}),
             "incoming": st.fixed_dictionaries(
-                {"speed": st.floats(0.0, 1e6), "pulley_radius": length, "friction": share}
+                {"speed": least, "pulley_radius": length, "friction": share}
             ),
             "plate": st.fixed_dictionaries(
                 {"distance": length, "angle_deg": st.floats(-89.999, 89.999), "restitution": share}
@@ -345,11 +366,11 @@ def test_the_starter_is_complete_and_valid_and_shows_the_defaults():
     scene = sc.parse(text)
     assert scene.outgoing is not None
     # With what is commented out put in, it is still valid, and every key there is, is in it.
-    keys = re.compile(r"^# (?=[a-z_]+ = |\[\[)", re.MULTILINE)
+    keys = re.compile(r"^# (?=[a-z_]+ = |\[)", re.MULTILINE)
     everything = tomllib.loads(keys.sub("", text))
     assert set(everything) | {"pair"} == set(CONTRACT)
     # What goes instead of something else is further in.
-    instead = re.compile(r"^# ( {2}(?=[a-z_]+ = |\[\[))?", re.MULTILINE)
+    instead = re.compile(r"^# ( {2}(?=[a-z_]+ = |\[))?", re.MULTILINE)
     blocks = instead.sub("", text).split("\n[")
     said = {
         block.strip("[").partition("]")[0]: set(re.findall(r"^(\w+) = ", block, re.MULTILINE))

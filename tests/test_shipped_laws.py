@@ -49,7 +49,8 @@ def test_the_spoon_turns_a_particle_as_impact_and_slide_say():
     u = a * cos(end) + b * sin(end) + c * exp(2.0 * mu * end)
     wanted = sqrt(u * G * rho) * cos(end)
     assert measure(run("spoon"), "landing.vx") == pytest.approx(wanted, rel=1e-12)
-    (written,) = [e.value for e in sc.load("spoon").expect if e.quantity == "landing.vx"]
+    name = "particles[0].landing.vx"
+    (written,) = [e.value for e in sc.load("spoon").expect if e.quantity == name]
     assert written == pytest.approx(wanted, rel=1e-12)
 
 

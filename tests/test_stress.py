@@ -18,7 +18,8 @@ from chutelab import scene
 from chutelab.checks import agreement  # noqa: F401 - or it would keep what a test puts in
 from chutelab.checks.stress import LAWS, Verdict
 from chutelab.cli import main
-from chutelab.engines.simulation import simulate
+from chutelab.engines.simulation import follow
+from chutelab.machine import build
 from chutelab.results.recorder import StalledError
 from chutelab.util.files import together
 from chutelab.util.signals import raised
@@ -117,7 +118,7 @@ def test_bad_input_is_exit_code_2(arguments, said):
 
 
 def test_a_stuck_run_is_told_and_not_judged(monkeypatch):
-    monkeypatch.setattr("chutelab.engines.simulation.simulate", stuck)
+    monkeypatch.setattr("chutelab.engines.simulation.judged", stuck)
     outcome = call("perpendicular", code=1)
     assert outcome.stdout == ""
     assert "particle 0 is stuck at t = 0.75 s" in outcome.stderr
@@ -128,7 +129,7 @@ def test_ctrl_c_ends_it(monkeypatch):
     def interrupts(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("chutelab.engines.simulation.simulate", interrupts)
+    monkeypatch.setattr("chutelab.engines.simulation.judged", interrupts)
     assert call("perpendicular", code=130).stdout == ""
 
 
@@ -152,12 +153,12 @@ max_time = 1e6
 
 
 def stuck(loaded, **_options):
-    recording = simulate(scene.from_dict(HOP))
+    recording = follow(build(scene.from_dict(HOP)), None, None)
     raise StalledError(0, 0.75, (0.25, 0.004), "it rattles", recording)
 
 
 def run_stuck(monkeypatch, tmp_path, *arguments, code=1):
-    monkeypatch.setattr("chutelab.engines.simulation.simulate", stuck)
+    monkeypatch.setattr("chutelab.engines.simulation.judged", stuck)
     monkeypatch.chdir(tmp_path)
     outcome = CliRunner().invoke(main, ["run", "perpendicular", *arguments])
     assert outcome.exit_code == code
@@ -176,7 +177,8 @@ def test_a_stuck_run_writes_what_there_is_if_asked(monkeypatch, tmp_path):
     assert "it rattles; what is written ends there" in said
     assert (listed(tmp_path / "out")) == ["events.csv", "recording.npz", "trajectory.csv"]
     saved = chutelab.Recording.load(tmp_path / "out" / "recording.npz")
-    assert saved.knots.tobytes() == simulate(scene.from_dict(HOP)).knots.tobytes()
+    hop = follow(build(scene.from_dict(HOP)), None, None)
+    assert saved.knots.tobytes() == hop.knots.tobytes()
 
 
 def test_partial_needs_out(monkeypatch, tmp_path):

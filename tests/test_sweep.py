@@ -36,6 +36,8 @@ from chutelab.studies.sweep import (
     MOST_VARIANTS,
     NUMBERS,
     REASON,
+    TEXTS,
+    TOUCHES,
     batch,
     planned,
     sweep,
@@ -43,6 +45,8 @@ from chutelab.studies.sweep import (
 from chutelab.studies.sweep.batch import alone
 from chutelab.studies.sweep.rows import joined
 from chutelab.util.errors import InputError
+
+PAID, HEAT = (f"ledger.by_surface.outgoing.{name}" for name in ("belt_work", "friction_loss"))
 
 JOINED = """
 [incoming]
@@ -89,7 +93,7 @@ ROUNDING = {"error": 1e-12, "residual": 1e-15}
 def assert_same(found, expected):
     assert list(found) == list(expected)
     for name in expected:
-        if name == REASON:
+        if name in TEXTS:
             assert found[name].tolist() == expected[name].tolist()
         else:
             np.testing.assert_allclose(
@@ -140,7 +144,7 @@ def test_samples_over_many_keys_are_single_runs(seed):
     singles = joined([alone(block, row) for row in range(len(block.values))])
     found = batch.swept(block)
     assert_same(found, singles)
-    assert np.isfinite(found["landing.x"]).sum() > 10
+    assert np.isfinite(found["landing.x.mean"]).sum() > 10
 
 
 def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
@@ -149,7 +153,7 @@ def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
 
     monkeypatch.setattr("chutelab.studies.sweep.batch.alone", never)
     swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:50", "incoming.speed=0.5,2,4"])
-    assert np.isfinite(swept.columns["landing.x"]).sum() > 100
+    assert np.isfinite(swept.columns["landing.x.mean"]).sum() > 100
 
 
 def test_surfaces_that_join_in_some_variants_only_are_told_apart():
@@ -163,7 +167,7 @@ def test_surfaces_that_join_in_some_variants_only_are_told_apart():
     singles = joined([alone(block, row) for row in range(len(block.values))])
     assert_same(found, singles)
     # Across the joint the particle slides onto the belt; beside it, it falls onto or under it.
-    assert len(np.unique(found["landing.vy"][[0, 3, 6]].round(6))) > 1
+    assert len(np.unique(found["landing.vy.mean"][[0, 3, 6]].round(6))) > 1
 
 
 def test_a_machine_whose_ends_join_in_a_chain_runs_by_itself():
@@ -240,14 +244,16 @@ def test_a_row_holds_what_the_run_shows():
         books, (down,) = ledger(recording), recording.select(Kind.LANDING)
         outgoing = books.by_surface["outgoing"]
         expected = {
-            "landing.x": down["position"][0], "landing.x_spread": 0.0,
-            "landing.y": down["position"][1],
-            "landing.vx": down["velocity_before"][0], "landing.vx_spread": 0.0,
-            "landing.vy": down["velocity_before"][1], "landing.vy_spread": 0.0,
-            "landing.t": down["t"], "time": recording.knots["t"][-1],
-            "belt_work": outgoing["belt_work"], "slip_heat": outgoing["friction_loss"],
+            "landing.x.mean": down["position"][0], "landing.x.spread": 0.0,
+            "landing.y.mean": down["position"][1],
+            "landing.vx.mean": down["velocity_before"][0], "landing.vx.spread": 0.0,
+            "landing.vy.mean": down["velocity_before"][1], "landing.vy.spread": 0.0,
+            "landing.t.mean": down["t"], "time": recording.knots["t"][-1],
+            "arrival.x.mean": down["position"][0], "arrival.x.spread": 0.0,
+            "arrival.vx.mean": down["velocity_before"][0], "arrival.vx.spread": 0.0,
+            PAID: outgoing["belt_work"], HEAT: outgoing["friction_loss"],
             "restitution_loss": books.restitution_loss, "power": outgoing["belt_work"] * rate,
-            "misses": 0.0, "residual": books.residual,
+            "plate_hits": 1.0, "misses": 0.0, "residual": books.residual,
         }  # fmt: skip
         assert {name: swept.columns[name][row] for name in expected} == expected
         assert set(expected) | {"error"} == set(NUMBERS)
@@ -261,15 +267,14 @@ def test_a_stream_has_means_and_spreads():
             "stream.count=40", "stream.bed_height=0.05", f"incoming.speed={speed}"
         ]))  # fmt: skip
         down = recording.first(recording.select(Kind.LANDING))
-        flights = down["t"] - down["particle"] / scene.stream.rate
         x, vx = down["position"][:, 0], down["velocity_before"][:, 0]
         found = {name: swept.columns[name][row] for name in NUMBERS}
-        assert found["landing.x"] == pytest.approx(x.mean(), rel=1e-14, abs=0.0)
-        assert found["landing.x_spread"] == pytest.approx(x.std(), rel=1e-12, abs=0.0)
-        assert found["landing.vx_spread"] == pytest.approx(vx.std(), rel=1e-12, abs=1e-15)
-        assert found["landing.t"] == pytest.approx(flights.mean(), rel=1e-13, abs=0.0)
+        assert found["landing.x.mean"] == pytest.approx(x.mean(), rel=1e-14, abs=0.0)
+        assert found["landing.x.spread"] == pytest.approx(x.std(), rel=1e-12, abs=0.0)
+        assert found["landing.vx.spread"] == pytest.approx(vx.std(), rel=1e-12, abs=1e-15)
+        assert found["landing.t.mean"] == pytest.approx(down["t"].mean(), rel=1e-13, abs=0.0)
         work = ledger(recording).by_surface["outgoing"]["belt_work"]
-        assert found["belt_work"] == work
+        assert found[PAID] == work
         assert found["power"] == pytest.approx(work / 40 * scene.stream.rate, rel=1e-15, abs=0.0)
         assert found["misses"] == 40 - len(down)
 
@@ -281,14 +286,12 @@ def test_what_the_belt_pays_is_that_of_solve_and_theory_only_where_runs_go_on_un
     down = sqrt((9.81 * 0.29685) ** 2 + 2.0 * 9.81 * 0.5)
     landed = sweep(load("perpendicular"), ["plate.restitution=0.5"])
     settled = sweep(load("perpendicular", ["run.until=settled"]), ["plate.restitution=0.5"])
-    assert landed.columns["belt_work"][0] == pytest.approx(m * vb * mu * down, rel=1e-12, abs=0.0)
-    assert settled.columns["belt_work"][0] == pytest.approx(m * vb * (vb - vx), rel=1e-12, abs=0.0)
-    assert settled.columns["slip_heat"][0] == pytest.approx(
-        0.5 * m * (vb - vx) ** 2, rel=1e-12, abs=0.0
-    )
-    for name in ("belt_work", "slip_heat", "power"):
+    assert landed.columns[PAID][0] == pytest.approx(m * vb * mu * down, rel=1e-12, abs=0.0)
+    assert settled.columns[PAID][0] == pytest.approx(m * vb * (vb - vx), rel=1e-12, abs=0.0)
+    assert settled.columns[HEAT][0] == pytest.approx(0.5 * m * (vb - vx) ** 2, rel=1e-12, abs=0.0)
+    for column, name in ((PAID, "belt_work"), (HEAT, "slip_heat"), ("power", "power")):
         expected = value(load("perpendicular"), name)
-        assert settled.columns[name][0] == pytest.approx(expected, rel=1e-12, abs=0.0)
+        assert settled.columns[column][0] == pytest.approx(expected, rel=1e-12, abs=0.0)
     assert "counted up to run.until" in str(landed)
     assert "counted up to run.until" not in str(settled)
 
@@ -297,9 +300,9 @@ def test_a_run_until_settled_that_never_is_says_so():
     scene = load("perpendicular", ["run.until=settled", "stream.count=2"])
     swept = sweep(scene, ["outgoing.friction=0,0.5"])
     assert swept.columns["misses"].tolist() == [0.0, 0.0]
-    assert swept.columns["belt_work"][0] == 0.0
+    assert swept.columns[PAID][0] == 0.0
     slides, rides = swept.columns[REASON].tolist()
-    assert "2 of 2 particles landed, but never came to rest" in slides
+    assert "2 of 2 particles arrived, but never came to rest" in slides
     assert rides == ""
     assert sweep(load("perpendicular"), ["outgoing.friction=0"]).columns[REASON].tolist() == [""]
 
@@ -339,10 +342,10 @@ def test_a_variant_that_cannot_be_or_misses_is_a_row_with_its_reason():
     assert "it missed the outgoing belt: left the scene" in reasons
     assert all("plate.restitution = 2" in reason for reason in reasons[3:])
     assert all("must be a number from 0 to 1" in reason for reason in reasons[3:])
-    assert np.isnan(swept.columns["landing.x"][3:]).all()
+    assert np.isnan(swept.columns["landing.x.mean"][3:]).all()
     missed = reasons.index("it missed the outgoing belt: left the scene")
     assert swept.columns["misses"][missed] == 1.0
-    assert np.isnan(swept.columns["landing.x"][missed])
+    assert np.isnan(swept.columns["landing.x.mean"][missed])
     assert swept.columns["restitution_loss"][missed] > 0.0
 
 
@@ -352,7 +355,7 @@ def test_a_run_that_gets_stuck_is_a_row(monkeypatch):
     def stuck(*_args, **_options):
         raise StalledError(0, 1.0, (0.0, 0.5), "it hangs")
 
-    monkeypatch.setattr("chutelab.studies.sweep.batch.simulate", stuck)
+    monkeypatch.setattr("chutelab.studies.sweep.batch.judged", stuck)
     monkeypatch.setattr("chutelab.studies.sweep.batch.run", stuck)
     reasons = sweep(load("perpendicular"), ["plate.restitution=0,1"]).columns[REASON]
     assert ["it hangs" in reason for reason in reasons] == [True, True]
@@ -447,7 +450,7 @@ def test_what_cannot_be_varied_is_refused_with_what_is_allowed(varies, allowed, 
             "nowhere/rows.csv: cannot be written: there is no folder nowhere",
         ),
         (["--plot", "rows.csv"], ".png"),
-        (["--plot", "rows.png", "--of", "height"], "landing.vx"),
+        (["--plot", "rows.png", "--of", "height"], "landing.vx.mean"),
         (["--resume"], "--out"),
         (["--scheduler", "nobody"], "tcp://"),
     ],
@@ -489,7 +492,7 @@ def test_the_last_key_of_a_grid_runs_fastest():
     assert swept.columns["plate.angle_deg"].tolist() == [0.0, 5.0, 0.0, 5.0]
     assert swept.shape == (2, 2)
     with pytest.raises(ValueError, match="read-only"):
-        swept.columns["landing.x"][0] = 0.0
+        swept.columns["landing.x.mean"][0] = 0.0
 
 
 def test_a_latin_hypercube_has_one_sample_in_each_row_and_column():
@@ -548,20 +551,20 @@ def test_the_command_prints_a_table_and_writes_files():
         call("sweep", "perpendicular", "--vary", "plate.angle_deg=0,80", "--json").stdout
     )
     assert found["variants"] == 2
-    assert found["columns"]["landing.x"][1] is None
-    assert found["columns"]["landing.vx"][0] == -1.0
+    assert found["columns"]["landing.x.mean"][1] is None
+    assert found["columns"]["landing.vx.mean"][0] == -1.0
 
 
 def test_lines_go_through_the_rows_and_stop_where_there_are_none():
     from chutelab.pictures.plots.design import sweep_figure
 
     swept = sweep(load("perpendicular"), ["plate.angle_deg=0:30:16", "incoming.speed=2,4"])
-    (ax, *_) = sweep_figure(swept, "landing.vx").axes
+    (ax, *_) = sweep_figure(swept, "landing.vx.mean").axes
     assert len(ax.lines) == 2
     for line, speed in zip(ax.lines, (2.0, 4.0), strict=True):
         mine = swept.columns["incoming.speed"] == speed
         assert line.get_xdata().tolist() == swept.columns["plate.angle_deg"][mine].tolist()
-        expected = swept.columns["landing.vx"][mine]
+        expected = swept.columns["landing.vx.mean"][mine]
         assert np.array_equal(line.get_ydata(), expected, equal_nan=True)
     assert np.isnan(ax.lines[0].get_ydata()).any()
     assert ax.get_legend().get_title().get_text() == "incoming.speed, m/s"
@@ -571,12 +574,80 @@ def test_two_keys_with_many_values_make_a_heat_map():
     from chutelab.pictures.plots.design import sweep_figure
 
     swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:9", "incoming.speed=2:4:10"])
-    figure = sweep_figure(swept, "belt_work")
+    figure = sweep_figure(swept, PAID)
     figure.write("heat.png")
     (mesh,) = figure.axes[0].collections
-    expected = 1e3 * swept.columns["belt_work"].reshape(9, 10).T
+    expected = 1e3 * swept.columns[PAID].reshape(9, 10).T
     assert np.ma.filled(mesh.get_array(), np.nan) == pytest.approx(expected)
     assert Path("heat.png").exists()
+
+
+PASSED = """
+gravity = 9.81
+[particle]
+radius = 0.0
+[incoming]
+speed = 2.0
+pulley_radius = 0.1
+[plate]
+distance = 0.5
+below = 0.45
+[outgoing]
+drop = 1.5
+drop_from = "top"
+length = 20.0
+"""
+"""A mass point falls ½ g (0.6 m / v)² up to the plate, which is 0.45 m long below the pivot."""
+
+
+def passes(speed):
+    return 0.5 * 9.81 * (0.6 / speed) ** 2 > 0.45
+
+
+def test_a_row_says_what_is_touched():
+    swept = sweep(parse(PASSED), ["incoming.speed=1.9:2.1:21"])
+    missed = passes(swept.columns["incoming.speed"])
+    assert 0 < missed.sum() < 21
+    expected = np.where(missed, "outgoing", "plate, outgoing")
+    assert swept.columns[TOUCHES].tolist() == expected.tolist()
+    assert swept.columns["plate_hits"].tolist() == (~missed).astype(float).tolist()
+    assert f"{(~missed).sum()} touch plate, outgoing; {missed.sum()} touch outgoing" in repr(swept)
+
+
+def test_bounces_in_a_row_are_one_touch_and_a_run_that_cannot_be_touches_nothing_known():
+    swept = sweep(load("perpendicular"), ["plate.angle_deg=-45,0,89"])
+    leaning, upright, refused = swept.columns[TOUCHES].tolist()
+    hits = simulate(load("perpendicular", ["plate.angle_deg=-45"])).select(Kind.IMPACT)
+    assert len(hits) > 1
+    assert leaning == upright == "plate, outgoing"
+    assert (refused, swept.columns[REASON][2] != "") == ("", True)
+
+
+@pytest.mark.parametrize(("edge", "told"), [(0.975, "left"), (0.965, "left | right")])
+def test_a_crowds_ways_are_told_from_a_fiftieth_on(edge, told):
+    """Of 100 beside each other, 1 cm apart, 2 or 3 fall on the floor on the right."""
+    floors = "".join(
+        f'[[surface]]\nname = "{name}"\nfrom = [{low}, -0.5]\nto = [{high}, -0.5]\n'
+        for name, low, high in (("left", -0.5, edge), ("right", edge, 1.5))
+    )
+    falling = "[stream]\ncount = 100\nat = [0.0, 0.0]\nto = [0.99, 0.0]\nvelocity = [0.0, 0.0]\n"
+    particle, end = "[particle]\nradius = 0.001\n", "[run]\nuntil = 0.5\n"
+    crowd = parse(particle + falling + floors + end)
+    assert batch.row_of(crowd)[TOUCHES].tolist() == [told]
+
+
+def test_a_map_is_hatched_where_the_plate_is_missed():
+    from chutelab.pictures.plots.design import sweep_figure
+
+    swept = sweep(parse(PASSED), ["incoming.speed=1.9:2.1:11", "plate.restitution=0:1:10"])
+    figure = sweep_figure(swept, "landing.vx.mean")
+    figure.write("map.svg")
+    ax = figure.axes[0]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["never meets the plate"]
+    (hatched,) = (one for one in ax.collections if getattr(one, "hatches", [None])[0])
+    points = np.column_stack([swept.columns["incoming.speed"], swept.columns["plate.restitution"]])
+    inside = hatched.get_paths()[0].contains_points(points)
+    assert inside.tolist() == passes(points[:, 0]).tolist()
 
 
 def test_samples_are_dots_and_crosses_where_there_is_nothing():
@@ -584,22 +655,22 @@ def test_samples_are_dots_and_crosses_where_there_is_nothing():
 
     scene = load("perpendicular")
     swept = sweep(scene, ["plate.angle_deg=0:40", "incoming.speed=1:4"], sample=30)
-    known = np.isfinite(swept.columns["landing.vx"])
+    known = np.isfinite(swept.columns["landing.vx.mean"])
     assert 0 < known.sum() < 30
-    ax = sweep_figure(swept, "landing.vx").axes[0]
+    ax = sweep_figure(swept, "landing.vx.mean").axes[0]
     (dots,), (crosses,) = ax.collections, ax.lines
     angles = swept.columns["plate.angle_deg"]
     assert dots.get_offsets()[:, 0].tolist() == angles[known].tolist()
     assert crosses.get_xdata().tolist() == angles[~known].tolist()
     one = sweep(scene, ["plate.angle_deg=0:40"], sample=20)
-    ax = sweep_figure(one, "landing.vx").axes[0]
+    ax = sweep_figure(one, "landing.vx.mean").axes[0]
     assert ax.get_xlim()[1] > one.columns["plate.angle_deg"].max()
 
 
 def test_help_names_the_columns():
     said = " ".join(call("sweep", "--help").stdout.split())
     for name in NUMBERS:
-        assert name.removesuffix("_spread") in said
+        assert name.removesuffix(".mean").removesuffix(".spread") in said
 
 
 def test_a_sweep_shows_itself():
@@ -614,7 +685,7 @@ def test_a_frame_has_the_columns():
     swept = sweep(load("perpendicular"), ["plate.angle_deg=0,10"])
     frame = swept.frame()
     assert list(frame.columns) == list(swept.columns)
-    assert frame["landing.vx"].tolist() == swept.columns["landing.vx"].tolist()
+    assert frame["landing.vx.mean"].tolist() == swept.columns["landing.vx.mean"].tolist()
 
 
 def test_nothing_heavy_is_imported_before_it_is_needed():

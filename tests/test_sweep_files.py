@@ -14,6 +14,7 @@ from chutelab.scene import load
 from chutelab.studies.sweep import (
     NUMBERS,
     REASON,
+    TEXTS,
     crew,
     planned,
     sweep,
@@ -35,9 +36,9 @@ def test_a_file_has_every_bit_of_the_rows():
     swept = sweep(load("perpendicular"), SMALL)
     with swept.to_csv("rows.csv").open(newline="") as file:
         head, *rows = csv.reader(file)
-    assert head == ["plate.angle_deg", "incoming.speed", *NUMBERS, REASON]
+    assert head == ["plate.angle_deg", "incoming.speed", *NUMBERS, *TEXTS]
     for name, cells in zip(head, zip(*rows, strict=True), strict=True):
-        if name == REASON:
+        if name in TEXTS:
             assert list(cells) == swept.columns[name].tolist()
         else:
             numbers = np.array([float(cell) if cell else np.nan for cell in cells])
@@ -51,7 +52,7 @@ def test_parquet_has_them_too():
     assert table.column_names == list(swept.columns)
     for name, values in swept.columns.items():
         column = table.column(name).to_pylist()
-        if name == REASON:
+        if name in TEXTS:
             assert column == values.tolist()
         else:
             assert [np.nan if x is None else x for x in column] == pytest.approx(

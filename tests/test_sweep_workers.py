@@ -179,26 +179,11 @@ def test_a_cluster_that_is_lost_ends_a_sweep_in_one_message(lost):
     """Of the scheduler killed, or stopped, or of all workers killed."""
     pytest.importorskip("distributed")
     Path("lost.py").write_text(LOST)
-    sources = str(Path(chutelab.__file__).parent.parent)
-    environment = {**os.environ, "PYTHONPATH": sources}
-
-    def begun(*command, **how):
-        running = subprocess.Popen([sys.executable, *command], env=environment, **how)
-        stack.callback(running.wait)
-        stack.callback(running.kill)
-        return running
-
     with ExitStack() as stack:
-        log = stack.enter_context(Path("log").open("w+"))
-        where = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-        scheduler = begun("-m", "distributed.cli.dask_scheduler", *where, stderr=log)
-        address = waited(lambda: re.search(r"tcp://127.0.0.1:\d+", Path("log").read_text()))[0]
-        crowd = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
-        worker = begun("-m", "distributed.cli.dask_worker", address, *crowd, stderr=log)
-        waited(lambda: "Registered to:" in Path("log").read_text())
+        address, scheduler, worker = clustered(stack)
         command = ["sweep", "perpendicular", "--vary", "plate.angle_deg=-20:20:5000"]
         command += ["--engine", "pymunk", "--out", "rows.csv", "--scheduler", address]
-        running = begun("lost.py", *command, stderr=subprocess.PIPE, text=True)
+        running = begun(stack, "lost.py", *command, stderr=subprocess.PIPE, text=True)
         part = part_of(Path("rows.csv"))
         waited(lambda: part.exists() and part.read_bytes().count(b"\n") > 3)
         if lost == "workers":
@@ -210,6 +195,43 @@ def test_a_cluster_that_is_lost_ends_a_sweep_in_one_message(lost):
     assert said.count("\n") == 1
     assert "the workers or the scheduler are gone" in said
     assert "rows.csv.part has the finished rows; --resume goes on" in said
+
+
+@pytest.mark.slow
+def test_a_worker_with_another_version_is_refused():
+    pytest.importorskip("distributed")
+    other = Path("other/chutelab-9.9.dist-info")
+    other.mkdir(parents=True)
+    (other / "METADATA").write_text("Metadata-Version: 2.1\nName: chutelab\nVersion: 9.9\n")
+    with ExitStack() as stack:
+        address, *_ = clustered(stack, path=[str(other.parent.absolute())])
+        refused = swept_at(address)
+    assert refused.exit_code == 2
+    assert re.search(r"tcp://\S+ has chutelab 9\.9, and here is \d", refused.stderr)
+    assert refused.stderr.count("\n") == 1
+
+
+def begun(stack, *command, path=(), **how):
+    """Start a Python process that ends with the stack; `path` goes before this chutelab."""
+    sources = [*path, str(Path(chutelab.__file__).parent.parent)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sources)}
+    running = subprocess.Popen([sys.executable, *command], env=environment, **how)
+    stack.callback(running.wait)
+    stack.callback(running.kill)
+    return running
+
+
+def clustered(stack, path=()):
+    """Start a scheduler and a worker; return the address and both."""
+    where = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    alone = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    with Path("log").open("w") as log:
+        scheduler = begun(stack, "-m", "distributed.cli.dask_scheduler", *where, stderr=log)
+        address = waited(lambda: re.search(r"tcp://127.0.0.1:\d+", Path("log").read_text()))[0]
+        start = ["-m", "distributed.cli.dask_worker", address, *alone]
+        worker = begun(stack, *start, path=path, stderr=log)
+    waited(lambda: "Registered to:" in Path("log").read_text())
+    return address, scheduler, worker
 
 
 def waited(holds):

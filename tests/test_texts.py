@@ -46,9 +46,9 @@ def figures():
     yield "overlay", lambda: plots.overlay(run())
     yield "strobe", lambda: plots.strobe(run())
     key = f"surface.{NAME}.speed"
-    yield "sweep", lambda: sweep_figure(sweep(scene(), [f"{key}=0:1:3"]), "landing.x")
+    yield "sweep", lambda: sweep_figure(sweep(scene(), [f"{key}=0:1:3"]), "landing.x.mean")
     two = [f"{key}=0:1:3", "plate.restitution=0,1"]
-    yield "sweep over two", lambda: sweep_figure(sweep(scene(), two), "landing.x")
+    yield "sweep over two", lambda: sweep_figure(sweep(scene(), two), "landing.x.mean")
     struck = f"impact.{NAME}.vx"
     yield "scan", lambda: scan(solve(scene(), "plate.restitution=0.3:0.6", f"{struck}=-1"))
     doubt = ["plate.restitution=0.5±0.1", f"{key}=0±0.1"]

@@ -5,13 +5,15 @@
 Both are built, and all of a lesson is done with each (`tools/fresh.py`); then the tests run with
 what was installed from the wheel, and arguments are handed to pytest. It is done with the Python
 that runs this, in a temporary folder; for `lowest` every library that chutelab or an extra names is
-at the lowest version of its bound, and what they need in turn is the newest that fits. Exit code:
-pytest's.
+at the lowest version of its bound, and what they need in turn is the newest that fits. For `newest`
+the tests run once more with each of the `KERNELS` of linear algebra that this processor can run.
+Exit code: pytest's, the largest one.
 """
 
 from __future__ import annotations
 
 import os
+import platform
 import re
 import subprocess
 import sys
@@ -29,6 +31,12 @@ LENIENT = ("-W", "default::DeprecationWarning", "-W", "default::PendingDeprecati
 """A library of some years ago calls what its own libraries have deprecated since; no user sees it,
 but the tests take warnings for errors."""
 
+KERNELS = ("Prescott", "Sandybridge", "Haswell", "Zen", "SkylakeX")
+"""What OpenBLAS, which is in NumPy and SciPy, chooses between by the processor (x86 only). Their
+last digits differ, and so does whatever depends on those."""
+
+TRIAL = "import numpy, scipy.linalg; scipy.linalg.svd(numpy.random.default_rng(0).random((99, 99)))"
+
 
 def lowest(project: dict[str, Any]) -> list[str]:
     """Pin every dependency of a `[project]` table, and of its extras, to its lower bound.
@@ -45,6 +53,18 @@ def lowest(project: dict[str, Any]) -> list[str]:
             sys.exit(f"pyproject.toml: {line!r} has no lower bound such as name>=1.2")
         pins.add(f"{found[1]}=={found[2]}")
     return sorted(pins)
+
+
+def kernels(python: Path, about: dict[str, str]) -> list[dict[str, str]]:
+    """Return the settings of the environment for the kernels that this processor can run.
+
+    One that needs instructions which it does not have ends with a signal.
+    """
+    if platform.machine().lower() not in ("x86_64", "amd64"):
+        return []
+    every = [{"OPENBLAS_CORETYPE": name} for name in KERNELS]
+    trial = [python, "-c", TRIAL]
+    return [one for one in every if subprocess.run(trial, env={**about, **one}).returncode == 0]
 
 
 def main(which: str, arguments: list[str]) -> int:
@@ -69,7 +89,12 @@ def main(which: str, arguments: list[str]) -> int:
         lenient = LENIENT if pins else ()
         about = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
         command = [python, "-m", "pytest", *tests, *lenient, *arguments]
-        return subprocess.run(command, cwd=ROOT, env=about).returncode
+        code = 0
+        for kernel in ({}, *(kernels(python, about) if which == "newest" else ())):
+            print(f"tests, {kernel or 'kernels of this processor'}", flush=True)
+            ended = subprocess.run(command, cwd=ROOT, env={**about, **kernel}).returncode
+            code = max(code, abs(ended))
+        return code
 
 
 if __name__ == "__main__":

@@ -18,10 +18,10 @@ The rooms of the house; each imports only those below it:
 - `mechanics`: flight, impact, ride;
 - `scene`: scene files; `util`: small things for all.
 
-What most people need is here: `load`, `Scene`, `SceneError`, `simulate`, `Recording`, `theory`,
-`compare`, `overlay`, `animate`, `live`, and `exercises`, `measured`, `design`, `figures`. Each is
-imported when it is first asked for, so that text output never waits for matplotlib, nor the exact
-engine for pymunk or wasmtime.
+What most people need is here: `load`, `Scene`, `SceneError`, `simulate`, `Recording`, `LawWarning`,
+`theory`, `compare`, `overlay`, `animate`, `live`, and `exercises`, `measured`, `design`, `figures`.
+Each is imported when it is first asked for, so that text output never waits for matplotlib, nor the
+exact engine for pymunk or wasmtime.
 """
 
 from __future__ import annotations
@@ -44,11 +44,13 @@ if TYPE_CHECKING:
     from chutelab.scene import Scene, SceneError, load
     from chutelab.studies import design, measured
     from chutelab.theory import figures
+    from chutelab.util.errors import LawWarning
 
     __version__: str
     """Of the package that is installed."""
 
 __all__ = [
+    "LawWarning",
     "Recording",
     "Scene",
     "SceneError",
@@ -75,6 +77,7 @@ _PACKAGES = {
 }
 
 _HOME = {
+    "LawWarning": "chutelab.util.errors",
     "Recording": "chutelab.results",
     "Scene": "chutelab.scene",
     "SceneError": "chutelab.scene",

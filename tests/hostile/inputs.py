@@ -51,7 +51,8 @@ USUAL = {
     "varies": "plate.angle_deg=0:20:3",
     "data": "../good/film.txt", "fit": "plate.restitution", "out": "out", "plot": "out.png",
     "only": "csv,json",
-    "target": "landing.vx=-1", "targets": "landing.vx=-1", "of": "landing.x", "engine": "exact",
+    "target": "landing.vx=-1", "targets": "landing.vx=-1", "of": "landing.x.mean",
+    "engine": "exact",
     "dt": "1e-3",
     "accuracy": "1e-3", "jobs": "1", "sample": "4", "seed": "3", "points": "9",
     "max_seconds": "0.3",
@@ -68,7 +69,7 @@ KEYS = (
     "run.engine", "particle.radius", "particle.spin", "surface.0.points", "gravity", "title",
     "plate", "a.b.c", "",
 )  # fmt: skip
-QUANTITIES = ("landing.x", "landing.vx", "impact.t", "d3", "belt_work", "reason", "nothing")
+QUANTITIES = ("landing.x", "landing.vx.mean", "impact.t", "d3", "belt_work", "reason", "nothing")
 
 
 def begin() -> None:

@@ -29,7 +29,7 @@ PATIENCE = 20.0
 
 PROMISED = (
     "got stuck", "was not reached", "no solution", "outside the tolerance", "broken",
-    "no browser could be opened",
+    "no browser could be opened", "LAW BROKEN",
 )  # fmt: skip
 """What an exit code of 1 says, where help promises it."""
 

@@ -6,6 +6,7 @@ const assets = "../../src/chutelab/pictures/live/assets/";
 const { startCore } = await import(`${assets}core.js`);
 const { Recording } = await import(`${assets}recording.js`);
 const { groundedLedger, stacks } = await import(`${assets}energy.js`);
+const { crowdOf } = await import(`${assets}crowd.js`);
 const { numbersOf } = await import(`${assets}numbers.js`);
 const { RunHistory } = await import(`${assets}stages.js`);
 const { histogram, runningMean } = await import(`${assets}landing.js`);
@@ -25,19 +26,22 @@ function recordingOf(machine) {
   core.begin(machine);
   for (let state = "running"; state === "running";) {
     state = core.proceed(50);
-    recording.add({ ...core.take(), tips: new Float64Array(), now: core.get("t"), state });
+    const books = state === "running" ? null : core.books();
+    recording.add({ ...core.take(), tips: new Float64Array(), now: core.get("t"), state, books });
   }
   return recording;
 }
 
 function runOf(machine) {
   const recording = recordingOf(machine), { begin, end } = recording;
-  const { stages, landings } = new RunHistory(recording, "plate");
+  const history = new RunHistory(recording, "plate"), { stages, landings } = history;
   const times = Array.from({ length: 400 }, (_, n) => begin + ((end - begin) * n) / 399);
   for (const { t } of recording.events.slice(0, 400)) times.push(t - 1e-9, t, t + 1e-9);
   const track = recording.tracks[0];
   return {
     numbers: numbersOf(stages, {}, machine.pulley?.radius ?? null, machine.radius),
+    crowd: crowdOf(recording, history),
+    points: recording.points(0, 1e-4).map(({ x, y }) => [x, y]),
     landings: landings.map(({ t, x }) => [t, x]),
     ledgers: times.map((t) => {
       const ledger = groundedLedger(recording, t);

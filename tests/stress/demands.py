@@ -22,6 +22,9 @@ STILL = 1e-2
 """m/s that a disk in a pile at rest may still move at: ten times the speed below which a run that
 waits for rest calls itself settled."""
 
+LOOKS = 2000
+"""Times besides those of all knots at which places are looked at."""
+
 AMPLIFIED = 10.0
 """Factor by which a contact may magnify what rounding did before: the reach of a flight over the
 radius of what it met, for flights of a few times that radius."""
@@ -39,9 +42,10 @@ def ended(e: Evidence, reasons: Sequence[str]) -> Verdict:
 def inside(e: Evidence, box: tuple[float, float, float, float]) -> Verdict:
     """Nobody leaves a box (left, right, bottom, top, m); the figure counts those who do."""
     left, right, bottom, top = box
-    x, y = e.samples.position.T
-    out = (x < left) | (x > right) | (y < bottom) | (y > top)
-    gone = np.unique(e.samples.particle[out])
+    t = e.recording.knots["t"]
+    position, _ = e.recording.at(np.concatenate([t, np.linspace(t.min(), t.max(), LOOKS)]))
+    x, y = np.moveaxis(position, -1, 0)
+    gone = np.flatnonzero(((x < left) | (x > right) | (y < bottom) | (y > top)).any(axis=0))
     return Verdict(len(gone), 0.0, f"particles: {gone[0]}" if len(gone) else "particles")
 
 

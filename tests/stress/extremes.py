@@ -258,6 +258,10 @@ def _flights() -> list[Case]:
 
     steps = "a flight is stepped too: 10^6 s are 3 · 10^7 steps of 1/30 s, several minutes"
 
+    # Far beyond where the flight ends: what leaves the box of all surfaces has ended.
+    post = surface("post", (6e5, 3e5), (6e5, -3e5))
+    room = merged(free, {"surface": [post]})
+
     def straight(e: Evidence) -> Verdict:
         return place_error(e, 0.125 + 0.5 * LONG, 0.25 - 0.25 * LONG)
 
@@ -270,7 +274,7 @@ def _flights() -> list[Case]:
         return place_error(e, x, 0.25 - 0.25 * LONG)
 
     return [
-        Case("flight-1e6", group, free, formula=straight, unpromised={"pymunk": steps}),
+        Case("flight-1e6", group, room, formula=straight, unpromised={"pymunk": steps}),
         Case("flight-1e6-wall", group, walled, formula=returned, unpromised={"pymunk": steps}),
     ]
 

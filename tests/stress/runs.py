@@ -16,7 +16,7 @@ from typing import Any
 
 from chutelab.checks.stress import Evidence, Verdict, judge
 from chutelab.checks.stress.laws import unseen
-from chutelab.engines.simulation import simulate
+from chutelab.engines.simulation import judged
 from chutelab.machine import build
 from chutelab.scene import SceneError
 from stress.case import PATIENCE, Case, Tables, by_name, scene_of, surface, thrown
@@ -71,7 +71,7 @@ def run(
     """Simulate a scene on one of `stress.case.ENGINES`; dt is None for the exact one."""
     scene = scene_of(tables, name, engine, dt)
     with bounded(patience) as progress:
-        recording = simulate(scene, by_name(engine), progress)
+        recording = judged(scene, by_name(engine), progress)
     return Evidence(build(scene), recording)
 
 

@@ -21,7 +21,7 @@ from chutelab.results.comparison import compare, relative_error, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import KINDS, measure
 from chutelab.scene import Scene, SceneError
-from chutelab.scene.rules import SYMBOLS, unit_of
+from chutelab.scene.rules import FIRST, SYMBOLS, unit_of
 from chutelab.scene.units import with_unit, write_size
 from chutelab.studies.accuracy import STIR, UNABLE, answer, because, distance, stirred
 from chutelab.theory import predict
@@ -337,8 +337,8 @@ def verify(
         unit = unit_of(quantity, scene.surfaces, names)
         assert unit is not None
         predicted = nan
-        if quantity in SYMBOLS:
-            predicted = float(getattr(prediction, quantity.removesuffix("_deg")))
+        if (symbol := quantity.removeprefix(FIRST)) in SYMBOLS:
+            predicted = float(getattr(prediction, symbol.removesuffix("_deg")))
             predicted = degrees(predicted) if quantity.endswith("_deg") else predicted
         values = {engine: measure(recordings[engine], quantity) for engine in recordings}
         if not values:

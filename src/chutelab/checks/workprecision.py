@@ -17,7 +17,7 @@ from statistics import median
 from time import perf_counter
 from typing import TypeVar
 
-from chutelab.engines.simulation import simulate
+from chutelab.engines.simulation import judged
 from chutelab.scene import Scene
 from chutelab.studies.accuracy import SMALLEST, STIR, UNABLE, LateError, Search, Wanted, because
 from chutelab.util.arrays import Progress
@@ -177,7 +177,7 @@ def _judged(
         aligned = method != "fixed"
         scene = scene.with_values({"run.dt": step, "run.align": aligned, "expect": None})
     import_module(f"chutelab.engines.{engine}")  # or its import would be timed
-    run = partial(simulate, scene, engine)
+    run = partial(judged, scene, engine)
     try:
         bounded(0.0)
         first, found = clocked(partial(run, progress=bounded))

@@ -178,13 +178,13 @@ class Book:
 
     def landings(self, runs: Runs) -> Picture:
         """Draw where the particles of some runs land, mean, spread, lowest and highest layer."""
-        from chutelab.pictures.plots.panels import draw_landings
+        from chutelab.pictures.plots.crowd import draw_arrivals
         from chutelab.pictures.plots.style import Picture
 
         figure = Picture((9.0, 2.2 * len(runs) + 0.8))
         panels = figure.subplots(len(runs), sharex=True, squeeze=False)
         for axes, (said, recording) in zip(panels[:, 0], runs.recordings.items(), strict=True):
-            draw_landings(axes, recording, said)
+            draw_arrivals(axes, recording, said)
         figure.tight_layout()
         return figure
 

@@ -16,20 +16,17 @@ _MARKUP: Final = re.compile(r"[\\`*_\[\]<>|&~]")
 
 
 def report(grades: Iterable[Grade]) -> str:
-    """Return the report of a class as Markdown; of what a student returned twice the first counts.
+    """Return the report of a class as Markdown.
 
-    Nothing that a student wrote is markup in it.
+    Files with one name on them all count: two students may have it, or one returned twice, and
+    nothing here can tell. Nothing that a student wrote is markup in it.
     """
     rows = list(grades)
-    first: dict[tuple[str, str], Grade] = {}
-    for row in rows:
-        if row.marks:
-            first.setdefault((row.lesson, plain(row.student)), row)
     lines = ["# Class report", ""]
     for name in EXERCISES:
-        if of_lesson := [row for row in first.values() if row.lesson == name]:
+        if of_lesson := [row for row in rows if row.marks and row.lesson == name]:
             lines += _lesson(name, of_lesson)
-    if rest := [row for row in rows if row not in first.values()]:
+    if rest := [row for row in rows if not row.marks]:
         lines += ["## Not counted", "", "| file | why |", "|---|---|"]
         lines += [f"| {_literal(row.file)} | {_literal(row.reason)} |" for row in rest]
         lines += [""]
@@ -38,8 +35,19 @@ def report(grades: Iterable[Grade]) -> str:
 
 def _lesson(name: str, rows: list[Grade]) -> Iterator[str]:
     exercise = EXERCISES[name]
-    handed = "1 student" if len(rows) == 1 else f"{len(rows)} students"
+    files: dict[str, list[Grade]] = {}
+    for row in rows:
+        files.setdefault(plain(row.student), []).append(row)
+    shared = {name: found for name, found in files.items() if len(found) > 1}
+    handed = "1 student" if len(files) == 1 else f"{len(files)} students"
+    handed += f", {len(rows)} files" if shared else ""
     yield from (f"## Lesson {exercise.number}: {exercise.title}", "", handed, "")
+    for found in shared.values():
+        several = ", ".join(_literal(row.file) for row in found)
+        yield from (
+            f"{_literal(found[0].student)}: several files have this name, and all count: {several}",
+            "",
+        )
     yield "| question | right | not right | no answer | working shown |"
     yield "|---|--:|--:|--:|--:|"
     for number, asked in enumerate(exercise.questions, 1):
@@ -55,8 +63,9 @@ def _lesson(name: str, rows: list[Grade]) -> Iterator[str]:
             yield f"| {number} | {_literal(mistake)} | {many} |"
     yield ""
     for row in rows:
+        which = f", {_literal(row.file)}" if plain(row.student) in shared else ""
         for key, text in row.words.items():
-            yield from (f"**{_literal(row.student)}** ({_literal(key)}):", "")
+            yield from (f"**{_literal(row.student)}** ({_literal(key)}{which}):", "")
             for line in text.splitlines():
                 # An indented line is shown as it is.
                 yield from textwrap.wrap(line, 90, initial_indent="    ", subsequent_indent="    ")

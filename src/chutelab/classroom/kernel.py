@@ -317,8 +317,8 @@ def _watch() -> None:
             with suppress(ProcessLookupError):
                 os.killpg(kernel.pid, signal.SIGKILL)
         until = monotonic() + PATIENCE / 2
-        while alive := _alive():
-            for process in alive:
+        while _any_left():
+            for process in _alive():
                 with suppress(psutil.Error):
                     process.kill()
             if monotonic() > until:
@@ -349,6 +349,23 @@ def _alive() -> list[Any]:
             if process.status() != psutil.STATUS_ZOMBIE:
                 alive.append(process)
     return alive
+
+
+def _any_left() -> bool:
+    """Tell whether a descendant of this process is left; children that are over are reaped.
+
+    A list of processes may miss one whose parent ends while the list is made. But where orphans
+    come back to this process, there is a child of it as long as there is any descendant.
+    """
+    if _POSIX:
+        try:
+            while os.waitpid(-1, os.WNOHANG)[0]:
+                pass
+        except ChildProcessError:
+            pass
+        else:
+            return True
+    return sys.platform != "linux" and bool(_alive())
 
 
 def _resident(process: Any) -> int:

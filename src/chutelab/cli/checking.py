@@ -123,7 +123,7 @@ def stress(
     strings.
     """
     from chutelab.checks.stress import Evidence, judge, need_judged
-    from chutelab.engines.simulation import simulate
+    from chutelab.engines.simulation import judged
     from chutelab.machine import build
     from chutelab.results.recorder import StalledError
     from chutelab.util.tables import Sheet, plain
@@ -132,7 +132,7 @@ def stress(
     need_judged(loaded)
     try:
         with progress("simulating") as update:
-            recording = simulate(loaded, progress=update)
+            recording = judged(loaded, progress=update)
     except StalledError as stalled:
         raise click.ClickException(str(stalled)) from stalled
     run = Evidence(build(loaded), recording)

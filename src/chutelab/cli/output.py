@@ -141,6 +141,8 @@ class Output:
             if self.out is not None:
                 files = [name for name in self.files if name != "events.csv" or not left_out]
                 say(f"wrote into {self.out}: {', '.join(files)}")
+        if recording.laws and (self.as_json or self.quiet):
+            say("\n".join(map(str, recording.laws)), err=True)
         if self.out is not None and left_out and not self.quiet:
             many, kept = len(recording.events), self.out / "recording.npz"
             say(
@@ -157,6 +159,11 @@ class Output:
                     f" have over {storage.MOST_ROWS:,} rows",
                     err=self.as_json,
                 )
+
+    def end(self, recording: Recording) -> None:
+        """End the command with exit code 1 if the run broke a law."""
+        if recording.laws:
+            click.get_current_context().exit(1)
 
 
 def _report(
@@ -239,7 +246,7 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
         "--details",
         is_flag=True,
         help="For experts: engine and steps, errors and residuals down to rounding, in the summary"
-        " and in overlay.png.",
+        " and in overlay.png; of a crowd particle 0, too.",
     )
     @json_option("Print one JSON object instead of tables.")
     @click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress bar.")

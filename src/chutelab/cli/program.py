@@ -1,7 +1,7 @@
 """The command ``chutelab``: its own options, and one place where errors become exit codes.
 
 0: done. 1: something failed that is not the user's to mend, ``verify`` or ``stress`` found what
-does not hold, or an accuracy was not reached.
+does not hold, a run broke a law, or an accuracy was not reached.
 2: what the user gave cannot be used. 130: interrupted with Ctrl-C. 143: terminated.
 129: the terminal was closed. 130, 143 and 129 leave nothing behind.
 """
@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import io
 import sys
+import warnings
+from functools import partial
 from typing import Any
 
 import click
 
 from chutelab.cli.console import open_streams, say
-from chutelab.util.errors import InputError, MissingLibraryError
+from chutelab.util.errors import InputError, LawWarning, MissingLibraryError
 from chutelab.util.signals import INTERRUPTED, exit_code, raised
 
 
@@ -43,10 +45,13 @@ class Program(InOrder):
         """
         asked, ends = {"debug": False}, kwargs.get("standalone_mode", True)
         kwargs |= {"obj": asked, "standalone_mode": False}
-        with raised():
+        broken: list[str] = []
+        with raised(), warnings.catch_warnings():
+            warnings.simplefilter("always", LawWarning)
+            warnings.showwarning = partial(_noted, broken, warnings.showwarning)
             try:
                 open_streams()
-                code = super().main(*args, **kwargs)
+                code = super().main(*args, **kwargs) or int(bool(broken))
             except (KeyboardInterrupt, Exception) as error:
                 if not ends:
                     raise
@@ -56,6 +61,17 @@ class Program(InOrder):
             if ends:
                 sys.exit(code or 0)
             return code
+
+
+def _noted(
+    broken: list[str], show: Any, message: Warning | str, category: type[Warning], *where: Any
+) -> None:
+    """Say which law a run broke, on standard error, and note it; show other warnings as ever."""
+    if issubclass(category, LawWarning):
+        say(str(message), err=True)
+        broken.append(str(message))
+    else:
+        show(message, category, *where)
 
 
 EXPECTED = (click.ClickException, InputError, MissingLibraryError)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 import click
@@ -75,11 +76,18 @@ def run(
 
     Without --out nothing is written. With --accuracy, --engine is kept, and --dt is the longest
     step that is tried; if the accuracy cannot be reached, everything is printed and written all the
-    same, and the exit code is 1. A run that --max-seconds ends counts as a run: its summary and
+    same, and the exit code is 1.
+
+    Every run is judged: numbers are finite, nothing is inside a surface or passes one, energy rises
+    only by drives, no loss is negative, the ledger closes. A law that is broken is told, and the
+    exit code is 1; what is printed and written says so. Without --engine another engine runs then,
+    if there is one that keeps the laws, and the summary says so.
+
+    A run that --max-seconds ends counts as a run: its summary and
     files are of what was recorded, particles that had not ended have "stopped" as their end, and
     the exit code is 0.
     """
-    from chutelab.engines.simulation import simulate
+    from chutelab.engines.simulation import judged
     from chutelab.results.recorder import StalledError
 
     if partial and output.out is None:
@@ -88,14 +96,18 @@ def run(
         raise click.UsageError("--max-seconds ends one run, --accuracy makes several: give one.")
     if max_seconds is not None and not isfinite(max_seconds):
         raise click.UsageError(f"--max-seconds {max_seconds}: a finite number above 0 s.")
+    began = perf_counter()
     loaded = loaded_as_told(scene, overrides, engine, dt)
+    if max_seconds is not None:
+        # It counts from the reading of the scene on.
+        max_seconds = max(max_seconds - (perf_counter() - began), 1e-9)
     reached: Accuracy | None = None
     stuck = ""
     with destination(output.out, output.files) as folder:
         try:
             with progress("simulating", quiet=output.quiet, left=True) as update:
                 if accuracy is None:
-                    recording = simulate(loaded, progress=update, max_seconds=max_seconds)
+                    recording = judged(loaded, progress=update, max_seconds=max_seconds)
                 else:
                     from chutelab.studies.accuracy import reach
 
@@ -119,6 +131,7 @@ def run(
         stuck = f"the accuracy of {accuracy} was not reached; {best}"
     if stuck:
         raise click.ClickException(stuck)
+    output.end(recording)
 
 
 @click.command(short_help="Print the summary of a recording.npz; make its files again.")
@@ -144,6 +157,7 @@ def show(recording: Path, output: Output) -> None:
         if folder is not None:
             output.write(loaded, folder)
     output.tell(loaded)
+    output.end(loaded)
 
 
 @click.command(short_help="Open a scene as a page that answers when you drag it.")

@@ -59,7 +59,7 @@ def _complete_column(
     multiple=True,
     help="Instead of --vary: what is not exactly known, such as plate.restitution=0.5±0.05, where"
     " 0.05 is the standard deviation (with :uniform at the end the half-width). Says how uncertain"
-    " that makes landing and belt work, and which key matters most.",
+    " that makes landing and belt work, for each kind of outcome, and which key matters most.",
 )
 @click.option(
     "--sample",
@@ -85,7 +85,7 @@ def _complete_column(
     "--of",
     "column",
     metavar="COLUMN",
-    default="landing.vx",
+    default="landing.vx.mean",
     show_default=True,
     shell_complete=_complete_column,
     help="What to draw.",
@@ -125,17 +125,32 @@ def sweep(
     and writes the same file as a sweep that was not interrupted. Rows that were changed meanwhile
     are refused, and so is a file that another sweep is writing.
 
-    Columns are the varied keys, then, in SI units: landing.x, landing.y, landing.vx, landing.vy
-    (mean over the particles; x, vx and vy also with _spread, the standard deviation), landing.t and
-    time (from the release to the landing, and to the end), belt_work and slip_heat (of the outgoing
-    belt), restitution_loss, power (belt work at the stream's rate), misses, residual (of the
-    ledger), error (against the theory), and reason (why there are no numbers, or not all).
+    Columns are the varied keys, then, in SI units, of all particles: arrival.x and arrival.vx (the
+    first touch of the outgoing belt, or of what lies on it), landing.x, landing.y, landing.vx,
+    landing.vy and landing.t (that of the belt itself), with .mean and .spread, the standard
+    deviation; time (from the release to the end), ledger.by_surface.outgoing.belt_work and
+    ledger.by_surface.outgoing.friction_loss, restitution_loss, power (belt work at the stream's
+    rate), plate_hits and misses (particles that met the plate, and that never arrived), residual
+    (of the ledger), error (of particle 0 against the theory), touches (the surfaces that particles
+    meet, in order, up to the landing; bounces in a row on one count once), and reason (why there
+    are no numbers, or not all). Maps are hatched where no particle meets the plate.
+
+    With --uncertainty, statistics are also told by what is touched: a stream that misses the plate
+    in half of all cases has two kinds of outcome, and their mean may be near to neither.
 
     Belt work, slip heat and power are counted up to run.until, which is the landing unless said: a
     slip that goes on after it is not in them. With --set run.until=settled it is, as it always is
     in chutelab solve and with --uncertainty.
     """
-    from chutelab.studies.sweep import NUMBERS, LostWorkersError, crew, planned, sweep_to, swept_by
+    from chutelab.studies.sweep import (
+        NUMBERS,
+        LostWorkersError,
+        crew,
+        no_column,
+        planned,
+        sweep_to,
+        swept_by,
+    )
 
     wrote = "\n".join(f"wrote {path}" for path in (out, plot) if path is not None)
     if bool(varies) == bool(uncertain):
@@ -155,7 +170,7 @@ def sweep(
         return
     loaded = loaded_as_told(scene, overrides)
     if column not in NUMBERS:
-        raise RefusedError(f"--of {column}: one of {', '.join(NUMBERS)}")
+        raise RefusedError(f"--of {no_column(column)}")
     check_file("--plot", plot, PICTURES)
     check_file("--out", out)
     try:

@@ -459,8 +459,6 @@ class _Run:
         return left
 
     def exits(self) -> Iterator[tuple[str, int, Guard]]:
-        if self.machine.until == "time":
-            return
         left, right, bottom, top = self.machine.exit_box
         low, high = np.array([left, bottom]) - self.base, np.array([right, top]) - self.base
         yield "exit", -1, lambda y: np.minimum(y[X].T - low, high - y[X].T).min(axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from math import inf
@@ -13,9 +14,10 @@ import numpy as np
 
 from chutelab.machine import Machine, build
 from chutelab.results import Recording
-from chutelab.results.recorder import EnoughError
+from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.scene import Fault, Scene, SceneError, load
 from chutelab.util.arrays import Progress
+from chutelab.util.errors import LawWarning
 
 ENGINES = ("auto", "exact", "contact", "pymunk")
 
@@ -60,7 +62,8 @@ def simulate(
         A scene, or what `chutelab.load` makes one of: a file, a name, nested mappings.
     engine : {"auto", "exact", "contact", "pymunk"}, optional
         Overrides the scene's ``run.engine``. With auto, what the exact engine cannot follow (a
-        spinning disk between a moving surface and another) goes to contact.
+        spinning disk between a moving surface and another) goes to contact, and where a run breaks
+        a law that every run must keep, the next engine that can runs instead: `Recording.instead`.
     progress : callable, optional
         Called now and then with the share of the run that is done, 0 to 1.
     max_seconds : float, optional
@@ -77,10 +80,31 @@ def simulate(
     Raises
     ------
     SceneError
-        If the scene cannot be loaded, its geometry contradicts itself, or the engine cannot run it.
+        If the scene cannot be loaded, its geometry contradicts itself, or the engine cannot run it;
+        if `max_seconds` are over before all particles have a place to start from.
     ValueError
         If `max_seconds` is not a finite number above 0, or there is no such engine.
+
+    Warns
+    -----
+    LawWarning
+        For each law that the run breaks, see `Recording.laws`: what, which particle, where, when,
+        and what to do.
     """
+    recording = judged(scene, engine, progress, max_seconds=max_seconds)
+    for broken in recording.laws:
+        warnings.warn(str(broken), LawWarning, stacklevel=2)
+    return recording
+
+
+def judged(
+    scene: Scene | str | Path | Mapping[str, Any],
+    engine: str | None = None,
+    progress: Progress | None = None,
+    *,
+    max_seconds: float | None = None,
+) -> Recording:
+    """Do as `simulate` does, without warning: for callers that read `Recording.laws`."""
     began = perf_counter()
     if max_seconds is not None and not 0.0 < max_seconds < inf:
         raise ValueError(f"max_seconds = {max_seconds!r}: a finite number above 0 s")
@@ -91,11 +115,40 @@ def simulate(
         if max_seconds is not None and perf_counter() - began > max_seconds:
             raise EnoughError
 
-    machine = build(scene if isinstance(scene, Scene) else load(scene))
-    return replace(
-        follow(machine, engine, progress if max_seconds is None else bounded),
-        seconds=perf_counter() - began,
-    )
+    scene = scene if isinstance(scene, Scene) else load(scene)
+    try:
+        machine = build(scene, lambda: bounded(0.0) if max_seconds is not None else None)
+    except EnoughError:
+        counts = [stream.count for stream in scene.streams]
+        most = counts.index(max(counts))
+        several = f"[{most}]" * (len(counts) > 1)
+        allowed = "fewer, or more seconds: those allowed were over before all had a place to start"
+        raise _refused(scene, f"stream{several}.count", counts[most], allowed) from None
+    watched = progress if max_seconds is None else bounded
+    recording = follow(machine, engine, watched)
+    if (engine or machine.engine) == "auto" and recording.laws:
+        recording = _instead(machine, recording, watched)
+    return replace(recording, seconds=perf_counter() - began)
+
+
+def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> Recording:
+    """Run a machine with the engines after the one that broke a law, until one keeps all.
+
+    If none does, the first run stands, with its laws.
+    """
+    said = []
+    recording, order = broken, ("exact", "contact", "pymunk")
+    for name in order[order.index(broken.engine) + 1 :]:
+        said.append(
+            f"{recording.engine} did not keep the laws of every run ({recording.laws[0].told})"
+        )
+        try:
+            recording = follow(machine, name, progress)
+        except (SceneError, StalledError):
+            break
+        if not recording.laws:
+            return replace(recording, instead="; ".join(said))
+    return broken
 
 
 def follow(machine: Machine, engine: str | None, progress: Progress | None) -> Recording:

@@ -25,7 +25,7 @@ from chutelab.machine.releases import Releases, draw, up_belt
 from chutelab.scene import Conveyor, Fault, Plate, Scene, SceneError, Surface
 from chutelab.scene.conflicts import ON_BELT
 from chutelab.scene.units import polygon_moment
-from chutelab.util.arrays import Bools, Floats, Ints, Numbers
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers, Watch, unwatched
 from chutelab.util.trig import RADIANS, hypot, sin_cos
 
 
@@ -81,7 +81,14 @@ class _Room:
         near = beside[0] & beside[1]
         for n in near.any(axis=(*range(1, near.ndim),)).nonzero()[0].tolist():
             yield (*_when(self.segments, n), partial(_on_segment, ends=self.ends[:, n]))
-        for n in range(len(self.arcs.surface)):
+        if not len(self.arcs.surface):
+            return
+        center, reach = np.moveaxis(self.arcs.center, -1, 0), self.arcs.radius
+        # Rounding must not leave one out that just touches.
+        reach = reach + ROUNDING * (np.abs(center).max(axis=0, initial=0.0) + reach)
+        beside = (center + reach > low[..., None]) & (center - reach < high[..., None])
+        near = beside[0] & beside[1]
+        for n in near.any(axis=(*range(near.ndim - 1),)).nonzero()[0].tolist():
             yield (*_when(self.arcs, n), partial(self.arcs.nearest, n))
 
     @property
@@ -106,7 +113,7 @@ class _Room:
             free &= hypot(*(places.T - axis)) >= wheel + radius
         return free
 
-    def cleared(self, releases: Releases, radius: Numbers) -> Releases:
+    def cleared(self, releases: Releases, radius: Numbers, watch: Watch) -> Releases:
         """Return releases of which none lies in a surface, or raise a `RefusedError`.
 
         One less than `ON_BELT` inside, as one written with ten digits may be, is moved out.
@@ -119,6 +126,7 @@ class _Room:
         belt, walks = self.scene.incoming, ~releases.carried
         others = np.count_nonzero(walks) > 0
         for surface, appears, vanishes, nearest in self.surfaces(low, high):
+            watch()
             onto = surface == 0 and belt is not None
             if onto and not others:
                 continue
@@ -205,7 +213,7 @@ class Part(NamedTuple):
 
 # A flight that never meets the plate's line has NaN for its impact.
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")
-def build(scene: Scene) -> Machine:
+def build(scene: Scene, watch: Watch = unwatched) -> Machine:
     """Resolve a validated scene, or a family of them.
 
     Parameters
@@ -213,6 +221,9 @@ def build(scene: Scene) -> Machine:
     scene : Scene
         Of a family (`chutelab.scene.variants`) each is resolved as it would be by itself; the
         machine has one particle for each, with surfaces of its own.
+    watch : callable, optional
+        Called now and then while particles are given their places, which may take long; what it
+        raises ends the building.
 
     Raises
     ------
@@ -225,8 +236,8 @@ def build(scene: Scene) -> Machine:
     lay: Any = {Plate: _hanging, Conveyor: _conveyor, Surface: _free}
     parts += [lay[type(table)](table) for table in scene.free]
     names = [part.name for part in parts]
-    kinds = range(1 if scene.shape else len(scene.particles))
-    met = [[_with_grip(*scene.met(kind, name)) for kind in kinds] for name in names]
+    kinds, meeting = range(1 if scene.shape else len(scene.particles)), scene.meetings()
+    met = [[_with_grip(*meeting(kind, name)) for kind in kinds] for name in names]
     lines: list[Piece] = []
     bends: list[Piece] = []
     for number, part in enumerate(parts):
@@ -248,9 +259,9 @@ def build(scene: Scene) -> Machine:
     arcs = _arcs(scene, bends) if bends else NO_ARCS
     belt, until, particles = scene.incoming, scene.run.until, scene.particles
     room = _Room(scene, names, columns[:4], segments, arcs)
-    releases, radius = draw(scene, room.clear)
+    releases, radius = draw(scene, room.clear, watch)
     particle = _particle(scene, releases.kind, radius)
-    releases = room.cleared(releases, particle.radius)
+    releases = room.cleared(releases, particle.radius, watch)
     bound = releases.t.max().item() + scene.run.max_time
     pulley = None
     if belt is not None:
@@ -264,7 +275,7 @@ def build(scene: Scene) -> Machine:
             incline=belt.incline_deg * RADIANS,
         )
     every = range(len(particles))
-    pairs = np.array([[scene.met(a, b) for b in every] for a in every])
+    pairs = np.array([[meeting(a, b) for b in every] for a in every])
     return Machine(
         scene=scene,
         surfaces=tuple(names),

@@ -7,10 +7,9 @@ few digits left.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 from math import ceil, inf, isnan, log2, nan, pi
 from typing import Any, Literal
 
@@ -66,21 +65,28 @@ def crossings(
     rows = np.concatenate([segments.start, segments.end], axis=1)
     owner = segments.surface.tolist()
     found: dict[tuple[int, int], None] = {}
-    met = _together(segments, segments)
-    for s, other in combinations(range(len(rows)), 2):
-        if owner[s] == owner[other] or not met[s, other]:
-            continue
-        if _parts(rows[s], rows[other]) and _parts(rows[other], rows[s]):
-            found[owner[s], owner[other]] = None
+    known = np.eye(len(names), dtype=bool)  # surfaces that need not be held against each other
+
+    def note(pairs: Ints) -> None:
+        found.update(dict.fromkeys(map(tuple, pairs.tolist())))
+        known[pairs[:, 0], pairs[:, 1]] = known[pairs[:, 1], pairs[:, 0]] = True
+
+    for one, other in _beside(segments, segments, known):
+        one, other = one[one < other], other[one < other]
+        crossed = _parts(rows[one], rows[other]) & _parts(rows[other], rows[one])
+        note(segments.surface[np.stack([one, other], axis=1)[crossed]])
     if len(arcs.surface):
         near = TOUCHES * np.abs(np.concatenate([segments.end, arcs.corners])).max()
-        for pieces, crossed in (
-            (segments, _chords(segments, arcs, near)), (arcs, _lenses(arcs, near))
-        ):  # fmt: skip
-            for s, n in np.argwhere(crossed & _together(pieces, arcs)).tolist():
-                pair = sorted((pieces.surface[s].item(), arcs.surface[n].item()))
-                if pair[0] != pair[1]:
-                    found[pair[0], pair[1]] = None
+        for pieces in (segments, arcs):
+            for one, other in _beside(pieces, arcs, known):
+                with_it = arcs.some(other)
+                crossed = (
+                    _chords(segments, one, with_it, near)
+                    if pieces is segments
+                    else _lenses(arcs.some(one), with_it, near)
+                )
+                pairs = np.stack([pieces.surface[one[crossed]], arcs.surface[other[crossed]]])
+                note(np.sort(pairs, axis=0).T)
     said = [Caution(names[b], names[a]) for a, b in found]
     if pulley is not None:
         start, along = rows[:, :2], rows[:, 2:] - rows[:, :2]
@@ -94,52 +100,74 @@ def crossings(
     return said
 
 
-def _together(one: Segments | Arcs, other: Segments | Arcs) -> Bools:
-    """Tell which pieces are there at the same time as which others, (S, A)."""
-    begin = np.maximum(one.appears[:, None], other.appears)
-    return begin < np.minimum(one.vanishes[:, None], other.vanishes)
+ABREAST = 256
+"""Pieces that are held against all others together, so that their pairs fit into memory."""
 
 
-def _chords(segments: Segments, arcs: Arcs, near: float) -> Bools:
-    """Tell which segments cross which arcs by more than `near` (m), (S, A)."""
-    start, tangent = segments.start[:, None], segments.tangent[:, None]
+def _beside(
+    one: Segments | Arcs, other: Segments | Arcs, known: Bools
+) -> Iterator[tuple[Ints, Ints]]:
+    """Yield pairs of pieces, by numbers, whose boxes touch while both are there.
+
+    Pieces of surfaces that are known to cross, (surfaces, surfaces), are left out.
+    """
+    (low, high), (low2, high2) = one.boxes, other.boxes
+    for first in range(0, len(one.surface), ABREAST):
+        some = slice(first, first + ABREAST)
+        met = ~known[one.surface[some, None], other.surface]
+        begin = np.maximum(one.appears[some, None], other.appears)
+        met &= begin < np.minimum(one.vanishes[some, None], other.vanishes)
+        for axis in (0, 1):
+            met &= low[some, axis, None] <= high2[:, axis]
+            met &= high[some, axis, None] >= low2[:, axis]
+        index, which = met.nonzero()
+        yield first + index, which
+
+
+def _chords(segments: Segments, which: Ints, arcs: Arcs, near: float) -> Bools:
+    """Tell which segments, by their numbers (n,), cross n arcs by more than `near` (m)."""
+    start, tangent = segments.start[which], segments.tangent[which]
     away = arcs.center - start
     foot = (away * tangent).sum(axis=-1)
     off = np.abs(tangent[..., 0] * away[..., 1] - tangent[..., 1] * away[..., 0])
     half = np.sqrt(np.maximum(arcs.radius**2 - off**2, 0.0))
     crossed = np.zeros(off.shape, dtype=bool)
     for s in (foot - half, foot + half):
-        on = (s > near) & (s < segments.length[:, None] - near)
+        on = (s > near) & (s < segments.length[which] - near)
         crossed |= on & arcs.holds(start + s[..., None] * tangent, near)
-    return crossed & (off < arcs.radius - near)
+    return np.asarray(crossed & (off < arcs.radius - near))
 
 
-@np.errstate(divide="ignore", invalid="ignore")
-def _lenses(arcs: Arcs, near: float) -> Bools:
-    """Tell which arcs cross each other by more than `near` (m), (A, A)."""
-    center, one, other = arcs.center[:, None], arcs.radius[:, None], arcs.radius
-    apart = arcs.center - center
-    distance = np.hypot(apart[..., 0], apart[..., 1])
-    towards = apart / distance[..., None]
-    aside = np.stack([-towards[..., 1], towards[..., 0]], axis=-1)
-    foot = 0.5 * (distance + (one - other) * (one + other) / distance)
-    half = np.sqrt(np.maximum(one**2 - foot**2, 0.0))
-    # Of the two points in which circles meet the one to the left; the other way round the other.
-    place = center + foot[..., None] * towards + half[..., None] * aside
-    crossed = arcs.holds(place, near) & arcs.holds(place.swapaxes(0, 1), near).T
-    return crossed & (distance < one + other - near) & (distance > np.abs(one - other) + near)
+def _lenses(first: Arcs, second: Arcs, near: float) -> Bools:
+    """Tell of which pairs (n,) the left one of both crossings is on both arcs, by `near` (m)."""
+    distance = np.hypot(*(second.center - first.center).T)
+    crossed = (distance < first.radius + second.radius - near) & (
+        distance > np.abs(first.radius - second.radius) + near
+    )
+    some = crossed.nonzero()[0]
+    first, second, distance = first.some(some), second.some(some), distance[some]
+    towards = (second.center - first.center) / distance[:, None]
+    aside = np.stack([-towards[:, 1], towards[:, 0]], axis=-1)
+    # The other way round it is the other crossing.
+    a, b = first.radius, second.radius
+    foot = 0.5 * (distance + (a - b) * (a + b) / distance)
+    half = np.sqrt(np.maximum(a**2 - foot**2, 0.0))
+    place = first.center + foot[:, None] * towards + half[:, None] * aside
+    crossed[some] = second.holds(place, near) & first.holds(place, near)
+    return np.asarray(crossed)
 
 
-def _parts(line: Floats, ends: Floats) -> bool:
-    """Tell whether two ends lie strictly on two sides of a line."""
-    (x0, y0, x1, y1), (u0, v0, u1, v1) = line, ends
+def _parts(line: Floats, ends: Floats) -> Bools:
+    """Tell of pairs (n, 4) whether two ends lie strictly on two sides of a line."""
+    (x0, y0, x1, y1), (u0, v0, u1, v1) = line.T, ends.T
     first = (x1 - x0) * (v0 - y0) - (y1 - y0) * (u0 - x0)
     second = (x1 - x0) * (v1 - y0) - (y1 - y0) * (u1 - x0)
-    return bool(first * second < 0.0)
+    return np.asarray(first * second < 0.0)
 
 
 EXIT_MARGIN = 1.0
-"""m below the lowest surface, or outside the box of all without gravity, where a track ends."""
+"""m below the lowest surface and release, or outside the box of all without gravity, where a track
+ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +255,11 @@ class Segments(Pieces):
         """Second end, (..., S, 2), m."""
         return self.start + self.length[..., None] * self.tangent
 
+    @property
+    def boxes(self) -> tuple[Floats, Floats]:
+        """Lower left and upper right corner of the box of each, (..., S, 2), m."""
+        return np.minimum(self.start, self.end), np.maximum(self.start, self.end)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Arcs(Pieces):
@@ -281,6 +314,17 @@ class Arcs(Pieces):
         way = self.radius * np.mod(np.arctan2(away[..., 1], away[..., 0]) - self.begin, 2.0 * pi)
         between = (way > near) & (way < self.radius * self.extent - near)
         return np.asarray(self.whole | between)
+
+    @property
+    def boxes(self) -> tuple[Floats, Floats]:
+        """Lower left and upper right corner of the box of each whole circle, (..., A, 2), m."""
+        reach = self.radius[..., None]
+        return self.center - reach, self.center + reach
+
+    def some(self, which: Ints) -> Arcs:
+        """Return some of the arcs, by their numbers."""
+        own = {name: getattr(self, name) for name in ("center", "radius", "begin", "extent")}
+        return replace(self, **{name: np.array(value[which]) for name, value in own.items()})
 
     @property
     def ends(self) -> tuple[Floats, Floats]:
@@ -399,11 +443,21 @@ class Machine:
     def exit_box(self) -> tuple[float, float, float, float]:
         """Left, right, bottom and top (m) beyond which a particle has left the scene.
 
-        With gravity only the bottom is finite: what flies up comes back. In a family these are
-        arrays (N,), and all have gravity or none.
+        With gravity only the bottom is finite: what flies up comes back. What is released below
+        all surfaces, or hangs on a string, has not left: the box holds releases, too. Where
+        particles do not meet it is the first of each stream, so that a particle does the same alone
+        and with others. In a family these are arrays (N,), and all have gravity or none.
         """
         wheel = self.pulley.radius if self.pulley is not None else -inf
-        ends = self.corners if self.corners.size else self.releases.position
+        corners, place = self.corners, self.releases.position
+        if corners.ndim > 2:
+            place = place[:, None]
+        elif not self.interact:
+            place = place[np.unique(self.releases.stream, return_index=True)[1]]
+        ends = np.concatenate([corners, place], axis=-2)
+        for thread in self.threads:
+            circle = np.add.outer([-thread.length, thread.length], thread.anchor)
+            ends = np.concatenate([ends, circle], axis=-2)
         low, high = ends.min(axis=-2), ends.max(axis=-2)
         left, bottom = (np.minimum(low[..., axis], -wheel) for axis in (0, 1))
         right, top = (np.maximum(high[..., axis], wheel) for axis in (0, 1))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from math import acos, degrees, floor, inf, prod, sqrt
+from typing import Any
 
 import numpy as np
 
 from chutelab.scene import Fault, Scene, SceneError, Stream
 from chutelab.scene.conflicts import beside
-from chutelab.util.arrays import Bools, Floats, Ints, Numbers
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers, Watch, unwatched
 from chutelab.util.tables import number
 from chutelab.util.trig import RADIANS, hypot, sin_cos
 
@@ -199,7 +200,7 @@ Clear = Callable[[Floats, float], Bools]
 """Tells which of some places (n, 2), m, a disk of a radius (m) can be in: not in any surface."""
 
 
-def draw(scene: Scene, clear: Clear) -> tuple[Releases, Floats | None]:
+def draw(scene: Scene, clear: Clear, watch: Watch = unwatched) -> tuple[Releases, Floats | None]:
     """Draw the releases of a scene; the same scene and seed give the same numbers.
 
     Of a family each scene has one particle. Particles that meet start where no other of their
@@ -211,6 +212,8 @@ def draw(scene: Scene, clear: Clear) -> tuple[Releases, Floats | None]:
         What is released.
     clear : callable
         Which places a packed box may use.
+    watch : callable, optional
+        Called now and then; what it raises ends the drawing.
 
     Returns
     -------
@@ -227,9 +230,9 @@ def draw(scene: Scene, clear: Clear) -> tuple[Releases, Floats | None]:
     drawn: list[Draw] = []
     for n, stream in enumerate(scene.streams):
         if stream.fill is None:
-            drawn.append(_draw(scene, n))
+            drawn.append(_draw(scene, n, watch))
         else:
-            drawn.append(_pour(scene, n, drawn, clear))
+            drawn.append(_pour(scene, n, drawn, clear, watch))
     if len(drawn) == 1:
         return drawn[0].releases, drawn[0].radius
     releases = Releases(
@@ -262,7 +265,7 @@ def _radii(scene: Scene, n: int, rng: np.random.Generator) -> Floats | None:
     return radii
 
 
-def _draw(scene: Scene, n: int) -> Draw:
+def _draw(scene: Scene, n: int, watch: Watch) -> Draw:
     """Draw the releases of one stream, at a point or along a line."""
     stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
     every = stream.count * prod(scene.shape)
@@ -308,7 +311,7 @@ def _draw(scene: Scene, n: int) -> Draw:
             velocity[:, 1] * cosine - velocity[:, 0] * sine,
         ], axis=1)  # fmt: skip
         each = np.full(every, particle.radius) if radii is None else radii
-        _spread_apart(stream, t, height, along, each, fall, lowest, rng)
+        _spread_apart(stream, t, height, along, each, fall, lowest, rng, watch)
     if rides and radii is not None:
         height += radii - particle.radius
     x, low = release_point(scene, n)
@@ -323,42 +326,87 @@ JITTER = 0.01
 """How far a place in it is moved at random each way, in the same unit: no pile is that even."""
 
 
-def _pour(scene: Scene, n: int, before: Sequence[Draw], clear: Clear) -> Draw:
-    """Pack a stream's box from below: rows of places, every other one shifted by half a pitch."""
-    stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
+HANDFUL = 4096
+"""Places of a box that are looked at together; what is above the particles never is."""
+
+LOOKS = 1_000_000
+"""Places of a box that are looked at, at most, and `TRIES` more for each particle."""
+
+
+def _packed(stream: Stream, largest: float, rng: np.random.Generator) -> Iterator[Floats]:
+    """Yield the places of a stream's box (n, 2), m, from below, a handful at a time.
+
+    They are in rows, every other one shifted by half a pitch.
+    """
     assert stream.fill is not None
     (left, bottom), (right, top) = stream.fill
-    rng = _dice(scene, n)
-    radii = _radii(scene, n, rng)
-    largest = particle.radius if particle.span is None else particle.span[1]
     pitch, room = PITCH * largest, largest * (1.0 + JITTER)
     rise = pitch * sqrt(0.75)
     rows = max(0, floor((top - bottom - 2.0 * room) / rise) + 1)
     across = max(0, floor((right - left - 2.0 * room) / pitch) + 1)
-    x, y = np.meshgrid(np.arange(across) * pitch, np.arange(rows) * rise)
-    x += 0.5 * pitch * (np.arange(rows) % 2)[:, None]
-    places = np.stack([left + room + x.ravel(), bottom + room + y.ravel()], axis=1)
-    places = places[places[:, 0] <= right - room]
-    places += JITTER * largest * rng.uniform(-1.0, 1.0, places.shape)
-    free = clear(places, largest)
+    most = min(rows * across, LOOKS + TRIES * stream.count)
+    for first in range(0, most, HANDFUL):
+        begin, along = divmod(first, across)
+        row, column = divmod(along + np.arange(min(HANDFUL, most - first)), across)
+        row += begin
+        x, y = column * pitch, row * rise
+        x += 0.5 * pitch * (row % 2)
+        places = np.stack([left + room + x, bottom + room + y], axis=1)
+        places = places[places[:, 0] <= right - room]
+        places += JITTER * largest * rng.uniform(-1.0, 1.0, places.shape)
+        yield places
+
+
+def _away(places: Floats, others: Floats, reach: Floats) -> Bools:
+    """Tell which places (n, 2), m, are at least a reach (k,) away from each of others (k, 2)."""
+    free, most = np.ones(len(places), dtype=bool), reach.max(initial=0.0)
+    low, high = places.min(axis=0) - most, places.max(axis=0) + most
+    near = ((others >= low) & (others <= high)).all(axis=1).nonzero()[0]
+    # Neighbours are side by side along the longer side of the places' box.
+    axis = int(np.argmax(high - low))
+    near = near[others[near, axis].argsort(kind="stable")]
+    line, there = others[near, axis], places[:, axis]
+    first, last = line.searchsorted(there - most), line.searchsorted(there + most, side="right")
+    many = last - first
+    place = np.arange(len(places)).repeat(many)
+    other = near[np.arange(len(place)) + (first - (many.cumsum() - many)).repeat(many)]
+    free[place[hypot(*(places[place] - others[other]).T) < reach[other]]] = False
+    return free
+
+
+def _pour(scene: Scene, n: int, before: Sequence[Draw], clear: Clear, watch: Watch) -> Draw:
+    """Pack a stream's box, as far up as it takes."""
+    stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
+    rng = _dice(scene, n)
+    radii = _radii(scene, n, rng)
+    largest = particle.radius if particle.span is None else particle.span[1]
+    others, reach = np.empty((0, 2)), np.empty(0)
     for kind, one in zip(scene.kinds, before, strict=False):
         other = scene.particles[kind].radius if one.radius is None else one.radius
-        theirs = one.releases.position
-        for place, r in zip(theirs, np.broadcast_to(other, len(theirs)), strict=True):
-            free &= hypot(*(places - place).T) >= largest + r
-    places = places[free]
-    if len(places) < stream.count:
+        others = np.concatenate([others, one.releases.position])
+        reach = np.concatenate([reach, np.broadcast_to(largest + other, len(one.releases.t))])
+    found, count = [np.empty((0, 2))], 0
+    for places in _packed(stream, largest, rng):
+        watch()
+        places = places[clear(places, largest)]
+        if len(others) and len(places):
+            places = places[_away(places, others, reach)]
+        found.append(places)
+        count += len(places)
+        if count >= stream.count:
+            break
+    if count < stream.count:
         several = f"[{n}]" * (len(scene.streams) > 1)
         allowed = (
-            f"a larger box, or stream{several}.count = {len(places)} at most: so many of radius"
+            f"a larger box, or stream{several}.count = {count} at most: so many of radius"
             f" {largest:.4g} m have room in it, away from all surfaces"
         )
-        value = [list(corner) for corner in stream.fill]
+        value = [list(corner) for corner in stream.fill or ()]
         raise SceneError(scene.source, [Fault(f"stream{several}.fill", value, allowed)])
     velocity = np.empty((stream.count, 2))
     velocity[:] = release_velocity(scene, n)
     t = np.full(stream.count, stream.start)
-    position = places[: stream.count].copy()
+    position = np.concatenate(found)[: stream.count].copy()
     return Draw(_releases(scene, n, t, position, velocity, False), radii)
 
 
@@ -371,6 +419,7 @@ def _spread_apart(
     fall: float,
     lowest: float,
     rng: np.random.Generator,
+    watch: Watch,
 ) -> None:
     """Redraw heights, in place, so that no particle starts inside one released before it.
 
@@ -383,7 +432,8 @@ def _spread_apart(
     # by one, stays away for good.
     close = np.zeros(0, dtype=np.int64)
     diameter = 2.0 * radius.max()
-    for i in range(1, stream.count):
+    for i in range(1, stream.count) if stream.bed_height > 0.0 else ():
+        watch()
         close = np.append(close, i - 1)
         age = t[i] - t[close]
         dx = velocity[close, 0] * age
@@ -392,7 +442,39 @@ def _spread_apart(
         near = (np.abs(dx) < diameter) & ~(sinks & (np.maximum(dy, lowest) <= -diameter))
         close, dx, dy = close[near], dx[near], np.maximum(dy[near], lowest)
         reach = radius[close] + radius[i]
-        for _ in range(TRIES if stream.bed_height > 0.0 else 0):
-            if np.all(dx**2 + (dy - height[i]) ** 2 >= reach**2):
-                break
-            height[i] = stream.bed_height * rng.random()
+        if np.all(dx**2 + (dy - height[i]) ** 2 >= reach**2):
+            continue
+        height[i] = _free_height(dx, dy, reach, stream.bed_height, rng)
+
+
+SURELY = 1e-6
+"""Share of a distance by which a height must be nearer than that to be taken whatever rounds."""
+
+
+def _free_height(
+    dx: Floats, dy: Floats, reach: Floats, bed: float, rng: np.random.Generator
+) -> float:
+    """Draw heights up to `bed` until one is a `reach` away from all at (dx, dy), m.
+
+    After `TRIES` the last one is kept as it is. The generator then stands where drawing one after
+    the other would have left it.
+    """
+    aside, square, drawn = dx**2, reach**2, 0
+    half = np.sqrt(np.maximum(square - aside, 0.0)) - SURELY * reach
+    # What is surely taken, from `low` to `top`: intervals that overlap are as good as one.
+    order = (dy - half)[half > 0.0].argsort()
+    low, top = ((dy + side * half)[half > 0.0][order] for side in (-1.0, 1.0))
+    top = np.maximum.accumulate(top)
+    while drawn < TRIES:
+        # Few at first, which mostly will do.
+        tried = bed * rng.random(min(max(8, 7 * drawn), TRIES - drawn))
+        drawn += len(tried)
+        below = low.searchsorted(tried)
+        taken = np.concatenate([[-inf], top])[below] > tried
+        for n in (~taken).nonzero()[0].tolist():
+            last = drawn - len(tried) + n + 1 == TRIES
+            if last or np.all(aside + (dy - tried[n]) ** 2 >= square):
+                generator: Any = rng.bit_generator
+                generator.advance(n + 1 - len(tried))
+                return float(tried[n])
+    return float(tried[-1])

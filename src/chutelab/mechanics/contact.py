@@ -240,6 +240,9 @@ def advance(circle: Circle, longest: Floats) -> Step:
     dt = np.minimum(_step_length(circle), longest)
     series = _series(circle)
     gauges = _gauges(circle, series)
+    near = np.minimum(circle.phi - circle.low, circle.high - circle.phi) < 2.0 * STEP_ANGLE
+    if np.count_nonzero(near):
+        _end_where_it_turns(circle, series, gauges, near, dt)
     passed = polynomial(gauges, dt) < 0.0
     hit = np.flatnonzero(passed.any(axis=0))
     outcome = np.zeros(len(dt), dtype=np.int8)
@@ -254,6 +257,24 @@ def advance(circle: Circle, longest: Floats) -> Step:
     return Step(dt, outcome, phi, w, z, work, heat, twist)
 
 
+def _end_where_it_turns(
+    circle: Circle, series: Floats, gauges: Floats, near: Bools, dt: Floats
+) -> None:
+    """Shorten steps to the turning point where that is beyond an end of the circle.
+
+    At the end of the whole step the particle would be back, and the end not seen.
+    """
+    back = np.sign(circle.w) * series[:, 1]
+    turns = np.flatnonzero(near & (polynomial(back, dt) < 0.0))
+    if len(turns):
+        passed = np.ones((1, len(turns)), dtype=bool)
+        (at,) = _first_negative(back[:, None, turns], dt[turns], passed)
+        ends = GAUGES[: gauges.shape[1]]
+        beyond = polynomial(gauges[:, :, turns], at) < 0.0
+        beyond &= ((ends == Outcome.LOW) | (ends == Outcome.HIGH))[:, None]
+        dt[turns] = np.where(beyond.any(axis=0), at, dt[turns])
+
+
 def _step_length(c: Circle) -> Floats:
     """Time for at most `STEP_ANGLE`, less where slip grows fast; inf at rest."""
     finite = np.where(np.isinf(c.friction) | (c.slip == 0.0), 0.0, c.friction)
@@ -264,9 +285,11 @@ def _step_length(c: Circle) -> Floats:
     pace = np.abs(c.w) + np.sqrt(2.0 * angle * rho * pull)
     with np.errstate(divide="ignore"):
         time = np.where(pace > 0.0, angle * rho / np.where(pace > 0.0, pace, 1.0), np.inf)
-        # Near the top the pull grows with the angle, as exp(t sqrt(g/ρ)).
+        # Near the top the pull grows with the angle, as exp(t sqrt(g/ρ)); at the very bottom it is
+        # zero, but not for long.
         falling = STEP_FALL * np.sqrt(rho / c.gravity)
-    return np.where(pull > 0.0, np.minimum(time, falling), time)
+    moves = (pull > 0.0) | (~held & (c.w != 0.0))
+    return np.where(moves, np.minimum(time, falling), time)
 
 
 def _series(c: Circle) -> Floats:

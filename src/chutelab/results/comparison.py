@@ -153,6 +153,6 @@ def scales(scene: Scene, prediction: Transfer) -> dict[str, Any]:
         "time": np.where(np.isfinite(t3), t2 + t3, t2),
         "angle": 1.0,
         "energy": energy,
-        "power": energy * scene.stream.rate,
+        "power": energy * scene.rate,
     }
     return {kind: float(size) if np.ndim(size) == 0 else size for kind, size in found.items()}

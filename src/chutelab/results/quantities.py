@@ -3,8 +3,7 @@
 `first` gives the first separation, impact or landing of each particle, `each` a quantity of each
 particle by its name, such as ``landing.x``, `measure` one of the run, such as ``landing.x.mean``,
 and `observed` those of particle 0 under the paper's symbols. Then there is what happened to a crowd
-as a whole: who waited for a place, who rode into others, who rolls where it should be carried, and
-whose ledger is not to be trusted.
+as a whole: who waited for a place, who rode into others, and who rolls where it should be carried.
 """
 
 from __future__ import annotations
@@ -18,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.machine.releases import Squeeze, squeeze
+from chutelab.results.arrival import arrivals, never
 from chutelab.results.ledger import ledger
-from chutelab.results.recording import ENTRIES, EVENT, REASONS, Kind, Recording
+from chutelab.results.recording import ENTRIES, REASONS, Kind, Recording
 from chutelab.scene import Scene
-from chutelab.scene.rules import NEEDED, SYMBOLS
-from chutelab.theory import Drag, belt_power, drag
+from chutelab.scene.rules import FIRST, NEEDED, SYMBOLS
+from chutelab.theory import Drag, drag
 from chutelab.util.arrays import Floats, Numbers
 from chutelab.util.tables import number
 
@@ -40,12 +40,10 @@ ALONG = 1e-14
 CARRIED = 1e-3
 """m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
 
-DOUBTFUL = 1000.0
-"""How many times what `doubtful` counts as explained an entry may be. Of 300 random machines the
-largest that is sound is 210 times, the smallest of a disk that locks in a nip 50,000 times."""
-
 _STATISTICS: dict[str, Callable[[Floats], Any]] = {
     "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,
+    "q02": lambda values: np.quantile(values, 0.02), "q50": np.median,
+    "q98": lambda values: np.quantile(values, 0.98),
 }  # fmt: skip
 
 
@@ -58,15 +56,6 @@ def first(recording: Recording, event: str, surface: str | None = None) -> NDArr
     found = recording.first(recording.select(Kind[event.upper()], surface=surface or NEEDED[event]))
     events = never(recording.count)
     events[found["particle"]] = found
-    return events
-
-
-def never(count: int) -> NDArray[Any]:
-    """Return events (count,) that did not happen: NaN throughout."""
-    events = np.zeros(count, dtype=EVENT)
-    for name in EVENT.names or ():
-        if EVENT[name].base.kind == "f":
-            events[name] = nan
     return events
 
 
@@ -125,6 +114,8 @@ def each(recording: Recording, name: str) -> Floats:
             return column(first(recording, "impact", surface), key)
         case ["separation" | "impact" | "landing" as event, key]:
             return column(first(recording, event), key)
+        case ["arrival", key]:
+            return column(arrivals(recording), key)
     values = symbols(recording)[name.removesuffix("_deg")]
     return np.degrees(values) if name.endswith("_deg") else values
 
@@ -133,7 +124,8 @@ def measure(recording: Recording, name: str) -> float:
     """Return a quantity of a recording, in the unit its name has; NaN if it did not happen.
 
     Names are such as ``x2``, ``landing.x.mean`` or ``ledger.by_surface.plate.restitution_loss``.
-    One without statistic is particle 0's; ``spread`` is the standard deviation. After
+    One without statistic is particle 0's, with or without ``particles[0].`` before it; ``spread``
+    is the standard deviation, ``q02`` what 2 % of the particles are below. After
     ``by_stream.NAME.`` it is that of the particles of one stream.
 
     Raises
@@ -141,6 +133,8 @@ def measure(recording: Recording, name: str) -> float:
     KeyError
         If there is no quantity of that name.
     """
+    if name.startswith(FIRST):
+        return float(each(recording, name.removeprefix(FIRST))[0])
     parts, whose = name.split("."), np.ones(recording.count, dtype=bool)
     if parts[0] == "by_stream":
         stream = recording.machine.streams.index(parts[1])
@@ -247,7 +241,7 @@ def from_events(
         "v3": np.hypot(vx, vy),
         "d3": top + radius - y3,
         "dEk": energy,
-        "P": energy * scene.stream.rate,
+        "P": energy * scene.rate,
     }
 
 
@@ -339,7 +333,7 @@ def waits(recording: Recording) -> Waits | None:
 class Plug:
     """Particles that meet each other and lie still in the machine when a run is over.
 
-    How many these are, and how many have left it or come to the outgoing belt.
+    How many these are, and how many have left it or arrived on the outgoing belt.
     """
 
     still: int
@@ -357,15 +351,18 @@ def plugged(recording: Recording) -> Plug | None:
     """Return who got stuck; None if nobody did, or nowhere was to be gone to.
 
     Told of particles that meet, where some got through or an outgoing belt waits for them, of a
-    run that was not stopped. Still is what moves with less than `STILL`.
+    run that was not stopped. Still is what moves with less than `STILL`, and what has settled: its
+    contacts are at rest, though a grain on trembling ones may be a little faster.
     """
     machine = recording.machine
     if not machine.interact or stopped(recording) is not None:
         return None
     through = recording.ended == REASONS.index("exit")
-    through[recording.select(Kind.LANDING)["particle"]] = True
+    if recording.scene.outgoing is not None:
+        through |= np.isfinite(arrivals(recording)["t"])
     still = np.zeros(recording.count, dtype=bool)
     still[recording.released] = np.hypot(*recording.ends()[1]["velocity"].T) < STILL
+    still |= recording.ended == REASONS.index("settled")
     lying, gone = int(np.count_nonzero(still & ~through)), int(np.count_nonzero(through))
     if not lying or not (gone or recording.scene.outgoing is not None):
         return None
@@ -389,39 +386,6 @@ def air_drag(recording: Recording) -> Drag | None:
         for part in (recording.particle.radius, recording.particle.mass)
     )
     return drag(recording.scene, recording.prediction, speed, radius, mass)
-
-
-@dataclass(frozen=True)
-class Steady:
-    """What the outgoing belt needs for streams that go on and on, if it carries what lands.
-
-    `rate` (t/h) is that of the streams whose rate was given as a mass per time, `power` (W) what it
-    takes to bring them to the belt's speed from how their particles landed, slip heat included.
-    """
-
-    rate: float
-    power: float
-
-    def __str__(self) -> str:
-        return f"outgoing belt, steady: P = {number(self.power)} W at {number(self.rate)} t/h"
-
-
-def steady(recording: Recording) -> Steady | None:
-    """Return what streams in t/h take of the outgoing belt; None without any that has landed."""
-    scene, belt = recording.scene, recording.scene.outgoing
-    if belt is None or all(stream.mass_rate is None for stream in scene.streams):
-        return None
-    vx = column(first(recording, "landing"), "vx")
-    mass = np.broadcast_to(recording.particle.mass, recording.count)
-    rate = power = 0.0
-    for index, stream in enumerate(scene.streams):
-        own = (recording.machine.releases.stream == index) & np.isfinite(vx)
-        if stream.mass_rate is not None and own.any():
-            fed = float(np.average(vx[own], weights=mass[own]))
-            tonnes = 3.6 * stream.mass_rate
-            rate += tonnes
-            power += float(belt_power(rate_t_h=tonnes, belt_speed=belt.speed, feed_speed=fed))
-    return Steady(rate, power) if rate else None
 
 
 def squeezed(recording: Recording) -> Squeeze | None:
@@ -472,57 +436,3 @@ def rolling(recording: Recording) -> Rolling | None:
     masses = np.broadcast_to(recording.particle.mass, recording.count)[settled["particle"]]
     due = belt.speed * float((masses * missing)[astray].sum())
     return Rolling(int(astray.sum()), paid, paid + due)
-
-
-@dataclass(frozen=True)
-class Doubtful:
-    """Ledgers that nothing explains: those of disks gripped between a moving surface and another.
-
-    Where friction holds a disk on both faces of a nip, rigid bodies have no finite impulse. Entries
-    then grow as the step falls, and say nothing of a real machine.
-
-    `particles` is how many have such entries, `entry` the largest of them, J, `particle` whose that
-    is, and `explained` what its weight and the fastest surface explain, J, see `doubtful`.
-    """
-
-    particles: int
-    particle: int
-    entry: float
-    explained: float
-
-    def __str__(self) -> str:
-        whose = "1 particle" if self.particles == 1 else f"{self.particles:,} particles"
-        return (
-            f"the energy ledger is NOT TO BE TRUSTED: {number(self.entry)} J of particle"
-            f" {self.particle} are beyond all that its weight and the moving surfaces explain, some"
-            f" {number(self.explained)} J ({whose} in all). That is so of a disk gripped between a"
-            " moving surface and another: rigid bodies have no finite impulse there"
-        )
-
-
-def doubtful(recording: Recording) -> Doubtful | None:
-    """Return whose entries are too large to be true; None if all can be explained.
-
-    Explained is m v² + m g (L + v t): v is the larger of the speed at the release and that of the
-    fastest surface, L the size of what all tracks cover, t the time from the release to the end. An
-    entry may be `DOUBTFUL` times that, for many blows and for what others press with.
-    """
-    who = np.flatnonzero(recording.released)
-    if not len(who):
-        return None
-    machine, places = recording.machine, recording.knots["position"]
-    first, last = recording.ends()
-    speeds = [np.ravel(pieces.speed) for pieces in (machine.segments, machine.arcs)]
-    fastest = np.abs(np.concatenate(speeds)).max(initial=0.0)
-    v = np.maximum(np.hypot(*first["velocity"].T), fastest)
-    way = np.hypot(*np.ptp(places, axis=0)) + v * (last["t"] - first["t"])
-    mass = np.broadcast_to(recording.particle.mass, recording.count)[who]
-    explained = mass * (v**2 + machine.gravity * way)
-    entries = np.abs(last["entries"]).max(axis=1)
-    beyond = entries > DOUBTFUL * explained
-    if not beyond.any():
-        return None
-    worst = int(np.argmax(np.where(beyond, entries, 0.0)))
-    return Doubtful(
-        int(beyond.sum()), int(who[worst]), float(entries[worst]), float(explained[worst])
-    )

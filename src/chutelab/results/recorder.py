@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine
-from chutelab.results.recording import EVENT, KNOT, Kind, Recording
+from chutelab.results.recording import EVENT, KNOT, REASONS, Kind, Recording
 from chutelab.util.arrays import Floats, Ints
 
 
@@ -67,6 +67,7 @@ class Recorder:
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
         self.ended = np.zeros(count, dtype=np.int8)
         self.contacts = 0
+        self.gained = 0.0
         self._knots: list[NDArray[Any]] = []
         self._owners: list[Ints] = []
         self._angles: list[Floats] = []
@@ -185,6 +186,8 @@ class Recorder:
                 angle = np.insert(angle, offsets[lonely], angle[offsets[lonely]])
             knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])
             np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
+        ended = self.ended.copy()
+        ended[(sizes == 0) & (ended == REASONS.index("time"))] = REASONS.index("unreleased")
         events = _joined(self._events, EVENT)
         t = events["t"]
         if count > 1 or np.count_nonzero(t[1:] < t[:-1]):
@@ -199,13 +202,14 @@ class Recorder:
             engine=engine,
             knots=knots,
             offsets=offsets,
-            ended=self.ended.copy(),
+            ended=ended,
             events=events,
             by_surface=self.by_surface.copy(),
             steps=steps,
             contacts=self.contacts,
             seconds=seconds,
             angle=angle,
+            gained=self.gained,
         )
 
 

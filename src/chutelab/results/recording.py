@@ -14,7 +14,7 @@ from enum import IntEnum
 from functools import cached_property
 from math import isnan, nan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,9 @@ from chutelab.scene import Scene, rules
 from chutelab.theory import Transfer, predict
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.tables import Sheet, Shown
+
+if TYPE_CHECKING:
+    from chutelab.results.laws import Broken
 
 ENTRIES = rules.ENTRIES
 """The three entries of the energy ledger, in the order of every array that holds them."""
@@ -168,6 +171,13 @@ class Recording(Shown):
         How far a particle has turned counterclockwise since its release at each knot, rad, where
         some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not tell.
         Empty where all are round: there it is the integral of ω.
+    instead : str
+        Where the engine that runs first broke a law of every run, and this one ran instead: which,
+        and how; else empty.
+    gained : float
+        Energy (J) that the contact engine's solves made beyond what moving surfaces and the parting
+        of overlaps give, summed over all steps: rounding of the energy turned over, or the solver
+        is wrong (docs/physics.md, "The law of a solve"). 0 of other engines.
     """
 
     machine: Machine
@@ -181,6 +191,8 @@ class Recording(Shown):
     contacts: int
     seconds: float = nan
     angle: Floats = field(default_factory=lambda: np.zeros(0))
+    instead: str = ""
+    gained: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("knots", "offsets", "ended", "events", "by_surface", "angle"):
@@ -215,6 +227,13 @@ class Recording(Shown):
     def prediction(self) -> Transfer:
         """What the theory predicts for the scene, see `chutelab.theory.predict`."""
         return predict(self.scene)
+
+    @cached_property
+    def laws(self) -> tuple[Broken, ...]:
+        """The laws of every run that this one breaks, empty if it keeps all; see `results.laws`."""
+        from chutelab.results.laws import judge
+
+        return judge(self)
 
     @property
     def count(self) -> int:

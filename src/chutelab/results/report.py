@@ -1,4 +1,4 @@
-"""What a run leaves to read, as tables: particle 0 beside the theory, the ledger, and notes."""
+"""What a run leaves to read, as tables: a crowd or particle 0, the ledger, and notes."""
 
 from __future__ import annotations
 
@@ -12,17 +12,15 @@ from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import (
     air_drag,
-    doubtful,
     layers,
-    measure,
     plugged,
     rolling,
     squeezed,
-    steady,
     stopped,
     waits,
 )
 from chutelab.results.recording import REASONS, Kind, Recording
+from chutelab.results.stream import crowd, steady
 from chutelab.util.tables import Sheet, number
 
 STATIONS = 6
@@ -51,12 +49,14 @@ def facts(recording: Recording, *, details: bool = False) -> str:
 def sheets(recording: Recording, *, details: bool = False) -> list[Sheet]:
     """Return the tables of a run, and what there is to know about it, a sheet each.
 
+    Of several particles these are all of them; particle 0 alone comes after them with `details`.
     With `details` errors are told down to rounding.
     """
-    compared = compare(recording).sheet(details=details)
-    parts = [compared]
-    if compared.notes and (way := _way(recording)).rows:
-        parts.append(way)
+    together = crowd(recording)
+    parts = [] if together is None else [together.sheet(details=details)]
+    nominal = _nominal(recording, details=details) if together is None or details else []
+    if together is None:
+        parts += nominal
     until = recording.scene.run.until
     # Belt work goes on after the landing: `belt_work` above is until nothing slips any more.
     ends = {"landed": "the landing", "settled": "all have settled"}.get(
@@ -64,31 +64,33 @@ def sheets(recording: Recording, *, details: bool = False) -> list[Sheet]:
     )
     books = ledger(recording).sheet(details=details)
     parts.append(replace(books, title=f"Energy ledger until {ends}, J"))
-    tell = (stopped, doubtful, plugged, waits, squeezed, rolling, steady, air_drag)
+    tell = (stopped, plugged, waits, squeezed, rolling, steady, air_drag)
     notes = [str(note) for one in tell if (note := one(recording)) is not None]
-    landed = measure(recording, "landing.count")
-    if landed > 1:
-        mean, spread = (measure(recording, f"landing.x.{what}") for what in ("mean", "spread"))
-        if not details and spread < 1e-9 * abs(mean):  # rounding
-            spread = 0.0
-        said = (
-            f"{landed:.0f} landed on the outgoing belt, at x = {number(mean)} m on average, with a"
-            f" spread of {1e3 * spread:.3g} mm (standard deviation)"
+    if (layered := layers(recording)) is not None:
+        notes.insert(
+            0,
+            "the lowest layer lands at x = {} m, the highest at {} m".format(*map(number, layered)),
         )
-        if (layered := layers(recording)) is not None:
-            said += "; the lowest layer at x = {} m, the highest at {} m".format(
-                *map(number, layered)
-            )
-        notes.insert(0, said)
     left = np.sort(recording.select(Kind.EXIT)["t"])
     if recording.machine.interact and len(left) >= FLOW:
         quarters = (f"{left[ceil(part * len(left) / 4) - 1]:.3f}" for part in (1, 2, 3, 4))
         said = "{} fell out of the machine: a quarter by {} s, half by {} s, three quarters by {} s"
         notes.insert(0, f"{said}, the last at {{}} s".format(len(left), *quarters))
+    if recording.instead:
+        notes.insert(0, f"{recording.instead}; {recording.engine} ran instead, and keeps them")
+    notes = [*map(str, recording.laws), *notes]
     return [
         *parts,
         *(Sheet("", (), (), notes=(f"{note[0].upper()}{note[1:]}.",)) for note in notes),
+        *(nominal if together is not None else ()),
     ]
+
+
+def _nominal(recording: Recording, *, details: bool) -> list[Sheet]:
+    """Return the tables of particle 0: beside the theory, and on its way where there is none."""
+    compared = compare(recording).sheet(details=details)
+    way = _way(recording)
+    return [compared, way] if compared.notes and way.rows else [compared]
 
 
 def _many(count: int, what: str) -> str:

@@ -168,6 +168,8 @@ def _about(recording: Recording) -> dict[str, Any]:
         "surfaces": list(recording.surfaces),
         "steps": recording.steps,
         "contacts": recording.contacts,
+        **({"instead": recording.instead} if recording.instead else {}),
+        "gained": recording.gained,
     }
 
 
@@ -190,11 +192,14 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Recording:
         if name != "angle" or "angle.npy" in archive.namelist()
     }
     about.pop("seconds", None)  # earlier files tell how long the run took
-    told = {name: about[name] for name in ("engine", "steps", "contacts")}
-    recording = Recording(machine=build(scene), **told, **arrays)
+    about.setdefault("gained", 0.0)  # ... and not this
+    told = {name: about[name] for name in ("engine", "steps", "contacts", "gained")}
+    instead = str(about.get("instead", ""))
+    recording = Recording(machine=build(scene), instead=instead, **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
         raise _UnfitError("the header is of another scene")
     numbers = {"by_surface": arrays["by_surface"], "angle": recording.angle}
+    numbers["gained"] = np.asarray(recording.gained, dtype=float)
     for name, dtype in (("knots", KNOT), ("events", EVENT)):
         numbers |= {f"{name}.{key}": arrays[name][key] for key in dtype.names or ()}
     for name, values in numbers.items():

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from math import degrees
 from typing import Any
 
+from chutelab.results.arrival import arrivals, fates
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import (
     air_drag,
     column,
-    doubtful,
     end_times,
     first,
     plugged,
     rolling,
     squeezed,
-    steady,
     stopped,
     waits,
 )
 from chutelab.results.recording import REASONS, Recording
+from chutelab.results.stream import crowd, steady
 from chutelab.scene.rules import SYMBOLS
 from chutelab.theory import Transfer, predict
 from chutelab.util.arrays import Floats
@@ -44,10 +45,13 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     being carried by it (see `rolling`), ``plugged`` unless particles got stuck (see
     `results.quantities.Plug`), ``waited`` unless particles found their place taken (see
     `results.quantities.Waits`), ``squeezed`` unless riders by adhesion got into each other (see
-    `machine.releases.Squeeze`), and ``doubtful`` unless entries of the ledger are too large to be
-    true (see `results.quantities.Doubtful`). ``drag`` is what air drag, left out, would do (see
-    `theory.Drag`), and ``steady`` is None unless streams were given in t/h (see
-    `results.quantities.Steady`).
+    `machine.releases.Squeeze`); ``laws`` is the list of `Recording.laws`, a table each, ``instead``
+    is None unless another engine ran first (see `Recording.instead`). ``drag`` is what air drag,
+    left out, would do (see `theory.Drag`), and ``steady`` is None unless streams were given in t/h
+    (see `results.stream.Steady`). ``landing`` is the first touch of the outgoing belt itself,
+    ``arrival`` that of the belt or of what lies on it. ``fates`` says how many particles ended
+    where (see `results.arrival.fates`), and ``crowd`` is None of one particle (see
+    `results.stream.Crowd`).
     """
     error, scene = compare(recording), recording.scene
     as_printed = None
@@ -70,13 +74,17 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "separation": events("separation"),
         "impact": events("impact", *AFTER),
         "landing": events("landing", *AFTER),
+        "arrival": {name: column(arrivals(recording), name) for name in BEFORE},
         "ended": {"t": end_times(recording), "reason": [REASONS[k] for k in recording.ended]},
+        "fates": Counter(fates(recording).tolist()),
+        "crowd": crowd(recording),
         "stopped": stopped(recording),
         "rolling": rolling(recording),
         "plugged": plugged(recording),
         "waited": waits(recording),
         "squeezed": squeezed(recording),
-        "doubtful": doubtful(recording),
+        "laws": recording.laws,
+        "instead": recording.instead or None,
         "drag": air_drag(recording),
         "steady": steady(recording),
         "ledger": ledger(recording),

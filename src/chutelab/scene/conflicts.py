@@ -13,8 +13,17 @@ from contextlib import suppress
 from typing import Any, Final
 
 from chutelab.scene.materials import PRESETS
-from chutelab.scene.rules import SYMBOLS, THEORY, UNPROMISED, suggestion, unit_of
-from chutelab.scene.units import MOST_PARTICLES, read_size, write_size
+from chutelab.scene.rules import FIRST, SYMBOLS, THEORY, UNPROMISED, suggestion, unit_of, whose
+from chutelab.scene.units import (
+    LIGHTEST,
+    MOST_PARTICLES,
+    MOST_PIECES,
+    SHORTEST,
+    apart,
+    read_size,
+    sphere_mass,
+    write_size,
+)
 from chutelab.util.errors import MISSING, Fault, did_you_mean
 from chutelab.util.trig import RADIANS, sin_cos
 
@@ -35,6 +44,12 @@ EITHER: Final = {"particle": "particles", "plate": "plates", "stream": "streams"
 
 ALWAYS: Final = ("particle", "stream", "run")
 """Tables that a scene has without writing them."""
+
+NO_MACHINE: Final = ("expect", "view", "live")
+"""Tables that say nothing of the machine."""
+
+LEAST_VIEW: Final = 1e-6
+"""Least width and height of a ``[view]``, m: less is not told apart far from the origin."""
 
 LIST: Final = (list, tuple)
 
@@ -137,12 +152,21 @@ def conflicts(look: Look) -> Iterator[Fault]:
             }
             yield from surface_conflicts(path, known)
     for row, conveyor in enumerate(look.several("conveyor")):
-        if isinstance(conveyor, Mapping) and conveyor.get("from") == conveyor.get("to") is not None:
-            yield Fault(
-                f"conveyor[{row}].to", conveyor["to"], f"must differ from conveyor[{row}].from"
-            )
+        path = f"conveyor[{row}]"
+        if (
+            isinstance(conveyor, Mapping)
+            and look.sound(path)
+            and not apart(conveyor["from"], conveyor["to"])
+        ):
+            yield Fault(f"{path}.to", conveyor["to"], _differ(path))
+    yield from _pieces(look)
     yield from _strings(look)
     yield from _expectations(look)
+    low, high = look("view", "from"), look("view", "to")
+    corners = isinstance(low, LIST) and isinstance(high, LIST)
+    if corners and any(b - a < LEAST_VIEW for a, b in zip(low, high, strict=True)):
+        text = f"must lie right of view.from = {list(low)} and above it, by 1e-6 m at least"
+        yield Fault("view.to", list(high), text)
 
 
 def _tables(look: Look) -> Iterator[Fault]:
@@ -243,6 +267,10 @@ def _kind(look: Look, row: int) -> Iterator[Fault]:
             yield Fault(path("spin"), True, text)
         if look.given("particle", "density", row):
             yield Fault(path("density"), density, f"{path('radius')} is 0: give a mass")
+        if look.given("particle", "material", row) and not look.given("particle", "mass", row):
+            yield Fault(path("mass"), MISSING, f"kg, because {path('radius')} is 0")
+    elif not shaped:
+        yield from _lightness(look, row)
     if look("particle", "rolling_friction", row) > 0.0 and spin is False and not shaped:
         text = f"needs {path('spin')} = true: what never turns never rolls"
         yield Fault(path("rolling_friction"), look("particle", "rolling_friction", row), text)
@@ -258,6 +286,26 @@ def _kind(look: Look, row: int) -> Iterator[Fault]:
             if look.given("particle", key, row):
                 text = f"is for what is round; a {shape} has a mass, and a size of its own"
                 yield Fault(path(key), look("particle", key, row), text)
+
+
+def _lightness(look: Look, row: int) -> Iterator[Fault]:
+    """Say if a density makes a kind of particles lighter than anything."""
+    key, density = "density", look("particle", "density", row)
+    if density is None and not look.given("particle", "mass", row):
+        key, name = "material", look("particle", "material", row)
+        own = [m for m in look.several("material") if isinstance(m, Mapping) and name is not None]
+        found = [m.get("density") for m in own if m.get("name") == name]
+        if not found and isinstance(name, str) and name in PRESETS:
+            found = [PRESETS[name].material.density]
+        density = found[0] if found and look.sound("material") else None
+    radius = look("particle", "radius", row)
+    if isinstance(radius, LIST):
+        radius = 0.5 * sum(radius)
+    if density is not None and sphere_mass(density, radius) < LIGHTEST:
+        path = look.path("particle", key, row)
+        text = f"with {look.path('particle', 'radius', row)} = {radius:g} m a mass of at least"
+        mass = sphere_mass(density, radius)
+        yield Fault(path, look("particle", key, row), f"{text} {LIGHTEST:g} kg, not {mass:.3g} kg")
 
 
 def _engine(look: Look) -> Iterator[Fault]:
@@ -305,6 +353,10 @@ def _release(look: Look, row: int) -> Iterator[Fault]:
     def given(key: str) -> bool:
         return look.given("stream", key, row)
 
+    start, until = look("stream", "start", row), look("run", "until")
+    if isinstance(until, int | float) and start >= until:
+        text = f"less than run.until = {until:g} s, when the run ends: nothing would be released"
+        yield Fault(path("start"), start, text)
     fills = given("fill")
     for key in ("at", "to", "rate", "bed_height", "speed_spread"):
         if fills and given(key):
@@ -315,6 +367,20 @@ def _release(look: Look, row: int) -> Iterator[Fault]:
     if given("to") and given("bed_height"):
         text = f"is a height above a point; {path('to')} makes a line of it"
         yield Fault(path("bed_height"), look("stream", "bed_height", row), text)
+    kind = _kind_of(look, row)
+    if (
+        given("width")
+        and look.sound(path("width"))
+        and look.sound(look.path("particle", "radius", kind))
+    ):
+        width, radius = look("stream", "width", row), look("particle", "radius", kind)
+        size = sum(radius) if isinstance(radius, list | tuple) else 2.0 * radius
+        if look("particle", "shape", kind) in ("box", "polygon") or size == 0.0:
+            text = "is for disks and spheres: the slice that is simulated is as thick as they are"
+            yield Fault(path("width"), width, text)
+        elif width < size:
+            text = f"must be at least the diameter of a particle, {size:g} m: one slice"
+            yield Fault(path("width"), width, text)
     if not look.has("incoming"):
         for key, what in (("at", "release point [x, y], m"), ("velocity", "[vx, vy], m/s")):
             if not given(key) and not fills and look.sound(path(key)):
@@ -323,7 +389,7 @@ def _release(look: Look, row: int) -> Iterator[Fault]:
     on_belt = not given("at") and not fills
     if given("at") and look.sound(path("at")) and not given("to"):
         x, y = look("stream", "at", row)
-        radius = look("particle", "radius", _kind_of(look, row))
+        radius = look("particle", "radius", kind)
         if isinstance(radius, list | tuple):
             radius = 0.5 * sum(radius)
         height = look("incoming", "pulley_radius") + radius
@@ -392,6 +458,27 @@ def _plate(look: Look, row: int) -> Iterator[Fault]:
             yield Fault(path("distance"), look("plate", "distance", row), text)
 
 
+def _pieces(look: Look) -> Iterator[Fault]:
+    """Say if surfaces and their copies are more pieces than an engine can look at."""
+    belts = ("incoming", "outgoing")
+    count = sum(map(look.has, belts)) + look.rows("plate") + 4 * look.rows("conveyor")
+    for row in range(look.rows("surface")):
+        if not look.sound(f"surface[{row}]"):
+            continue
+        points, repeat = (look("surface", key, row) for key in ("points", "repeat"))
+        opens, closes = (look("surface", key, row) for key in ("opens_at", "closes_at"))
+        pieces = max(1, len(points or ()) - 1) * math.prod(copies[0] for copies in repeat)
+        if opens is not None and closes is not None and opens < closes:
+            pieces *= 2
+        count += pieces
+        if count > MOST_PIECES:
+            key = "repeat" if repeat else "points"
+            value = look("surface", key, row)
+            text = f"at most {MOST_PIECES} pieces of surfaces, copies too, in all"
+            yield Fault(f"surface[{row}].{key}", value, f"{text}, not {count}")
+            return
+
+
 def _strings(look: Look) -> Iterator[Fault]:
     counts = [look("stream", "count", row) for row in range(max(1, look.rows("stream")))]
     for row, string in enumerate(look.several("string")):
@@ -402,6 +489,10 @@ def _strings(look: Look) -> Iterator[Fault]:
 
 
 ARC: Final = ("radius", "from_deg", "to_deg")
+
+
+def _differ(path: str) -> str:
+    return f"must differ from {path}.from by at least {SHORTEST:g} m"
 
 
 def surface_conflicts(path: str, surface: Mapping[str, Any]) -> Iterator[Fault]:
@@ -431,6 +522,9 @@ def surface_conflicts(path: str, surface: Mapping[str, Any]) -> Iterator[Fault]:
         if angles and (begin == end or abs(end - begin) > 360.0):
             text = f"must be another angle than {path}.from_deg, at most 360 from it"
             yield Fault(f"{path}.to_deg", end, text)
+        elif angles and abs(end - begin) * RADIANS * (surface.get("radius") or 1.0) < SHORTEST:
+            text = f"so far from {path}.from_deg that the arc is {SHORTEST:g} m long, at least"
+            yield Fault(f"{path}.to_deg", end, text)
         return
     if points is not None:
         for key, value in (("from", start), ("to", to)):
@@ -443,8 +537,8 @@ def surface_conflicts(path: str, surface: Mapping[str, Any]) -> Iterator[Fault]:
     elif start is None or to is None:
         key, other = ("from", "to") if start is None else ("to", "from")
         yield Fault(f"{path}.{key}", MISSING, f"a point [x, y], to go with {path}.{other}")
-    elif start == to:
-        yield Fault(f"{path}.to", to, f"must differ from {path}.from")
+    elif isinstance(start, LIST) and isinstance(to, LIST) and not apart(start, to):
+        yield Fault(f"{path}.to", to, _differ(path))
 
 
 def stream_name(row: int) -> str:
@@ -460,8 +554,10 @@ def _expectations(look: Look) -> Iterator[Fault]:
         surfaces.append("plate")
     free = [look(table, "name", row) for table in SURFACES for row in range(look.rows(table))]
     surfaces += [name for name in free if isinstance(name, str)]
-    streams = []
+    streams, counts = [], []
     for row in range(max(1, look.rows("stream"))):
+        many = look("stream", "count", row)
+        counts.append(many if isinstance(many, int) else 1)
         called = look("stream", "name", row)
         streams.append(called if isinstance(called, str) else stream_name(row))
     for index, given in enumerate(look.several("expect")):
@@ -476,7 +572,10 @@ def _expectations(look: Look) -> Iterator[Fault]:
             text = f"no such quantity here; {suggestion(name, surfaces)}"
             yield Fault(f"{path}.quantity", name, text)
             continue
-        if given.get("value") == THEORY and name not in SYMBOLS:
+        if text := whose(name, sum(counts)):
+            yield Fault(f"{path}.quantity", name, text)
+            continue
+        if given.get("value") == THEORY and name.removeprefix(FIRST) not in SYMBOLS:
             text = f"a number; the theory has no {name}, only {', '.join(SYMBOLS)}"
             yield Fault(f"{path}.value", THEORY, text)
         for key in ("tolerance", "tolerance_contact", "tolerance_pymunk"):

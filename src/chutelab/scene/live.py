@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from chutelab.scene.conflicts import ALWAYS
+from chutelab.scene.conflicts import ALWAYS, NO_MACHINE
 from chutelab.scene.messages import LISTS, faults_of, unknown
 from chutelab.scene.overrides import (
     Override,
@@ -109,7 +109,7 @@ def _refused(document: Mapping[str, Any], key: str) -> str:
     except InputError as error:
         return str(error)
     table = str(path[0])
-    if table in ("expect", "live"):
+    if table in NO_MACHINE:
         return f"[{table}] is no part of the machine"
     for depth in range(1, len(path) + 1):
         if rule_at(path[:depth]) is None:

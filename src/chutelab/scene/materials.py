@@ -12,7 +12,7 @@ from typing import Any, Final, Self
 
 from pydantic import model_validator
 
-from chutelab.scene.units import Amount, Name, Positive, Share, Table, described
+from chutelab.scene.units import Amount, Density, Name, Share, Table, described
 
 LIGHTEST: Final = 100.0
 """kg/m³: about expanded polystyrene; balsa has 110 to 140, cork 220."""
@@ -25,7 +25,7 @@ class Material(Table):
     """What particles are made of; a pair that is not given is as the material with itself."""
 
     name: Name = described(..., "Unique name, for particle.material")
-    density: Positive = described(..., "Density of the solid, without the voids of a heap", "kg/m³")
+    density: Density = described(..., "Density of the solid, without the voids of a heap", "kg/m³")
     restitution: Share = described(..., "Coefficient of restitution with itself")
     friction: Amount = described(..., "Coulomb coefficient of friction µ with itself")
     restitution_steel: Share = described(

@@ -92,6 +92,9 @@ def _phrases(rule: Mapping[str, Any]) -> list[str]:
     if rule["type"] == "object":
         return ["a table of keys and values"]
     if rule["type"] != "array":
+        least = rule.get("not", {}).get("exclusiveMaximum")
+        if least is not None:
+            return [_WORDS[rule["type"]] + _range({**rule, "minimum": least}), "0"]
         return [_WORDS[rule["type"]] + _range(rule)]
     if "prefixItems" in rule:
         return ["a point [x, y] of two numbers"]

@@ -33,20 +33,30 @@ SYMBOLS: Final = {
 _UNITS: Final = {
     "t": "s", "x": "m", "y": "m", "vx": "m/s", "vy": "m/s", "vx_after": "m/s", "vy_after": "m/s",
 }  # fmt: skip
-STATISTICS: Final = ("mean", "spread", "min", "max")
+STATISTICS: Final = ("mean", "spread", "min", "max", "q02", "q50", "q98")
 ENTRIES: Final = ("belt_work", "restitution_loss", "friction_loss")
 STORED: Final = ("kinetic", "potential")
 TOTALS: Final = (*ENTRIES, "residual", "turned_over")
-ENDINGS: Final = ("time", "landed", "settled", "exit", "stopped")
+ENDINGS: Final = ("time", "landed", "settled", "exit", "stopped", "unreleased")
+"""Why a track ends; the last is that of a particle that was not released until the run was over."""
+
+FIRST: Final = "particles[0]."
+"""What a quantity of particle 0 begins with; it has to where there are several particles."""
+
+
 NEEDED: Final = {"separation": "incoming", "impact": "plate", "landing": "outgoing"}
 """Events, and the table without which there are none; impacts on free surfaces go by name."""
+
+ARRIVAL: Final = "arrival"
+"""The first touch of the outgoing belt, or of what lies on it; the landing is that of the belt."""
 
 
 def unit_of(name: str, surfaces: Iterable[str], streams: Collection[str] = ()) -> str | None:
     """Return the unit of a quantity, "" for a number of things; None if the scene has none such.
 
-    Names are such as ``x2``, ``landing.x``, ``landing.x.mean``, ``flight.t``, ``impact.ramp.t``,
-    ``landing.count``, ``ended.settled``, ``ledger.belt_work``, ``ledger.kinetic.end`` or
+    Names are such as ``x2``, ``landing.x``, ``particles[0].landing.x``, ``landing.x.mean``,
+    ``arrival.vx.spread``, ``flight.t``, ``impact.ramp.t``, ``landing.count``, ``ended.settled``,
+    ``ledger.belt_work``, ``ledger.kinetic.end`` or
     ``ledger.by_surface.outgoing.belt_work``; the surfaces are all that the scene has. What has a
     statistic or a count is also of one stream, by its name: ``by_stream.left.landing.x.mean``.
 
@@ -56,6 +66,10 @@ def unit_of(name: str, surfaces: Iterable[str], streams: Collection[str] = ()) -
     ('m', None)
     """
     units = _units(tuple(surfaces))
+    if name.startswith(FIRST):
+        own = name.removeprefix(FIRST)
+        particular = own in SYMBOLS or own.rpartition(".")[2] in (*_UNITS, *ENTRIES)
+        return units.get(own) if particular and not own.startswith("ledger.by_surface.") else None
     match name.split(".", 2):
         case ["by_stream", stream, rest]:
             many = rest.rpartition(".")[2] in ("count", *STATISTICS)
@@ -67,8 +81,11 @@ def unit_of(name: str, surfaces: Iterable[str], streams: Collection[str] = ()) -
 def _units(surfaces: tuple[str, ...]) -> dict[str, str]:
     """Return the units of all quantities of a scene with these surfaces, by name."""
     events = {event: _UNITS for event, home in NEEDED.items() if home in surfaces}
+    before = {column: unit for column, unit in _UNITS.items() if not column.endswith("_after")}
     if "separation" in events:
-        events["separation"] = {k: u for k, u in _UNITS.items() if not k.endswith("_after")}
+        events["separation"] = before
+    if "landing" in events:
+        events[ARRIVAL] = before
     events |= {f"impact.{name}": _UNITS for name in surfaces if name not in NEEDED.values()}
     units = dict(SYMBOLS) if {"incoming", "plate"} <= set(surfaces) else {}
     units |= {"contacts": "", **{f"ended.{ending}": "" for ending in ENDINGS}}
@@ -84,6 +101,32 @@ def _units(surfaces: tuple[str, ...]) -> dict[str, str]:
     for name in (*surfaces, "particles"):
         units |= {f"ledger.by_surface.{name}.{entry}": "J" for entry in ENTRIES}
     return units
+
+
+def whose(name: str, count: int) -> str:
+    """Say how a name has to go on where there are several particles; "" if it says whose it is.
+
+    So of landings and arrivals, and of what the outgoing belt pays: those of particle 0 are not
+    those of the stream.
+
+    Examples
+    --------
+    >>> whose("landing.x", 1), whose("landing.x.mean", 200)
+    ('', '')
+    >>> whose("landing.x", 200)
+    'of 200 particles: particles[0].landing.x, or landing.x.mean of the stream'
+    """
+    if count <= 1:
+        return ""
+    match name.split("."):
+        case ["landing" | "arrival", column] if column in _UNITS:
+            all_of = f"{name}.mean of the stream"
+        case ["belt_work" | "slip_heat"]:
+            entry = "belt_work" if name == "belt_work" else "friction_loss"
+            all_of = f"ledger.by_surface.outgoing.{entry} of the stream"
+        case _:
+            return ""
+    return f"of {count} particles: {FIRST}{name}, or {all_of}"
 
 
 def suggestion(name: str, surfaces: Iterable[str]) -> str:
@@ -114,7 +157,8 @@ class Expect(Table):
     quantity: Text = described(
         ...,
         "What is looked at: a paper's symbol such as x2 or phi1_deg, or a key of the JSON summary "
-        "such as landing.x, landing.x.mean, ledger.by_surface.outgoing.belt_work",
+        "such as landing.x (of several particles particles[0].landing.x), landing.x.mean, "
+        "ledger.by_surface.outgoing.belt_work",
         max_length=200,
     )
     value: Literal["theory"] | Value = described(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from math import hypot, pi, sqrt
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from math import hypot, sqrt
 from typing import Annotated, Any, Final, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
@@ -23,15 +24,17 @@ from chutelab.scene.tables import (
     Stream,
     String,
     Surface,
+    View,
 )
 from chutelab.scene.units import (
     MOST_EXPECTATIONS,
     MOST_KINDS,
     MOST_SURFACES,
-    Amount,
+    Gravity,
     Table,
     Text,
     described,
+    sphere_mass,
     tonnes_per_hour,
 )
 
@@ -48,6 +51,7 @@ TABLES: Final[dict[str, type[Table]]] = {
     "stream": Stream,
     "run": Run,
     "expect": Expect,
+    "view": View,
     "live": Live,
 }
 
@@ -88,7 +92,7 @@ class Scene(Table):
     """
 
     title: Text = described("Untitled scene", "What the scene is called", max_length=200)
-    gravity: Amount = described(9.81, "Gravity g, downward", "m/s²")
+    gravity: Gravity = described(9.81, "Gravity g, downward", "m/s²")
     particles: Annotated[tuple[Particle, ...], BeforeValidator(_one_or_several)] = _several(
         (Particle(),), alias="particle", min_length=1, max_length=MOST_KINDS
     )
@@ -107,6 +111,7 @@ class Scene(Table):
     )
     run: Run = Field(default_factory=Run)
     expect: tuple[Expect, ...] = Field((), max_length=MOST_EXPECTATIONS)
+    view: View | None = None
     live: Live = Field(default_factory=Live)
 
     _source: str = PrivateAttr("<scene>")
@@ -151,42 +156,71 @@ class Scene(Table):
         """Number of particles of all streams."""
         return sum(stream.count for stream in self.streams)
 
+    def slices(self, number: int = 0) -> float:
+        """Return how many slices a stream's material is wide, each one particle thick.
+
+        The width over the mean diameter of its particles; 1 without a width. What a slice takes, or
+        brings, per time is so many times less than what all of the material does.
+        """
+        width, particle = self.streams[number].width, self.particles[self.kinds[number]]
+        return 1.0 if width is None else width / (2.0 * particle.radius)
+
+    @property
+    def rate(self) -> float:
+        """Particles per second of the first stream, of all its width."""
+        return self.stream.rate * self.slices()
+
     @property
     def crowded(self) -> bool:
         """Whether particles meet each other."""
         return self.count > 1 and any(stream.interact for stream in self.streams)
 
     def met(self, kind: int, other: int | str) -> tuple[float, float]:
-        """Return restitution and friction of a kind of particles and another kind, or a surface.
+        """Return restitution and friction of a kind of particles and another, see `meetings`."""
+        return self.meetings()(kind, other)
+
+    def meetings(self) -> Callable[[int, int | str], tuple[float, float]]:
+        """Return what tells restitution and friction of a kind and another kind, or a surface.
 
         What ``[[pair]]`` says of the two counts first, then what the surface (or a stream of the
         kind) says, then the material, then the default. Of two kinds that nothing is said of it is
         the geometric mean of what each has with itself, a mixing rule that is as good as any.
         """
-        particle = self.particles[kind]
-        with_it: str | None
-        if isinstance(other, str):
-            with_it, table = other, self.surface_table(other)
-            steel = isinstance(table, Plate) or (
-                isinstance(table, Surface) and table.material == "steel"
-            )
-            values = self._own(particle, (table,), "_steel" if steel else "_rubber")
-        elif other == kind:
-            with_it, rows = particle.name, zip(self.streams, self.kinds, strict=True)
-            own = [stream for stream, its in rows if its == kind]
-            values = self._own(particle, own or [Stream()])
-        else:
-            with_it = self.particles[other].name
-            pairs = zip(self.met(kind, kind), self.met(other, other), strict=True)
-            products: list[Any] = [a * b for a, b in pairs]
-            # A power of a half is no square root to the last bit.
-            values = tuple(sqrt(p) if isinstance(p, float) else p**0.5 for p in products)
-        restitution, friction = values
-        for pair in reversed(self.pair):
-            if set(pair.between) == {particle.name, with_it}:
-                restitution = restitution if pair.restitution is None else pair.restitution
-                friction = friction if pair.friction is None else pair.friction
-        return restitution, friction
+        tables = {name: self.surface_table(name) for name in ("incoming", "plate", "outgoing")}
+        tables |= {str(free.name): free for free in self.free}
+        pairs: dict[frozenset[str | None], dict[str, float]] = {}
+        for pair in self.pair:
+            said = {"restitution": pair.restitution, "friction": pair.friction}
+            told = {key: value for key, value in said.items() if value is not None}
+            # The first one counts.
+            names = frozenset(pair.between)
+            pairs[names] = told | pairs.get(names, {})
+
+        @cache
+        def met(kind: int, other: int | str) -> tuple[float, float]:
+            particle = self.particles[kind]
+            with_it: str | None
+            if isinstance(other, str):
+                with_it, table = other, tables[other]
+                steel = isinstance(table, Plate) or (
+                    isinstance(table, Surface) and table.material == "steel"
+                )
+                values = self._own(particle, (table,), "_steel" if steel else "_rubber")
+            elif other == kind:
+                with_it, rows = particle.name, zip(self.streams, self.kinds, strict=True)
+                own = [stream for stream, its in rows if its == kind]
+                values = self._own(particle, own or [Stream()])
+            else:
+                with_it = self.particles[other].name
+                both = zip(met(kind, kind), met(other, other), strict=True)
+                products: list[Any] = [a * b for a, b in both]
+                # A power of a half is no square root to the last bit.
+                values = tuple(sqrt(p) if isinstance(p, float) else p**0.5 for p in products)
+            restitution, friction = values
+            said = pairs.get(frozenset((particle.name, with_it)), {})
+            return said.get("restitution", restitution), said.get("friction", friction)
+
+        return met
 
     def _own(self, particle: Particle, homes: Sequence[Any], column: str = "") -> Any:
         """Return what tables say, else the material, else the default of the first."""
@@ -338,8 +372,7 @@ class Scene(Table):
         if shaped:
             filled._fill("radius", max(hypot(x, y) for x, y in filled.outline))
         if density is not None:
-            size = filled.radius
-            filled._fill("mass", density * (4.0 / 3.0 * pi) * (size * size * size))
+            filled._fill("mass", sphere_mass(density, filled.radius))
         return filled
 
     def _with_rate(self, stream: Stream, number: int, kind: int) -> Stream:
@@ -353,7 +386,8 @@ class Scene(Table):
         if isinstance(typed, str):
             filled._fill("rate", typed)
             mass = self.particles[kind].mean_mass
-            filled._resolve("rate", tonnes_per_hour(typed) / 3.6 / mass)
+            slices = self.slices(number)
+            filled._resolve("rate", tonnes_per_hour(typed) / 3.6 / mass / slices)
         return filled
 
 

@@ -18,12 +18,15 @@ from chutelab.scene.units import (
     Box,
     Coordinate,
     Corners,
+    Density,
+    Duration,
     Keys,
+    Length,
+    Mass,
     Name,
     Number,
     Point,
     Polyline,
-    Positive,
     Radius,
     Ranges,
     Rate,
@@ -31,6 +34,7 @@ from chutelab.scene.units import (
     Resolved,
     Share,
     Size,
+    Speed,
     Switch,
     Table,
     Text,
@@ -65,8 +69,8 @@ class Particle(Resolved):
     points: Corners | None = described(
         None, "Of a polygon, convex: [[x, y], ...]; it turns about its centroid", "m"
     )
-    mass: Positive = described(0.008, "Mass m; or a density, or a material that has one", "kg")
-    density: Positive | None = described(
+    mass: Mass = described(0.008, "Mass m; or a density, or a material that has one", "kg")
+    density: Density | None = described(
         None, "Instead of a mass: that of a solid sphere of the radius", "kg/m³"
     )
     material: Text | None = described(
@@ -120,9 +124,9 @@ class Pair(Table):
 class Incoming(Table):
     """The incoming conveyor and its drive pulley, whose axis is the origin."""
 
-    speed: Amount = described(..., "Belt speed v0", "m/s")
-    pulley_radius: Positive = described(..., "Radius R of the drive pulley, with the belt", "m")
-    length: Positive = described(1.0, "Length of belt before the pulley", "m")
+    speed: Speed = described(..., "Belt speed v0", "m/s")
+    pulley_radius: Length = described(..., "Radius R of the drive pulley, with the belt", "m")
+    length: Length = described(1.0, "Length of belt before the pulley", "m")
     incline_deg: Number = described(
         0.0,
         "Angle β at which the belt rises to the pulley, which it meets where it is tangential",
@@ -147,7 +151,7 @@ class Plate(Table):
 
     name: Name | None = described(None, "Name of a further plate, for events and the ledger")
     pivot: Point | None = described(None, "Of a further plate: its pivot [x, y]", "m")
-    distance: Positive = described(
+    distance: Length = described(
         None,
         "Of the damping plate: d_okr, from the pulley's leading edge x = R to the pivot",
         "m",
@@ -179,14 +183,14 @@ class Outgoing(Table):
     speed: Coordinate = described(
         None, "Belt speed v_dop, may be negative; default: the incoming belt's", "m/s"
     )
-    drop: Positive = described(..., "Fall to the belt, measured as drop_from says", "m")
+    drop: Length = described(..., "Fall to the belt, measured as drop_from says", "m")
     drop_from: Literal["impact", "top"] = described(
         "impact",
         '"impact": drop is d2, the fall of a particle\'s centre from plate impact to landing; '
         '"top": drop is d3, from the top of the pulley (y = R) down to the belt surface',
     )
     start: Coordinate = described(-2.0, "World x where the belt begins; it reaches forward", "m")
-    length: Positive = described(6.0, "Length of the belt", "m")
+    length: Length = described(6.0, "Length of the belt", "m")
     restitution: Share = pair_restitution(0.0, "particle-belt")
     friction: Amount = pair_friction(0.5, "particle-belt")
 
@@ -200,7 +204,7 @@ class Conveyor(Table):
         json_schema_extra={"x-unit": "m"},
     )  # fmt: skip
     to: Point = described(..., "Axis [x, y] of the second pulley", "m")
-    pulley_radius: Positive = described(0.1, "Radius of both pulleys, with the belt", "m")
+    pulley_radius: Length = described(0.1, "Radius of both pulleys, with the belt", "m")
     speed: Coordinate = described(
         ..., "Speed on top, from the first to the second pulley; may be negative", "m/s"
     )
@@ -233,7 +237,7 @@ class Surface(Table):
     to: Point | None = described(None, "Second end [x, y]", "m")
     points: Polyline = described(None, "Instead of from and to: a polyline [[x, y], ...]", "m")
     center: Point | None = described(None, "Of an arc: its centre [x, y]", "m")
-    radius: Positive | None = described(None, "Of an arc: its radius", "m")
+    radius: Length | None = described(None, "Of an arc: its radius", "m")
     from_deg: Angle = described(
         0.0, "Of an arc: where it begins, counterclockwise from the x axis", "degrees"
     )
@@ -280,7 +284,7 @@ class String(Table):
         ..., alias="from", description="Fixed end [x, y] (m).", json_schema_extra={"x-unit": "m"}
     )
     particle: Whole = described(0, "Number of the particle, over all streams, from 0", ge=0)
-    length: Positive | None = described(
+    length: Length | None = described(
         None, "Length; default: the distance at the particle's release", "m"
     )
 
@@ -300,6 +304,12 @@ class Stream(Resolved):
         'Particles per second, or a text such as "120 t/h"; particle i is released at start +'
         " i / rate",
         "1/s",
+    )
+    width: Length | None = described(
+        None,
+        "Width of the material on the belt: a rate in t/h, and all that is told per time, is of all"
+        " of it, of which a slice as thick as a particle is simulated; default: of the slice",
+        "m",
     )
     start: Amount = described(0.0, "When the first is released", "s")
     bed_height: Amount = described(
@@ -331,7 +341,7 @@ class Stream(Resolved):
 
     @property
     def mass_rate(self) -> float | None:
-        """The rate in kg/s, if it was given as a mass per time."""
+        """The rate in kg/s, of all its width, if it was given as a mass per time."""
         typed = self._typed.get("rate")
         return tonnes_per_hour(typed) / 3.6 if isinstance(typed, str) else None
 
@@ -349,13 +359,13 @@ class Run(Table):
     engine: Literal["auto", "exact", "contact", "pymunk"] = described(
         "auto", '"auto" takes exact where particles do not interact, else contact'
     )
-    until: Literal["landed", "settled"] | Positive = described(
+    until: Literal["landed", "settled"] | Duration = described(
         None,
         'Ending: "landed", "settled" or a number of seconds; default: "landed" with [outgoing], '
-        'else "settled"',
+        'else "settled". What is 1 m below the lowest surface has left before',
         "s",
     )
-    max_time: Positive = described(
+    max_time: Duration = described(
         30.0, "Bound on every ending, counted from the last release", "s"
     )
     dt: Number = described(
@@ -368,6 +378,16 @@ class Run(Table):
     align: bool = described(
         True, "Whether the pymunk engine's steps of a lone particle end at contacts, or all last dt"
     )
+
+
+class View(Table):
+    """What pictures, film and page show, instead of what they choose. No engine looks at it."""
+
+    from_: Point = Field(
+        ..., alias="from", description="Lower left corner [x, y] (m).",
+        json_schema_extra={"x-unit": "m"},
+    )  # fmt: skip
+    to: Point = described(..., "Upper right corner [x, y]", "m")
 
 
 class Preset(Table):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import isfinite, nan
+from math import hypot, isfinite, nan, pi
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import (
@@ -14,13 +14,14 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     PrivateAttr,
     SerializerFunctionWrapHandler,
     WithJsonSchema,
     model_serializer,
 )
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from chutelab.util.errors import about_comma
 
@@ -152,7 +153,10 @@ def write_size(number: float, unit: str, digits: int = 3) -> str:
 RESERVED_NAMES: Final = ("incoming", "plate", "outgoing", "particles")
 """Names in ledgers and events that a free surface may not take."""
 
-WORDS: Final = r"""[^\s.=\[\]"']+(?: [^\s.=\[\]"']+)*"""
+_SIGN: Final = r"""[^\s\x1c-\x1f\x85\ufeff.=\[\]"']"""
+"""Of a name. What is a blank to Python only, or to JavaScript only, is none to either."""
+
+WORDS: Final = f"{_SIGN}+(?: {_SIGN}+)*"
 NAME: Final = f"^{WORDS}$"
 """A free surface's name, such that an override can name it in a path."""
 
@@ -162,10 +166,32 @@ LONGEST_NAME: Final = 40
 LARGEST: Final = 1e6
 """Bound on every dimensional quantity, SI: far beyond any chute, far from overflow in v⁴."""
 
+SHORTEST: Final = 1e-9
+"""m; a few atoms. Less than that has no surface, and releases on a belt are told apart by no less.
+
+This and the following are far from underflow in squares and products, too."""
+
+LIGHTEST: Final = 1e-27
+"""kg; less than any atom has, of which the lightest has 1.7e-27 kg."""
+
+THINNEST: Final = 1e-3
+"""kg/m³; less than any solid has, and than air at a thousandth of its pressure."""
+
+BRIEFEST: Final = 1e-9
+"""s; less than a blow between the smallest grains lasts, which has no duration here."""
+
+WEAKEST: Final = 1e-9
+"""m/s²; the pull of a grain of 1 mm on another, about. Weaker gravity is none: write 0."""
+
+SLOWEST: Final = 1e-9
+"""m/s; 3 cm in a year, as continents drift. What is slower stands still: write 0."""
+
 MOST_PARTICLES: Final = 10_000_000
 """Their knots alone would be gigabytes beyond this."""
 
 MOST_SURFACES: Final = 1_000
+MOST_PIECES: Final = 10_000
+"""Straight and bent pieces of all surfaces with their copies: engines look at each."""
 MOST_KINDS: Final = 100
 """Of particles, and of streams."""
 MOST_KEYS: Final = 200
@@ -175,10 +201,18 @@ MOST_POINTS: Final = 10_000
 MOST_EXPECTATIONS: Final = 1_000
 
 
+def apart(first: Sequence[float], second: Sequence[float]) -> bool:
+    """Tell whether there is room for a surface between two points, m."""
+    return hypot(second[0] - first[0], second[1] - first[1]) >= SHORTEST
+
+
 def _distinct(points: tuple[Point, ...]) -> tuple[Point, ...]:
     for first, second in pairwise(points):
-        if first == second:
-            raise ValueError(f"consecutive points must differ, [{first[0]}, {first[1]}] repeats")
+        if not apart(first, second):
+            raise ValueError(
+                f"consecutive points must differ by at least {SHORTEST:g} m,"
+                f" [{first[0]}, {first[1]}] repeats"
+            )
     return points
 
 
@@ -208,7 +242,10 @@ Point = tuple[Coordinate, Coordinate]
 Polyline = Annotated[
     tuple[Point, ...], Field(min_length=2, max_length=MOST_POINTS), AfterValidator(_distinct)
 ]
-Positive = Annotated[Number, Field(gt=0.0, le=LARGEST)]
+Length = Annotated[Number, Field(ge=SHORTEST, le=LARGEST)]
+Mass = Annotated[Number, Field(ge=LIGHTEST, le=LARGEST)]
+Density = Annotated[Number, Field(ge=THINNEST, le=LARGEST)]
+Duration = Annotated[Number, Field(ge=BRIEFEST, le=LARGEST)]
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 Angle = Annotated[Number, Field(ge=-720.0, le=720.0)]
 
@@ -223,6 +260,34 @@ class Worded:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         return {**handler(schema), "x-words": self.words}
+
+
+class OrLeast:
+    """Allows 0, or a number that is not less than the least that means something."""
+
+    def __init__(self, least: float) -> None:
+        self.least = least
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self._judged, handler(source))
+
+    def _judged(self, number: float) -> float:
+        if 0.0 < number < self.least:
+            # Its words are those of the JSON Schema.
+            raise PydanticCustomError("least", "too small a number")
+        return number
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        between = {"exclusiveMinimum": 0.0, "exclusiveMaximum": self.least}
+        return {**handler(schema), "not": between}
+
+
+Gravity = Annotated[Amount, OrLeast(WEAKEST)]
+Speed = Annotated[Amount, OrLeast(SLOWEST)]
 
 
 def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
@@ -272,7 +337,7 @@ Values = Annotated[
 ]
 
 Span = Annotated[
-    tuple[Positive, Positive],
+    tuple[Length, Length],
     AfterValidator(_ascending),
     Worded("a range [from, to] with from < to"),
 ]
@@ -289,7 +354,7 @@ def _box(corners: tuple[Point, Point]) -> tuple[Point, Point]:
 Box = Annotated[
     tuple[Point, Point], AfterValidator(_box), Worded("a box [[left, bottom], [right, top]]")
 ]
-Size = Annotated[tuple[Positive, Positive], Worded("[width, height] of two numbers > 0")]
+Size = Annotated[tuple[Length, Length], Worded(f"[width, height] of two numbers from {SHORTEST:g}")]
 Two = Annotated[tuple[Text, Text], Worded('two names ["a", "b"]')]
 
 
@@ -337,6 +402,11 @@ Copies = Annotated[
 Repeats = Annotated[tuple[Copies, ...], Worded("one or two copies [[n, dx, dy], ...]")]
 
 
+def sphere_mass(density: float, radius: float) -> float:
+    """Return the mass of a solid sphere, kg."""
+    return density * (4.0 / 3.0 * pi) * (radius * radius * radius)
+
+
 def tonnes_per_hour(text: str) -> float:
     """Read a rate such as "120 t/h"; NaN if it is none.
 
@@ -358,7 +428,7 @@ if TYPE_CHECKING:
     Rate = float
     Radius = float
 else:
-    Radius = Amount | Span
+    Radius = Annotated[Amount, OrLeast(SHORTEST)] | Span
     Rate = Annotated[
         Annotated[Number, Field(ge=1e-6, le=1e9)]
         | Annotated[Text, Field(max_length=40), Worded('a text such as "120 t/h"')],

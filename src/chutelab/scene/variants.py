@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chutelab.scene.conflicts import EITHER, Look, conflicts
+from chutelab.scene.conflicts import EITHER, NO_MACHINE, Look, conflicts
 from chutelab.scene.loading import SceneError, from_dict, plain, to_dict
 from chutelab.scene.overrides import (
     Override,
@@ -193,7 +193,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
             text = next((one.allowed for one in said if path.startswith(one.key)), text)
         raise InputError(text, vary.typed)
     kinds = {kind.get("type") for kind in about.get("anyOf", [about])}
-    if not (indexed or kinds & {"number", "integer"}) or parts[0] in ("expect", "live"):
+    if not (indexed or kinds & {"number", "integer"}) or parts[0] in NO_MACHINE:
         raise InputError(f"{path} is no number, and only numbers can be varied", vary.typed)
     unit = str(about.get("x-unit") or "")
     if vary.unit not in ("", unit) and (vary.unit, unit) != ("%", ""):
@@ -244,8 +244,11 @@ def is_plain(path: str) -> bool:
 
 def accepted(path: str, values: Floats) -> Bools:
     """Tell which values a key that `is_plain` takes, (N,), if nothing else is looked at."""
-    low, high = limits_of(rule_at(parts_of(path)) or {}) or (nan, nan)
-    return np.isfinite(values) & (low <= values) & (values <= high)
+    rule = rule_at(parts_of(path)) or {}
+    low, high = limits_of(rule) or (nan, nan)
+    too_little = rule.get("not", {"exclusiveMinimum": low, "exclusiveMaximum": low})
+    little = (too_little["exclusiveMinimum"] < values) & (values < too_little["exclusiveMaximum"])
+    return np.asarray(np.isfinite(values) & (low <= values) & (values <= high) & ~little)
 
 
 def judged_by(scene: Scene, values: Mapping[str, object]) -> set[str]:

@@ -20,7 +20,7 @@ from typing import Literal
 import numpy as np
 
 from chutelab.engines import reference
-from chutelab.engines.simulation import simulate
+from chutelab.engines.simulation import judged
 from chutelab.machine import build
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
 from chutelab.results.comparison import compare, scales
@@ -236,7 +236,7 @@ def answer(
 
     if engine == "dop853":
         return reference.run(build(scene), bounded)
-    return simulate(scene, engine, progress if max_seconds is None else bounded)
+    return judged(scene, engine, progress if max_seconds is None else bounded)
 
 
 def because(error: Exception) -> str:

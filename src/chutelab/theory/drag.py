@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot, inf, nan, pi
+from math import hypot, inf, isnan, nan, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,8 +50,10 @@ class Drag:
         Speed for which the next three are told, the highest known, m/s.
     reynolds, coefficient : float
         Reynolds number and drag coefficient of a sphere of the particle's radius.
+    slowing : float
+        Drag over mass, m/s².
     share_of_weight : float
-        Drag over weight; infinite without gravity.
+        Drag over weight; NaN without gravity.
     impact_shift : float
         How much higher particle 0 would meet the plate, m (negative: lower); NaN without a closed
         form, or if it would not get so far.
@@ -64,6 +66,7 @@ class Drag:
     speed: float
     reynolds: float
     coefficient: float
+    slowing: float
     share_of_weight: float
     impact_shift: float
     landing_shift: float
@@ -73,6 +76,8 @@ class Drag:
         share = f"{100.0 * self.share_of_weight:.2g} % of the weight"
         if self.share_of_weight >= 1.0:
             share = f"{self.share_of_weight:.3g} times the weight"
+        if isnan(self.share_of_weight):
+            share = f"a deceleration of {self.slowing:.2g} m/s²"
         said = f"air drag, left out, would be {share} at {self.speed:.3g} m/s"
         if not self.arrives:
             said += ", and air would keep particle 0 from getting there"
@@ -134,7 +139,8 @@ def drag(
         speed=speed,
         reynolds=reynolds,
         coefficient=drag_coefficient(reynolds),
-        share_of_weight=slowed / scene.gravity if scene.gravity > 0.0 else inf,
+        slowing=slowed,
+        share_of_weight=slowed / scene.gravity if scene.gravity > 0.0 else nan,
         impact_shift=impact,
         landing_shift=landing,
         arrives=not (np.isfinite(found.t2) and np.isnan(impact))

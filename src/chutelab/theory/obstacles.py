@@ -1,8 +1,14 @@
 """First contacts of one disk with finite surfaces: on the ride, in flight, with all their ends.
 
 Only whether, when and with what; the velocities are `transfer`'s business. Surfaces are segments
-and arcs without thickness, touched from either side at the disk's radius. Contacts are found where
-a distance falls through the radius; a graze to within rounding may go either way.
+and arcs without thickness, touched from either side at the disk's radius.
+
+A surface has features: the two sides of a face, the inside and the outside of an arc, and the
+points where they end. The gap to each is a function of time (on the ride, of the angle) that is
+followed between its turning points: the disk collides at the first instant at which a gap falls to
+zero, touching included, in a place that is on the feature. A gap that is zero from the beginning
+falls if the disk approaches or is pressed, and not if it leaves or goes along. Zero is what
+rounding makes of the numbers, so a graze to within rounding is one.
 """
 
 from __future__ import annotations
@@ -23,6 +29,10 @@ Bend = tuple[str, ArrayLike, float, float, float]
 
 HALVINGS = 60
 """Bisections of a contact time: they exhaust a double's digits."""
+
+ROUNDING = 2.0**-48
+"""Share of the numbers that a gap is worked out from by which it may be off: 16 units of the last
+place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,12 +121,12 @@ class Arcs:
             found[index] = on_it if self.holds(index, point) else ends[:, index].min()
         return found
 
-    def rings(self, radius: float) -> Iterator[tuple[int, float, bool]]:
-        """Yield the circles of a disk's centre at contacts: arc, m, if it comes from inside."""
+    def rings(self, radius: float) -> Iterator[tuple[int, float, float]]:
+        """Yield where a disk can touch: arc, the arc's radius (m), and 1 outside or -1 inside."""
         for index, size in enumerate(self.radius.tolist()):
-            yield index, size + radius, False
+            yield index, size, 1.0
             if size > radius:
-                yield index, size - radius, True
+                yield index, size, -1.0
 
 
 NO_ARCS = Arcs.of([])
@@ -183,11 +193,7 @@ class Flight:
 
 
 def corner_times(flight: Flight, points: Floats, radius: float, horizon: float) -> Floats:
-    """Return when the centre first comes as close as `radius` to each point, (P,); inf if not.
-
-    The distance, squared, is a quartic. Between the roots of its derivative it is monotone, so no
-    approach is overlooked, and none found that is not there.
-    """
+    """Return when the centre first comes as close as `radius` to each point, (P,); inf if not."""
     first = np.full(len(points), np.inf)
     if radius <= 0.0 or horizon <= 0.0:
         return first
@@ -196,57 +202,51 @@ def corner_times(flight: Flight, points: Floats, radius: float, horizon: float) 
         apex = np.clip(flight.velocity[1] / flight.gravity, 0.0, horizon)
         stops = np.append(stops, apex)
     places = flight.at(stops)
-    reach = (points >= places.min(axis=0) - radius) & (points <= places.max(axis=0) + radius)
+    room = 1.001 * radius
+    reach = (points >= places.min(axis=0) - room) & (points <= places.max(axis=0) + room)
     for index in np.flatnonzero(reach.all(axis=1)):
-        quartic, marks = _distance(flight, points[index], radius, horizon)
-        inside = np.flatnonzero(np.polyval(quartic, marks) < 0.0)
-        if inside.size:
-            first[index] = _falls(quartic, marks[max(inside[0] - 1, 0)], marks[inside[0]])
+        first[index] = next(ring_times(flight, points[index], 0.0, radius, horizon), np.inf)
     return first
 
 
-def _distance(
-    flight: Flight, point: Floats, radius: float, horizon: float
-) -> tuple[Floats, Floats]:
-    """Return the square of the distance from a point, less that of `radius`, as a quartic in time.
+def ring_times(
+    flight: Flight, center: Floats, size: float, radius: float, horizon: float, side: float = 1.0
+) -> Iterator[float]:
+    """Yield when a disk comes to a circle of a size (m) from outside, or inside (-1.0), in order.
 
-    And times, from 0 to `horizon`, between which it rises or falls all the way.
+    The distance, squared, is a quartic. Between the roots of its derivative it is monotone, so no
+    approach is overlooked, and none found that is not there.
     """
     drop = np.array([0.0, -0.5 * flight.gravity])
-    apart = flight.position - point
+    apart = flight.position - center
     quartic = np.array(
         [
             drop @ drop,
             2.0 * flight.velocity @ drop,
             flight.velocity @ flight.velocity + 2.0 * apart @ drop,
             2.0 * apart @ flight.velocity,
-            apart @ apart - radius**2,
+            apart @ apart - (size + side * radius) ** 2,
         ]
     )
     # Complex roots only add breakpoints, which do no harm.
     turns = np.roots(np.polyder(quartic)).real
-    inner = turns[(turns > 0.0) & (turns < horizon)]
-    return quartic, np.sort(np.concatenate([[0.0, horizon], inner]))
-
-
-def _falls(quartic: Floats, low: float, high: float) -> float:
-    """Return where a polynomial that is negative at `high` falls through 0."""
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if np.polyval(quartic, middle) < 0.0 else (middle, high)
-    return high
-
-
-def ring_times(
-    flight: Flight, center: Floats, radius: float, horizon: float, *, outward: bool = False
-) -> Iterator[float]:
-    """Yield when the centre of a disk comes into a circle, or goes out of it, in order."""
-    quartic, marks = _distance(flight, center, radius, horizon)
-    if outward:
-        quartic = -quartic
-    values = np.polyval(quartic, marks)
-    for index in np.flatnonzero((values[:-1] >= 0.0) & (values[1:] < 0.0)):
-        yield _falls(quartic, marks[index], marks[index + 1])
+    marks = np.sort(np.concatenate([[0.0, horizon], turns[(turns > 0.0) & (turns < horizon)]]))
+    reach = np.abs(flight.position).sum() + np.abs(center).sum() + size + radius
+    off = ROUNDING * (np.polyval(np.abs(quartic), marks) + (size + side * radius) * reach)
+    gap = side * quartic
+    values = np.polyval(gap, marks)
+    values[np.abs(values) <= off] = 0.0
+    for index in np.flatnonzero((values[:-1] >= 0.0) & (values[1:] <= 0.0)):
+        low, high = marks[index : index + 2]
+        if values[index] == 0.0:
+            # Where the gap is zero first, the fall begins there, if it is one.
+            if values[index + 1] < 0.0:
+                yield float(low)
+            continue
+        for _ in range(HALVINGS if values[index + 1] < 0.0 else 0):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if np.polyval(gap, middle) < 0.0 else (middle, high)
+        yield float(high)
 
 
 def first_in_flight(
@@ -259,12 +259,16 @@ def first_in_flight(
     speed = normal @ flight.velocity
     bend = -0.5 * flight.gravity * normal[:, 1]
     faces = np.full(len(length), np.inf)
+    off = ROUNDING * (np.abs(flight.position).sum() + np.abs(segments.start).sum(axis=1) + radius)
     for side in (1.0, -1.0):
-        # Where c + b t + a t² falls through 0, without cancellation; NaN if nowhere.
+        # Where c + b t + a t² falls to 0, without cancellation; NaN if nowhere.
         c, b, a = side * height - radius, side * speed, side * bend
+        c[np.abs(c) <= off] = 0.0
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            root = np.sqrt(b**2 - 4.0 * a * c)
+            square = b**2 - 4.0 * a * c
+            root = np.sqrt(np.where(np.abs(square) <= 4.0 * np.abs(a) * off, 0.0, square))
             t = np.where(b > 0.0, -(b + root) / (2.0 * a), 2.0 * c / (root - b))
+        t[(c == 0.0) & (b == 0.0) & (a < 0.0)] = 0.0
         met = (t >= 0.0) & (t <= horizon)
         foot = np.full(len(t), -1.0)
         foot[met] = np.sum((flight.at(t[met]) - segments.start[met]) * tangent[met], axis=1)
@@ -274,10 +278,10 @@ def first_in_flight(
     if not arcs.names or horizon <= 0.0:
         return straight
     faces = np.full(len(arcs.names), np.inf)
-    for index, size, outward in arcs.rings(radius):
-        for t in ring_times(flight, arcs.center[index], size, horizon, outward=outward):
-            if arcs.holds(index, flight.at(np.array(t))):
-                faces[index] = min(faces[index], t)
+    for index, size, side in arcs.rings(radius):
+        for time in ring_times(flight, arcs.center[index], size, radius, horizon, side):
+            if arcs.holds(index, flight.at(np.array(time))):
+                faces[index] = min(faces[index], time)
                 break
     corners = corner_times(flight, arcs.points, radius, horizon)
     time, index = _earliest(np.concatenate([faces, corners]), len(faces))
@@ -299,29 +303,29 @@ def first_on_pulley(
     with np.errstate(invalid="ignore"):
         for side in (radius, -radius):
             lean = np.arctan2(normal[:, 0], normal[:, 1])
-            spread = np.arccos((level + side) / ride_radius)
+            spread = _spread((level + side) / ride_radius)
             for angle in (lean - spread, lean + spread):
                 place = ride_radius * np.stack([np.sin(angle), np.cos(angle)], axis=1)
                 foot = np.sum((place - segments.start) * tangent, axis=1)
                 angles.append(np.where((foot >= 0.0) & (foot <= length), angle, np.inf))
         if radius > 0.0:
             angles += _on_circle(ride_radius, segments.points, radius)
-        touched = np.mod(np.concatenate(angles) - begin, 2.0 * np.pi)
+        touched = _turned(np.concatenate(angles), begin)
         touched[~(touched <= last - begin)] = np.inf
         straight = _earliest(touched, len(segments.names))
         if not arcs.names:
             return straight
         angles = list(_on_circle(ride_radius, arcs.points, radius)) if radius > 0.0 else []
-        for index, size, _ in arcs.rings(radius):
-            for angle in _on_circle(ride_radius, arcs.center[index], size):
+        for index, size, side in arcs.rings(radius):
+            for angle in _on_circle(ride_radius, arcs.center[index], size + side * radius):
                 place = ride_radius * np.array([np.sin(angle), np.cos(angle)])
                 row = np.full(len(arcs.names), np.inf)
                 row[index] = angle if arcs.holds(index, place) else np.inf
                 angles.append(row)
-        touched = np.mod(np.concatenate(angles) - begin, 2.0 * np.pi)
+        touched = _turned(np.concatenate(angles), begin)
         touched[~(touched <= last - begin)] = np.inf
-    angle, index = _earliest(touched, len(arcs.names))
-    return straight if straight[0] <= angle else (angle, len(segments.names) + index)
+    turned, index = _earliest(touched, len(arcs.names))
+    return straight if straight[0] <= turned else (turned, len(segments.names) + index)
 
 
 def _on_circle(ride_radius: float, points: Floats, radius: float) -> tuple[Floats, Floats]:
@@ -330,8 +334,20 @@ def _on_circle(ride_radius: float, points: Floats, radius: float) -> tuple[Float
     lean = np.arctan2(points[..., 0], points[..., 1])
     with np.errstate(all="ignore"):
         cosine = (ride_radius**2 + far**2 - radius**2) / (2.0 * ride_radius * far)
-        spread = np.arccos(cosine)
+        spread = _spread(cosine)
     return lean - spread, lean + spread
+
+
+def _spread(cosine: Floats) -> Floats:
+    """Return the angle of a cosine, which may be beyond 1 by rounding; NaN if it is by more."""
+    over = np.abs(cosine) - 1.0
+    return np.asarray(np.arccos(np.where(np.abs(over) <= ROUNDING, np.sign(cosine), cosine)))
+
+
+def _turned(angle: Floats, begin: float) -> Floats:
+    """Return how far angles are from where a ride begins, from 0 to 2π, rad."""
+    turned = np.mod(angle - begin, 2.0 * np.pi)
+    return np.asarray(np.where(turned >= 2.0 * np.pi - ROUNDING, 0.0, turned))
 
 
 def _earliest(times: Floats, count: int) -> tuple[float, int]:

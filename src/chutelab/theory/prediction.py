@@ -242,7 +242,7 @@ def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
             incline=incline,
             ride_length=ride_length,
             plate_friction=plate_friction,
-            interval=1.0 / stream.rate,
+            interval=1.0 / scene.rate,
             rebound=rebound,
             unbounded_plate=False,
         )
@@ -321,7 +321,7 @@ def _before_the_plate(course: Course) -> Trouble:
     centre, rides, again = np.zeros(2), course.ride_radius, np.inf
     slow = found.v1 * found.v1 * sin_cos(found.phi1)[1] < flight.gravity * rides
     if found.phi1 < 0.0 and slow:
-        again = next(ring_times(flight, centre, rides, horizon), np.inf)
+        again = next(ring_times(flight, centre, rides, 0.0, horizon), np.inf)
     hops = again < horizon
     index = first_in_flight(flight, obstacles, radius, min(horizon, again))[1]
     # What is in the way of a flight that misses the plate anyway does not matter.

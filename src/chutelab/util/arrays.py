@@ -17,3 +17,10 @@ Numbers = Floats | float
 Progress = Callable[[float], None]
 """Called now and then with the share of the work that is done, 0 to 1. One that an engine calls may
 raise `results.recorder.EnoughError`: the run ends there, with what is recorded."""
+
+Watch = Callable[[], None]
+"""Called now and then in work that may take long; what it raises ends the work."""
+
+
+def unwatched() -> None:
+    """Let the work go on, whatever it takes."""

@@ -145,6 +145,13 @@ class InputError(ValueError):
         return f"{text}\n{self.hint}" if self.hint else text
 
 
+class LawWarning(UserWarning):
+    """A run broke a law that every run must keep, see `Recording.laws`: do not trust its numbers.
+
+    ``warnings.simplefilter("error", chutelab.LawWarning)`` makes it an error.
+    """
+
+
 class MissingLibraryError(ImportError):
     """A library is not installed, or too old; the text says what to install."""
 

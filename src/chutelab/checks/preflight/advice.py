@@ -9,11 +9,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import suppress
-from math import ceil, cos, floor, inf, isnan, log10, pi, radians, sqrt
+from math import ceil, cos, floor, inf, isnan, log10, pi, radians
+from time import process_time
 from typing import Any
 
 import numpy as np
 
+from chutelab.checks.preflight.places import places
 from chutelab.checks.preflight.results import (
     Advice,
     Effort,
@@ -23,12 +25,13 @@ from chutelab.checks.preflight.results import (
     coverage,
     skipped,
 )
-from chutelab.checks.preflight.trial import Trial, effort, stepping, trial
+from chutelab.checks.preflight.trial import Trial, effort, peak, stepping, trial
 from chutelab.engines.simulation import choose
 from chutelab.machine import DRIVE_PULLEY, Caution, Machine, build
 from chutelab.machine.builder import CLEARANCE, CLEARANCE_RADII
 from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Recording
+from chutelab.results.arrival import arrivals
 from chutelab.results.quantities import waits
 from chutelab.results.recording import blocks, hermite
 from chutelab.scene import Scene, SceneError, shown
@@ -50,6 +53,12 @@ SMALL = 0.002
 
 MARGIN = 0.01
 """m to spare beyond what would just do; as a share, of a rate."""
+
+MOST_CAUTIONS = 20
+"""Surfaces that cross, or miss, that are told one by one; for each some settings are tried."""
+
+ON_RUBBER = 0.5
+"""Coefficient of friction of bulk material on a belt: 0.5 to 0.7 by ISO 5048."""
 
 SOME = 16
 """Particles that are followed to where they miss the belt, at most."""
@@ -78,27 +87,11 @@ def _densities(scene: Scene) -> Iterator[Advice]:
         )
 
 
-def _in_loops(scene: Scene, machine: Machine) -> Iterator[Advice]:
-    """Warn of releases between the carrying and the returning side of a conveyor."""
-    for belt in scene.conveyor:
-        way = np.subtract(belt.to, belt.from_)
-        (x, y), (dx, dy) = (machine.releases.position - belt.from_).T, way / np.hypot(*way)
-        along, aside = x * dx + y * dy, np.abs(x * dy - y * dx)
-        inside = (along > 0.0) & (along < np.hypot(*way)) & (aside < belt.pulley_radius)
-        if inside.any():
-            yield Advice(
-                f"{belt.name}: {np.count_nonzero(inside)} of {machine.count} particles start inside"
-                " its loop, and fall on its returning side",
-                "a release above its carrying side",
-                {},
-            )
-
-
 def advice(
     scene: Scene, machine: Machine, tried: Trial, steps: Stepping | None, cost: Effort
 ) -> Iterator[Advice]:
     """Yield what may surprise about a scene that works; `steps` is None for the exact engine."""
-    for caution in machine.warnings:
+    for caution in machine.warnings[:MOST_CAUTIONS]:
         mended: Settings = {}
         for settings in _candidates(scene, machine, caution):
             with suppress(SceneError):
@@ -107,8 +100,10 @@ def advice(
                     mended = settings
                     break
         yield _advised(str(caution), mended, otherwise=LEAVE if caution.crosses else LOOK)
+    if (more := len(machine.warnings) - MOST_CAUTIONS) > 0:
+        yield _advised(f"{more:,} further pairs of surfaces cross", otherwise=LEAVE)
     yield from _densities(scene)
-    yield from _in_loops(scene, machine)
+    yield from places(scene, machine)
     if steps is not None and not steps.safe and steps.way is not None and steps.longest is not None:
         yield _advised(
             f"a particle covers {write_size(steps.way, 'm')} in a step, but a surface catches it"
@@ -140,22 +135,27 @@ def advice(
     if tried.recording is not None and waited is not None and waited.particles:
         # Each waits for all that waited before it.
         released = int(np.count_nonzero(tried.recording.released))
-        period = 1.0 / scene.stream.rate + waited.longest / max(1, released - 1)
+        stream = scene.stream
+        period = 1.0 / stream.rate + waited.longest / max(1, released - 1)
+        rate: Any = (1.0 - MARGIN) / period
+        # In the unit in which it was given.
+        tonnes = 3.6 * (stream.mass_rate or 0.0) * (rate / stream.rate)
+        rate = f"{_down(tonnes):g} t/h" if stream.mass_rate is not None else _down(rate)
+        key = "stream.rate" if len(scene.streams) == 1 else "stream[0].rate"
         yield _advised(
             f"of {released} particles tried, {waited}",
-            {"stream.rate": _down((1.0 - MARGIN) / period)},
+            {key: rate},
             after=", or a larger stream.bed_height",
         )
     start, rides = machine.releases, machine.releases.carried
     radius = np.broadcast_to(machine.particle.radius, machine.count)[rides]
     pressed = squeeze(scene, start.t[rides], start.position[rides], radius)
     if pressed is not None and scene.incoming is not None:
-        bed = scene.stream.bed_height
-        highest = scene.incoming.pulley_radius + scene.particle.radius + bed
+        # Not another speed: that would be another machine.
         yield _advised(
             f"of {machine.count} particles, {pressed}",
-            {"incoming.speed": _up(sqrt(scene.gravity * highest))},
-            after=f", to leave at the top{', or stream.bed_height = 0' if bed > 0.0 else ''}",
+            {"incoming.friction": ON_RUBBER},
+            after=", or what the material has on the belt: then layers push each other",
         )
     if scene.run.engine == "pymunk" and not machine.interact and machine.count > 1:
         yield _advised(
@@ -251,7 +251,7 @@ def _belt_height(machine: Machine) -> float:
 def _ending(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice]:
     """Yield what is odd about how the trial's particles end."""
     ended = [REASONS[reason] for reason in tried.ended.tolist()]
-    gone, late = ended.count("exit"), ended.count("time")
+    gone, late = ended.count("exit"), ended.count("time") + ended.count("unreleased")
     lone = len(ended) == 1
     who = "the particle" if lone else f"of {len(ended)} particles tried,"
     out = scene.outgoing
@@ -263,7 +263,15 @@ def _ending(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice
             settings = {"outgoing.start": first} if first < out.start else {}
             if settings or last > out.start + out.length:
                 settings["outgoing.length"] = last - first
-        yield _advised(f"{who} {'misses' if lone else f'{gone} miss'} the outgoing belt", settings)
+        came = np.isfinite(arrivals(tried)["t"]) & (tried.ended == EXIT)
+        for many, what, are in (
+            (gone - int(came.sum()), "miss", "misses"),
+            (int(came.sum()), "go over an end of", "goes over an end of"),
+        ):
+            if many:
+                yield _advised(
+                    f"{who} {are if lone else f'{many} {what}'} the outgoing belt", settings
+                )
     if late and machine.until != "time":
         what = "has landed" if machine.until == "landed" else "is at rest"
         yield _advised(
@@ -303,16 +311,20 @@ def _down(value: float) -> float:
 def preflight(scene: Scene) -> Preflight:
     """Look at a scene before it runs.
 
-    Takes some 1.5 s of processor time at most: a trial run is cut off after 1 s.
+    Besides the set-up it takes some 1.5 s of processor time at most: a trial run is cut off after
+    1 s.
 
     Raises
     ------
     SceneError
         If the geometry contradicts itself.
     """
+    begin, before = process_time(), peak()
     machine = build(scene)
+    setup = process_time() - begin
     engine = choose(machine)
     tried = trial(machine, engine)
+    grown = peak() - before
     if scene.run.engine != "auto":
         why = f'run.engine = "{engine}" asks for it'
     elif engine == "pymunk":
@@ -333,7 +345,7 @@ def preflight(scene: Scene) -> Preflight:
             what = "when all are at rest" if machine.interact else "each particle at rest"
         ends = f"{what} (or gone), at most {ends}"
     steps = None if engine == "exact" else stepping(machine, engine, tried)
-    cost = effort(machine, tried)
+    cost = effort(machine, tried, setup, grown)
     return Preflight(
         title=scene.title,
         built=tuple(built(machine)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, field, replace
 from math import ceil, inf, log, log1p
 from time import process_time
@@ -154,8 +155,26 @@ LOOK = 64
 """Particles whose bounces are followed up, at most."""
 
 
-def effort(machine: Machine, tried: Trial) -> Effort:
-    """Tell from a trial what the whole run costs."""
+def peak() -> int:
+    """Return the bytes that this process has had at its peak; 0 where that cannot be told."""
+    try:
+        from resource import RUSAGE_SELF, getrusage
+    except ImportError:
+        return 0
+    return getrusage(RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+def effort(machine: Machine, tried: Trial, setup: float, grown: int) -> Effort:
+    """Tell from a trial what the whole run costs.
+
+    Its set-up took so many s of processor time, and with the trial so many bytes of memory.
+    """
+    cost = _effort(machine, tried)
+    memory = max(cost.memory, round(PROGRAM) + grown)
+    return replace(cost, seconds=setup + cost.seconds, memory=memory)
+
+
+def _effort(machine: Machine, tried: Trial) -> Effort:
     recording = tried.recording
     if recording is None:
         return Effort(0, tried.seconds, True, "a trial run did not come to an end", 0)

@@ -9,16 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.checks.stress.evidence import ON_ARCS, PIECES, PRESSED, Evidence, Verdict, worst
-from chutelab.checks.stress.surfaces import Piece
 from chutelab.results import REASONS, Kind
+from chutelab.results.barriers import Hit
+from chutelab.results.evidence import ON_ARCS, PRESSED, Evidence, Verdict, worst
 from chutelab.util.arrays import Floats, Ints
 
 AT_SURFACES = (Kind.IMPACT, Kind.LANDING, Kind.STICK, Kind.SLIP, Kind.SETTLE)
 """What happens at a surface, if one is named."""
-
-ZOOMS = 12
-"""Times that the place of a crossing is narrowed down to a `PIECES`-th: to rounding."""
 
 INSTANTS, PLACES = 1000, 200_000
 """Times at which pairs of particles are looked at, and places, all particles together, at most."""
@@ -27,89 +24,33 @@ COLLISIONS = 300
 """Collisions, and releases, at which that is done besides, at most."""
 
 
-def _touchable(e: Evidence, piece: Piece) -> tuple[Ints, Floats]:
-    """Return the samples (c,) at which a piece is there for a particle, and their gaps (c,), m.
-
-    A gate shuts on nobody: who is in the way as it appears is not touched until clear of it. A step
-    that is under way as it appears may end before it is noticed.
-    """
-    s = e.samples
-    if piece.appears == -inf and piece.vanishes == inf:
-        return np.arange(len(s.t)), piece.gap(s.position, e.radii[s.particle])
-    late = e.dt or 0.0
-    on = np.flatnonzero(piece.there(s.t) & (s.t >= piece.appears + late))
-    who = s.particle[on]
-    gap = piece.gap(s.position[on], e.radii[who])
-    if piece.appears == -inf or not len(on):
-        return on, gap
-    clear = np.cumsum(gap >= -(e.rounding + e.arcs + e.late))
-    first = np.flatnonzero(np.diff(who, prepend=-1))
-    begun: Ints = clear[first] - np.diff(clear, prepend=0)[first]
-    before = np.repeat(begun, np.diff(first, append=len(on)))
-    kept = clear > before
-    return on[kept], gap[kept]
-
-
 def no_one_through(e: Evidence) -> Verdict | None:
     """No centre passes a surface between its ends; the figure counts the passages."""
-    s = e.samples
-    if not e.pieces or not len(s.t):
+    if not e.pieces or not len(e.recording.knots):
         return None
-    clear = max(e.rounding, ON_ARCS * e.radius)
-    passages = []
-    for piece in e.pieces:
-        rows, _ = _touchable(e, piece)
-        aside = piece.beside(s.position[rows])
-        # Side on which it was last seen clearly, carried on through touches.
-        seen = np.where(np.abs(aside) > clear, np.sign(aside), 0.0)
-        last = np.maximum.accumulate(np.where(seen != 0.0, np.arange(len(seen)), 0))
-        side, who = seen[last], s.particle[rows]
-        flips = (side[1:] * side[:-1] < 0.0) & (who[last[1:]] == who[last[:-1]])
-        for at in np.flatnonzero(flips).tolist():
-            row = int(rows[at])
-            if piece.within(_crossing(e, piece, row, side[at]), clear).all():
-                passages.append(
-                    f"particle {s.particle[row]} through {piece.name} at t = {s.t[row]:.6g} s"
-                )
-    return Verdict(len(passages), 0.0, passages[0] if passages else "passages")
-
-
-def _crossing(e: Evidence, piece: Piece, at: int, side: float) -> Floats:
-    """Return where (1, 2) the line of a piece is crossed from a side, between two samples, m."""
-    s = e.samples
-    if s.left[at] != s.left[at + 1]:
-        # A jump, from one interval to the next.
-        return s.position[at : at + 1]
-    low, high = s.share[at], s.share[at + 1]
-    for _ in range(ZOOMS):
-        shares = np.linspace(low, high, PIECES + 1)
-        places = e.between(np.full(len(shares), s.left[at]), shares)
-        # The last place on the old side: before it there may be a touch, where signs are rounding.
-        before = int(np.flatnonzero(piece.beside(places) * side > 0.0)[-1:].sum())
-        low, high = shares[before], shares[min(before + 1, PIECES)]
-    return places[before : before + 1]
+    found = [hit for hit in e.hits if hit.passes]
+    return Verdict(len(found), 0.0, _first(e, "particle {} through {} at t = {:.6g} s", found))
 
 
 def depth(e: Evidence) -> Verdict | None:
     """No disk is deeper in a surface than rounding, or a step, allows; the figure is in m.
 
-    What overlapped at the release may go on doing so, no deeper.
+    It is 0 where all are proven to be no deeper. What overlapped at the release may go on doing so.
     """
-    s = e.samples
-    if not len(s.t) or not e.pieces:
+    if not e.pieces or not len(e.recording.knots):
         return None
-    found = []
-    for piece in e.pieces:
-        rows, gap = _touchable(e, piece)
-        if not len(rows):
-            continue
-        starts = np.flatnonzero(np.diff(s.particle[rows], prepend=-1))
-        first = np.minimum(gap[starts], 0.0)
-        deeper = np.repeat(first, np.diff(starts, append=len(gap))) - gap
-        at = int(np.argmax(deeper))
-        where = f"particle {s.particle[rows[at]]} in {piece.name} at t = {s.t[rows[at]]:.6g} s"
-        found.append((deeper[at], where))
-    return worst(found, e.rounding + e.arcs + e.late, "m")
+    found = sorted(e.hits, key=lambda hit: -hit.depth)
+    deepest = found[0].depth if found else 0.0
+    return Verdict(
+        deepest, e.allowed, f"m, {_first(e, 'particle {} in {} at t = {:.6g} s', found)}"
+    )
+
+
+def _first(e: Evidence, said: str, found: list[Hit]) -> str:
+    if not found:
+        return "none"
+    one = found[0]
+    return said.format(one.particle, e.pieces_of(one.particle)[one.piece].name, one.t)
 
 
 def overlap(e: Evidence) -> Verdict | None:

@@ -26,24 +26,11 @@ from chutelab.checks.stress.barriers import (
     settled_to_stay,
 )
 from chutelab.checks.stress.blows import cone, rebound
-from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict, worst
+from chutelab.results.evidence import A_CONTACT, EPS, ROUNDINGS, Evidence, Verdict, worst
 from chutelab.results.ledger import ledger
 from chutelab.scene import Fault, Scene, SceneError
 
 Law = Callable[[Evidence], Verdict | None]
-
-A_CONTACT = 2.0
-"""eps that one contact may move an energy by: half an ulp for each of two velocity components, a
-height and a sum."""
-
-BOOKED = 1e-9
-"""Share of the energy turned over that the contact engine may misbook in a crowd: its promise."""
-
-ROUGH = 1e-4
-"""Share of the radius by which a track of the pymunk engine may be off between two knots."""
-
-HAIR = 1e-10
-"""Share of the radius by which the pymunk engine's disks are larger, and so their levers."""
 
 BALANCES = 2000
 """Times at which the energy of a crowd is summed."""
@@ -94,7 +81,7 @@ def energy(e: Evidence) -> Verdict | None:
     if e.crowd:
         return _energy_of_crowd(e)
     knots, offsets = e.recording.knots, e.recording.offsets
-    total = np.sum(e.recording.energies(knots, e.recording.owner), axis=0) - knots["entries"][:, 0]
+    total = np.sum(e.energies, axis=0) - knots["entries"][:, 0]
     rises = []
     for i in range(e.recording.count):
         own = total[offsets[i] : offsets[i + 1]]
@@ -103,9 +90,7 @@ def energy(e: Evidence) -> Verdict | None:
             at = int(np.argmax(rise))
             t = knots["t"][offsets[i] + at]
             rises.append((rise[at] / e.energy, f"particle {i} at t = {t:.6g} s"))
-    # A knot in contact holds the mean velocity of a step, half a step's pull off its books.
-    known = e.speed * e.machine.gravity * (e.dt or 0.0) * float(e.masses.max()) / e.energy
-    return worst(rises, _energy_bound(e) + known, f"of {e.energy:.3g} J")
+    return worst(rises, e.energy_bound + e.parted / e.energy, f"of {e.energy:.3g} J")
 
 
 def _energy_of_crowd(e: Evidence) -> Verdict:
@@ -132,13 +117,7 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
     rise = gain - np.minimum.accumulate(gain)
     at = int(np.argmax(rise))
     where = f"of {e.energy:.3g} J, at t = {times[at]:.6g} s"
-    # An overlap that is parted lifts a disk by no more than it was deep.
-    allowed = float(e.masses.sum()) * e.machine.gravity * e.late
-    if e.alike and e.dt is not None:
-        # The pymunk engine leaves out touches that move a track by less than `ROUGH` of the radius.
-        # A cubic whose end velocity is off by w is off by 4/27 w τ in place, τ a step or more.
-        allowed += 2.0 * e.masses.max() * e.speed * 27.0 / 4.0 * ROUGH * e.radius / e.dt
-    return Verdict(float(rise[at]) / e.energy, _energy_bound(e) + allowed / e.energy, where)
+    return Verdict(float(rise[at]) / e.energy, e.energy_bound + e.parted / e.energy, where)
 
 
 def residual(e: Evidence) -> Verdict | None:
@@ -146,25 +125,7 @@ def residual(e: Evidence) -> Verdict | None:
     if not e.energy:
         return None
     figure = abs(ledger(e.recording).residual) / e.energy
-    return Verdict(figure, _energy_bound(e), f"of {e.energy:.3g} J")
-
-
-def _energy_bound(e: Evidence) -> float:
-    """Bound what numbers may do to the energy, as a share of the energy in play.
-
-    Contacts round it. In a stepped engine each contact moves it, besides, by the weight times
-    `Evidence.late`, where an overlap is parted: impulses themselves are booked to the last bit.
-    """
-    rounding = EPS * (ROUNDINGS + A_CONTACT * e.recording.contacts)
-    if e.dt is None:
-        return rounding
-    if e.crowd and e.engine == "contact":
-        return BOOKED
-    m, steps = e.machine, EPS * A_CONTACT * e.recording.steps
-    touched = max(1, e.recording.contacts)
-    if e.engine != "contact":
-        steps += touched * HAIR
-    return rounding + steps + touched * float(e.masses.max()) * m.gravity * e.late / e.energy
+    return Verdict(figure, e.energy_bound, f"of {e.energy:.3g} J")
 
 
 def momentum(e: Evidence) -> Verdict | None:

@@ -36,7 +36,7 @@ from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_
 from chutelab.classroom.lessons.texts import INDEX, html_of, own_words, words_for
 from chutelab.classroom.lessons.wheel import write_wheel
 from chutelab.classroom.words import Words, words
-from chutelab.engines.simulation import simulate
+from chutelab.engines.simulation import judged
 from chutelab.scene import Fault, to_dict
 from chutelab.util.files import aside, refuse_other, together, whole
 from chutelab.util.versions import own_version, version_of
@@ -102,7 +102,8 @@ def build(
         with aside(path.parent, path):
             refuse_other(path)
         scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
-        recording = simulate(scene, progress=progress)
+        # Lesson 8 shows a run that breaks a law.
+        recording = judged(scene, progress=progress)
         settings = lesson.picture.model_dump(exclude={"scene", "set", "split"})
         path.parent.mkdir(parents=True, exist_ok=True)
         animate(recording, path, question=lesson.question, predict=True, comment=wanted, **settings)

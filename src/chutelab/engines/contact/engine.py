@@ -302,6 +302,7 @@ class Job:
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count
+        recorder.gained = world.gained
         return recorder.finish(
             engine="contact", steps=world.step_count, seconds=seconds, origin=place
         )

@@ -95,7 +95,11 @@ class Module:
     def __init__(self) -> None:
         engine, module = _compiled()
         self._store = wasmtime.Store(engine)
-        exports = wasmtime.Instance(self._store, module, []).exports(self._store)
+        try:
+            exports = wasmtime.Instance(self._store, module, []).exports(self._store)
+        except wasmtime.WasmtimeError as error:
+            # Addresses for all that it may grow to are set apart, and there may be too few.
+            raise MemoryError(" ".join(str(error).split())) from error
         initialize: Any = exports["_initialize"]
         initialize(self._store)
         self._memory: Any = exports["memory"]

@@ -33,10 +33,13 @@ def _hold(s: State, index: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Flo
         return
     a, b = s.contact(index, *on), s.contact(index, *other)
     moving = (a.belt != 0.0) | (b.belt != 0.0)
-    if np.any(moving & s.turns[index]):
+    beyond = (moving & s.turns[index]).nonzero()[0]
+    if len(beyond):
+        n, names = beyond[0], s.machine.surfaces
         raise CornerError(
-            "a spinning disk is held between two surfaces of which one moves; the exact engine"
-            ' cannot follow that: run it with engine = "contact"'
+            f"particle {s.first + index[n]}, a spinning disk, is held between"
+            f" {names[a.surface[n]]!r} and {names[b.surface[n]]!r}, of which one moves; the exact"
+            ' engine cannot follow that: run it with engine = "contact"'
         )
     v, mass = s.v.take(index, axis=1), s.mass[index]
     turning = s.z[index] ** 2 / np.where(s.turns[index], s.lever[index], 1.0)
@@ -109,8 +112,8 @@ def load_on(s: State, index: Ints, obstacle: Ints, c: Contact) -> Floats:
 def pressed(s: State, index: Ints, obstacle: Ints, c: Contact) -> Bools:
     """Tell which particles an obstacle bears: by a positive load, or one that is about to be.
 
-    Where a path round a circle gets steeper towards the weight, what hops along it lands in ever
-    shorter hops where the load is 0; by rounding that is never above 0.
+    Where a path round a circle gets steeper towards the weight, the hops of a particle shrink
+    towards the point of zero load, and by rounding its load there is never above 0.
     """
     load = load_on(s, index, obstacle, c)
     bears = load > 0.0
@@ -167,7 +170,7 @@ def _roll(
     """Choose between turning and not where rolling friction acts; of the others nothing changes.
 
     Returns what makes the contact point slip, m/s², the share of it that friction must take up to
-    hold it, and who can rest there.
+    hold it, and which particles can rest there.
     """
     o, lever, most = s.on[index], s.lever[index], s.rolling[index] * load
     acts, share = s.rolling[index] > 0.0, s.share[index]
@@ -312,7 +315,7 @@ def _after(
 def _stop_jammed(
     s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats
 ) -> Bools | None:
-    """Bring to rest, and tell, who goes to and fro between two obstacles without getting on."""
+    """Stop particles that go to and fro between two obstacles without progress; tell which."""
     if not (s.idling or s.crawling or np.count_nonzero(rebound <= 2.0 * CRAWL)):
         return None
     slow = length_of(s.v.take(index, axis=1)) <= CRAWL
@@ -346,7 +349,7 @@ def _blow(
 ) -> None:  # fmt: skip
     """Change the velocities (`before` so far), book the energies, write events and knots.
 
-    `landing` tells who lands with it; None for nobody.
+    `landing` tells which particles land with it; None if none does.
     """
     omega_before = s.omega(index)
     along = dot(before, c.tangent)

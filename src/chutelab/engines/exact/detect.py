@@ -50,6 +50,7 @@ class Motion:
     past: Past | None = None  # of points
     on: Ints | None = None  # segment they slide on, which they cannot meet, and its face
     on_side: Floats | None = None
+    joint: Ints | None = None  # set of `Joints.groups` that they leave all of, tangentially, or -1
     never: Bools | None = None  # (S + C,), obstacles that none of them can meet
     gates: Floats | None = None  # (T, k), times until gates open or shut, s
 
@@ -120,12 +121,11 @@ def first_circle(
     gap[3] = dot(v, a)
     gap[4] = 0.25 * dot(a, a)
     gap *= sense
-    if obstacles.span.size:
-        # Who comes in through the opening of an arc, along its very end, is inside for a moment.
-        gap[0] += np.where((sense < 0.0) & (gap[0] < 0.0), 2.0 * rho * touch, 0.0)
     leaving = motion.left[index] == circle + obstacles.segments
     if motion.past is not None:
         leaving |= motion.left[index] == obstacles.back(circle)
+    if motion.joint is not None:
+        leaving |= obstacles.joints.shares(motion.joint[index], circle + obstacles.segments, 0)
     touching = np.abs(distance - rho) <= touch
     # The direction from the centre is as uncertain as the places are, over ρ.
     uncertain = 2.0 * (PARALLEL * rho + touch) * length_of(v)
@@ -144,7 +144,7 @@ def first_circle(
         shift = order >= n
         gap[:-1, shift] = gap[1:, shift]
         gap[-1, shift] = 0.0
-    # Behind already, and for good, or nothing ever pulls it in: no contact to find.
+    # Already past it for good, or never approaching it: no contact to find.
     open_ = (
         ~now & ((gap[0] >= 0.0) | (gap > 0.0).any(axis=0)) & (gap < 0.0).any(axis=0)
     ).nonzero()[0]
@@ -161,10 +161,66 @@ def first_circle(
         t[open_] = _polished(
             found.min(axis=0), d, v, a, sense[open_] * rho[open_], order[open_] == 0
         )
+    if obstacles.span.size:
+        bent = (pick(obstacles.span[1], rows, circle) < 2.0 * np.pi).nonzero()[0]
+        if len(bent):
+            at = index[bent]
+            sides = None if motion.gates is None else motion.gates[:, at]
+            t[bent] = np.minimum(
+                t[bent], _entry(motion, obstacles, until[at], at, circle[bent], sides)
+            )
     # The soonest is written last; of those met at once, the one with the lowest number.
     best = np.argsort(t, kind="stable")[::-1]
     time[index[best]], nearest[index[best]] = t[best], circle[best]
     return time, nearest
+
+
+def _entry(
+    motion: Motion, obstacles: Obstacles, until: Floats, index: Ints, circle: Ints,
+    gates: Floats | None,
+) -> Floats:  # fmt: skip
+    """Return when paths come in past the end of an arc along its face, (k,); inf if they do not.
+
+    Before that the arc is not beside the particle, and the gap to its circle may have any sign.
+    Where the gap is zero at the instant at which the arc comes to be beside it, there is no
+    crossing from positive to negative: it is a contact if the gap falls from there.
+    """
+    rows = motion.rows[index]
+    d = motion.position[:, index] - pick(obstacles.center, rows, circle)
+    v = motion.velocity[:, index]
+    a = np.broadcast_to(motion.acceleration, motion.velocity.shape)[:, index]
+    rho, touch = pick(obstacles.rho, rows, circle), rows_of(obstacles.touch, rows)
+    begin, extent = pick(obstacles.span, rows, circle)
+    first = np.full(len(index), np.inf)
+    for end, angle, turn in ((1, begin, 1.0), (0, begin + extent, -1.0)):
+        out = np.stack([np.cos(angle), np.sin(angle)])
+        away = turn * np.stack([out[1], -out[0]])
+        ahead = dot(away, d)
+        if motion.joint is not None:
+            # It is exactly there now.
+            joint = motion.joint[index]
+            here = (joint != NONE) & obstacles.joints.groups[2][joint, circle, end]
+            ahead = np.where(here, 0.0, ahead)
+        time = descent(ahead, dot(away, v), dot(away, a))
+        enters = (time > 0.0) & (time < until)
+        time = np.where(enters, time, 0.0)
+        place, pace = d + time * (v + 0.5 * time * a), v + time * a
+        enters &= np.abs(dot(out, place) - np.abs(rho)) <= touch
+        some = enters.nonzero()[0]
+        if not len(some):
+            continue
+        place, pace, pull, time = place[:, some], pace[:, some], a[:, some], time[some]
+        if gates is not None:
+            there = epoch_of(gates[:, some], time)
+            enters[some] = obstacles.reached(rows[some], circle[some], place, there)
+        # The gap, which is zero then, over the time since: so its own zero is divided out.
+        gap = np.zeros((5, len(some)))
+        gap[0], gap[1] = 2.0 * dot(place, pace), dot(pace, pace) + dot(place, pull)
+        gap[2], gap[3] = dot(pace, pull), 0.25 * dot(pull, pull)
+        gap *= np.sign(rho[some])
+        falls = np.where(gap[0] < 0.0, 0.0, descents(gap, until[some] - time).min(axis=0))
+        first[some] = np.minimum(first[some], np.where(enters[some], time + falls, np.inf))
+    return first
 
 
 def _polished(t: Floats, d: Floats, v: Floats, a: Floats, rho: Floats, apart: Bools) -> Floats:
@@ -217,7 +273,7 @@ FEW = 4
 def first_contact(
     motion: Motion, obstacles: Obstacles, radius: Floats, until: Floats
 ) -> tuple[Floats, Bools, Ints, Floats]:
-    """Return until when particles go on, who meets something then, and its number and side, (k,).
+    """Return when particles meet something, which of them do, and its number and side, (k,).
 
     Finds: faces within a segment's length, ends of segments (for a disk), the pulley. Misses, by
     design: a point against the end of a segment, and anything the particle overlaps already.
@@ -290,7 +346,7 @@ def _reached(
         near &= ~motion.never
     faces = near[: obstacles.segments].nonzero()[0]
     if motion.on is not None and len(faces):
-        # Along a face nobody meets the other one either.
+        # A sliding particle cannot hit the opposite face.
         faces = faces[(motion.on != faces[:, None]).any(axis=1)]
     return faces, near[obstacles.segments :].nonzero()[0]
 
@@ -300,7 +356,7 @@ def _faces(
 ) -> tuple[Floats, Ints, Floats]:
     """Return time, segment and side of the first face met up to `until`, (k,); time inf if none.
 
-    Of the given segments; works on arrays of shape (S, F, k), where F is 1 if nobody turns back
+    Of the given segments; works on arrays of shape (S, F, k), where F is 1 if no path turns back
     from a segment before `until` and can so meet one of its faces only, else 2.
     """
     some = len(segments) < obstacles.segments
@@ -318,6 +374,10 @@ def _faces(
 
     leaving = motion.left == segments[:, None, None]
     same = leaving & (motion.left_side == sides)
+    if motion.joint is not None:
+        face = np.where(sides < 0.0, 1, 0)
+        both = obstacles.joints.shares(motion.joint, segments[:, None, None], face)
+        same, leaving = same | both, leaving | both
     touching = np.abs(gap) <= rows_of(obstacles.touch, motion.rows)
     touching |= same
     grazing: Bools | None = None
@@ -379,12 +439,15 @@ WAYS = np.array([[-1.0], [1.0]])
 """Backwards and forwards, as rows of what `bounds` returns."""
 
 
-BOUND = np.dtype([("angle", "f8"), ("obstacle", "i8"), ("side", "f8"), ("handover", "?")])
+BOUND = np.dtype(
+    [("angle", "f8"), ("obstacle", "i8"), ("side", "f8"), ("handover", "?"), ("joint", "i8")]
+)
 """Nearest angle (rad) in one direction where a ride ends, and what is there.
 
 ∓inf and obstacle -1 where the way is free. `handover` marks where something takes over without a
 blow: at an end of the circle a face of its segment, at the tip of a moving one, where the rim
-changes its direction, the other half of the circle."""
+changes its direction, the other half of the circle. `joint` is what is touched all at once where a
+piece ends, a number in `Joints.groups`, or -1."""
 
 
 def bounds(
@@ -402,7 +465,7 @@ def bounds(
 
     def narrow(
         angle: Floats, closing: Floats, met: Bools, obstacle: Ints | int, side: Floats | int,
-        handover: bool = False,
+        handover: bool = False, joint: int = NONE,
     ) -> None:  # fmt: skip
         """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
         ahead = np.maximum(np.mod(WAYS * (angle - phi) + NOW, 2.0 * np.pi) - NOW, 0.0)
@@ -412,6 +475,7 @@ def bounds(
         np.copyto(found["obstacle"], obstacle, where=nearer)
         np.copyto(found["side"], side, where=nearer)
         np.copyto(found["handover"], handover, where=nearer)
+        np.copyto(found["joint"], joint, where=nearer)
 
     center, facing, joints = pick(obstacles.center, rows, circle), np.sign(rho), obstacles.joints
     for segment in range(obstacles.segments):
@@ -439,12 +503,13 @@ def bounds(
             closing = facing * np.sin(angle - tilt)
             number = joints.obstacle(piece, face)
             goes = (here == this) & obstacles.present[epoch, number]
+            joint = int(joints.groups[0][piece, end, FACES.index(face)])
             if onto:
-                narrow(angle, closing, goes, number, face, True)
+                narrow(angle, closing, goes, number, face, True, joint)
             else:
                 at = (epoch, piece, end, FACES.index(face))
                 obstacle, side_there = (array[at] for array in joints.onward)
-                narrow(angle, -closing, goes, obstacle, side_there, True)
+                narrow(angle, -closing, goes, obstacle, side_there, True, joint)
     crown = pick(joints.crown, rows, circle)
     tilt = np.arctan2(crown[0], crown[1])
     moves = (crown != 0.0).any(axis=0) & (pick(obstacles.material, rows, here)[0] != 0.0)

@@ -16,7 +16,10 @@ from chutelab.engines.exact.obstacles import (
     JOINT,
     Bends,
     ahead_of,
+    along,
+    beginnings,
     corners_of,
+    curvatures_of,
     dot,
     obstacles,
     resting,
@@ -31,9 +34,9 @@ from chutelab.util.arrays import Bools, Ints, Progress
 
 
 def kinds(machine: Machine) -> list[Ints]:
-    """Return the members of a family by what the engine reads off the first one only.
+    """Group members of a family that share every trait taken from the first one.
 
-    That is: how segments join, and whether there are points, points that may lie in a surface,
+    Traits are how pieces join, and whether there are points, points that may lie in a surface,
     gravity, and a belt at rest.
 
     Parameters
@@ -50,33 +53,40 @@ def kinds(machine: Machine) -> list[Ints]:
     ends, ahead = corners_of(machine, bends), ahead_of(machine, bends)
     size, radius = size_of(ends, bends, machine.releases.position), machine.particle.radius
     reach = JOINT * size
+    curvature = curvatures_of(machine, bends)
     traits = [np.greater(radius, 0.0), radius <= touch_of(size), np.greater(machine.gravity, 0.0)]
     if machine.pulley is not None:
         traits.append(np.equal(machine.pulley.speed, 0.0))
     traits += [*np.atleast_2d(machine.arcs.whole).T]
     for arc, on in enumerate(resting(ends, bends, reach)):
-        slant = dot(ends - bends.center[:, arc, None], ahead) / bends.shape[0, arc]
-        traits += [*on, *(on & (np.abs(slant) <= COLLINEAR))]
+        away = (ends - bends.center[:, arc, None]) / bends.shape[0, arc]
+        flush = on & (np.abs(dot(away, ahead)) <= COLLINEAR)
+        traits += [*on, *flush, *(flush & (dot(along(away), ahead) > 0.0))]
+    traits += beginnings(machine, bends, ends, reach).values()
     # Most ends are never near each other.
     beyond = ends.min(axis=-1)[:, :, None] > ends.max(axis=-1)[:, None] + reach.max()
     beyond |= beyond.transpose(0, 2, 1)
     joins: dict[frozenset[int], Bools] = {}
+    ordered: dict[frozenset[int], Bools] = {}
     for a, b in np.argwhere(np.triu(~beyond.any(axis=0), 1)).tolist():
         near: Bools = np.all(np.abs(ends[:, a] - ends[:, b]) <= reach, axis=0)
         joins[frozenset((a, b))] = near
         outward, onward = ahead[:, a], ahead[:, b]
-        cross = np.abs(outward[0] * onward[1] - outward[1] * onward[0])
-        traits += [
-            near,
-            near & (np.abs(outward - onward).max(axis=0) <= FOLDED),
-            near & (cross <= COLLINEAR),
-        ]
-    # Where a joins b and b joins c, but a does not join c, the order of the ends matters too.
-    nobody = np.zeros(machine.count, dtype=bool)
-    chained = nobody.copy()
+        cross = outward[0] * onward[1] - outward[1] * onward[0]
+        folded = near & (np.abs(outward - onward).max(axis=0) <= FOLDED)
+        traits += [near, folded, near & (np.abs(cross) <= COLLINEAR)]
+        tighter = curvature[a] > curvature[b]
+        ordered[frozenset((a, b))] = np.where(folded, tighter, near & (cross > COLLINEAR))
+    # Where three meet, their order round the place matters.
     for one, other in combinations(joins, 2):
         if len(one ^ other) == 2:
-            chained |= joins[one] & joins[other] & ~joins.get(one ^ other, nobody)
+            traits += [ordered[one], ordered[other]]
+    # Where a joins b and b joins c, but a does not join c, the order of the ends matters too.
+    none = np.zeros(machine.count, dtype=bool)
+    chained = none.copy()
+    for one, other in combinations(joins, 2):
+        if len(one ^ other) == 2:
+            chained |= joins[one] & joins[other] & ~joins.get(one ^ other, none)
     apart = np.where(chained, 1 + np.arange(machine.count), 0)
     table = np.stack([np.broadcast_to(trait, machine.count) for trait in (*traits, apart)])
     order = np.lexsort(table)
@@ -97,11 +107,11 @@ ROUNDS = 500_000
 within 200,000; one that rattles at 7 ms a period for the default max_time needs 10,000."""
 
 WINDOW = 10_000
-"""Rounds after which it is asked whether everybody gets on."""
+"""Progress check interval, in rounds."""
 
 TICK = 1e-12
-"""s; mean time between events below which nobody gets on: the last bounces before rest, at 1e-9
-m/s, are 200 times as far apart."""
+"""s; mean time between events below which a particle makes no progress: the last bounces before
+rest, at 1e-9 m/s, are 200 times as far apart."""
 
 
 def run(
@@ -134,7 +144,7 @@ def run(
     CornerError
         If a spinning disk is held between surfaces of which one moves.
     StalledError
-        If a particle goes on without getting on; with what was recorded until then.
+        If a particle has event after event without progress; with what was recorded until then.
     """
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")

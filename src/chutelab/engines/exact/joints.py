@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 NONE = -1
 
+TURN = 2.0 * np.pi
+
 FOLDED = 1e-9
 """Difference of two directions below which one piece lies on the other where they meet."""
 
@@ -23,6 +25,13 @@ COLLINEAR = 1e-12
 
 FACES = (1, -1)
 """The left and the right face of a piece."""
+
+
+CIRCULAR = 1e-9
+"""Share of a curvature by which two pieces that leave a place in one direction differ at least."""
+
+THROUGH = 2
+"""In place of an end: a piece that goes on through a place, first along it, then (3) back."""
 
 
 class Handover(NamedTuple):
@@ -34,8 +43,27 @@ class Handover(NamedTuple):
     onto: bool  # whether it is the piece that is gone over to; else the one that ends
 
 
+class Ray(NamedTuple):
+    """A piece seen from a place where it ends, or which it passes."""
+
+    piece: int
+    end: int  # or `THROUGH`, where the way out is along the piece, and `THROUGH` + 1
+    angle: float  # of the way out, rad, 0 to 2 π
+    bend: float  # curvature of the way out, 1/m, positive counterclockwise
+
+    @property
+    def left(self) -> int:
+        """Face of the piece on the left of the way out; the right one has the other sign."""
+        return 1 if self.end in (0, THROUGH) else -1
+
+
 class Joints:
     """Where pieces end; arrays over their two ends, and over their left and right faces.
+
+    The pieces that share a place, sorted by the angles at which they leave it, divide its
+    surroundings into sectors. A disk is in one of them and can touch only the two faces that bound
+    that. Where the angle between these is π they are *flush*, and a ride on one goes on on the
+    other; where it is more, round the place; where it is less, the ride is stopped before.
 
     Parameters
     ----------
@@ -77,27 +105,63 @@ class Joints:
             return o.pulley if face > 0 else NONE
         return piece - o.segments + o.first_arc + (0 if face > 0 else o.arcs)
 
-    def _follow(self, present: Bools) -> Ints:
-        """Return which piece goes on where another ends, and at which of its ends, (2, P, 2).
+    @cached_property
+    def _places(self) -> list[list[Ray]]:
+        """The rays of each place where pieces end, counterclockwise; of two alike the first."""
+        o, ahead = self._o, self.tips[1][..., 0]
+        places: dict[int, list[Ray]] = defaultdict(list)
+        for piece, pair in enumerate(o.spots):
+            arc = piece - o.segments
+            curvature = 1.0 / o.bend[0, arc, 0] if arc >= 0 else 0.0
+            for end, spot in enumerate(pair):
+                x, y = -ahead[:, piece, end]
+                bend = curvature if end else -curvature
+                places[spot].append(Ray(piece, end, _angle(x, y), bend))
+        for piece, end in np.argwhere(o.rests != NONE).tolist():
+            rays, arc = places[o.spots[piece][end]], o.rests[piece, end]
+            through = o.segments + arc
+            if any(ray.piece == through for ray in rays):
+                continue
+            if arc == o.arcs:
+                # By rounding the place is not quite on top of the pulley, but the belt is flush.
+                (x, y), radius = self.tips[2][:, piece, end, 0], o.rho[-1, 0]
+            else:
+                x, y = (
+                    self.tips[0][:, piece, end, 0] - o.center[:, o.first_arc - o.segments + arc, 0]
+                )
+                radius = o.bend[0, arc, 0]
+            bend = 1.0 / radius
+            rays.append(Ray(through, THROUGH, _angle(y, -x), -bend))
+            rays.append(Ray(through, THROUGH + 1, _angle(-y, x), bend))
+        return list(places.values())
 
-        Of the pieces that are there, (S + C,); -1 if none does; the first one wins. Pieces that
-        fold back onto each other do not go on from each other.
+    def _sectors(self, present: Bools) -> list[tuple[Ray, Ray, float]]:
+        """Return the two rays of each sector, the right one first, and its angle, rad.
+
+        Of the pieces that are there, (S + C,). What lies on another piece has no sector.
         """
-        spots, ahead = self._o.spots, self.tips[1][..., 0]
-        follow = np.full((2, len(spots), 2), NONE, dtype=np.int64)
-        meeting: dict[int, list[tuple[int, int]]] = defaultdict(list)
-        for piece, pair in enumerate(spots):
-            if present[self.obstacle(piece, 1)]:
-                for end, spot in enumerate(pair):
-                    meeting[spot].append((piece, end))
-        for ends in meeting.values():
-            for n, (s, e) in enumerate(ends):
-                for other, f in ends[n + 1 :]:
-                    if other == s or follow[0, s, e] != NONE or follow[0, other, f] != NONE:
-                        continue
-                    if np.abs(ahead[:, s, e] - ahead[:, other, f]).max() > FOLDED:
-                        follow[:, s, e], follow[:, other, f] = (other, f), (s, e)
-        return follow
+        found = []
+        for rays in self._places:
+            ring: list[list[Ray]] = []
+            for ray in sorted(rays, key=lambda ray: ray.angle):
+                if not present[self.obstacle(ray.piece, 1)]:
+                    continue
+                if ring and ray.angle - ring[-1][0].angle <= COLLINEAR:
+                    ring[-1].append(ray)
+                else:
+                    ring.append([ray])
+            if len(ring) > 1 and ring[0][0].angle + TURN - ring[-1][0].angle <= COLLINEAR:
+                ring[0] += ring.pop()
+            flat = [ray for alike in ring for ray in _by_bend(alike)]
+            for n, ray in enumerate(flat):
+                after = flat[(n + 1) % len(flat)]
+                angle = (after.angle - ray.angle) % TURN
+                if TURN - angle <= COLLINEAR:
+                    angle = 0.0
+                if len(flat) == 1 or (len(ring) == 1 and n == len(flat) - 1):
+                    angle = TURN
+                found.append((ray, after, angle))
+        return found
 
     @cached_property
     def onward(self) -> tuple[Ints, Floats]:
@@ -106,35 +170,70 @@ class Joints:
         Another face if that is flush, else the circle round the end, whose side is left open, 0;
         -1 for nothing. Before the first change of what is there, and after each.
         """
-        found = [self._onward(self._follow(present)) for present in self._o.present]
-        obstacle, side = zip(*found, strict=True)
-        return np.stack(obstacle), np.stack(side)
+        o, found = self._o, []
+        for present in o.present:
+            obstacle = np.repeat(o.end_circle[: len(o.spots), :, None], 2, axis=2)
+            side = np.zeros(obstacle.shape)
+            for right, left, angle in self._sectors(present):
+                if abs(angle - np.pi) > COLLINEAR:
+                    continue
+                faces = (right, right.left, left, -left.left), (left, -left.left, right, right.left)
+                for ray, face, other, onto in faces:
+                    if ray.end < THROUGH:
+                        n = FACES.index(face)
+                        obstacle[ray.piece, ray.end, n] = self.obstacle(other.piece, onto)
+                        side[ray.piece, ray.end, n] = onto
+            found.append((obstacle, side))
+        obstacles, sides = zip(*found, strict=True)
+        return np.stack(obstacles), np.stack(sides)
 
-    def _onward(self, follow: Ints) -> tuple[Ints, Floats]:
-        o = self._o
-        place, _, left = (array[..., 0] for array in self.tips)
-        obstacle = np.repeat(o.end_circle[: len(o.spots), :, None], 2, axis=2)
-        side = np.zeros(obstacle.shape)
-        for piece, end in np.ndindex(len(o.spots), 2):
-            normal, (other, there) = left[:, piece, end], follow[:, piece, end]
-            arc = o.rests[piece, end]
-            if other != NONE:
-                against = left[:, other, there]
-            elif arc == o.arcs:
-                other, against = o.segments + arc, normal
-            elif arc != NONE:
-                other = o.segments + arc
-                against = place[:, piece, end] - o.center[:, o.first_arc - o.segments + arc, 0]
-                against = against / np.hypot(*against)
-            else:
-                continue
-            if abs(normal[0] * against[1] - normal[1] * against[0]) > COLLINEAR:
-                continue
-            turn = 1 if normal @ against > 0.0 else -1
-            for n, face in enumerate(FACES):
-                obstacle[piece, end, n] = self.obstacle(other, turn * face)
-                side[piece, end, n] = turn * face
-        return obstacle, side
+    @cached_property
+    def groups(self) -> tuple[Ints, Bools, Bools]:
+        """What a disk touches at once where faces end: number of each set, (P, 2, 2), and the sets.
+
+        Faces that share a place and the normal there, and the circle round it; which obstacles, and
+        which faces of segments, are in a set: (G, S + C, 2). Last, which ends of the circles that
+        are arcs are there, (G, C, 2).
+        """
+        o, left = self._o, self.tips[2][..., 0]
+        number = np.full((len(o.spots), 2, 2), NONE, dtype=np.int64)
+        sets: list[Bools] = []
+        edges: list[Bools] = []
+        for rays in self._places:
+            known: list[tuple[Floats, int]] = []
+            for ray in rays:
+                for n, face in enumerate(FACES):
+                    if ray.end < THROUGH:
+                        normal = face * left[:, ray.piece, ray.end]
+                    elif ray.end == THROUGH:
+                        normal = face * np.array([-np.sin(ray.angle), np.cos(ray.angle)])
+                    else:
+                        continue
+                    same = [g for m, g in known if np.abs(normal - m).max() <= COLLINEAR]
+                    group = same[0] if same else len(sets)
+                    if not same:
+                        known.append((normal, group))
+                        sets.append(np.zeros((len(o.surface), 2), dtype=bool))
+                        edges.append(np.zeros((len(o.rho), 2), dtype=bool))
+                    own = self.obstacle(ray.piece, face)
+                    if own != NONE:
+                        sets[group][own, n if own < o.segments else slice(None)] = True
+                    if ray.end < THROUGH:
+                        if own >= o.segments:
+                            edges[group][own - o.segments, ray.end] = True
+                        number[ray.piece, ray.end, n] = group
+                        circle = o.end_circle[ray.piece, ray.end]
+                        if circle != NONE:
+                            sets[group][circle] = True
+        if not sets:
+            none = np.zeros((0, len(o.surface), 2), dtype=bool)
+            return number, none, none
+        return number, np.stack(sets), np.stack(edges)
+
+    def shares(self, group: Ints, obstacle: Ints, face: Ints | int) -> Bools:
+        """Tell which obstacles, by the index of the face of a segment, are in sets `groups`."""
+        sets = self.groups[1]
+        return np.asarray((group != NONE) & sets[group, obstacle, face])
 
     @cached_property
     def meeting(self) -> Ints:
@@ -163,7 +262,12 @@ class Joints:
         which turn clockwise all round, have 0.
         """
         o, left = self._o, self.tips[2]
-        follow = self._follow(np.ones(len(o.surface), dtype=bool))
+        follow = np.full((2, len(o.spots), 2), NONE, dtype=np.int64)
+        for right, other, angle in self._sectors(np.ones(len(o.surface), dtype=bool)):
+            if angle >= np.pi - COLLINEAR and right is not other:
+                for one, two in ((right, other), (other, right)):
+                    if one.end < THROUGH and two.end < THROUGH:
+                        follow[:, one.piece, one.end] = two.piece, two.end
         crown = np.zeros((2, len(o.rho), left.shape[-1]))
         for piece, end in reversed(list(np.ndindex(len(o.spots), 2))):
             circle, (other, there) = o.end_circle[piece, end], follow[:, piece, end]
@@ -195,23 +299,26 @@ class Joints:
 
     @cached_property
     def beside(self) -> Bools:
-        """Tell what touches a circle without being met, as it goes over into it, (C, S + C, 2).
+        """Tell what touches a circle without being met, as both share a place, (C, S + C, 2).
 
-        The last axis is the face of a segment; both are the same for a circle.
+        The last axis is the face of a segment; both are the same for a circle. Such a circle and
+        such a face are tangent to each other there, and have no other point in common.
         """
-        o, (onward, _) = self._o, self.onward
+        o, (_, sets, _) = self._o, self.groups
         beside = np.zeros((len(o.rho), len(o.surface), 2), dtype=bool)
-
-        def touch(one: int, face: int, other: int) -> None:
-            """Note that an obstacle, or this face of a segment, and a circle touch."""
-            if one < o.segments:
-                beside[other - o.segments, one, FACES.index(face)] = True
-            else:
-                beside[other - o.segments, one] = beside[one - o.segments, other] = True
-
-        for piece, end, n in np.ndindex(len(o.spots), 2, 2):
-            own, circle = self.obstacle(piece, FACES[n]), o.end_circle[piece, end]
-            for other in (int(circle), *onward[:, piece, end, n].tolist()):
-                if other >= o.segments:
-                    touch(own, FACES[n], other)
+        for members in sets:
+            beside[members[o.segments :, 0]] |= members
         return beside
+
+
+def _angle(x: float, y: float) -> float:
+    return float(np.arctan2(y, x) % TURN)
+
+
+def _by_bend(rays: list[Ray]) -> list[Ray]:
+    """Sort rays of one angle counterclockwise; of those that lie on each other keep the first."""
+    kept: list[Ray] = []
+    for ray in rays:
+        if all(abs(ray.bend - o.bend) > CIRCULAR * abs(o.bend) for o in kept):
+            kept.append(ray)
+    return sorted(kept, key=lambda ray: ray.bend)

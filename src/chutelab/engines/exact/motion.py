@@ -29,8 +29,11 @@ from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
 
-def go_on(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
-    """Go on from the end of a face or an arc on what follows, or fly if nothing holds there."""
+def go_on(s: State, index: Ints, obstacle: Ints, side: Floats, joint: Ints) -> None:
+    """Go on from the end of a face or an arc on what follows, or fly if nothing holds there.
+
+    `joint` tells what is touched there, see `Joints.groups`.
+    """
     if not len(index):
         return
     o, left, face = s.obstacles, s.on[index], s.side[index]
@@ -42,7 +45,7 @@ def go_on(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
     # From a tangential joint it flies off what follows; from an end it leaves what ends.
     flush = ends | (obstacle < o.segments) | (obstacle >= o.first_arc)
     last, last_side = np.where(flush, obstacle, left), np.where(flush, side, face)
-    s.fly(index[off], last[off], last_side[off], 2)
+    s.fly(index[off], last[off], last_side[off], 2, joint[off])
     rest_on(s, index[stays], obstacle[stays], side[stays], np.zeros(np.count_nonzero(stays)))
 
 
@@ -180,7 +183,7 @@ def ride(s: State, index: Ints) -> None:
         there = s.bounds[way, index]
         obstacle, side = there["obstacle"], there["side"]
         joins = at & there["handover"]
-        go_on(s, index[joins], obstacle[joins], side[joins])
+        go_on(s, index[joins], obstacle[joins], side[joins], there["joint"][joins])
         hit = at & ~joins
         if hit.any():
             strike(s, index[hit], obstacle[hit], side[hit])
@@ -205,6 +208,9 @@ AT_REST = np.zeros((2, 1))
 def fly(s: State, index: Ints) -> None:
     """Move particles in flight on to their next event and resolve it."""
     motion = _motion(s, index, rows_of(s.fall, index))
+    joint = s.joint[index]
+    if np.count_nonzero(joint != NONE):
+        motion.joint = joint
     stops, leaves = s.stop[index] - s.age[index], None
     # What falls meets surfaces before it leaves the scene: when that is matters to few.
     if not s.falls or s.obstacles.segments > FEW:
@@ -230,7 +236,7 @@ def fly(s: State, index: Ints) -> None:
 def carry(s: State, index: Ints) -> None:
     """Move particles that the belt carries on to the pulley, or to what is in the way."""
     if len(s.changes):
-        # Who was on the pulley when a gate opened or shut.
+        # Particles that were on the pulley when a gate opened or shut.
         place = s.p[:, index]
         round_ = dot(place, s.up_belt[:, index]) > rows_of(s.obstacles.touch, index)
         turn, pace = np.arctan2(place[0], place[1]), length_of(s.v[:, index])
@@ -330,7 +336,7 @@ def _motion(s: State, index: Ints, acceleration: Floats) -> Motion:
 
 
 def _next(s: State, motion: Motion, until: Floats) -> tuple[Floats, Bools, Ints, Floats]:
-    """Return what `first_contact` does, and count who does not get on."""
+    """Return what `first_contact` does, and count events that take no time."""
     found = first_contact(motion, s.obstacles, s.radius[motion.rows], until)
     s.count_idle(motion.rows, found[0])
     return found
@@ -375,9 +381,7 @@ def _end(s: State, motion: Motion) -> Floats:
 
 
 def _exit(s: State, motion: Motion) -> Floats:
-    """Time until a flight leaves the scene; never in a run that lasts a number of seconds."""
-    if s.machine.until == "time":
-        return np.full(len(motion.rows), np.inf)
+    """Time until a flight leaves the scene."""
     left, right, bottom, top = s.exit_box[:, motion.rows]
     (x, y), (vx, vy) = motion.position, motion.velocity
     fall = rows_of(s.fall, motion.rows)
@@ -407,4 +411,4 @@ def _leave_face(s: State, index: Ints) -> None:
     face = (side < 0.0).astype(np.int64)
     at = (s.epoch(index), segment, end, face)
     obstacle, obstacle_side = (array[at] for array in o.joints.onward)
-    go_on(s, index, obstacle, obstacle_side)
+    go_on(s, index, obstacle, obstacle_side, o.joints.groups[0][segment, end, face])

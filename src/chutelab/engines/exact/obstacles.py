@@ -18,11 +18,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from sys import float_info
+from typing import Any
 
 import numpy as np
 
-from chutelab.engines.exact.joints import NONE, Joints
+from chutelab.engines.exact.joints import COLLINEAR, NONE, Joints
 from chutelab.machine import Machine
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -152,7 +154,8 @@ class Obstacles:
 
     def of(self, first: int, last: int) -> Obstacles:
         """Return the obstacles of the particles from `first` up to `last`."""
-        if self.length.shape[-1] == self.rho.shape[-1] == self.material.shape[-1] == 1:
+        shared = self.length, self.rho, self.material, self.touch
+        if all(array.shape[-1] == 1 for array in shared):
             return self
         own = {name: getattr(self, name) for name in PER_PARTICLE}
         own = {name: array[..., first:last] for name, array in own.items() if array.shape[-1] > 1}
@@ -296,6 +299,10 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     size = size_of(corners, bends, machine.releases.position)
     touch = touch_of(size, far)
     near = JOINT * size
+    widest = touch if corners.shape[-1] > 1 else touch.max()
+    on = beginnings(machine, bends, corners[..., :1], near[:1])
+    if on:
+        return obstacles(_cut(machine, corners, list(on), near[0].item()), far)
     spots = spots_of(corners[..., 0], near[0].item())
     came, went, changes = seg.appears, seg.vanishes, NEVER
     if len(bends.order):
@@ -348,7 +355,7 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     if arcs:
         room = bends.shape[0] - radius
         center += [bends.center, bends.center]
-        rho += [bends.shape[0] + radius, np.where(room > touch, -room, np.nan)]
+        rho += [bends.shape[0] + radius, np.where(room > widest, -room, np.nan)]
     if wheel is not None:
         center.append(np.zeros((2, 1, 1)))
         rho.append(np.asarray(wheel.radius + radius).reshape(1, -1))
@@ -370,11 +377,11 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     over = FOOT * length[:, None]
     faces[0, 3], faces[1, 3] = -over, over + length[:, None]
     # A circle's box is smaller, met from outside: what only touches it does not meet it.
-    beside, inner = radius + BOX_TOUCHES * touch, np.abs(rhos - touch)
+    beside, inner = radius + BOX_TOUCHES * widest, np.abs(rhos - widest)
     low = [np.minimum(start, stop) - beside, centers - inner]
     high = [np.maximum(start, stop) + beside, centers + inner]
     if arcs:
-        # Nobody meets the inside of an arc that is too narrow.
+        # A particle does not fit inside such a narrow arc.
         low[1] = np.where(np.isnan(low[1]), np.inf, low[1])
         high[1] = np.where(np.isnan(high[1]), -np.inf, high[1])
     present, vanishes = np.ones((len(changes) + 1, len(which)), dtype=bool), went.take(which)
@@ -382,7 +389,7 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
         since = np.concatenate([[-np.inf], changes])[:, None]
         there = (came <= since) & (went > since)
         present = there[:, which]
-        # An end is there with any of those that have it.
+        # A shared end exists while any of its pieces exists.
         for s, e in np.argwhere(end_circle != NONE).tolist():
             present[:, end_circle[s, e]] |= there[:, owner[s]]
     span = np.empty((2, 0, 1))
@@ -451,14 +458,17 @@ def corners_of(machine: Machine, bends: Bends) -> Floats:
 
 
 def size_of(corners: Floats, bends: Bends, places: Floats) -> Floats:
-    """Return the largest coordinate, m, (n,): of each particle, where each has its own corners."""
-    count = corners.shape[-1]
+    """Return the largest coordinate that each particle meets, m, (n,); n is 1 if all have one.
+
+    It is that of the surfaces and of the particle's own release: of no other particle's.
+    """
     # Not their methods, which take twice as long.
     size = np.maximum.reduce(np.abs(corners), axis=(0, 1), initial=0.0)
     if len(bends.order):
         size = np.maximum(size, (np.abs(bends.center) + bends.shape[0]).max(axis=(0, 1)))
-    farthest: Floats = np.maximum.reduce(np.abs(places.reshape(count, -1)), axis=1)
-    return np.asarray(np.maximum(size, farthest))
+    size = np.maximum(size, np.maximum.reduce(np.abs(places), axis=1))
+    several = corners.shape[-1] > 1 or np.count_nonzero(size != size[0])
+    return np.asarray(size if several else size[:1])
 
 
 def touch_of(size: Floats, far: float = 0.0) -> Floats:
@@ -485,6 +495,76 @@ def ahead_of(machine: Machine, bends: Bends) -> Floats:
         (x, y), (u, v) = _out(begin + extent), _out(begin)
         return np.concatenate([-along, np.stack([-y, x]), along, np.stack([v, -u])], axis=1)
     return np.concatenate([-along, along], axis=1)
+
+
+def curvatures_of(machine: Machine, bends: Bends) -> Floats:
+    """Return the curvatures of the pieces at those ends, seen from there, to the left, (2 P, n)."""
+    straight = np.zeros((len(machine.segments.surface), 1))
+    bent = 1.0 / bends.shape[0, : bends.open]
+    return joined([straight, -bent, straight, bent], 0)
+
+
+def beginnings(
+    machine: Machine, bends: Bends, ends: Floats, near: Floats
+) -> dict[tuple[int, int], Bools]:
+    """Tell which of the ends (2 P, n) lie inside a segment and are tangent to it, each (n,).
+
+    By the numbers of segment and end; those that none of the rows has are left out. What the
+    incoming belt carries comes to nothing that begins on it.
+    """
+    pieces, segments = ends.shape[1] // 2, len(machine.segments.surface)
+    own = np.arange(segments)
+    found: dict[tuple[int, int], Bools] = {}
+    starts, stops = ends[:, :segments], ends[:, pieces : pieces + segments]
+    reach = near.max()
+    low = np.minimum(starts, stops).min(axis=-1)[:, :, None] - reach
+    high = np.maximum(starts, stops).max(axis=-1)[:, :, None] + reach
+    least, most = (ends, ends) if ends.shape[-1] == 1 else (ends.min(axis=-1), ends.max(axis=-1))
+    inside = (most.reshape(2, 1, -1) >= low) & (least.reshape(2, 1, -1) <= high)
+    inside = inside[0] & inside[1]
+    inside[own, own] = inside[own, pieces + own] = False
+    if machine.pulley is not None:
+        inside[0] = False
+    if not np.count_nonzero(inside):
+        return found
+    ahead = ahead_of(machine, bends)[..., : ends.shape[-1]]
+    for s, end in zip(*(number.tolist() for number in inside.nonzero()), strict=True):
+        away, tangent, outward = ends[:, end] - starts[:, s], ahead[:, pieces + s], ahead[:, end]
+        foot, length = dot(away, tangent), dot(stops[:, s] - starts[:, s], tangent)
+        on = np.abs(tangent[0] * away[1] - tangent[1] * away[0]) <= near
+        on &= (foot > near) & (foot < length - near)
+        on &= np.abs(tangent[0] * outward[1] - tangent[1] * outward[0]) <= COLLINEAR
+        if on.any():
+            found[s, end] = on
+    return found
+
+
+def _cut(machine: Machine, ends: Floats, places: Sequence[tuple[int, int]], near: float) -> Machine:
+    """Cut segments where other pieces begin on them: there three join."""
+    segments = machine.segments
+    starts, tangents = _vectors(segments.start), _vectors(segments.tangent)
+    which: list[int] = []
+    feet: list[tuple[Floats, Floats]] = []
+    for s, length in enumerate(_scalars(segments.length)):
+        at = [dot(ends[:, end] - starts[:, s], tangents[:, s]) for on, end in places if on == s]
+        at = [np.zeros(1), *sorted(at, key=lambda foot: float(foot[0])), length]
+        for low, high in pairwise(at):
+            if (high - low)[0] > near:
+                which.append(s)
+                feet.append((low, high))
+    low, high = (joined([pair[n][None] for pair in feet], 0) for n in (0, 1))
+    start = starts[:, which] + low * tangents[:, which]
+    own: dict[str, Any] = {
+        name: array.take(which, axis=-1)
+        for name, array in vars(segments).items()
+        if name not in ("start", "tangent", "length")
+    }
+    several = segments.start.ndim == 3
+    own["start"], own["length"] = start.T, (high - low).T
+    own["tangent"] = segments.tangent.take(which, axis=-2)
+    if not several:
+        own["start"], own["length"] = own["start"][0], own["length"][0]
+    return replace(machine, segments=replace(segments, **own))
 
 
 def resting(corners: Floats, bends: Bends, near: Floats) -> Bools:

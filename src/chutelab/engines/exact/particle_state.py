@@ -119,7 +119,7 @@ class State:
         self.fall = np.zeros((2, count))
         self.fall[1] = -self.gravity
         self.falls = bool(self.gravity[0] != 0.0)
-        # Who turns, and whether anybody does; m*/m and m r²/I (or 0), see `rim_share`.
+        # Which particles turn, and whether any does; m*/m and m r²/I (or 0), see `rim_share`.
         self.turns = inertia > 0.0
         self.spins = np.count_nonzero(self.turns) > 0
         # Rolling friction, of those that turn; the sign of the spin it opposes, 0 while it holds.
@@ -158,8 +158,9 @@ class State:
         # What is being left, see `detect.Motion`.
         self.left, self.left_side = np.full(count, NONE), np.zeros(count)
         self.order = np.zeros(count, dtype=np.int64)
+        self.joint = np.full(count, NONE)
         # Events in a row that took no time, and that went slowly to and fro between two obstacles;
-        # whether anybody has any.
+        # whether any particle has some.
         self.idle, self.crawls = np.zeros((2, count), dtype=np.int64)
         self.idling = self.crawling = False
         # Angle of a ride round a circle, and where it ends.
@@ -227,12 +228,12 @@ class State:
             raise self.stalled(int(index[np.argmax(self.idle[index])]), reason)
 
     def stalled(self, particle: int, reason: str) -> StalledError:
-        """Say that a particle, numbered within the block, does not get on."""
+        """Say that a particle, numbered within the block, makes no progress."""
         t, x, y = self.now(np.array([particle]))[:3, 0].tolist()
         return StalledError(self.first + particle, t, (x, y), reason)
 
     def parties(self) -> list[tuple[int, Ints]]:
-        """Return the modes (but `DONE`) that particles are in now, and who is in each."""
+        """Return the modes (but `DONE`) that particles are in now, and which are in each."""
         mode = int(self.mode[0])
         if self.count == 1 or np.count_nonzero(self.mode == mode) == self.count:
             return [(mode, self.everyone)] if mode != Mode.DONE else []
@@ -382,12 +383,16 @@ class State:
         self.mode[index] = Mode.DONE
         self.ended[index] = REASONS.index(reason)
 
-    def fly(self, index: Ints, left: ArrayLike, side: ArrayLike, order: ArrayLike) -> None:
-        """Let the particles go, away from the obstacle they touched."""
+    def fly(
+        self, index: Ints, left: ArrayLike, side: ArrayLike, order: ArrayLike,
+        joint: ArrayLike = NONE,
+    ) -> None:  # fmt: skip
+        """Let the particles go, away from the obstacle they touched, or all those of a joint."""
         at = self.at(index)
         self.mode[at] = Mode.FLIGHT
         self.on[at], self.side[at], self.slip[at] = NONE, 0.0, 1.0
         self.left[at], self.left_side[at], self.order[at] = left, side, order
+        self.joint[at] = joint
 
     def part(self, index: Ints, surface: int | Ints) -> None:
         """Tell that particles leave a surface."""

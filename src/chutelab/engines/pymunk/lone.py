@@ -67,8 +67,9 @@ ROLLS = 20
 SHORT = 1e-5
 """Share of a step; a contact that lasts less has ended."""
 
-WINDOW = 30_000
-"""Steps of Chipmunk's at one instant for a particle that does not get on; they take 2 s."""
+WINDOW, GAINED = 30_000, 100
+"""Steps of Chipmunk's, and rounds of the loop, in which a particle must get on by so many `run.dt`.
+They take 2 to 8 s. A ride round 1/1000 of the radius at 1 m/s needs a third of them."""
 
 TICK = 1e-12
 """s; what is closer to each other is at one instant."""
@@ -162,10 +163,9 @@ class Lone:
         released = bool(self.machine.releases.carried[self.particle])
         if released:
             self._carry()
-        moved = self.steps
+        begin, done, rounds = self.t, self.steps, 0
         while not self.ended:
             self._look()
-            begin = self.t
             if self.world.gates and not released:
                 self._gates()
             touching, room = {}, inf
@@ -181,14 +181,16 @@ class Lone:
             elif released or not self._ride(touching, room):
                 self._fly(touching)
             released = False
-            if self.t - begin >= TICK:
-                moved = self.steps
-            elif self.steps - moved > WINDOW and not self.ended:
+            rounds += 1
+            if self.t - begin >= GAINED * self.dt:
+                begin, done, rounds = self.t, self.steps, 0
+            elif self.steps - done + rounds > WINDOW and not self.ended:
                 self._end("time")
                 raise StalledError(
                     self.particle, self.t, (self.x.x, self.x.y),
-                    f"{WINDOW} steps in no time: it is driven to and fro in a narrow"
-                    " place; move the surfaces there apart, or lower their restitution",
+                    f"{WINDOW} steps gain less than {GAINED} times run.dt: it goes to and fro, or"
+                    " round, in a narrow place; move the surfaces there apart, lower their"
+                    " restitution, or take another engine",
                 )  # fmt: skip
         self.world.space.remove(self.body, self.circle)
         self._look()
@@ -285,7 +287,7 @@ class Lone:
         self.on, self.slipping = -1, None
         path = Flight(self.x, self.v, self.pull)
         span, reason = self.machine.end_time - self.t, "time"
-        if self.machine.until != "time" and (out := path.leaves(self.machine.exit_box)) < span:
+        if (out := path.leaves(self.machine.exit_box)) < span:
             span, reason = out, "exit"
         if self.changes - self.t < span:
             span, reason = self.changes - self.t, ""

@@ -37,6 +37,9 @@ from chutelab.util.arrays import Floats, Ints, Progress
 SOON = 1e-9
 """Share of a step that a time may be ahead and count as now."""
 
+TOUCHING = 1e-9
+"""Radii by which disks that just touch may overlap when they are released."""
+
 STAY, HOP = 5, 50
 """Pushes of one surface that make a ride, and steps without one that end it. A grip of large
 friction hops for some steps at a time; the ride ends with its last push."""
@@ -121,7 +124,6 @@ class Shared:
         recorder.entries = self.entries[:, :count].T
         self.free, self.inside, self.landed = np.zeros((3, count), dtype=bool)
         self.calm = np.zeros(count)
-        self.box = machine.exit_box if machine.until != "time" else (-inf, inf, -inf, inf)
         # The last surface that pushed a particle, how often in a row, the time and the state then.
         self.on, self.pushes = np.full(count, -1), np.zeros(count, dtype=np.int64)
         self.left = np.zeros((6, count))
@@ -227,9 +229,7 @@ class Shared:
             return self.shapes.taken(i, x + late * v)
         now = self.state[1, :2, others] - (x + late * v)
         apart = now, now - late * (self.state[1, 2:4, others] - v)
-        near = 4.0 * self.r**2
-        if np.ndim(self.r):
-            near = (self.radius[i] + self.radius[others]) ** 2
+        near = (self.radius[i] * (1.0 - TOUCHING) + self.radius[others]) ** 2
         return any(bool(((d * d).sum(axis=1) < near).any()) for d in apart)
 
     def _free(self, i: int, t: float, x: Vec2d, v: Vec2d) -> None:
@@ -512,7 +512,7 @@ class Shared:
 
     def _endings(self, t: float, entries: Floats) -> None:
         """End who left, landed or settled."""
-        until, (left, right, bottom, top) = self.machine.until, self.box
+        until, (left, right, bottom, top) = self.machine.until, self.machine.exit_box
         x, y = self.state[1, :2, : self.count]
         out = (y < bottom) | (y > top) | (x < left) | (x > right)
         for i in np.flatnonzero(out & self.free).tolist():
@@ -556,10 +556,11 @@ class Shared:
         else:
             angle = 0.0 if self.angle is None else self.angle[i] + (t - self.t) * omega
             self.tracks.knot(i, t, x, v, omega, angle)
+            # A string is tied once the ride is over.
+            self.world.space.remove(*(string.joint for string in self.strings.get(i, ())))
         if kind is not None:
             surface = self.on[i] if kind == Kind.SETTLE else -1
             self.recorder.events(kind, i, t, x, v, omega, surface=surface)
         self.recorder.ended[i] = REASONS.index(reason)
-        self.world.space.remove(*(string.joint for string in self.strings.get(i, ())))
         self.world.space.remove(*self.bodies[i])
         self.inside[i] = self.free[i] = False

@@ -155,19 +155,27 @@ class Bend(Face):
     def put(self, x: Vec2d) -> None:
         """Put the foot where the arc is nearest to a place (m), or out of reach beside an arc."""
         assert self.foot.body is not None
+        assert isinstance(self.shape, pymunk.Circle)
         beside = self.gap(x)[0] == inf
         away = x + Vec2d(4.0 * self.radius, 0.0)
-        self.foot.body.position = away if beside else self.shape.point_query(x).point
+        onto = self.center + self.shape.radius * self.outward(x)
+        self.foot.body.position = away if beside else onto
+
+    def outward(self, x: Vec2d) -> Vec2d:
+        """Return the direction of a place from the centre.
+
+        Nearer to the centre than 1e-5 m Chipmunk has its own, the same for all places.
+        """
+        away = x - self.center
+        return away.normalized() if away.length > 0.0 else Vec2d(0.0, 1.0)
 
     def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
         """Return the gap (m) and the normal; inf where an end is nearer than all between them."""
-        found = self.shape.point_query(x)
-        side = 1.0 if found.distance >= 0.0 else -1.0
-        if self.extent < 2.0 * pi:
-            away = x - self.center
-            if (atan2(away.y, away.x) - self.begin) % (2.0 * pi) > self.extent:
-                return inf, side * found.gradient
-        return side * found.distance - self.radius, side * found.gradient
+        distance, away = self.shape.point_query(x).distance, self.outward(x)
+        side = 1.0 if distance >= 0.0 else -1.0
+        if (atan2(away.y, away.x) - self.begin) % (2.0 * pi) > self.extent:
+            return inf, side * away
+        return side * distance - self.radius, side * away
 
     def belt(self, normal: Vec2d) -> float:
         """Return the speed (m/s) along (n_y, -n_x): the surface runs clockwise."""

@@ -31,6 +31,7 @@ from chutelab.pictures.plots.bodies import (
 )
 from chutelab.pictures.plots.machinery import Piece, draw_piece, pieces, points_of
 from chutelab.pictures.plots.scenery import (
+    FINE,
     nominal,
     one_of_many,
     places,
@@ -90,12 +91,15 @@ def bodies(
 
 def trail(ax: Axes, recording: Recording, times: Floats, reach: float) -> Moving:
     """Return the way that particle 0 came in the last `reach` seconds of the recording."""
-    passed = np.union1d(times, track_times(recording))
+    fine = FINE * float(np.ptp(ax.get_xlim()))
+    passed = np.union1d(times, track_times(recording, fine=fine))
     path, _ = nominal(recording, passed)
+    begun, _ = nominal(recording, np.maximum(times - reach, passed[0]))
 
     def behind(index: int) -> Floats:
         ends = [times[index] - reach, times[index]]
-        return path[slice(*np.searchsorted(passed, ends, side="right"))]
+        later = path[slice(*np.searchsorted(passed, ends, side="right"))]
+        return np.concatenate([begun[index : index + 1], later])
 
     return line(ax, "trail", behind, color=style.TRACK, lw=2.0)
 

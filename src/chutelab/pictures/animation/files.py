@@ -16,8 +16,9 @@ import numpy as np
 from PIL import Image
 
 from chutelab.pictures.animation.moments import Moment, asked, film, slowness, span
-from chutelab.pictures.animation.stage import SHOWS, Stage, lay_out
+from chutelab.pictures.animation.stage import Stage, lay_out
 from chutelab.pictures.plots import style
+from chutelab.pictures.plots.scenery import as_crowd
 from chutelab.results import Recording
 from chutelab.util.errors import MissingLibraryError
 from chutelab.util.files import whole
@@ -146,7 +147,7 @@ def animate(
     slow: float | None = None,
     title: str | None = None,
     question: str = "",
-    show: Collection[str] = SHOWS,
+    show: Collection[str] | None = None,
     predict: bool = False,
     comment: str = "",
 ) -> Path:
@@ -174,7 +175,8 @@ def animate(
     show : collection of str, optional
         Which of `SHOWS` to show: "parabola" (the analytic one, dashed), "trails", "strobe" (dots
         at round times), "velocity" (of particle 0, an arrow with its components) and "energy"
-        (the ledger as bars; without it the scene is wider).
+        (the ledger as bars; without it the scene is wider). By default all, but of a crowd
+        neither strobe dots nor velocity, and no impact of particle 0 is told.
     predict : bool, optional
         Let whoever watches predict: the film begins without the analytic parabola, and waits as
         the particle comes to the top of the drive pulley, or as it begins.
@@ -203,14 +205,15 @@ def animate(
     if kind in VIDEOS and (width % 2 or height % 2):
         raise ValueError(f"{width} x {height} pixels: allowed in a video are even numbers")
     fps = (25 if recording.count == 1 else 20) if fps is None else fps
-    shows = frozenset([show] if isinstance(show, str) else show)
+    shows = None if show is None else frozenset([show] if isinstance(show, str) else show)
     layout = lay_out(
         recording, width=width, height=height, title=title, question=question, shows=shows
     )
     begin, end = span(recording, layout.window)
     pace = slowness(end - begin) if slow is None else slow
     ask = asked(recording, begin) if predict else None
-    moments = film(recording, begin, end, fps=fps, slow=pace, ask=ask)
+    crowd = as_crowd(recording) and "velocity" not in layout.shows
+    moments = film(recording, begin, end, fps=fps, slow=pace, ask=ask, crowd=crowd)
     stage = Stage(recording, layout, moments, slow=pace, ask=ask)
     pictures = map(stage.frame, range(len(moments)))
     delays = [moment.delay for moment in moments]

@@ -13,7 +13,8 @@ from chutelab.machine import Machine
 from chutelab.pictures.plots import Window
 from chutelab.pictures.plots.scenery import STRUCK, action, nominal, one_of_many
 from chutelab.pictures.plots.style import quantity
-from chutelab.results import PARTICLES, Kind, Recording
+from chutelab.results import PARTICLES, REASONS, Kind, Recording
+from chutelab.results.arrival import arrivals
 from chutelab.util.arrays import Bools, Floats, Ints
 
 
@@ -198,11 +199,13 @@ def film(
     fps: int,
     slow: float,
     ask: float | None = None,
+    crowd: bool = False,
 ) -> tuple[Moment, ...]:
     """Return the moments from `begin` to `end`: even steps, and a hold at each impact worth it.
 
     There are `fps` pictures a second; `slow` is seconds on the screen for one of the recording. At
-    the time `ask`, if it is given, the film holds for whoever watches to predict what comes.
+    the time `ask`, if it is given, the film holds for whoever watches to predict what comes. Of a
+    `crowd` it tells how many have come and gone, and holds at no impact of particle 0.
 
     Raises
     ------
@@ -222,7 +225,8 @@ def film(
     events = recording.events
     mine = events[(events["particle"] == 0) | (events["other"] == 0)]
     mine = mine[(mine["t"] >= begin) & (mine["t"] <= end)]
-    if one_of_many(recording):
+    crowd = crowd or one_of_many(recording)
+    if crowd:
         mine = mine[:0]
     held = _held(mine)
     stops = mine["t"][held]
@@ -235,8 +239,9 @@ def film(
     hold = min(HOLD_TOTAL // max(len(stops), 1), HOLD_LONGEST)
     delays = np.where(np.isin(times, stops), hold, delay)
     delays[-1] = max(delays[-1], TAIL)
-    if one_of_many(recording):
-        words = _gates(recording.machine, times, slow)
+    if crowd:
+        gates = _gates(recording.machine, times, slow)
+        words = [told or said for told, said in zip(gates, _counts(recording, times), strict=True)]
     else:
         words = _words(recording, mine, held, times, slow)
     if ask is not None:
@@ -306,6 +311,23 @@ def _gates(machine: Machine, times: Floats, slow: float) -> list[str]:
         told[i][1] if i >= 0 and slow * (t - told[i][0]) <= TOLD else ""
         for t, i in zip(times.tolist(), last.tolist(), strict=True)
     ]
+
+
+def _counts(recording: Recording, times: Floats) -> list[str]:
+    """Return the caption of a crowd at each time: how many are released, have arrived, have left.
+
+    Of the last two only what any of them does in the end.
+    """
+    first, last = recording.ends()
+    come = arrivals(recording)["t"]
+    gone = last["t"][recording.ended[recording.released] == REASONS.index("exit")]
+    counted = {"released": first["t"], "arrived": come[np.isfinite(come)], "left the scene": gone}
+    told = [
+        [f"{n:,} {name}" for n in np.searchsorted(np.sort(when), times, side="right").tolist()]
+        for name, when in counted.items()
+        if len(when)
+    ]
+    return [", ".join(parts) for parts in zip(*told, strict=True)]
 
 
 def _words(

@@ -29,7 +29,9 @@ from chutelab.pictures.animation.actors import (
 from chutelab.pictures.animation.moments import Moment, span
 from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_scene, style, window_of
 from chutelab.pictures.plots.scenery import (
+    FINE,
     around,
+    as_crowd,
     energies,
     nominal,
     one_of_many,
@@ -43,6 +45,9 @@ from chutelab.util.arrays import Bools
 
 SHOWS = ("parabola", "trails", "strobe", "velocity", "energy")
 """What a picture can show besides the machine and the particles."""
+
+NOMINAL = frozenset(("strobe", "velocity"))
+"""What of it is of particle 0."""
 
 INCHES = (8.0, 4.5)
 """Width and height of the picture at least: text keeps its share of it at any pixel size."""
@@ -118,9 +123,11 @@ def lay_out(
     height: int,
     title: str | None = None,
     question: str = "",
-    shows: frozenset[str] = frozenset(SHOWS),
+    shows: frozenset[str] | None = None,
 ) -> Layout:
     """Choose the window such that everything that moves, arrows included, is in the picture.
+
+    It shows all by default, but of a crowd not what particle 0 does.
 
     Raises
     ------
@@ -129,16 +136,18 @@ def lay_out(
     """
     if width < LEAST[0] or height < LEAST[1]:
         raise ValueError(f"{width} x {height} pixels: allowed are at least {LEAST[0]} x {LEAST[1]}")
+    wanted, shows = shows, frozenset(SHOWS) if shows is None else shows
     if unknown := sorted(shows - set(SHOWS)):
         raise ValueError(f"show = {unknown[0]!r}: allowed are {', '.join(SHOWS)}")
-    if one_of_many(recording):
-        shows -= {"strobe", "velocity"}
+    if one_of_many(recording) or (wanted is None and as_crowd(recording)):
+        shows -= NOMINAL
     view = (0.015, 0.135, 0.675 if "energy" in shows else 0.97, 0.65 if question else 0.71)
     aspect = view[2] * width / (view[3] * height)
     pulley = recording.machine.pulley
     window = window_of(recording).fitted(aspect)
     begin, end = span(recording, window)
-    times = track_times(recording, begin, min(end, float(recording.track(0)["t"][-1])))
+    last = min(end, float(recording.track(0)["t"][-1]))
+    times = track_times(recording, begin, last, fine=FINE * window.width)
     position, velocity = nominal(recording, times)
     # What has left it for good shall not make all else small.
     inside = window.holds(position)
@@ -149,6 +158,8 @@ def lay_out(
     corners = [(window.left, window.bottom), (window.right, window.top)]
     if pulley is not None:
         corners.append((-pulley.radius - NAME * window.width, 0.0))
+    if recording.scene.view is not None:
+        return tight
     room = LETTER_ROOM * window.width
     tips = position + tight.arrow * velocity
     grown = around(np.concatenate([corners, tips - room, tips + room]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import nextafter
 from typing import Any, Final
 
 from chutelab.machine import build
@@ -11,9 +10,13 @@ from chutelab.scene.conflicts import EITHER
 from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.schema import as_written
+from chutelab.scene.units import LARGEST, SHORTEST
 
 SAFE: Final = 2**53
 """JavaScript's numbers have all digits of whole numbers up to here."""
+
+MOST: Final = 100_000
+"""Particles that a page has room for: it keeps their tracks, and draws them in each frame."""
 
 LISTS: Final = ("material", "pair", "conveyor", "surface")
 
@@ -40,16 +43,22 @@ def describe(scene: Scene) -> dict[str, Any]:
     Raises
     ------
     SceneError
-        If the page cannot show it: mass points, boxes, polygons or strings.
+        If the page cannot show it: mass points, boxes, polygons, strings, or too many particles; or
+        if the scene contradicts itself where it is laid out.
     """
     _need_disks(scene)
     tables = as_written(scene)
-    out = scene.outgoing
+    machine, out = build(scene), scene.outgoing
     if out is not None and out.drop_from == "impact":
-        machine = build(scene)
         height = machine.segments.start[machine.segments.surface == machine.landing][0, 1].item()
         assert scene.incoming is not None
         drop = scene.incoming.pulley_radius - height
+        if not SHORTEST <= drop <= LARGEST:
+            allowed = (
+                "more: a page measures the drop from the top of the pulley, and must find the belt"
+                f" below that; it would be {drop:.4g} m"
+            )
+            raise SceneError(scene.source, [Fault("outgoing.drop", out.drop, allowed)])
         tables["outgoing"] = {**tables["outgoing"], "drop": drop, "drop_from": "top"}
     tables.pop("expect", None)
     for key in EITHER:
@@ -74,6 +83,11 @@ def _need_disks(scene: Scene) -> None:
             faults.append(Fault(f"{table}.shape", kind.shape, allowed))
         elif kind.radius == 0.0:
             faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
+    if scene.count > MOST:
+        counts = [stream.count for stream in scene.streams]
+        table = f"stream[{counts.index(max(counts))}]" if len(counts) > 1 else "stream"
+        text = f"a page has room for {MOST} particles, and these are {scene.count}"
+        faults.append(Fault(f"{table}.count", max(counts), text))
     if scene.string:
         faults.append(Fault("string", None, f"{allowed}, without strings"))
     if faults:
@@ -104,11 +118,12 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
     # Mass points, boxes and polygons are for other engines.
     particle = rules["particle"]
     particle["shape"]["form"] = {"enum": ["disk", "sphere"]}
-    particle["radius"]["low"] = nextafter(0.0, 1.0)
+    particle["radius"]["low"] = SHORTEST
     number, span = particle["radius"]["form"]["anyOf"]
-    del number["minimum"]
-    number["exclusiveMinimum"] = 0.0
+    number = {"type": number["type"], "minimum": SHORTEST, "maximum": number["maximum"]}
     particle["radius"]["form"] = {"anyOf": [number, span]}
+    count = rules["stream"]["count"]
+    count["high"] = count["form"]["maximum"] = MOST
     return rules
 
 

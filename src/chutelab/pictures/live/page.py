@@ -74,6 +74,7 @@ def html(
         language=language,
         title=escape(scene.title),
         version=escape(own_version()),
+        broken=escape(data["strings"]["broken-page"]),
         home=f'<a class="home" href="{escape(home[1])}">{escape(home[0])}</a>' if home else "",
         css=css,
         css_hash=_hash(css),

@@ -6,6 +6,7 @@
 `machinery`      the machine to scale, with names
 `bodies`         particles to scale, turned as they are, strings
 `panels`         tracks, parabola, residual, velocity, energy ledger
+`crowd`          envelope, arrivals, flow, belt power, losses by surface
 `figure`         the overlay; the paper's figures
 `strobe`         a still for print: where the particle is at round times
 `split`          the velocity at an impact, along the surface and into it
@@ -17,6 +18,13 @@
 Figures are drawn by Agg through `Figure` objects: no pyplot, no global state.
 """
 
+from chutelab.pictures.plots.crowd import (
+    draw_arrivals,
+    draw_envelope,
+    draw_flow,
+    draw_losses,
+    draw_power,
+)
 from chutelab.pictures.plots.figure import overlay
 from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.panels import (
@@ -24,7 +32,6 @@ from chutelab.pictures.plots.panels import (
     analytic_of,
     arcs,
     draw_analytic,
-    draw_landings,
     draw_ledger,
     draw_residual,
     draw_tracks,
@@ -40,8 +47,12 @@ __all__ = [
     "analytic_of",
     "arcs",
     "draw_analytic",
-    "draw_landings",
+    "draw_arrivals",
+    "draw_envelope",
+    "draw_flow",
     "draw_ledger",
+    "draw_losses",
+    "draw_power",
     "draw_residual",
     "draw_scene",
     "draw_tracks",

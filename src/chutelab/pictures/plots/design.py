@@ -13,16 +13,23 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.patches import Patch
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.style import Picture
 from chutelab.scene.units import symbol, with_unit
 from chutelab.studies.design import Solution, Uncertainty
-from chutelab.studies.sweep import NUMBERS, REASON, Sweep
-from chutelab.util.arrays import Floats
+from chutelab.studies.sweep import NUMBERS, REASON, Sweep, no_column
+from chutelab.studies.sweep.rows import RARE
+from chutelab.util.arrays import Bools, Floats
 
 SIZE = (9.0, 5.6)
 BARS = (style.TRACK, style.STREAM)
+KINDS = (style.STREAM, style.ANALYTIC, style.BELT, style.STRIKE, style.STEEL)
+"""Colours of the kinds of outcome; the last one also of all that follow."""
+
+MISSING = "///"
+"""Hatch over what never meets the plate."""
 
 
 def scan(solution: Solution) -> Picture:
@@ -124,9 +131,18 @@ def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
     if not len(values):
         return ax
     low, high = factor * found.interval[row]
+    often = [kind for kind, one in found.kinds.items() if one.share > RARE][: len(KINDS) - 1]
+    parts = {f"touch {kind}": factor * found.outputs[found.touches == kind, row] for kind in often}
+    parts["others"] = factor * found.outputs[~np.isin(found.touches, often), row]
+    parts = {name: one[np.isfinite(one)] for name, one in parts.items()}
+    parts = {name: one for name, one in parts.items() if len(one)}
+    bars: dict[str, Any] = {"bins": 40, "edgecolor": "white", "linewidth": 0.3, "zorder": 3.0}
     ax.hist(
-        factor * values, bins=40, color=style.STREAM, edgecolor="white", linewidth=0.3, zorder=3.0
-    )
+        list(parts.values()), color=KINDS[: len(parts)], stacked=True,
+        label=[shorten(name, 34, placeholder=" …") for name in parts], **bars,
+    )  # fmt: skip
+    if len(parts) > 1:
+        ax.legend(loc="best", fontsize=style.SMALL)
     ax.axvspan(low, high, color=style.STEEL_LIGHT, zorder=0.5)
     ax.axvline(factor * found.mean[row], color=style.INK, linewidth=1.4, zorder=4.0)
     style.note(ax, f"95 %: {low:.4g} to {high:.4g}")
@@ -204,7 +220,7 @@ def sweep_figure(swept: Sweep, column: str) -> Picture:
         If more than two keys vary, or there is no such column.
     """
     if column not in NUMBERS:
-        raise ValueError(f"{column}: one of {', '.join(NUMBERS)}")
+        raise ValueError(no_column(column))
     figure = Picture(SWEEP_SIZE)
     draw_sweep(figure.add_subplot(), swept, column)
     figure.subplots_adjust(left=0.115, right=0.97, top=0.86, bottom=0.18)
@@ -229,8 +245,8 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
     keys = keys or list(swept.quantities)[:1]
     what, unit = NUMBERS[column][0].split(",")[0], swept.unit(column)
     what = what if what.startswith(("x ", "y ")) else what[0].upper() + what[1:]
-    if column.endswith("_spread"):
-        what = f"Standard deviation of {column.removesuffix('_spread')}"
+    if column.endswith(".spread"):
+        what = f"Standard deviation of {column.removesuffix('.spread')}"
     scale, unit = style.scaled(swept.columns[column], unit)
     label, z = with_unit(what, unit), scale * swept.columns[column]
     counts = [len(np.unique(swept.columns[key])) for key in keys]
@@ -250,7 +266,7 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
                 first[known], second[known], c=z[known], cmap=COLORS, s=16.0
             )
         else:
-            painted = _draw_heat(ax, first, second, z)
+            painted = _draw_heat(ax, first, second, z, swept.columns["plate_hits"] == 0.0)
         if known.any():
             bar = ax.figure.colorbar(painted, ax=ax, pad=0.02)
             bar.set_label(label, fontsize=style.NORMAL)
@@ -286,8 +302,8 @@ def _draw_lines(ax: Axes, x: Floats, others: Floats, z: Floats) -> None:
         )  # fmt: skip
 
 
-def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats) -> ScalarMappable:
-    """Draw a heat map; grey where there is nothing to tell."""
+def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> ScalarMappable:
+    """Draw a heat map; grey where there is nothing to tell, hatched where the plate is missed."""
     (x, across), (y, up) = (np.unique(values, return_inverse=True) for values in (x, y))
     field = np.full((len(y), len(x)), np.nan)
     field[up, across] = z
@@ -298,4 +314,26 @@ def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats) -> ScalarMappable:
         # White where the sign changes: that is often what is looked for.
         reach = float(np.nanmax(np.abs(field)))
         limits = {"cmap": "RdBu_r", "vmin": -reach, "vmax": reach}
+    if missing.any():
+        hatched = np.zeros(field.shape)
+        hatched[up, across] = missing
+        # Contours follow the edges of the cells where each cell has the same value at both.
+        edges = [np.repeat(_edges(values), 2)[1:-1] for values in (x, y)]
+        whole = hatched.repeat(2, axis=0).repeat(2, axis=1)
+        ax.contourf(*edges, whole, levels=[0.5, 1.5], colors="none", hatches=[MISSING], zorder=3.0)
+        ax.contour(*edges, whole, levels=[0.5], colors=[style.INK], linewidths=0.6, zorder=3.0)
+        never = Patch(facecolor="none", edgecolor=style.INK, hatch=MISSING)
+        ax.legend(
+            [never], ["never meets the plate"], loc="lower right", bbox_to_anchor=(1.0, 1.0),
+            frameon=False, fontsize=style.SMALL, borderaxespad=0.2,
+        )  # fmt: skip
     return ax.pcolormesh(x, y, field, shading="nearest", rasterized=True, **limits)
+
+
+def _edges(middles: Floats) -> Floats:
+    """Return where cells around some middles begin and end, as `pcolormesh` has them."""
+    between = 0.5 * (middles[1:] + middles[:-1])
+    if not len(between):
+        return np.array([middles[0] - 0.5, middles[0] + 0.5])
+    first, last = 2.0 * middles[0] - between[0], 2.0 * middles[-1] - between[-1]
+    return np.concatenate([[first], between, [last]])

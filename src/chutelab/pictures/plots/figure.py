@@ -15,22 +15,33 @@ from matplotlib.gridspec import SubplotSpec
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.bodies import draw_bodies, stream_handles
+from chutelab.pictures.plots.crowd import (
+    draw_arrivals,
+    draw_envelope,
+    draw_flow,
+    draw_losses,
+    draw_power,
+)
 from chutelab.pictures.plots.machinery import HALO, draw_scene
 from chutelab.pictures.plots.panels import (
     Arc,
     analytic_of,
     draw_analytic,
-    draw_landings,
     draw_ledger,
     draw_residual,
     draw_tracks,
     draw_velocity,
-    drawn_tracks,
 )
-from chutelab.pictures.plots.scenery import bodily, one_of_many, places, window_of
+from chutelab.pictures.plots.scenery import (
+    as_crowd,
+    bodily,
+    drawn_tracks,
+    one_of_many,
+    places,
+    window_of,
+)
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
-from chutelab.results.quantities import layers
 from chutelab.theory import Transfer
 from chutelab.theory.figures import Panel, PaperFigure
 
@@ -59,15 +70,17 @@ def overlay(
     ax : Axes, optional
         Draw only the scene with its tracks, and into these; ``ax.legend()`` adds the legend.
     details : bool
-        For experts: also the numerical error, the ledger's residual and the engine.
+        For experts: also the numerical error, the ledger's residual and the engine; and of a crowd
+        particle 0.
 
     Returns
     -------
     Figure
         That of `ax`; or a new one, with scene and tracks, velocity and energy ledger beside it;
-        with `details` the distance from the analytic path beneath it. Where nothing is known
-        analytically, of many particles, boxes or strings: there all particles at four moments. Of
-        a bed of particles that do not meet: there where they land.
+        with `details` the distance from the analytic path beneath it. Of a crowd: the envelope of
+        its paths, beneath it where particles arrive and the belts' power, and beside it flow,
+        ledger and losses by surface. Where nothing is known analytically, of many particles, boxes
+        or strings: beneath it all particles at four moments.
 
     Raises
     ------
@@ -83,26 +96,38 @@ def overlay(
     if ax is not None:
         if path is not None:
             raise ValueError("path and ax: give one; what holds the axes is yours to save")
-        draw_view(ax, recording, parts, bodies=all_of_them, legend=False)
+        crowd = as_crowd(recording) and not details
+        draw_view(ax, recording, parts, bodies=all_of_them, crowd=crowd, legend=False)
         return ax.figure.canvas.figure
     figure = Picture(SIZE)
-    spread = not (all_of_them or details) and layers(recording) is not None
-    ratios = [2.6, 1.0] if all_of_them or spread else [4.2, 1.0] if details else [1.0]
+    crowd = as_crowd(recording) and not details
+    beneath = all_of_them or details or (crowd and recording.machine.landing >= 0)
+    ratios = [4.2, 1.0] if details and not all_of_them else [2.6, 1.0] if beneath else [1.0]
     grid = figure.add_gridspec(
         len(ratios), 1, height_ratios=ratios, left=0.06, right=0.56, top=0.88,
         bottom=0.02 if all_of_them else 0.08, hspace=0.28,
     )  # fmt: skip
-    side = figure.add_gridspec(2, 1, left=0.63, right=0.985, top=0.88, bottom=0.155, hspace=0.34)
+    side = figure.add_gridspec(
+        3 if crowd else 2, 1, left=0.63 if not crowd else 0.66, right=0.985, top=0.88,
+        bottom=0.155, hspace=0.52 if crowd else 0.34,
+    )  # fmt: skip
     view = figure.add_subplot(grid[0])
-    draw_view(view, recording, parts, bodies=all_of_them)
+    draw_view(view, recording, parts, bodies=all_of_them, crowd=crowd)
     if all_of_them:
         draw_moments(figure, grid[1], recording)
-    elif spread:
-        draw_landings(figure.add_subplot(grid[1]), recording, "Where they land")
+    elif crowd and beneath:
+        pair = grid[1].subgridspec(1, 2, wspace=0.28)
+        draw_arrivals(figure.add_subplot(pair[0]), recording)
+        draw_power(figure.add_subplot(pair[1]), recording)
     elif details:
         draw_residual(figure.add_subplot(grid[1]), recording, parts, start, str(prediction.reason))
-    draw_velocity(figure.add_subplot(side[0]), recording, parts, start)
-    books = draw_ledger(figure.add_subplot(side[1]), recording, details=details)
+    panels = [figure.add_subplot(side[row]) for row in range(side.nrows)]
+    if crowd:
+        draw_flow(panels[0], recording)
+        draw_losses(panels[2], recording)
+    else:
+        draw_velocity(panels[0], recording, parts, start)
+    books = draw_ledger(panels[1], recording, details=details)
     figure.legend(
         *books.get_legend_handles_labels(),
         loc="lower center",
@@ -130,16 +155,20 @@ def draw_view(
     parts: tuple[Arc, ...],
     *,
     bodies: bool = False,
+    crowd: bool = False,
     legend: bool = True,
 ) -> Axes:
     """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend.
 
-    With `bodies` also the particles, at the last moment at which half of them or more are there.
+    Of a `crowd` the envelope of the paths instead of what particle 0 does. With `bodies` also the
+    particles, at the last moment at which half of them or more are there.
     """
     style.dress(ax, "x, m", "y, m")
     draw_scene(ax, recording.machine, window_of(recording))
     draw_analytic(ax, parts)
-    draw_tracks(ax, recording, marks=not (bodies and one_of_many(recording)))
+    draw_tracks(ax, recording, marks=not crowd)
+    if crowd and not one_of_many(recording):
+        draw_envelope(ax, recording)
     handles = ax.get_legend_handles_labels()[0]
     if bodies:
         t = fullest(recording)

@@ -13,10 +13,10 @@ from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.panels import analytic_of, draw_analytic
 from chutelab.pictures.plots.scenery import (
     FAR,
+    FINE,
     around,
-    nominal,
+    path_of,
     struck_by_nominal,
-    track_times,
     window_of,
 )
 from chutelab.pictures.plots.style import Picture
@@ -81,7 +81,7 @@ def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -
         (recording, "track", style.TRACK, "-", "simulation"),
     ):
         if run is not None:
-            path, _ = nominal(run, track_times(run))
+            path = path_of(run, 0, FINE * float(np.ptp(ax.get_xlim())))
             ax.plot(*path.T, line, color=colour, lw=1.6, zorder=5.0, gid=gid, label=label)
     for chosen, colour, label in (
         (found.used, style.STRIKE, "measured"),

@@ -18,23 +18,23 @@ from chutelab.machine.releases import on_belt, release_velocity, up_belt
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.bodies import stream_colours
 from chutelab.pictures.plots.scenery import (
+    FINE,
+    drawn_tracks,
     energies,
     nominal,
-    one_of_many,
-    spread,
+    path_of,
     strobe_step,
     strobe_times,
     struck_by_nominal,
-    subset,
     track_times,
     upright,
 )
 from chutelab.results import Recording
-from chutelab.results.quantities import each, layers, measure
+from chutelab.results.quantities import measure
 from chutelab.scene import Scene
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
-from chutelab.util.arrays import Floats, Ints
+from chutelab.util.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -130,10 +130,6 @@ def flight(parts: tuple[Arc, ...], times: ArrayLike) -> tuple[Floats, Floats]:
     return position, velocity
 
 
-STREAM_TRACKS, FEW_TRACKS = 60, 12
-"""Tracks that are drawn of a stream, and of many particles that nothing brings one after the other;
-more would be one blot."""
-
 ROUNDING = 2.0**-52
 """m; the spacing of floating-point numbers at 1 m."""
 
@@ -154,34 +150,28 @@ def analytic_of(
     return arcs(recording.prediction if prediction is None else prediction, recording.scene), left
 
 
-def drawn_tracks(recording: Recording) -> Ints:
-    """Return the particles whose tracks are drawn; particle 0 is the first."""
-    chosen = spread(recording.count, FEW_TRACKS if one_of_many(recording) else STREAM_TRACKS)
-    return chosen[recording.released[chosen]]
-
-
 def draw_tracks(ax: Axes, recording: Recording, *, marks: bool = True) -> Axes:
     """Draw particle 0's track over the others', with strobe dots at round times and impact markers.
 
     The others' are thin and translucent, each in the colour of its stream. Without `marks` there
-    are neither dots nor markers.
+    are neither dots nor markers, and particle 0's is one of them if there are others.
     """
-    lines = []
-    chosen = drawn_tracks(recording)[1:]
+    chosen = drawn_tracks(recording)
+    alike = not marks and len(chosen) > 1
+    chosen = chosen if alike else chosen[1:]
     machine = recording.machine
     colours = stream_colours(len(machine.streams))
-    for i in chosen:
-        one = subset(recording, [i])
-        knots = np.unique(one.knots["t"])
-        times = np.union1d(np.linspace(knots[0], knots[-1], 200), knots[:: len(knots) // 200 + 1])
-        lines.append(one.at(times)[0][:, 0])
+    fine = FINE * float(np.ptp(ax.get_xlim()))
+    lines = [path_of(recording, i, fine) for i in chosen.tolist()]
     if lines:
         hues = [colours[stream] for stream in machine.releases.stream[chosen]]
         tracks = LineCollection(lines, colors=hues, lw=0.8, alpha=0.35, zorder=3.0)
         tracks.set_gid("stream")
         ax.add_collection(tracks, autolim=False)
-    position, _ = nominal(recording, track_times(recording))
-    ax.plot(*position.T, color=style.TRACK, lw=1.6, zorder=5.0, gid="track", label="track")
+    if alike:
+        return ax
+    path = path_of(recording, 0, fine)
+    ax.plot(*path.T, color=style.TRACK, lw=1.6, zorder=5.0, gid="track", label="track")
     if not marks:
         return ax
     dots, _ = nominal(recording, strobe_times(recording))
@@ -273,30 +263,6 @@ def draw_velocity(
 def _beyond(times: Floats) -> float:
     """Return a time a little after the end, so that a jump at the end can be seen."""
     return float(times[-1] + (0.04 * (times[-1] - times[0]) or 1e-3))
-
-
-def draw_landings(ax: Axes, recording: Recording, title: str) -> Axes:
-    """Draw how many particles land where on the outgoing belt, with the mean and the spread.
-
-    Of a bed, the landings of the lowest and the highest layer are marked.
-    """
-    found = each(recording, "landing.x")
-    found = found[np.isfinite(found)]
-    style.dress(ax, "place of the landing x, m", "particles", title)
-    if len(found) == 0:
-        return ax
-    mean, deviation = float(found.mean()), float(found.std())
-    # All that land in one place still make a bar.
-    edges = 24 if np.ptp(found) > 1e-9 else [mean - 5e-4, mean + 5e-4]
-    ax.hist(found, bins=edges, color=style.STREAM)
-    ax.axvspan(mean - deviation, mean + deviation, color=style.MUTED, alpha=0.2, gid="spread")
-    ax.axvline(mean, color=style.INK, lw=1.6, gid="mean")
-    style.note(ax, f"mean {mean:.4f} m, spread {1e3 * deviation:.2f} mm")
-    if (ends := layers(recording)) is not None:
-        for x, layer, dashes in zip(ends, ("lowest", "highest"), ("--", ":"), strict=True):
-            ax.axvline(x, color=style.STRIKE, lw=1.6, ls=dashes, gid=layer, label=f"{layer} layer")
-        ax.legend(fontsize=style.SMALL, loc="upper left", framealpha=0.85)
-    return ax
 
 
 SHOWN = 1e-9

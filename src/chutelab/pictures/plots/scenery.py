@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chutelab.machine.parts import EXIT_MARGIN
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.quantities import measure
+from chutelab.results.stream import FEWEST
 from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.errors import InputError
 
 STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
 """Kinds of event in which something is hit."""
@@ -72,9 +75,13 @@ def action(recording: Recording) -> tuple[float, float]:
     """Return when particle 0 begins to do something, and when it ends, s.
 
     It begins at its separation from the incoming belt, or at its release if it is not carried to
-    one.
+    one; an `InputError` if it never was released.
     """
     track = recording.track(0)
+    if not len(track):
+        end = float(np.max(recording.machine.end_time))
+        text = "more: pictures follow particle 0, for which no place was free up to then"
+        raise InputError(text, "run.until", end, recording.machine.scene.source)
     begin = measure(recording, "separation.t")
     return float(track["t"][0]) if isnan(begin) else begin, float(track["t"][-1])
 
@@ -99,18 +106,69 @@ def strobe_times(recording: Recording) -> Floats:
     return round_times(float(clock[0]), float(clock[-1]), strobe_step(recording))
 
 
-def track_times(
-    recording: Recording, begin: float | None = None, end: float | None = None
-) -> Floats:
-    """Return even times, joined by the knots of particle 0 and the moments just before them.
+FINE = 2e-4
+"""Share of what is seen by which a line that is drawn may miss the curve."""
 
-    So a jump at an impact is drawn upright, not slanted. By default all of its track.
+MOST_CHORDS = 500
+"""Straight parts in which a piece of a track is drawn at most."""
+
+
+def track_times(
+    recording: Recording,
+    begin: float | None = None,
+    end: float | None = None,
+    *,
+    particle: int = 0,
+    fine: float | None = None,
+) -> Floats:
+    """Return times at which a track is to be drawn: straight lines between them miss it by `fine`.
+
+    They are its knots, the moments just before jumps, which are so drawn upright, and even parts
+    of each piece, as many as its curvature asks for: over a time h a chord misses a curve by at
+    most h²/8 times its largest acceleration, and a cubic has that at one of its ends.
+
+    Parameters
+    ----------
+    recording : Recording
+        Whose track.
+    begin, end : float, optional
+        s; by default all of the track.
+    particle : int
+        Which one.
+    fine : float, optional
+        m; by default the share `FINE` of the track's extent.
     """
-    count, knots = 400, recording.track(0)["t"]
-    begin, end = knots[0] if begin is None else begin, knots[-1] if end is None else end
-    if len(knots) > count:
-        knots = recording.events["t"][recording.events["particle"] == 0][:count]
-    return upright(np.linspace(begin, end, count), knots)
+    track = recording.track(particle)
+    t, place, velocity = track["t"], track["position"], track["velocity"]
+    if fine is None:
+        fine = FINE * float(np.ptp(place, axis=0).max())
+    h, way = np.diff(t), np.diff(place, axis=0)
+    first, last = h[:, None] * velocity[:-1], h[:, None] * velocity[1:]
+    bent = np.maximum(
+        np.hypot(*(6.0 * way - 4.0 * first - 2.0 * last).T),
+        np.hypot(*(6.0 * way - 2.0 * first - 4.0 * last).T),
+    )
+    parts = np.ceil(np.sqrt(bent / 8.0 / max(fine, 1e-300)))
+    parts = np.clip(parts, 1, MOST_CHORDS).astype(np.int64)
+    number = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    even = np.repeat(t[:-1], parts) + number * np.repeat(h / parts, parts)
+    jumps = np.nextafter(t[1:][h == 0.0], -np.inf)
+    times = np.unique(np.concatenate([even, t[-1:], jumps[jumps >= t[0]]]))
+    if begin is None and end is None:
+        return times
+    ends = [t[0] if begin is None else begin, t[-1] if end is None else end]
+    return np.union1d(times[(times > ends[0]) & (times < ends[1])], ends)
+
+
+def path_of(recording: Recording, particle: int, fine: float) -> Floats:
+    """Return the points of a line that misses a particle's track by about `fine` (m), (P, 2)."""
+    times = track_times(recording, particle=particle, fine=fine)
+    place = subset(recording, [particle]).at(times)[0][:, 0]
+    # What lies still or creeps has thousands of knots in one place.
+    cell = np.floor(place / fine)
+    kept = np.append(np.any(cell[1:] != cell[:-1], axis=1), True)
+    kept[0] = True
+    return np.asarray(place[kept])
 
 
 def upright(times: Floats, jumps: Floats) -> Floats:
@@ -153,6 +211,11 @@ MANY = 60
 """Particles from which on some may stray out of the window."""
 
 
+def as_crowd(recording: Recording) -> bool:
+    """Tell whether pictures lead with all particles, and show particle 0 on request only."""
+    return recording.count >= FEWEST
+
+
 def one_of_many(recording: Recording) -> bool:
     """Tell whether what all particles do matters, not the way of particle 0.
 
@@ -183,9 +246,20 @@ def places(recording: Recording, particles: Sequence[int] | Ints, times: Floats)
     return position
 
 
+STREAM_TRACKS, FEW_TRACKS = 60, 12
+"""Tracks that are drawn of a stream, and of many particles that nothing brings one after the other;
+more would be one blot."""
+
+
+def drawn_tracks(recording: Recording) -> Ints:
+    """Return the particles whose tracks are drawn; particle 0 is the first."""
+    chosen = spread(recording.count, FEW_TRACKS if one_of_many(recording) else STREAM_TRACKS)
+    return chosen[recording.released[chosen]]
+
+
 NEARBY, FAR = 0.35, 1.0
-"""Shares of the action's size: around it within the first the ends of surfaces are shown, within
-the second what happens later."""
+"""Shares of the action's size: around it within the first the ends of belts are shown, within the
+second those of what stands still, and what happens later."""
 
 
 @dataclass(frozen=True)
@@ -240,6 +314,10 @@ class Window:
             (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
         )
 
+    def nearest(self, points: Floats) -> Floats:
+        """Return the nearest places inside to points, (..., 2)."""
+        return np.clip(points, (self.left, self.bottom), (self.right, self.top))
+
     def clip(self, start: Floats, end: Floats) -> tuple[Floats, Floats] | None:
         """Return the ends of the part of a straight line inside, None if it stays outside."""
         along = end - start
@@ -255,22 +333,27 @@ class Window:
 
 
 def window_of(recording: Recording) -> Window:
-    """Return the window in which something happens, with room for labels.
+    """Return the window in which something happens, with room for labels; `[view]` overrides it.
 
     It holds particle 0 from separation (or release, without one) to its landing (or last impact),
-    the pulley, and ends of surfaces that are near; of what comes later, and of nearly all impacts
-    of the other particles, as much as does not make all else small. Where particle 0 is not the
-    one that matters, see `bodily`, or there are several streams, it holds all particles alike.
+    the pulley, where the others are released and strike something, and the ends of surfaces near
+    there; of what comes later, and of the fall of what leaves the scene, as much as does not make
+    all else small. Where particle 0 is not the one that matters, see `bodily`, or there are several
+    streams, it holds all particles alike.
     """
     machine, many = recording.machine, one_of_many(recording)
+    if (view := recording.scene.view) is not None:
+        return Window(view.from_[0], view.to[0], view.from_[1], view.to[1])
     crowd = _crowd(recording, 0 if many else 1)
-    path, tail = (crowd, crowd[:0]) if many else _path(recording)
+    path, tail, fall = (crowd, crowd[:0], crowd[:0]) if many else _path(recording)
     together = bodily(recording) or len(machine.streams) > 1
     points = [np.concatenate([path, crowd]) if together else path]
     if bodily(recording):
         # All that come to lie somewhere: of a heap its feet, which few strike.
         stays = recording.ended[recording.released] != REASONS.index("exit")
         points.append(recording.ends()[1]["position"][stays])
+        tracks = [recording.track(i)["position"] for i in drawn_tracks(recording).tolist()]
+        fall = np.concatenate([fall, *tracks])
     for thread in machine.threads:
         points += [np.array([thread.anchor]), recording.track(thread.particle)["position"]]
     if machine.pulley is not None:
@@ -278,13 +361,15 @@ def window_of(recording: Recording) -> Window:
         points.append(np.array([-corner, corner]))
     core = around(np.concatenate(points))
     far = core.padded(*[FAR] * 4)
-    later = np.concatenate([tail, crowd])
-    points.append(np.clip(later, (far.left, far.bottom), (far.right, far.top)))
+    points.append(far.nearest(np.concatenate([tail, crowd])))
     near = around(np.concatenate(points)).padded(*[NEARBY] * 4)
     # The incoming belt, segment 0, may be cut off anywhere.
     free = slice(0 if machine.pulley is None else 1, None)
-    ends = [machine.segments.start[free], machine.segments.end[free], machine.arcs.corners]
-    points.append(np.concatenate(ends)[near.holds(np.concatenate(ends))])
+    ends = np.stack([machine.segments.start[free], machine.segments.end[free]], axis=1)
+    still = (machine.segments.speed[free] == 0.0)[:, None]
+    points.append(ends[near.holds(ends) | (still & far.holds(ends))])
+    points.append(machine.arcs.corners[near.holds(machine.arcs.corners)])
+    points.append(around(np.concatenate(points)).padded(*[NEARBY] * 4).nearest(fall))
     # Names stand left of the pulley and behind the plate.
     left = 0.06 if machine.pulley is None else 0.24
     right = 0.22 if "plate" in machine.surfaces else 0.06
@@ -295,43 +380,48 @@ def window_of(recording: Recording) -> Window:
     return around(held).padded(left, right, 0.10, 0.12).joined(whole)
 
 
-def _path(recording: Recording) -> tuple[Floats, Floats]:
-    """Return particle 0's positions up to landing or last impact, and from there to its end."""
+def _path(recording: Recording) -> tuple[Floats, Floats, Floats]:
+    """Return particle 0's positions up to landing or last impact, from there on, and as it falls.
+
+    What falls has left the scene, and touched nothing since.
+    """
     begin, end = action(recording)
     mine = recording.events[recording.events["particle"] == 0]
     gone = mine["kind"] == Kind.EXIT
     mine = mine[~gone & (mine["t"] > begin)]
-    # Of what leaves the scene nobody needs to see the fall after its last event.
-    if gone.any() and len(mine):
-        end = float(mine["t"][-1])
+    rests = float(mine["t"][-1]) if gone.any() and len(mine) else end
     struck = struck_by_nominal(recording)
     # What it struck before, on the way to the end of a ramp, is not where it goes.
     struck = struck[struck["t"] > begin]
     landed = struck["t"][struck["kind"] == Kind.LANDING]
-    last = landed[0] if len(landed) else struck["t"][-1] if len(struck) else end
+    last = landed[0] if len(landed) else struck["t"][-1] if len(struck) else rests
     times = track_times(recording, begin, end)
     position, _ = nominal(recording, times)
-    return position[times <= last], position[times > last]
+    first, left = times <= last, times > rests
+    return position[first], position[~first & ~left], position[left]
 
 
 def _crowd(recording: Recording, begin: int) -> Floats:
-    """Corners of the box around where particles strike something, or the middle 96 % of many.
+    """Corners of boxes around where particles from the number `begin` on strike or are released.
 
-    Particles from the number `begin` on.
-
-    Where they are released counts too if no belt carries them from there.
+    Of many the middle 96 % of the impacts count. Where they are released counts if no belt carries
+    them from there. What meets on its fall below all surfaces meets at their bottom.
     """
-    events = recording.events
-    left = recording.select(Kind.SEPARATION)
+    events = recording.events[recording.events["particle"] >= begin]
+    left = events[events["kind"] == Kind.SEPARATION]
     left = left[left["surface"] == recording.surface_index("incoming")]
     carried = np.isin(events["particle"], left["particle"])
-    counts = np.isin(events["kind"], STRUCK)
-    counts |= ~carried & (events["kind"] == Kind.RELEASE)
-    others = events[counts & (events["particle"] >= begin)]
-    if not len(others):
-        return np.empty((0, 2))
+    released = events["position"][~carried & (events["kind"] == Kind.RELEASE)]
+    struck = events["position"][np.isin(events["kind"], STRUCK)]
     strays = 0.02 if recording.count > MANY else 0.0
-    return np.asarray(np.quantile(others["position"], [strays, 1.0 - strays], axis=0))
+    bottom = recording.machine.exit_box[2] + EXIT_MARGIN
+    corners = [
+        np.quantile(places, [share, 1.0 - share], axis=0)
+        for places, share in ((released, 0.0), (struck, strays))
+        if len(places)
+    ]
+    found = np.concatenate([np.empty((0, 2)), *corners])
+    return np.asarray(np.maximum(found, [-np.inf, bottom]))
 
 
 def around(points: Floats) -> Window:

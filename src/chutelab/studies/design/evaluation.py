@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.engines.simulation import simulate
+from chutelab.engines.simulation import judged, simulate
 from chutelab.results import ENTRIES, Recording
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError, rules
@@ -25,8 +25,10 @@ from chutelab.studies.design.quantities import (
     courses_of,
     each_once,
     measured,
+    own_key,
 )
 from chutelab.studies.sweep.batch import Block, one_line, together
+from chutelab.studies.sweep.rows import touches
 from chutelab.util.arrays import Floats, Ints, Progress
 from chutelab.util.errors import InputError
 
@@ -100,10 +102,10 @@ def suits(scene: Scene, keys: Sequence[str], quantities: Sequence[Quantity]) -> 
     """Tell whether variants of a scene can run at once, and all quantities be read off that."""
 
     def readable(quantity: Quantity) -> bool:
-        match quantity.key.split("."):
+        match own_key(quantity.key).split("."):
             case _ if quantity.source != "run":
                 return True
-            case ["separation" | "impact" | "landing", *column]:
+            case ["separation" | "impact" | "landing" | "arrival", *column]:
                 return column[-1] not in ("count", *rules.STATISTICS)
             case ["ledger", name]:
                 return name in ENTRIES
@@ -144,6 +146,9 @@ class Outcomes(NamedTuple):
     faults: list[str]
     """Why there was no run; "" where there was one."""
 
+    touches: list[str]
+    """Kind of each outcome, see `chutelab.studies.sweep.rows.touches`; `NO_RUN` without a run."""
+
 
 @dataclass
 class Evaluator:
@@ -169,9 +174,10 @@ class Evaluator:
                 np.concatenate([part.values for part in parts]),
                 [course for part in parts for course in part.courses],
                 [fault for part in parts for fault in part.faults],
+                [kind for part in parts for kind in part.touches],
             )
         values = np.full((len(table), len(self.quantities)), np.nan)
-        courses, faults = np.full((2, len(table)), "", dtype=object)
+        courses, faults, kinds = np.full((3, len(table)), "", dtype=object)
         # The run that ends as the scene says comes last: what both runs know is read off that.
         wanted = {quantity.ending for quantity in self.quantities} - {"any"}
         endings = sorted(wanted, reverse=True) or ["scene"]
@@ -181,6 +187,7 @@ class Evaluator:
                 if one.ending in ("any", ending):
                     values[rows, column] = one.of(recording)
             courses[rows] = courses_of(recording)[: len(rows)]
+            kinds[rows] = touches(recording, len(rows))
 
         left = set(range(len(table)))
         if len(table) >= MANY and suits(self.scene, self.keys, self.quantities):
@@ -198,15 +205,17 @@ class Evaluator:
             given = dict(zip(self.keys, table[row].tolist(), strict=True))
             try:
                 for ending in endings:
-                    recording = simulate(self.scene.with_values(given | _until(ending)))
+                    recording = judged(self.scene.with_values(given | _until(ending)))
                     read(ending, recording, np.array([row]))
+                    for broken in recording.laws[:1]:
+                        faults[row] = str(broken)
             except (SceneError, StalledError) as error:
                 faults[row] = reason(error) if isinstance(error, SceneError) else str(error)
             self._ran(1)
         values[faults != ""] = np.nan
-        courses[faults != ""] = NO_RUN
+        courses[faults != ""] = kinds[faults != ""] = NO_RUN
         self.runs += len(table)
-        return Outcomes(values, courses.tolist(), faults.tolist())
+        return Outcomes(values, courses.tolist(), faults.tolist(), kinds.tolist())
 
     def _ran(self, variants: float) -> None:
         self._done += variants

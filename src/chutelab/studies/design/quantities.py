@@ -133,9 +133,9 @@ class Quantity:
             return nan if value is None or value is MISSING or isinstance(value, str) else value
         if self.source == "run":
             settled = recording.ended == REASONS.index("settled")
-            rate = recording.scene.stream.rate
+            rate = recording.scene.rate
             if recording.scene.shape:
-                value = each(recording, self.key)
+                value = each(recording, own_key(self.key))
             else:
                 value = measure(recording, self.key)
                 settled, rate = settled.all(), rate / recording.count
@@ -144,6 +144,15 @@ class Quantity:
             if self.name == "power":
                 value = value * rate
         return value
+
+
+def own_key(key: str) -> str:
+    """Return what a lone particle has of a quantity that is named as particle 0's, or a mean.
+
+    >>> own_key("particles[0].landing.x"), own_key("landing.x.mean")
+    ('landing.x', 'landing.x')
+    """
+    return key.removeprefix(rules.FIRST).removesuffix(".mean")
 
 
 def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
@@ -155,7 +164,10 @@ def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
         If the scene has no such quantity.
     """
     # What comes before the landing, and the landing itself, is there however the run ends.
-    early = name.partition(".")[0] in (*rules.NEEDED, *rules.SYMBOLS)
+    if which := rules.whose(name, scene.count):
+        raise InputError(which, typed or name)
+    own = name.removeprefix(rules.FIRST)
+    early = own.partition(".")[0] in (*rules.NEEDED, rules.ARRIVAL, *rules.SYMBOLS)
     key, ending = SHORT.get(name, (name, "any" if early else "scene"))
     unit = rules.unit_of(key, scene.surfaces)
     if unit is None:

@@ -161,7 +161,7 @@ def _derivatives(evaluate: Evaluator, at: Floats, along: Floats) -> Floats:
     the two agree best, since next to a jump the function may bend within any step. `along` is the
     range of the key in its own direction, (K,).
     """
-    (here,), (course,), _ = evaluate(at[np.newaxis])
+    (here,), (course,), *_ = evaluate(at[np.newaxis])
     steps = np.multiply.outer(STEPS, (1.0, 0.5))
     shares = np.multiply.outer((1.0, -1.0), steps)
     found = evaluate(at + shares.reshape(-1, 1) * along)

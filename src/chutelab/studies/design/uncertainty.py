@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chutelab.scene import Scene, SceneError
 from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
@@ -20,6 +22,8 @@ from chutelab.scene.variants import Vary, quantity, reason
 from chutelab.studies.design.evaluation import INSIDE, Evaluator
 from chutelab.studies.design.quantities import each_once, measured, scipy
 from chutelab.studies.design.sensitivity import Indices, indices, sampled
+from chutelab.studies.sweep import TOUCHES
+from chutelab.studies.sweep.rows import RARE
 from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_text
@@ -150,7 +154,10 @@ def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
 
 
 QUANTITIES: Final = ("landing.x", "belt_work")
-"""What is looked at unless said."""
+"""What is looked at unless said, of a lone particle."""
+
+OF_A_STREAM: Final = ("arrival.x.mean", "ledger.by_surface.outgoing.belt_work")
+"""The same of several particles; the work is counted up to ``run.until``."""
 
 SAMPLES: Final = 1024
 """Of each of the K + 2 sets of points: indices to about a hundredth."""
@@ -163,6 +170,37 @@ MOST_SAMPLES: Final = 1 << 20
 
 INTERVAL: Final = (0.025, 0.975)
 """Between these shares of the sample lies the 95 % interval."""
+
+
+@dataclass(frozen=True, eq=False)
+class Statistics:
+    """Of M quantities over some samples; those without a value do not count.
+
+    Attributes
+    ----------
+    share : float
+        Of all samples.
+    mean, deviation : ndarray, shape (M,)
+        Means and standard deviations; NaN without a single value.
+    interval : ndarray, shape (M, 2)
+        95 % intervals.
+    """
+
+    share: float
+    mean: Floats
+    deviation: Floats
+    interval: Floats
+
+
+def statistics(outputs: Floats, total: int) -> Statistics:
+    """Return the statistics of the quantities in some of a `total` of samples, (n, M)."""
+    known = [column[np.isfinite(column)] for column in outputs.T]
+    found = [
+        (one.mean(), one.std(), *np.quantile(one, INTERVAL)) if len(one) else (np.nan,) * 4
+        for one in known
+    ]
+    mean, deviation, *ends = np.array(found).T
+    return Statistics(len(outputs) / total, mean, deviation, np.stack(ends, axis=1))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -181,6 +219,8 @@ class Uncertainty(Shown):
         The quantities with all inputs at their means.
     inputs, outputs : ndarray, shape (N, K) and (N, M)
         A sample of the inputs, and what came of it, NaN where it did not happen.
+    touches : ndarray of str, shape (N,)
+        The kind of each outcome: which surfaces are met, see `chutelab.studies.sweep.rows`.
     indices : tuple of Indices
         Of each quantity.
     lost : dict of str
@@ -196,37 +236,47 @@ class Uncertainty(Shown):
     nominal: Floats
     inputs: Floats
     outputs: Floats
+    touches: NDArray[Any]
     indices: tuple[Indices, ...]
     lost: dict[str, int]
     runs: int
     samples: int
     seed: int
 
-    def _of_each(self, statistic: Callable[[Floats], Any], shape: tuple[int, ...] = ()) -> Floats:
-        """Return a statistic of the known values of each quantity, (M, ...); NaN without any."""
-        known = (column[np.isfinite(column)] for column in self.outputs.T)
-        return np.array([statistic(one) if len(one) else np.full(shape, np.nan) for one in known])
+    @cached_property
+    def overall(self) -> Statistics:
+        """Of all samples, whatever they touch."""
+        return statistics(self.outputs, len(self.outputs))
 
     @property
     def mean(self) -> Floats:
         """Means of the quantities, (M,); NaN without a single value."""
-        return self._of_each(np.mean)
+        return self.overall.mean
 
     @property
     def deviation(self) -> Floats:
         """Their standard deviations, (M,)."""
-        return self._of_each(np.std)
+        return self.overall.deviation
 
     @property
     def interval(self) -> Floats:
         """Their 95 % intervals, (M, 2)."""
-        return self._of_each(lambda one: np.quantile(one, INTERVAL), (2,))
+        return self.overall.interval
+
+    @cached_property
+    def kinds(self) -> dict[str, Statistics]:
+        """Of the samples of each kind of outcome, the most frequent one first; all kinds."""
+        counts = Counter(self.touches.tolist())
+        return {
+            kind: statistics(self.outputs[self.touches == kind], len(self.outputs))
+            for kind, _ in sorted(counts.items(), key=lambda item: (-item[1], item[0]))
+        }
 
     @property
-    def columns(self) -> dict[str, Floats]:
-        """Inputs and outputs by name, (N,) each."""
-        names = (*(one.key for one in self.spreads), *self.quantities)
-        return dict(zip(names, (*self.inputs.T, *self.outputs.T), strict=True))
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Inputs, outputs and what is touched by name, (N,) each."""
+        names = (*(one.key for one in self.spreads), *self.quantities, TOUCHES)
+        return dict(zip(names, (*self.inputs.T, *self.outputs.T, self.touches), strict=True))
 
     def frame(self) -> Any:
         """Return inputs and outputs as a pandas DataFrame; ImportError without pandas."""
@@ -244,20 +294,20 @@ class Uncertainty(Shown):
             for one in self.spreads
         )
         columns = ["", *(with_unit(n, u) for n, u in zip(self.quantities, self.units, strict=True))]
-        rows = [
-            ("all inputs at their means", *(f"{value:.6g}" for value in self.nominal)),
-            ("mean", *(f"{value:.6g}" for value in self.mean)),
-            ("standard deviation", *(f"{value:.3g}" for value in self.deviation)),
-            ("95 % interval", *(f"{low:.5g} .. {high:.5g}" for low, high in self.interval)),
-        ]
-        foot = []
+        nominal = tuple(f"{value:.6g}" for value in self.nominal)
+        rows = [("all inputs at their means", *nominal), *_lines(self.overall)]
+        foot: list[tuple[str, ...]] = []
         for k, one in enumerate(self.spreads):
             cells = []
-            for found in self.indices:
-                share, low, high = 100.0 * np.array([found.first[k], *found.first_interval[k]])
+            for about in self.indices:
+                share, low, high = 100.0 * np.array([about.first[k], *about.first_interval[k]])
                 known = np.isfinite(share)
                 cells.append(f"{share:.1f} % ({low:.0f} .. {high:.0f})" if known else "-")
             foot.append((f"share of {one.key}", *cells))
+        if len(self.kinds) > 1:
+            for kind, found in self.kinds.items():
+                if found.share > RARE:
+                    foot += [(f"{100.0 * found.share:.1f} % touch {kind}",), *_lines(found)]
         return Sheet(
             f"{self.scene}: {given}", tuple(columns), tuple(rows), foot=tuple(foot),
             notes=tuple(self._notes()),
@@ -275,6 +325,7 @@ class Uncertainty(Shown):
             for one in self.spreads
             if one.cut > NOTHING
         ]
+        said += self._of_kinds()
         total = len(self.inputs)
         for why, count in sorted(self.lost.items(), key=lambda item: -item[1])[:3]:
             said.append(f"{count} of {total} samples are left out: {why}.")
@@ -283,11 +334,35 @@ class Uncertainty(Shown):
                 said.append(f"{name} does not depend on these inputs.")
         return said
 
+    def _of_kinds(self) -> list[str]:
+        often = [kind for kind, one in self.kinds.items() if one.share > RARE]
+        if len(self.kinds) == 1:
+            return [f"All samples touch {', '.join(self.kinds)}."]
+        said = []
+        if len(often) > 1:
+            said += [
+                f"These are {len(often)} kinds of outcome: the mean over all of them need not be"
+                " near to any, and the shares above are of the variance between them, too."
+            ]
+        if rare := len(self.kinds) - len(often):
+            share = 100.0 * sum(one.share for one in self.kinds.values() if one.share <= RARE)
+            others = f"{rare} other ways" if rare > 1 else "another way"
+            said += [f"{share:.2g} % of the samples go {others}."]
+        return said
+
+
+def _lines(found: Statistics) -> list[tuple[str, ...]]:
+    return [
+        ("mean", *(f"{value:.6g}" for value in found.mean)),
+        ("standard deviation", *(f"{value:.3g}" for value in found.deviation)),
+        ("95 % interval", *(f"{low:.5g} .. {high:.5g}" for low, high in found.interval)),
+    ]
+
 
 def uncertainty(
     scene: Scene,
     given: str | Sequence[str],
-    quantities: Sequence[str] = QUANTITIES,
+    quantities: Sequence[str] | None = None,
     *,
     samples: int = SAMPLES,
     seed: int = 0,
@@ -303,7 +378,8 @@ def uncertainty(
         ``KEY=MEAN±SPREAD``, or ``KEY=±SPREAD`` around the scene's own value. SPREAD is a standard
         deviation, or in per cent of the mean; with ``:uniform`` at the end a half-width.
     quantities : sequence of str
-        What is looked at, see `chutelab.studies.design.quantities`.
+        What is looked at, see `chutelab.studies.design.quantities`; default: `QUANTITIES`, or
+        `OF_A_STREAM`.
     samples : int
         Points of each of the K + 2 sets, a power of 2 (else the next one is taken).
     seed : int
@@ -329,6 +405,8 @@ def uncertainty(
     True
     """
     inputs = spreads(scene, [given] if isinstance(given, str) else list(given))
+    if quantities is None:
+        quantities = QUANTITIES if scene.count == 1 else OF_A_STREAM
     names = list(dict.fromkeys(quantities))
     wanted = [measured(scene, name, f"quantity {name}") for name in names]
     if not wanted:
@@ -355,7 +433,7 @@ def uncertainty(
         lost[outcomes.faults[i] or why] += 1
     return Uncertainty(
         scene.title, inputs, tuple(names), tuple(one.unit for one in wanted), nominal,
-        points[:used], outcomes.values[:used],
+        points[:used], outcomes.values[:used], np.array(outcomes.touches[:used], dtype=object),
         tuple(
             indices(sets, seed)
             for sets in outcomes.values.T.reshape(len(wanted), -1, samples)
@@ -367,7 +445,10 @@ def uncertainty(
 def as_dict(found: Uncertainty) -> dict[str, Any]:
     """Return the result as plain lists and floats, for JSON; without the samples."""
     inputs = ("key", "unit", "mean", "spread", "law", "cut")
-    columns = {name: getattr(found, name) for name in ("nominal", "mean", "deviation", "interval")}
+
+    def told_of(one: Statistics, m: int) -> dict[str, Any]:
+        return {of: getattr(one, of)[m] for of in ("mean", "deviation", "interval")}
+
     told = {
         "format": 1,
         "scene": found.scene,
@@ -375,11 +456,22 @@ def as_dict(found: Uncertainty) -> dict[str, Any]:
         "quantities": {
             name: {
                 "unit": found.units[m],
-                **{of: values[m] for of, values in columns.items()},
+                "nominal": found.nominal[m],
+                **told_of(found.overall, m),
                 "first": found.indices[m].first,
                 "total": found.indices[m].total,
             }
             for m, name in enumerate(found.quantities)
+        },
+        "touches": {
+            kind: {
+                "share": one.share,
+                "quantities": {
+                    name: told_of(one, m)
+                    for m, name in enumerate(found.quantities if one.share > RARE else ())
+                },
+            }
+            for kind, one in found.kinds.items()
         },
         "lost": found.lost,
         "runs": found.runs,

@@ -8,13 +8,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from chutelab.scene import MISSING, Fault, Scene, shown
 from chutelab.scene.overrides import at_path, joined, limits_of, names_of, parts_of, rule_at
 from chutelab.scene.schema import as_written
 from chutelab.studies.measured.track import LARGEST, MeasuredError, Track
 from chutelab.util.errors import did_you_mean
+
+SMALLEST: Final = 1e-6
+"""Of its start: the least value at which a number that must be positive is searched. A fit of what
+the points do not tell is driven to a bound by rounding, and next to 0 a length has no direction."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,8 @@ class Parameter:
     start : float
         Its value in the scene or the placement.
     low, high : float
-        The least and the largest value that are allowed.
+        The least and the largest value that are searched: those that are allowed, but not below
+        `SMALLEST` of the start where 0 is not.
     """
 
     key: str
@@ -49,7 +54,7 @@ def placements(track: Track) -> dict[str, Parameter]:
     place, anything = track.placement, (-LARGEST, LARGEST)
     found = (
         Parameter("t0", "s", place.t0, *anything),
-        Parameter("scale", "m per unit", place.scale, 0.0, LARGEST),
+        Parameter("scale", "m per unit", place.scale, SMALLEST * place.scale, LARGEST),
         Parameter("origin.x", "file units", place.origin[0], *anything),
         Parameter("origin.y", "file units", place.origin[1], *anything),
     )
@@ -123,7 +128,9 @@ def _of_scene(document: Mapping[str, Any], key: str, others: Iterable[str]) -> P
         return f"has no value in this scene; give one to start from, --set {path}=..."
     if limits is None or isinstance(value, (str, bool)):
         return f"{shown(value)} is not a number that can vary continuously"
-    return Parameter(key, rule.get("x-unit", ""), float(value), *limits)
+    low, high = limits
+    low = max(low, SMALLEST * value) if low > 0.0 else low
+    return Parameter(key, rule.get("x-unit", ""), float(value), low, high)
 
 
 def numbers(document: Mapping[str, Any]) -> Iterator[str]:

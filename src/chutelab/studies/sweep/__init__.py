@@ -3,7 +3,7 @@
 >>> import chutelab
 >>> from chutelab.studies.sweep import sweep
 >>> swept = sweep(chutelab.load("perpendicular"), ["incoming.speed=2,4", "plate.restitution=0,1"])
->>> len(swept), swept.columns["landing.vx"].round(3).tolist()
+>>> len(swept), swept.columns["landing.vx.mean"].round(3).tolist()
 (4, [0.0, -2.0, 0.0, -4.0])
 
 - `plan`: what is to be varied, looked at before anything runs; samples of ranges.
@@ -19,7 +19,7 @@ SciPy, pyarrow, Dask and pandas are imported when they are needed.
 from chutelab.studies.sweep.batch import row_of
 from chutelab.studies.sweep.plan import DESIGNS, MOST_VARIANTS, Plan, planned
 from chutelab.studies.sweep.result import Sweep
-from chutelab.studies.sweep.rows import NUMBERS, REASON
+from chutelab.studies.sweep.rows import NUMBERS, REASON, TEXTS, TOUCHES, no_column
 from chutelab.studies.sweep.sweeping import (
     Crew,
     LostWorkersError,
@@ -34,11 +34,14 @@ __all__ = [
     "MOST_VARIANTS",
     "NUMBERS",
     "REASON",
+    "TEXTS",
+    "TOUCHES",
     "Crew",
     "LostWorkersError",
     "Plan",
     "Sweep",
     "crew",
+    "no_column",
     "planned",
     "row_of",
     "sweep",

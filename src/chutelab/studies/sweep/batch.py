@@ -7,12 +7,13 @@ does not fit is left over, to be run alone: that is never wrong, only slower.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from chutelab.engines.exact import CornerError, kinds, run
-from chutelab.engines.simulation import simulate
+from chutelab.engines.simulation import judged
 from chutelab.machine import RefusedError, build
 from chutelab.results import Recording
 from chutelab.results.recorder import StalledError
@@ -98,11 +99,13 @@ def alone(block: Block, row: int) -> Columns:
 def row_of(scene: Scene, engine: str | None = None) -> Columns:
     """Simulate a scene and return its row; if it cannot be run, one that says why."""
     try:
-        recording = simulate(scene, engine)
+        recording = judged(scene, engine)
     except SceneError as error:
         return because(reason(error))
     except StalledError as error:
         return because(f"the run got stuck: {error}")
+    if recording.laws:
+        return because(str(recording.laws[0]))
     return rows(recording)
 
 
@@ -150,13 +153,15 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
     left: list[int] = []
     while groups:
         which = groups.pop()
-        try:
-            runs.append((run(build(scenes(which)), apart=True), which))
-        except (CornerError, StalledError):
-            # Whoever does not get through is found by halving.
-            halves = np.array_split(which, 2) if len(which) > 1 else []
-            groups += halves
-            left += [] if halves else which.tolist()
+        with suppress(CornerError, StalledError):
+            recording = run(build(scenes(which)), apart=True)
+            if not recording.laws:
+                runs.append((recording, which))
+                continue
+        # Those that do not get through, or break a law, are found by halving.
+        halves = np.array_split(which, 2) if len(which) > 1 else []
+        groups += halves
+        left += [] if halves else which.tolist()
     return runs, faults, left
 
 

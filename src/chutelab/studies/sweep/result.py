@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.scene.variants import Quantity
-from chutelab.studies.sweep.rows import NUMBERS, REASON
+from chutelab.studies.sweep.rows import HEAT, NUMBERS, REASON, TEXTS, TOUCHES, Named
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, number
@@ -80,7 +80,7 @@ def synced(path: Path) -> None:
 def text_of(columns: Rows) -> str:
     """Return rows as lines of CSV, from which `columns_of` gets every bit back."""
     cells = [
-        values.tolist() if name == REASON else list(map(_number, values.tolist()))
+        values.tolist() if name in TEXTS else list(map(_number, values.tolist()))
         for name, values in columns.items()
     ]
     return "".join(csv_lines(zip(*cells, strict=True)))
@@ -96,7 +96,7 @@ def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
     cells = list(zip(*csv.reader(io.StringIO(text, newline="")), strict=True))
     return {
         name: np.array(list(map(unquoted, column)), dtype=object)
-        if name == REASON
+        if name in TEXTS
         else np.array([float(cell) if cell else np.nan for cell in column])
         for name, column in zip(names, cells, strict=True)
     }
@@ -106,8 +106,9 @@ MOST_REASONS = 5
 """Reasons that are listed."""
 
 PARTIAL = (
-    "belt_work, slip_heat and power are counted up to run.until. --set run.until=settled counts"
-    " them until nothing slips on the belt, as the theory, solve and --uncertainty do."
+    "The outgoing belt's work, its slip heat and power are counted up to run.until. --set"
+    " run.until=settled counts them until nothing slips on the belt, as the theory, solve and"
+    " --uncertainty do."
 )
 """Said where runs may end before the slip does."""
 
@@ -124,7 +125,8 @@ class Sweep(Shown):
         What each varied key is.
     columns : dict of str to ndarray, (N,)
         Read-only: the varied keys, then what came of each variant, see `NUMBERS`
-        (NaN where there is nothing to tell), then ``reason``: why there are no numbers, or not all.
+        (NaN where there is nothing to tell), then ``touches``: which surfaces the particles meet,
+        and ``reason``: why there are no numbers, or not all.
     shape : tuple of int or None
         Values of each key in a grid, whose last key runs fastest; None for samples.
     settled : bool
@@ -138,6 +140,7 @@ class Sweep(Shown):
     settled: bool = False
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", Named(self.columns))
         for values in self.columns.values():
             values.flags.writeable = False
 
@@ -164,7 +167,7 @@ class Sweep(Shown):
         """Return from where to where each column goes, and why rows have no numbers."""
         rows = []
         for name, values in self.columns.items():
-            if name == REASON or not np.isfinite(values).any():
+            if name in TEXTS or not np.isfinite(values).any():
                 continue
             unit = self.unit(name)
             known = values[np.isfinite(values)]
@@ -172,8 +175,13 @@ class Sweep(Shown):
             if name in self.quantities or low != high or low != 0.0:
                 rows.append((name, unit, number(low), number(high), f"{len(known):,}"))
         notes = []
-        if not self.settled and np.any(np.nan_to_num(self.columns["slip_heat"])):
+        if not self.settled and np.any(np.nan_to_num(self.columns[HEAT])):
             notes.append(PARTIAL)
+        ways = Counter(way for way in self.columns[TOUCHES].tolist() if way)
+        if len(ways) > 1:
+            told = [f"{count:,} touch {way}" for way, count in ways.most_common(MOST_REASONS)]
+            told += [f"others go {len(ways) - MOST_REASONS:,} other ways"] * (len(ways) > len(told))
+            notes.append("; ".join(told))
         reasons = Counter(reason for reason in self.columns[REASON].tolist() if reason)
         notes += [f"{count:,} × {reason}" for reason, count in reasons.most_common(MOST_REASONS)]
         if len(reasons) > MOST_REASONS:

@@ -7,13 +7,15 @@ the same operations, so that a row does not depend on which it came from.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.results import ENTRIES, REASONS, Kind, Recording, balance
+from chutelab.results.arrival import arrivals, fates, never
 from chutelab.results.comparison import relative_error, scales
 from chutelab.results.quantities import (
     QUANTITIES,
@@ -21,42 +23,88 @@ from chutelab.results.quantities import (
     end_times,
     first,
     from_events,
-    never,
 )
+from chutelab.results.stream import told_fates
 from chutelab.scene.rules import NEEDED
 from chutelab.theory import unbounded
-from chutelab.util.arrays import Bools, Floats
+from chutelab.util.arrays import Bools, Floats, Ints
 
 Columns = dict[str, NDArray[Any]]
 
+PAID, HEAT = (f"ledger.by_surface.outgoing.{entry}" for entry in ("belt_work", "friction_loss"))
+
 NUMBERS: dict[str, tuple[str, str]] = {
-    "landing.x": ("x of the landing on the outgoing belt, mean over the particles", "m"),
-    "landing.x_spread": ("its standard deviation", "m"),
-    "landing.y": ("y of the landing, mean", "m"),
-    "landing.vx": ("forward velocity just before the landing, mean", "m/s"),
-    "landing.vx_spread": ("its standard deviation", "m/s"),
-    "landing.vy": ("upward velocity just before the landing, mean", "m/s"),
-    "landing.vy_spread": ("its standard deviation", "m/s"),
-    "landing.t": ("time from a particle's release to its landing, mean", "s"),
+    "arrival.x.mean": (
+        "x where particles come to the outgoing belt, or what lies on it, mean",
+        "m",
+    ),
+    "arrival.x.spread": ("its standard deviation", "m"),
+    "arrival.vx.mean": ("forward velocity just before the arrival, mean", "m/s"),
+    "arrival.vx.spread": ("its standard deviation", "m/s"),
+    "landing.x.mean": ("x of the landing on the outgoing belt itself, mean", "m"),
+    "landing.x.spread": ("its standard deviation", "m"),
+    "landing.y.mean": ("y of the landing, mean", "m"),
+    "landing.vx.mean": ("forward velocity just before the landing, mean", "m/s"),
+    "landing.vx.spread": ("its standard deviation", "m/s"),
+    "landing.vy.mean": ("upward velocity just before the landing, mean", "m/s"),
+    "landing.vy.spread": ("its standard deviation", "m/s"),
+    "landing.t.mean": ("time of the landing, mean", "s"),
     "time": ("time from a particle's release to the end of its track, mean", "s"),
-    "belt_work": ("what the outgoing belt's drive pays up to run.until, all particles", "J"),
-    "slip_heat": ("heat of the slip on the outgoing belt up to run.until", "J"),
+    PAID: ("what the outgoing belt's drive pays up to run.until, all particles", "J"),
+    HEAT: ("heat of the slip on the outgoing belt up to run.until", "J"),
     "restitution_loss": ("loss of all bounces", "J"),
-    "power": ("belt work up to run.until per particle times stream.rate", "W"),
-    "misses": ("particles that never landed on the outgoing belt", ""),
+    "power": ("belt work up to run.until per particle times the rate of all the width", "W"),
+    "plate_hits": ("particles that met the plate before a landing", ""),
+    "misses": ("particles that never came to the outgoing belt, nor to what lies on it", ""),
     "residual": ("energy that the ledger cannot explain: the numerical error", "J"),
     "error": ("largest relative error of particle 0 against the theory", ""),
 }
 """Columns of numbers, with their definitions and units; NaN where there is nothing to tell."""
 
-REASON = "reason"
+EARLIER = {
+    "belt_work": PAID, "slip_heat": HEAT,
+    **{f"landing.{key}": f"landing.{key}.mean" for key in ("x", "y", "vx", "vy", "t")},
+    **{f"landing.{key}_spread": f"landing.{key}.spread" for key in ("x", "vx", "vy")},
+}  # fmt: skip
+"""What columns were called that had a name which means another thing in a run, and are called."""
+
+TOUCHES: Final = "touches"
+"""The column that says which surfaces the particles meet, see `touches`; "" without a run."""
+
+REASON: Final = "reason"
 """The column that says why there are no numbers, or not all; "" otherwise."""
+
+TEXTS: Final = (TOUCHES, REASON)
+"""The columns of words, which come last."""
+
+
+def no_column(name: str) -> str:
+    """Say which columns of numbers there are, or what an earlier name has become.
+
+    >>> no_column("landing.x")
+    'landing.x is called landing.x.mean now: in a run landing.x is of one particle'
+    """
+    if name in EARLIER:
+        if name in ("belt_work", "slip_heat"):
+            why = f"{name} is what is paid until nothing slips, this is up to run.until"
+        else:
+            why = f"in a run {name.partition('_')[0]} is of one particle"
+        return f"{name} is called {EARLIER[name]} now: {why}"
+    return f"{name}: one of {', '.join(NUMBERS)}"
+
+
+class Named(dict[str, NDArray[Any]]):
+    """Columns by name; asked for one that is not there, it says what it is called."""
+
+    def __missing__(self, name: str) -> NDArray[Any]:
+        """Raise a KeyError that says which columns there are."""
+        raise KeyError(no_column(name))
 
 
 def empty(count: int) -> Columns:
     """Return rows that tell nothing yet."""
     found: Columns = {name: np.full(count, np.nan) for name in NUMBERS}
-    found[REASON] = np.full(count, "", dtype=object)
+    found |= {name: np.full(count, "", dtype=object) for name in TEXTS}
     return found
 
 
@@ -133,10 +181,12 @@ def _described(recording: Recording, holds: Bools) -> list[NDArray[Any]]:
 
 FATES = {
     "time": "still under way when the run ended",
+    "stopped": "still under way when the run was stopped",
+    "unreleased": "never released",
     "settled": "came to rest elsewhere",
     "exit": "left the scene",
 }
-"""What became of particles that did not land, by why their tracks ended."""
+"""What became of a lone particle that did not arrive, by why its track ended."""
 
 
 def rows(recording: Recording, variants: int = 1) -> Columns:
@@ -155,13 +205,14 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
     begin, end = recording.ends()
     began = np.full(recording.count, np.nan)
     began[released] = begin["t"]
-    landings = first(recording, "landing")
-    values = {f"landing.{name}": column(landings, name) for name in ("x", "y", "vx", "vy")}
-    values |= {"landing.t": landings["t"] - began, "time": end_times(recording) - began}
-    for name, value in values.items():
-        found[name], spread = _mean_and_spread(value.reshape(shape))
-        if f"{name}_spread" in found:
-            found[f"{name}_spread"] = spread
+    came = arrivals(recording)
+    for event, its in (("landing", first(recording, "landing")), ("arrival", came)):
+        for key in ("x", "y", "vx", "vy", "t"):
+            mean, spread = _mean_and_spread(column(its, key).reshape(shape))
+            for statistic, value in (("mean", mean), ("spread", spread)):
+                if (name := f"{event}.{key}.{statistic}") in found:
+                    found[name] = value
+    found["time"], _ = _mean_and_spread((end_times(recording) - began).reshape(shape))
     who = np.flatnonzero(released)
     kinetic_first, potential_first = recording.energies(begin, who)
     kinetic, potential = recording.energies(end, who)
@@ -170,11 +221,16 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
     whole[0, released] = change - balance(end["entries"])
     whole[1, released] = end["entries"][:, ENTRIES.index("restitution_loss")]
     found["residual"], found["restitution_loss"] = whole.reshape(2, *shape).sum(axis=2)
+    found[TOUCHES] = touches(recording, variants)
+    if scene.plate is not None:
+        who, surface = _met(recording)
+        met = np.unique(who[surface == recording.surface_index("plate")])
+        found["plate_hits"] = np.bincount(met // shape[1], minlength=variants).astype(np.float64)
     if scene.outgoing is not None:
         paid = _paid(recording, variants)
-        found["belt_work"], found["slip_heat"] = paid["belt_work"], paid["friction_loss"]
-        found["power"] = np.asarray(found["belt_work"] / shape[1] * scene.stream.rate)
-        missed = np.isnan(landings["t"]).reshape(shape)
+        found[PAID], found[HEAT] = paid["belt_work"], paid["friction_loss"]
+        found["power"] = np.asarray(found[PAID] / shape[1] * scene.rate)
+        missed = np.isnan(came["t"]).reshape(shape)
         found["misses"] = missed.sum(axis=1).astype(np.float64)
         _tell(found[REASON], recording, missed)
     found["error"] = deviation(recording, shape)
@@ -199,7 +255,7 @@ def _paid(recording: Recording, count: int) -> dict[str, Floats]:
 
 
 def _tell(reasons: NDArray[Any], recording: Recording, missed: Bools) -> None:
-    """Say what became of those that did not land, (V, M), and whose slip went on after that."""
+    """Say what became of those that did not arrive, (V, M), and whose slip went on after that."""
     every, ended = missed.shape[1], recording.ended.reshape(missed.shape)
     restless = ~missed & (ended != REASONS.index("settled"))
     if recording.machine.until != "settled":
@@ -207,14 +263,73 @@ def _tell(reasons: NDArray[Any], recording: Recording, missed: Bools) -> None:
     for row in np.flatnonzero((missed | restless).any(axis=1)).tolist():
         said = []
         if missed[row].any():
-            fates = [REASONS[k] for k in ended[row, missed[row]].tolist()]
-            told = [f"{fates.count(name)} {fate}" for name, fate in FATES.items() if name in fates]
-            who = f"{len(fates)} of {every} particles" if every > 1 else "it"
-            fate = ", ".join(told) if every > 1 else FATES[fates[0]]
+            # Of several particles a recording is of one variant.
+            fate = (
+                told_fates(Counter(fates(recording)[missed[row]].tolist()))
+                if every > 1
+                else FATES[REASONS[ended[row, 0]]]
+            )
+            who = f"{np.count_nonzero(missed[row])} of {every} particles" if every > 1 else "it"
             said.append(f"{who} missed the outgoing belt: {fate}")
         if restless[row].any():
             who = f"{restless[row].sum()} of {every} particles" if every > 1 else "it"
-            said.append(
-                f"{who} landed, but never came to rest on a belt: belt_work has only a part"
-            )
+            said.append(f"{who} arrived, but never came to rest on a belt: {PAID} has only a part")
         reasons[row] = "; ".join(said)
+
+
+LONGEST: Final = 6
+"""Surfaces that are named: what is thrown to and fro longer goes by the same name."""
+
+NOTHING: Final = "nothing"
+"""What a particle touches that meets no surface."""
+
+RARE: Final = 0.02
+"""Share up to which a way of few is not told: of the particles of a crowd, of uncertain samples."""
+
+
+def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
+    """Return which surfaces the particles of each variant meet, (V,) of str.
+
+    Such as ``plate, outgoing``: the kind of an outcome. Numbers of one kind vary smoothly, and a
+    mean over several may be near to none of them. It ends with the landing, and impacts in a row on
+    one surface count as one. Of a crowd the ways that more than `RARE` of it takes are told, the
+    most frequent one first, such as ``plate, outgoing | outgoing``.
+    """
+    who, surface = _met(recording)
+    place = np.arange(len(who)) - np.searchsorted(who, who)
+    ways = np.full((recording.count, LONGEST + 1), -1)
+    near = place <= LONGEST
+    ways[who[near], place[near]] = surface[near]
+    # Rows of a table are compared column by column: `np.unique` of rows takes ten times as long.
+    taken, example = np.zeros(recording.count, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    for met in ways.T[: place.max(initial=-1) + 1]:
+        numbers = taken * (len(recording.surfaces) + 1) + met + 1
+        _, example, taken = np.unique(numbers, return_index=True, return_inverse=True)
+    every = [[recording.surfaces[k] for k in way if k >= 0] for way in ways[example].tolist()]
+    names = np.array(list(map(_named, every)), dtype=object)
+    if recording.count == variants:
+        texts: NDArray[Any] = names[taken]
+        return texts
+    texts = np.empty(variants, dtype=object)
+    for row, taken_here in enumerate(taken.reshape(variants, -1).tolist()):
+        counts = Counter(taken_here).most_common()
+        often = [names[way] for way, count in counts if count > RARE * len(taken_here)]
+        texts[row] = " | ".join(often or [names[counts[0][0]]])
+    return texts
+
+
+def _named(surfaces: list[str]) -> str:
+    if len(surfaces) > LONGEST:
+        surfaces[LONGEST - 1 :] = ["and so on"]
+    return ", ".join(surfaces) or NOTHING
+
+
+def _met(recording: Recording) -> tuple[Ints, Ints]:
+    """Return particles and the surfaces that each meets up to its landing, (E,) each."""
+    events = recording.select(Kind.IMPACT, Kind.LANDING, Kind.SETTLE)
+    events = events[np.argsort(events["particle"], kind="stable")]
+    who, surface = events["particle"], events["surface"]
+    landings = np.cumsum(events["kind"] == Kind.LANDING) - (events["kind"] == Kind.LANDING)
+    kept = landings == landings[np.searchsorted(who, who)]
+    kept[1:] &= (who[1:] != who[:-1]) | (surface[1:] != surface[:-1])
+    return who[kept], surface[kept]

@@ -35,11 +35,11 @@ from chutelab.studies.sweep.batch import swept
 from chutelab.studies.sweep.part import unfinished
 from chutelab.studies.sweep.plan import Plan, planned
 from chutelab.studies.sweep.result import Sweep, format_of, synced, write, write_csv
-from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns, joined
+from chutelab.studies.sweep.rows import NUMBERS, REASON, TEXTS, Columns, joined
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import InputError
 from chutelab.util.files import writing
-from chutelab.util.versions import library
+from chutelab.util.versions import library, own_version
 
 Job = tuple[int, Any]
 
@@ -207,6 +207,7 @@ def _cluster(address: str) -> Iterator[Crew]:
     try:
         threads = sum(client.nthreads().values())
         if threads:
+            _check_same_version(client, address)
             yield Crew(client.get_executor(pure=False), 2 * threads, alive=alive)
     except Exception as error:
         gone = isinstance(error, (dask.KilledWorker, CancelledError, TimeoutError))
@@ -222,6 +223,27 @@ def _cluster(address: str) -> Iterator[Crew]:
             client.close(PATIENCE)
     if not threads:
         raise InputError(f"--scheduler {address}: it has no workers; start some with `dask`")
+
+
+def _check_same_version(client: Any, address: str) -> None:
+    """Refuse workers whose chutelab is another version: their rows would not be those of this one.
+
+    A worker that cannot say its version has none, or one from before it could be asked.
+    """
+    own = own_version()
+    others = {
+        worker: said if isinstance(said, str) else "no chutelab that could be asked"
+        for worker, said in client.run(own_version, on_error="return").items()
+        if said != own
+    }
+    if others:
+        worker, said = next(iter(sorted(others.items())))
+        count = f"{len(others)} of its workers, such as {worker}," if len(others) > 1 else worker
+        verb = "have" if len(others) > 1 else "has"
+        raise InputError(
+            f"--scheduler {address}: {count} {verb} chutelab {said}, and here is {own}: install"
+            " the same on all"
+        )
 
 
 def _ask(dask: ModuleType, address: str) -> None:
@@ -307,7 +329,7 @@ def sweep(
     --------
     >>> import chutelab
     >>> swept = sweep(chutelab.load("perpendicular"), ["plate.restitution=0:1:3"])
-    >>> swept.columns["landing.vx"]
+    >>> swept.columns["landing.vx.mean"]
     array([ 0., -1., -2.])
     """
     plan = planned(scene, varies, sample=sample, design=design, seed=seed, engine=engine)
@@ -350,7 +372,7 @@ def sweep_to(
         result = _gathered(plan, blocks)
         with writing(out):
             if form == "csv":
-                write_csv((*plan.keys, *NUMBERS, REASON), texts, out)
+                write_csv((*plan.keys, *NUMBERS, *TEXTS), texts, out)
             else:
                 write(result.columns, out, form)
             synced(out)

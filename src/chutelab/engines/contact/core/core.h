@@ -16,6 +16,8 @@ extern World W;
 #define TOUCH 5e-3
 /* Overlap, in radii, from which on nothing may sink further, not even by a hop. */
 #define SUNK 1e-2
+/* Overlap, in radii, of disks that just touch, written with some digits: their places count as free. */
+#define TOUCHING 1e-9
 /* Approach, in radii per step, that is left to the next step instead of an impact at its instant:
    a tenth of TOUCH, so that what is left is in reach of the contacts before it overlaps. */
 #define SKIP 5e-4
@@ -78,6 +80,9 @@ static inline int goes_on(int j, int other) {
     return j == other || (j < 0 && other < 0 && (is_mate(j, other) || is_mate(other, j)));
 }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
+
+/* Change of normal velocity that a contact asks for under its impulse, m/s. */
+static inline double asks(const Contact *c) { return c->need - c->gives * c->impulse[0]; }
 
 /* Move a disk along its parabola. */
 static inline void advance(Disk *d, double t) {

@@ -163,14 +163,14 @@ int place_is_free(int i, double x, double y, double t) {
     double r = W.disks[i].radius, box[4] = {x - r, y - r, x + r, y + r}, nx, ny;
     for (int k = 0; k < W.surface_count && W.gate_count; k++) {
         const Surface *s = W.surfaces + k;
-        if (s->gate >= 0 && s->there == THERE && gap_to(s, x, y, r, &nx, &ny) < -1e-9 * r) return 0;
+        if (s->gate >= 0 && s->there == THERE && gap_to(s, x, y, r, &nx, &ny) < -TOUCHING * r) return 0;
     }
     if (!W.interact) return 1;
     int n = query(i, box);
     for (int k = 0; k < n; k++) {
         Disk o = W.disks[W.found[k]];
         advance(&o, t);
-        if (square(o.x - x) + square(o.y - y) < square(o.radius + r)) return 0;
+        if (square(o.x - x) + square(o.y - y) < square(o.radius + (1 - TOUCHING) * r)) return 0;
     }
     return 1;
 }

@@ -129,12 +129,13 @@ typedef struct { double restitution, friction, rolling; } Pair; /* [in] rolling:
 typedef struct {
     double nx, ny;          /* unit normal towards i */
     double gap;             /* m */
-    double need;            /* m/s; least change of normal velocity that keeps the gap closed */
+    double need;            /* m/s; least change of normal velocity that keeps the gap closed ... */
+    double gives;           /* ... and by how much less for each N s of its normal impulse, 1/kg */
     double pull;            /* m/s2; by which gravity makes it slip on a surface */
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
-    double swept[3];        /* the impulse two sweeps ago */
-    double course[3];       /* where it is heading to; both see `hasten` */
+    double swept[3];        /* the impulse two sweeps ago, see `hasten` */
+    double course[3];       /* where it is heading to, see `hasten` and `descend` */
     double mass[3];         /* what the contact feels of masses and inertias, in the same order */
     double light[3];        /* 1 / mass, 0 where there is none */
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
@@ -208,6 +209,7 @@ typedef struct {
     int impact_count, step_count, solve_count, sweep_count;
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */
+    double gained;       /* J; by which solves broke their law of energy, see `check_energy` */
     /* within the step */
     int low, high;       /* disks that this part of the run is about */
     int phase, cell_count, heap_count, moved_count, wide_count;

@@ -281,6 +281,20 @@ static void look_ahead(int i) {
     }
 }
 
+/* Step of a disk by itself, s, `h` at most, in which it goes by no more than TURN of the room that a
+   hollow leaves it: whether that holds it, did, or it is at its opening, in touch with both ends. */
+static double hollow_step(const Disk *d, double h) {
+    double speed = sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * h, nx, ny;
+    for (int k = 0; k < W.surface_count; k++) {
+        const Surface *s = W.surfaces + k;
+        double room = s->radius - d->radius;
+        if (s->shape == SEGMENT || !(room > 0) || speed * h <= TURN * room) continue;
+        if (square(d->x - s->x) + square(d->y - s->y) < square(s->radius)
+            && gap_to(s, d->x, d->y, d->radius, &nx, &ny) < TOUCH * d->radius) h = TURN * room / speed;
+    }
+    return h;
+}
+
 /* Begin a step: where prescribed paths lead, who may meet, what lasts. A status other than DONE says
    what was too small, and nothing has happened yet. */
 static int begin_step(void) {
@@ -289,9 +303,7 @@ static int begin_step(void) {
     double next = set_gates(W.t), h = W.dt, stride = 0;
     if (W.g > 0)
         for (int i = W.low; i < W.high; i++) h = MIN(h, sqrt(8 * HOP * W.disks[i].radius / W.g));
-    if (!W.interact)
-        for (int n = 0; n < W.disks[W.low].held_count; n++)
-            h = MIN(h, turning_time(W.disks + W.low, W.surfaces + W.disks[W.low].held[n]));
+    if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     W.step = h;
     W.soft = 2 * W.g * h;
     W.skip = SKIP / h;
@@ -387,7 +399,7 @@ static void end_step(void) {
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         if (!is_live(d)) continue;
-        if (W.until != UNTIL_TIME && d->mode != RIDING) leave(i, W.step_end);
+        if (d->mode != RIDING) leave(i, W.step_end);
         if (d->mode == FREE) advance(d, W.step_end);
         else if (d->mode == ASLEEP) {
             d->x += d->ux * (W.step_end - W.t);

@@ -38,7 +38,8 @@ static double press(Contact *c) {
         x -= b->vx - b->ux;
         y -= b->vy - b->uy;
     }
-    double normal = MAX(c->impulse[0] - c->mass[0] * (x * c->nx + y * c->ny - c->need), 0);
+    double off = x * c->nx + y * c->ny - asks(c);
+    double normal = MAX(c->impulse[0] - off / (c->light[0] + c->gives), 0);
     double change[3] = {normal - c->impulse[0], 0, 0};
     if (change[0] != 0) push(c, change);
     c->impulse[0] = normal;
@@ -49,7 +50,7 @@ static double press(Contact *c) {
 static double violation(const Contact *list, int count, double x, double y) {
     double worst = 0;
     for (int n = 0; n < count; n++)
-        worst = MAX(worst, list[n].need - x * list[n].nx - y * list[n].ny);
+        worst = MAX(worst, asks(list + n) - x * list[n].nx - y * list[n].ny);
     return worst;
 }
 
@@ -68,7 +69,7 @@ static double press_corner(Contact *list, int count) {
     double least = violation(list, count, x, y);
     for (int i = 0; i < count && least > rounding; i++) {
         const Contact *c = list + i;
-        double one = c->need - x * c->nx - y * c->ny;
+        double one = asks(c) - x * c->nx - y * c->ny;
         double left = violation(list, count, x + one * c->nx, y + one * c->ny);
         if (one <= 0 || left >= least) continue;
         least = left;
@@ -79,7 +80,7 @@ static double press_corner(Contact *list, int count) {
         for (int j = 0; j < i && least > rounding; j++) {
             const Contact *c = list + i, *o = list + j;
             double cosine = c->nx * o->nx + c->ny * o->ny, sine = c->nx * o->ny - c->ny * o->nx;
-            double one = c->need - x * c->nx - y * c->ny, two = o->need - x * o->nx - y * o->ny;
+            double one = asks(c) - x * c->nx - y * c->ny, two = asks(o) - x * o->nx - y * o->ny;
             if (fabs(sine) < PARALLEL) continue;
             double first = (one - cosine * two) / (sine * sine), then = (two - cosine * one) / (sine * sine);
             double left = violation(list, count, x + first * c->nx + then * o->nx,
@@ -138,6 +139,58 @@ static double hasten(Contact *list, int count, double size) {
     return now;
 }
 
+/* The derivative of the cost along `course`, J. The cost of impulses J, whose changes of velocity are
+   W J, is 1/2 J W J + J q: what sweeps make least, one contact after the other. W J + q is how far the
+   velocities are from what the contacts ask for; see docs/physics.md. */
+static double downhill(const Contact *list, int count) {
+    double sum = 0, u[3], v[3];
+    for (int n = 0; n < count; n++) {
+        const Contact *c = list + n;
+        const double *d = c->course;
+        if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
+        relative(c, 1, u);
+        relative(c, 0, v);
+        sum += d[0] * (v[0] - u[0] - asks(c)) + d[1] * (v[1] + c->drift) + d[2] * v[2];
+    }
+    return sum;
+}
+
+static void advance_impulses(Contact *list, int count, double by) {
+    for (int n = 0; n < count; n++) {
+        double more[3];
+        for (int k = 0; k < 3; k++) list[n].impulse[k] += more[k] = by * list[n].course[k];
+        push(list + n, more);
+    }
+}
+
+/* Line search: go along `course` to where the cost is least, at most all of it. */
+static void descend(Contact *list, int count) {
+    double from = downhill(list, count);
+    if (!(from < 0)) return;
+    advance_impulses(list, count, 1);
+    double to = downhill(list, count);
+    if (to > 0) advance_impulses(list, count, -to / (to - from));
+}
+
+/* Start from impulses of the step before, as far as they lower the cost: where contacts have opened,
+   what had been pressed between others would throw disks out. */
+static void start_warm(Contact *list, int count) {
+    for (int n = 0; n < count; n++)
+        for (int k = 0; k < 3; k++) {
+            list[n].course[k] = list[n].impulse[k];
+            list[n].impulse[k] = 0;
+        }
+    descend(list, count);
+}
+
+/* Lower all impulses alike, where that lowers the cost. They do no work then on the velocities that
+   they leave, however far the sweeps had come: W J + q times J is at most 0. */
+static void ease_off(Contact *list, int count) {
+    for (int n = 0; n < count; n++)
+        for (int k = 0; k < 3; k++) list[n].course[k] = -list[n].impulse[k];
+    descend(list, count);
+}
+
 /* Sweep over contacts, those of one disk with surfaces as one, until no relative velocity changes by
    more than `accurate`; the first `plain` ones are not hastened. Return by how much one changed in the
    last sweep, or INFINITY if the sweeps diverge. */
@@ -188,7 +241,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
                 double u[3], v[3];
                 relative(c, 1, u);
                 relative(c, 0, v);
-                worst = MAX(worst, c->need - v[0] + u[0]);
+                worst = MAX(worst, asks(c) - v[0] + u[0]);
             }
         }
         if (worst <= enough) break;
@@ -216,6 +269,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
         }
         left--;
     }
+    ease_off(list, count);
 }
 
 /* Where the slip of a disk by itself turns round within a step, since friction cannot hold it, the
@@ -265,16 +319,45 @@ static void sort_by_islands(void) {
     W.earlier = c;
 }
 
+/* Note by how much the step's impulses break their law: the kinetic energy after them, less that
+   before, plus that of the change itself, is at most what moving surfaces give and what the contacts
+   ask for. What is on its left is summed over disks, what is on its right over contacts. */
+static void check_energy(void) {
+    double gained = 0;
+    for (int i = W.low; i < W.high; i++) {
+        const Disk *d = W.disks + i;
+        if (d->mode != FREE) continue;
+        double x = d->vx - d->ux, y = d->vy - d->uy, w = d->spin - d->uspin;
+        gained += d->mass * (x * d->vx + y * d->vy) + d->inertia * w * d->spin;
+    }
+    for (int n = 0; n < W.contact_count; n++) {
+        const Contact *c = W.contacts + n;
+        const double *J = c->impulse;
+        double u[3];
+        if (J[0] == 0) continue;
+        relative(c, 1, u);
+        gained -= J[0] * (u[0] + asks(c)) - J[1] * c->drift + J[2] * c->other[2];
+        gained -= c->two ? 0 : J[0] * c->other[0] + J[1] * c->other[1];
+    }
+    W.gained += MAX(gained, 0);
+}
+
 void solve_contacts(void) {
     if (W.interact) sort_by_islands();
-    for (int n = 0; n < W.contact_count; n++) push(W.contacts + n, W.contacts[n].impulse);
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
-        double least = INFINITY;
+        double least = INFINITY, heaviest = 0;
+        int driven = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
-            least = MIN(least, MIN(W.disks[c->i].radius, W.disks[c->j >= 0 ? c->j : c->i].radius));
+            const Disk *a = W.disks + c->i, *b = W.disks + (c->j >= 0 ? c->j : c->i);
+            least = MIN(least, MIN(a->radius, b->radius));
+            heaviest = MAX(heaviest, MAX(a->mass, b->mass));
+            driven |= !c->two && c->other[1] != 0;
         }
+        /* A drive presses as hard as it must: there no spring would hold, and friction is lowered. */
+        for (int n = from; n < to; n++) W.contacts[n].gives *= driven ? 0 : 1 / heaviest;
+        start_warm(list, to - from);
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), PLAIN,
                            W.accurate, W.skip * least);
@@ -290,5 +373,6 @@ void solve_contacts(void) {
         c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);
+    check_energy();
     W.solve_count++;
 }

@@ -4,10 +4,13 @@
 #include "core.h"
 
 /* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step: gently,
-   since parting does work. Of an overlap as deep as DEEP more, up to all. */
+   since parting does work. Of an overlap as deep as DEEP more, up to all. It parts like a spring that
+   GIVES, of stiffness PART / GIVES M / step^2, M the heaviest mass of the island: what is wedged cannot
+   part, and without a bound its impulses would grow in each sweep. */
 #define SLOP 1e-3
 #define PART 0.1
 #define DEEP 0.03
+#define GIVES 3e-3
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
 
@@ -76,6 +79,7 @@ static int add(int i, int j, double least, double bound, double h) {
     if (c->gap < -SLOP * least) {
         double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
         aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
+        c->gives = GIVES;
     }
     c->need = (aim - later) / h;
     c->drift = 0.5 * h * c->pull;
@@ -107,8 +111,11 @@ static int add(int i, int j, double least, double bound, double h) {
     /* In a corner the other surface may press it on this one. */
     int alone = d->supports <= 1 || gone;
     c->leaves = pressed && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
-    if (c->leaves) c->need = floor;
-    if (c->leaves) c->drift = (until < h ? until : 0) * c->pull;
+    if (c->leaves || gone) c->gives = 0;
+    if (c->leaves) {
+        c->need = floor;
+        c->drift = (until < h ? until : 0) * c->pull;
+    } else if (gone) c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     else if (pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
     W.contact_count++;
     return 1;

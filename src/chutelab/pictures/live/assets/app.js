@@ -23,9 +23,15 @@ import { Words } from "./words.js";
 /** @param {string} id @returns {any} */
 const byId = (id) => document.getElementById(id);
 
-/** @param {string} text base64 */
+/** What is no base64 gives no core, as the engine then says. @param {string} text base64 */
 function bytesOf(text) {
-  const binary = atob(text), bytes = new Uint8Array(binary.length);
+  let binary = "";
+  try {
+    binary = atob(text);
+  } catch {
+    return new Uint8Array();
+  }
+  const bytes = new Uint8Array(binary.length);
   for (let i = 0; i < binary.length; i += 1) bytes[i] = binary.charCodeAt(i);
   return bytes;
 }
@@ -63,6 +69,7 @@ function start() {
   Object.assign(globalThis, {
     chutelab: { lab, stage, panels, exercise, toml: () => toToml(/** @type {any} */ (lab.given)) },
   });
+  byId("broken").remove();
 }
 
 start();

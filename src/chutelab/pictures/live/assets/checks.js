@@ -21,6 +21,9 @@ const EITHER = ["particle", "plate", "stream"];
 /** Names of surfaces that no free one may take. */
 const RESERVED = ["incoming", "plate", "outgoing", "particles"];
 
+/** Least width and height of a view, m. */
+const LEAST_VIEW = 1e-6;
+
 /** Tables that are for other programs. */
 const FOREIGN = ["expect", "live"];
 
@@ -92,11 +95,22 @@ function* misfitsOfTable(row, rules, path) {
       if (required) yield [path(key), value, "missing"];
     } else if (!fits(value, form)) {
       const number = typeof value === "number" && low !== undefined && high !== undefined;
-      if (number && low === Number.MIN_VALUE) yield [path(key), value, "above", { high }];
-      else if (number) yield [path(key), value, "range", { low, high }];
+      const least = leastOf(form);
+      if (number && least !== undefined) {
+        yield [path(key), value, "range-or-none", { low: least, high }];
+      } else if (number) yield [path(key), value, "range", { low, high }];
       else yield [path(key), value, "form"];
     }
   }
+}
+
+/**
+ * Returns the least number that a form takes besides 0, if it takes 0.
+ * @param {import("./forms.js").Form} form
+ * @returns {number | undefined}
+ */
+function leastOf({ anyOf, not }) {
+  return not ? not.exclusiveMaximum : anyOf?.map(leastOf).find((least) => least !== undefined);
 }
 
 /**
@@ -158,14 +172,34 @@ export function* conflictsOf(scene, given) {
   yield* plateConflicts(scene, given);
   for (const [n, one] of scene.surface.entries()) yield* layoutConflicts(one, `surface[${n}]`);
   for (const [n, { from, to }] of scene.conveyor.entries()) {
-    if (samePoint(from, to)) yield [`conveyor[${n}].to`, to, "same-points"];
+    if (tooNear(from, to)) yield [`conveyor[${n}].to`, to, "same-points"];
   }
+  yield* pieceConflicts(scene);
   for (const n of scene.streams.keys()) yield* releaseConflicts(scene, given, n);
+  const counts = scene.streams.map(({ count }) => count);
+  const most = scene.most;
+  if (counts.reduce((sum, count) => sum + count, 0) > most) {
+    const n = counts.indexOf(Math.max(...counts));
+    yield [pathOf(given, "stream", n, "count"), counts[n], "too-many", { high: most }];
+  }
+  const { view } = scene;
+  if (view?.to.some((end, n) => end - view.from[n] < LEAST_VIEW)) {
+    yield ["view.to", view.to, "view-corners"];
+  }
 }
 
+/** m; less than that is no surface. */
+const LEAST_LENGTH = 1e-9;
+
+/** kg; less than any atom has. */
+const LEAST_MASS = 1e-27;
+
+/** Straight and bent pieces of all surfaces with their copies, at most. */
+const MOST_PIECES = 10_000;
+
 /** @param {Point | undefined} a @param {Point | undefined} b */
-function samePoint(a, b) {
-  return a !== undefined && b !== undefined && a[0] === b[0] && a[1] === b[1];
+function tooNear(a, b) {
+  return a !== undefined && b !== undefined && Math.hypot(b[0] - a[0], b[1] - a[1]) < LEAST_LENGTH;
 }
 
 /**
@@ -186,6 +220,26 @@ function* beltConflicts(scene) {
 
 /**
  * @param {Scene} scene
+ * @returns {Generator<Wrong>}
+ */
+function* pieceConflicts({ incoming, outgoing, plates, conveyor, surface }) {
+  let count = Number(incoming !== null) + Number(outgoing !== null) + plates.length;
+  count += 4 * conveyor.length;
+  for (const [n, one] of surface.entries()) {
+    const { points, repeat, opens_at: opens, closes_at: closes } = one;
+    const twice = opens !== undefined && closes !== undefined && opens < closes;
+    count += repeat.reduce((many, [copies]) => many * copies,
+      Math.max(1, (points?.length ?? 0) - 1) * (twice ? 2 : 1));
+    if (count > MOST_PIECES) {
+      const key = repeat.length ? "repeat" : "points";
+      yield [`surface[${n}].${key}`, one[key], "too-many", { high: MOST_PIECES }];
+      return;
+    }
+  }
+}
+
+/**
+ * @param {Scene} scene
  * @param {Given} given
  * @returns {Generator<Wrong>}
  */
@@ -195,6 +249,7 @@ function* kindConflicts(scene, given) {
     if ("mass" in kind.given && "density" in kind.given) {
       yield [path("density"), kind.density, "mass-and-density"];
     }
+    if (!(kind.mass >= LEAST_MASS)) yield [path("mass"), kind.mass, "range", { low: LEAST_MASS, high: 1e6 }];
     if (kind.span !== undefined && kind.span[0] >= kind.span[1]) {
       yield [path("radius"), kind.span, "not-ascending"];
     }
@@ -249,7 +304,8 @@ function* layoutConflicts(one, key) {
     }
     if (one.radius === undefined) yield [`${key}.radius`, undefined, "missing"];
     const extent = Math.abs(one.to_deg - one.from_deg);
-    if (extent === 0.0 || extent > 360.0) yield [`${key}.to_deg`, one.to_deg, "arc-angles"];
+    const short = extent * RADIANS * (one.radius ?? 1.0) < LEAST_LENGTH;
+    if (short || extent > 360.0) yield [`${key}.to_deg`, one.to_deg, "arc-angles"];
     return;
   }
   // Of what belongs to an arc, the angles of a whole one do no harm.
@@ -266,7 +322,7 @@ function* layoutConflicts(one, key) {
   } else if (from === undefined || to === undefined) {
     yield [`${key}.${from === undefined ? "from" : "to"}`, undefined, "missing"];
   }
-  if (points?.some((point, place) => samePoint(point, points[place + 1]))) {
+  if (points?.some((point, place) => tooNear(point, points[place + 1]))) {
     const last = given.points === undefined ? "to" : "points";
     yield [`${key}.${last}`, given[last], "same-points"];
   }
@@ -282,7 +338,15 @@ function* releaseConflicts(scene, given, n) {
   const { incoming } = scene;
   const stream = scene.streams[n];
   const path = (/** @type {string} */ key) => pathOf(given, "stream", n, key);
+  const { until } = scene.run;
+  if (typeof until === "number" && stream.start >= until) {
+    yield [path("start"), stream.start, "after-end"];
+  }
   if (!Number.isFinite(stream.rate)) yield [path("rate"), stream.given.rate, "form"];
+  const size = 2.0 * scene.particles[scene.kinds[n]].radius;
+  if (stream.width !== undefined && stream.width < size) {
+    yield [path("width"), stream.width, "range", { low: size, high: 1e6 }];
+  }
   for (const key of ["at", "to", "rate", "bed_height", "speed_spread"]) {
     if (stream.fill !== undefined && key in stream.given) {
       yield [path(key), stream.given[key], "not-both", { other: "fill" }];

@@ -84,6 +84,7 @@ function sectionsOf(scene) {
   for (const table of /** @type {const} */ (["conveyor", "surface"])) add(table, scene[table]);
   add("stream", scene.streams);
   add("particle", scene.particles);
+  add("view", scene.view ? [{}] : []);
   return found;
 }
 
@@ -110,7 +111,7 @@ function idle(table, row) {
       ...(row.given.from ? ["points"] : [])];
   }
   if (table === "stream") {
-    return [...(row.count === 1 ? ["rate", "bed_height", "speed_spread", "seed"] : []),
+    return [...(row.count === 1 ? ["rate", "width", "bed_height", "speed_spread", "seed"] : []),
       ...(row.interact ? [] : ["restitution", "friction"])];
   }
   const weighed = table === "particle" && (row.given.density ?? row.given.material) !== undefined;

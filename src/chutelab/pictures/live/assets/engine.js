@@ -17,15 +17,21 @@ class Engine {
     /** @type {(chunk: Chunk) => void} */
     this.onChunk = () => {};
     worker.onmessage = ({ data }) => {
+      if (data.type === "broken") this.fail();
       if (data.type === "chunk" && data.id === this.id) this.onChunk(data);
     };
-    worker.onerror = ({ message }) => this.onFailure(message);
+    worker.onerror = () => this.fail();
     worker.postMessage({ type: "load", wasm, layout });
   }
 
-  /** The thread did not start, or broke. @param {string} message */
-  onFailure(message) {
-    throw new Error(`the engine's thread: ${message}`);
+  /** Whether the thread did not start, or broke: no run comes back then. */
+  broken = false;
+
+  onFailure = () => {};
+
+  fail() {
+    this.broken = true;
+    this.onFailure();
   }
 
   /** Begin a run, and end the one before.

@@ -10,6 +10,7 @@
  * @property {number} [maximum]
  * @property {number} [exclusiveMinimum]
  * @property {number} [exclusiveMaximum]
+ * @property {Form} [not] a range that is left out
  * @property {number} [maxLength]
  * @property {string} [pattern]
  * @property {number} [minItems]
@@ -57,7 +58,8 @@ function fitsWhole(value, form) {
  * @param {number} value
  * @param {Form} form
  */
-function isInRange(value, { minimum, maximum, exclusiveMinimum, exclusiveMaximum }) {
+function isInRange(value, { minimum, maximum, exclusiveMinimum, exclusiveMaximum, not }) {
+  if (not && isInRange(value, not)) return false;
   return !(value < (minimum ?? -Infinity) || value > (maximum ?? Infinity)
     || value <= (exclusiveMinimum ?? -Infinity) || value >= (exclusiveMaximum ?? Infinity));
 }

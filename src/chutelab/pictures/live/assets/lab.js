@@ -41,6 +41,7 @@ class Lab {
     this.fault = null;
     /** What undo goes back to once what is dragged is let go. @type {Given | undefined} */
     this.before = undefined;
+    engine.onFailure = () => this.refuse(new Fault("", undefined, "no-engine"));
     this.use(this.first);
   }
 
@@ -71,8 +72,10 @@ class Lab {
       if (!(error instanceof Fault)) throw error;
       this.fault = error;
     }
+    const isTaken = !this.fault;
+    if (this.engine.broken) this.fault = new Fault("", undefined, "no-engine");
     this.tell("scene");
-    return !this.fault;
+    return isTaken;
   }
 
   /** Say why something cannot be; all stays as it is. @param {Fault} fault */

@@ -95,7 +95,7 @@ const CLEARANCE = 0.05;
 const CLEARANCE_RADII = 3.0;
 
 /** m below the lowest surface, or outside the box of all without gravity, where a track ends. */
-const EXIT_MARGIN = 1.0;
+export const EXIT_MARGIN = 1.0;
 
 /** @type {[number, number][]} */
 const ALWAYS = [[-Infinity, Infinity]];
@@ -392,7 +392,9 @@ function exitBox(scene, segments, arcs, releases) {
       hold(x + radius * cosine, y + radius * sine);
     }
   }
-  if (!segments.length && !arcs.length) releases.forEach(({ x, y }) => hold(x, y));
+  // Where particles do not meet it is the first of each stream: alone each does the same.
+  releases.filter(({ stream }, i) => scene.crowded || stream !== releases[i - 1]?.stream)
+    .forEach(({ x, y }) => hold(x, y));
   if (scene.gravity) return [-Infinity, Infinity, bottom - EXIT_MARGIN, Infinity];
   return [left - EXIT_MARGIN, right + EXIT_MARGIN, bottom - EXIT_MARGIN, top + EXIT_MARGIN];
 }

@@ -1,5 +1,7 @@
-// The numbers of a transfer by the paper's symbols: as simulated, beside the closed form.
+// The numbers of a transfer by the paper's symbols: as simulated, beside the closed form. Of a
+// crowd first those of the crowd, and of particle 0 if somebody asks.
 
+import { FEWEST, crowdOf } from "./crowd.js";
 import { card, follow, html } from "./panels.js";
 import { historyOf } from "./stages.js";
 import { predict } from "./prediction.js";
@@ -86,7 +88,12 @@ class NumbersPanel {
     const head = html("thead", {}, html("tr", {}, html("td"), this.simulated,
       html("th", { scope: "col" }, words.say("analytic"))));
     this.reason = html("p", { class: "note" });
-    const panel = card("numbers", words.say("numbers"), html("table", {}, head, this.body), this.reason);
+    this.lone = html("div", {}, html("table", {}, head, this.body), this.reason);
+    this.crowd = html("tbody");
+    this.lead = html("table", { class: "crowd" }, this.crowd);
+    this.asked = html("details", { class: "values" }, html("summary", {}, words.say("particle-0")));
+    const panel = card("numbers", words.say("numbers"), this.lead, this.asked, this.lone);
+    this.asked.before(this.lone);
     home.append(panel);
     follow(lab, panel, ["run"], () => this.refresh());
   }
@@ -95,7 +102,14 @@ class NumbersPanel {
     const { words, lab } = this;
     const { machine } = /** @type {Recording} */ (lab.recording), many = machine.releases.length;
     const { numbers, reason } = predict(/** @type {Scene} */ (lab.scene));
-    const rows = numbersOf(historyOf(lab)?.stages ?? [], numbers,
+    const history = historyOf(lab), crowd = many >= FEWEST, { stages = [] } = history ?? {};
+    this.lead.hidden = this.asked.hidden = !crowd;
+    if (crowd && history) {
+      this.tellCrowd(crowdOf(/** @type {Recording} */ (lab.recording), history));
+    }
+    if (crowd) this.asked.append(this.lone);
+    else this.asked.before(this.lone);
+    const rows = numbersOf(crowd ? stages.slice(0, 1) : stages, numbers,
       machine.pulley?.radius ?? NaN, machine.radius)
       .filter(({ simulated, analytic }) => isFinite(simulated) || isFinite(analytic));
     this.body.replaceChildren(...rows.map(({ id, symbol, unit, simulated, analytic }) =>
@@ -103,12 +117,33 @@ class NumbersPanel {
         html("th", { scope: "row" }, html("b", {}, symbol), ` ${words.say(`number-${id}`)}, ${unit}`),
         ...[simulated, analytic].map((value) =>
           html("td", {}, words.number(Math.abs(value) < ROUNDED ? 0 : tidy(value)))))));
-    this.simulated.textContent = many > 1 ? words.say("simulated-mean", { n: many })
+    this.simulated.textContent = many > 1 && !crowd ? words.say("simulated-mean", { n: many })
       : words.say("simulated");
     const why = reason ? words.say(`reason-${reason.text}`, Object.fromEntries(Object
       .entries(reason.words).map(([key, value]) => [key, typeof value === "number"
         ? words.number(value) : words.name(value)]))) : "";
     this.reason.textContent = rows.length || !machine.pulley ? why : words.say("numbers-none");
+  }
+
+  /** @param {import("./crowd.js").CrowdNumbers} its */
+  tellCrowd({ released, landed, flow, mean, spread, quantiles, work, power, losses }) {
+    const { words } = this;
+    const all = /** @type {Recording} */ (this.lab.recording).machine.releases.length;
+    const metres = (/** @type {number} */ x) => `${words.fixed(x, 3)} m`;
+    const rows = /** @type {[string, string, string][]} */ ([
+      ["released", words.say("crowd-released"), `${released} / ${all}`],
+      ["flow", words.say("crowd-flow"), isFinite(flow) ? `${words.number(flow, 3)} kg/s` : ""],
+      ["landed", words.say("crowd-landed"), landed ? String(landed) : ""],
+      ["place", words.say("crowd-place"), landed ? `${metres(mean)} ± ${metres(spread)}` : ""],
+      ["quantiles", words.say("crowd-quantiles"),
+        landed ? `${quantiles.map((x) => words.fixed(x, 3)).join(" / ")} m` : ""],
+      ["power", words.say("crowd-power"),
+        work ? `${words.energy(work)}, ${words.number(power, 3)} W` : ""],
+      ...losses.map(([name, loss]) => [`loss-${name}`,
+        words.say("crowd-loss", { name: words.name(name) }), words.energy(loss)]),
+    ]);
+    this.crowd.replaceChildren(...rows.filter(([, , told]) => told).map(([id, name, told]) =>
+      html("tr", { "data-id": id }, html("th", { scope: "row" }, name), html("td", {}, told))));
   }
 }
 

@@ -24,6 +24,9 @@ import { arcCos, atan2, lengthOf, modulo, sinCos } from "./trig.js";
 /** Bisections: they exhaust a double's digits. */
 const HALVINGS = 60;
 
+/** Share of the numbers that a gap is worked out from by which it may be off, `ROUNDING` there. */
+const NOUGHT = 2.0 ** -48;
+
 /** @type {Hit} */
 const NO_HIT = { time: Infinity, name: "" };
 
@@ -178,35 +181,37 @@ function fallOf(polynomial, low, high) {
 }
 
 /**
- * Returns the square of the distance from a point, less that of a radius, as a quartic in time.
- * @param {Flight} flight
- * @param {Point} point
- * @param {number} radius
- */
-function distanceTo({ x, y, vx, vy, gravity }, point, radius) {
-  const fall = -0.5 * gravity;
-  const [dx, dy] = [x - point[0], y - point[1]];
-  return [
-    fall * fall, 2.0 * vy * fall, vx * vx + vy * vy + 2.0 * dy * fall,
-    2.0 * (dx * vx + dy * vy), dx * dx + dy * dy - radius * radius,
-  ];
-}
-
-/**
- * Returns when the centre of a disk comes into a circle, or goes out of it, in order.
+ * Returns when a disk comes to a circle of a size (m) from outside, or inside (-1.0), in order.
  * @param {Flight} flight
  * @param {Point} center
+ * @param {number} size
  * @param {number} radius
  * @param {number} horizon
- * @param {boolean} [outward]
+ * @param {number} [side]
  * @returns {number[]}
  */
-export function ringTimes(flight, center, radius, horizon, outward = false) {
-  const quartic = distanceTo(flight, center, radius).map((part) => (outward ? -part : part));
+export function ringTimes({ x, y, vx, vy, gravity }, center, size, radius, horizon, side = 1.0) {
+  const fall = -0.5 * gravity;
+  const [dx, dy] = [x - center[0], y - center[1]];
+  const around = size + side * radius;
+  const quartic = [
+    fall * fall, 2.0 * vy * fall, vx * vx + vy * vy + 2.0 * dy * fall,
+    2.0 * (dx * vx + dy * vy), dx * dx + dy * dy - around * around,
+  ];
   const marks = [0.0, ...changesOf(slopeOf(quartic), 0.0, horizon), horizon];
+  const reach = Math.abs(x) + Math.abs(y) + Math.abs(center[0]) + Math.abs(center[1])
+    + size + radius;
+  const sizes = quartic.map(Math.abs);
+  const gap = quartic.map((part) => side * part);
+  const values = marks.map((mark) => {
+    const value = valueOf(gap, mark);
+    return Math.abs(value) <= NOUGHT * (valueOf(sizes, mark) + around * reach) ? 0.0 : value;
+  });
   return marks.slice(1).flatMap((end, n) => {
-    const falls = valueOf(quartic, marks[n]) >= 0.0 && valueOf(quartic, end) < 0.0;
-    return falls ? [fallOf(quartic, marks[n], end)] : [];
+    // Where the gap is zero first, the fall begins there.
+    if (values[n] === 0.0) return values[n + 1] < 0.0 ? [marks[n]] : [];
+    if (values[n] < 0.0 || values[n + 1] > 0.0) return [];
+    return [values[n + 1] < 0.0 ? fallOf(gap, marks[n], end) : end];
   });
 }
 
@@ -219,22 +224,16 @@ export function ringTimes(flight, center, radius, horizon, outward = false) {
  */
 export function cornerTime(flight, point, radius, horizon) {
   if (radius <= 0.0 || horizon <= 0.0) return Infinity;
-  const quartic = distanceTo(flight, point, radius);
-  const marks = [0.0, ...changesOf(slopeOf(quartic), 0.0, horizon), horizon];
-  const inside = marks.findIndex((mark) => valueOf(quartic, mark) < 0.0);
-  return inside < 0 ? Infinity : fallOf(quartic, marks[Math.max(inside - 1, 0)], marks[inside]);
+  return ringTimes(flight, point, 0.0, radius, horizon)[0] ?? Infinity;
 }
 
 /**
- * Returns the circles of a disk's centre at contacts with a bend, and if it comes from inside.
+ * Returns from which sides a disk can touch a bend: 1 outside, -1 inside.
  * @param {Bend} bend
  * @param {number} radius
- * @returns {[number, boolean][]}
  */
-function ringsOf(bend, radius) {
-  const outside = bend.radius + radius;
-  return bend.radius > radius
-    ? [[outside, false], [bend.radius - radius, true]] : [[outside, false]];
+function sidesOf(bend, radius) {
+  return bend.radius > radius ? [1.0, -1.0] : [1.0];
 }
 
 /**
@@ -251,11 +250,16 @@ function faceTime(flight, line, radius, horizon) {
   const height = (flight.x - x0) * nx + (flight.y - y0) * ny;
   const speed = flight.vx * nx + flight.vy * ny;
   const bend = -0.5 * flight.gravity * ny;
+  const off = NOUGHT
+    * (Math.abs(flight.x) + Math.abs(flight.y) + Math.abs(x0) + Math.abs(y0) + radius);
   const times = [1.0, -1.0].map((side) => {
-    // Where c + b t + a t² falls through 0, without cancellation; NaN if nowhere.
-    const [c, b, a] = [side * height - radius, side * speed, side * bend];
-    const root = Math.sqrt(b * b - 4.0 * a * c);
-    const t = b > 0.0 ? -(b + root) / (2.0 * a) : 2.0 * c / (root - b);
+    // Where c + b t + a t² falls to 0, without cancellation; NaN if nowhere.
+    const [gap, b, a] = [side * height - radius, side * speed, side * bend];
+    const c = Math.abs(gap) <= off ? 0.0 : gap;
+    const square = b * b - 4.0 * a * c;
+    const root = Math.sqrt(Math.abs(square) <= 4.0 * Math.abs(a) * off ? 0.0 : square);
+    const pressed = c === 0.0 && b === 0.0 && a < 0.0;
+    const t = pressed ? 0.0 : b > 0.0 ? -(b + root) / (2.0 * a) : 2.0 * c / (root - b);
     if (!(t >= 0.0 && t <= horizon)) return Infinity;
     const [x, y] = placeAt(flight, t);
     const foot = (x - x0) * tx + (y - y0) * ty;
@@ -280,8 +284,8 @@ export function firstInFlight(flight, { lines, bends }, radius, horizon) {
   }
   if (horizon <= 0.0) return hit;
   for (const bend of bends) {
-    for (const [size, outward] of ringsOf(bend, radius)) {
-      const times = ringTimes(flight, bend.center, size, horizon, outward);
+    for (const side of sidesOf(bend, radius)) {
+      const times = ringTimes(flight, bend.center, bend.radius, radius, horizon, side);
       const time = times.find((t) => holds(bend, placeAt(flight, t)));
       hit = earlier(hit, time ?? Infinity, bend.name);
     }
@@ -290,6 +294,14 @@ export function firstInFlight(flight, { lines, bends }, radius, horizon) {
     hit = earlier(hit, cornerTime(flight, point, radius, horizon), name);
   }
   return hit;
+}
+
+/**
+ * Returns the angle of a cosine, which may be beyond 1 by rounding; NaN if it is by more.
+ * @param {number} cosine
+ */
+function spreadOf(cosine) {
+  return arcCos(Math.abs(Math.abs(cosine) - 1.0) <= NOUGHT ? Math.sign(cosine) : cosine);
 }
 
 /**
@@ -304,7 +316,8 @@ export function firstInFlight(flight, { lines, bends }, radius, horizon) {
 export function firstOnPulley(rideRadius, begin, last, { lines, bends }, radius) {
   let hit = NO_HIT;
   const meet = (/** @type {number} */ angle, /** @type {string} */ name) => {
-    const turned = modulo(angle - begin, 2.0 * Math.PI);
+    const far = modulo(angle - begin, 2.0 * Math.PI);
+    const turned = far >= 2.0 * Math.PI - NOUGHT ? 0.0 : far;
     if (turned <= last - begin) hit = earlier(hit, turned, name);
   };
   const place = (/** @type {number} */ angle) => {
@@ -315,7 +328,7 @@ export function firstOnPulley(rideRadius, begin, last, { lines, bends }, radius)
   const around = (/** @type {Point} */ [x, y], /** @type {number} */ size) => {
     const far = lengthOf(x, y);
     const square = rideRadius * rideRadius + far * far - size * size;
-    const spread = arcCos(square / (2.0 * rideRadius * far));
+    const spread = spreadOf(square / (2.0 * rideRadius * far));
     const lean = atan2(x, y);
     return [lean - spread, lean + spread];
   };
@@ -325,7 +338,7 @@ export function firstOnPulley(rideRadius, begin, last, { lines, bends }, radius)
     const level = x0 * -ty + y0 * tx;
     for (const side of [radius, -radius]) {
       const lean = atan2(-ty, tx);
-      const spread = arcCos((level + side) / rideRadius);
+      const spread = spreadOf((level + side) / rideRadius);
       for (const angle of [lean - spread, lean + spread]) {
         const [x, y] = place(angle);
         const foot = (x - x0) * tx + (y - y0) * ty;
@@ -339,8 +352,8 @@ export function firstOnPulley(rideRadius, begin, last, { lines, bends }, radius)
     }
   }
   for (const bend of bends) {
-    for (const [size] of ringsOf(bend, radius)) {
-      for (const angle of around(bend.center, size)) {
+    for (const side of sidesOf(bend, radius)) {
+      for (const angle of around(bend.center, bend.radius + side * radius)) {
         if (holds(bend, place(angle))) meet(angle, bend.name);
       }
     }

@@ -7,7 +7,7 @@ import { reachBelow, surfaceParts } from "./machine.js";
 import {
   cornerTime, firstInFlight, firstOnPulley, horizonOf, overlapped, placeAt, ringTimes,
 } from "./obstacles.js";
-import { met } from "./scene.js";
+import { met, slices } from "./scene.js";
 import { because, cutFrom, transfer, unanswered } from "./transfer.js";
 import { RADIANS, sinCos } from "./trig.js";
 
@@ -74,7 +74,8 @@ function unboundedTransfer(scene, belt, plate) {
     angle: plate.angle_deg * RADIANS, pivotHeight: plate.pivot_height, restitution, drop, beltSpeed,
     particleRadius: own.radius, mass: own.mass, gravity: scene.gravity, spin: own.spin,
     inertia: own.shape === "sphere" ? 0.4 : 0.5, incline: belt.incline_deg * RADIANS,
-    plateFriction, interval: 1.0 / scene.streams[0].rate, unboundedPlate: false,
+    plateFriction, unboundedPlate: false,
+    interval: 1.0 / (scene.streams[0].rate * slices(scene.streams[0], own)),
   });
   if (out === null) return found(0.0, 0.0);
   const { phi1, y2 } = found(0.0, out.speed).numbers;
@@ -209,7 +210,7 @@ class Course {
     // once, by rounding: it starts on the circle.
     const slow = v1 * v1 * sinCos(phi1)[1] < separation.gravity * rideRadius;
     const [again = Infinity] = phi1 < 0.0 && slow
-      ? ringTimes(separation, [0.0, 0.0], rideRadius, horizon) : [];
+      ? ringTimes(separation, [0.0, 0.0], rideRadius, 0.0, horizon) : [];
     const hops = again < horizon;
     const others = { lines: hit ? lines.slice(1) : lines, bends };
     const { name } = firstInFlight(separation, others, radius, Math.min(horizon, again));

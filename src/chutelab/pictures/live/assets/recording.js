@@ -16,6 +16,9 @@ const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, 
 /** Of events, as in the enum Kind of the core. */
 const RELEASE = 0, SEPARATION = 1;
 
+/** Straight parts in which a piece of a track is drawn at most. */
+const MOST_CHORDS = 500;
+
 /** Knots of one particle, `KNOT_ROW` doubles each. */
 class Track {
   rows = new Float64Array(8 * KNOT_ROW);
@@ -196,11 +199,16 @@ class Recording {
      * @type {{index: number, entries: number[], goesOn: boolean}[] | null} */
     this.renamed = null;
     this.shift = 0;
+    /** Belt work, restitution and friction loss by surface, and of the particles among each other,
+     * J, once the run is over; none if the scene was changed under way.
+     * @type {number[][] | null} */
+    this.books = null;
   }
 
   /** @param {{knots: Float64Array, tips: Float64Array, events: Event[], now: number,
-   *   state: string}} chunk */
-  add({ knots, tips, events, now, state }) {
+   *   state: string, books?: number[][] | null}} chunk */
+  add({ knots, tips, events, now, state, books = null }) {
+    this.books = this.renamed ? null : books;
     const its = (/** @type {number} */ disk) =>
       this.renamed ? this.renamed[disk] : { index: disk, entries: null, goesOn: false };
     for (const track of this.tracks) track.live = false;
@@ -279,11 +287,16 @@ class Recording {
         track.tip = 1;
       } else releases.push({ ...release, t: Math.max(0, release.t - t) });
     });
+    // Of what was taken away nothing is left.
+    const count = machine.releases.length;
+    this.tracks.length = Math.min(this.tracks.length, count);
     this.measure();
-    this.events = this.events.filter((event) => event.t <= t);
+    this.events = this.events.filter(({ t: when, disk, other }) =>
+      when <= t && disk < count && other < count);
     this.machine = machine;
     this.renamed = renamed;
     this.shift = t;
+    this.books = null;
     this.now = t;
     this.state = "running";
     const some = (/** @type {number[]} */ values) => renamed.map(({ index }) => values[index]);
@@ -355,22 +368,32 @@ class Recording {
     return total;
   }
 
-  /** Points of a track from its begin to t, knots among them, for a line through them.
-   * @param {number} index @param {number} from @param {number} to @param {number} step s */
-  points(index, from, to, step) {
+  /** Points of a track, its knots among them: straight lines between them miss it by `fine` (m).
+   * Over a time h a chord misses a curve by at most h²/8 times its largest acceleration, which a
+   * cubic has at one of its ends.
+   * @param {number} index @param {number} fine */
+  points(index, fine) {
     const track = this.tracks[index];
-    /** @type {State[]} */
+    /** @type {{x: number, y: number}[]} */
     const points = [];
-    const begin = Math.max(from, track.begin);
-    const end = Math.min(to, track.end);
-    if (!(begin <= end)) return points;
-    for (let t = begin, i = track.knotBefore(begin); ;) {
-      points.push(/** @type {State} */ (track.state(t)));
-      if (t >= end) return points;
-      while (i + 1 < track.count && track.at(i + 1, T) <= t) i += 1;
-      const knot = i + 1 < track.count ? track.at(i + 1, T) : end;
-      t = Math.min(t + step, knot > t ? knot : end, end);
+    for (let i = 0; i < track.count; i += 1) {
+      points.push({ x: track.at(i, X), y: track.at(i, Y) });
+      const h = i + 1 < track.count ? track.at(i + 1, T) - track.at(i, T) : 0;
+      if (!(h > 0)) continue;
+      const bends = [[X, VX], [Y, VY]].map(([place, pace]) => {
+        const way = 6 * (track.at(i + 1, place) - track.at(i, place));
+        const first = h * track.at(i, pace), last = h * track.at(i + 1, pace);
+        return [way - 4 * first - 2 * last, way - 2 * first - 4 * last];
+      });
+      const bent = Math.max(Math.hypot(bends[0][0], bends[1][0]),
+        Math.hypot(bends[0][1], bends[1][1]));
+      const parts = Math.min(Math.ceil(Math.sqrt(bent / 8 / fine)), MOST_CHORDS);
+      for (let n = 1; n < parts; n += 1) {
+        const [x] = track.curve(i, X, VX, h, n / parts), [y] = track.curve(i, Y, VY, h, n / parts);
+        points.push({ x, y });
+      }
     }
+    return points;
   }
 }
 

@@ -34,6 +34,9 @@ const JITTER = 0.01;
 /** Places of a box that are looked at together; what is above the particles never is. */
 const HANDFUL = 1000;
 
+/** Places of a box that are looked at, at most, and `TRIES` more for each particle. */
+const LOOKS = 1_000_000;
+
 /**
  * Returns where the lowest layer of a stream is released, m.
  * @param {Scene} scene
@@ -82,8 +85,9 @@ export function draw(scene, clear) {
   scene.streams.forEach((stream, n) => {
     const drawn = stream.fill === undefined
       ? drawStream(scene, n) : pour(scene, n, releases, radius, clear);
-    releases.push(...drawn.releases);
-    radius.push(...drawn.radius);
+    // One by one: a call takes some hundred thousand arguments at most.
+    for (const release of drawn.releases) releases.push(release);
+    for (const r of drawn.radius) radius.push(r);
   });
   return { releases, radius };
 }
@@ -204,7 +208,7 @@ function spreadApart(bed, t, height, velocity, radius, fall, lowest, dice) {
   // by one, stays away for good.
   /** @type {number[]} */
   let close = [];
-  for (let i = 1; i < t.length; i++) {
+  for (let i = 1; bed > 0.0 && i < t.length; i++) {
     close.push(i - 1);
     /** @type {{dx: number, dy: number, reach: number}[]} */
     const near = [];
@@ -217,7 +221,7 @@ function spreadApart(bed, t, height, velocity, radius, fall, lowest, dice) {
       if (stays) near.push({ dx, dy, reach: radius[j] + radius[i] });
       return stays;
     });
-    for (let tries = bed > 0.0 ? TRIES : 0; tries > 0; tries--) {
+    for (let tries = TRIES; tries > 0; tries--) {
       const free = near.every(({ dx, dy, reach }) => {
         const up = dy - height[i];
         return dx * dx + up * up >= reach * reach;
@@ -249,6 +253,36 @@ function* packedPlaces([[left, bottom], [right, top]], largest) {
 }
 
 /**
+ * Returns what tells whether a disk of a radius may be at a place, away from those of the streams
+ * before it: in a grid of cells it looks at its own and those around.
+ * @param {Release[]} before
+ * @param {number[]} their radii
+ * @param {number} radius
+ * @returns {(x: number, y: number) => boolean}
+ */
+function freeOf(before, their, radius) {
+  let largest = 0.0;
+  for (const r of their) largest = Math.max(largest, r);
+  const size = radius + largest;
+  const cell = (/** @type {number} */ x) => Math.floor(x / size);
+  /** @type {Map<string, number[]>} */
+  const grid = new Map();
+  before.forEach(({ x, y }, j) => {
+    const key = `${cell(x)} ${cell(y)}`;
+    const known = grid.get(key);
+    if (known) known.push(j);
+    else grid.set(key, [j]);
+  });
+  const around = [-1, 0, 1];
+  return (x, y) => around.every((right) => around.every((up) => {
+    const near = grid.get(`${cell(x) + right} ${cell(y) + up}`) ?? [];
+    return near.every((j) => {
+      return lengthOf(x - before[j].x, y - before[j].y) >= radius + their[j];
+    });
+  }));
+}
+
+/**
  * Packs a stream's box, as far up as it takes.
  * @param {Scene} scene
  * @param {number} n
@@ -265,23 +299,24 @@ function pour(scene, n, before, their, clear) {
   const radius = drawRadii(scene, n, dice);
   const largest = particle.span === undefined ? particle.radius : particle.span[1];
   const source = packedPlaces(box, largest);
+  const isFree = freeOf(before, their, largest);
   /** @type {Point[]} */
   const found = [];
+  let left = LOOKS + TRIES * stream.count;
   for (let more = true; more && found.length < stream.count;) {
     /** @type {Point[]} */
     const places = [];
     while (more && places.length < HANDFUL) {
       const { value, done } = source.next();
-      more = !done;
-      if (done) break;
+      left -= 1;
+      more = !done && left >= 0;
+      if (done || !more) break;
       const x = value[0] + JITTER * largest * dice.uniform(-1.0, 1.0);
       places.push([x, value[1] + JITTER * largest * dice.uniform(-1.0, 1.0)]);
     }
     const free = clear(places, largest);
     found.push(...places.filter(([x, y], i) => {
-      return free[i] && before.every((other, j) => {
-        return lengthOf(x - other.x, y - other.y) >= largest + their[j];
-      });
+      return free[i] && isFree(x, y);
     }));
   }
   if (found.length < stream.count) {

@@ -41,6 +41,7 @@ import { conflictsOf, listOf, misfitsOf, straysOf } from "./checks.js";
  * @property {string} [particle]
  * @property {number} count
  * @property {number} rate particles per second
+ * @property {number} [width]
  * @property {number} start
  * @property {number} bed_height
  * @property {number} speed_spread
@@ -127,7 +128,7 @@ import { conflictsOf, listOf, misfitsOf, straysOf } from "./checks.js";
  * @property {string} title
  * @property {number} gravity
  * @property {Particle[]} particles
- * @property {Record<string, Record<string, number>>} materials numbers by name, presets too
+ * @property {Map<string, Record<string, number>>} materials numbers by name, presets too
  * @property {{between: [string, string], restitution?: number, friction?: number}[]} pair
  * @property {Incoming | null} incoming
  * @property {Plate[]} plates
@@ -138,6 +139,8 @@ import { conflictsOf, listOf, misfitsOf, straysOf } from "./checks.js";
  * @property {{until: "landed" | "settled" | number, max_time: number, dt: number}} run
  * @property {number[]} kinds which of the particles each stream consists of
  * @property {boolean} crowded whether particles meet
+ * @property {number} most how many particles a page has room for
+ * @property {{from: Point, to: Point} | null} view corners of what is shown
  */
 
 /** What is wrong with a scene. */
@@ -177,14 +180,14 @@ export function resolve(given, lab) {
   const rows = (/** @type {string} */ table) => {
     return listOf(given[table]).map((row) => filled(table, row));
   };
-  /** @type {Record<string, Record<string, number>>} */
-  const materials = { ...lab.presets };
+  // A map, for a name may be one that every object has.
+  const materials = new Map(Object.entries(lab.presets));
   for (const { name, ...own } of listOf(given.material)) {
     for (const key of ["restitution", "friction"]) {
       own[`${key}_steel`] ??= own[key];
       own[`${key}_rubber`] ??= own[key];
     }
-    materials[name] = own;
+    materials.set(name, /** @type {Record<string, number>} */ (own));
   }
   const particles = given.particle === undefined ? [filled("particle", {})] : rows("particle");
   const streams = given.stream === undefined ? [filled("stream", {})] : rows("stream");
@@ -194,7 +197,7 @@ export function resolve(given, lab) {
     return particles.length === 1 || stream.particle === undefined
       ? 0 : names.indexOf(stream.particle);
   });
-  for (const wrong of straysOf(given, names, Object.keys(materials))) throw new Fault(...wrong);
+  for (const wrong of straysOf(given, names, [...materials.keys()])) throw new Fault(...wrong);
   particles.forEach((kind) => fillMass(kind, materials));
   streams.forEach((stream, n) => fillRate(stream, n, particles[kinds[n]]));
   const incoming = given.incoming === undefined ? null : filled("incoming", given.incoming);
@@ -218,8 +221,9 @@ export function resolve(given, lab) {
     title: given.title ?? lab.tables.scene.title.default,
     gravity: given.gravity ?? lab.tables.scene.gravity.default,
     particles, materials, pair: given.pair ?? [], incoming, plates, outgoing,
-    conveyor: rows("conveyor"), surface, streams, run, kinds,
+    conveyor: rows("conveyor"), surface, streams, run, kinds, view: given.view ?? null,
     crowded: count > 1 && streams.some((stream) => stream.interact),
+    most: lab.tables.stream.count.high ?? Infinity,
   };
   for (const wrong of conflictsOf(scene, given)) throw new Fault(...wrong);
   return scene;
@@ -228,12 +232,12 @@ export function resolve(given, lab) {
 /**
  * Fills in the mean radius of particles, and the mass that goes with that.
  * @param {any} kind
- * @param {Record<string, Record<string, number>>} materials
+ * @param {Map<string, Record<string, number>>} materials
  */
 function fillMass(kind, materials) {
   let density = kind.density;
   if (density === undefined && kind.material !== undefined && !("mass" in kind.given)) {
-    density = materials[kind.material].density;
+    density = materials.get(kind.material)?.density;
   }
   if (Array.isArray(kind.radius)) {
     kind.span = kind.radius;
@@ -261,7 +265,16 @@ function fillRate(stream, number, kind) {
     const cube = kind.radius * kind.radius * kind.radius;
     mass = kind.mass * 0.25 * (low + high) * (low * low + high * high) / cube;
   }
-  stream.rate = Number(found?.[1]) / 3.6 / mass;
+  stream.rate = Number(found?.[1]) / 3.6 / mass / slices(stream, kind);
+}
+
+/**
+ * Returns how many slices, each one particle thick, the material of a stream is wide.
+ * @param {Stream} stream
+ * @param {Particle} kind
+ */
+export function slices({ width }, kind) {
+  return width === undefined ? 1.0 : width / (2.0 * kind.radius);
 }
 
 /**
@@ -316,7 +329,8 @@ export function met(scene, kind, other) {
  * @returns {[number, any]}
  */
 function ownValues(scene, particle, homes, column, grips) {
-  const material = particle.material === undefined ? null : scene.materials[particle.material];
+  const material = particle.material === undefined ? null
+    : scene.materials.get(particle.material) ?? null;
   const value = (/** @type {"restitution" | "friction"} */ key) => {
     const said = homes.find((home) => key in home.given);
     const own = said === undefined && !(grips && key === "friction");

@@ -21,8 +21,9 @@ const LEAST = 1.2, LEAST_FEW = 3;
 /** Pixels between the dashes that show a belt run. */
 const DASH = 26;
 
-/** Pieces of a track are no longer than this, s. */
-const FINE = 0.004;
+/** By how much a line that is drawn may miss the track: pixels, and before there are any, the share
+ * of the machine. */
+const FINE = 0.2, FINE_SHARE = 1e-3;
 
 /** @param {string} name @param {Record<string, unknown>} [attributes] @returns {any} */
 function svg(name, attributes = {}) {
@@ -64,7 +65,10 @@ class Stage {
       this.colours.clear();
       this.paint();
     });
-    lab.on("scene", () => this.rebuild());
+    lab.on("scene", () => {
+      if (JSON.stringify(lab.scene?.view) === this.chosen) this.rebuild();
+      else this.fit();
+    });
     lab.on("run", () => this.traced());
     lab.on("time", () => this.paint());
     this.listen();
@@ -93,19 +97,29 @@ class Stage {
   moved = false;
 
   fit() {
-    const { machine, recording } = this.lab;
+    const { machine, recording, scene } = this.lab;
     if (!machine) return;
-    const points = recording ? this.trackPoints(recording).flat() : [];
-    this.view.fit(boxOf(machine, points));
+    const bare = boxOf(machine, []);
+    const fine = FINE_SHARE * Math.max(bare.right - bare.left, bare.top - bare.bottom);
+    const points = recording ? this.trackPoints(recording, fine).flat() : [];
+    const chosen = scene?.view;
+    if (chosen) {
+      const [[left, bottom], [right, top]] = [chosen.from, chosen.to];
+      this.view.fit({ left, bottom, right, top }, 0);
+    } else this.view.fit(boxOf(machine, points));
+    this.chosen = JSON.stringify(chosen);
     this.fitted = points.length > 0;
     this.moved = false;
     this.rebuild();
   }
 
-  /** @param {import("./recording.js").Recording} recording */
-  trackPoints(recording) {
+  /** `[view]` of the scene that is shown, as text. @type {string | undefined} */
+  chosen;
+
+  /** @param {import("./recording.js").Recording} recording @param {number} fine m */
+  trackPoints(recording, fine) {
     const shown = recording.machine.interact ? [] : recording.tracks.slice(0, MOST_TRACKS);
-    return shown.map((_, i) => recording.points(i, -Infinity, Infinity, FINE));
+    return shown.map((_, i) => recording.points(i, fine));
   }
 
   /** The run has come on: its tracks, and the first view once there is one. */
@@ -210,7 +224,7 @@ class Stage {
     const { recording } = this.lab, { view } = this;
     this.paths.replaceChildren();
     if (!recording || !this.show.trails || this.blind) return;
-    for (const points of this.trackPoints(recording)) {
+    for (const points of this.trackPoints(recording, FINE / view.scale)) {
       if (points.length < 2) continue;
       const line = points.map(({ x, y }) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`);
       this.paths.append(svg("polyline", { points: line.join(" "), class: "track" }));

@@ -1,5 +1,7 @@
 // Between the world, m with y up, and the picture, pixels with y down.
 
+import { EXIT_MARGIN } from "./machine.js";
+
 /**
  * @typedef {{left: number, bottom: number, right: number, top: number}} Box
  * @typedef {import("./machine.js").Machine} Machine
@@ -69,8 +71,11 @@ class View {
 /** m of belts and walls that are shown beyond all that matters. */
 const BEYOND = 0.35;
 
+/** Share of the machine's size, of the fall of what has fallen off that is shown. */
+const FALL = 0.35;
+
 /** What is shown of a machine at first: its tracks and all that they can meet, but only so much of
- * belts and walls, which may be long.
+ * belts and walls, which may be long, and of the fall of what leaves the scene.
  * @param {Machine} machine @param {{x: number, y: number}[]} points @returns {Box} */
 function boxOf(machine, points) {
   const box = { left: Infinity, bottom: Infinity, right: -Infinity, top: -Infinity };
@@ -87,7 +92,13 @@ function boxOf(machine, points) {
     }
   }
   if (machine.pulley) widen(0, 0, machine.pulley.radius);
-  points.forEach(({ x, y }) => widen(x, y));
+  const [west, east, south, north] = machine.exitBox.map((side, n) =>
+    side + (n % 2 ? -EXIT_MARGIN : EXIT_MARGIN));
+  // Without a surface nothing is left.
+  const all = !machine.segments.length && !machine.arcs.length;
+  const inside = (/** @type {{x: number, y: number}} */ { x, y }) =>
+    all || (x >= west && x <= east && y >= south && y <= north);
+  points.filter(inside).forEach(({ x, y }) => widen(x, y));
   if (!points.length) machine.releases.forEach(({ x, y }, i) => widen(x, y, machine.radius[i]));
   const ends = (/** @type {import("./machine.js").Segment} */ { x, y, tx, ty, length }) =>
     [[x, y], [x + tx * length, y + ty * length]];
@@ -99,6 +110,11 @@ function boxOf(machine, points) {
   const [left, right] = [box.left - BEYOND, box.right + BEYOND];
   for (const [x, y] of machine.segments.filter(({ speed }) => speed).flatMap(ends)) {
     widen(isFinite(left) ? Math.min(Math.max(x, left), right) : x, y);
+  }
+  const held = { ...box }, room = FALL * Math.max(box.right - box.left, box.top - box.bottom);
+  for (const point of points.filter((one) => !inside(one))) {
+    widen(Math.min(Math.max(point.x, held.left - room), held.right + room),
+      Math.min(Math.max(point.y, held.bottom - room), held.top + room));
   }
   return box;
 }

@@ -41,8 +41,7 @@ class Words {
     for (const [id, value] of Object.entries(found)) {
       values[id] = typeof value === "number" ? this.bound(value) : value;
     }
-    const above = text === "range" && Number(found.low) > 0 && Number(found.low) < 1e-300;
-    const why = this.say(`fault-${above ? "above" : text}`, values);
+    const why = this.say(`fault-${text}`, values);
     return where ? `${where}: ${why}` : why;
   }
 

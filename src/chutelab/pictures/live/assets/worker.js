@@ -5,6 +5,7 @@
 //      time (s).
 // Out: {type: "chunk", id, knots, tips, events, now, state, books, reasons}, where state
 //      is "running", "done", "stalled" or "failed"; books and reasons come with the end.
+//      {type: "broken"}, where the core cannot be loaded.
 
 import { startCore } from "./core.js";
 
@@ -96,9 +97,14 @@ async function load({ wasm, layout }) {
 addEventListener("message", async ({ data }) => {
   if (data.type === "load") {
     ready = load(data);
+    ready.catch(() => postMessage({ type: "broken" }));
     return;
   }
-  await ready;
+  try {
+    await ready;
+  } catch {
+    return;
+  }
   if (data.type === "run") {
     core.begin(data.machine);
     job = { id: data.id, until: data.until, steps: 64 };

@@ -120,36 +120,45 @@ class Bow(Piece):
         return np.asarray((foot > margin) & (foot < self.extent * self.radius - margin))
 
 
-def pieces(machine: Machine) -> list[Piece]:
-    """Return all pieces: the straight ones, the bent ones, and the drive pulley last."""
+def pieces(machine: Machine, member: int | None = None) -> list[Piece]:
+    """Return all pieces: the straight ones, the bent ones, and the drive pulley last.
+
+    Of a family of machines those of one member.
+    """
     found: list[Piece] = []
+
+    def own(values: Any, last: int) -> Any:
+        """Return what is the member's, of values with so many axes else."""
+        return values[member] if member is not None and np.ndim(values) > last else values
+
     for part in (machine.segments, machine.arcs):
+        straight = part is machine.segments
+        shape = ("start", "tangent", "length") if straight else (
+            "center", "radius", "begin", "extent"
+        )  # fmt: skip
         for k, surface in enumerate(part.surface.tolist()):
             common: dict[str, Any] = {
                 "name": machine.surfaces[surface],
                 "surface": surface,
-                "speed": float(part.speed[k]),
+                "speed": float(own(part.speed, 1)[k]),
                 "restitution": part.restitution[..., k],
                 "friction": part.friction[..., k],
                 "appears": float(part.appears[k]),
                 "vanishes": float(part.vanishes[k]),
             }
-            if part is machine.segments:
-                at = {name: getattr(part, name)[k] for name in ("start", "tangent", "length")}
-                found.append(Line(**common, **at))
-            else:
-                names = ("center", "radius", "begin", "extent")
-                found.append(Bow(**common, **{name: getattr(part, name)[k] for name in names}))
+            places = {"start": 2, "tangent": 2, "center": 2}
+            at = {name: own(getattr(part, name), places.get(name, 1))[k] for name in shape}
+            found.append(Line(**common, **at) if straight else Bow(**common, **at))
     if (wheel := machine.pulley) is not None:
         found.append(
             Bow(
                 name="pulley",
                 surface=wheel.surface,
-                speed=wheel.speed,
+                speed=own(wheel.speed, 0),
                 restitution=wheel.restitution,
                 friction=wheel.friction,
                 center=np.zeros(2),
-                radius=wheel.radius,
+                radius=own(wheel.radius, 0),
             )
         )
     return found

@@ -1,0 +1,342 @@
+"""Where particles come to, and where they go.
+
+A particle *arrives* on a surface when it first touches it, or touches what lies on it. What lies on
+a surface at an instant is found from the places of all particles: those that touch it, those that
+touch these, and so on. A particle that has bounced off lies on nothing, so what it meets in the air
+has not arrived. Where particles do not meet each other, to arrive is to touch the surface itself.
+
+The fate of a particle is where it is when its track ends, or by which way it has left.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.machine import Arcs, Machine, Segments
+from chutelab.results.recording import EVENT, PARTICLES, REASONS, Kind, Recording, hermite
+from chutelab.util.arrays import Bools, Floats, Ints
+
+TOUCH = 0.01
+"""Gap, as a share of the smaller radius, up to which two touch: twice what the contact engine
+lets a contact open that lasts, ten times what the pymunk engine lets them overlap."""
+
+POINT = 1e-9
+"""Gap up to which a mass point touches a surface, as a share of the size of the machine."""
+
+LOOKS = 100
+"""Instants at which it is looked who lies on a surface without a blow that was recorded."""
+
+HALVINGS = 24
+"""Of the time between two such instants, until the one is known at which a contact began."""
+
+_known: WeakKeyDictionary[Recording, dict[str, NDArray[Any]]] = WeakKeyDictionary()
+
+
+def arrivals(recording: Recording, surface: str = "outgoing") -> NDArray[Any]:
+    """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
+
+    Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
+    for the surface itself) say something of an arrival on what lies there. Not of a family.
+    """
+    known = _known.setdefault(recording, {})
+    if surface not in known:
+        known[surface] = _arrivals(recording, surface)
+        known[surface].flags.writeable = False
+    return known[surface]
+
+
+def fates(recording: Recording) -> NDArray[Any]:
+    """Return what became of each particle, in words, (N,); each has one fate. Not of a family.
+
+    ``on NAME``
+        It touches a surface when its track ends, or lies on what does, or is carried by it in a
+        bed; where these are several, the one that is fewest contacts away, and of these the belts
+        first.
+    ``off NAME left``, ``off NAME right``
+        It came to a belt (not the incoming one), has left the scene, and met no other surface
+        between: carried off, at the end of the belt that was nearer when it fell below the belt.
+    ``fell left``, ``fell right``, ``fell below``, ``flew above``
+        It has left the scene otherwise: beside the machine, below it, or (without gravity) above.
+    ``in the air``
+        It touches nothing when its track ends.
+    ``unreleased``
+        It was never released.
+    """
+    machine, count = recording.machine, recording.count
+    said = np.full(count, "unreleased", dtype=object)
+    who = np.flatnonzero(recording.released)
+    if not len(who):
+        return said
+    last = recording.ends()[1]
+    left, right, bottom, top = machine.exit_box
+    (x, y), out = last["position"].T, recording.ended[who] == REASONS.index("exit")
+    gone = out | (x < left) | (x > right) | (y < bottom) | (y > top)
+    said[who[gone]] = _ways_out(recording, who[gone], last["position"][gone])
+    stays, places = who[~gone], last["position"][~gone]
+    there, names = Places(recording), recording.surfaces[:-1]
+    belts = [name for name in names if name in moving(machine)]
+    order = [*belts, *(name for name in names if name not in belts)]
+    home = np.full(len(stays), -1)
+    for n, name in enumerate(order):
+        home[(home < 0) & there.bare(stays, places, name, last["t"][~gone])] = n
+    if machine.interact:
+        one, two = there.touching(stays, places)
+        reached = -1
+        while (now := int(np.count_nonzero(home >= 0))) > reached:
+            reached, before = now, home.copy()
+            for a, b in ((one, two), (two, one)):
+                new = (before[a] >= 0) & (before[b] < 0)
+                home[b[new]] = before[a[new]]
+    if machine.releases.carried.any():
+        # In its bed a particle is carried at its height, whatever it touches.
+        rides = machine.releases.carried.copy()
+        rides[recording.select(Kind.SEPARATION, surface="incoming")["particle"]] = False
+        home[rides[stays]] = order.index("incoming")
+    if machine.landing >= 0:
+        home[recording.ended[stays] == REASONS.index("landed")] = order.index("outgoing")
+    said[stays] = [f"on {order[n]}" if n >= 0 else "in the air" for n in home.tolist()]
+    return said
+
+
+def moving(machine: Machine) -> set[str]:
+    """Return the names of the belts: the outgoing one, and all surfaces that move."""
+    pieces = (machine.segments, machine.arcs)
+    owners = {owner for p in pieces for owner in p.surface[p.speed != 0.0].tolist()}
+    return {machine.surfaces[owner] for owner in owners | {machine.landing} - {-1}}
+
+
+def _ways_out(recording: Recording, gone: Ints, ends: Floats) -> list[str]:
+    """Return by which way particles have left the scene that end outside of it, (n, 2), m."""
+    machine = recording.machine
+    corners = machine.corners if machine.corners.size else machine.releases.position
+    (left, _), (right, top) = corners.min(axis=0), corners.max(axis=0)
+    x, y = ends.T
+    high = np.where((y > top) & (machine.gravity == 0.0), "flew above", "fell below")
+    said = np.where(x < left, "fell left", np.where(x > right, "fell right", high)).astype(object)
+    touch = recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
+    # Of several rows the last one holds, and rows are in the order of time.
+    met, when = np.full(recording.count, -1), np.full(recording.count, -np.inf)
+    met[touch["particle"]], when[touch["particle"]] = touch["surface"], touch["t"]
+    others = recording.surface_index(PARTICLES)
+    since = np.full(len(gone), -np.inf)
+    for name in sorted(moving(machine) - {"incoming"}):
+        came = arrivals(recording, name)["t"][gone]
+        own = recording.surface_index(name)
+        elsewhere = (when[gone] > came) & ~np.isin(met[gone], (own, others))
+        carried = (came > since) & ~elsewhere
+        since = np.where(carried, came, since)
+        pieces = [
+            part[machine.segments.surface == own]
+            for part in (machine.segments.start, machine.segments.end)
+        ]
+        bent = machine.arcs.surface == own
+        pieces += [machine.arcs.center[bent]]
+        (first, low), (second, _) = (
+            edge(np.concatenate(pieces), axis=0) for edge in (np.min, np.max)
+        )
+        for n in np.flatnonzero(carried).tolist():
+            track = recording.track(int(gone[n]))
+            above = np.flatnonzero(track["position"][:, 1] >= low)
+            where = track["position"][above[-1] if len(above) else -1, 0]
+            said[n] = f"off {name} {'left' if where < 0.5 * (first + second) else 'right'}"
+    return [str(one) for one in said]
+
+
+def never(count: int) -> NDArray[Any]:
+    """Return events (count,) that did not happen: NaN throughout."""
+    events = np.zeros(count, dtype=EVENT)
+    for name in EVENT.names or ():
+        if EVENT[name].base.kind == "f":
+            events[name] = np.nan
+    return events
+
+
+def _arrivals(recording: Recording, surface: str) -> NDArray[Any]:
+    found = never(recording.count)
+    direct = recording.select(Kind.LANDING, Kind.IMPACT, surface=surface)
+    if not recording.machine.interact:
+        own = recording.first(direct)
+        found[own["particle"]] = own
+        return found
+    if surface not in recording.surfaces:
+        return found
+    there = Places(recording)
+    met = np.concatenate([direct, recording.select(Kind.COLLISION)])
+    # Nobody comes before the first that touches the surface itself, which is told however soft.
+    begin = float(direct["t"].min(initial=np.inf))
+    met = met[met["t"] >= begin]
+    met = met[np.argsort(met["t"], kind="stable")]
+    if not len(met):
+        return found
+    looks = np.linspace(begin, float(recording.knots["t"].max(initial=begin)), LOOKS)
+    times, one, two = (met[name].copy() for name in ("t", "particle", "other"))
+    come = np.zeros(recording.count, dtype=bool)
+    last = 0
+    for before, look in zip(np.append(begin, looks[:-1]), looks, strict=True):
+        if come.all():
+            break
+        now = int(np.searchsorted(times, look, side="right"))
+        # Two that have come say nothing new.
+        between = np.arange(last, now)
+        between = between[~(come[one[between]] & come[two[between]] & (two[between] >= 0))]
+        some = (between, times[between], one[between], two[between])
+        for row, t, i, j in zip(*(column.tolist() for column in some), strict=True):
+            if j < 0:
+                if not come[i]:
+                    found[i], come[i] = met[row], True
+            elif come[i] != come[j]:
+                new, old = (j, i) if come[i] else (i, j)
+                # Whatever lies there has come before.
+                who, places = there.at(t, np.flatnonzero(come))
+                if there.carries(old, t, who, places, surface):
+                    found[new] = met[row] if new == i else there.state(new, t, old)
+                    come[new] = True
+        last = now
+        # What came to lie there so softly that no blow was recorded.
+        who, places = there.at(look)
+        lies = there.lying(look, who, places, surface)
+        for i in who[lies & np.isnan(found["t"][who])].tolist():
+            found[i], come[i] = there.began(i, surface, before, look), True
+    return found
+
+
+def _is_there(pieces: Segments | Arcs, k: int, t: Any) -> Any:
+    return (pieces.appears[k] <= t) & (t < pieces.vanishes[k])
+
+
+class Places:
+    """Where particles are at an instant, and what of them lies on a surface then."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.recording = recording
+        self.radius = np.broadcast_to(recording.particle.radius, recording.count)
+        knots, corners = recording.knots, recording.machine.corners
+        self._point = POINT * float(np.ptp(corners, axis=0).max()) if corners.size else 0.0
+        self._t0 = float(knots["t"].min(initial=0.0))
+        self._span = 2.0 * (float(knots["t"].max(initial=0.0)) - self._t0) + 1.0
+        self._keys = recording.owner * self._span + (knots["t"] - self._t0)
+
+    def _cells(self, who: Ints, t: Any, side: Any = "right") -> tuple[Ints, Floats]:
+        """Return the interval of each track that holds t, and the share of it that has passed."""
+        knots, offsets = self.recording.knots, self.recording.offsets
+        left = np.searchsorted(self._keys, who * self._span + (t - self._t0), side=side) - 1
+        left = np.clip(left, offsets[who], offsets[who + 1] - 2)
+        h = knots["t"][left + 1] - knots["t"][left]
+        share = np.divide(t - knots["t"][left], h, out=np.ones_like(h), where=h > 0.0)
+        return left, np.clip(share, 0.0, 1.0)
+
+    def at(self, t: float, who: Ints | None = None) -> tuple[Ints, Floats]:
+        """Return who is under way at t, of some or all, and where, (n,) and (n, 2), m."""
+        knots, offsets = self.recording.knots, self.recording.offsets
+        who = np.flatnonzero(self.recording.released) if who is None else who
+        first, last = knots["t"][offsets[who]], knots["t"][offsets[who + 1] - 1]
+        who = who[(first <= t) & (t <= last)]
+        return who, self.on(who, t)
+
+    def on(self, who: Ints, t: Any) -> Floats:
+        """Return where particles (n,) are at t, s, one or (n,), while under way, (n, 2), m."""
+        left, share = self._cells(who, t)
+        sides = (hermite(self.recording.knots, left, share, axis)[0] for axis in (0, 1))
+        return np.stack([*sides], axis=-1)
+
+    def belt_work(self, who: Ints, t: Any) -> Floats:
+        """Return the belt work booked of particles (n,) up to t, s, one or (n,), (n,), J."""
+        knots, offsets = self.recording.knots["entries"][:, 0], self.recording.offsets
+        left, share = self._cells(who, t, "left")
+        booked = knots[left] + share * (knots[left + 1] - knots[left])
+        return np.where(t < self.recording.knots["t"][offsets[who]], 0.0, booked)
+
+    def state(self, particle: int, t: float, other: int = -1) -> NDArray[Any]:
+        """Return time, place and velocity of a particle just before t, as an event."""
+        left, share = self._cells(np.array([particle]), t, "left")
+        event = never(1)
+        for axis in (0, 1):
+            place, pace = hermite(self.recording.knots, left, share, axis)
+            event["position"][:, axis] = place
+            event["velocity_before"][:, axis] = event["velocity_after"][:, axis] = pace
+        event["t"], event["particle"], event["other"] = t, particle, other
+        event["kind"], event["surface"] = Kind.COLLISION, len(self.recording.surfaces) - 1
+        found: NDArray[Any] = event[0]
+        return found
+
+    def bare(self, who: Ints, places: Floats, surface: str, t: Any) -> Bools:
+        """Tell which particles touch a surface itself at t (s, one or (n,)), (n,)."""
+        machine, owner = self.recording.machine, self.recording.surface_index(surface)
+        gap = np.full(len(who), np.inf)
+        flat, bent, wheel = machine.segments, machine.arcs, machine.pulley
+        for k in np.flatnonzero(flat.surface == owner).tolist():
+            away = places - flat.start[k]
+            along = np.clip(away @ flat.tangent[k], 0.0, flat.length[k])
+            far = np.hypot(*(away - along[:, None] * flat.tangent[k]).T)
+            gap = np.where(_is_there(flat, k, t), np.minimum(gap, far), gap)
+        for k in np.flatnonzero(bent.surface == owner).tolist():
+            far = np.hypot(*(places.T - bent.nearest(k, places)))
+            gap = np.where(_is_there(bent, k, t), np.minimum(gap, far), gap)
+        if wheel is not None and wheel.surface == owner:
+            gap = np.minimum(gap, np.abs(np.hypot(*places.T) - wheel.radius))
+        radius = self.radius[who]
+        return np.asarray(gap <= radius * (1.0 + TOUCH) + self._point)
+
+    def touching(self, who: Ints, places: Floats) -> tuple[Ints, Ints]:
+        """Return all pairs that touch, by their rows in `who`, (p,) each."""
+        radius, order = self.radius[who], np.argsort(places[:, 0], kind="stable")
+        x, reach = places[order, 0], 2.0 * radius.max(initial=0.0) * (1.0 + TOUCH)
+        firsts, seconds = [], []
+        for step in range(1, len(order)):
+            near = np.flatnonzero(x[step:] - x[:-step] <= reach)
+            if not len(near):
+                break
+            one, two = order[near], order[near + step]
+            least = np.minimum(radius[one], radius[two])
+            met = np.hypot(*(places[one] - places[two]).T) <= (
+                radius[one] + radius[two] + TOUCH * least
+            )
+            firsts.append(one[met])
+            seconds.append(two[met])
+        none = np.zeros(0, dtype=np.int64)
+        return np.concatenate([none, *firsts]), np.concatenate([none, *seconds])
+
+    def lying(self, t: float, who: Ints, places: Floats, surface: str) -> Bools:
+        """Tell which particles lie on a surface at t (s), or on what lies on it, (n,)."""
+        lies = self.bare(who, places, surface, t)
+        one, two = self.touching(who, places)
+        many = -1
+        while (now := int(np.count_nonzero(lies))) > many:
+            many = now
+            lies[one] |= lies[two]
+            lies[two] |= lies[one]
+        return lies
+
+    def carries(self, particle: int, t: float, who: Ints, places: Floats, surface: str) -> bool:
+        """Tell whether one of `who` lies on a surface at t (s), or on what lies on it."""
+        radius = self.radius[who]
+        todo = np.flatnonzero(who == particle).tolist()
+        seen = np.zeros(len(who), dtype=bool)
+        seen[todo] = True
+        while todo:
+            k = todo.pop()
+            if self.bare(who[k : k + 1], places[k : k + 1], surface, t)[0]:
+                return True
+            room = radius + radius[k] + TOUCH * np.minimum(radius, radius[k])
+            next_to = (np.hypot(*(places - places[k]).T) <= room) & ~seen
+            seen |= next_to
+            # The lowest, which is next to be looked at, is the nearest to what carries it.
+            near = np.flatnonzero(next_to)
+            todo += near[np.argsort(-places[near, 1])].tolist()
+        return False
+
+    def began(self, particle: int, surface: str, before: float, after: float) -> NDArray[Any]:
+        """Return the state in which a particle that lies there `after` came there (s), as an event.
+
+        To a share of 2**-`HALVINGS` of the time between the two.
+        """
+        for _ in range(HALVINGS):
+            middle = 0.5 * (before + after)
+            who, places = self.at(middle)
+            lies = particle in who and self.carries(particle, middle, who, places, surface)
+            before, after = (before, middle) if lies else (middle, after)
+        return self.state(particle, after)

@@ -1,0 +1,380 @@
+"""What a law looks at, a run and the numbers in play, and how it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from math import sqrt
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chutelab.machine import Machine
+from chutelab.results.ledger import ledger
+from chutelab.results.recording import Recording, balance
+from chutelab.results.surfaces import Bow, Piece, pieces
+from chutelab.util.arrays import Bools, Floats, Ints
+
+if TYPE_CHECKING:
+    from chutelab.results.barriers import Hit
+
+EPS = float(np.finfo(np.float64).eps)
+
+PRESSED = 0.05
+"""Share of the radius by which disks of a crowd may be pressed into each other or into a surface:
+what the contact engine promises. A solver that iterates leaves some."""
+
+SLOP = 1e-3
+"""The same that Chipmunk is told to leave alone."""
+
+A_CONTACT = 2.0
+"""eps that one contact may move an energy by: half an ulp for each of two velocity components, a
+height and a sum."""
+
+BOOKED = 1e-9
+"""Share of the energy turned over that the contact engine may misbook in a crowd: its promise."""
+
+ROUGH = 1e-4
+"""Share of the radius by which a track of the pymunk engine may be off between two knots."""
+
+HAIR = 1e-10
+"""Share of the radius by which the pymunk engine's disks are larger, and so their levers."""
+
+ROUNDINGS = 500.0
+"""Roundings that one number may have gone through between two contacts: some ten operations, each
+on numbers up to some ten times as large as what comes out."""
+
+ON_ARCS = 1e-9
+"""Share of its radius by which a cubic between two knots may leave a circle: the recording's
+contract."""
+
+
+def _most(value: Any) -> float:
+    """Return a number, or the largest of several: NumPy takes microseconds to find that of one."""
+    return value if isinstance(value, float) else float(np.max(value))
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """One run: the scene, resolved, and what an engine made of it."""
+
+    machine: Machine
+    recording: Recording
+
+    @property
+    def engine(self) -> str:
+        """Engine that ran."""
+        return self.recording.engine
+
+    @property
+    def dt(self) -> float | None:
+        """Its step, s; None for the exact engine."""
+        return None if self.engine == "exact" else self.machine.dt
+
+    @property
+    def crowd(self) -> bool:
+        """Whether particles meet each other."""
+        return self.machine.interact
+
+    @cached_property
+    def columns(self) -> Floats:
+        """The numbers of all knots, each in a row, (9, K), in the order of `KNOT`."""
+        knots = self.recording.knots
+        return np.ascontiguousarray(knots.view(np.float64).reshape(len(knots), -1).T)
+
+    @cached_property
+    def alike(self) -> bool:
+        """Whether all is left to Chipmunk, in steps that are all alike."""
+        m = self.machine
+        return self.engine == "pymunk" and (
+            m.interact
+            or not m.align
+            or len(m.threads) > 0
+            or any(o is not None for o in m.outlines)
+        )
+
+    @property
+    def family(self) -> bool:
+        """Whether each particle has a machine of its own, see `Machine`."""
+        return self.machine.segments.length.ndim > 1
+
+    @cached_property
+    def pieces(self) -> list[Piece]:
+        """All pieces of its surfaces."""
+        return pieces(self.machine)
+
+    def pieces_of(self, particle: int) -> list[Piece]:
+        """Return the pieces that a particle may meet: of a family those of its own machine."""
+        return pieces(self.machine, particle) if self.family else self.pieces
+
+    @cached_property
+    def radius_of(self) -> Any:
+        """Radius of the particles, m, or of each, (N,); of one with corners the circle inside."""
+        m = self.machine
+        if all(outline is None for outline in m.outlines):
+            return m.particle.radius
+        found = np.broadcast_to(np.asarray(m.particle.radius, dtype=float), m.count).copy()
+        for kind, corners in enumerate(m.outlines):
+            if corners is not None:
+                edge = np.roll(corners, -1, axis=0) - corners
+                off = corners[:, 0] * edge[:, 1] - corners[:, 1] * edge[:, 0]
+                found[m.releases.kind == kind] = (off / np.hypot(*edge.T)).min()
+        return found
+
+    @cached_property
+    def sized(self) -> bool:
+        """Whether particles have a size; a mass point has none."""
+        return -_most(-self.radius_of) > 0.0
+
+    @cached_property
+    def radii(self) -> Floats:
+        """Radius of each particle, (N,), m."""
+        return self._of_each(self.radius_of)
+
+    @cached_property
+    def masses(self) -> Floats:
+        """Mass of each particle, (N,), kg."""
+        return self._of_each(self.machine.particle.mass)
+
+    @cached_property
+    def inertias(self) -> Floats:
+        """Moment of inertia of each particle, (N,), kg m²."""
+        return self._of_each(self.machine.particle.inertia)
+
+    def _of_each(self, value: Any) -> Floats:
+        return np.broadcast_to(np.asarray(value, dtype=float), self.recording.count)
+
+    @cached_property
+    def gravity(self) -> float:
+        """m/s²; of a family the largest."""
+        return _most(self.machine.gravity)
+
+    @cached_property
+    def speed(self) -> float:
+        """Largest speed of anything that moves, belts included, m/s."""
+        m = self.machine
+        moving = 0.0
+        for part in (m.segments, m.arcs, m.pulley):
+            if part is not None and np.size(part.speed):
+                moving = max(moving, np.abs(part.speed).max())
+        vx, vy = self.columns[3:5]
+        if len(vx):
+            moving = max(moving, sqrt((vx * vx + vy * vy).max()))
+        return float(moving)
+
+    @cached_property
+    def length(self) -> float:
+        """Largest length in play, m: coordinates, radii, and the way made while the clock ran.
+
+        The clock's own rounding moves a particle: half an ulp of t, times its speed.
+        """
+        m, path = self.machine, self.columns[:3]
+        size = self.radius
+        if m.segments.length.size:
+            size = max(size, np.abs(m.segments.start).max() + m.segments.length.max())
+        if m.arcs.radius.size:
+            size = max(size, np.abs(m.arcs.center).max() + m.arcs.radius.max() + self.radius)
+        if m.pulley is not None:
+            size = max(size, _most(m.pulley.radius) + self.radius)
+        if path.size:
+            t, x, y = np.maximum(path.max(axis=1), -path.min(axis=1)).tolist()
+            size = max(size, x, y, self.speed * t)
+        return float(size)
+
+    @cached_property
+    def energies(self) -> tuple[Floats, Floats]:
+        """Kinetic and potential energy at each knot, (K,), J."""
+        body, (y, vx, vy, omega) = self.recording.particle, self.columns[2:6]
+        g: Any = self.machine.gravity
+        if np.ndim(g) or any(np.ndim(value) for value in vars(body).values()):
+            owner = self.recording.owner
+            body, g = body.of(owner), g[owner] if np.ndim(g) else g
+        return body.kinetic(vx, vy, omega), body.mass * g * y
+
+    @cached_property
+    def gain(self) -> Floats:
+        """Energy at each knot, less what the books say it got, (K,), J: what is unexplained."""
+        kinetic, potential = self.energies
+        return kinetic + potential - balance(self.columns[6:].T)
+
+    @cached_property
+    def within(self) -> Bools:
+        """Tell after which knots another one of the same particle comes, (K - 1,)."""
+        same = np.ones(len(self.recording.knots), dtype=bool)
+        same[self.ends[1]] = False
+        return same[:-1]
+
+    @cached_property
+    def ends(self) -> tuple[Ints, Ints]:
+        """First and last knot of each particle that was released, (n,)."""
+        first, beyond = self.recording.offsets[:-1], self.recording.offsets[1:]
+        there = beyond > first
+        return first[there], beyond[there] - 1
+
+    @cached_property
+    def energy(self) -> float:
+        """Energy in play, J: what every particle had at most, and what was booked on it.
+
+        Of a crowd it is what was turned over.
+        """
+        if self.crowd or not len(self.recording.knots):
+            return ledger(self.recording).turned_over
+        kinetic, potential = self.energies
+        height = kinetic + np.abs(potential) + np.abs(self.columns[6:]).sum(axis=0)
+        return float(np.maximum.reduceat(height, self.ends[0]).sum())
+
+    @cached_property
+    def energy_bound(self) -> float:
+        """What numbers may do to the energy, as a share of the energy in play.
+
+        Contacts round it. In a stepped engine each contact moves it, besides, by the weight times
+        `late`, where an overlap is parted: impulses themselves are booked to the last bit.
+        """
+        rounding = EPS * (ROUNDINGS + A_CONTACT * self.recording.contacts)
+        if self.dt is None:
+            return rounding
+        if self.crowd and self.engine == "contact":
+            return BOOKED
+        steps = EPS * A_CONTACT * self.recording.steps
+        touched = max(1, self.recording.contacts)
+        if self.engine != "contact":
+            steps += touched * HAIR
+        pulled = touched * float(self.masses.max()) * self.gravity * self.late
+        return rounding + steps + (pulled / self.energy if self.energy else 0.0)
+
+    @cached_property
+    def parted(self) -> float:
+        """Energy that parting overlaps may give, J: no more than lifts all by how deep they were.
+
+        Of lone particles a knot in contact holds the mean velocity of a step, half a step's pull
+        off its books.
+        """
+        if self.dt is None:
+            return 0.0
+        if not self.crowd:
+            heaviest = float(self.masses.max())
+            return self.speed * self.gravity * self.dt * heaviest
+        allowed = float(self.masses.sum()) * self.gravity * self.late
+        if self.alike:
+            # The pymunk engine leaves out touches that move a track by less than `ROUGH` of the
+            # radius. A cubic whose end velocity is off by w is off by 4/27 w τ in place, τ a step
+            # or more.
+            off = 27.0 / 4.0 * ROUGH * self.radius / self.dt
+            allowed += 2.0 * float(self.masses.max()) * self.speed * off
+        return allowed
+
+    @cached_property
+    def rounding(self) -> float:
+        """What rounding may do to a length, m."""
+        return ROUNDINGS * EPS * self.length
+
+    @cached_property
+    def radius(self) -> float:
+        """Radius of the largest particle, m."""
+        return _most(self.machine.particle.radius)
+
+    @property
+    def bows(self) -> list[Bow]:
+        """Its bent pieces, the drive pulley among them."""
+        return [piece for piece in self.pieces if isinstance(piece, Bow)]
+
+    @cached_property
+    def arcs(self) -> float:
+        """How far a curve between two knots may leave the way along an arc or round an end, m."""
+        m = self.machine
+        bent = float(m.arcs.radius.max(initial=0.0))
+        if m.pulley is not None:
+            bent = max(bent, _most(m.pulley.radius))
+        return ON_ARCS * (self.radius + bent)
+
+    @property
+    def side(self) -> float:
+        """How far from a line a centre has to be to be on one side of it, m."""
+        return max(self.rounding, ON_ARCS * self.radius)
+
+    @cached_property
+    def allowed(self) -> float:
+        """How deep a disk may be in a surface, m: by rounding, the curve between knots, a step."""
+        return self.rounding + self.arcs + self.late
+
+    @cached_property
+    def limit_of(self) -> Any:
+        """How near a centre may come to a surface, m, of all particles or of each, (N,).
+
+        Of a mass point only the side counts: it may be beyond by what is allowed.
+        """
+        radius = self.radius_of
+        if np.ndim(radius) == 0:
+            return max(radius - self.allowed, 0.0) if radius else -self.allowed
+        return np.where(radius == 0.0, -self.allowed, np.maximum(radius - self.allowed, 0.0))
+
+    @cached_property
+    def hits(self) -> list[Hit]:
+        """Where particles are too deep in surfaces, or pass them, see `results.barriers`."""
+        from chutelab.results.barriers import hits
+
+        return hits(self)
+
+    @cached_property
+    def bent(self) -> float:
+        """Largest acceleration towards the centre of an arc that somebody moves along inside, m/s².
+
+        Outside it is never more than gravity's: what is faster leaves.
+        """
+        found, places = 0.0, self.recording.knots["position"]
+        radii = self.radii[self.recording.owner]
+        for bow in self.bows:
+            inner = bow.radius - radii
+            off = np.abs(bow.beside(places) + radii)
+            along = (inner > 0.0) & (off < 0.1 * radii) & bow.within(places, 0.0)
+            if along.any():
+                found = max(found, self.speed**2 / float(inner[along].min()))
+        return found
+
+    @cached_property
+    def late(self) -> float:
+        """How far beyond a surface a step may take a disk, m; 0 for the exact engine.
+
+        Where steps are all alike a contact is seen up to a step late, so by the way of a step, and
+        Chipmunk leaves its slop. A lone particle's blows are found at their own instants; where it
+        stays in contact a step goes straight on, off by less than a dt². On a straight surface a is
+        the weight, on a rim it is v²/ρ besides, which is no more than g where it does not lift off;
+        inside an arc it may be more.
+        In a crowd of the contact engine disks are pressed, by what `PRESSED` says.
+        """
+        if self.dt is None:
+            return 0.0
+        if self.alike:
+            return self.speed * self.dt + SLOP * self.radius
+        if self.crowd:
+            return PRESSED * self.radius
+        return (2.0 * self.gravity + self.bent) * self.dt**2
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a law found."""
+
+    figure: float  # the worst there was
+    bound: float  # what it must not exceed
+    detail: str = ""  # unit, and where it was
+    law: str = ""
+    unpromised: str = ""  # why the engine does not promise a law that is not kept; "" if it does
+
+    @property
+    def holds(self) -> bool:
+        """Whether the law is kept; it never is by a figure that is no number."""
+        return self.figure <= self.bound
+
+    @property
+    def broken(self) -> bool:
+        """Whether a promised law is not kept."""
+        return not self.holds and not self.unpromised
+
+
+def worst(found: Iterable[tuple[float, str]], bound: float, unit: str) -> Verdict:
+    """Return the verdict on the largest of some figures, each with where it was; at least 0."""
+    figure, where = max([(0.0, ""), *found], key=itemgetter(0))
+    return Verdict(float(figure), bound, f"{unit}, {where}" if where else unit)

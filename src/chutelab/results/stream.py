@@ -1,0 +1,401 @@
+"""A stream as a whole: its flow and its fates, what it takes of the belt, how wide its paths are.
+
+A scene is a slice of the material on a belt, as thick as a particle: a stream whose material is
+``stream.width`` wide is width / (2 r) such slices side by side, and brings so many times the mass
+per time, and takes so many times the power, of the one that is simulated. Without a width, what is
+told per time is of the slice.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from math import isnan, nan, sqrt
+from typing import Any
+
+import numpy as np
+
+from chutelab.results.arrival import Places, arrivals, fates
+from chutelab.results.quantities import CARRIED, each, measure
+from chutelab.results.recording import ENTRIES, REASONS, Recording
+from chutelab.scene import Scene
+from chutelab.scene.units import with_unit
+from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.tables import Sheet, Shown, number
+
+QUANTILES = (0.02, 0.5, 0.98)
+"""Shares of the paths that an envelope leaves on its right: its two edges, and the middle."""
+
+FEWEST = 20
+"""Particles of a stream from which on its paths have an envelope."""
+
+MOST_PATHS = 400
+"""Paths of a stream that its envelope is made of, at most; of more, evenly chosen ones."""
+
+JUMP = 5.0
+"""Distances between two places by which its lines may go on from one to the next."""
+
+AHEAD = 1.0 / 60.0
+"""Share of the way that the direction of a cut looks ahead, and back."""
+
+INSTANTS = 400
+"""Instants of the way at which paths are looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Envelope:
+    """The paths of a stream, cut across its way at S places: where 2, 50 and 98 % of them pass.
+
+    Attributes
+    ----------
+    middle : ndarray, (S, 2)
+        The way: where the particles of the stream are as long after their release, the median of
+        either coordinate, m. Places are evenly far from each other.
+    normal : ndarray, (S, 2)
+        Unit vector across the way at each place, to its left.
+    offset : ndarray, (3, S)
+        `QUANTILES` of how far to the left of the way the paths cross, m.
+    """
+
+    middle: Floats
+    normal: Floats
+    offset: Floats
+
+    @property
+    def lines(self) -> Floats:
+        """Edge to the right, middle and edge to the left as lines, (3, S, 2), m."""
+        return np.asarray(self.middle + self.offset[..., None] * self.normal)
+
+
+def envelopes(recording: Recording, places: int = 60) -> dict[str, Envelope]:
+    """Return the envelopes of the streams of a recording, by name, each cut at so many places.
+
+    A path is that of a particle from its release to its arrival on the outgoing belt, or to its
+    end. The way goes on as long as half of the paths do, and its lines do not jump. Streams have
+    none that are released all at once, or whose paths are fewer than `FEWEST`, or lead nowhere. Not
+    of a family.
+    """
+    found = {}
+    due = recording.machine.releases
+    end = np.full(recording.count, np.nan)
+    end[recording.released] = recording.ends()[1]["t"]
+    end = np.fmin(end, arrivals(recording)["t"])
+    for index, (name, stream) in enumerate(
+        zip(recording.machine.streams, recording.scene.streams, strict=True)
+    ):
+        own = np.flatnonzero((due.stream == index) & np.isfinite(end))
+        if stream.at_once or len(own) < FEWEST:
+            continue
+        own = own[np.linspace(0, len(own) - 1, min(len(own), MOST_PATHS)).astype(np.int64)]
+        if (one := _envelope(recording, own, end[own], places)) is not None:
+            found[name] = one
+    return found
+
+
+def _envelope(recording: Recording, own: Ints, end: Floats, places: int) -> Envelope | None:
+    """Return the envelope of the paths of some particles up to their ends (s)."""
+    begin = recording.knots["t"][recording.offsets[own]]
+    since = np.linspace(0.0, float(np.median(end - begin)), INSTANTS)
+    times = begin + since[:, None]
+    under_way = times <= end
+    row, column = np.nonzero(under_way)
+    paths = np.full((*under_way.shape, 2), np.nan)
+    paths[row, column] = Places(recording).on(own[column], times[row, column])
+    way = np.nanmedian(paths, axis=1)
+    length = np.concatenate([[0.0], np.hypot(*np.diff(way, axis=0).T).cumsum()])
+    if not length[-1] > 0.0:
+        return None
+    at = np.linspace(0.0, length[-1], places)
+    clock = np.interp(at, length, since)
+    behind, middle, ahead = (
+        np.stack([np.interp(at + by, length, way[:, axis]) for axis in (0, 1)], axis=-1)
+        for by in (-AHEAD * length[-1], 0.0, AHEAD * length[-1])
+    )
+    tangent = ahead - behind
+    tangent /= np.hypot(*tangent.T)[:, None]
+    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
+    offset = np.full((len(QUANTILES), places), np.nan)
+    for s in range(places):
+        # A path passes where it goes from behind the cut to before it; of several times that one
+        # counts that is nearest to the way's.
+        away = paths - middle[s]
+        along, left = away @ tangent[s], away @ normal[s]
+        passes = (along[:-1] <= 0.0) & (along[1:] > 0.0)
+        late = np.where(passes, np.abs(since[:-1] - clock[s])[:, None], np.inf)
+        row, column = late.argmin(axis=0), np.arange(len(own))
+        through = np.isfinite(late[row, column])
+        row, column = row[through], column[through]
+        if not 2 * len(row) >= len(own):
+            continue
+        ahead, behind = along[row + 1, column], along[row, column]
+        share = -behind / (ahead - behind)
+        crossed = left[row, column] + share * (left[row + 1, column] - left[row, column])
+        offset[:, s] = np.quantile(crossed, QUANTILES)
+    found = Envelope(middle, normal, offset)
+    jumps = np.hypot(*np.moveaxis(np.diff(found.lines, axis=1), 2, 0)).max(axis=0)
+    # Where half of the particles come to lie, the way turns round, and cuts go through the rest.
+    broken = np.flatnonzero(jumps > JUMP * at[1])
+    offset[:, broken[0] + 1 if len(broken) else places :] = np.nan
+    return found
+
+
+BLOCKS = 10
+"""Blocks of particles in the order of their arrival, whose spread tells a standard error."""
+
+PER_BLOCK = 2
+"""Particles in a block, at least."""
+
+BELT_WORK = ENTRIES.index("belt_work")
+
+
+@dataclass(frozen=True)
+class Steady:
+    """What the outgoing belt needs for streams that go on and on, if it carries what arrives.
+
+    `rate` (t/h) is that of the streams whose rate was given as a mass per time, `power` (W) what
+    it takes to bring them to the belt's speed, slip heat included: the work on what has settled,
+    per mass, times the rate. It is None where nothing has settled. `error` is its standard error
+    (W), from blocks of particles; None without enough of them. `width` (m) is that of the material
+    that rate and power are of, None if they are of the slice that is simulated.
+    """
+
+    rate: float
+    power: float | None
+    error: float | None
+    width: float | None
+
+    def __str__(self) -> str:
+        of = "of the simulated slice" if self.width is None else f"{self.width:g} m wide"
+        said = f"at {number(self.rate)} t/h, {of}"
+        if self.power is None:
+            return (
+                f"outgoing belt, steady {said}: the power is not known, as nothing settles on it in"
+                " this run; --set run.until=settled tells it"
+            )
+        power = number(self.power)
+        if self.error is not None:
+            power = f"{self.power:.4g} ± {self.error:.2g}"
+        return f"outgoing belt, steady: P = {power} W {said}"
+
+
+def works(recording: Recording) -> Floats:
+    """Return what the outgoing belt has paid for each particle that settled on it, J, (N,).
+
+    NaN of the others. Where particles do not meet each other and do not turn, that is
+    m v_b (v_b - v_x) of each that has landed, however its bounces go. Otherwise it is what the
+    ledger has of a particle since it arrived: of those that the run has settled, that go as fast
+    as the belt at the end, or that it has carried off.
+    """
+    scene, machine = recording.scene, recording.machine
+    found = np.full(recording.count, nan)
+    belt = scene.outgoing
+    came = arrivals(recording)
+    who = np.flatnonzero(np.isfinite(came["t"]) & recording.released)
+    if belt is None or belt.speed is None or not len(who):
+        return found
+    speed: float = belt.speed
+    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    alone = not machine.interact and np.all(recording.particle.inertia == 0.0)
+    if alone and machine.until != "settled":
+        found[who] = mass[who] * speed * (speed - came["velocity_before"][who, 0])
+        return found
+    last = recording.knots[recording.offsets[who + 1] - 1]
+    settled = recording.ended[who] == REASONS.index("settled")
+    if machine.until != "landed":
+        there = fates(recording)[who]
+        slip = np.abs(last["velocity"][:, 0] - speed)
+        rides = (there == "on outgoing") & (slip <= CARRIED)
+        settled |= rides | np.char.startswith(there.astype(str), "off outgoing")
+    who, last = who[settled], last[settled]
+    found[who] = last["entries"][:, BELT_WORK] - Places(recording).belt_work(who, came["t"][who])
+    return found
+
+
+def steady(recording: Recording) -> Steady | None:
+    """Return what streams in t/h take of the outgoing belt; None without any that has arrived."""
+    scene = recording.scene
+    fed = [stream.mass_rate for stream in scene.streams]
+    came = np.isfinite(arrivals(recording)["t"]) if scene.outgoing is not None else np.zeros(0)
+    if not came.any() or all(rate is None for rate in fed):
+        return None
+    paid = works(recording)
+    rate = power = variance = 0.0
+    widths = {stream.width for stream in scene.streams if stream.mass_rate is not None}
+    for index, stream in enumerate(scene.streams):
+        own = came & (recording.machine.releases.stream == index)
+        if stream.mass_rate is None or not own.any():
+            continue
+        each_kg, error = _per_mass(recording, paid, own)
+        rate += 3.6 * stream.mass_rate
+        power += stream.mass_rate * each_kg
+        variance += (stream.mass_rate * error) ** 2
+    width = widths.pop() if len(widths) == 1 else None
+    return Steady(
+        rate, None if isnan(power) else power, None if isnan(variance) else sqrt(variance), width
+    )
+
+
+def _per_mass(recording: Recording, paid: Floats, own: Bools) -> tuple[float, float]:
+    """Return the work per mass of some particles, J/kg, and its standard error; NaN unless known.
+
+    The error is that of the mean of blocks. Where each particle is alone, a block is particles in
+    the order of arrival. Where they meet, what the belt pays for one it pays in part for those
+    that it pushes: there a block is what is paid, of all, from one arrival to a later one. The
+    first and the last of these blocks, in which the stream sets in and runs out, do not count.
+    """
+    came = arrivals(recording)["t"]
+    order = np.argsort(came, kind="stable")
+    order = order[(own & np.isfinite(paid))[order]]
+    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    if not len(order):
+        return nan, nan
+    mean = float(paid[order].sum() / mass[order].sum())
+    if len(order) < BLOCKS * PER_BLOCK:
+        return mean, nan
+    blocks = np.array_split(order, BLOCKS)
+    works = [float(paid[block].sum()) for block in blocks]
+    if recording.machine.interact:
+        there, until = Places(recording), [float(came[block[-1]]) for block in blocks]
+        begun = there.belt_work(order, came[order])
+        sums = [
+            float((there.belt_work(order, np.maximum(t, came[order])) - begun).sum()) for t in until
+        ]
+        works, blocks = np.diff(sums).tolist()[:-1], blocks[1:-1]
+    ratios = [work / float(mass[block].sum()) for work, block in zip(works, blocks, strict=True)]
+    return mean, float(np.std(ratios, ddof=1) / sqrt(len(ratios)))
+
+
+FLOW = 8
+"""Particles that must have arrived for a word about how fast they came."""
+
+
+@dataclass(frozen=True, repr=False)
+class Crowd(Shown):
+    """A run of several particles, as a whole.
+
+    Attributes
+    ----------
+    particles : int
+        How many there are.
+    fates : dict of int
+        How many have which fate, see `arrival.fates`; all of them together.
+    arrival, landing : dict of dict of float, or None
+        Of t (s), x (m), vx and vy (m/s), of those that came to the outgoing belt, or touched the
+        belt itself: ``mean``, ``spread`` (standard deviation), ``q02``, ``q50``, ``q98``, and under
+        ``count`` how many these are. None without an outgoing belt.
+    flow : float or None
+        t/h with which the middle half of the particles arrives, in the slice that is simulated;
+        None of fewer than `FLOW`.
+    whole_flow : float or None
+        The same of all the width of the material; None without a width.
+    width : float or None
+        Of the material, m.
+    thick : dict of float
+        By stream, how far its outer paths are apart where the way to the belt is half done, m: 96 %
+        of the paths lie between. Only streams that have an envelope there.
+    """
+
+    particles: int
+    fates: dict[str, int]
+    arrival: dict[str, Any] | None
+    landing: dict[str, Any] | None
+    flow: float | None
+    whole_flow: float | None
+    width: float | None
+    thick: dict[str, float]
+
+    def sheet(self, *, details: bool = False) -> Sheet:
+        """Return where the particles came, how fast, and where they went.
+
+        Without `details` a spread that is rounding is 0.
+        """
+        rows: list[tuple[str, ...]] = []
+        notes = [f"where they are, or went: {told_fates(self.fates)}"]
+        if self.arrival is not None and self.landing is not None:
+            came, landed = self.arrival["count"], self.landing["count"]
+            notes.insert(
+                0,
+                f"{came} of {self.particles} arrived on the outgoing belt: touched it, or what lies"
+                f" on it; {landed} landed: touched the belt itself",
+            )
+            for what, told, shown in (
+                ("arrival", self.arrival, ("t", "x", "vx", "vy")), ("landing", self.landing, ("x",))
+            ):  # fmt: skip
+                for key in shown if told["count"] else ():
+                    values = dict(told[key])
+                    if not details and values["spread"] < 1e-9 * abs(values["mean"]):
+                        values["spread"] = 0.0
+                    cells = (number(values[name]) for name in COLUMNS)
+                    rows.append((with_unit(f"{what}.{key}", UNITS[key]), *cells))
+        if self.flow is not None:
+            said = f"{number(self.flow)} t/h in the simulated slice, one particle thick"
+            if self.whole_flow is not None:
+                said = f"{number(self.whole_flow)} t/h, {self.width:g} m wide ({said})"
+            notes.append(f"flow onto the belt: {said}")
+        notes += [
+            f"{name}: 96 % of the paths are within {1e3 * size:.3g} mm half-way"
+            for name, size in self.thick.items()
+        ]
+        heads = ("", "mean", "spread", "2 %", "50 %", "98 %") if rows else ()
+        written = tuple(f"{note[0].upper()}{note[1:]}." for note in notes)
+        return Sheet("All particles", heads, tuple(rows), notes=written)
+
+
+UNITS = {"t": "s", "x": "m", "vx": "m/s", "vy": "m/s"}
+COLUMNS = ("mean", "spread", "q02", "q50", "q98")
+
+
+def told_fates(counts: dict[str, int]) -> str:
+    """Return fates in words, the most frequent first.
+
+    >>> told_fates({"on outgoing": 197, "fell left": 3})
+    '197 on outgoing, 3 fell left'
+    """
+    return ", ".join(f"{n} {fate}" for fate, n in sorted(counts.items(), key=lambda one: -one[1]))
+
+
+def crowd(recording: Recording) -> Crowd | None:
+    """Return a run of several particles as a whole; None of one."""
+    scene = recording.scene
+    if recording.count < 2:
+        return None
+    told: dict[str, Any] = {"arrival": None, "landing": None}
+    for event in told if scene.outgoing is not None else ():
+        told[event] = {"count": int(measure(recording, f"{event}.count"))} | {
+            key: {name: measure(recording, f"{event}.{key}.{name}") for name in COLUMNS}
+            for key in ("t", "x", "vx", "vy")
+        }
+    flow = _flow(recording) if scene.outgoing is not None else None
+    ways = {name: np.ptp(one.offset[[0, 2], 1]) for name, one in envelopes(recording, 3).items()}
+    return Crowd(
+        particles=recording.count,
+        fates=dict(Counter(fates(recording).tolist())),
+        arrival=told["arrival"],
+        landing=told["landing"],
+        flow=None if flow is None else flow[0],
+        whole_flow=None if flow is None or scene.stream.width is None else flow[1],
+        width=scene.stream.width,
+        thick={name: float(size) for name, size in ways.items() if np.isfinite(size)},
+    )
+
+
+def _flow(recording: Recording) -> tuple[float, float] | None:
+    """Return the flow onto the outgoing belt in t/h, of the slice and of all the width."""
+    t = each(recording, "arrival.t")
+    order = np.argsort(t, kind="stable")[: int(np.isfinite(t).sum())]
+    if len(order) < FLOW:
+        return None
+    first, last = (int(share * (len(order) - 1)) for share in (0.25, 0.75))
+    span = float(t[order[last]] - t[order[first]])
+    if not span > 0.0:
+        return None
+    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    middle = order[first + 1 : last + 1]
+    slices = _slices(recording.scene)[recording.machine.releases.stream[middle]]
+    brought = mass[middle]
+    return 3.6 * float(brought.sum()) / span, 3.6 * float((brought * slices).sum()) / span
+
+
+def _slices(scene: Scene) -> Floats:
+    """Return how many slices each stream is wide."""
+    return np.array([scene.slices(number) for number in range(len(scene.streams))])

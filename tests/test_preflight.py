@@ -14,6 +14,7 @@ from chutelab import scene as sc
 from chutelab import theory
 from chutelab.checks.preflight import advice, preflight, trial
 from chutelab.checks.preflight.places import places
+from chutelab.engines import pymunk
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import REASONS
@@ -177,15 +178,16 @@ def test_advice_about_a_rate_is_in_the_unit_that_was_given():
 # What it costs: on counts; seconds are the machine's.
 
 
+@pytest.mark.usefixtures("patient")
 @pytest.mark.parametrize("name", LONE)
-def test_a_lone_particles_contacts_are_those_of_its_run(name, monkeypatch):
-    monkeypatch.setattr(trial, "PATIENCE", 30.0)  # s; whatever else the computer does
+def test_a_lone_particles_contacts_are_those_of_its_run(name):
     found = look(name)
     assert found.effort.contacts == simulate(sc.load(name)).contacts
     assert not found.effort.at_least
     assert 0.0 < found.effort.seconds < 5.0
 
 
+@pytest.mark.usefixtures("patient")
 @pytest.mark.parametrize(
     ("name", "contacts"), [("stream-independent", 20_000), ("perpendicular", 2)]
 )
@@ -207,6 +209,19 @@ class Clock:
         return self.now
 
 
+@pytest.fixture(autouse=True)
+def reports_by_steps(monkeypatch):
+    """Pymunk reports by steps alone: a busy machine gets as many reports as an idle one."""
+    monkeypatch.setattr(pymunk, "SLICE", inf)
+
+
+@pytest.fixture
+def patient(monkeypatch):
+    """A busy machine gets as far in a trial as an idle one."""
+    monkeypatch.setattr(trial, "PATIENCE", 30.0)
+    monkeypatch.setattr(trial, "LONE_PATIENCE", 30.0)
+
+
 def look_at(monkeypatch, scene, most, tick=1.0):
     """Return what a run will cost, told after so many looks at it, and a tick for each."""
     monkeypatch.setattr(trial, "process_time", Clock(tick))
@@ -216,7 +231,7 @@ def look_at(monkeypatch, scene, most, tick=1.0):
 
 
 def looks(scene, engine=None):
-    """Return how often a run is looked at, and its recording."""
+    """Return the shares of a run that were reported, and its recording."""
     shares = []
     return shares, simulate(scene, engine, shares.append)
 
@@ -288,6 +303,7 @@ def test_what_a_trial_hardly_begins_is_not_known(monkeypatch):
     assert re.search(r"memory +not known, at least \d+ MB", shown)
 
 
+@pytest.mark.usefixtures("patient")
 def test_memory_grows_with_what_is_recorded():
     """72 bytes a knot and 99 an event, there some three times at the end; and the program."""
     few, many = (look("stream-independent", f"stream.count={n}").effort for n in (1000, 20_000))

@@ -134,6 +134,18 @@ class Track {
     return { x, y, vx, vy, spin, ended: false };
   }
 
+  /** Place and velocity just before a time at which it is under way: before a blow, if one is then.
+   * @param {number} t */
+  before(t) {
+    let i = this.knotBefore(t);
+    while (i > 0 && this.at(i, T) >= t) i -= 1;
+    if (this.count < 2) return this.stateOf(0, false);
+    const h = this.at(i + 1, T) - this.at(i, T), s = h > 0 ? (t - this.at(i, T)) / h : 1;
+    if (s >= 1) return this.stateOf(i + 1, false);
+    const [x, vx] = this.curve(i, X, VX, h, s), [y, vy] = this.curve(i, Y, VY, h, s);
+    return { x, y, vx, vy };
+  }
+
   /** @param {number} i @param {boolean} ended @returns {State} */
   stateOf(i, ended) {
     return {
@@ -152,6 +164,29 @@ class Track {
       + s * (h * va + s * (3 * dx - h * (2 * va + vb) + s * (h * (va + vb) - 2 * dx)));
     const slope = dx / h;
     return [where, va + s * (2 * (3 * slope - 2 * va - vb) + 3 * s * (va + vb - 2 * slope))];
+  }
+
+  /** Points from a knot to the next, both among them: straight lines between them miss the track
+   * by `fine` (m). Over a time h a chord misses a curve by at most h²/8 times its largest
+   * acceleration, which a cubic has at one of its ends.
+   * @param {number} i @param {number} fine */
+  chords(i, fine) {
+    const t = this.at(i, T), h = this.at(i + 1, T) - t;
+    const bends = [[X, VX], [Y, VY]].map(([place, pace]) => {
+      const way = 6 * (this.at(i + 1, place) - this.at(i, place));
+      const first = h * this.at(i, pace), last = h * this.at(i + 1, pace);
+      return [way - 4 * first - 2 * last, way - 2 * first - 4 * last];
+    });
+    const bent = Math.max(Math.hypot(bends[0][0], bends[1][0]),
+      Math.hypot(bends[0][1], bends[1][1]));
+    const parts = h > 0 ? Math.min(Math.ceil(Math.sqrt(bent / 8 / fine)), MOST_CHORDS) : 1;
+    const points = [{ t, x: this.at(i, X), y: this.at(i, Y) }];
+    for (let n = 1; n < parts; n += 1) {
+      const [x] = this.curve(i, X, VX, h, n / parts), [y] = this.curve(i, Y, VY, h, n / parts);
+      points.push({ t: t + (h * n) / parts, x, y });
+    }
+    points.push({ t: t + h, x: this.at(i + 1, X), y: this.at(i + 1, Y) });
+    return points;
   }
 
   /** By how much it has turned since its release, counterclockwise, rad. @param {number} t */
@@ -203,11 +238,14 @@ class Recording {
      * J, once the run is over; none if the scene was changed under way.
      * @type {number[][] | null} */
     this.books = null;
+    /** By which the engine's solves broke their law of energy, J. */
+    this.gained = 0;
   }
 
   /** @param {{knots: Float64Array, tips: Float64Array, events: Event[], now: number,
-   *   state: string, books?: number[][] | null}} chunk */
-  add({ knots, tips, events, now, state, books = null }) {
+   *   state: string, books?: number[][] | null, gained?: number}} chunk */
+  add({ knots, tips, events, now, state, books = null, gained = 0 }) {
+    this.gained = gained;
     this.books = this.renamed ? null : books;
     const its = (/** @type {number} */ disk) =>
       this.renamed ? this.renamed[disk] : { index: disk, entries: null, goesOn: false };
@@ -369,31 +407,13 @@ class Recording {
   }
 
   /** Points of a track, its knots among them: straight lines between them miss it by `fine` (m).
-   * Over a time h a chord misses a curve by at most h²/8 times its largest acceleration, which a
-   * cubic has at one of its ends.
    * @param {number} index @param {number} fine */
   points(index, fine) {
     const track = this.tracks[index];
-    /** @type {{x: number, y: number}[]} */
-    const points = [];
-    for (let i = 0; i < track.count; i += 1) {
-      points.push({ x: track.at(i, X), y: track.at(i, Y) });
-      const h = i + 1 < track.count ? track.at(i + 1, T) - track.at(i, T) : 0;
-      if (!(h > 0)) continue;
-      const bends = [[X, VX], [Y, VY]].map(([place, pace]) => {
-        const way = 6 * (track.at(i + 1, place) - track.at(i, place));
-        const first = h * track.at(i, pace), last = h * track.at(i + 1, pace);
-        return [way - 4 * first - 2 * last, way - 2 * first - 4 * last];
-      });
-      const bent = Math.max(Math.hypot(bends[0][0], bends[1][0]),
-        Math.hypot(bends[0][1], bends[1][1]));
-      const parts = Math.min(Math.ceil(Math.sqrt(bent / 8 / fine)), MOST_CHORDS);
-      for (let n = 1; n < parts; n += 1) {
-        const [x] = track.curve(i, X, VX, h, n / parts), [y] = track.curve(i, Y, VY, h, n / parts);
-        points.push({ x, y });
-      }
-    }
-    return points;
+    const { count } = track;
+    if (!count) return [];
+    const points = Array.from({ length: count - 1 }, (_, i) => track.chords(i, fine).slice(1));
+    return [{ t: track.begin, x: track.at(0, X), y: track.at(0, Y) }, ...points.flat()];
   }
 }
 

@@ -57,15 +57,16 @@ const FAULTS = {
 
 function faultyOf({ machine, fault }) {
   const recording = recordingOf(machine);
-  const event = recording.events.find(({ kind }) => kind === 4), track = recording.tracks[event.disk];
+  const event = recording.events.find(({ kind }) => kind === 4), { disk } = event;
+  const track = recording.tracks[disk], radius = machine.radius[disk];
   const set = (knot, column, value) => {
     const at = knot * 10 + column;
     track.rows[at] = typeof value === "function" ? value(track.rows[at]) : value;
   };
   const touch = Array.from({ length: track.count }, (_, n) => n)
     .find((n) => track.at(n, T) >= event.t);
-  FAULTS[fault]({ recording, set, touch, last: track.count - 1, radius: machine.radius[event.disk] });
-  return { ...lawOf(recording), disk: event.disk, at: event.t };
+  FAULTS[fault]({ recording, set, touch, last: track.count - 1, radius });
+  return { ...lawOf(recording), disk, at: event.t };
 }
 
 function runOf(machine) {

@@ -20,10 +20,10 @@ const IMPACT = 3, LANDING = 4, COLLISION = 5;
 const TOUCH = 0.01;
 
 /** Instants at which it is looked who lies on the belt without a blow that was recorded. */
-const LOOKS = 100;
+const RESTS = 100;
 
 /** Of the time between two such instants, until the one is known at which a contact began. */
-const HALVINGS = 24;
+const BISECTIONS = 24;
 
 class Arrivals {
   /** @param {Recording} recording as far as it has come */
@@ -42,9 +42,9 @@ class Arrivals {
     /** s up to which it is known what has arrived. */
     this.since = NaN;
     this.read();
-    const first = this.since, last = this.reach, step = (last - first) / (LOOKS - 1);
-    for (let n = 0; n < LOOKS && step >= 0; n += 1) {
-      this.look(n < LOOKS - 1 ? n * step + first : last);
+    const first = this.since, last = this.reach, step = (last - first) / (RESTS - 1);
+    for (let n = 0; n < RESTS && step >= 0; n += 1) {
+      this.look(n < RESTS - 1 ? n * step + first : last);
     }
   }
 
@@ -82,7 +82,9 @@ class Arrivals {
     }
     this.due = [...this.due, ...direct, ...more.filter(({ kind }) => kind === COLLISION)]
       .filter(({ t }) => t >= this.since);
-    this.due.sort((a, b) => a.t - b.t || a.disk - b.disk);
+    // Of one instant, what touches the belt comes first.
+    const late = (/** @type {Event} */ { kind }) => Number(kind === COLLISION);
+    this.due.sort((a, b) => a.t - b.t || late(a) - late(b) || a.disk - b.disk);
   }
 
   /** Judge all contacts up to a time, and who lies on the belt then. @param {number} t s */
@@ -178,7 +180,7 @@ class Arrivals {
   /** How a particle that lies there at one time, but not at an earlier one, came there.
    * @param {number} i @param {number} before s @param {number} after s */
   began(i, before, after) {
-    for (let n = 0; n < HALVINGS; n += 1) {
+    for (let n = 0; n < BISECTIONS; n += 1) {
       const middle = 0.5 * (before + after);
       if (this.carries(i, middle, this.places(middle))) after = middle;
       else before = middle;

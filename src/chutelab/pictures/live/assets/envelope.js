@@ -18,10 +18,10 @@ const MOST_PATHS = 400;
 const JUMP = 5;
 
 /** Share of the way that the direction of a cut looks ahead, and back. */
-const AHEAD = 1 / 60;
+const LOOK_AHEAD = 1 / 60;
 
 /** Instants of the way at which paths are looked at, and places at which they are cut. */
-const INSTANTS = 400, PLACES = 60;
+const MOMENTS = 400, CUTS = 60;
 
 /** The value at x of straight lines through points, as far as they reach.
  * @param {number} x @param {number[]} xs ascending @param {number[]} ys */
@@ -72,7 +72,7 @@ function envelopesOf({ machine, tracks }, arrivals) {
  * @returns {Point[][] | null} */
 function envelope(own) {
   const lasts = median(own.map(({ track, end }) => end - track.begin));
-  const since = evenly(lasts, INSTANTS);
+  const since = evenly(lasts, MOMENTS);
   const paths = own.map(({ track, end }) => since.map((s) => {
     const t = track.begin + s, state = t <= end ? track.state(t) : null;
     return state ? [state.x, state.y] : null;
@@ -80,20 +80,20 @@ function envelope(own) {
   const way = [0, 1].map((axis) => since.map((_, row) =>
     median(paths.flatMap((path) => path[row]?.[axis] ?? []))));
   const length = [0];
-  for (let row = 1; row < INSTANTS; row += 1) {
+  for (let row = 1; row < MOMENTS; row += 1) {
     length.push(length[row - 1]
       + Math.hypot(way[0][row] - way[0][row - 1], way[1][row] - way[1][row - 1]));
   }
-  const whole = length[INSTANTS - 1];
+  const whole = length[MOMENTS - 1];
   if (!(whole > 0)) return null;
-  const at = evenly(whole, PLACES);
+  const at = evenly(whole, CUTS);
   const on = (/** @type {number} */ x) =>
     /** @type {Point} */ (way.map((values) => between(x, length, values)));
   /** @type {Point[][]} */
   const lines = QUANTILES.map(() => []);
-  for (let n = 0; n < PLACES; n += 1) {
+  for (let n = 0; n < CUTS; n += 1) {
     const [x, y] = on(at[n]), clock = between(at[n], length, since);
-    const [before, after] = [on(at[n] - AHEAD * whole), on(at[n] + AHEAD * whole)];
+    const [before, after] = [on(at[n] - LOOK_AHEAD * whole), on(at[n] + LOOK_AHEAD * whole)];
     const size = Math.hypot(after[0] - before[0], after[1] - before[1]);
     const [tx, ty] = [(after[0] - before[0]) / size, (after[1] - before[1]) / size];
     const crossed = paths.flatMap((path) => crossing(path, since, clock, [x, y], [tx, ty]) ?? [])

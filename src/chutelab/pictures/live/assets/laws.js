@@ -21,7 +21,7 @@ const BOOKED = 1e-9;
 const PRESSED = 0.05;
 
 /** Share of the radius by which straight lines may miss the curve of a track. */
-const FINE = 0.25;
+const CHORD_FINE = 0.25;
 
 /** Pairs of a piece of track and a surface that are looked at in one go. */
 const MOST_PAIRS = 300_000;
@@ -114,7 +114,7 @@ class Laws {
   /** Look at a track between two knots. @param {number} i @param {number} knot */
   look(i, knot) {
     const { tracks, machine } = this.recording, r = machine.radius[i];
-    const points = tracks[i].chords(knot, FINE * r);
+    const points = tracks[i].chords(knot, CHORD_FINE * r);
     const low = { x: Infinity, y: Infinity }, high = { x: -Infinity, y: -Infinity };
     for (const { x, y } of points) {
       [low.x, low.y] = [Math.min(low.x, x), Math.min(low.y, y)];

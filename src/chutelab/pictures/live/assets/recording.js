@@ -139,9 +139,12 @@ class Track {
   before(t) {
     let i = this.knotBefore(t);
     while (i > 0 && this.at(i, T) >= t) i -= 1;
-    if (this.count < 2) return this.stateOf(0, false);
+    i = Math.min(i, this.count - 2);
     const h = this.at(i + 1, T) - this.at(i, T), s = h > 0 ? (t - this.at(i, T)) / h : 1;
-    if (s >= 1) return this.stateOf(i + 1, false);
+    if (s >= 1) {
+      const [x, y, vx, vy] = [X, Y, VX, VY].map((column) => this.at(i + 1, column));
+      return { x, y, vx, vy };
+    }
     const [x, vx] = this.curve(i, X, VX, h, s), [y, vy] = this.curve(i, Y, VY, h, s);
     return { x, y, vx, vy };
   }
@@ -217,6 +220,16 @@ class Track {
       return h > 0 ? from + s * (this.at(i + 1, column) - from) : from;
     });
   }
+}
+
+/** What each particle is called, whatever comes before it: by its stream, and which of it.
+ * @param {Machine} machine */
+function namesOf({ releases, streams }) {
+  const count = streams.map(() => 0);
+  return releases.map(({ stream }) => {
+    count[stream] += 1;
+    return `${count[stream]} ${streams[stream]}`;
+  });
 }
 
 /** The tracks and events of a run, which may still go on. */
@@ -305,13 +318,20 @@ class Recording {
     const releases = [];
     /** @type {number[]} */
     const spins = [];
-    machine.releases.forEach((release, index) => {
-      const track = this.tracks[index] ?? (this.tracks[index] = new Track());
-      const ended = track.count > 0 && !track.live && track.end < t;
-      // What a change finds out of balance would stay so.
-      const ledger = this.ledgerOf(index, t);
-      const entries = ledger
+    // Where each is in the run so far: streams that come and go move those after them.
+    const earlier = new Map(namesOf(this.machine).map((name, index) => [name, index]));
+    const was = namesOf(machine).map((name) => earlier.get(name) ?? -1);
+    // What a change finds out of balance would stay so.
+    const booked = was.map((index) => {
+      const ledger = index < 0 ? null : this.ledgerOf(index, t);
+      return ledger
         ? [ledger.belt_work, ledger.restitution_loss, ledger.friction_loss] : [0, 0, 0];
+    });
+    this.tracks = was.map((index) => this.tracks[index] ?? new Track());
+    this.events = this.renumbered(t, was, machine.surfaces);
+    machine.releases.forEach((release, index) => {
+      const track = this.tracks[index], entries = booked[index];
+      const ended = track.count > 0 && !track.live && track.end < t;
       track.cut(t, entries);
       const state = track.state(t);
       if (ended) return;
@@ -325,12 +345,7 @@ class Recording {
         track.tip = 1;
       } else releases.push({ ...release, t: Math.max(0, release.t - t) });
     });
-    // Of what was taken away nothing is left.
-    const count = machine.releases.length;
-    this.tracks.length = Math.min(this.tracks.length, count);
     this.measure();
-    this.events = this.events.filter(({ t: when, disk, other }) =>
-      when <= t && disk < count && other < count);
     this.machine = machine;
     this.renamed = renamed;
     this.shift = t;
@@ -347,6 +362,23 @@ class Recording {
       segments: machine.segments.map(gate), arcs: machine.arcs.map(gate),
       endTime: Math.max(0, machine.endTime - t),
     };
+  }
+
+  /** Events up to t as a changed machine numbers particles and surfaces; of what was taken away
+   * nothing is left.
+   * @param {number} t @param {number[]} was where each particle was @param {string[]} surfaces */
+  renumbered(t, was, surfaces) {
+    /** @type {Map<number, number>} */
+    const now = new Map(was.map((index, n) => [index, n]));
+    const names = this.machine.surfaces;
+    return this.events.flatMap((event) => {
+      const disk = now.get(event.disk);
+      const other = event.other < 0 ? event.other : now.get(event.other);
+      if (event.t > t || disk === undefined || other === undefined) return [];
+      const surface = event.surface < names.length
+        ? surfaces.indexOf(names[event.surface]) : surfaces.length;
+      return [{ ...event, disk, other, surface }];
+    });
   }
 
   /** @param {number} index @param {number} t */

@@ -159,3 +159,27 @@ def test_the_page_shows_the_machine_not_the_fall_and_what_a_view_says(shown):
     page.evaluate("chutelab.lab.change({ 'view.to': [1.8, 1.3] })")
     left, bottom, right, top = page.evaluate(EDGES)
     assert min((right - left) / 2.0, (top - bottom) / 1.8) == pytest.approx(1.0, rel=1e-9)
+
+
+DAMAGE = """([column, change]) => {
+  const { lab } = chutelab, [track] = lab.recording.tracks;
+  track.rows[(track.count - 1) * 10 + column] += change;
+  lab.tell("run");
+}"""
+
+
+def test_a_broken_law_is_told_below_the_picture(shown):
+    """A sound run has no such line; one whose last knot is off has it, in the page's language."""
+    page = shown("perpendicular", language="de")
+    line = page.locator("#law")
+    page.evaluate("chutelab.lab.tell('run')")
+    page.wait_for_timeout(300)
+    assert line.is_hidden()
+    page.evaluate(DAMAGE, [3, 0.5])
+    playwright.expect(line).to_be_visible()
+    playwright.expect(line).to_contain_text("Gesetz verletzt: die Bilanz geht nicht auf.")
+    # Another run of the scene is sound again.
+    page.evaluate("chutelab.lab.change({ 'plate.distance': 0.45 })")
+    playwright.expect(line).to_be_hidden()
+    page.evaluate(DAMAGE, [0, float("nan")])
+    playwright.expect(line).to_contain_text("endlich")

@@ -21,6 +21,7 @@ import numpy as np
 
 from chutelab.machine import build
 from chutelab.scene import Scene, SceneError, from_dict
+from sandbox import Dice
 
 FAMILIES = ("chain", "joint", "bowl", "waves")
 
@@ -57,11 +58,11 @@ def heading(degrees: float) -> tuple[float, float]:
     return cos(radians(degrees)), sin(radians(degrees))
 
 
-class Drawing:
+class Drawing(Dice):
     """One attempt at a scene."""
 
     def __init__(self, rng: np.random.Generator, family: str) -> None:
-        self.rng = rng
+        super().__init__(rng)
         self.rows: list[dict[str, Any]] = []
         self.r = float(10.0 ** self.number(-2.5, -1.2))
         self.usual = self.values()
@@ -83,18 +84,6 @@ class Drawing:
             "stream": self.one_of(*self.starts),
             "run": {"until": round(self.number(0.8, 2.5), 3)},
         }
-
-    def number(self, low: float, high: float) -> float:
-        return float(self.rng.uniform(low, high))
-
-    def whole(self, low: int, high: int) -> int:
-        return int(self.rng.integers(low, high + 1))
-
-    def chance(self, share: float) -> bool:
-        return bool(self.rng.random() < share)
-
-    def one_of(self, *values: Any) -> Any:
-        return values[int(self.rng.integers(len(values)))]
 
     def values(self) -> dict[str, float]:
         return {

@@ -35,11 +35,31 @@ def tables(seed: int) -> dict[str, Any]:
         return drawn
 
 
-class Drawing:
+class Dice:
+    """Values drawn at random."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng = rng
+
+    def number(self, low: float, high: float) -> float:
+        return float(self.rng.uniform(low, high))
+
+    def whole(self, low: int, high: int) -> int:
+        return int(self.rng.integers(low, high + 1))
+
+    def chance(self, share: float) -> bool:
+        return bool(self.rng.random() < share)
+
+    def one_of(self, *values: Any) -> Any:
+        return values[int(self.rng.integers(len(values)))]
+
+
+class Drawing(Dice):
     """One attempt at a scene."""
 
     def __init__(self, rng: np.random.Generator, *, meet: bool) -> None:
-        self.rng, self.meet = rng, meet
+        super().__init__(rng)
+        self.meet = meet
         self.end = self.number(1.0, 1.6)
         self.transfer = self.chance(0.4)
         self.adheres = self.transfer and self.chance(0.5)
@@ -58,18 +78,6 @@ class Drawing:
         if self.transfer and self.chance(0.3):
             ending = "landed" if "outgoing" in self.tables else "settled"
             self.tables["run"] = {"until": ending, "max_time": self.end}
-
-    def number(self, low: float, high: float) -> float:
-        return float(self.rng.uniform(low, high))
-
-    def whole(self, low: int, high: int) -> int:
-        return int(self.rng.integers(low, high + 1))
-
-    def chance(self, share: float) -> bool:
-        return bool(self.rng.random() < share)
-
-    def one_of(self, *values: Any) -> Any:
-        return values[int(self.rng.integers(len(values)))]
 
     def vector(self, reach: float) -> list[float]:
         return self.rng.uniform(-reach, reach, 2).tolist()

@@ -13,11 +13,16 @@ import numpy as np
 import pytest
 
 import chutelab
+import sandbox
+from chutelab.engines.contact import run
 from chutelab.machine import build
 from chutelab.pictures import live
 from chutelab.results import Kind
+from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
+from chutelab.results.stream import envelopes
 from chutelab.scene import load
+from crowds import crowd
 from live.machines import as_page_has_it, plain
 
 HERE = Path(__file__).parent
@@ -106,18 +111,15 @@ def test_the_time_of_flight_is_told_where_no_plate_is_on_the_way(runs):
 def test_a_crowds_numbers_are_sums_over_all(runs, name):
     scene, answer = runs[name]
     ours, its = chutelab.simulate(scene, engine="contact"), answer["crowd"]
-    first = ours.first(ours.select(Kind.LANDING))
-    x = first["position"][:, 0]
-    assert (its["released"], its["landed"]) == (ours.count, len(x))
+    landed = ours.first(ours.select(Kind.LANDING))
+    x = arrivals(ours)["position"][:, 0]
+    x = x[np.isfinite(x)]
+    counts = (its["released"], its["arrived"], its["landed"])
+    assert counts == (ours.count, len(x), len(landed))
     assert its["mean"] == pytest.approx(x.mean(), rel=1e-13)
     assert its["spread"] == pytest.approx(x.std(), rel=1e-9)
     assert its["quantiles"] == pytest.approx(np.quantile(x, [0.02, 0.5, 0.98]), rel=1e-13)
-    # Mass that leaves the pulley in the time of the middle 80 %.
-    left = np.sort(ours.first(ours.select(Kind.SEPARATION, surface="incoming"))["t"])
-    tenth = ours.count // 10
-    middle = left[tenth : ours.count - tenth]
-    flow = (len(middle) - 1) * scene.particle.mass / (middle[-1] - middle[0])
-    assert its["flow"] == pytest.approx(flow, rel=1e-12)
+    assert its["flow"] == pytest.approx(chutelab.results.stream.crowd(ours).flow, rel=1e-12)
     books = ledger(ours)
     assert its["work"] == pytest.approx(books.belt_work, rel=1e-9)
     lasts = ours.knots["t"].max() - ours.knots["t"].min()
@@ -125,6 +127,68 @@ def test_a_crowds_numbers_are_sums_over_all(runs, name):
     lost = {n: b["restitution_loss"] + b["friction_loss"] for n, b in books.by_surface.items()}
     assert dict(its["losses"]) == pytest.approx({n: v for n, v in lost.items() if v}, rel=1e-9)
     assert [v for _, v in its["losses"]] == sorted((v for v in lost.values() if v), reverse=True)
+
+
+def same_arrivals(ours, its):
+    """Tell whether the page has Python's arrivals, to the last bit."""
+    found = arrivals(ours)
+    rows = zip(found["t"], *found["position"].T, *found["velocity_before"].T, strict=True)
+    told = [[np.nan] * 5 if one is None else [*one.values()] for one in its]
+    return np.array_equal(np.array([*rows]), np.array(told, dtype=float), equal_nan=True)
+
+
+@pytest.mark.parametrize("name", [name for name, *_ in SCENES])
+def test_arrivals_and_envelopes_are_pythons(runs, name):
+    """Arrivals to the last bit; lines to rounding, which sums differently."""
+    scene, answer = runs[name]
+    ours = chutelab.simulate(scene, engine="contact")
+    assert same_arrivals(ours, answer["arrivals"])
+    bands = [*envelopes(ours).values()]
+    assert len(bands) == len(answer["envelopes"])
+    for band, its in zip(bands, answer["envelopes"], strict=True):
+        its = np.array(its["lines"], dtype=float)
+        there = its.shape[1]
+        assert np.isnan(band.lines[:, there:]).all()
+        assert its == pytest.approx(band.lines[:, :there], abs=1e-12, nan_ok=True)
+
+
+def test_arrivals_in_crowds_drawn_at_random_are_pythons():
+    """Those that touch only what lies there, softly or hard, among them."""
+    drawn = [machine for _, machine in (crowd(seed, count=60) for seed in range(40))]
+    drawn = [build(load("rock-box")), *(machine for machine in drawn if machine.landing >= 0)]
+    assert len(drawn) > 5
+    answers = ask(crowds=[as_page_has_it(machine) for machine in drawn])["arrivals"]
+    indirect = 0
+    for n, (machine, its) in enumerate(zip(drawn, answers, strict=True)):
+        ours = run(machine)
+        assert same_arrivals(ours, its), n
+        own = ours.first(ours.select(Kind.LANDING, Kind.IMPACT, surface="outgoing"))
+        indirect += np.isfinite(arrivals(ours)["t"]).sum() - len(own)
+    assert indirect > 10
+
+
+LAWS = ("law-finite", "law-inside", "law-through", "law-energy", "law-losses", "law-ledger")
+
+
+@pytest.mark.parametrize("name", ["perpendicular", "stream"])
+def test_each_law_is_broken_by_what_breaks_it_and_by_nothing_else(name):
+    machine = as_page_has_it(build(load(name, ["stream.count=20"] if name == "stream" else ())))
+    sound, *broken = ask(faulty=[{"machine": machine, "fault": law} for law in ("none", *LAWS)])[
+        "faulty"
+    ]
+    assert "law" not in sound
+    for law, told in zip(LAWS, broken, strict=True):
+        assert told["law"] == law
+        if law in ("law-inside", "law-through"):
+            assert (told["name"], told["particle"]) == ("outgoing", told["disk"])
+            assert told["t"] == pytest.approx(told["at"], abs=0.2)
+
+
+def test_sound_runs_keep_the_laws(runs):
+    assert [name for name, (_, answer) in runs.items() if answer["law"]] == []
+    drawn = [build(sandbox.draw(seed)) for seed in range(60)]
+    told = ask(sound=[as_page_has_it(machine) for machine in drawn])["laws"]
+    assert [seed for seed, law in enumerate(told) if law] == []
 
 
 def test_a_track_is_drawn_as_the_curve_it_is(runs):

@@ -109,18 +109,21 @@ def test_curves_are_read_off_and_set_the_time(shown):
     assert 0.4 * end < page.evaluate("chutelab.lab.t") < 0.55 * end
 
 
-def test_a_streams_landings_fill_up_with_time_and_a_lone_particle_has_none(shown):
+def test_a_streams_arrivals_fill_up_with_time_and_a_lone_particle_has_none(shown):
     assert shown("perpendicular").locator("#landing").is_hidden()
     page = shown("stream-independent", ["stream.count=60"], language="de")
     result = page.locator("#landing .result")
     playwright.expect(result).to_have_text(re.compile("^Mittelwert von 60: x = 0,4"))
-    times = page.evaluate("chutelab.panels[2].landings.map(({ t }) => t)")
+    times = page.evaluate("chutelab.panels[2].arrivals.map(({ t }) => t)")
     assert len(times) == 60
     page.evaluate("t => chutelab.lab.seek(t)", 0.5 * (times[29] + times[30]))
     playwright.expect(result).to_have_text(re.compile("^Mittelwert von 30:"))
     crowd = page.locator("#numbers .crowd")
     playwright.expect(crowd).to_contain_text(re.compile("ausgegeben\\s*60 / 60"))
-    playwright.expect(crowd).to_contain_text(re.compile("Landepunkt, Mittelwert ± Streuung\\s*0,4"))
+    playwright.expect(crowd).to_contain_text(
+        re.compile("Ort der Ankunft, Mittelwert ± Streuung\\s*0,4")
+    )
+    assert page.locator("#stage .envelope").count() == page.locator("#stage .track").count() == 1
     # Particle 0 on request.
     table = page.locator("#numbers table:not(.crowd)")
     assert table.is_hidden()
@@ -159,3 +162,27 @@ def test_the_page_shows_the_machine_not_the_fall_and_what_a_view_says(shown):
     page.evaluate("chutelab.lab.change({ 'view.to': [1.8, 1.3] })")
     left, bottom, right, top = page.evaluate(EDGES)
     assert min((right - left) / 2.0, (top - bottom) / 1.8) == pytest.approx(1.0, rel=1e-9)
+
+
+DAMAGE = """([column, change]) => {
+  const { lab } = chutelab, [track] = lab.recording.tracks;
+  track.rows[(track.count - 1) * 10 + column] += change;
+  lab.tell("run");
+}"""
+
+
+def test_a_broken_law_is_told_below_the_picture(shown):
+    """A sound run has no such line; one whose last knot is off has it, in the page's language."""
+    page = shown("perpendicular", language="de")
+    line = page.locator("#law")
+    page.evaluate("chutelab.lab.tell('run')")
+    page.wait_for_timeout(300)
+    assert line.is_hidden()
+    page.evaluate(DAMAGE, [3, 0.5])
+    playwright.expect(line).to_be_visible()
+    playwright.expect(line).to_contain_text("Gesetz verletzt: die Bilanz geht nicht auf.")
+    # Another run of the scene is sound again.
+    page.evaluate("chutelab.lab.change({ 'plate.distance': 0.45 })")
+    playwright.expect(line).to_be_hidden()
+    page.evaluate(DAMAGE, [0, float("nan")])
+    playwright.expect(line).to_contain_text("endlich")

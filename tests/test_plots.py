@@ -28,6 +28,7 @@ from chutelab.pictures.plots import Window, scenery, style
 from chutelab.results import Kind, Recording
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import Recorder
+from chutelab.util.errors import InputError
 from handmade import (
     BELT_TIME,
     DISTANCE,
@@ -558,6 +559,27 @@ def crowd() -> Recording:
     return simulate(
         scene.load("stream-independent", ["stream.count=60", "stream.rate=80", "run.until=settled"])
     )
+
+
+@pytest.mark.parametrize("rain", [3, 30], ids=["few", "crowd"])
+def test_no_picture_where_particle_0_never_found_a_place(rain: int, tmp_path: Path) -> None:
+    """It is due at 0.2 s where another one has lain from the start; the others fall beside it."""
+    rest = {"velocity": [0.0, 0.0], "interact": True}
+    recording = simulate(scene.from_dict({
+        "particle": {"radius": 0.01},
+        "surface": [{"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "restitution": 0.0}],
+        "stream": [
+            {"name": "late", "at": [0.0, 0.0105], "start": 0.2, "count": 1, **rest},
+            {"name": "early", "at": [0.0, 0.0105], "count": 1, **rest},
+            {"name": "rain", "at": [0.3, 0.2], "count": rain, "rate": 60.0, **rest},
+        ],
+        "run": {"until": 0.8},
+    }))  # fmt: skip
+    assert recording.released[:3].tolist() == [False, True, True]
+    for draw, name in ((plots.overlay, "a.png"), (animate, "a.gif")):
+        with pytest.raises(InputError, match="no place was free"):
+            draw(recording, path=tmp_path / name)
+    assert [*tmp_path.iterdir()] == []
 
 
 NOMINAL = {"track", "strobe", "impacts", "vx", "vy", "residual"}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -10,7 +12,7 @@ from chutelab import simulate
 from chutelab.cli import main
 from chutelab.machine import build
 from chutelab.results import REASONS, Kind
-from chutelab.results.arrival import LOOKS, arrivals, fates
+from chutelab.results.arrival import LOOKS, Places, arrivals, fates
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import each, measure
 from chutelab.results.recorder import Recorder
@@ -122,6 +124,18 @@ def test_a_particle_arrives_on_what_lies_on_the_belt_and_on_nothing_else():
     assert np.isnan(found["t"][4])
     landed = each(recording, "landing.t")
     assert np.flatnonzero(np.isfinite(landed)).tolist() == [0, 3]
+
+
+def test_what_leans_on_several_lies_there_if_one_of_them_does():
+    """1 lies on the belt; 0 leans on it and, in later pairs, on two that hang in the air."""
+    angles = np.radians([270.0, 60.0, 0.0])
+    around = 2.0 * R * np.stack([np.cos(angles), np.sin(angles)], axis=1) + [0.0, 3.0 * R]
+    rows = [line(x, y, 0.0, 1.0) for x, y in [(0.0, 3.0 * R), *around.tolist()]]
+    for order in permutations(range(4)):
+        recording = by_hand([rows[n] for n in order], landings=[(0.0, order.index(1))])
+        there = Places(recording)
+        lies = there.lying(0.5, *there.at(0.5), "outgoing")
+        assert lies.all(), order
 
 
 def test_what_has_bounced_off_carries_nobody():

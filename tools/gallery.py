@@ -14,7 +14,7 @@ from pathlib import Path
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.plots.figure import draw_view
 from chutelab.pictures.plots.panels import analytic_of
-from chutelab.pictures.plots.scenery import bodily
+from chutelab.pictures.plots.scenery import as_crowd, bodily
 from chutelab.pictures.plots.style import Picture
 from chutelab.scene import load
 from chutelab.scene.loading import about
@@ -40,12 +40,13 @@ def text() -> str:
 
 
 def picture(name: str, path: Path) -> None:
-    """Run a scene, and draw it with its particles, or with the tracks of those that never meet."""
+    """Run a scene, and draw it with its particles, tracks, or the envelope of a crowd."""
     recording = simulate(load(name))
     figure = Picture(SIZE, DPI)
     ax = figure.add_axes((0.135, 0.13, 0.845, 0.74))
     parts = analytic_of(recording, recording.prediction)[0]
-    draw_view(ax, recording, parts, bodies=not parts and bodily(recording))
+    bodies, crowd = not parts and bodily(recording), as_crowd(recording)
+    draw_view(ax, recording, parts, bodies=bodies, crowd=crowd)
     figure.write(path)
 
 

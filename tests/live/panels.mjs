@@ -6,7 +6,9 @@ const assets = "../../src/chutelab/pictures/live/assets/";
 const { startCore } = await import(`${assets}core.js`);
 const { Recording } = await import(`${assets}recording.js`);
 const { groundedLedger, stacks } = await import(`${assets}energy.js`);
+const { Arrivals } = await import(`${assets}arrival.js`);
 const { crowdOf } = await import(`${assets}crowd.js`);
+const { Laws } = await import(`${assets}laws.js`);
 const { numbersOf } = await import(`${assets}numbers.js`);
 const { RunHistory } = await import(`${assets}stages.js`);
 const { histogram, runningMean } = await import(`${assets}landing.js`);
@@ -32,15 +34,53 @@ function recordingOf(machine) {
   return recording;
 }
 
+function lawOf(recording) {
+  const laws = new Laws(recording);
+  // Each look is at a few, until all is seen.
+  for (let n = 0; n < 1000; n += 1) laws.update();
+  return laws.broken;
+}
+
+// What a run may not do, each done to a sound one.
+const T = 0, Y = 2, VX = 3, FRICTION = 8;
+const FAULTS = {
+  none: () => {},
+  "law-finite": ({ set, last }) => set(last, VX, NaN),
+  "law-inside": ({ set, touch, radius }) => set(touch, Y, (y) => y - 0.2 * radius),
+  "law-through": ({ set, touch, last, radius }) => {
+    for (let n = touch + 1; n <= last; n += 1) set(n, Y, (y) => y - 4 * radius);
+  },
+  "law-energy": ({ recording }) => { recording.gained = 1e-3; },
+  "law-losses": ({ set, last }) => set(last, FRICTION, -1),
+  "law-ledger": ({ set, last }) => set(last, VX, (vx) => 1.001 * vx + 0.001),
+};
+
+function faultyOf({ machine, fault }) {
+  const recording = recordingOf(machine);
+  const event = recording.events.find(({ kind }) => kind === 4), { disk } = event;
+  const track = recording.tracks[disk], radius = machine.radius[disk];
+  const set = (knot, column, value) => {
+    const at = knot * 10 + column;
+    track.rows[at] = typeof value === "function" ? value(track.rows[at]) : value;
+  };
+  const touch = Array.from({ length: track.count }, (_, n) => n)
+    .find((n) => track.at(n, T) >= event.t);
+  FAULTS[fault]({ recording, set, touch, last: track.count - 1, radius });
+  return { ...lawOf(recording), disk, at: event.t };
+}
+
 function runOf(machine) {
   const recording = recordingOf(machine), { begin, end } = recording;
-  const history = new RunHistory(recording, "plate"), { stages, landings } = history;
+  const history = new RunHistory(recording, "plate"), { stages, landings, arrivals } = history;
   const times = Array.from({ length: 400 }, (_, n) => begin + ((end - begin) * n) / 399);
   for (const { t } of recording.events.slice(0, 400)) times.push(t - 1e-9, t, t + 1e-9);
   const track = recording.tracks[0];
   return {
     numbers: numbersOf(stages, {}, machine.pulley?.radius ?? null, machine.radius),
-    crowd: crowdOf(recording, history),
+    crowd: crowdOf(recording, arrivals, landings.length),
+    arrivals: arrivals.found,
+    envelopes: history.envelopes,
+    law: lawOf(recording),
     points: recording.points(0, 1e-4).map(({ x, y }) => [x, y]),
     landings: landings.map(({ t, x }) => [t, x]),
     ledgers: times.map((t) => {
@@ -66,6 +106,9 @@ const revive = (_, value) => (["Infinity", "-Infinity"].includes(value) ? Number
 const asked = JSON.parse(readFileSync(0, "utf8"), revive);
 process.stdout.write(JSON.stringify({
   runs: asked.machines?.map(runOf),
+  arrivals: asked.crowds?.map((machine) => new Arrivals(recordingOf(machine)).found),
+  laws: asked.sound?.map((machine) => lawOf(recordingOf(machine))),
+  faulty: asked.faulty?.map(faultyOf),
   histograms: asked.values?.map((values) => histogram(values)),
   means: asked.values?.map(runningMean),
   ticks: asked.ranges?.map(([low, high]) => ticks(low, high, 5)),

@@ -25,7 +25,7 @@ TOUCH = 0.01
 lets a contact open that lasts, ten times what the pymunk engine lets them overlap."""
 
 POINT = 1e-9
-"""Gap up to which a mass point touches a surface, as a share of the size of the machine."""
+"""Distance up to which a mass point touches a surface, as a share of the size of the machine."""
 
 LOOKS = 100
 """Instants at which it is looked who lies on a surface without a blow that was recorded."""
@@ -279,7 +279,7 @@ class Places:
         if wheel is not None and wheel.surface == owner:
             gap = np.minimum(gap, np.abs(np.hypot(*places.T) - wheel.radius))
         radius = self.radius[who]
-        return np.asarray(gap <= radius * (1.0 + TOUCH) + self._point)
+        return np.asarray(gap <= np.where(radius > 0.0, radius * (1.0 + TOUCH), self._point))
 
     def touching(self, who: Ints, places: Floats) -> tuple[Ints, Ints]:
         """Return all pairs that touch, by their rows in `who`, (p,) each."""
@@ -307,8 +307,9 @@ class Places:
         many = -1
         while (now := int(np.count_nonzero(lies))) > many:
             many = now
-            lies[one] |= lies[two]
-            lies[two] |= lies[one]
+            # A particle is in several pairs, of which any one counts.
+            lies[one[lies[two]]] = True
+            lies[two[lies[one]]] = True
         return lies
 
     def carries(self, particle: int, t: float, who: Ints, places: Floats, surface: str) -> bool:

@@ -204,10 +204,10 @@ WHITE = 0.8
 """pt; the edge that tells particles apart where they overlap."""
 
 
-def draw_bodies(ax: Axes, recording: Recording, t: float) -> Axes:
-    """Draw all particles and strings as they are at a time (s), particle 0 in a colour of its own.
+def draw_bodies(ax: Axes, recording: Recording, t: float, *, crowd: bool = False) -> Axes:
+    """Draw all particles and strings as they are at a time (s), in the colour of their stream.
 
-    Others have the colour of their stream.
+    Unless they are a `crowd`, particle 0 has a colour of its own.
     """
     machine = recording.machine
     released = np.flatnonzero(recording.released)
@@ -215,7 +215,8 @@ def draw_bodies(ax: Axes, recording: Recording, t: float) -> Axes:
         (f"stream {machine.streams[i]}", color, released[machine.releases.stream[released] == i])
         for i, color in enumerate(stream_colours(len(machine.streams)))
     ]
-    drawn.append(("particle 0", style.STRIKE, released[released == 0]))
+    if not crowd:
+        drawn.append(("particle 0", style.STRIKE, released[released == 0]))
     for gid, color, particles in drawn:
         look: dict[str, Any] = {"least": LEAST, "edge": WHITE, "zorder": 4.0}
         position, angle = motion(recording, particles, np.array([t]))

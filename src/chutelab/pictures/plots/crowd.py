@@ -23,19 +23,22 @@ EDGES = f"{100 * QUANTILES[0]:.0f} to {100 * QUANTILES[-1]:.0f} % of the paths"
 
 
 def draw_envelope(ax: Axes, recording: Recording) -> Axes:
-    """Draw for each stream the band in which all but few of its paths lie, and the middle one."""
+    """Draw for each stream the band in which all but few of its paths lie, and the middle one.
+
+    A legend names them once; which stream has which colour is told by its particles.
+    """
     streams, paths = recording.machine.streams, envelopes(recording)
     colours = stream_colours(len(streams))
     for name, color in zip(streams, colours, strict=True):
         if name not in paths:
             continue
+        first = name == next(iter(paths))
         right, middle, left = (line[np.isfinite(line).all(axis=1)] for line in paths[name].lines)
-        several = f", {name}" if len(colours) > 1 else ""
         (band,) = ax.fill(*np.concatenate([right, left[::-1]]).T, color=color, alpha=0.4, lw=0.0)
-        band.set(zorder=3.5, gid="envelope", label=style.plain(EDGES + several))
+        band.set(zorder=3.5, gid="envelope", label=EDGES if first else "")
         dark = style.TRACK if len(colours) == 1 else style.tint(color, 0.6, "#000000")
         (way,) = ax.plot(*middle.T, color=dark, lw=1.6, zorder=5.0, gid="median")
-        way.set_label(style.plain(f"median path{several}"))
+        way.set_label("median path" if first else "")
     return ax
 
 

@@ -114,7 +114,7 @@ def overlay(
     view = figure.add_subplot(grid[0])
     draw_view(view, recording, parts, bodies=all_of_them, crowd=crowd)
     if all_of_them:
-        draw_moments(figure, grid[1], recording)
+        draw_moments(figure, grid[1], recording, crowd=crowd)
     elif crowd and beneath:
         pair = grid[1].subgridspec(1, 2, wspace=0.28)
         draw_arrivals(figure.add_subplot(pair[0]), recording)
@@ -172,7 +172,7 @@ def draw_view(
     handles = ax.get_legend_handles_labels()[0]
     if bodies:
         t = fullest(recording)
-        draw_bodies(ax, recording, t)
+        draw_bodies(ax, recording, t, crowd=crowd)
         ax.set_xlabel(f"x, m    (particles at t = {t:.3g} s)")
     if len(recording.machine.streams) > 1:
         handles += stream_handles(recording.machine)
@@ -197,7 +197,7 @@ GRIDS = ((1, 4), (2, 2), (4, 1))
 """Rows and columns in which they may stand."""
 
 
-def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording) -> None:
+def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, crowd: bool) -> None:
     """Draw the scene small, without names, with all particles, at even times from first to last."""
     window, clock = window_of(recording), recording.knots["t"]
     room = place.get_position(figure)
@@ -209,7 +209,7 @@ def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording) -> N
         t = times[row * grid[1] + column]
         ax = figure.add_subplot(cells[row, column])
         draw_scene(ax, recording.machine, window, small=True)
-        draw_bodies(ax, recording, t)
+        draw_bodies(ax, recording, t, crowd=crowd)
         ax.set(xticks=[], yticks=[])
         for spine in ax.spines.values():
             spine.set_color(style.STEEL_LIGHT)

@@ -153,7 +153,10 @@ def note(ax: Axes, text: str) -> None:
 
 
 def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> None:
-    """Add a legend right above axes, in one line if it fits; by default of all that has a label."""
+    """Add a legend right above axes, by default of all that has a label.
+
+    It is one line if that fits, else as many `columns`, or fewer, as are no wider than the axes.
+    """
     options: dict[str, Any] = {
         "handles": handles,
         "loc": "lower left",
@@ -163,9 +166,10 @@ def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> No
         "borderaxespad": 0.3,
         "handlelength": 2.2,
     }
-    legend = ax.legend(**options, ncols=max(columns, len(handles or ())))
-    if legend.get_window_extent().x1 > ax.get_window_extent().x1:
-        ax.legend(**options, ncols=columns)
+    for ncols in (max(columns, len(handles or ())), *range(columns, 0, -1)):
+        legend = ax.legend(**options, ncols=ncols)
+        if legend.get_window_extent().x1 <= ax.get_window_extent().x1:
+            return
 
 
 DASHED: dict[str, Any] = {"color": ANALYTIC, "lw": 4.0, "ls": (0, (2.2, 1.1))}

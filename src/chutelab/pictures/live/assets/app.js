@@ -11,6 +11,7 @@ import { Keep } from "./keep.js";
 import { listenToKeys } from "./keyboard.js";
 import { toToml } from "./keys.js";
 import { Lab } from "./lab.js";
+import { watchLaws } from "./laws.js";
 import { LandingPanel } from "./landing.js";
 import { NumbersPanel } from "./numbers.js";
 import { Prediction } from "./predict.js";
@@ -52,6 +53,7 @@ function start() {
   const stage = new Stage(byId("stage"), lab, words);
   const panels = [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel]
     .map((Panel) => new Panel(byId("panels"), lab, words));
+  watchLaws(byId("law"), lab, words);
   new Arrows(stage, words);
   new Tools(byId("stage").parentElement, lab, stage, words, new Symbols(stage));
   const inspector = new Inspector(byId("panels"), lab, words);

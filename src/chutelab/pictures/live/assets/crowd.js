@@ -1,18 +1,24 @@
-// The numbers of a crowd: how many, how much, where they land, what belts pay, what surfaces take.
+// The numbers of a crowd: how many, how much, where they arrive, what belts pay, what surfaces
+// take.
 
 /**
  * @typedef {import("./recording.js").Recording} Recording
- * @typedef {import("./stages.js").RunHistory} RunHistory
- * @typedef {{released: number, landed: number, flow: number, mean: number, spread: number,
- *   quantiles: number[], work: number, power: number, losses: [string, number][]}} CrowdNumbers
- *   counts; kg/s that leave the pulley; m of the first contacts with the outgoing belt itself; J
- *   and W of all belts; J by surface. NaN and no losses where they are not known
+ * @typedef {import("./arrival.js").Arrival} Arrival
+ * @typedef {{released: number, arrived: number, landed: number, flow: number, mean: number,
+ *   spread: number, quantiles: number[], work: number, power: number,
+ *   losses: [string, number][]}} CrowdNumbers
+ *   counts: of those that touched the outgoing belt or what lies on it, and the belt itself; t/h
+ *   that arrive, of the slice; m of the arrivals; J and W of all belts; J by surface. NaN and no
+ *   losses where they are not known
  */
 
 /** Particles from which on they are a crowd, as in Python's pictures. */
 const FEWEST = 20;
 
-/** Shares of the landings that lie before a place. */
+/** Arrivals from which on they have a flow. */
+const FLOW = 8;
+
+/** Shares of the arrivals that lie before a place, and of paths on the right of a line. */
 const QUANTILES = [0.02, 0.5, 0.98];
 
 /** The value below which a share of sorted values lies, straight between two of them.
@@ -23,36 +29,37 @@ function quantile(sorted, share) {
   return sorted.length ? sorted[low] + (at - low) * (sorted[high] - sorted[low]) : NaN;
 }
 
-/** Mass per time of those that come at times, of the middle 80 %, kg/s; NaN of fewer than ten.
- * @param {{t: number, mass: number}[]} coming */
+/** Mass per time of the middle half of those that come at times, t/h; NaN of fewer than `FLOW`.
+ * @param {{t: number, mass: number}[]} coming in the order of time */
 function flowOf(coming) {
-  const order = [...coming].sort((a, b) => a.t - b.t), tenth = Math.floor(order.length / 10);
-  const middle = order.slice(tenth, order.length - tenth);
-  const passed = middle.length ? middle[middle.length - 1].t - middle[0].t : 0;
-  if (order.length < 10 || !(passed > 0)) return NaN;
+  const [first, last] = [0.25, 0.75].map((share) => Math.floor(share * (coming.length - 1)));
+  const passed = coming.length < FLOW ? NaN : coming[last].t - coming[first].t;
+  if (!(passed > 0)) return NaN;
   // The first of them comes as the time begins.
-  return middle.slice(1).reduce((sum, { mass }) => sum + mass, 0) / passed;
+  const middle = coming.slice(first + 1, last + 1);
+  return (3.6 * middle.reduce((sum, { mass }) => sum + mass, 0)) / passed;
 }
 
-/** @param {Recording} recording @param {RunHistory} history @returns {CrowdNumbers} */
-function crowdOf(recording, { stages, landings }) {
+/** @param {Recording} recording @param {{found: (Arrival | undefined)[]}} arrivals
+ * @param {number} landed how many have touched the belt itself @returns {CrowdNumbers} */
+function crowdOf(recording, { found }, landed) {
   const { machine, tracks, books, begin, end } = recording;
-  const places = landings.map(({ x }) => x).sort((a, b) => a - b);
+  const come = found.flatMap((one, i) => (one ? [{ ...one, mass: machine.mass[i] }] : []))
+    .sort((a, b) => a.t - b.t);
+  const places = come.map(({ x }) => x).sort((a, b) => a - b);
   const mean = places.reduce((sum, x) => sum + x, 0) / places.length;
   const squares = places.reduce((sum, x) => sum + (x - mean) ** 2, 0);
-  const leaving = machine.pulley ? stages.flatMap(({ left }, i) =>
-    (left ? [{ t: left.t, mass: machine.mass[i] }] : [])) : [];
   const work = recording.ledger(end).belt_work;
   const names = [...machine.surfaces, "particles"];
   const losses = (books ?? []).map(([, restitution, friction], row) =>
     /** @type {[string, number]} */ ([names[row], restitution + friction]));
   return {
-    released: tracks.filter(({ count }) => count > 0).length, landed: places.length,
-    flow: flowOf(leaving), mean, spread: Math.sqrt(squares / places.length),
+    released: tracks.filter(({ count }) => count > 0).length, arrived: come.length, landed,
+    flow: flowOf(come), mean, spread: Math.sqrt(squares / places.length),
     quantiles: QUANTILES.map((share) => quantile(places, share)),
     work, power: work / (end - begin),
     losses: losses.filter(([, loss]) => loss !== 0).sort((a, b) => b[1] - a[1]),
   };
 }
 
-export { FEWEST, crowdOf };
+export { FEWEST, QUANTILES, crowdOf, quantile };

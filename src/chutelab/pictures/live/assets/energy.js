@@ -18,19 +18,6 @@ const SIGNS = /** @type {Entry[]} */ ([
 /** A residual below this part of the whole is rounding, and not shown. */
 const TINY_RESIDUAL = 1e-12;
 
-/** A law is broken beyond this part of the whole: the contact engine promises to book to 1e-9. */
-const BOOKED = 1e-9;
-
-/** Which law of every run the ledger of a whole run breaks; "" if none.
- * @param {Ledger} ledger */
-function brokenLaw(ledger) {
-  const values = SIGNS.map(([name]) => ledger[name]);
-  if (!values.every(isFinite)) return "law-finite";
-  const size = values.reduce((sum, value) => sum + Math.abs(value), 0);
-  if (Math.min(ledger.restitution_loss, ledger.friction_loss) < -BOOKED * size) return "law-losses";
-  return Math.abs(ledger.residual) > BOOKED * size ? "law-ledger" : "";
-}
-
 /** What was put in, and where it is: an entry of the other sign changes sides. A residual that is
  * only rounding is in neither.
  * @param {Ledger} ledger */
@@ -66,8 +53,7 @@ class EnergyPanel {
     const bars = html("div", { class: "bars", "aria-hidden": "true" },
       html("span", {}, words.say("put-in")), this.bars[0],
       html("span", {}, words.say("is-now")), this.bars[1]);
-    this.broken = html("p", { class: "note", role: "alert", hidden: "" });
-    const panel = card("energy", words.say("energy"), this.broken, bars,
+    const panel = card("energy", words.say("energy"), bars,
       html("table", {}, html("tbody", {}, ...this.rows)),
       html("p", { class: "note" }, words.say("energy-note")));
     home.append(panel);
@@ -82,9 +68,6 @@ class EnergyPanel {
     const recording = /** @type {Recording} */ (this.lab.recording);
     const ledger = groundedLedger(recording, this.lab.t);
     const { putIn, isNow, size } = stacks(ledger);
-    const law = brokenLaw(recording.ledger(recording.end));
-    this.broken.hidden = !law;
-    this.broken.textContent = law ? this.words.say(law) : "";
     this.longest ||= stacks(groundedLedger(recording, recording.end)).size;
     this.longest = Math.max(this.longest, size);
     [putIn, isNow].forEach((parts, n) => {
@@ -102,4 +85,4 @@ class EnergyPanel {
   }
 }
 
-export { EnergyPanel, brokenLaw, groundedLedger, stacks };
+export { EnergyPanel, groundedLedger, stacks };

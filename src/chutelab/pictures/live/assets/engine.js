@@ -5,7 +5,7 @@
  * @typedef {import("./core.js").Event} Event
  * @typedef {{type: "chunk", id: number, knots: Float64Array, tips: Float64Array,
  *   events: Event[], now: number, state: string, books: number[][] | null,
- *   reasons: number[] | null}} Chunk
+ *   reasons: number[] | null, gained: number}} Chunk
  */
 
 class Engine {

@@ -1,4 +1,5 @@
-// Where the particles of a stream land: a histogram, and the mean of the first n with its error.
+// Where the particles of a stream arrive on the outgoing belt: a histogram, and the mean of the
+// first n with its error.
 
 import { Chart, onWidth, rangeOf, roundUp } from "./chart.js";
 import { card, follow, html } from "./panels.js";
@@ -68,15 +69,14 @@ class LandingPanel {
     });
   }
 
-  /** Landings in the order of time. @type {{t: number, x: number}[]} */
-  landings = [];
+  /** In the order of time. @type {{t: number, x: number}[]} */
+  arrivals = [];
 
   draw() {
     const { words } = this;
     if (this.panel.hidden || !this.panel.open) return;
-    // The history's own list grows.
-    this.landings = [...historyOf(this.lab)?.landings ?? []];
-    const places = this.landings.map(({ x }) => x);
+    this.arrivals = historyOf(this.lab)?.arrivals.list ?? [];
+    const places = this.arrivals.map(({ x }) => x);
     const all = histogram(places);
     const { from, width, counts } = all;
     this.all = all;
@@ -112,20 +112,20 @@ class LandingPanel {
     return `M${bars.px(from).toFixed(1)} ${bars.py(0)}${tops.join("")}V${bars.py(0)}Z`;
   }
 
-  /** What has landed up to now. */
+  /** What has arrived up to now. */
   fill() {
-    const { landings, words, all } = this;
-    if (this.panel.hidden || !all || !landings.length) return;
+    const { arrivals, words, all } = this;
+    if (this.panel.hidden || !all || !arrivals.length) return;
     let n = 0;
     const counts = all.counts.map(() => 0);
-    for (; n < landings.length && landings[n].t <= this.lab.t; n += 1) {
-      const bin = Math.floor(landings[n].x / all.width) - Math.round(all.from / all.width);
+    for (; n < arrivals.length && arrivals[n].t <= this.lab.t; n += 1) {
+      const bin = Math.floor(arrivals[n].x / all.width) - Math.round(all.from / all.width);
       counts[bin] += 1;
     }
     this.filled.setAttribute("d", this.steps({ ...all, counts }));
     this.means.point(n || NaN);
-    // Before the first one lands the whole is told.
-    const which = n || landings.length, { mean, error } = this.running[which - 1];
+    // Before the first one arrives the whole is told.
+    const which = n || arrivals.length, { mean, error } = this.running[which - 1];
     // Both with the same places; below a nanometre is rounding.
     const places = error > 1e-9 ? Math.max(3, 1 - Math.floor(Math.log10(error))) : 3;
     this.result.textContent = words.say(isFinite(error) ? "landing-result" : "landing-first", {

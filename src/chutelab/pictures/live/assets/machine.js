@@ -65,6 +65,7 @@ import { RADIANS, lengthOf, modulo, sinCos } from "./trig.js";
  * @property {Segment[]} segments
  * @property {Arc[]} arcs
  * @property {Pulley | null} pulley
+ * @property {string[]} streams what tells them apart: names, or which of those without
  * @property {Release[]} releases
  * @property {number[]} radius of each particle, m
  * @property {number[]} mass kg
@@ -137,7 +138,7 @@ export function build(scene) {
   const drawn = draw(scene, (places, radius) => clearOf(scene, room, places, radius));
   const releases = movedOut(scene, room, drawn.releases, drawn.radius);
   const { incoming: belt, run, particles } = scene;
-  let last = -Infinity;
+  let last = -Infinity, unnamed = 0;
   for (const release of releases) last = Math.max(last, release.t);
   const bound = last + run.max_time;
   const pairs = every.map((a) => every.map((b) => met(scene, a, b)));
@@ -157,6 +158,7 @@ export function build(scene) {
       radius: belt.pulley_radius, speed: belt.speed, incline: belt.incline_deg * RADIANS,
       surface: 0, ...values[0],
     },
+    streams: scene.streams.map(({ name }) => name ?? `#${(unnamed += 1)}`),
     releases,
     radius,
     ...heft(scene, releases, radius),

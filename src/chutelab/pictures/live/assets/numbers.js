@@ -105,7 +105,8 @@ class NumbersPanel {
     const history = historyOf(lab), crowd = many >= FEWEST, { stages = [] } = history ?? {};
     this.lead.hidden = this.asked.hidden = !crowd;
     if (crowd && history) {
-      this.tellCrowd(crowdOf(/** @type {Recording} */ (lab.recording), history));
+      const { arrivals, landings } = history;
+      this.tellCrowd(crowdOf(/** @type {Recording} */ (lab.recording), arrivals, landings.length));
     }
     if (crowd) this.asked.append(this.lone);
     else this.asked.before(this.lone);
@@ -126,17 +127,18 @@ class NumbersPanel {
   }
 
   /** @param {import("./crowd.js").CrowdNumbers} its */
-  tellCrowd({ released, landed, flow, mean, spread, quantiles, work, power, losses }) {
+  tellCrowd({ released, arrived, landed, flow, mean, spread, quantiles, work, power, losses }) {
     const { words } = this;
     const all = /** @type {Recording} */ (this.lab.recording).machine.releases.length;
     const metres = (/** @type {number} */ x) => `${words.fixed(x, 3)} m`;
     const rows = /** @type {[string, string, string][]} */ ([
       ["released", words.say("crowd-released"), `${released} / ${all}`],
-      ["flow", words.say("crowd-flow"), isFinite(flow) ? `${words.number(flow, 3)} kg/s` : ""],
+      ["arrived", words.say("crowd-arrived"), arrived ? String(arrived) : ""],
       ["landed", words.say("crowd-landed"), landed ? String(landed) : ""],
-      ["place", words.say("crowd-place"), landed ? `${metres(mean)} ± ${metres(spread)}` : ""],
+      ["flow", words.say("crowd-flow"), isFinite(flow) ? `${words.number(flow, 3)} t/h` : ""],
+      ["place", words.say("crowd-place"), arrived ? `${metres(mean)} ± ${metres(spread)}` : ""],
       ["quantiles", words.say("crowd-quantiles"),
-        landed ? `${quantiles.map((x) => words.fixed(x, 3)).join(" / ")} m` : ""],
+        arrived ? `${quantiles.map((x) => words.fixed(x, 3)).join(" / ")} m` : ""],
       ["power", words.say("crowd-power"),
         work ? `${words.energy(work)}, ${words.number(power, 3)} W` : ""],
       ...losses.map(([name, loss]) => [`loss-${name}`,

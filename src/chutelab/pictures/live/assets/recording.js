@@ -134,6 +134,21 @@ class Track {
     return { x, y, vx, vy, spin, ended: false };
   }
 
+  /** Place and velocity just before a time at which it is under way: before a blow, if one is then.
+   * @param {number} t */
+  before(t) {
+    let i = this.knotBefore(t);
+    while (i > 0 && this.at(i, T) >= t) i -= 1;
+    i = Math.min(i, this.count - 2);
+    const h = this.at(i + 1, T) - this.at(i, T), s = h > 0 ? (t - this.at(i, T)) / h : 1;
+    if (s >= 1) {
+      const [x, y, vx, vy] = [X, Y, VX, VY].map((column) => this.at(i + 1, column));
+      return { x, y, vx, vy };
+    }
+    const [x, vx] = this.curve(i, X, VX, h, s), [y, vy] = this.curve(i, Y, VY, h, s);
+    return { x, y, vx, vy };
+  }
+
   /** @param {number} i @param {boolean} ended @returns {State} */
   stateOf(i, ended) {
     return {
@@ -152,6 +167,29 @@ class Track {
       + s * (h * va + s * (3 * dx - h * (2 * va + vb) + s * (h * (va + vb) - 2 * dx)));
     const slope = dx / h;
     return [where, va + s * (2 * (3 * slope - 2 * va - vb) + 3 * s * (va + vb - 2 * slope))];
+  }
+
+  /** Points from a knot to the next, both among them: straight lines between them miss the track
+   * by `fine` (m). Over a time h a chord misses a curve by at most h²/8 times its largest
+   * acceleration, which a cubic has at one of its ends.
+   * @param {number} i @param {number} fine */
+  chords(i, fine) {
+    const t = this.at(i, T), h = this.at(i + 1, T) - t;
+    const bends = [[X, VX], [Y, VY]].map(([place, pace]) => {
+      const way = 6 * (this.at(i + 1, place) - this.at(i, place));
+      const first = h * this.at(i, pace), last = h * this.at(i + 1, pace);
+      return [way - 4 * first - 2 * last, way - 2 * first - 4 * last];
+    });
+    const bent = Math.max(Math.hypot(bends[0][0], bends[1][0]),
+      Math.hypot(bends[0][1], bends[1][1]));
+    const parts = h > 0 ? Math.min(Math.ceil(Math.sqrt(bent / 8 / fine)), MOST_CHORDS) : 1;
+    const points = [{ t, x: this.at(i, X), y: this.at(i, Y) }];
+    for (let n = 1; n < parts; n += 1) {
+      const [x] = this.curve(i, X, VX, h, n / parts), [y] = this.curve(i, Y, VY, h, n / parts);
+      points.push({ t: t + (h * n) / parts, x, y });
+    }
+    points.push({ t: t + h, x: this.at(i + 1, X), y: this.at(i + 1, Y) });
+    return points;
   }
 
   /** By how much it has turned since its release, counterclockwise, rad. @param {number} t */
@@ -184,6 +222,16 @@ class Track {
   }
 }
 
+/** What each particle is called, whatever comes before it: by its stream, and which of it.
+ * @param {Machine} machine */
+function namesOf({ releases, streams }) {
+  const count = streams.map(() => 0);
+  return releases.map(({ stream }) => {
+    count[stream] += 1;
+    return `${count[stream]} ${streams[stream]}`;
+  });
+}
+
 /** The tracks and events of a run, which may still go on. */
 class Recording {
   /** @param {Machine} machine */
@@ -203,11 +251,14 @@ class Recording {
      * J, once the run is over; none if the scene was changed under way.
      * @type {number[][] | null} */
     this.books = null;
+    /** By which the engine's solves broke their law of energy, J. */
+    this.gained = 0;
   }
 
   /** @param {{knots: Float64Array, tips: Float64Array, events: Event[], now: number,
-   *   state: string, books?: number[][] | null}} chunk */
-  add({ knots, tips, events, now, state, books = null }) {
+   *   state: string, books?: number[][] | null, gained?: number}} chunk */
+  add({ knots, tips, events, now, state, books = null, gained = 0 }) {
+    this.gained = gained;
     this.books = this.renamed ? null : books;
     const its = (/** @type {number} */ disk) =>
       this.renamed ? this.renamed[disk] : { index: disk, entries: null, goesOn: false };
@@ -267,13 +318,20 @@ class Recording {
     const releases = [];
     /** @type {number[]} */
     const spins = [];
-    machine.releases.forEach((release, index) => {
-      const track = this.tracks[index] ?? (this.tracks[index] = new Track());
-      const ended = track.count > 0 && !track.live && track.end < t;
-      // What a change finds out of balance would stay so.
-      const ledger = this.ledgerOf(index, t);
-      const entries = ledger
+    // Where each is in the run so far: streams that come and go move those after them.
+    const earlier = new Map(namesOf(this.machine).map((name, index) => [name, index]));
+    const was = namesOf(machine).map((name) => earlier.get(name) ?? -1);
+    // What a change finds out of balance would stay so.
+    const booked = was.map((index) => {
+      const ledger = index < 0 ? null : this.ledgerOf(index, t);
+      return ledger
         ? [ledger.belt_work, ledger.restitution_loss, ledger.friction_loss] : [0, 0, 0];
+    });
+    this.tracks = was.map((index) => this.tracks[index] ?? new Track());
+    this.events = this.renumbered(t, was, machine.surfaces);
+    machine.releases.forEach((release, index) => {
+      const track = this.tracks[index], entries = booked[index];
+      const ended = track.count > 0 && !track.live && track.end < t;
       track.cut(t, entries);
       const state = track.state(t);
       if (ended) return;
@@ -287,12 +345,7 @@ class Recording {
         track.tip = 1;
       } else releases.push({ ...release, t: Math.max(0, release.t - t) });
     });
-    // Of what was taken away nothing is left.
-    const count = machine.releases.length;
-    this.tracks.length = Math.min(this.tracks.length, count);
     this.measure();
-    this.events = this.events.filter(({ t: when, disk, other }) =>
-      when <= t && disk < count && other < count);
     this.machine = machine;
     this.renamed = renamed;
     this.shift = t;
@@ -309,6 +362,23 @@ class Recording {
       segments: machine.segments.map(gate), arcs: machine.arcs.map(gate),
       endTime: Math.max(0, machine.endTime - t),
     };
+  }
+
+  /** Events up to t as a changed machine numbers particles and surfaces; of what was taken away
+   * nothing is left.
+   * @param {number} t @param {number[]} was where each particle was @param {string[]} surfaces */
+  renumbered(t, was, surfaces) {
+    /** @type {Map<number, number>} */
+    const now = new Map(was.map((index, n) => [index, n]));
+    const names = this.machine.surfaces;
+    return this.events.flatMap((event) => {
+      const disk = now.get(event.disk);
+      const other = event.other < 0 ? event.other : now.get(event.other);
+      if (event.t > t || disk === undefined || other === undefined) return [];
+      const surface = event.surface < names.length
+        ? surfaces.indexOf(names[event.surface]) : surfaces.length;
+      return [{ ...event, disk, other, surface }];
+    });
   }
 
   /** @param {number} index @param {number} t */
@@ -369,31 +439,13 @@ class Recording {
   }
 
   /** Points of a track, its knots among them: straight lines between them miss it by `fine` (m).
-   * Over a time h a chord misses a curve by at most h²/8 times its largest acceleration, which a
-   * cubic has at one of its ends.
    * @param {number} index @param {number} fine */
   points(index, fine) {
     const track = this.tracks[index];
-    /** @type {{x: number, y: number}[]} */
-    const points = [];
-    for (let i = 0; i < track.count; i += 1) {
-      points.push({ x: track.at(i, X), y: track.at(i, Y) });
-      const h = i + 1 < track.count ? track.at(i + 1, T) - track.at(i, T) : 0;
-      if (!(h > 0)) continue;
-      const bends = [[X, VX], [Y, VY]].map(([place, pace]) => {
-        const way = 6 * (track.at(i + 1, place) - track.at(i, place));
-        const first = h * track.at(i, pace), last = h * track.at(i + 1, pace);
-        return [way - 4 * first - 2 * last, way - 2 * first - 4 * last];
-      });
-      const bent = Math.max(Math.hypot(bends[0][0], bends[1][0]),
-        Math.hypot(bends[0][1], bends[1][1]));
-      const parts = Math.min(Math.ceil(Math.sqrt(bent / 8 / fine)), MOST_CHORDS);
-      for (let n = 1; n < parts; n += 1) {
-        const [x] = track.curve(i, X, VX, h, n / parts), [y] = track.curve(i, Y, VY, h, n / parts);
-        points.push({ x, y });
-      }
-    }
-    return points;
+    const { count } = track;
+    if (!count) return [];
+    const points = Array.from({ length: count - 1 }, (_, i) => track.chords(i, fine).slice(1));
+    return [{ t: track.begin, x: track.at(0, X), y: track.at(0, Y) }, ...points.flat()];
   }
 }
 

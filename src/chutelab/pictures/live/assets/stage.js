@@ -2,6 +2,7 @@
 
 import { openHandles } from "./controls.js";
 import { ARROW, Handles, roundTo, valuesOf } from "./handles.js";
+import { historyOf } from "./stages.js";
 import { View, boxOf } from "./view.js";
 
 /**
@@ -224,11 +225,31 @@ class Stage {
     const { recording } = this.lab, { view } = this;
     this.paths.replaceChildren();
     if (!recording || !this.show.trails || this.blind) return;
+    const { envelopes = [] } = historyOf(this.lab) ?? {};
+    for (const { stream, lines } of envelopes) this.drawEnvelope(stream, lines);
+    if (envelopes.length) return;
     for (const points of this.trackPoints(recording, FINE / view.scale)) {
       if (points.length < 2) continue;
       const line = points.map(({ x, y }) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`);
       this.paths.append(svg("polyline", { points: line.join(" "), class: "track" }));
     }
+  }
+
+  /** Lines of an envelope: the band between the outer two, and the middle one.
+   * @param {number} stream @param {[number, number][][]} lines m */
+  drawEnvelope(stream, lines) {
+    const { view } = this;
+    const [right, middle, left] = lines.map((line) => line.filter(([x]) => isFinite(x))
+      .map(([x, y]) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`));
+    const band = svg("polygon", { points: [...right, ...left.reverse()].join(" "), class: "envelope" });
+    if (this.isMixed) band.style.fill = `var(--kind-${stream % 5})`;
+    band.append(Object.assign(svg("title"), { textContent: this.words.say("envelope") }));
+    this.paths.append(band, svg("polyline", { points: middle.join(" "), class: "track" }));
+  }
+
+  /** Whether particles are coloured by their stream. */
+  get isMixed() {
+    return (this.lab.scene?.kinds.length ?? 0) > 1;
   }
 
   /** Particles, and what moves. */
@@ -253,7 +274,7 @@ class Stage {
     if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
     const spins = machine.inertia.some((value) => value > 0);
     context.lineWidth = 1;
-    const { kinds } = /** @type {import("./scene.js").Scene} */ (lab.scene);
+    const { isMixed } = this;
     for (let i = 0; i < recording.tracks.length; i += 1) {
       const state = recording.tracks[i].state(t);
       if (!state || (state.ended && recording.tracks.length > 1)) continue;
@@ -263,7 +284,7 @@ class Stage {
       context.beginPath();
       context.arc(x, y, r, 0, 2 * Math.PI);
       const stream = machine.releases[i]?.stream ?? 0;
-      context.fillStyle = kinds.length > 1 ? this.colour(`kind-${stream % 5}`) : ink;
+      context.fillStyle = isMixed ? this.colour(`kind-${stream % 5}`) : ink;
       context.fill();
       if (r > 3) {
         context.strokeStyle = rim;

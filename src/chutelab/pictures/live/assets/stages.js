@@ -1,5 +1,9 @@
 // What has happened to each particle, kept as the events of a run come in.
 
+import { Arrivals } from "./arrival.js";
+import { FEWEST } from "./crowd.js";
+import { envelopesOf } from "./envelope.js";
+
 /**
  * @typedef {import("./lab.js").Lab} Lab
  * @typedef {import("./recording.js").Recording} Recording
@@ -10,6 +14,9 @@
  */
 
 const STAGE = { separation: 1, impact: 3, landing: 4, collision: 5 };
+
+/** By how much longer a run has to be for its envelopes to be made anew. */
+const LONGER = 1.2;
 
 /** The name of the plate that the paper's numbers are about. @param {Scene} scene */
 const plateName = ({ plates }) => (plates[0]?.pivot && plates[0].name) || "plate";
@@ -29,6 +36,10 @@ class RunHistory {
     /** All impacts in the order of time. @type {Blow[]} */
     this.blows = [];
     this.largestBlow = 0;
+    this.arrivals = new Arrivals(recording);
+    this.state = recording.state;
+    /** s from which on envelopes are made anew. */
+    this.enveloped = -Infinity;
     this.update();
   }
 
@@ -39,9 +50,28 @@ class RunHistory {
       && this.stages.length === recording.machine.releases.length;
   }
 
+  /** The envelopes of the streams, as far as the run has come. */
+  get envelopes() {
+    const { recording, arrivals } = this, { now, begin, state } = recording;
+    const t = state === "running" ? now : Infinity;
+    const released = recording.tracks.filter(({ count }) => count).length;
+    if (released >= FEWEST && t > this.enveloped) {
+      this.enveloped = begin + LONGER * (t - begin);
+      this.paths = envelopesOf(recording, arrivals.found);
+    }
+    return this.paths;
+  }
+
+  /** @type {import("./envelope.js").Envelope[]} */
+  paths = [];
+
   /** Take in what is new. */
   update() {
-    const { events } = this, begin = this.seen;
+    const { events, recording } = this, begin = this.seen;
+    // At the end the whole run is looked at, as in Python.
+    if (recording.state === this.state) this.arrivals.update();
+    else this.arrivals = new Arrivals(recording);
+    this.state = recording.state;
     for (; this.seen < events.length; this.seen += 1) this.add(events[this.seen]);
     if (begin === this.seen) return;
     // Particles that do not meet are run one after the other.

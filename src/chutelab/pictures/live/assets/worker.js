@@ -3,8 +3,9 @@
 // In:  {type: "load", wasm, layout}, the core compressed by zlib; {type: "run", id, machine, until}
 //      begins a run and ends the one before; {type: "until", id, until} lets it go on to a later
 //      time (s).
-// Out: {type: "chunk", id, knots, tips, events, now, state, books, reasons}, where state
-//      is "running", "done", "stalled" or "failed"; books and reasons come with the end.
+// Out: {type: "chunk", id, knots, tips, events, now, state, books, reasons, gained}, where
+//      state is "running", "done", "stalled" or "failed"; books and reasons come with the end;
+//      gained is the energy by which solves broke their law so far, J.
 //      {type: "broken"}, where the core cannot be loaded.
 
 import { startCore } from "./core.js";
@@ -67,6 +68,7 @@ function work() {
   postMessage({
     type: "chunk", id: job.id, knots: all, tips, events, now: core.get("t"), state,
     books: over ? core.books() : null, reasons: over ? core.reasons() : null,
+    gained: core.get("gained"),
   }, { transfer: [all.buffer, tips.buffer] });
   if (over) job = null;
   else schedule();

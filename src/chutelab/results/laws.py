@@ -137,13 +137,11 @@ def _round(e: Evidence) -> bool:
 
 
 def _unreal(e: Evidence) -> Broken | None:
-    knots, events = e.recording.knots, e.recording.events
-    numbers = knots.view(np.float64).reshape(len(knots), -1)
-    rest = events.view(_NUMBERS)
-    parts = numbers, e.recording.by_surface, rest["t"], rest["rest"]
+    events = e.recording.events.view(_NUMBERS)
+    parts = e.columns, e.recording.by_surface, events["t"], events["rest"]
     if all(np.isfinite(part).all() for part in parts):
         return None
-    bad = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
+    bad = np.flatnonzero(~np.isfinite(e.columns).all(axis=0))
     count = float(sum((~np.isfinite(part)).sum() for part in parts))
     if len(bad):
         return _told(e, FINITE, bad, count, 0.0, "")

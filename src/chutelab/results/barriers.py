@@ -67,7 +67,7 @@ class Hit:
 
 
 def _lines(machine: Machine) -> dict[str, Floats]:
-    """Return starts, tangents (S, 2) and lengths (S,) of straight pieces, of a family (N, S, ...)."""
+    """Return starts, tangents (S, 2) and lengths (S,) of lines, of a family (N, S, ...)."""
     s = machine.segments
     return {"start": s.start, "tangent": s.tangent, "length": s.length}
 
@@ -230,15 +230,12 @@ def _unproven(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints
     """Return the intervals, and the pieces beside them, that one look does not prove clear."""
     points, n = paths.points, paths.points.shape[2]
     count = (table["radius"] if "radius" in table else table["length"]).shape[-1]
-    if n * count <= FEW and not e.family:
-        return _few(e, paths, table, count)
-    if e.family:
-        # A machine for each particle.
-        width = 1
-    else:
-        # What follows each other is of one track only where tracks are long.
-        short = len(e.columns[0]) < WIDTH * e.recording.count and n * count <= PAIRS
-        width = n if n <= WIDTH or short or not e.sized else WIDTH
+    # What follows each other is of one track only where tracks are long.
+    short = len(e.columns[0]) < WIDTH * e.recording.count and n * count <= PAIRS
+    if not e.family and (n <= WIDTH or short or not e.sized):
+        return (_beside_rounds if "radius" in table else _beside_lines)(e, paths, table)
+    # Of a family a machine for each particle.
+    width = 1 if e.family else WIDTH
     blocks_ = -(-n // width)
     if blocks_ * width > n:
         points = np.concatenate([points, points[:, :, -1:].repeat(blocks_ * width - n, 2)], axis=2)
@@ -246,15 +243,10 @@ def _unproven(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints
     if np.ndim(limit):
         limit = np.append(limit, np.full(blocks_ * width - n, inf)).reshape(blocks_, width)
     cut = points.reshape(2, 4, blocks_, width)
-    single = blocks_ == 1 and not e.family
-    if single:
-        block, piece, chosen = np.zeros(count, dtype=np.int64), np.arange(count), table
-        own = cut
-    else:
-        block, piece = _near(e, paths, cut, table, count)
-        own = cut.take(block, axis=2)
-        limit = limit[block] if np.ndim(limit) else limit
-        chosen = _pick(table, piece, paths.owner[block] if e.family else None)
+    block, piece = _near(e, paths, cut, table, count)
+    own = cut.take(block, axis=2)
+    limit = limit[block] if np.ndim(limit) else limit
+    chosen = _pick(table, piece, paths.owner[block] if e.family else None)
     row = {
         name: values[..., None, :] if name in POINTS else values[..., None]
         for name, values in chosen.items()
@@ -265,48 +257,56 @@ def _unproven(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints
         if e.machine.pulley is not None and doubt.any():
             # The incoming belt ends on the pulley: beyond it that is what is near.
             belt = (piece == 0).nonzero()[0]
-            x, y = own if single else own.take(belt, axis=2)
+            x, y = own.take(belt, axis=2)
             start, tangent = row["start"][belt], row["tangent"][belt]
             foot = tangent[..., 0] * (x - start[..., 0]) + tangent[..., 1] * (y - start[..., 1])
             doubt[belt] &= foot.min(axis=0) < row["length"][belt]
     else:
-        # A first look by the ball about the beginning: how far the control points are from there.
-        x, y = points[:, 1:] - points[:, :1]
-        span = np.sqrt((x * x + y * y).max(axis=0)).reshape(blocks_, width)
-        span = span if single else span[block]
-        first, center = own[:, 0], row["center"]
-        x, y = first[0] - center[..., 0], first[1] - center[..., 1]
-        away, radius = x * x + y * y, row["radius"]
-        doubt = away < (radius + limit + span) ** 2
-        within = radius - limit - span
-        doubt &= (away > within * within) | (within <= 0.0)
+        doubt = _near_round(own, row, limit)
     pair, column = doubt.nonzero()
-    if single or not len(pair):
-        return column, piece[pair]
     interval, piece = block[pair] * width + column, piece[pair]
     inside = interval < n
     return interval[inside], piece[inside]
 
 
-def _few(
-    e: Evidence, paths: Paths, table: dict[str, Floats], count: int
-) -> tuple[Ints, Ints]:
-    """Do as `_unproven` does, of a few intervals beside a few pieces: all of them at once."""
-    n = paths.points.shape[2]
-    if "radius" in table:
+def _near_round(points: Floats, piece: dict[str, Floats], limit: Any) -> Bools:
+    """Tell which paths have boxes that are not clear of circles."""
+    center, radius = np.moveaxis(piece["center"], -1, 0), piece["radius"]
+    low, high = points.min(axis=1) - center, points.max(axis=1) - center
+    x, y = np.maximum(np.maximum(low, -high), 0.0)
+    doubt = x * x + y * y < (radius + limit) ** 2
+    x, y = np.maximum(high, -low)
+    inner = radius - limit
+    doubt &= (x * x + y * y > inner * inner) | (inner <= 0.0)
+    return np.asarray(doubt)
+
+
+def _beside_rounds(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints, Ints]:
+    """Do as `_unproven` does, of all intervals beside all bent pieces at once."""
+    n, count = paths.points.shape[2], len(table["radius"])
+    if n * count <= FEW:
         every, beside = np.divmod(np.arange(n * count), count)
         return every, beside
-    normal = table["tangent"][:, ::-1] * _LEFT
-    d = (normal @ paths.points.reshape(2, -1)).reshape(count, 4, n)
-    d -= (normal * table["start"]).sum(axis=1)[:, None, None]
+    row = {"center": table["center"][:, None], "radius": table["radius"][:, None]}
+    piece, interval = _near_round(paths.points[:, :, None], row, paths.limit).nonzero()
+    return interval, piece
+
+
+def _beside_lines(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints, Ints]:
+    """Do as `_unproven` does, of all intervals beside all straight pieces at once."""
+    n, start = paths.points.shape[2], table["start"]
+    points, normal = paths.points.reshape(2, -1), table["tangent"][:, ::-1] * _LEFT
+    d = (normal @ points).reshape(-1, 4, n)
+    d -= (normal * start).sum(axis=1)[:, None, None]
     doubt = d.min(axis=1) < paths.limit
     doubt &= d.max(axis=1) > -paths.limit
     piece, interval = doubt.nonzero()
     if e.machine.pulley is not None and len(piece) and piece[0] == 0:
         # The incoming belt ends on the pulley: beyond it that is what is near.
-        along = (paths.points.T - table["start"][0]) @ table["tangent"][0]
-        beyond = (piece == 0) & (along.min(axis=1) >= table["length"][0])[interval]
-        piece, interval = piece[~beyond], interval[~beyond]
+        tangent = table["tangent"][0]
+        foot = (tangent @ points).reshape(4, n).min(axis=0) - tangent @ start[0]
+        met = (piece > 0) | (foot < table["length"][0])[interval]
+        piece, interval = piece[met], interval[met]
     return interval, piece
 
 
@@ -356,7 +356,8 @@ def _settled(
     points = paths.points.take(interval, axis=2)
     for halving in range(HALVINGS + 1):
         owner = paths.owner[interval] if len(paths.owner) else None
-        doubt = (~clear(points, _pick(table, piece, owner), _of(paths.limit, interval))).nonzero()[0]
+        proven = clear(points, _pick(table, piece, owner), _of(paths.limit, interval))
+        doubt = (~proven).nonzero()[0]
         if not len(doubt):
             return []
         interval, piece, begin = interval[doubt], piece[doubt], begin[doubt]

@@ -95,6 +95,11 @@ class Evidence:
             return np.empty((9, 0))
         return np.frombuffer(knots, np.float64).reshape(len(knots), -1).T.copy()
 
+    @cached_property
+    def sizes(self) -> Floats:
+        """Largest size of each number of a knot, (9,); NaN if one is. Of one knot or more."""
+        return np.asarray(np.maximum(self.columns.max(axis=1), -self.columns.min(axis=1)))
+
     @property
     def alike(self) -> bool:
         """Whether all is left to Chipmunk, in steps that are all alike."""
@@ -190,7 +195,7 @@ class Evidence:
         if m.pulley is not None:
             size = max(size, _most(m.pulley.radius) + self.radius)
         if self.columns.size:
-            t, x, y = np.abs(self.columns[:3]).max(axis=1).tolist()
+            t, x, y = self.sizes[:3].tolist()
             size = max(size, x, y, self.speed * t)
         return size
 
@@ -246,8 +251,9 @@ class Evidence:
         kinetic, potential = self.energies
         height = np.abs(potential)
         height += kinetic
+        size = np.empty_like(height)
         for entries in self.columns[6:]:
-            height += np.abs(entries)
+            height += np.abs(entries, out=size)
         return float(np.maximum.reduceat(height, self.ends[0]).sum())
 
     @cached_property

@@ -138,11 +138,11 @@ def _round(e: Evidence) -> bool:
 
 def _unreal(e: Evidence) -> Broken | None:
     events = e.recording.events.view(_NUMBERS)
-    parts = e.columns, e.recording.by_surface, events["t"], events["rest"]
-    if all(np.isfinite(part).all() for part in parts):
+    parts = e.recording.by_surface, events["t"], events["rest"]
+    if all(np.isfinite(part).all() for part in (e.sizes, *parts)):
         return None
     bad = np.flatnonzero(~np.isfinite(e.columns).all(axis=0))
-    count = float(sum((~np.isfinite(part)).sum() for part in parts))
+    count = float(sum((~np.isfinite(part)).sum() for part in (e.columns, *parts)))
     if len(bad):
         return _told(e, FINITE, bad, count, 0.0, "")
     return _of_all(e, FINITE, "", count, 0.0)
@@ -194,7 +194,7 @@ def _books(e: Evidence) -> Iterator[Broken]:
         yield _of_all(e, LEDGER, "", abs(residual), bound)
     if not e.crowd:
         rises = gain[1:] - gain[:-1]
-        if np.abs(rises).max(initial=0.0) > most:
+        if len(rises) and max(rises.max(), -rises.min()) > most:
             rises = np.abs(np.where(within, rises, 0.0))
             rows = (rises > most).nonzero()[0]
             if len(rows):

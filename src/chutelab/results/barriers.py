@@ -294,19 +294,27 @@ def _beside_rounds(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple
 
 def _beside_lines(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints, Ints]:
     """Do as `_unproven` does, of all intervals beside all straight pieces at once."""
-    n, start = paths.points.shape[2], table["start"]
-    points, normal = paths.points.reshape(2, -1), table["tangent"][:, ::-1] * _LEFT
-    d = (normal @ points).reshape(-1, 4, n)
-    d -= (normal * start).sum(axis=1)[:, None, None]
-    doubt = d.min(axis=1) < paths.limit
-    doubt &= d.max(axis=1) > -paths.limit
+    start, tangent, limit = table["start"], table["tangent"], paths.limit
+    points, normal = paths.points.reshape(2, -1), tangent[:, ::-1] * _LEFT
+
+    def along(way: Floats) -> Floats:
+        """Return how far the control points are from the starts that way, (S, 4, n), m."""
+        found = (way @ points).reshape(len(way), 4, -1)
+        found -= (way * start).sum(axis=1)[:, None, None]
+        return found
+
+    aside = along(normal)
+    doubt = aside.min(axis=1) < limit
+    doubt &= aside.max(axis=1) > -limit
+    if np.count_nonzero(doubt):
+        foot, margin = along(tangent), np.maximum(limit, 0.0)
+        reach = table["length"][:, None] + margin
+        if e.machine.pulley is not None:
+            # The incoming belt ends on the pulley: beyond it that is what is near.
+            reach[0] -= margin
+        doubt &= foot.min(axis=1) < reach
+        doubt &= foot.max(axis=1) > -margin
     piece, interval = doubt.nonzero()
-    if e.machine.pulley is not None and len(piece) and piece[0] == 0:
-        # The incoming belt ends on the pulley: beyond it that is what is near.
-        tangent = table["tangent"][0]
-        foot = (tangent @ points).reshape(4, n).min(axis=0) - tangent @ start[0]
-        met = (piece > 0) | (foot < table["length"][0])[interval]
-        piece, interval = piece[met], interval[met]
     return interval, piece
 
 

@@ -354,6 +354,9 @@ class Evidence:
 
         Outside it is never more than gravity's: what is faster leaves.
         """
+        if not self.machine.arcs.radius.size:
+            # No particle is inside the drive pulley.
+            return 0.0
         found, places = 0.0, self.recording.knots["position"]
         radii = self.radii[self.recording.owner]
         for bow in self.bows:

@@ -280,13 +280,14 @@ class Evidence:
         """Energy that parting overlaps may give, J: no more than lifts all by how deep they were.
 
         Of lone particles a knot in contact holds the mean velocity of a step, half a step's pull
-        off its books.
+        off its books: that of the weight along the way, and across it that of an arc's inside.
         """
         if self.dt is None:
             return 0.0
         if not self.crowd:
             heaviest = float(self.masses.max())
-            return self.speed * self.gravity * self.dt * heaviest
+            across = 0.5 * (0.5 * self.bent * self.dt) ** 2
+            return heaviest * (self.speed * self.gravity * self.dt + across)
         allowed = float(self.masses.sum()) * self.gravity * self.late
         if self.alike:
             # The pymunk engine leaves out touches that move a track by less than `ROUGH` of the
@@ -350,7 +351,7 @@ class Evidence:
 
     @cached_property
     def bent(self) -> float:
-        """Largest acceleration towards the centre of an arc that somebody moves along inside, m/s².
+        """Largest acceleration towards the centre of an arc that a particle moves along inside, m/s².
 
         Outside it is never more than gravity's: what is faster leaves.
         """
@@ -364,7 +365,7 @@ class Evidence:
             off = np.abs(bow.beside(places) + radii)
             along = (inner > 0.0) & (off < 0.1 * radii) & bow.within(places, 0.0)
             if along.any():
-                found = max(found, self.speed**2 / float(inner[along].min()))
+                found = max(found, float((self.paces[along] / inner[along]).max()))
         return found
 
     @property

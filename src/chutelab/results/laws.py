@@ -184,10 +184,10 @@ def _books(e: Evidence) -> Iterator[Broken]:
         if len(rows):
             yield _told(e, LOSSES, rows + 1, back[rows].min(), -most)
     total = recording.by_surface[..., 1:]
-    if total.min(initial=0.0) < -bound:
+    if total.min(initial=0.0) < -most:
         low = total.reshape(-1, *total.shape[-2:]).min(axis=(0, 2))
         name = recording.surfaces[int(low.argmin())]
-        yield _of_all(e, LOSSES, name, low.min(), -bound)
+        yield _of_all(e, LOSSES, name, low.min(), -most)
     first, last = e.ends
     residual = float((gain[last] - gain[first]).sum())
     if abs(residual) > bound:

@@ -351,7 +351,7 @@ class Evidence:
 
     @cached_property
     def bent(self) -> float:
-        """Largest acceleration towards the centre of an arc that a particle moves along inside, m/s².
+        """Largest acceleration towards the centre of an arc that one moves along inside, m/s².
 
         Outside it is never more than gravity's: what is faster leaves.
         """

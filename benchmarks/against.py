@@ -53,8 +53,10 @@ COMMANDS = {
 }
 
 
-def worked() -> None:
+def worked(source: str) -> None:
     """Answer lines ``[case, times]`` with seconds and the recording's hash, until input ends."""
+    # Ahead of what an editable install may have put there.
+    sys.path.insert(0, source)
     import chutelab
     from chutelab.cli import main
 
@@ -86,9 +88,8 @@ class Version:
 
     def __init__(self, checkout: Path, folder: Path) -> None:
         folder.mkdir()
-        about = {**os.environ, "PYTHONPATH": str(checkout / "src")}
         self.process = subprocess.Popen(
-            [sys.executable, Path(__file__), "--work"], cwd=folder, env=about, text=True,
+            [sys.executable, Path(__file__), "--work", checkout / "src"], cwd=folder, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         )  # fmt: skip
 
@@ -146,4 +147,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    worked() if sys.argv[1:] == ["--work"] else sys.exit(main())
+    worked(sys.argv[2]) if sys.argv[1:2] == ["--work"] else sys.exit(main())

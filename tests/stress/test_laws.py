@@ -125,6 +125,8 @@ def test_a_passage_there_and_back_within_one_interval_is_seen():
     up["velocity"][:, 1] *= 2.0
     over = Evidence(built, replace(recording, knots=up))
     assert barriers.no_one_through(over).figure == 2
+    first, *_ = replace(over.recording, machine=built).laws
+    assert first.law == "nothing through a surface"
 
 
 def test_energy_from_nothing_is_seen():

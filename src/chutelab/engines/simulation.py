@@ -128,7 +128,9 @@ def judged(
     recording = follow(machine, engine, watched)
     if (engine or machine.engine) == "auto" and recording.laws:
         recording = _instead(machine, recording, watched)
-    return replace(recording, seconds=perf_counter() - began)
+    # In place: a copy would be judged anew.
+    object.__setattr__(recording, "seconds", perf_counter() - began)
+    return recording
 
 
 def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> Recording:

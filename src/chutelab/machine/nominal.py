@@ -54,8 +54,10 @@ def discharge(scene: Scene) -> tuple[Pair, Pair]:
         if np.count_nonzero(across > ALONG * np.hypot(vx, vy)):
             return position, velocity
     rho, speed = scene.incoming.pulley_radius + scene.particle.radius, scene.incoming.speed
-    if not isinstance(scene.met(scene.kinds[0], "incoming")[1], str):
-        return _slip_round(scene, rho, vx * cosine + vy * sine, 0.0 - (x * cosine + y * sine))
+    _, friction = scene.met(scene.kinds[0], "incoming")
+    if not isinstance(friction, str):
+        way = 0.0 - (x * cosine + y * sine)
+        return _slip_round(scene, rho, vx * cosine + vy * sine, way, friction)
     # Adhesion lets go where cos φ1 = v²/(g ρ), Eq. (2), or where the belt ends if that is more.
     ratio = np.divide(speed * speed, scene.gravity * rho)
     grip = np.where(np.greater(speed, 0.0), np.minimum(ratio, cosine), nan)
@@ -65,13 +67,15 @@ def discharge(scene: Scene) -> tuple[Pair, Pair]:
     return (rho * side, rho * grip), (speed * grip, 0.0 - speed * side)
 
 
-def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -> tuple[Pair, Pair]:
+def _slip_round(
+    scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers, friction: Numbers
+) -> tuple[Pair, Pair]:
     """Go along belt and pulley with Coulomb friction."""
     belt = scene.incoming
     assert belt is not None
     given = (
-        rho, speed, distance, scene.gravity, scene.met(scene.kinds[0], "incoming")[1], belt.speed,
-        np.radians(belt.incline_deg), belt.length,
+        rho, speed, distance, scene.gravity, friction, belt.speed, np.radians(belt.incline_deg),
+        belt.length,
     )  # fmt: skip
     shape = np.broadcast_shapes(*map(np.shape, given))
     rho, speed, distance, gravity, friction, pace, incline, length = (

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from math import comb, inf
 from typing import Any
 
@@ -45,6 +44,9 @@ HALVINGS = 12
 GATED = 200
 """Times at which it is asked whether a particle has got clear of a gate that shut on it."""
 
+_LEFT = np.array([-1.0, 1.0])
+"""What a tangent's coordinates, the second first, are times those of the normal on its left."""
+
 _ROWS, _COLUMNS = np.triu_indices(4)
 _SQUARE = np.zeros((7, 10))
 for _n, (_i, _j) in enumerate(zip(_ROWS.tolist(), _COLUMNS.tolist(), strict=True)):
@@ -64,37 +66,31 @@ class Hit:
     passes: bool  # whether its centre gets to the other side, between the piece's ends
 
 
-@dataclass(frozen=True, eq=False)
-class Shapes:
-    """Straight and bent pieces of a machine as arrays (S, ...), of a family (N, S, ...)."""
+def _lines(machine: Machine) -> dict[str, Floats]:
+    """Return starts, tangents (S, 2) and lengths (S,) of lines, of a family (N, S, ...)."""
+    s = machine.segments
+    return {"start": s.start, "tangent": s.tangent, "length": s.length}
 
-    machine: Machine
 
-    @cached_property
-    def lines(self) -> dict[str, Floats]:
-        """Starts, tangents (S, 2) and lengths (S,)."""
-        s = self.machine.segments
-        return {"start": s.start, "tangent": s.tangent, "length": s.length}
-
-    @cached_property
-    def rounds(self) -> dict[str, Floats]:
-        """Centres (A, 2), radii, begins and extents (A,) of arcs, the drive pulley last."""
-        arcs, wheel = self.machine.arcs, self.machine.pulley
-        names = ("center", "radius", "begin", "extent")
-        found = {name: getattr(arcs, name) for name in names}
-        if wheel is not None:
-            radius = np.asarray(wheel.radius, dtype=float)[..., None]
-            own = {"center": np.zeros((*radius.shape, 2)), "radius": radius}
-            own |= {"begin": np.zeros(radius.shape), "extent": np.full(radius.shape, inf)}
-            if not found["radius"].size:
-                return own
-            for n, mine in own.items():
-                axis = -2 if n in POINTS else -1
-                # Of a family either may have a row for each member.
-                ahead = np.broadcast_shapes(mine.shape[:axis], found[n].shape[:axis])
-                both = (np.broadcast_to(a, (*ahead, *a.shape[axis:])) for a in (found[n], mine))
-                found[n] = np.concatenate(list(both), axis=axis)
+def _rounds(machine: Machine) -> dict[str, Floats]:
+    """Return centres (A, 2), radii, begins and extents (A,) of arcs, the drive pulley last."""
+    arcs, wheel = machine.arcs, machine.pulley
+    found = {name: getattr(arcs, name) for name in ("center", "radius", "begin", "extent")}
+    if wheel is None:
         return found
+    radius = np.asarray(wheel.radius, dtype=float)[..., None]
+    none = np.zeros(radius.shape)
+    own = {"center": np.zeros((*radius.shape, 2)), "radius": radius, "begin": none}
+    own["extent"] = none + inf
+    if not found["radius"].size:
+        return own
+    for n, mine in own.items():
+        axis = -2 if n in POINTS else -1
+        # Of a family either may have a row for each member.
+        ahead = np.broadcast_shapes(mine.shape[:axis], found[n].shape[:axis])
+        both = (np.broadcast_to(a, (*ahead, *a.shape[axis:])) for a in (found[n], mine))
+        found[n] = np.concatenate(list(both), axis=axis)
+    return found
 
 
 class Paths:
@@ -156,7 +152,11 @@ def _clear_of_lines(points: Floats, piece: dict[str, Floats], limit: Any) -> Boo
         return np.asarray(clear)
     start, tangent = piece["start"].T, piece["tangent"].T
     foot = tangent[0] * (points[0] - start[0]) + tangent[1] * (points[1] - start[1])
-    before, beyond = foot.max(axis=0) <= 0.0, foot.min(axis=0) >= piece["length"]
+    low, high = foot.min(axis=0) - piece["length"], -foot.max(axis=0)
+    clear |= np.maximum(low, high) >= np.maximum(limit, 0.0)
+    if clear.all():
+        return np.asarray(clear)
+    before, beyond = high >= 0.0, low >= 0.0
     ended = (~clear & (before | beyond)).nonzero()[0]
     if len(ended):
         end = piece["start"] + np.where(before, 0.0, piece["length"])[:, None] * piece["tangent"]
@@ -169,6 +169,8 @@ def _clear_of_rounds(points: Floats, piece: dict[str, Floats], limit: Any) -> Bo
     """Tell which paths (m,) are proven to keep their distance from bent pieces (m,)."""
     q, radius = _squares(points, piece["center"]), piece["radius"]
     clear = q.min(axis=0) >= (radius + limit) ** 2
+    if clear.all():
+        return np.asarray(clear)
     clear |= (q.max(axis=0) <= (radius - limit) ** 2) & (radius > limit)
     if clear.all():
         return np.asarray(clear)
@@ -198,15 +200,12 @@ def hits(e: Evidence) -> list[Hit]:
     way of a gate as it shut is spared until it is clear of it; what overlapped at its release may
     go on doing so, no deeper.
     """
-    found, shapes = list[Hit](), Shapes(e.machine)
-    kinds = [
-        (table, clear, number)
-        for table, clear, number in (
-            (shapes.lines, _clear_of_lines, 0),
-            (shapes.rounds, _clear_of_rounds, shapes.lines["length"].shape[-1]),
-        )
-        if table["radius" if number or "radius" in table else "length"].size
-    ]
+    found, m = list[Hit](), e.machine
+    kinds: list[tuple[dict[str, Floats], Any, int]] = []
+    if m.segments.length.size:
+        kinds.append((_lines(m), _clear_of_lines, 0))
+    if m.arcs.radius.size or m.pulley is not None:
+        kinds.append((_rounds(m), _clear_of_rounds, m.segments.length.shape[-1]))
     if not kinds:
         return found
     way = e.columns[:3]
@@ -220,7 +219,7 @@ def hits(e: Evidence) -> list[Hit]:
                 found += _turned(e, paths, table, number)
             interval, piece = _unproven(e, paths, table)
             if len(interval):
-                interval, piece = _there(e, paths, interval, piece, number)
+                interval, piece = _there(e, paths, interval, piece, bent="radius" in table)
             for begin in range(0, len(interval), PAIRS):
                 some = slice(begin, begin + PAIRS)
                 found += _settled(e, paths, interval[some], piece[some], table, clear, number)
@@ -231,16 +230,12 @@ def _unproven(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints
     """Return the intervals, and the pieces beside them, that one look does not prove clear."""
     points, n = paths.points, paths.points.shape[2]
     count = (table["radius"] if "radius" in table else table["length"]).shape[-1]
-    if "radius" in table and n * count <= FEW:
-        every, beside = np.divmod(np.arange(n * count), count)
-        return every, beside
-    if e.family:
-        # A machine for each particle.
-        width = 1
-    else:
-        # What follows each other is of one track only where tracks are long.
-        short = len(e.columns[0]) < WIDTH * e.recording.count and n * count <= PAIRS
-        width = n if n <= WIDTH or short or not e.sized else WIDTH
+    # What follows each other is of one track only where tracks are long.
+    short = len(e.columns[0]) < WIDTH * e.recording.count and n * count <= PAIRS
+    if not e.family and (n <= WIDTH or short or not e.sized):
+        return (_beside_rounds if "radius" in table else _beside_lines)(e, paths, table)
+    # Of a family a machine for each particle.
+    width = 1 if e.family else WIDTH
     blocks_ = -(-n // width)
     if blocks_ * width > n:
         points = np.concatenate([points, points[:, :, -1:].repeat(blocks_ * width - n, 2)], axis=2)
@@ -248,15 +243,10 @@ def _unproven(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints
     if np.ndim(limit):
         limit = np.append(limit, np.full(blocks_ * width - n, inf)).reshape(blocks_, width)
     cut = points.reshape(2, 4, blocks_, width)
-    single = blocks_ == 1 and not e.family
-    if single:
-        block, piece, chosen = np.zeros(count, dtype=np.int64), np.arange(count), table
-        own = cut
-    else:
-        block, piece = _near(e, paths, cut, table, count)
-        own = cut.take(block, axis=2)
-        limit = limit[block] if np.ndim(limit) else limit
-        chosen = _pick(table, piece, paths.owner[block] if e.family else None)
+    block, piece = _near(e, paths, cut, table, count)
+    own = cut.take(block, axis=2)
+    limit = limit[block] if np.ndim(limit) else limit
+    chosen = _pick(table, piece, paths.owner[block] if e.family else None)
     row = {
         name: values[..., None, :] if name in POINTS else values[..., None]
         for name, values in chosen.items()
@@ -267,36 +257,73 @@ def _unproven(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints
         if e.machine.pulley is not None and doubt.any():
             # The incoming belt ends on the pulley: beyond it that is what is near.
             belt = (piece == 0).nonzero()[0]
-            x, y = own if single else own.take(belt, axis=2)
+            x, y = own.take(belt, axis=2)
             start, tangent = row["start"][belt], row["tangent"][belt]
             foot = tangent[..., 0] * (x - start[..., 0]) + tangent[..., 1] * (y - start[..., 1])
             doubt[belt] &= foot.min(axis=0) < row["length"][belt]
     else:
-        # A first look by the ball about the beginning: how far the control points are from there.
-        x, y = points[:, 1:] - points[:, :1]
-        span = np.sqrt((x * x + y * y).max(axis=0)).reshape(blocks_, width)
-        span = span if single else span[block]
-        first, center = own[:, 0], row["center"]
-        x, y = first[0] - center[..., 0], first[1] - center[..., 1]
-        away, radius = x * x + y * y, row["radius"]
-        doubt = away < (radius + limit + span) ** 2
-        within = radius - limit - span
-        doubt &= (away > within * within) | (within <= 0.0)
+        doubt = _near_round(own, row, limit)
     pair, column = doubt.nonzero()
-    if single or not len(pair):
-        return column, piece[pair]
     interval, piece = block[pair] * width + column, piece[pair]
     inside = interval < n
     return interval[inside], piece[inside]
 
 
+def _near_round(points: Floats, piece: dict[str, Floats], limit: Any) -> Bools:
+    """Tell which paths have boxes that are not clear of circles."""
+    center, radius = np.moveaxis(piece["center"], -1, 0), piece["radius"]
+    low, high = points.min(axis=1) - center, points.max(axis=1) - center
+    x, y = np.maximum(np.maximum(low, -high), 0.0)
+    doubt = x * x + y * y < (radius + limit) ** 2
+    x, y = np.maximum(high, -low)
+    inner = radius - limit
+    doubt &= (x * x + y * y > inner * inner) | (inner <= 0.0)
+    return np.asarray(doubt)
+
+
+def _beside_rounds(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints, Ints]:
+    """Do as `_unproven` does, of all intervals beside all bent pieces at once."""
+    n, count = paths.points.shape[2], len(table["radius"])
+    if n * count <= FEW:
+        every, beside = np.divmod(np.arange(n * count), count)
+        return every, beside
+    row = {"center": table["center"][:, None], "radius": table["radius"][:, None]}
+    piece, interval = _near_round(paths.points[:, :, None], row, paths.limit).nonzero()
+    return interval, piece
+
+
+def _beside_lines(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints, Ints]:
+    """Do as `_unproven` does, of all intervals beside all straight pieces at once."""
+    start, tangent, limit = table["start"], table["tangent"], paths.limit
+    points, normal = paths.points.reshape(2, -1), tangent[:, ::-1] * _LEFT
+
+    def along(way: Floats) -> Floats:
+        """Return how far the control points are from the starts that way, (S, 4, n), m."""
+        found = (way @ points).reshape(len(way), 4, -1)
+        found -= (way * start).sum(axis=1)[:, None, None]
+        return found
+
+    aside = along(normal)
+    doubt = aside.min(axis=1) < limit
+    doubt &= aside.max(axis=1) > -limit
+    if np.count_nonzero(doubt):
+        foot, margin = along(tangent), np.maximum(limit, 0.0)
+        reach = table["length"][:, None] + margin
+        if e.machine.pulley is not None:
+            # The incoming belt ends on the pulley: beyond it that is what is near.
+            reach[0] -= margin
+        doubt &= foot.min(axis=1) < reach
+        doubt &= foot.max(axis=1) > -margin
+    piece, interval = doubt.nonzero()
+    return interval, piece
+
+
 def _there(
-    e: Evidence, paths: Paths, interval: Ints, piece: Ints, number: int
+    e: Evidence, paths: Paths, interval: Ints, piece: Ints, *, bent: bool
 ) -> tuple[Ints, Ints]:
     """Return those intervals beside pieces in which the pieces are there for some time."""
-    part = e.machine.segments if number == 0 else e.machine.arcs
-    gated = np.isfinite(part.appears) | np.isfinite(part.vanishes)
-    if not gated.any():
+    part = e.machine.arcs if bent else e.machine.segments
+    if not len(part.appears) or max(part.appears.max(), -part.vanishes.min()) == -inf:
         return interval, piece
     always = np.append(part.appears, -inf), np.append(part.vanishes, inf)
     row = np.minimum(piece, len(part.appears))
@@ -337,10 +364,13 @@ def _settled(
     points = paths.points.take(interval, axis=2)
     for halving in range(HALVINGS + 1):
         owner = paths.owner[interval] if len(paths.owner) else None
-        doubt = ~clear(points, _pick(table, piece, owner), _of(paths.limit, interval))
+        proven = clear(points, _pick(table, piece, owner), _of(paths.limit, interval))
+        doubt = (~proven).nonzero()[0]
+        if not len(doubt):
+            return []
         interval, piece, begin = interval[doubt], piece[doubt], begin[doubt]
-        points = points.compress(doubt, axis=2)
-        if not len(interval) or halving == HALVINGS:
+        points = points.take(doubt, axis=2)
+        if halving == HALVINGS:
             break
         a, b, c, d = np.moveaxis(points, 1, 0)
         ab, bc, cd = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + d)
@@ -351,7 +381,7 @@ def _settled(
         )
         size *= 0.5
         begin = np.concatenate([begin, begin + size])
-        interval, piece = np.tile(interval, 2), np.tile(piece, 2)
+        interval, piece = np.concatenate([interval] * 2), np.concatenate([piece] * 2)
     return _measured(e, paths, interval, piece + number, begin, size, points)
 
 
@@ -364,8 +394,6 @@ def _measured(
     Left are the parts of `size` (a share of the interval) that begin at shares (m,).
     """
     worst: dict[tuple[int, int, float], Hit] = {}
-    if not len(interval):
-        return []
     t_of, left = e.columns[0], paths.knots[interval]
     owners = np.searchsorted(e.recording.offsets, left, side="right") - 1
     machines = owners if e.family else np.zeros_like(owners)
@@ -447,7 +475,7 @@ def _turned(e: Evidence, paths: Paths, table: dict[str, Floats], number: int) ->
     owner = np.searchsorted(e.recording.offsets, paths.knots, side="right") - 1
     same = (owner[1:] == owner[:-1]).nonzero()[0]
     places, t = paths.points[:, 0].T, e.recording.knots["t"][paths.knots]
-    count = table["radius" if number else "length"].shape[-1]
+    count = table["radius" if "radius" in table else "length"].shape[-1]
     for who in np.unique(owner[same]).tolist():
         own = same[owner[same] == who]
         for k in range(number, number + count):

@@ -13,7 +13,7 @@ import numpy as np
 
 from chutelab.machine import Machine
 from chutelab.results.ledger import ledger
-from chutelab.results.recording import Recording, balance
+from chutelab.results.recording import Recording
 from chutelab.results.surfaces import Bow, Piece, pieces
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -56,6 +56,15 @@ def _most(value: Any) -> float:
     return value if isinstance(value, float) else float(np.max(value))
 
 
+def _size(values: Floats) -> float:
+    """Return the largest size of some numbers; 0 of none."""
+    return float(np.abs(values).max()) if values.size else 0.0
+
+
+def _of(value: Any, which: Any) -> Any:
+    return value if np.ndim(value) == 0 else value[which]
+
+
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """One run: the scene, resolved, and what an engine made of it."""
@@ -82,9 +91,16 @@ class Evidence:
     def columns(self) -> Floats:
         """The numbers of all knots, each in a row, (9, K), in the order of `KNOT`."""
         knots = self.recording.knots
-        return np.ascontiguousarray(knots.view(np.float64).reshape(len(knots), -1).T)
+        if not len(knots):
+            return np.empty((9, 0))
+        return np.frombuffer(knots, np.float64).reshape(len(knots), -1).T.copy()
 
     @cached_property
+    def sizes(self) -> Floats:
+        """Largest size of each number of a knot, (9,); NaN if one is. Of one knot or more."""
+        return np.asarray(np.maximum(self.columns.max(axis=1), -self.columns.min(axis=1)))
+
+    @property
     def alike(self) -> bool:
         """Whether all is left to Chipmunk, in steps that are all alike."""
         m = self.machine
@@ -155,14 +171,16 @@ class Evidence:
     def speed(self) -> float:
         """Largest speed of anything that moves, belts included, m/s."""
         m = self.machine
-        moving = 0.0
-        for part in (m.segments, m.arcs, m.pulley):
-            if part is not None and np.size(part.speed):
-                moving = max(moving, np.abs(part.speed).max())
+        belts = [_size(m.segments.speed), _size(m.arcs.speed)]
+        if m.pulley is not None:
+            belts.append(_most(np.abs(m.pulley.speed)))
+        return max(*belts, sqrt(_size(self.paces)))
+
+    @cached_property
+    def paces(self) -> Floats:
+        """Square of the speed at each knot, (K,), m²/s²."""
         vx, vy = self.columns[3:5]
-        if len(vx):
-            moving = max(moving, sqrt((vx * vx + vy * vy).max()))
-        return float(moving)
+        return np.asarray(vx * vx + vy * vy)
 
     @cached_property
     def length(self) -> float:
@@ -170,48 +188,57 @@ class Evidence:
 
         The clock's own rounding moves a particle: half an ulp of t, times its speed.
         """
-        m, path = self.machine, self.columns[:3]
-        size = self.radius
-        if m.segments.length.size:
-            size = max(size, np.abs(m.segments.start).max() + m.segments.length.max())
+        m = self.machine
+        size = max(self.radius, _size(m.segments.start) + _size(m.segments.length))
         if m.arcs.radius.size:
-            size = max(size, np.abs(m.arcs.center).max() + m.arcs.radius.max() + self.radius)
+            size = max(size, _size(m.arcs.center) + _size(m.arcs.radius) + self.radius)
         if m.pulley is not None:
             size = max(size, _most(m.pulley.radius) + self.radius)
-        if path.size:
-            t, x, y = np.maximum(path.max(axis=1), -path.min(axis=1)).tolist()
+        if self.columns.size:
+            t, x, y = self.sizes[:3].tolist()
             size = max(size, x, y, self.speed * t)
-        return float(size)
+        return size
 
     @cached_property
     def energies(self) -> tuple[Floats, Floats]:
         """Kinetic and potential energy at each knot, (K,), J."""
-        body, (y, vx, vy, omega) = self.recording.particle, self.columns[2:6]
-        g: Any = self.machine.gravity
-        if np.ndim(g) or any(np.ndim(value) for value in vars(body).values()):
+        body, g = self.recording.particle, self.machine.gravity
+        mass: Any = body.mass
+        inertia: Any = body.inertia
+        if np.ndim(g) or np.ndim(mass) or np.ndim(inertia):
             owner = self.recording.owner
-            body, g = body.of(owner), g[owner] if np.ndim(g) else g
-        return body.kinetic(vx, vy, omega), body.mass * g * y
+            mass, inertia, g = (_of(value, owner) for value in (mass, inertia, g))
+        kinetic = 0.5 * mass * self.paces
+        omega = self.columns[5]
+        kinetic += 0.5 * inertia * (omega * omega)
+        return kinetic, mass * g * self.columns[2]
 
     @cached_property
     def gain(self) -> Floats:
         """Energy at each knot, less what the books say it got, (K,), J: what is unexplained."""
         kinetic, potential = self.energies
-        return kinetic + potential - balance(self.columns[6:].T)
+        belt, restitution, friction = self.columns[6:]
+        gain = kinetic + potential
+        booked = belt - restitution
+        booked -= friction
+        gain -= booked
+        return gain
 
     @cached_property
     def within(self) -> Bools:
         """Tell after which knots another one of the same particle comes, (K - 1,)."""
-        same = np.ones(len(self.recording.knots), dtype=bool)
-        same[self.ends[1]] = False
-        return same[:-1]
+        same = np.ones(len(self.recording.knots) - 1, dtype=bool)
+        same[self.ends[0][1:] - 1] = False
+        return same
 
     @cached_property
     def ends(self) -> tuple[Ints, Ints]:
         """First and last knot of each particle that was released, (n,)."""
         first, beyond = self.recording.offsets[:-1], self.recording.offsets[1:]
         there = beyond > first
-        return first[there], beyond[there] - 1
+        if not there.all():
+            first, beyond = first[there], beyond[there]
+        return first, beyond - 1
 
     @cached_property
     def energy(self) -> float:
@@ -222,7 +249,11 @@ class Evidence:
         if self.crowd or not len(self.recording.knots):
             return ledger(self.recording).turned_over
         kinetic, potential = self.energies
-        height = kinetic + np.abs(potential) + np.abs(self.columns[6:]).sum(axis=0)
+        height = np.abs(potential)
+        height += kinetic
+        size = np.empty_like(height)
+        for entries in self.columns[6:]:
+            height += np.abs(entries, out=size)
         return float(np.maximum.reduceat(height, self.ends[0]).sum())
 
     @cached_property
@@ -249,13 +280,14 @@ class Evidence:
         """Energy that parting overlaps may give, J: no more than lifts all by how deep they were.
 
         Of lone particles a knot in contact holds the mean velocity of a step, half a step's pull
-        off its books.
+        off its books: that of the weight along the way, and across it that of an arc's inside.
         """
         if self.dt is None:
             return 0.0
         if not self.crowd:
             heaviest = float(self.masses.max())
-            return self.speed * self.gravity * self.dt * heaviest
+            across = 0.5 * (0.5 * self.bent * self.dt) ** 2
+            return heaviest * (self.speed * self.gravity * self.dt + across)
         allowed = float(self.masses.sum()) * self.gravity * self.late
         if self.alike:
             # The pymunk engine leaves out touches that move a track by less than `ROUGH` of the
@@ -265,7 +297,7 @@ class Evidence:
             allowed += 2.0 * float(self.masses.max()) * self.speed * off
         return allowed
 
-    @cached_property
+    @property
     def rounding(self) -> float:
         """What rounding may do to a length, m."""
         return ROUNDINGS * EPS * self.length
@@ -280,11 +312,11 @@ class Evidence:
         """Its bent pieces, the drive pulley among them."""
         return [piece for piece in self.pieces if isinstance(piece, Bow)]
 
-    @cached_property
+    @property
     def arcs(self) -> float:
         """How far a curve between two knots may leave the way along an arc or round an end, m."""
         m = self.machine
-        bent = float(m.arcs.radius.max(initial=0.0))
+        bent = _size(m.arcs.radius)
         if m.pulley is not None:
             bent = max(bent, _most(m.pulley.radius))
         return ON_ARCS * (self.radius + bent)
@@ -319,10 +351,13 @@ class Evidence:
 
     @cached_property
     def bent(self) -> float:
-        """Largest acceleration towards the centre of an arc that somebody moves along inside, m/s².
+        """Largest acceleration towards the centre of an arc that one moves along inside, m/s².
 
         Outside it is never more than gravity's: what is faster leaves.
         """
+        if not self.machine.arcs.radius.size:
+            # No particle is inside the drive pulley.
+            return 0.0
         found, places = 0.0, self.recording.knots["position"]
         radii = self.radii[self.recording.owner]
         for bow in self.bows:
@@ -330,10 +365,10 @@ class Evidence:
             off = np.abs(bow.beside(places) + radii)
             along = (inner > 0.0) & (off < 0.1 * radii) & bow.within(places, 0.0)
             if along.any():
-                found = max(found, self.speed**2 / float(inner[along].min()))
+                found = max(found, float((self.paces[along] / inner[along]).max()))
         return found
 
-    @cached_property
+    @property
     def late(self) -> float:
         """How far beyond a surface a step may take a disk, m; 0 for the exact engine.
 

@@ -137,14 +137,12 @@ def _round(e: Evidence) -> bool:
 
 
 def _unreal(e: Evidence) -> Broken | None:
-    knots, events = e.recording.knots, e.recording.events
-    numbers = knots.view(np.float64).reshape(len(knots), -1)
-    rest = events.view(_NUMBERS)
-    parts = numbers, e.recording.by_surface, rest["t"], rest["rest"]
-    if all(np.isfinite(part).all() for part in parts):
+    events = e.recording.events.view(_NUMBERS)
+    parts = e.recording.by_surface, events["t"], events["rest"]
+    if all(np.isfinite(part).all() for part in (e.sizes, *parts)):
         return None
-    bad = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
-    count = float(sum((~np.isfinite(part)).sum() for part in parts))
+    bad = np.flatnonzero(~np.isfinite(e.columns).all(axis=0))
+    count = float(sum((~np.isfinite(part)).sum() for part in (e.columns, *parts)))
     if len(bad):
         return _told(e, FINITE, bad, count, 0.0, "")
     return _of_all(e, FINITE, "", count, 0.0)
@@ -186,17 +184,17 @@ def _books(e: Evidence) -> Iterator[Broken]:
         if len(rows):
             yield _told(e, LOSSES, rows + 1, back[rows].min(), -most)
     total = recording.by_surface[..., 1:]
-    if total.min(initial=0.0) < -bound:
+    if total.min(initial=0.0) < -most:
         low = total.reshape(-1, *total.shape[-2:]).min(axis=(0, 2))
         name = recording.surfaces[int(low.argmin())]
-        yield _of_all(e, LOSSES, name, low.min(), -bound)
+        yield _of_all(e, LOSSES, name, low.min(), -most)
     first, last = e.ends
     residual = float((gain[last] - gain[first]).sum())
     if abs(residual) > bound:
         yield _of_all(e, LEDGER, "", abs(residual), bound)
     if not e.crowd:
         rises = gain[1:] - gain[:-1]
-        if np.abs(rises).max(initial=0.0) > most:
+        if len(rises) and max(rises.max(), -rises.min()) > most:
             rises = np.abs(np.where(within, rises, 0.0))
             rows = (rises > most).nonzero()[0]
             if len(rows):

@@ -118,8 +118,8 @@ def _envelope(recording: Recording, own: Ints, end: Floats, places: int) -> Enve
     for s in range(places):
         # A path passes where it goes from behind the cut to before it; of several times that one
         # counts that is nearest to the way's.
-        away = paths - middle[s]
-        along, left = away @ tangent[s], away @ normal[s]
+        along = paths @ tangent[s]
+        along -= middle[s] @ tangent[s]
         passes = (along[:-1] <= 0.0) & (along[1:] > 0.0)
         late = np.where(passes, np.abs(since[:-1] - clock[s])[:, None], np.inf)
         row, column = late.argmin(axis=0), np.arange(len(own))
@@ -127,10 +127,10 @@ def _envelope(recording: Recording, own: Ints, end: Floats, places: int) -> Enve
         row, column = row[through], column[through]
         if not 2 * len(row) >= len(own):
             continue
-        ahead, behind = along[row + 1, column], along[row, column]
-        share = -behind / (ahead - behind)
-        crossed = left[row, column] + share * (left[row + 1, column] - left[row, column])
-        offset[:, s] = np.quantile(crossed, QUANTILES)
+        last, next_ = along[row, column], along[row + 1, column]
+        share = (-last / (next_ - last))[:, None]
+        crossed = paths[row, column] * (1.0 - share) + paths[row + 1, column] * share - middle[s]
+        offset[:, s] = np.quantile(crossed @ normal[s], QUANTILES)
     found = Envelope(middle, normal, offset)
     jumps = np.hypot(*np.moveaxis(np.diff(found.lines, axis=1), 2, 0)).max(axis=0)
     # Where half of the particles come to lie, the way turns round, and cuts go through the rest.

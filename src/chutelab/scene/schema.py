@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from math import hypot, sqrt
 from typing import Annotated, Any, Final, Self
 
@@ -196,8 +195,14 @@ class Scene(Table):
             names = frozenset(pair.between)
             pairs[names] = told | pairs.get(names, {})
 
-        @cache
+        known: dict[tuple[int, int | str], tuple[float, float]] = {}
+
         def met(kind: int, other: int | str) -> tuple[float, float]:
+            if (kind, other) not in known:
+                known[kind, other] = found(kind, other)
+            return known[kind, other]
+
+        def found(kind: int, other: int | str) -> tuple[float, float]:
             particle = self.particles[kind]
             with_it: str | None
             if isinstance(other, str):

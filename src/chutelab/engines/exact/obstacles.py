@@ -299,7 +299,7 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     size = size_of(corners, bends, machine.releases.position)
     touch = touch_of(size, far)
     near = JOINT * size
-    widest = touch if corners.shape[-1] > 1 else touch.max()
+    widest = touch if touch.shape[-1] == corners.shape[-1] else touch.max()
     on = beginnings(machine, bends, corners[..., :1], near[:1])
     if on:
         return obstacles(_cut(machine, corners, list(on), near[0].item()), far)
@@ -513,20 +513,22 @@ def beginnings(
     incoming belt carries comes to nothing that begins on it.
     """
     pieces, segments = ends.shape[1] // 2, len(machine.segments.surface)
-    own = np.arange(segments)
     found: dict[tuple[int, int], Bools] = {}
     starts, stops = ends[:, :segments], ends[:, pieces : pieces + segments]
+    low, high, least, most = np.minimum(starts, stops), np.maximum(starts, stops), ends, ends
+    if ends.shape[-1] > 1:
+        low, high = low.min(axis=-1)[:, :, None], high.max(axis=-1)[:, :, None]
+        least, most = ends.min(axis=-1), ends.max(axis=-1)
     reach = near.max()
-    low = np.minimum(starts, stops).min(axis=-1)[:, :, None] - reach
-    high = np.maximum(starts, stops).max(axis=-1)[:, :, None] + reach
-    least, most = (ends, ends) if ends.shape[-1] == 1 else (ends.min(axis=-1), ends.max(axis=-1))
-    inside = (most.reshape(2, 1, -1) >= low) & (least.reshape(2, 1, -1) <= high)
+    inside = (most.reshape(2, 1, -1) >= low - reach) & (least.reshape(2, 1, -1) <= high + reach)
     inside = inside[0] & inside[1]
+    # Most have none but their own two ends inside.
+    if np.count_nonzero(inside) == 2 * segments:
+        return found
+    own = np.arange(segments)
     inside[own, own] = inside[own, pieces + own] = False
     if machine.pulley is not None:
         inside[0] = False
-    if not np.count_nonzero(inside):
-        return found
     ahead = ahead_of(machine, bends)[..., : ends.shape[-1]]
     for s, end in zip(*(number.tolist() for number in inside.nonzero()), strict=True):
         away, tangent, outward = ends[:, end] - starts[:, s], ahead[:, pieces + s], ahead[:, end]

@@ -205,7 +205,9 @@ class Bend(Face):
             sides = [side if away.dot(side) >= 0.0 else -side for side in sides]
             ahead = min(falls(away.dot(n), v.dot(n), path.pull(n)) for n in sides)
             # Past the line, or it might take itself to be on either side of it.
-            return ahead + CREEP * self.radius / max(v.length, sqrt(path.most * self.radius))
+            pace = max(v.length, sqrt(path.most * self.radius))
+            # What lies still where nothing pulls never gets there.
+            return ahead + CREEP * self.radius / pace if pace else inf
         if not (hollow := self.hollow(x)):
             return falls(gap, rate, pull)
         rho, c = 1.0 / hollow, away.length

@@ -462,15 +462,19 @@ def bounds(
     """
     found = np.zeros((2, len(rows)), dtype=BOUND)
     found["angle"], found["obstacle"] = WAYS * np.inf, NONE
+    # As far as places are sure, over the radius: by so much a gap of zero may be passed already.
+    rounding = rows_of(obstacles.touch, rows) / np.abs(rho)
 
     def narrow(
         angle: Floats, closing: Floats, met: Bools, obstacle: Ints | int, side: Floats | int,
         handover: bool = False, joint: int = NONE,
     ) -> None:  # fmt: skip
         """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
-        ahead = np.maximum(np.mod(WAYS * (angle - phi) + NOW, 2.0 * np.pi) - NOW, 0.0)
+        rate = WAYS * closing
+        now = NOW + rounding / np.maximum(rate, GRAZING)
+        ahead = np.maximum(np.mod(WAYS * (angle - phi) + now, 2.0 * np.pi) - now, 0.0)
         place = phi + WAYS * ahead
-        nearer = met & (WAYS * closing > GRAZING) & (WAYS * (place - found["angle"]) < 0.0)
+        nearer = met & (rate > GRAZING) & (WAYS * (place - found["angle"]) < 0.0)
         np.copyto(found["angle"], place, where=nearer)
         np.copyto(found["obstacle"], obstacle, where=nearer)
         np.copyto(found["side"], side, where=nearer)

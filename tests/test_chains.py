@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import cos, sin
-from time import process_time
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from chutelab.engines import contact, exact
 from chutelab.machine import build
 from chutelab.results.recorder import StalledError
 from chutelab.scene import from_dict
-from judge import faults
+from judge import faults, turn_in_a_step
 
 MANY = 3000
 
@@ -37,11 +36,17 @@ TILTS = (1e-5, -1e-5, 1e-4, -1e-4)
 NEAR = 2e-5
 """m that contact may be off by, at any step."""
 
+TURN = 0.01
+"""rad by which the way may turn in a step for contact to be held against exact at last."""
+
+FINEST = 4096
+"""Largest share of its step that contact is run with."""
+
 PLACES = 600
 """Times at which two runs are compared."""
 
-LONGEST = 5.0
-"""s of processor time that a run of the exact engine may take."""
+LONGEST = 50_000
+"""Rounds that a run of the exact engine may take."""
 
 
 def judged(run, seeds):
@@ -54,12 +59,14 @@ def judged(run, seeds):
 
 
 def in_time(machine):
-    """Run with the exact engine, for so long at most: a run of it that takes longer hangs."""
-    began = process_time()
+    """Run with the exact engine, for so many rounds at most: a run of it that takes more hangs."""
+    rounds = 0
 
     def looked_at(share):
-        if process_time() - began > LONGEST:
-            raise TimeoutError(f"{share:.1%} of the run in {LONGEST} s")
+        nonlocal rounds
+        rounds += 1
+        if rounds > LONGEST:
+            raise TimeoutError(f"{share:.1%} of the run in {LONGEST} rounds")
 
     return exact.run(machine, looked_at)
 
@@ -88,21 +95,23 @@ def apart(one, other, times):
     return np.nan_to_num(np.hypot(*off.T))
 
 
-def disagreements(machine, followed, finish):
+def disagreements(machine, drawn, followed, finish):
     """Return how far contact is from exact at finer and finer steps, m, up to a time; [] if sound.
 
     It falls below `NEAR`, or by the first order at least: to an eighth and a hundredth of the
-    radius, or by as much as the step. As blows that a step takes for rest come one by one, and
-    tight arcs are turned through in a step, that may come late.
+    radius, or by as much as the step. As blows that a step takes for rest come one by one, that may
+    come late; where a tight arc is turned through in a step, as late as `TURN` asks for.
     """
-    times, errors = np.linspace(0.0, finish, PLACES), []
-    for finer in (1, 4, 16, 64):
+    times, errors, finer = np.linspace(0.0, finish, PLACES), [], 1
+    while True:
         stepped = contact.run(replace(machine, dt=machine.dt / finer))
         errors.append(float(apart(followed, stepped, times).max()))
         least = min(errors[0] / 8.0, 0.01 * machine.particle.radius)
         if errors[-1] <= max(NEAR, least, 2.0 * errors[0] / finer if finer > 1 else 0.0):
             return []
-    return errors
+        if finer >= FINEST or (finer >= 64 and turn_in_a_step(stepped, drawn) < TURN):
+            return errors
+        finer *= 4
 
 
 def verdict(seed):
@@ -125,7 +134,7 @@ def verdict(seed):
     times = np.linspace(0.0, drawn["run"]["until"], PLACES)
     parted = times[apart(followed, beside, times) > FAR]
     finish = parted[0] if len(parted) else times[-1]
-    if errors := disagreements(machine, followed, finish):
+    if errors := disagreements(machine, drawn, followed, finish):
         times = np.linspace(0.0, finish, PLACES)
         for angle in TILTS:
             off = apart(followed, in_time(turned(machine, angle)), times).max()
@@ -228,8 +237,8 @@ def test_the_comparison_sees_another_machine():
     """Contact on a machine that is not quite the one that was followed exactly."""
     machine = build(from_dict(WALL))
     followed = exact.run(machine)
-    assert disagreements(machine, followed, 1.5) == []
+    assert disagreements(machine, WALL, followed, 1.5) == []
     wall = machine.segments
     moved = replace(wall, start=np.add(wall.start, [[1e-4, 0.0], [0.0, 0.0]]))
-    errors = disagreements(replace(machine, segments=moved), followed, 1.5)
+    errors = disagreements(replace(machine, segments=moved), WALL, followed, 1.5)
     assert errors == pytest.approx([1.5e-4] * 4, rel=1e-6)

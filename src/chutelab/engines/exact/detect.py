@@ -121,7 +121,12 @@ def first_circle(
     gap[3] = dot(v, a)
     gap[4] = 0.25 * dot(a, a)
     gap *= sense
-    leaving = motion.left[index] == circle + obstacles.segments
+    left = motion.left[index] - obstacles.segments
+    leaving = left == circle
+    if obstacles.arcs > 1:
+        # Arcs that lie on each other are left together.
+        alike = obstacles.joints.alike
+        leaving |= (left >= 0) & (alike[np.maximum(left, 0)] == alike[circle])
     if motion.past is not None:
         leaving |= motion.left[index] == obstacles.back(circle)
     if motion.joint is not None:

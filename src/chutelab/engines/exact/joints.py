@@ -247,6 +247,15 @@ class Joints:
         return np.array(rows, dtype=np.int64).reshape(len(found), most).T
 
     @cached_property
+    def alike(self) -> Ints:
+        """Return a number for each circle that those with its centre and radius share, (C,)."""
+        o = self._o
+        shape = np.concatenate([o.center, o.rho[None]])
+        shape = np.round(np.nan_to_num(shape) / (4.0 * o.touch.max()))
+        rows = shape.swapaxes(0, 1).reshape(len(o.rho), -1)
+        return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1))
+
+    @cached_property
     def owns(self) -> Bools:
         """Tell of which segments a circle is an end, (C, S)."""
         o = self._o

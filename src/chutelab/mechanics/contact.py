@@ -133,8 +133,8 @@ LEFT_OUT = 1e-16
 """Share of the angle (rad), of the speeds and of the load that the last terms of a step may be."""
 
 CURVE = 0.9e-9
-"""Share of the radius by which the cubic Hermite curve between two knots may leave the way, as seen at
-three times of a step: 1e-9 everywhere."""
+"""Share of the radius by which the cubic Hermite curve between two knots may leave the way: 1e-9,
+less what is missed by looking at three times of a step."""
 
 STEP_ANGLE = (384.0 * CURVE) ** 0.25
 """rad between knots at constant speed: there the curve is off by ρ Δφ⁴/384."""

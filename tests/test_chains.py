@@ -168,18 +168,17 @@ ANSWERS = {"sound", "chaotic", "sensitive"}
 
 
 def test_exact_engine_on_chains_and_bowls():
-    found = {seed: verdict(seed) for seed in (0, 12, 24, 36)}
+    found = {seed: verdict(seed) for seed in range(60)}
     assert {seed: said for seed, said in found.items() if said[0] not in ANSWERS} == {}
 
 
-def test_exact_and_contact_in_a_bowl_hardly_wider_than_the_disk():
-    """It turns by 40° on a way of 1.4 mm at 3 m/s: contact needs steps of 4 µs to see that.
+def test_exact_engine_in_a_bowl_hardly_wider_than_the_disk():
+    """It turns by 40° on a path of 1.4 mm radius at 3 m/s: contact needs steps of 4 µs for that.
 
     Without friction all is known: it slides down p2 and p3, flies off their end, meets p4 where its
     centre is R - r from that of the arc, keeps what it has along it, and leaves at its end.
     """
     drawn = tables(48)
-    assert verdict(48)[0] in ANSWERS
     r, g, rows = drawn["particle"]["radius"], drawn["gravity"], drawn["surface"]
     top, joint, end = (np.array(p) for p in (rows[2]["from"], rows[2]["to"], rows[3]["to"]))
     down, along = ((b - a) / np.hypot(*(b - a)) for a, b in ((top, joint), (joint, end)))

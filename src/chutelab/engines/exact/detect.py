@@ -434,7 +434,7 @@ def _faces(
 
 
 NOW = 1e-12
-"""rad; an obstacle this close to the present angle is met now."""
+"""rad; so far the angle of a joint is sure, as ends within `obstacles.JOINT` are one."""
 
 GRAZING = 1e-9
 """Sine of the angle between path and surface below which a ride only touches, and goes on."""
@@ -467,7 +467,6 @@ def bounds(
     """
     found = np.zeros((2, len(rows)), dtype=BOUND)
     found["angle"], found["obstacle"] = WAYS * np.inf, NONE
-    # As far as places are sure, over the radius: by so much a gap of zero may be passed already.
     rounding = rows_of(obstacles.touch, rows) / np.abs(rho)
 
     def narrow(
@@ -476,7 +475,9 @@ def bounds(
     ) -> None:  # fmt: skip
         """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
         rate = WAYS * closing
-        now = NOW + rounding / np.maximum(rate, GRAZING)
+        # Over so small an angle x a gap, x rate + x²/2 over the radius, is rounding: it is here.
+        steep = np.maximum(rate, 0.0)
+        now = NOW + 2.0 * rounding / (steep + np.sqrt(steep**2 + 2.0 * rounding))
         ahead = np.maximum(np.mod(WAYS * (angle - phi) + now, 2.0 * np.pi) - now, 0.0)
         place = phi + WAYS * ahead
         nearer = met & (rate > GRAZING) & (WAYS * (place - found["angle"]) < 0.0)

@@ -28,11 +28,20 @@ UNSOUND = {
 }
 """Seeds on which the contact engine breaks a law, and why."""
 
+APART = {
+    1532: "contact loses 4 % of its speed at a joint that is typed 84 nm off, more at finer steps",
+    1690: "where a face at rest goes on from an arc that drives it, contact holds it at the joint,"
+    " though friction cannot: 2.4 of the load is less than tan 70°",
+    1727: "with 20 µm of room contact gains speed at a joint that is typed microns off",
+}
+"""Seeds on which the contact engine converges to something else than the exact one, and why."""
+
 NUDGE, FAR = 1e-9, 1e-6
 """m/s by which a run is disturbed, and m: what it is off by then is chaos."""
 
-TILTS = (1e-5, -1e-5, 1e-4, -1e-4)
-"""rad by which a scene is turned with which contact does not agree."""
+TILTS = (1e-5, -1e-5)
+"""rad by which a scene is turned with which contact does not agree: it leaves arcs up to 6e-6 rad
+before their ends, and what comes down on an end again grazes it or not."""
 
 NEAR = 2e-5
 """m that contact may be off by, at any step."""
@@ -213,13 +222,25 @@ def test_exact_engine_in_a_bowl_hardly_wider_than_the_disk():
 
 @pytest.mark.slow
 def test_exact_engine_on_thousands():
-    """Nothing wrong, 1 in 300 refused, and 1 in 50 that cannot be compared, at most."""
-    found = {seed: verdict(seed) for seed in range(MANY)}
+    """Nothing wrong, 1 in 300 refused, and 1 in 100 that cannot be compared, at most."""
+    found = {seed: verdict(seed) for seed in range(MANY) if seed not in APART}
     assert {seed: said for seed, said in found.items() if said[0] == "wrong"} == {}
     refused = {seed: said for seed, said in found.items() if said[0] == "refused"}
     assert len(refused) <= MANY / 300, refused
     apart = {seed: said for seed, said in found.items() if said[0] in ("chaotic", "sensitive")}
-    assert len(apart) <= MANY / 50, apart
+    assert len(apart) <= MANY / 100, apart
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(seed, marks=pytest.mark.xfail(strict=True, reason=reason))
+        for seed, reason in APART.items()
+    ],
+)
+def test_exact_and_contact_where_contact_is_off(seed):
+    assert verdict(seed)[0] in ANSWERS
 
 
 WALL = {

@@ -436,10 +436,6 @@ def _faces(
 NOW = 1e-12
 """rad; so far the angle of a joint is sure, as ends within `obstacles.JOINT` are one."""
 
-GRAZING = 1e-9
-"""Sine of the angle between path and surface below which a ride only touches, and goes on."""
-
-
 WAYS = np.array([[-1.0], [1.0]])
 """Backwards and forwards, as rows of what `bounds` returns."""
 
@@ -480,7 +476,7 @@ def bounds(
         now = NOW + 2.0 * rounding / (steep + np.sqrt(steep**2 + 2.0 * rounding))
         ahead = np.maximum(np.mod(WAYS * (angle - phi) + now, 2.0 * np.pi) - now, 0.0)
         place = phi + WAYS * ahead
-        nearer = met & (rate > GRAZING) & (WAYS * (place - found["angle"]) < 0.0)
+        nearer = met & (rate > 0.0) & (WAYS * (place - found["angle"]) < 0.0)
         np.copyto(found["angle"], place, where=nearer)
         np.copyto(found["obstacle"], obstacle, where=nearer)
         np.copyto(found["side"], side, where=nearer)
@@ -498,7 +494,8 @@ def bounds(
             tilt = np.arctan2(face * normal[0], face * normal[1])
             level = (face * dot(start - center, normal) + radius) / rho
             half = np.arccos(np.clip(level, -1.0, 1.0))
-            met = (np.abs(level) <= 1.0) & ~joints.beside[circle, segment, n]
+            # A ride that only touches goes on.
+            met = (np.abs(level) < 1.0) & ~joints.beside[circle, segment, n]
             met &= obstacles.present[epoch, segment]
             for angle in (tilt - half, tilt + half):
                 foot = dot(center + rho * _up(angle) - start, tangent)

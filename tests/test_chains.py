@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, sin
-from time import process_time
+from math import cos, radians, sin
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from chains import draw, tables
 from chutelab.engines import contact, exact
@@ -28,20 +28,35 @@ UNSOUND = {
 }
 """Seeds on which the contact engine breaks a law, and why."""
 
+APART = {
+    **dict.fromkeys(
+        (797, 1532, 1727),
+        "where a joint is typed a part of a micron off, contact leaves it faster or slower, the"
+        " more so the finer its steps",
+    ),
+    1690: "where a face at rest goes on from an arc that drives it, contact holds it at the joint,"
+    " though friction cannot: 2.4 of the load is less than tan 70°",
+}
+"""Seeds on which the contact engine does not come to be where the exact one is, and why."""
+
 NUDGE, FAR = 1e-9, 1e-6
 """m/s by which a run is disturbed, and m: what it is off by then is chaos."""
 
-TILTS = (1e-5, -1e-5, 1e-4, -1e-4)
-"""rad by which a scene is turned with which contact does not agree."""
+TILTS = (1e-5, -1e-5)
+"""rad by which a scene is turned with which contact does not agree: it leaves arcs up to 6e-6 rad
+before their ends, and what comes down on an end again grazes it or not."""
 
 NEAR = 2e-5
 """m that contact may be off by, at any step."""
 
+FINEST = 4096
+"""Part of its step that contact is run with at last, where it does not agree before."""
+
 PLACES = 600
 """Times at which two runs are compared."""
 
-LONGEST = 5.0
-"""s of processor time that a run of the exact engine may take."""
+LONGEST = 50_000
+"""Rounds that a run of the exact engine may take."""
 
 
 def judged(run, seeds):
@@ -54,12 +69,14 @@ def judged(run, seeds):
 
 
 def in_time(machine):
-    """Run with the exact engine, for so long at most: a run of it that takes longer hangs."""
-    began = process_time()
+    """Run with the exact engine, for so many rounds at most: a run of it that takes more hangs."""
+    rounds = 0
 
     def looked_at(share):
-        if process_time() - began > LONGEST:
-            raise TimeoutError(f"{share:.1%} of the run in {LONGEST} s")
+        nonlocal rounds
+        rounds += 1
+        if rounds > LONGEST:
+            raise TimeoutError(f"{share:.1%} of the run in {LONGEST} rounds")
 
     return exact.run(machine, looked_at)
 
@@ -92,17 +109,19 @@ def disagreements(machine, followed, finish):
     """Return how far contact is from exact at finer and finer steps, m, up to a time; [] if sound.
 
     It falls below `NEAR`, or by the first order at least: to an eighth and a hundredth of the
-    radius, or by as much as the step. As blows that a step takes for rest come one by one, and
-    tight arcs are turned through in a step, that may come late.
+    radius, or by as much as the step. As blows that a step takes for rest come one by one, that may
+    come late, and so where a tight arc is turned through in a step, or an end is grazed.
     """
-    times, errors = np.linspace(0.0, finish, PLACES), []
-    for finer in (1, 4, 16, 64):
+    times, errors, finer = np.linspace(0.0, finish, PLACES), [], 1
+    while True:
         stepped = contact.run(replace(machine, dt=machine.dt / finer))
         errors.append(float(apart(followed, stepped, times).max()))
         least = min(errors[0] / 8.0, 0.01 * machine.particle.radius)
         if errors[-1] <= max(NEAR, least, 2.0 * errors[0] / finer if finer > 1 else 0.0):
             return []
-    return errors
+        if finer == FINEST:
+            return errors
+        finer *= 4
 
 
 def verdict(seed):
@@ -161,24 +180,70 @@ ANSWERS = {"sound", "chaotic", "sensitive"}
 
 
 def test_exact_engine_on_chains_and_bowls():
-    found = {seed: verdict(seed) for seed in (0, 12, 24, 36)}
+    found = {seed: verdict(seed) for seed in range(60)}
     assert {seed: said for seed, said in found.items() if said[0] not in ANSWERS} == {}
 
 
-@pytest.mark.xfail(strict=True, reason="contact is up to 6 mm off at all steps, in a tight bowl")
-def test_exact_and_contact_in_a_bowl_hardly_wider_than_the_disk():
-    assert verdict(48)[0] in ANSWERS
+def test_exact_engine_in_a_bowl_hardly_wider_than_the_disk():
+    """It turns by 40° on a path of 1.4 mm radius at 3 m/s: contact needs steps of 4 µs for that.
+
+    Without friction all is known: it slides down p2 and p3, flies off their end, meets p4 where its
+    centre is R - r from that of the arc, keeps what it has along it, and leaves at its end.
+    """
+    drawn = tables(48)
+    r, g, rows = drawn["particle"]["radius"], drawn["gravity"], drawn["surface"]
+    top, joint, end = (np.array(p) for p in (rows[2]["from"], rows[2]["to"], rows[3]["to"]))
+    down, along = ((b - a) / np.hypot(*(b - a)) for a, b in ((top, joint), (joint, end)))
+    assert abs(down[0] * along[1] - down[1] * along[0]) < 1e-6
+    normal, start = np.array([-down[1], down[0]]), np.array(drawn["stream"]["at"])
+    drop = ((start - top) @ normal - r) / normal[1]
+    held = (2.0 * g * drop) ** 0.5 * -down[1]
+    at = end + r * np.array([-along[1], along[0]])
+    velocity = (held**2 + 2.0 * g * (start[1] - drop - at[1])) ** 0.5 * along
+    center, path = np.array(rows[4]["center"]), rows[4]["radius"] - r
+
+    def fallen(t):
+        return at + velocity * t - [0.0, 0.5 * g * t * t]
+
+    times = np.linspace(0.0, 2e-3, 21)
+    outside = [np.hypot(*(fallen(t) - center)) > path for t in times]
+    first = outside.index(True, outside.index(False))
+    t = brentq(
+        lambda t: np.hypot(*(fallen(t) - center)) - path, times[first - 1], times[first], xtol=1e-16
+    )
+    met, fast = fallen(t), velocity - [0.0, g * t]
+    away = (met - center) / path
+    rim = radians(rows[4]["to_deg"])
+    last = center + path * np.array([cos(rim), sin(rim)])
+    pace = (fast[1] * away[0] - fast[0] * away[1]) ** 2 + 2.0 * g * (met[1] - last[1])
+    track = exact.run(build(draw(48))).track(0)
+    leaves = np.hypot(*(track["position"] - last).T).argmin()
+    np.testing.assert_allclose(track["position"][leaves], last, rtol=0, atol=1e-12)
+    expected = pace**0.5 * np.array([-sin(rim), cos(rim)])
+    np.testing.assert_allclose(track["velocity"][leaves], expected, rtol=0, atol=1e-9)
 
 
 @pytest.mark.slow
 def test_exact_engine_on_thousands():
-    """Nothing wrong, 1 in 300 refused, and 1 in 50 that cannot be compared, at most."""
-    found = {seed: verdict(seed) for seed in range(MANY)}
+    """Nothing wrong, 1 in 300 refused, and 1 in 100 that cannot be compared, at most."""
+    found = {seed: verdict(seed) for seed in range(MANY) if seed not in APART}
     assert {seed: said for seed, said in found.items() if said[0] == "wrong"} == {}
     refused = {seed: said for seed, said in found.items() if said[0] == "refused"}
     assert len(refused) <= MANY / 300, refused
     apart = {seed: said for seed, said in found.items() if said[0] in ("chaotic", "sensitive")}
-    assert len(apart) <= MANY / 50, apart
+    assert len(apart) <= MANY / 100, apart
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(seed, marks=pytest.mark.xfail(strict=True, reason=reason))
+        for seed, reason in APART.items()
+    ],
+)
+def test_exact_and_contact_where_contact_is_off(seed):
+    assert verdict(seed)[0] in ANSWERS
 
 
 WALL = {
@@ -232,4 +297,4 @@ def test_the_comparison_sees_another_machine():
     wall = machine.segments
     moved = replace(wall, start=np.add(wall.start, [[1e-4, 0.0], [0.0, 0.0]]))
     errors = disagreements(replace(machine, segments=moved), followed, 1.5)
-    assert errors == pytest.approx([1.5e-4] * 4, rel=1e-6)
+    assert errors == pytest.approx([1.5e-4] * 7, rel=1e-6)

@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.special import ellipj
 
 from chutelab import machine, scene
 from chutelab.engines import exact
@@ -69,6 +72,75 @@ def thrown(p0, v0, begin, end):
 
 
 coordinate = st.floats(-10.0, 10.0)
+
+
+def between(run):
+    """Times at eighths of the way from each knot to the next."""
+    t = np.unique(run.track(0)["t"])
+    return (t[:-1, None] + np.diff(t)[:, None] * np.arange(8) / 8.0).ravel()
+
+
+@pytest.mark.parametrize("highest", [0.5, 5.0, 80.0, 89.9])
+@pytest.mark.parametrize("rho", [0.5, 0.05, 5e-4])
+def test_between_knots_in_a_bowl_it_is_on_its_way_to_1e_9_of_the_radius(highest, rho):
+    """From rest at φ0 a pendulum is at sin(φ/2) = sin(φ0/2) cd(t sqrt(g/ρ)), Jacobi's function."""
+    k = np.sin(np.radians(highest) / 2.0)
+    run = made(
+        {
+            "gravity": G,
+            "particle": {"radius": 0.02, "mass": M, "spin": False},
+            "surface": [{"name": "bowl", "center": [0.0, 0.0], "radius": rho + 0.02,
+                         "from_deg": 180, "to_deg": 360, "friction": 0.0, "restitution": 0.0}],
+            "stream": {"at": [rho * np.sin(2.0 * np.arcsin(k)), -rho * (1.0 - 2.0 * k * k)],
+                       "velocity": [0.0, 0.0]},
+            "run": {"until": 9.0 * (rho / G) ** 0.5},
+        }
+    )  # fmt: skip
+    t = between(run)
+    _, cn, dn, _ = ellipj(t * (G / rho) ** 0.5, k * k)
+    phi = 2.0 * np.arcsin(k * cn / dn)
+    there = rho * np.stack([np.sin(phi), -np.cos(phi)], axis=1)
+    assert len(t) > 8 * 60
+    assert np.hypot(*(run.at(t)[0][:, 0] - there).T).max() <= 1e-9 * rho
+
+
+def test_between_knots_on_the_pulley_it_is_on_its_way_to_1e_9_of_the_radius():
+    """It slips from sin φ = µ (cos φ - u0) on, u = v²/(g ρ); then u is as written below."""
+    mu, v, rho = 0.5, 2.0, 0.504
+    run = made(
+        {
+            "gravity": G,
+            "particle": {"radius": 0.004, "mass": M, "spin": False},
+            "incoming": {"pulley_radius": 0.5, "speed": v, "friction": mu, "length": 0.2},
+            "stream": {"at": [-0.1, rho], "velocity": [v, 0.0]},
+            "run": {"until": 0.2},
+        }
+    )
+    u0 = v * v / (G * rho)
+
+    def forced(phi):
+        return ((4.0 * mu**2 - 2.0) * np.cos(phi) - 6.0 * mu * np.sin(phi)) / (1.0 + 4.0 * mu**2)
+
+    onset = brentq(lambda phi: np.sin(phi) - mu * (np.cos(phi) - u0), 0.0, 1.0, xtol=1e-15)
+    grown = (u0 - forced(onset)) * np.exp(-2.0 * mu * onset)
+
+    def pace(phi):
+        return (G * rho * (forced(phi) + grown * np.exp(2.0 * mu * phi))) ** 0.5
+
+    leaves = brentq(lambda phi: pace(phi) ** 2 - G * rho * np.cos(phi), onset, 1.0, xtol=1e-15)
+    t = between(run)
+    x, y = run.at(t)[0][:, 0].T
+    phi = np.arctan2(x, y)
+    on = (x > 0.0) & (phi < leaves)
+    assert np.count_nonzero(on & (phi > onset)) > 50
+    assert np.abs(np.hypot(x, y) - rho)[on].max() <= 1e-9 * rho
+    for when, angle in zip(t[on], phi[on], strict=True):
+        if angle <= onset:
+            late, fast = when - (0.1 + rho * angle) / v, v
+        else:
+            slipping = quad(lambda phi: rho / pace(phi), onset, angle, epsabs=1e-13)[0]
+            late, fast = when - (0.1 + rho * onset) / v - slipping, pace(angle)
+        assert abs(late * fast) <= 1e-9 * rho
 
 
 @given(

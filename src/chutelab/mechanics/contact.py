@@ -13,7 +13,7 @@ and F = stick · g sin φ + load · N: gripping without turning is stick = -1, r
 friction adds a couple q m r, at most κ N, that opposes the spin against the surface's own,
 z' = (m r²/I) (F + q), and holds it where it can. Everything is
 expanded in a Taylor series in time, which holds for any mixture of turning back, spinning and
-slipping; a step is as long as a knot may be, so the series costs no extra steps.
+slipping. A step is as long as its last terms are rounding; knots within it come from the series.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.mechanics.ballistics import polynomial
-from chutelab.util.arrays import Bools, Floats
+from chutelab.util.arrays import Bools, Floats, Ints
 
 DISK_SHARE = 1.0 / 3.0
 """m*/m of a free disk: at its rim, with I = m r²/2, an impulse moves the contact point 3 times as
@@ -126,17 +126,21 @@ def grip_limit(friction: Floats, normal: Floats) -> Floats:
     return np.asarray(friction * normal)
 
 
-ORDER = 14
-"""Degree of the series: with the steps below the first term left out is under 1e-16."""
+ORDER = 20
+"""Degree of the series."""
 
-STEP_ANGLE = 0.0244
-"""rad; a Hermite curve through knots this far apart is off by ρ Δφ⁴/384 < 1e-9 ρ."""
+LEFT_OUT = 1e-16
+"""Share of the angle (rad), of the speeds and of the load that the last terms of a step may be."""
 
-STEP_GROWTH = 0.5
-"""Largest 2 µ Δφ of a step: slip grows like exp(2 µ φ)."""
+CURVE = 0.9e-9
+"""Share of the radius by which the cubic Hermite curve between two knots may leave the way: 1e-9,
+less what is missed by looking at three times of a step."""
 
-STEP_FALL = 0.4
-"""Longest step in units of sqrt(ρ/g), in which the fall from the top grows e-fold."""
+STEP_ANGLE = (384.0 * CURVE) ** 0.25
+"""rad between knots at constant speed: there the curve is off by ρ Δφ⁴/384."""
+
+MOST_KNOTS = 32
+"""Knots in one step."""
 
 HALVINGS = 64
 """Bisections of a step for the time of an event, past the last bit."""
@@ -210,6 +214,9 @@ class Step:
     work: Floats  # ∫F dt, m/s: times mass and belt speed it is the belt's work
     heat: Floats  # -∫F u dt, m²/s²: times mass it is the friction loss; with that of the couple
     twist: Floats  # ∫q dt, m/s: times mass and the surface's r ω it is the belt's work too
+    # Knots before the end, (7, m, k): time since the beginning, then φ to `twist` as above; those
+    # whose time is not below `dt` are none.
+    knots: Floats
 
 
 def normal_force(circle: Circle) -> Floats:
@@ -237,59 +244,70 @@ def advance(circle: Circle, longest: Floats) -> Step:
     longest : ndarray, (k,)
         s; upper bound of the step.
     """
-    dt = np.minimum(_step_length(circle), longest)
     series = _series(circle)
+    dt, parts = _step(circle, series, longest)
     gauges = _gauges(circle, series)
-    near = np.minimum(circle.phi - circle.low, circle.high - circle.phi) < 2.0 * STEP_ANGLE
-    if np.count_nonzero(near):
-        _end_where_it_turns(circle, series, gauges, near, dt)
-    passed = polynomial(gauges, dt) < 0.0
-    hit = np.flatnonzero(passed.any(axis=0))
+    _end_where_it_turns(circle, series, gauges, dt)
+    times = dt * np.minimum(np.arange(1, parts.max() + 1)[:, None] / parts, 1.0)
+    passed = polynomial(gauges[:, :, None], times) < 0.0
     outcome = np.zeros(len(dt), dtype=np.int8)
+    hit = np.flatnonzero(passed.any(axis=(0, 1)))
     if len(hit):
-        at = _first_negative(gauges[:, :, hit], dt[hit], passed[:, hit])
+        first = passed[:, :, hit].any(axis=0).argmax(axis=0)
+        low = np.where(first > 0, times[first - 1, hit], 0.0)
+        at = _first_negative(gauges[:, :, hit], low, times[first, hit], passed[:, first, hit])
         which = np.argmin(at, axis=0)
         dt[hit] = at[which, np.arange(len(hit))]
         outcome[hit] = GAUGES[which]
     phi, w, z, work, heat, twist = polynomial(series[:, :6], dt)
     phi = np.where(outcome == Outcome.LOW, circle.low, phi)
     phi = np.where(outcome == Outcome.HIGH, circle.high, phi)
-    return Step(dt, outcome, phi, w, z, work, heat, twist)
+    times = times[:-1]
+    knots = np.concatenate([times[None], polynomial(series[:, :6, None], times)])
+    return Step(dt, outcome, phi, w, z, work, heat, twist, knots)
 
 
-def _end_where_it_turns(
-    circle: Circle, series: Floats, gauges: Floats, near: Bools, dt: Floats
-) -> None:
+def _step(c: Circle, series: Floats, longest: Floats) -> tuple[Floats, Ints]:
+    """Return how long a step is, s, and by how many knots, evenly in time, it is recorded, (k,).
+
+    The cubic between two knots, h apart, is off by h⁴/384 times the fourth derivative of the place
+    ρ exp(i φ), which is ρ |φ₁⁴ - 3 φ₂² - 4 φ₁ φ₃ + i (φ₄ - 6 φ₁² φ₂)| with those of the angle.
+    """
+    pace = np.abs(c.w) + np.abs(c.z) + np.abs(c.belt) + np.sqrt(c.gravity * np.abs(c.rho))
+    scale = np.stack([np.ones_like(pace), pace, pace, c.gravity + c.w**2 / np.abs(c.rho)])
+    terms = np.abs(series[:, [0, 1, 2, 6]])
+    dt = longest.copy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for n in (ORDER - 1, ORDER):
+            share = np.nan_to_num((terms[n] / scale).max(axis=0))
+            dt = np.minimum(dt, (LEFT_OUT / share) ** (1.0 / n))
+    # What rests does so for ever.
+    finite = np.where(np.isfinite(dt), dt, 0.0)
+    times, rates, found = finite * np.array([[0.0], [0.5], [1.0]]), series[:, 0], []
+    for _ in range(4):
+        rates = rates[1:] * np.arange(1, len(rates))[:, None]
+        found.append(polynomial(rates[:, None], times))
+    one, two, three, four = found
+    bend = np.hypot(one**4 - 3.0 * two**2 - 4.0 * one * three, four - 6.0 * one**2 * two)
+    parts = np.ceil(finite * (bend.max(axis=0) / (384.0 * CURVE)) ** 0.25).clip(1.0)
+    dt *= np.minimum(MOST_KNOTS / parts, 1.0)
+    return dt, np.minimum(parts, MOST_KNOTS).astype(np.int64)
+
+
+def _end_where_it_turns(circle: Circle, series: Floats, gauges: Floats, dt: Floats) -> None:
     """Shorten steps to the turning point where that is beyond an end of the circle.
 
     At the end of the whole step the particle would be back, and the end not seen.
     """
     back = np.sign(circle.w) * series[:, 1]
-    turns = np.flatnonzero(near & (polynomial(back, dt) < 0.0))
+    turns = np.flatnonzero(polynomial(back, dt) < 0.0)
     if len(turns):
         passed = np.ones((1, len(turns)), dtype=bool)
-        (at,) = _first_negative(back[:, None, turns], dt[turns], passed)
+        (at,) = _first_negative(back[:, None, turns], np.zeros(len(turns)), dt[turns], passed)
         ends = GAUGES[: gauges.shape[1]]
         beyond = polynomial(gauges[:, :, turns], at) < 0.0
         beyond &= ((ends == Outcome.LOW) | (ends == Outcome.HIGH))[:, None]
         dt[turns] = np.where(beyond.any(axis=0), at, dt[turns])
-
-
-def _step_length(c: Circle) -> Floats:
-    """Time for at most `STEP_ANGLE`, less where slip grows fast; inf at rest."""
-    finite = np.where(np.isinf(c.friction) | (c.slip == 0.0), 0.0, c.friction)
-    angle = np.minimum(STEP_ANGLE, STEP_GROWTH / np.maximum(2.0 * finite, 1e-300))
-    held = (c.slip == 0.0) & (c.share == 1.0)
-    pull = np.where(held, 0.0, c.gravity * (np.abs(np.sin(c.phi)) + finite))
-    rho = np.abs(c.rho)
-    pace = np.abs(c.w) + np.sqrt(2.0 * angle * rho * pull)
-    with np.errstate(divide="ignore"):
-        time = np.where(pace > 0.0, angle * rho / np.where(pace > 0.0, pace, 1.0), np.inf)
-        # Near the top the pull grows with the angle, as exp(t sqrt(g/ρ)); at the very bottom it is
-        # zero, but not for long.
-        falling = STEP_FALL * np.sqrt(rho / c.gravity)
-    moves = (pull > 0.0) | (~held & (c.w != 0.0))
-    return np.where(moves, np.minimum(time, falling), time)
 
 
 def _series(c: Circle) -> Floats:
@@ -361,9 +379,9 @@ def _gauges(c: Circle, series: Floats) -> Floats:
     return gauges
 
 
-def _first_negative(gauges: Floats, dt: Floats, passed: Bools) -> Floats:
-    """Bisect each gauge that is negative at dt for its change of sign, (6, k); inf for the rest."""
-    low, high = np.zeros(passed.shape), np.broadcast_to(dt, passed.shape).copy()
+def _first_negative(gauges: Floats, low: Floats, high: Floats, passed: Bools) -> Floats:
+    """Bisect each gauge that is negative at `high`, (G, k); inf for the rest."""
+    low, high = (np.broadcast_to(end, passed.shape) for end in (low, high))
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         above = polynomial(gauges, middle) >= 0.0

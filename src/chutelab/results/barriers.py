@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from chutelab.machine import Machine
-from chutelab.results.evidence import HAIR, Evidence
+from chutelab.results.evidence import Evidence
 from chutelab.results.recording import blocks, hermite
-from chutelab.results.surfaces import Bow, Piece
+from chutelab.results.surfaces import Piece
 from chutelab.util.arrays import Bools, Floats, Ints
 
 WIDTH = 64
@@ -411,12 +411,11 @@ def _measured(
         share = begin[rows] + size * at
         t = t_of[knot] + share * (t_of[knot + 1] - t_of[knot])
         deep = deep[row, at]
-        allowed = e.allowed + _off_circle(e, shape, radius, knot)
-        bad = (passes | (deep > allowed)) & shape.there(t) & (t >= shape.appears + (e.dt or 0.0))
+        bad = (passes | (deep > e.allowed)) & shape.there(t) & (t >= shape.appears + (e.dt or 0.0))
         for one in np.unique(owner[bad]).tolist():
             own = (bad & (owner == one)).nonzero()[0]
             forgiven = _forgiven(e, one, shape, float(e.radii[one]), t[own])
-            bad[own] = (passes[own] & (forgiven < inf)) | (deep[own] > forgiven + allowed[own])
+            bad[own] = (passes[own] & (forgiven < inf)) | (deep[own] > forgiven + e.allowed)
             deep[own] -= np.minimum(forgiven, radius[own])
         for n in bad.nonzero()[0].tolist():
             x, y = ends[n, at[n]].tolist()
@@ -426,27 +425,6 @@ def _measured(
             if key not in worst or hit.depth > worst[key].depth:
                 worst[key] = hit
     return list(worst.values())
-
-
-def _off_circle(e: Evidence, piece: Piece, radius: Floats, left: Ints) -> Floats:
-    """Bound how far the cubics after knots (m,) may leave a circle that both their ends touch, m.
-
-    A cubic is off by h⁴/384 times the fourth derivative of the way. Of a way round a circle of
-    radius ρ that is at most (v² + 3 a ρ)²/ρ³, with the acceleration a along it: the weight and, by
-    friction, as much again.
-    """
-    if not isinstance(piece, Bow):
-        return np.zeros(len(left))
-    knots = e.recording.knots
-    first, last = knots[left], knots[left + 1]
-    touch = np.ones(len(left), dtype=bool)
-    for knot in (first, last):
-        gap = piece.gap(knot["position"], radius)
-        touch &= np.abs(gap) <= e.allowed + HAIR * radius
-    path = np.hypot(*(first["position"] - piece.center).T)
-    v = np.maximum(*(np.hypot(*knot["velocity"].T) for knot in (first, last)))
-    bend = (v**2 + 6.0 * e.gravity * path) ** 2 / np.maximum(path, radius) ** 3
-    return np.where(touch, (last["t"] - first["t"]) ** 4 * bend / 384.0, 0.0)
 
 
 def _forgiven(e: Evidence, owner: int, piece: Piece, radius: float, t: Floats) -> Floats:

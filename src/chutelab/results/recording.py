@@ -2,7 +2,8 @@
 
 A particle's track is a list of *knots*; between two knots it is the cubic Hermite curve through
 them. With exact end velocities that curve is the parabola of free flight, so a flight costs two
-knots however long it lasts. An impact is two knots at one time.
+knots however long it lasts; along arcs the exact engine's is within 1e-9 of the radius. An impact
+is two knots at one time.
 """
 
 from __future__ import annotations

@@ -121,7 +121,12 @@ def first_circle(
     gap[3] = dot(v, a)
     gap[4] = 0.25 * dot(a, a)
     gap *= sense
-    leaving = motion.left[index] == circle + obstacles.segments
+    left = motion.left[index] - obstacles.segments
+    leaving = left == circle
+    if obstacles.arcs > 1:
+        # Arcs that lie on each other are left together.
+        alike = obstacles.joints.alike
+        leaving |= (left >= 0) & (alike[np.maximum(left, 0)] == alike[circle])
     if motion.past is not None:
         leaving |= motion.left[index] == obstacles.back(circle)
     if motion.joint is not None:
@@ -429,11 +434,7 @@ def _faces(
 
 
 NOW = 1e-12
-"""rad; an obstacle this close to the present angle is met now."""
-
-GRAZING = 1e-9
-"""Sine of the angle between path and surface below which a ride only touches, and goes on."""
-
+"""rad; so far the angle of a joint is sure, as ends within `obstacles.JOINT` are one."""
 
 WAYS = np.array([[-1.0], [1.0]])
 """Backwards and forwards, as rows of what `bounds` returns."""
@@ -462,15 +463,20 @@ def bounds(
     """
     found = np.zeros((2, len(rows)), dtype=BOUND)
     found["angle"], found["obstacle"] = WAYS * np.inf, NONE
+    rounding = rows_of(obstacles.touch, rows) / np.abs(rho)
 
     def narrow(
         angle: Floats, closing: Floats, met: Bools, obstacle: Ints | int, side: Floats | int,
         handover: bool = False, joint: int = NONE,
     ) -> None:  # fmt: skip
         """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
-        ahead = np.maximum(np.mod(WAYS * (angle - phi) + NOW, 2.0 * np.pi) - NOW, 0.0)
+        rate = WAYS * closing
+        # Over so small an angle x a gap, x rate + x²/2 over the radius, is rounding: it is here.
+        steep = np.maximum(rate, 0.0)
+        now = NOW + 2.0 * rounding / (steep + np.sqrt(steep**2 + 2.0 * rounding))
+        ahead = np.maximum(np.mod(WAYS * (angle - phi) + now, 2.0 * np.pi) - now, 0.0)
         place = phi + WAYS * ahead
-        nearer = met & (WAYS * closing > GRAZING) & (WAYS * (place - found["angle"]) < 0.0)
+        nearer = met & (rate > 0.0) & (WAYS * (place - found["angle"]) < 0.0)
         np.copyto(found["angle"], place, where=nearer)
         np.copyto(found["obstacle"], obstacle, where=nearer)
         np.copyto(found["side"], side, where=nearer)
@@ -488,7 +494,8 @@ def bounds(
             tilt = np.arctan2(face * normal[0], face * normal[1])
             level = (face * dot(start - center, normal) + radius) / rho
             half = np.arccos(np.clip(level, -1.0, 1.0))
-            met = (np.abs(level) <= 1.0) & ~joints.beside[circle, segment, n]
+            # A ride that only touches goes on.
+            met = (np.abs(level) < 1.0) & ~joints.beside[circle, segment, n]
             met &= obstacles.present[epoch, segment]
             for angle in (tilt - half, tilt + half):
                 foot = dot(center + rho * _up(angle) - start, tangent)

@@ -247,6 +247,14 @@ class Joints:
         return np.array(rows, dtype=np.int64).reshape(len(found), most).T
 
     @cached_property
+    def alike(self) -> Ints:
+        """Return a number for each circle that those with its centre and radius share, (C,)."""
+        o = self._o
+        shape = np.stack(np.broadcast_arrays(*o.center, o.rho), axis=1)
+        rows = np.round(np.nan_to_num(shape) / (4.0 * o.touch.max())).reshape(len(o.rho), -1)
+        return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1))
+
+    @cached_property
     def owns(self) -> Bools:
         """Tell of which segments a circle is an end, (C, S)."""
         o = self._o
@@ -306,7 +314,13 @@ class Joints:
         """
         o, (_, sets, _) = self._o, self.groups
         beside = np.zeros((len(o.rho), len(o.surface), 2), dtype=bool)
+        arcs = np.arange(o.first_arc, o.first_arc + o.arcs)
+        # To a point both faces of a piece are in one place.
+        points = o.arcs > 0 and o.rho[arcs[0] - o.segments, 0] <= o.bend[0, 0, 0] + o.touch[0]
         for members in sets:
+            if points:
+                members = members | members[:, ::-1]
+                members[arcs] = members[arcs + o.arcs] = members[arcs] | members[arcs + o.arcs]
             beside[members[o.segments :, 0]] |= members
         return beside
 

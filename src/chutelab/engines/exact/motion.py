@@ -137,21 +137,31 @@ def ride(s: State, index: Ints) -> None:
     outcome = np.where(lifted, Outcome.LIFT, step.outcome)
     go = np.flatnonzero(~lifted)
     s.count_idle(index, np.where(lifted, 0.0, step.dt))
-    s.age[index[go]] += step.dt[go]
     center = s.p.take(index, axis=1) - rho * c.normal
+    mass = s.mass[index]
+
+    def booked(work: Floats, heat: Floats, twist: Floats) -> tuple[Floats, Floats]:
+        drive = work * c.belt
+        return mass * (drive + twist * turn if s.rolls else drive), mass * heat
+
+    at = ((step.knots[0] < step.dt) & ~lifted).nonzero()
+    if len(at[1]):
+        t, angle, w, z, *sums = step.knots
+        work, heat = booked(*sums)
+        rows = s.now(index)[:, at[1]]
+        rows[0] += t[at]
+        rows[1:3], rows[3:5] = _on_circle(rho[at[1]], angle[at], w[at], center[:, at[1]])
+        if s.spins:
+            rows[5] = z[at] / s.radius[index[at[1]]]
+        rows[6] += work[at]
+        rows[8] += heat[at]
+        s.log.add(index[at[1]], rows)
+    s.age[index[go]] += step.dt[go]
     _place(s, index[go], rho[go], step.phi[go], step.w[go], center[:, go])
     s.angle[index[go]] = step.phi[go]
     s.z[index[go]] = step.z[go]
-    mass, work = s.mass[index], step.work * c.belt
-    if s.rolls:
-        work += step.twist * turn
-    s.book(
-        index[go],
-        c.surface[go],
-        (mass * work)[go],
-        0.0,
-        (mass * step.heat)[go],
-    )
+    work, heat = booked(step.work, step.heat, step.twist)
+    s.book(index[go], c.surface[go], work[go], 0.0, heat[go])
     s.knots(index[go])
 
     over = (outcome == Outcome.NOTHING) & (s.age[index] >= s.stop[index])
@@ -193,9 +203,15 @@ def _place(
     s: State, index: Ints, rho: Floats, phi: Floats, w: Floats, center: Floats | float = 0.0
 ) -> None:
     """Put particles at an angle of a circle, moving along it."""
+    s.p[:, index], s.v[:, index] = _on_circle(rho, phi, w, center)
+
+
+def _on_circle(
+    rho: Floats, phi: Floats, w: Floats, center: Floats | float
+) -> tuple[Floats, Floats]:
+    """Return place and velocity (2, k) at an angle of a circle, moving along it."""
     sine, cosine = np.sin(phi), np.cos(phi)
-    s.p[:, index] = center + rho * np.stack([sine, cosine])
-    s.v[:, index] = w * np.stack([cosine, -sine])
+    return center + rho * np.stack([sine, cosine]), w * np.stack([cosine, -sine])
 
 
 CLEAR = 16.0

@@ -383,7 +383,7 @@ class Thread:
 
 
 EARTH = 9.81
-"""m/s²; gravity for which the engines' bounds on speeds and times are written, see `Machine.pace`."""
+"""m/s²; gravity for which engines' bounds on speeds and times are written, see `Machine.pace`."""
 
 
 @dataclass(frozen=True, eq=False)

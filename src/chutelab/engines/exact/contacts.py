@@ -235,7 +235,7 @@ def face_force(s: State, index: Ints, c: Contact) -> tuple[Floats, Floats, Float
 
 
 NEGLIGIBLE = 1e-12
-"""m/s, times `Machine.pace`, and so are the following; an approach this slow is a touch, not a blow."""
+"""m/s times `Machine.pace`, as the following; an approach this slow is a touch, not a blow."""
 
 REST = 1e-9
 """m/s; a rebound this slow is summed with all that would follow it: u_n (1 + ε)/(1 - ε) of normal

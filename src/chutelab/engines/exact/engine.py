@@ -110,8 +110,8 @@ WINDOW = 10_000
 """Progress check interval, in rounds."""
 
 TICK = 1e-12
-"""s, over `Machine.pace`; mean time between events below which a particle makes no progress: the last bounces before
-rest, at 1e-9 m/s, are 200 times as far apart."""
+"""s over `Machine.pace`; mean time between events below which a particle makes no progress: the
+last bounces before rest, at 1e-9 m/s, are 200 times as far apart."""
 
 
 def run(

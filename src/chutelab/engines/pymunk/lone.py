@@ -43,8 +43,8 @@ INSTANT = 1e-30
 """s; the step that resolves a blow: nothing moves in it."""
 
 SEAM = 1e-6
-"""Share of `Machine.pace` in m/s plus the particle's speed; in a lasting contact, where a surface goes on in the
-next one, an approach this slow is no blow."""
+"""Share of `Machine.pace` in m/s plus the particle's speed; in a lasting contact, where a surface
+goes on in the next one, an approach this slow is no blow."""
 
 STRIDE = 0.5
 """Share of the radius that a step of a lasting contact may always be long: it meets every end."""

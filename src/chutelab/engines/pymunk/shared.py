@@ -347,7 +347,9 @@ class Shared:
         sums = np.ones((5, len(one)))
         sums[0], sums[1] = rub * belt, -0.5 * push * (rate[0] + rate[1])
         sums[2] = -0.5 * rub * (slip[0] + slip[1])
-        sums[3] = (np.abs(rate[1]) < self.still) & (np.abs(slip[1]) < self.still) & ~self.throws[other]
+        sums[3] = (
+            (np.abs(rate[1]) < self.still) & (np.abs(slip[1]) < self.still) & ~self.throws[other]
+        )
         if self.arm is not None:
             rolls = self.radius[one] * np.abs(mine[1, 2] - others[1, 2] - self.spin[other])
             sums[3] *= (self.arm[one] == 0.0) | (rolls < self.still)

@@ -32,7 +32,7 @@ DIGITS = 16.0 * float(np.finfo(float).eps)
 """Share of the machine's size below which a gap is rounding."""
 
 TINY = 1e-12
-"""Share of `Machine.pace` in m/s plus the particle's speed; an approach this slow is a touch, no blow."""
+"""Share of `Machine.pace` in m/s plus the particle's speed; so slow an approach is no blow."""
 
 LOW = 2.0
 """Hairs; bounces lower than this cannot be told from lying on the surface."""

@@ -200,6 +200,9 @@ void close_step(double h) {
         int owners = 0;
         for (int link = d->links; link >= 0; link = W.links[link]) {
             const Contact *c = W.contacts + link / 2;
+            /* What its hop reaches it lies on, too: that is no blow. */
+            if (!W.interact && c->impulse[0] == 0 && c->gap <= 0.125 * W.g * h * h
+                    && d->held_count < MAX_HELD) d->held[d->held_count++] = -1 - c->j;
             if (c->impulse[0] == 0) continue;
             if (!only || c->owner != only->owner || c->j >= 0) owners++;
             if (!only || c->impulse[0] > only->impulse[0]) only = c;

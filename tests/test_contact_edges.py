@@ -46,6 +46,49 @@ def test_a_nip_that_no_impulses_hold_open_lets_the_belt_slip(count, alpha, frict
     assert lowest == pytest.approx(edge + R / np.tan(0.5 * alpha), abs=0.02 * R / alpha)
 
 
+def nip(friction, dt, angle, wall=0.0, **particle):
+    """A belt of 2 m/s draws a disk under a wall that leans back over it, by `angle` to the belt."""
+    edge = np.array([0.1, 0.005])
+    top = edge + 0.3 * np.array([-cos(angle), sin(angle)])
+    faces = [face("belt", (-1.0, 0.0), (1.0, 0.0), speed=2.0, friction=friction, restitution=0.2),
+             face("wall", edge, top, friction=wall, restitution=0.3)]  # fmt: skip
+    machine = scene_of(particle={"radius": R, "mass": 0.008, **particle}, surface=faces,
+                       run={"until": 2.0, "dt": dt})  # fmt: skip
+    return run(thrown(machine, [-0.5, 2.0 * R], [1.0, 0.0]))
+
+
+@pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
+@pytest.mark.parametrize("friction", [0.3, 1.0, 1.6, 1.9, 1e6])
+def test_a_belt_slips_under_what_it_cannot_move_and_stalls_where_that_locks(friction, dt):
+    """The smooth wall gives N2 sin α = µ N1, the belt N1 = m g + N2 cos α: N1 = m g/(1 - µ cot α).
+
+    The belt pays µ N1 v. At µ = tan α no load holds the nip open: from there on it stalls.
+    """
+    angle = radians(60.0)
+    recording = nip(friction, dt, angle, spin=False)
+    knots = recording.track(0)
+    late = np.array([np.interp([1.5, 2.0], knots["t"], entry) for entry in knots["entries"].T])
+    paid, restitution, heat = np.diff(late)[:, 0] / 0.5
+    locks = friction > np.tan(angle)
+    load = 0.0 if locks else 0.008 * G / (1.0 - friction / np.tan(angle))
+    assert [paid, heat] == pytest.approx(
+        2 * [0.0 if locks else friction * load * 2.0], rel=1e-6, abs=1e-9
+    )
+    assert abs(restitution) < 1e-9
+    assert np.hypot(*knots["velocity"][-1]) < 1e-9
+
+
+@pytest.mark.parametrize("wall", [0.1, 0.8])
+@pytest.mark.parametrize("friction", [0.5, 1e6])
+@pytest.mark.parametrize("angle", [30.0, 60.0])
+def test_what_a_nip_costs_is_the_same_at_a_finer_step(angle, friction, wall):
+    """A disk that turns rolls on the belt as far as the wall lets it."""
+    costs = [nip(friction, dt, radians(angle), wall, spin=True) for dt in (1e-3, 2.5e-4)]
+    coarse, fine = (run.by_surface.sum(axis=0) for run in costs)
+    np.testing.assert_allclose(coarse, fine, rtol=0.02)
+    assert (costs[0].by_surface[:, 1:] >= 0.0).all()
+
+
 @pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
 def test_who_leaves_a_crest_flies(dt):
     """A disk rolls over a round crest, which grips without a bound, and leaves it once and for all.

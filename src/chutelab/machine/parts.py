@@ -382,6 +382,10 @@ class Thread:
     length: float  # m
 
 
+EARTH = 9.81
+"""m/s²; gravity for which engines' bounds on speeds and times are written, see `Machine.pace`."""
+
+
 @dataclass(frozen=True, eq=False)
 class Machine:
     """Everything an engine needs to run.
@@ -412,6 +416,15 @@ class Machine:
     streams: tuple[str, ...]  # names; `Releases.stream` tells whose a particle is
     engine: str  # what the scene asks for: "auto", "exact", "contact" or "pymunk"
     plate_warnings: tuple[Caution, ...]  # of a nominal particle that misses the plate
+
+    @cached_property
+    def pace(self) -> Any:
+        """What bounds on speeds are multiplied by, and bounds on times divided; (N,) of a family.
+
+        √(g / 9.81 m/s²), and 1 without gravity: a run repeats if all its speeds are twice as high,
+        all its times half as long, and gravity is four times as strong.
+        """
+        return np.sqrt(np.where(np.greater(self.gravity, 0.0), self.gravity, EARTH) / EARTH)
 
     @property
     def count(self) -> int:

@@ -235,7 +235,7 @@ def face_force(s: State, index: Ints, c: Contact) -> tuple[Floats, Floats, Float
 
 
 NEGLIGIBLE = 1e-12
-"""m/s; an approach this slow is a touch, not a blow."""
+"""m/s times `Machine.pace`, as the following; an approach this slow is a touch, not a blow."""
 
 REST = 1e-9
 """m/s; a rebound this slow is summed with all that would follow it: u_n (1 + ε)/(1 - ε) of normal
@@ -259,7 +259,7 @@ def strike(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
     c = s.contact(index, obstacle, side)
     before = s.v.take(index, axis=1)
     approach = np.maximum(-dot(before, c.normal), 0.0)
-    soft = approach <= NEGLIGIBLE
+    soft = approach <= NEGLIGIBLE * s.pace[index]
     if np.count_nonzero(soft):
         c = c._replace(restitution=np.where(soft, 0.0, c.restitution))
     rebound = c.restitution * approach
@@ -294,12 +294,12 @@ def _after(
         # A blow from elsewhere may leave those that slide or ride where they are.
         on = index[held]
         under = s.contact(on)
-        leaving = np.abs(dot(s.v.take(on, axis=1), under.normal)) > NEGLIGIBLE
+        leaving = np.abs(dot(s.v.take(on, axis=1), under.normal)) > NEGLIGIBLE * s.pace[on]
         held[held] = ~leaving & pressed(s, on, s.on[on], under)
         slides = held & live
         _slide_past(s, index[slides], obstacle[slides], side[slides], rebound[slides])
         live &= ~held
-    rests = live & (rebound <= REST)
+    rests = live & (rebound <= REST * s.pace[index])
     if np.count_nonzero(rests):
         rests &= pressed(s, index, obstacle, c)
         rest_on(s, index[rests], obstacle[rests], side[rests], rebound[rests])
@@ -316,9 +316,9 @@ def _stop_jammed(
     s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats
 ) -> Bools | None:
     """Stop particles that go to and fro between two obstacles without progress; tell which."""
-    if not (s.idling or s.crawling or np.count_nonzero(rebound <= 2.0 * CRAWL)):
+    if not (s.idling or s.crawling or np.count_nonzero(rebound <= 2.0 * CRAWL * s.pace[index])):
         return None
-    slow = length_of(s.v.take(index, axis=1)) <= CRAWL
+    slow = length_of(s.v.take(index, axis=1)) <= CRAWL * s.pace[index]
     if not (s.idling or s.crawling or np.count_nonzero(slow)):
         return None
     before, before_side = _touched_before(s, index)
@@ -368,7 +368,7 @@ def _blow(
         -0.5 * mass * tangential * (slip + after) + heat,
     )
     s.knots(index)
-    told = (approach > NEGLIGIBLE) | (tangential != 0.0)
+    told = (approach > NEGLIGIBLE * s.pace[index]) | (tangential != 0.0)
     if landing is not None:
         told |= landing
     kind: int | Ints = int(Kind.IMPACT)
@@ -391,7 +391,7 @@ def _slide_past(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Fl
     pull, _, _ = face_force(s, index, s.contact(index))
     against = s.contact(index, other, other_side)
     pressed = dot(pull, against.normal) < -OPPOSED * length_of(pull)
-    stuck = (rebound[kept] <= REST) & pressed
+    stuck = (rebound[kept] <= REST * s.pace[index]) & pressed
     on = (s.on[index[stuck]], s.side[index[stuck]])
     _hold(s, index[stuck], on, (other[stuck], other_side[stuck]))
 

@@ -110,8 +110,8 @@ WINDOW = 10_000
 """Progress check interval, in rounds."""
 
 TICK = 1e-12
-"""s; mean time between events below which a particle makes no progress: the last bounces before
-rest, at 1e-9 m/s, are 200 times as far apart."""
+"""s over `Machine.pace`; mean time between events below which a particle makes no progress: the
+last bounces before rest, at 1e-9 m/s, are 200 times as far apart."""
 
 
 def run(
@@ -194,7 +194,7 @@ def _to_the_end(s: State, progress: Progress | None) -> None:
             raise s.stalled(int(s.mode.argmax()), reason)
         if s.rounds and s.rounds % WINDOW == 0:
             passed = s.age - then
-            stuck = ((s.mode != Mode.DONE) & (passed < WINDOW * TICK)).nonzero()[0]
+            stuck = ((s.mode != Mode.DONE) & (passed < WINDOW * TICK / s.pace)).nonzero()[0]
             if len(stuck):
                 reason = (
                     f"{WINDOW} events took {passed[stuck[0]]:.2g} s: it is driven to and fro in a"

@@ -116,7 +116,7 @@ class State:
         mine, particle = slice(first, last), machine.particle
         self.radius, self.mass = self.each(particle.radius), self.each(particle.mass)
         self.gravity, inertia = self.each(machine.gravity), self.each(particle.inertia)
-        self.fall = np.zeros((2, count))
+        self.pace, self.fall = self.each(machine.pace), np.zeros((2, count))
         self.fall[1] = -self.gravity
         self.falls = bool(self.gravity[0] != 0.0)
         # Which particles turn, and whether any does; m*/m and m r²/I (or 0), see `rim_share`.

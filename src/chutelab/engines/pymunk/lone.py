@@ -43,8 +43,8 @@ INSTANT = 1e-30
 """s; the step that resolves a blow: nothing moves in it."""
 
 SEAM = 1e-6
-"""Share of 1 m/s plus the particle's speed; in a lasting contact, where a surface goes on in the
-next one, an approach this slow is no blow."""
+"""Share of `Machine.pace` in m/s plus the particle's speed; in a lasting contact, where a surface
+goes on in the next one, an approach this slow is no blow."""
 
 STRIDE = 0.5
 """Share of the radius that a step of a lasting contact may always be long: it meets every end."""
@@ -72,7 +72,7 @@ WINDOW, GAINED = 30_000, 100
 They take 2 to 8 s. A ride round 1/1000 of the radius at 1 m/s needs a third of them."""
 
 TICK = 1e-12
-"""s; what is closer to each other is at one instant."""
+"""s, over `Machine.pace`; what is closer to each other is at one instant."""
 
 OFTEN = 1000
 """Steps of a flight between two reports of progress; they take 2 ms."""
@@ -127,7 +127,7 @@ class Lone:
         self.recorder, self.particle, self.report = recorder, particle, report
         start = machine.releases
         self.r, self.g, self.dt = world.radius, machine.gravity, machine.dt
-        self.pull = Vec2d(0.0, -self.g)
+        self.pull, self.pace = Vec2d(0.0, -self.g), world.pace
         self.t = float(start.t[particle])
         self.x = Vec2d(*start.position[particle].tolist())
         self.v = Vec2d(*start.velocity[particle].tolist())
@@ -175,7 +175,7 @@ class Lone:
                     touching[face] = normal
                 else:
                     room = min(room, gap)
-            slow = max(self.world.tiny, SEAM if self.on >= 0 else 0.0) * (1.0 + self.v.length)
+            slow = max(self.world.tiny, SEAM if self.on >= 0 else 0.0) * (self.pace + self.v.length)
             if any(self.v.dot(normal) < -slow for normal in touching.values()):
                 self._blow(touching)
             elif released or not self._ride(touching, room):
@@ -324,7 +324,7 @@ class Lone:
         struck = min(touching, key=lambda face: self.v.dot(touching[face]))
         gap, normal = struck.gap(self.x)
         self.x -= gap * normal
-        self.blows = self.blows + 1 if self.t - self.struck < TICK else 0
+        self.blows = self.blows + 1 if self.t - self.struck < TICK / self.pace else 0
         self.struck = self.t
         self.restitution = {struck: self._rebound(struck, normal)}
         if self.blows > TURNS:
@@ -348,7 +348,7 @@ class Lone:
         # What slides in a hollow is pressed on by that.
         weight += face.hollow(self.x) * self.v.cross(normal) ** 2
         rebound = face.restitution * approach
-        touch = approach <= self.world.tiny * (1.0 + self.v.length)
+        touch = approach <= self.world.tiny * (self.pace + self.v.length)
         low = rebound * rebound < 2.0 * LOW * self.world.hair * weight
         return 0.0 if touch or low else face.restitution
 
@@ -356,7 +356,7 @@ class Lone:
 
     def _ride(self, touching: dict[Face, Vec2d], room: float) -> bool:
         """Step on in contact, `room` (m) from all else; False if no surface pushes."""
-        slow = SEAM * (1.0 + self.v.length)
+        slow = SEAM * (self.pace + self.v.length)
         if all(self.v.dot(normal) > slow for normal in touching.values()):
             return False
         # The step meets every end and every other surface, rather than pass them.
@@ -430,7 +430,7 @@ class Lone:
             bends = into > 0.0 or (into < before and face.hollow(middle) > 0.0)
             self.restitution[face] = 1.0 - max(before / into, 0.0) if bends else 0.0
         contacts = self._rolled(middle - h * self.v, self.v, h, self.pull)
-        if abs(self.v.dot(normal)) > SEAM * (1.0 + self.v.length):
+        if abs(self.v.dot(normal)) > SEAM * (self.pace + self.v.length):
             turn = (self.body.velocity.length / self.v.length) ** 2
             self.restitution = {face: turn * one for face, one in self.restitution.items()}
             contacts = self._rolled(middle - h * self.v, self.v, h, self.pull)

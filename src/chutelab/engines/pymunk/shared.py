@@ -45,7 +45,7 @@ STAY, HOP = 5, 50
 friction hops for some steps at a time; the ride ends with its last push."""
 
 CALM, STILL = 0.1, 1e-3
-"""s and m/s: who slips and moves less for that long has settled."""
+"""s over `Machine.pace`, and m/s times that: who slips and moves less for that long has settled."""
 
 _BODY = (
     batch.BodyFields.BODY_ID
@@ -109,7 +109,8 @@ class Shared:
         # How far each has turned, where that is seen.
         self.fields = _BODY | batch.BodyFields.ANGLE if self.corners else _BODY
         self.angle = np.zeros(rows) if self.corners else None
-        self.g = machine.gravity
+        self.g, pace = machine.gravity, world.pace
+        self.lasts, self.still = CALM / pace, STILL * pace
         self.pull = Vec2d(0.0, -self.g)
         # A whole number of steps ends the run.
         self.t = self.begin = float(starts.t.min())
@@ -346,10 +347,12 @@ class Shared:
         sums = np.ones((5, len(one)))
         sums[0], sums[1] = rub * belt, -0.5 * push * (rate[0] + rate[1])
         sums[2] = -0.5 * rub * (slip[0] + slip[1])
-        sums[3] = (np.abs(rate[1]) < STILL) & (np.abs(slip[1]) < STILL) & ~self.throws[other]
+        sums[3] = (
+            (np.abs(rate[1]) < self.still) & (np.abs(slip[1]) < self.still) & ~self.throws[other]
+        )
         if self.arm is not None:
             rolls = self.radius[one] * np.abs(mine[1, 2] - others[1, 2] - self.spin[other])
-            sums[3] *= (self.arm[one] == 0.0) | (rolls < STILL)
+            sums[3] *= (self.arm[one] == 0.0) | (rolls < self.still)
         pair = other < self.count
         self.recorder.by_surface[-1] += sums[:3] @ pair
         for k in np.flatnonzero(pair) if self.rides else ():
@@ -529,9 +532,9 @@ class Shared:
         if until == "landed":
             for i in np.flatnonzero(self.landed & self.free).tolist():
                 self._end(i, "landed")
-        calm = self.inside & (self.calm >= CALM)
+        calm = self.inside & (self.calm >= self.lasts)
         # Nothing has settled that a gate is still to change, or has just changed.
-        gated = self.t < self.machine.last_gate + CALM
+        gated = self.t < self.machine.last_gate + self.lasts
         under_way = gated or bool(self.waiting) or bool((self.inside & ~calm).any())
         together = self.machine.interact and under_way
         if until == "settled" and not together:
@@ -541,7 +544,7 @@ class Shared:
 
     def _tell_calm(self, i: int) -> None:
         """Tell since when a particle lies calm, if it does: since the end of that step."""
-        if i not in self.rides and self.calm[i] >= CALM:
+        if i not in self.rides and self.calm[i] >= self.lasts:
             late, place, speed = self.calm[i] - self.h, *self.state[1, :4, i].reshape(2, 2)
             self.recorder.events(
                 Kind.STICK, i, self.t - late, place - late * speed, speed, surface=self.on[i]

@@ -32,7 +32,7 @@ DIGITS = 16.0 * float(np.finfo(float).eps)
 """Share of the machine's size below which a gap is rounding."""
 
 TINY = 1e-12
-"""Share of 1 m/s plus the particle's speed; an approach this slow is a touch, no blow."""
+"""Share of `Machine.pace` in m/s plus the particle's speed; so slow an approach is no blow."""
 
 LOW = 2.0
 """Hairs; bounces lower than this cannot be told from lying on the surface."""
@@ -278,7 +278,7 @@ class World:
         size = float(np.abs([*machine.corners.ravel(), r]).max())
         self.rounding = DIGITS * size
         self.hair = max(HAIR * r, 4.0 * self.rounding)
-        self.tiny = max(TINY, self.rounding / r)
+        self.tiny, self.pace = max(TINY, self.rounding / r), float(machine.pace)
         self.by_shape: dict[pymunk.Shape, Face] = {}
         for n, (start, end) in enumerate(
             zip(parts.start.tolist(), parts.end.tolist(), strict=True)
@@ -415,7 +415,7 @@ class World:
             x, v = path.at(t)
             gap, normal = face.gap(x)
             rate = v.dot(normal)
-            slow = self.tiny * (1.0 + v.length)
+            slow = self.tiny * (self.pace + v.length)
             if leaving:
                 if gap < -hair and t > 0.0:
                     return bisected(lambda t: face.gap(path.at(t)[0])[0] < -0.5 * hair, last, t)[0]

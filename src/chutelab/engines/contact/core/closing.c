@@ -5,7 +5,7 @@
 
 /* Steps that a contact in a crowd lasts at least if its end is told as a separation. */
 #define LASTS 10
-/* m/s; below it the contacts of a crowd count as calm: `settled` in the contract. */
+/* m/s on Earth, and so is STOPPED; below it contacts of a crowd are calm: `settled` in the contract. */
 #define CALM 1e-3
 /* m/s; of a disk by itself: what is left of a speed that has come to nothing. */
 #define STOPPED 1e-9
@@ -55,10 +55,10 @@ static int lies(const Disk *d, const Contact *c, double h) {
     const Surface *s = W.surfaces + (-1 - c->j);
     double speed = fabs(d->vx + 0.5 * h * W.gx) + fabs(d->vy + 0.5 * h * W.gy);
     if (s->speed != 0 && c->owner != W.landing) return 0;
-    if (bending(s, d->x, d->y, d->radius) != 0 && (speed > STOPPED || c->other[1] != 0)) return 0;
-    if (c->arm > 0 && fabs(d->spin - c->other[2]) * d->radius > STOPPED) return 0;
+    if (bending(s, d->x, d->y, d->radius) != 0 && (speed > STOPPED * W.pace || c->other[1] != 0)) return 0;
+    if (c->arm > 0 && fabs(d->spin - c->other[2]) * d->radius > STOPPED * W.pace) return 0;
     /* Its arm may have stopped it for a moment, or holds it. */
-    int held = speed <= STOPPED && fabs(c->pull) * d->radius <= c->arm * press_on(d, s, c->nx, c->ny);
+    int held = speed <= STOPPED * W.pace && fabs(c->pull) * d->radius <= c->arm * press_on(d, s, c->nx, c->ny);
     return d->inertia == 0 || c->pull == 0 || held;
 }
 
@@ -173,7 +173,7 @@ void close_step(double h) {
         double off = fabs(0.5 * (u[0] + v[0])), slip = fabs(v[1] + c->drift);
         double turn = fabs(v[2]) * a->radius, rest = REST * sqrt(W.g * a->radius);
         int driven = !b && W.surfaces[-1 - c->j].speed != 0 && c->owner != W.landing;
-        if (off > CALM || slip > CALM || driven || (b && b->mode == RIDING)) {
+        if (off > CALM * W.pace || slip > CALM * W.pace || driven || (b && b->mode == RIDING)) {
             a->calm = 0;
             if (b) b->calm = 0;
         }
@@ -200,6 +200,9 @@ void close_step(double h) {
         int owners = 0;
         for (int link = d->links; link >= 0; link = W.links[link]) {
             const Contact *c = W.contacts + link / 2;
+            /* What its hop reaches it lies on, too: that is no blow. */
+            if (!W.interact && c->impulse[0] == 0 && c->gap <= 0.125 * W.g * h * h
+                    && d->held_count < MAX_HELD) d->held[d->held_count++] = -1 - c->j;
             if (c->impulse[0] == 0) continue;
             if (!only || c->owner != only->owner || c->j >= 0) owners++;
             if (!only || c->impulse[0] > only->impulse[0]) only = c;
@@ -240,7 +243,7 @@ void close_step(double h) {
             for (int link = d->links; link >= 0; link = W.links[link])
                 if (W.contacts[link / 2].impulse[0] > 0)
                     most = MAX(most, fabs(W.contacts[link / 2].other[1]));
-            if (most + fabs(s[2]) * d->radius < STOPPED) reason = BY_SETTLING;
+            if (most + fabs(s[2]) * d->radius < STOPPED * W.pace) reason = BY_SETTLING;
         }
         if (W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
         d->ends = reason;

@@ -44,6 +44,8 @@ extern World W;
 #define TOUCHES 8
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */
 #define GRAZE 1e-6
+/* Friction, 76 degrees, that takes all slip in any blow; where sweeps diverge it is lowered from here. */
+#define ROUGH 4.0
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
 #define STALL 20000
 /* rad; within it the inside of an arc counts as flat: steps of a disk by itself turn it by no more. */
@@ -92,6 +94,13 @@ static inline void advance(Disk *d, double t) {
     d->vx += W.gx * h;
     d->vy += W.gy * h;
     d->t = t;
+}
+
+/* Whether a disk by itself flies off a surface that is so rough that a touch, however soft, is a blow:
+   it is not pressed again before it comes back. */
+static inline int flies_off(const Disk *d, int k, double rate) {
+    return surface_pair(d, k)->friction > ROUGH
+        && rate > GRAZE * (sqrt(d->vx * d->vx + d->vy * d->vy) + W.soft);
 }
 
 /* geometry.c */

@@ -352,6 +352,38 @@ static void end_hop(int i, double t) {
     knot_held(i);
 }
 
+/* Whether a disk lies on surface k, or on one that goes on as it. */
+static int lies_on(const Disk *d, int k) {
+    for (int n = 0; n < d->held_count; n++)
+        if (goes_on(-1 - d->held[n], -1 - k)) return 1;
+    return 0;
+}
+
+/* Whether a disk by itself may meet another surface within a span than k and what it lies on. */
+static int meets_another(int i, int k, double span) {
+    const Disk *d = W.disks + i;
+    double speed = MAX(sqrt(d->vx * d->vx + d->vy * d->vy), fabs(W.surfaces[k].speed)), nx, ny;
+    const int *list;
+    int count = surfaces_near(i, &list);
+    for (int n = 0; n < count; n++) {
+        const Surface *s = W.surfaces + list[n];
+        if (goes_on(-1 - k, -1 - list[n]) || lies_on(d, list[n]) || !is_near(s, d)) continue;
+        if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) < (speed + W.g * span) * span) return 1;
+    }
+    return 0;
+}
+
+/* What a blow has lifted a disk by itself off, it lies on no more. */
+static void let_fly(Disk *d) {
+    double nx, ny;
+    int kept = 0;
+    for (int n = 0; n < d->held_count; n++) {
+        gap_to(W.surfaces + d->held[n], d->x, d->y, d->radius, &nx, &ny);
+        if (!flies_off(d, d->held[n], d->vx * nx + d->vy * ny)) d->held[kept++] = d->held[n];
+    }
+    d->held_count = kept;
+}
+
 /* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, by Newton's restitution
    and Coulomb's friction. */
 static void strike(int i, int j, double t) {
@@ -376,16 +408,17 @@ static void strike(int i, int j, double t) {
     if (jammed || (c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt)) back = 0;
     double press = j < 0 ? press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) : 0, later = 0;
     int rests = j < 0 && back <= press * MIN(W.step, turning_time(a, W.surfaces + (-1 - j)));
-    if (rests) {
-        /* The bounces that are left out, infinitely many, would have taken so long. */
-        if (back > 0 && c.rest < 1) later = 2 * back / (press * (1 - c.rest));
-        back = 0;
-    }
+    /* The bounces that are left out, infinitely many, would have taken so long. */
+    if (rests && back > 0 && c.rest < 1) later = 2 * back / (press * (1 - c.rest));
+    /* ... unless it meets something before they end: of endless friction each of them is a blow. */
+    if (!W.interact && later > 0 && c.friction > ROUGH && meets_another(i, -1 - j, later)) rests = later = 0;
+    if (rests) back = 0;
     double before[3] = {a->vx, a->vy, a->spin};
     if (jammed) jam(&c, t);
     else give(&c, c.mass[0] * (back - u[0]));
     a->since = t + later;
     if (c.two) b->since = t;
+    if (!W.interact) let_fly(a);
     W.impact_count++;
     int landing = j < 0 && c.owner == W.landing && !a->landed, kind = COLLISION;
     if (j < 0) kind = landing ? LANDING : IMPACT;
@@ -406,7 +439,7 @@ static int struck_too(const Contact *c, double t, int *j) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double nx, ny;
     *j = c->j;
-    if (a->mode != FREE) return 0;
+    if (a->mode != FREE || (!W.interact && c->impulse[0] == 0)) return 0;
     advance(a, t);
     if (c->j < 0) {
         const Surface *s = face_at(W.surfaces + (-1 - c->j), a->x, a->y);

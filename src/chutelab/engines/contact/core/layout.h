@@ -219,6 +219,8 @@ typedef struct {
     double again;        /* what lasts needs so many times the impulses of the step before */
     double before;       /* share of this step's impulses that belongs to the one before */
     double g;            /* m/s2; size of gravity */
+    double pace;         /* sqrt(g / EARTH), 1 without gravity: bounds on speeds grow with it, bounds
+                            on times shrink: a film of the run shown faster is a run */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
     double skip;         /* 1/s; SKIP in a step: radii that it may go */
 } World;

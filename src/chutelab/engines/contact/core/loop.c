@@ -4,7 +4,7 @@
 
 World W;
 
-/* s; within it everything of a settled crowd is calm. */
+/* s on Earth; within it everything of a settled crowd is calm. */
 #define SETTLED 0.1
 /* Of the radius: a hop under gravity stays below it, else the step is shorter than asked for. */
 #define HOP 1e-3
@@ -243,7 +243,7 @@ static int has_settled(void) {
     if (W.gate_count && next_gate(W.t) < INFINITY) return 0;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
-        if (d->mode == WAITING || d->mode == RIDING || (d->mode == FREE && d->calm < SETTLED)) return 0;
+        if (d->mode == WAITING || d->mode == RIDING || (d->mode == FREE && d->calm < SETTLED / W.pace)) return 0;
     }
     return 1;
 }

@@ -9,6 +9,9 @@
 #define JOINED 1e-3
 #define SMOOTH 1e-2
 
+/* m/s2; gravity for which bounds on speeds and times are written: others have `W.pace` of them. */
+#define EARTH 9.81
+
 /* Most sweeps of the contact solver in a step: with 60 a pile of 2,000 hardly comes to rest. */
 #define SWEEPS 100
 #define SWEEPS_ALONE 500
@@ -152,6 +155,7 @@ __attribute__((visibility("default"))) void prepare(void) {
     W.sweeps = alone ? SWEEPS_ALONE : SWEEPS;
     W.sleeps = !alone;
     W.smooth_x = alone ? 1e-5 : 1e-4;
-    W.smooth_v = 1e-4;
-    W.accurate = alone ? 1e-15 : 3e-4;
+    W.pace = W.g > 0 ? sqrt(W.g / EARTH) : 1;
+    W.smooth_v = 1e-4 * W.pace;
+    W.accurate = (alone ? 1e-15 : 3e-4) * W.pace;
 }

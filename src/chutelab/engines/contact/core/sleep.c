@@ -3,8 +3,10 @@
 
 #include "core.h"
 
-/* s; so long an island has to be at rest. */
+/* s on Earth; so long an island has to be at rest. */
 #define CALM_DOWN 0.1
+/* m/s on Earth; surfaces whose velocities differ by less move alike. */
+#define ALIKE 1e-12
 
 /* Wake the island of a disk at t. Within a step its disks hop like all that lies, for what is left
    of it: half of what gravity takes until then they get from what they lie on. */
@@ -47,7 +49,7 @@ static int joins(const Contact *c, double *u, int *owner) {
     /* Nothing has settled that a belt will throw. */
     if (s->speed != 0 && W.until == UNTIL_SETTLED && c->owner != W.landing) return 0;
     if (fabs(W.gx * x + W.gy * y) > 1e-12 * W.g * fabs(belt)) return 0;
-    if (*owner >= 0 && (fabs(u[0] - x) > 1e-12 || fabs(u[1] - y) > 1e-12)) return 0;
+    if (*owner >= 0 && (fabs(u[0] - x) > ALIKE * W.pace || fabs(u[1] - y) > ALIKE * W.pace)) return 0;
     u[0] = x;
     u[1] = y;
     *owner = c->owner;
@@ -59,7 +61,7 @@ void fall_asleep(void) {
     int *parent = W.queue, ready = 0;
     for (int i = W.low; i < W.high; i++) {
         parent[i] = i;
-        ready += W.disks[i].mode == FREE && W.disks[i].rest >= CALM_DOWN;
+        ready += W.disks[i].mode == FREE && W.disks[i].rest >= CALM_DOWN / W.pace;
     }
     if (!ready || !W.sleeps) return;
     for (int n = 0; n < W.contact_count; n++) {
@@ -74,7 +76,7 @@ void fall_asleep(void) {
     }
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
-        if (d->mode == FREE && d->rest < CALM_DOWN) W.found[island_of(i)]++;
+        if (d->mode == FREE && d->rest < CALM_DOWN / W.pace) W.found[island_of(i)]++;
     }
     for (int n = 0; n < W.contact_count; n++) {
         const Contact *c = W.contacts + n;

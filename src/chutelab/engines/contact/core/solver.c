@@ -8,8 +8,6 @@
 
 #include "core.h"
 
-/* Friction from which on it is lowered where sweeps diverge: 76 degrees. */
-#define ROUGH 4.0
 /* Of the greatest change where sweeps diverge: contacts that change by so much are lowered. */
 #define FOLLOWS 0.01
 /* Times that friction is lowered, to a quarter and at last to nothing. */
@@ -223,11 +221,16 @@ static double sweep(Contact *list, int count, int sweeps, int plain, double accu
     return worst;
 }
 
+/* Whether a surface that moves drives a disk. */
+static int drives(const Contact *c) { return c->j < 0 && c->other[1] != 0; }
+
 /* Solve contacts by sweeps until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
    will do. A crowd is swept again, up to so many rounds, of which the last is good enough if it crawls,
    and more finely where small changes leave gaps open. By itself (0 rounds), and where sweeps diverge,
    rigid bodies with all of the friction may have no solution, driven into a wedge that locks itself:
-   there it is lowered until they have one. */
+   there it is lowered until they have one. Gaps tell nothing of that where a drive presses: it presses
+   harder in each sweep, so there the changes have to end, too. A disk that cannot turn is held where
+   friction locks, and would slip away from a lower one: it stalls the drive, for this step. */
 void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough) {
     double first = INFINITY;
     for (int left = TRIES, more = rounds;;) {
@@ -242,6 +245,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
                 relative(c, 1, u);
                 relative(c, 0, v);
                 worst = MAX(worst, asks(c) - v[0] + u[0]);
+                if (drives(c)) worst = MAX(worst, change);
             }
         }
         if (worst <= enough) break;
@@ -253,10 +257,17 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
         more = rounds;
         worst = 0;
         for (int n = 0; n < count; n++) worst = MAX(worst, list[n].change);
+        int stalled = 0;
+        for (int n = 0; n < count; n++) {
+            Contact *c = list + n;
+            if (W.interact || W.disks[c->i].inertia > 0 || !drives(c) || c->change < FOLLOWS * worst) continue;
+            c->other[1] = c->other[2] = 0;
+            stalled = 1;
+        }
         for (int n = 0; n < count; n++) {
             Contact *c = list + n;
             Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-            if (c->change >= FOLLOWS * worst) c->share = left > 1 ? 0.25 * c->share : 0;
+            if (!stalled && c->change >= FOLLOWS * worst) c->share = left > 1 ? 0.25 * c->share : 0;
             a->vx = a->ux;
             a->vy = a->uy;
             a->spin = a->uspin;
@@ -267,7 +278,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
             }
             c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
         }
-        left--;
+        left -= !stalled;
     }
     ease_off(list, count);
 }
@@ -361,7 +372,7 @@ void solve_contacts(void) {
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), PLAIN,
                            W.accurate, W.skip * least);
-        else sweep_contacts(list, to - from, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9));
+        else sweep_contacts(list, to - from, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9 * W.pace));
     }
     for (int n = 0; n < W.contact_count; n++) {
         /* Rounding presses nobody; with endless friction even that would pull. */

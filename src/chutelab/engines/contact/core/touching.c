@@ -72,6 +72,8 @@ static int add(int i, int j, double least, double bound, double h) {
     later = gap_later(c, h);
     if (far && later > 0) return 1;
     relative(c, 0, u);
+    /* A blow has just lifted it off: it flies. */
+    if (!W.interact && !W.tracks[i].lasted && flies_off(d, -1 - j, u[0])) return 1;
     /* What has sunk in counts however it moves: else what parts others would press it, or what knocks
        on it in each step. */
     if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > W.soft)) return 1;

@@ -143,6 +143,9 @@ typedef struct {
     double rest;            /* coefficient of restitution */
     double share;           /* of its friction that acts; below 1 where surfaces wedge a disk */
     double change;          /* m/s; by which the last sweep changed its slip */
+    double entries[3], later[3]; /* J; what its impulses do to the ledger, and what the part of them
+                                    does that belongs to this step; see `account` */
+    double given[2];        /* J; the same for the belt that carries the partner */
     int i, j;
     int two;                /* whether j is a free disk, which feels the impulse too */
     int owner;              /* of the ledger entries */

@@ -185,7 +185,7 @@ static void start_warm(Contact *list, int count) {
 
 /* Lower all impulses alike, where that lowers the cost. They do no work then on the velocities that
    they leave, however far the sweeps had come: W J + q times J is at most 0. */
-static void ease_off(Contact *list, int count) {
+void ease_off(Contact *list, int count) {
     for (int n = 0; n < count; n++)
         for (int k = 0; k < 3; k++) list[n].course[k] = -list[n].impulse[k];
     descend(list, count);
@@ -269,7 +269,6 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
         }
         left--;
     }
-    ease_off(list, count);
 }
 
 /* Where the slip of a disk by itself turns round within a step, since friction cannot hold it, the
@@ -362,15 +361,16 @@ void solve_contacts(void) {
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), PLAIN,
                            W.accurate, W.skip * least);
         else sweep_contacts(list, to - from, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9));
-    }
-    for (int n = 0; n < W.contact_count; n++) {
-        /* Rounding presses nobody; with endless friction even that would pull. */
-        Contact *c = W.contacts + n;
-        const Disk *a = W.disks + c->i;
-        if (c->impulse[0] >= NOISE * c->mass[0] * (fabs(a->vx) + fabs(a->vy))) continue;
-        for (int k = 0; k < 3; k++) c->impulse[k] = -c->impulse[k];
-        push(c, c->impulse);
-        c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+        for (int n = from; n < to; n++) {
+            /* Rounding does not press; with endless friction even that would pull. */
+            Contact *c = W.contacts + n;
+            const Disk *a = W.disks + c->i;
+            if (c->impulse[0] >= NOISE * c->mass[0] * (fabs(a->vx) + fabs(a->vy))) continue;
+            for (int k = 0; k < 3; k++) c->impulse[k] = -c->impulse[k];
+            push(c, c->impulse);
+            c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+        }
+        ease_off(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);
     check_energy();

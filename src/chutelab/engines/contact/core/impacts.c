@@ -176,7 +176,7 @@ void was_moved(int i) {
    changes what the other has to stop, by a share of 5/7 at most in turn. */
 static void give(Contact *c, double normal) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-    double *J = c->impulse, u[3], v[3], entries[3], given[3], most = c->friction * normal;
+    double *J = c->impulse, u[3], v[3], given[3], most = c->friction * normal;
     double arm = c->arm * normal, more[3] = {normal, 0, 0};
     relative(c, 0, u);
     J[0] = normal;
@@ -197,9 +197,10 @@ static void give(Contact *c, double normal) {
         push(c, more);
         relative(c, 0, v);
     }
-    share_out(c, u, v, 0, entries, given);
-    book(a->entries, c->two ? b->entries : 0, c->owner, entries);
+    share_out(c, u, v, 0, c->entries, given);
+    book(a->entries, c->two ? b->entries : 0, c->owner, c->entries);
     if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
+    give_back(c, 1);
 }
 
 /* Let a disk lie on a surface from t on. The step of a disk by itself ends here; in a crowd half of

@@ -3,13 +3,15 @@
 
 #include "core.h"
 
-/* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step: gently,
-   since parting does work. Of an overlap as deep as DEEP more, up to all. It parts like a spring that
-   GIVES, of stiffness PART / GIVES M / step^2, M the heaviest mass of the island: what is wedged cannot
-   part, and without a bound its impulses would grow in each sweep. */
+/* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step, of a deeper
+   one more, all of one as deep as DEEP, but no more than MOST_PARTED radii: gently, since parting does
+   work, and in a chain the speeds add up. It parts like a spring that GIVES, of stiffness
+   PART / GIVES M / step^2, M the heaviest mass of the island: what is wedged cannot part, and without a
+   bound its impulses would grow in each sweep. */
 #define SLOP 1e-3
 #define PART 0.1
 #define DEEP 0.03
+#define MOST_PARTED 3e-3
 #define GIVES 3e-3
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
@@ -77,8 +79,8 @@ static int add(int i, int j, double least, double bound, double h) {
     if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > W.soft)) return 1;
     double aim = MIN(c->gap, 0);
     if (c->gap < -SLOP * least) {
-        double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
-        aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
+        double beyond = -c->gap - SLOP * least, part = MAX(PART, -c->gap / (DEEP * least)) * beyond;
+        aim = c->gap + MIN(part, MOST_PARTED * least);
         c->gives = GIVES;
     }
     c->need = (aim - later) / h;

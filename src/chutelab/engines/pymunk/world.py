@@ -250,6 +250,12 @@ def own(values: ArrayLike, particle: int) -> float:
     return float(values[particle] if values.ndim else values)
 
 
+def exit_box(machine: Machine, particle: int) -> tuple[float, float, float, float]:
+    """Return a particle's own of `Machine.exit_box`, m."""
+    left, right, bottom, top = (own(side, particle) for side in machine.exit_box)
+    return left, right, bottom, top
+
+
 def falls(gap: float, rate: float, pull: float) -> float:
     """Return the first time (s) at which gap + rate τ + pull τ²/2 falls to 0, inf if never."""
     ahead = max(gap, 0.0)

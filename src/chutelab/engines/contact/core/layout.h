@@ -44,6 +44,7 @@ typedef struct {
     double ride_rho;            /* ... and its distance from the axis on the pulley; 0: no ride */
     double ride_speed;          /* m/s */
     double ride_from, ride_to;  /* s; when the ride began and ends */
+    double exit_box[4];         /* [in] m; left, bottom, right, top; its track ends outside */
     double left, bottom, right, top; /* box that it can reach in this step */
     double zone[4];             /* the box, and room round it, for which `World.nearby` is right */
     double due;                 /* s; its next event, INFINITY if none is foreseen in this step */
@@ -204,7 +205,6 @@ typedef struct {
     double gx, gy;       /* m/s2 */
     double dt;           /* s; longest step */
     double end_time;     /* s */
-    double exit_box[4];  /* m; left, bottom, right, top; tracks end outside */
     double smooth_x, smooth_v; /* radii, m/s; by how much a track may leave out what lasts */
     double accurate;     /* m/s; changes at which sweeps end */
     /* [out] */

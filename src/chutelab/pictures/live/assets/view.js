@@ -92,8 +92,9 @@ function boxOf(machine, points) {
     }
   }
   if (machine.pulley) widen(0, 0, machine.pulley.radius);
-  const [west, east, south, north] = machine.exitBox.map((side, n) =>
-    side + (n % 2 ? -EXIT_MARGIN : EXIT_MARGIN));
+  const [west, east, south, north] = machine.exitBoxes.reduce((all, box) =>
+    all.map((side, n) => n % 2 ? Math.max(side, box[n] - EXIT_MARGIN)
+      : Math.min(side, box[n] + EXIT_MARGIN)), [Infinity, -Infinity, Infinity, -Infinity]);
   // Without a surface nothing is left.
   const all = !machine.segments.length && !machine.arcs.length;
   const inside = (/** @type {{x: number, y: number}} */ { x, y }) =>

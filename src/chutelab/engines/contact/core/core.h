@@ -82,7 +82,9 @@ static inline int goes_on(int j, int other) {
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
 /* Change of normal velocity that a contact asks for under its impulse, m/s. */
-static inline double asks(const Contact *c) { return c->need - c->gives * c->impulse[0]; }
+static inline double asks(const Contact *c) {
+    return MIN(c->need - c->gives * c->impulse[0], c->most);
+}
 
 /* Move a disk along its parabola. */
 static inline void advance(Disk *d, double t) {

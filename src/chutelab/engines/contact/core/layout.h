@@ -131,7 +131,8 @@ typedef struct {
     double nx, ny;          /* unit normal towards i */
     double gap;             /* m */
     double need;            /* m/s; least change of normal velocity that keeps the gap closed ... */
-    double gives;           /* ... and by how much less for each N s of its normal impulse, 1/kg */
+    double gives;           /* ... and by how much less for each N s of its normal impulse, 1/kg ... */
+    double most;            /* ... but by no more than that, m/s */
     double pull;            /* m/s2; by which gravity makes it slip on a surface */
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */

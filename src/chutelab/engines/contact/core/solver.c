@@ -22,6 +22,8 @@
 #define MOST_ROUNDS 50
 /* Sweeps before they are hastened: most solves need no more. */
 #define PLAIN 6
+/* Steps of a line search: rounding ends it sooner. */
+#define SECANTS 5
 /* Of momentum. */
 #define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
@@ -38,8 +40,9 @@ static double press(Contact *c) {
         x -= b->vx - b->ux;
         y -= b->vy - b->uy;
     }
-    double off = x * c->nx + y * c->ny - asks(c);
-    double normal = MAX(c->impulse[0] - off / (c->light[0] + c->gives), 0);
+    double opens = x * c->nx + y * c->ny;
+    double given = (c->need - c->gives * c->impulse[0] - opens) / (c->light[0] + c->gives);
+    double normal = MAX(c->impulse[0] + MIN(given, (c->most - opens) * c->mass[0]), 0);
     double change[3] = {normal - c->impulse[0], 0, 0};
     if (change[0] != 0) push(c, change);
     c->impulse[0] = normal;
@@ -163,13 +166,18 @@ static void advance_impulses(Contact *list, int count, double by) {
     }
 }
 
-/* Line search: go along `course` to where the cost is least, at most all of it. */
+/* Line search: go along `course` to where the cost is least, at most all of it, and never beyond. The
+   cost is convex; where `asks` of no contact bends, the first secant is exact. */
 static void descend(Contact *list, int count) {
-    double from = downhill(list, count);
+    double from = downhill(list, count), way = 1;
     if (!(from < 0)) return;
-    advance_impulses(list, count, 1);
-    double to = downhill(list, count);
-    if (to > 0) advance_impulses(list, count, -to / (to - from));
+    advance_impulses(list, count, way);
+    for (int n = 0; n < SECANTS; n++) {
+        double to = downhill(list, count), back = way * to / (to - from);
+        if (!(to > 0)) return;
+        advance_impulses(list, count, -back);
+        way -= back;
+    }
 }
 
 /* Start from impulses of the step before, as far as they lower the cost: where contacts have opened,

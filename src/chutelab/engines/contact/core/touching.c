@@ -3,11 +3,11 @@
 
 #include "core.h"
 
-/* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step, of a deeper
-   one more, all of one as deep as DEEP, but no more than MOST_PARTED radii: gently, since parting does
-   work, and in a chain the speeds add up. It parts like a spring that GIVES, of stiffness
+/* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step, of an overlap
+   as deep as DEEP more, up to all. It parts like a spring that GIVES, of stiffness
    PART / GIVES M / step^2, M the heaviest mass of the island: what is wedged cannot part, and without a
-   bound its impulses would grow in each sweep. */
+   bound its impulses would grow in each sweep. What does part goes by MOST_PARTED radii in a step, no
+   more: gently, since parting does work, and where a wedged chain opens the speeds add up. */
 #define SLOP 1e-3
 #define PART 0.1
 #define DEEP 0.03
@@ -79,8 +79,9 @@ static int add(int i, int j, double least, double bound, double h) {
     if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > W.soft)) return 1;
     double aim = MIN(c->gap, 0);
     if (c->gap < -SLOP * least) {
-        double beyond = -c->gap - SLOP * least, part = MAX(PART, -c->gap / (DEEP * least)) * beyond;
-        aim = c->gap + MIN(part, MOST_PARTED * least);
+        double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
+        aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
+        c->most = (c->gap + MOST_PARTED * least - later) / h;
         c->gives = GIVES;
     }
     c->need = (aim - later) / h;
@@ -113,7 +114,10 @@ static int add(int i, int j, double least, double bound, double h) {
     /* In a corner the other surface may press it on this one. */
     int alone = d->supports <= 1 || gone;
     c->leaves = pressed && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
-    if (c->leaves || gone) c->gives = 0;
+    if (c->leaves || gone) {
+        c->gives = 0;
+        c->most = INFINITY;
+    }
     if (c->leaves) {
         c->need = floor;
         c->drift = (until < h ? until : 0) * c->pull;

@@ -300,8 +300,8 @@ class World:
                 float(restitution), min(float(friction), GRIP), r, -inf, inf,
                 turning.angular_velocity,
             ))  # fmt: skip
-        for n, center in enumerate(arcs.center.tolist()):
-            self._bend(n, Vec2d(*center), self._about(arcs, n))
+        for n, (center, *ends) in enumerate(zip(arcs.center.tolist(), *arcs.ends, strict=True)):
+            self._bend(n, Vec2d(*center), ends, self._about(arcs, n))
         self.faces = list(self.by_shape.values())
         self.gates = any(face.appears > -inf or face.vanishes < inf for face in self.faces)
 
@@ -322,8 +322,8 @@ class World:
             "appears": float(parts.appears[n]), "vanishes": float(parts.vanishes[n]), "spin": 0.0,
         }  # fmt: skip
 
-    def _bend(self, n: int, center: Vec2d, about: dict[str, Any]) -> None:
-        """Add an arc, and its ends."""
+    def _bend(self, n: int, center: Vec2d, ends: list[Floats], about: dict[str, Any]) -> None:
+        """Add an arc, and its ends (m)."""
         arcs = self.machine.arcs
         radius, begin, extent = (
             float(values[n]) for values in (arcs.radius, arcs.begin, arcs.extent)
@@ -336,6 +336,8 @@ class World:
         circle = pymunk.Circle(body, radius)
         circle.cache_bb()
         base = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        # Feet in one place would be pairs, each with each, in every step.
+        base.position = center
         foot = pymunk.Circle(base, 0.0)
         about["spin"] = -about["speed"] / radius
         if whole:
@@ -348,33 +350,39 @@ class World:
         # Of the centre's way there, which bends no more than the sharpest arc.
         more = sqrt(2.0 * JOINT * self.hair * float(arcs.radius.min())) / (radius + self.radius)
         before, after = (
-            more if self._goes_on(end[n], out, more) else 0.0
-            for end, out in zip(arcs.ends, outs, strict=True)
+            more if self._goes_on(end, out, more) else 0.0
+            for end, out in zip(ends, outs, strict=True)
         )
         self._add(Bend(
             circle, tangent=None, foot=foot, begin=begin - before, extent=extent + before + after,
             **about,
         ))  # fmt: skip
         # Out of it is along the surface at the first end, against it at the last.
-        for end, out, way in zip(arcs.ends, outs, (1.0, -1.0), strict=True):
+        for end, out, way in zip(ends, outs, (1.0, -1.0), strict=True):
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
-            point = pymunk.Circle(still, 0.0, end[n].tolist())
+            point = pymunk.Circle(still, 0.0, end.tolist())
             self._add(Face(point, tangent=out, **about | {"speed": way * about["speed"]}))
 
-    def _goes_on(self, end: Floats, out: Vec2d, bend: float) -> bool:
-        """Tell whether another piece goes on from an end (m), turning by less than `bend` (rad)."""
+    @cached_property
+    def _onward(self) -> tuple[Floats, Floats]:
+        """Ends of all pieces from left to right, (n, 2), m, and the way on into each, (n, 2)."""
         parts, arcs = self.machine.segments, self.machine.arcs
-        first, last = arcs.begin, arcs.begin + arcs.extent
-        onward = [
+        first, last = arcs.begin[~arcs.whole], (arcs.begin + arcs.extent)[~arcs.whole]
+        ends = np.concatenate([parts.start, parts.end, *(end[~arcs.whole] for end in arcs.ends)])
+        ways = np.concatenate([
             parts.tangent, -parts.tangent,
             np.stack([-np.sin(first), np.cos(first)], axis=-1),
             np.stack([np.sin(last), -np.cos(last)], axis=-1),
-        ]  # fmt: skip
-        near = (
-            np.hypot(*(np.concatenate([parts.start, parts.end, *arcs.ends]) - end).T) <= self.hair
-        )
-        near[2 * len(parts.length) :] &= ~np.tile(arcs.whole, 2)
-        return bool((np.hypot(*(np.concatenate(onward) - out)[near].T) <= bend).any())
+        ])  # fmt: skip
+        order = ends[:, 0].argsort(kind="stable")
+        return ends[order], ways[order]
+
+    def _goes_on(self, end: Floats, out: Vec2d, bend: float) -> bool:
+        """Tell whether another piece goes on from an end (m), turning by less than `bend` (rad)."""
+        ends, ways = self._onward
+        low, high = ends[:, 0].searchsorted([end[0] - self.hair, end[0] + self.hair])
+        near = np.hypot(*(ends[low : high + 1] - end).T) <= self.hair
+        return bool((np.hypot(*(ways[low : high + 1] - out)[near].T) <= bend).any())
 
     def _add(self, face: Face) -> None:
         shape = face.touched

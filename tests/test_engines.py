@@ -798,7 +798,7 @@ def test_a_crowd_on_a_gate_that_is_still_to_open_has_not_settled(engine):
 @pytest.mark.parametrize("align", [True, False])
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
 def test_without_gravity_each_particle_that_meets_no_other_has_a_box_of_its_own(engine, align):
-    """It starts up to 50 m from the surface, and ends 1 m beyond that or beyond where it started."""
+    """It starts up to 50 m from the surface, and ends 1 m beyond that or beyond its start."""
     found = chutelab.simulate(from_dict({
         "gravity": 0.0,
         "particle": {"radius": 0.01},

@@ -605,7 +605,9 @@ def test_what_a_scene_of_many_arcs_takes_grows_with_their_number(monkeypatch):
     def of(count):
         peg = {"center": [0.0, 0.0], "radius": 0.02, "from_deg": 10, "to_deg": 170}
         pegs = {"name": "pegs", **peg, "repeat": [[count, 0.1, 0.0]]}
-        machine = build(sc.from_dict({"stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]}, "surface": [pegs]}))
+        machine = build(
+            sc.from_dict({"stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]}, "surface": [pegs]})
+        )
         asked.clear()
         return World(machine), len(asked)
 

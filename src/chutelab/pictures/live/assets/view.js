@@ -92,9 +92,13 @@ function boxOf(machine, points) {
     }
   }
   if (machine.pulley) widen(0, 0, machine.pulley.radius);
-  const [west, east, south, north] = machine.exitBoxes.reduce((all, box) =>
-    all.map((side, n) => n % 2 ? Math.max(side, box[n] - EXIT_MARGIN)
-      : Math.min(side, box[n] + EXIT_MARGIN)), [Infinity, -Infinity, Infinity, -Infinity]);
+  let [west, east, south, north] = [Infinity, -Infinity, Infinity, -Infinity];
+  for (const [left, right, bottom, top] of machine.exitBoxes) {
+    west = Math.min(west, left + EXIT_MARGIN);
+    east = Math.max(east, right - EXIT_MARGIN);
+    south = Math.min(south, bottom + EXIT_MARGIN);
+    north = Math.max(north, top - EXIT_MARGIN);
+  }
   // Without a surface nothing is left.
   const all = !machine.segments.length && !machine.arcs.length;
   const inside = (/** @type {{x: number, y: number}} */ { x, y }) =>

@@ -264,8 +264,9 @@ void take_back(int i) {
         for (int n = 0; n < 3; n++) {
             double back = (c->two ? 0.5 : 1) * c->later[n];
             if (c->i != i && !c->two) back = 0;
-            W.books[3 * c->owner + n] -= back;
             d->entries[n] -= back;
+            if (W.interact && n > 0) spread(-back, n);
+            else W.books[3 * c->owner + n] -= back;
         }
         if (c->i != i) continue;
         W.books[3 * W.ride_owner] -= c->given[1];

@@ -125,6 +125,7 @@ void write_event(int kind, int i, int other, int owner, double t, const double *
                  const double *before, const double *after, double normal, double tangent);
 void event_here(int kind, int i, int owner);
 void book(double *first, double *second, int owner, const double *entries);
+void spread(double loss, int k);
 void give_back(const Contact *list, int count);
 
 /* contact.c */

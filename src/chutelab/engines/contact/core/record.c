@@ -198,21 +198,27 @@ void book(double *first, double *second, int owner, const double *entries) {
     }
 }
 
+/* Book losses as a part of what has been lost so far, at each surface in proportion. */
+void spread(double loss, int k) {
+    double lost = 0;
+    if (loss == 0) return;
+    for (int n = 0; n <= W.owner_count; n++) lost += MAX(W.books[3 * n + k], 0);
+    for (int n = 0; n <= W.owner_count && lost > 0; n++)
+        W.books[3 * n + k] += loss * (MAX(W.books[3 * n + k], 0) / lost);
+    if (lost == 0) W.books[3 * W.owner_count + k] += loss;
+}
+
 /* Book what contacts of a crowd gave back, their losses below zero, as a part of what has been lost, at
    whatever surface: what parts an overlap was lost when that came to be, and a hop's height when the
    one before ended. */
 void give_back(const Contact *list, int count) {
     for (int k = 1; k < 3 && W.interact; k++) {
-        double back = 0, lost = 0;
+        double back = 0;
         for (int n = 0; n < count; n++) {
             double gain = MIN(list[n].entries[k], 0);
             W.books[3 * list[n].owner + k] -= gain;
             back += gain;
         }
-        if (back == 0) continue;
-        for (int n = 0; n <= W.owner_count; n++) lost += MAX(W.books[3 * n + k], 0);
-        for (int n = 0; n <= W.owner_count && lost > 0; n++)
-            W.books[3 * n + k] += back * (MAX(W.books[3 * n + k], 0) / lost);
-        if (lost == 0) W.books[3 * W.owner_count + k] += back;
+        spread(back, k);
     }
 }

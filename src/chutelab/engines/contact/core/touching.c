@@ -7,11 +7,12 @@
    as deep as DEEP more, up to all. It parts like a spring that GIVES, of stiffness
    PART / GIVES M / step^2, M the heaviest mass of the island: what is wedged cannot part, and without a
    bound its impulses would grow in each sweep. What does part goes by MOST_PARTED radii in a step, no
-   more: gently, since parting does work, and where a wedged chain opens the speeds add up. */
+   more: gently, since parting does work, and where a wedged chain opens the speeds add up; less, and
+   the impulses of such a chain take many times the sweeps. */
 #define SLOP 1e-3
 #define PART 0.1
 #define DEEP 0.03
-#define MOST_PARTED 3e-3
+#define MOST_PARTED 1e-2
 #define GIVES 3e-3
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4

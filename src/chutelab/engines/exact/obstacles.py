@@ -332,9 +332,9 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     # end that lies on an arc, or that of the belt on the pulley, cannot be met.
     rests = np.full((len(spots), 2), NONE)
     if arcs:
-        for arc, on in enumerate(resting(corners, bends, near)):
+        for arc, lie in enumerate(resting(corners, bends, near)):
             if not len(changes) or stays[flat + arc]:
-                rests[on[..., 0].reshape(2, -1).T] = arc
+                rests[lie[..., 0].reshape(2, -1).T] = arc
     if wheel is not None:
         rests[0, 1] = arcs
     known: dict[int, int] = {}

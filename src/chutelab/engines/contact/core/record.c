@@ -198,14 +198,17 @@ void book(double *first, double *second, int owner, const double *entries) {
     }
 }
 
-/* Book losses as a part of what has been lost so far, at each surface in proportion. */
+/* Book a loss, or a gain below zero, as a part of what has been lost so far, at each surface in
+   proportion. A gain beyond that waits in the last row until there is something to take it from. */
 void spread(double loss, int k) {
-    double lost = 0;
+    double *last = W.books + 3 * W.owner_count + k, lost = 0;
+    loss += MIN(*last, 0);
+    *last = MAX(*last, 0);
     if (loss == 0) return;
     for (int n = 0; n <= W.owner_count; n++) lost += MAX(W.books[3 * n + k], 0);
-    for (int n = 0; n <= W.owner_count && lost > 0; n++)
-        W.books[3 * n + k] += loss * (MAX(W.books[3 * n + k], 0) / lost);
-    if (lost == 0) W.books[3 * W.owner_count + k] += loss;
+    double share = lost > 0 ? MAX(loss / lost, -1) : 0;
+    for (int n = 0; n <= W.owner_count; n++) W.books[3 * n + k] += share * MAX(W.books[3 * n + k], 0);
+    *last += loss - share * lost;
 }
 
 /* Book what contacts of a crowd gave back, their losses below zero, as a part of what has been lost, at

@@ -569,13 +569,12 @@ def _cut(machine: Machine, ends: Floats, places: Sequence[tuple[int, int]], near
 
 def resting(corners: Floats, bends: Bends, near: Floats) -> Iterator[Bools]:
     """Yield of each arc which ends (2 P, n) lie on it, but not where it ends."""
-    for center, (radius, begin, extent) in zip(
-        bends.center.swapaxes(0, 1), bends.shape.swapaxes(0, 1), strict=True
-    ):
-        away = corners - center[:, None]
-        on = np.abs(np.hypot(away[0], away[1]) - radius) <= near
+    arcs = zip(bends.center.swapaxes(0, 1), bends.shape.swapaxes(0, 1), strict=True)
+    for center, (radius, begin, extent) in arcs:
+        x, y = corners - center[:, None]
+        on = np.abs(np.hypot(x, y) - radius) <= near
         if on.any():
-            turn = np.mod(np.arctan2(away[1], away[0]) - begin, 2.0 * np.pi)
+            turn = np.mod(np.arctan2(y, x) - begin, 2.0 * np.pi)
             edge = np.where(extent < 2.0 * np.pi, near / radius, 0.0)
             on &= (turn >= edge) & (turn <= extent - edge)
         yield on

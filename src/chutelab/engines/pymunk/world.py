@@ -252,8 +252,7 @@ def own(values: ArrayLike, particle: int) -> float:
 
 def exit_box(machine: Machine, particle: int) -> tuple[float, float, float, float]:
     """Return a particle's own of `Machine.exit_box`, m."""
-    left, right, bottom, top = (own(side, particle) for side in machine.exit_box)
-    return left, right, bottom, top
+    return tuple(own(side, particle) for side in machine.exit_box)  # type: ignore[return-value]
 
 
 def falls(gap: float, rate: float, pull: float) -> float:
@@ -336,8 +335,7 @@ class World:
         circle = pymunk.Circle(body, radius)
         circle.cache_bb()
         base = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-        # Feet in one place would be pairs, each with each, in every step.
-        base.position = center
+        base.position = center  # feet in one place would be pairs, each with each, in every step
         foot = pymunk.Circle(base, 0.0)
         about["spin"] = -about["speed"] / radius
         if whole:
@@ -380,9 +378,9 @@ class World:
     def _goes_on(self, end: Floats, out: Vec2d, bend: float) -> bool:
         """Tell whether another piece goes on from an end (m), turning by less than `bend` (rad)."""
         ends, ways = self._onward
-        low, high = ends[:, 0].searchsorted([end[0] - self.hair, end[0] + self.hair])
-        near = np.hypot(*(ends[low : high + 1] - end).T) <= self.hair
-        return bool((np.hypot(*(ways[low : high + 1] - out)[near].T) <= bend).any())
+        low, high = ends[:, 0].searchsorted([end[0] - self.hair, end[0] + self.hair]) + [0, 1]
+        near = np.hypot(*(ends[low:high] - end).T) <= self.hair
+        return bool((np.hypot(*(ways[low:high] - out)[near].T) <= bend).any())
 
     def _add(self, face: Face) -> None:
         shape = face.touched

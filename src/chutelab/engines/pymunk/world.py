@@ -365,20 +365,19 @@ class World:
     def _onward(self) -> tuple[Floats, Floats]:
         """Ends of all pieces from left to right, (n, 2), m, and the way on into each, (n, 2)."""
         parts, arcs = self.machine.segments, self.machine.arcs
-        first, last = arcs.begin[~arcs.whole], (arcs.begin + arcs.extent)[~arcs.whole]
-        ends = np.concatenate([parts.start, parts.end, *(end[~arcs.whole] for end in arcs.ends)])
-        ways = np.concatenate([
-            parts.tangent, -parts.tangent,
-            np.stack([-np.sin(first), np.cos(first)], axis=-1),
-            np.stack([np.sin(last), -np.cos(last)], axis=-1),
-        ])  # fmt: skip
+        some = ~arcs.whole
+        first, last = arcs.begin[some], (arcs.begin + arcs.extent)[some]
+        ends = np.concatenate([parts.start, parts.end, *(end[some] for end in arcs.ends)])
+        begins = np.stack([-np.sin(first), np.cos(first)], axis=-1)
+        back = np.stack([np.sin(last), -np.cos(last)], axis=-1)
+        ways = np.concatenate([parts.tangent, -parts.tangent, begins, back])
         order = ends[:, 0].argsort(kind="stable")
         return ends[order], ways[order]
 
     def _goes_on(self, end: Floats, out: Vec2d, bend: float) -> bool:
         """Tell whether another piece goes on from an end (m), turning by less than `bend` (rad)."""
         ends, ways = self._onward
-        low, high = ends[:, 0].searchsorted([end[0] - self.hair, end[0] + self.hair]) + [0, 1]
+        low, high = ends[:, 0].searchsorted([end[0] - self.hair, end[0] + 1.01 * self.hair])
         near = np.hypot(*(ends[low:high] - end).T) <= self.hair
         return bool((np.hypot(*(ways[low:high] - out)[near].T) <= bend).any())
 

@@ -152,7 +152,7 @@ def test_a_tilted_world_is_a_turned_scene(crowded):
         machine = crowd_scene(surface=[box], run={"until": 0.6})
         core = Core(thrown(machine, place @ matrix.T, velocity @ matrix.T))
         core.tilt(tilt)
-        core.world.exit_box[:] = -inf, -inf, inf, inf
+        core.disks["exit_box"][:] = -inf, -inf, inf, inf
         found.append(core.run())
     # Rounding may move a knot of what lasts: a track leaves out 1e-4 of the radius there.
     times, close = np.linspace(0.0, 0.599, 200), 2e-6 if crowded else 1e-12

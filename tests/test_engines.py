@@ -793,3 +793,20 @@ def test_a_crowd_on_a_gate_that_is_still_to_open_has_not_settled(engine):
     # From rest at y = r down to 1 m below the gate.
     fall = sqrt(2.0 * (1.0 + 0.01) / 9.81)
     assert found.ends()[1]["t"] == pytest.approx(0.5 + fall, rel=0.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("align", [True, False])
+@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
+def test_without_gravity_each_particle_that_meets_no_other_has_a_box_of_its_own(engine, align):
+    """It starts up to 50 m from the surface, and ends 1 m beyond that or beyond its start."""
+    found = chutelab.simulate(from_dict({
+        "gravity": 0.0,
+        "particle": {"radius": 0.01},
+        "surface": [{"name": "wall", "from": [0.0, 1.0], "to": [0.0, 2.0]}],
+        "stream": {"count": 6, "at": [-50.0, 0.0], "to": [50.0, 0.0], "velocity": [2.0, 0.0]},
+        "run": {"engine": engine, "align": align, "until": 100.0, "dt": 0.01},
+    }))  # fmt: skip
+    assert (found.ended == REASONS.index("exit")).all()
+    first, last = found.ends()
+    right = np.maximum(first["position"][:, 0], 0.0) + 1.0
+    np.testing.assert_allclose(last["position"][:, 0], right, rtol=0.0, atol=1e-9)

@@ -15,8 +15,9 @@ from chutelab import theory
 from chutelab.checks.preflight import advice, preflight, trial
 from chutelab.checks.preflight.places import places
 from chutelab.engines import pymunk
+from chutelab.engines.pymunk.world import Bend, World
 from chutelab.engines.simulation import simulate
-from chutelab.machine import build
+from chutelab.machine import Arcs, build
 from chutelab.results import REASONS
 from chutelab.results.quantities import QUANTITIES
 from chutelab.results.recorder import StalledError
@@ -609,3 +610,25 @@ def test_a_fill_that_reaches_through_walls_is_told(name):
     said = f"stream.fill reaches through {name}: {outside} of 400 particles start beyond"
     assert found == ([said] if outside else [])
     assert (outside > 5) == (name in ("slope", "corner", "arc", "wide peg"))
+
+
+def test_what_a_scene_of_many_arcs_takes_grows_with_their_number(monkeypatch):
+    """The pymunk engine's set-up: ends worked out for all at once, feet that are no pairs."""
+    asked = []
+    point = Arcs.point
+    monkeypatch.setattr(Arcs, "point", lambda arcs, angle: asked.append(1) or point(arcs, angle))
+
+    def of(count):
+        peg = {"center": [0.0, 0.0], "radius": 0.02, "from_deg": 10, "to_deg": 170}
+        pegs = {"name": "pegs", **peg, "repeat": [[count, 0.1, 0.0]]}
+        machine = build(
+            sc.from_dict({"stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]}, "surface": [pegs]})
+        )
+        asked.clear()
+        return World(machine), len(asked)
+
+    (few, once), (many, again) = of(5), of(200)
+    assert once == again
+    feet = {face.foot.body.position for face in many.faces if isinstance(face, Bend)}
+    assert len(feet) == 200
+    assert len(many.faces) == 40 * len(few.faces)

@@ -371,7 +371,7 @@ SOUND = {
     "chains and bowls": (60, lambda n: build(chains.draw(n)), LONE),
     "all of a scene file": (40, lambda n: build(drawn.draw(n, points=False)), LONE),
     "crowds of all sizes": (20, lambda n: crowds.crowd(n, count=40)[1], ("contact",)),
-    "columns": (20, lambda n: build(scene.from_dict(columns.column(n, 40)[0])), ("contact",)),
+    "columns": (20, lambda n: build(scene.from_dict(columns.column(n, 40))), ("contact",)),
 }
 """How many sound machines of each generator, 500 in all, and the engines that they run on."""
 

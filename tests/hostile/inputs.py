@@ -25,9 +25,10 @@ import chutelab
 from broken_sandbox import BASES
 from chutelab import scene
 from chutelab.cli import main
+from chutelab.scene import Scene
 from chutelab.studies.sweep import planned
 from chutelab.studies.sweep.sweeping import Crew, sweep_to
-from hostile.mutants import NUMBERS, TEXTS, changed, garbled, value
+from hostile.mutants import NUMBERS, TEXTS, changed, extreme, garbled, value
 
 GOOD = Path("../good")
 SCENES = sorted(scene.shipped())
@@ -69,6 +70,27 @@ KEYS = (
     "run.engine", "particle.radius", "particle.spin", "surface.0.points", "gravity", "title",
     "plate", "a.b.c", "",
 )  # fmt: skip
+LISTS = ("material", "pair", "conveyor", "surface", "string", "expect")
+"""Tables of which there are several."""
+
+
+def _rules() -> dict[str, Any]:
+    """Return the schema's rule of each key, by table and name."""
+    schema = Scene.model_json_schema()
+    found: dict[str, Any] = {}
+    for table, rule in schema["properties"].items():
+        parts = [rule, *rule.get("anyOf", ()), *([rule["items"]] if "items" in rule else [])]
+        names = [part["$ref"].rpartition("/")[2] for part in parts if "$ref" in part]
+        found |= {
+            f"{table}.{key}": own
+            for name in names
+            for key, own in schema["$defs"][name]["properties"].items()
+        }
+        found[table] = rule
+    return found
+
+
+RULES = _rules()
 QUANTITIES = ("landing.x", "landing.vx.mean", "impact.t", "d3", "belt_work", "reason", "nothing")
 
 
@@ -131,13 +153,44 @@ def machines(rng: random.Random) -> list[str]:
     return _mutant(rng, tables)
 
 
-def _mutant(rng: random.Random, tables: Any) -> list[str]:
+def keys(rng: random.Random) -> list[str]:
+    """A scene in which one to three keys of all that there are have extreme values."""
+    drawn = rng.choices(sorted(RULES), k=rng.choice((1, 1, 2, 3)))
+    bases = [
+        *BASES.values(),
+        *(tomllib.loads(path.read_text()) for path in scene.shipped().values()),
+    ]
+    table = drawn[0].partition(".")[0]
+    tables = copy.deepcopy(rng.choice([base for base in bases if table in base] or bases))
+    _few(tables)
+    for path in drawn:
+        table, _, key = path.partition(".")
+        given = extreme(rng, RULES[path])
+        if not key:
+            tables[table] = given
+            continue
+        rows = tables.setdefault(table, [{}] if table in LISTS else {})
+        row = rng.choice(rows or [{}]) if isinstance(rows, list) else rows
+        if isinstance(row, dict):
+            row[key] = given
+    return _written(rng, tables)
+
+
+def _few(tables: Any) -> None:
     # Work that takes long is no hang.
     streams = tables.get("stream", [])
     for stream in streams if isinstance(streams, list) else [streams]:
         stream["count"] = min(stream.get("count", 1), 200)
+
+
+def _mutant(rng: random.Random, tables: Any) -> list[str]:
+    _few(tables)
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         tables = changed(rng, tables)
+    return _written(rng, tables)
+
+
+def _written(rng: random.Random, tables: Any) -> list[str]:
     try:
         text = tomli_w.dumps(tables).encode("utf-8", "surrogatepass")
     except (TypeError, AttributeError, ValueError):  # the whole is no table any more
@@ -292,6 +345,7 @@ def notebooks(rng: random.Random) -> list[str]:
 KINDS: dict[str, Callable[[random.Random], list[str]]] = {
     "scenes": scenes,
     "machines": machines,
+    "keys": keys,
     "arguments": arguments,
     "tracks": tracks,
     "recordings": recordings,

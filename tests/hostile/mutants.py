@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from math import inf, nan, nextafter
 from typing import Any
 
 NUMBERS = (
@@ -34,6 +35,31 @@ def value(rng: random.Random) -> Any:
         (*plain, [], {}, [rng.choice(plain)], [rng.choice(NUMBERS), rng.choice(NUMBERS)],
          [[0.0, 0.0], [rng.choice(NUMBERS), 1.0]], {"x": rng.choice(plain)})
     )  # fmt: skip
+
+
+def extreme(rng: random.Random, rule: Any) -> Any:
+    """Return a value at or beyond an end of what a JSON schema's rule allows, or a wrong one."""
+    if "anyOf" in rule:
+        rule = rng.choice(rule["anyOf"])
+    if rng.random() < 0.15:
+        return value(rng)
+    kind = rule.get("type")
+    if "enum" in rule:
+        return rng.choice((*rule["enum"], ""))
+    if kind in ("number", "integer"):
+        names = ("minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum", "default")
+        ends = [rule[name] for name in names if rule.get(name) is not None]
+        beyond = [nextafter(end, side) for end in ends for side in (-inf, inf)]
+        tiny = (0, -0.0, -1, 5e-324, 1e-300, 1e-12, 1e12, 1e300, 10**30, nan, inf, -inf)
+        return rng.choice((*ends, *ends, *beyond, *tiny))
+    if kind == "boolean":
+        return rng.choice((True, False))
+    if kind == "array" and "prefixItems" in rule:
+        items = [extreme(rng, item) for item in rule["prefixItems"]]
+        return items[: rng.choice((0, 1, 2, 2, 2, 2))]
+    if kind == "array" and "items" in rule and "$ref" not in rule["items"]:
+        return [extreme(rng, rule["items"]) for _ in range(rng.choice((0, 1, 2, 40)))]
+    return value(rng)
 
 
 def garbled(rng: random.Random, data: bytes) -> bytes:

@@ -22,6 +22,7 @@ MEMORY = 2 << 20
 SHARES = {
     "scenes": 0.2,
     "machines": 0.2,
+    "keys": 0.3,
     "arguments": 0.2,
     "tracks": 0.15,
     "recordings": 0.15,
@@ -29,7 +30,7 @@ SHARES = {
     "notebooks": 0.02,
 }
 ASKED = int(os.environ.get("CHUTELAB_HOSTILE", "2000"))
-"""Cases in all of a slow run."""
+"""Cases of a slow run, of which each kind has its share."""
 
 
 def results(kind: str, seed: int, count: int, folder: Path) -> list[dict]:

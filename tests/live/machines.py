@@ -39,7 +39,9 @@ def as_page_has_it(machine):
         "endTime": float(machine.end_time),
         "dt": machine.dt,
         "interact": machine.interact,
-        "exitBox": [float(side) for side in machine.exit_box],
+        "exitBoxes": np.stack(
+            [np.broadcast_to(side, machine.count) for side in machine.exit_box], axis=1
+        ).tolist(),
         "segments": rows(
             segments,
             {

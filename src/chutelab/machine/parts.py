@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from chutelab.machine.releases import Releases
 from chutelab.scene import Scene
-from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 from chutelab.util.trig import atan2, hypot, sin_cos
 
 DRIVE_PULLEY = "the drive pulley"
@@ -453,25 +453,25 @@ class Machine:
         return (*self.plate_warnings, *crossings(self.surfaces, self.segments, self.arcs, radius))
 
     @cached_property
-    def exit_box(self) -> tuple[float, float, float, float]:
+    def exit_box(self) -> tuple[Numbers, Numbers, Numbers, Numbers]:
         """Left, right, bottom and top (m) beyond which a particle has left the scene.
 
         With gravity only the bottom is finite: what flies up comes back. What is released below
         all surfaces, or hangs on a string, has not left: the box holds releases, too. Where
-        particles do not meet it is the first of each stream, so that a particle does the same alone
-        and with others. In a family these are arrays (N,), and all have gravity or none.
+        particles do not meet it holds each one's own alone, so that a particle does the same alone
+        and with others: then, and in a family, these are arrays (N,) if there are several. In a
+        family all have gravity or none.
         """
         wheel = self.pulley.radius if self.pulley is not None else -inf
         corners, place = self.corners, self.releases.position
-        if corners.ndim > 2:
-            place = place[:, None]
-        elif not self.interact:
-            place = place[np.unique(self.releases.stream, return_index=True)[1]]
-        ends = np.concatenate([corners, place], axis=-2)
         for thread in self.threads:
             circle = np.add.outer([-thread.length, thread.length], thread.anchor)
-            ends = np.concatenate([ends, circle], axis=-2)
-        low, high = ends.min(axis=-2), ends.max(axis=-2)
+            corners = np.concatenate([corners, circle], axis=-2)
+        low, high = corners.min(axis=-2, initial=inf), corners.max(axis=-2, initial=-inf)
+        if corners.ndim == 2 and (self.interact or len(place) == 1):
+            low, high = np.minimum(low, place.min(axis=0)), np.maximum(high, place.max(axis=0))
+        else:
+            low, high = np.minimum(low, place), np.maximum(high, place)
         left, bottom = (np.minimum(low[..., axis], -wheel) for axis in (0, 1))
         right, top = (np.maximum(high[..., axis], wheel) for axis in (0, 1))
         if np.count_nonzero(self.gravity) == np.size(self.gravity):

@@ -72,7 +72,7 @@ def fates(recording: Recording) -> NDArray[Any]:
     if not len(who):
         return said
     last = recording.ends()[1]
-    left, right, bottom, top = machine.exit_box
+    left, right, bottom, top = (np.broadcast_to(side, count)[who] for side in machine.exit_box)
     (x, y), out = last["position"].T, recording.ended[who] == REASONS.index("exit")
     gone = out | (x < left) | (x > right) | (y < bottom) | (y > top)
     said[who[gone]] = _ways_out(recording, who[gone], last["position"][gone])

@@ -171,8 +171,9 @@ def _books(e: Evidence) -> Iterator[Broken]:
     """Judge energy and ledger.
 
     Of lone particles what is unexplained may not change from knot to knot; particles that meet give
-    energy to each other, so of them it is the sum of all at some times. Losses that are booked are
-    never less than before but by what parting overlaps gives.
+    energy to each other, so of them it is the sum of all at some times, and what the solves of the
+    contact engine gained. Losses that are booked are never less than before but by what parting
+    overlaps gives.
     """
     recording, gain, within = e.recording, e.gain, e.within
     bound = e.energy_bound * e.energy
@@ -203,7 +204,9 @@ def _books(e: Evidence) -> Iterator[Broken]:
     t = recording.knots["t"]
     times = np.sort(t[:: max(1, len(t) // INSTANTS)])
     rise = recording.energy_at(times)["residual"]
-    if rise.max(initial=0.0) > most:
+    if recording.gained > bound:
+        yield _of_all(e, ENERGY, "", recording.gained, bound)
+    elif rise.max(initial=0.0) > most:
         yield _of_all(e, ENERGY, "", rise.max(), most)
 
 

@@ -161,7 +161,6 @@ class Job:
     def settings(self, buckets: int, cells: int) -> None:
         """Fill in the numbers of the world."""
         machine, world, wheel = self.machine, self.module.world, self.machine.pulley
-        left, right, bottom, top = machine.exit_box
         for name, value in (
             ("disk_count", machine.count), ("surface_count", len(self.pieces)),
             ("kind_count", self.kinds), ("material_count", self.materials),
@@ -174,7 +173,6 @@ class Job:
             ("g", machine.gravity), ("dt", machine.dt), ("end_time", machine.end_time),
         ):  # fmt: skip
             setattr(world, name, value)
-        world.exit_box[:] = left, bottom, right, top
 
     def fill(self) -> None:
         """Fill in disks, surfaces and pairs."""
@@ -188,6 +186,9 @@ class Job:
         disks["inertia"] = particle.inertia
         disks["kind"] = releases.kind
         disks["rides"] = releases.carried
+        left, right, bottom, top = machine.exit_box
+        for n, side in enumerate((left, bottom, right, top)):
+            disks["exit_box"][:, n] = side
         module.array("surfaces", dtype("Surface"), len(self.pieces))[:] = self.pieces
         pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials))
         pairs = pairs.reshape(self.kinds, -1)

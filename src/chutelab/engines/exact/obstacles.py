@@ -15,7 +15,7 @@ reads lies together.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -332,9 +332,9 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     # end that lies on an arc, or that of the belt on the pulley, cannot be met.
     rests = np.full((len(spots), 2), NONE)
     if arcs:
-        for arc, on in enumerate(resting(corners, bends, near)[..., 0]):
+        for arc, lie in enumerate(resting(corners, bends, near)):
             if not len(changes) or stays[flat + arc]:
-                rests[on.reshape(2, -1).T] = arc
+                rests[lie[..., 0].reshape(2, -1).T] = arc
     if wheel is not None:
         rests[0, 1] = arcs
     known: dict[int, int] = {}
@@ -569,14 +569,17 @@ def _cut(machine: Machine, ends: Floats, places: Sequence[tuple[int, int]], near
     return replace(machine, segments=replace(segments, **own))
 
 
-def resting(corners: Floats, bends: Bends, near: Floats) -> Bools:
-    """Tell which ends (2 P, n) lie on an arc, but not where it ends, (A, 2 P, n)."""
-    away = corners[:, None] - bends.center[:, :, None]
-    radius, begin, extent = bends.shape[:, :, None]
-    turn = np.mod(np.arctan2(away[1], away[0]) - begin, 2.0 * np.pi)
-    edge = np.where(extent < 2.0 * np.pi, near / radius, 0.0)
-    on = np.abs(np.hypot(away[0], away[1]) - radius) <= near
-    return np.asarray(on & (turn >= edge) & (turn <= extent - edge))
+def resting(corners: Floats, bends: Bends, near: Floats) -> Iterator[Bools]:
+    """Yield of each arc which ends (2 P, n) lie on it, but not where it ends."""
+    arcs = zip(bends.center.swapaxes(0, 1), bends.shape.swapaxes(0, 1), strict=True)
+    for center, (radius, begin, extent) in arcs:
+        x, y = corners - center[:, None]
+        on = np.abs(np.hypot(x, y) - radius) <= near
+        if on.any():
+            turn = np.mod(np.arctan2(y, x) - begin, 2.0 * np.pi)
+            edge = np.where(extent < 2.0 * np.pi, near / radius, 0.0)
+            on &= (turn >= edge) & (turn <= extent - edge)
+        yield on
 
 
 def spots_of(ends: Floats, tolerance: float) -> list[tuple[int, int]]:

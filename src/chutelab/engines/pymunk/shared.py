@@ -28,7 +28,7 @@ import pymunk
 from pymunk import Vec2d, batch
 
 from chutelab.engines.pymunk.shapes import Shapes
-from chutelab.engines.pymunk.world import Bend, Carriage, Flight, Tracks, World
+from chutelab.engines.pymunk.world import Bend, Carriage, Flight, Tracks, World, exit_box
 from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder
@@ -521,7 +521,7 @@ class Shared:
         for i in np.flatnonzero(out & self.free).tolist():
             begin = Vec2d(*self.state[0, :2, i].tolist())
             v = Vec2d(*self.state[0, 2:4, i].tolist())
-            late = Flight(begin, v, self.pull).leaves(self.machine.exit_box)
+            late = Flight(begin, v, self.pull).leaves(exit_box(self.machine, i))
             if late < self.h and (entries[:, i] == self.entries[:, i]).all():
                 # It flew, and left within the step.
                 after = v + late * self.pull

@@ -252,6 +252,11 @@ def own(values: ArrayLike, particle: int) -> float:
     return float(values[particle] if values.ndim else values)
 
 
+def exit_box(machine: Machine, particle: int) -> tuple[float, float, float, float]:
+    """Return a particle's own of `Machine.exit_box`, m."""
+    return tuple(own(side, particle) for side in machine.exit_box)  # type: ignore[return-value]
+
+
 def falls(gap: float, rate: float, pull: float) -> float:
     """Return the first time (s) at which gap + rate τ + pull τ²/2 falls to 0, inf if never."""
     ahead = max(gap, 0.0)
@@ -296,8 +301,8 @@ class World:
                 float(restitution), min(float(friction), GRIP), r, -inf, inf,
                 turning.angular_velocity,
             ))  # fmt: skip
-        for n, center in enumerate(arcs.center.tolist()):
-            self._bend(n, Vec2d(*center), self._about(arcs, n))
+        for n, (center, *ends) in enumerate(zip(arcs.center.tolist(), *arcs.ends, strict=True)):
+            self._bend(n, Vec2d(*center), ends, self._about(arcs, n))
         self.faces = list(self.by_shape.values())
         self.gates = any(face.appears > -inf or face.vanishes < inf for face in self.faces)
 
@@ -318,8 +323,8 @@ class World:
             "appears": float(parts.appears[n]), "vanishes": float(parts.vanishes[n]), "spin": 0.0,
         }  # fmt: skip
 
-    def _bend(self, n: int, center: Vec2d, about: dict[str, Any]) -> None:
-        """Add an arc, and its ends."""
+    def _bend(self, n: int, center: Vec2d, ends: list[Floats], about: dict[str, Any]) -> None:
+        """Add an arc, and its ends (m)."""
         arcs = self.machine.arcs
         radius, begin, extent = (
             float(values[n]) for values in (arcs.radius, arcs.begin, arcs.extent)
@@ -332,6 +337,7 @@ class World:
         circle = pymunk.Circle(body, radius)
         circle.cache_bb()
         base = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        base.position = center  # feet in one place would be pairs, each with each, in every step
         foot = pymunk.Circle(base, 0.0)
         about["spin"] = -about["speed"] / radius
         if whole:
@@ -344,33 +350,38 @@ class World:
         # Of the centre's way there, which bends no more than the sharpest arc.
         more = sqrt(2.0 * JOINT * self.hair * float(arcs.radius.min())) / (radius + self.radius)
         before, after = (
-            more if self._goes_on(end[n], out, more) else 0.0
-            for end, out in zip(arcs.ends, outs, strict=True)
+            more if self._goes_on(end, out, more) else 0.0
+            for end, out in zip(ends, outs, strict=True)
         )
         self._add(Bend(
             circle, tangent=None, foot=foot, begin=begin - before, extent=extent + before + after,
             **about,
         ))  # fmt: skip
         # Out of it is along the surface at the first end, against it at the last.
-        for end, out, way in zip(arcs.ends, outs, (1.0, -1.0), strict=True):
+        for end, out, way in zip(ends, outs, (1.0, -1.0), strict=True):
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
-            point = pymunk.Circle(still, 0.0, end[n].tolist())
+            point = pymunk.Circle(still, 0.0, end.tolist())
             self._add(Face(point, tangent=out, **about | {"speed": way * about["speed"]}))
+
+    @cached_property
+    def _onward(self) -> tuple[Floats, Floats]:
+        """Ends of all pieces from left to right, (n, 2), m, and the way on into each, (n, 2)."""
+        parts, arcs = self.machine.segments, self.machine.arcs
+        some = ~arcs.whole
+        first, last = arcs.begin[some], (arcs.begin + arcs.extent)[some]
+        ends = np.concatenate([parts.start, parts.end, *(end[some] for end in arcs.ends)])
+        begins = np.stack([-np.sin(first), np.cos(first)], axis=-1)
+        back = np.stack([np.sin(last), -np.cos(last)], axis=-1)
+        ways = np.concatenate([parts.tangent, -parts.tangent, begins, back])
+        order = ends[:, 0].argsort(kind="stable")
+        return ends[order], ways[order]
 
     def _goes_on(self, end: Floats, out: Vec2d, bend: float) -> bool:
         """Tell whether another piece goes on from an end (m), turning by less than `bend` (rad)."""
-        parts, arcs = self.machine.segments, self.machine.arcs
-        first, last = arcs.begin, arcs.begin + arcs.extent
-        onward = [
-            parts.tangent, -parts.tangent,
-            np.stack([-np.sin(first), np.cos(first)], axis=-1),
-            np.stack([np.sin(last), -np.cos(last)], axis=-1),
-        ]  # fmt: skip
-        near = (
-            np.hypot(*(np.concatenate([parts.start, parts.end, *arcs.ends]) - end).T) <= self.hair
-        )
-        near[2 * len(parts.length) :] &= ~np.tile(arcs.whole, 2)
-        return bool((np.hypot(*(np.concatenate(onward) - out)[near].T) <= bend).any())
+        ends, ways = self._onward
+        low, high = ends[:, 0].searchsorted([end[0] - self.hair, end[0] + 1.01 * self.hair])
+        near = np.hypot(*(ends[low:high] - end).T) <= self.hair
+        return bool((np.hypot(*(ways[low:high] - out)[near].T) <= bend).any())
 
     def _add(self, face: Face) -> None:
         shape = face.touched

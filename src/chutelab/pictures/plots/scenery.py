@@ -414,7 +414,7 @@ def _crowd(recording: Recording, begin: int) -> Floats:
     released = events["position"][~carried & (events["kind"] == Kind.RELEASE)]
     struck = events["position"][np.isin(events["kind"], STRUCK)]
     strays = 0.02 if recording.count > MANY else 0.0
-    bottom = recording.machine.exit_box[2] + EXIT_MARGIN
+    bottom = np.min(recording.machine.exit_box[2]) + EXIT_MARGIN
     corners = [
         np.quantile(places, [share, 1.0 - share], axis=0)
         for places, share in ((released, 0.0), (struck, strays))

@@ -135,10 +135,14 @@ void close_step(double h) {
             d->rest += h;
         }
     }
+    for (int from = 0, to = 0; from < W.contact_count; from = to) {
+        while (to < W.contact_count && (!W.interact || W.contacts[to].island == W.contacts[from].island)) to++;
+        account(W.contacts + from, to - from);
+    }
     for (int n = 0; n < W.contact_count; n++) {
         Contact *c = W.contacts + n;
         Disk *a = W.disks + c->i, *b = c->j >= 0 ? W.disks + c->j : 0;
-        double u[3], v[3], entries[3], given[3];
+        double u[3], v[3], given[3] = {c->given[0], 0, 0};
         c->next = a->before;
         a->before = n;
         W.links[2 * n] = a->links;
@@ -152,13 +156,12 @@ void close_step(double h) {
         if (!b && a->held_count < MAX_HELD) a->held[a->held_count++] = -1 - c->j;
         relative(c, 1, u);
         relative(c, 0, v);
-        share_out(c, u, v, 0, entries, given);
-        book(a->gain, c->two ? b->gain : 0, c->owner, entries);
+        book(a->gain, c->two ? b->gain : 0, c->owner, c->entries);
         if (given[0] != 0) book(a->gain, 0, W.ride_owner, given);
-        share_out(c, u, v, W.before, entries, given);
+        a->ahead[0] += c->given[1];
         for (int k = 0; k < 3; k++) {
-            a->ahead[k] += (c->two ? 0.5 : 1) * entries[k] + given[k];
-            if (c->two) b->ahead[k] += 0.5 * entries[k];
+            a->ahead[k] += (c->two ? 0.5 : 1) * c->later[k];
+            if (c->two) b->ahead[k] += 0.5 * c->later[k];
         }
         a->supports++;
         if (b) b->supports++;
@@ -182,6 +185,7 @@ void close_step(double h) {
             if (b) b->rest = 0;
         }
     }
+    give_back(W.contacts, W.contact_count);
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         Track *track = W.tracks + i;
@@ -260,21 +264,16 @@ void take_back(int i) {
     Disk *d = W.disks + i;
     for (int link = d->links; link >= 0; link = W.links[link]) {
         const Contact *c = W.contacts + link / 2;
-        double u[3], v[3], entries[3], given[3];
-        if (c->impulse[0] == 0) continue;
-        relative(c, 1, u);
-        relative(c, 0, v);
-        share_out(c, u, v, W.before, entries, given);
         for (int n = 0; n < 3; n++) {
-            double back = (c->two ? 0.5 : 1) * entries[n];
+            double back = (c->two ? 0.5 : 1) * c->later[n];
             if (c->i != i && !c->two) back = 0;
-            W.books[3 * c->owner + n] -= back;
             d->entries[n] -= back;
-            if (c->i == i) {
-                W.books[3 * W.ride_owner + n] -= given[n];
-                d->entries[n] -= given[n];
-            }
+            if (W.interact && n > 0) spread(-back, n);
+            else W.books[3 * c->owner + n] -= back;
         }
+        if (c->i != i) continue;
+        W.books[3 * W.ride_owner] -= c->given[1];
+        d->entries[0] -= c->given[1];
     }
 }
 

@@ -48,6 +48,7 @@ void describe(Contact *c, int i, int j) {
     c->share = 1;
     c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx : 0;
     c->gives = c->change = 0;
+    c->most = INFINITY;
     c->friction = pair->friction;
     c->arm = pair->rolling * reach;
 }
@@ -102,6 +103,41 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
     entries[2] = -J[1] * (first * u[1] + then * v[1]) - J[2] * (first * u[2] + then * v[2]);
     given[0] = c->j >= 0 && !c->two ? all * (J[0] * c->other[0] + J[1] * c->other[1]) : 0;
     given[1] = given[2] = 0;
+}
+
+/* Share what is lost in contacts that were solved together: of a crowd only the sum is known. In a chain
+   wedged between walls impulses of any size hold each other; where one of its gaps opens and another
+   closes, one seems to give what the other takes. So where the sum is a loss those that gain
+   gain nothing and the others lose so much less; where it is a gain, the other way round. */
+static void pool(Contact *list, int count, int later) {
+    double sums[2] = {0, 0};
+    for (int n = 0; n < count; n++) {
+        const double *loss = later ? list[n].later : list[n].entries;
+        for (int k = 1; k < 3; k++) sums[loss[k] < 0] += loss[k];
+    }
+    double all = sums[0] + sums[1];
+    double shares[2] = {all > 0 ? all / sums[0] : 0, all < 0 ? all / sums[1] : 0};
+    for (int n = 0; n < count; n++) {
+        double *loss = later ? list[n].later : list[n].entries;
+        for (int k = 1; k < 3; k++) loss[k] *= shares[loss[k] < 0];
+    }
+}
+
+/* Work out the ledger entries of contacts that were solved together. */
+void account(Contact *list, int count) {
+    for (int n = 0; n < count; n++) {
+        Contact *c = list + n;
+        double u[3], v[3], given[3];
+        relative(c, 1, u);
+        relative(c, 0, v);
+        share_out(c, u, v, 0, c->entries, given);
+        c->given[0] = given[0];
+        share_out(c, u, v, W.before, c->later, given);
+        c->given[1] = given[0];
+    }
+    if (!W.interact) return;
+    pool(list, count, 0);
+    pool(list, count, 1);
 }
 
 /* By how much more than gravity the way inside an arc presses a disk on a surface, m/s2: that arc, or

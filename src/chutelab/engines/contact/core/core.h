@@ -84,7 +84,9 @@ static inline int goes_on(int j, int other) {
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
 /* Change of normal velocity that a contact asks for under its impulse, m/s. */
-static inline double asks(const Contact *c) { return c->need - c->gives * c->impulse[0]; }
+static inline double asks(const Contact *c) {
+    return MIN(c->need - c->gives * c->impulse[0], c->most);
+}
 
 /* Move a disk along its parabola. */
 static inline void advance(Disk *d, double t) {
@@ -132,6 +134,8 @@ void write_event(int kind, int i, int other, int owner, double t, const double *
                  const double *before, const double *after, double normal, double tangent);
 void event_here(int kind, int i, int owner);
 void book(double *first, double *second, int owner, const double *entries);
+void spread(double loss, int k);
+void give_back(const Contact *list, int count);
 
 /* contact.c */
 void describe(Contact *c, int i, int j);
@@ -140,6 +144,7 @@ void push(const Contact *c, const double *impulse);
 int island_of(int i);
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given);
+void account(Contact *list, int count);
 double pressed_inside(const Disk *d, int surface);
 double turning_time(const Disk *d, const Surface *s);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
@@ -162,6 +167,7 @@ int find_contacts(double h, int *woke);
 
 /* solver.c */
 void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough);
+void ease_off(Contact *list, int count);
 void solve_contacts(void);
 
 /* closing.c */

@@ -176,7 +176,7 @@ void was_moved(int i) {
    changes what the other has to stop, by a share of 5/7 at most in turn. */
 static void give(Contact *c, double normal) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-    double *J = c->impulse, u[3], v[3], entries[3], given[3], most = c->friction * normal;
+    double *J = c->impulse, u[3], v[3], given[3], most = c->friction * normal;
     double arm = c->arm * normal, more[3] = {normal, 0, 0};
     relative(c, 0, u);
     J[0] = normal;
@@ -197,9 +197,10 @@ static void give(Contact *c, double normal) {
         push(c, more);
         relative(c, 0, v);
     }
-    share_out(c, u, v, 0, entries, given);
-    book(a->entries, c->two ? b->entries : 0, c->owner, entries);
+    share_out(c, u, v, 0, c->entries, given);
+    book(a->entries, c->two ? b->entries : 0, c->owner, c->entries);
     if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
+    give_back(c, 1);
 }
 
 /* Let a disk lie on a surface from t on. The step of a disk by itself ends here; in a crowd half of
@@ -286,6 +287,7 @@ static void jam(Contact *struck, double t) {
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
     /* Not hastened: then what rattles may never be as calm as it must be. */
     sweep_contacts(list, count, 0, W.sweeps, 0.1 * left, left);
+    ease_off(list, count);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
         Disk *d = W.disks + m;
         double v[3] = {d->vx, d->vy, d->spin};
@@ -295,19 +297,18 @@ static void jam(Contact *struck, double t) {
         was_moved(m);
         memcpy(&d->vx, v, sizeof v);
     }
+    account(list, count);
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-        double u[3], v[3], entries[3], given[3];
+        double given[3] = {c->given[0], 0, 0};
         if (c->j < 0 && c->impulse[0] > 0) hold(a, -1 - c->j);
-        relative(c, 1, u);
-        relative(c, 0, v);
-        share_out(c, u, v, 0, entries, given);
-        book(a->entries, c->two ? b->entries : 0, c->owner, entries);
+        book(a->entries, c->two ? b->entries : 0, c->owner, c->entries);
         if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
         if ((c->i == i && c->j == struck->j) || (c->i == struck->j && c->j == i))
             for (int k = 0; k < 2; k++) struck->impulse[k] = c->impulse[k];
     }
+    give_back(list, count);
 }
 
 /* Bring a disk by itself that lasts on a surface from its hop to the smooth path, before it is struck

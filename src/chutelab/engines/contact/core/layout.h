@@ -44,6 +44,7 @@ typedef struct {
     double ride_rho;            /* ... and its distance from the axis on the pulley; 0: no ride */
     double ride_speed;          /* m/s */
     double ride_from, ride_to;  /* s; when the ride began and ends */
+    double exit_box[4];         /* [in] m; left, bottom, right, top; its track ends outside */
     double left, bottom, right, top; /* box that it can reach in this step */
     double zone[4];             /* the box, and room round it, for which `World.nearby` is right */
     double due;                 /* s; its next event, INFINITY if none is foreseen in this step */
@@ -130,7 +131,8 @@ typedef struct {
     double nx, ny;          /* unit normal towards i */
     double gap;             /* m */
     double need;            /* m/s; least change of normal velocity that keeps the gap closed ... */
-    double gives;           /* ... and by how much less for each N s of its normal impulse, 1/kg */
+    double gives;           /* ... and by how much less for each N s of its normal impulse, 1/kg ... */
+    double most;            /* ... but by no more than that, m/s */
     double pull;            /* m/s2; by which gravity makes it slip on a surface */
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
@@ -143,6 +145,9 @@ typedef struct {
     double rest;            /* coefficient of restitution */
     double share;           /* of its friction that acts; below 1 where surfaces wedge a disk */
     double change;          /* m/s; by which the last sweep changed its slip */
+    double entries[3], later[3]; /* J; what its impulses do to the ledger, and what the part of them
+                                    does that belongs to this step; see `account` */
+    double given[2];        /* J; the same for the belt that carries the partner */
     int i, j;
     int two;                /* whether j is a free disk, which feels the impulse too */
     int owner;              /* of the ledger entries */
@@ -201,7 +206,6 @@ typedef struct {
     double gx, gy;       /* m/s2 */
     double dt;           /* s; longest step */
     double end_time;     /* s */
-    double exit_box[4];  /* m; left, bottom, right, top; tracks end outside */
     double smooth_x, smooth_v; /* radii, m/s; by how much a track may leave out what lasts */
     double accurate;     /* m/s; changes at which sweeps end */
     /* [out] */

@@ -193,8 +193,8 @@ static void leave(int i, double end) {
     for (int n = 0; n < 4; n++) {
         int y = n % 2;
         double side = n < 2 ? -1 : 1, pull = side * (y ? W.gy : W.gx);
-        double gap = side * (W.exit_box[n] - (y ? d->y : d->x)), rate = side * (y ? d->vy : d->vx);
-        if (!(fabs(W.exit_box[n]) < INFINITY) || gap - (rate + 0.5 * pull * h) * h >= 0) continue;
+        double gap = side * (d->exit_box[n] - (y ? d->y : d->x)), rate = side * (y ? d->vy : d->vx);
+        if (!(fabs(d->exit_box[n]) < INFINITY) || gap - (rate + 0.5 * pull * h) * h >= 0) continue;
         double t = 0, root = sqrt(MAX(rate * rate + 2 * pull * gap, 0));
         if (gap > 0) t = 2 * gap / (rate + root);
         else if (rate < 0) t = pull > 0 ? -rate / pull : INFINITY;

@@ -197,3 +197,31 @@ void book(double *first, double *second, int owner, const double *entries) {
         if (second) second[n] += share * entries[n];
     }
 }
+
+/* Book a loss, or a gain below zero, as a part of what has been lost so far, at each surface in
+   proportion. A gain beyond that waits in the last row until there is something to take it from. */
+void spread(double loss, int k) {
+    double *last = W.books + 3 * W.owner_count + k, lost = 0;
+    loss += MIN(*last, 0);
+    *last = MAX(*last, 0);
+    if (loss == 0) return;
+    for (int n = 0; n <= W.owner_count; n++) lost += MAX(W.books[3 * n + k], 0);
+    double share = lost > 0 ? MAX(loss / lost, -1) : 0;
+    for (int n = 0; n <= W.owner_count; n++) W.books[3 * n + k] += share * MAX(W.books[3 * n + k], 0);
+    *last += loss - share * lost;
+}
+
+/* Book what contacts of a crowd gave back, their losses below zero, as a part of what has been lost, at
+   whatever surface: what parts an overlap was lost when that came to be, and a hop's height when the
+   one before ended. */
+void give_back(const Contact *list, int count) {
+    for (int k = 1; k < 3 && W.interact; k++) {
+        double back = 0;
+        for (int n = 0; n < count; n++) {
+            double gain = MIN(list[n].entries[k], 0);
+            W.books[3 * list[n].owner + k] -= gain;
+            back += gain;
+        }
+        spread(back, k);
+    }
+}

@@ -20,6 +20,8 @@
 #define MOST_ROUNDS 50
 /* Sweeps before they are hastened: most solves need no more. */
 #define PLAIN 6
+/* Steps of a line search: rounding ends it sooner. */
+#define SECANTS 5
 /* Of momentum. */
 #define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
@@ -36,8 +38,9 @@ static double press(Contact *c) {
         x -= b->vx - b->ux;
         y -= b->vy - b->uy;
     }
-    double off = x * c->nx + y * c->ny - asks(c);
-    double normal = MAX(c->impulse[0] - off / (c->light[0] + c->gives), 0);
+    double opens = x * c->nx + y * c->ny;
+    double given = (c->need - c->gives * c->impulse[0] - opens) / (c->light[0] + c->gives);
+    double normal = MAX(c->impulse[0] + MIN(given, (c->most - opens) * c->mass[0]), 0);
     double change[3] = {normal - c->impulse[0], 0, 0};
     if (change[0] != 0) push(c, change);
     c->impulse[0] = normal;
@@ -161,13 +164,18 @@ static void advance_impulses(Contact *list, int count, double by) {
     }
 }
 
-/* Line search: go along `course` to where the cost is least, at most all of it. */
+/* Line search: go along `course` to where the cost is least, at most all of it, and never beyond. The
+   cost is convex; where `asks` of no contact bends, the first secant is exact. */
 static void descend(Contact *list, int count) {
-    double from = downhill(list, count);
+    double from = downhill(list, count), way = 1;
     if (!(from < 0)) return;
-    advance_impulses(list, count, 1);
-    double to = downhill(list, count);
-    if (to > 0) advance_impulses(list, count, -to / (to - from));
+    advance_impulses(list, count, way);
+    for (int n = 0; n < SECANTS; n++) {
+        double to = downhill(list, count), back = way * to / (to - from);
+        if (!(to > 0)) return;
+        advance_impulses(list, count, -back);
+        way -= back;
+    }
 }
 
 /* Start from impulses of the step before, as far as they lower the cost: where contacts have opened,
@@ -183,7 +191,7 @@ static void start_warm(Contact *list, int count) {
 
 /* Lower all impulses alike, where that lowers the cost. They do no work then on the velocities that
    they leave, however far the sweeps had come: W J + q times J is at most 0. */
-static void ease_off(Contact *list, int count) {
+void ease_off(Contact *list, int count) {
     for (int n = 0; n < count; n++)
         for (int k = 0; k < 3; k++) list[n].course[k] = -list[n].impulse[k];
     descend(list, count);
@@ -280,7 +288,6 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
         }
         left -= !stalled;
     }
-    ease_off(list, count);
 }
 
 /* Where the slip of a disk by itself turns round within a step, since friction cannot hold it, the
@@ -373,15 +380,16 @@ void solve_contacts(void) {
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), PLAIN,
                            W.accurate, W.skip * least);
         else sweep_contacts(list, to - from, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9 * W.pace));
-    }
-    for (int n = 0; n < W.contact_count; n++) {
-        /* Rounding presses nobody; with endless friction even that would pull. */
-        Contact *c = W.contacts + n;
-        const Disk *a = W.disks + c->i;
-        if (c->impulse[0] >= NOISE * c->mass[0] * (fabs(a->vx) + fabs(a->vy))) continue;
-        for (int k = 0; k < 3; k++) c->impulse[k] = -c->impulse[k];
-        push(c, c->impulse);
-        c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+        for (int n = from; n < to; n++) {
+            /* Rounding does not press; with endless friction even that would pull. */
+            Contact *c = W.contacts + n;
+            const Disk *a = W.disks + c->i;
+            if (c->impulse[0] >= NOISE * c->mass[0] * (fabs(a->vx) + fabs(a->vy))) continue;
+            for (int k = 0; k < 3; k++) c->impulse[k] = -c->impulse[k];
+            push(c, c->impulse);
+            c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+        }
+        ease_off(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);
     check_energy();

@@ -3,13 +3,16 @@
 
 #include "core.h"
 
-/* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step: gently,
-   since parting does work. Of an overlap as deep as DEEP more, up to all. It parts like a spring that
-   GIVES, of stiffness PART / GIVES M / step^2, M the heaviest mass of the island: what is wedged cannot
-   part, and without a bound its impulses would grow in each sweep. */
+/* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step, of an overlap
+   as deep as DEEP more, up to all. It parts like a spring that GIVES, of stiffness
+   PART / GIVES M / step^2, M the heaviest mass of the island: what is wedged cannot part, and without a
+   bound its impulses would grow in each sweep. What does part goes by MOST_PARTED radii in a step, no
+   more: gently, since parting does work, and where a wedged chain opens the speeds add up; less, and
+   the impulses of such a chain take many times the sweeps. */
 #define SLOP 1e-3
 #define PART 0.1
 #define DEEP 0.03
+#define MOST_PARTED 1e-2
 #define GIVES 3e-3
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
@@ -81,6 +84,7 @@ static int add(int i, int j, double least, double bound, double h) {
     if (c->gap < -SLOP * least) {
         double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
         aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
+        c->most = (c->gap + MOST_PARTED * least - later) / h;
         c->gives = GIVES;
     }
     c->need = (aim - later) / h;
@@ -113,7 +117,10 @@ static int add(int i, int j, double least, double bound, double h) {
     /* In a corner the other surface may press it on this one. */
     int alone = d->supports <= 1 || gone;
     c->leaves = pressed && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
-    if (c->leaves || gone) c->gives = 0;
+    if (c->leaves || gone) {
+        c->gives = 0;
+        c->most = INFINITY;
+    }
     if (c->leaves) {
         c->need = floor;
         c->drift = (until < h ? until : 0) * c->pull;

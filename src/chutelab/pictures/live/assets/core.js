@@ -99,13 +99,14 @@ class Core {
 
   /** Fill in fields of one row of an array.
    * @param {string} name @param {string} struct @param {number} row
-   * @param {Record<string, number>} values */
+   * @param {Record<string, number | number[]>} values */
   fill(name, struct, row, values) {
     const { size, fields } = this.layout.structs[struct];
     const begin = this.get(name) + row * size;
     for (const [key, value] of Object.entries(values)) {
       const [offset, type] = fields[key];
-      if (type === "double") this.doubles[(begin + offset) >> 3] = value;
+      if (typeof value !== "number") this.doubles.set(value, (begin + offset) >> 3);
+      else if (type === "double") this.doubles[(begin + offset) >> 3] = value;
       else this.ints[(begin + offset) >> 2] = value;
     }
   }
@@ -153,9 +154,6 @@ class Core {
       g: machine.gravity, dt: machine.dt, end_time: machine.endTime,
     };
     for (const [name, value] of Object.entries(numbers)) this.set(name, value);
-    const [left, right, bottom, top] = machine.exitBox;
-    const box = (this.world + this.layout.structs.World.fields.exit_box[0]) >> 3;
-    this.doubles.set([left, bottom, right, top], box);
     rows.forEach(({ restitution, friction, ...row }, k) => {
       this.fill("surfaces", "Surface", k, row);
       for (let kind = 0; kind < kinds; kind += 1) {
@@ -169,10 +167,12 @@ class Core {
       }
     }
     releases.forEach((one, i) => {
+      const [left, right, bottom, top] = machine.exitBoxes[i];
       this.fill("disks", "Disk", i, {
         x: one.x, y: one.y, vx: one.vx, vy: one.vy, spin: machine.spins?.[i] ?? 0, release: one.t,
         radius: machine.radius[i], mass: machine.mass[i], inertia: machine.inertia[i],
         kind: one.kind, rides: Number(one.carried), goes_on: Number(machine.goesOn?.[i] ?? false),
+        exit_box: [left, bottom, right, top],
       });
     });
     this.exports.prepare();

@@ -61,7 +61,7 @@ import { RADIANS, lengthOf, modulo, sinCos } from "./trig.js";
  * @property {number} endTime s
  * @property {number} dt s
  * @property {boolean} interact
- * @property {[number, number, number, number]} exitBox left, right, bottom, top, m
+ * @property {[number, number, number, number][]} exitBoxes left, right, bottom, top, m, of each
  * @property {Segment[]} segments
  * @property {Arc[]} arcs
  * @property {Pulley | null} pulley
@@ -151,7 +151,7 @@ export function build(scene) {
     endTime: typeof run.until === "string" ? bound : Math.min(bound, run.until),
     dt: run.dt,
     interact: scene.crowded,
-    exitBox: exitBox(scene, segments, arcs, releases),
+    exitBoxes: exitBoxes(scene, segments, arcs, releases),
     segments,
     arcs,
     pulley: belt === null ? null : {
@@ -361,16 +361,17 @@ function surfacePart(one) {
 }
 
 /**
- * Returns left, right, bottom and top beyond which a particle has left the scene.
+ * Returns left, right, bottom and top beyond which each particle has left the scene.
  *
- * With gravity only the bottom is finite: what flies up comes back.
+ * With gravity only the bottom is finite: what flies up comes back. Where particles do not meet the
+ * box of each holds its own release, else those of all.
  * @param {Scene} scene
  * @param {Segment[]} segments
  * @param {Arc[]} arcs
  * @param {Release[]} releases
- * @returns {[number, number, number, number]}
+ * @returns {[number, number, number, number][]}
  */
-function exitBox(scene, segments, arcs, releases) {
+function exitBoxes(scene, segments, arcs, releases) {
   const wheel = scene.incoming === null ? -Infinity : scene.incoming.pulley_radius;
   let [left, right, bottom, top] = [-wheel, wheel, -wheel, wheel];
   const hold = (/** @type {number} */ x, /** @type {number} */ y) => {
@@ -394,9 +395,9 @@ function exitBox(scene, segments, arcs, releases) {
       hold(x + radius * cosine, y + radius * sine);
     }
   }
-  // Where particles do not meet it is the first of each stream: alone each does the same.
-  releases.filter(({ stream }, i) => scene.crowded || stream !== releases[i - 1]?.stream)
-    .forEach(({ x, y }) => hold(x, y));
-  if (scene.gravity) return [-Infinity, Infinity, bottom - EXIT_MARGIN, Infinity];
-  return [left - EXIT_MARGIN, right + EXIT_MARGIN, bottom - EXIT_MARGIN, top + EXIT_MARGIN];
+  if (scene.crowded) releases.forEach(({ x, y }) => hold(x, y));
+  return releases.map(({ x, y }) => scene.gravity
+    ? [-Infinity, Infinity, Math.min(bottom, y) - EXIT_MARGIN, Infinity]
+    : [Math.min(left, x) - EXIT_MARGIN, Math.max(right, x) + EXIT_MARGIN,
+      Math.min(bottom, y) - EXIT_MARGIN, Math.max(top, y) + EXIT_MARGIN]);
 }

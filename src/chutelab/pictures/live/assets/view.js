@@ -92,8 +92,13 @@ function boxOf(machine, points) {
     }
   }
   if (machine.pulley) widen(0, 0, machine.pulley.radius);
-  const [west, east, south, north] = machine.exitBox.map((side, n) =>
-    side + (n % 2 ? -EXIT_MARGIN : EXIT_MARGIN));
+  let [west, east, south, north] = [Infinity, -Infinity, Infinity, -Infinity];
+  for (const [left, right, bottom, top] of machine.exitBoxes) {
+    west = Math.min(west, left + EXIT_MARGIN);
+    east = Math.max(east, right - EXIT_MARGIN);
+    south = Math.min(south, bottom + EXIT_MARGIN);
+    north = Math.max(north, top - EXIT_MARGIN);
+  }
   // Without a surface nothing is left.
   const all = !machine.segments.length && !machine.arcs.length;
   const inside = (/** @type {{x: number, y: number}} */ { x, y }) =>

@@ -433,8 +433,8 @@ def _faces(
     return first, segments[segment], side
 
 
-NOW = 1e-12
-"""rad; so far the angle of a joint is sure, as ends within `obstacles.JOINT` are one."""
+NOW = 2e-11
+"""rad; an obstacle this close to the present angle is met now: by rounding it may be passed."""
 
 WAYS = np.array([[-1.0], [1.0]])
 """Backwards and forwards, as rows of what `bounds` returns."""
@@ -463,7 +463,6 @@ def bounds(
     """
     found = np.zeros((2, len(rows)), dtype=BOUND)
     found["angle"], found["obstacle"] = WAYS * np.inf, NONE
-    rounding = rows_of(obstacles.touch, rows) / np.abs(rho)
 
     def narrow(
         angle: Floats, closing: Floats, met: Bools, obstacle: Ints | int, side: Floats | int,
@@ -471,10 +470,7 @@ def bounds(
     ) -> None:  # fmt: skip
         """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
         rate = WAYS * closing
-        # Over so small an angle x a gap, x rate + x²/2 over the radius, is rounding: it is here.
-        steep = np.maximum(rate, 0.0)
-        now = NOW + 2.0 * rounding / (steep + np.sqrt(steep**2 + 2.0 * rounding))
-        ahead = np.maximum(np.mod(WAYS * (angle - phi) + now, 2.0 * np.pi) - now, 0.0)
+        ahead = np.maximum(np.mod(WAYS * (angle - phi) + NOW, 2.0 * np.pi) - NOW, 0.0)
         place = phi + WAYS * ahead
         nearer = met & (rate > 0.0) & (WAYS * (place - found["angle"]) < 0.0)
         np.copyto(found["angle"], place, where=nearer)

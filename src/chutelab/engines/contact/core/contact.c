@@ -104,6 +104,14 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
     given[1] = given[2] = 0;
 }
 
+int is_one(const Disk *d, int k, int other) {
+    double nx, ny, mx, my;
+    if (other < 0 || goes_on(-1 - k, -1 - other)) return other >= 0;
+    double gap = gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny);
+    double off = gap - gap_to(W.surfaces + other, d->x, d->y, d->radius, &mx, &my);
+    return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;
+}
+
 /* By how much more than gravity the way inside an arc presses a disk on a surface, m/s2: that arc, or
    the one before or after a joint that the disk passes. */
 double pressed_inside(const Disk *d, int surface) {
@@ -112,7 +120,7 @@ double pressed_inside(const Disk *d, int surface) {
         const Surface *s = W.surfaces + (n % 2 ? surface : d->held[n / 2]);
         if (s->shape == SEGMENT || s->radius <= d->radius) continue;
         if (square(d->x - s->x) + square(d->y - s->y) >= s->radius * s->radius) continue;
-        if (!goes_on(-1 - d->held[n / 2], -1 - surface)) continue;
+        if (!is_one(d, d->held[n / 2], surface)) continue;
         most = MAX(most, (d->vx * d->vx + d->vy * d->vy) / (s->radius - d->radius));
     }
     return most;

@@ -79,6 +79,9 @@ static inline int is_mate(int j, int other) {
 static inline int goes_on(int j, int other) {
     return j == other || (j < 0 && other < 0 && (is_mate(j, other) || is_mate(other, j)));
 }
+/* The same for surfaces of which a disk touches the same place: pieces in one place, or the point that
+   two share. */
+int is_one(const Disk *d, int k, int other);
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
 /* Change of normal velocity that a contact asks for under its impulse, m/s. */
@@ -148,6 +151,7 @@ void lie_down(int i);
 void was_moved(int i);
 
 /* touching.c */
+double gap_later(const Contact *c, double h);
 double time_unloaded(const double *load, const double *t);
 int find_contacts(double h, int *woke);
 

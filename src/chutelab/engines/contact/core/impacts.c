@@ -65,7 +65,7 @@ double soft_approach(const Disk *d, double radius) {
 double left_over(const Disk *d, int impacts, int surface, double radius) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
     for (int n = 0; n < d->held_count; n++) {
-        if (!goes_on(-1 - d->held[n], -1 - surface)) continue;
+        if (!is_one(d, d->held[n], surface)) continue;
         const Surface *s = W.surfaces + surface;
         if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius) continue;
         least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface)) * W.step);

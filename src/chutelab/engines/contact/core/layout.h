@@ -131,6 +131,8 @@ typedef struct {
     double gap;             /* m */
     double need;            /* m/s; least change of normal velocity that keeps the gap closed ... */
     double gives;           /* ... and by how much less for each N s of its normal impulse, 1/kg */
+    double later, bend;     /* m; its gap at the step's end without impulses, and what they change of it
+                               but for the straight way: see `bends` */
     double pull;            /* m/s2; by which gravity makes it slip on a surface */
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */

@@ -26,6 +26,9 @@
 #define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
 #define DIVERGES 1e3
+/* Radii by which what bends may be off, and times its change before up to which it is gone on with. */
+#define FINE 1e-8
+#define SHRINKS 0.9
 /* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
    press harder by as much in each, without end. */
 #define CRAWLS 0.5
@@ -272,6 +275,34 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
     ease_off(list, count);
 }
 
+/* What the impulses of a step change of a gap at its end, m, but for the straight way along its normal:
+   the surface may bend, and friction changes how far the disk gets on it. */
+static double bends(const Contact *c, double h) {
+    double u[3], v[3];
+    if (c->j >= 0 || c->leaves || c->need == -INFINITY) return 0;
+    relative(c, 1, u);
+    relative(c, 0, v);
+    return gap_later(c, h) - c->later - h * (v[0] - u[0]);
+}
+
+/* Solve the contacts of a disk by itself so that gaps are closed where its impulses lead to: again with
+   what bends, as long as that changes less each time. Else it would sink into a hollow, step by step. */
+static void solve_alone(Contact *list, int count) {
+    double h = W.step_end - W.t, r = W.disks[list->i].radius;
+    for (double last = INFINITY;;) {
+        double most = 0;
+        sweep_contacts(list, count, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9));
+        for (int n = 0; n < count; n++) most = MAX(most, fabs(bends(list + n, h) - list[n].bend));
+        if (most <= FINE * r || most >= SHRINKS * last) return;
+        last = most;
+        for (int n = 0; n < count; n++) {
+            double bend = bends(list + n, h);
+            list[n].need -= (bend - list[n].bend) / h;
+            list[n].bend = bend;
+        }
+    }
+}
+
 /* Where the slip of a disk by itself turns round within a step, since friction cannot hold it, the
    friction turns too. The sweeps would bring the slip to zero, which is wrong in first order. */
 static void turn_slip(Contact *c) {
@@ -361,7 +392,7 @@ void solve_contacts(void) {
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), PLAIN,
                            W.accurate, W.skip * least);
-        else sweep_contacts(list, to - from, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9));
+        else solve_alone(list, to - from);
     }
     for (int n = 0; n < W.contact_count; n++) {
         /* Rounding presses nobody; with endless friction even that would pull. */

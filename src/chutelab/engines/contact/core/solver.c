@@ -103,11 +103,16 @@ static double press_corner(Contact *list, int count) {
     return changed;
 }
 
+/* The most that a contact allows of friction, N s, or of rolling friction, N m s, as it is pressed. */
+static double bound(const Contact *c, int rolling) {
+    double rough = c->share < 1 ? c->share * MIN(c->friction, ROUGH) : c->friction;
+    return (rolling ? c->share * c->arm : rough) * c->impulse[0];
+}
+
 /* Give a contact the friction that stops its slip and its rolling, as far as it is pressed. */
 static double rub(Contact *c) {
     double *J = c->impulse, v[3], change[3] = {0, 0, 0};
-    double rough = c->share < 1 ? c->share * MIN(c->friction, ROUGH) : c->friction;
-    double most = rough * J[0], arm = c->share * c->arm * J[0];
+    double most = bound(c, 0), arm = bound(c, 1);
     relative(c, 0, v);
     change[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most) - J[1];
     change[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -arm), arm) - J[2];
@@ -226,6 +231,21 @@ static double sweep(Contact *list, int count, int sweeps, int plain, double accu
     return worst;
 }
 
+/* Take back friction beyond what contacts allow: sweeps that did not come to an end have pressed less
+   since. */
+static void keep_bounds(Contact *list, int count) {
+    for (int n = 0; n < count; n++) {
+        Contact *c = list + n;
+        double more[3] = {0, 0, 0};
+        for (int k = 1; k < 3; k++) {
+            double most = bound(c, k == 2);
+            more[k] = MIN(MAX(c->impulse[k], -most), most) - c->impulse[k];
+            c->impulse[k] += more[k];
+        }
+        if (more[1] != 0 || more[2] != 0) push(c, more);
+    }
+}
+
 /* Solve contacts by sweeps until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
    will do. A crowd is swept again, up to so many rounds, of which the last is good enough if it crawls,
    and more finely where small changes leave gaps open. By itself (0 rounds), and where sweeps diverge,
@@ -235,8 +255,10 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
     double first = INFINITY;
     for (int left = TRIES, more = rounds;;) {
         double change = sweep(list, count, W.sweeps, plain, accurate), worst = change;
-        if ((change <= accurate && more < 2) || left == 0) break;
-        if (change <= accurate) accurate *= 0.1;
+        int ended = change <= accurate;
+        if (!ended) keep_bounds(list, count);
+        if ((ended && more < 2) || left == 0) break;
+        if (ended) accurate *= 0.1;
         if (change < INFINITY) {
             worst = 0;
             for (int n = 0; n < count; n++) {

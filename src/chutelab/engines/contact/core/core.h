@@ -151,7 +151,7 @@ void lie_down(int i);
 void was_moved(int i);
 
 /* touching.c */
-double gap_later(const Contact *c, double h);
+double gap_later(const Contact *c, double h, double *bends);
 double time_unloaded(const double *load, const double *t);
 int find_contacts(double h, int *woke);
 

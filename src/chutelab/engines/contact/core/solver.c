@@ -257,6 +257,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
         double change = sweep(list, count, W.sweeps, plain, accurate), worst = change;
         int ended = change <= accurate;
         if (!ended) keep_bounds(list, count);
+        ease_off(list, count);
         if ((ended && more < 2) || left == 0) break;
         if (ended) accurate *= 0.1;
         if (change < INFINITY) {
@@ -294,17 +295,16 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
         }
         left--;
     }
-    ease_off(list, count);
 }
 
 /* What the impulses of a step change of a gap at its end, m, but for the straight way along its normal:
    the surface may bend, and friction changes how far the disk gets on it. */
 static double bends(const Contact *c, double h) {
-    double u[3], v[3];
-    if (c->j >= 0 || c->leaves || c->need == -INFINITY) return 0;
+    double u[3], v[3], hollow = 0, later = gap_later(c, h, &hollow);
+    if (!(hollow < 0) || c->leaves || c->need == -INFINITY) return 0;
     relative(c, 1, u);
     relative(c, 0, v);
-    return gap_later(c, h) - c->later - h * (v[0] - u[0]);
+    return later - c->later - h * (v[0] - u[0]);
 }
 
 /* Solve the contacts of a disk by itself so that gaps are closed where its impulses lead to: again with

@@ -14,13 +14,16 @@
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
 
-double gap_later(const Contact *c, double h) {
+/* The gap at the end of the step on the path as it is; of a surface also how the way bends there, see
+   `bending`, if that is asked for. */
+double gap_later(const Contact *c, double h, double *bends) {
     const Disk *a = W.disks + c->i;
     double x = a->x + (a->vx + 0.5 * W.gx * h) * h, y = a->y + (a->vy + 0.5 * W.gy * h) * h, nx, ny;
     if (c->j < 0) {
         const Surface *s = W.surfaces + (-1 - c->j), *then = face_at(s, x, y);
         /* From afar it comes to no other piece than the one that the normal is of. */
         if (then != s && c->gap > TOUCH * a->radius) return INFINITY;
+        if (bends) *bends = bending(then, x, y, a->radius);
         return gap_to(then, x, y, a->radius, &nx, &ny);
     }
     const Disk *b = W.disks + c->j;
@@ -74,7 +77,7 @@ static int add(int i, int j, double least, double bound, double h) {
     /* The next face or pulley that a disk by itself slides on to may be further off. */
     int far = c->gap > TOUCH * least;
     if (far && (W.interact || j >= 0 || !d->supports)) return 1;
-    later = c->later = gap_later(c, h);
+    later = c->later = gap_later(c, h, 0);
     c->bend = 0;
     if (far && later > 0) return 1;
     relative(c, 0, u);
@@ -86,7 +89,7 @@ static int add(int i, int j, double least, double bound, double h) {
     if (c->gap < -SLOP * least) {
         double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
         aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
-        c->gives = GIVES;
+        if (W.interact) c->gives = GIVES;
     }
     c->need = (aim - later) / h;
     c->drift = 0.5 * h * c->pull;

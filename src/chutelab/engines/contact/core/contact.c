@@ -48,6 +48,7 @@ void describe(Contact *c, int i, int j) {
     c->share = 1;
     c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx : 0;
     c->gives = c->change = 0;
+    c->eases = c->mass[0];
     c->friction = pair->friction;
     c->arm = pair->rolling * reach;
 }

@@ -131,20 +131,21 @@ typedef struct {
     double gap;             /* m */
     double need;            /* m/s; least change of normal velocity that keeps the gap closed ... */
     double gives;           /* ... and by how much less for each N s of its normal impulse, 1/kg */
-    double later, bend;     /* m; its gap at the step's end without impulses, and what they change of it
-                               but for the straight way: see `bends` */
     double pull;            /* m/s2; by which gravity makes it slip on a surface */
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
     double swept[3];        /* the impulse two sweeps ago, see `hasten` */
-    double course[3];       /* where it is heading to, see `hasten` and `descend` */
+    double course[3];       /* where it is heading to, see `hasten` */
     double mass[3];         /* what the contact feels of masses and inertias, in the same order */
     double light[3];        /* 1 / mass, 0 where there is none */
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
     double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */
+    double eases;           /* kg; impulse for a change of normal velocity, as far as it gives */
     double rest;            /* coefficient of restitution */
     double share;           /* of its friction that acts; below 1 where surfaces wedge a disk */
     double change;          /* m/s; by which the last sweep changed its slip */
+    double later, bend;     /* m; its gap at the step's end without impulses, and what they change of it
+                               but for the straight way: see `bends` */
     int i, j;
     int two;                /* whether j is a free disk, which feels the impulse too */
     int owner;              /* of the ledger entries */

@@ -41,8 +41,7 @@ static double press(Contact *c) {
         x -= b->vx - b->ux;
         y -= b->vy - b->uy;
     }
-    double off = x * c->nx + y * c->ny - asks(c);
-    double normal = MAX(c->impulse[0] - off / (c->light[0] + c->gives), 0);
+    double normal = MAX(c->impulse[0] - c->eases * (x * c->nx + y * c->ny - asks(c)), 0);
     double change[3] = {normal - c->impulse[0], 0, 0};
     if (change[0] != 0) push(c, change);
     c->impulse[0] = normal;
@@ -147,56 +146,35 @@ static double hasten(Contact *list, int count, double size) {
     return now;
 }
 
-/* The derivative of the cost along `course`, J. The cost of impulses J, whose changes of velocity are
-   W J, is 1/2 J W J + J q: what sweeps make least, one contact after the other. W J + q is how far the
-   velocities are from what the contacts ask for; see docs/physics.md. */
-static double downhill(const Contact *list, int count) {
-    double sum = 0, u[3], v[3];
+/* Take the share of all impulses at which the cost is least. The cost of impulses J, whose changes of
+   velocity are W J, is 1/2 J W J + J q: what sweeps make least, one contact after the other. W J + q is
+   how far the velocities are from what the contacts ask for; see docs/physics.md. Along J its slope goes
+   straight from `none` to `all`. Where sweeps end, the impulses do no work so on the velocities that
+   they leave, however far the sweeps had come: W J + q times J is at most 0. */
+static void lessen(Contact *list, int count) {
+    double none = 0, all = 0, u[3], v[3], more[3];
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
-        const double *d = c->course;
-        if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
+        const double *J = c->impulse;
+        if (J[0] == 0 && J[1] == 0 && J[2] == 0) continue;
         relative(c, 1, u);
         relative(c, 0, v);
-        sum += d[0] * (v[0] - u[0] - asks(c)) + d[1] * (v[1] + c->drift) + d[2] * v[2];
+        none += J[1] * (u[1] + c->drift) + J[2] * u[2] - J[0] * c->need;
+        all += J[1] * (v[1] + c->drift) + J[2] * v[2] + J[0] * (v[0] - u[0] - asks(c));
     }
-    return sum;
-}
-
-static void advance_impulses(Contact *list, int count, double by) {
+    if (!(all > 0)) return;
+    double less = none < 0 ? all / (all - none) : 1;
     for (int n = 0; n < count; n++) {
-        double more[3];
-        for (int k = 0; k < 3; k++) list[n].impulse[k] += more[k] = by * list[n].course[k];
+        for (int k = 0; k < 3; k++) list[n].impulse[k] += more[k] = -less * list[n].impulse[k];
         push(list + n, more);
     }
-}
-
-/* Line search: go along `course` to where the cost is least, at most all of it. */
-static void descend(Contact *list, int count) {
-    double from = downhill(list, count);
-    if (!(from < 0)) return;
-    advance_impulses(list, count, 1);
-    double to = downhill(list, count);
-    if (to > 0) advance_impulses(list, count, -to / (to - from));
 }
 
 /* Start from impulses of the step before, as far as they lower the cost: where contacts have opened,
    what had been pressed between others would throw disks out. */
 static void start_warm(Contact *list, int count) {
-    for (int n = 0; n < count; n++)
-        for (int k = 0; k < 3; k++) {
-            list[n].course[k] = list[n].impulse[k];
-            list[n].impulse[k] = 0;
-        }
-    descend(list, count);
-}
-
-/* Lower all impulses alike, where that lowers the cost. They do no work then on the velocities that
-   they leave, however far the sweeps had come: W J + q times J is at most 0. */
-static void ease_off(Contact *list, int count) {
-    for (int n = 0; n < count; n++)
-        for (int k = 0; k < 3; k++) list[n].course[k] = -list[n].impulse[k];
-    descend(list, count);
+    for (int n = 0; n < count; n++) push(list + n, list[n].impulse);
+    lessen(list, count);
 }
 
 /* Sweep over contacts, those of one disk with surfaces as one, until no relative velocity changes by
@@ -257,7 +235,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
         double change = sweep(list, count, W.sweeps, plain, accurate), worst = change;
         int ended = change <= accurate;
         if (!ended) keep_bounds(list, count);
-        ease_off(list, count);
+        lessen(list, count);
         if ((ended && more < 2) || left == 0) break;
         if (ended) accurate *= 0.1;
         if (change < INFINITY) {
@@ -409,7 +387,12 @@ void solve_contacts(void) {
             driven |= !c->two && c->other[1] != 0;
         }
         /* A drive presses as hard as it must: there no spring would hold, and friction is lowered. */
-        for (int n = from; n < to; n++) W.contacts[n].gives *= driven ? 0 : 1 / heaviest;
+        for (int n = from; n < to; n++) {
+            Contact *c = W.contacts + n;
+            if (c->gives == 0) continue;
+            c->gives *= driven ? 0 : 1 / heaviest;
+            c->eases = 1 / (c->light[0] + c->gives);
+        }
         start_warm(list, to - from);
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), PLAIN,

@@ -105,9 +105,11 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
     given[1] = given[2] = 0;
 }
 
-int is_one(const Disk *d, int k, int other) {
+/* Hardly ever asked to the end: inline it would slow all that asks. */
+__attribute__((noinline)) int is_one(const Disk *d, int k, int other) {
     double nx, ny, mx, my;
-    if (other < 0 || goes_on(-1 - k, -1 - other)) return other >= 0;
+    if (other < 0) return 0;
+    if (goes_on(-1 - k, -1 - other)) return 1;
     double gap = gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny);
     double off = gap - gap_to(W.surfaces + other, d->x, d->y, d->radius, &mx, &my);
     return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;

@@ -223,6 +223,7 @@ typedef struct {
     double before;       /* share of this step's impulses that belongs to the one before */
     double g;            /* m/s2; size of gravity */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
+    double room;         /* m; least that a hollow leaves a disk by itself, INFINITY without one */
     double skip;         /* 1/s; SKIP in a step: radii that it may go */
 } World;
 

@@ -286,6 +286,7 @@ static void look_ahead(int i) {
    lasts on another piece comes no further than to it. */
 static double hollow_step(const Disk *d, double h) {
     double speed = sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * h, nx, ny;
+    if (speed * h <= TURN * W.room) return h;
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = W.surfaces + k;
         double room = s->radius - d->radius;
@@ -464,6 +465,11 @@ static int begin_part(void) {
         d->heap_place = -1;
         d->on = -1;
         W.t = MIN(W.t, d->release);
+    }
+    W.room = INFINITY;
+    for (int k = 0; k < W.surface_count; k++) {
+        double room = W.surfaces[k].radius - W.disks[W.low].radius;
+        if (W.surfaces[k].shape != SEGMENT && room > 0) W.room = MIN(W.room, room);
     }
     return 1;
 }

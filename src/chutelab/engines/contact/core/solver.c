@@ -27,7 +27,7 @@
 /* Times the first change: sweeps whose changes grow so far never end. */
 #define DIVERGES 1e3
 /* Radii by which what bends may be off, and times its change before up to which it is gone on with. */
-#define FINE 1e-8
+#define FINE 1e-6
 #define SHRINKS 0.9
 /* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
    press harder by as much in each, without end. */
@@ -235,7 +235,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
         double change = sweep(list, count, W.sweeps, plain, accurate), worst = change;
         int ended = change <= accurate;
         if (!ended) keep_bounds(list, count);
-        lessen(list, count);
+        if (!ended || W.interact) lessen(list, count);
         if ((ended && more < 2) || left == 0) break;
         if (ended) accurate *= 0.1;
         if (change < INFINITY) {
@@ -278,8 +278,10 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
 /* What the impulses of a step change of a gap at its end, m, but for the straight way along its normal:
    the surface may bend, and friction changes how far the disk gets on it. */
 static double bends(const Contact *c, double h) {
-    double u[3], v[3], hollow = 0, later = gap_later(c, h, &hollow);
-    if (!(hollow < 0) || c->leaves || c->need == -INFINITY) return 0;
+    double u[3], v[3], hollow = 0, later;
+    if (c->leaves || c->need == -INFINITY || is_flat(W.surfaces + (-1 - c->j))) return 0;
+    later = gap_later(c, h, &hollow);
+    if (!(hollow < 0)) return 0;
     relative(c, 1, u);
     relative(c, 0, v);
     return later - c->later - h * (v[0] - u[0]);

@@ -115,6 +115,12 @@ __attribute__((noinline)) int is_one(const Disk *d, int k, int other) {
     return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;
 }
 
+int is_held(const Disk *d, int k) {
+    for (int n = 0; n < d->held_count; n++)
+        if (is_one(d, d->held[n], k)) return 1;
+    return 0;
+}
+
 /* By how much more than gravity the way inside an arc presses a disk on a surface, m/s2: that arc, or
    the one before or after a joint that the disk passes. */
 double pressed_inside(const Disk *d, int surface) {

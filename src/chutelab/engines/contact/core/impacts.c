@@ -480,7 +480,7 @@ void lie_down(int i) {
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = W.surfaces + k;
         double nx, ny;
-        if (s->there != THERE || is_spared(s, d) || face_at(s, d->x, d->y) != s) continue;
+        if (s->there != THERE || is_spared(s, d) || face_at(s, d->x, d->y) != s || is_held(d, k)) continue;
         if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
         double press = press_on(d, s, nx, ny);
         if (press <= 0 || fabs(d->vx * nx + d->vy * ny) > press * W.dt) continue;

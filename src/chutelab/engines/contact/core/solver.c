@@ -26,7 +26,8 @@
 #define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
 #define DIVERGES 1e3
-/* Radii by which what bends may be off, and times its change before up to which it is gone on with. */
+/* Radii by which a gap may be off where the way bends; times its last change up to which it is solved
+   for once more. */
 #define FINE 1e-6
 #define SHRINKS 0.9
 /* Times the change at the end of the first round: sweeps that have not crawled to less in the last one

@@ -100,8 +100,7 @@ static int add(int i, int j, double least, double bound, double h) {
             for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
             c->was = W.earlier[k].owner;
         }
-    int pressed = c->impulse[0] > 0;
-    for (int n = 0; n < d->held_count && !pressed; n++) pressed = is_one(d, d->held[n], -1 - j);
+    int pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
        above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
     double floor = -u[0], until = j < 0 ? time_on_face(c) : INFINITY, least_need = floor;

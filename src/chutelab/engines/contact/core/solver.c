@@ -28,7 +28,7 @@
 #define DIVERGES 1e3
 /* Radii by which a gap may be off where the way bends; times its last change up to which it is solved
    for once more. */
-#define FINE 1e-6
+#define FINE 1e-8
 #define SHRINKS 0.9
 /* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
    press harder by as much in each, without end. */

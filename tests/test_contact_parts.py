@@ -151,6 +151,36 @@ def test_a_sphere_rolls_inside_an_arc_as_a_pendulum_of_seven_fifths_its_mass():
     assert residual(recording) < 1e-12
 
 
+@pytest.mark.parametrize(("share", "speed", "friction"), [(0.8, 0.5, 2.4), (0.9, 0.2, 2.4)])
+def test_a_disk_that_a_hollow_belt_carries_up_stays_at_its_wall(share, speed, friction):
+    """Friction speeds it up within a step: its way bends more than it did at the step's beginning.
+
+    Its centre is R - r from the arc's, to a hundred thousandth of r at any of a thousand steps.
+    """
+    size = R / share
+    drum = {"center": (0.0, 0.0), "radius": size, "begin": 0.0, "extent": 2.0 * pi}
+    machine = arc_machine(drum | {"speed": speed, "friction": friction}, run={"until": 1.0})
+    track = run(thrown(machine, (0.0, R - size))).track(0)
+    off = np.hypot(*track["position"].T) - (size - R)
+    assert np.hypot(*track["velocity"].T).max() > 0.5 * speed
+    assert off.max() < 1e-5 * R
+
+
+@pytest.mark.parametrize("crowded", [False, True])
+def test_pieces_in_one_place_are_one(crowded):
+    """All pieces twice, and in a crowd a second disk that slides on a floor: the same paths."""
+    bowl = {"center": (0.0, 0.0), "radius": 1.1 * R, "begin": 0.5 * pi, "extent": 1.5 * pi}
+    floor = face("floor", (-0.1, -0.05), (0.1, -0.05), friction=0.3)
+    ends = []
+    for times in (1, 2):
+        floors = [floor | {"name": f"floor{n}"} for n in range(times)]
+        machine = arc_machine(*[bowl] * times, surface=floors, run={"until": 0.46})
+        starts = np.array([[-0.09 * R, 0.0435 * R], [0.05, R - 0.05]])[: 1 + crowded]
+        recording = run(thrown(machine, starts, np.array([[0.0, 0.0], [0.1, 0.0]])[: 1 + crowded]))
+        ends.append(recording.at(np.linspace(0.0, 0.459, 100))[0])
+    assert np.abs(ends[1] - ends[0]).max() < 1e-9 * R
+
+
 @pytest.mark.parametrize("crowded", [False, True])
 @pytest.mark.parametrize("size", [1.05, 1.3, 4.0])
 def test_in_an_elastic_drum_without_gravity_all_chords_are_alike(size, crowded):

@@ -49,6 +49,7 @@ void describe(Contact *c, int i, int j) {
     c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx : 0;
     c->gives = c->change = 0;
     c->most = INFINITY;
+    c->eases = c->mass[0];
     c->friction = pair->friction;
     c->arm = pair->rolling * reach;
 }
@@ -140,6 +141,22 @@ void account(Contact *list, int count) {
     pool(list, count, 1);
 }
 
+/* Hardly ever asked to the end: inline it would slow all that asks. */
+__attribute__((noinline)) int is_one(const Disk *d, int k, int other) {
+    double nx, ny, mx, my;
+    if (other < 0) return 0;
+    if (goes_on(-1 - k, -1 - other)) return 1;
+    double gap = gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny);
+    double off = gap - gap_to(W.surfaces + other, d->x, d->y, d->radius, &mx, &my);
+    return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;
+}
+
+int is_held(const Disk *d, int k) {
+    for (int n = 0; n < d->held_count; n++)
+        if (is_one(d, d->held[n], k)) return 1;
+    return 0;
+}
+
 /* By how much more than gravity the way inside an arc presses a disk on a surface, m/s2: that arc, or
    the one before or after a joint that the disk passes. */
 double pressed_inside(const Disk *d, int surface) {
@@ -148,7 +165,7 @@ double pressed_inside(const Disk *d, int surface) {
         const Surface *s = W.surfaces + (n % 2 ? surface : d->held[n / 2]);
         if (s->shape == SEGMENT || s->radius <= d->radius) continue;
         if (square(d->x - s->x) + square(d->y - s->y) >= s->radius * s->radius) continue;
-        if (!goes_on(-1 - d->held[n / 2], -1 - surface)) continue;
+        if (!is_one(d, d->held[n / 2], surface)) continue;
         most = MAX(most, (d->vx * d->vx + d->vy * d->vy) / (s->radius - d->radius));
     }
     return most;

@@ -81,6 +81,14 @@ static inline int is_mate(int j, int other) {
 static inline int goes_on(int j, int other) {
     return j == other || (j < 0 && other < 0 && (is_mate(j, other) || is_mate(other, j)));
 }
+/* The same for surfaces of which a disk touches the same place: pieces in one place, or the point that
+   two share. */
+int is_one(const Disk *d, int k, int other);
+int is_held(const Disk *d, int k);
+/* Whether a disk that is on a piece at the beginning of a step is on no hollow at its end. */
+static inline int is_flat(const Surface *s) {
+    return s->shape == SEGMENT && s->mates[0] < 0 && s->mates[1] < 0;
+}
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
 /* Change of normal velocity that a contact asks for under its impulse, m/s. */
@@ -162,12 +170,12 @@ void lie_down(int i);
 void was_moved(int i);
 
 /* touching.c */
+double gap_later(const Contact *c, double h, double *bends);
 double time_unloaded(const double *load, const double *t);
 int find_contacts(double h, int *woke);
 
 /* solver.c */
 void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough);
-void ease_off(Contact *list, int count);
 void solve_contacts(void);
 
 /* closing.c */

@@ -65,7 +65,7 @@ double soft_approach(const Disk *d, double radius) {
 double left_over(const Disk *d, int impacts, int surface, double radius) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
     for (int n = 0; n < d->held_count; n++) {
-        if (!goes_on(-1 - d->held[n], -1 - surface)) continue;
+        if (!is_one(d, d->held[n], surface)) continue;
         const Surface *s = W.surfaces + surface;
         if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius) continue;
         least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface)) * W.step);
@@ -287,7 +287,6 @@ static void jam(Contact *struck, double t) {
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
     /* Not hastened: then what rattles may never be as calm as it must be. */
     sweep_contacts(list, count, 0, W.sweeps, 0.1 * left, left);
-    ease_off(list, count);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
         Disk *d = W.disks + m;
         double v[3] = {d->vx, d->vy, d->spin};
@@ -514,7 +513,7 @@ void lie_down(int i) {
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = W.surfaces + k;
         double nx, ny;
-        if (s->there != THERE || is_spared(s, d) || face_at(s, d->x, d->y) != s) continue;
+        if (s->there != THERE || is_spared(s, d) || face_at(s, d->x, d->y) != s || is_held(d, k)) continue;
         if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
         double press = press_on(d, s, nx, ny);
         if (press <= 0 || fabs(d->vx * nx + d->vy * ny) > press * W.dt) continue;

@@ -137,17 +137,20 @@ typedef struct {
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
     double swept[3];        /* the impulse two sweeps ago, see `hasten` */
-    double course[3];       /* where it is heading to, see `hasten` and `descend` */
+    double course[3];       /* where it is heading to, see `hasten` */
     double mass[3];         /* what the contact feels of masses and inertias, in the same order */
     double light[3];        /* 1 / mass, 0 where there is none */
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
     double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */
+    double eases;           /* kg; impulse for a change of normal velocity, as far as it gives */
     double rest;            /* coefficient of restitution */
     double share;           /* of its friction that acts; below 1 where surfaces wedge a disk */
     double change;          /* m/s; by which the last sweep changed its slip */
     double entries[3], later[3]; /* J; what its impulses do to the ledger, and what the part of them
                                     does that belongs to this step; see `account` */
     double given[2];        /* J; the same for the belt that carries the partner */
+    double free_gap, bend;     /* m; its gap at the step's end without impulses, and what they change of it
+                               but for the straight way: see `bends` */
     int i, j;
     int two;                /* whether j is a free disk, which feels the impulse too */
     int owner;              /* of the ledger entries */
@@ -226,6 +229,7 @@ typedef struct {
     double pace;         /* sqrt(g / EARTH), 1 without gravity: bounds on speeds grow with it, bounds
                             on times shrink: a film of the run shown faster is a run */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
+    double room;         /* m; least that a hollow leaves a disk by itself, INFINITY without one */
     double skip;         /* 1/s; SKIP in a step: radii that it may go */
 } World;
 

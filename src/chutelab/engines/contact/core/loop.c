@@ -282,15 +282,18 @@ static void look_ahead(int i) {
 }
 
 /* Step of a disk by itself, s, `h` at most, in which it goes by no more than TURN of the room that a
-   hollow leaves it: whether that holds it, did, or it is at its opening, in touch with both ends. */
+   hollow leaves it: whether that holds it, did, or it is at its opening, in touch with both ends. What
+   lasts on another piece comes no further than to it. */
 static double hollow_step(const Disk *d, double h) {
     double speed = sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * h, nx, ny;
+    if (speed * h <= TURN * W.room) return h;
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = W.surfaces + k;
         double room = s->radius - d->radius;
         if (s->shape == SEGMENT || !(room > 0) || speed * h <= TURN * room) continue;
-        if (square(d->x - s->x) + square(d->y - s->y) < square(s->radius)
-            && gap_to(s, d->x, d->y, d->radius, &nx, &ny) < TOUCH * d->radius) h = TURN * room / speed;
+        if (square(d->x - s->x) + square(d->y - s->y) >= square(s->radius)) continue;
+        double off = gap_to(s, d->x, d->y, d->radius, &nx, &ny) - TOUCH * d->radius;
+        if (off < 0 || d->supports) h = MIN(h, MAX(TURN * room, off) / speed);
     }
     return h;
 }
@@ -462,6 +465,11 @@ static int begin_part(void) {
         d->heap_place = -1;
         d->on = -1;
         W.t = MIN(W.t, d->release);
+    }
+    W.room = INFINITY;
+    for (int k = 0; k < W.surface_count; k++) {
+        double room = W.surfaces[k].radius - W.disks[W.low].radius;
+        if (W.surfaces[k].shape != SEGMENT && room > 0) W.room = MIN(W.room, room);
     }
     return 1;
 }

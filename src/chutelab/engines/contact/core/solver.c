@@ -20,12 +20,14 @@
 #define MOST_ROUNDS 50
 /* Sweeps before they are hastened: most solves need no more. */
 #define PLAIN 6
-/* Steps of a line search: rounding ends it sooner. */
-#define SECANTS 5
 /* Of momentum. */
 #define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
 #define DIVERGES 1e3
+/* Radii by which a gap may be off where the way bends; times its last change up to which it is solved
+   for once more. */
+#define FINE 1e-8
+#define SHRINKS 0.9
 /* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
    press harder by as much in each, without end. */
 #define CRAWLS 0.5
@@ -39,7 +41,7 @@ static double press(Contact *c) {
         y -= b->vy - b->uy;
     }
     double opens = x * c->nx + y * c->ny;
-    double given = (c->need - c->gives * c->impulse[0] - opens) / (c->light[0] + c->gives);
+    double given = (c->need - c->gives * c->impulse[0] - opens) * c->eases;
     double normal = MAX(c->impulse[0] + MIN(given, (c->most - opens) * c->mass[0]), 0);
     double change[3] = {normal - c->impulse[0], 0, 0};
     if (change[0] != 0) push(c, change);
@@ -101,11 +103,16 @@ static double press_corner(Contact *list, int count) {
     return changed;
 }
 
+/* The most that a contact allows of friction, N s, or of rolling friction, N m s, as it is pressed. */
+static double bound(const Contact *c, int rolling) {
+    double rough = c->share < 1 ? c->share * MIN(c->friction, ROUGH) : c->friction;
+    return (rolling ? c->share * c->arm : rough) * c->impulse[0];
+}
+
 /* Give a contact the friction that stops its slip and its rolling, as far as it is pressed. */
 static double rub(Contact *c) {
     double *J = c->impulse, v[3], change[3] = {0, 0, 0};
-    double rough = c->share < 1 ? c->share * MIN(c->friction, ROUGH) : c->friction;
-    double most = rough * J[0], arm = c->share * c->arm * J[0];
+    double most = bound(c, 0), arm = bound(c, 1);
     relative(c, 0, v);
     change[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most) - J[1];
     change[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -arm), arm) - J[2];
@@ -140,61 +147,36 @@ static double hasten(Contact *list, int count, double size) {
     return now;
 }
 
-/* The derivative of the cost along `course`, J. The cost of impulses J, whose changes of velocity are
-   W J, is 1/2 J W J + J q: what sweeps make least, one contact after the other. W J + q is how far the
-   velocities are from what the contacts ask for; see docs/physics.md. */
-static double downhill(const Contact *list, int count) {
-    double sum = 0, u[3], v[3];
+/* Take the share of all impulses at which the cost is least. The cost of impulses J, whose changes of
+   velocity are W J, is 1/2 J W J + J q: what sweeps make least, one contact after the other. W J + q is
+   how far the velocities are from what the contacts ask for; see docs/physics.md. Along J its slope goes
+   straight from `none` to `all`; where what an overlap asks for bends it goes below that, and the share
+   is a little less. Where sweeps end, the impulses do no work so on the velocities that they leave,
+   however far the sweeps had come: W J + q times J is at most 0. */
+static void lessen(Contact *list, int count) {
+    double none = 0, all = 0, u[3], v[3], more[3];
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
-        const double *d = c->course;
-        if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
+        const double *J = c->impulse;
+        if (J[0] == 0 && J[1] == 0 && J[2] == 0) continue;
         relative(c, 1, u);
         relative(c, 0, v);
-        sum += d[0] * (v[0] - u[0] - asks(c)) + d[1] * (v[1] + c->drift) + d[2] * v[2];
+        none += J[1] * (u[1] + c->drift) + J[2] * u[2] - J[0] * MIN(c->need, c->most);
+        all += J[1] * (v[1] + c->drift) + J[2] * v[2] + J[0] * (v[0] - u[0] - asks(c));
     }
-    return sum;
-}
-
-static void advance_impulses(Contact *list, int count, double by) {
+    if (!(all > 0)) return;
+    double less = none < 0 ? all / (all - none) : 1;
     for (int n = 0; n < count; n++) {
-        double more[3];
-        for (int k = 0; k < 3; k++) list[n].impulse[k] += more[k] = by * list[n].course[k];
+        for (int k = 0; k < 3; k++) list[n].impulse[k] += more[k] = -less * list[n].impulse[k];
         push(list + n, more);
-    }
-}
-
-/* Line search: go along `course` to where the cost is least, at most all of it, and never beyond. The
-   cost is convex; where `asks` of no contact bends, the first secant is exact. */
-static void descend(Contact *list, int count) {
-    double from = downhill(list, count), way = 1;
-    if (!(from < 0)) return;
-    advance_impulses(list, count, way);
-    for (int n = 0; n < SECANTS; n++) {
-        double to = downhill(list, count), back = way * to / (to - from);
-        if (!(to > 0)) return;
-        advance_impulses(list, count, -back);
-        way -= back;
     }
 }
 
 /* Start from impulses of the step before, as far as they lower the cost: where contacts have opened,
    what had been pressed between others would throw disks out. */
 static void start_warm(Contact *list, int count) {
-    for (int n = 0; n < count; n++)
-        for (int k = 0; k < 3; k++) {
-            list[n].course[k] = list[n].impulse[k];
-            list[n].impulse[k] = 0;
-        }
-    descend(list, count);
-}
-
-/* Lower all impulses alike, where that lowers the cost. They do no work then on the velocities that
-   they leave, however far the sweeps had come: W J + q times J is at most 0. */
-void ease_off(Contact *list, int count) {
-    for (int n = 0; n < count; n++)
-        for (int k = 0; k < 3; k++) list[n].course[k] = -list[n].impulse[k];
-    descend(list, count);
+    for (int n = 0; n < count; n++) push(list + n, list[n].impulse);
+    lessen(list, count);
 }
 
 /* Sweep over contacts, those of one disk with surfaces as one, until no relative velocity changes by
@@ -232,6 +214,21 @@ static double sweep(Contact *list, int count, int sweeps, int plain, double accu
 /* Whether a surface that moves drives a disk. */
 static int drives(const Contact *c) { return c->j < 0 && c->other[1] != 0; }
 
+/* Take back friction beyond what contacts allow: sweeps that did not come to an end have pressed less
+   since. */
+static void keep_bounds(Contact *list, int count) {
+    for (int n = 0; n < count; n++) {
+        Contact *c = list + n;
+        double more[3] = {0, 0, 0};
+        for (int k = 1; k < 3; k++) {
+            double most = bound(c, k == 2);
+            more[k] = MIN(MAX(c->impulse[k], -most), most) - c->impulse[k];
+            c->impulse[k] += more[k];
+        }
+        if (more[1] != 0 || more[2] != 0) push(c, more);
+    }
+}
+
 /* Solve contacts by sweeps until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
    will do. A crowd is swept again, up to so many rounds, of which the last is good enough if it crawls,
    and more finely where small changes leave gaps open. By itself (0 rounds), and where sweeps diverge,
@@ -243,8 +240,11 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
     double first = INFINITY;
     for (int left = TRIES, more = rounds;;) {
         double change = sweep(list, count, W.sweeps, plain, accurate), worst = change;
-        if ((change <= accurate && more < 2) || left == 0) break;
-        if (change <= accurate) accurate *= 0.1;
+        int ended = change <= accurate;
+        if (!ended) keep_bounds(list, count);
+        if (!ended || W.interact) lessen(list, count);
+        if ((ended && more < 2) || left == 0) break;
+        if (ended) accurate *= 0.1;
         if (change < INFINITY) {
             worst = 0;
             for (int n = 0; n < count; n++) {
@@ -287,6 +287,36 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
             c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
         }
         left -= !stalled;
+    }
+}
+
+/* What the impulses of a step change of a gap at its end, m, but for the straight way along its normal:
+   the surface may bend, and friction changes how far the disk gets on it. */
+static double bends(const Contact *c, double h) {
+    double u[3], v[3], hollow = 0, later;
+    if (c->leaves || c->need == -INFINITY || is_flat(W.surfaces + (-1 - c->j))) return 0;
+    later = gap_later(c, h, &hollow);
+    if (!(hollow < 0)) return 0;
+    relative(c, 1, u);
+    relative(c, 0, v);
+    return later - c->free_gap - h * (v[0] - u[0]);
+}
+
+/* Solve the contacts of a disk by itself so that gaps are closed where its impulses lead to: again with
+   what bends, as long as that changes less each time. Else it would sink into a hollow, step by step. */
+static void solve_alone(Contact *list, int count) {
+    double h = W.step_end - W.t, r = W.disks[list->i].radius;
+    for (double last = INFINITY;;) {
+        double most = 0;
+        sweep_contacts(list, count, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9 * W.pace));
+        for (int n = 0; n < count; n++) most = MAX(most, fabs(bends(list + n, h) - list[n].bend));
+        if (most <= FINE * r || most >= SHRINKS * last) return;
+        last = most;
+        for (int n = 0; n < count; n++) {
+            double bend = bends(list + n, h);
+            list[n].need -= (bend - list[n].bend) / h;
+            list[n].bend = bend;
+        }
     }
 }
 
@@ -374,12 +404,17 @@ void solve_contacts(void) {
             driven |= !c->two && c->other[1] != 0;
         }
         /* A drive presses as hard as it must: there no spring would hold, and friction is lowered. */
-        for (int n = from; n < to; n++) W.contacts[n].gives *= driven ? 0 : 1 / heaviest;
+        for (int n = from; n < to; n++) {
+            Contact *c = W.contacts + n;
+            if (c->gives == 0) continue;
+            c->gives *= driven ? 0 : 1 / heaviest;
+            c->eases = 1 / (c->light[0] + c->gives);
+        }
         start_warm(list, to - from);
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), PLAIN,
                            W.accurate, W.skip * least);
-        else sweep_contacts(list, to - from, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9 * W.pace));
+        else solve_alone(list, to - from);
         for (int n = from; n < to; n++) {
             /* Rounding does not press; with endless friction even that would pull. */
             Contact *c = W.contacts + n;
@@ -389,7 +424,7 @@ void solve_contacts(void) {
             push(c, c->impulse);
             c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
         }
-        ease_off(list, to - from);
+        if (W.interact) lessen(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);
     check_energy();

@@ -17,10 +17,18 @@
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
 
-static double gap_later(const Contact *c, double h) {
+/* The gap at the end of the step on the path as it is; of a surface also how the way bends there, see
+   `bending`, if that is asked for. */
+double gap_later(const Contact *c, double h, double *bends) {
     const Disk *a = W.disks + c->i;
     double x = a->x + (a->vx + 0.5 * W.gx * h) * h, y = a->y + (a->vy + 0.5 * W.gy * h) * h, nx, ny;
-    if (c->j < 0) return gap_to(face_at(W.surfaces + (-1 - c->j), x, y), x, y, a->radius, &nx, &ny);
+    if (c->j < 0) {
+        const Surface *s = W.surfaces + (-1 - c->j), *then = face_at(s, x, y);
+        /* From afar it comes to no other piece than the one that the normal is of. */
+        if (then != s && c->gap > TOUCH * a->radius) return INFINITY;
+        if (bends) *bends = bending(then, x, y, a->radius);
+        return gap_to(then, x, y, a->radius, &nx, &ny);
+    }
     const Disk *b = W.disks + c->j;
     x -= b->x + (b->vx + 0.5 * W.gx * h) * h;
     y -= b->y + (b->vy + 0.5 * W.gy * h) * h;
@@ -72,20 +80,24 @@ static int add(int i, int j, double least, double bound, double h) {
     /* The next face or pulley that a disk by itself slides on to may be further off. */
     int far = c->gap > TOUCH * least;
     if (far && (W.interact || j >= 0 || !d->supports)) return 1;
-    later = gap_later(c, h);
+    later = c->free_gap = gap_later(c, h, 0);
+    c->bend = 0;
     if (far && later > 0) return 1;
     relative(c, 0, u);
     /* A blow has just lifted it off: it flies. */
     if (!W.interact && !W.tracks[i].lasted && flies_off(d, -1 - j, u[0])) return 1;
     /* What has sunk in counts however it moves: else what parts others would press it, or what knocks
        on it in each step. */
-    if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > W.soft)) return 1;
+    if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > MAX(W.soft, soft_approach(d, least))))
+        return 1;
     double aim = MIN(c->gap, 0);
     if (c->gap < -SLOP * least) {
         double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
         aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
-        c->most = (c->gap + MOST_PARTED * least - later) / h;
-        c->gives = GIVES;
+        if (W.interact) {
+            c->most = (c->gap + MOST_PARTED * least - later) / h;
+            c->gives = GIVES;
+        }
     }
     c->need = (aim - later) / h;
     c->drift = 0.5 * h * c->pull;
@@ -96,8 +108,7 @@ static int add(int i, int j, double least, double bound, double h) {
             for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
             c->was = W.earlier[k].owner;
         }
-    int pressed = c->impulse[0] > 0;
-    for (int n = 0; n < d->held_count; n++) pressed |= goes_on(-1 - d->held[n], j);
+    int pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
        above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
     double floor = -u[0], until = j < 0 ? time_on_face(c) : INFINITY, least_need = floor;

@@ -352,13 +352,6 @@ static void end_hop(int i, double t) {
     knot_held(i);
 }
 
-/* Whether a disk lies on surface k, or on one that goes on as it. */
-static int lies_on(const Disk *d, int k) {
-    for (int n = 0; n < d->held_count; n++)
-        if (goes_on(-1 - d->held[n], -1 - k)) return 1;
-    return 0;
-}
-
 /* Whether a disk by itself may meet another surface within a span than k and what it lies on. */
 static int meets_another(int i, int k, double span) {
     const Disk *d = W.disks + i;
@@ -367,7 +360,7 @@ static int meets_another(int i, int k, double span) {
     int count = surfaces_near(i, &list);
     for (int n = 0; n < count; n++) {
         const Surface *s = W.surfaces + list[n];
-        if (goes_on(-1 - k, -1 - list[n]) || lies_on(d, list[n]) || !is_near(s, d)) continue;
+        if (is_one(d, k, list[n]) || is_held(d, list[n]) || !is_near(s, d)) continue;
         if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) < (speed + W.g * span) * span) return 1;
     }
     return 0;

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 from dataclasses import replace
 from math import inf
-from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
 from chutelab.machine import Machine, build
 from chutelab.results import Recording
 from chutelab.results.recorder import EnoughError, StalledError
-from chutelab.scene import Fault, Scene, SceneError, load
+from chutelab.scene import AnyScene, Fault, Overrides, Scene, SceneError, load
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import LawWarning
 
@@ -48,10 +45,11 @@ def choose(machine: Machine, engine: str | None = None) -> str:
 
 
 def simulate(
-    scene: Scene | str | Path | Mapping[str, Any],
+    scene: AnyScene,
+    changes: Overrides = (),
+    *,
     engine: str | None = None,
     progress: Progress | None = None,
-    *,
     max_seconds: float | None = None,
 ) -> Recording:
     """Run a scene.
@@ -60,6 +58,8 @@ def simulate(
     ----------
     scene : Scene, str, path or mapping
         A scene, or what `chutelab.load` makes one of: a file, a name, nested mappings.
+    changes : mapping, str, or several
+        Laid over the scene as `chutelab.load` does: ``{"plate.angle_deg": 20}``.
     engine : {"auto", "exact", "contact", "pymunk"}, optional
         Overrides the scene's ``run.engine``. With auto, what the exact engine cannot follow (a
         spinning disk between a moving surface and another) goes to contact, and where a run breaks
@@ -91,17 +91,18 @@ def simulate(
         For each law that the run breaks, see `Recording.laws`: what, which particle, where, when,
         and what to do.
     """
-    recording = judged(scene, engine, progress, max_seconds=max_seconds)
+    recording = judged(scene, changes, engine=engine, progress=progress, max_seconds=max_seconds)
     for broken in recording.laws:
         warnings.warn(str(broken), LawWarning, stacklevel=2)
     return recording
 
 
 def judged(
-    scene: Scene | str | Path | Mapping[str, Any],
+    scene: AnyScene,
+    changes: Overrides = (),
+    *,
     engine: str | None = None,
     progress: Progress | None = None,
-    *,
     max_seconds: float | None = None,
 ) -> Recording:
     """Do as `simulate` does, without warning: for callers that read `Recording.laws`."""
@@ -115,7 +116,7 @@ def judged(
         if max_seconds is not None and perf_counter() - began > max_seconds:
             raise EnoughError
 
-    scene = scene if isinstance(scene, Scene) else load(scene)
+    scene = load(scene, changes)
     try:
         machine = build(scene, lambda: bounded(0.0) if max_seconds is not None else None)
     except EnoughError:

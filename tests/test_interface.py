@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from math import radians
@@ -13,8 +14,12 @@ import pytest
 import chutelab
 from chutelab import design, theory
 from chutelab.checks.preflight import preflight
+from chutelab.machine import build
+from chutelab.results.quantities import stopped
 from chutelab.scene import shipped, to_dict
 from chutelab.util.errors import InputError
+
+PEG = {"center": [0.0, 0.0], "radius": 0.01}
 
 FUNCTIONS = {
     "simulate": lambda scene: chutelab.simulate(scene).measure("landing.x"),
@@ -91,11 +96,50 @@ def test_a_recording_answers_by_itself():
         chutelab.measure(recording, "landng.x")
 
 
+class EnoughError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
+@pytest.mark.parametrize("slip", [EnoughError, KeyboardInterrupt])
+def test_what_ends_a_run_has_the_recording_so_far(engine, slip):
+    name = "stream-independent" if engine == "exact" else "stream"
+    looks = []
+
+    def progress(share):
+        looks.append(share)
+        if len(looks) == 3:
+            if slip is EnoughError:
+                raise EnoughError
+            signal.raise_signal(signal.SIGINT)  # as Ctrl-C
+
+    with pytest.raises(slip) as ended:
+        chutelab.simulate(name, engine=engine, progress=progress)
+    recording = ended.value.recording
+    assert stopped(recording) is not None
+    assert "stopped" in recording.summary()["ended"]["reason"]
+    assert recording.ledger.relative_residual < 1e-9
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
 def test_degrees_in_place_of_radians_are_told():
     numbers = {"speed": 2.0, "pulley_radius": 0.1, "distance": 0.5}
     with pytest.warns(UserWarning, match=r"angle = 20 is in radians.*np\.radians\(20\)"):
         theory.transfer(**numbers, angle=20)
     theory.transfer(**numbers, angle=radians(20))
+
+
+def test_scenes_and_machines_show_themselves_in_a_line():
+    scene = chutelab.load("perpendicular")
+    said = "<Scene perpendicular: Perpendicular damping plate, 2 m/s; 1 particle, incoming, plate,"
+    assert repr(scene) == f"{said} outgoing>"
+    assert repr(build(scene)) == f"<Machine of {scene!r}>"
+    assert (
+        len(
+            repr(chutelab.load("galton", {"surface": [PEG | {"name": f"p{i}"} for i in range(50)]}))
+        )
+        < 150
+    )
 
 
 def test_completion_offers_what_is_meant_for_users():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from time import perf_counter
@@ -15,6 +16,7 @@ from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.scene import AnyScene, Fault, Overrides, Scene, SceneError, load
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import LawWarning
+from chutelab.util.signals import ctrl_c_waits
 
 ENGINES = ("auto", "exact", "contact", "pymunk")
 
@@ -85,6 +87,9 @@ def simulate(
     ValueError
         If `max_seconds` is not a finite number above 0, or there is no such engine.
 
+    Exceptions that `progress` raises, and the KeyboardInterrupt of Ctrl-C, end the run; they have
+    its ``recording``, as after `max_seconds`.
+
     Warns
     -----
     LawWarning
@@ -110,26 +115,45 @@ def judged(
     if max_seconds is not None and not 0.0 < max_seconds < inf:
         raise ValueError(f"max_seconds = {max_seconds!r}: a finite number above 0 s")
 
-    def bounded(share: float) -> None:
-        if progress is not None:
-            progress(share)
-        if max_seconds is not None and perf_counter() - began > max_seconds:
-            raise EnoughError
+    scene, cut = load(scene, changes), list[BaseException]()
+    with ctrl_c_waits() as interrupted:
 
-    scene = load(scene, changes)
+        def look() -> None:
+            interrupted()
+            if max_seconds is not None and perf_counter() - began > max_seconds:
+                raise EnoughError
+
+        def watched(share: float) -> None:
+            try:
+                if progress is not None:
+                    progress(share)
+                look()
+            except EnoughError:
+                raise
+            except BaseException as error:
+                cut.append(error)
+                raise EnoughError from None
+
+        machine = _built(scene, look)
+        recording = follow(machine, engine, watched)
+        if (engine or machine.engine) == "auto" and recording.laws and not cut:
+            recording = _instead(machine, recording, watched)
+    recording = replace(recording, seconds=perf_counter() - began)
+    for error in cut:
+        error.recording = recording  # type: ignore[attr-defined]
+        raise error
+    return recording
+
+
+def _built(scene: Scene, look: Callable[[], None]) -> Machine:
     try:
-        machine = build(scene, lambda: bounded(0.0) if max_seconds is not None else None)
+        return build(scene, look)
     except EnoughError:
         counts = [stream.count for stream in scene.streams]
         most = counts.index(max(counts))
         several = f"[{most}]" * (len(counts) > 1)
         allowed = "fewer, or more seconds: those allowed were over before all had a place to start"
         raise _refused(scene, f"stream{several}.count", counts[most], allowed) from None
-    watched = progress if max_seconds is None else bounded
-    recording = follow(machine, engine, watched)
-    if (engine or machine.engine) == "auto" and recording.laws:
-        recording = _instead(machine, recording, watched)
-    return replace(recording, seconds=perf_counter() - began)
 
 
 def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> Recording:

@@ -382,7 +382,7 @@ class Thread:
     length: float  # m
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Machine:
     """Everything an engine needs to run.
 
@@ -412,6 +412,9 @@ class Machine:
     streams: tuple[str, ...]  # names; `Releases.stream` tells whose a particle is
     engine: str  # what the scene asks for: "auto", "exact", "contact" or "pymunk"
     plate_warnings: tuple[Caution, ...]  # of a nominal particle that misses the plate
+
+    def __repr__(self) -> str:
+        return f"<Machine of {self.scene!r}>"
 
     @property
     def count(self) -> int:

@@ -333,6 +333,12 @@ class Scene(Table):
             changes["string"] = held or None
         return self.with_values(changes)
 
+    def __repr__(self) -> str:
+        particles = "1 particle" if self.count == 1 else f"{self.count:,} particles"
+        names = self.surfaces
+        surfaces = ", ".join(names) if len(names) <= 6 else f"{len(names):,} surfaces"
+        return f"<Scene {self.source}: {self.title}; {particles}, {surfaces}>"
+
     def __eq__(self, other: object) -> bool:
         # The same machine from another file is the same scene.
         return self.__dict__ == other.__dict__ if isinstance(other, Scene) else NotImplemented

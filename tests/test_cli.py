@@ -1035,6 +1035,8 @@ def test_verify_ends_with_1_when_a_scene_shows_something_else():
     ]  # fmt: skip
     assert said.endswith("4 outside the tolerance\n")
     found = json.loads(call("verify", "other.toml", "inclined-60", "--json", code=1).stdout)
+    alone = call("verify", "other.toml", "inclined-60", "--jobs", "1", "--json", code=1).stdout
+    assert json.loads(alone) == found
     assert found["failures"] == 4
     other, inclined = found["scenes"]
     assert list(other) == ["scene", "title", "expectations", "agreement", "skipped"]

@@ -157,7 +157,7 @@ def measure(name, engine):
     ours, theirs, compared = [], [], name in COMPARED
     for _ in range(REPEATS if compared else 1):
         begin = process_time()
-        recording = simulate(drawn, engine)
+        recording = simulate(drawn, engine=engine)
         ours.append(process_time() - begin)
         end = float(recording.ends()[1]["t"].max())
         if compared:

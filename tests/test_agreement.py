@@ -272,10 +272,10 @@ def test_what_places_plate_and_belt_is_shared_by_the_engines_and_told_by_the_the
 ):
     """An error in the nominal particle's flight moves the belt for all engines alike."""
     given = scene.load("perpendicular", [f"outgoing.drop_from={drop_from}", "outgoing.drop=1"])
-    right = {engine: simulate(given, engine) for engine in ("exact", "contact", "pymunk")}
+    right = {engine: simulate(given, engine=engine) for engine in ("exact", "contact", "pymunk")}
     honest = nominal.descent
     monkeypatch.setattr(nominal, "descent", lambda *given: 1.1 * honest(*given))
-    wrong = {engine: simulate(given, engine) for engine in right}
+    wrong = {engine: simulate(given, engine=engine) for engine in right}
     heights = [one.select(Kind.LANDING)[0]["position"][1] for one in wrong.values()]
     assert heights == pytest.approx([heights[0]] * 3, abs=1e-9)
     # By 1.1 of the time to the plate, t2 = 0.5937 m / (2 m/s), it falls 1.21 of the height.

@@ -105,7 +105,7 @@ def test_a_planted_error_is_told(monkeypatch):
 
     def wrong(scene, engine=None, progress=None):
         faster = scene.model_copy(update={"gravity": scene.gravity * 1.001})
-        return replace(simulate(faster, engine, progress), machine=build(scene))
+        return replace(simulate(faster, engine=engine, progress=progress), machine=build(scene))
 
     monkeypatch.setattr(bench, "judged", wrong)
     (row,) = measure(load("perpendicular"), ("exact",), repeats=0)

@@ -4,8 +4,10 @@ import csv
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
@@ -406,10 +408,10 @@ def test_a_run_writes_the_whole_set():
 
 
 def test_a_run_works_everything_out_once():
-    found = calls([sc.Scene.model_validate.__func__, build, predict],
+    found = calls([sc.Scene.validated.__func__, build, predict],
                   "run", "perpendicular", "--out", "once")  # fmt: skip
     # The theory answers twice: as corrected and as printed.
-    assert found == {"model_validate": 1, "build": 1, "predict": 2}
+    assert found == {"validated": 1, "build": 1, "predict": 2}
 
 
 def test_a_table_of_very_many_events_is_written_if_it_is_asked_for(monkeypatch):
@@ -559,6 +561,28 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(monkeypatch):
     assert result.stdout == ""
     assert result.stderr.strip() == "Interrupted."
     assert list(Path().iterdir()) == []
+
+
+def test_ctrl_c_keeps_in_out_what_was_recorded(monkeypatch):
+    @contextmanager
+    def third_report(*_arguments, **_options):
+        shares = []
+
+        def report(share):
+            shares.append(share)
+            if len(shares) == 3:
+                signal.raise_signal(signal.SIGINT)
+
+        yield report
+
+    monkeypatch.setattr("chutelab.cli.running.progress", third_report)
+    result = call("run", "stream", "--out", "out", "--only", "json,npz", code=130)
+    assert result.stdout == ""
+    assert "what was recorded is written to out" in result.stderr
+    assert json.loads(Path("out/summary.json").read_text("utf-8"))["stopped"]["particles"] > 0
+    assert chutelab.Recording.load("out/recording.npz").count == 200
+    assert call("run", "stream", code=130).stdout == ""
+    assert [path.name for path in Path().iterdir()] == ["out"]
 
 
 def test_a_failure_of_ours_ends_with_1_one_line_and_nothing_written(monkeypatch):
@@ -1011,6 +1035,8 @@ def test_verify_ends_with_1_when_a_scene_shows_something_else():
     ]  # fmt: skip
     assert said.endswith("4 outside the tolerance\n")
     found = json.loads(call("verify", "other.toml", "inclined-60", "--json", code=1).stdout)
+    alone = call("verify", "other.toml", "inclined-60", "--jobs", "1", "--json", code=1).stdout
+    assert json.loads(alone) == found
     assert found["failures"] == 4
     other, inclined = found["scenes"]
     assert list(other) == ["scene", "title", "expectations", "agreement", "skipped"]

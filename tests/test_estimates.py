@@ -94,7 +94,9 @@ def measured(machine):
 def judged(machines):
     """Return the share of estimates that are right, of those that are told, and how many are."""
     for engine in ("exact", "contact", "pymunk"):
-        simulate(load("slip"), engine)  # what an engine's first run in a process adds is not asked
+        simulate(
+            load("slip"), engine=engine
+        )  # what an engine's first run in a process adds is not asked
     right = told = false = count = 0
     for name, machine in machines:
         count += 1

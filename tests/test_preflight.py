@@ -234,7 +234,7 @@ def look_at(monkeypatch, scene, most, tick=1.0):
 def looks(scene, engine=None):
     """Return the shares of a run that were reported, and its recording."""
     shares = []
-    return shares, simulate(scene, engine, shares.append)
+    return shares, simulate(scene, engine=engine, progress=shares.append)
 
 
 BOUNCE = """

@@ -22,6 +22,7 @@ from chutelab.results import ENTRIES, REASONS, Kind
 from chutelab.results import recording as tracks
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import Recorder
+from chutelab.util.errors import InputError
 
 EPS = 2.0**-52
 G = 9.81
@@ -331,8 +332,11 @@ def test_events_are_found_by_kind_and_surface():
     ramp = recording.surface_index("ramp")
     wanted = [e for e in recording.events if e["kind"] in kinds and e["surface"] == ramp]
     assert [e.tobytes() for e in found] == [e.tobytes() for e in wanted] != []
-    # releases are on no surface, which is not the surface of no such name
-    assert len(recording.select(surface="hood")) == 0 > recording.surface_index("hood")
+    assert np.array_equal(recording.select("impact", "SETTLE", surface="ramp"), found)
+    with pytest.raises(InputError, match=r'surface = "rmp": did you mean ramp\?'):
+        recording.select(surface="rmp")
+    with pytest.raises(InputError, match=r'kind = "impacts": did you mean impact\?'):
+        recording.select("impacts")
     first = recording.first(recording.select(Kind.IMPACT))
     assert first["particle"].tolist() == [0, 1, 2, 3, 4]
     for event in first:

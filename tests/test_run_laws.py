@@ -48,7 +48,7 @@ CROWD = {
 
 
 def recorded(tables, engine="exact"):
-    return judged(scene.from_dict({"particle": {"radius": 0.01}, **tables}, "test"), engine)
+    return judged(scene.from_dict({"particle": {"radius": 0.01}, **tables}, "test"), engine=engine)
 
 
 def spoilt(recording, **changes):
@@ -268,13 +268,13 @@ def faulty(monkeypatch):
 def test_simulate_warns_and_the_recording_holds_the_laws(faulty):
     faulty("exact")
     with pytest.warns(chutelab.LawWarning) as told:
-        run = simulate(scene.from_dict(HOP), "exact")
+        run = simulate(scene.from_dict(HOP), engine="exact")
     assert [str(one.message) for one in told] == list(map(str, run.laws))
     assert run.laws[0].law == laws.THROUGH
     with warnings.catch_warnings():
         warnings.simplefilter("error", chutelab.LawWarning)
         with pytest.raises(chutelab.LawWarning, match="LAW BROKEN, nothing through a surface"):
-            simulate(scene.from_dict(HOP), "exact")
+            simulate(scene.from_dict(HOP), engine="exact")
 
 
 def test_auto_takes_another_engine_and_says_so(faulty, tmp_path):

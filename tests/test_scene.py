@@ -199,8 +199,10 @@ def test_a_direct_call_judges_and_fills_as_a_file_does():
     assert scene.plate is not None
     assert scene.plate.pivot_height == 0.1
     assert plate.pivot_height is None, "the caller's own table stays as it was"
-    with pytest.raises(ValidationError, match=r"\[plate\] needs the table \[incoming\]"):
+    with pytest.raises(sc.SceneError, match=r"\[plate\] needs the table \[incoming\]"):
         sc.Scene(plate=plate)
+    with pytest.raises(sc.SceneError, match=r"gravity = -1: must be .*, in m/s²"):
+        sc.Scene(gravity=-1)
 
 
 def test_the_title_is_the_files_name_unless_given(tmp_path):

@@ -164,8 +164,8 @@ def after(looks):
 
 @pytest.mark.parametrize(("name", "engine", "changes", "looks"), STOPPABLE)
 def test_a_run_that_is_stopped_keeps_what_was_recorded(name, engine, changes, looks, tmp_path):
-    scene_, whole = loaded(name, *changes), simulate(loaded(name, *changes), engine)
-    recording = simulate(scene_, engine, watch := after(looks))
+    scene_, whole = loaded(name, *changes), simulate(loaded(name, *changes), engine=engine)
+    recording = simulate(scene_, engine=engine, progress=(watch := after(looks)))
     assert len(watch.seen) == looks
     found = stopped(recording)
     assert found is not None
@@ -194,24 +194,26 @@ def test_a_run_that_is_stopped_keeps_what_was_recorded(name, engine, changes, lo
 
 def test_who_has_not_been_reached_is_not_said_to_have_waited():
     """The engine for particles that do not meet takes one block after the other."""
-    recording = simulate(loaded("stream-independent"), "exact", after(2))
+    recording = simulate(loaded("stream-independent"), engine="exact", progress=after(2))
     assert stopped(recording).unreleased > 5000
     assert waits(recording) is None
 
 
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
 def test_a_time_limit_ends_a_run(engine):
-    found = stopped(simulate(loaded("belt-landing"), engine, max_seconds=1e-9))
+    found = stopped(simulate(loaded("belt-landing"), engine=engine, max_seconds=1e-9))
     assert (found.particles, found.unreleased) == (1, 0)
-    assert stopped(simulate(loaded("perpendicular"), engine, max_seconds=1e3)) is None
+    assert stopped(simulate(loaded("perpendicular"), engine=engine, max_seconds=1e3)) is None
 
 
 def test_a_run_that_is_over_is_not_stopped_by_the_last_look():
     for engine in ("exact", "contact", "pymunk"):
         looks = []
-        whole = simulate(loaded("perpendicular"), engine, looks.append)
+        whole = simulate(loaded("perpendicular"), engine=engine, progress=looks.append)
         assert looks[-1] == 1.0
-        assert same(whole, simulate(loaded("perpendicular"), engine, after(len(looks))))
+        assert same(
+            whole, simulate(loaded("perpendicular"), engine=engine, progress=after(len(looks)))
+        )
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])

@@ -18,10 +18,10 @@ The rooms of the house; each imports only those below it:
 - `mechanics`: flight, impact, ride;
 - `scene`: scene files; `util`: small things for all.
 
-What most people need is here: `load`, `Scene`, `SceneError`, `simulate`, `Recording`, `LawWarning`,
-`theory`, `compare`, `overlay`, `animate`, `live`, and `exercises`, `measured`, `design`, `figures`.
-Each is imported when it is first asked for, so that text output never waits for matplotlib, nor the
-exact engine for pymunk or wasmtime.
+What most people need is here: `scenes`, `load`, `Scene`, `SceneError`, `simulate`, `Recording`,
+`Kind`, `LawWarning`, `theory`, `compare`, `measure`, `sweep`, `solve`, `overlay`, `animate`,
+`live`, and `exercises`, `measured`, `design`, `figures`. Each is imported when it is first asked
+for, so that text output never waits for matplotlib, nor the exact engine for pymunk or wasmtime.
 """
 
 from __future__ import annotations
@@ -39,10 +39,14 @@ if TYPE_CHECKING:
     from chutelab.pictures.animation import animate
     from chutelab.pictures.live import live
     from chutelab.pictures.plots import overlay
-    from chutelab.results import Recording
+    from chutelab.results import Kind, Recording
     from chutelab.results.comparison import compare
+    from chutelab.results.quantities import measure
     from chutelab.scene import Scene, SceneError, load
+    from chutelab.scene import shipped as scenes
     from chutelab.studies import design, measured
+    from chutelab.studies.design import solve
+    from chutelab.studies.sweep import sweep
     from chutelab.theory import figures
     from chutelab.util.errors import LawWarning
 
@@ -50,6 +54,7 @@ if TYPE_CHECKING:
     """Of the package that is installed."""
 
 __all__ = [
+    "Kind",
     "LawWarning",
     "Recording",
     "Scene",
@@ -62,9 +67,13 @@ __all__ = [
     "figures",
     "live",
     "load",
+    "measure",
     "measured",
     "overlay",
+    "scenes",
     "simulate",
+    "solve",
+    "sweep",
     "theory",
 ]
 
@@ -77,6 +86,7 @@ _PACKAGES = {
 }
 
 _HOME = {
+    "Kind": "chutelab.results",
     "LawWarning": "chutelab.util.errors",
     "Recording": "chutelab.results",
     "Scene": "chutelab.scene",
@@ -85,8 +95,11 @@ _HOME = {
     "compare": "chutelab.results.comparison",
     "live": "chutelab.pictures.live",
     "load": "chutelab.scene",
+    "measure": "chutelab.results.quantities",
     "overlay": "chutelab.pictures.plots",
     "simulate": "chutelab.engines.simulation",
+    "solve": "chutelab.studies.design",
+    "sweep": "chutelab.studies.sweep",
 }
 
 
@@ -96,6 +109,8 @@ def __getattr__(name: str) -> Any:
         value = import_module("chutelab.util.versions").own_version()
     elif name in _PACKAGES:
         value = import_module(_PACKAGES[name])
+    elif name == "scenes":
+        value = import_module("chutelab.scene").shipped
     elif name in _HOME:
         value = getattr(import_module(_HOME[name]), name)
     else:

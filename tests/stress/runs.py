@@ -71,7 +71,7 @@ def run(
     """Simulate a scene on one of `stress.case.ENGINES`; dt is None for the exact one."""
     scene = scene_of(tables, name, engine, dt)
     with bounded(patience) as progress:
-        recording = judged(scene, by_name(engine), progress)
+        recording = judged(scene, engine=by_name(engine), progress=progress)
     return Evidence(build(scene), recording)
 
 

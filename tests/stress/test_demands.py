@@ -106,7 +106,7 @@ def test_engine_step_and_alignment_are_those_that_are_asked_for(monkeypatch):
 
     def note(loaded, engine, progress):
         asked.append((engine, loaded.run.engine, loaded.run.dt, loaded.run.align))
-        return simulate(loaded, "exact")
+        return simulate(loaded, engine="exact")
 
     monkeypatch.setattr(runs, "judged", note)
     for engine in ENGINES:

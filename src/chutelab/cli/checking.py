@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 
 import click
 
 from chutelab.cli.console import progress, say, tell
 from chutelab.cli.parameters import (
+    Count,
     complete_scene,
     dt_option,
     engine_option,
@@ -58,8 +61,15 @@ def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) ->
 @click.command(short_help="Check what scenes promise; compare independent answers.")
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1, shell_complete=complete_scene)
 @max_seconds_option(300.0, "Leave out an answer that takes longer than S seconds.")
+@click.option(
+    "--jobs",
+    metavar="N",
+    type=Count(min=0),
+    default=0,
+    help="Spread the scenes over N processes; 0, the default, is one for each processor.",
+)
 @json_option()
-def verify(scenes: tuple[str, ...], max_seconds: float, as_json: bool) -> None:
+def verify(scenes: tuple[str, ...], max_seconds: float, jobs: int, as_json: bool) -> None:
     """Check what each SCENE is expected to show (default: all shipped ones).
 
     Every [[expect]] of a scene is looked at on each engine that can run it, and in the theory.
@@ -68,15 +78,21 @@ def verify(scenes: tuple[str, ...], max_seconds: float, as_json: bool) -> None:
     """
     from chutelab.checks import agreement
     from chutelab.scene import load, shipped
+    from chutelab.studies.sweep import crew
     from chutelab.util.tables import Sheet, plain
 
     loaded = {name: load(name) for name in scenes or shipped()}
-    found: dict[str, agreement.Verification] = {}
-    with progress("verifying") as update:
-        for done, (name, scene) in enumerate(loaded.items()):
+    work = partial(agreement.verify, max_seconds=max_seconds)
+    answered: dict[int, agreement.Verification] = {}
+    with (
+        progress("verifying") as update,
+        crew(min(len(loaded), jobs or os.cpu_count() or 1)) as team,
+    ):
+        for number, answer in team.results(work, enumerate(loaded.values())):
+            answered[number] = answer
             if update is not None:
-                update(done / len(loaded))
-            found[name] = agreement.verify(scene, max_seconds=max_seconds)
+                update(len(answered) / len(loaded))
+    found = {name: answered[number] for number, name in enumerate(loaded)}
     failures = sum(answer.failures for answer in found.values())
     answers = [
         {

@@ -3,7 +3,8 @@
 0: done. 1: something failed that is not the user's to mend, ``verify`` or ``stress`` found what
 does not hold, a run broke a law, or an accuracy was not reached.
 2: what the user gave cannot be used. 130: interrupted with Ctrl-C. 143: terminated.
-129: the terminal was closed. 130, 143 and 129 leave nothing behind.
+129: the terminal was closed. 143 and 129 leave nothing behind, and so does 130, but for what a
+``run --out`` had recorded.
 """
 
 from __future__ import annotations

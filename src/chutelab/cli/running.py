@@ -83,9 +83,9 @@ def run(
     exit code is 1; what is printed and written says so. Without --engine another engine runs then,
     if there is one that keeps the laws, and the summary says so.
 
-    A run that --max-seconds ends counts as a run: its summary and
-    files are of what was recorded, particles that had not ended have "stopped" as their end, and
-    the exit code is 0.
+    A run that --max-seconds ends counts as a run: its summary and files are of what was recorded,
+    particles that had not ended have "stopped" as their end, and the exit code is 0. Ctrl-C ends a
+    run the same way: with --out its files are written, and the exit code is 130.
     """
     from chutelab.engines.simulation import judged
     from chutelab.results.recorder import StalledError
@@ -102,7 +102,7 @@ def run(
         # It counts from the reading of the scene on.
         max_seconds = max(max_seconds - (perf_counter() - began), 1e-9)
     reached: Accuracy | None = None
-    stuck = ""
+    stuck, interrupted = "", None
     with destination(output.out, output.files) as folder:
         try:
             with progress("simulating", quiet=output.quiet, left=True) as update:
@@ -119,8 +119,15 @@ def run(
             if kept or stalled.recording is None:
                 raise click.ClickException(f"{stalled}{kept}") from stalled
             recording, stuck = stalled.recording, f"{stalled}; what is written ends there"
+        except KeyboardInterrupt as error:
+            if folder is None or not hasattr(error, "recording"):
+                raise
+            recording, interrupted = error.recording, error
+            say(f"Interrupted: what was recorded is written to {output.out}.", err=True)
         if folder is not None:
             output.write(recording, folder, reached)
+    if interrupted is not None:
+        raise interrupted
     output.tell(recording, reached)
     if reached is not None and not reached.met:
         from chutelab.studies.accuracy import written

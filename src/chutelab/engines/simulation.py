@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf
-from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
 from chutelab.machine import Machine, build
 from chutelab.results import Recording
 from chutelab.results.recorder import EnoughError, StalledError
-from chutelab.scene import Fault, Scene, SceneError, load
+from chutelab.scene import AnyScene, Fault, Overrides, Scene, SceneError, load
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import LawWarning
+from chutelab.util.signals import ctrl_c_waits
 
 ENGINES = ("auto", "exact", "contact", "pymunk")
 
@@ -48,10 +47,11 @@ def choose(machine: Machine, engine: str | None = None) -> str:
 
 
 def simulate(
-    scene: Scene | str | Path | Mapping[str, Any],
+    scene: AnyScene,
+    changes: Overrides = (),
+    *,
     engine: str | None = None,
     progress: Progress | None = None,
-    *,
     max_seconds: float | None = None,
 ) -> Recording:
     """Run a scene.
@@ -60,6 +60,8 @@ def simulate(
     ----------
     scene : Scene, str, path or mapping
         A scene, or what `chutelab.load` makes one of: a file, a name, nested mappings.
+    changes : mapping, str, or several
+        Laid over the scene as `chutelab.load` does: ``{"plate.angle_deg": 20}``.
     engine : {"auto", "exact", "contact", "pymunk"}, optional
         Overrides the scene's ``run.engine``. With auto, what the exact engine cannot follow (a
         spinning disk between a moving surface and another) goes to contact, and where a run breaks
@@ -85,23 +87,27 @@ def simulate(
     ValueError
         If `max_seconds` is not a finite number above 0, or there is no such engine.
 
+    Exceptions that `progress` raises, and the KeyboardInterrupt of Ctrl-C, end the run; they have
+    its ``recording``, as after `max_seconds`.
+
     Warns
     -----
     LawWarning
         For each law that the run breaks, see `Recording.laws`: what, which particle, where, when,
         and what to do.
     """
-    recording = judged(scene, engine, progress, max_seconds=max_seconds)
+    recording = judged(scene, changes, engine=engine, progress=progress, max_seconds=max_seconds)
     for broken in recording.laws:
         warnings.warn(str(broken), LawWarning, stacklevel=2)
     return recording
 
 
 def judged(
-    scene: Scene | str | Path | Mapping[str, Any],
+    scene: AnyScene,
+    changes: Overrides = (),
+    *,
     engine: str | None = None,
     progress: Progress | None = None,
-    *,
     max_seconds: float | None = None,
 ) -> Recording:
     """Do as `simulate` does, without warning: for callers that read `Recording.laws`."""
@@ -109,28 +115,46 @@ def judged(
     if max_seconds is not None and not 0.0 < max_seconds < inf:
         raise ValueError(f"max_seconds = {max_seconds!r}: a finite number above 0 s")
 
-    def bounded(share: float) -> None:
-        if progress is not None:
-            progress(share)
-        if max_seconds is not None and perf_counter() - began > max_seconds:
-            raise EnoughError
+    scene, cut = load(scene, changes), list[BaseException]()
+    with ctrl_c_waits() as interrupted:
 
-    scene = scene if isinstance(scene, Scene) else load(scene)
+        def look() -> None:
+            interrupted()
+            if max_seconds is not None and perf_counter() - began > max_seconds:
+                raise EnoughError
+
+        def watched(share: float) -> None:
+            try:
+                if progress is not None:
+                    progress(share)
+                look()
+            except EnoughError:
+                raise
+            except BaseException as error:
+                cut.append(error)
+                raise EnoughError from None
+
+        machine = _built(scene, look)
+        recording = follow(machine, engine, watched)
+        if (engine or machine.engine) == "auto" and recording.laws and not cut:
+            recording = _instead(machine, recording, watched)
+    # In place: a copy would be judged anew.
+    object.__setattr__(recording, "seconds", perf_counter() - began)
+    for error in cut:
+        error.recording = recording  # type: ignore[attr-defined]
+        raise error
+    return recording
+
+
+def _built(scene: Scene, look: Callable[[], None]) -> Machine:
     try:
-        machine = build(scene, lambda: bounded(0.0) if max_seconds is not None else None)
+        return build(scene, look)
     except EnoughError:
         counts = [stream.count for stream in scene.streams]
         most = counts.index(max(counts))
         several = f"[{most}]" * (len(counts) > 1)
         allowed = "fewer, or more seconds: those allowed were over before all had a place to start"
         raise _refused(scene, f"stream{several}.count", counts[most], allowed) from None
-    watched = progress if max_seconds is None else bounded
-    recording = follow(machine, engine, watched)
-    if (engine or machine.engine) == "auto" and recording.laws:
-        recording = _instead(machine, recording, watched)
-    # In place: a copy would be judged anew.
-    object.__setattr__(recording, "seconds", perf_counter() - began)
-    return recording
 
 
 def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> Recording:

@@ -386,7 +386,7 @@ EARTH = 9.81
 """m/s²; gravity for which engines' bounds on speeds and times are written, see `Machine.pace`."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Machine:
     """Everything an engine needs to run.
 
@@ -416,6 +416,9 @@ class Machine:
     streams: tuple[str, ...]  # names; `Releases.stream` tells whose a particle is
     engine: str  # what the scene asks for: "auto", "exact", "contact" or "pymunk"
     plate_warnings: tuple[Caution, ...]  # of a nominal particle that misses the plate
+
+    def __repr__(self) -> str:
+        return f"<Machine of {self.scene!r}>"
 
     @cached_property
     def pace(self) -> Any:

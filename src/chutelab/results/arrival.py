@@ -157,12 +157,12 @@ def never(count: int) -> NDArray[Any]:
 
 def _arrivals(recording: Recording, surface: str) -> NDArray[Any]:
     found = never(recording.count)
+    if surface not in recording.surfaces:
+        return found
     direct = recording.select(Kind.LANDING, Kind.IMPACT, surface=surface)
     if not recording.machine.interact:
         own = recording.first(direct)
         found[own["particle"]] = own
-        return found
-    if surface not in recording.surfaces:
         return found
     there = Places(recording)
     met = np.concatenate([direct, recording.select(Kind.COLLISION)])

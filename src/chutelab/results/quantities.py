@@ -21,7 +21,7 @@ from chutelab.results.arrival import arrivals, never
 from chutelab.results.ledger import ledger
 from chutelab.results.recording import ENTRIES, REASONS, Kind, Recording
 from chutelab.scene import Scene
-from chutelab.scene.rules import FIRST, NEEDED, SYMBOLS
+from chutelab.scene.rules import FIRST, NEEDED, SYMBOLS, suggestion, unit_of
 from chutelab.theory import Drag, drag
 from chutelab.util.arrays import Floats, Numbers
 from chutelab.util.tables import number
@@ -53,8 +53,10 @@ def first(recording: Recording, event: str, surface: str | None = None) -> NDArr
     From the incoming belt, on the plate and on the outgoing belt, unless another surface is given.
     NaN throughout where it did not happen.
     """
-    found = recording.first(recording.select(Kind[event.upper()], surface=surface or NEEDED[event]))
-    events = never(recording.count)
+    events, surface = never(recording.count), surface or NEEDED[event]
+    if surface not in recording.surfaces:
+        return events
+    found = recording.first(recording.select(event, surface=surface))
     events[found["particle"]] = found
     return events
 
@@ -131,8 +133,11 @@ def measure(recording: Recording, name: str) -> float:
     Raises
     ------
     KeyError
-        If there is no quantity of that name.
+        If the scene has no quantity of that name.
     """
+    surfaces, streams = recording.scene.surfaces, recording.machine.streams
+    if unit_of(name, surfaces, streams) is None:
+        raise KeyError(f"no quantity {name!r}; {suggestion(name, surfaces)}")
     if name.startswith(FIRST):
         return float(each(recording, name.removeprefix(FIRST))[0])
     parts, whose = name.split("."), np.ones(recording.count, dtype=bool)

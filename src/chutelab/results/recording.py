@@ -24,10 +24,12 @@ from chutelab.machine import Machine, Particle
 from chutelab.scene import Scene, rules
 from chutelab.theory import Transfer, predict
 from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.tables import Sheet, Shown
 
 if TYPE_CHECKING:
     from chutelab.results.laws import Broken
+    from chutelab.results.ledger import Ledger
 
 ENTRIES = rules.ENTRIES
 """The three entries of the energy ledger, in the order of every array that holds them."""
@@ -51,6 +53,17 @@ class Kind(IntEnum):
     STICK = 6
     SETTLE = 7
     EXIT = 8
+
+
+def kind_of(kind: Kind | str) -> Kind:
+    """Return a kind of event by its name, in small letters or capitals; `InputError` if none."""
+    if isinstance(kind, str):
+        names = [one.lower() for one in Kind.__members__]
+        if kind.lower() not in names:
+            there = f"there are {', '.join(names)}"
+            raise InputError(did_you_mean(kind, names, there), "kind", kind)
+        return Kind[kind.upper()]
+    return Kind(kind)
 
 
 EVENT = np.dtype(
@@ -236,6 +249,30 @@ class Recording(Shown):
 
         return judge(self)
 
+    @cached_property
+    def ledger(self) -> Ledger:
+        """Where the energy went, in total and by surface; see `results.ledger.Ledger`."""
+        from chutelab.results.ledger import ledger
+
+        return ledger(self)
+
+    def measure(self, quantity: str) -> float:
+        """Return a quantity by its name, such as ``landing.x.mean``; see `chutelab.measure`."""
+        from chutelab.results.quantities import measure
+
+        return measure(self, quantity)
+
+    def summary(self) -> dict[str, Any]:
+        """Return what ``chutelab run --json`` prints; see `results.summary.summary`."""
+        from chutelab.results.summary import summary
+
+        return summary(self)
+
+    @cached_property
+    def t(self) -> Floats:
+        """Times of all knots, s, in order and each once: what happens, happens between two."""
+        return np.unique(self.knots["t"])
+
     @property
     def count(self) -> int:
         """Number of particles."""
@@ -312,20 +349,31 @@ class Recording(Shown):
         """Return the index of a surface, or -1 if the scene has none of that name."""
         return self.surfaces.index(name) if name in self.surfaces else -1
 
-    def select(self, *kinds: Kind, surface: str | None = None) -> NDArray[Any]:
-        """Return the events of the given kinds (all if none is given), sorted by time.
+    def select(self, *kinds: Kind | str, surface: str | None = None) -> NDArray[Any]:
+        """Return events, sorted by time.
 
-        With `surface`, those on that surface only: none if the scene has none of that name.
+        Parameters
+        ----------
+        *kinds : Kind or str
+            Their kinds, ``Kind.IMPACT`` or ``"impact"``; all if none is given.
+        surface : str, optional
+            Only those on this surface of the scene.
+
+        Raises
+        ------
+        InputError
+            If there is no such kind, or the scene has no such surface.
         """
+        kinds = tuple(kind_of(kind) for kind in kinds)
+        if surface is not None and surface not in self.surfaces:
+            there = f"the scene has {', '.join(self.surfaces)}"
+            raise InputError(did_you_mean(surface, self.surfaces, there), "surface", surface)
         keep = np.ones(len(self.events), dtype=bool)
         if kinds:
             # Several times as fast as `np.isin` where events are few, as those of one particle.
             keep &= np.logical_or.reduce([self.events["kind"] == kind for kind in kinds])
         if surface is not None:
-            # Events on no surface have index -1, as unknown names do.
-            keep &= (self.events["surface"] == self.surface_index(surface)) & (
-                surface in self.surfaces
-            )
+            keep &= self.events["surface"] == self.surface_index(surface)
         return self.events[keep]
 
     def first(self, events: NDArray[Any]) -> NDArray[Any]:

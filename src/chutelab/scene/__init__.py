@@ -15,6 +15,8 @@
 
 from chutelab.scene.loading import (
     About,
+    AnyScene,
+    Overrides,
     SceneError,
     about,
     find,
@@ -47,11 +49,13 @@ __all__ = [
     "MISSING",
     "RESERVED_NAMES",
     "About",
+    "AnyScene",
     "Conveyor",
     "Expect",
     "Fault",
     "Incoming",
     "Outgoing",
+    "Overrides",
     "Particle",
     "Plate",
     "Run",

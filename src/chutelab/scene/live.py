@@ -59,7 +59,7 @@ def live_faults(document: Mapping[str, Any], live: Live) -> Iterator[Fault]:
         sound = {key: value for key, value in preset.set.items() if key not in refused}
         apply(changed, [Override(key, value) for key, value in sound.items()])
         try:
-            Scene.model_validate(changed)
+            Scene.validated(changed)
         except ValidationError as error:
             # Nothing of a change that does not go together with the rest.
             for fault in faults_of(error, changed):

@@ -13,10 +13,10 @@ from typing import Any, Final
 import tomli_w
 from pydantic import ValidationError
 
-from chutelab.scene.conflicts import Look, conflicts
+from chutelab.scene.conflicts import ConflictError, Look, conflicts
 from chutelab.scene.live import live_faults
 from chutelab.scene.messages import faults_of, nearest
-from chutelab.scene.overrides import Override, apply, joined
+from chutelab.scene.overrides import Override, apply, joined, sized
 from chutelab.scene.schema import DEFAULTS, Scene, as_written, plain_number
 from chutelab.scene.units import flat
 from chutelab.util.errors import Fault, InputError, cut, did_you_mean, printable
@@ -126,16 +126,18 @@ Overrides = str | Override | Mapping[str, object] | Iterable["Overrides"]
 """What is laid over a scene: a text ``KEY=VALUE``, values by key, or several of these."""
 
 
-def load(
-    scene: str | Path | Mapping[str, Any], overrides: Overrides = (), *more: Overrides
-) -> Scene:
+AnyScene = Scene | str | Path | Mapping[str, Any]
+"""What `load` makes a scene of, and so does every function that takes a scene."""
+
+
+def load(scene: AnyScene, overrides: Overrides = (), *more: Overrides) -> Scene:
     """Load a scene from a file or, by name, from the shipped ones.
 
     Parameters
     ----------
     scene
-        A file; the name of a shipped scene, with or without ``.toml``; or the tables of a file as
-        nested mappings.
+        A file; the name of a shipped scene, with or without ``.toml``; the tables of a file as
+        nested mappings; or a scene, which is validated anew if something is laid over it.
     overrides, *more
         Laid over the scene, the last one wins: texts ``KEY=VALUE``; mappings of values by full
         path, or nested as in the file; or lists of these.
@@ -156,6 +158,9 @@ def load(
     ('floor',)
     """
     overrides = (overrides, *more)
+    if isinstance(scene, Scene):
+        changes = list(_each(overrides))
+        return from_dict(to_dict(scene), scene.source, changes) if changes else scene
     if isinstance(scene, Mapping):
         return from_dict(scene, overrides=overrides)
     found = find(scene)
@@ -213,6 +218,7 @@ def from_dict(
         document: dict[str, Any] = plain(mapping)
     except RecursionError as error:
         raise SceneError(source, [Fault("", None, str(error))]) from None
+    document = sized(document)
     faults, given = apply(document, _each(overrides))
     empty = not document
     if source != "<scene>":
@@ -225,7 +231,7 @@ def from_dict(
         raise SceneError(source, faults + [_traced(fault, given) for fault in broken])
     scene: Scene | None = None
     try:
-        scene = Scene.model_validate(document)
+        scene = Scene.validated(document)
     except ValidationError as error:
         found = faults_of(error, document)
         faulty = {fault.key for fault in found}
@@ -241,6 +247,13 @@ def from_dict(
         raise SceneError(source, faults, f"The scene is empty. {_STARTER}" if empty else "")
     scene._source = source
     return scene
+
+
+def refused(error: ValidationError, tables: Mapping[str, Any]) -> SceneError:
+    """Say in words what `Scene` does not take."""
+    causes = (detail.get("ctx", {}).get("error") for detail in error.errors(include_url=False))
+    together = [fault for one in causes if isinstance(one, ConflictError) for fault in one.faults]
+    return SceneError("<scene>", faults_of(error, tables) + together)
 
 
 SURROGATE: Final = re.compile("[\ud800-\udfff]")

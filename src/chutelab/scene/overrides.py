@@ -228,7 +228,7 @@ def apply(
         one = read(given_one) if isinstance(given_one, str) else given_one
         try:
             path = resolved(document, one.key)
-            _put(document, path, _measured(path, one.value))
+            _put(document, path, sized(one.value, path))
         except InputError as error:
             faults.append(Fault(one.typed or one.key, None, str(error)))
         else:
@@ -236,13 +236,25 @@ def apply(
     return faults, given
 
 
-def _measured(path: Sequence[str | int], value: object) -> object:
-    """Return the number that a text such as "4 mm" is at a path which takes numbers."""
-    rule = rule_at(path)
-    if not isinstance(value, str) or rule is None or limits_of(rule) is None:
-        return value
-    size = size_in(value, str(rule.get("x-unit") or ""))
-    return value if size is None else size
+def sized(value: Any, path: Sequence[str | int] = ()) -> Any:
+    """Copy a document, or what is at a path of one, with numbers for texts such as "4 mm".
+
+    Only where a number is wanted, and the text has its unit.
+    """
+    match value:
+        case dict():
+            return {key: sized(content, (*path, key)) for key, content in value.items()}
+        case list():
+            return [sized(item, (*path, index)) for index, item in enumerate(value)]
+        case str() if path and value[:1] in "+-.0123456789":
+            key = list(path)
+            while isinstance(key[-1], int):
+                key.pop()
+            rule = rule_at(path)
+            if rule is not None and limits_of(rule) is not None:
+                size = size_in(value, str((rule_at(key) or {}).get("x-unit") or ""))
+                return value if size is None else size
+    return value
 
 
 def value_of(text: str) -> object:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import hypot, sqrt
 from typing import Annotated, Any, Final, Self
 
-from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
 from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts, stream_name
 from chutelab.scene.materials import PRESETS, Material
@@ -86,8 +86,8 @@ class Scene(Table):
 
     Raises
     ------
-    pydantic.ValidationError
-        If built directly from bad values; `chutelab.scene.from_dict` says it in words.
+    SceneError
+        With all faults.
     """
 
     title: Text = described("Untitled scene", "What the scene is called", max_length=200)
@@ -115,6 +115,22 @@ class Scene(Table):
 
     _source: str = PrivateAttr("<scene>")
     _shape: tuple[int, ...] = PrivateAttr(())
+
+    def __init__(self, **tables: Any) -> None:
+        try:
+            super().__init__(**tables)
+        except ValidationError as error:
+            # Here, because `loading` builds on the tables above.
+            from chutelab.scene.loading import refused
+
+            raise refused(error, tables) from None
+
+    @classmethod
+    def validated(cls, document: Mapping[str, Any]) -> Self:
+        """Return the scene of a document, or raise Pydantic's own ValidationError."""
+        scene = cls.__new__(cls)
+        Table.__init__(scene, **document)
+        return scene
 
     @classmethod
     def tables(cls) -> dict[str, type[Table]]:
@@ -321,6 +337,12 @@ class Scene(Table):
             held = [row for row in tables["string"] if row.get("particle", 0) == 0]
             changes["string"] = held or None
         return self.with_values(changes)
+
+    def __repr__(self) -> str:
+        particles = "1 particle" if self.count == 1 else f"{self.count:,} particles"
+        names = self.surfaces
+        surfaces = ", ".join(names) if len(names) <= 6 else f"{len(names):,} surfaces"
+        return f"<Scene {self.source}: {self.title}; {particles}, {surfaces}>"
 
     def __eq__(self, other: object) -> bool:
         # The same machine from another file is the same scene.

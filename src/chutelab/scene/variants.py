@@ -67,6 +67,10 @@ class Vary:
             raise InputError("only finite numbers are allowed", self.typed)
 
 
+Varied = str | Sequence["Vary | str"] | Mapping[str, Sequence[float | str]]
+"""Keys that vary and their values, see `varied`."""
+
+
 @dataclass(frozen=True)
 class Range(Vary):
     """A key of the scene and the two ends of what it may be, to draw samples from."""
@@ -78,6 +82,28 @@ class Range(Vary):
         low, high = self.values
         if low >= high:
             raise InputError(f"the range is empty: from {low:g} to {high:g}", self.typed)
+
+
+def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
+    """Return what is varied as a list of one kind, `Vary` or `Range`.
+
+    Values by key, numbers or texts with a unit; texts as ``--vary`` takes them; or such a list.
+    """
+    if isinstance(varies, str):
+        varies = [varies]
+    if isinstance(varies, Mapping):
+        form = "must be a list of numbers, or of texts such as 4 mm"
+        found = []
+        for key, values in varies.items():
+            typed = f"--vary {key}=..."
+            if isinstance(values, str) or not hasattr(values, "__len__"):
+                raise InputError(form, typed)
+            numbers, unit = _numbers(typed, [str(value) for value in plain(values)], form)
+            # + 0.0: there is one zero.
+            found.append(kind(key, tuple(number + 0.0 for number in numbers), typed, unit))
+        return found
+    read = parse_range if kind is Range else parse
+    return [read(vary) if isinstance(vary, str) else vary for vary in varies]
 
 
 def parse(text: str) -> Vary:

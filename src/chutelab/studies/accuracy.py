@@ -27,7 +27,7 @@ from chutelab.results.comparison import compare, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import QUANTITIES, first
 from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene, SceneError
+from chutelab.scene import AnyScene, Scene, SceneError, load
 from chutelab.scene.rules import NEEDED
 from chutelab.scene.units import read_size, write_size
 from chutelab.util.arrays import Floats, Progress
@@ -236,7 +236,7 @@ def answer(
 
     if engine == "dop853":
         return reference.run(build(scene), bounded)
-    return judged(scene, engine, progress if max_seconds is None else bounded)
+    return judged(scene, engine=engine, progress=progress if max_seconds is None else bounded)
 
 
 def because(error: Exception) -> str:
@@ -316,7 +316,7 @@ class Accuracy:
 
 
 def reach(
-    scene: Scene, wanted: Wanted | str | float, progress: Progress | None = None
+    scene: AnyScene, wanted: Wanted | str | float, progress: Progress | None = None
 ) -> tuple[Recording, Accuracy]:
     """Run a scene until it is accurate enough, or cannot be made so.
 
@@ -324,8 +324,8 @@ def reach(
 
     Parameters
     ----------
-    scene : Scene
-        From `chutelab.load`.
+    scene : Scene, str, path or mapping
+        What `chutelab.load` takes.
     wanted : Wanted, str or float
         Such as ``"1mm"`` or ``1e-6``.
     progress : callable, optional
@@ -351,7 +351,7 @@ def reach(
     """
     if not isinstance(wanted, Wanted):
         wanted = parse(wanted if isinstance(wanted, str) else repr(float(wanted)))
-    return Search(scene, wanted, progress).result()
+    return Search(load(scene), wanted, progress).result()
 
 
 class Search:

@@ -28,7 +28,7 @@ from chutelab.util.trig import RADIANS, hypot, sin_cos
 
 if TYPE_CHECKING:
     # The paper's tables are there without the model of a scene.
-    from chutelab.scene import Scene
+    from chutelab.scene import AnyScene, Scene
 
 LEAST_CLEARANCE = 0.05
 """m of the default plate's lower end above the outgoing belt, for particles below 17 mm."""
@@ -157,13 +157,13 @@ ON_BELT = 1e-12
 """m; a release this close to the riding height differs from it by the rounding of a sum only."""
 
 
-def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
+def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     """Predict particle 0 of a scene in closed form.
 
     Parameters
     ----------
-    scene : Scene
-        A validated scene; its particle 0 is nominal (no spread, lowest layer).
+    scene : Scene, str, path or mapping
+        What `chutelab.load` takes; its particle 0 is nominal (no spread, lowest layer).
     rebound : {"corrected", "as-printed"}
         Which Eq. (9), see `transfer`.
 
@@ -182,6 +182,10 @@ def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     way ends the answer, shut or open. What happens after the landing is not looked at. Contacts
     that graze to within rounding may be judged either way.
     """
+    # Here, because the equations alone need no scene files, and none of Pydantic.
+    from chutelab.scene import load
+
+    scene = load(scene)
     fault = _outside(scene)
     if fault:
         return cut(unanswered(), "separation", Reason.OUTSIDE.because(fault))

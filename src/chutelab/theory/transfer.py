@@ -6,6 +6,7 @@ Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside
 
 from __future__ import annotations
 
+import warnings
 from typing import Literal
 
 import numpy as np
@@ -121,6 +122,11 @@ def transfer(
     ValueError
         If `rebound` is neither form, or the parameters do not broadcast.
 
+    Warns
+    -----
+    UserWarning
+        If an angle is beyond ±π/2, which looks like degrees.
+
     Notes
     -----
     V. Molnár et al., Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016. Relative errors are a
@@ -157,6 +163,13 @@ def transfer(
     arrays = [np.asarray(value, dtype=np.float64) for value in numbers.values()]
     turning, *whole = np.broadcast_arrays(np.asarray(spin, dtype=np.bool_), *arrays)
     flat = dict(zip(numbers, (array.ravel() for array in whole), strict=True))
+    for name in ("angle", "incline"):
+        if len(beyond := flat[name][np.abs(flat[name]) > np.pi / 2]):
+            warnings.warn(
+                f"{name} = {beyond[0]:g} is in radians, and beyond ±π/2; of degrees take"
+                f" np.radians({beyond[0]:g})",
+                stacklevel=2,
+            )
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         found = stages(
             **flat,

@@ -91,6 +91,38 @@ def held() -> Iterator[None]:
         _obey(kept[0], None)
 
 
+@contextmanager
+def ctrl_c_waits() -> Iterator[Callable[[], None]]:
+    """Give a function that raises what a Ctrl-C would have raised before.
+
+    So a run is interrupted where it can be, and keeps what it has. A second Ctrl-C is obeyed at
+    once. In a thread, and where the program has a handler of its own, nothing changes.
+    """
+    came: list[int] = []
+    before = signal.getsignal(signal.SIGINT)
+
+    def look() -> None:
+        if came and callable(before):
+            before(came.pop(), None)
+
+    def note(signum: int, frame: Any) -> None:
+        if came and callable(before):
+            before(signum, frame)
+        came.append(signum)
+
+    changed = False
+    if before in (signal.default_int_handler, _obey):
+        with suppress(ValueError):
+            signal.signal(signal.SIGINT, note)
+            changed = True
+    try:
+        yield look
+    finally:
+        if changed:
+            signal.signal(signal.SIGINT, before)
+    look()
+
+
 def _obey(signum: int, _frame: object) -> None:
     if _kept is not None:
         _kept.append(signum)

@@ -34,7 +34,7 @@ from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.quantities import waits
 from chutelab.results.recording import blocks, hermite
-from chutelab.scene import Scene, SceneError, shown
+from chutelab.scene import AnyScene, Scene, SceneError, load, shown
 from chutelab.scene.materials import DENSEST, LIGHTEST, PRESETS
 from chutelab.scene.units import write_size
 from chutelab.util.arrays import Floats, Ints
@@ -308,7 +308,7 @@ def _down(value: float) -> float:
     return -_up(-value)
 
 
-def preflight(scene: Scene) -> Preflight:
+def preflight(scene: AnyScene) -> Preflight:
     """Look at a scene before it runs.
 
     Besides the set-up it takes some 1.5 s of processor time at most: a trial run is cut off after
@@ -319,6 +319,7 @@ def preflight(scene: Scene) -> Preflight:
     SceneError
         If the geometry contradicts itself.
     """
+    scene = load(scene)
     begin, before = process_time(), peak()
     machine = build(scene)
     setup = process_time() - begin

@@ -14,11 +14,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from chutelab.scene import Scene, load
+from chutelab.scene import AnyScene, Overrides, load
 from chutelab.util.errors import MissingLibraryError
 
 if TYPE_CHECKING:
@@ -26,8 +24,8 @@ if TYPE_CHECKING:
 
 
 def live(
-    scene: Scene | str | Path,
-    overrides: Sequence[str] = (),
+    scene: AnyScene,
+    overrides: Overrides = (),
     *,
     height: int = 640,
     language: str = "en",
@@ -36,10 +34,10 @@ def live(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        A scene, a file, or the name of a shipped scene.
-    overrides : sequence of str
-        ``KEY=VALUE`` each, laid over a file or shipped scene.
+    scene : Scene, str, path or mapping
+        What `chutelab.load` takes.
+    overrides : mapping, str, or several
+        Laid over it, see `chutelab.load`.
     height : int
         Of the page, in pixels.
     language : {"en", "de"}
@@ -70,8 +68,7 @@ def live(
             raise
         text = 'live pages in a notebook need anywidget: python -m pip install "chutelab[notebook]"'
         raise MissingLibraryError(text) from error
-    loaded = scene if isinstance(scene, Scene) else load(scene, overrides)
-    return shown(loaded, height=height, language=language)
+    return shown(load(scene, overrides), height=height, language=language)
 
 
 __all__ = ["live"]

@@ -7,7 +7,7 @@ numbers are smooth functions of the keys; where it changes, they may jump.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 from chutelab.engines.simulation import judged, simulate
 from chutelab.results import ENTRIES, Recording
 from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene, SceneError, rules
+from chutelab.scene import AnyScene, Scene, SceneError, load, rules
 from chutelab.scene.overrides import value_at
-from chutelab.scene.variants import is_plain, parse_range, quantity, reason
+from chutelab.scene.variants import Range, Varied, Vary, is_plain, quantity, reason, varied
 from chutelab.studies.design.quantities import (
     Quantity,
     courses_of,
@@ -65,13 +65,10 @@ class Span:
         return self.high - self.low
 
 
-def ranges(scene: Scene, texts: Sequence[str]) -> tuple[Span, ...]:
-    """Read what ``--vary`` takes, several times; each is tried on the scene."""
+def ranges(scene: Scene, vary: Varied) -> tuple[Span, ...]:
+    """Return the ranges of keys that vary; each is tried on the scene."""
 
-    def read(text: str) -> Span:
-        if text.count(":") != 1:
-            raise InputError(FORM, f"--vary {text}")
-        given = parse_range(text)
+    def read(given: Vary) -> Span:
         home = given.key.partition(".")[0]
         if home in Scene.tables() and getattr(scene, home) in (None, ()):
             named = "[[surface]]" if home == "surface" else f"[{home}]"
@@ -95,7 +92,10 @@ def ranges(scene: Scene, texts: Sequence[str]) -> tuple[Span, ...]:
         start = float(value) if isinstance(value, (int, float)) else None
         return Span(about.path, about.unit, low, high, start)
 
-    return each_once("--vary", texts, read, ASK, MOST)
+    for text in [vary] if isinstance(vary, str) else vary:
+        if not isinstance(vary, Mapping) and isinstance(text, str) and text.count(":") != 1:
+            raise InputError(FORM, f"--vary {text}")
+    return each_once("--vary", varied(vary, Range), read, ASK, MOST)
 
 
 def suits(scene: Scene, keys: Sequence[str], quantities: Sequence[Quantity]) -> bool:
@@ -227,7 +227,7 @@ def _until(ending: str) -> dict[str, str]:
     return {"run.until": "settled"} if ending == "settled" else {}
 
 
-def value(scene: Scene, name: str) -> float:
+def value(scene: AnyScene, name: str) -> float:
     """Run a scene and return one of its quantities; NaN if it did not happen.
 
     Names are those of `chutelab.studies.design.quantities`.
@@ -241,9 +241,9 @@ def value(scene: Scene, name: str) -> float:
 
     Examples
     --------
-    >>> from chutelab.scene import load
-    >>> round(value(load("perpendicular"), "belt_work"), 9)
+    >>> round(value("perpendicular", "belt_work"), 9)
     0.048
     """
+    scene = load(scene)
     wanted = measured(scene, name)
     return float(wanted.of(simulate(scene.with_values(_until(wanted.ending)))))

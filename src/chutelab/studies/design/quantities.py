@@ -32,18 +32,22 @@ T = TypeVar("T")
 
 
 def each_once(
-    option: str, texts: Sequence[str], read: Callable[[str], T], ask: str, most: int
+    option: str, given: Sequence[Any], read: Callable[[Any], T], ask: str, most: int
 ) -> tuple[T, ...]:
     """Read what an option takes, given 1 to `most` times; each result has another `key`."""
-    if not texts:
+
+    def typed(one: Any) -> str:
+        return one.typed if isinstance(one, Vary) else f"{option} {one}"
+
+    if not given:
         raise InputError(ask, option)
-    if len(texts) > most:
-        raise InputError(f"at most {most} keys are allowed", f"{option} {texts[most]}")
+    if len(given) > most:
+        raise InputError(f"at most {most} keys are allowed", typed(given[most]))
     found: dict[str, T] = {}
-    for text in texts:
+    for text in given:
         one: Any = read(text)
         if one.key in found:
-            raise InputError(f"{one.key} is given already", f"{option} {text}")
+            raise InputError(f"{one.key} is given already", typed(text))
         found[one.key] = one
     return tuple(found.values())
 

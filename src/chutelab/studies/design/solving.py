@@ -6,7 +6,7 @@ polish.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 from typing import Any, Final
@@ -14,7 +14,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.scene import Scene
+from chutelab.scene import AnyScene, Scene, load
+from chutelab.scene.variants import Varied
 from chutelab.studies.design.answers import Answer, Goal, Solution
 from chutelab.studies.design.evaluation import Evaluator, Span, ranges
 from chutelab.studies.design.quantities import Quantity, measured, scipy
@@ -92,9 +93,9 @@ MORE: Final = 400
 
 
 def solve(
-    scene: Scene,
-    vary: str | Sequence[str],
-    target: str | Sequence[str],
+    scene: AnyScene,
+    vary: Varied,
+    target: str | Sequence[str] | Mapping[str, object],
     *,
     points: int = POINTS,
     seed: int = 0,
@@ -104,13 +105,14 @@ def solve(
 
     Parameters
     ----------
-    scene : Scene
-        From `chutelab.load`.
-    vary : str or sequence of str
-        ``KEY=FROM:TO``, the keys and the ranges that are searched.
-    target : str or sequence of str
-        ``QUANTITY=VALUE``: a quantity of the run, and the number, key of the scene or quantity that
-        it is to equal. With several keys there may be several targets, up to one a key.
+    scene : Scene, str, path or mapping
+        What `chutelab.load` takes.
+    vary : mapping, str or sequence of str
+        The keys and the ranges that are searched: ``{KEY: (FROM, TO)}``, or ``KEY=FROM:TO``.
+    target : mapping, str or sequence of str
+        ``{QUANTITY: VALUE}`` or ``QUANTITY=VALUE``: a quantity of the run, and the number, key of
+        the scene or quantity that it is to equal. With several keys there may be several targets,
+        up to one a key.
     points : int
         With one key: how many values are looked at first. Two solutions between neighbours are
         found only if the quantity bends visibly between them.
@@ -135,11 +137,13 @@ def solve(
 
     Examples
     --------
-    >>> from chutelab.scene import load
-    >>> found = solve(load("inclined-20"), "plate.angle_deg=0:60", "landing.vx=1.0")
+    >>> found = solve("inclined-20", {"plate.angle_deg": (0, 60)}, {"landing.vx": 1.0})
     >>> round(found.answer.values[0], 6)
     47.828951
     """
+    scene = load(scene)
+    if isinstance(target, Mapping):
+        target = [f"{name}={value}" for name, value in target.items()]
     texts = [target] if isinstance(target, str) else list(target)
     if not texts:
         raise InputError("name at least one, such as landing.vx=outgoing.speed", "--target")
@@ -159,8 +163,8 @@ def solve(
 
 
 def minimize(
-    scene: Scene,
-    vary: str | Sequence[str],
+    scene: AnyScene,
+    vary: Varied,
     quantity: str,
     *,
     points: int = POINTS,
@@ -172,13 +176,14 @@ def minimize(
     Parameters, result and errors are those of `solve`, with a quantity such as ``belt_work`` or
     ``landing.t`` for the target.
     """
+    scene = load(scene)
     wanted = [measured(scene, quantity, f"--minimize {quantity}")]
     return _Search("minimize", quantity, wanted, scene, vary, points, seed, progress).extremum()
 
 
 def maximize(
-    scene: Scene,
-    vary: str | Sequence[str],
+    scene: AnyScene,
+    vary: Varied,
     quantity: str,
     *,
     points: int = POINTS,
@@ -186,6 +191,7 @@ def maximize(
     progress: Progress | None = None,
 ) -> Solution:
     """Find the values of some keys for which a quantity is largest; see `minimize`."""
+    scene = load(scene)
     wanted = [measured(scene, quantity, f"--maximize {quantity}")]
     return _Search("maximize", quantity, wanted, scene, vary, points, seed, progress).extremum()
 
@@ -199,7 +205,7 @@ class _Search:
         what: str,
         quantities: Sequence[Quantity],
         scene: Scene,
-        vary: str | Sequence[str],
+        vary: Varied,
         points: int,
         seed: int,
         progress: Progress | None,
@@ -209,7 +215,7 @@ class _Search:
         if seed < 0:
             raise InputError("must be a whole number from 0", f"--seed {seed}")
         self.goal, self.what, self.points, self.seed = goal, what, points, seed
-        self.ranges = ranges(scene, [vary] if isinstance(vary, str) else list(vary))
+        self.ranges = ranges(scene, vary)
         scipy("optimize")
         keys = [one.key for one in self.ranges]
         runs = points + MORE if len(keys) == 1 else 800 * len(keys)

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.scene import Scene, SceneError
+from chutelab.scene import AnyScene, Scene, SceneError, load
 from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
 from chutelab.scene.units import read_size, with_unit
 from chutelab.scene.variants import Vary, quantity, reason
@@ -360,7 +360,7 @@ def _lines(found: Statistics) -> list[tuple[str, ...]]:
 
 
 def uncertainty(
-    scene: Scene,
+    scene: AnyScene,
     given: str | Sequence[str],
     quantities: Sequence[str] | None = None,
     *,
@@ -372,8 +372,8 @@ def uncertainty(
 
     Parameters
     ----------
-    scene : Scene
-        From `chutelab.load`.
+    scene : Scene, str, path or mapping
+        What `chutelab.load` takes.
     given : str or sequence of str
         ``KEY=MEAN±SPREAD``, or ``KEY=±SPREAD`` around the scene's own value. SPREAD is a standard
         deviation, or in per cent of the mean; with ``:uniform`` at the end a half-width.
@@ -396,14 +396,14 @@ def uncertainty(
 
     Examples
     --------
-    >>> from chutelab.scene import load
     >>> found = uncertainty(
-    ...     load("perpendicular"), ["restitution=0.5±0.05", "plate.distance=±1%"], ["landing.x"],
+    ...     "perpendicular", ["restitution=0.5±0.05", "plate.distance=±1%"], ["landing.x"],
     ...     samples=64,
     ... )
     >>> bool(found.indices[0].first[0] > found.indices[0].first[1])
     True
     """
+    scene = load(scene)
     inputs = spreads(scene, [given] if isinstance(given, str) else list(given))
     if quantities is None:
         quantities = QUANTITIES if scene.count == 1 else OF_A_STREAM

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.results import Recording
-from chutelab.scene import Fault, Scene, SceneError
+from chutelab.scene import AnyScene, Fault, Scene, SceneError, load
 from chutelab.studies.measured import result
 from chutelab.studies.measured.parameters import Parameter, changed, resolve
 from chutelab.studies.measured.result import Fit
@@ -150,12 +150,12 @@ TUNING = 2.0
 """Standard deviations from which on a robust fit begins to believe a point less."""
 
 
-def fit(scene: Scene, track: Track, keys: Sequence[str], *, robust: bool = False) -> Fit:
+def fit(scene: AnyScene, track: Track, keys: Sequence[str], *, robust: bool = False) -> Fit:
     """Fit parameters of a scene, or of how a track lies in it, to a measured track.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene, str, path or mapping
         Its values are where the fit starts, its validation gives the bounds.
     track : Track
         See `chutelab.studies.measured.read`.
@@ -176,6 +176,7 @@ def fit(scene: Scene, track: Track, keys: Sequence[str], *, robust: bool = False
         Without SciPy; says what to install.
     """
     _scipy("optimize")
+    scene = load(scene)
     parameters = resolve(scene, track, keys)
     if scene.crowded:
         text = "must be false for a fit, which follows one particle that meets no others"

@@ -9,7 +9,7 @@ import numpy as np
 
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
-from chutelab.scene import Fault, Scene, SceneError
+from chutelab.scene import AnyScene, Fault, Scene, SceneError, load
 from chutelab.scene.units import write_size
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.tables import Sheet, Shown
@@ -242,7 +242,7 @@ class Residuals(Shown):
         return Sheet(title, ("", "x", "y", "together"), tuple(rows), notes=tuple(notes))
 
 
-def residuals(scene: Scene, track: Track) -> Residuals:
+def residuals(scene: AnyScene, track: Track) -> Residuals:
     """Simulate a scene and lay a measured track over its particle 0.
 
     Raises
@@ -252,7 +252,7 @@ def residuals(scene: Scene, track: Track) -> Residuals:
     MeasuredError
         If fewer than three points lie within the simulated time.
     """
-    return over(run(scene), track)
+    return over(run(load(scene)), track)
 
 
 def over(recording: Recording, track: Track) -> Residuals:

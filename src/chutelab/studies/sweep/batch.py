@@ -99,7 +99,7 @@ def alone(block: Block, row: int) -> Columns:
 def row_of(scene: Scene, engine: str | None = None) -> Columns:
     """Simulate a scene and return its row; if it cannot be run, one that says why."""
     try:
-        recording = judged(scene, engine)
+        recording = judged(scene, engine=engine)
     except SceneError as error:
         return because(reason(error))
     except StalledError as error:

@@ -5,23 +5,23 @@ Values are grids, or samples of several ranges at once: Latin hypercube or Sobol
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from chutelab.engines.simulation import ENGINES
-from chutelab.scene import Scene
+from chutelab.scene import AnyScene, Scene, load
 from chutelab.scene.variants import (
     Quantity,
     Range,
+    Varied,
     Vary,
     count_of,
     is_plain,
-    parse,
-    parse_range,
     quantities,
+    varied,
 )
 from chutelab.studies.sweep.batch import Block
 from chutelab.util.arrays import Floats
@@ -110,8 +110,8 @@ class Plan:
 
 
 def planned(
-    scene: Scene,
-    varies: Sequence[Vary | str] | Mapping[str, Any],
+    scene: AnyScene,
+    varies: Varied,
     *,
     sample: int | None = None,
     design: str = "lhs",
@@ -129,31 +129,23 @@ def planned(
     """
     if engine is not None and engine not in ENGINES:
         raise ValueError(f"engine = {engine!r}: one of {', '.join(ENGINES)}")
-    kind, read = (Vary, parse) if sample is None else (Range, parse_range)
-    varied: tuple[Vary, ...]
-    if hasattr(varies, "items"):
-        # + 0.0: there is one zero.
-        columns = {
-            key: np.asarray(values, np.float64).ravel() + 0.0 for key, values in varies.items()
-        }
-        varied = tuple(kind(key, tuple(column.tolist())) for key, column in columns.items())
-    else:
-        varied = tuple(read(vary) if isinstance(vary, str) else vary for vary in varies)
-        for vary in varied:
-            if not isinstance(vary, kind):
-                raise InputError("samples are drawn from ranges, not from lists", vary.typed)
-    if not varied:
+    scene, kind = load(scene), Vary if sample is None else Range
+    varying = tuple(varied(varies, kind))
+    for vary in varying:
+        if not isinstance(vary, kind):
+            raise InputError("samples are drawn from ranges, not from lists", vary.typed)
+    if not varying:
         raise InputError("at least one key is to be varied, such as plate.angle_deg", "--vary")
-    if len(varied) > MOST_KEYS:
-        raise InputError(f"at most {MOST_KEYS} keys can be varied", varied[MOST_KEYS].typed)
-    about = quantities(scene, varied)
-    for vary, one in zip(varied, about, strict=True):
+    if len(varying) > MOST_KEYS:
+        raise InputError(f"at most {MOST_KEYS} keys can be varied", varying[MOST_KEYS].typed)
+    about = quantities(scene, varying)
+    for vary, one in zip(varying, about, strict=True):
         if one.whole and not all(value.is_integer() for value in vary.values):
             raise InputError(f"{one.path} takes whole numbers only", vary.typed)
     if sample is None:
-        count_of(varied, MOST_VARIANTS)
-        return Plan(scene, varied, about, engine, None)
-    return Plan(scene, varied, about, engine, _drawn(varied, about, sample, design, seed))
+        count_of(varying, MOST_VARIANTS)
+        return Plan(scene, varying, about, engine, None)
+    return Plan(scene, varying, about, engine, _drawn(varying, about, sample, design, seed))
 
 
 def _drawn(

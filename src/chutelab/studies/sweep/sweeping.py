@@ -11,7 +11,7 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -29,8 +29,8 @@ from threading import Thread
 from types import ModuleType
 from typing import Any, Final
 
-from chutelab.scene import Scene
-from chutelab.scene.variants import Vary
+from chutelab.scene import AnyScene
+from chutelab.scene.variants import Varied
 from chutelab.studies.sweep.batch import swept
 from chutelab.studies.sweep.part import unfinished
 from chutelab.studies.sweep.plan import Plan, planned
@@ -279,8 +279,8 @@ AHEAD: Final = 64
 
 
 def sweep(
-    scene: Scene,
-    varies: Sequence[Vary | str] | Mapping[str, Any],
+    scene: AnyScene,
+    varies: Varied,
     *,
     sample: int | None = None,
     design: str = "lhs",
@@ -297,10 +297,10 @@ def sweep(
 
     Parameters
     ----------
-    scene : Scene
-        From `chutelab.load`.
-    varies : sequence of Vary or str, or mapping
-        ``KEY=FROM:TO:COUNT`` or ``KEY=a,b,c`` each, or values by key; a grid of all combinations,
+    scene : Scene, str, path or mapping
+        What `chutelab.load` takes.
+    varies : mapping, or sequence of Vary or str
+        Values by key, or ``KEY=FROM:TO:COUNT`` or ``KEY=a,b,c`` each; a grid of all combinations,
         whose last key runs fastest. With `sample`, ``KEY=FROM:TO``, or two ends by key.
     sample : int, optional
         Draw so many samples from the ranges instead; needs SciPy.
@@ -327,8 +327,7 @@ def sweep(
 
     Examples
     --------
-    >>> import chutelab
-    >>> swept = sweep(chutelab.load("perpendicular"), ["plate.restitution=0:1:3"])
+    >>> swept = sweep("perpendicular", {"plate.restitution": [0.0, 0.5, 1.0]})
     >>> swept.columns["landing.vx.mean"]
     array([ 0., -1., -2.])
     """

@@ -104,7 +104,7 @@ def test_a_broken_law_a_broken_demand_and_another_twin_are_found(monkeypatch):
 def test_engine_step_and_alignment_are_those_that_are_asked_for(monkeypatch):
     asked = []
 
-    def note(loaded, engine, progress):
+    def note(loaded, *, engine, progress):
         asked.append((engine, loaded.run.engine, loaded.run.dt, loaded.run.align))
         return simulate(loaded, engine="exact")
 
@@ -134,7 +134,7 @@ def test_a_scene_that_must_be_refused_and_one_that_must_not():
 
 @pytest.mark.parametrize("calls", [True, False])
 def test_the_watchdog_ends_what_never_would(monkeypatch, calls):
-    def hangs(_loaded, _engine, progress):
+    def hangs(_loaded, *, engine, progress):
         while True:
             time.sleep(0.005)
             if calls:

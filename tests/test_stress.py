@@ -47,7 +47,7 @@ def test_each_law_is_a_line_with_figure_and_bound():
     assert shown.startswith("Perpendicular damping plate, 2 m/s\nengine exact\n")
     rows = re.findall(r"^ok  ([a-z ]*[a-z]) +(\d\S*) +(\d\S*)  (.+)$", shown, re.M)
     assert [name for name, *_ in rows] == [
-        "finite numbers", "time goes forward", "nobody lost", "lasts to the end",
+        "finite numbers", "time goes forward", "none lost", "lasts to the end",
         "no one through", "no one inside", "bounces off something", "released into room",
         "friction of the pair", "rebound of the pair", "energy never rises", "ledger closes",
     ]  # fmt: skip

@@ -84,7 +84,7 @@ def test_two_of_the_halvings_are_left_to_chance():
 def test_a_run_is_judged_by_every_law_that_applies():
     found = runs.findings(Case("hop", "test", HOP, ends=("time",)), "exact", None)
     assert [one.law for one in found] == [
-        "finite numbers", "time goes forward", "nobody lost", "lasts to the end",
+        "finite numbers", "time goes forward", "none lost", "lasts to the end",
         "no one through", "no one inside", "bounces off something", "released into room",
         "friction of the pair", "rebound of the pair", "energy never rises", "ledger closes",
         "ends as it must",

@@ -34,7 +34,7 @@ ANSWERS: Final = {
     "pymunk": ("Chipmunk's solver, stepped", "the machine's arrays"),
     "dop853": ("SciPy's ODE solver, events", "the machine's arrays"),
 }
-"""Who answers: how, and what it has in common with other answers. import-linter holds this."""
+"""The answers: how each is found, and what it shares with others. import-linter holds this."""
 
 BLOWS: Final = {"exact": 1e-12, "dop853": 1e-12, "contact": 1e-10, "pymunk": 1e-9}
 """Relative error allowed where all contacts are blows, for inputs whose change comes out no larger
@@ -209,7 +209,7 @@ class Finding:
     Attributes
     ----------
     quantity, unit, source : str
-        What was looked at, in what unit, and who says what it should be.
+        What was looked at, in what unit, and the source of the expected value.
     engine : str
         ``exact``, ``contact``, ``pymunk`` or ``theory``.
     expected, simulated : float

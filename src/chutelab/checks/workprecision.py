@@ -55,7 +55,7 @@ as with `timeit`. A single run of a millisecond would measure what others left i
 
 @dataclass(frozen=True)
 class Timing:
-    """One engine on the scene with one step; None is what it has not."""
+    """One engine on the scene with one step; None where it does not apply."""
 
     method: str  # one of `METHODS`
     parameter: str = ""  # "dt", or "" for the exact engine
@@ -170,7 +170,7 @@ def measure(
 def _judged(
     scene: Scene, method: str, step: float | None, search: Search, bounded: Progress
 ) -> tuple[Timing, Stopwatch | None]:
-    """Run once and tell the error, before any repeat: who fails is not worth the time."""
+    """Run once and tell the error before any repeat: a method that fails is not timed."""
     blank = Timing(method, "" if step is None else "dt", step)
     engine = "pymunk" if method == "fixed" else method
     if step is not None:

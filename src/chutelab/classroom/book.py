@@ -195,7 +195,7 @@ class Book:
         page = self._lesson.page
         if page is None:
             raise InputError(f"lesson {self._lesson.name} has no page: [page] is not in its plan")
-        # Who has come as far as this has predicted.
+        # By now the student has predicted.
         shown = [*page.settings, Override("live.predict", False)]
         return live(scene_of(self._lesson, page.scene, shown))
 

@@ -98,19 +98,19 @@ def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
             reason=printable(row.reason),
             words={printable(key): printable_lines(text) for key, text in row.words.items()},
         )
-        who = (row.lesson, plain(row.student))
-        if row.lesson and who in first:
-            same = printable(f"same lesson and student as {first[who]}")
+        entry = (row.lesson, plain(row.student))
+        if row.lesson and entry in first:
+            same = printable(f"same lesson and student as {first[entry]}")
             row = replace(row, reason="; ".join(filter(None, [row.reason, same])))
         elif row.lesson:
             row = replace(row, reason="; ".join(filter(None, [row.reason, *_copied(row, rows)])))
             rows.append(row)
-        first.setdefault(who, file)
+        first.setdefault(entry, file)
         yield row
 
 
 def _copied(row: Grade, before: Iterable[Grade]) -> Iterator[str]:
-    """Say which wrong answers are right for the numbers of somebody before, or the other way."""
+    """Say which wrong answers are right for another student's numbers, or the other way round."""
     for other in before:
         if other.lesson == row.lesson:
             if found := _right_for(row, other):
@@ -136,7 +136,7 @@ def write_csv(grades: Iterable[Grade], path: str | Path) -> Path:
     Raises
     ------
     FileExistsError
-        If ``NAME.part`` is there: somebody's marks, or a grading that still runs.
+        If ``NAME.part`` is there: earlier marks, or a grading that still runs.
     """
     path = Path(path)
     part = path.with_name(f"{path.name}.part")
@@ -235,7 +235,7 @@ def _works(reports: object) -> list[_Work]:
     Raises
     ------
     ForgedError
-        If that is no report of a chutelab: anybody's code ran there.
+        If that is no report of a chutelab: unknown code ran there.
     """
     if not isinstance(reports, list) or len(reports) > (OPENED.maxlen or 0):
         raise ForgedError("its report is not a list of tasks, or too long a one")

@@ -1,14 +1,14 @@
 """Cells of a notebook, run in a process of their own: watched, limited, ended with all it started.
 
-Three processes: whoever calls `run`; the watcher, `_watch`; and the kernel, `_work`, which runs the
+Three processes: the caller of `run`; the watcher, `_watch`; and the kernel, `_work`, which runs the
 cells in a session and a folder of its own. The watcher ends the kernel and its descendants when the
 kernel is through, takes too much, or `run` is gone. A cell that signals its parent hits the
 watcher, which takes no signals. What the cells print goes nowhere. The kernel tells what was
 checked through a pipe, a JSON object a line; students' code can write there too, so nothing of it
 is believed unchecked.
 
-This keeps accidents and clumsy tricks from the computer, not somebody who means harm: the cells run
-with all rights of whoever calls.
+This keeps accidents and clumsy tricks from the computer, not from attackers: the cells run with
+all rights of the caller.
 """
 
 from __future__ import annotations
@@ -296,7 +296,7 @@ def _watch() -> None:
             [sys.executable, "-m", NAME, "work"],
             cwd=folder,
             stdin=subprocess.PIPE,
-            # Start-up files and history of whoever grades are left out.
+            # The caller's start-up files and history are left out.
             env={**os.environ, "IPYTHONDIR": folder},
             start_new_session=True,
         )
@@ -313,7 +313,7 @@ def _watch() -> None:
                 code = TOO_MUCH
                 break
         if _POSIX:
-            # All of them at once, or whoever forks faster than this kills would stay ahead.
+            # All of them at once, or a process that forks faster than this kills would stay ahead.
             with suppress(ProcessLookupError):
                 os.killpg(kernel.pid, signal.SIGKILL)
         until = monotonic() + PATIENCE / 2
@@ -416,7 +416,7 @@ def _work() -> None:
 
     config = Config()
     config.HistoryManager.enabled = False
-    # Tracebacks take time, and nobody reads them.
+    # Tracebacks take time and are not read.
     config.InteractiveShell.xmode = "Minimal"
     shell = Shell.instance(config=config)
     turn = Lock()

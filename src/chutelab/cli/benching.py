@@ -136,8 +136,8 @@ def _table(title: str, timings: Sequence[Timing], measured: str) -> Sheet:
         if one.failed
     ]
     for how in dict.fromkeys(one.how for one in timings if one.how):
-        who = dict.fromkeys(one.method for one in timings if one.how == how)
-        notes.append(f"error of {', '.join(who)}: {how}")
+        methods = dict.fromkeys(one.method for one in timings if one.how == how)
+        notes.append(f"error of {', '.join(methods)}: {how}")
     return Sheet(title, heads, tuple(rows), tail=1, notes=(*notes, measured))
 
 

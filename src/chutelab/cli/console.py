@@ -145,7 +145,7 @@ PATIENCE = 1.0
 def progress(
     what: str, *, quiet: bool = False, left: bool = False
 ) -> Iterator[Callable[[float], None] | None]:
-    """Give a callable that takes the share of the task that is done; None if nobody looks.
+    """Give a callable that takes the share of the task that is done; None if nothing is shown.
 
     With `left`, the bar also tells how long it may still take.
     """
@@ -173,7 +173,7 @@ def progress(
             console=Console(stderr=True),
             transient=True,
         )
-        # Without a total it pulses: nobody has said yet how far it is.
+        # Without a total it pulses.
         bar.add_task(printable(what), total=None)
         bar.start()
         bars.append(bar)

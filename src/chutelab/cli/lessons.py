@@ -250,7 +250,7 @@ def new(name: Path, model: str | None) -> None:
     """Start a lesson of your own: a folder NAME with lesson.toml, worksheet, explanation and scene.
 
     It can be shown and built at once; change it from there. With --from it is a copy of a shipped
-    lesson, for whoever wants to adapt one, or to work through it. Nothing is ever overwritten.
+    lesson, to adapt one, or to work through it. Nothing is ever overwritten.
 
     \b
     chutelab lesson new my-lesson
@@ -433,9 +433,9 @@ def grade(
     that is for accidents. Grade the notebooks of strangers in a container. Nothing of a result file
     is run.
 
-    Marks say which numbers were handed in, not how they were found: whoever looks for the right
-    ones finds them, by trying until the replies say so, with chutelab's own theory, or in the
-    exercises' source. Working that was shown is in the column "revealed", and has a * in the table;
+    Marks say which numbers were handed in, not how they were found: the right ones can be
+    found by trying until the replies say so, with chutelab's own theory, or in the exercises'
+    source. Working that was shown is in the column "revealed", and has a * in the table;
     a result file can be written so that it does not tell.
 
     Ctrl-C, or a crash, keeps the marks so far, in FILE.part.

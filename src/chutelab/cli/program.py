@@ -76,7 +76,7 @@ def _noted(
 
 
 EXPECTED = (click.ClickException, InputError, MissingLibraryError)
-"""What somebody gave: told the same with ``--debug``."""
+"""Invalid input: told the same with ``--debug``."""
 
 
 def _told(error: BaseException) -> int:

@@ -130,25 +130,25 @@ def _along_belt(circle: Circle, distance: Floats, length: Floats) -> tuple[Float
 def _round_pulley(circle: Circle) -> tuple[Floats, Floats]:
     """Return angle from the top and speed where particles lift off the pulley, NaN if never."""
     phi, w = np.full((2, len(circle.phi)), nan)
-    who = np.flatnonzero(np.isfinite(circle.w))
-    circle = _some(circle, who)
+    index = np.flatnonzero(np.isfinite(circle.w))
+    circle = _some(circle, index)
     for _ in range(STEPS):
         lifts = normal_force(circle) <= 0.0
-        phi[who[lifts]], w[who[lifts]] = circle.phi[lifts], circle.w[lifts]
+        phi[index[lifts]], w[index[lifts]] = circle.phi[lifts], circle.w[lifts]
         if lifts.any():
-            who, circle = who[~lifts], _some(circle, ~lifts)
-        if not len(who):
+            index, circle = index[~lifts], _some(circle, ~lifts)
+        if not len(index):
             break
-        step = advance(circle, np.full(len(who), inf))
+        step = advance(circle, np.full(len(index), inf))
         gone = step.outcome == Outcome.LIFT
-        phi[who[gone]], w[who[gone]] = step.phi[gone], step.w[gone]
+        phi[index[gone]], w[index[gone]] = step.phi[gone], step.w[gone]
         goes_on = ~gone & np.isfinite(step.dt) & (step.outcome != Outcome.LOW)
         circle = replace(circle, phi=step.phi, w=step.w, z=step.z)
         onset = np.sign(np.sin(circle.phi))
         slip = np.where(step.outcome == Outcome.GRIP, grip_slip(circle), circle.slip)
         circle = replace(circle, slip=np.where(step.outcome == Outcome.ONSET, onset, slip))
         if not goes_on.all():
-            who, circle = who[goes_on], _some(circle, goes_on)
+            index, circle = index[goes_on], _some(circle, goes_on)
     return phi, w
 
 

@@ -348,7 +348,7 @@ class Pulley:
     """The drive pulley, axis at the origin, turning clockwise (its top moves forward).
 
     The incoming belt is segment 0 of the machine and ends on it, where it is tangential: `incline`
-    before its top. It is none of the arcs.
+    before its top. It is not listed in `arcs`.
 
     Attributes
     ----------
@@ -483,7 +483,7 @@ class Machine:
 
 
 REMOTE = 8.0
-"""Sizes of a machine that it must be away from the world's origin to be given one of its own."""
+"""Distance from the world's origin, in machine sizes, beyond which a local origin is used."""
 
 
 def origin(machine: Machine) -> tuple[float, float]:

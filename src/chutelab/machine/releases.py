@@ -128,7 +128,7 @@ class Squeeze:
 def squeeze(
     scene: Scene, t: Floats, position: Floats, radius: Numbers | None = None
 ) -> Squeeze | None:
-    """Return who rides into others; None if nobody does.
+    """Return which particles ride into others; None if none does.
 
     A ride that something ends early counts as if it went on. Two that would be in each other on the
     belt already do not count: one of them waits.
@@ -423,12 +423,12 @@ def _spread_apart(
 ) -> None:
     """Redraw heights, in place, so that no particle starts inside one released before it.
 
-    One that finds no free place in the bed keeps what was drawn last, and waits when it is due.
+    If no height is free, the last draw is kept, and the release is delayed.
 
     Earlier particles are taken to have moved on at their release velocity, and to have fallen by
     ``fall`` (m/s²) times their age squared, but not below ``lowest`` (m above the lowest layer).
     """
-    # Who may still be in the way: whoever has moved on by a diameter, or has fallen below the bed
+    # What may still be in the way: what has moved on by a diameter, or has fallen below the bed
     # by one, stays away for good.
     close = np.zeros(0, dtype=np.int64)
     diameter = 2.0 * radius.max()

@@ -4,7 +4,7 @@
 - `recorder`: what engines write a run into.
 - `ledger`: where the energy went, in total and by surface.
 - `quantities`: the one reader of a run's numbers, by name and by particle.
-- `arrival`: who has come to a surface, or to what lies on it.
+- `arrival`: which particles have come to a surface, or to what lies on it.
 - `stream`: a stream as a whole: the envelope of its paths.
 - `comparison`: `compare`, particle 0 against the theory.
 - `report`: what a run leaves to read, as tables.

@@ -28,7 +28,7 @@ POINT = 1e-9
 """Distance up to which a mass point touches a surface, as a share of the size of the machine."""
 
 LOOKS = 100
-"""Instants at which it is looked who lies on a surface without a blow that was recorded."""
+"""Instants at which particles on a surface are looked for, beside recorded blows."""
 
 HALVINGS = 24
 """Of the time between two such instants, until the one is known at which a contact began."""
@@ -68,15 +68,17 @@ def fates(recording: Recording) -> NDArray[Any]:
     """
     machine, count = recording.machine, recording.count
     said = np.full(count, "unreleased", dtype=object)
-    who = np.flatnonzero(recording.released)
-    if not len(who):
+    particles = np.flatnonzero(recording.released)
+    if not len(particles):
         return said
     last = recording.ends()[1]
-    left, right, bottom, top = (np.broadcast_to(side, count)[who] for side in machine.exit_box)
-    (x, y), out = last["position"].T, recording.ended[who] == REASONS.index("exit")
+    left, right, bottom, top = (
+        np.broadcast_to(side, count)[particles] for side in machine.exit_box
+    )
+    (x, y), out = last["position"].T, recording.ended[particles] == REASONS.index("exit")
     gone = out | (x < left) | (x > right) | (y < bottom) | (y > top)
-    said[who[gone]] = _ways_out(recording, who[gone], last["position"][gone])
-    stays, places = who[~gone], last["position"][~gone]
+    said[particles[gone]] = _ways_out(recording, particles[gone], last["position"][gone])
+    stays, places = particles[~gone], last["position"][~gone]
     there, names = Places(recording), recording.surfaces[:-1]
     belts = [name for name in names if name in moving(machine)]
     order = [*belts, *(name for name in names if name not in belts)]
@@ -166,7 +168,7 @@ def _arrivals(recording: Recording, surface: str) -> NDArray[Any]:
         return found
     there = Places(recording)
     met = np.concatenate([direct, recording.select(Kind.COLLISION)])
-    # Nobody comes before the first that touches the surface itself, which is told however soft.
+    # None arrives before the first that touches the surface itself, which is told however soft.
     begin = float(direct["t"].min(initial=np.inf))
     met = met[met["t"] >= begin]
     met = met[np.argsort(met["t"], kind="stable")]
@@ -191,15 +193,15 @@ def _arrivals(recording: Recording, surface: str) -> NDArray[Any]:
             elif come[i] != come[j]:
                 new, old = (j, i) if come[i] else (i, j)
                 # Whatever lies there has come before.
-                who, places = there.at(t, np.flatnonzero(come))
-                if there.carries(old, t, who, places, surface):
+                particles, places = there.at(t, np.flatnonzero(come))
+                if there.carries(old, t, particles, places, surface):
                     found[new] = met[row] if new == i else there.state(new, t, old)
                     come[new] = True
         last = now
         # What came to lie there so softly that no blow was recorded.
-        who, places = there.at(look)
-        lies = there.lying(look, who, places, surface)
-        for i in who[lies & np.isnan(found["t"][who])].tolist():
+        particles, places = there.at(look)
+        lies = there.lying(look, particles, places, surface)
+        for i in particles[lies & np.isnan(found["t"][particles])].tolist():
             found[i], come[i] = there.began(i, surface, before, look), True
     return found
 
@@ -220,35 +222,35 @@ class Places:
         self._span = 2.0 * (float(knots["t"].max(initial=0.0)) - self._t0) + 1.0
         self._keys = recording.owner * self._span + (knots["t"] - self._t0)
 
-    def _cells(self, who: Ints, t: Any, side: Any = "right") -> tuple[Ints, Floats]:
+    def _cells(self, particles: Ints, t: Any, side: Any = "right") -> tuple[Ints, Floats]:
         """Return the interval of each track that holds t, and the share of it that has passed."""
         knots, offsets = self.recording.knots, self.recording.offsets
-        left = np.searchsorted(self._keys, who * self._span + (t - self._t0), side=side) - 1
-        left = np.clip(left, offsets[who], offsets[who + 1] - 2)
+        left = np.searchsorted(self._keys, particles * self._span + (t - self._t0), side=side) - 1
+        left = np.clip(left, offsets[particles], offsets[particles + 1] - 2)
         h = knots["t"][left + 1] - knots["t"][left]
         share = np.divide(t - knots["t"][left], h, out=np.ones_like(h), where=h > 0.0)
         return left, np.clip(share, 0.0, 1.0)
 
-    def at(self, t: float, who: Ints | None = None) -> tuple[Ints, Floats]:
-        """Return who is under way at t, of some or all, and where, (n,) and (n, 2), m."""
+    def at(self, t: float, particles: Ints | None = None) -> tuple[Ints, Floats]:
+        """Return particles under way at t, of some or all, and places, (n,) and (n, 2), m."""
         knots, offsets = self.recording.knots, self.recording.offsets
-        who = np.flatnonzero(self.recording.released) if who is None else who
-        first, last = knots["t"][offsets[who]], knots["t"][offsets[who + 1] - 1]
-        who = who[(first <= t) & (t <= last)]
-        return who, self.on(who, t)
+        particles = np.flatnonzero(self.recording.released) if particles is None else particles
+        first, last = knots["t"][offsets[particles]], knots["t"][offsets[particles + 1] - 1]
+        particles = particles[(first <= t) & (t <= last)]
+        return particles, self.on(particles, t)
 
-    def on(self, who: Ints, t: Any) -> Floats:
+    def on(self, particles: Ints, t: Any) -> Floats:
         """Return where particles (n,) are at t, s, one or (n,), while under way, (n, 2), m."""
-        left, share = self._cells(who, t)
+        left, share = self._cells(particles, t)
         sides = (hermite(self.recording.knots, left, share, axis)[0] for axis in (0, 1))
         return np.stack([*sides], axis=-1)
 
-    def belt_work(self, who: Ints, t: Any) -> Floats:
+    def belt_work(self, particles: Ints, t: Any) -> Floats:
         """Return the belt work booked of particles (n,) up to t, s, one or (n,), (n,), J."""
         knots, offsets = self.recording.knots["entries"][:, 0], self.recording.offsets
-        left, share = self._cells(who, t, "left")
+        left, share = self._cells(particles, t, "left")
         booked = knots[left] + share * (knots[left + 1] - knots[left])
-        return np.where(t < self.recording.knots["t"][offsets[who]], 0.0, booked)
+        return np.where(t < self.recording.knots["t"][offsets[particles]], 0.0, booked)
 
     def state(self, particle: int, t: float, other: int = -1) -> NDArray[Any]:
         """Return time, place and velocity of a particle just before t, as an event."""
@@ -263,10 +265,10 @@ class Places:
         found: NDArray[Any] = event[0]
         return found
 
-    def bare(self, who: Ints, places: Floats, surface: str, t: Any) -> Bools:
+    def bare(self, particles: Ints, places: Floats, surface: str, t: Any) -> Bools:
         """Tell which particles touch a surface itself at t (s, one or (n,)), (n,)."""
         machine, owner = self.recording.machine, self.recording.surface_index(surface)
-        gap = np.full(len(who), np.inf)
+        gap = np.full(len(particles), np.inf)
         flat, bent, wheel = machine.segments, machine.arcs, machine.pulley
         for k in np.flatnonzero(flat.surface == owner).tolist():
             away = places - flat.start[k]
@@ -278,12 +280,12 @@ class Places:
             gap = np.where(_is_there(bent, k, t), np.minimum(gap, far), gap)
         if wheel is not None and wheel.surface == owner:
             gap = np.minimum(gap, np.abs(np.hypot(*places.T) - wheel.radius))
-        radius = self.radius[who]
+        radius = self.radius[particles]
         return np.asarray(gap <= np.where(radius > 0.0, radius * (1.0 + TOUCH), self._point))
 
-    def touching(self, who: Ints, places: Floats) -> tuple[Ints, Ints]:
-        """Return all pairs that touch, by their rows in `who`, (p,) each."""
-        radius, order = self.radius[who], np.argsort(places[:, 0], kind="stable")
+    def touching(self, particles: Ints, places: Floats) -> tuple[Ints, Ints]:
+        """Return all pairs that touch, by their rows in `particles`, (p,) each."""
+        radius, order = self.radius[particles], np.argsort(places[:, 0], kind="stable")
         x, reach = places[order, 0], 2.0 * radius.max(initial=0.0) * (1.0 + TOUCH)
         firsts, seconds = [], []
         for step in range(1, len(order)):
@@ -300,10 +302,10 @@ class Places:
         none = np.zeros(0, dtype=np.int64)
         return np.concatenate([none, *firsts]), np.concatenate([none, *seconds])
 
-    def lying(self, t: float, who: Ints, places: Floats, surface: str) -> Bools:
+    def lying(self, t: float, particles: Ints, places: Floats, surface: str) -> Bools:
         """Tell which particles lie on a surface at t (s), or on what lies on it, (n,)."""
-        lies = self.bare(who, places, surface, t)
-        one, two = self.touching(who, places)
+        lies = self.bare(particles, places, surface, t)
+        one, two = self.touching(particles, places)
         many = -1
         while (now := int(np.count_nonzero(lies))) > many:
             many = now
@@ -312,15 +314,17 @@ class Places:
             lies[two[lies[one]]] = True
         return lies
 
-    def carries(self, particle: int, t: float, who: Ints, places: Floats, surface: str) -> bool:
-        """Tell whether one of `who` lies on a surface at t (s), or on what lies on it."""
-        radius = self.radius[who]
-        todo = np.flatnonzero(who == particle).tolist()
-        seen = np.zeros(len(who), dtype=bool)
+    def carries(
+        self, particle: int, t: float, particles: Ints, places: Floats, surface: str
+    ) -> bool:
+        """Tell whether one of `particles` lies on a surface at t (s), or on what lies on it."""
+        radius = self.radius[particles]
+        todo = np.flatnonzero(particles == particle).tolist()
+        seen = np.zeros(len(particles), dtype=bool)
         seen[todo] = True
         while todo:
             k = todo.pop()
-            if self.bare(who[k : k + 1], places[k : k + 1], surface, t)[0]:
+            if self.bare(particles[k : k + 1], places[k : k + 1], surface, t)[0]:
                 return True
             room = radius + radius[k] + TOUCH * np.minimum(radius, radius[k])
             next_to = (np.hypot(*(places - places[k]).T) <= room) & ~seen
@@ -337,7 +341,9 @@ class Places:
         """
         for _ in range(HALVINGS):
             middle = 0.5 * (before + after)
-            who, places = self.at(middle)
-            lies = particle in who and self.carries(particle, middle, who, places, surface)
+            particles, places = self.at(middle)
+            lies = particle in particles and self.carries(
+                particle, middle, particles, places, surface
+            )
             before, after = (before, middle) if lies else (middle, after)
         return self.state(particle, after)

@@ -105,9 +105,9 @@ class Ledger(Shown):
 def ledger(recording: Recording) -> Ledger:
     """Close the books of a recording."""
     first, last = recording.ends()
-    who = np.flatnonzero(recording.released)
-    energies = np.stack([*recording.energies(first, who), *recording.energies(last, who)])
-    streams, stream = recording.machine.streams, recording.machine.releases.stream[who]
+    index = np.flatnonzero(recording.released)
+    energies = np.stack([*recording.energies(first, index), *recording.energies(last, index)])
+    streams, stream = recording.machine.streams, recording.machine.releases.stream[index]
     return Ledger(
         **_closed(energies, last["entries"]),
         by_surface={

@@ -3,7 +3,7 @@
 `first` gives the first separation, impact or landing of each particle, `each` a quantity of each
 particle by its name, such as ``landing.x``, `measure` one of the run, such as ``landing.x.mean``,
 and `observed` those of particle 0 under the paper's symbols. Then there is what happened to a crowd
-as a whole: who waited for a place, who rode into others, and who rolls where it should be carried.
+as a whole: which particles waited for a place, rode into others, or roll instead of being carried.
 """
 
 from __future__ import annotations
@@ -267,10 +267,10 @@ class Stopped:
     t: float
 
     def __str__(self) -> str:
-        who = "1 particle" if self.particles == 1 else f"{self.particles:,} particles"
+        some = "1 particle" if self.particles == 1 else f"{self.particles:,} particles"
         after = f" and {self.unreleased:,} not yet released" if self.unreleased else ""
         return (
-            f"STOPPED before it was over, with {who} under way{after}: all of it is recorded up to"
+            f"STOPPED before it was over, with {some} under way{after}: all of it is recorded up to"
             f" t = {number(self.t)} s, and sums are of what is recorded"
         )
 
@@ -307,9 +307,9 @@ class Waits:
     def __str__(self) -> str:
         said = []
         if self.particles:
-            who = "1 particle" if self.particles == 1 else f"{self.particles} particles"
+            some = "1 particle" if self.particles == 1 else f"{self.particles} particles"
             said.append(
-                f"{who} waited for a free place to be released, {number(self.longest)} s at most"
+                f"{some} waited for a free place to be released, {number(self.longest)} s at most"
                 f" and {number(self.mean)} s on average"
             )
         if self.never:
@@ -318,7 +318,7 @@ class Waits:
 
 
 def waits(recording: Recording) -> Waits | None:
-    """Return who waited for its place; None if nobody did."""
+    """Return which particles waited for a place; None if none did."""
     due, dt = recording.machine.releases.t, recording.machine.dt
     # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
     least = (1.0 + 1e-6) * dt if recording.engine == "pymunk" else 1e-9
@@ -353,7 +353,7 @@ class Plug:
 
 
 def plugged(recording: Recording) -> Plug | None:
-    """Return who got stuck; None if nobody did, or nowhere was to be gone to.
+    """Return which particles got stuck; None if none did, or there was nowhere to go.
 
     Told of particles that meet, where some got through or an outgoing belt waits for them, of a
     run that was not stopped. Still is what moves with less than `STILL`, and what has settled: its
@@ -383,18 +383,18 @@ def air_drag(recording: Recording) -> Drag | None:
     speed = float(speeds[fastest])
     # Not every knot has the speed just before an impact; events do.
     met = np.hypot(*recording.events["velocity_before"].T)
-    who = int(np.searchsorted(recording.offsets, fastest, side="right")) - 1
+    particle = int(np.searchsorted(recording.offsets, fastest, side="right")) - 1
     if len(met) and met.max() > speed:
-        speed, who = float(met.max()), int(recording.events["particle"][np.argmax(met)])
+        speed, particle = float(met.max()), int(recording.events["particle"][np.argmax(met)])
     radius, mass = (
-        float(np.broadcast_to(part, recording.count)[who])
+        float(np.broadcast_to(part, recording.count)[particle])
         for part in (recording.particle.radius, recording.particle.mass)
     )
     return drag(recording.scene, recording.prediction, speed, radius, mass)
 
 
 def squeezed(recording: Recording) -> Squeeze | None:
-    """Return who rode into others by adhesion, see `machine.releases.squeeze`; None if nobody."""
+    """Return what rode into others by adhesion, see `machine.releases.squeeze`; or None."""
     released = recording.select(Kind.RELEASE)
     released = released[recording.machine.releases.carried[released["particle"]]]
     radius = np.broadcast_to(recording.particle.radius, recording.count)[released["particle"]]

@@ -426,13 +426,13 @@ class Recording(Shown):
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         firsts, lasts = self.ends()
         at_release = np.zeros(self.count)
-        who = np.flatnonzero(self.released)
-        at_release[who] = sum(self.energies(firsts, who))
+        particles = np.flatnonzero(self.released)
+        at_release[particles] = sum(self.energies(firsts, particles))
 
         final = np.empty((6, len(lasts)))
-        final[:2] = self.energies(lasts, who)
+        final[:2] = self.energies(lasts, particles)
         final[2:5] = lasts["entries"].T
-        final[5] = final[:2].sum(axis=0) - at_release[who] - balance(lasts["entries"])
+        final[5] = final[:2].sum(axis=0) - at_release[particles] - balance(lasts["entries"])
         order = np.argsort(lasts["t"], kind="stable")
         sums = np.concatenate([np.zeros((6, 1)), final[:, order].cumsum(axis=1)], axis=1)
         out = sums[:, np.searchsorted(lasts["t"][order], times, side="left")]

@@ -51,7 +51,7 @@ MOST_UNPACKED = 150
 come to 60, and a file that is made to fill the memory to 1000."""
 
 ENGINES = ("exact", "contact", "pymunk")
-"""Who can have made a recording."""
+"""Engines that can have made a recording."""
 
 FAR = 1e100
 """Bound on every number: energies and distances computed from it stay finite."""

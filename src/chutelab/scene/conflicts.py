@@ -227,7 +227,7 @@ def _names(look: Look) -> Iterator[Fault]:
             )
     tables = [table for table in ("incoming", "plate", "outgoing") if look.has(table)]
     anything = [n for n in (*kinds, *surfaces, *tables) if isinstance(n, str)]
-    # Of names that are themselves at fault nobody can tell which one was meant.
+    # Skip checks of references if names are invalid.
     if not all(map(look.sound, ("particle", *SURFACES))):
         return
     for row, pair in enumerate(look.several("pair")):

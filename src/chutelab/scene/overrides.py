@@ -59,14 +59,14 @@ _schema = cache(schema)
 NAMED: Final = ("particle", "material", "plate", "conveyor", "surface", "stream")
 """Tables of which there may be several, with names."""
 
-NOBODY: Final[Mapping[str, Sequence[object]]] = {}
+NO_NAMES: Final[Mapping[str, Sequence[object]]] = {}
 
 _SEGMENT: Final = re.compile(rf"({WORDS})((?:\[\d{{1,9}}\])*)")
 _FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
 _BARE_KEY: Final = re.compile(r"[\w-]+")
 
 
-def parts_of(path: str, names: Mapping[str, Sequence[object]] = NOBODY) -> list[str | int]:
+def parts_of(path: str, names: Mapping[str, Sequence[object]] = NO_NAMES) -> list[str | int]:
     """Return the keys and indices of a full path, such as ``stream.at[0]``.
 
     A table of which there are several goes by index or, if it is one of the names given, by name.

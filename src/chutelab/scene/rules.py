@@ -152,7 +152,7 @@ Words = Annotated[Text, Field(max_length=40)]
 
 
 class Expect(Table):
-    """A number that a run of the scene should show, how exactly, and who says so."""
+    """A number that a run of the scene should show, how exactly, and the source."""
 
     quantity: Text = described(
         ...,

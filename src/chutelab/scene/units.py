@@ -195,7 +195,7 @@ MOST_PIECES: Final = 10_000
 MOST_KINDS: Final = 100
 """Of particles, and of streams."""
 MOST_KEYS: Final = 200
-"""That a page lists: more than anybody looks through."""
+"""Most that a page lists."""
 MOST_PRESETS: Final = 20
 MOST_POINTS: Final = 10_000
 MOST_EXPECTATIONS: Final = 1_000

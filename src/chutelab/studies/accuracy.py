@@ -249,7 +249,7 @@ WITNESSES = {
     "contact": ("exact", "dop853", "pymunk"),
     "pymunk": ("exact", "dop853", "contact"),
 }
-"""Whom an engine's run is held against, the most exact first; who cannot run it is passed over."""
+"""What a run is compared with, the most exact first; engines that cannot run it are skipped."""
 
 STEPPED = ("contact", "pymunk")
 """Engines whose error depends on run.dt."""
@@ -423,7 +423,7 @@ class Search:
         """Run a scene once more."""
 
         def share(share: float) -> None:
-            # Half of what is left goes to each run: nobody knows how many there will be.
+            # Half of what is left goes to each run: how many there will be is not known.
             if self.progress is not None:
                 self.progress(1.0 - 0.5**self.runs * (1.0 - 0.5 * share))
 
@@ -484,7 +484,7 @@ class Search:
     def crowd(self, found: Recording) -> Accuracy:
         """Hold what can be said of a crowd as a whole against another engine's, and stirs of both.
 
-        A change of the inputs that nobody would notice moves every particle's way after a few
+        A change of the inputs too small to notice moves every particle's way after a few
         collisions, and so, less, the mean: differences smaller than that would be luck.
         """
         engine = "pymunk" if found.engine == "contact" else "contact"

@@ -1,7 +1,7 @@
 """Small things that know nothing of scenes and machines.
 
 - `arrays`: types of arrays, each named once.
-- `errors`: what somebody gave and cannot be used: the one error, its faults, what was meant.
+- `errors`: invalid input: the one error, its faults, what was meant.
 - `files`: files that are written whole or not at all, CSV and TSV in them.
 - `signals`: Ctrl-C, TERM and HUP, all raised as a KeyboardInterrupt.
 - `tables`: tables for people, plain data for JSON, columns as a DataFrame.

@@ -1,4 +1,4 @@
-"""What somebody gave and cannot be used: its faults, the error that lists them, what was meant."""
+"""Invalid input: its faults, the error that lists them, and what was probably meant."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class Fault:
 
 
 class InputError(ValueError):
-    """What somebody gave cannot be used; the text lists every fault.
+    """Invalid input; the text lists every fault.
 
     The command line ends with it, and exit code 2.
 

@@ -26,7 +26,7 @@ _ASIDE: Final = ".chutelab-unfinished-"
 """Beginning of the names of folders in which files are made before they get their place."""
 
 _OLD: Final = 3600.0
-"""s after which a folder that nobody holds is taken for one that a killed program left."""
+"""s after which a folder that no process holds counts as left by a killed program."""
 
 
 @contextmanager
@@ -86,7 +86,7 @@ def together(folder: Path) -> Iterator[Path]:
 def first_bytes(path: Path, most: int) -> bytes:
     """Read a file, up to one byte more than `most`, so that larger ones show.
 
-    A named pipe is refused: perhaps nobody ever writes to it.
+    A named pipe is refused: perhaps no process ever writes to it.
     """
     if path.is_fifo() and Path(os.path.realpath(path)).exists():
         raise OSError(EINVAL, "it is a pipe, not a file", str(path))
@@ -106,7 +106,7 @@ def _held(folder: Path) -> Iterator[bool]:
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:  # somebody holds it, or the file system has no locks
+        except OSError:  # another process holds it, or the file system has no locks
             yield False
         else:
             yield True

@@ -49,9 +49,9 @@ _obeyed: list[tuple[int, float]] = []
 def raised(*, last: bool = False) -> Iterator[None]:
     """Raise `Terminated` for each signal of `NAMES`.
 
-    Signals that are ignored (``nohup``, jobs in the background) or have a handler of somebody
-    else's are left alone, and so are all in a thread, which can set none. With `last` the program
-    ends after this: then a signal no longer raises anything, since nobody would catch it, but ends
+    Signals that are ignored (``nohup``, jobs in the background) or have another handler are left
+    alone, and so are all in a thread, which can set none. With `last` the program
+    ends after this: then a signal no longer raises anything, since nothing would catch it, but ends
     the process at once with the exit code that it would have had.
     """
     usual = (signal.SIG_DFL, signal.default_int_handler)

@@ -1,6 +1,6 @@
 """Packages that are installed or not, their versions, and what figures were measured on.
 
-Nothing in it names anybody.
+It names no person and no machine.
 """
 
 from __future__ import annotations

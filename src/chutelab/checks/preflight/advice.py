@@ -253,7 +253,7 @@ def _ending(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice
     ended = [REASONS[reason] for reason in tried.ended.tolist()]
     gone, late = ended.count("exit"), ended.count("time") + ended.count("unreleased")
     lone = len(ended) == 1
-    who = "the particle" if lone else f"of {len(ended)} particles tried,"
+    subject = "the particle" if lone else f"of {len(ended)} particles tried,"
     out = scene.outgoing
     if gone and out is not None:
         settings: Settings = {}
@@ -270,13 +270,13 @@ def _ending(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice
         ):
             if many:
                 yield _advised(
-                    f"{who} {are if lone else f'{many} {what}'} the outgoing belt", settings
+                    f"{subject} {are if lone else f'{many} {what}'} the outgoing belt", settings
                 )
     if late and machine.until != "time":
         what = "has landed" if machine.until == "landed" else "is at rest"
         yield _advised(
-            f"{who} {'is' if lone else f'{late} are'} stopped at t = {machine.end_time:.6g} s by"
-            f" run.max_time, before it {what}",
+            f"{subject} {'is' if lone else f'{late} are'} stopped at t = {machine.end_time:.6g} s"
+            f" by run.max_time, before it {what}",
             {"run.max_time": _up(10.0 * scene.run.max_time)},
             after=f", or if it goes on for ever, run.until = {machine.end_time:g}",
         )

@@ -139,7 +139,7 @@ WORDS = {
     Reason.SECOND: "After the plate it meets something else before it lands",
     Reason.MISSES: "It does not come down on the outgoing belt",
 }
-"""What a reason means for somebody who sees the scene for the first time."""
+"""What a reason means, in words for a first look at the scene."""
 
 
 def coverage(scene: Scene) -> Coverage:

@@ -280,18 +280,18 @@ def _bounces(recording: Recording, rounds: int) -> list[float]:
     their scatter allows.
     """
     under_way = recording.released & (recording.ended == REASONS.index("stopped"))
-    who = np.flatnonzero(under_way)
+    particles = np.flatnonzero(under_way)
     begun = recording.count - int(np.count_nonzero(~recording.released & ~under_way))
-    if begun > 2 * len(who):
+    if begun > 2 * len(particles):
         # Most have ended: blocks are alike.
-        return [recording.count / begun, recording.count / (begun - len(who))]
-    some = who[:: max(1, len(who) // LOOK)]
+        return [recording.count / begun, recording.count / (begun - len(particles))]
+    some = particles[:: max(1, len(particles) // LOOK)]
     ends = np.broadcast_to(recording.machine.end_time, recording.count)
     left = np.array([_left(recording.track(i)["t"], float(ends[i])) for i in some]).reshape(-1, 2)
     # Rounds to come of each; the block goes on as long as one of them does.
     left = np.minimum(left * recording.steps, max(0, ROUNDS - recording.steps))
-    together = TOGETHER + 0.5 * (begun + len(who))
-    more = TOGETHER * left.max(axis=0, initial=0.0) + len(who) * left.mean(axis=0)
+    together = TOGETHER + 0.5 * (begun + len(particles))
+    more = TOGETHER * left.max(axis=0, initial=0.0) + len(particles) * left.mean(axis=0)
     grown = (1.0 + more / (rounds * together)) * recording.count / begun
     return [float(grown.min()), float(grown.max())]
 

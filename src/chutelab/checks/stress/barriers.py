@@ -1,4 +1,4 @@
-"""Laws on where nobody may be: beyond a surface, in one, in another particle, on nothing."""
+"""Laws on places: no particle is beyond a surface, in one or in another particle."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def closest(position: Floats, radius: Floats) -> tuple[float, int, int]:
 
 
 def on_something(e: Evidence) -> Verdict | None:
-    """Nobody bounces off nothing: what happens at a surface, or a particle, happens there.
+    """Each impact lies on the surface, or the particle, that it names.
 
     The figure is the largest distance of an event's place from what it names, less the radius, m.
     """
@@ -186,7 +186,7 @@ def on_something(e: Evidence) -> Verdict | None:
 
 
 def released_free(e: Evidence) -> Verdict | None:
-    """Nobody is released inside another or a surface; the figure is how deep, m."""
+    """No particle is released inside another or a surface; the figure is how deep, m."""
     releases = e.recording.select(Kind.RELEASE)
     if not (e.crowd or len(e.machine.surfaces)) or not len(releases):
         return None

@@ -39,7 +39,7 @@ def cone(e: Evidence) -> Verdict | None:
 
 
 def rebound(e: Evidence) -> Verdict | None:
-    """Nobody leaves a surface but at the pair's restitution times the speed of approach.
+    """Judge whether speeds after blows are the restitution times the speeds before.
 
     This is about one blow at a time, so not about crowds and corners. A stepped engine may let a
     particle stay that would leave slower than gravity brings it back in a step, and the pymunk

@@ -108,8 +108,8 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
         times = times[np.linspace(0, len(times) - 1, BALANCES).astype(int)]
     books = e.recording.energy_at(times)
     first, _ = e.recording.ends()
-    who = np.flatnonzero(e.recording.released)
-    brought = np.sum(e.recording.energies(first, who), axis=0)
+    index = np.flatnonzero(e.recording.released)
+    brought = np.sum(e.recording.energies(first, index), axis=0)
     brought = brought[np.argsort(first["t"], kind="stable")]
     entered = np.searchsorted(np.sort(first["t"]), times, side="right")
     start = np.concatenate([[0.0], np.cumsum(brought)])[entered]
@@ -227,7 +227,7 @@ def unseen(e: Evidence) -> str:
 LAWS: dict[str, Law] = {
     "finite numbers": finite,
     "time goes forward": ordered,
-    "nobody lost": released,
+    "none lost": released,
     "lasts to the end": lasting,
     "no one through": no_one_through,
     "no one inside": depth,

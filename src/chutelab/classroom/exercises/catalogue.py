@@ -337,8 +337,8 @@ def lesson(name: str | int, student: object = "", language: str = "en") -> Task:
     >>> task.check(1).verdict
     <Verdict.BLANK: 'not attempted'>
     """
-    who = str(student).strip() or "anybody"
-    if len(who) > LONGEST_NAME:
-        said = f"a name has at most {LONGEST_NAME} characters; this one has {len(who)}"
-        raise ExerciseError(said, "student", who)
-    return Task(told(find(name).name, words(language).language), who)
+    name_given = str(student).strip() or "anybody"
+    if len(name_given) > LONGEST_NAME:
+        said = f"a name has at most {LONGEST_NAME} characters; this one has {len(name_given)}"
+        raise ExerciseError(said, "student", name_given)
+    return Task(told(find(name).name, words(language).language), name_given)

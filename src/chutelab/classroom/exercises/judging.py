@@ -310,7 +310,7 @@ def is_rounded(answer: float, number: float) -> bool:
 def judge(case: Case, answer: float, others: Iterable[tuple[str, float]] = ()) -> Reply:
     """Judge a finite answer.
 
-    It is the right one, or a known mistake, or the right one of somebody else, or two mistakes at
+    It is the right one, or a known mistake, or the right one of another student, or two mistakes at
     once, or off.
 
     Parameters

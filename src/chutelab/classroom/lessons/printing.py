@@ -173,7 +173,7 @@ def _table(table: SyntaxTreeNode) -> str:
     columns = ", ".join("1fr" if one else "auto" for one in blank)
     head, *body = ("".join(f"[{cell or '#blank'}]" for cell in row) for row in rows)
     made = f"#table(columns: ({columns},), table.header{head}){''.join(body)}"
-    # Whoever fills it in has it on one page.
+    # It is filled in by hand, so it stays on one page.
     return f"#block(breakable: false)[{made}]" if any(blank) else made
 
 

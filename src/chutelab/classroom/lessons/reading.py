@@ -308,7 +308,7 @@ def _unread(text: Path) -> Iterator[Fault]:
 
 
 def _strays(folder: Path) -> list[Fault]:
-    """Return the files of a folder that are links to some elsewhere: they may be anybody's.
+    """Return the files of a folder that are links to files elsewhere.
 
     A page or a copy of the lesson would have what is in them.
     """

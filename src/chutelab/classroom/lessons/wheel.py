@@ -1,6 +1,6 @@
 """The wheel of the chutelab that runs, made of its own files: no network, no tools for building.
 
-Whoever hands out lessons has chutelab, so those who get them can have the same. Its files are those
+A teacher who hands out lessons has chutelab, so pupils can have the same. Its files are those
 of the package, and in a checkout the scenes and lessons beside ``src``; what says what it needs is
 what the installer keeps of it. The form is that of the binary distribution format, PEP 427.
 """

@@ -123,7 +123,7 @@ class Job:
         self.module, self.machine = module, machine
         self.knots: list[NDArray[Any]] = []
         self.events: list[NDArray[Any]] = []
-        # Whoever is under way or to come when the run is ended, from the first disk of this part.
+        # First disk of the part in which the run was stopped: from it on disks have not ended.
         self.stopped_from = machine.count
         n = machine.count
         self.pieces = pieces(machine)

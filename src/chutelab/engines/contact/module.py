@@ -168,7 +168,7 @@ _idle: list[Module] = []
 
 
 def borrow() -> Module:
-    """Return a module that nobody uses, reset; give it back with `give_back`."""
+    """Return a module that is not in use, reset; give it back with `give_back`."""
     try:
         module = _idle.pop()
     except IndexError:

@@ -197,7 +197,7 @@ class Lone:
         self._look()
 
     def _gates(self) -> None:
-        """See which surfaces are there; who shut on the particle waits until it is clear."""
+        """See which surfaces are there; a gate that shut on the particle waits till it is clear."""
         there = [face for face in self.world.faces if face.appears <= self.t < face.vanishes]
         inside = {face for face in there if face.gap(self.x)[0] < -self.world.hair}
         self.shut = inside.difference(self.faces)

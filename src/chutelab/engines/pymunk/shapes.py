@@ -266,7 +266,7 @@ class Shapes:
             self.points.append((*rows, first, -jx, -jy, n.x, n.y, c.r1.x, c.r1.y, c.r2.x, c.r2.y))
 
     def open_and_shut(self, now: float) -> None:
-        """Put in gates that are there at a time (s), take out the others, see whom they shut on."""
+        """Put in gates that are there at a time (s), take out others; note what they shut on."""
         space = self.world.space
         for face, shapes in self.gates.items():
             if (face.appears <= now < face.vanishes) == (face in self.up):

@@ -45,7 +45,7 @@ STAY, HOP = 5, 50
 friction hops for some steps at a time; the ride ends with its last push."""
 
 CALM, STILL = 0.1, 1e-3
-"""s over `Machine.pace`, and m/s times that: who slips and moves less for that long has settled."""
+"""s over `Machine.pace`, and m/s times that: slower for that long, a particle has settled."""
 
 _BODY = (
     batch.BodyFields.BODY_ID
@@ -142,7 +142,7 @@ class Shared:
         for row, face in enumerate(faces, count):
             if isinstance(face, Bend):
                 self.center[:, row] = face.center
-        # Of those who turn: 1/I, and rolling friction's arm over the radius, if any has it.
+        # Of particles that turn: 1/I, and rolling friction's arm over the radius, if any has it.
         self.ease, share = np.zeros((2, rows))
         inertia = np.broadcast_to(p.inertia, count)
         np.divide(1.0, inertia, out=self.ease[:count], where=inertia > 0.0)
@@ -157,7 +157,7 @@ class Shared:
             )
             joint.error_bias = 0.0
             self.strings.setdefault(thread.particle, []).append(String(joint, thread.length))
-        # Rows by sorted id of their bodies; that of the Space's own is nobody's.
+        # Rows by sorted id of their bodies; that of the Space's own is no particle's.
         self.nobody = world.space.static_body.id
         self.buffer, ids = batch.Buffer(), np.array(list(self.shapes.rank), dtype=np.uintp)
         self.row = ids.argsort()
@@ -195,7 +195,7 @@ class Shared:
     # Releases and rides
 
     def _release(self) -> None:
-        """Release who is due, at a time up to now, if nobody is in the place."""
+        """Release particles that are due, at a time up to now, where the place is free."""
         starts = self.machine.releases
         for i in list(self.waiting):
             due = float(starts.t[i])
@@ -222,7 +222,7 @@ class Shared:
                 self._free(i, t, x, v)
 
     def _taken(self, i: int, x: Vec2d, v: Vec2d, late: float) -> bool:
-        """Tell whether somebody is where a particle is to start, now or when it was due."""
+        """Tell whether the place where a particle starts is taken, now or when it was due."""
         others = np.flatnonzero(self.inside)
         if not len(others):
             return False
@@ -249,7 +249,7 @@ class Shared:
         self.free[i], self.calm[i] = True, 0.0
 
     def _ride(self) -> None:
-        """Steer who is carried round the pulley through this step; let go whose ride is over."""
+        """Steer carried particles round the pulley in this step; let go those at its end."""
         ahead = self.t + 0.5 * self.h
         for i, ride in list(self.rides.items()):
             body, shape = self.bodies[i]
@@ -272,7 +272,7 @@ class Shared:
     # Steps
 
     def _step(self) -> None:
-        """Step all, book what happened, and end who has ended."""
+        """Step all, book what happened, and end the tracks that end."""
         space = self.world.space
         if self.rides:
             self._ride()
@@ -308,7 +308,7 @@ class Shared:
         self._endings(t, entries)
 
     def _contacts(self) -> None:
-        """Book what pushes, and tell blows, landings and who rides what."""
+        """Book what pushes, and tell blows, landings and which particle rides what."""
         a, b, first, values = self._touches()
         # The impulse acts on A, the normal points from A to B.
         push = -values[0] * values[2] - values[1] * values[3]
@@ -358,7 +358,7 @@ class Shared:
         for k in np.flatnonzero(pair) if self.rides else ():
             for row, motion, sign in ((one, mine, -0.5), (other, others, 0.5)):
                 if (i := int(row[k])) in self.rides:
-                    # The belt's work on who hits a particle that it carries.
+                    # The belt's work on a particle that hits one that it carries.
                     ride = self.rides[i]
                     ride.write(self.recorder, self.t - self.h)
                     mean = motion[0, :2, k] + motion[1, :2, k]
@@ -499,22 +499,22 @@ class Shared:
                 self.entries[1, i] += loss
                 self.recorder.by_surface[-1, 1] += loss
 
-    def _riding(self, who: Ints, surface: Ints) -> None:
+    def _riding(self, particles: Ints, surface: Ints) -> None:
         """Count pushes of surfaces in a row; tell separations at the last one's time."""
         over = self.left[0] < self.t - HOP * self.h
-        over[who[self.on[who] != surface]] = True
+        over[particles[self.on[particles] != surface]] = True
         for i in np.flatnonzero(over & (self.pushes >= STAY)):
             t, x, y, vx, vy, omega = self.left[:, i].tolist()
             self.recorder.events(Kind.SEPARATION, i, t, (x, y), (vx, vy), omega, surface=self.on[i])
         self.pushes[over] = 0
-        self.pushes[who] += 1
-        self.on[who] = surface
-        self.left[0, who], self.left[1:, who] = self.t, self.state[1][:, who]
+        self.pushes[particles] += 1
+        self.on[particles] = surface
+        self.left[0, particles], self.left[1:, particles] = self.t, self.state[1][:, particles]
 
     # The end
 
     def _endings(self, t: float, entries: Floats) -> None:
-        """End who left, landed or settled."""
+        """End particles that left, landed or settled."""
         until, (left, right, bottom, top) = self.machine.until, self.machine.exit_box
         x, y = self.state[1, :2, : self.count]
         out = (y < bottom) | (y > top) | (x < left) | (x > right)

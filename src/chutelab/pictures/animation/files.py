@@ -178,7 +178,7 @@ def animate(
         (the ledger as bars; without it the scene is wider). By default all, but of a crowd
         neither strobe dots nor velocity, and no impact of particle 0 is told.
     predict : bool, optional
-        Let whoever watches predict: the film begins without the analytic parabola, and waits as
+        Let viewers predict: the film begins without the analytic parabola, and waits as
         the particle comes to the top of the drive pulley, or as it begins.
     comment : str, optional
         A text that a GIF keeps, not shown.

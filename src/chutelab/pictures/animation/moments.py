@@ -204,7 +204,7 @@ def film(
     """Return the moments from `begin` to `end`: even steps, and a hold at each impact worth it.
 
     There are `fps` pictures a second; `slow` is seconds on the screen for one of the recording. At
-    the time `ask`, if it is given, the film holds for whoever watches to predict what comes. Of a
+    the time `ask`, if it is given, the film holds, for viewers to predict what comes. Of a
     `crowd` it tells how many have come and gone, and holds at no impact of particle 0.
 
     Raises

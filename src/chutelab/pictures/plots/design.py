@@ -167,7 +167,7 @@ def draw_shares(ax: Axes, found: Uncertainty, row: int) -> Axes:
     """Draw the share of the variance that each input explains, alone and with its interactions."""
     indices = found.indices[row]
     name = found.quantities[row]
-    style.dress(ax, "share of the variance, %", "", f"{name}: who is to blame")
+    style.dress(ax, "share of the variance, %", "", f"{name}: what the spread comes from")
     places = np.arange(len(found.spreads), dtype=np.float64)
     for offset, label, values, spans, colour in (
         (-0.19, "alone", indices.first, indices.first_interval, BARS[0]),

@@ -187,12 +187,12 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     """
     books = recording.energy_at(times)
     first, _ = recording.ends()
-    order, who = np.argsort(first["t"], kind="stable"), np.flatnonzero(recording.released)
+    order, indices = np.argsort(first["t"], kind="stable"), np.flatnonzero(recording.released)
     at_release = np.concatenate(
-        [[0.0], np.cumsum(sum(recording.energies(first[order], who[order])))]
+        [[0.0], np.cumsum(sum(recording.energies(first[order], indices[order])))]
     )
     released = np.searchsorted(first["t"][order], times, side="right")
-    masses = np.broadcast_to(recording.particle.mass, recording.count)[who][order]
+    masses = np.broadcast_to(recording.particle.mass, recording.count)[indices][order]
     weight = np.concatenate([[0.0], np.cumsum(masses)])[released] * recording.gravity
     heights = recording.knots["position"][:, 1]
     stays = recording.ended != REASONS.index("exit")

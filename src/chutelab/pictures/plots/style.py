@@ -62,7 +62,7 @@ SMALL, NORMAL, LARGE = 9.5, 10.5, 13.0
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 
 PREFIXED = ("J", "W", "m")
-"""Units that are scaled: nobody reads millimetres a second or millidegrees."""
+"""Units that are scaled: millimetres a second and millidegrees are hard to read."""
 
 
 def scaled(values: ArrayLike, unit: str) -> tuple[float, str]:
@@ -125,7 +125,7 @@ def drawable(text: str) -> str:
 def plain(text: str) -> str:
     r"""Return a text such that matplotlib writes it as it is, and takes no ``$`` for mathematics.
 
-    Whatever somebody else has written, a title, a name, a key, goes through this.
+    Use it for all text from users: titles, names, keys.
 
     >>> plain("5 $ or $x_1$"), plain("\x1b[31m")
     ('5 \\$ or \\$x_1\\$', '�[31m')

@@ -59,10 +59,10 @@ def scipy(name: str) -> Any:
 
 MANY: Final = 6
 """Touches of one surface in a row from which on they are not counted: a particle that bounces to
-rest does so a thousand times, and one more is no other course."""
+rest does so a thousand times, and extra bounces do not change the sequence of contacts."""
 
 LONGEST: Final = 6
-"""Surfaces that are named: what is thrown to and fro longer goes by the same name."""
+"""Surfaces that are named; longer sequences are cut off there."""
 
 
 def courses_of(recording: Recording) -> list[str]:

@@ -34,7 +34,7 @@ this step is right to about 1e-9, and next to no point lies within it of an impa
 
 SINGULAR = 1e-6
 """Least singular value, relative to the largest, of a Jacobian with columns of equal length: far
-above what differences leave of zero, far below what noise would let anybody measure."""
+above what differences leave of zero, far below what noise allows to measure."""
 
 UNMOVED = 1e-7
 """m; a parameter that moves the points by no more when it changes by its own size has no effect."""

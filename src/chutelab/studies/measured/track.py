@@ -1,4 +1,4 @@
-"""`Track`: the points that somebody measured, in the world, and beside the simulation."""
+"""`Track`: measured points, in the world and beside the simulation."""
 
 from __future__ import annotations
 

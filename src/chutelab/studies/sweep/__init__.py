@@ -11,7 +11,7 @@
 - `batch`: a block of variants run: many at once through the exact engine, or one by one.
 - `result`: `Sweep`, and CSV and Parquet files.
 - `part`: the file of the finished rows of a sweep that is not finished.
-- `sweeping`: `sweep`, and who does the work: this process, several, or a Dask cluster.
+- `sweeping`: `sweep`: variants run here, in processes, or on a Dask cluster.
 
 SciPy, pyarrow, Dask and pandas are imported when they are needed.
 """

@@ -4,7 +4,7 @@ It is locked while the sweep runs, which tells a sweep that runs from one that w
 It has lines of JSON. The first one is about the sweep, and has the process that writes. Each other
 one has the number that a block of rows begins with, the rows as text, and the SHA-256 of what
 stands in all lines up to there: a line that is changed, doubled, moved or missing is found. It is
-no protection against somebody who computes hashes for rows of their own.
+no protection against rows whose hashes were computed for them.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ INTERVAL: Final = 0.5
 """s from one fsync to the next at least: an fsync takes milliseconds, and so may a block."""
 
 BEYOND: Final = 2**31 - 2
-"""Byte that is locked on Windows, where nobody could read a locked one; the file ends before."""
+"""Byte that is locked on Windows, beyond the file's end: a locked byte cannot be read."""
 
 
 def part_of(out: Path) -> Path:
@@ -100,7 +100,7 @@ class Part:
         self.path, self._plan = path, plan
         self._chain = hashlib.sha256()
         self._synced = -INTERVAL
-        self._ours = False  # not what an earlier sweep, or somebody else, left
+        self._ours = False  # not what an earlier sweep, or another program, left
         self._file = _locked(path)
 
     def take_up(self, *, resume: bool) -> None:
@@ -115,7 +115,7 @@ class Part:
             "engine": self._plan.engine,
         }
         start = json.dumps(head).encode()[:-1]
-        # As long for every process: who resumes writes over it.
+        # As long for every process: a resumed sweep writes over it.
         mine = start + b', "process": %10d}\n' % os.getpid()
         self._chain.update(start)
         first = self._file.readline(LONGEST)
@@ -243,7 +243,7 @@ def _locked(path: Path) -> BinaryIO:
             except OSError:
                 pass  # There are file systems without locks.
             file.seek(0)
-            # Whoever had it may have removed it just now: then it is made anew.
+            # Its owner may have removed it just now: then it is made anew.
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(number), path.stat()):
                     stack.pop_all()

@@ -1,4 +1,4 @@
-"""`sweep`: all variants of a scene, by whoever does the work, and what came of each.
+"""`sweep`: run variants here, in processes, or on Dask, and gather what came of each.
 
 The work is done by this process, by processes of this computer, or by a Dask cluster.
 """
@@ -55,7 +55,7 @@ ADDRESS: Final = re.compile(r"(\w+://)?[^\s:/]+:\d{1,5}")
 
 
 class LostWorkersError(RuntimeError):
-    """Those who did the work are gone; the text says what to do."""
+    """All workers are gone; the text says what to do."""
 
 
 class Crew:
@@ -120,7 +120,7 @@ class Crew:
 
 @contextmanager
 def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
-    """Give those who do the work.
+    """Give the workers.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def _ask(dask: ModuleType, address: str) -> None:
     """Refuse an address at which no Dask scheduler answers, in time.
 
     A client waits for ever for one who accepts a connection and says nothing, and prints a
-    traceback of other faults after 20 s. Nobody has to wait for the thread that asks first.
+    traceback of other faults after 20 s. The thread that asks first need not be waited for.
     """
     answers: SimpleQueue[str | Exception] = SimpleQueue()
 
@@ -311,7 +311,7 @@ def sweep(
     jobs : int
         Processes to spread the work over; 0 is one for each processor.
     executor : concurrent.futures.Executor, optional
-        Who does the work instead, such as that of a Dask client.
+        Runs the work instead, such as that of a Dask client.
     progress : callable, optional
         Called now and then with the share that is done, 0 to 1.
 

@@ -215,7 +215,6 @@ def interrupted(folder, *arguments, when, sent=(signal.SIGINT,)):
 
 ENDS = [
     # A second signal does not break off the clean-up of the first.
-    ([signal.SIGINT] * 5, 130, "Interrupted."),
     ([signal.SIGTERM] * 3, 143, "Terminated."),
     ([signal.SIGHUP], 129, "Terminated."),
 ]
@@ -235,6 +234,24 @@ def test_a_signal_during_a_run_leaves_nothing(tmp_path, sent, code, says):
     ended = interrupted(tmp_path, "endless.toml", "--out", "out", when=when, sent=sent)
     assert ended == (code, f"\n{says}\n")
     assert listed(tmp_path) == ["endless.toml"]
+
+
+def test_ctrl_c_during_a_run_leaves_what_was_recorded(tmp_path):
+    (tmp_path / "endless.toml").write_text(ENDLESS)
+    begun = []
+
+    def when():
+        if list(tmp_path.glob(".chutelab-*")):
+            begun.append(time.monotonic())
+        return bool(begun) and time.monotonic() > begun[0] + 0.5
+
+    code, said = interrupted(
+        tmp_path, "endless.toml", "--out", "out", "--only", "json,npz", when=when,
+        sent=[signal.SIGINT] * 5,
+    )  # fmt: skip
+    assert (code, said.split("\n")[-2]) == (130, "Interrupted.")
+    assert listed(tmp_path) == ["endless.toml", "out"]
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["stopped"]
 
 
 @pytest.mark.parametrize("name", ["overlay.png", ".chutelab-*/lesson.gif"])

@@ -477,7 +477,7 @@ STATED = {
         "tan α = µ on, {26.6}° here": degrees(atan(0.5)),
         "With c = 0.3 that is {16.7}°": degrees(atan(0.3)),
         "of the height, {71} %, and": 100.0 / sqrt(2.0),
-        "to 3 / √5, about {1.3}°": 3.0 / sqrt(5.0),
+        "uncertain by 3° / √5, about {1.3}°": 3.0 / sqrt(5.0),
     },
     "physics": {
         "up to {1} m/s. A faster": sqrt(G * 0.1),

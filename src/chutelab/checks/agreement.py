@@ -19,7 +19,7 @@ from chutelab.machine import build
 from chutelab.results import Recording
 from chutelab.results.comparison import compare, relative_error, scales
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import KINDS, measure
+from chutelab.results.quantities import KINDS, each, measure
 from chutelab.scene import Scene, SceneError
 from chutelab.scene.rules import FIRST, SYMBOLS, unit_of
 from chutelab.scene.units import with_unit, write_size
@@ -148,7 +148,8 @@ def _lasts(found: Recording) -> bool:
     """Tell whether anything but gravity acts between blows, apart from the ride by adhesion."""
     track = found.track(0)
     if found.machine.releases.carried[0]:
-        track = track[track["t"] >= measure(found, "separation.t")]  # none if it never leaves
+        # None if it never leaves.
+        track = track[track["t"] >= each(found, "separation.t")[0]]
     time, velocity = np.diff(track["t"]), np.diff(track["velocity"], axis=0)
     velocity[:, 1] += found.gravity * time
     speed = float(np.hypot(*track["velocity"].T).max(initial=0.0))

@@ -177,7 +177,7 @@ def _judged(
         aligned = method != "fixed"
         scene = scene.with_values({"run.dt": step, "run.align": aligned, "expect": None})
     import_module(f"chutelab.engines.{engine}")  # or its import would be timed
-    run = partial(judged, scene, engine)
+    run = partial(judged, scene, engine=engine)
     try:
         bounded(0.0)
         first, found = clocked(partial(run, progress=bounded))

@@ -95,20 +95,21 @@ def held() -> Iterator[None]:
 def ctrl_c_waits() -> Iterator[Callable[[], None]]:
     """Give a function that raises what a Ctrl-C would have raised before.
 
-    So a run is interrupted where it can be, and keeps what it has. A second Ctrl-C is obeyed at
-    once. In a thread, and where the program has a handler of its own, nothing changes.
+    So a run is interrupted where it can be, and keeps what it has. One that comes `GRACE` after the
+    first is obeyed at once. In a thread, and where there is another handler, nothing changes.
     """
-    came: list[int] = []
+    came: list[float] = []
     before = signal.getsignal(signal.SIGINT)
 
     def look() -> None:
         if came and callable(before):
-            before(came.pop(), None)
+            came.clear()
+            before(signal.SIGINT, None)
 
     def note(signum: int, frame: Any) -> None:
-        if came and callable(before):
+        if came and callable(before) and monotonic() - came[0] > GRACE:
             before(signum, frame)
-        came.append(signum)
+        came.append(monotonic())
 
     changed = False
     if before in (signal.default_int_handler, _obey):

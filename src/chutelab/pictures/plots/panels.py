@@ -30,7 +30,7 @@ from chutelab.pictures.plots.scenery import (
     upright,
 )
 from chutelab.results import Recording
-from chutelab.results.quantities import measure
+from chutelab.results.quantities import each
 from chutelab.scene import Scene
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
@@ -144,7 +144,7 @@ def analytic_of(
 
     They are those of the recording's own prediction if none is given.
     """
-    left = measure(recording, "separation.t")
+    left = float(each(recording, "separation.t")[0])
     if isnan(left):
         return (), 0.0
     return arcs(recording.prediction if prediction is None else prediction, recording.scene), left

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine.parts import EXIT_MARGIN
 from chutelab.results import REASONS, Kind, Recording
-from chutelab.results.quantities import measure
+from chutelab.results.quantities import each
 from chutelab.results.stream import FEWEST
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.errors import InputError
@@ -82,7 +82,7 @@ def action(recording: Recording) -> tuple[float, float]:
         end = float(np.max(recording.machine.end_time))
         text = "more: pictures follow particle 0, for which no place was free up to then"
         raise InputError(text, "run.until", end, recording.machine.scene.source)
-    begin = measure(recording, "separation.t")
+    begin = float(each(recording, "separation.t")[0])
     return float(track["t"][0]) if isnan(begin) else begin, float(track["t"][-1])
 
 

@@ -246,7 +246,7 @@ void close_step(double h) {
             double most = MAX(fabs(s[0]) + fabs(s[1]), fabs(p[0]) + fabs(p[1]));
             for (int link = d->links; link >= 0; link = W.links[link])
                 if (W.contacts[link / 2].impulse[0] > 0)
-                    most = MAX(most, fabs(W.contacts[link / 2].other[1]));
+                    most = MAX(most, fabs(W.surfaces[-1 - W.contacts[link / 2].j].speed));
             if (most + fabs(s[2]) * d->radius < STOPPED * W.pace) reason = BY_SETTLING;
         }
         if (W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;

@@ -397,9 +397,10 @@ def _pour(scene: Scene, n: int, before: Sequence[Draw], clear: Clear, watch: Wat
             break
     if count < stream.count:
         several = f"[{n}]" * (len(scene.streams) > 1)
+        fewer = f", or stream{several}.count = {count} at most" if count else ""
         allowed = (
-            f"a larger box, or stream{several}.count = {count} at most: so many of radius"
-            f" {largest:.4g} m have room in it, away from all surfaces"
+            f"a larger box{fewer}: {count or 'none'} of radius {largest:.4g} m have room in it,"
+            " away from all surfaces"
         )
         value = [list(corner) for corner in stream.fill or ()]
         raise SceneError(scene.source, [Fault(f"stream{several}.fill", value, allowed)])

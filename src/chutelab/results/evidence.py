@@ -249,11 +249,9 @@ class Evidence:
         if self.crowd or not len(self.recording.knots):
             return ledger(self.recording).turned_over
         kinetic, potential = self.energies
-        height = np.abs(potential)
+        height = np.add.reduce(np.abs(self.columns[6:]), axis=0)
+        height += np.abs(potential)
         height += kinetic
-        size = np.empty_like(height)
-        for entries in self.columns[6:]:
-            height += np.abs(entries, out=size)
         return float(np.maximum.reduceat(height, self.ends[0]).sum())
 
     @cached_property

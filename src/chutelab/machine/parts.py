@@ -475,11 +475,12 @@ class Machine:
             low, high = np.minimum(low, place.min(axis=0)), np.maximum(high, place.max(axis=0))
         else:
             low, high = np.minimum(low, place), np.maximum(high, place)
-        left, bottom = (np.minimum(low[..., axis], -wheel) for axis in (0, 1))
-        right, top = (np.maximum(high[..., axis], wheel) for axis in (0, 1))
+        bottom = np.minimum(low[..., 1], -wheel) - EXIT_MARGIN
         if np.count_nonzero(self.gravity) == np.size(self.gravity):
-            return -inf, inf, bottom - EXIT_MARGIN, inf
-        return left - EXIT_MARGIN, right + EXIT_MARGIN, bottom - EXIT_MARGIN, top + EXIT_MARGIN
+            return -inf, inf, bottom, inf
+        left = np.minimum(low[..., 0], -wheel) - EXIT_MARGIN
+        right, top = (np.maximum(high[..., axis], wheel) + EXIT_MARGIN for axis in (0, 1))
+        return left, right, bottom, top
 
 
 REMOTE = 8.0

@@ -32,9 +32,6 @@ CHUNK = 1 << 12
 POINTS = ("start", "tangent", "center")
 """What pieces have two numbers of."""
 
-FEW = 256
-"""Intervals beside bent pieces that need no first look."""
-
 PAIRS = 1 << 14
 """Intervals beside pieces that are halved together."""
 
@@ -66,6 +63,10 @@ class Hit:
     passes: bool  # whether its centre gets to the other side, between the piece's ends
 
 
+Kind = tuple[dict[str, Floats], Any, int]
+"""Pieces of a kind: their numbers; what tells which paths are clear of them; the first's number."""
+
+
 def _lines(machine: Machine) -> dict[str, Floats]:
     """Return starts, tangents (S, 2) and lengths (S,) of lines, of a family (N, S, ...)."""
     s = machine.segments
@@ -91,6 +92,10 @@ def _rounds(machine: Machine) -> dict[str, Floats]:
         both = (np.broadcast_to(a, (*ahead, *a.shape[axis:])) for a in (found[n], mine))
         found[n] = np.concatenate(list(both), axis=axis)
     return found
+
+
+def _count(table: dict[str, Floats]) -> int:
+    return int(table["radius" if "radius" in table else "length"].shape[-1])
 
 
 class Paths:
@@ -201,7 +206,7 @@ def hits(e: Evidence) -> list[Hit]:
     go on doing so, no deeper.
     """
     found, m = list[Hit](), e.machine
-    kinds: list[tuple[dict[str, Floats], Any, int]] = []
+    kinds: list[Kind] = []
     if m.segments.length.size:
         kinds.append((_lines(m), _clear_of_lines, 0))
     if m.arcs.radius.size or m.pulley is not None:
@@ -209,15 +214,28 @@ def hits(e: Evidence) -> list[Hit]:
     if not kinds:
         return found
     way = e.columns[:3]
-    moves = (way[:, 1:] != way[:, :-1]).any(axis=0)
-    left = (moves & e.within).nonzero()[0]
+    moves = np.logical_or.reduce(way[:, 1:] != way[:, :-1], axis=0)
+    if e.recording.count > 1:
+        moves &= e.within
+    left = moves.nonzero()[0]
+    boxes = None if e.family else Boxes(kinds)
+    # What follows each other is of one track only where tracks are long.
+    short = len(e.columns[0]) < WIDTH * e.recording.count
     chunk = CHUNK if e.sized else max(1, len(left))
     for first in range(0, len(left), chunk):
         paths = Paths(e, left[first : first + chunk])
+        n = len(paths.knots)
+        near = None
+        if boxes and (n <= WIDTH or not e.sized or (short and n * boxes.count <= PAIRS)):
+            near = boxes.near(e, paths)
         for table, clear, number in kinds:
             if not e.sized:
                 found += _turned(e, paths, table, number)
-            interval, piece = _unproven(e, paths, table)
+            if near is None:
+                interval, piece = _unproven(e, paths, table)
+            else:
+                first_, beyond = near[1].searchsorted((number, number + _count(table))).tolist()
+                interval, piece = near[0][first_:beyond], near[1][first_:beyond] - number
             if len(interval):
                 interval, piece = _there(e, paths, interval, piece, bent="radius" in table)
             for begin in range(0, len(interval), PAIRS):
@@ -229,11 +247,6 @@ def hits(e: Evidence) -> list[Hit]:
 def _unproven(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints, Ints]:
     """Return the intervals, and the pieces beside them, that one look does not prove clear."""
     points, n = paths.points, paths.points.shape[2]
-    count = (table["radius"] if "radius" in table else table["length"]).shape[-1]
-    # What follows each other is of one track only where tracks are long.
-    short = len(e.columns[0]) < WIDTH * e.recording.count and n * count <= PAIRS
-    if not e.family and (n <= WIDTH or short or not e.sized):
-        return (_beside_rounds if "radius" in table else _beside_lines)(e, paths, table)
     # Of a family a machine for each particle.
     width = 1 if e.family else WIDTH
     blocks_ = -(-n // width)
@@ -243,7 +256,7 @@ def _unproven(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints
     if np.ndim(limit):
         limit = np.append(limit, np.full(blocks_ * width - n, inf)).reshape(blocks_, width)
     cut = points.reshape(2, 4, blocks_, width)
-    block, piece = _near(e, paths, cut, table, count)
+    block, piece = _near(e, paths, cut, table)
     own = cut.take(block, axis=2)
     limit = limit[block] if np.ndim(limit) else limit
     chosen = _pick(table, piece, paths.owner[block] if e.family else None)
@@ -281,41 +294,47 @@ def _near_round(points: Floats, piece: dict[str, Floats], limit: Any) -> Bools:
     return np.asarray(doubt)
 
 
-def _beside_rounds(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints, Ints]:
-    """Do as `_unproven` does, of all intervals beside all bent pieces at once."""
-    n, count = paths.points.shape[2], len(table["radius"])
-    if n * count <= FEW:
-        every, beside = np.divmod(np.arange(n * count), count)
-        return every, beside
-    row = {"center": table["center"][:, None], "radius": table["radius"][:, None]}
-    piece, interval = _near_round(paths.points[:, :, None], row, paths.limit).nonzero()
-    return interval, piece
+class Boxes:
+    """A box about each of P pieces, the lines first, turned as the piece is.
 
+    `ways`, (2 P, 2), are its sides' directions, one of each piece and then the other: across and
+    along a line, x and y of a bent piece. `low` and `high`, (2, P, 1), m, are how far it goes.
+    """
 
-def _beside_lines(e: Evidence, paths: Paths, table: dict[str, Floats]) -> tuple[Ints, Ints]:
-    """Do as `_unproven` does, of all intervals beside all straight pieces at once."""
-    start, tangent, limit = table["start"], table["tangent"], paths.limit
-    points, normal = paths.points.reshape(2, -1), tangent[:, ::-1] * _LEFT
+    def __init__(self, kinds: list[Kind]) -> None:
+        tables = [table for table, _, _ in kinds]
+        lines = _count(tables[0]) if "length" in tables[0] else 0
+        self.count = count = sum(map(_count, tables))
+        ways = np.zeros((2, count, 2))
+        self.low, self.high = low, high = np.empty((2, 2, count, 1))
+        self.along = np.zeros((2, count, 1), dtype=bool)
+        if lines:
+            start, tangent, length = (tables[0][name] for name in ("start", "tangent", "length"))
+            ways[0, :lines], ways[1, :lines] = tangent[:, ::-1] * _LEFT, tangent
+            low[:, :lines, 0] = high[:, :lines, 0] = np.add.reduce(ways[:, :lines] * start, axis=2)
+            high[1, :lines, 0] += length
+            self.along[1, :lines] = True
+        if lines < count:
+            center, radius = tables[-1]["center"].T, tables[-1]["radius"]
+            ways[0, lines:, 0] = ways[1, lines:, 1] = 1.0
+            low[:, lines:, 0], high[:, lines:, 0] = center - radius, center + radius
+        self.ways = ways.reshape(-1, 2)
 
-    def along(way: Floats) -> Floats:
-        """Return how far the control points are from the starts that way, (S, 4, n), m."""
-        found = (way @ points).reshape(len(way), 4, -1)
-        found -= (way * start).sum(axis=1)[:, None, None]
-        return found
-
-    aside = along(normal)
-    doubt = aside.min(axis=1) < limit
-    doubt &= aside.max(axis=1) > -limit
-    if np.count_nonzero(doubt):
-        foot, margin = along(tangent), np.maximum(limit, 0.0)
-        reach = table["length"][:, None] + margin
-        if e.machine.pulley is not None:
+    def near(self, e: Evidence, paths: Paths) -> tuple[Ints, Ints]:
+        """Return intervals, and in order the pieces of whose boxes they are not clear."""
+        margin = paths.limit
+        if not e.sized:
+            # A point may be beyond a line by what is allowed, but not beside its ends.
+            margin = np.where(self.along, np.maximum(margin, 0.0), margin)
+        low, high = self.low - margin, self.high + margin
+        if e.machine.pulley is not None and self.along[1, 0, 0]:
             # The incoming belt ends on the pulley: beyond it that is what is near.
-            reach[0] -= margin
-        doubt &= foot.min(axis=1) < reach
-        doubt &= foot.max(axis=1) > -margin
-    piece, interval = doubt.nonzero()
-    return interval, piece
+            high[1, 0] = self.high[1, 0]
+        found = (self.ways @ paths.points.reshape(2, -1)).reshape(2, self.count, 4, -1)
+        doubt = np.minimum.reduce(found, axis=2) < high
+        doubt &= np.maximum.reduce(found, axis=2) > low
+        piece, interval = (doubt[0] & doubt[1]).nonzero()
+        return interval, piece
 
 
 def _there(
@@ -332,9 +351,7 @@ def _there(
     return interval[kept], piece[kept]
 
 
-def _near(
-    e: Evidence, paths: Paths, points: Floats, table: dict[str, Floats], count: int
-) -> tuple[Ints, Ints]:
+def _near(e: Evidence, paths: Paths, points: Floats, table: dict[str, Floats]) -> tuple[Ints, Ints]:
     """Return blocks of intervals and pieces whose boxes touch."""
     reach = e.radius + e.allowed
     low, high = points.min(axis=(1, 3)), points.max(axis=(1, 3))
@@ -346,7 +363,7 @@ def _near(
         least, most = table["center"] - arm, table["center"] + arm
     if e.family and least.ndim > 2:
         least, most = least[paths.owner], most[paths.owner]
-    near = np.ones((low.shape[1], count), dtype=bool)
+    near = np.ones((low.shape[1], _count(table)), dtype=bool)
     for axis in (0, 1):
         near &= low[axis][:, None] <= most[..., axis] + reach
         near &= high[axis][:, None] >= least[..., axis] - reach
@@ -453,7 +470,7 @@ def _turned(e: Evidence, paths: Paths, table: dict[str, Floats], number: int) ->
     owner = np.searchsorted(e.recording.offsets, paths.knots, side="right") - 1
     same = (owner[1:] == owner[:-1]).nonzero()[0]
     places, t = paths.points[:, 0].T, e.recording.knots["t"][paths.knots]
-    count = table["radius" if "radius" in table else "length"].shape[-1]
+    count = _count(table)
     for who in np.unique(owner[same]).tolist():
         own = same[owner[same] == who]
         for k in range(number, number + count):

@@ -365,35 +365,43 @@ def crowd(recording: Recording) -> Crowd | None:
             key: {name: measure(recording, f"{event}.{key}.{name}") for name in COLUMNS}
             for key in ("t", "x", "vx", "vy")
         }
-    flow = _flow(recording) if scene.outgoing is not None else None
+    flow = flows(recording)
     ways = {name: np.ptp(one.offset[[0, 2], 1]) for name, one in envelopes(recording, 3).items()}
     return Crowd(
         particles=recording.count,
         fates=dict(Counter(fates(recording).tolist())),
         arrival=told["arrival"],
         landing=told["landing"],
-        flow=None if flow is None else flow[0],
-        whole_flow=None if flow is None or scene.stream.width is None else flow[1],
+        flow=flow[0],
+        whole_flow=flow[1],
         width=scene.stream.width,
         thick={name: float(size) for name, size in ways.items() if np.isfinite(size)},
     )
 
 
-def _flow(recording: Recording) -> tuple[float, float] | None:
-    """Return the flow onto the outgoing belt in t/h, of the slice and of all the width."""
+def flows(recording: Recording) -> tuple[float | None, float | None]:
+    """Return the flow onto the outgoing belt in t/h, of the slice and of all the width.
+
+    Either is None where too few arrive to tell, the second one without ``stream.width`` as well.
+    """
+    if recording.scene.outgoing is None:
+        return None, None
     t = each(recording, "arrival.t")
     order = np.argsort(t, kind="stable")[: int(np.isfinite(t).sum())]
     if len(order) < FLOW:
-        return None
+        return None, None
     first, last = (int(share * (len(order) - 1)) for share in (0.25, 0.75))
     span = float(t[order[last]] - t[order[first]])
     if not span > 0.0:
-        return None
+        return None, None
     mass = np.broadcast_to(recording.particle.mass, recording.count)
     middle = order[first + 1 : last + 1]
     slices = _slices(recording.scene)[recording.machine.releases.stream[middle]]
     brought = mass[middle]
-    return 3.6 * float(brought.sum()) / span, 3.6 * float((brought * slices).sum()) / span
+    whole = 3.6 * float((brought * slices).sum()) / span
+    return 3.6 * float(
+        brought.sum()
+    ) / span, None if recording.scene.stream.width is None else whole
 
 
 def _slices(scene: Scene) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from math import hypot, sqrt
 from typing import Annotated, Any, Final, Self
 
@@ -201,7 +202,11 @@ class Scene(Table):
         kind) says, then the material, then the default. Of two kinds that nothing is said of it is
         the geometric mean of what each has with itself, a mixing rule that is as good as any.
         """
-        tables = {name: self.surface_table(name) for name in ("incoming", "plate", "outgoing")}
+        tables: dict[str, Any] = {
+            "incoming": self.incoming,
+            "plate": self.plate,
+            "outgoing": self.outgoing,
+        }
         tables |= {str(free.name): free for free in self.free}
         pairs: dict[frozenset[str | None], dict[str, float]] = {}
         for pair in self.pair:
@@ -210,38 +215,38 @@ class Scene(Table):
             # The first one counts.
             names = frozenset(pair.between)
             pairs[names] = told | pairs.get(names, {})
+        # A function in a function that calls itself would only be freed by the garbage collector.
+        return partial(self._met, tables, pairs, {})
 
-        known: dict[tuple[int, int | str], tuple[float, float]] = {}
-
-        def met(kind: int, other: int | str) -> tuple[float, float]:
-            if (kind, other) not in known:
-                known[kind, other] = found(kind, other)
+    def _met(
+        self, tables: Mapping[str, Any], pairs: Mapping[frozenset[str | None], dict[str, float]],
+        known: dict[tuple[int, int | str], tuple[float, float]], kind: int, other: int | str,
+    ) -> tuple[float, float]:  # fmt: skip
+        if (kind, other) in known:
             return known[kind, other]
-
-        def found(kind: int, other: int | str) -> tuple[float, float]:
-            particle = self.particles[kind]
-            with_it: str | None
-            if isinstance(other, str):
-                with_it, table = other, tables[other]
-                steel = isinstance(table, Plate) or (
-                    isinstance(table, Surface) and table.material == "steel"
-                )
-                values = self._own(particle, (table,), "_steel" if steel else "_rubber")
-            elif other == kind:
-                with_it, rows = particle.name, zip(self.streams, self.kinds, strict=True)
-                own = [stream for stream, its in rows if its == kind]
-                values = self._own(particle, own or [Stream()])
-            else:
-                with_it = self.particles[other].name
-                both = zip(met(kind, kind), met(other, other), strict=True)
-                products: list[Any] = [a * b for a, b in both]
-                # A power of a half is no square root to the last bit.
-                values = tuple(sqrt(p) if isinstance(p, float) else p**0.5 for p in products)
-            restitution, friction = values
-            said = pairs.get(frozenset((particle.name, with_it)), {})
-            return said.get("restitution", restitution), said.get("friction", friction)
-
-        return met
+        particle = self.particles[kind]
+        with_it: str | None
+        if isinstance(other, str):
+            with_it, table = other, tables[other]
+            steel = isinstance(table, Plate) or (
+                isinstance(table, Surface) and table.material == "steel"
+            )
+            values = self._own(particle, (table,), "_steel" if steel else "_rubber")
+        elif other == kind:
+            with_it, rows = particle.name, zip(self.streams, self.kinds, strict=True)
+            own = [stream for stream, its in rows if its == kind]
+            values = self._own(particle, own or [Stream()])
+        else:
+            with_it = self.particles[other].name
+            mine, theirs = (self._met(tables, pairs, known, k, k) for k in (kind, other))
+            products: list[Any] = [a * b for a, b in zip(mine, theirs, strict=True)]
+            # A power of a half is no square root to the last bit.
+            values = tuple(sqrt(p) if isinstance(p, float) else p**0.5 for p in products)
+        restitution, friction = values
+        said = pairs.get(frozenset((particle.name, with_it)), {}) if pairs else {}
+        found = said.get("restitution", restitution), said.get("friction", friction)
+        known[kind, other] = found
+        return found
 
     def _own(self, particle: Particle, homes: Sequence[Any], column: str = "") -> Any:
         """Return what tables say, else the material, else the default of the first."""
@@ -263,13 +268,6 @@ class Scene(Table):
             return None
         own = {material.name: material for material in self.material}
         return own.get(particle.material) or PRESETS[particle.material].material
-
-    def surface_table(self, name: str) -> Incoming | Plate | Outgoing | Conveyor | Surface:
-        """Return the table that a surface is from, by its name."""
-        if name in ("incoming", "plate", "outgoing"):
-            table: Incoming | Plate | Outgoing = getattr(self, name)
-            return table
-        return next(free for free in self.free if free.name == name)
 
     @property
     def free(self) -> tuple[Plate | Conveyor | Surface, ...]:

@@ -11,7 +11,7 @@ from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import layers
-from chutelab.results.stream import QUANTILES, crowd, envelopes
+from chutelab.results.stream import QUANTILES, envelopes, flows
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import number
 
@@ -90,12 +90,10 @@ def draw_flow(ax: Axes, recording: Recording) -> Axes:
             count = np.append(np.arange(len(times) + 1), len(times))
             (steps,) = ax.step(clock, count, where="post", color=color, lw=1.6, gid=name)
             steps.set_label(f"{name} {len(times):,}")
-    told = crowd(recording)
-    if told is not None and told.flow is not None:
-        flow, of = told.flow, ", of the slice"
-        if told.whole_flow is not None:
-            flow, of = told.whole_flow, ""
-        style.note(ax, f"{number(flow)} t/h arrive{of}")
+    flow, whole = flows(recording)
+    if flow is not None:
+        said = f"{number(flow)} t/h arrive, of the slice"
+        style.note(ax, said if whole is None else f"{number(whole)} t/h arrive")
     ax.set(xlim=ends if ends[1] > ends[0] else None, ylim=(0.0, 1.08 * recording.count))
     ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)
     return ax

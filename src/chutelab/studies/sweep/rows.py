@@ -301,11 +301,14 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
     ways = np.full((recording.count, LONGEST + 1), -1)
     near = place <= LONGEST
     ways[who[near], place[near]] = surface[near]
-    # Rows of a table are compared column by column: `np.unique` of rows takes ten times as long.
-    taken, example = np.zeros(recording.count, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    # A way as one number: `np.unique` of rows takes ten times as long.
+    taken, kinds, some = np.zeros(recording.count, dtype=np.int64), 1, len(recording.surfaces) + 1
     for met in ways.T[: place.max(initial=-1) + 1]:
-        numbers = taken * (len(recording.surfaces) + 1) + met + 1
-        _, example, taken = np.unique(numbers, return_index=True, return_inverse=True)
+        if kinds * some > np.iinfo(np.int64).max:
+            found, taken = np.unique(taken, return_inverse=True)
+            kinds = len(found)
+        taken, kinds = taken * some + met + 1, kinds * some
+    _, example, taken = np.unique(taken, return_index=True, return_inverse=True)
     every = [[recording.surfaces[k] for k in way if k >= 0] for way in ways[example].tolist()]
     names = np.array(list(map(_named, every)), dtype=object)
     if recording.count == variants:

@@ -24,15 +24,11 @@ ONCE = (
 """Seeds on which the contact engine broke a law: pieces in one place, wedges, hollows hardly wider
 than the disk."""
 
-APART = {
-    **dict.fromkeys(
-        (797, 1532, 1727),
-        "where a joint is typed a part of a micron off, contact leaves it faster or slower, the"
-        " more so the finer its steps",
-    ),
-    1690: "where a face at rest goes on from an arc that drives it, contact holds it at the joint,"
-    " though friction cannot: 2.4 of the load is less than tan 70°",
-}
+APART = dict.fromkeys(
+    (797, 1532, 1727),
+    "where a joint is typed a part of a micron off, contact leaves it faster or slower, the more so"
+    " the finer its steps",
+)
 """Seeds on which the contact engine does not come to be where the exact one is, and why."""
 
 NUDGE, FAR = 1e-9, 1e-6

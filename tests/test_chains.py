@@ -24,11 +24,14 @@ ONCE = (
 """Seeds on which the contact engine broke a law: pieces in one place, wedges, hollows hardly wider
 than the disk."""
 
-APART = dict.fromkeys(
-    (797, 1532, 1727),
-    "where a joint is typed a part of a micron off, contact leaves it faster or slower, the more so"
-    " the finer its steps",
-)
+APART = {
+    **dict.fromkeys(
+        (797, 1532, 1727, 2371),
+        "where a joint is typed a part of a micron off, contact leaves it faster or slower, the"
+        " more so the finer its steps",
+    ),
+    2869: "of two straight pieces on one line, of different friction, contact takes both in turn",
+}
 """Seeds on which the contact engine does not come to be where the exact one is, and why."""
 
 NUDGE, FAR = 1e-9, 1e-6

@@ -26,12 +26,11 @@ than the disk."""
 
 APART = {
     **dict.fromkeys(
-        (797, 1532, 1727),
+        (797, 1532, 1727, 2371),
         "where a joint is typed a part of a micron off, contact leaves it faster or slower, the"
         " more so the finer its steps",
     ),
-    1690: "where a face at rest goes on from an arc that drives it, contact holds it at the joint,"
-    " though friction cannot: 2.4 of the load is less than tan 70°",
+    2869: "of two straight pieces on one line, of different friction, contact takes both in turn",
 }
 """Seeds on which the contact engine does not come to be where the exact one is, and why."""
 

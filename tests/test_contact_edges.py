@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from chutelab.engines import contact, exact
 from chutelab.engines.contact import run
 from chutelab.results import Kind
 from machines import bent, face, scene_of, thrown
@@ -221,3 +222,30 @@ def test_a_disk_squeezes_through_the_gap_of_a_ring_and_feels_both_ends(share, as
         ])  # fmt: skip
         assert np.hypot(*(way[:, None] - ends).transpose(2, 0, 1)).min() > 0.999 * R
         assert np.hypot(*way[-1]) < ring - 0.999 * R
+
+
+@pytest.mark.parametrize("engine", [contact, exact])
+@pytest.mark.parametrize("seed", range(12))
+def test_a_corner_is_of_the_first_piece_that_ends_there(engine, seed):
+    """Onto the top where two hollow belts meet: it leaves as fast along as the first of them runs.
+
+    Where a piece ends is rounded for each by itself; that does not decide.
+    """
+    draw = np.random.default_rng(seed)
+    x, y, *sizes = draw.uniform(0.2, 1.0, 4)
+    arcs = [
+        {"center": (x - size * cos(at), y - size * sin(at)), "radius": size, "begin": begin,
+         "extent": radians(50.0), "friction": 10.0, "restitution": 0.5}
+        for at, begin, size in zip(
+            np.radians([220.0, 320.0]), np.radians([220.0, 270.0]), sizes, strict=True
+        )
+    ][:: 1 - 2 * (seed % 2)]  # fmt: skip
+    machine = scene_of(
+        particle={"radius": 0.02, "spin": False},
+        surface=[FAR],
+        stream={"at": [x, y + 0.1]},
+        run={"until": 0.2},
+    )
+    roof = [arc | {"speed": 0.5 + n} for n, arc in enumerate(arcs)]
+    hit = engine.run(bent(machine, *roof)).select(Kind.IMPACT)[0]
+    assert abs(hit["velocity_after"][0]) == pytest.approx(0.5, rel=1e-9)

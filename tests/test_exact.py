@@ -506,6 +506,48 @@ def test_a_disk_that_cannot_slip_leaves_where_rolling_says():
     assert angle == pytest.approx(degrees(acos((3.0 * u0 + 4.0) / 7.0)), abs=1e-4)
 
 
+def test_what_a_wall_stops_on_a_belt_without_slip_is_rolling_at_once():
+    """A blow across the way turns the pace w into -ε w and makes no slip's normal impulse.
+
+    Adhesion stops the slip -(1 + ε) w all the same, for a disk by (1 + ε) w/3 of its pace. Before
+    it rolls down from 0.1 to 0.3 rad: w² = v² + 4/3 g ρ (cos 0.1 - cos 0.3).
+    """
+    v, wheel, r, restitution = 1.0, 0.5, 0.004, 0.9
+    ride = wheel + r
+
+    def out(angle):
+        return np.array([sin(angle), cos(angle)])
+
+    foot = (wheel + 0.001) * out(0.3) + r * out(0.3 + np.pi / 2.0)
+    top = foot + 5.0 * r * out(0.3)
+    recording = run(
+        {
+            "gravity": G,
+            "particle": {"radius": r, "spin": True},
+            "incoming": {"speed": v, "pulley_radius": wheel, "friction": "adhesion"},
+            "surface": [
+                {"name": "wall", "from": foot.tolist(), "to": top.tolist(),
+                 "friction": 0.0, "restitution": restitution},
+            ],
+            "stream": {
+                "at": (ride * out(0.1)).tolist(),
+                "velocity": (v * out(0.1 + np.pi / 2.0)).tolist(),
+            },
+            "run": {"until": 0.5},
+        }
+    )  # fmt: skip
+    w = sqrt(v**2 + 4.0 / 3.0 * G * ride * (cos(0.1) - cos(0.3)))
+    hit = recording.select(Kind.IMPACT, surface="wall")[0]
+    after = recording.events[recording.events["t"] == hit["t"]][-1]
+    along = out(0.3 + np.pi / 2.0)
+    assert hit["velocity_before"] @ along == pytest.approx(w, rel=1e-12)
+    assert hit["velocity_after"] @ along == pytest.approx(-restitution * w, rel=1e-12)
+    pace = -restitution * w + (1.0 + restitution) * w / 3.0
+    assert after["velocity_after"] @ along == pytest.approx(pace, rel=1e-12)
+    assert after["omega_after"] * r == pytest.approx(v - pace, rel=1e-12)
+    assert ledger(recording).relative_residual < 1e-13
+
+
 def test_knots_on_the_pulley_are_close_enough_for_the_curve_between_them():
     recording = conveyor(speed=2.0, friction="adhesion")
     _, _, event = separation_of(recording)

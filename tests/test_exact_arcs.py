@@ -238,6 +238,18 @@ def test_round_the_whole_loop_the_angle_goes_on():
     assert hypot(*left["velocity_after"]) ** 2 == pytest.approx(36.0 - 2.0 * G * height, rel=1e-12)
 
 
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_without_friction_and_gravity_it_goes_round_a_ring_as_often_as_there_is_time(way):
+    """θ = v t/L, here for 160 turns."""
+    length, speed = 0.08, 4.0
+    until = 160.2 * 2.0 * pi * length / speed
+    built = at([0.0, -length], [way * speed, 0.0], until=until, gravity=0.0)
+    end = exact.run(bent(built, bowl(0.1, extent=2.0 * pi))).track(0)[-1]
+    angle = way * 0.2 * 2.0 * pi
+    place = [length * sin(angle), -length * cos(angle)]
+    np.testing.assert_allclose(end["position"], place, rtol=0, atol=1e-10)
+
+
 @pytest.mark.parametrize("aim", [-1.0, -0.4, 0.2, 0.9])
 def test_a_blow_on_either_side_is_newtons_and_coulombs(aim):
     """Shot from the centre and from far outside without gravity, on a rim that runs clockwise."""

@@ -365,10 +365,11 @@ def _gauges(c: Circle, series: Floats) -> Floats:
     gauges[:, 2] = np.where(limited, grip + force, 0.0)
     gauges[:, 3] = c.slip * (w + z)
     gauges[0, 3] -= c.slip * c.belt
-    gauges[:, 4] = phi
-    gauges[:, 5] = -phi
-    gauges[0, 4] -= np.where(np.isfinite(c.low), c.low, -1e3)
-    gauges[0, 5] += np.where(np.isfinite(c.high), c.high, 1e3)
+    for n, way, end in ((4, 1.0, c.low), (5, -1.0, c.high)):
+        # Round a circle that does not end it may go however often.
+        ends = np.isfinite(end)
+        gauges[:, n] = np.where(ends, way * phi, 0.0)
+        gauges[0, n] -= np.where(ends, way * end, -1.0)
     if c.rolling is not None and c.roll is not None and c.turn is not None:
         gauges[:, 6] = c.roll * z
         gauges[0, 6] -= c.roll * c.turn

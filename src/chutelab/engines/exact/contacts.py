@@ -139,6 +139,13 @@ def settle_law(s: State, index: Ints) -> None:
     arc = s.mode[index] == Mode.ARC
     w = dot(s.v.take(index, axis=1), c.tangent)
     slip = s.slip_of(index, c, w)
+    drags = index[np.isinf(c.friction) & (slip != 0.0)]
+    if len(drags):
+        # Friction without bound stops a slip without a normal impulse.
+        none = np.zeros(len(drags))
+        _blow(s, drags, s.contact(drags), s.v.take(drags, axis=1), none, none, None)
+        w = dot(s.v.take(index, axis=1), c.tangent)
+        slip = s.slip_of(index, c, w)
     still = slip == 0.0
     halted = index[still]
     if len(halted):
@@ -222,7 +229,7 @@ def face_force(s: State, index: Ints, c: Contact) -> tuple[Floats, Floats, Float
     pull, load = s.weight_along(index, c.normal), s.weight_on(index, c.normal)
     slip = s.slip[index]
     gripping = slip == 0.0
-    finite = np.where(np.isinf(c.friction) | gripping, 0.0, c.friction)
+    finite = np.where(gripping, 0.0, c.friction)
     couple, tends, share = np.zeros(len(index)), pull, s.share[index]
     if s.rolls:
         held = (s.rolling[index] > 0.0) & (s.roll[index] == 0.0)

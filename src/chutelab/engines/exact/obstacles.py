@@ -234,9 +234,6 @@ JOINT = 1e-12
 TOUCH_ULPS = 256.0
 """Rounding of a coordinate, in units of the last place of the scene's size: closer is touching."""
 
-GIVEN_ULPS = 1.0
-"""The same of a coordinate in the scene file, for one far from the origin."""
-
 NEVER = np.empty(0)
 """Changes of a machine without gates."""
 
@@ -474,7 +471,7 @@ def size_of(corners: Floats, bends: Bends, places: Floats) -> Floats:
 def touch_of(size: Floats, far: float = 0.0) -> Floats:
     """Return `Obstacles.touch` of a scene of a size, counted from a point that far away, m."""
     # Far away the scene's own numbers are rounded, each by half a last place.
-    return float_info.epsilon * (TOUCH_ULPS * size + GIVEN_ULPS * far)
+    return float_info.epsilon * (TOUCH_ULPS * size + far)
 
 
 def _vectors(array: Floats) -> Floats:

@@ -285,13 +285,11 @@ class World:
         self.hair = max(HAIR * r, 4.0 * self.rounding)
         self.tiny, self.pace = max(TINY, self.rounding / r), float(machine.pace)
         self.by_shape: dict[pymunk.Shape, Face] = {}
-        for n, (start, end) in enumerate(
-            zip(parts.start.tolist(), parts.end.tolist(), strict=True)
-        ):
+        ways = parts.start.tolist(), parts.end.tolist(), parts.tangent.tolist()
+        for n, (start, end, tangent) in enumerate(zip(*ways, strict=True)):
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
-            about = self._about(parts, n)
-            tangent = Vec2d(*parts.tangent[n].tolist())
-            self._add(Face(pymunk.Segment(still, start, end, 0.0), tangent=tangent, **about))
+            shape = pymunk.Segment(still, start, end, 0.0)
+            self._add(Face(shape, tangent=Vec2d(*tangent), **self._about(parts, n)))
         if wheel is not None:
             turning = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             turning.angular_velocity = -wheel.speed / wheel.radius
@@ -329,7 +327,6 @@ class World:
         radius, begin, extent = (
             float(values[n]) for values in (arcs.radius, arcs.begin, arcs.extent)
         )
-        whole = extent >= 2.0 * pi
         body = pymunk.Body(body_type=pymunk.Body.STATIC)
         body.position = center
         # A shape that is not in the Space does not keep its body.
@@ -340,7 +337,7 @@ class World:
         base.position = center  # feet in one place would be pairs, each with each, in every step
         foot = pymunk.Circle(base, 0.0)
         about["spin"] = -about["speed"] / radius
-        if whole:
+        if extent >= 2.0 * pi:
             self._add(Bend(circle, tangent=None, foot=foot, begin=0.0, extent=inf, **about))
             return
         outs = [

@@ -121,6 +121,23 @@ static int mate_of(int k, int end, double r) {
     return -1;
 }
 
+/* Ends in one place but for rounding are one point, of the first piece that ends there. */
+static void share_ends(int k, double near) {
+    Surface *s = W.surfaces + k;
+    if (s->shape == CIRCLE) return;
+    for (int m = 0; m < k; m++) {
+        const Surface *first = W.surfaces + m;
+        if (first->shape == CIRCLE) continue;
+        for (int n = 0; n < 4; n++) {
+            double *end = s->end + (n & 2);
+            const double *other = first->end + 2 * (n & 1);
+            if (fabs(end[0] - other[0]) > near || fabs(end[1] - other[1]) > near) continue;
+            end[0] = other[0];
+            end[1] = other[1];
+        }
+    }
+}
+
 /* The host has laid out the arrays and filled in what is marked [in]: fill in what follows. */
 __attribute__((visibility("default"))) void prepare(void) {
     double least = INFINITY, most = 0, s = sin(W.ride_incline), c = cos(W.ride_incline);
@@ -139,6 +156,7 @@ __attribute__((visibility("default"))) void prepare(void) {
     for (int k = 0; k < W.surface_count; k++) {
         Surface *piece = W.surfaces + k;
         derive(piece);
+        share_ends(k, TOUCHING * least);
         piece->gate = piece->opens > -INFINITY || piece->closes < INFINITY ? W.gate_count++ : -1;
         W.everything[k] = k;
     }

@@ -37,6 +37,10 @@ the heaviest mass."""
 SMOOTH = 1e-4
 """m/s on Earth, see `Machine.pace`: what a track of the contact engine in a crowd may leave out."""
 
+BULGE = 1e-5
+"""Share of the radius by which the cubic between two knots of the contact engine's tracks may be off
+the way of a particle by itself: it writes a knot where it would be more."""
+
 A_CONTACT = 2.0
 """eps that one contact may move an energy by: half an ulp for each of two velocity components, a
 height and a sum."""
@@ -383,7 +387,8 @@ class Evidence:
     @cached_property
     def allowed(self) -> float:
         """How deep a disk may be in a surface, m: by rounding, the curve between knots, a step."""
-        return self.rounding + self.arcs + self.late
+        bulge = BULGE * self.radius if self.engine == "contact" and not self.crowd else 0.0
+        return self.rounding + self.arcs + self.late + bulge
 
     @cached_property
     def limit_of(self) -> Any:

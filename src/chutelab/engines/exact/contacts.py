@@ -318,7 +318,8 @@ def _stop_jammed(
     """Stop particles that go to and fro between two obstacles without progress; tell which."""
     if not (s.idling or s.crawling or np.count_nonzero(rebound <= 2.0 * CRAWL * s.pace[index])):
         return None
-    slow = length_of(s.v.take(index, axis=1)) <= CRAWL * s.pace[index]
+    speed = length_of(s.v.take(index, axis=1))
+    slow = speed <= CRAWL * s.pace[index]
     if not (s.idling or s.crawling or np.count_nonzero(slow)):
         return None
     before, before_side = _touched_before(s, index)
@@ -326,6 +327,8 @@ def _stop_jammed(
     s.crawls[index] = np.where(slow, s.crawls[index] + between, 0)
     s.crawling = bool(s.crawls.any())
     jammed = between & ((s.idle[index] > COLLAPSE) | (s.crawls[index] > COLLAPSE))
+    # What has crawled to and fro until it counts as at rest is so: on an arc it would ride from there.
+    jammed |= between & (s.crawls[index] > 2) & (speed <= REST * s.pace[index])
     if not np.count_nonzero(jammed):
         return None
     # Faces that lie on each other make no corner.

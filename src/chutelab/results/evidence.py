@@ -38,8 +38,8 @@ SMOOTH = 1e-4
 """m/s on Earth, see `Machine.pace`: what a track of the contact engine in a crowd may leave out."""
 
 BULGE = 1e-5
-"""Share of the radius by which the cubic between two knots of the contact engine's tracks may be off
-the way of a particle by itself: it writes a knot where it would be more."""
+"""Share of the radius by which the cubic between two knots may be off the way of a particle by
+itself with the contact engine, which writes a knot where it would be more."""
 
 A_CONTACT = 2.0
 """eps that one contact may move an energy by: half an ulp for each of two velocity components, a
@@ -329,7 +329,7 @@ class Evidence:
         """
         if not self.crowd or self.engine != "contact":
             return 0.0
-        return float(self.masses.sum()) * self.speed * SMOOTH * self.machine.pace
+        return float(self.masses.sum() * self.speed * SMOOTH * self.machine.pace)
 
     def opened(self, times: Floats) -> Floats:
         """Return the energy that parting overlaps may give in the steps at times (T,), J.

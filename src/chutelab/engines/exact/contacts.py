@@ -327,7 +327,7 @@ def _stop_jammed(
     s.crawls[index] = np.where(slow, s.crawls[index] + between, 0)
     s.crawling = bool(s.crawls.any())
     jammed = between & ((s.idle[index] > COLLAPSE) | (s.crawls[index] > COLLAPSE))
-    # What has crawled to and fro until it counts as at rest is so: on an arc it would ride from there.
+    # What has crawled until it counts as at rest is so: on an arc it would ride from there.
     jammed |= between & (s.crawls[index] > 2) & (speed <= REST * s.pace[index])
     if not np.count_nonzero(jammed):
         return None

@@ -175,6 +175,41 @@ def test_a_crowd_that_makes_energy_is_seen(engine):
     assert laws.LOSSES in both
 
 
+@pytest.mark.parametrize(("share", "seen"), [(0.9, False), (1.1, True)])
+def test_overlaps_give_back_what_parting_them_may(share, seen):
+    """Two disks overlap by 2 %: (p d / h)² M / 0.012, p d = (2/3) (0.02 - 0.001) r, at most 1 %."""
+    rows = [{"at": [x, 0.0], "velocity": [0.0, 0.0], "interact": True} for x in (0.0, 0.5)]
+    tables = {"gravity": 0.0, "particle": {"radius": 0.01, "mass": 0.01},
+              "stream": [{"name": f"one-{n}", **row} for n, row in enumerate(rows)],
+              "run": {"until": 0.5, "dt": 1e-3}}  # fmt: skip
+    part = min(2.0 / 3.0 * (0.02 - 0.001), 0.01) * 0.01 / 1e-3
+
+    def give(knots):
+        knots["position"][:, 0] = np.repeat([0.0, 0.0198], len(knots) // 2)
+        knots["entries"][-1, 1] -= share * part**2 * 0.01 / 0.012
+
+    found = names(spoilt(recorded(tables, "contact"), knots=give))
+    assert (laws.LOSSES in found) == seen
+
+
+@pytest.mark.parametrize(("shuts", "seen"), [(0.5, False), (0.7, True)])
+def test_what_lies_in_a_gate_a_little_as_it_shuts_is_spared(shuts, seen):
+    """A disk is 3 % of its radius deep where the gate shuts, and goes on; or it comes later."""
+    gate = {**surface("gate", (-1.0, 0.0), (1.0, 0.0)), "opens_at": 0.0, "closes_at": shuts}
+    tables = {"gravity": 0.0, "surface": [gate],
+              "stream": {"at": [0.0, 0.0597], "velocity": [0.0, -0.1], "interact": True},
+              "run": {"until": 1.5}}  # fmt: skip
+
+    def through(knots):
+        t = knots["t"]
+        down = 0.0597 - 0.1 * t
+        knots["position"][:, 1] = down if not seen else down + 0.021
+        knots["velocity"][:, 1] = -0.1
+
+    found = names(spoilt(recorded(tables, "contact"), knots=through))
+    assert (laws.THROUGH in found) == seen
+
+
 def test_a_loss_of_a_surface_that_is_negative_is_told_with_its_name():
     def give(books):
         books[0, 1] = -1e-9

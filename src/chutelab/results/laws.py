@@ -173,14 +173,17 @@ def _books(e: Evidence) -> Iterator[Broken]:
     Of lone particles what is unexplained may not change from knot to knot; particles that meet give
     energy to each other, so of them it is the sum of all at some times, and what the solves of the
     contact engine gained. Losses that are booked are never less than before but by what parting
-    overlaps gives: where many do so at one instant, those that overlap there.
+    overlaps gives: where many do so at one instant, those that overlap there. Where the contact
+    engine holds a particle by itself in a nip, impulses of any size hold each other, and along
+    normals seems to be given what friction takes: only the sum is known.
     """
     recording, gain, within = e.recording, e.gain, e.within
     bound = e.energy_bound * e.energy
     booked, most = e.columns[7:], bound + e.parted
     losses = booked[:, 1:] - booked[:, :-1]
     if losses.min(initial=0.0) < -most:
-        back = np.where(within, losses, 0.0).min(axis=0)
+        together = e.engine == "contact" and not e.crowd
+        back = np.where(within, losses.sum(axis=0) if together else losses.min(axis=0), 0.0)
         rows = (back < -most).nonzero()[0]
         rows, least = _beyond_overlaps(e, rows, back[rows], most)
         if len(rows):

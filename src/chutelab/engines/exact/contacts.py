@@ -139,6 +139,15 @@ def settle_law(s: State, index: Ints) -> None:
     arc = s.mode[index] == Mode.ARC
     w = dot(s.v.take(index, axis=1), c.tangent)
     slip = s.slip_of(index, c, w)
+    endless = (slip != 0.0) & np.isinf(c.friction) & arc
+    if endless.any():
+        # A push from elsewhere made it slip: friction without bound takes that at once.
+        held, drag = index[endless], -(s.share[index] * slip)[endless]
+        w[endless] += drag
+        s.z[held] += s.lever[held] * drag
+        work, heat = drag * c.belt[endless], -0.5 * drag * slip[endless]
+        s.book(held, c.surface[endless], s.mass[held] * work, 0.0, s.mass[held] * heat)
+        slip[endless] = 0.0
     still = slip == 0.0
     halted = index[still]
     if len(halted):
@@ -318,8 +327,7 @@ def _stop_jammed(
     """Stop particles that go to and fro between two obstacles without progress; tell which."""
     if not (s.idling or s.crawling or np.count_nonzero(rebound <= 2.0 * CRAWL * s.pace[index])):
         return None
-    speed = length_of(s.v.take(index, axis=1))
-    slow = speed <= CRAWL * s.pace[index]
+    slow = length_of(s.v.take(index, axis=1)) <= CRAWL * s.pace[index]
     if not (s.idling or s.crawling or np.count_nonzero(slow)):
         return None
     before, before_side = _touched_before(s, index)
@@ -327,8 +335,6 @@ def _stop_jammed(
     s.crawls[index] = np.where(slow, s.crawls[index] + between, 0)
     s.crawling = bool(s.crawls.any())
     jammed = between & ((s.idle[index] > COLLAPSE) | (s.crawls[index] > COLLAPSE))
-    # What has crawled until it counts as at rest is so: on an arc it would ride from there.
-    jammed |= between & (s.crawls[index] > 2) & (speed <= REST * s.pace[index])
     if not np.count_nonzero(jammed):
         return None
     # Faces that lie on each other make no corner.

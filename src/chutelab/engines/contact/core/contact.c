@@ -106,8 +106,8 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
     given[1] = given[2] = 0;
 }
 
-/* Share what is lost in contacts that were solved together: only the sum is known. In a chain wedged
-   between walls, or a disk by itself in a nip, impulses of any size hold each other; where one of its gaps opens and another
+/* Share what is lost in contacts that were solved together: of a crowd only the sum is known. In a chain
+   wedged between walls impulses of any size hold each other; where one of its gaps opens and another
    closes, one seems to give what the other takes. So where the sum is a loss those that gain
    gain nothing and the others lose so much less; where it is a gain, the other way round. */
 static void pool(Contact *list, int count, int later) {
@@ -136,7 +136,7 @@ void account(Contact *list, int count) {
         share_out(c, u, v, W.before, c->later, given);
         c->given[1] = given[0];
     }
-    if (!W.interact && count < 2) return;
+    if (!W.interact) return;
     pool(list, count, 0);
     pool(list, count, 1);
 }

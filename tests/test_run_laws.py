@@ -196,14 +196,13 @@ def test_overlaps_give_back_what_parting_them_may(share, seen):
 def test_what_lies_in_a_gate_a_little_as_it_shuts_is_spared(shuts, seen):
     """A disk is 3 % of its radius deep where the gate shuts, and goes on; or it comes later."""
     gate = {**surface("gate", (-1.0, 0.0), (1.0, 0.0)), "opens_at": 0.0, "closes_at": shuts}
-    tables = {"gravity": 0.0, "surface": [gate],
-              "stream": {"at": [0.0, 0.0597], "velocity": [0.0, -0.1], "interact": True},
-              "run": {"until": 1.5}}  # fmt: skip
+    one = {"name": "one", "at": [0.0, 0.0597], "velocity": [0.0, -0.1], "interact": True}
+    tables = {"gravity": 0.0, "surface": [gate], "run": {"until": 1.5},
+              "stream": [one, {**one, "name": "other", "at": [0.5, 0.0597]}]}  # fmt: skip
+    late = 0.021 if seen else 0.0
 
     def through(knots):
-        t = knots["t"]
-        down = 0.0597 - 0.1 * t
-        knots["position"][:, 1] = down if not seen else down + 0.021
+        knots["position"][:, 1] = late + 0.0597 - 0.1 * knots["t"]
         knots["velocity"][:, 1] = -0.1
 
     found = names(spoilt(recorded(tables, "contact"), knots=through))

@@ -175,6 +175,40 @@ def test_a_crowd_that_makes_energy_is_seen(engine):
     assert laws.LOSSES in both
 
 
+@pytest.mark.parametrize(("share", "seen"), [(0.9, False), (1.1, True)])
+def test_overlaps_give_back_what_parting_them_may(share, seen):
+    """Two disks overlap by 2 %: (p d / h)² M / 0.012, p d = (2/3) (0.02 - 0.001) r, at most 1 %."""
+    rows = [{"at": [x, 0.0], "velocity": [0.0, 0.0], "interact": True} for x in (0.0, 0.5)]
+    tables = {"gravity": 0.0, "particle": {"radius": 0.01, "mass": 0.01},
+              "stream": [{"name": f"one-{n}", **row} for n, row in enumerate(rows)],
+              "run": {"until": 0.5, "dt": 1e-3}}  # fmt: skip
+    part = min(2.0 / 3.0 * (0.02 - 0.001), 0.01) * 0.01 / 1e-3
+
+    def give(knots):
+        knots["position"][:, 0] = np.repeat([0.0, 0.0198], len(knots) // 2)
+        knots["entries"][-1, 1] -= share * part**2 * 0.01 / 0.012
+
+    found = names(spoilt(recorded(tables, "contact"), knots=give))
+    assert (laws.LOSSES in found) == seen
+
+
+@pytest.mark.parametrize(("shuts", "seen"), [(0.5, False), (0.7, True)])
+def test_what_lies_in_a_gate_a_little_as_it_shuts_is_spared(shuts, seen):
+    """A disk is 3 % of its radius deep where the gate shuts, and goes on; or it comes later."""
+    gate = {**surface("gate", (-1.0, 0.0), (1.0, 0.0)), "opens_at": 0.0, "closes_at": shuts}
+    one = {"name": "one", "at": [0.0, 0.0597], "velocity": [0.0, -0.1], "interact": True}
+    tables = {"gravity": 0.0, "surface": [gate], "run": {"until": 1.5},
+              "stream": [one, {**one, "name": "other", "at": [0.5, 0.0597]}]}  # fmt: skip
+    late = 0.021 if seen else 0.0
+
+    def through(knots):
+        knots["position"][:, 1] = late + 0.0597 - 0.1 * knots["t"]
+        knots["velocity"][:, 1] = -0.1
+
+    found = names(spoilt(recorded(tables, "contact"), knots=through))
+    assert (laws.THROUGH in found) == seen
+
+
 def test_a_loss_of_a_surface_that_is_negative_is_told_with_its_name():
     def give(books):
         books[0, 1] = -1e-9
@@ -363,11 +397,25 @@ def test_what_is_proven_clear_is_clear(seed):
         assert run is not whole or not hits(e)
 
 
+def in_steps(tables):
+    """Return a machine whose crowd Chipmunk can follow: its fastest go 0.9 of the least radius.
+
+    From the highest release to the end of all tracks, 1 m below the lowest surface, a free fall has
+    v² = v0² + 2 g h; belts give what they have.
+    """
+    m = build(scene.from_dict(tables))
+    y, v0 = m.releases.position[:, 1], np.hypot(*m.releases.velocity.T).max()
+    low = min(m.corners[:, 1].min(initial=np.inf), y.min()) - 1.0
+    belts = np.abs(np.concatenate([m.segments.speed, m.arcs.speed])).max(initial=0.0)
+    v = max(hypot(v0, (2.0 * m.gravity * (y.max() - low)) ** 0.5), belts)
+    return replace(m, dt=min(m.dt, 0.9 * float(np.min(m.particle.radius)) / v))
+
+
 LONE = "exact", "contact", "pymunk"
 SOUND = {
     "sandbox, apart": (220, lambda n: build(sandbox.draw(2 * n)), ("exact", "contact")),
     "sandbox, meeting": (120, lambda n: build(sandbox.draw(2 * n + 1)), ("contact",)),
-    "sandbox, Pymunk": (20, lambda n: build(sandbox.draw(2 * n + 1)), ("pymunk",)),
+    "sandbox, Pymunk": (20, lambda n: in_steps(sandbox.tables(2 * n + 1)), ("pymunk",)),
     "chains and bowls": (60, lambda n: build(chains.draw(n)), LONE),
     "all of a scene file": (40, lambda n: build(drawn.draw(n, points=False)), LONE),
     "crowds of all sizes": (20, lambda n: crowds.crowd(n, count=40)[1], ("contact",)),
@@ -375,9 +423,14 @@ SOUND = {
 }
 """How many sound machines of each generator, 500 in all, and the engines that they run on."""
 
+MADE = "Chipmunk makes 0.1 % of the energy turned over in one step where a heap is struck at g = 0"
+
+WRONG = {("sandbox, Pymunk", 14): MADE}
+"""Runs that are wrong, and say so, and why: at 1, 0.4 and 0.2 ms; the contact engine's is not."""
+
 
 def alarms(name, seeds):
-    """Return what is told of random sound machines, of those that the engines before do not refuse.
+    """Return what is told of random sound machines, by each engine that does not refuse.
 
     The exact engine refuses disks that get gripped in a nip: rigid bodies have no finite impulse
     there. A run that says that it is stuck says that it is not right.
@@ -386,8 +439,8 @@ def alarms(name, seeds):
     found = []
     for seed in seeds:
         machine = draw(seed)
-        with suppress(SceneError, StalledError):
-            for engine in engines:
+        for engine in engines:
+            with suppress(SceneError, StalledError):
                 run = simulation.follow(machine, engine, None)
                 found += [f"{name} {seed} {engine}: {broken}" for broken in run.laws]
     return found
@@ -404,4 +457,14 @@ def test_random_sound_scenes_raise_no_alarm(name):
     [(name, first) for name, (count, *_) in SOUND.items() for first in range(0, count, 20)],
 )
 def test_five_hundred_random_sound_scenes_raise_no_alarm(name, first):
-    assert alarms(name, range(first, min(first + 20, SOUND[name][0]))) == []
+    seeds = range(first, min(first + 20, SOUND[name][0]))
+    assert alarms(name, [seed for seed in seeds if (name, seed) not in WRONG]) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [pytest.param(*one, marks=pytest.mark.xfail(reason=why)) for one, why in WRONG.items()],
+)
+def test_runs_that_are_wrong_say_so(name, seed):
+    assert alarms(name, [seed]) == []

@@ -458,7 +458,7 @@ def _forgiven(e: Evidence, owner: int, piece: Piece, radius: float, t: Floats) -
     times = np.unique(np.concatenate([t, np.linspace(piece.appears, last, GATED)]))
     ((_, _, left, share),) = blocks(track, np.array([0, len(track)]), times)
     path = np.stack([hermite(track, left, share, axis)[0] for axis in (0, 1)], axis=-1)
-    clear = times[piece.gap(path, np.full(len(path), radius)) >= -e.allowed]
+    clear = times[piece.gap(path, np.full(len(path), radius)) >= 0.0]
     return np.where(t > clear.min(initial=inf), 0.0, inf)
 
 

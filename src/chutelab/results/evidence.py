@@ -27,7 +27,19 @@ PRESSED = 0.05
 what the contact engine promises. A solver that iterates leaves some."""
 
 SLOP = 1e-3
-"""The same that Chipmunk is told to leave alone."""
+"""The same that Chipmunk and the contact engine leave alone."""
+
+PARTS, DEEP, OPENS, GIVES = 0.1, 0.03, 1e-2, 3e-3
+"""How the contact engine parts overlaps in a crowd: which share of one in a step, that of one as
+deep as `DEEP` radii all; by how many radii at most; and how much less for an impulse, in m/s times
+the heaviest mass."""
+
+SMOOTH = 1e-4
+"""m/s on Earth, see `Machine.pace`: what a track of the contact engine in a crowd may leave out."""
+
+BULGE = 1e-5
+"""Share of the radius by which the cubic between two knots may be off the way of a particle by
+itself with the contact engine, which writes a knot where it would be more."""
 
 A_CONTACT = 2.0
 """eps that one contact may move an energy by: half an ulp for each of two velocity components, a
@@ -66,6 +78,18 @@ def _size(values: Floats) -> float:
 
 def _of(value: Any, which: Any) -> Any:
     return value if np.ndim(value) == 0 else value[which]
+
+
+def overlaps(places: Floats, radii: Floats) -> tuple[Floats, Floats]:
+    """Return how deep disks (N, 2), (N,), m, are in each other, (P,), m, and the lesser radii."""
+    order, most = np.argsort(places[:, 0]), float(radii.max(initial=0.0))
+    x = places[order, 0]
+    ahead = np.searchsorted(x, x + 2.0 * most, side="right") - np.arange(1, len(x) + 1)
+    first = np.repeat(np.arange(len(x)), ahead)
+    then = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(ahead) - ahead, ahead)
+    i, j = order[first], order[then]
+    depth = radii[i] + radii[j] - np.hypot(*(places[i] - places[j]).T)
+    return depth[depth > 0.0], np.minimum(radii[i], radii[j])[depth > 0.0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,6 +323,40 @@ class Evidence:
             allowed += 2.0 * float(self.masses.max()) * self.speed * off
         return allowed
 
+    @cached_property
+    def untold(self) -> float:
+        """Energy that a crowd's tracks may leave out between two knots, J.
+
+        m v w, where constant acceleration is as good as the true way but for a velocity w.
+        """
+        if not self.crowd or self.engine != "contact":
+            return 0.0
+        return float(self.masses.sum() * self.speed * SMOOTH * self.machine.pace)
+
+    def opened(self, times: Floats) -> Floats:
+        """Return the energy that parting overlaps may give in the steps at times (T,), J.
+
+        A solve raises the kinetic energy by at most the sum of J a, J the impulse of a contact and
+        a the speed with which it is to open. Of an overlap d that is a = p d / h - c J, a spring's,
+        with c = 0.003 / M: J a is at most (p d / h)² / (4 c). See docs/physics.md.
+        """
+        m, radii, found = self.machine, self.radii, np.zeros(len(times))
+        step = m.dt if m.gravity == 0.0 else min(m.dt, sqrt(8e-3 * float(radii.min()) / m.gravity))
+        for n, x in enumerate(self.recording.at(times)[0]):
+            there = np.isfinite(x[:, 0])
+            both = [overlaps(x[there], radii[there])]
+            both += [
+                (-piece.gap(x[there], radii[there]), radii[there])
+                for piece in self.pieces
+                if piece.there(times[n])
+            ]
+            depth, least = (np.concatenate(some) for some in zip(*both, strict=True))
+            deep = depth / least
+            part = np.minimum(np.maximum(PARTS, deep / DEEP), 1.0) * np.maximum(deep - SLOP, 0.0)
+            speed = np.minimum(part, OPENS) * least / step
+            found[n] = float(self.masses.max()) / (4.0 * GIVES) * float((speed * speed).sum())
+        return found
+
     @property
     def rounding(self) -> float:
         """What rounding may do to a length, m."""
@@ -331,7 +389,8 @@ class Evidence:
     @cached_property
     def allowed(self) -> float:
         """How deep a disk may be in a surface, m: by rounding, the curve between knots, a step."""
-        return self.rounding + self.arcs + self.late
+        bulge = BULGE * self.radius if self.engine == "contact" and not self.crowd else 0.0
+        return self.rounding + self.arcs + self.late + bulge
 
     @cached_property
     def limit_of(self) -> Any:

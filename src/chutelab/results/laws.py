@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from chutelab.results.evidence import Evidence
-from chutelab.results.recording import EVENT, Recording
+from chutelab.results.recording import EVENT, Recording, blocks
 from chutelab.util.arrays import Floats, Ints
 from chutelab.util.tables import number
 
@@ -173,17 +173,21 @@ def _books(e: Evidence) -> Iterator[Broken]:
     Of lone particles what is unexplained may not change from knot to knot; particles that meet give
     energy to each other, so of them it is the sum of all at some times, and what the solves of the
     contact engine gained. Losses that are booked are never less than before but by what parting
-    overlaps gives.
+    overlaps gives: where many do so at one instant, those that overlap there. Where the contact
+    engine holds a particle by itself in a nip, impulses of any size hold each other, and along
+    normals seems to be given what friction takes: only the sum is known.
     """
     recording, gain, within = e.recording, e.gain, e.within
     bound = e.energy_bound * e.energy
     booked, most = e.columns[7:], bound + e.parted
     losses = booked[:, 1:] - booked[:, :-1]
     if losses.min(initial=0.0) < -most:
-        back = np.where(within, losses, 0.0).min(axis=0)
+        together = e.engine == "contact" and not e.crowd
+        back = np.where(within, losses.sum(axis=0) if together else losses.min(axis=0), 0.0)
         rows = (back < -most).nonzero()[0]
+        rows, least = _beyond_overlaps(e, rows, back[rows], most)
         if len(rows):
-            yield _told(e, LOSSES, rows + 1, back[rows].min(), -most)
+            yield _told(e, LOSSES, rows + 1, back[rows].min(), -least)
     total = recording.by_surface[..., 1:]
     if total.min(initial=0.0) < -most:
         low = total.reshape(-1, *total.shape[-2:]).min(axis=(0, 2))
@@ -201,13 +205,46 @@ def _books(e: Evidence) -> Iterator[Broken]:
             if len(rows):
                 yield _told(e, ENERGY, rows + 1, rises[rows].max(), most)
         return
-    t = recording.knots["t"]
-    times = np.sort(t[:: max(1, len(t) // INSTANTS)])
-    rise = recording.energy_at(times)["residual"]
     if recording.gained > bound:
         yield _of_all(e, ENERGY, "", recording.gained, bound)
-    elif rise.max(initial=0.0) > most:
-        yield _of_all(e, ENERGY, "", rise.max(), most)
+    elif (rise := _rise(e).max(initial=0.0)) > most + e.untold:
+        yield _of_all(e, ENERGY, "", rise, most + e.untold)
+
+
+def _rise(e: Evidence) -> Floats:
+    """Return what all together have at some times (T,) that is unexplained, J: the least it may be.
+
+    When between its knots one got energy from another is not told, only how much: at any time
+    between them it has at least the lesser of what is unexplained at the two.
+    """
+    recording, gain, t = e.recording, e.gain, e.columns[0]
+    times = np.sort(t[:: max(1, len(t) // INSTANTS)])
+    first, last = e.ends
+    at_release = np.zeros(recording.count)
+    at_release[recording.released] = gain[first]
+    found = ((gain[last] - gain[first]) * (t[last] < times[:, None])).sum(axis=1)
+    for row, particle, left, _ in blocks(recording.knots, recording.offsets, times):
+        least = np.minimum(gain[left], gain[left + 1]) - at_release[particle]
+        np.add.at(found, row, least)
+    return np.asarray(found)
+
+
+def _beyond_overlaps(e: Evidence, rows: Ints, back: Floats, most: float) -> tuple[Ints, float]:
+    """Return which of some intervals (k,) give back more than overlaps may, and what these may, J.
+
+    In a crowd of the contact engine all that ends at an instant is one sum, and of the instants
+    those are judged at which most is given back.
+    """
+    if not (e.crowd and e.engine == "contact" and len(rows)):
+        return rows, most
+    times, which = np.unique(e.columns[0][rows + 1], return_inverse=True)
+    given = np.bincount(which, back)
+    worst = np.argsort(given)[:INSTANTS]
+    allowed = most + np.maximum(e.opened(times[worst]), e.opened(times[worst] - e.machine.dt))
+    bad = (given[worst] < -allowed).nonzero()[0]
+    if not len(bad):
+        return rows[:0], most
+    return rows[np.isin(which, worst[bad])], float(allowed[bad].min())
 
 
 def _steps(e: Evidence) -> Iterator[Broken]:

@@ -303,7 +303,9 @@ def test_a_crowds_summary_leads_with_the_crowd():
     assert told.index("All particles") < told.index("Energy ledger")
     assert "Particle 0" not in told
     assert "200 of 200 arrived on the outgoing belt" in told
-    assert "145 landed: touched the belt itself" in told
+    landed = np.unique(simulate("stream").select("landing")["particle"])
+    assert 100 < len(landed) < 200, "the others came to lie on these"
+    assert f"{len(landed)} landed: touched the belt itself" in told
     assert "in the simulated slice" in told
     assert "Particle 0" in call("run", "stream", "--details")
     assert "Particle 0" in call("run", "perpendicular")
@@ -317,7 +319,8 @@ def test_what_is_told_of_a_crowd_is_counted_from_its_arrivals():
     assert told["crowd"]["arrival"]["x"]["mean"] == pytest.approx(x.mean())
     assert told["crowd"]["arrival"]["x"]["q98"] == pytest.approx(np.quantile(x, 0.98))
     assert told["crowd"]["arrival"]["count"] == 200
-    assert told["crowd"]["landing"]["count"] == 145
+    landed = np.unique(recording.select("landing")["particle"])
+    assert told["crowd"]["landing"]["count"] == len(landed) < 200
     assert measure(recording, "arrival.vx.spread") == pytest.approx(
         came["velocity_before"][:, 0].std()
     )

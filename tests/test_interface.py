@@ -6,6 +6,7 @@ import json
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from math import radians
 
 import numpy as np
@@ -16,6 +17,7 @@ from chutelab import design, theory
 from chutelab.checks.preflight import preflight
 from chutelab.machine import build
 from chutelab.results.quantities import stopped
+from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.scene import shipped, to_dict
 from chutelab.util.errors import InputError
 
@@ -96,12 +98,12 @@ def test_a_recording_answers_by_itself():
         chutelab.measure(recording, "landng.x")
 
 
-class EnoughError(Exception):
+class HaltError(Exception):
     pass
 
 
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
-@pytest.mark.parametrize("slip", [EnoughError, KeyboardInterrupt])
+@pytest.mark.parametrize("slip", [HaltError, KeyboardInterrupt])
 def test_what_ends_a_run_has_the_recording_so_far(engine, slip):
     name = "stream-independent" if engine == "exact" else "stream"
     looks = []
@@ -109,8 +111,8 @@ def test_what_ends_a_run_has_the_recording_so_far(engine, slip):
     def progress(share):
         looks.append(share)
         if len(looks) == 3:
-            if slip is EnoughError:
-                raise EnoughError
+            if slip is HaltError:
+                raise HaltError
             signal.raise_signal(signal.SIGINT)  # as Ctrl-C
 
     with pytest.raises(slip) as ended:
@@ -120,6 +122,21 @@ def test_what_ends_a_run_has_the_recording_so_far(engine, slip):
     assert "stopped" in recording.summary()["ended"]["reason"]
     assert recording.ledger.relative_residual < 1e-9
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_run_that_gets_stuck_while_it_is_interrupted_is_interrupted(monkeypatch):
+    def stuck(machine, progress):
+        with suppress(EnoughError):
+            progress(0.5)
+        raise StalledError(0, 0.1, (0.0, 0.0), "stuck", half)
+
+    half = chutelab.simulate("perpendicular")
+    monkeypatch.setattr("chutelab.engines.exact.run", stuck)
+    with pytest.raises(StalledError):
+        chutelab.simulate("perpendicular")
+    with pytest.raises(KeyboardInterrupt) as ended:
+        chutelab.simulate("perpendicular", progress=lambda _: signal.raise_signal(signal.SIGINT))
+    assert ended.value.recording is half
 
 
 def test_degrees_in_place_of_radians_are_told():

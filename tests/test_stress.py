@@ -220,33 +220,30 @@ ENDS = [
 ]
 
 
-@pytest.mark.parametrize(("sent", "code", "says"), ENDS)
-def test_a_signal_during_a_run_leaves_nothing(tmp_path, sent, code, says):
+@pytest.fixture
+def in_the_middle(tmp_path):
+    """Tell when an endless run is in the middle: half a second after its folder is there."""
     (tmp_path / "endless.toml").write_text(ENDLESS)
     begun = []
 
     def when():
-        # The folder it will write to is there: half a second later it is in the middle of the run.
         if list(tmp_path.glob(".chutelab-*")):
             begun.append(time.monotonic())
         return bool(begun) and time.monotonic() > begun[0] + 0.5
 
-    ended = interrupted(tmp_path, "endless.toml", "--out", "out", when=when, sent=sent)
+    return when
+
+
+@pytest.mark.parametrize(("sent", "code", "says"), ENDS)
+def test_a_signal_during_a_run_leaves_nothing(tmp_path, in_the_middle, sent, code, says):
+    ended = interrupted(tmp_path, "endless.toml", "--out", "out", when=in_the_middle, sent=sent)
     assert ended == (code, f"\n{says}\n")
     assert listed(tmp_path) == ["endless.toml"]
 
 
-def test_ctrl_c_during_a_run_leaves_what_was_recorded(tmp_path):
-    (tmp_path / "endless.toml").write_text(ENDLESS)
-    begun = []
-
-    def when():
-        if list(tmp_path.glob(".chutelab-*")):
-            begun.append(time.monotonic())
-        return bool(begun) and time.monotonic() > begun[0] + 0.5
-
+def test_ctrl_c_during_a_run_leaves_what_was_recorded(tmp_path, in_the_middle):
     code, said = interrupted(
-        tmp_path, "endless.toml", "--out", "out", "--only", "json,npz", when=when,
+        tmp_path, "endless.toml", "--out", "out", "--only", "json,npz", when=in_the_middle,
         sent=[signal.SIGINT] * 5,
     )  # fmt: skip
     assert (code, said.split("\n")[-2]) == (130, "Interrupted.")

@@ -135,8 +135,13 @@ def judged(
                 raise EnoughError from None
 
         machine = _built(scene, look)
-        recording = follow(machine, engine, watched)
-        if (engine or machine.engine) == "auto" and recording.laws and not cut:
+        try:
+            recording = follow(machine, engine, watched)
+        except StalledError as stalled:
+            if not cut or stalled.recording is None:
+                raise
+            recording = stalled.recording
+        if (engine or machine.engine) == "auto" and not cut and recording.laws:
             recording = _instead(machine, recording, watched)
     # In place: a copy would be judged anew.
     object.__setattr__(recording, "seconds", perf_counter() - began)

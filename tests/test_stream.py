@@ -364,3 +364,23 @@ def test_a_sweep_misses_only_what_never_came_to_the_belt():
     missed = int(short.columns["misses"][0])
     assert 0 < missed < 200
     assert f"{missed} of 200 particles missed the outgoing belt" in short.columns["reason"][0]
+
+
+@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
+def test_what_passes_on_to_a_belt_without_a_blow_has_arrived_there(engine):
+    """A hollow ends tangentially where a belt runs against the particle, which gets across it."""
+    hollow = {"center": [0.0, 0.2], "radius": 0.2, "from_deg": 180, "to_deg": 270, "friction": 0.4}
+    belt = {"from": [-0.5, 0.0], "to": [1.0, 0.0], "speed": -1.0, "friction": 0.5}
+    recording = simulate(
+        {
+            "particle": {"radius": 0.01, "spin": True},
+            "surface": [{"name": "hollow", **hollow}, {"name": "belt", **belt}],
+            "stream": {"at": [-0.185, 0.3], "velocity": [0.0, 0.0]},
+            "run": {"until": 3.0},
+        },
+        engine=engine,
+    )
+    assert fates(recording).tolist() == ["off belt right"]
+    came = arrivals(recording, "belt")["t"][0]
+    across = recording.track(0)["t"][recording.track(0)["position"][:, 0] < 0.0].max()
+    assert across - 0.01 < came < recording.select("separation", surface="belt")["t"][0]

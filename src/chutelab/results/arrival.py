@@ -161,7 +161,8 @@ def _arrivals(recording: Recording, surface: str) -> NDArray[Any]:
     found = never(recording.count)
     if surface not in recording.surfaces:
         return found
-    direct = recording.select(Kind.LANDING, Kind.IMPACT, surface=surface)
+    # All that happens on it: what passes on to it from a tangential chute gives no blow.
+    direct = recording.select(surface=surface)
     if not recording.machine.interact:
         own = recording.first(direct)
         found[own["particle"]] = own

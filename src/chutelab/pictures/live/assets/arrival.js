@@ -14,7 +14,7 @@ import { modulo } from "./trig.js";
  * @typedef {{i: number, x: number, y: number}} Place  of particle i
  */
 
-const IMPACT = 3, LANDING = 4, COLLISION = 5;
+const COLLISION = 5;
 
 /** Gap, as a share of the smaller radius, up to which two touch. */
 const TOUCH = 0.01;
@@ -69,8 +69,8 @@ class Arrivals {
     const { events, machine } = this.recording;
     const more = events.slice(this.seen);
     this.seen = events.length;
-    const direct = more.filter(({ kind, surface }) =>
-      (kind === LANDING || kind === IMPACT) && surface === machine.landing);
+    // All that happens on it: what passes on to it from a tangential chute gives no blow.
+    const direct = more.filter(({ surface }) => surface === machine.landing);
     if (!machine.interact) {
       for (const event of direct) this.found[event.disk] ??= arrivalOf(event);
       return;

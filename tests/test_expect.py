@@ -18,7 +18,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
 from chutelab.results.quantities import measure
 from chutelab.results.summary import summary
-from chutelab.scene.rules import SYMBOLS, unit_of
+from chutelab.scene.quantities import FIRST, THEORY, lookup
 from chutelab.scene.units import read_size, write_size
 from machines import PERPENDICULAR
 
@@ -99,17 +99,17 @@ def test_names_are_the_keys_of_the_json_and_give_its_numbers(name):
     found = json.loads(json.dumps(summary(recording)))
     compared = 0
     for key, value in flat(found):
-        if unit_of(key, surfaces) is None:
+        if lookup(key, surfaces) is None:
             continue
-        measured = measure(recording, key)
+        measured = measure(recording, FIRST + key if isinstance(value, list) else key)
         first = value[0] if isinstance(value, list) else value
         assert measured == first or (first is None and isnan(measured)), key
         compared += 1
-    # separation, impact, landing, arrival, as far as their tables are there; contacts; ended.t;
-    # the ledger.
-    columns = 5 * ("incoming" in tables) + 7 * ("plate" in tables) + 12 * ("outgoing" in tables)
-    assert compared == columns + 1 + 1 + 5 + 3 * (len(surfaces) + 1)
-    assert set(SYMBOLS) == set(found["theory"]) - {"reason"}
+    # separation and flight, impact, landing and arrival, as far as their tables are there;
+    # contacts; track.t; ended.t, x, y; the ledger; error.max.
+    columns = 6 * ("incoming" in tables) + 7 * ("plate" in tables) + 12 * ("outgoing" in tables)
+    assert compared == columns + 1 + 1 + 3 + 5 + 3 * (len(surfaces) + 1) + 1
+    assert {row.name for row in THEORY.values()} == set(found["theory"]) - {"reason"}
 
 
 def test_statistics_are_over_all_particles_it_happened_to():
@@ -360,7 +360,8 @@ def test_the_ramp_is_met_a_radius_before_its_line():
     cosine = 0.8 / hypot(0.8, 0.3)
     above = 0.8 - (0.6 - 0.3 * 0.3 / 0.8)
     expected = sqrt(2.0 * (above - 0.0063 / cosine) / G)
-    assert value_of("free-fall", "impact.ramp.t") == pytest.approx(expected, rel=1e-14, abs=0.0)
+    found = value_of("free-fall", "particles[0].impact.ramp.t")
+    assert found == pytest.approx(expected, rel=1e-14, abs=0.0)
 
 
 def test_the_mean_landing_point_is_an_integral_over_the_bed():

@@ -18,8 +18,8 @@ from chutelab.results.summary import summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "arrival", "ended", "fates", "crowd", "stopped", "rolling", "plugged",
-    "waited", "squeezed",
+    "impact", "landing", "arrival", "flight", "track", "ended", "fates", "crowd", "stopped",
+    "rolling", "plugged", "waited", "squeezed",
     "laws", "instead", "drag", "steady", "ledger", "theory", "theory_as_printed",
     "error",
     "accuracy",
@@ -30,8 +30,8 @@ LEDGER = [
     "turned_over", "by_surface", "by_stream",
 ]  # fmt: skip
 THEORY = [
-    "phi1_deg", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3", "v3x",
-    "v3y", "v3", "d3", "dEk", "P", "belt_work", "slip_heat", "reason",
+    "phi1_deg", "v1", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3",
+    "v3x", "v3y", "v3", "d3", "dEk", "P", "belt_work", "slip_heat", "reason",
 ]  # fmt: skip
 
 
@@ -58,7 +58,7 @@ def test_the_keys_are_those_of_the_contract(name, overrides):
     assert list(found) == TOP
     assert list(found["separation"]) == BEFORE
     assert list(found["impact"]) == list(found["landing"]) == [*BEFORE, "vx_after", "vy_after"]
-    assert list(found["ended"]) == ["t", "reason"]
+    assert list(found["ended"]) == ["t", "x", "y", "reason"]
     assert list(found["ledger"]) == LEDGER
     assert list(found["ledger"]["by_surface"]) == list(recording.surfaces)
     for entries in found["ledger"]["by_surface"].values():
@@ -153,7 +153,7 @@ def test_the_printed_equation_has_the_sine_and_cosine_the_wrong_way_round():
     assert right["v2r"] == pytest.approx(v2 * np.hypot(cosine, 0.5 * sine), rel=1e-14, abs=0.0)
     assert as_printed["v2r"] == pytest.approx(v2 * np.hypot(sine, 0.5 * cosine), rel=1e-14, abs=0.0)
     same = [key for key in THEORY if right[key] == as_printed[key]]
-    assert {"phi1_deg", "t2", "x2", "y2", "v2", "phi2_deg"} <= set(same)
+    assert {"phi1_deg", "v1", "t2", "x2", "y2", "v2", "phi2_deg"} <= set(same)
     assert "x3" not in same
 
 

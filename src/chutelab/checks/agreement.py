@@ -19,9 +19,9 @@ from chutelab.machine import build
 from chutelab.results import Recording
 from chutelab.results.comparison import compare, relative_error, scales
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import KINDS, each, measure
+from chutelab.results.quantities import each, measure
 from chutelab.scene import Scene, SceneError
-from chutelab.scene.rules import FIRST, SYMBOLS, unit_of
+from chutelab.scene.quantities import FIRST, lookup
 from chutelab.scene.units import with_unit, write_size
 from chutelab.studies.accuracy import STIR, UNABLE, answer, because, distance, stirred
 from chutelab.theory import predict
@@ -335,12 +335,12 @@ def verify(
     findings: list[Finding] = []
     for expect in scene.expect:
         quantity, names = expect.quantity, [str(stream.name) for stream in scene.streams]
-        unit = unit_of(quantity, scene.surfaces, names)
-        assert unit is not None
+        row = lookup(quantity, scene.surfaces, names)
+        assert row is not None
         predicted = nan
-        if (symbol := quantity.removeprefix(FIRST)) in SYMBOLS:
-            predicted = float(getattr(prediction, symbol.removesuffix("_deg")))
-            predicted = degrees(predicted) if quantity.endswith("_deg") else predicted
+        if row.theory:
+            predicted = float(getattr(prediction, row.field.removeprefix(FIRST)))
+            predicted = degrees(predicted) if row.unit == "degrees" else predicted
         values = {engine: measure(recordings[engine], quantity) for engine in recordings}
         if not values:
             values = dict.fromkeys(skipped, nan)
@@ -356,17 +356,17 @@ def verify(
             scale = 0.0
             if quantity == "ledger.residual":
                 scale = ledger(recordings[engine]).turned_over if recordings else nan
-            elif unit and not quantity.startswith("ledger."):
-                scale = scales(scene, prediction)[KINDS[unit]]
+            elif row.unit and not quantity.startswith("ledger."):
+                scale = scales(scene, prediction)[row.kind]
             off = abs(simulated - expected)
             if size == "%":
                 one, other = simulated, expected
-                if unit == "degrees":
+                if row.unit == "degrees":
                     one, other = radians(one), radians(other)
                 off = float(relative_error(one, other, scale))
             findings.append(
                 Finding(
-                    quantity, unit, expect.source, engine, expected, simulated, off,
+                    quantity, row.unit, expect.source, engine, expected, simulated, off,
                     tolerance, relative=size == "%",
                 )
             )  # fmt: skip

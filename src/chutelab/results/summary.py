@@ -7,31 +7,19 @@ from collections.abc import Mapping
 from math import degrees
 from typing import Any
 
-from chutelab.results.arrival import arrivals, fates
+from chutelab.results.arrival import fates
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import (
-    air_drag,
-    column,
-    end_times,
-    first,
-    plugged,
-    rolling,
-    squeezed,
-    stopped,
-    waits,
-)
+from chutelab.results.notes import air_drag, plugged, rolling, squeezed, stopped, waits
+from chutelab.results.quantities import each
 from chutelab.results.recording import REASONS, Recording
 from chutelab.results.stream import crowd, steady
-from chutelab.scene.rules import SYMBOLS
+from chutelab.scene.quantities import REGISTRY, THEORY
 from chutelab.theory import Transfer, predict
-from chutelab.util.arrays import Floats
 from chutelab.util.tables import plain
 
 FORMAT = 1
 """Version of the object; keys are only ever added to a version."""
-
-BEFORE, AFTER = ("t", "x", "y", "vx", "vy"), ("vx_after", "vy_after")
 
 
 def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -59,10 +47,12 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         # The printed Eq. (9) is for a frictionless upright plate.
         as_printed = _theory(predict(scene, rebound="as-printed"))
 
-    def events(event: str, *names: str) -> dict[str, Floats]:
-        found = first(recording, event)
-        return {name: column(found, name) for name in (*BEFORE, *names)}
-
+    lists: dict[str, dict[str, Any]] = {}
+    for name, row in REGISTRY.items():
+        if row.of == "particle" and "SURFACE" not in name:
+            home, key = name.split(".")
+            lists.setdefault(home, {})[key] = each(recording, name)
+    lists["ended"]["reason"] = [REASONS[k] for k in recording.ended]
     told: dict[str, Any] = plain({
         "format": FORMAT,
         "scene": recording.title,
@@ -71,11 +61,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "seconds": recording.seconds,
         "steps": recording.steps,
         "contacts": recording.contacts,
-        "separation": events("separation"),
-        "impact": events("impact", *AFTER),
-        "landing": events("landing", *AFTER),
-        "arrival": {name: column(arrivals(recording), name) for name in BEFORE},
-        "ended": {"t": end_times(recording), "reason": [REASONS[k] for k in recording.ended]},
+        **lists,
         "fates": Counter(fates(recording).tolist()),
         "crowd": crowd(recording),
         "stopped": stopped(recording),
@@ -98,7 +84,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
 
 def _theory(prediction: Transfer) -> dict[str, Any]:
     out: dict[str, Any] = {}
-    for name in SYMBOLS:
-        value = float(getattr(prediction, name.removesuffix("_deg")))
-        out[name] = degrees(value) if name.endswith("_deg") else value
+    for field, row in THEORY.items():
+        value = float(getattr(prediction, field))
+        out[row.name] = degrees(value) if row.unit == "degrees" else value
     return {**out, "reason": str(prediction.reason) or None}

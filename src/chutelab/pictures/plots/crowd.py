@@ -10,7 +10,7 @@ from chutelab.pictures.plots.bodies import stream_colours
 from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import layers
+from chutelab.results.notes import layers
 from chutelab.results.stream import QUANTILES, envelopes, flows
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import number

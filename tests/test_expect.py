@@ -353,7 +353,8 @@ def test_the_end_of_the_slip_follows_from_its_whole_impulse():
     v3y = sqrt(fallen**2 + 2 * G * 0.5)
     landing = 0.5 + 0.29685 + (v3y - fallen) / G
     end = landing + ((2.0 + 1.0) / 0.08 - v3y) / G
-    assert value_of("belt-landing", "ended.t") == pytest.approx(end, rel=1e-14, abs=0.0)
+    found = value_of("belt-landing", "particles[0].ended.t")
+    assert found == pytest.approx(end, rel=1e-14, abs=0.0)
 
 
 def test_the_ramp_is_met_a_radius_before_its_line():

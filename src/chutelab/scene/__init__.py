@@ -2,7 +2,8 @@
 
 - `units`: sizes with their units, and what a key may hold: strict types and ranges.
 - `materials`: ``[[material]]``, and presets with their spread and sources.
-- `rules`: ``[[expect]]``, and the names of a run's quantities.
+- `quantities`: the registry of a run's quantities, from which all that names them comes.
+- `rules`: ``[[expect]]``, what a scene should show.
 - `conflicts`: what no single key can answer for.
 - `tables`: the tables of a scene as frozen Pydantic models, with the defaults.
 - `schema`: `Scene`, all tables together, and what follows from one for another.

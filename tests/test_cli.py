@@ -1076,6 +1076,7 @@ def test_help_lists_the_commands():
         "tables",
         "scenes",
         "materials",
+        "quantities",
         "new",
         "schema",
         "verify",

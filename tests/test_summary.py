@@ -14,7 +14,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.results import REASONS, Kind
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.summary import summary
+from chutelab.results.summary import schema, summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
@@ -256,3 +256,31 @@ def test_who_never_finds_a_place_is_counted_and_who_is_not_due_is_not():
     }  # fmt: skip
     found = printed(simulate(scene.from_dict(lying, "mine.toml")))["waited"]
     assert found == {"particles": 0, "longest": 0.0, "mean": 0.0, "never": 4}
+
+
+def described(schema, found, path=""):
+    """Assert that an object has the keys and types that a JSON Schema says, and no others."""
+    kinds = {"integer": int, "number": (int, float), "string": str, "array": list, "object": dict}
+    types = schema.get("type", [])
+    allowed = [
+        kinds[one] for one in ([types] if isinstance(types, str) else types) if one != "null"
+    ]
+    assert (found is None and "null" in types) or not types or isinstance(found, *allowed), path
+    if isinstance(found, dict) and "properties" in schema:
+        assert found.keys() <= schema["properties"].keys(), path
+        assert not (missing := set(schema.get("required", ())) - found.keys()), (path, missing)
+        for key, inner in found.items():
+            described(schema["properties"][key], inner, f"{path}.{key}")
+    for inner in found if isinstance(found, list) else ():
+        described(schema.get("items", {}), inner, path)
+        assert inner in schema.get("items", {}).get("enum", [inner])
+
+
+@pytest.mark.parametrize("case", [*SHIPPED[:3], *SHIPPED[-2:]])
+def test_the_schema_describes_every_key_with_its_unit(case):
+    said = schema()
+    described(said, printed(run(case[0], *case[1])))
+    for event in ("separation", "impact", "landing", "arrival"):
+        units = {key: one["x-unit"] for key, one in said["properties"][event]["properties"].items()}
+        assert units.items() >= {"t": "s", "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}.items()
+    assert said["properties"]["theory"]["properties"]["phi1_deg"]["x-unit"] == "degrees"

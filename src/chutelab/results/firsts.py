@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import nan
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +19,24 @@ ALONG = 1e-14
 """Share of the rebound speed below which its part away from the plate is rounding."""
 
 
+_known: WeakKeyDictionary[Recording, dict[tuple[str, str], NDArray[Any]]] = WeakKeyDictionary()
+
+
 def first(recording: Recording, event: str, surface: str | None = None) -> NDArray[Any]:
     """Return the first "separation", "impact" or "landing" of each particle, (N,), dtype `EVENT`.
 
     From the incoming belt, on the plate and on the outgoing belt, unless another surface is given.
-    NaN throughout where it did not happen.
+    NaN throughout where it did not happen. Read-only.
     """
-    events, surface = never(recording.count), surface or NEEDED[event]
-    if surface not in recording.surfaces:
-        return events
-    found = recording.first(recording.select(event, surface=surface))
-    events[found["particle"]] = found
-    return events
+    known, key = _known.setdefault(recording, {}), (event, surface or NEEDED[event])
+    if key not in known:
+        events = never(recording.count)
+        if key[1] in recording.surfaces:
+            found = recording.first(recording.select(event, surface=key[1]))
+            events[found["particle"]] = found
+        events.flags.writeable = False
+        known[key] = events
+    return known[key]
 
 
 def column(events: NDArray[Any], name: str) -> Floats:
@@ -57,7 +64,7 @@ def paid(recording: Recording, surface: str, entry: str) -> Floats:
 
 def symbols(recording: Recording) -> dict[str, Floats]:
     """Return `THEORY` of each particle, (N,), SI units and radians; NaN without one."""
-    left, hit, down = (first(recording, event) for event in NEEDED)
+    left, hit, down = (first(recording, event).copy() for event in NEEDED)
     # In the paper's frame an impact is counted from the separation, a landing from the impact.
     hit[np.isnan(left["t"])] = never(1)
     down[np.isnan(hit["t"])] = never(1)

@@ -16,7 +16,6 @@ import numpy as np
 from chutelab.results.arrival import arrivals
 from chutelab.results.comparison import worst
 from chutelab.results.firsts import column, end_times, first, paid, symbols
-from chutelab.results.ledger import ledger
 from chutelab.results.recording import ENTRIES, REASONS, Recording, balance
 from chutelab.scene.quantities import FIRST, lookup, suggestion, whose
 from chutelab.util.arrays import Bools, Floats
@@ -133,9 +132,9 @@ def measured(recording: Recording, name: str) -> Floats:
         case ["ledger", *entry] if many > 1 or recording.scene.shape:
             return each(recording, name)
         case ["ledger", stored, end]:
-            return np.array([getattr(ledger(recording), stored)[("start", "end").index(end)]])
+            return np.array([getattr(recording.ledger, stored)[("start", "end").index(end)]])
         case ["ledger", entry]:
-            return np.array([getattr(ledger(recording), entry)])
+            return np.array([getattr(recording.ledger, entry)])
         case [*event, "count"]:
             return count(np.isfinite(each(recording, ".".join([*event, "t"]))))
         case [*quantity, statistic] if statistic in _STATISTICS:

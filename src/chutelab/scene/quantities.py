@@ -81,8 +81,8 @@ STATISTICS: Final = {
 EVENTS: Final = {
     "separation": ("incoming", "the separation"),
     "impact": ("plate", "the impact on the plate"),
-    "landing": ("outgoing", "the landing on the outgoing belt itself"),
-    "arrival": ("outgoing", "the arrival on the outgoing belt or what lies on it"),
+    "landing": ("outgoing", "the landing on the belt itself"),
+    "arrival": ("outgoing", "the arrival on the belt or its load"),
     "impact.SURFACE": ("", "the impact on SURFACE"),
 }
 """What happens to a particle, for the first time: the table that it needs, and what it is."""
@@ -114,7 +114,7 @@ def _event(event: str) -> Iterator[Quantity]:
         ("vy", "m/s", "upward velocity just before {}", {"landing": BOTH}),
         ("vx_after", "m/s", "forward velocity just after {}", {}),
         ("vy_after", "m/s", "upward velocity just after {}", {}),
-        ("count", "", "how many particles came to {}", {"impact": ITSELF}),
+        ("count", "", "particles that came to {}", {"impact": ITSELF}),
     ):
         if not (key.endswith("_after") and event in ("separation", "arrival")):
             of: Of = "stream" if key == "count" else "particle"

@@ -56,11 +56,12 @@ PLAY = """\
 QUANTITIES = """\
 # Quantities of a run
 
-These names mean the same in `[[expect]]`, `sweep`, `solve`, `measure` and the JSON of a run. `SURFACE` is the name of
-any surface. What each particle has goes by its bare name where there is one particle; of several,
-`particles[0].landing.x` is that of the first one, and with {statistics} it is of all of them, such as
-`landing.x.mean`; `by_stream.NAME.landing.x.mean` is of one stream. What is nominal is of particle 0, and what is of a
-lone particle there is only where it is the only one. The ledger counts up to `run.until`.
+These names mean the same in `[[expect]]`, `sweep`, `solve`, `measure` and the JSON of a run.
+`SURFACE` is the name of any surface. What each particle has goes by its bare name where there is
+one particle; of several, `particles[0].landing.x` is that of the first one, and with {statistics}
+it is of all of them, such as `landing.x.mean`; `by_stream.NAME.landing.x.mean` is of one stream.
+What is nominal is of particle 0, and what is of a lone particle there is only where it is the
+only one. The ledger counts up to `run.until`.
 
 | name | unit | meaning | of |
 |---|---|---|---|

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chutelab.engines.contact import engine, module
+from chutelab.core import module
+from chutelab.engines.contact import engine
 from chutelab.machine import build
 from chutelab.scene import load
 from live.machines import as_page_has_it, plain

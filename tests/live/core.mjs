@@ -4,7 +4,7 @@ import { readFileSync } from "node:fs";
 
 import { startCore } from "../../src/chutelab/pictures/live/assets/core.js";
 
-const home = new URL("../../src/chutelab/engines/contact/core/", import.meta.url);
+const home = new URL("../../src/chutelab/core/", import.meta.url);
 const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
 const core = await startCore(await WebAssembly.compile(readFileSync(new URL("core.wasm", home))), layout);
 

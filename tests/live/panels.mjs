@@ -18,7 +18,7 @@ const { ticks } = await import(`${assets}chart.js`);
 const { placed, spaceOf } = await import(`${assets}symbols.js`);
 const { StopWatch, angleBetween, nearestOn } = await import(`${assets}tools.js`);
 
-const home = new URL("../../src/chutelab/engines/contact/core/", import.meta.url);
+const home = new URL("../../src/chutelab/core/", import.meta.url);
 const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
 const core = await startCore(
   await WebAssembly.compile(readFileSync(new URL("core.wasm", home))), layout);

@@ -51,7 +51,7 @@ def html(
         If there is something in the scene that the contact engine has not, by its key.
     """
     css = f":root {{\n{_palette()}}}\n{_asset('page.css')}"
-    core = files("chutelab.engines.contact") / "core"
+    core = files("chutelab.core")
     facts = describe(scene)
     live = live_of(scene, facts["scene"])
     if given := facts["scene"].get("live"):

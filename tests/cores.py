@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from chutelab.engines.contact import engine, module
+from chutelab.core import module
+from chutelab.engines.contact import engine
 
 
 class Core:

@@ -224,7 +224,8 @@ def test_a_bundle_works_from_a_file_in_a_browser(web, opened):
     page.click("text=Stop the film")
     assert page.evaluate(source) == "still.png"
     page.click("text=Explanation: open it")
-    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    # The formulas are laid out a moment after the page is there.
+    page.wait_for_function("document.documentElement.scrollWidth === 360")
     assert page.evaluate(source) == "end.png"
     page.click("text=Back to the lesson")
     page.click("text=Try it")

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 import wasmtime
 
-from chutelab.engines.contact import module, run
+from chutelab.core import module
+from chutelab.engines.contact import run
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import Kind, laws
@@ -42,8 +43,8 @@ def test_twenty_columns_and_silos_make_no_energy(seed):
 def test_without_the_line_searches_columns_make_energy_and_a_law_tells(tmp_path, monkeypatch):
     """The planted fault: impulses of the step before are taken as they are, and none are eased."""
     pytest.importorskip("ziglang")
-    core = tmp_path / "src" / "chutelab" / "engines" / "contact" / "core"
-    for path in (ROOT / "src").glob("chutelab/engines/contact/core/*.[ch]"):
+    core = tmp_path / "src" / "chutelab" / "core"
+    for path in (ROOT / "src").glob("chutelab/core/*.[ch]"):
         core.mkdir(parents=True, exist_ok=True)
         shutil.copy(path, core)
     (tmp_path / "tools").mkdir()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 import shutil
 import subprocess
+import sys
 from dataclasses import replace
 from importlib.resources import files
 from math import acos, cos, hypot, inf, pi, sin, sqrt
@@ -14,8 +17,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
+from chutelab.core.module import Status, constants, dtype
 from chutelab.engines.contact import run
-from chutelab.engines.contact.module import Status, constants, dtype
 from chutelab.machine import build
 from chutelab.results import REASONS, Kind
 from chutelab.scene import load
@@ -493,7 +496,7 @@ def test_in_node_it_does_the_same_to_the_bit(tmp_path, crowded):
             core.job.make_room(what, 2 * getattr(core.world, f"{what}_room"))
     # All of the memory: the core's own data are as `_initialize` left them in both.
     (tmp_path / "memory").write_bytes(memory_of(core.module))
-    here = files("chutelab.engines.contact") / "core"
+    here = files("chutelab.core")
     script = Path(__file__).with_name("contact_in_node.mjs")
     command = ["node", str(script), str(here / "core.wasm"), str(here / "layout.json")]
     subprocess.run(
@@ -506,3 +509,48 @@ def test_in_node_it_does_the_same_to_the_bit(tmp_path, crowded):
 
 def test_the_host_knows_the_statuses_of_the_core():
     assert {status.name: status.value for status in Status} == constants("Status")
+
+
+START = """
+from chutelab import simulate
+from chutelab.core import module
+kept = module._kept((module.files("chutelab.core") / "core.wasm").read_bytes())
+print(kept, float(simulate("perpendicular", engine="contact").knots["position"].sum()).hex())
+"""
+
+
+@pytest.mark.parametrize(
+    "spoil", ["missing", "cut off", "damaged", "foreign", "another's", "no folder"]
+)
+def test_a_compiled_core_that_is_kept_costs_only_time(tmp_path, spoil):
+    """What is loaded is machine code: a wrong byte in it once ended Python with a crash."""
+
+    def start():
+        env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
+        done = subprocess.run(
+            [sys.executable, "-c", START], env=env, capture_output=True, text=True, timeout=60
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        kept, result = done.stdout.split()
+        return Path(kept), result
+
+    kept, result = start()
+    assert kept.parent.parent == tmp_path / "cache"
+    good = kept.read_bytes()
+    if spoil == "missing":
+        kept.unlink()
+    elif spoil == "cut off":
+        kept.write_bytes(good[:1000])
+    elif spoil == "damaged":
+        kept.write_bytes(good[:150_000] + bytes([good[150_000] ^ 255]) + good[150_001:])
+    elif spoil == "foreign":
+        code = good[32:].replace(b"wasmtime", b"wastetim")
+        kept.write_bytes(hashlib.sha256(code).digest() + code)
+    elif spoil == "another's":
+        kept.chmod(0o666)
+    else:
+        shutil.rmtree(tmp_path / "cache")
+        (tmp_path / "cache").write_text("a file")
+    assert start()[1] == result
+    if spoil not in ("another's", "no folder"):
+        assert kept.read_bytes() == good

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import chutelab.pictures.live
 import sandbox
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
@@ -19,25 +15,16 @@ from chutelab.scene.overrides import Override
 from chutelab.theory import Reason, predict, transfer
 from chutelab.theory.results import STAGES
 from live.machines import as_page_has_it, plain
+from live.node import ask, needs_node
 
-NODE = shutil.which("node")
-ASSETS = Path(chutelab.pictures.live.__file__).parent / "assets"
-
-pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
+pytestmark = needs_node
 
 SCENES = 500
 
 
 def in_node(asked, what="scenes"):
     """Return what JavaScript says of scenes, as their files have them, of transfers or edits."""
-    told = json.dumps({"lab": describe(load("perpendicular")), what: asked})
-    script = Path(__file__).parent / "live" / "bits.mjs"
-    done = subprocess.run(
-        [NODE, str(script), str(ASSETS)], input=told, capture_output=True, text=True, check=False,
-        timeout=120,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)[what]
+    return ask("bits.mjs", {"lab": describe(load("perpendicular")), what: asked})[what]
 
 
 def differences(mine, other, path=""):

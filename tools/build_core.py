@@ -15,7 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-CORE = Path(__file__).parents[1] / "src" / "chutelab" / "engines" / "contact" / "core"
+CORE = Path(__file__).parents[1] / "src" / "chutelab" / "core"
 
 FLAGS = (
     "-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O3", "-flto", "-Wall",

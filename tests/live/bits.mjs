@@ -1,4 +1,4 @@
-// What JavaScript says of scenes and transfers: `node bits.mjs ASSETS < {lab, scenes, transfers}`.
+// What JavaScript says of scenes and transfers: `node bits.mjs MODULES < {lab, scenes, transfers}`.
 //
 // Of each scene {toml, machine, prediction} or {toml, fault}, of parameters what `transfer`
 // returns; of an edit [keys, values by path] the keys after it, as TOML, and what they have there.

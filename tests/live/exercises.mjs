@@ -1,12 +1,13 @@
 // Exercises as the page has them: a JSON question on stdin, the answers on stdout.
 import { readFileSync } from "node:fs";
+import { pathToFileURL } from "node:url";
 
-const assets = "../../src/chutelab/pictures/live/assets/";
-const { drawnFor, plainName } = await import(`${assets}draw.js`);
-const { fixedText, generalText, scientific } = await import(`${assets}decimal.js`);
-const { readTyped } = await import(`${assets}judging.js`);
-const { sha256 } = await import(`${assets}sha256.js`);
-const { Task } = await import(`${assets}task.js`);
+const modules = pathToFileURL(`${process.argv[2]}/`);
+const { drawnFor, plainName } = await import(new URL("draw.js", modules));
+const { fixedText, generalText, scientific } = await import(new URL("decimal.js", modules));
+const { readTyped } = await import(new URL("judging.js", modules));
+const { sha256 } = await import(new URL("sha256.js", modules));
+const { Task } = await import(new URL("task.js", modules));
 
 /** What a student sees who gives these answers, and then asks for everything else. */
 function played({ exercise, student, answers, others = [] }) {

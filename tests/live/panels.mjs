@@ -1,24 +1,25 @@
 // What the panels and tools of the page work out, without a screen: a JSON question on stdin, the
 // answers on stdout.
 import { readFileSync } from "node:fs";
+import { pathToFileURL } from "node:url";
 
-const assets = "../../src/chutelab/pictures/live/assets/";
-const { startCore } = await import(`${assets}core.js`);
-const { Recording } = await import(`${assets}recording.js`);
-const { groundedLedger, stacks } = await import(`${assets}energy.js`);
-const { Arrivals } = await import(`${assets}arrival.js`);
-const { crowdOf } = await import(`${assets}crowd.js`);
-const { Laws } = await import(`${assets}laws.js`);
-const { numbersOf } = await import(`${assets}numbers.js`);
-const { RunHistory } = await import(`${assets}stages.js`);
-const { histogram, runningMean } = await import(`${assets}landing.js`);
-const { samplesOf } = await import(`${assets}curves.js`);
-const { contactForce } = await import(`${assets}arrows.js`);
-const { ticks } = await import(`${assets}chart.js`);
-const { placed, spaceOf } = await import(`${assets}symbols.js`);
-const { StopWatch, angleBetween, nearestOn } = await import(`${assets}tools.js`);
+const modules = pathToFileURL(`${process.argv[2]}/`);
+const { startCore } = await import(new URL("core.js", modules));
+const { Recording } = await import(new URL("recording.js", modules));
+const { groundedLedger, stacks } = await import(new URL("energy.js", modules));
+const { Arrivals } = await import(new URL("arrival.js", modules));
+const { crowdOf } = await import(new URL("crowd.js", modules));
+const { Laws } = await import(new URL("laws.js", modules));
+const { numbersOf } = await import(new URL("numbers.js", modules));
+const { RunHistory } = await import(new URL("stages.js", modules));
+const { histogram, runningMean } = await import(new URL("landing.js", modules));
+const { samplesOf } = await import(new URL("curves.js", modules));
+const { contactForce } = await import(new URL("arrows.js", modules));
+const { ticks } = await import(new URL("chart.js", modules));
+const { placed, spaceOf } = await import(new URL("symbols.js", modules));
+const { StopWatch, angleBetween, nearestOn } = await import(new URL("tools.js", modules));
 
-const home = new URL("../../src/chutelab/engines/contact/core/", import.meta.url);
+const home = new URL("../../src/chutelab/core/", import.meta.url);
 const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
 const core = await startCore(
   await WebAssembly.compile(readFileSync(new URL("core.wasm", home))), layout);

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.engines.contact.module import (
+from chutelab.core.module import (
     Module,
     Status,
     borrow,

@@ -1,0 +1,6 @@
+"""What runs in Python and in the page alike, in C.
+
+- `*.c`: built to `core.wasm` by `python tools/build_core.py`; `layout.h` says what they share with
+  their host, and is a way in.
+- `module`: the core in memory, run by wasmtime; numbers in, numbers out.
+"""

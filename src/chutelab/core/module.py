@@ -1,0 +1,229 @@
+"""The core in memory: WebAssembly run by wasmtime, its arrays as NumPy's.
+
+Nothing else in the package knows that the core is WebAssembly.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+from contextlib import suppress
+from enum import IntEnum
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import wasmtime
+from numpy.typing import NDArray
+
+from chutelab.util.files import whole
+
+PAGE = 65536
+"""Bytes of a page of WebAssembly's memory."""
+
+LARGE = 64 * 2**20
+"""Bytes beyond which a used memory is let go rather than kept for the next run."""
+
+SUBJECTS = ("World",)
+"""Structs of layout.h of which the core has one each."""
+
+TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}
+
+
+@cache
+def _layout() -> dict[str, Any]:
+    text = (files(__package__) / "layout.json").read_text(encoding="utf-8")
+    described: dict[str, Any] = json.loads(text)
+    return described
+
+
+@cache
+def dtype(struct: str) -> np.dtype[Any]:
+    """Return a struct of layout.h as a NumPy type."""
+    described = _layout()["structs"][struct]
+    fields = described["fields"]
+    return np.dtype(
+        {
+            "names": list(fields),
+            "formats": [
+                (TYPES[kind], (n,)) if n > 1 else TYPES[kind] for _, kind, n in fields.values()
+            ],
+            "offsets": [offset for offset, _, _ in fields.values()],
+            "itemsize": described["size"],
+        }
+    )
+
+
+@cache
+def _struct(name: str) -> type[ctypes.Structure]:
+    """Return a struct as a structure of ctypes, which is read and set ten times as fast."""
+    kinds = {"double": ctypes.c_double, "int": ctypes.c_int32, "pointer": ctypes.c_uint32}
+    fields = _layout()["structs"][name]["fields"]
+    rows = [
+        (field, kinds[kind] * n if n > 1 else kinds[kind]) for field, (_, kind, n) in fields.items()
+    ]
+    return type(name, (ctypes.Structure,), {"_fields_": rows})
+
+
+@cache
+def constants(enum: str) -> dict[str, int]:
+    """Return an enum of layout.h."""
+    values: dict[str, int] = _layout()["enums"][enum]
+    return values
+
+
+@cache
+def number(name: str) -> int:
+    """Return a number that layout.h defines."""
+    value: int = _layout()["constants"][name]
+    return value
+
+
+class Status(IntEnum):
+    """Why the core came back, as in layout.h."""
+
+    DONE = 0
+    PAUSED = 1
+    FULL_KNOTS = 2
+    FULL_EVENTS = 3
+    FULL_NEAR = 4
+    FULL_CONTACTS = 5
+    STALLED = 6
+
+
+class Module:
+    """One instance of the module, with a memory of its own.
+
+    Each subject of the core has one struct of numbers and of pointers to arrays, which a function
+    named like it gives; `world` is that of the contact engine. Arrays are placed one after the
+    other behind the module's own data; `forget` frees them all.
+    """
+
+    def __init__(self) -> None:
+        engine, module = _compiled()
+        self._store = wasmtime.Store(engine)
+        try:
+            self._exports = wasmtime.Instance(self._store, module, []).exports(self._store)
+        except wasmtime.WasmtimeError as error:
+            # Addresses for all that it may grow to are set apart, and there may be too few.
+            raise MemoryError(" ".join(str(error).split())) from error
+        self.call("_initialize")
+        self._memory: Any = self._exports["memory"]
+        base: Any = self._exports["__heap_base"]
+        self._base: int = base.value(self._store)
+        self._begins = {name: self.call(name.lower()) for name in SUBJECTS}
+        self.forget()
+
+    def call(self, name: str, *numbers: float) -> Any:
+        """Call a function of the core."""
+        function: Any = self._exports[name]
+        return function(self._store, *numbers)
+
+    def forget(self) -> None:
+        """Free all arrays and reset all structs."""
+        self._end = self._base
+        self._look()
+        for struct in self.structs.values():
+            ctypes.memset(ctypes.addressof(struct), 0, ctypes.sizeof(struct))
+
+    def _look(self) -> None:
+        """Look at the memory anew; it moves when it grows, and with it every array."""
+        size = self._memory.data_len(self._store)
+        address = ctypes.addressof(self._memory.data_ptr(self._store).contents)
+        self._bytes = np.ctypeslib.as_array((ctypes.c_uint8 * size).from_address(address))
+        self.structs: dict[str, Any] = {
+            name: _struct(name).from_address(address + begin)
+            for name, begin in self._begins.items()
+        }
+        self.world: Any = self.structs["World"]
+
+    @property
+    def size(self) -> int:
+        """Bytes of its memory."""
+        return len(self._bytes)
+
+    def place(self, *arrays: tuple[str, np.dtype[Any], int], of: str = "World") -> None:
+        """Make room for arrays of zeros, to which the fields of a struct point from now on."""
+        begins, first = [], self._end
+        for _, kind, count in arrays:
+            begin = (self._end + 15) // 16 * 16
+            begins.append(begin)
+            self._end = begin + kind.itemsize * max(1, count)
+        if self._end > self.size:
+            self._memory.grow(self._store, -(-(self._end - self.size) // PAGE))
+            self._look()
+        self._bytes[first : self._end] = 0
+        for (name, _, _), begin in zip(arrays, begins, strict=True):
+            setattr(self.structs[of], name, begin)
+
+    def array(self, name: str, kind: np.dtype[Any], count: int, of: str = "World") -> NDArray[Any]:
+        """Return a view of the array that a struct's field points to; `place` makes it invalid."""
+        begin: int = getattr(self.structs[of], name)
+        rows: NDArray[Any] = self._bytes[begin : begin + kind.itemsize * count].view(kind)
+        return rows
+
+    def prepare(self) -> None:
+        """Have the core work out what follows from the arrays as they are filled in."""
+        self.call("prepare")
+
+    def run(self, steps: int) -> Status:
+        """Run on for at most so many steps."""
+        return Status(self.call("run", steps))
+
+
+@cache
+def _compiled() -> tuple[wasmtime.Engine, wasmtime.Module]:
+    """Return the module, compiled: that takes 60 ms, to load what the last time kept 1 ms."""
+    engine, source = wasmtime.Engine(), (files(__package__) / "core.wasm").read_bytes()
+    kept = _kept(source)
+    with suppress(OSError, wasmtime.WasmtimeError):
+        data = kept.read_bytes()
+        # What is loaded is run as it is: nothing damaged, nothing that another user can write.
+        if sha256(data[32:]).digest() == data[:32] and _own(kept):
+            return engine, wasmtime.Module.deserialize(engine, data[32:])
+    module = wasmtime.Module(engine, source)
+    code = bytes(module.serialize())
+    with suppress(OSError):
+        kept.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with whole(kept) as unfinished:
+            unfinished.write_bytes(sha256(code).digest() + code)
+    return engine, module
+
+
+def _kept(source: bytes) -> Path:
+    """Return the file that keeps what a core was compiled to by this version of wasmtime."""
+    folder = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    name = sha256(source + version("wasmtime").encode("ascii")).hexdigest()[:16]
+    return (Path(folder) if folder else Path("~/.cache").expanduser()) / "chutelab" / f"{name}.core"
+
+
+def _own(file: Path) -> bool:
+    """Tell whether only this user can write a file and its folder; on Windows its place says so."""
+    if os.name == "nt":
+        return True
+    states = [file.stat(), file.parent.stat()]
+    return all(one.st_uid == os.geteuid() and not one.st_mode & 0o022 for one in states)
+
+
+_idle: list[Module] = []
+
+
+def borrow() -> Module:
+    """Return a module that is not in use, reset; give it back with `give_back`."""
+    try:
+        module = _idle.pop()
+    except IndexError:
+        return Module()
+    module.forget()
+    return module
+
+
+def give_back(module: Module) -> None:
+    """Keep a module for the next run, unless its memory has grown large."""
+    if module.size <= LARGE:
+        _idle.append(module)

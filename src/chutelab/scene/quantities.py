@@ -48,7 +48,7 @@ class Quantity(NamedTuple):
     """Statistics that are columns of a sweep; "" is the quantity itself."""
 
     symbol: str = ""
-    """The paper's symbol, "" if it has none."""
+    """What the page calls it in short, the paper's symbol if there is one."""
 
     theory: bool = False
     """Whether the closed form has it, too."""
@@ -119,7 +119,10 @@ def _event(event: str) -> Iterator[Quantity]:
         if not (key.endswith("_after") and event in ("separation", "arrival")):
             of: Of = "stream" if key == "count" else "particle"
             columns = swept.get(event, ())
-            yield Quantity(f"{event}.{key}", unit, text.format(what), of, needs, columns=columns)
+            yield Quantity(
+                f"{event}.{key}", unit, text.format(what), of, needs, columns=columns,
+                symbol=key if event == "landing" and of == "particle" else "",
+            )  # fmt: skip
 
 
 def _paper(name: str, symbol: str, unit: str, meaning: str) -> Quantity:
@@ -146,7 +149,8 @@ REGISTRY: Final = {
     row.name: row
     for row in (
         *chain.from_iterable(map(_event, EVENTS)),
-        Quantity("flight.t", "s", "time of flight from the incoming belt", needs=("incoming",)),
+        Quantity("flight.t", "s", "time of flight from the incoming belt",
+                 needs=("incoming",), symbol="t"),
         Quantity("track.t", "s", "time from the release to the end", ending="scene", columns=MEAN),
         Quantity("ended.t", "s", "time at which the track ends", ending="scene"),
         Quantity("ended.x", "m", "x where the track ends", ending="scene"),

@@ -6,11 +6,11 @@
 - `rules`: ``[[expect]]``, what a scene should show.
 - `conflicts`: what no single key can answer for.
 - `tables`: the tables of a scene as frozen Pydantic models, with the defaults.
-- `schema`: `Scene`, all tables together, and what follows from one for another.
+- `schema`: all tables together, and what follows from one for another.
 - `overrides`: keys by their full path: JSON Schema, limits, ``KEY=VALUE`` texts.
 - `messages`: what Pydantic says of a scene, in words.
 - `live`: ``[live]``, what its page offers, and whether its keys are there.
-- `loading`: read, parse, override, validate, write; the shipped scenes.
+- `loading`: `Scene`; read, parse, override, validate, write; the shipped scenes.
 - `variants`: one scene with other values: ``--vary``, combinations, families.
 """
 
@@ -18,6 +18,7 @@ from chutelab.scene.loading import (
     About,
     AnyScene,
     Overrides,
+    Scene,
     SceneError,
     about,
     find,
@@ -31,7 +32,6 @@ from chutelab.scene.loading import (
 )
 from chutelab.scene.overrides import schema
 from chutelab.scene.rules import Expect
-from chutelab.scene.schema import Scene
 from chutelab.scene.tables import (
     Conveyor,
     Incoming,

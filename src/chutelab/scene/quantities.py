@@ -309,12 +309,13 @@ def suggestion(name: str, surfaces: Collection[str]) -> str:
 
 
 def _names(surfaces: Collection[str]) -> list[str]:
-    """Return all names of a scene with these surfaces, or with the first ones of very many."""
-    found = []
+    """Return the names of a scene with these surfaces, or with the first ones of very many."""
+    found: list[str] = []
     for row in REGISTRY.values():
+        statistics = STATISTICS if row.of == "particle" else ()
         # Of a thousand surfaces some will do: looking for likeness takes long.
-        some = list(surfaces)[:50] if "SURFACE" in row.name else [""]
-        for base in (row.name.replace("SURFACE", surface) for surface in some):
-            names = (told.name for told in (_told(row, key) for key in ("", *STATISTICS)) if told)
-            found += [name.replace(row.name, base) for name in names if lookup(base, surfaces)]
+        for surface in list(surfaces)[:50] if "SURFACE" in row.name else [""]:
+            name = row.name.replace("SURFACE", surface)
+            if lookup(name, surfaces):
+                found += [name, *(f"{name}.{statistic}" for statistic in statistics)]
     return found

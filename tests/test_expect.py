@@ -97,18 +97,26 @@ def test_names_are_the_keys_of_the_json_and_give_its_numbers(name):
     tables = [table for table in ("incoming", "plate", "outgoing") if getattr(scene, table)]
     surfaces = [*tables, *(free.name for free in scene.surface)]
     found = json.loads(json.dumps(summary(recording)))
-    compared = 0
+    compared = set()
     for key, value in flat(found):
         if lookup(key, surfaces) is None:
             continue
         measured = measure(recording, FIRST + key if isinstance(value, list) else key)
         first = value[0] if isinstance(value, list) else value
         assert measured == first or (first is None and isnan(measured)), key
-        compared += 1
-    # separation and flight, impact, landing and arrival, as far as their tables are there;
-    # contacts; track.t; ended.t, x, y; the ledger; error.max.
-    columns = 6 * ("incoming" in tables) + 7 * ("plate" in tables) + 12 * ("outgoing" in tables)
-    assert compared == columns + 1 + 1 + 3 + 5 + 3 * (len(surfaces) + 1) + 1
+        compared.add(key)
+    before = ["t", "x", "y", "vx", "vy"]
+    keys = {"incoming": ["flight.t", *(f"separation.{key}" for key in before)]}
+    keys["plate"] = [f"impact.{key}" for key in (*before, "vx_after", "vy_after")]
+    keys["outgoing"] = [f"landing.{key}" for key in (*before, "vx_after", "vy_after")]
+    keys["outgoing"] += [f"arrival.{key}" for key in before]
+    entries = ["belt_work", "restitution_loss", "friction_loss"]
+    expected = {"contacts", "error.max", "track.t", "ended.t", "ended.x", "ended.y"}
+    expected |= {f"ledger.{key}" for key in (*entries, "residual", "turned_over")}
+    expected |= {
+        f"ledger.by_surface.{n}.{key}" for n in (*surfaces, "particles") for key in entries
+    }
+    assert compared >= expected.union(*(keys[table] for table in tables))
     assert {row.name for row in THEORY.values()} == set(found["theory"]) - {"reason"}
 
 

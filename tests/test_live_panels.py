@@ -88,7 +88,7 @@ def test_the_numbers_are_those_of_pythons_recordings(runs):
         its = {row["id"]: row["simulated"] for row in answer["numbers"]}
         its["phi1_deg"] = np.radians(its["phi1_deg"])
         told = [row for row in THEORY.values() if row.name in its]
-        assert len(told) == 11
+        assert len(told) >= 11
         for row in told:
             expected = pytest.approx(ours[row.field], rel=1e-13, abs=1e-15)
             assert its[row.name] == expected, (name, row.name)

@@ -56,9 +56,9 @@ def test_the_keys_are_those_of_the_contract(name, overrides):
     recording = run(name, *overrides)
     found = printed(recording)
     assert list(found) == TOP
-    assert list(found["separation"]) == BEFORE
-    assert list(found["impact"]) == list(found["landing"]) == [*BEFORE, "vx_after", "vy_after"]
-    assert list(found["ended"]) == ["t", "x", "y", "reason"]
+    assert found["separation"].keys() >= {*BEFORE}
+    assert found["impact"].keys() >= {*BEFORE, "vx_after", "vy_after"} <= found["landing"].keys()
+    assert found["ended"].keys() >= {"t", "x", "y", "reason"}
     assert list(found["ledger"]) == LEDGER
     assert list(found["ledger"]["by_surface"]) == list(recording.surfaces)
     for entries in found["ledger"]["by_surface"].values():
@@ -89,7 +89,8 @@ def test_columns_hold_the_first_event_of_each_particle_or_null(name, overrides):
                 and event["kind"] == kind
                 and recording.surfaces[event["surface"]] == surface
             ]
-            row = [column[particle] for column in found[key].values()]
+            names = BEFORE if key == "separation" else [*BEFORE, "vx_after", "vy_after"]
+            row = [found[key][name][particle] for name in names]
             if not own:
                 assert row == [None] * len(row)
                 continue

@@ -10,18 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby
-from math import degrees, inf, isfinite, log, nan, radians
+from math import inf, isfinite, log, nan, radians
 from typing import Final
 
 import numpy as np
 
 from chutelab.machine import build
 from chutelab.results import Recording
-from chutelab.results.comparison import compare, relative_error, scales
+from chutelab.results.comparison import compare, predicted, relative_error, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import each, measure
 from chutelab.scene import Scene, SceneError
-from chutelab.scene.quantities import FIRST, lookup
+from chutelab.scene.quantities import lookup
 from chutelab.scene.units import with_unit, write_size
 from chutelab.studies.accuracy import STIR, UNABLE, answer, because, distance, stirred
 from chutelab.theory import predict
@@ -337,19 +337,16 @@ def verify(
         quantity, names = expect.quantity, [str(stream.name) for stream in scene.streams]
         row = lookup(quantity, scene.surfaces, names)
         assert row is not None
-        predicted = nan
-        if row.theory:
-            predicted = float(getattr(prediction, row.field.removeprefix(FIRST)))
-            predicted = degrees(predicted) if row.unit == "degrees" else predicted
+        told = predicted(prediction, row)
         values = {engine: measure(recordings[engine], quantity) for engine in recordings}
         if not values:
             values = dict.fromkeys(skipped, nan)
-        expected = predicted
+        expected = told
         if not isinstance(expect.value, str):
             expected = float(expect.value)
             # What the theory has to say of an expectation that is not its own.
-            if isfinite(predicted):
-                values["theory"] = predicted
+            if isfinite(told):
+                values["theory"] = told
         for engine, simulated in values.items():
             tolerance, size = expect.allowed(engine) or (None, "%")
             # An entry is measured by itself, but what should be nothing by what was turned over.

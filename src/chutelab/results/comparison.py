@@ -18,7 +18,7 @@ from chutelab.results.arrival import never
 from chutelab.results.firsts import from_events, symbols, until_no_slip
 from chutelab.results.recording import Kind, Recording
 from chutelab.scene import Scene
-from chutelab.scene.quantities import NEEDED, THEORY
+from chutelab.scene.quantities import NEEDED, THEORY, Quantity
 from chutelab.scene.units import with_unit
 from chutelab.theory import Transfer, unbounded
 from chutelab.util.arrays import Bools, Floats
@@ -86,6 +86,12 @@ class Comparison(Shown):
             texts=2,
             notes=(f"{ends}; {self.reason}",) if self.reason else (),
         )
+
+
+def predicted(prediction: Transfer, row: Quantity) -> float:
+    """Return what the theory predicts of a quantity, in its unit; NaN where it has none."""
+    value = float(getattr(prediction, row.field)) if row.theory else nan
+    return degrees(value) if row.unit == "degrees" else value
 
 
 def compare(recording: Recording) -> Comparison:

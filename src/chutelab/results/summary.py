@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import fields
-from math import degrees
 from typing import Any
 
 from chutelab.results.arrival import fates
-from chutelab.results.comparison import compare
+from chutelab.results.comparison import compare, predicted
 from chutelab.results.ledger import Ledger
 from chutelab.results.notes import air_drag, plugged, rolling, squeezed, stopped, waits
 from chutelab.results.quantities import each
@@ -109,11 +108,8 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
 
 
 def _theory(prediction: Transfer) -> dict[str, Any]:
-    out: dict[str, Any] = {}
-    for field, row in THEORY.items():
-        value = float(getattr(prediction, field))
-        out[row.name] = degrees(value) if row.unit == "degrees" else value
-    return {**out, "reason": str(prediction.reason) or None}
+    told = {row.name: predicted(prediction, row) for row in THEORY.values()}
+    return {**told, "reason": str(prediction.reason) or None}
 
 
 def schema() -> dict[str, Any]:

@@ -59,7 +59,7 @@ class Quantity(NamedTuple):
     @property
     def field(self) -> str:
         """Its name in `chutelab.theory.Transfer`, where angles are in radians."""
-        return self.name.removesuffix("_deg")
+        return self.name.removeprefix(FIRST).removesuffix("_deg")
 
     @property
     def kind(self) -> str:

@@ -68,8 +68,8 @@ export interface Machine {
   rolling: number[]; // by kind
 }
 
-/** One surface: polylines with a speed, bends (x, y, radius, begin, extent, speed), and when they
- * are there. */
+/** One surface: polylines with a speed, bends (x, y, radius, begin, extent, speed), and when
+ * they are there. */
 interface Part {
   name: string;
   lines: { points: Point[], speed: number }[];

@@ -3,7 +3,6 @@
 - `units`: sizes with their units, and what a key may hold: strict types and ranges.
 - `materials`: ``[[material]]``, and presets with their spread and sources.
 - `quantities`: the registry of a run's quantities, from which all that names them comes.
-- `rules`: ``[[expect]]``, what a scene should show.
 - `conflicts`: what no single key can answer for.
 - `tables`: the tables of a scene as frozen Pydantic models, with the defaults.
 - `schema`: all tables together, and what follows from one for another.
@@ -31,9 +30,9 @@ from chutelab.scene.loading import (
     to_toml,
 )
 from chutelab.scene.overrides import schema
-from chutelab.scene.rules import Expect
 from chutelab.scene.tables import (
     Conveyor,
+    Expect,
     Incoming,
     Outgoing,
     Particle,

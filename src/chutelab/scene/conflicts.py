@@ -14,7 +14,6 @@ from typing import Any, Final
 
 from chutelab.scene.materials import PRESETS
 from chutelab.scene.quantities import REGISTRY, lookup, suggestion, whose
-from chutelab.scene.rules import THEORY, UNPROMISED
 from chutelab.scene.units import (
     LIGHTEST,
     MOST_PARTICLES,
@@ -27,6 +26,10 @@ from chutelab.scene.units import (
 )
 from chutelab.util.errors import MISSING, Fault, did_you_mean
 from chutelab.util.trig import RADIANS, sin_cos
+
+THEORY: Final = "theory"
+UNPROMISED: Final = "none"
+"""What an expectation may have for its value and for a tolerance."""
 
 ON_BELT: Final = 1e-9
 """How near to the belt's height R + r a release counts as lying on the belt, m."""

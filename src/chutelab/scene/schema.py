@@ -11,9 +11,9 @@ from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts, stream_name
 from chutelab.scene.materials import PRESETS, Material
-from chutelab.scene.rules import Expect
 from chutelab.scene.tables import (
     Conveyor,
+    Expect,
     Incoming,
     Live,
     Outgoing,
@@ -80,16 +80,7 @@ def _several(default: Any, **limits: Any) -> Any:
 
 
 class SceneTables(Table):
-    """A validated scene, all defaults filled in that need no geometry.
-
-    Of tables of which there may be one or several, `particles`, `plates` and `streams` are all;
-    `stream` is the first, `particle` its kind, and `plate` the one at a distance from the pulley.
-
-    Raises
-    ------
-    SceneError
-        With all faults.
-    """
+    """The tables of a scene, with all defaults that need no geometry."""
 
     title: Text = described("Untitled scene", "What the scene is called", max_length=200)
     gravity: Gravity = described(9.81, "Gravity g, downward", "m/s²")

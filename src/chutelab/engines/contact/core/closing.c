@@ -130,6 +130,7 @@ void close_step(double h) {
         d->supports = 0;
         if (W.length_before > 0.01 * W.dt) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
+        d->lacks = 0;
         if (d->mode == FREE) {
             d->calm += h;
             d->rest += h;

@@ -156,6 +156,8 @@ void account(Contact *list, int count);
 double pressed_inside(const Disk *d, int surface);
 double turning_time(const Disk *d, const Surface *s);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
+double chord(const Contact *c, double h);
+double follow(Contact *c, double past, double out);
 
 /* impacts.c */
 void foresee(int i);

@@ -212,9 +212,10 @@ static void support(int i, int k, double t) {
     hold(d, k);
     double press = press_on(d, W.surfaces + k, c.nx, c.ny), left = W.step_end - t, u[3];
     if (press <= 0 || !W.interact) return;
+    double cosine = follow(&c, 0, chord(&c, left));
     relative(&c, 0, u);
     c.drift = 0.5 * left * c.pull;
-    give(&c, 0.5 * press * d->mass * left);
+    give(&c, 0.5 * press * d->mass * left / cosine);
     /* Friction that need not slow it can hold it from now on. */
     if (fabs(u[1]) <= 1e-12 * W.g * W.dt && fabs(c.impulse[1]) < c.friction * c.impulse[0]) {
         d->slips = 0;

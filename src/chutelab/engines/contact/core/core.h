@@ -167,7 +167,7 @@ int next_disk(void);
 void shock(int i, int j, double t);
 void hold(Disk *d, int k);
 double soft_approach(const Disk *d, double radius);
-double left_over(const Disk *d, int impacts, int surface, double radius);
+double left_over(const Disk *d, int impacts, int surface, double radius, int sunk);
 void lie_down(int i);
 void was_moved(int i);
 

@@ -223,7 +223,7 @@ int find_contacts(double h, int *woke) {
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
         /* What the step before left over is taken up here. */
         int impacts = MAX(a->impacts, b->impacts);
-        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least);
+        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least, 0);
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
             bound = MAX(bound, MAX(W.soft, W.skip * least));
         if (a->mode == ASLEEP || b->mode == ASLEEP) {
@@ -238,7 +238,7 @@ int find_contacts(double h, int *woke) {
         Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         int first = W.contact_count;
-        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius);
+        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius, 0);
         if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
         const int *list;
         int count = surfaces_near(i, &list);

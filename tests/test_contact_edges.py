@@ -90,7 +90,9 @@ def test_a_belt_slips_under_what_it_cannot_move_and_stalls_where_that_locks(fric
 
 
 @pytest.mark.parametrize(("count", "dt"), [(2, 1e-3), (2, 5e-4), (4, 1e-3)])
-@pytest.mark.parametrize(("friction", "angle"), [(0.3, 30.0), (1.0, 30.0), (0.3, 60.0), (1.0, 60.0)])
+@pytest.mark.parametrize(
+    ("friction", "angle"), [(0.3, 30.0), (1.0, 30.0), (0.3, 60.0), (1.0, 60.0)]
+)
 def test_in_a_row_that_is_pushed_into_a_nip_each_pays_for_its_load(count, friction, angle, dt):
     """The others push the first with F = (n - 1) µ m g: N2 sin α = µ N1 + F, N1 = m g + N2 cos α.
 
@@ -108,7 +110,9 @@ def test_in_a_row_that_is_pushed_into_a_nip_each_pays_for_its_load(count, fricti
 
 
 @pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
-@pytest.mark.parametrize(("count", "angle", "wall"), [(2, 30.0, 0.0), (2, 60.0, 0.5), (4, 30.0, 0.0)])
+@pytest.mark.parametrize(
+    ("count", "angle", "wall"), [(2, 30.0, 0.0), (2, 60.0, 0.5), (4, 30.0, 0.0)]
+)
 def test_a_row_on_a_belt_that_grips_without_bound_stalls_it(count, angle, wall, dt):
     """What cannot move blocks it, and nothing is paid; before, a blow costs m v² at most.
 

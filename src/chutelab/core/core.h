@@ -156,6 +156,8 @@ void account(Contact *list, int count);
 double pressed_inside(const Disk *d, int surface);
 double turning_time(const Disk *d, const Surface *s);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
+double chord(const Contact *c, double h);
+double follow(Contact *c, double past, double out);
 
 /* impacts.c */
 void foresee(int i);
@@ -165,7 +167,7 @@ int next_disk(void);
 void shock(int i, int j, double t);
 void hold(Disk *d, int k);
 double soft_approach(const Disk *d, double radius);
-double left_over(const Disk *d, int impacts, int surface, double radius);
+double left_over(const Disk *d, int impacts, int surface, double radius, int sunk);
 void lie_down(int i);
 void was_moved(int i);
 

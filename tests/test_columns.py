@@ -27,6 +27,19 @@ def test_a_column_makes_no_energy(seed):
     assert found.laws == ()
 
 
+@pytest.mark.parametrize(("seed", "count"), [(8, 200), (9, 150)])
+def test_what_jams_is_not_pressed_into_each_other(seed, count):
+    """By 5 % of the lesser radius, the promise of the engine, at most."""
+    found = run(build(from_dict(column(seed, count))))
+    i, j = np.triu_indices(count, 1)
+    radii, deepest = np.broadcast_to(found.machine.particle.radius, count), 0.0
+    for places in found.at(np.linspace(0.0, found.knots["t"].max(), 200))[0]:
+        depth = radii[i] + radii[j] - np.hypot(*(places[i] - places[j]).T)
+        deepest = max(deepest, np.nanmax(depth / np.minimum(radii[i], radii[j]), initial=0.0))
+    assert deepest < 0.05
+    assert found.laws == ()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_twenty_columns_and_silos_make_no_energy(seed):

@@ -289,8 +289,8 @@ static void jam(Contact *struck, double t) {
     }
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
-    /* Not hastened: then what rattles may never be as calm as it must be. */
-    sweep_contacts(list, count, 0, W.sweeps, 0.1 * left, left);
+    /* Not hastened at first: then what rattles may never be as calm as it must be. */
+    sweep_contacts(list, count, 0, JAM_SWEEPS, W.sweeps, 0.1 * left, left);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
         Disk *d = W.disks + m;
         double v[3] = {d->vx, d->vy, d->spin};

@@ -247,7 +247,7 @@ static void keep_bounds(Contact *list, int count) {
     }
 }
 
-/* Solve contacts by sweeps until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
+/* Solve contacts by `sweeps` until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
    will do. A crowd is swept again, up to so many rounds, of which the last is good enough if it crawls,
    and more finely where small changes leave gaps open. By itself (0 rounds), and where sweeps diverge,
    rigid bodies with all of the friction may have no solution, driven into a wedge that locks itself:
@@ -255,10 +255,11 @@ static void keep_bounds(Contact *list, int count) {
    harder in each sweep, so there the changes have to end, too. A disk that cannot turn is held where
    friction locks, and would slip away from a lower one: it stalls the drive, for this step, and so does
    one that others block on a belt that grips without bound, which never slips. */
-void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough) {
+void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
+                    double enough) {
     double first = INFINITY;
     for (int left = TRIES, more = rounds;;) {
-        double change = sweep(list, count, W.sweeps, plain, accurate), worst = change;
+        double change = sweep(list, count, sweeps, plain, accurate), worst = change;
         int ended = change <= accurate;
         if (!ended) keep_bounds(list, count);
         if (!ended || W.interact) lessen(list, count);
@@ -325,7 +326,7 @@ static void solve_alone(Contact *list, int count) {
     double h = W.step_end - W.t, r = W.disks[list->i].radius;
     for (double last = INFINITY;;) {
         double most = 0;
-        sweep_contacts(list, count, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9 * W.pace));
+        sweep_contacts(list, count, 0, W.sweeps, W.sweeps, W.accurate, MAX(W.accurate, 1e-9 * W.pace));
         for (int n = 0; n < count; n++) most = MAX(most, fabs(bends(list + n, h) - list[n].bend));
         if (most <= FINE * r || most >= SHRINKS * last) return;
         last = most;
@@ -429,8 +430,8 @@ void solve_contacts(void) {
         }
         start_warm(list, to - from);
         if (W.interact)
-            sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), PLAIN,
-                           W.accurate, W.skip * least);
+            sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,
+                           PLAIN, W.accurate, W.skip * least);
         else solve_alone(list, to - from);
         for (int n = from; n < to; n++) {
             /* Rounding does not press; with endless friction even that would pull. */

@@ -128,8 +128,9 @@ void close_step(double h) {
            step is: that is no blow, and of endless friction it would be one however soft. */
         if (d->mode == FREE && (W.interact || !d->supports)) d->held_count = 0;
         d->supports = 0;
-        if (W.length_before > 0.01 * W.dt) d->impacts = 0;
+        if (W.length_before > 0.01 * W.step) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
+        d->lacks = 0;
         if (d->mode == FREE) {
             d->calm += h;
             d->rest += h;

@@ -42,6 +42,8 @@ extern World W;
 #define JAMMED 30
 /* Contacts per disk that a jam may have: disks in a plane have three pairs each at most. */
 #define TOUCHES 8
+/* Sweeps that a jam may take: what they leave open rattles on, and is the next jam after a few impacts. */
+#define JAM_SWEEPS 2000
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */
 #define GRAZE 1e-6
 /* Friction, 76 degrees, that takes all slip in any blow; where sweeps diverge it is lowered from here. */
@@ -156,6 +158,8 @@ void account(Contact *list, int count);
 double pressed_inside(const Disk *d, int surface);
 double turning_time(const Disk *d, const Surface *s);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
+double chord(const Contact *c, double h);
+double follow(Contact *c, double past, double out);
 
 /* impacts.c */
 void foresee(int i);
@@ -165,7 +169,7 @@ int next_disk(void);
 void shock(int i, int j, double t);
 void hold(Disk *d, int k);
 double soft_approach(const Disk *d, double radius);
-double left_over(const Disk *d, int impacts, int surface, double radius);
+double left_over(const Disk *d, int impacts, int surface, double radius, int sunk);
 void lie_down(int i);
 void was_moved(int i);
 
@@ -175,7 +179,8 @@ double time_unloaded(const double *load, const double *t);
 int find_contacts(double h, int *woke);
 
 /* solver.c */
-void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough);
+void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
+                    double enough);
 void solve_contacts(void);
 
 /* closing.c */

@@ -54,6 +54,8 @@ typedef struct {
     double entries[3];          /* J; belt work, restitution loss, friction loss so far */
     double gain[3];             /* J; what this step's lasting contacts add to them */
     double ahead[3];            /* J; the second half of it */
+    double lacks;               /* J; kinetic energy that the mean velocity of this step's impulses lacks
+                                   in a hollow, see `account` */
     int kind;                   /* [in] row of the table of pairs */
     int rides;                  /* [in] the incoming belt carries it by adhesion */
     int goes_on;                /* [in] it was under way before: released wherever others are */
@@ -149,6 +151,7 @@ typedef struct {
     double entries[3], later[3]; /* J; what its impulses do to the ledger, and what the part of them
                                     does that belongs to this step; see `account` */
     double given[2];        /* J; the same for the belt that carries the partner */
+    double turns;           /* m/s2; by which a hollow turns the way of a disk in a crowd, else 0 */
     double free_gap, bend;     /* m; its gap at the step's end without impulses, and what they change of it
                                but for the straight way: see `bends` */
     int i, j;

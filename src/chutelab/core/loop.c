@@ -368,6 +368,8 @@ static int go_through(void) {
         Disk *d = W.disks + i;
         double t = d->due;
         int j = d->partner;
+        /* The step was cut short. */
+        if (t >= W.step_end) return DONE;
         if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
         if (W.event_count + SHOCKS * W.contact_count + 64 > W.event_room)
             return FULL_EVENTS;

@@ -241,7 +241,7 @@ def test_the_theory_is_asked_for_its_own_symbols_only():
     assert [row.engine for row in verify(expecting("t2", 0.29685, 1e-6)).findings] == [
         *("exact", "contact", "pymunk", "theory")
     ]
-    for quantity, value in (("t2", '"theory"'), ("impact.t", "0.79685")):
+    for quantity, value in (("t2", '"theory"'), ("impact.t", "0.79685"), ("t2.mean", "0.29685")):
         engines = [row.engine for row in verify(expecting(quantity, value, 1e-6)).findings]
         assert engines == ["exact", "contact", "pymunk"]
 

@@ -117,7 +117,8 @@ def measured(recording: Recording, name: str) -> Floats:
 
     match parts:
         case ["contacts"]:
-            return np.array([float(recording.contacts)])
+            # Of a family they are counted together.
+            return np.full(many, nan if recording.scene.shape else float(recording.contacts))
         case ["ended", reason] if reason in REASONS:
             return count(recording.ended == REASONS.index(reason))
         case ["misses"]:

@@ -79,13 +79,13 @@ STATISTICS: Final = {
 """What is told of all particles together; those without a value do not count."""
 
 EVENTS: Final = {
-    "separation": ("incoming", "the separation"),
-    "impact": ("plate", "the impact on the plate"),
-    "landing": ("outgoing", "the landing on the belt itself"),
-    "arrival": ("outgoing", "the arrival on the belt or its load"),
-    "impact.SURFACE": ("", "the impact on SURFACE"),
+    "separation": ("incoming", "the separation", "left the incoming belt"),
+    "impact": ("plate", "the impact on the plate", "met the plate"),
+    "landing": ("outgoing", "the landing on the belt itself", "touched the outgoing belt itself"),
+    "arrival": ("outgoing", "the arrival on the belt or its load", "arrived on the outgoing belt"),
+    "impact.SURFACE": ("", "the impact on SURFACE", "met SURFACE"),
 }
-"""What happens to a particle, for the first time: the table that it needs, and what it is."""
+"""What happens to a particle, for the first time: the table that it needs, a noun and a verb."""
 
 NEEDED: Final = {event: EVENTS[event][0] for event in ("separation", "impact", "landing")}
 """Events of the transfer, and their surfaces; impacts on free surfaces go by name."""
@@ -104,7 +104,7 @@ HEAT: Final = "ledger.by_surface.outgoing.friction_loss"
 
 def _event(event: str) -> Iterator[Quantity]:
     """Yield the rows of what is known of each particle at an event, and how many it happened to."""
-    home, what = EVENTS[event]
+    home, what, verb = EVENTS[event]
     needs = (home,) if home else ()
     for key, unit, text, swept in (
         ("t", "s", "time of {}", {"landing": MEAN}),
@@ -114,7 +114,7 @@ def _event(event: str) -> Iterator[Quantity]:
         ("vy", "m/s", "upward velocity just before {}", {"landing": BOTH}),
         ("vx_after", "m/s", "forward velocity just after {}", {}),
         ("vy_after", "m/s", "upward velocity just after {}", {}),
-        ("count", "", "particles that came to {}", {"impact": ITSELF}),
+        ("count", "", f"particles that {verb}", {"impact": ITSELF}),
     ):
         if not (key.endswith("_after") and event in ("separation", "arrival")):
             of: Of = "stream" if key == "count" else "particle"
@@ -221,7 +221,7 @@ def _told(row: Quantity, statistic: str) -> Quantity | None:
     if row.of not in ("particle", "nominal") or statistic not in STATISTICS:
         return None
     meaning = f"{row.meaning}, {STATISTICS[statistic]}"
-    return row._replace(name=f"{row.name}.{statistic}", meaning=meaning, of="stream")
+    return row._replace(name=f"{row.name}.{statistic}", meaning=meaning, of="stream", theory=False)
 
 
 COLUMNS: Final = {

@@ -135,6 +135,11 @@ def test_statistics_are_over_all_particles_it_happened_to():
     }.items():
         found = measure(recording, f"landing.{statistic}")
         assert found == pytest.approx(value, rel=1e-13, abs=0.0)
+    tracks = [recording.track(particle)["t"] for particle in range(40)]
+    assert tracks[1][0] > 0.0, "released later"
+    lasted = sum(t[-1] - t[0] for t in tracks) / 40
+    assert measure(recording, "track.t.mean") == pytest.approx(lasted, rel=1e-13, abs=0.0)
+    assert measure(recording, "misses") == 40 - len(x)
     assert measure(recording, "ended.landed") == len(x)
     assert measure(recording, "ended.exit") == 40 - len(x)
     assert measure(recording, "ended.settled") == 0

@@ -49,13 +49,6 @@ def column(events: NDArray[Any], name: str) -> Floats:
     return np.asarray(events[f"velocity_{when}"][:, "xy".index(name[1])])
 
 
-def end_times(recording: Recording) -> Floats:
-    """Return when the particles' tracks end, s, (N,); NaN of those that were never released."""
-    times = np.full(recording.count, nan)
-    times[recording.released] = recording.ends()[1]["t"]
-    return times
-
-
 def paid(recording: Recording, surface: str, entry: str) -> Floats:
     """Return an entry of a surface of each variant, (V,), J; of a family V = N, else 1."""
     books = recording.by_surface.reshape(-1, len(recording.surfaces), len(ENTRIES))

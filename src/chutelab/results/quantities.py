@@ -15,7 +15,7 @@ import numpy as np
 
 from chutelab.results.arrival import arrivals
 from chutelab.results.comparison import worst
-from chutelab.results.firsts import column, end_times, first, paid, symbols
+from chutelab.results.firsts import column, first, paid, symbols
 from chutelab.results.recording import ENTRIES, REASONS, Recording, balance
 from chutelab.scene.quantities import FIRST, lookup, suggestion, whose
 from chutelab.util.arrays import Bools, Floats
@@ -40,7 +40,7 @@ def each(recording: Recording, name: str) -> Floats:
     """
     match name.split("."):
         case ["ended", "t"]:
-            return end_times(recording)
+            return _at_end(recording, recording.ends()[1]["t"])
         case ["ended", "x" | "y" as axis]:
             return _at_end(recording, recording.ends()[1]["position"][:, "xy".index(axis)])
         case ["track", "t"]:
@@ -130,7 +130,7 @@ def measured(recording: Recording, name: str) -> Floats:
         case ["ledger", "power"]:
             work = paid(recording, "outgoing", "belt_work")
             return np.asarray(work / shape[1] * recording.scene.rate)
-        case ["ledger", *entry] if many > 1 or recording.scene.shape:
+        case ["ledger", *_] if recording.scene.shape:
             return each(recording, name)
         case ["ledger", stored, end]:
             return np.array([getattr(recording.ledger, stored)[("start", "end").index(end)]])

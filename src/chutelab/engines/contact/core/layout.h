@@ -191,12 +191,14 @@ typedef struct {
     int *found;          /* (2 disks) */
     int *nearby;         /* (disks, MAX_NEARBY) surfaces near each, ascending */
     int *everything;     /* (surfaces) 0, 1, ... */
+    int *ends;           /* (2 surfaces) ends of segments and arcs, sorted by place ... */
+    int *circles;        /* ... and within, behind them, the circles */
     int *spared;         /* (disks, gates) 1: what shut on this disk, and does not touch it yet */
     /* sizes */
     int disk_count, surface_count, kind_count, material_count, owner_count;
     int knot_room, event_room, contact_room, near_room, cell_room;
     int bucket_count;    /* a power of two */
-    int gate_count;
+    int gate_count, end_count, circle_count;
     /* the run */
     int interact;        /* disks meet each other */
     int until;

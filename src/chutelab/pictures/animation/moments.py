@@ -85,7 +85,7 @@ def sentence(recording: Recording, event: Any) -> str:
         Kind.RELEASE: "is released",
         Kind.SEPARATION: pulley if name == "incoming" else f"leaves {on} at {after}",
         Kind.SLIP: f"begins to slip on {on}",
-        Kind.STICK: f"no longer slips on {on}",
+        Kind.STICK: f"is on {on} without slip",
         Kind.IMPACT: f"strikes {on} at {before}",
         Kind.LANDING: f"lands on {on} at {before}",
         Kind.COLLISION: f"is hit by particle {i}" if (i := int(event["particle"])) else hits,

@@ -12,6 +12,33 @@
 /* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
 #define REST 2.5e-3
 
+/* How long ago the foot of a disk passed the end at which it comes on to a surface, s; below 0: it will.
+   0 where it is none within a step. */
+static double since_passage(const Contact *c) {
+    const Disk *d = W.disks + c->i;
+    const Surface *s = W.surfaces + (-1 - c->j);
+    double since = 0, least = INFINITY;
+    for (int n = 0; n < 4 && s->shape != CIRCLE; n += 2) {
+        double x = s->end[n], y = s->end[n + 1];
+        double tx = s->shape == SEGMENT ? s->tx : (s->y - y) / s->radius;
+        double ty = s->shape == SEGMENT ? s->ty : (x - s->x) / s->radius;
+        double past = (d->x - x) * tx + (d->y - y) * ty, along = d->ux * tx + d->uy * ty;
+        if (fabs(past) > fabs(along) * MAX(W.length_before, W.length) || fabs(past) >= least) continue;
+        least = fabs(past);
+        since = past / along;
+    }
+    return since;
+}
+
+/* Tell that a disk has gone over to another surface without a blow, when it did. */
+static void tell_passage(const Contact *c, int kind) {
+    Disk then = W.disks[c->i];
+    double since = since_passage(c);
+    then.x -= since * then.ux;
+    then.y -= since * then.uy;
+    write_event(kind, c->i, -1, c->owner, then.t - since, &then.x, &then.ux, &then.ux, 0, 0);
+}
+
 /* Note whether a disk that lasts on one surface slips there, sticks, or has come to rest. */
 static void note_grip(Disk *d, const Contact *c, const double *u, const double *v, double h) {
     int i = c->i;
@@ -26,14 +53,15 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     }
     track->load[0] = c->impulse[0] / span;
     track->load_t[0] = d->t;
-    /* A smooth way may go on as another surface. */
-    if (d->on >= 0 && d->on == c->was) d->on = c->owner;
-    if (d->on != c->owner) {
+    if (d->on < 0) {
         /* It came to lie there without an impact that was told. */
         write_event(IMPACT, i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
-        d->on = c->owner;
         d->slips = 1;
+    } else if (d->on != c->owner) {
+        tell_passage(c, grips ? STICK : SLIP);
+        d->slips = !grips;
     }
+    d->on = c->owner;
     if (grips && d->slips) {
         /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
         double s = u[1] - c->pull * past, pull = c->pull;
@@ -165,9 +193,10 @@ void close_step(double h) {
         }
         a->supports++;
         if (b) b->supports++;
-        else if (c->owner == W.landing && !a->landed) {
-            write_event(LANDING, c->i, -1, c->owner, a->t, &a->x, &a->ux, &a->vx, c->impulse[0],
-                        c->impulse[1]);
+        else if (c->owner == W.landing && !a->landed && (a->on < 0 || since_passage(c) >= 0)) {
+            if (a->on >= 0) tell_passage(c, LANDING);
+            else write_event(LANDING, c->i, -1, c->owner, a->t, &a->x, &a->ux, &a->vx, c->impulse[0],
+                             c->impulse[1]);
             a->landed = 1;
             a->on = c->owner;
             a->slips = 1;

@@ -119,6 +119,7 @@ typedef struct {
     int owner;              /* [in] number of the surface it is part of */
     int mates[2];           /* pieces that go on smoothly beyond its ends, of a circle that lead to it;
                                or -1 */
+    double ledges[2];       /* m; how far their ends are apart there */
     int gate;               /* column of `spared` if it comes and goes, else -1 */
     int there;              /* whether it is there in this step; LEAVING: until just now */
     double box[4];          /* m; left, bottom, right, top */
@@ -231,6 +232,7 @@ typedef struct {
     double pace;         /* sqrt(g / EARTH), 1 without gravity: bounds on speeds grow with it, bounds
                             on times shrink: a film of the run shown faster is a run */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
+    double ledge;        /* m; up to which a joint is smooth in this step, see `begin_step` */
     double room;         /* m; least that a hollow leaves a disk by itself, INFINITY without one */
     double skip;         /* 1/s; SKIP in a step: radii that it may go */
 } World;

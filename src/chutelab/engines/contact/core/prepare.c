@@ -134,11 +134,14 @@ static int first_near(int end, double r, double *last) {
     return low;
 }
 
-/* Which piece goes on smoothly beyond an end: an arc, or beyond a segment an arc or circle; or -1. */
-static int mate_of(int k, int end, double r) {
-    const Surface *s = W.surfaces + k;
+/* Note which piece goes on smoothly beyond an end: an arc, or beyond a segment an arc or circle; or -1. */
+static void find_mate(int k, int end, double r) {
+    Surface *s = W.surfaces + k;
     double place[2], onward[2], other[2], back[2], last;
     int mate = W.surface_count;
+    s->mates[end] = -1;
+    s->ledges[end] = 0;
+    if (s->shape == CIRCLE) return;
     at_end(s, end, place, onward);
     for (int row = first_near(2 * k + end, r, &last); row < W.end_count; row++) {
         int m = W.ends[row] / 2;
@@ -146,19 +149,22 @@ static int mate_of(int k, int end, double r) {
         if (rank(W.ends[row]) > last) break;
         if (m == k || m >= mate || (next->shape == SEGMENT && s->shape == SEGMENT)) continue;
         at_end(next, W.ends[row] % 2, other, back);
-        if (hypot(other[0] - place[0], other[1] - place[1]) <= JOINED * r
-            && hypot(back[0] + onward[0], back[1] + onward[1]) <= SMOOTH) mate = m;
+        double off = hypot(other[0] - place[0], other[1] - place[1]);
+        if (off > JOINED * r || hypot(back[0] + onward[0], back[1] + onward[1]) > SMOOTH) continue;
+        s->mates[end] = mate = m;
+        s->ledges[end] = off;
     }
-    if (mate < W.surface_count) return mate;
+    if (mate < W.surface_count) return;
     for (int n = 0; n < W.circle_count; n++) {
         const Surface *next = W.surfaces + W.circles[n];
         double x = place[0] - next->x, y = place[1] - next->y, reach = next->radius + JOINED * r;
         if (fabs(x) > reach || fabs(y) > reach) continue;
-        double d = hypot(x, y);
-        if (fabs(d - next->radius) <= JOINED * r
-            && fabs(x * onward[0] + y * onward[1]) <= SMOOTH * d) return W.circles[n];
+        double d = hypot(x, y), off = fabs(d - next->radius);
+        if (off > JOINED * r || fabs(x * onward[0] + y * onward[1]) > SMOOTH * d) continue;
+        s->mates[end] = W.circles[n];
+        s->ledges[end] = off;
+        return;
     }
-    return -1;
 }
 
 /* Ends in one place but for rounding are one point, of the first piece that ends there. */
@@ -201,13 +207,14 @@ __attribute__((visibility("default"))) void prepare(void) {
     for (int k = 0; k < 2 * W.surface_count; k++)
         if (W.surfaces[k / 2].shape != CIRCLE) share_end(k / 2, k % 2, TOUCHING * least, least);
     for (int k = 0; k < W.surface_count; k++)
-        for (int end = 0; end < 2; end++)
-            W.surfaces[k].mates[end] = W.surfaces[k].shape == CIRCLE ? -1 : mate_of(k, end, least);
+        for (int end = 0; end < 2; end++) find_mate(k, end, least);
     for (int k = 0; k < 2 * W.surface_count; k++) {
         int mate = W.surfaces[k / 2].mates[k % 2], *of = W.surfaces[MAX(mate, 0)].mates;
         if (W.surfaces[k / 2].shape == CIRCLE || mate < 0 || W.surfaces[mate].shape != CIRCLE) continue;
+        W.surfaces[mate].ledges[of[0] >= 0] = W.surfaces[k / 2].ledges[k % 2];
         of[of[0] >= 0] = k / 2;
     }
+    W.ledge = INFINITY;
     W.gx = 0;
     W.gy = -W.g;
     W.sweeps = alone ? SWEEPS_ALONE : SWEEPS;

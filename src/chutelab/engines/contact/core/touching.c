@@ -54,7 +54,7 @@ static double time_on_face(const Contact *c) {
         length = 2 * half;
     }
     if (along < 0 || along > length || run == 0) return INFINITY;
-    if (s->mates[run > 0] >= 0) {
+    if (mate_of(s, run > 0) >= 0) {
         const Surface *next = W.surfaces + s->mates[run > 0];
         double load = -(W.gx * c->nx + W.gy * c->ny), fast = d->vx * c->ny - d->vy * c->nx;
         int round = next->shape != SEGMENT

@@ -141,14 +141,37 @@ void account(Contact *list, int count) {
     pool(list, count, 1);
 }
 
-/* Hardly ever asked to the end: inline it would slow all that asks. */
-__attribute__((noinline)) int is_one(const Disk *d, int k, int other) {
+/* Whether a disk touches the same place of two surfaces: pieces on each other, or the point that they share. */
+static int same_place(const Disk *d, int k, int other) {
     double nx, ny, mx, my;
-    if (other < 0) return 0;
-    if (goes_on(-1 - k, -1 - other)) return 1;
     double gap = gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny);
     double off = gap - gap_to(W.surfaces + other, d->x, d->y, d->radius, &mx, &my);
     return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;
+}
+
+/* Hardly ever asked to the end: inline it would slow all that asks. */
+__attribute__((noinline)) int is_one(const Disk *d, int k, int other) {
+    return other >= 0 && (goes_on(-1 - k, -1 - other) || same_place(d, k, other));
+}
+
+/* Of the surfaces that a disk touches in the same place as k the one that acts: the face that it lies on already,
+   else the first in the file. */
+int acting(int i, int k) {
+    const Disk *d = W.disks + i;
+    const int *list;
+    int count = surfaces_near(i, &list), first = W.surfaces[k].there == THERE ? k : W.surface_count;
+    for (int n = 0; n < count; n++) {
+        const Surface *s = W.surfaces + list[n];
+        if (list[n] == k || s->there != THERE || !is_near(s, d)) continue;
+        if (!same_place(d, k, list[n]) || face_at(s, d->x, d->y) != s) continue;
+        for (int h = 0; h < d->held_count; h++) {
+            const Surface *held = W.surfaces + d->held[h];
+            if ((d->held[h] == list[n] || (d->held[h] == k && held->there == THERE))
+                && bending(held, d->x, d->y, d->radius) != 1 / d->radius) return d->held[h];
+        }
+        first = MIN(first, list[n]);
+    }
+    return first < W.surface_count ? first : k;
 }
 
 int is_held(const Disk *d, int k) {

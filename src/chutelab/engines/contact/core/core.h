@@ -86,7 +86,6 @@ static inline int goes_on(int j, int other) {
 /* The same for surfaces of which a disk touches the same place: pieces in one place, or the point that
    two share. */
 int is_one(const Disk *d, int k, int other);
-int acting(int i, int k);
 int is_held(const Disk *d, int k);
 /* Whether a disk that is on a piece at the beginning of a step is on no hollow at its end. */
 static inline int is_flat(const Surface *s) {

@@ -271,8 +271,7 @@ static void jam(Contact *struck, double t) {
         int most = surfaces_near(m, &nearby);
         for (int n = 0; n < most; n++) {
             const Surface *s = W.surfaces + nearby[n];
-            if (s->there == THERE && is_near(s, a) && face_at(s, a->x, a->y) == s
-                && acting(m, nearby[n]) == nearby[n])
+            if (s->there == THERE && is_near(s, a) && face_at(s, a->x, a->y) == s)
                 add_touching(m, -1 - nearby[n], a->radius, &count);
         }
     }
@@ -403,7 +402,6 @@ static void strike(int i, int j, double t) {
     int impacts = j >= 0 ? MAX(a->impacts, b->impacts) : a->impacts;
     Contact c;
     double u[3];
-    if (j < 0) j = -1 - acting(i, -1 - j);
     describe(&c, i, j);
     c.drift = 0;
     was_moved(i);

@@ -80,7 +80,6 @@ static int add(int i, int j, double least, double bound, double h) {
     /* The next face or pulley that a disk by itself slides on to may be further off. */
     int far = c->gap > TOUCH * least;
     if (far && (W.interact || j >= 0 || !d->supports)) return 1;
-    if (j < 0 && acting(i, -1 - j) != -1 - j) return 1;
     later = c->free_gap = gap_later(c, h, 0);
     c->bend = 0;
     if (far && later > 0) return 1;

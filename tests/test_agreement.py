@@ -356,4 +356,8 @@ def test_what_slides_down_a_round_chute_on_to_the_outgoing_belt_has_landed(engin
 
     (landing,) = recording.select(Kind.LANDING)
     assert landing["t"] == pytest.approx(quad(rate, 0.0, first)[0], abs=LATE[engine])
+    speed = path / rate(0.0)
+    # The stepped ones to second order: 100 dt².
+    off = 1e-12 if engine == "exact" else 1e-4
+    np.testing.assert_allclose(landing["velocity_after"], [speed, 0.0], rtol=0, atol=off)
     assert [REASONS[n] for n in recording.ended] == ["landed"]

@@ -92,7 +92,7 @@ def sentence(recording: Recording, event: Any) -> str:
         Kind.SETTLE: f"has settled on {on}",
         Kind.EXIT: "has left the scene",
     }[kind]
-    if kind not in (Kind.IMPACT, Kind.LANDING):
+    if kind not in (Kind.IMPACT, Kind.LANDING) or event["normal_impulse"] == 0.0:
         return text
     normal = contact_normal(recording.machine, event)
     into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))

@@ -12,12 +12,14 @@
 /* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
 #define REST 2.5e-3
 
-/* How long ago the foot of a disk passed the end at which it comes on to a surface, s; below 0: it will.
-   0 where it is none within a step. */
-static double since_passage(const Contact *c) {
+/* How long ago the foot of a disk passed the end at which it comes on to a surface, s, and the direction of the
+   surface there; below 0: it will. 0 where it is none within a step. */
+static double since_passage(const Contact *c, double *way) {
     const Disk *d = W.disks + c->i;
     const Surface *s = W.surfaces + (-1 - c->j);
     double since = 0, least = INFINITY;
+    way[0] = c->ny;
+    way[1] = -c->nx;
     for (int n = 0; n < 4 && s->shape != CIRCLE; n += 2) {
         double x = s->end[n], y = s->end[n + 1];
         double tx = s->shape == SEGMENT ? s->tx : (s->y - y) / s->radius;
@@ -26,17 +28,28 @@ static double since_passage(const Contact *c) {
         if (fabs(past) > fabs(along) * MAX(W.length_before, W.length) || fabs(past) >= least) continue;
         least = fabs(past);
         since = past / along;
+        way[0] = tx;
+        way[1] = ty;
     }
     return since;
 }
 
-/* Tell that a disk has gone over to another surface without a blow, when it did. */
+/* Tell that a disk has gone over to another surface without a blow, when it did: as fast along both as its
+   last two steps on the one before lead to. */
 static void tell_passage(const Contact *c, int kind) {
-    Disk then = W.disks[c->i];
-    double since = since_passage(c);
-    then.x -= since * then.ux;
-    then.y -= since * then.uy;
-    write_event(kind, c->i, -1, c->owner, then.t - since, &then.x, &then.ux, &then.ux, 0, 0);
+    const Disk *d = W.disks + c->i;
+    const Track *track = W.tracks + c->i;
+    const double *last = track->held, *past = track->past;
+    double way[2], t = d->t - since_passage(c, way), on = t - last[0];
+    double then[5] = {d->x, d->y, d->ux, d->uy, d->uspin};
+    for (int n = 0; n < 3 && track->lasted > 1; n++) {
+        then[2 + n] = last[3 + n] + on / (last[0] - past[0]) * (last[3 + n] - past[3 + n]);
+        if (n < 2) then[n] = last[1 + n] + 0.5 * on * (last[3 + n] + then[2 + n]);
+    }
+    double along = then[2] * way[0] + then[3] * way[1];
+    then[2] = along * way[0];
+    then[3] = along * way[1];
+    write_event(kind, c->i, -1, c->owner, t, then, then + 2, then + 2, 0, 0);
 }
 
 /* Note whether a disk that lasts on one surface slips there, sticks, or has come to rest. */
@@ -170,7 +183,7 @@ void close_step(double h) {
     for (int n = 0; n < W.contact_count; n++) {
         Contact *c = W.contacts + n;
         Disk *a = W.disks + c->i, *b = c->j >= 0 ? W.disks + c->j : 0;
-        double u[3], v[3], given[3] = {c->given[0], 0, 0};
+        double u[3], v[3], way[2], given[3] = {c->given[0], 0, 0};
         c->next = a->before;
         a->before = n;
         W.links[2 * n] = a->links;
@@ -193,7 +206,7 @@ void close_step(double h) {
         }
         a->supports++;
         if (b) b->supports++;
-        else if (c->owner == W.landing && !a->landed && (a->on < 0 || since_passage(c) >= 0)) {
+        else if (c->owner == W.landing && !a->landed && (a->on < 0 || since_passage(c, way) >= 0)) {
             if (a->on >= 0) tell_passage(c, LANDING);
             else write_event(LANDING, c->i, -1, c->owner, a->t, &a->x, &a->ux, &a->vx, c->impulse[0],
                              c->impulse[1]);

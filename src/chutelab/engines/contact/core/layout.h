@@ -158,7 +158,6 @@ typedef struct {
     int island;             /* a disk by which it is known */
     int next;               /* of the contacts of disk i in the step before */
     int leaves;             /* it parts in this step */
-    int was;                /* owner of the one of the step before that it goes on from, or -1 */
 } Contact;
 
 typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; } Knot;       /* [out] */
@@ -232,7 +231,7 @@ typedef struct {
     double pace;         /* sqrt(g / EARTH), 1 without gravity: bounds on speeds grow with it, bounds
                             on times shrink: a film of the run shown faster is a run */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
-    double ledge;        /* m; up to which a joint is smooth in this step, see `begin_step` */
+    double ledge;        /* m; up to which a joint is smooth in this step, see `ledge_in` */
     double room;         /* m; least that a hollow leaves a disk by itself, INFINITY without one */
     double skip;         /* 1/s; SKIP in a step: radii that it may go */
 } World;

@@ -103,12 +103,9 @@ static int add(int i, int j, double least, double bound, double h) {
     c->need = (aim - later) / h;
     c->drift = 0.5 * h * c->pull;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
-    c->was = -1;
     for (int k = d->before; k >= 0; k = W.earlier[k].next)
-        if (goes_on(W.earlier[k].j, j)) {
+        if (goes_on(W.earlier[k].j, j))
             for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
-            c->was = W.earlier[k].owner;
-        }
     int pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
        above the face while that lasts. Beyond, the end presses it only if it is slow enough. */

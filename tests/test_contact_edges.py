@@ -197,7 +197,9 @@ def test_off_a_curved_chute_the_error_is_of_second_order_at_every_step(slope, en
         recording = run(thrown(bent(machine, arc), joint - way * onward + R * up))
         assert np.abs(recording.track(0)[-1]["position"] - place).max() < 40.0 * dt * dt, dt
         # Neither the joint nor the end is struck.
-        assert recording.events["kind"].tolist() == [Kind.RELEASE, Kind.SEPARATION]
+        assert recording.events["kind"].tolist() == [Kind.RELEASE, Kind.SLIP, Kind.SEPARATION]
+        onto = sqrt(2.0 * way / pull)
+        assert recording.select(Kind.SLIP)["t"] == pytest.approx(onto, abs=10.0 * dt * dt)
         assert recording.select(Kind.SEPARATION)["t"] == pytest.approx(left, abs=60.0 * dt * dt)
 
 

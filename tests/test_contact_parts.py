@@ -79,9 +79,9 @@ def test_no_joint_of_a_smooth_chute_is_felt(slope, joint, crowded):
         errors.append(abs(last["velocity"][0] - speed))
         assert abs(last["velocity"][1]) < 1e-12
         assert last["position"][1] == pytest.approx(R, abs=1e-3 * R)
-        # It never leaves, and the next piece is no blow, though it is another surface.
+        # It never leaves, and each next piece is no blow: it goes on slipping on another surface.
         told = recording.events["kind"][recording.events["particle"] == 0]
-        assert told.tolist() == [Kind.RELEASE]
+        assert told.tolist() == [Kind.RELEASE, Kind.SLIP, Kind.SLIP, Kind.SLIP]
         assert residual(recording) < 1e-12
     # Of second order; a bump, of half of what gravity does in a step, would be of first.
     assert (np.array(errors) < 20.0 * speed * np.square(steps)).all(), errors
@@ -93,6 +93,37 @@ def test_a_joint_written_with_some_digits_is_smooth_too():
         machine, speed = slide_down(0.7, 0.4, 1e-3, apart=2e-6, crowded=crowded)
         last = run(machine).track(0)[-1]
         assert last["velocity"][0] == pytest.approx(speed, rel=1e-3)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.6])
+@pytest.mark.parametrize("dt", [1e-3, 2e-5])
+def test_a_ledge_is_felt_as_far_as_steps_resolve_it(dt, restitution):
+    """A floor ends a ledge a below the lowest point of an arc: a disk meets its edge at θ.
+
+    cos θ = 1 - a/r, and what goes into the edge, v sin θ, comes back times ε. Over a smooth joint
+    the disk is lifted by a in a step: that is slower where the step's way is longer than r θ / 2.
+    """
+    ledge, v, radius = 1e-6, 1.0, 0.3
+    theta = acos(1.0 - ledge / R)
+    values = {"friction": 0.0, "restitution": restitution}
+    floor = face("floor", (-1.0, 0.0), (0.0, 0.0), **values)
+    arc = {"center": (0.0, radius + ledge), "radius": radius, "begin": 1.5 * pi, "extent": 1.0}
+    machine = arc_machine({**arc, **values}, surface=[floor], run={"until": 0.06, "dt": dt})
+    recording = run(thrown(machine, (-0.05, R), (v, 0.0)))
+    blows = recording.select(Kind.IMPACT)
+    if v * dt > R * theta / 2.0:
+        assert not len(blows)
+        vx, vy = recording.at([0.0515])[1][0, 0]
+        # On the arc it rises by (v t)^2 / (2 (R - r)).
+        assert vx == pytest.approx(v, rel=1e-4)
+        assert vy == pytest.approx(0.0015 * v * v / (radius - R), abs=2.0 * ledge / dt)
+    else:
+        back = (1.0 + restitution) * v * sin(theta)
+        struck = 0.05 - R * sin(theta)
+        assert blows["t"][0] == pytest.approx(struck / v, abs=1e-7)
+        after = [v - back * sin(theta), back * cos(theta)]
+        # It comes to the edge from a hop of one step.
+        np.testing.assert_allclose(blows["velocity_after"][0], after, rtol=0, atol=2.0 * G * dt)
 
 
 # Inside and outside of arcs

@@ -7,6 +7,27 @@
 /* Sine of half the angle that a step may turn a disk in a hollow by, at most. */
 #define STEEPEST 0.9
 
+/* Whether a disk touches the same place of two surfaces: pieces on each other, or the point that they share. */
+static int same_place(const Disk *d, int k, int other) {
+    double nx, ny, mx, my;
+    double gap = gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny);
+    double off = gap - gap_to(W.surfaces + other, d->x, d->y, d->radius, &mx, &my);
+    return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;
+}
+
+/* The surface that acts where a disk touches k: of those in the same place the first in the file. */
+static int acting(int i, int k) {
+    const Disk *d = W.disks + i;
+    const int *list;
+    int count = surfaces_near(i, &list), first = W.surfaces[k].there == THERE ? k : W.surface_count;
+    for (int n = 0; n < count && list[n] < first; n++) {
+        const Surface *s = W.surfaces + list[n];
+        if (list[n] == k || s->there != THERE || !is_near(s, d)) continue;
+        if (same_place(d, k, list[n]) && face_at(s, d->x, d->y) == s) first = list[n];
+    }
+    return first < W.surface_count ? first : k;
+}
+
 /* Fill in a contact of disk i as both partners are now; impulses are left alone. */
 void describe(Contact *c, int i, int j) {
     const Disk *a = W.disks + i;
@@ -20,8 +41,10 @@ void describe(Contact *c, int i, int j) {
     c->mass[1] = mass + r * r * turn;
     if (j < 0) {
         const Surface *s = W.surfaces + (-1 - j);
+        int acts = -1 - j;
         c->gap = gap_to(s, a->x, a->y, r, &c->nx, &c->ny);
-        pair = surface_pair(a, -1 - j);
+        if (c->gap <= TOUCH * r) s = W.surfaces + (acts = acting(i, acts));
+        pair = surface_pair(a, acts);
         c->owner = s->owner;
         c->other[0] = 0;
         c->other[1] = surface_speed(s, c->nx, c->ny, a->x, a->y, r);
@@ -163,12 +186,7 @@ void account(Contact *list, int count) {
 
 /* Hardly ever asked to the end: inline it would slow all that asks. */
 __attribute__((noinline)) int is_one(const Disk *d, int k, int other) {
-    double nx, ny, mx, my;
-    if (other < 0) return 0;
-    if (goes_on(-1 - k, -1 - other)) return 1;
-    double gap = gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny);
-    double off = gap - gap_to(W.surfaces + other, d->x, d->y, d->radius, &mx, &my);
-    return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;
+    return other >= 0 && (goes_on(-1 - k, -1 - other) || same_place(d, k, other));
 }
 
 int is_held(const Disk *d, int k) {

@@ -75,10 +75,12 @@ static inline int is_near(const Surface *s, const Disk *d) {
     return s->there && s->box[0] < d->right && s->box[2] > d->left && s->box[1] < d->top
         && s->box[3] > d->bottom && !is_spared(s, d);
 }
+/* The piece that goes on smoothly beyond an end of a surface, of a circle one that leads to it, or -1. */
+static inline int mate_of(const Surface *s, int n) { return s->ledges[n] <= W.ledge ? s->mates[n] : -1; }
 /* Whether two partners of a disk, in the numbers of `Contact.j`, are one or go on smoothly. */
 static inline int is_mate(int j, int other) {
-    const int *mates = W.surfaces[-1 - j].mates;
-    return mates[0] == -1 - other || mates[1] == -1 - other;
+    const Surface *s = W.surfaces + (-1 - j);
+    return mate_of(s, 0) == -1 - other || mate_of(s, 1) == -1 - other;
 }
 static inline int goes_on(int j, int other) {
     return j == other || (j < 0 && other < 0 && (is_mate(j, other) || is_mate(other, j)));
@@ -89,7 +91,7 @@ int is_one(const Disk *d, int k, int other);
 int is_held(const Disk *d, int k);
 /* Whether a disk that is on a piece at the beginning of a step is on no hollow at its end. */
 static inline int is_flat(const Surface *s) {
-    return s->shape == SEGMENT && s->mates[0] < 0 && s->mates[1] < 0;
+    return s->shape == SEGMENT && mate_of(s, 0) < 0 && mate_of(s, 1) < 0;
 }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 

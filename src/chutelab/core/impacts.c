@@ -381,6 +381,19 @@ static void let_fly(Disk *d) {
     d->held_count = kept;
 }
 
+/* Whether a disk meets a face in line with another surface that it lasts on: it only goes over to it. */
+static int goes_straight_on(const Contact *c) {
+    const Disk *d = W.disks + c->i;
+    const Surface *s = W.surfaces + (-1 - c->j);
+    if (d->on < 0 || d->on == c->owner || s->shape != SEGMENT) return 0;
+    for (int link = d->links; link >= 0; link = W.links[link]) {
+        const Contact *last = W.contacts + link / 2;
+        if (last->owner == d->on && last->impulse[0] > 0
+            && fabs(last->nx * s->tx + last->ny * s->ty) <= GRAZE) return 1;
+    }
+    return 0;
+}
+
 /* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, by Newton's restitution
    and Coulomb's friction. */
 static void strike(int i, int j, double t) {
@@ -419,11 +432,12 @@ static void strike(int i, int j, double t) {
     W.impact_count++;
     int landing = j < 0 && c.owner == W.landing && !a->landed, kind = COLLISION;
     if (j < 0) kind = landing ? LANDING : IMPACT;
-    if (landing || -u[0] > W.soft || W.g == 0 || (j < 0 && a->on != c.owner))
+    int passes = j < 0 && -u[0] <= W.soft && goes_straight_on(&c);
+    if (!passes && (landing || -u[0] > W.soft || W.g == 0 || (j < 0 && a->on != c.owner)))
         write_event(kind, i, j >= 0 ? j : -1, c.owner, t, &a->x, before, &a->vx,
                     c.impulse[0], c.impulse[1]);
-    if (landing) a->landed = 1;
-    if (j < 0) {
+    if (landing && !passes) a->landed = 1;
+    if (j < 0 && !passes) {
         a->on = c.owner;
         a->slips = 1;
     }

@@ -54,7 +54,7 @@ static double time_on_face(const Contact *c) {
         length = 2 * half;
     }
     if (along < 0 || along > length || run == 0) return INFINITY;
-    if (s->mates[run > 0] >= 0) {
+    if (mate_of(s, run > 0) >= 0) {
         const Surface *next = W.surfaces + s->mates[run > 0];
         double load = -(W.gx * c->nx + W.gy * c->ny), fast = d->vx * c->ny - d->vy * c->nx;
         int round = next->shape != SEGMENT
@@ -119,12 +119,12 @@ static int add(int i, int j, double least, double bound, double h) {
     c->need = (aim - later) / h;
     c->drift = 0.5 * h * c->pull;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
-    c->was = -1;
-    for (int k = d->before; k >= 0; k = W.earlier[k].next)
-        if (goes_on(W.earlier[k].j, j)) {
-            for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
-            c->was = W.earlier[k].owner;
-        }
+    int lasted = 0;
+    for (int k = d->before; k >= 0; k = W.earlier[k].next) {
+        if (!goes_on(W.earlier[k].j, j)) continue;
+        lasted = 1;
+        for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
+    }
     int pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
        above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
@@ -155,7 +155,7 @@ static int add(int i, int j, double least, double bound, double h) {
     } else if (gone) c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     else if (pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
     if (j < 0 && W.interact && !gone && !c->leaves) {
-        follow(c, c->was >= 0 ? W.length_before : 0, chord(c, h));
+        follow(c, lasted ? W.length_before : 0, chord(c, h));
         if (c->turns > 0) c->need = closes(c, aim, h);
     }
     W.contact_count++;

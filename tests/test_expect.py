@@ -16,10 +16,11 @@ from chutelab import theory
 from chutelab.checks.agreement import MOST_ALONE, verify
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
-from chutelab.results.quantities import measure
+from chutelab.results.quantities import measure, measured
 from chutelab.results.summary import summary
-from chutelab.scene.quantities import FIRST, THEORY, lookup
+from chutelab.scene.quantities import FIRST, REGISTRY, STATISTICS, THEORY, lookup, whose
 from chutelab.scene.units import read_size, write_size
+from chutelab.studies.sweep.batch import Block, together
 from machines import PERPENDICULAR
 
 G = 9.81
@@ -152,6 +153,35 @@ def test_what_did_not_happen_is_nan_and_unknown_names_are_errors():
     assert measure(recording, "landing.count") == 0.0
     with pytest.raises(KeyError):
         measure(recording, "landings")
+
+
+def names_of(scene):
+    """Every name that a scene of one stream has for a quantity of one particle, or of all."""
+    surfaces = [*scene.surfaces, "particles"]
+    for row in REGISTRY.values():
+        for surface in surfaces if "SURFACE" in row.name else [""]:
+            base = row.name.replace("SURFACE", surface)
+            for name in (base, FIRST + base, *(f"{base}.{statistic}" for statistic in STATISTICS)):
+                found = lookup(name, scene.surfaces)
+                if found is not None and not whose(found, scene.count):
+                    yield name
+
+
+def test_each_row_of_the_registry_is_read_alone_in_a_crowd_and_in_a_family():
+    """A family of variants gives each the numbers that it has alone, but for rounding."""
+    _, crowd = shipped("spoon", "stream.count=4")
+    for name in names_of(crowd.scene):
+        assert isinstance(measure(crowd, name), float), name
+    scene = sc.load("belt-landing")
+    block = Block(scene, ("plate.restitution",), np.array([[0.3], [0.5]]))
+    ((family, rows),), _, _ = together(block)
+    alone = [simulate(scene.with_values(block.settings(row))) for row in rows]
+    names = [name for name in names_of(scene) if name != "contacts"]
+    assert len(names) > 400
+    for name in names:
+        expected = [measure(recording, name) for recording in alone]
+        kind = pytest.approx(expected, rel=1e-12, abs=1e-13, nan_ok=True)
+        assert measured(family, name) == kind, name
 
 
 def test_stored_energies_have_a_start_and_an_end():

@@ -3,14 +3,21 @@
 import { mayDraw } from "./controls.ts";
 import { surfaceAt, withArc, withLine, withParticle } from "./edit.ts";
 import { roundTo } from "./handles.ts";
-import { html } from "./panels.ts";
-import { svg, type Stage } from "./stage.ts";
+import { html, iconButton } from "./panels.ts";
+import { svg } from "./scenery.ts";
+import type { Stage } from "./stage.ts";
 import type { Inspector } from "./inspector.ts";
 import type { Lab } from "./lab.ts";
 import type { Words } from "./words.ts";
 
 type Place = [number, number];
 type Mode = "move" | "line" | "arc" | "drop";
+
+/** What stands on the buttons, see page.html. */
+const DRAWINGS: Record<string, string> = {
+  move: "select", line: "line", arc: "arc", drop: "ball", delete: "bin", "zoom-in": "plus",
+  "zoom-out": "minus",
+};
 
 /** Points that a thing is drawn by. */
 const POINTS = { move: 0, line: 2, arc: 3, drop: 1 };
@@ -56,7 +63,7 @@ class Bench {
   tools(home: any) {
     const { words, lab, stage } = this, free = mayDraw(lab.data);
     const button = (id: string, act: (event: MouseEvent) => void) => {
-      const made = html("button", { type: "button", id: `tool-${id}` }, words.say(id));
+      const made = iconButton(`tool-${id}`, DRAWINGS[id], words.say(id));
       made.addEventListener("click", act);
       return made;
     };
@@ -69,15 +76,7 @@ class Bench {
     this.remove = button("delete", () => this.inspector.takeAway());
     const middle = (factor: number) =>
       this.zoom(factor, 0.5 * stage.view.width, 0.5 * stage.view.height);
-    const zooms = ([
-      ["zoom-in", "+", ZOOM], ["zoom-out", "−", 1 / ZOOM],
-    ] as [string, string, number][]).map(([id, sign, factor]) => {
-      const made = button(id, () => middle(factor));
-      made.textContent = sign;
-      made.setAttribute("aria-label", words.say(id));
-      made.title = words.say(id);
-      return made;
-    });
+    const zooms = [button("zoom-in", () => middle(ZOOM)), button("zoom-out", () => middle(1 / ZOOM))];
     home.prepend(...this.modes.map(([, made]) => made), ...(free ? [this.remove] : []), ...zooms);
     const presets = lab.data.live?.presets ?? [];
     if (!presets.length) return;
@@ -238,7 +237,7 @@ class Bench {
     const own = (piece: { surface: number }) => piece.surface === surface;
     const lines = machine.segments.filter(own).map(({ x, y, tx, ty, length }) =>
       `M${view.px(x)} ${view.py(y)}L${view.px(x + tx * length)} ${view.py(y + ty * length)}`);
-    const arcs = machine.arcs.filter(own).map((arc) => stage.arcPath(arc));
+    const arcs = machine.arcs.filter(own).map((arc) => stage.scenery.arcPath(arc));
     this.chosen.setAttribute("d", [...lines, ...arcs].join(""));
     this.seen = `${view.scale} ${view.x} ${view.y} ${view.width} ${view.height}`;
   }

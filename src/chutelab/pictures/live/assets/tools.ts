@@ -1,8 +1,9 @@
 // What measures in the picture, tape, angle, stop watch and tracer, and what the picture shows.
 
 import { roundUp } from "./chart.ts";
-import { eased, html } from "./panels.ts";
-import { svg, type Stage } from "./stage.ts";
+import { eased, html, icon, iconButton } from "./panels.ts";
+import { svg } from "./scenery.ts";
+import type { Stage } from "./stage.ts";
 import type { Handle } from "./handles.ts";
 import type { Lab } from "./lab.ts";
 import type { Track, State } from "./recording.ts";
@@ -95,20 +96,30 @@ class Tools {
   ) {
     this.layer = svg("g", { class: "measures", "aria-hidden": "true" });
     stage.over.append(this.layer);
-    this.bar = html("div", { class: "tools", role: "group", "aria-label": words.say("tools") });
-    home.append(this.bar);
+    const bar = html("div", { class: "tools", role: "group", "aria-label": words.say("tools") });
+    document.getElementById("fit")?.after(bar);
     for (const name of ["tape", "protractor", "watch", "tracer"] as const) {
-      const button = html("button", { type: "button", id: `tool-${name}`, "aria-pressed": "false" },
-        words.say(`name-${name}`));
+      const button = iconButton(`tool-${name}`, name, words.say(`name-${name}`));
+      button.setAttribute("aria-pressed", "false");
       button.addEventListener("click", () => this.toggle(name, button));
-      this.bar.append(button);
+      bar.append(button);
     }
+    const head = html("summary", { class: "ib", title: words.say("show"), "aria-label": words.say("show") },
+      icon("eye"));
+    this.bar = html("div", { class: "float choices" });
+    const menu = html("details", { class: "menu tools", id: "show" }, head, this.bar);
+    document.getElementById("views")?.prepend(menu);
+    addEventListener("pointerdown", ({ target }) => {
+      if (!menu.contains(target as Node)) menu.open = false;
+    });
     const show = stage.show as Record<string, boolean>;
     this.box("trails", show.trails, (on) => { show.trails = on; });
     this.strobe = this.box("strobe", show.strobe, (on) => { show.strobe = on; });
     this.box("velocity-arrows", show.velocity, (on) => { show.velocity = on; });
     this.box("force-arrows", show.forces, (on) => { show.forces = on; });
     this.box("symbols", symbols.shown, (on) => { symbols.shown = on; });
+    this.box("grid", true, (on) => { stage.scenery.ground.classList.toggle("off", !on); });
+    this.hues();
     this.panel = this.watchPanel();
     home.append(this.panel);
     stage.further.push(() => this.handles());
@@ -152,6 +163,30 @@ class Tools {
     const text = html("span", {}, this.words.say(name));
     this.bar.append(html("label", { class: "check" }, input, text));
     return text;
+  }
+
+  /** What colour a particle has. */
+  hues() {
+    const { stage, words } = this, { balls } = stage;
+    const legend = html("div", { class: "ramp num" });
+    const buttons = (["material", "speed", "kind"] as const).map((hue) => {
+      const button = html("button", { type: "button", id: `hue-${hue}`, "aria-pressed": "false" },
+        words.say(`hue-${hue}`));
+      button.addEventListener("click", () => {
+        balls.hue = hue;
+        balls.measure();
+        for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
+        legend.hidden = hue !== "speed";
+        legend.replaceChildren(html("i"), html("span", {}, "0"),
+          html("span", {}, `${words.plain(0.5 * balls.fastest)}`),
+          html("span", {}, `${words.plain(balls.fastest)} m/s`));
+        stage.paint();
+      });
+      return button;
+    });
+    buttons[0].setAttribute("aria-pressed", "true");
+    legend.hidden = true;
+    this.bar.append(html("p", {}, words.say("hue")), html("div", { class: "seg" }, ...buttons), legend);
   }
 
   nameStrobe() {

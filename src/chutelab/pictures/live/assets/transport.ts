@@ -38,8 +38,7 @@ class Transport {
     };
     for (const [id, act] of Object.entries(buttons)) {
       const button = element(id);
-      if (button.classList.contains("text")) button.textContent = words.say(id);
-      else button.title = words.say(id);
+      button.title = words.say(id);
       button.setAttribute("aria-label", words.say(id));
       button.addEventListener("click", act);
     }

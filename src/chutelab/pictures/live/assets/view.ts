@@ -22,12 +22,17 @@ class View {
     this.height = height;
   }
 
-  /** Show all of a box, with some room round it. @param margin px */
-  fit({ left, bottom, right, top }: Box, margin: number = 34) {
-    const across = Math.max(1, this.width - 2 * margin), up = Math.max(1, this.height - 2 * margin);
+  /** The part of the picture that no card covers, px. */
+  free = { left: 0, top: 0, right: 1, bottom: 1 };
+
+  /** Show all of a box in the free part, with some room round it. @param margin px */
+  fit({ left, bottom, right, top }: Box, margin: number = 30) {
+    const { free } = this;
+    const across = Math.max(1, free.right - free.left - 2 * margin);
+    const up = Math.max(1, free.bottom - free.top - 2 * margin);
     this.scale = Math.min(across / Math.max(right - left, 1e-6), up / Math.max(top - bottom, 1e-6));
-    this.x = 0.5 * (left + right);
-    this.y = 0.5 * (bottom + top);
+    this.x = 0.5 * (left + right) + (0.5 * (this.width - free.left - free.right)) / this.scale;
+    this.y = 0.5 * (bottom + top) - (0.5 * (this.height - free.top - free.bottom)) / this.scale;
   }
 
   /** @param py the point that stays, pixels */

@@ -332,7 +332,7 @@ def test_every_reason_of_the_closed_form_has_its_words():
     for name in ("prediction.ts", "transfer.ts"):
         module = (ASSETS / name).read_text(encoding="utf-8")
         given |= set(re.findall(r'because\("[\w-]+", "([\w-]+)"', module))
-        given |= set(re.findall(r'meets\("[\w-]+", \w+, "([\w-]+)"', module))
+        given |= set(re.findall(r'meets\("[\w-]+", "[\w-]+", \w+, "([\w-]+)"', module))
         given |= set(re.findall(r'return "([\w-]+)";', module))
     assert len(given) > 15
     assert given <= known

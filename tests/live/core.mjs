@@ -1,13 +1,8 @@
 // Runs machines in node by the page's own host of the core: a JSON list on stdin, one on stdout of
 // {state, knots (rows of ten numbers), events, books}.
 import { readFileSync } from "node:fs";
-import { pathToFileURL } from "node:url";
 
-const { startCore } = await import(pathToFileURL(`${process.argv[2]}/core.js`));
-
-const home = new URL("../../src/chutelab/core/", import.meta.url);
-const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
-const core = await startCore(await WebAssembly.compile(readFileSync(new URL("core.wasm", home))), layout);
+import { core } from "./run.mjs";
 
 // JSON has no infinity.
 const revive = (_, value) => (["Infinity", "-Infinity"].includes(value) ? Number(value) : value);

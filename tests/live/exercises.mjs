@@ -1,13 +1,13 @@
 // Exercises as the page has them: a JSON question on stdin, the answers on stdout.
 import { readFileSync } from "node:fs";
-import { pathToFileURL } from "node:url";
 
-const modules = pathToFileURL(`${process.argv[2]}/`);
-const { drawnFor, plainName } = await import(new URL("draw.js", modules));
-const { fixedText, generalText, scientific } = await import(new URL("decimal.js", modules));
-const { readTyped } = await import(new URL("judging.js", modules));
-const { sha256 } = await import(new URL("sha256.js", modules));
-const { Task } = await import(new URL("task.js", modules));
+import { load } from "./run.mjs";
+
+const { drawnFor, plainName } = await load("draw.js");
+const { fixedText, generalText, scientific } = await load("decimal.js");
+const { readTyped } = await load("judging.js");
+const { sha256 } = await load("sha256.js");
+const { Task } = await load("task.js");
 
 /** What a student sees who gives these answers, and then asks for everything else. */
 function played({ exercise, student, answers, others = [] }) {

@@ -1,39 +1,21 @@
 // What the panels and tools of the page work out, without a screen: a JSON question on stdin, the
 // answers on stdout.
 import { readFileSync } from "node:fs";
-import { pathToFileURL } from "node:url";
 
-const modules = pathToFileURL(`${process.argv[2]}/`);
-const { startCore } = await import(new URL("core.js", modules));
-const { Recording } = await import(new URL("recording.js", modules));
-const { groundedLedger, stacks } = await import(new URL("energy.js", modules));
-const { Arrivals } = await import(new URL("arrival.js", modules));
-const { crowdOf } = await import(new URL("crowd.js", modules));
-const { Laws } = await import(new URL("laws.js", modules));
-const { numbersOf } = await import(new URL("numbers.js", modules));
-const { RunHistory } = await import(new URL("stages.js", modules));
-const { histogram, runningMean } = await import(new URL("landing.js", modules));
-const { samplesOf } = await import(new URL("curves.js", modules));
-const { contactForce } = await import(new URL("arrows.js", modules));
-const { ticks } = await import(new URL("chart.js", modules));
-const { placed, spaceOf } = await import(new URL("symbols.js", modules));
-const { StopWatch, angleBetween, nearestOn } = await import(new URL("tools.js", modules));
+import { load, recordingOf } from "./run.mjs";
 
-const home = new URL("../../src/chutelab/core/", import.meta.url);
-const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
-const core = await startCore(
-  await WebAssembly.compile(readFileSync(new URL("core.wasm", home))), layout);
-
-function recordingOf(machine) {
-  const recording = new Recording(machine);
-  core.begin(machine);
-  for (let state = "running"; state === "running";) {
-    state = core.proceed(50);
-    const books = state === "running" ? null : core.books();
-    recording.add({ ...core.take(), tips: new Float64Array(), now: core.get("t"), state, books });
-  }
-  return recording;
-}
+const { groundedLedger, stacks } = await load("energy.js");
+const { Arrivals } = await load("arrival.js");
+const { crowdOf } = await load("crowd.js");
+const { Laws } = await load("laws.js");
+const { numbersOf } = await load("numbers.js");
+const { RunHistory } = await load("stages.js");
+const { histogram, runningMean } = await load("landing.js");
+const { samplesOf } = await load("curves.js");
+const { contactForce } = await load("arrows.js");
+const { ticks } = await load("chart.js");
+const { placed, spaceOf } = await load("symbols.js");
+const { StopWatch, angleBetween, nearestOn } = await load("tools.js");
 
 function lawOf(recording) {
   const laws = new Laws(recording);

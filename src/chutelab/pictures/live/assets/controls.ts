@@ -10,11 +10,9 @@ type Live = { predict?: boolean, controls?: string[] | null, panels?: string[] |
   ranges?: Record<string, [number, number]>,
   presets?: { name: string, set: Record<string, unknown> }[] };
 type Page = { tables: Record<string, Record<string, any>>, live?: Live };
-/** A part of the scene; "scene" of
- * the main numbers of all */
+/** A part of the scene; "scene" of the main numbers of all */
 type Section = { table: string, row: number, name: string };
-/** A number that can be
- * typed; it is the n-th `part` `of` so many */
+/** A number that can be typed; it is the n-th `part` `of` so many */
 export type Field = { key: string, table: string, owner: string, name: string, part: number,
   of: number, unit: string, low: number, high: number, value: number | string };
 

@@ -6,8 +6,7 @@ import type { Arrival } from "./arrival.ts";
 import type { Recording, Track } from "./recording.ts";
 
 type Point = [number, number];
-/** Edge to the right, middle, edge to the
- * left, m; NaN where there is none */
+/** Edge to the right, middle, edge to the left, m; NaN where there is none */
 export type Envelope = { stream: number, lines: Point[][] };
 
 /** Paths that an envelope is made of, at most; of more, evenly chosen ones. */

@@ -6,8 +6,8 @@ import type { Scene } from "./scene.ts";
 /** A number of the scene; `part` of one that is a point */
 type Axis = { key: string, part?: number, value: number, unit: string, step: number,
   low: number, high: number };
-/** `what` is a word of the catalogue; `drag` tells the axes' values for a place in the world. One
- * of a tool takes them by `change` itself, and may say more than its values. */
+/** `what` is a word of the catalogue; `drag` tells the axes' values for a place in the world.
+ * One of a tool takes them by `change` itself, and may say more than its values. */
 export type Handle = { id: string, surface: string, what: string, shape: "point" | "turn" | "arrow",
   x: number, y: number, from?: [number, number], axes: Axis[],
   drag: (x: number, y: number) => number[], change?: (numbers: number[]) => void,

@@ -56,7 +56,7 @@ class Keep {
 
   get numbers(): (string | number)[][] {
     const { lab, words } = this, machine = lab.machine as any;
-    const { numbers } = predict(lab.scene as any);
+    const { numbers } = predict(lab.scene as Scene, this.recording);
     const found = numbersOf(historyOf(lab)?.stages ?? [], numbers,
       machine.pulley?.radius ?? NaN, machine.radius);
     return [["", words.say("simulated"), words.say("analytic"), ""],

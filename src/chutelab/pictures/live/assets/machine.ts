@@ -68,9 +68,9 @@ export interface Machine {
   rolling: number[]; // by kind
 }
 
-/** One surface: polylines with a speed, bends (x, y, radius, begin, extent, speed), and when they
- * are there. */
-export interface Part {
+/** One surface: polylines with a speed, bends (x, y, radius, begin, extent, speed), and when
+ * they are there. */
+interface Part {
   name: string;
   lines: { points: Point[], speed: number }[];
   bends: [number, number, number, number, number, number][];
@@ -159,7 +159,7 @@ export function build(scene: Scene): Machine {
  * Returns all surfaces, in the order of the ledger.
  * @throws {Fault} if the plate has no length
  */
-export function surfaceParts(scene: Scene): Part[] {
+function surfaceParts(scene: Scene): Part[] {
   const hanging = scene.plates.filter(({ pivot }) => pivot !== undefined);
   return [...beltsOf(scene), ...hanging.map(hangingPlate), ...scene.conveyor.map(conveyorPart),
     ...scene.surface.map(surfacePart)];
@@ -217,7 +217,7 @@ function beltsOf(scene: Scene): Part[] {
 }
 
 /** Returns how far the damping plate reaches below its pivot, m. */
-export function reachBelow(scene: Scene, plate: Plate) {
+function reachBelow(scene: Scene, plate: Plate) {
   if (plate.below !== undefined) return plate.below;
   const { incoming: belt, outgoing: out } = scene;
   if (belt === null || out === null) return REACH_WITHOUT_BELT;

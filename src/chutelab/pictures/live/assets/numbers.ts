@@ -102,7 +102,7 @@ class NumbersPanel {
   refresh() {
     const { words, lab } = this;
     const { machine } = lab.recording as Recording, many = machine.releases.length;
-    const { numbers, reason } = predict(lab.scene as Scene);
+    const { numbers, reason } = predict(lab.scene as Scene, lab.recording as Recording);
     const history = historyOf(lab), crowd = many >= FEWEST, { stages = [] } = history ?? {};
     this.lead.hidden = this.asked.hidden = !crowd;
     if (crowd && history) {

@@ -7,8 +7,8 @@ import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
 import type { Event } from "./core.ts";
 
-/** Its middle, px, and the
- * side of its point that is tried first, rad counterclockwise from the right */
+/** Its middle, px, and the side of its point that is tried first, rad counterclockwise from the
+ * right */
 type Label = { text: string, x: number, y: number, side?: number };
 type Space = { left: number, top: number, right: number, bottom: number };
 

@@ -3,8 +3,8 @@
 import { Case, drawnFor, plainName, worded, type Exercise, type DrawnNumbers } from "./draw.ts";
 import { judge, readTyped, withUnit, type Reply, type Verdict } from "./judging.ts";
 
-/** Of one question: what became of the last answer, the last number
- * that was checked, how many answers, how many hints were read, whether the working was shown */
+/** Of one question: what became of the last answer, the last number that was checked, how many
+ * answers, how many hints were read, whether the working was shown */
 type Standing = { verdict: Verdict, answer: number | null, tries: number, hints: number,
   revealed: boolean };
 /** What is handed in */

@@ -33,7 +33,7 @@ interface Parameters {
 }
 
 /** Quantities by the stage that yields them, in the order of events. */
-export const STAGES = {
+const STAGES = {
   separation: ["phi1", "v1", "omega1"],
   impact: ["t2", "x2", "y2", "v2", "v2x", "v2y", "phi2"],
   rebound: ["phi2r", "v2r", "omega2"],

@@ -57,7 +57,9 @@ class Balls {
   }
 
   /** Paint one at a place, px. @param speed m/s */
-  paint(context: CanvasRenderingContext2D, i: number, x: number, y: number, r: number, speed: number) {
+  paint(
+    context: CanvasRenderingContext2D, i: number, x: number, y: number, r: number, speed: number,
+  ) {
     if (this.hue === "speed" || r < SHADED) {
       const shades = SHADES[this.kindOf(i)] ?? STREAMS[Number(this.kindOf(i))];
       context.fillStyle = this.hue === "speed" ? this.colour(`v${this.step(speed)}`) : shades[1];

@@ -1,4 +1,4 @@
-// What a machine looks like: belts that run, pulleys, plates with a struck face, walls, grid, scale.
+// What a machine looks like: belts that run, pulleys, plates with a struck face, walls, the grid.
 //
 // Bodies have volume. The surface that particles meet is the outer edge of a belt and the coloured
 // face of a plate; what is drawn of their thickness lies on the other side.
@@ -22,7 +22,7 @@ const PITCH = 24, CLEAT = 5;
 /** Thickness of belts, px: least, most, and as a share of the picture's height. */
 const THICK = [3.5, 9, 0.0117];
 
-/** Of a belt that turns round no pulley of its own: distance of its two strands in its thickness. */
+/** Of a belt without pulleys of its own: distance of its two strands in its thickness. */
 const STRANDS = 4.5;
 
 /** Thickness of plates in that of belts. */
@@ -43,10 +43,12 @@ class Scenery {
   gates: Gate[] = [];
   layer: any;
   ground: any;
+  scale: any;
   thick = 6;
 
   constructor(readonly view: View, readonly words: Words) {
     this.ground = svg("g", { class: "ground", "aria-hidden": "true" });
+    this.scale = svg("g", { class: "scale", "aria-hidden": "true" });
     this.layer = svg("g", { class: "surfaces" });
   }
 
@@ -131,14 +133,15 @@ class Scenery {
     const [value, unit] = step < 0.01 ? [1e3 * step, "mm"] : [step, "m"];
     text.textContent = `${this.words.plain(Number(value.toPrecision(3)))} ${unit}`;
     ground.replaceChildren(
-      svg("path", { d: lines(0.5), class: "minor" }), svg("path", { d: lines(0), class: "major" }),
-      svg("path", { d: `M${left} ${y - 5}v10m0-5h${long}m0-5v10`, class: "scale" }), text,
-    );
+      svg("path", { d: lines(0.5), class: "minor" }), svg("path", { d: lines(0), class: "major" }));
+    const bar = `M${left} ${y - 5}v10m0-5h${long}m0-5v10`;
+    this.scale.replaceChildren(svg("path", { d: bar, class: "halo" }), svg("path", { d: bar }),
+      text);
   }
 
   /** A belt along a path in px, its outer edge on the path's left; with cleats that run. */
   band(path: string, speed: number, edge = "") {
-    const group = svg("g", { class: "band" });
+    const group = svg("g");
     const cleats = svg("path", {
       d: path, class: "cleat", "stroke-width": 0.42 * this.thick,
       "stroke-dasharray": `${CLEAT} ${PITCH - CLEAT}`,
@@ -149,19 +152,20 @@ class Scenery {
     return group;
   }
 
-  /** The frame that carries a belt, with its speed: a bar in the coordinates of the belt, px. */
-  frame(from: number, to: number, y: number, thick: number, speed: number, upright: number) {
-    const group = svg("g"), long = to - from;
-    if (long < 20 || thick < 3) return group;
+  /** The frame that carries a belt: a bar in the coordinates of the belt, px. */
+  frame(group: any, from: number, to: number, y: number, thick: number) {
+    if (to - from < 20 || thick < 3) return;
     group.append(svg("rect", {
-      class: "frame", x: from, y: y - 0.5 * thick, width: long, height: thick, rx: Math.min(5, thick / 4),
+      class: "frame", x: from, y: y - 0.5 * thick, width: to - from, height: thick,
+      rx: Math.min(5, thick / 4),
     }));
-    return this.tell(group, from, to, y, thick, speed, upright);
   }
 
   /** Write the speed of a belt on its frame where that can be seen. */
-  tell(group: any, from: number, to: number, y: number, thick: number, speed: number, upright: number) {
-    if (thick < 15 || to - from < 150) return group;
+  tell(
+    group: any, from: number, to: number, y: number, thick: number, speed: number, upright = 1,
+  ) {
+    if (thick < 15 || to - from < 150) return;
     const said = `${this.words.fixed(Math.abs(speed), 1)} m/s`;
     const text = svg("text", {
       class: "on-frame", x: 0.5 * (from + to), y: y + 5, "text-anchor": "middle",
@@ -169,7 +173,6 @@ class Scenery {
     });
     text.textContent = speed * upright > 0 ? `${said} →` : `← ${said}`;
     group.append(text);
-    return group;
   }
 
   wheel(x: number, y: number, r: number, speed: number, radius: number) {
@@ -196,17 +199,17 @@ class Scenery {
     const [x, y, scale] = [view.px(0), view.py(0), view.scale];
     const r = radius * scale, inner = Math.max(r - 0.5 * thick, 0.5 * r), long = length * scale;
     group.setAttribute("transform", `rotate(${(-incline * 180) / Math.PI} ${x} ${y})`);
-    const loop = `M${x - long} ${y - inner}H${x}A${inner} ${inner} 0 0 1 ${x} ${y + inner}H${x - long}`
-      + `A${inner} ${inner} 0 0 1 ${x - long} ${y - inner}`;
-    const edge = inner + 0.36 * thick;
+    const loop = stadium(x - long, x, y, inner), out = inner + 0.36 * thick;
+    const edge = `M${x - long} ${y - out}H${x}A${out} ${out} 0 0 1 ${x + out} ${y}`;
     const wheel = Math.max(r - thick - 1, 0.4 * r);
     // As far to the left as is seen, so that the speed stands in sight.
     const seen = Math.max(x - long + r, -0.02 * view.width);
     if (r > 2 * thick) {
-      group.append(this.frame(x - long + 0.6 * r, x - 1.3 * r, y, Math.min(26, 0.6 * wheel), 0, 1));
-      this.tell(group, Math.max(seen, 40), x - 1.3 * r, y, Math.min(26, 0.6 * wheel), speed, 1);
+      const wide = Math.min(26, 0.6 * wheel);
+      this.frame(group, x - long + 1.3 * r, x - 1.3 * r, y, wide);
+      this.tell(group, Math.max(seen, this.view.free.left), x - 1.3 * r, y, wide, speed);
     }
-    group.append(this.band(loop, speed, `M${x - long} ${y - edge}H${x}A${edge} ${edge} 0 0 1 ${x + edge} ${y}`),
+    group.append(this.band(loop, speed, edge),
       this.wheel(x - long, y, wheel, speed, radius), this.wheel(x, y, wheel, speed, radius));
     return group;
   }
@@ -222,22 +225,24 @@ class Scenery {
     group.setAttribute("transform", `translate(${px} ${py}) rotate(${(-angle * 180) / Math.PI})`);
     const turn = Math.min(0.5 * STRANDS * thick, 0.25 * long), top = 0.5 * thick;
     const onward = back ? -speed : speed;
-    const loop = `M0 ${top}H${long}a${turn} ${turn} 0 0 1 0 ${2 * turn}H0a${turn} ${turn} 0 0 1 0 ${-2 * turn}`;
-    const middle = top + turn, roller = Math.max(turn - 0.8 * thick, 1);
-    group.append(this.frame(0, long, middle, Math.min(24, 2 * turn - 1.6 * thick), 0, 1));
+    const middle = top + turn, loop = stadium(0, long, middle, turn);
+    const roller = Math.max(turn - 0.8 * thick, 1);
+    this.frame(group, 0, long, middle, Math.min(24, 2 * turn - 1.6 * thick));
     const rollers = Math.max(1, Math.round(long / ROLLERS));
     for (let n = 0; n <= rollers && rollers < 400; n += 1) {
       group.append(svg("circle", { cx: (long * n) / rollers, cy: middle, r: roller, class: "bolt" }));
     }
     group.append(this.band(loop, onward, `M0 ${0.14 * thick}H${long}`));
     const level = Math.abs(angle) < 0.02;
-    const [left, right] = level ? [Math.max(0, 70 - px), Math.min(long, view.width - 40 - px)] : [0, long];
+    const { free } = view;
+    const left = level ? Math.max(0, free.left - px) : 0;
+    const right = level ? Math.min(long, free.right - px) : long;
     const between = (right - left) / Math.max(1, Math.round((right - left) / ROLLERS));
     if (between > 90 && 2 * turn - 1.6 * thick >= 15) {
       // Between two rollers, near the middle of what is seen.
       const spacing = long / rollers, n = Math.round(0.5 * (left + right) / spacing - 0.5);
       const at = (n + 0.5) * spacing;
-      this.tell(group, at - 80, at + 80, middle, 24, onward, 1);
+      this.tell(group, at - 80, at + 80, middle, 24, onward);
     }
     return group;
   }
@@ -250,10 +255,13 @@ class Scenery {
     const angle = Math.atan2(b.y - a.y, b.x - a.x), long = Math.hypot(b.x - a.x, b.y - a.y) * scale;
     const [px, py] = [view.px(a.x), view.py(a.y)];
     group.setAttribute("transform", `translate(${px} ${py}) rotate(${(-angle * 180) / Math.PI})`);
-    const loop = `M0 ${-inner}H${long}A${inner} ${inner} 0 0 1 ${long} ${inner}H0A${inner} ${inner} 0 0 1 0 ${-inner}`;
+    const loop = stadium(0, long, 0, inner);
     const speed = a.speed, wheel = Math.max(r - thick - 1, 0.4 * r);
     const upright = Math.cos(angle) >= 0 ? 1 : -1, wide = Math.min(24, 0.6 * wheel);
-    if (wheel > SPOKED) group.append(this.frame(1.3 * r, long - 1.3 * r, 0, wide, speed, upright));
+    if (wheel > SPOKED) {
+      this.frame(group, 1.3 * r, long - 1.3 * r, 0, wide);
+      this.tell(group, 1.3 * r, long - 1.3 * r, 0, wide, speed, upright);
+    }
     group.append(this.band(loop, speed), this.wheel(0, 0, wheel, speed, a.radius),
       this.wheel(long, 0, wheel, speed, a.radius));
     return group;
@@ -261,11 +269,12 @@ class Scenery {
 
   /** A whole circle that turns: a wheel, or round what is inside of it a drum. */
   drum(arc: Arc, { releases }: Machine) {
-    const { view, thick } = this, { x, y, radius, speed } = arc, group = svg("g", { class: "part" });
+    const { view, thick } = this, { x, y, radius, speed } = arc;
+    const group = svg("g", { class: "part" });
     const [px, py, r] = [view.px(x), view.py(y), radius * view.scale];
     const holds = releases.some((one) => Math.hypot(one.x - x, one.y - y) < radius);
     const line = r + (holds ? 0.5 : -0.5) * thick;
-    const ring = `M${px - line} ${py}A${line} ${line} 0 1 1 ${px + line} ${py}A${line} ${line} 0 1 1 ${px - line} ${py}`;
+    const ring = stadium(px, px, py, line);
     if (!holds) group.append(this.wheel(px, py, Math.max(r - thick - 1, 0.4 * r), speed, radius));
     group.append(this.band(ring, speed));
     return group;
@@ -292,7 +301,7 @@ class Scenery {
     return path;
   }
 
-  /** A plate: steel behind its struck face, which is on the left from the lower end to the upper. */
+  /** A plate: steel behind its struck face, which is on the left on the way up. */
   plate({ x, y, tx, ty, length }: Segment) {
     const { view, thick } = this, group = svg("g", { class: "part" });
     const long = length * view.scale, deep = PLATE * thick;
@@ -316,5 +325,10 @@ class Scenery {
     return group;
   }
 }
+
+/** The way of a belt round two wheels, clockwise from the left one's top, px. */
+const stadium = (left: number, right: number, y: number, r: number) =>
+  `M${left} ${y - r}H${right}A${r} ${r} 0 0 1 ${right} ${y + r}H${left}`
+  + `A${r} ${r} 0 0 1 ${left} ${y - r}`;
 
 export { Scenery, svg };

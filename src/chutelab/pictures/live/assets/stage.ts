@@ -34,6 +34,8 @@ class Stage {
   handles: Handle[] = [];
   gripOf: Map<string, any> = new Map();
   held: Handle | null = null;
+  /** The part that is chosen, whose handles are seen. */
+  part = "";
   fitted = false;
 
   constructor(readonly home: HTMLElement, readonly lab: Lab, readonly words: Words) {
@@ -48,7 +50,8 @@ class Stage {
     this.scenery = new Scenery(this.view, words);
     this.balls = new Balls(lab, (name) => this.colour(name));
     this.paths = svg("g", { class: "paths" });
-    this.back.append(steel(), this.scenery.ground, this.scenery.layer, this.paths);
+    const { ground, layer, scale } = this.scenery;
+    this.back.append(steel(), ground, layer, this.paths, scale);
     this.grips = svg("g", { class: "grips" });
     /** Further layers, of tools, lie below the handles. */
     this.over = svg("g", { class: "over" });
@@ -76,7 +79,8 @@ class Stage {
     const style = getComputedStyle(this.home);
     const inset = (side: string) => parseFloat(style.getPropertyValue(`padding-${side}`)) || 0;
     this.view.free = {
-      left: inset("left"), top: inset("top"), right: width - inset("right"), bottom: height - inset("bottom"),
+      left: inset("left"), top: inset("top"), right: width - inset("right"),
+      bottom: height - inset("bottom"),
     };
     this.corner = [inset("bottom") + 20, inset("left") + 24];
     const dense = globalThis.devicePixelRatio || 1;
@@ -294,6 +298,7 @@ class Stage {
   describe(grip: any, handle: Handle) {
     const { view, words } = this, x = view.px(handle.x), y = view.py(handle.y);
     grip.setAttribute("transform", `translate(${x} ${y})`);
+    grip.classList.toggle("own", handle.surface === this.part);
     const [stem, , knob] = grip.children;
     knob.setAttribute("d", KNOBS[handle.shape]);
     if (handle.from) {
@@ -380,8 +385,11 @@ class Stage {
       this.held.change(this.held.drag(x, y));
       return;
     }
-    const numbers = this.held.drag(x, y).map((value, n) =>
-      roundTo(value, fine[axes[n].unit] ?? snap));
+    const { held } = this, near = (value: number) => roundTo(value, snap);
+    // A body moves by round steps, and keeps its shape.
+    const numbers = held.whole ? held.drag(held.x + near(x - held.x), held.y + near(y - held.y))
+      .map((value) => Number(value.toPrecision(12)))
+      : held.drag(x, y).map((value, n) => roundTo(value, fine[axes[n].unit] ?? snap));
     this.lab.change(valuesOf(this.held, numbers), { done: false });
   }
 
@@ -418,7 +426,8 @@ class Stage {
 /** How plates and wheels shine. */
 function steel() {
   const shine = svg("linearGradient", { id: "steel", x1: 0, y1: 0, x2: 1, y2: 1 });
-  shine.append(svg("stop", { offset: 0, class: "steel-a" }), svg("stop", { offset: 1, class: "steel-b" }));
+  shine.append(svg("stop", { offset: 0, class: "steel-a" }),
+    svg("stop", { offset: 1, class: "steel-b" }));
   const found = svg("defs");
   found.append(shine);
   return found;

@@ -104,10 +104,10 @@ class Tools {
       button.addEventListener("click", () => this.toggle(name, button));
       bar.append(button);
     }
-    const head = html("summary", { class: "ib", title: words.say("show"), "aria-label": words.say("show") },
-      icon("eye"));
+    const name = words.say("show"), named = { class: "ib", title: name, "aria-label": name };
+    const head = html("summary", named, icon("eye"));
     this.bar = html("div", { class: "float choices" });
-    const menu = html("details", { class: "menu tools", id: "show" }, head, this.bar);
+    const menu = html("details", { class: "menu looks", id: "show" }, head, this.bar);
     document.getElementById("views")?.prepend(menu);
     addEventListener("pointerdown", ({ target }) => {
       if (!menu.contains(target as Node)) menu.open = false;
@@ -186,7 +186,8 @@ class Tools {
     });
     buttons[0].setAttribute("aria-pressed", "true");
     legend.hidden = true;
-    this.bar.append(html("p", {}, words.say("hue")), html("div", { class: "seg" }, ...buttons), legend);
+    const choice = html("div", { class: "seg" }, ...buttons);
+    this.bar.append(html("p", {}, words.say("hue")), choice, legend);
   }
 
   nameStrobe() {
@@ -200,11 +201,13 @@ class Tools {
     if (on) this.on.add(name);
     else this.on.delete(name);
     // A tool lies in the middle of what is shown when it is taken out.
-    const size = roundUp((0.12 * Math.min(view.width, view.height)) / view.scale);
+    const least = Math.min(view.free.right - view.free.left, view.height);
+    const size = roundUp((0.12 * least) / view.scale);
+    const [x, y] = view.middle;
     const at = (dx: number, dy: number) =>
-      [this.tidy(view.x + dx * size), this.tidy(view.y + dy * size)] as Point;
-    if (name === "tape") this.tape = [at(-1, -1.5), at(1, -1.5)];
-    if (name === "protractor") this.protractor = [at(-1, -1), at(1, -1), at(0, 1)];
+      [this.tidy(x + dx * size), this.tidy(y + dy * size)] as Point;
+    if (name === "tape") this.tape = [at(-1, -0.5), at(1, -0.5)];
+    if (name === "protractor") this.protractor = [at(-1, -0.5), at(1, -0.5), at(0, 0.7)];
     if (name === "watch") this.panel.hidden = !on;
     if (name === "tracer") this.traced = { t: this.lab.t, index: 0 };
     this.readWatch();

@@ -25,6 +25,12 @@ class View {
   /** The part of the picture that no card covers, px. */
   free = { left: 0, top: 0, right: 1, bottom: 1 };
 
+  /** The world's point in the middle of the free part. */
+  get middle(): [number, number] {
+    const { left, right, top, bottom } = this.free;
+    return [this.worldX(0.5 * (left + right)), this.worldY(0.5 * (top + bottom))];
+  }
+
   /** Show all of a box in the free part, with some room round it. @param margin px */
   fit({ left, bottom, right, top }: Box, margin: number = 30) {
     const { free } = this;
@@ -99,7 +105,11 @@ function boxOf(machine: Machine, points: { x: number, y: number }[]): Box {
   const all = !machine.segments.length && !machine.arcs.length;
   const inside = ({ x, y }: { x: number, y: number }) =>
     all || (x >= west && x <= east && y >= south && y <= north);
-  points.filter(inside).forEach(({ x, y }) => widen(x, y));
+  // Of the ride on the incoming belt as much as half of what comes after it.
+  const onward = machine.pulley ? points.filter((one) => one.x >= 0 && inside(one)) : [];
+  const span = onward.reduce((most, { x, y }) => Math.max(most, x, Math.abs(y)), 0);
+  const from = onward.length ? -Math.max(0.5 * span, 2 * (machine.pulley?.radius ?? 0)) : -Infinity;
+  points.filter(inside).forEach(({ x, y }) => widen(Math.max(x, from), y));
   if (!points.length) machine.releases.forEach(({ x, y }, i) => widen(x, y, machine.radius[i]));
   const ends = ({ x, y, tx, ty, length }: Segment) =>
     [[x, y], [x + tx * length, y + ty * length]];

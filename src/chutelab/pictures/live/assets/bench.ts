@@ -118,7 +118,7 @@ class Bench {
     front.addEventListener("pointermove", (event: PointerEvent) => {
       const at = this.stage.placeOf(event);
       if (this.mode !== "move") this.sketch(at);
-      else if (this.grabbed) this.carry(at);
+      else if (this.grabbed) this.carry(at, event);
       else if (this.fingers.has(event.pointerId)) {
         const alone = this.fingers.size === 1 && event.pointerType === "touch";
         // One finger on an empty place scrolls the page.
@@ -174,12 +174,14 @@ class Bench {
   }
 
   /** Move the body that is grabbed along. @param at pixels */
-  carry(at: Place) {
+  carry(at: Place, event: PointerEvent) {
     const { stage, grabbed, pressed } = this;
     if (stage.held || !grabbed || !pressed) return;
     if (Math.hypot(at[0] - pressed[0], at[1] - pressed[1]) < STRAY) return;
     if (this.inspector.part !== grabbed.surface) this.inspector.choose(grabbed.surface);
     stage.held = grabbed;
+    // This move may be the only one: where all comes late, many are told as one.
+    stage.aim(event);
   }
 
   /** Where a finger came down that does nothing else. */

@@ -329,13 +329,7 @@ class Stage {
       (grip as any).focus();
       this.front.setPointerCapture(event.pointerId);
     });
-    this.front.addEventListener("pointermove", (event: PointerEvent) => {
-      if (!this.held) return;
-      const [px, py] = this.placeOf(event);
-      this.latest = [this.view.worldX(px), this.view.worldY(py)];
-      // More events than frames come: the latest counts.
-      if (!this.waiting) this.waiting = requestAnimationFrame(() => this.follow());
-    });
+    this.front.addEventListener("pointermove", (event: PointerEvent) => this.aim(event));
     for (const end of ["pointerup", "pointercancel"]) {
       this.front.addEventListener(end, () => {
         if (!this.held) return;
@@ -348,6 +342,15 @@ class Stage {
       const handle = this.handles.find(({ id }) => id === grip?.getAttribute("data-id"));
       if (handle && this.nudge(handle, event)) event.preventDefault();
     });
+  }
+
+  /** Have what is held follow the pointer. */
+  aim(event: PointerEvent) {
+    if (!this.held) return;
+    const [px, py] = this.placeOf(event);
+    this.latest = [this.view.worldX(px), this.view.worldY(py)];
+    // More events than frames come: the latest counts.
+    if (!this.waiting) this.waiting = requestAnimationFrame(() => this.follow());
   }
 
   /** Where the pointer has moved since the last frame. */

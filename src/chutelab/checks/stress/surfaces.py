@@ -120,17 +120,9 @@ class Bow(Piece):
         return np.asarray((foot > margin) & (foot < self.extent * self.radius - margin))
 
 
-def pieces(machine: Machine, member: int | None = None) -> list[Piece]:
-    """Return all pieces: the straight ones, the bent ones, and the drive pulley last.
-
-    Of a family of machines those of one member.
-    """
+def pieces(machine: Machine) -> list[Piece]:
+    """Return all pieces: the straight ones, the bent ones, and the drive pulley last."""
     found: list[Piece] = []
-
-    def own(values: Any, last: int) -> Any:
-        """Return what is the member's, of values with so many axes else."""
-        return values[member] if member is not None and np.ndim(values) > last else values
-
     for part in (machine.segments, machine.arcs):
         straight = part is machine.segments
         shape = ("start", "tangent", "length") if straight else (
@@ -140,25 +132,24 @@ def pieces(machine: Machine, member: int | None = None) -> list[Piece]:
             common: dict[str, Any] = {
                 "name": machine.surfaces[surface],
                 "surface": surface,
-                "speed": float(own(part.speed, 1)[k]),
+                "speed": float(part.speed[k]),
                 "restitution": part.restitution[..., k],
                 "friction": part.friction[..., k],
                 "appears": float(part.appears[k]),
                 "vanishes": float(part.vanishes[k]),
             }
-            places = {"start": 2, "tangent": 2, "center": 2}
-            at = {name: own(getattr(part, name), places.get(name, 1))[k] for name in shape}
+            at = {name: getattr(part, name)[k] for name in shape}
             found.append(Line(**common, **at) if straight else Bow(**common, **at))
     if (wheel := machine.pulley) is not None:
         found.append(
             Bow(
                 name="pulley",
                 surface=wheel.surface,
-                speed=own(wheel.speed, 0),
+                speed=wheel.speed,
                 restitution=wheel.restitution,
                 friction=wheel.friction,
                 center=np.zeros(2),
-                radius=own(wheel.radius, 0),
+                radius=wheel.radius,
             )
         )
     return found

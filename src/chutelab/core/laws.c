@@ -61,7 +61,7 @@ static double gain(int i, const double *knot) {
 
 static Breach *tell(int law, double amount, double bound) {
     Breach *one = L.breaches + L.breach_count++;
-    *one = (Breach){All.knot_t, NAN, NAN, amount, bound, law, 0, -1, -1};
+    *one = (Breach){All.knot_t, NAN, NAN, amount, bound, law, 0, -1, -1, -1, 0};
     return one;
 }
 
@@ -282,6 +282,7 @@ static void tell_hits(int passes) {
     one->particles = particles;
     one->particle = first->particle;
     one->surface = L.barriers[row].surface;
+    one->piece = first->piece;
 }
 
 /* Energy. */

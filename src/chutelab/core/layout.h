@@ -296,7 +296,8 @@ typedef struct {                                                                
     int law;
     int particles;          /* how many broke it; 0 if it is about all together */
     int particle;           /* the first of them, or -1 */
-    int surface;            /* which it is about, or -1 */
+    int surface, piece;     /* which it is about, or -1 */
+    int pad;
 } Breach;
 
 typedef struct {

@@ -236,9 +236,11 @@ def barriers(machine: Machine) -> NDArray[Any]:
 
 def _broken(recording: Recording, row: NDArray[Any], figures: Any) -> Broken:
     """Return a law that is broken in words."""
-    t, x, y, amount, bound, which, particles, particle, surface = row.tolist()
-    law = LAWS[which]
+    t, x, y, amount, bound, which, particles, particle, surface, piece, _ = row.tolist()
+    law, m = LAWS[which], recording.machine
     name = recording.surfaces[surface] if surface >= 0 else ""
+    if m.pulley is not None and piece == m.segments.length.shape[-1] + m.arcs.radius.shape[-1]:
+        name = "pulley"
     advice = _advice(recording, law, figures)
     return Broken(
         law, particles, particle, t, (x, y), name, amount, bound, UNITS.get(law, "J"), advice

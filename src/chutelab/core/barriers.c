@@ -26,7 +26,7 @@ typedef struct { double x[4], y[4]; } Curve;
 static struct {
     Barrier *piece;
     int particle, number, knot; /* of the piece; of the knot before */
-    double radius, limit;       /* m; how near a centre may come */
+    double radius, limit;       /* m; how near a centre may come, where it is not to be looked at */
     int deepest;                /* the hit of this interval that passes nothing, or -1 */
 } At;
 
@@ -244,11 +244,15 @@ static double clear_from(void) {
    without bound in a gate that shut on it, as long as it has not been clear of it since. */
 static double forgiven(double t) {
     const double *first = KNOT(L.offsets[At.particle]);
-    if (At.piece->appears <= first[0]) {
-        return MAX(At.radius - distance(At.piece, first[1], first[2]), 0);
-    }
+    int gate = At.piece->appears > first[0];
+    if (!gate) return MAX(At.radius - distance(At.piece, first[1], first[2]), 0);
     if (isnan(At.piece->clear)) At.piece->clear = clear_from();
     return t > At.piece->clear ? 0 : INFINITY;
+}
+
+/* From now on only deeper places of this interval, and passages, are looked for. */
+static void ask_for(double depth) {
+    if (At.radius > 0) At.limit = MAX(At.radius - depth, 0);
 }
 
 /* What is left of an interval: note it if it is bad. */
@@ -265,6 +269,7 @@ static void measure(const Curve *c, double begin, double size) {
     double spared = forgiven(t);
     if (!((passes && spared < INFINITY) || deep[at] > spared + L.allowed)) return;
     double depth = deep[at] - MIN(spared, At.radius);
+    if (!passes) ask_for(deep[at]);
     if (passes) {
         /* Each passage counts, and of all the rest of an interval the deepest place. */
         add_hit(t, x[at], y[at], depth, 1);
@@ -314,6 +319,11 @@ static void look(const Curve *c, Barrier *b, int number, int knot) {
     At.number = number;
     At.knot = knot;
     At.deepest = -1;
+    At.limit = At.radius > 0 ? MAX(At.radius - L.allowed, 0) : -L.allowed;
+    if (is_clear(c)) return;
+    double spared = forgiven(next);
+    if (spared == INFINITY) return;
+    ask_for(L.allowed + spared);
     settle(c, 0, 1, 0);
 }
 
@@ -339,7 +349,7 @@ static void turn(const Curve *c, Barrier *pieces, int first, int knot) {
 
 /* Look at some intervals that follow each other. */
 static void look_at_all(const Curve *curves, const int *knots, int count, Barrier *pieces) {
-    double box[4], own[4], margin = MAX(At.limit, 0);
+    double box[4], own[4], margin = MAX(At.radius - L.allowed, 0);
     int near = 0;
     empty(box);
     for (int n = 0; n < count; n++) {
@@ -371,7 +381,6 @@ void find_hits(void) {
         int count = 0, first = 1;
         At.particle = i;
         At.radius = r;
-        At.limit = r > 0 ? MAX(r - L.allowed, 0) : -L.allowed;
         for (int k = 0; k < L.piece_count; k++) pieces[k].clear = NAN;
         for (int k = L.offsets[i]; k < L.offsets[i + 1] - 1; k++) {
             const double *a = KNOT(k), *b = a + L.row;

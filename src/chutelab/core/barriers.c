@@ -250,7 +250,7 @@ static double forgiven(double t) {
     return t > At.piece->clear ? 0 : INFINITY;
 }
 
-/* From now on only deeper places of this interval, and passages, are looked for. */
+/* From now on only places of this interval that are deeper than that, and passages, are looked for. */
 static void ask_for(double depth) {
     if (At.radius > 0) At.limit = MAX(At.radius - depth, 0);
 }
@@ -269,7 +269,7 @@ static void measure(const Curve *c, double begin, double size) {
     double spared = forgiven(t);
     if (!((passes && spared < INFINITY) || deep[at] > spared + L.allowed)) return;
     double depth = deep[at] - MIN(spared, At.radius);
-    if (!passes) ask_for(deep[at]);
+    if (!passes) ask_for(deep[at] + L.rounding + L.arcs);
     if (passes) {
         /* Each passage counts, and of all the rest of an interval the deepest place. */
         add_hit(t, x[at], y[at], depth, 1);
@@ -347,23 +347,25 @@ static void turn(const Curve *c, Barrier *pieces, int first, int knot) {
     }
 }
 
+/* An interval of a track: its path, and the box about that. */
+typedef struct { Curve path; double box[4]; int knot; } Interval;
+
 /* Look at some intervals that follow each other. */
-static void look_at_all(const Curve *curves, const int *knots, int count, Barrier *pieces) {
-    double box[4], own[4], margin = MAX(At.radius - L.allowed, 0);
+static void look_at_all(const Interval *some, int count, Barrier *pieces) {
+    double box[4], margin = MAX(At.radius - L.allowed, 0);
     int near = 0;
     empty(box);
     for (int n = 0; n < count; n++) {
-        for (int k = 0; k < 4; k++) grow(box, curves[n].x[k], curves[n].y[k]);
+        grow(box, some[n].box[0], some[n].box[1]);
+        grow(box, some[n].box[2], some[n].box[3]);
     }
     for (int k = 0; k < L.piece_count; k++) {
         if (!apart(box, pieces[k].box, margin)) pieces[near++].near = k;
     }
-    for (int n = 0; n < count && near; n++) {
-        empty(own);
-        for (int k = 0; k < 4; k++) grow(own, curves[n].x[k], curves[n].y[k]);
-        for (int k = 0; k < near; k++) {
-            Barrier *b = pieces + pieces[k].near;
-            if (!apart(own, b->box, margin)) look(curves + n, b, pieces[k].near, knots[n]);
+    for (int k = 0; k < near; k++) {
+        Barrier *b = pieces + pieces[k].near;
+        for (int n = 0; n < count; n++) {
+            if (!apart(some[n].box, b->box, margin)) look(&some[n].path, b, pieces[k].near, some[n].knot);
         }
     }
 }
@@ -372,28 +374,29 @@ static void look_at_all(const Curve *curves, const int *knots, int count, Barrie
    for each interval beside each piece. What stood in the way of a gate as it shut is spared until it
    is clear of it; what overlapped at its release may go on doing so, no deeper. */
 void find_hits(void) {
-    Curve curves[WIDTH];
-    int knots[WIDTH];
+    Interval some[WIDTH];
     L.hit_count = 0;
     for (int i = 0; i < L.particle_count && L.piece_count; i++) {
         Barrier *pieces = L.barriers + (L.family ? i * L.piece_count : 0);
-        double r = L.bodies[i].radius;
         int count = 0, first = 1;
         At.particle = i;
-        At.radius = r;
+        At.radius = L.bodies[i].radius;
         for (int k = 0; k < L.piece_count; k++) pieces[k].clear = NAN;
         for (int k = L.offsets[i]; k < L.offsets[i + 1] - 1; k++) {
             const double *a = KNOT(k), *b = a + L.row;
             if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) continue;
-            curve_after(a, curves + count);
-            if (r == 0) turn(curves + count, pieces, first, k);
+            Interval *now = some + count++;
+            curve_after(a, &now->path);
+            now->knot = k;
+            empty(now->box);
+            for (int n = 0; n < 4; n++) grow(now->box, now->path.x[n], now->path.y[n]);
+            if (At.radius == 0) turn(&now->path, pieces, first, k);
             first = 0;
-            knots[count++] = k;
             if (count == WIDTH) {
-                look_at_all(curves, knots, count, pieces);
+                look_at_all(some, count, pieces);
                 count = 0;
             }
         }
-        look_at_all(curves, knots, count, pieces);
+        look_at_all(some, count, pieces);
     }
 }

@@ -89,44 +89,50 @@ static void tell_group(int law, const Group *group, double amount, double bound)
     one->particle = group->particle;
 }
 
-/* Numbers. */
-
-static int is_real(void) {
-    Group bad = {0};
-    int count = L.unreal;
-    for (int i = 0; i < L.particle_count; i++) {
-        for (int k = L.offsets[i]; k < L.offsets[i + 1]; k++) {
-            int found = 0;
-            for (int n = 0; n < 9; n++) found += !isfinite(KNOT(k)[n]);
-            if (found) add(&bad, i, k);
-            count += found;
-        }
-    }
-    for (int n = 0; n < 3 * L.book_rows; n++) count += !isfinite(L.books[n]);
-    if (bad.particles) tell_group(LAW_FINITE, &bad, count, 0);
-    else if (count) tell(LAW_FINITE, count, 0);
-    return !count;
-}
-
 /* Bounds. */
 
-/* Sums and largest numbers of all knots, and the largest speed and length in play. The clock's own
-   rounding moves a particle: half an ulp of t, times its speed. */
-static void weigh(void) {
-    double t = 0, place = 0, fastest = 0, size[4] = {0};
+/* Look at all numbers: tell whether they are finite, and find the largest of each kind; also the energy in
+   play, J: what every particle had at most, and what was booked on it, or of a crowd what was turned over.
+   The clock's own rounding moves a particle: half an ulp of t, times its speed. */
+static int weigh(void) {
+    double t = 0, place = 0, fastest = 0, size[4] = {0}, entries[3] = {0}, lifted = 0;
+    Group bad = {0};
+    int unreal = L.unreal;
+    L.energy = 0;
     for (int i = 0; i < L.particle_count; i++) {
-        All.mass += L.bodies[i].mass;
-        All.heaviest = MAX(All.heaviest, L.bodies[i].mass);
+        const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
+        double mass = L.bodies[i].mass, highest = 0;
+        All.mass += mass;
+        All.heaviest = MAX(All.heaviest, mass);
         All.gravity = MAX(All.gravity, L.bodies[i].gravity);
         All.smallest = i ? MIN(All.smallest, L.bodies[i].radius) : L.bodies[i].radius;
-        for (int k = L.offsets[i]; k < L.offsets[i + 1]; k++) {
-            const double *knot = KNOT(k);
+        for (const double *knot = first; knot <= last; knot += L.row) {
+            double sum = 0;
+            for (int n = 0; n < 9; n++) sum += 0 * knot[n];
+            if (sum != 0) { /* NAN: one of them is not finite. */
+                for (int n = 0; n < 9; n++) unreal += !isfinite(knot[n]);
+                add(&bad, i, L.offsets[i] + (knot - first) / L.row);
+            }
             t = MAX(t, fabs(knot[0]));
             All.knot_t = MAX(All.knot_t, knot[0]);
             place = MAX(place, MAX(fabs(knot[1]), fabs(knot[2])));
             fastest = MAX(fastest, pace(knot));
+            if (L.interact) continue;
+            highest = MAX(highest, fabs(knot[6]) + fabs(knot[7]) + fabs(knot[8])
+                + fabs(potential(i, knot)) + kinetic(i, knot));
         }
+        if (L.interact && is_released(i)) {
+            highest = kinetic(i, first);
+            lifted += potential(i, last) - potential(i, first);
+            for (int n = 0; n < 3; n++) entries[n] += last[6 + n];
+        }
+        L.energy += highest;
     }
+    L.energy += fabs(lifted) + fabs(entries[0]) + fabs(entries[1]) + fabs(entries[2]);
+    for (int n = 0; n < 3 * L.book_rows; n++) unreal += !isfinite(L.books[n]);
+    if (bad.particles) tell_group(LAW_FINITE, &bad, unreal, 0);
+    else if (unreal) tell(LAW_FINITE, unreal, 0);
+    if (unreal) return 0;
     L.speed = sqrt(fastest);
     double *start = size, *length = size + 1, *center = size + 2, *radius = size + 3;
     for (int k = 0; k < L.piece_count * (L.family ? L.particle_count : 1); k++) {
@@ -142,6 +148,7 @@ static void weigh(void) {
     if (*radius) L.length = MAX(L.length, *center + *radius + L.largest);
     L.rounding *= L.length;
     L.arcs = ON_ARCS * (L.largest + *radius);
+    return 1;
 }
 
 /* Largest acceleration towards the centre of an arc that a particle moves along inside, m/s2. Outside it
@@ -177,29 +184,6 @@ static double lateness(void) {
     return (2 * All.gravity + L.bent) * square(L.dt);
 }
 
-/* Energy in play, J: what every particle had at most, and what was booked on it. Of a crowd it is what
-   was turned over. */
-static double energy_in_play(void) {
-    double sum = 0, entries[3] = {0}, lifted = 0;
-    for (int i = 0; i < L.particle_count; i++) {
-        if (!is_released(i)) continue;
-        const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
-        if (L.interact) {
-            sum += kinetic(i, first);
-            lifted += potential(i, last) - potential(i, first);
-            for (int n = 0; n < 3; n++) entries[n] += last[6 + n];
-            continue;
-        }
-        double highest = 0;
-        for (const double *knot = first; knot <= last; knot += L.row) {
-            highest = MAX(highest, fabs(knot[6]) + fabs(knot[7]) + fabs(knot[8])
-                + fabs(potential(i, knot)) + kinetic(i, knot));
-        }
-        sum += highest;
-    }
-    return sum + fabs(lifted) + fabs(entries[0]) + fabs(entries[1]) + fabs(entries[2]);
-}
-
 /* What numbers may do to the energy, as a share of the energy in play. Contacts round it. In a stepped
    engine each contact moves it, besides, by the weight times `late`, where an overlap is parted: impulses
    themselves are booked to the last bit. */
@@ -232,12 +216,10 @@ static double energy_parted(void) {
 }
 
 static void find_bounds(void) {
-    weigh();
     L.bent = L.engine == ENGINE_EXACT ? 0 : bent_inside();
     L.late = lateness();
     int lone = L.engine == ENGINE_CONTACT && !L.interact;
     L.allowed = L.rounding + L.arcs + L.late + (lone ? BULGE * L.largest : 0);
-    L.energy = energy_in_play();
     L.energy_bound = energy_share();
     L.parted = energy_parted();
     /* m v w, where constant acceleration is as good as the true way but for a velocity w. */
@@ -322,36 +304,7 @@ static double risen(void) {
     return found;
 }
 
-/* Of lone particles what is unexplained may not change from knot to knot; particles that meet give energy
-   to each other, so of them it is the sum of all at some times, and what the solves of the contact engine
-   gained. */
-static void judge_energy(double bound) {
-    double most = bound + L.parted, worst = 0;
-    if (L.interact) {
-        if (L.gained > bound) {
-            tell(LAW_ENERGY, L.gained, bound);
-        } else {
-            double rise = risen();
-            if (rise > most + L.untold) tell(LAW_ENERGY, rise, most + L.untold);
-        }
-        return;
-    }
-    Group bad = {0};
-    for (int i = 0; i < L.particle_count; i++) {
-        if (!is_released(i)) continue;
-        double before = gain(i, KNOT(L.offsets[i]));
-        for (int k = L.offsets[i] + 1; k < L.offsets[i + 1]; k++) {
-            double now = gain(i, KNOT(k)), rise = fabs(now - before);
-            before = now;
-            if (rise <= most) continue;
-            worst = MAX(worst, rise);
-            add(&bad, i, k);
-        }
-    }
-    tell_group(LAW_ENERGY, &bad, worst, most);
-}
-
-/* Losses: what a knot gives back of those that were booked, J, at most 0. Where the contact engine holds a
+/* What a knot gives back of the losses that were booked, J, at most 0. Where the contact engine holds a
    particle by itself in a nip, impulses of any size hold each other, and along normals seems to be given
    what friction takes: only the sum is known. */
 static double given_back(int k) {
@@ -447,28 +400,48 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
     return bad;
 }
 
-/* Losses that are booked are never less than before but by what parting overlaps gives: where many do so at
-   one instant, those that overlap there. */
-static void judge_losses(double bound) {
-    double most = bound + L.parted, least = most, worst = 0;
-    int crowd = L.interact && L.engine == ENGINE_CONTACT, count = 0;
+/* Energy and ledger. Of lone particles what is unexplained may not change from knot to knot; particles that
+   meet give energy to each other, so of them it is the sum of all at some times, and what the solves of the
+   contact engine gained. Losses that are booked are never less than before but by what parting overlaps
+   gives: where many do so at one instant, those that overlap there. */
+static void judge_books(double bound) {
+    double most = bound + L.parted, least = most, rise = 0, back = 0, residual = 0, low = 0;
+    int crowd = L.interact && L.engine == ENGINE_CONTACT, count = 0, surface = -1;
+    Group rises = {0}, backs = {0};
     Instant instants[INSTANTS];
     if (crowd) count = beyond_overlaps(most, instants, &least);
-    Group bad = {0};
-    for (int i = 0; i < L.particle_count && (!crowd || count); i++) {
-        for (int k = L.offsets[i] + 1; k < L.offsets[i + 1]; k++) {
-            double back = given_back(k);
-            int told = !crowd;
-            if (back >= -most) continue;
-            for (int n = 0; n < count && !told; n++) told = KNOT(k)[0] == instants[n].t;
-            if (!told) continue;
-            worst = MIN(worst, back);
-            add(&bad, i, k);
+    for (int i = 0; i < L.particle_count; i++) {
+        if (!is_released(i)) continue;
+        double first = gain(i, KNOT(L.offsets[i])), before = first;
+        if (L.interact) residual += gain(i, KNOT(last_of(i))) - first;
+        for (int k = L.offsets[i] + 1; k < L.offsets[i + 1] && (!crowd || count); k++) {
+            double own = given_back(k);
+            int told = own < -most;
+            if (told && crowd) {
+                told = 0;
+                for (int n = 0; n < count; n++) told |= KNOT(k)[0] == instants[n].t;
+            }
+            if (told) {
+                back = MIN(back, own);
+                add(&backs, i, k);
+            }
+            if (L.interact) continue;
+            double now = gain(i, KNOT(k)), change = fabs(now - before);
+            before = now;
+            if (change <= most) continue;
+            rise = MAX(rise, change);
+            add(&rises, i, k);
         }
+        if (!L.interact) residual += before - first;
     }
-    tell_group(LAW_LOSSES, &bad, worst, -least);
-    double low = 0;
-    int surface = -1;
+    if (L.interact && L.gained > bound) {
+        tell(LAW_ENERGY, L.gained, bound);
+    } else if (L.interact) {
+        rise = risen();
+        if (rise > most + L.untold) tell(LAW_ENERGY, rise, most + L.untold);
+    }
+    tell_group(LAW_ENERGY, &rises, rise, most);
+    tell_group(LAW_LOSSES, &backs, back, -least);
     for (int n = 0; n < L.book_rows; n++) {
         double loss = MIN(L.books[3 * n + 1], L.books[3 * n + 2]);
         if (loss >= low) continue;
@@ -476,14 +449,6 @@ static void judge_losses(double bound) {
         surface = n % L.surface_count;
     }
     if (low < -most) tell(LAW_LOSSES, low, -most)->surface = surface;
-}
-
-static void judge_ledger(double bound) {
-    double residual = 0;
-    for (int i = 0; i < L.particle_count; i++) {
-        if (!is_released(i)) continue;
-        residual += gain(i, KNOT(last_of(i))) - gain(i, KNOT(L.offsets[i]));
-    }
     if (fabs(residual) > bound) tell(LAW_LEDGER, fabs(residual), bound);
 }
 
@@ -521,17 +486,15 @@ static void judge_steps(void) {
 __attribute__((export_name("judge"))) void judge(void) {
     L.breach_count = L.hit_count = 0;
     memset(&All, 0, sizeof All);
-    if (!is_real()) return; /* The other laws say nothing about what is no number. */
     shape_barriers();
+    if (!weigh()) return; /* The other laws say nothing about what is no number. */
     find_bounds();
     find_hits();
     if (L.hit_count > L.hit_room) return; /* It is asked again, with more room. */
     double bound = L.energy_bound * L.energy;
     tell_hits(1);
     tell_hits(0);
-    judge_energy(bound);
-    judge_losses(bound);
-    judge_ledger(bound);
+    judge_books(bound);
     judge_steps();
 }
 

@@ -269,7 +269,7 @@ static void measure(const Curve *c, double begin, double size) {
     double spared = forgiven(t);
     if (!((passes && spared < INFINITY) || deep[at] > spared + L.allowed)) return;
     double depth = deep[at] - MIN(spared, At.radius);
-    if (!passes) ask_for(deep[at] + L.rounding + L.arcs);
+    if (!passes) ask_for(deep[at] + L.rounding);
     if (passes) {
         /* Each passage counts, and of all the rest of an interval the deepest place. */
         add_hit(t, x[at], y[at], depth, 1);

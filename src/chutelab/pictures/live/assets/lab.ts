@@ -91,11 +91,15 @@ class Lab {
       recording.add(chunk);
       this.tellSoon();
       // After a change a track may well lie where a surface is now.
-      if (recording.state !== "done" || recording.renamed) return;
-      this.engine.judge(runOf(recording), (breaches) => {
-        recording.breaches = breaches;
-        this.tellSoon();
-      });
+      if (recording.state === "done" && !recording.renamed) this.judge(recording);
+    });
+  }
+
+  /** Find the laws that a run breaks, which is over. */
+  judge(recording: Recording) {
+    this.engine.judge(runOf(recording), (breaches) => {
+      recording.breaches = breaches;
+      this.tellSoon();
     });
   }
 

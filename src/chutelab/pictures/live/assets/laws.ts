@@ -23,7 +23,9 @@ function lawSaid(broken: Breach, { machine }: Recording, words: Words) {
     name: words.name(machine.surfaces[surface] ?? ""), particle, t: words.number(t),
     x: words.number(x), y: words.number(y),
   };
-  return words.say("law-broken", { what: words.say(SAID[law], where) });
+  // What one particle has got unexplained is no solver's doing.
+  const said = SAID[law] === "law-energy" && particle >= 0 ? "law-ledger" : SAID[law];
+  return words.say("law-broken", { what: words.say(said, where) });
 }
 
 export { SAID, watchLaws };

@@ -33,17 +33,6 @@ class Piece(ABC):
     def away(self, position: Floats) -> Floats:
         """Return the way from the nearest point of it to places (c, 2), m."""
 
-    @abstractmethod
-    def beside(self, position: Floats) -> Floats:
-        """Return distances (c,) from its line, the side on the left or outside positive, m."""
-
-    @abstractmethod
-    def within(self, position: Floats, margin: float) -> Bools:
-        """Tell which places (c, 2) are beside it, and not beyond its ends or nearer than a margin.
-
-        Ends are `margin` (m) inside of what they are.
-        """
-
     def gap(self, position: Floats, radius: Floats) -> Floats:
         """Return distances (c,) from disks round places (c, 2), m."""
         return np.asarray(np.hypot(*self.away(position).T) - radius)
@@ -68,14 +57,6 @@ class Line(Piece):
         from_start = position - self.start
         foot = np.clip(from_start @ self.tangent, 0.0, self.length)
         return np.asarray(from_start - foot[:, None] * self.tangent)
-
-    def beside(self, position: Floats) -> Floats:  # noqa: D102
-        from_start = position - self.start
-        return np.asarray(self.tangent[0] * from_start[:, 1] - self.tangent[1] * from_start[:, 0])
-
-    def within(self, position: Floats, margin: float) -> Bools:  # noqa: D102
-        foot = (position - self.start) @ self.tangent
-        return np.asarray((foot > margin) & (foot < self.length - margin))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -109,15 +90,6 @@ class Bow(Piece):
             nearer = np.hypot(*first.T) <= np.hypot(*last.T)
             away[beyond] = np.where(nearer[:, None], first, last)
         return np.asarray(away)
-
-    def beside(self, position: Floats) -> Floats:  # noqa: D102
-        return np.asarray(np.hypot(*(position - self.center).T) - self.radius)
-
-    def within(self, position: Floats, margin: float) -> Bools:  # noqa: D102
-        if self.extent >= 2.0 * pi:
-            return np.ones(len(position), dtype=bool)
-        foot = self._along(position) * self.radius
-        return np.asarray((foot > margin) & (foot < self.extent * self.radius - margin))
 
 
 def pieces(machine: Machine) -> list[Piece]:

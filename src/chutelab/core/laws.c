@@ -159,11 +159,11 @@ static double bent_inside(void) {
         const Barrier *b = L.barriers + n;
         if (b->radius == 0 || (L.pulley && n == L.piece_count - 1)) continue;
         for (int i = 0; i < L.particle_count; i++) {
-            double r = L.bodies[i].radius, inner = b->radius - r;
+            double r = L.bodies[i].radius, inner = b->radius - r, low = MAX(inner - 0.1 * r, 0);
             for (int k = L.offsets[i]; k < L.offsets[i + 1] && inner > 0; k++) {
                 const double *knot = KNOT(k);
                 double far = square(knot[1] - b->x) + square(knot[2] - b->y);
-                if (far <= square(inner - 0.1 * r) || far >= square(inner + 0.1 * r)) continue;
+                if (far < square(low) || far >= square(inner + 0.1 * r)) continue;
                 if (!is_within(b, knot[1], knot[2], 0)) continue;
                 found = MAX(found, pace(knot) / inner);
             }

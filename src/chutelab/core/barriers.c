@@ -307,6 +307,12 @@ static void settle(const Curve *c, double begin, double size, int halvings) {
 
 /* Look at an interval beside one piece that its box is not clear of. */
 static void look(const Curve *c, Barrier *b, int number, int knot) {
+    At.piece = b;
+    At.number = number;
+    At.knot = knot;
+    At.deepest = -1;
+    At.limit = At.radius > 0 ? MAX(At.radius - L.allowed, 0) : -L.allowed;
+    if (is_clear(c)) return;
     double t = KNOT(knot)[0], next = KNOT(knot + 1)[0];
     if (next < b->appears + L.dt || t > b->vanishes) return;
     if (L.pulley && number == 0) {
@@ -315,12 +321,6 @@ static void look(const Curve *c, Barrier *b, int number, int knot) {
         for (int k = 0; k < 4; k++) beyond = beyond && foot(b, c->x[k], c->y[k]) >= b->length;
         if (beyond) return;
     }
-    At.piece = b;
-    At.number = number;
-    At.knot = knot;
-    At.deepest = -1;
-    At.limit = At.radius > 0 ? MAX(At.radius - L.allowed, 0) : -L.allowed;
-    if (is_clear(c)) return;
     double spared = forgiven(next);
     if (spared == INFINITY) return;
     ask_for(L.allowed + spared);

@@ -36,7 +36,8 @@ async function startCore(module: WebAssembly.Module, layout: Layout) {
 class Core {
   exports: any;
   base;
-  world;
+  /** Where the structs of the core's subjects are, by their names. */
+  subjects: Record<string, number>;
   end;
   machine: Machine | null = null;
   bytes = new Uint8Array();
@@ -47,7 +48,7 @@ class Core {
     this.exports = instance.exports;
     this.exports._initialize();
     this.base = this.exports.__heap_base.value;
-    this.world = this.exports.world();
+    this.subjects = { World: this.exports.world(), Laws: this.exports.laws() };
     this.end = this.base;
     this.look();
   }
@@ -60,21 +61,21 @@ class Core {
     this.ints = new Int32Array(buffer);
   }
 
-  get(name: string) {
-    const [offset, type] = this.layout.structs.World.fields[name];
-    const at = this.world + offset;
+  get(name: string, of = "World") {
+    const [offset, type] = this.layout.structs[of].fields[name];
+    const at = this.subjects[of] + offset;
     return type === "double" ? this.doubles[at >> 3] : this.ints[at >> 2];
   }
 
-  set(name: string, value: number) {
-    const [offset, type] = this.layout.structs.World.fields[name];
-    const at = this.world + offset;
+  set(name: string, value: number, of = "World") {
+    const [offset, type] = this.layout.structs[of].fields[name];
+    const at = this.subjects[of] + offset;
     if (type === "double") this.doubles[at >> 3] = value;
     else this.ints[at >> 2] = value;
   }
 
-  /** Make room for an array of zeros, to which `World.name` points from now on. */
-  place(name: string, kind: string, count: number) {
+  /** Make room for an array of zeros, to which a struct's field points from now on. */
+  place(name: string, kind: string, count: number, of = "World") {
     const size = SIZES[kind] ?? this.layout.structs[kind].size;
     const begin = Math.ceil(this.end / 16) * 16;
     this.end = begin + size * Math.max(1, count);
@@ -83,7 +84,7 @@ class Core {
       this.look();
     }
     this.bytes.fill(0, begin, this.end);
-    this.set(name, begin);
+    this.set(name, begin, of);
   }
 
   makeRoom(what: keyof typeof GROWING, room: number) {
@@ -92,9 +93,10 @@ class Core {
   }
 
   /** Fill in fields of one row of an array. */
-  fill(name: string, struct: string, row: number, values: Record<string, number | number[]>) {
+  fill(name: string, struct: string, row: number, values: Record<string, number | number[]>,
+    of = "World") {
     const { size, fields } = this.layout.structs[struct];
-    const begin = this.get(name) + row * size;
+    const begin = this.get(name, of) + row * size;
     for (const [key, value] of Object.entries(values)) {
       const [offset, type] = fields[key];
       if (typeof value !== "number") this.doubles.set(value, (begin + offset) >> 3);
@@ -103,11 +105,16 @@ class Core {
     }
   }
 
+  /** Set all fields of a struct to 0. */
+  reset(of: string) {
+    this.bytes.fill(0, this.subjects[of], this.subjects[of] + this.layout.structs[of].size);
+  }
+
   /** Lay out a machine: the run is at its beginning then. */
   begin(machine: Machine) {
     this.machine = machine;
     this.end = this.base;
-    this.bytes.fill(0, this.world, this.world + this.layout.structs.World.size);
+    this.reset("World");
     const { interact, releases, rolling } = machine;
     const n = releases.length;
     const rows = surfaceRows(machine, this.layout.enums.Shape);
@@ -257,10 +264,15 @@ class Core {
 
   grow: { what: string, room: number } | null = null;
 
-  events(): Event[] {
-    const { size, fields } = this.layout.structs.Event;
-    return Array.from({ length: this.get("event_count") }, (_, row) => {
-      const begin = this.get("events") + row * size;
+  events() {
+    return this.rows("events", "Event", this.get("event_count")) as Event[];
+  }
+
+  /** Rows of an array, with all their fields. */
+  rows(name: string, struct: string, count: number, of = "World"): Record<string, any>[] {
+    const { size, fields } = this.layout.structs[struct];
+    return Array.from({ length: count }, (_, row) => {
+      const begin = this.get(name, of) + row * size;
       const values = Object.entries(fields).map(([name, [offset, type, many]]) => {
         const array = type === "double" ? this.doubles : this.ints;
         const at = (begin + offset) >> (type === "double" ? 3 : 2);

@@ -158,3 +158,32 @@ def test_the_projector_shows_the_machine_large_and_little_else(shown):
     page.click("#full")
     assert page.evaluate(size) == before
     assert page.locator("#bench").is_visible()
+
+
+LABELS = """() => {
+  const home = chutelab.stage.front.getBoundingClientRect();
+  return [...document.querySelectorAll(".symbols text, .surfaces .on-frame, .scale text")]
+    .map((text) => [
+      text.textContent, text.getBoundingClientRect(), text.closest(".symbols") !== null])
+    .map(([text, { left, right, top, bottom }, own]) =>
+      [text, [left - home.left, right - home.left, top - home.top, bottom - home.top], own]);
+}"""
+
+
+@pytest.mark.parametrize("size", [(1366, 768), (1920, 1080), (390, 844)])
+@pytest.mark.parametrize(
+    "name",
+    ["perpendicular", "inclined-20", "inclined-60", "inclined-conveyor", "low-speed", "cascade"],
+)
+def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
+    page = shown(name, viewport={"width": size[0], "height": size[1]})
+    found, free = page.evaluate(LABELS), page.evaluate("chutelab.stage.view.free")
+    assert sum(own for *_, own in found) >= 3
+    for n, (text, (left, right, top, bottom), own) in enumerate(found):
+        if own:
+            assert free["left"] - 4 <= left < right <= free["right"] + 4, text
+            assert free["top"] - 4 <= top < bottom <= free["bottom"] + 4, text
+        for other, (left2, right2, top2, bottom2), own2 in found[n + 1 :]:
+            # A line of text is taller than its letters.
+            apart = min(right, right2) - max(left, left2), min(bottom, bottom2) - max(top, top2)
+            assert not (own or own2) or min(apart) <= 5.0, (text, other, apart)

@@ -233,4 +233,81 @@ typedef struct {
     double skip;         /* 1/s; SKIP in a step: radii that it may go */
 } World;
 
+/* A scene as one row of numbers: keys of its tables, by their own names, NaN where nothing is given.
+   Tables follow each other in the order of `Plan`'s counts, those of one kind in that of the file. A
+   family of scenes are several such rows. All of these structs are of doubles alone. */
+
+enum DropFrom { FROM_IMPACT, FROM_TOP };
+
+typedef struct { double gravity; } SceneKeys;
+
+/* Of a kind of particles. */
+typedef struct {
+    double radius;          /* m; the mean */
+    double span[2];         /* m; of radii that differ */
+    double moment;          /* I/(m r2); 0 if it never turns */
+} ParticleKeys;
+
+typedef struct {
+    double kind;            /* which of the particles it consists of */
+    double at[2], to[2], fill[4], velocity[2];
+} StreamKeys;
+
+typedef struct {
+    double speed, pulley_radius, length, incline_deg;
+    double friction;        /* with the nominal particle; INFINITY is adhesion */
+} IncomingKeys;
+
+/* With a pivot it is a further plate, else the damping plate. */
+typedef struct { double distance, pivot_height, pivot[2], angle_deg, above, below; } PlateKeys;
+
+typedef struct { double speed, drop, drop_from, start, length; } OutgoingKeys;
+
+typedef struct { double from[2], to[2], pulley_radius, speed; } ConveyorKeys;
+
+typedef struct {
+    double corners;         /* of `points`, which stand behind all tables, surface by surface; 0: an arc */
+    double center[2], radius, from_deg, to_deg, speed, opens_at, closes_at;
+    double repeat[6];       /* up to two of count, dx, dy */
+} SurfaceKeys;
+
+/* Pieces of surfaces. Speeds are along the tangent, and clockwise round an arc. */
+typedef struct {                                                                         /* [out] */
+    double start[2], end[2], tangent[2], length, speed;
+    double appears, vanishes; /* s; it is there from the one to the other */
+    int surface;              /* which it belongs to */
+} Segment;
+
+typedef struct {                                                                         /* [out] */
+    double center[2], radius, begin, extent, speed; /* `Surface` says more */
+    double appears, vanishes;
+    int surface;
+} Arc;
+
+/* What contradicts itself: no impact to place the outgoing belt by, a plate without a length, or
+   one that the impact lies above or below of. */
+enum Contradiction { SOUND, NO_IMPACT, NO_LENGTH, HIT_ABOVE, HIT_BELOW };
+
+/* The flight that places plate and belt: that of particle 0, without spread. */
+typedef struct {                                                                         /* [out] */
+    double position[2], velocity[2]; /* where it begins; NaN if it never leaves forwards */
+    double hit[2];          /* m; its centre as it meets the plate's unbounded line; NaN if never */
+    double along;           /* m; how far above the pivot that is, along the plate */
+    double below;           /* m; how far the damping plate reaches below its pivot */
+    int contradiction;
+    int off;                /* the hit is above or below the plate: HIT_ABOVE, HIT_BELOW, or SOUND */
+} Nominal;
+
+/* Machines: rows of numbers in, surfaces out; of each member of a family as many. */
+typedef struct {
+    double *rows;           /* [in] (members, width) */
+    int members, width;     /* [in] */
+    int particles, streams, incoming, plates, outgoing, conveyors, surfaces; /* [in] counts */
+    Segment *segments;      /* [out] (members, segment_count) */
+    Arc *arcs;
+    Nominal *nominal;       /* [out] (members) */
+    int segment_room, arc_room;   /* [in] of all members */
+    int segment_count, arc_count; /* [out] of each */
+} Plan;
+
 #endif

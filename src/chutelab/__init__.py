@@ -16,12 +16,14 @@ The rooms of the house; each imports only those below it:
 - `results`: recordings, ledger, comparison, summary;
 - `theory` and `machine`: the paper in closed form; a scene resolved to arrays for the engines;
 - `mechanics`: flight, impact, ride;
-- `scene`: scene files; `util`: small things for all.
+- `scene`: scene files;
+- `core`: what runs in Python and in the page alike, in C: builds machines, runs contact;
+- `util`: small things for all.
 
 What most people need is here: `scenes`, `load`, `Scene`, `SceneError`, `simulate`, `Recording`,
 `Kind`, `LawWarning`, `theory`, `compare`, `measure`, `sweep`, `solve`, `overlay`, `animate`,
 `live`, and `exercises`, `measured`, `design`, `figures`. Each is imported when it is first asked
-for, so that text output never waits for matplotlib, nor the exact engine for pymunk or wasmtime.
+for, so that text output never waits for matplotlib, nor the exact engine for pymunk.
 """
 
 from __future__ import annotations

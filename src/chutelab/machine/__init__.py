@@ -2,7 +2,7 @@
 
 - `parts`: `Machine`, its particle, segments and pulley.
 - `releases`: where, when and how fast each particle starts.
-- `nominal`: the flight of particle 0, which settles the geometry.
+- `rows`: a scene as one row of numbers, of which the core lays the surfaces.
 - `builder`: `build`, from a validated scene to a machine.
 """
 

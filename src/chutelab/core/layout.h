@@ -349,6 +349,7 @@ typedef struct {
     int *listed;            /* (pieces) */
     int count;              /* [in] particles of each member */
     int head_room;          /* [in] a power of two */
+    int looks;              /* [in] particles and places that a call looks at before it comes back */
     /* how far it has come */
     int member, stream, first, is_begun, next, near_count, found, listed_count;
     double looked, cell;

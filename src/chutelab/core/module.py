@@ -34,6 +34,8 @@ SUBJECTS = ("World", "Plan", "Drawing")
 
 TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}
 
+REAL, INTEGER = np.dtype(TYPES["double"]), np.dtype(TYPES["int"])
+
 
 @cache
 def _layout() -> dict[str, Any]:

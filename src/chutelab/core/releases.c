@@ -272,9 +272,9 @@ static int draw_stream(void) {
     return 1;
 }
 
-/* Draw on, for about so many looks at particles and places: DONE, or PAUSED. */
-EXPORT int draw(int looks) {
-    budget = looks;
+/* Draw on, for about `looks`: DONE, or PAUSED. */
+EXPORT int draw(void) {
+    budget = D.looks;
     for (; D.member < P.members; D.member++, D.stream = D.first = 0) {
         Refusal *refusal = D.refusals + D.member;
         tables = tables_of(D.member);

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import borrow, dtype, give_back
+from chutelab.core.module import REAL, Module, dtype
 from chutelab.scene import Scene
 from chutelab.util.arrays import Numbers
 
@@ -23,8 +23,6 @@ WORDS = {"adhesion": inf, "impact": 0.0, "top": 1.0}
 
 WORD = 2**32
 """Seeds are handed over as two numbers below it."""
-
-REAL = np.dtype("<f8")
 
 ROOM = 64
 """Segments and arcs of one scene for which there is room at first."""
@@ -101,7 +99,7 @@ class Laid:
     nominal: NDArray[Any]
 
 
-def lay(scene: Scene, friction: Numbers) -> Laid:
+def lay(module: Module, scene: Scene, friction: Numbers) -> Laid:
     """Have the core lay the surfaces of a scene, or of a family's."""
     numbers = row(scene, friction)
     every = scene.shape[0] if scene.shape else 1
@@ -111,36 +109,32 @@ def lay(scene: Scene, friction: Numbers) -> Laid:
             rows[:, column] = value
     else:
         rows[0] = numbers
-    module, segments, arcs = borrow(), ROOM, ROOM
-    try:
+    segments, arcs = ROOM, ROOM
+    while True:
+        module.place(
+            ("rows", REAL, rows.size), ("nominal", dtype("Nominal"), every),
+            ("segments", dtype("Segment"), every * segments),
+            ("arcs", dtype("Arc"), every * arcs), of="Plan",
+        )  # fmt: skip
         plan = module.structs["Plan"]
-        while True:
-            module.place(
-                ("rows", REAL, rows.size), ("nominal", dtype("Nominal"), every),
-                ("segments", dtype("Segment"), every * segments),
-                ("arcs", dtype("Arc"), every * arcs), of="Plan",
-            )  # fmt: skip
-            plan = module.structs["Plan"]
-            module.array("rows", REAL, rows.size, of="Plan")[:] = rows.ravel()
-            plan.members, plan.width = rows.shape
-            plan.particles, plan.streams = len(scene.particles), len(scene.streams)
-            plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
-            plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
-            plan.surfaces = len(scene.surface)
-            plan.segment_room, plan.arc_room = every * segments, every * arcs
-            if module.call("build"):
-                break
-            segments, arcs = plan.segment_count, plan.arc_count
-        found = (
-            module.array(name, dtype(struct), every * count, of="Plan")
-            .copy()
-            .reshape((*scene.shape, *more))
-            for name, struct, count, more in (
-                ("segments", "Segment", plan.segment_count, (plan.segment_count,)),
-                ("arcs", "Arc", plan.arc_count, (plan.arc_count,)),
-                ("nominal", "Nominal", 1, ()),
-            )
+        module.array("rows", REAL, rows.size, of="Plan")[:] = rows.ravel()
+        plan.members, plan.width = rows.shape
+        plan.particles, plan.streams = len(scene.particles), len(scene.streams)
+        plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
+        plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
+        plan.surfaces = len(scene.surface)
+        plan.segment_room, plan.arc_room = every * segments, every * arcs
+        if module.call("build"):
+            break
+        segments, arcs = plan.segment_count, plan.arc_count
+    found = (
+        module.array(name, dtype(struct), every * count, of="Plan")
+        .copy()
+        .reshape((*scene.shape, *more))
+        for name, struct, count, more in (
+            ("segments", "Segment", plan.segment_count, (plan.segment_count,)),
+            ("arcs", "Arc", plan.arc_count, (plan.arc_count,)),
+            ("nominal", "Nominal", 1, ()),
         )
-        return Laid(*found)
-    finally:
-        give_back(module)
+    )
+    return Laid(*found)

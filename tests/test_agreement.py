@@ -13,7 +13,9 @@ import pytest
 from chutelab import machine, scene, theory
 from chutelab.checks.agreement import ANSWERS, agreement, order, verify
 from chutelab.engines import exact, reference
+from chutelab.engines.contact.engine import Job
 from chutelab.engines.exact import contacts
+from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.simulation import simulate
 from chutelab.machine import builder
 from chutelab.mechanics import ballistics, contact
@@ -252,6 +254,37 @@ def test_a_wrong_formula_is_caught_from_outside(where, wrong, until, monkeypatch
     assert not found.met
     assert found.reached is None or found.reached > 0.1 * WRONG
     assert found.against == ("theory" if until == "landed" else "dop853")
+
+
+def heavier_core(job, *given, honest=Job.settings):
+    honest(job, *given)
+    job.module.world.g *= 1.0 + WRONG
+
+
+def heavier_flight(run, *given, honest=Lone.__init__):
+    honest(run, *given)
+    run.pull *= 1.0 + WRONG
+
+
+def heavier_ode(run, *given, honest=reference._Run.__init__):
+    honest(run, *given)
+    run.g = run.g * (1.0 + WRONG)
+
+
+@pytest.mark.parametrize(
+    ("name", "where", "wrong"),
+    [
+        ("exact", "chutelab.engines.exact.detect.descent", late_descent),
+        ("contact", "chutelab.engines.contact.engine.Job.settings", heavier_core),
+        ("pymunk", "chutelab.engines.pymunk.lone.Lone.__init__", heavier_flight),
+        ("dop853", "chutelab.engines.reference._Run.__init__", heavier_ode),
+    ],
+)
+def test_what_is_wrong_in_one_engine_is_wrong_in_no_other(name, where, wrong, monkeypatch):
+    monkeypatch.setattr(where, wrong)
+    failed = [row.pair for row in agreement(scene.load("perpendicular")) if not row.holds]
+    assert any(name in pair for pair in failed)
+    assert all(name in pair for pair in failed)
 
 
 def test_what_places_the_belt_is_shared_by_the_engines_and_told_by_the_theory(monkeypatch):

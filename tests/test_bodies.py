@@ -22,7 +22,6 @@ from chutelab.pictures.plots.bodies import (
     placed,
     stream_colours,
     strings,
-    turned,
 )
 from chutelab.pictures.plots.scenery import energies, places, window_of
 from chutelab.results import Recording
@@ -66,7 +65,9 @@ def test_angles_are_the_integral_of_the_angular_velocity(
     other = [(0.0, 0.1, 0.5, 0.0, 0.0, 7.0), (9.0, 0.1, 0.5, 0.0, 0.0, 7.0)]
     recording = recording_of(machine_of(FLOOR, at=[(0, 1), (0, 1)]), other, rows)
     now = t[0] + share * (t[-1] - t[0])
-    (angles,) = turned(recording, np.array([0, 1]), np.array([now]))
+    seen = recording.at(now)
+    (angles,) = seen.angle
+    assert seen.omega[0] == pytest.approx([7.0, np.interp(now, t, omega)], rel=1e-9, abs=1e-9)
     clock = np.union1d(t[t < now], [now])
     # The trapezoidal rule is exact for what is linear between its points.
     integral = np.sum(0.5 * np.diff(clock) * (lambda w: w[1:] + w[:-1])(np.interp(clock, t, omega)))
@@ -78,7 +79,7 @@ def test_an_angle_that_is_told_counts_more_than_the_sum_of_the_spin() -> None:
     rows = [(0, 0, 0.5, 0, 0, 1), (1, 0, 0.5, 0, 0, 1), (3, 0, 0.5, 0, 0, 1)]
     machine = machine_of(FLOOR, radius=0.054, outlines=(BOX,))
     told = replace(recording_of(machine, rows), angle=np.array([0.0, 1.0, 3.3]))
-    angle = turned(told, np.array([0]), np.array([0.5, 1.0, 2.0, 2.999999, 3.0]))[:, 0]
+    angle = told.at([0.5, 1.0, 2.0, 2.999999, 3.0]).angle[:, 0]
     assert angle == pytest.approx([0.5, 1.0, 2.15, 3.3, 3.3], abs=1e-5)
 
 
@@ -90,7 +91,7 @@ def test_a_spin_that_an_impact_changes_turns_at_once_with_the_new_one() -> None:
         (2, 0, 0.5, 0, 0, -3),
     ]
     recording = recording_of(machine_of(FLOOR), rows)
-    angle = turned(recording, np.array([0]), np.array([0.5, 1.0, 1.5, 2.0, 2.1]))[:, 0]
+    angle = recording.at([0.5, 1.0, 1.5, 2.0, 2.1]).angle[:, 0]
     assert angle[:4] == pytest.approx([1.0, 2.0, 0.5, -1.0], abs=1e-14)
     assert np.isnan(angle[4])
 

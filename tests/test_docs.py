@@ -13,6 +13,8 @@ from urllib.parse import unquote
 
 import pytest
 
+from chutelab.results import EVENT, KNOT
+
 ROOT = Path(__file__).resolve().parent.parent
 NEEDED = ("furo", "latex2mathml", "myst_parser", "numpydoc", "sphinx")
 
@@ -109,6 +111,8 @@ def test_every_public_name_is_in_the_reference(site):
     names = set(public_names())
     assert len(names) > 100
     assert names - documented == set()
+    fields = (site / "api" / "chutelab.results.html").read_text(encoding="utf-8")
+    assert all(f'<span class="pre">{name}</span>' in fields for name in EVENT.names + KNOT.names)
 
 
 def test_formulas_are_mathematics(site):

@@ -3,41 +3,30 @@
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import chutelab.pictures.live
 import sandbox
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
 from chutelab.scene import SceneError, from_dict, load, parse, shipped
 from chutelab.scene.overrides import Override
 from chutelab.theory import Reason, predict, transfer
+from chutelab.theory.prediction import unbounded
 from chutelab.theory.results import STAGES
 from live.machines import as_page_has_it, plain
+from live.node import ask, needs_node
 
-NODE = shutil.which("node")
-ASSETS = Path(chutelab.pictures.live.__file__).parent / "assets"
-
-pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
+pytestmark = needs_node
 
 SCENES = 500
 
 
-def in_node(asked, what="scenes"):
+def in_node(asked, what="scenes", *, runs=False):
     """Return what JavaScript says of scenes, as their files have them, of transfers or edits."""
-    told = json.dumps({"lab": describe(load("perpendicular")), what: asked})
-    script = Path(__file__).parent / "live" / "bits.mjs"
-    done = subprocess.run(
-        [NODE, str(script), str(ASSETS)], input=told, capture_output=True, text=True, check=False,
-        timeout=120,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)[what]
+    lab = describe(load("perpendicular"))
+    return ask("bits.mjs", {"lab": lab, what: asked, "runs": runs})[what]
 
 
 def differences(mine, other, path=""):
@@ -319,19 +308,43 @@ def transfer_scene(seed):
     return tables
 
 
+def misses_the_face(scene):
+    """Tell whether the equations' flight passes the finite plate, or never comes to its line."""
+    found, machine = unbounded(scene), build(scene)
+    plate = machine.segments.surface.tolist().index(machine.surfaces.index("plate"))
+    ride = scene.incoming.pulley_radius + scene.particle.radius
+    centre = ride * np.sin(found.phi1) + found.x2, ride * np.cos(found.phi1) - found.y2
+    foot = (centre - machine.segments.start[plate]) @ machine.segments.tangent[plate]
+    return not 0.0 <= foot <= machine.segments.length[plate]
+
+
 def test_predictions_are_the_same_to_the_last_bit_and_have_the_same_reasons():
+    """Python looks for what is in the way, the page reads it off its run's events."""
     documents = []
     for seed in range(SCENES):
         tables = transfer_scene(seed)
         if not keys_refused(tables):
             documents.append(tables)
     assert len(documents) > 0.9 * SCENES
-    reasons = []
-    for document, found in zip(documents, in_node(documents), strict=True):
-        mine = predict(from_dict(document))
+    reasons, passed = [], 0
+    for document, answer in zip(documents, in_node(documents, runs=True), strict=True):
+        scene, found = from_dict(document), answer["prediction"]
+        mine, why = predict(scene), found["reason"] or {"claim": None, "text": None, "words": {}}
+        if "it is a gate" in str(mine.reason) and why["text"] != "gate":
+            # It was not there when the particle came.
+            solid = [one for one in document["surface"] if "opens_at" not in one]
+            mine = predict(from_dict({**document, "surface": solid}))
         reasons.append(Reason.of(mine.reason))
-        wrong = unlike(mine, found["prediction"])
-        assert not wrong, (document, str(mine.reason), found["prediction"]["reason"], wrong[:3])
+        if reasons[-1] is Reason.EARLY and why["claim"] == "no-impact":
+            # Of what would strike an end of the plate, but meets something else before, both hold.
+            assert misses_the_face(scene), document
+            passed += 1
+            found = {**found, "reason": {"claim": "early"}}
+        elif reasons[-1] is Reason.EARLY:
+            assert f": {why['words']['surface']}: " in str(mine.reason), (document, why)
+        wrong = unlike(mine, found)
+        assert not wrong, (document, str(mine.reason), why, wrong[:3])
+    assert passed < 0.01 * SCENES
     for reason in (None, *Reason):
         assert reasons.count(reason) > 10, (reason, reasons.count(reason))
 

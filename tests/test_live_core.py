@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import shutil
-import subprocess
-from pathlib import Path
-
 import numpy as np
-import pytest
 
 from chutelab.core import module
 from chutelab.engines.contact import engine
 from chutelab.machine import build
 from chutelab.scene import load
 from live.machines import as_page_has_it, plain
+from live.node import ask, needs_node
 
-HERE = Path(__file__).parent
-NODE = shutil.which("node")
-pytestmark = pytest.mark.skipif(NODE is None, reason="needs node")
+pytestmark = needs_node
 
 SCENES = [
     "perpendicular", "inclined-40", "stream", "slip", "spoon", "cascade", "two-sizes",
@@ -32,12 +25,7 @@ def test_the_pages_host_runs_every_kind_of_scene_as_python_does():
     for row in SCENES:
         name, *overrides = (row,) if isinstance(row, str) else row
         machines.append(build(load(name, overrides)))
-    done = subprocess.run(
-        [str(NODE), HERE / "live" / "core.mjs"],
-        input=json.dumps(plain([as_page_has_it(machine) for machine in machines])),
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    answers = json.loads(done.stdout)
+    answers = ask("core.mjs", plain([as_page_has_it(machine) for machine in machines]))
     for row, machine, answer in zip(SCENES, machines, answers, strict=True):
         job = engine.Job(module.Module(), machine)
         assert job.run(None) is None

@@ -6,22 +6,16 @@ import base64
 import csv
 import json
 import re
-import shutil
-import subprocess
 from io import StringIO
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import chutelab.pictures.live
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
 from chutelab.scene import from_dict, load, parse, to_toml
-
-NODE = shutil.which("node")
-ASSETS = Path(chutelab.pictures.live.__file__).parent / "assets"
-needs_node = pytest.mark.skipif(NODE is None, reason="node is not installed")
+from live.node import ASSETS, needs_node
+from live.node import ask as ask_node
 
 SCENES = ("perpendicular", "inclined-40", "cascade", "spoon", "inclined-conveyor", "free-fall")
 TWO_KINDS = """
@@ -62,13 +56,7 @@ def ask(*questions, language="en"):
         "strings": words(language),
         "questions": questions,
     }
-    script = Path(__file__).parent / "live" / "edit.mjs"
-    done = subprocess.run(
-        [NODE, str(script), str(ASSETS)], input=json.dumps(told), capture_output=True, text=True,
-        check=False, timeout=60,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return ask_node("edit.mjs", told)
 
 
 def arc_through(a, b, c):
@@ -346,7 +334,7 @@ def test_both_languages_say_everything_and_nothing_twice():
         assert blanks[0] == blanks[1], name
         assert text.strip()
         assert german[name].strip()
-    modules = "".join(path.read_text(encoding="utf-8") for path in ASSETS.glob("*.js"))
+    modules = "".join(path.read_text(encoding="utf-8") for path in ASSETS.glob("*.ts"))
     page = (ASSETS / "page.html").read_text(encoding="utf-8")
     said = re.findall(r'\bsay\("([\w-]+)"', modules) + re.findall(r'data-\w+="([\w-]+)"', page)
     faults = {third(rest) for rest in modules.split("new Fault(")[1:]}

@@ -1,47 +1,28 @@
-"""The live page's modules: joined as one script, checked for types and style where node is."""
+"""The live page's modules: types and style where node is; the words that they say."""
 
 from __future__ import annotations
 
 import json
 import re
-import shutil
 import subprocess
-from pathlib import Path
-
-import pytest
 
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.in_page import SAID, data_of
-from chutelab.pictures.live.page import LANGUAGES, joined
+from chutelab.pictures.live.page import LANGUAGES
+from live.node import ASSETS, HERE, NODE, needs_node
 
-LIVE = Path(__file__).parent / "live"
-NODE = shutil.which("node")
-ASSETS = LIVE.parents[1] / "src" / "chutelab" / "pictures" / "live" / "assets"
 SCORM = ASSETS.parents[2] / "classroom" / "lessons" / "assets" / "scorm"
-
-needs_node = pytest.mark.skipif(NODE is None, reason="needs node")
-needs_tools = pytest.mark.skipif(
-    NODE is None or not (LIVE / "node_modules").is_dir(), reason="needs npm ci in tests/live"
-)
 
 
 @needs_node
-@pytest.mark.parametrize("name", ["app.js", "worker.js"])
-def test_joined_the_modules_are_one_script_without_two_of_a_name(tmp_path, name):
-    script = tmp_path / "joined.mjs"
-    script.write_text(joined(name), encoding="utf-8")
-    subprocess.run([str(NODE), "--check", script], check=True, capture_output=True)
-
-
-@needs_tools
 def test_types_and_style():
-    root, config = LIVE.parents[1], "tests/live/eslint.config.js"
+    root, config = HERE.parents[1], "tests/live/eslint.config.js"
     for tool, *arguments in (
         ("typescript/bin/tsc", "-p", "tests/live"),
         ("eslint/bin/eslint.js", "-c", config, ASSETS, SCORM, "tests/live"),
     ):
         done = subprocess.run(
-            [str(NODE), LIVE / "node_modules" / tool, *arguments],
+            [str(NODE), HERE / "node_modules" / tool, *arguments],
             cwd=root, capture_output=True, text=True,
         )  # fmt: skip
         assert done.returncode == 0, done.stdout + done.stderr
@@ -63,7 +44,7 @@ def test_every_language_has_every_word_and_no_other():
 
 def test_every_word_that_is_said_is_in_the_catalogue():
     text = json.loads((ASSETS / "strings" / "en.json").read_text(encoding="utf-8"))
-    modules = [path for path in ASSETS.iterdir() if path.name.endswith(".js")]
+    modules = [path for path in ASSETS.iterdir() if path.name.endswith(".ts")]
     assert len(modules) > 20
     for module in modules:
         said = re.findall(r'\bsay\("([\w-]+)"', module.read_text(encoding="utf-8"))
@@ -85,7 +66,7 @@ def test_every_word_in_the_catalogue_is_said():
 def test_every_word_of_an_exercise_is_in_its_catalogue():
     told = data_of(EXERCISES["the-bounce"])["words"]
     assert {key.partition("-")[0] for key in told} == set(SAID)
-    for name in ("draw.js", "judging.js", "task.js", "exercise.js"):
+    for name in ("draw.ts", "judging.ts", "task.ts", "exercise.ts"):
         text = (ASSETS / name).read_text(encoding="utf-8")
         said = re.findall(r'\b(?:worded\((?:exercise, )?|its\()"([\w-]+)"', text)
         assert said

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-import subprocess
 from itertools import combinations
 from pathlib import Path
 
@@ -16,7 +14,6 @@ import chutelab
 import sandbox
 from chutelab.engines.contact import run
 from chutelab.machine import build
-from chutelab.pictures import live
 from chutelab.results import Kind
 from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
@@ -24,12 +21,11 @@ from chutelab.results.stream import envelopes
 from chutelab.scene import load
 from crowds import crowd
 from live.machines import as_page_has_it, plain
+from live.node import ASSETS, needs_node
+from live.node import ask as ask_node
 
-HERE = Path(__file__).parent
-ASSETS = Path(live.__file__).parent / "assets"
-THROW = HERE.parent / "lessons" / "01-the-parabola" / "throw.toml"
-NODE = shutil.which("node")
-pytestmark = pytest.mark.skipif(NODE is None, reason="needs node")
+THROW = Path(__file__).parents[1] / "lessons" / "01-the-parabola" / "throw.toml"
+pytestmark = needs_node
 
 # A lone particle and a stream, on plates, round a pulley with slip, on a belt, on arcs; a crowd.
 SCENES = [
@@ -40,11 +36,7 @@ SCENES = [
 
 
 def ask(**questions):
-    done = subprocess.run(
-        [str(NODE), HERE / "live" / "panels.mjs"],
-        input=json.dumps(plain(questions)), capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    return json.loads(done.stdout)
+    return ask_node("panels.mjs", plain(questions))
 
 
 @pytest.fixture(scope="module")
@@ -337,10 +329,10 @@ def test_every_reason_of_the_closed_form_has_its_words():
     text = (ASSETS / "strings" / "en.json").read_text(encoding="utf-8")
     known = {id_.removeprefix("reason-") for id_ in json.loads(text) if id_.startswith("reason-")}
     given = set()
-    for name in ("prediction.js", "transfer.js"):
+    for name in ("prediction.ts", "transfer.ts"):
         module = (ASSETS / name).read_text(encoding="utf-8")
         given |= set(re.findall(r'because\("[\w-]+", "([\w-]+)"', module))
-        given |= set(re.findall(r'meets\("[\w-]+", \w+, "([\w-]+)"', module))
+        given |= set(re.findall(r'meets\("[\w-]+", "[\w-]+", \w+, "([\w-]+)"', module))
         given |= set(re.findall(r'return "([\w-]+)";', module))
     assert len(given) > 15
     assert given <= known

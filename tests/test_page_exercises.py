@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-import subprocess
 import sys
 from hashlib import sha256
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -35,10 +32,10 @@ from chutelab.classroom.words import LANGUAGES, words
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
 from chutelab.results.ledger import ENTRIES
+from live.node import ask as ask_node
+from live.node import needs_node
 
-HERE = Path(__file__).parent
-NODE = shutil.which("node")
-pytestmark = pytest.mark.skipif(NODE is None, reason="needs node")
+pytestmark = needs_node
 
 NAMES = list(EXERCISES)
 STUDENTS = [
@@ -49,12 +46,7 @@ STUDENTS = [
 
 def ask(**questions):
     """Return what the page's modules say."""
-    done = subprocess.run(
-        [str(NODE), HERE / "live" / "exercises.mjs"],
-        input=json.dumps(questions), capture_output=True, text=True, check=False, timeout=120,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return ask_node("exercises.mjs", questions)
 
 
 # What it is made of

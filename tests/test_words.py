@@ -48,7 +48,7 @@ def test_every_language_says_all_that_english_says_with_the_same_numbers_in_it()
 def test_every_sentence_of_the_catalogue_is_said_somewhere():
     sources = [*CLASSROOM.rglob("*.py"), *CLASSROOM.rglob("*.js")]
     package = CLASSROOM.parent
-    sources += [*(package / "pictures" / "live").rglob("*.js"), package / "cli" / "lessons.py"]
+    sources += [*(package / "pictures" / "live").rglob("*.ts"), package / "cli" / "lessons.py"]
     code = "\n".join(path.read_text(encoding="utf-8") for path in sources)
     said = set(re.findall(r"""["'`]([\w-]+)["'`]""", code))
     # What is put together from a verdict, a unit, or for whom a lesson or a sheet is.

@@ -1,26 +1,27 @@
-// What JavaScript says of scenes and transfers: `node bits.mjs ASSETS < {lab, scenes, transfers}`.
+// What JavaScript says of scenes and transfers: `node bits.mjs MODULES < QUESTION`.
 //
-// Of each scene {toml, machine, prediction} or {toml, fault}, of parameters what `transfer`
-// returns; of an edit [keys, values by path] the keys after it, as TOML, and what they have there.
+// Of each scene {toml, machine, prediction (where it runs)} or {toml, fault}, of parameters what
+// `transfer` returns; of an edit [keys, values by path] the keys after it, as TOML, and what they
+// have there.
 //
 // JSON has no Infinity and no NaN: they come as text.
 import { readFileSync } from "node:fs";
-import { join } from "node:path";
-import { pathToFileURL } from "node:url";
 
-const load = (name) => import(pathToFileURL(join(process.argv[2], name)).href);
+import { load, recordingOf } from "./run.mjs";
+
 const { build } = await load("machine.js");
 const { Fault, resolve } = await load("scene.js");
 const { toToml, valueAt, withValues } = await load("keys.js");
 const { predict } = await load("prediction.js");
 const { transfer } = await load("transfer.js");
 
-const { lab, scenes = [], transfers = [], edits = [] } = JSON.parse(readFileSync(0, "utf8"));
+const { lab, scenes = [], runs, transfers = [], edits = [] } = JSON.parse(readFileSync(0, "utf8"));
 const told = scenes.map((given) => {
   const toml = toToml(given);
   try {
     const scene = resolve(given, lab);
-    return { machine: build(scene), prediction: predict(scene), toml };
+    const machine = build(scene);
+    return { machine, prediction: runs ? predict(scene, recordingOf(machine, 4)) : null, toml };
   } catch (fault) {
     if (!(fault instanceof Fault)) throw fault;
     return { fault: { key: fault.key, text: fault.text, words: fault.words }, toml };

@@ -2,11 +2,7 @@
 // {state, knots (rows of ten numbers), events, books}.
 import { readFileSync } from "node:fs";
 
-import { startCore } from "../../src/chutelab/pictures/live/assets/core.js";
-
-const home = new URL("../../src/chutelab/core/", import.meta.url);
-const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
-const core = await startCore(await WebAssembly.compile(readFileSync(new URL("core.wasm", home))), layout);
+import { core } from "./run.mjs";
 
 // JSON has no infinity.
 const revive = (_, value) => (["Infinity", "-Infinity"].includes(value) ? Number(value) : value);

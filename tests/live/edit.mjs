@@ -1,9 +1,8 @@
 // Asks the page's modules in node: a JSON list of questions on stdin, one of answers on stdout.
 import { readFileSync } from "node:fs";
-import { pathToFileURL } from "node:url";
 
-const home = pathToFileURL(`${process.argv[2]}/`);
-const load = async (name) => import(new URL(name, home));
+import { load } from "./run.mjs";
+
 const [controls, edit, keys, machine, scene, share, words] = await Promise.all(
   ["controls.js", "edit.js", "keys.js", "machine.js", "scene.js", "share.js", "words.js"].map(load),
 );

@@ -1,12 +1,13 @@
 // Exercises as the page has them: a JSON question on stdin, the answers on stdout.
 import { readFileSync } from "node:fs";
 
-const assets = "../../src/chutelab/pictures/live/assets/";
-const { drawnFor, plainName } = await import(`${assets}draw.js`);
-const { fixedText, generalText, scientific } = await import(`${assets}decimal.js`);
-const { readTyped } = await import(`${assets}judging.js`);
-const { sha256 } = await import(`${assets}sha256.js`);
-const { Task } = await import(`${assets}task.js`);
+import { load } from "./run.mjs";
+
+const { drawnFor, plainName } = await load("draw.js");
+const { fixedText, generalText, scientific } = await load("decimal.js");
+const { readTyped } = await load("judging.js");
+const { sha256 } = await load("sha256.js");
+const { Task } = await load("task.js");
 
 /** What a student sees who gives these answers, and then asks for everything else. */
 function played({ exercise, student, answers, others = [] }) {

@@ -2,37 +2,20 @@
 // answers on stdout.
 import { readFileSync } from "node:fs";
 
-const assets = "../../src/chutelab/pictures/live/assets/";
-const { startCore } = await import(`${assets}core.js`);
-const { Recording } = await import(`${assets}recording.js`);
-const { groundedLedger, stacks } = await import(`${assets}energy.js`);
-const { Arrivals } = await import(`${assets}arrival.js`);
-const { crowdOf } = await import(`${assets}crowd.js`);
-const { Laws } = await import(`${assets}laws.js`);
-const { numbersOf } = await import(`${assets}numbers.js`);
-const { RunHistory } = await import(`${assets}stages.js`);
-const { histogram, runningMean } = await import(`${assets}landing.js`);
-const { samplesOf } = await import(`${assets}curves.js`);
-const { contactForce } = await import(`${assets}arrows.js`);
-const { ticks } = await import(`${assets}chart.js`);
-const { placed, spaceOf } = await import(`${assets}symbols.js`);
-const { StopWatch, angleBetween, nearestOn } = await import(`${assets}tools.js`);
+import { load, recordingOf } from "./run.mjs";
 
-const home = new URL("../../src/chutelab/core/", import.meta.url);
-const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
-const core = await startCore(
-  await WebAssembly.compile(readFileSync(new URL("core.wasm", home))), layout);
-
-function recordingOf(machine) {
-  const recording = new Recording(machine);
-  core.begin(machine);
-  for (let state = "running"; state === "running";) {
-    state = core.proceed(50);
-    const books = state === "running" ? null : core.books();
-    recording.add({ ...core.take(), tips: new Float64Array(), now: core.get("t"), state, books });
-  }
-  return recording;
-}
+const { groundedLedger, stacks } = await load("energy.js");
+const { Arrivals } = await load("arrival.js");
+const { crowdOf } = await load("crowd.js");
+const { Laws } = await load("laws.js");
+const { numbersOf } = await load("numbers.js");
+const { RunHistory } = await load("stages.js");
+const { histogram, runningMean } = await load("landing.js");
+const { samplesOf } = await load("curves.js");
+const { contactForce } = await load("arrows.js");
+const { ticks } = await load("chart.js");
+const { placed, spaceOf } = await load("symbols.js");
+const { StopWatch, angleBetween, nearestOn } = await load("tools.js");
 
 function lawOf(recording) {
   const laws = new Laws(recording);

@@ -11,10 +11,10 @@ import click
 
 from chutelab.cli.console import progress, say, tell
 from chutelab.cli.parameters import (
-    Count,
     complete_scene,
     dt_option,
     engine_option,
+    jobs_option,
     json_option,
     loaded_as_told,
     max_seconds_option,
@@ -61,13 +61,7 @@ def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) ->
 @click.command(short_help="Check what scenes promise; compare independent answers.")
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1, shell_complete=complete_scene)
 @max_seconds_option(300.0, "Leave out an answer that takes longer than S seconds.")
-@click.option(
-    "--jobs",
-    metavar="N",
-    type=Count(min=0),
-    default=0,
-    help="Spread the scenes over N processes; 0, the default, is one for each processor.",
-)
+@jobs_option(0, "Spread the scenes over N processes")
 @json_option()
 def verify(scenes: tuple[str, ...], max_seconds: float, jobs: int, as_json: bool) -> None:
     """Check what each SCENE is expected to show (default: all shipped ones).

@@ -108,6 +108,18 @@ def max_seconds_option(default: float, text: str) -> Decorator:
     )
 
 
+def jobs_option(default: int, text: str) -> Decorator:
+    """Return ``--jobs``; 0 is one process for each processor."""
+    text += "; 0, the default, is one" if default == 0 else "; 0 is one"
+    return click.option(
+        "--jobs",
+        metavar="N",
+        type=Count(min=0),
+        default=default,
+        help=f"{text} for each processor.",
+    )
+
+
 scene_argument = click.argument("scene", shell_complete=complete_scene)
 
 set_option = click.option(

@@ -14,9 +14,9 @@ from click.shell_completion import CompletionItem
 from chutelab.cli import console
 from chutelab.cli.output import PICTURES, check_file
 from chutelab.cli.parameters import (
-    Count,
     engine_option,
     file_option,
+    jobs_option,
     json_option,
     loaded_as_told,
     scene_argument,
@@ -90,13 +90,7 @@ def _complete_column(
     shell_complete=_complete_column,
     help="What to draw.",
 )
-@click.option(
-    "--jobs",
-    metavar="N",
-    type=Count(min=0),
-    default=1,
-    help="Spread the work over N processes; 0 is one for each processor.",
-)
+@jobs_option(1, "Spread the work over N processes")
 @click.option("--scheduler", metavar="ADDRESS", help="Spread it over a Dask cluster instead.")
 @json_option("Print one JSON object with all columns.")
 @click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress bar.")

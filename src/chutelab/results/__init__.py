@@ -20,8 +20,19 @@ from chutelab.results.recording import (
     PARTICLES,
     REASONS,
     Kind,
+    Motion,
     Recording,
     balance,
 )
 
-__all__ = ["ENTRIES", "EVENT", "KNOT", "PARTICLES", "REASONS", "Kind", "Recording", "balance"]
+__all__ = [
+    "ENTRIES",
+    "EVENT",
+    "KNOT",
+    "PARTICLES",
+    "REASONS",
+    "Kind",
+    "Motion",
+    "Recording",
+    "balance",
+]

@@ -82,9 +82,18 @@ EVENT = np.dtype(
         ("tangential_impulse", "f8"),
     ]
 )
-"""One event: SI units; `other` is the partner or -1, `surface` an index into `Recording.surfaces`
-or -1, `kind` a `Kind`; the impulses (N s) act on the particle, the normal one away from the
-surface, the tangential one along (n_y, -n_x) for the contact normal n."""
+"""One event, in SI units.
+
+- ``t``: when, s.
+- ``particle``, ``other``: its number, and that of the particle it meets, or -1.
+- ``kind``: a `Kind`.
+- ``surface``: index into `Recording.surfaces`, or -1.
+- ``position``: of the particle's centre, m.
+- ``velocity_before``, ``velocity_after``: of its centre, m/s.
+- ``omega_before``, ``omega_after``: its angular velocity, counterclockwise, rad/s.
+- ``normal_impulse``: on the particle along n, away from the surface or the other particle, N s.
+- ``tangential_impulse``: along (n_y, -n_x), N s.
+"""
 
 KNOT = np.dtype(
     [
@@ -95,7 +104,13 @@ KNOT = np.dtype(
         ("entries", "f8", 3),
     ]
 )
-"""One knot: time, state, and the cumulative ledger entries (J) of that particle, see `ENTRIES`."""
+"""One knot, in SI units.
+
+- ``t``: when, s.
+- ``position``, ``velocity``: of the particle's centre, m and m/s.
+- ``omega``: its angular velocity, counterclockwise, rad/s.
+- ``entries``: of the energy ledger of this particle since its release, J, see `ENTRIES`.
+"""
 
 
 def balance(entries: NDArray[Any]) -> Floats:
@@ -151,6 +166,60 @@ def hermite(knots: NDArray[Any], left: Ints, share: Floats, axis: int) -> tuple[
     pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
     over = s >= 1.0
     return np.where(over, pb, where), np.where(over, vb, pace)
+
+
+class Motion(tuple[Floats, Floats]):
+    """Positions (m) and velocities (m/s) at some times, (T, N, 2), a pair; and how particles turn.
+
+    NaN before a particle's release and after its end; at an impact the state after it.
+    """
+
+    _recording: Recording
+    _times: Floats
+
+    def __new__(
+        cls, position: Floats, velocity: Floats, recording: Recording, times: Floats
+    ) -> Motion:
+        """Return the pair, of a recording at times (T,), s."""
+        self = super().__new__(cls, (position, velocity))
+        self._recording, self._times = recording, times
+        return self
+
+    @property
+    def position(self) -> Floats:
+        """Where the centres are, (T, N, 2), m."""
+        return self[0]
+
+    @property
+    def velocity(self) -> Floats:
+        """Their velocities, (T, N, 2), m/s."""
+        return self[1]
+
+    @property
+    def omega(self) -> Floats:
+        """Angular velocity, counterclockwise, (T, N), rad/s: linear between knots."""
+        found, omega = np.full(self[0].shape[:2], np.nan), self._recording.knots["omega"]
+        for row, particle, left, share in self._recording.blocks(self._times):
+            found[row, particle] = omega[left] + share * (omega[left + 1] - omega[left])
+        return found
+
+    @property
+    def angle(self) -> Floats:
+        """How far particles have turned counterclockwise since their release, (T, N), rad.
+
+        The integral of `omega`; where the recording says more, see `Recording.angle`, it is
+        corrected evenly from knot to knot.
+        """
+        some, found = self._recording, np.full(self[0].shape[:2], np.nan)
+        t, omega, first = some.knots["t"], some.knots["omega"], some.offsets[:-1]
+        passed = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
+        told = some.angle if len(some.angle) else passed
+        for row, particle, left, share in some.blocks(self._times):
+            h = t[left + 1] - t[left]
+            gained = h * share * (omega[left] + 0.5 * share * (omega[left + 1] - omega[left]))
+            missed = share * (np.diff(told)[left] - np.diff(passed)[left])
+            found[row, particle] = told[left] - told[first[particle]] + gained + missed
+        return found
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -381,26 +450,22 @@ class Recording(Shown):
         _, index = np.unique(events["particle"], return_index=True)
         return events[index]
 
-    def at(self, times: ArrayLike) -> tuple[Floats, Floats]:
-        """Return positions (m) and velocities (m/s) at any times.
+    def blocks(self, times: Floats) -> Iterator[Cells]:
+        """Find the knots before and after every particle's place at times (T,), s: see `Cells`."""
+        return blocks(self.knots, self.offsets, times)
 
-        Parameters
-        ----------
-        times : array_like, shape (T,)
-            s, in any order.
+    def at(self, times: ArrayLike) -> Motion:
+        """Return positions (m) and velocities (m/s), (T, N, 2), at times (T,), s, in any order.
 
-        Returns
-        -------
-        position, velocity : ndarray, shape (T, N, 2)
-            NaN before a particle's release and after its end; at an impact the state after it.
+        What it returns is a pair of arrays, and has `Motion.angle` and `Motion.omega`, (T, N).
         """
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         position, velocity = np.full((2, len(times), self.count, 2), np.nan)
-        for row, particle, left, share in blocks(self.knots, self.offsets, times):
+        for row, particle, left, share in self.blocks(times):
             for axis in (0, 1):
                 where, pace = hermite(self.knots, left, share, axis)
                 position[row, particle, axis], velocity[row, particle, axis] = where, pace
-        return position, velocity
+        return Motion(position, velocity, self, times)
 
     def energy_at(self, times: ArrayLike) -> dict[str, Floats]:
         """Return the energy ledger of all released particles up to each time.
@@ -437,7 +502,7 @@ class Recording(Shown):
         sums = np.concatenate([np.zeros((6, 1)), final[:, order].cumsum(axis=1)], axis=1)
         out = sums[:, np.searchsorted(lasts["t"][order], times, side="left")]
 
-        for row, particle, left, share in blocks(self.knots, self.offsets, times):
+        for row, particle, left, share in self.blocks(times):
             values = self._under_way(particle, left, share, at_release[particle])
             for total, value in zip(out, values, strict=True):
                 np.add.at(total, row, value)

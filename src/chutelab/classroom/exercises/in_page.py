@@ -1,7 +1,7 @@
 """An exercise as data for a live page: texts as they are, formulas as trees.
 
 No page may evaluate text, so Python's own parser turns each formula into a tree that a small
-evaluator (``pictures/live/assets/formula.js``) walks. There is no answer in the data: the page
+evaluator (``pictures/live/assets/formula.ts``) walks. There is no answer in the data: the page
 draws a student's numbers from the name and computes right and wrong answers from them, as `Task`
 does. The way to the answer stands there as a template: it says no more than the formulas that the
 page has to know, and has no numbers.

@@ -17,7 +17,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from chutelab.util.errors import MissingLibraryError
 
 _PACKAGE: Final = Path(__file__).parents[2]
-_SOURCES: Final = (".c", ".h", ".pyc")
+_SOURCES: Final = (".c", ".h", ".pyc", ".ts")
 """Endings of files that a wheel does without."""
 
 _FORM: Final = "Wheel-Version: 1.0\nGenerator: chutelab\nRoot-Is-Purelib: true\nTag: py3-none-any\n"

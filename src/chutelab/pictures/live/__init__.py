@@ -3,13 +3,15 @@
 - `describe`: what a page knows of a scene, as JSON.
 - `page`: `html` and `write`, the page as one file.
 - `widget`: the page in a notebook; the only module that needs anywidget.
-- ``assets``: HTML, CSS, the catalogues of words, and the modules of JavaScript. Without a screen:
-  ``trig.js``, ``random.js``, ``scene.js``, ``machine.js`` (keys become surfaces), ``transfer.js``
-  (the closed form), ``core.js`` and ``worker.js`` (the contact engine in its thread),
-  ``engine.js``, ``recording.js``, ``lab.js``, ``handles.js``, ``view.js``, ``words.js``; and of a
-  lesson's exercise, as `chutelab.classroom.exercises` has it, ``formula.js``, ``draw.js``,
-  ``judging.js``, ``task.js``. With one: ``exercise.js``, ``stage.js``, ``transport.js`` and
-  ``app.js``, which joins all.
+- ``bundle``: the script of the page and that of the engine's thread, as `tools/build_page.py` makes
+  them of the modules.
+- ``assets``: HTML, CSS, the catalogues of words, and the modules of TypeScript. Without a screen:
+  ``trig.ts``, ``random.ts``, ``scene.ts``, ``machine.ts`` (keys become surfaces), ``transfer.ts``
+  (the closed form), ``core.ts`` and ``worker.ts`` (the contact engine in its thread),
+  ``engine.ts``, ``recording.ts``, ``lab.ts``, ``handles.ts``, ``view.ts``, ``words.ts``; and of a
+  lesson's exercise, as `chutelab.classroom.exercises` has it, ``formula.ts``, ``draw.ts``,
+  ``judging.ts``, ``task.ts``. With one: ``exercise.ts``, ``stage.ts``, ``transport.ts`` and
+  ``app.ts``, which joins all.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""One HTML file from a scene: data, style, modules, the engine's thread and its WebAssembly."""
+"""One HTML file from a scene: data, style, script, the engine's thread and its WebAssembly."""
 
 from __future__ import annotations
 
 import json
-import re
 import zlib
 from base64 import b64encode
 from collections.abc import Mapping
@@ -50,7 +49,7 @@ def html(
     SceneError
         If there is something in the scene that the contact engine has not, by its key.
     """
-    css = f":root {{\n{_palette()}}}\n{_asset('page.css')}"
+    css = f":root {{\n{_palette()}}}\n{_file('assets/page.css')}"
     core = files("chutelab.core")
     facts = describe(scene)
     live = live_of(scene, facts["scene"])
@@ -62,15 +61,15 @@ def html(
         "live": live,
         "version": own_version(),
         "language": language,
-        "strings": json.loads(_asset(f"strings/{language}.json")),
+        "strings": json.loads(_file(f"assets/strings/{language}.json")),
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
         **({} if exercise is None else {"exercise": exercise}),
         "wasm": b64encode(zlib.compress((core / "core.wasm").read_bytes(), 9)).decode("ascii"),
     }
     # Within a script element nothing but an end tag must look like one.
     packed = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
-    script = joined("app.js")
-    return Template(_asset("page.html")).substitute(
+    script = _file("bundle/app.js")
+    return Template(_file("assets/page.html")).substitute(
         language=language,
         title=escape(scene.title),
         version=escape(own_version()),
@@ -80,7 +79,7 @@ def html(
         css_hash=_hash(css),
         script=script,
         script_hash=_hash(script),
-        worker=joined("worker.js"),
+        worker=_file("bundle/worker.js"),
         data=packed.replace("<", "\\u003c"),
     )
 
@@ -104,32 +103,8 @@ def write(
 
 
 @cache
-def joined(name: str) -> str:
-    """Return a module and all it builds on as one, in an order in which each comes after those."""
-    order: list[str] = []
-
-    def visit(module: str) -> None:
-        if module not in order:
-            for other in re.findall(IMPORTED, _asset(module)):
-                visit(other)
-            order.append(module)
-
-    visit(name)
-    text = "".join(re.sub(TAKEN_OFF, "", _asset(module)) for module in order)
-    # Half of the modules is what they say to developers. A worker's text is in a script element.
-    return re.sub(COMMENT, "", text).replace("</", "<\\/")
-
-
-IMPORTED = re.compile(r'^import [^;]+ from "\./([\w-]+\.js)";$', re.MULTILINE)
-TAKEN_OFF = re.compile(
-    r"^import [^;]+;\n|^export \{[^}]+\};\n|^export (?=async|class|const|function)", re.MULTILINE
-)
-COMMENT = re.compile(r"/\*\*(?:[^*]|\*(?!/))*\*/\s*|^ *//.*\n|^ +|^\n", re.MULTILINE)
-
-
-@cache
-def _asset(name: str) -> str:
-    return (files("chutelab.pictures.live") / "assets" / name).read_text(encoding="utf-8")
+def _file(name: str) -> str:
+    return (files("chutelab.pictures.live") / name).read_text(encoding="utf-8")
 
 
 def _hash(text: str) -> str:

@@ -16,7 +16,6 @@ from chutelab.pictures.plots import style
 from chutelab.pictures.plots.machinery import points_of
 from chutelab.pictures.plots.scenery import places, stays, subset
 from chutelab.results import Recording
-from chutelab.results.recording import blocks
 from chutelab.util.arrays import Floats, Ints
 
 HUES = (style.STREAM, PURPLE, ORANGE, BLUE, GREEN)
@@ -27,29 +26,6 @@ def stream_colours(count: int) -> list[str]:
     """Return a colour for each stream; from the sixth on they are darker, then they repeat."""
     every = [*HUES, *(style.tint(hue, 0.6, "#000000") for hue in HUES)]
     return [every[i % len(every)] for i in range(count)]
-
-
-def turned(recording: Recording, particles: Ints, times: Floats) -> Floats:
-    """Return how far particles have turned counterclockwise since their release, (T, n), rad.
-
-    Angular velocity is linear between knots, and so its integral is exact for what the knots say.
-    Where they say more, see `Recording.angle`, it is corrected evenly from one to the next. NaN
-    where a particle is not seen, see `chutelab.pictures.plots.scenery.places`.
-    """
-    some = subset(recording, particles)
-    t, omega, offsets = some.knots["t"], some.knots["omega"], some.offsets
-    passed = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
-    told = some.angle if len(some.angle) else passed
-    angle = np.full((len(times), len(particles)), np.nan)
-    for row, particle, left, share in blocks(some.knots, offsets, times):
-        h = t[left + 1] - t[left]
-        gained = h * share * (omega[left] + 0.5 * share * (omega[left + 1] - omega[left]))
-        missed = share * (np.diff(told)[left] - np.diff(passed)[left])
-        angle[row, particle] = told[left] - told[offsets[particle]] + gained + missed
-    for i in np.flatnonzero(stays(recording)[particles]).tolist():
-        last = offsets[i + 1] - 1
-        angle[times > t[last], i] = told[last] - told[offsets[i]]
-    return angle
 
 
 LONGEST = 20
@@ -168,7 +144,12 @@ def motion(recording: Recording, particles: Ints, times: Floats) -> tuple[Floats
     position = places(recording, particles, times)
     if all(outline is None for outline in recording.machine.outlines):
         return position, np.zeros(position.shape[:2])
-    return position, turned(recording, particles, times)
+    some = subset(recording, particles)
+    angle = some.at(times).angle
+    for i in np.flatnonzero(stays(recording)[particles]).tolist():
+        end = some.track(i)["t"][-1]
+        angle[times > end, i] = some.at([end]).angle[0, i]
+    return position, angle
 
 
 HANGING = np.linspace(0.0, 1.0, 13)

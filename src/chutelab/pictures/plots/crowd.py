@@ -62,7 +62,9 @@ def draw_arrivals(ax: Axes, recording: Recording, title: str = "Arrivals") -> Ax
     if (ends := layers(recording)) is not None:
         for x, layer, dashes in zip(ends, ("lowest", "highest"), ("--", ":"), strict=True):
             ax.axvline(x, color=style.STRIKE, lw=1.6, ls=dashes, gid=layer, label=f"{layer} layer")
-        ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)
+        # Above the bars.
+        ax.set_ylim(top=1.25 * ax.get_ylim()[1])
+        ax.legend(fontsize=style.SMALL, loc="upper center", ncols=2, framealpha=0.85)
     ax.locator_params(axis="x", nbins=5)
     return ax
 

@@ -1,0 +1,76 @@
+// The page: reads its data, starts the engine's thread, and joins the parts.
+
+import { Bench } from "./bench.ts";
+import { Engine } from "./engine.ts";
+import { Arrows } from "./arrows.ts";
+import { CurvesPanel } from "./curves.ts";
+import { EnergyPanel } from "./energy.ts";
+import { ExercisePanel } from "./exercise.ts";
+import { Inspector } from "./inspector.ts";
+import { Keep } from "./keep.ts";
+import { listenToKeys } from "./keyboard.ts";
+import { toToml } from "./keys.ts";
+import { Lab } from "./lab.ts";
+import { watchLaws } from "./laws.ts";
+import { LandingPanel } from "./landing.ts";
+import { NumbersPanel } from "./numbers.ts";
+import { Prediction } from "./predict.ts";
+import { Stage } from "./stage.ts";
+import { Symbols } from "./symbols.ts";
+import { Tools } from "./tools.ts";
+import { Transport } from "./transport.ts";
+import { Words } from "./words.ts";
+
+const byId = (id: string): any => document.getElementById(id);
+
+/** What is no base64 gives no core, as the engine then says. @param text base64 */
+function bytesOf(text: string) {
+  let binary = "";
+  try {
+    binary = atob(text);
+  } catch {
+    return new Uint8Array();
+  }
+  const bytes = new Uint8Array(binary.length);
+  for (let i = 0; i < binary.length; i += 1) bytes[i] = binary.charCodeAt(i);
+  return bytes;
+}
+
+function start() {
+  const data = JSON.parse(byId("lab").textContent);
+  const words = new Words(data.language, data.strings);
+  const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
+  const newEngine = () => new Engine(
+    new Worker(URL.createObjectURL(source)), bytesOf(data.wasm).buffer, data.layout);
+  for (const element of document.querySelectorAll("[data-say]")) {
+    element.textContent = words.say((element as HTMLElement).dataset.say ?? "");
+  }
+  for (const element of document.querySelectorAll("[data-label]")) {
+    element.setAttribute("aria-label", words.say(element.getAttribute("data-label") ?? ""));
+  }
+  const lab = new Lab(data, newEngine());
+  const stage = new Stage(byId("stage"), lab, words);
+  const panels = [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel]
+    .map((Panel) => new Panel(byId("panels"), lab, words));
+  watchLaws(byId("law"), lab, words);
+  new Arrows(stage, words);
+  new Tools(byId("stage").parentElement, lab, stage, words, new Symbols(stage));
+  const inspector = new Inspector(byId("panels"), lab, words);
+  const bench = new Bench(byId("bench"), stage, inspector, lab, words);
+  new Transport(lab, stage, words);
+  new Keep(byId("panels"), stage, lab, words);
+  if (data.live?.predict) new Prediction(stage, lab, words);
+  listenToKeys(bench, lab, words);
+  for (const panel of document.querySelectorAll("#panels > .card, .tools, .watch")) {
+    const name = panel.id || "tools";
+    if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
+  }
+  const exercise = data.exercise
+    && new ExercisePanel(byId("panels"), stage, lab, words, newEngine);
+  Object.assign(globalThis, {
+    chutelab: { lab, stage, panels, exercise, toml: () => toToml(lab.given as any) },
+  });
+  byId("broken").remove();
+}
+
+start();

@@ -1,0 +1,318 @@
+// What no scene may say: values that do not have the form of their key, keys that contradict each
+// other, names that lead nowhere. The rules are Python's, of `chutelab.scene`.
+import { onBelt } from "./belt.ts";
+import { fits, type Form } from "./forms.ts";
+import { RADIANS, sinCos } from "./trig.ts";
+import type { Given, Lab, Point, Scene, Rule, Surface } from "./scene.ts";
+
+/** What a `Fault` says: key, value, id of a text, and its words. */
+type Wrong = [string, unknown, string, Record<string, number | string>?];
+
+/** Tables that are always lists, and those that may be one. */
+const LISTS = ["material", "pair", "conveyor", "surface"];
+const EITHER = ["particle", "plate", "stream"];
+
+/** Names of surfaces that no free one may take. */
+const RESERVED = ["incoming", "plate", "outgoing", "particles"];
+
+/** Least width and height of a view, m. */
+const LEAST_VIEW = 1e-6;
+
+/** Tables that are for other programs. */
+const FOREIGN = ["expect", "live"];
+
+/** Returns a table of which there may be one or several as a list. */
+export function listOf(rows: any): Given[] {
+  return rows === undefined ? [] : Array.isArray(rows) ? rows : [rows];
+}
+
+/** Returns the full path of a key of a table of which there may be one or several. */
+export function pathOf(given: Given, table: string, row: number, key: string) {
+  return Array.isArray(given[table]) ? `${table}[${row}].${key}` : `${table}.${key}`;
+}
+
+function isTable(value: any) {
+  return typeof value === "object" && value !== null && !Array.isArray(value);
+}
+
+/** Yields values that do not have the form of their key, and keys that are missing or unknown. */
+export function* misfitsOf(given: Given, lab: Lab): Generator<Wrong> {
+  for (const [table, value] of Object.entries(given)) {
+    if (FOREIGN.includes(table) || Object.hasOwn(lab.tables.scene, table)) continue;
+    if (!Object.hasOwn(lab.tables, table) || table === "scene") yield [table, value, "unknown-key"];
+    const list = LISTS.includes(table) || (EITHER.includes(table) && Array.isArray(value));
+    const sound = list ? Array.isArray(value) && value.every(isTable) : isTable(value);
+    if (!sound) yield [table, value, "form"];
+    if (EITHER.includes(table) && list && table !== "plate" && !value.length) {
+      yield [table, value, "form"];
+    }
+  }
+  yield* misfitsOfTable(given, lab.tables.scene, (key) => key);
+  for (const [table, rules] of Object.entries(lab.tables)) {
+    if (table === "scene" || FOREIGN.includes(table)) continue;
+    for (const [n, row] of listOf(given[table]).entries()) {
+      const unknown = Object.keys(row).find((key) => !Object.hasOwn(rules, key));
+      if (unknown !== undefined) {
+        yield [pathOf(given, table, n, unknown), row[unknown], "unknown-key"];
+      }
+      yield* misfitsOfTable(row, rules, (key) => pathOf(given, table, n, key));
+    }
+  }
+}
+
+function* misfitsOfTable(
+  row: Given, rules: Record<string, Rule>, path: (key: string) => string,
+): Generator<Wrong> {
+  for (const [key, { form, low, high, required }] of Object.entries(rules)) {
+    const value = row[key];
+    if (value === undefined) {
+      if (required) yield [path(key), value, "missing"];
+    } else if (!fits(value, form)) {
+      const number = typeof value === "number" && low !== undefined && high !== undefined;
+      const least = leastOf(form);
+      if (number && least !== undefined) {
+        yield [path(key), value, "range-or-none", { low: least, high }];
+      } else if (number) yield [path(key), value, "range", { low, high }];
+      else yield [path(key), value, "form"];
+    }
+  }
+}
+
+/** Returns the least number that a form takes besides 0, if it takes 0. */
+function leastOf({ anyOf, not }: Form): number | undefined {
+  return not ? not.exclusiveMaximum : anyOf?.map(leastOf).find((least) => least !== undefined);
+}
+
+/**
+ * Yields names that are there twice, are missing, or lead nowhere.
+ * @param kinds names of the kinds of particles
+ * @param materials names
+ */
+export function* straysOf(
+  given: Given, kinds: (string | undefined)[], materials: string[],
+): Generator<Wrong> {
+  const surfaces = ["incoming", "plate", "outgoing"].filter((table) => given[table] !== undefined);
+  const taken = new Set();
+  for (const table of ["plate", "conveyor", "surface", "particle", "stream", "material"]) {
+    const free = ["plate", "conveyor", "surface"].includes(table);
+    const own = free ? taken : new Set(table === "particle" ? taken : []);
+    const rows = listOf(given[table]);
+    for (const [n, { name }] of rows.entries()) {
+      const path = pathOf(given, table, n, "name");
+      if (name === undefined) {
+        if (table === "particle" && rows.length > 1) yield [path, name, "missing"];
+        continue;
+      }
+      if (own.has(name)) yield [path, name, "same-name"];
+      if (RESERVED.includes(name)) yield [path, name, "reserved-name"];
+      own.add(name);
+      if (free) surfaces.push(name);
+    }
+  }
+  for (const [n, { particle }] of listOf(given.stream).entries()) {
+    if (particle !== undefined && !kinds.includes(particle)) {
+      yield [pathOf(given, "stream", n, "particle"), particle, "no-such-kind"];
+    }
+  }
+  for (const [n, { material }] of listOf(given.particle).entries()) {
+    if (material !== undefined && !materials.includes(material)) {
+      yield [pathOf(given, "particle", n, "material"), material, "no-such-material"];
+    }
+  }
+  for (const [n, { between }] of listOf(given.pair).entries()) {
+    const key = `pair[${n}].between`;
+    if (!between.some((name: string) => kinds.includes(name))) {
+      yield [key, between, "no-such-kind"];
+    }
+    for (const [place, name] of between.entries()) {
+      if (![...kinds, ...surfaces].includes(name)) yield [`${key}[${place}]`, name, "no-such-name"];
+    }
+  }
+}
+
+/** Yields what contradicts each other. */
+export function* conflictsOf(scene: Scene, given: Given): Generator<Wrong> {
+  yield* beltConflicts(scene);
+  yield* kindConflicts(scene, given);
+  yield* plateConflicts(scene, given);
+  for (const [n, one] of scene.surface.entries()) yield* layoutConflicts(one, `surface[${n}]`);
+  for (const [n, { from, to }] of scene.conveyor.entries()) {
+    if (tooNear(from, to)) yield [`conveyor[${n}].to`, to, "same-points"];
+  }
+  yield* pieceConflicts(scene);
+  for (const n of scene.streams.keys()) yield* releaseConflicts(scene, given, n);
+  const counts = scene.streams.map(({ count }) => count);
+  const most = scene.most;
+  if (counts.reduce((sum, count) => sum + count, 0) > most) {
+    const n = counts.indexOf(Math.max(...counts));
+    yield [pathOf(given, "stream", n, "count"), counts[n], "too-many", { high: most }];
+  }
+  const { view } = scene;
+  if (view?.to.some((end, n) => end - view.from[n] < LEAST_VIEW)) {
+    yield ["view.to", view.to, "view-corners"];
+  }
+}
+
+/** m; less than that is no surface. */
+const LEAST_LENGTH = 1e-9;
+
+/** kg; less than any atom has. */
+const LEAST_MASS = 1e-27;
+
+/** Straight and bent pieces of all surfaces with their copies, at most. */
+const MOST_PIECES = 10_000;
+
+function tooNear(a: Point | undefined, b: Point | undefined) {
+  return a !== undefined && b !== undefined && Math.hypot(b[0] - a[0], b[1] - a[1]) < LEAST_LENGTH;
+}
+
+function* beltConflicts(scene: Scene): Generator<Wrong> {
+  const { incoming, outgoing } = scene;
+  const damps = scene.plates.some((plate) => plate.pivot === undefined);
+  if (incoming === null && (damps || outgoing !== null)) {
+    yield ["incoming", undefined, "needs-incoming"];
+  }
+  if (outgoing?.drop_from === "impact") yield ["outgoing.drop_from", "impact", "drop-from-impact"];
+  if (outgoing === null && scene.run.until === "landed") {
+    yield ["run.until", "landed", "needs-outgoing"];
+  }
+}
+
+function* pieceConflicts(
+  { incoming, outgoing, plates, conveyor, surface }: Scene,
+): Generator<Wrong> {
+  let count = Number(incoming !== null) + Number(outgoing !== null) + plates.length;
+  count += 4 * conveyor.length;
+  for (const [n, one] of surface.entries()) {
+    const { points, repeat, opens_at: opens, closes_at: closes } = one;
+    const twice = opens !== undefined && closes !== undefined && opens < closes;
+    count += repeat.reduce((many, [copies]) => many * copies,
+      Math.max(1, (points?.length ?? 0) - 1) * (twice ? 2 : 1));
+    if (count > MOST_PIECES) {
+      const key = repeat.length ? "repeat" : "points";
+      yield [`surface[${n}].${key}`, one[key], "too-many", { high: MOST_PIECES }];
+      return;
+    }
+  }
+}
+
+function* kindConflicts(scene: Scene, given: Given): Generator<Wrong> {
+  for (const [n, kind] of scene.particles.entries()) {
+    const path = (key: string) => pathOf(given, "particle", n, key);
+    if ("mass" in kind.given && "density" in kind.given) {
+      yield [path("density"), kind.density, "mass-and-density"];
+    }
+    if (!(kind.mass >= LEAST_MASS)) yield [path("mass"), kind.mass, "range", { low: LEAST_MASS, high: 1e6 }];
+    if (kind.span !== undefined && kind.span[0] >= kind.span[1]) {
+      yield [path("radius"), kind.span, "not-ascending"];
+    }
+    if (kind.rolling_friction > 0.0 && !kind.spin) {
+      yield [path("rolling_friction"), kind.rolling_friction, "needs-spin"];
+    }
+  }
+}
+
+function* plateConflicts(scene: Scene, given: Given): Generator<Wrong> {
+  let damping = 0;
+  for (const [n, plate] of scene.plates.entries()) {
+    const path = (key: string) => pathOf(given, "plate", n, key);
+    if (plate.above === 0.0 && plate.below === 0.0) yield [path("above"), 0.0, "no-length"];
+    const { pivot, distance, name } = plate;
+    if (pivot !== undefined) {
+      if (distance !== undefined) yield [path("pivot"), pivot, "not-both", { other: "distance" }];
+      if (name === undefined) yield [path("name"), name, "missing"];
+      if ("pivot_height" in plate.given) {
+        yield [path("pivot_height"), plate.pivot_height, "not-both", { other: "pivot" }];
+      }
+    } else {
+      if (distance === undefined) yield [path("distance"), distance, "missing"];
+      if (name !== undefined) yield [path("name"), name, "not-both", { other: "distance" }];
+      damping += 1;
+      if (damping > 1) yield [path("distance"), distance, "one-plate"];
+    }
+  }
+}
+
+function* layoutConflicts(one: Surface, key: string): Generator<Wrong> {
+  const { given, center, points, opens_at: opens } = one;
+  const { from, to } = given;
+  if (opens !== undefined && opens === one.closes_at) {
+    yield [`${key}.opens_at`, opens, "same-times"];
+  }
+  if (center !== undefined) {
+    for (const other of ["from", "to", "points"]) {
+      if (given[other] !== undefined) {
+        yield [`${key}.${other}`, given[other], "not-both", { other: "center" }];
+      }
+    }
+    if (one.radius === undefined) yield [`${key}.radius`, undefined, "missing"];
+    const extent = Math.abs(one.to_deg - one.from_deg);
+    const short = extent * RADIANS * (one.radius ?? 1.0) < LEAST_LENGTH;
+    if (short || extent > 360.0) yield [`${key}.to_deg`, one.to_deg, "arc-angles"];
+    return;
+  }
+  // Of what belongs to an arc, the angles of a whole one do no harm.
+  const angles = [one.from_deg, one.to_deg].every((angle) => angle === 0.0 || angle === 360.0);
+  if (one.radius !== undefined || !angles) yield [`${key}.center`, undefined, "missing"];
+  if (given.points !== undefined) {
+    for (const other of ["from", "to"]) {
+      if (given[other] !== undefined) {
+        yield [`${key}.${other}`, given[other], "not-both", { other: "points" }];
+      }
+    }
+  } else if (from === undefined && to === undefined) {
+    yield [`${key}.points`, undefined, "missing"];
+  } else if (from === undefined || to === undefined) {
+    yield [`${key}.${from === undefined ? "from" : "to"}`, undefined, "missing"];
+  }
+  if (points?.some((point, place) => tooNear(point, points[place + 1]))) {
+    const last = given.points === undefined ? "to" : "points";
+    yield [`${key}.${last}`, given[last], "same-points"];
+  }
+}
+
+/** @param n of the stream */
+function* releaseConflicts(scene: Scene, given: Given, n: number): Generator<Wrong> {
+  const { incoming } = scene;
+  const stream = scene.streams[n];
+  const path = (key: string) => pathOf(given, "stream", n, key);
+  const { until } = scene.run;
+  if (typeof until === "number" && stream.start >= until) {
+    yield [path("start"), stream.start, "after-end"];
+  }
+  if (!Number.isFinite(stream.rate)) yield [path("rate"), stream.given.rate, "form"];
+  const size = 2.0 * scene.particles[scene.kinds[n]].radius;
+  if (stream.width !== undefined && stream.width < size) {
+    yield [path("width"), stream.width, "range", { low: size, high: 1e6 }];
+  }
+  for (const key of ["at", "to", "rate", "bed_height", "speed_spread"]) {
+    if (stream.fill !== undefined && key in stream.given) {
+      yield [path(key), stream.given[key], "not-both", { other: "fill" }];
+    }
+  }
+  if (stream.to !== undefined) {
+    if (stream.at === undefined) yield [path("at"), undefined, "missing"];
+    if ("bed_height" in stream.given) {
+      yield [path("bed_height"), stream.bed_height, "not-both", { other: "to" }];
+    }
+  }
+  if (incoming === null) {
+    if (stream.fill !== undefined) return;
+    if (stream.at === undefined) yield [path("at"), undefined, "missing"];
+    if (stream.velocity === undefined) yield [path("velocity"), undefined, "missing"];
+    return;
+  }
+  if (incoming.friction !== "adhesion" || !onBelt(scene, n)) return;
+  if (stream.speed_spread > 0.0) {
+    yield [path("speed_spread"), stream.speed_spread, "adhesion-speed"];
+  }
+  if (stream.velocity !== undefined) {
+    const [sine, cosine] = sinCos(incoming.incline_deg * RADIANS);
+    const [vx, vy] = stream.velocity;
+    const near = 1e-12 * Math.abs(incoming.speed);
+    const off = Math.abs(vx - incoming.speed * cosine) > near;
+    if (off || Math.abs(vy - incoming.speed * sine) > near) {
+      yield [path("velocity"), stream.velocity, "adhesion-speed"];
+    }
+  }
+}

@@ -1,0 +1,64 @@
+// The numbers of a crowd: how many, how much, where they arrive, what belts pay, what surfaces
+// take.
+
+import type { Arrival } from "./arrival.ts";
+import type { Recording } from "./recording.ts";
+
+/** Counts: of those that touched the outgoing belt or what lies on it, and the belt itself; t/h
+ * that arrive, of the slice; m of the arrivals; J and W of all belts; J by surface. NaN and no
+ * losses where they are not known */
+export type CrowdNumbers = { released: number, arrived: number, landed: number, flow: number,
+  mean: number, spread: number, quantiles: number[], work: number, power: number, losses: [string,
+  number][] };
+
+/** Particles from which on they are a crowd, as in Python's pictures. */
+const FEWEST = 20;
+
+/** Arrivals from which on they have a flow. */
+const FLOW = 8;
+
+/** Shares of the arrivals that lie before a place, and of paths on the right of a line. */
+const QUANTILES = [0.02, 0.5, 0.98];
+
+/** The value below which a share of sorted values lies, straight between two of them. */
+function quantile(sorted: number[], share: number) {
+  const at = share * (sorted.length - 1), low = Math.floor(at);
+  const high = Math.min(low + 1, sorted.length - 1);
+  return sorted.length ? sorted[low] + (at - low) * (sorted[high] - sorted[low]) : NaN;
+}
+
+/** Mass per time of the middle half of those that come at times, t/h; NaN of fewer than `FLOW`.
+ * @param coming in the order of time */
+function flowOf(coming: { t: number, mass: number }[]) {
+  const [first, last] = [0.25, 0.75].map((share) => Math.floor(share * (coming.length - 1)));
+  const passed = coming.length < FLOW ? NaN : coming[last].t - coming[first].t;
+  if (!(passed > 0)) return NaN;
+  // The first of them comes as the time begins.
+  const middle = coming.slice(first + 1, last + 1);
+  return (3.6 * middle.reduce((sum, { mass }) => sum + mass, 0)) / passed;
+}
+
+/** @param landed how many have touched the belt itself */
+function crowdOf(
+  recording: Recording, { found }: { found: (Arrival | undefined)[] }, landed: number,
+): CrowdNumbers {
+  const { machine, tracks, books, begin, end } = recording;
+  const come = found.flatMap((one, i) => (one ? [{ ...one, mass: machine.mass[i] }] : []))
+    .sort((a, b) => a.t - b.t);
+  const places = come.map(({ x }) => x).sort((a, b) => a - b);
+  const mean = places.reduce((sum, x) => sum + x, 0) / places.length;
+  const squares = places.reduce((sum, x) => sum + (x - mean) ** 2, 0);
+  const work = recording.ledger(end).belt_work;
+  const names = [...machine.surfaces, "particles"];
+  const losses = (books ?? []).map(([, restitution, friction], row) =>
+    [names[row], restitution + friction] as [string, number]);
+  return {
+    released: tracks.filter(({ count }) => count > 0).length, arrived: come.length, landed,
+    flow: flowOf(come), mean, spread: Math.sqrt(squares / places.length),
+    quantiles: QUANTILES.map((share) => quantile(places, share)),
+    work, power: work / (end - begin),
+    losses: losses.filter(([, loss]) => loss !== 0).sort((a, b) => b[1] - a[1]),
+  };
+}
+
+export { FEWEST, QUANTILES, crowdOf, quantile };

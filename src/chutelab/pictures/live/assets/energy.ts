@@ -1,0 +1,84 @@
+// The energy ledger as two bars that close: what was put in, and where it is.
+
+import { card, follow, html } from "./panels.ts";
+import type { Lab } from "./lab.ts";
+import type { Recording, Ledger } from "./recording.ts";
+import type { Words } from "./words.ts";
+
+type Entry = [keyof Ledger, number];
+
+const SIGNS: Entry[] = [
+  ["start", 1], ["belt_work", 1], ["kinetic", -1], ["potential", -1], ["restitution_loss", -1],
+  ["friction_loss", -1], ["residual", 1],
+];
+
+/** A residual below this part of the whole is rounding, and not shown. */
+const TINY_RESIDUAL = 1e-12;
+
+/** What was put in, and where it is: an entry of the other sign changes sides. A residual that is
+ * only rounding is in neither. */
+function stacks(ledger: Ledger) {
+  const entries = SIGNS.map(([name, sign]) => [name, sign * ledger[name]] as Entry);
+  const side = (sign: number) =>
+    entries.map(([name, value]) => [name, Math.max(sign * value, 0)] as Entry);
+  const size = side(1).reduce((sum, [, value]) => sum + value, 0);
+  const shown = ([name, value]: Entry) => name !== "residual" || value > TINY_RESIDUAL * size;
+  return { putIn: side(1).filter(shown), isNow: side(-1).filter(shown), size };
+}
+
+/** The ledger with heights from the lowest point of the run, so that no part of it is negative. */
+function groundedLedger(recording: Recording, t: number) {
+  const ledger = recording.ledger(Math.min(t, recording.end)), { machine } = recording;
+  // Only of those that are there: the others have no part in the ledger yet.
+  const low = recording.tracks.reduce((sum, track, i) => (track.begin <= t
+    ? sum + machine.mass[i] * machine.gravity * track.lowest : sum), 0);
+  return { ...ledger, start: ledger.start - low, potential: ledger.potential - low };
+}
+
+class EnergyPanel {
+  bars;
+  cells;
+  rows;
+
+  constructor(home: Element, readonly lab: Lab, readonly words: Words) {
+    this.bars = ["put-in", "is-now"].map((id) => html("div", { class: "bar", id }));
+    this.cells = new Map(SIGNS.map(([name]) => [name, html("td")]));
+    this.rows = SIGNS.map(([name]) => html("tr", { "data-id": name },
+      html("th", { scope: "row" }, html("i", { class: `energy-${name}` }), words.say(`energy-${name}`)),
+      this.cells.get(name)));
+    const bars = html("div", { class: "bars", "aria-hidden": "true" },
+      html("span", {}, words.say("put-in")), this.bars[0],
+      html("span", {}, words.say("is-now")), this.bars[1]);
+    const panel = card("energy", words.say("energy"), bars,
+      html("table", {}, html("tbody", {}, ...this.rows)),
+      html("p", { class: "note" }, words.say("energy-note")));
+    home.append(panel);
+    lab.on("run", () => { this.longest = 0; });
+    follow(lab, panel, ["time", "run"], () => this.refresh());
+  }
+
+  /** J that the bars have room for; 0 if it is not known yet. */
+  longest = 0;
+
+  refresh() {
+    const recording = this.lab.recording as Recording;
+    const ledger = groundedLedger(recording, this.lab.t);
+    const { putIn, isNow, size } = stacks(ledger);
+    this.longest ||= stacks(groundedLedger(recording, recording.end)).size;
+    this.longest = Math.max(this.longest, size);
+    [putIn, isNow].forEach((parts, n) => {
+      const there = parts.filter(([, value]) => value > 0);
+      this.bars[n].replaceChildren(...there.map(([name, value]) => {
+        const part = html("i", { class: `energy-${name}` });
+        part.style.width = `${(100 * value) / (this.longest || 1)}%`;
+        return part;
+      }));
+    });
+    SIGNS.forEach(([name], n) => {
+      this.cells.get(name).textContent = this.words.energy(ledger[name]);
+      this.rows[n].hidden = name === "residual" && Math.abs(ledger[name]) <= TINY_RESIDUAL * size;
+    });
+  }
+}
+
+export { EnergyPanel, groundedLedger, stacks };

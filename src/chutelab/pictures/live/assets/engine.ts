@@ -1,0 +1,51 @@
+// The picture's side of the worker: asks for runs, and hands on what comes back of the latest.
+
+import type { Event } from "./core.ts";
+import type { Machine } from "./machine.ts";
+
+type Chunk = { type: "chunk", id: number, knots: Float64Array, tips: Float64Array,
+  events: Event[], now: number, state: string, books: number[][] | null,
+  reasons: number[] | null, gained: number };
+
+class Engine {
+  id = 0;
+  until = 0;
+  onChunk: (chunk: Chunk) => void = () => {};
+
+  constructor(readonly worker: Worker, wasm: ArrayBuffer, layout: object) {
+    worker.onmessage = ({ data }) => {
+      if (data.type === "broken") this.fail();
+      if (data.type === "chunk" && data.id === this.id) this.onChunk(data);
+    };
+    worker.onerror = () => this.fail();
+    worker.postMessage({ type: "load", wasm, layout });
+  }
+
+  /** Whether the thread did not start, or broke: no run comes back then. */
+  broken = false;
+
+  onFailure = () => {};
+
+  fail() {
+    this.broken = true;
+    this.onFailure();
+  }
+
+  /** Begin a run, and end the one before.
+   * @param until s, to which one whose particles meet runs on */
+  run(machine: Machine, until: number, onChunk: (chunk: Chunk) => void) {
+    this.id += 1;
+    this.until = until;
+    this.onChunk = onChunk;
+    this.worker.postMessage({ type: "run", id: this.id, machine, until });
+  }
+
+  /** Let the run go on to a later time. */
+  allow(until: number) {
+    if (until <= this.until) return;
+    this.until = until;
+    this.worker.postMessage({ type: "until", id: this.id, until });
+  }
+}
+
+export { Engine };

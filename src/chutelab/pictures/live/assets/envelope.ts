@@ -1,0 +1,133 @@
+// The paths of a stream as a whole: between which lines 96 % of them pass, and the one in the
+// middle. The same as the envelopes of Python's `results/stream.py`.
+
+import { FEWEST, QUANTILES, quantile } from "./crowd.ts";
+import type { Arrival } from "./arrival.ts";
+import type { Recording, Track } from "./recording.ts";
+
+type Point = [number, number];
+/** Edge to the right, middle, edge to the left, m; NaN where there is none */
+export type Envelope = { stream: number, lines: Point[][] };
+
+/** Paths that an envelope is made of, at most; of more, evenly chosen ones. */
+const MOST_PATHS = 400;
+
+/** Distances between two places by which its lines may go on from one to the next. */
+const JUMP = 5;
+
+/** Share of the way that the direction of a cut looks ahead, and back. */
+const LOOK_AHEAD = 1 / 60;
+
+/** Instants of the way at which paths are looked at, and places at which they are cut. */
+const MOMENTS = 400, CUTS = 60;
+
+/** The value at x of straight lines through points, as far as they reach.
+ * @param xs ascending */
+function between(x: number, xs: number[], ys: number[]) {
+  let low = 0, high = xs.length - 1;
+  if (x <= xs[0] || high < 1) return ys[0];
+  if (x >= xs[high]) return ys[high];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (xs[middle] <= x) low = middle;
+    else high = middle;
+  }
+  return ys[low] + ((ys[high] - ys[low]) / (xs[high] - xs[low])) * (x - xs[low]);
+}
+
+const median = (values: number[]) => quantile(values.sort((a, b) => a - b), 0.5);
+
+/** Evenly from 0 to a last value. */
+const evenly = (last: number, many: number) => Array.from({ length: many }, (_, n) =>
+  (n < many - 1 ? n * (last / (many - 1)) : last));
+
+/** The envelopes of the streams of a run, as far as it has come. A path is that of a particle from
+ * its release to its arrival on the outgoing belt, or to its end. A stream has none whose particles
+ * are all there at once, or whose paths are fewer than `FEWEST`, or lead nowhere.
+ * @param arrivals of each particle */
+function envelopesOf(
+  { machine, tracks }: Recording, arrivals: (Arrival | undefined)[],
+): Envelope[] {
+  const { releases } = machine, last = releases[releases.length - 1]?.stream ?? -1;
+  const found: Envelope[] = [];
+  for (let stream = 0; stream <= last; stream += 1) {
+    const all = releases.map((_, i) => i).filter((i) => releases[i].stream === stream);
+    if (all.every((i) => releases[i].t === releases[all[0]].t)) continue;
+    const own = all.filter((i) => tracks[i].count);
+    if (own.length < FEWEST) continue;
+    const some = evenly(own.length - 1, Math.min(own.length, MOST_PATHS))
+      .map((n) => own[Math.floor(n)]);
+    const lines = envelope(some.map((i) => ({
+      track: tracks[i], end: Math.min(tracks[i].end, arrivals[i]?.t ?? Infinity),
+    })));
+    if (lines) found.push({ stream, lines });
+  }
+  return found;
+}
+
+function envelope(own: { track: Track, end: number }[]): Point[][] | null {
+  const lasts = median(own.map(({ track, end }) => end - track.begin));
+  const since = evenly(lasts, MOMENTS);
+  const paths = own.map(({ track, end }) => since.map((s) => {
+    const t = track.begin + s, state = t <= end ? track.state(t) : null;
+    return state ? [state.x, state.y] : null;
+  }));
+  const way = [0, 1].map((axis) => since.map((_, row) =>
+    median(paths.flatMap((path) => path[row]?.[axis] ?? []))));
+  const length = [0];
+  for (let row = 1; row < MOMENTS; row += 1) {
+    length.push(length[row - 1]
+      + Math.hypot(way[0][row] - way[0][row - 1], way[1][row] - way[1][row - 1]));
+  }
+  const whole = length[MOMENTS - 1];
+  if (!(whole > 0)) return null;
+  const at = evenly(whole, CUTS);
+  const on = (x: number) =>
+    way.map((values) => between(x, length, values)) as Point;
+  const lines: Point[][] = QUANTILES.map(() => []);
+  for (let n = 0; n < CUTS; n += 1) {
+    const [x, y] = on(at[n]), clock = between(at[n], length, since);
+    const [before, after] = [on(at[n] - LOOK_AHEAD * whole), on(at[n] + LOOK_AHEAD * whole)];
+    const size = Math.hypot(after[0] - before[0], after[1] - before[1]);
+    const [tx, ty] = [(after[0] - before[0]) / size, (after[1] - before[1]) / size];
+    const crossed = paths.flatMap((path) => crossing(path, since, clock, [x, y], [tx, ty]) ?? [])
+      .sort((a, b) => a - b);
+    const isPassed = 2 * crossed.length >= own.length;
+    const offsets = QUANTILES.map((share) => (isPassed ? quantile(crossed, share) : NaN));
+    offsets.forEach((off, q) => lines[q].push([x - off * ty, y + off * tx]));
+    // Where half of the particles come to lie, the way turns round, and cuts go through the rest.
+    const jumps = n && lines.some((line) =>
+      Math.hypot(line[n][0] - line[n - 1][0], line[n][1] - line[n - 1][1]) > JUMP * at[1]);
+    if (jumps) return lines.map((line) => line.slice(0, n));
+  }
+  return lines;
+}
+
+/** How far to the left of a place a path crosses the cut there, m; null where it does not. It
+ * crosses where it goes from behind the cut to before it: of several times the one that is nearest
+ * to the way's.
+ * @param since s @param clock s of the way
+ * @param tangent across which the cut is */
+function crossing(
+  path: (number[] | null)[], since: number[], clock: number, [x, y]: Point, [tx, ty]: Point,
+) {
+  let least = Infinity, found = null;
+  let before = null;
+  for (let row = 0; row < path.length; row += 1) {
+    const point = path[row];
+    if (!point) break;
+    const [u, v] = [point[0] - x, point[1] - y];
+    const now = { along: u * tx + v * ty, left: v * tx - u * ty };
+    if (before && before.along <= 0 && now.along > 0) {
+      const late = Math.abs(since[row - 1] - clock);
+      if (late < least) {
+        const share = -before.along / (now.along - before.along);
+        [least, found] = [late, before.left + share * (now.left - before.left)];
+      }
+    }
+    before = now;
+  }
+  return found;
+}
+
+export { envelopesOf };

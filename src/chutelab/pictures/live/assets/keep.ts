@@ -1,0 +1,151 @@
+// What one takes along: a link, the scene, the picture, tables; and the address that follows.
+
+import { toToml } from "./keys.ts";
+import { numbersOf } from "./numbers.ts";
+import { card, html } from "./panels.ts";
+import { predict } from "./prediction.ts";
+import { Fault, type Given, type Scene } from "./scene.ts";
+import { download, fileStem, fromHash, knotRows, toCsv, toHash } from "./share.ts";
+import { historyOf } from "./stages.ts";
+import type { Lab } from "./lab.ts";
+import type { Recording } from "./recording.ts";
+import type { Stage } from "./stage.ts";
+import type { Words } from "./words.ts";
+
+/** What a picture of its own needs of the page's style. */
+const KEPT = ["fill", "stroke", "stroke-width", "stroke-linecap", "stroke-dasharray", "opacity",
+  "font-family", "font-size", "font-style", "paint-order", "text-anchor", "dominant-baseline",
+  "display"];
+
+/** Pixels of a saved picture for each of the page's. */
+const DENSE = 2;
+
+class Keep {
+  comma;
+  said;
+
+  constructor(home: Element, readonly stage: Stage, readonly lab: Lab, readonly words: Words) {
+    this.comma = html("input", { type: "checkbox", id: "comma" });
+    this.comma.checked = words.comma;
+    this.said = html("p", { class: "note", role: "status" });
+    const button = (id: string, act: () => void, reveals = false) => {
+      const made = html("button", { type: "button", class: reveals ? "reveals" : "" }, words.say(id));
+      made.addEventListener("click", act);
+      return made;
+    };
+    const hasAddress = /^(https?|file):$/.test(location.protocol);
+    home.append(card("share", words.say("share"), html("div", { class: "row" },
+      ...(hasAddress ? [button("copy-link", () => this.copy())] : []),
+      button("save-scene", () => this.save("toml", this.toml, "application/toml")),
+      button("save-picture", () => this.picture()),
+      button("save-knots", () => this.table("knots", knotRows(this.recording)), true),
+      button("save-numbers", () => this.table("numbers", this.numbers), true),
+      html("label", {}, this.comma, ` ${words.say("decimal-comma")}`)), this.said));
+    lab.on("scene", () => this.follow());
+    addEventListener("hashchange", () => this.open());
+    this.open();
+  }
+
+  get recording() {
+    return this.lab.recording as Recording;
+  }
+
+  get toml() {
+    return toToml(this.lab.given as Given);
+  }
+
+  get numbers(): (string | number)[][] {
+    const { lab, words } = this, machine = lab.machine as any;
+    const { numbers } = predict(lab.scene as Scene, this.recording);
+    const found = numbersOf(historyOf(lab)?.stages ?? [], numbers,
+      machine.pulley?.radius ?? NaN, machine.radius);
+    return [["", words.say("simulated"), words.say("analytic"), ""],
+      ...found.map(({ symbol, simulated, analytic, unit }) => [symbol, simulated, analytic, unit])];
+  }
+
+  /** Take over the scene of the address, if it can be. */
+  open() {
+    const { lab } = this, { hash } = location;
+    if (hash === this.hash || (hash.length < 2 && !this.hash)) return;
+    this.hash = hash;
+    const given = hash.length < 2 ? lab.first : fromHash(lab.first, hash);
+    if (given) lab.replace(given);
+    else lab.refuse(new Fault("", hash, "address"));
+  }
+
+  hash = "";
+
+  told: object | undefined;
+
+  /** What was changed and let go is in the address, and told to a page that this one is part of. */
+  follow() {
+    const { lab } = this, { given } = lab;
+    if (!given || lab.before || this.told === given) return;
+    const first = !this.told && given === lab.first;
+    this.told = given;
+    if (first) return;
+    this.hash = toHash(lab.first, given);
+    try {
+      history.replaceState(null, "", this.hash || location.href.replace(/#.*/s, ""));
+    } catch {
+      // A page without an address of its own, such as a frame's text, has none to change.
+    }
+    if (parent !== window) parent.postMessage({ chutelab: "scene", toml: this.toml }, "*");
+  }
+
+  async copy() {
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.said.textContent = this.words.say("copied");
+    } catch {
+      prompt(this.words.say("copy-link"), location.href);
+    }
+  }
+
+  save(ending: string, content: BlobPart, type: string) {
+    const scene = this.lab.scene as Scene;
+    download(`${fileStem(scene.title)}.${ending}`, content, type);
+  }
+
+  table(name: string, rows: (string | number)[][]) {
+    // The mark tells spreadsheets that it is Unicode.
+    this.save(`${name}.csv`, `\ufeff${toCsv(rows, this.comma.checked)}`, "text/csv");
+  }
+
+  /** The picture as it is now: surfaces and tracks, particles, tools. */
+  async picture() {
+    const { stage } = this, { width, height } = stage.view;
+    const canvas = document.createElement("canvas");
+    canvas.width = DENSE * width;
+    canvas.height = DENSE * height;
+    const context = canvas.getContext("2d") as CanvasRenderingContext2D;
+    context.scale(DENSE, DENSE);
+    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--card");
+    context.fillRect(0, 0, width, height);
+    const layers = [await drawnSvg(stage.back, stage.back, width, height), stage.canvas,
+      await drawnSvg(stage.front, stage.over, width, height)];
+    for (const layer of layers) context.drawImage(layer, 0, 0, width, height);
+    canvas.toBlob((blob) => { if (blob) this.save("png", blob, "image/png"); }, "image/png");
+  }
+}
+
+/** A part of an SVG as an image, with the style it has on the page. */
+async function drawnSvg(
+  whole: any, part: any, width: number, height: number,
+): Promise<HTMLImageElement> {
+  const root = whole.cloneNode(false), copy = part.cloneNode(true);
+  const [from, to] = [part, copy].map((one) => [one, ...one.querySelectorAll("*")]);
+  from.forEach((element: Element, n: number) => {
+    const style = getComputedStyle(element);
+    for (const name of KEPT) to[n].setAttribute(name, style.getPropertyValue(name));
+  });
+  root.append(...(part === whole ? copy.childNodes : [copy]));
+  for (const [name, value] of Object.entries({ width, height })) root.setAttribute(name, value);
+  const image = new Image();
+  const text = new XMLSerializer().serializeToString(root);
+  image.src = `data:image/svg+xml,${encodeURIComponent(text)}`;
+  await image.decode();
+  return image;
+}
+
+export { Keep };

@@ -1,0 +1,214 @@
+// The scene under somebody's hands: its values, its run, its clock. Nothing here draws.
+
+import { withValues } from "./keys.ts";
+import { build, type Machine } from "./machine.ts";
+import { Recording } from "./recording.ts";
+import { Fault, resolve, type Scene, type Given } from "./scene.ts";
+import type { Engine } from "./engine.ts";
+
+export type News = "scene" | "run" | "time" | "play";
+
+/** s of a crowd that is computed before it is shown. */
+const AHEAD = 0.5;
+
+/** Undo reaches back so many changes. */
+const MOST_UNDO = 200;
+
+/** Slow motion and fast, in times of real time. */
+const RATES = [0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 4];
+
+class Lab {
+  listeners: Map<News, Set<() => void>> = new Map();
+  past: Given[] = [];
+  future: Given[] = [];
+  first;
+  t = 0;
+  playing = false;
+  rate = 1;
+  fault: Fault | null = null;
+  /** What undo goes back to once what is dragged is let go. */
+  before: Given | undefined = undefined;
+  given?: Given;
+  scene?: Scene;
+  machine?: Machine;
+  recording?: Recording;
+
+  /** @param data of the page */
+  constructor(readonly data: any, readonly engine: Engine) {
+    this.first = data.scene as Given;
+    engine.onFailure = () => this.refuse(new Fault("", undefined, "no-engine"));
+    this.use(this.first);
+  }
+
+  on(news: News, listener: () => void) {
+    if (!this.listeners.has(news)) this.listeners.set(news, new Set());
+    this.listeners.get(news)?.add(listener);
+  }
+
+  tell(news: News) {
+    this.listeners.get(news)?.forEach((listener) => listener());
+  }
+
+  /** Take over a scene that can be built, and run it; one that cannot changes nothing but
+   * `fault`. */
+  use(given: Given): boolean {
+    try {
+      const scene = resolve(given, this.data);
+      const machine = build(scene);
+      const goesOn = this.machine?.interact && machine.interact && this.t > 0;
+      this.given = given;
+      this.scene = scene;
+      this.machine = machine;
+      this.fault = null;
+      this.run(goesOn ? this.t : 0);
+    } catch (error) {
+      if (!(error instanceof Fault)) throw error;
+      this.fault = error;
+    }
+    const isTaken = !this.fault;
+    if (this.engine.broken) this.fault = new Fault("", undefined, "no-engine");
+    this.tell("scene");
+    return isTaken;
+  }
+
+  /** Say why something cannot be; all stays as it is. */
+  refuse(fault: Fault) {
+    this.fault = fault;
+    this.tell("scene");
+  }
+
+  /** Run from a time on, with what is there then: a crowd goes on under somebody's hands, all
+   * others begin anew, since they take no time.
+   * @param from s */
+  run(from: number) {
+    const machine = this.machine as Machine;
+    let job = machine;
+    if (from > 0 && this.recording) job = this.recording.goOn(from, machine);
+    else this.recording = new Recording(machine);
+    const { recording } = this;
+    this.engine.run(job, AHEAD + (from > 0 ? 0 : this.t), (chunk) => {
+      recording.add(chunk);
+      this.tellSoon();
+    });
+  }
+
+  /** Tell of the run once a frame: a crowd sends more often. */
+  tellSoon() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.tell("run");
+    });
+  }
+
+  waiting = false;
+
+  /** Change values of the scene, by key. While something is dragged they are no step of undo
+   * yet. */
+  change(values: Record<string, unknown>, { done = true }: { done?: boolean } = {}) {
+    this.replace(withValues(this.given as Given, values), { done });
+  }
+
+  replace(given: Given, { done = true }: { done?: boolean } = {}) {
+    const { before } = this;
+    this.before ??= this.given;
+    if (!this.use(given)) this.before = before;
+    if (done) this.settle();
+  }
+
+  /** What was dragged is let go: make one step of undo of it. */
+  settle() {
+    if (this.before && this.before !== this.given) {
+      this.past = [...this.past, this.before].slice(-MOST_UNDO);
+      this.future = [];
+    }
+    this.before = undefined;
+    this.tell("scene");
+  }
+
+  undo() {
+    this.travel(this.past, this.future);
+  }
+
+  redo() {
+    this.travel(this.future, this.past);
+  }
+
+  travel(from: Given[], to: Given[]) {
+    const given = from.pop();
+    if (!given) return;
+    to.push(this.given as Given);
+    this.use(given);
+  }
+
+  /** Back to the scene as it was written, which can be undone. */
+  reset() {
+    if (this.given !== this.first) this.replace(this.first);
+    this.restart();
+  }
+
+  /** All again from the beginning, with the machine as it is now. */
+  restart() {
+    this.t = this.start;
+    if (this.recording?.renamed) this.run(0);
+    this.tell("time");
+  }
+
+  /** When there is something to see, s. */
+  get start() {
+    return Math.min(0, this.recording?.begin ?? 0);
+  }
+
+  /** s up to which time may go: the end of the run, or as far as it has come. */
+  get end() {
+    const { recording } = this;
+    if (!recording) return 0;
+    return recording.state === "running" && recording.machine.interact
+      ? recording.now : Math.max(recording.end, 0);
+  }
+
+  get isOver() {
+    return this.recording?.state !== "running" && this.t >= this.end;
+  }
+
+  /** Whether play may begin. */
+  mayPlay = () => true;
+
+  play() {
+    if (!this.mayPlay()) return;
+    if (this.isOver) this.restart();
+    this.playing = true;
+    this.tell("play");
+  }
+
+  pause() {
+    this.playing = false;
+    this.tell("play");
+  }
+
+  /** @param t s */
+  seek(t: number) {
+    this.t = Math.max(this.start, Math.min(t, this.end));
+    this.allow(0);
+    this.tell("time");
+  }
+
+  /** Let the run go on so far that so many seconds can be shown at once.
+   * @param seconds of real time */
+  allow(seconds: number) {
+    const since = this.t - (this.recording?.shift ?? 0);
+    this.engine.allow(since + (seconds + AHEAD) * Math.max(1, this.rate));
+  }
+
+  /** Go on by a frame of so many seconds of real time. */
+  tick(seconds: number) {
+    if (!this.playing) return;
+    this.allow(seconds);
+    this.t = Math.min(this.t + seconds * this.rate, this.end);
+    this.tell("time");
+    if (this.isOver) this.pause();
+  }
+}
+
+export { Lab, RATES };

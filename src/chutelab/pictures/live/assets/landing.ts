@@ -1,0 +1,142 @@
+// Where the particles of a stream arrive on the outgoing belt: a histogram, and the mean of the
+// first n with its error.
+
+import { Chart, onWidth, rangeOf, roundUp } from "./chart.ts";
+import { card, follow, html } from "./panels.ts";
+import { svg } from "./stage.ts";
+import { historyOf } from "./stages.ts";
+import type { Lab } from "./lab.ts";
+import type { Words } from "./words.ts";
+
+type Histogram = { from: number, width: number, counts: number[] };
+
+/** Points of a running mean that are drawn at most. */
+const MOST_POINTS = 300;
+
+/** How often values lie in bins of a round width, √n of them or a few more or less.
+ * @param of those that the bins are made for */
+function histogram(values: number[], of: number[] = values): Histogram {
+  const [low, high] = rangeOf(of, 0);
+  // All may land at one place.
+  const span = Math.max(high - low, 1e-4 * Math.max(Math.abs(low), Math.abs(high), 1e-6));
+  const width = roundUp(span / Math.max(4, Math.min(40, Math.sqrt(of.length))));
+  const first = Math.floor(low / width), last = Math.floor(high / width);
+  const counts = new Array(last - first + 1).fill(0);
+  for (const value of values) counts[Math.floor(value / width) - first] += 1;
+  return { from: first * width, width, counts };
+}
+
+/** The mean of the first n values and its standard error s/√n, for n = 1, 2, ...
+ * (Welford's recurrence); the error of a single value is not known. */
+function runningMean(values: number[]): { mean: number, error: number }[] {
+  let mean = 0, squares = 0;
+  return values.map((value, i) => {
+    const n = i + 1, off = value - mean;
+    mean += off / n;
+    squares += off * (value - mean);
+    return { mean, error: n > 1 ? Math.sqrt(squares / (n - 1) / n) : NaN };
+  });
+}
+
+class LandingPanel {
+  bars;
+  means;
+  result;
+  panel;
+
+  constructor(home: Element, readonly lab: Lab, readonly words: Words) {
+    this.bars = new Chart(words, 150);
+    this.means = new Chart(words, 130);
+    this.result = html("p", { class: "result" });
+    this.panel = card("landing", words.say("landing"),
+      html("p", { class: "chart-title" }, words.say("landing-histogram")), this.bars.root,
+      html("p", { class: "chart-title" }, words.say("landing-mean")), this.means.root, this.result,
+      html("p", { class: "note" }, words.say("landing-note")));
+    this.panel.hidden = true;
+    home.append(this.panel);
+    const look = () => {
+      this.panel.hidden = (lab.machine?.releases.length ?? 0) < 2 || !lab.scene?.outgoing;
+    };
+    lab.on("scene", look);
+    look();
+    follow(lab, this.panel, ["run"], () => this.draw());
+    follow(lab, this.panel, ["time"], () => this.fill());
+    onWidth(this.bars.root, (width) => {
+      this.bars.width = this.means.width = width;
+      this.draw();
+    });
+  }
+
+  /** In the order of time. */
+  arrivals: { t: number, x: number }[] = [];
+
+  draw() {
+    const { words } = this;
+    if (this.panel.hidden || !this.panel.open) return;
+    this.arrivals = historyOf(this.lab)?.arrivals.list ?? [];
+    const places = this.arrivals.map(({ x }) => x);
+    const all = histogram(places);
+    const { from, width, counts } = all;
+    this.all = all;
+    this.bars.frame([from, from + width * Math.max(1, counts.length)],
+      [0, Math.max(1, ...counts) * 1.08], { below: "x / m", beside: "n", whole: true });
+    this.outline = svg("path", { class: "bins", d: this.steps(all) });
+    this.filled = svg("path", { class: "bins filled" });
+    this.bars.marks.append(this.outline, this.filled);
+    this.running = runningMean(places);
+    const { running } = this;
+    const some = running.map((_, i) => i)
+      .filter((i) => i % Math.ceil(running.length / MOST_POINTS) === 0 || i === running.length - 1);
+    const sides = [1, -1].map((sign) => some.filter((i) => isFinite(running[i].error))
+      .map((i) => [i + 1, running[i].mean + sign * running[i].error]));
+    // The first few are far off, and are not to make all the others flat.
+    const few = Math.min(5, 0.5 * running.length);
+    const seen = sides.flat().filter(([n]) => n > few).map(([, x]) => x);
+    this.means.frame([0, Math.max(2, running.length)], rangeOf(seen), { below: "n", beside: "x / m" });
+    const { means } = this;
+    const path = [...sides[0], ...sides[1].reverse()]
+      .map(([n, x]) => `${means.px(n).toFixed(1)} ${means.py(x).toFixed(1)}`);
+    if (path.length) means.marks.append(svg("path", { class: "band", d: `M${path.join("L")}Z` }));
+    means.line(some.map((i) => i + 1), some.map((i) => running[i].mean), "curve-a");
+    this.result.textContent = places.length ? "" : words.say("landing-none");
+    this.fill();
+  }
+
+  steps({ from, width, counts }: Histogram) {
+    const { bars } = this;
+    const tops = counts.map((count, i) =>
+      `V${bars.py(count).toFixed(1)}H${bars.px(from + (i + 1) * width).toFixed(1)}`);
+    return `M${bars.px(from).toFixed(1)} ${bars.py(0)}${tops.join("")}V${bars.py(0)}Z`;
+  }
+
+  /** What has arrived up to now. */
+  fill() {
+    const { arrivals, words, all } = this;
+    if (this.panel.hidden || !all || !arrivals.length) return;
+    let n = 0;
+    const counts = all.counts.map(() => 0);
+    for (; n < arrivals.length && arrivals[n].t <= this.lab.t; n += 1) {
+      const bin = Math.floor(arrivals[n].x / all.width) - Math.round(all.from / all.width);
+      counts[bin] += 1;
+    }
+    this.filled.setAttribute("d", this.steps({ ...all, counts }));
+    this.means.point(n || NaN);
+    // Before the first one arrives the whole is told.
+    const which = n || arrivals.length, { mean, error } = this.running[which - 1];
+    // Both with the same places; below a nanometre is rounding.
+    const places = error > 1e-9 ? Math.max(3, 1 - Math.floor(Math.log10(error))) : 3;
+    this.result.textContent = words.say(isFinite(error) ? "landing-result" : "landing-first", {
+      n: which, mean: words.fixed(mean, places), error: words.fixed(error, places),
+    });
+  }
+
+  all: Histogram | undefined;
+
+  running: { mean: number, error: number }[] = [];
+
+  outline: any;
+
+  filled: any;
+}
+
+export { LandingPanel, histogram, runningMean };

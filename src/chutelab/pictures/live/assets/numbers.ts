@@ -1,0 +1,154 @@
+// The numbers of a transfer by the paper's symbols: as simulated, beside the closed form. Of a
+// crowd first those of the crowd, and of particle 0 if somebody asks.
+
+import { FEWEST, crowdOf, type CrowdNumbers } from "./crowd.ts";
+import { card, follow, html } from "./panels.ts";
+import { historyOf, type Stages } from "./stages.ts";
+import { predict } from "./prediction.ts";
+import type { Lab } from "./lab.ts";
+import type { Recording } from "./recording.ts";
+import type { Scene } from "./scene.ts";
+import type { Words } from "./words.ts";
+
+type Row = { id: string, symbol: string, unit: string, simulated: number, analytic: number };
+
+const SYMBOLS: Record<string, [string, string]> = {
+  phi1: ["φ₁", "°"], v1: ["v₁", "m/s"], t2: ["t₂", "s"], x2: ["x₂", "m"], v2: ["v₂", "m/s"],
+  v2r: ["v₂′", "m/s"], t3: ["t₃", "s"], x3: ["x₃", "m"], v3: ["v₃", "m/s"], d2: ["d₂", "m"],
+  d3: ["d₃", "m"], x: ["x", "m"], t: ["t", "s"],
+};
+
+/** What is below this is rounding, in any of the units. */
+const ROUNDED = 1e-12;
+
+/** Without the last digits: where a value is halfway, both columns are to round it the same way. */
+const tidy = (value: number) => Number(value.toPrecision(11));
+
+function mean(values: number[]) {
+  let sum = 0, many = 0;
+  for (const value of values) {
+    if (!isFinite(value)) continue;
+    sum += value;
+    many += 1;
+  }
+  return sum / many;
+}
+
+/** Each number as the mean over all particles that have it, and as predicted; NaN where there is
+ * none.
+ * @param found those of `predict`
+ * @param pulley its radius, m @param radius of each particle, m */
+function numbersOf(
+  stages: Stages[], found: Record<string, number>, pulley: number, radius: number[],
+): Row[] {
+  // What leaves a wall or a hopper has not left a pulley.
+  if (!isFinite(pulley)) stages = stages.map(({ hit, down }) => ({ hit, down }));
+  const speed = (v: number[]) => Math.hypot(v[0], v[1]);
+  const over = (value: (its: Stages, i: number) => number) => mean(stages.map(value));
+  // The paper counts x3 back from the plate, and heights down.
+  const simulated: Record<string, number> = {
+    phi1: over(({ left }) => (left ? (Math.atan2(left.x, left.y) * 180) / Math.PI : NaN)),
+    v1: over(({ left }) => (left ? speed(left.after) : NaN)),
+    t2: over(({ left, hit }) => (left && hit ? hit.t - left.t : NaN)),
+    x2: over(({ left, hit }) => (left && hit ? hit.x - left.x : NaN)),
+    v2: over(({ hit }) => (hit ? speed(hit.before) : NaN)),
+    v2r: over(({ hit }) => (hit ? speed(hit.after) : NaN)),
+    t3: over(({ hit, down }) => (hit && down ? down.t - hit.t : NaN)),
+    x3: over(({ hit, down }) => (hit && down ? hit.x - down.x : NaN)),
+    v3: over(({ down }) => (down ? speed(down.before) : NaN)),
+    d2: over(({ hit, down }) => (hit && down ? hit.y - down.y : NaN)),
+    d3: over(({ down }, i) => (down ? pulley + radius[i] - down.y : NaN)),
+    x: over(({ down }) => (down ? down.x : NaN)),
+    // With a plate between, t2 and t3 say it.
+    t: over(({ left, hit, down }) => (left && down && !hit ? down.t - left.t : NaN)),
+  };
+  const { phi1, x2, x3, y3 } = found;
+  const analytic: Record<string, number> = {
+    ...found,
+    phi1: (phi1 * 180) / Math.PI,
+    d2: y3,
+    x: (pulley + radius[0]) * Math.sin(phi1) + x2 - x3,
+  };
+  return Object.entries(SYMBOLS).map(([id, [symbol, unit]]) => ({
+    id, symbol, unit, simulated: simulated[id], analytic: analytic[id] ?? NaN,
+  }));
+}
+
+class NumbersPanel {
+  body;
+  simulated;
+  reason;
+  lone;
+  crowd;
+  lead;
+  asked;
+
+  constructor(home: Element, readonly lab: Lab, readonly words: Words) {
+    this.body = html("tbody");
+    this.simulated = html("th", { scope: "col" });
+    const head = html("thead", {}, html("tr", {}, html("td"), this.simulated,
+      html("th", { scope: "col" }, words.say("analytic"))));
+    this.reason = html("p", { class: "note" });
+    this.lone = html("div", {}, html("table", {}, head, this.body), this.reason);
+    this.crowd = html("tbody");
+    this.lead = html("table", { class: "crowd" }, this.crowd);
+    this.asked = html("details", { class: "values" }, html("summary", {}, words.say("particle-0")));
+    const panel = card("numbers", words.say("numbers"), this.lead, this.asked, this.lone);
+    this.asked.before(this.lone);
+    home.append(panel);
+    follow(lab, panel, ["run"], () => this.refresh());
+  }
+
+  refresh() {
+    const { words, lab } = this;
+    const { machine } = lab.recording as Recording, many = machine.releases.length;
+    const { numbers, reason } = predict(lab.scene as Scene, lab.recording as Recording);
+    const history = historyOf(lab), crowd = many >= FEWEST, { stages = [] } = history ?? {};
+    this.lead.hidden = this.asked.hidden = !crowd;
+    if (crowd && history) {
+      const { arrivals, landings } = history;
+      this.tellCrowd(crowdOf(lab.recording as Recording, arrivals, landings.length));
+    }
+    if (crowd) this.asked.append(this.lone);
+    else this.asked.before(this.lone);
+    const rows = numbersOf(crowd ? stages.slice(0, 1) : stages, numbers,
+      machine.pulley?.radius ?? NaN, machine.radius)
+      .filter(({ simulated, analytic }) => isFinite(simulated) || isFinite(analytic));
+    this.body.replaceChildren(...rows.map(({ id, symbol, unit, simulated, analytic }) =>
+      html("tr", { "data-id": id },
+        html("th", { scope: "row" }, html("b", {}, symbol), ` ${words.say(`number-${id}`)}, ${unit}`),
+        ...[simulated, analytic].map((value) =>
+          html("td", {}, words.number(Math.abs(value) < ROUNDED ? 0 : tidy(value)))))));
+    this.simulated.textContent = many > 1 && !crowd ? words.say("simulated-mean", { n: many })
+      : words.say("simulated");
+    const why = reason ? words.say(`reason-${reason.text}`, Object.fromEntries(Object
+      .entries(reason.words).map(([key, value]) => [key, typeof value === "number"
+        ? words.number(value) : words.name(value)]))) : "";
+    this.reason.textContent = rows.length || !machine.pulley ? why : words.say("numbers-none");
+  }
+
+  tellCrowd(
+    { released, arrived, landed, flow, mean, spread, quantiles, work, power, losses }: CrowdNumbers,
+  ) {
+    const { words } = this;
+    const all = (this.lab.recording as Recording).machine.releases.length;
+    const metres = (x: number) => `${words.fixed(x, 3)} m`;
+    const rows: [string, string, string][] = [
+      ["released", words.say("crowd-released"), `${released} / ${all}`],
+      ["arrived", words.say("crowd-arrived"), arrived ? String(arrived) : ""],
+      ["landed", words.say("crowd-landed"), landed ? String(landed) : ""],
+      ["flow", words.say("crowd-flow"), isFinite(flow) ? `${words.number(flow, 3)} t/h` : ""],
+      ["place", words.say("crowd-place"), arrived ? `${metres(mean)} ± ${metres(spread)}` : ""],
+      ["quantiles", words.say("crowd-quantiles"),
+        arrived ? `${quantiles.map((x) => words.fixed(x, 3)).join(" / ")} m` : ""],
+      ["power", words.say("crowd-power"),
+        work ? `${words.energy(work)}, ${words.number(power, 3)} W` : ""],
+      ...losses.map(([name, loss]) => [`loss-${name}`,
+        words.say("crowd-loss", { name: words.name(name) }), words.energy(loss)] as [string, string, string]),
+    ];
+    this.crowd.replaceChildren(...rows.filter(([, , told]) => told).map(([id, name, told]) =>
+      html("tr", { "data-id": id }, html("th", { scope: "row" }, name), html("td", {}, told))));
+  }
+}
+
+export { NumbersPanel, SYMBOLS, numbersOf };

@@ -1,0 +1,429 @@
+// What a run leaves: where each particle is at any time, and its energy ledger.
+// Between the engine's knots a track is the cubic Hermite curve, as in Python's recordings.
+
+import { KNOT_ROW, type Machine, type Event } from "./core.ts";
+
+export type State = { x: number, y: number, vx: number, vy: number, spin: number, ended: boolean };
+export type Ledger = { start: number, kinetic: number, potential: number, belt_work: number,
+  restitution_loss: number, friction_loss: number, residual: number };
+
+const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, FRICTION = 8;
+
+/** Of events, as in the enum Kind of the core. */
+const RELEASE = 0, SEPARATION = 1;
+
+/** Straight parts in which a piece of a track is drawn at most. */
+const MOST_CHORDS = 500;
+
+/** Knots of one particle, `KNOT_ROW` doubles each. */
+class Track {
+  rows = new Float64Array(8 * KNOT_ROW);
+
+  count = 0;
+
+  /** Where it was looked for last. */
+  near = 0;
+
+  /** How many of the last knots only tell how far it has come, until there are others. */
+  tip = 0;
+
+  /** Whether it is still under way where the run has come to. */
+  live = false;
+
+  /** Forget the knots that only tell how far it has come. */
+  dropTips() {
+    this.count -= this.tip;
+    this.tip = 0;
+    this.turns.length = Math.min(this.turns.length, this.count);
+  }
+
+  /** @param shift s */
+  add(row: Float64Array, shift: number, entries: number[] | null) {
+    if ((this.count + 1) * KNOT_ROW > this.rows.length) {
+      const rows = new Float64Array(2 * this.rows.length);
+      rows.set(this.rows);
+      this.rows = rows;
+    }
+    const begin = this.count * KNOT_ROW;
+    this.rows.set(row, begin);
+    this.rows[begin] += shift;
+    if (entries) for (let n = 0; n < 3; n += 1) this.rows[begin + BELT + n] += entries[n];
+    this.count += 1;
+  }
+
+  at(knot: number, column: number) {
+    return this.rows[knot * KNOT_ROW + column];
+  }
+
+  /** Lowest knot, m. */
+  get lowest() {
+    const sure = this.count - this.tip;
+    for (; this.seen < sure; this.seen += 1) {
+      this.low = Math.min(this.low, this.at(this.seen, Y));
+    }
+    return this.low;
+  }
+
+  /** The lowest of the first so many knots. */
+  low = Infinity;
+
+  seen = 0;
+
+  get begin() {
+    return this.count ? this.rows[0] : Infinity;
+  }
+
+  get end() {
+    return this.count ? this.at(this.count - 1, T) : -Infinity;
+  }
+
+  /** The last knot that is not after t. */
+  knotBefore(t: number) {
+    let low = 0;
+    let high = this.count - 1;
+    const { near } = this;
+    if (near < high && this.at(near, T) <= t) {
+      if (this.at(near + 1, T) > t) return near;
+      low = near;
+    }
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (this.at(middle, T) <= t) low = middle;
+      else high = middle;
+    }
+    this.near = low;
+    return low;
+  }
+
+  /** Forget what is after t, but for the state then.
+   * @param entries of the ledger then, J */
+  cut(t: number, entries: number[]) {
+    const state = this.state(t);
+    if (!state) {
+      this.count = 0;
+      this.tip = 0;
+    }
+    if (!state || this.end <= t) return;
+    const { x, y, vx, vy, spin } = state;
+    this.count = this.knotBefore(t) + 1;
+    this.turns.length = Math.min(this.turns.length, this.count);
+    this.low = Infinity;
+    this.seen = 0;
+    this.near = 0;
+    this.tip = 0;
+    this.add(new Float64Array([t, x, y, vx, vy, spin, ...entries, 0]), 0, null);
+  }
+
+  /** Position, velocity and spin; null before the release, and where the track ended after it. */
+  state(t: number): State | null {
+    if (!this.count || t < this.rows[0]) return null;
+    const last = this.count - 1;
+    if (t >= this.end) return this.stateOf(last, t > this.end && !this.live);
+    const i = this.knotBefore(t);
+    const h = this.at(i + 1, T) - this.at(i, T);
+    const s = (t - this.at(i, T)) / h;
+    const [x, vx] = this.curve(i, X, VX, h, s);
+    const [y, vy] = this.curve(i, Y, VY, h, s);
+    const spin = this.at(i, SPIN) * (1 - s) + this.at(i + 1, SPIN) * s;
+    return { x, y, vx, vy, spin, ended: false };
+  }
+
+  /** Place and velocity just before a time at which it is under way: before a blow, if one is
+   * then. */
+  before(t: number) {
+    let i = this.knotBefore(t);
+    while (i > 0 && this.at(i, T) >= t) i -= 1;
+    i = Math.min(i, this.count - 2);
+    const h = this.at(i + 1, T) - this.at(i, T), s = h > 0 ? (t - this.at(i, T)) / h : 1;
+    if (s >= 1) {
+      const [x, y, vx, vy] = [X, Y, VX, VY].map((column) => this.at(i + 1, column));
+      return { x, y, vx, vy };
+    }
+    const [x, vx] = this.curve(i, X, VX, h, s), [y, vy] = this.curve(i, Y, VY, h, s);
+    return { x, y, vx, vy };
+  }
+
+  stateOf(i: number, ended: boolean): State {
+    return {
+      x: this.at(i, X), y: this.at(i, Y), vx: this.at(i, VX), vy: this.at(i, VY),
+      spin: this.at(i, SPIN), ended,
+    };
+  }
+
+  /** A coordinate and its velocity at the share s of the time h between two knots. */
+  curve(i: number, place: number, pace: number, h: number, s: number) {
+    const a = this.at(i, place), va = this.at(i, pace), vb = this.at(i + 1, pace);
+    const dx = this.at(i + 1, place) - a;
+    const where = a
+      + s * (h * va + s * (3 * dx - h * (2 * va + vb) + s * (h * (va + vb) - 2 * dx)));
+    const slope = dx / h;
+    return [where, va + s * (2 * (3 * slope - 2 * va - vb) + 3 * s * (va + vb - 2 * slope))];
+  }
+
+  /** Points from a knot to the next, both among them: straight lines between them miss the track
+   * by `fine` (m). Over a time h a chord misses a curve by at most h²/8 times its largest
+   * acceleration, which a cubic has at one of its ends. */
+  chords(i: number, fine: number) {
+    const t = this.at(i, T), h = this.at(i + 1, T) - t;
+    const bends = [[X, VX], [Y, VY]].map(([place, pace]) => {
+      const way = 6 * (this.at(i + 1, place) - this.at(i, place));
+      const first = h * this.at(i, pace), last = h * this.at(i + 1, pace);
+      return [way - 4 * first - 2 * last, way - 2 * first - 4 * last];
+    });
+    const bent = Math.max(Math.hypot(bends[0][0], bends[1][0]),
+      Math.hypot(bends[0][1], bends[1][1]));
+    const parts = h > 0 ? Math.min(Math.ceil(Math.sqrt(bent / 8 / fine)), MOST_CHORDS) : 1;
+    const points = [{ t, x: this.at(i, X), y: this.at(i, Y) }];
+    for (let n = 1; n < parts; n += 1) {
+      const [x] = this.curve(i, X, VX, h, n / parts), [y] = this.curve(i, Y, VY, h, n / parts);
+      points.push({ t: t + (h * n) / parts, x, y });
+    }
+    points.push({ t: t + h, x: this.at(i + 1, X), y: this.at(i + 1, Y) });
+    return points;
+  }
+
+  /** By how much it has turned since its release, counterclockwise, rad. */
+  angle(t: number) {
+    if (!this.count || t <= this.begin) return 0;
+    const i = t >= this.end ? this.count - 1 : this.knotBefore(t);
+    for (let n = this.turns.length; n < this.count; n += 1) {
+      const h = n ? this.at(n, T) - this.at(n - 1, T) : 0;
+      const mean = n ? 0.5 * (this.at(n, SPIN) + this.at(n - 1, SPIN)) : 0;
+      this.turns.push(n ? this.turns[n - 1] + h * mean : 0);
+    }
+    const h = Math.min(t, this.end) - this.at(i, T);
+    const spin = (this.state(Math.min(t, this.end)) as State).spin;
+    return this.turns[i] + 0.5 * h * (this.at(i, SPIN) + spin);
+  }
+
+  /** Angle at each knot, as far as somebody has asked. */
+  turns: number[] = [];
+
+  /** Belt work, restitution loss and friction loss so far, J, straight between knots. */
+  entries(t: number) {
+    const i = t >= this.end ? this.count - 1 : this.knotBefore(t);
+    const h = i + 1 < this.count ? this.at(i + 1, T) - this.at(i, T) : 0;
+    const s = h > 0 ? Math.min(1, (t - this.at(i, T)) / h) : 0;
+    return [BELT, RESTITUTION, FRICTION].map((column) => {
+      const from = this.at(i, column);
+      return h > 0 ? from + s * (this.at(i + 1, column) - from) : from;
+    });
+  }
+}
+
+/** What each particle is called, whatever comes before it: by its stream, and which of it. */
+function namesOf({ releases, streams }: Machine) {
+  const count = streams.map(() => 0);
+  return releases.map(({ stream }) => {
+    count[stream] += 1;
+    return `${count[stream]} ${streams[stream]}`;
+  });
+}
+
+/** The tracks and events of a run, which may still go on. */
+class Recording {
+  tracks;
+  events: Event[] = [];
+  state = "running";
+  /** s up to which all is there. */
+  now = 0;
+  /** What a run that goes on after a change calls the particles, and what it adds to entries. */
+  renamed: { index: number, entries: number[], goesOn: boolean }[] | null = null;
+  shift = 0;
+  /** Belt work, restitution and friction loss by surface, and of the particles among each other,
+   * J, once the run is over; none if the scene was changed under way. */
+  books: number[][] | null = null;
+  /** By which the engine's solves broke their law of energy, J. */
+  gained = 0;
+
+  constructor(public machine: Machine) {
+    this.tracks = machine.releases.map(() => new Track());
+  }
+
+  add({ knots, tips, events, now, state, books = null, gained = 0 }: {
+    knots: Float64Array, tips: Float64Array, events: Event[], now: number, state: string,
+    books?: number[][] | null, gained?: number,
+  }) {
+    this.gained = gained;
+    this.books = this.renamed ? null : books;
+    const its = (disk: number) =>
+      this.renamed ? this.renamed[disk] : { index: disk, entries: null, goesOn: false };
+    for (const track of this.tracks) track.live = false;
+    for (const rows of [knots, tips]) {
+      for (let begin = 0; begin < rows.length; begin += KNOT_ROW) {
+        const row = rows.subarray(begin, begin + KNOT_ROW);
+        const { index, entries } = its(row[9]);
+        const track = this.tracks[index];
+        const isTip = rows === tips;
+        if (!(isTip && track.live)) track.dropTips();
+        track.live = isTip;
+        if (isTip && row[0] + this.shift < track.end) continue;
+        track.add(row, this.shift, entries);
+        if (isTip) track.tip += 1;
+      }
+    }
+    for (const event of events) {
+      const { index, goesOn } = its(event.disk);
+      // Who goes on after a change is not released once more.
+      if (goesOn && event.kind === RELEASE && event.t === 0) continue;
+      const other = event.other >= 0 ? its(event.other).index : event.other;
+      this.events.push({ ...event, t: event.t + this.shift, disk: index, other });
+    }
+    this.measure();
+    this.state = state;
+    this.now = state === "running" ? now + this.shift : Math.max(this.end, now + this.shift);
+  }
+
+  /** When the last track ends, and the first begins, s. */
+  get end() {
+    return this.span[1];
+  }
+
+  get begin() {
+    return this.span[0];
+  }
+
+  measure() {
+    let begin = Infinity, end = -Infinity;
+    for (const track of this.tracks) {
+      if (track.begin < begin) begin = track.begin;
+      if (track.end > end) end = track.end;
+    }
+    this.span = [begin, end];
+  }
+
+  span = [Infinity, -Infinity];
+
+  /** Forget what is after t, and return the machine by which a run goes on from there, in a time
+   * that begins then: with those under way, and with those still to come. */
+  goOn(t: number, machine: Machine): Machine {
+    const renamed: { index: number, entries: number[], goesOn: boolean }[] = [];
+    const releases: Machine["releases"] = [];
+    const spins: number[] = [];
+    // Where each is in the run so far: streams that come and go move those after them.
+    const earlier = new Map(namesOf(this.machine).map((name, index) => [name, index]));
+    const was = namesOf(machine).map((name) => earlier.get(name) ?? -1);
+    // What a change finds out of balance would stay so.
+    const booked = was.map((index) => {
+      const ledger = index < 0 ? null : this.ledgerOf(index, t);
+      return ledger
+        ? [ledger.belt_work, ledger.restitution_loss, ledger.friction_loss] : [0, 0, 0];
+    });
+    this.tracks = was.map((index) => this.tracks[index] ?? new Track());
+    this.events = this.renumbered(t, was, machine.surfaces);
+    machine.releases.forEach((release, index) => {
+      const track = this.tracks[index], entries = booked[index];
+      const ended = track.count > 0 && !track.live && track.end < t;
+      track.cut(t, entries);
+      const state = track.state(t);
+      if (ended) return;
+      renamed.push({ index, entries, goesOn: state !== null });
+      spins.push(state ? state.spin : 0);
+      if (state) {
+        const { x, y, vx, vy } = state;
+        // Whoever still rides the belt goes on riding.
+        const carried = release.carried && x < 0 && !this.hasLeft(index, t);
+        releases.push({ ...release, x, y, vx, vy, t: 0, carried });
+        track.tip = 1;
+      } else releases.push({ ...release, t: Math.max(0, release.t - t) });
+    });
+    this.measure();
+    this.machine = machine;
+    this.renamed = renamed;
+    this.shift = t;
+    this.books = null;
+    this.now = t;
+    this.state = "running";
+    const some = (values: number[]) => renamed.map(({ index }) => values[index]);
+    const gate = (piece: any) => ({
+      ...piece, appears: piece.appears - t, vanishes: piece.vanishes - t,
+    });
+    return {
+      ...machine, releases, spins, goesOn: renamed.map((its) => its.goesOn),
+      exitBoxes: renamed.map(({ index }) => machine.exitBoxes[index]),
+      radius: some(machine.radius), mass: some(machine.mass), inertia: some(machine.inertia),
+      segments: machine.segments.map(gate), arcs: machine.arcs.map(gate),
+      endTime: Math.max(0, machine.endTime - t),
+    };
+  }
+
+  /** Events up to t as a changed machine numbers particles and surfaces; of what was taken away
+   * nothing is left.
+   * @param was where each particle was */
+  renumbered(t: number, was: number[], surfaces: string[]) {
+    const now: Map<number, number> = new Map(was.map((index, n) => [index, n]));
+    const names = this.machine.surfaces;
+    return this.events.flatMap((event) => {
+      const disk = now.get(event.disk);
+      const other = event.other < 0 ? event.other : now.get(event.other);
+      if (event.t > t || disk === undefined || other === undefined) return [];
+      const surface = event.surface < names.length
+        ? surfaces.indexOf(names[event.surface]) : surfaces.length;
+      return [{ ...event, disk, other, surface }];
+    });
+  }
+
+  hasLeft(index: number, t: number) {
+    return this.events.some((event) =>
+      event.disk === index && event.kind === SEPARATION && event.t <= t);
+  }
+
+  /** The energy ledger of one particle; while it slips the balance gives the slip heat, while it is
+   * carried the belt's work, in flight what it leaves over is the residual. In a crowd particles
+   * give energy to each other, and the balance is that of all. */
+  ledgerOf(index: number, t: number): Ledger | null {
+    const track = this.tracks[index];
+    const state = track.state(t);
+    if (!state) return null;
+    const { machine } = this;
+    const mass = machine.mass[index], inertia = machine.inertia[index];
+    const kinetic = ({ vx, vy, spin }: State) =>
+      0.5 * mass * (vx * vx + vy * vy) + 0.5 * inertia * spin * spin;
+    const potential = ({ y }: State) => mass * machine.gravity * y;
+    const energy = (one: State) => kinetic(one) + potential(one);
+    const first = track.stateOf(0, false);
+    const start = energy(first);
+    const gain = energy(state) - start;
+    const i = t >= track.end ? track.count - 1 : track.knotBefore(t);
+    const j = Math.min(i + 1, track.count - 1);
+    let [belt, restitution, friction] = track.entries(t);
+    const residualAt = (k: number) => energy(track.stateOf(k, false)) - start
+      - (track.at(k, BELT) - track.at(k, RESTITUTION) - track.at(k, FRICTION));
+    let residual = residualAt(i);
+    if (!machine.interact) restitution = track.at(i, RESTITUTION);
+    const changes = (column: number) =>
+      !machine.interact && track.at(i, column) !== track.at(j, column);
+    if (changes(FRICTION)) friction = belt - restitution + residual - gain;
+    else if (changes(BELT)) belt = gain + restitution + friction - residual;
+    else residual = gain - (belt - restitution - friction);
+    return {
+      start, kinetic: kinetic(state), potential: potential(state), belt_work: belt,
+      restitution_loss: restitution, friction_loss: friction, residual,
+    };
+  }
+
+  /** The ledger of all particles that have been released. */
+  ledger(t: number): Ledger {
+    const total: Ledger = {
+      start: 0, kinetic: 0, potential: 0, belt_work: 0, restitution_loss: 0, friction_loss: 0,
+      residual: 0,
+    };
+    const names = Object.keys(total) as (keyof Ledger)[];
+    for (let index = 0; index < this.tracks.length; index += 1) {
+      const its = this.ledgerOf(index, t);
+      if (its) for (const name of names) total[name] += its[name];
+    }
+    return total;
+  }
+
+  /** Points of a track, its knots among them: straight lines between them miss it by `fine` (m). */
+  points(index: number, fine: number) {
+    const track = this.tracks[index];
+    const { count } = track;
+    if (!count) return [];
+    const points = Array.from({ length: count - 1 }, (_, i) => track.chords(i, fine).slice(1));
+    return [{ t: track.begin, x: track.at(0, X), y: track.at(0, Y) }, ...points.flat()];
+  }
+}
+
+export { Recording, Track };

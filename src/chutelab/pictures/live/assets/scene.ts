@@ -1,0 +1,324 @@
+// A scene as its file has it, and with all defaults: `resolve`. The same rules as in Python's
+// `chutelab.scene`, of which a page needs those about what can be edited. `keys.ts` changes keys.
+import { conflictsOf, listOf, misfitsOf, straysOf } from "./checks.ts";
+import type { Form } from "./forms.ts";
+
+export type Point = [number, number];
+/** Keys as a scene file has them */
+export type Given = Record<string, any>;
+
+/** What a key may hold */
+export interface Rule {
+  default?: any; // absent where a key has none
+  required?: boolean;
+  unit?: string;
+  low?: number;
+  high?: number;
+  form: Form;
+}
+
+/** What Python writes into the page, see `describe.py` */
+export interface Lab {
+  tables: Record<string, Record<string, Rule>>; // rules by table and key
+  presets: Record<string, Record<string, number>>; // materials by name
+}
+
+interface Particle {
+  name?: string;
+  shape: "disk" | "sphere";
+  radius: number; // the mean one where they differ
+  span?: Point; // the least and the largest radius where they differ
+  mass: number;
+  density?: number;
+  material?: string;
+  spin: boolean;
+  rolling_friction: number;
+  given: Given; // the keys that were written
+}
+
+interface Stream {
+  name: string;
+  particle?: string;
+  count: number;
+  rate: number; // particles per second
+  width?: number;
+  start: number;
+  bed_height: number;
+  speed_spread: number;
+  seed: number | string;
+  at?: Point;
+  to?: Point;
+  fill?: [Point, Point];
+  velocity?: Point;
+  interact: boolean;
+  restitution: number;
+  friction: number;
+  given: Given;
+}
+
+export interface Plate {
+  name?: string;
+  pivot?: Point;
+  distance: number;
+  angle_deg: number;
+  pivot_height: number;
+  above: number;
+  below?: number;
+  restitution: number;
+  friction: number;
+  given: Given;
+}
+
+export interface Surface {
+  name: string;
+  points?: Point[]; // of a straight one
+  center?: Point; // of an arc
+  radius: number;
+  from_deg: number;
+  to_deg: number;
+  restitution: number;
+  friction: number;
+  material: "steel" | "rubber";
+  speed: number;
+  opens_at?: number;
+  closes_at?: number;
+  repeat: [number, number, number][];
+  given: Given;
+}
+
+export interface Conveyor {
+  name: string;
+  from: Point;
+  to: Point;
+  pulley_radius: number;
+  speed: number;
+  restitution: number;
+  friction: number;
+  given: Given;
+}
+
+export interface Incoming {
+  speed: number;
+  pulley_radius: number;
+  length: number;
+  incline_deg: number;
+  friction: "adhesion" | number;
+  restitution: number;
+  given: Given;
+}
+
+interface Outgoing {
+  speed: number;
+  drop: number;
+  drop_from: "impact" | "top";
+  start: number;
+  length: number;
+  restitution: number;
+  friction: number;
+  given: Given;
+}
+
+/** All defaults filled in; names as in the file, but for three lists */
+export interface Scene {
+  title: string;
+  gravity: number;
+  particles: Particle[];
+  materials: Map<string, Record<string, number>>; // numbers by name, presets too
+  pair: { between: [string, string], restitution?: number, friction?: number }[];
+  incoming: Incoming | null;
+  plates: Plate[];
+  outgoing: Outgoing | null;
+  conveyor: Conveyor[];
+  surface: Surface[];
+  streams: Stream[];
+  run: { until: "landed" | "settled" | number, max_time: number, dt: number };
+  kinds: number[]; // which of the particles each stream consists of
+  crowded: boolean; // whether particles meet
+  most: number; // how many particles a page has room for
+  view: { from: Point, to: Point } | null; // corners of what is shown
+}
+
+/** What is wrong with a scene. */
+export class Fault extends Error {
+  /**
+   * @param key full path, such as `plate.angle_deg` or `surface[1].radius`
+   * @param value what was found there; undefined if the key is missing
+   * @param text id of a text in the catalogue
+   * @param words numbers and names for that text
+   */
+  constructor(
+    readonly key: string, readonly value: unknown, readonly text: string,
+    readonly words: Record<string, number | string> = {},
+  ) {
+    super(`${key}: ${text} ${JSON.stringify(words)}`);
+  }
+}
+
+/**
+ * Fills in all defaults.
+ * @throws {Fault} if a value is out of its range, or keys contradict each other
+ */
+export function resolve(given: Given, lab: Lab): Scene {
+  for (const wrong of misfitsOf(given, lab)) throw new Fault(...wrong);
+  const filled = (table: string, row: Given) => {
+    const values: Given = {};
+    for (const [key, rule] of Object.entries(lab.tables[table])) {
+      if (rule.default !== undefined) values[key] = rule.default;
+    }
+    return { ...values, ...row, given: row } as any;
+  };
+  const rows = (table: string) => {
+    return listOf(given[table]).map((row) => filled(table, row));
+  };
+  // A map, for a name may be one that every object has.
+  const materials = new Map(Object.entries(lab.presets));
+  for (const { name, ...own } of listOf(given.material)) {
+    for (const key of ["restitution", "friction"]) {
+      own[`${key}_steel`] ??= own[key];
+      own[`${key}_rubber`] ??= own[key];
+    }
+    materials.set(name, own as Record<string, number>);
+  }
+  const particles = given.particle === undefined ? [filled("particle", {})] : rows("particle");
+  const streams = given.stream === undefined ? [filled("stream", {})] : rows("stream");
+  const names = particles.map((kind) => kind.name);
+  const kinds: number[] = streams.map((stream) => {
+    return particles.length === 1 || stream.particle === undefined
+      ? 0 : names.indexOf(stream.particle);
+  });
+  for (const wrong of straysOf(given, names, [...materials.keys()])) throw new Fault(...wrong);
+  particles.forEach((kind) => fillMass(kind, materials));
+  streams.forEach((stream, n) => fillRate(stream, n, particles[kinds[n]]));
+  const incoming = given.incoming === undefined ? null : filled("incoming", given.incoming);
+  const outgoing = given.outgoing === undefined ? null : filled("outgoing", given.outgoing);
+  if (outgoing !== null && incoming !== null) outgoing.speed ??= incoming.speed;
+  const plates = rows("plate");
+  for (const plate of plates) {
+    if (plate.pivot === undefined && incoming !== null) {
+      plate.pivot_height ??= incoming.pulley_radius;
+    }
+  }
+  const surface = rows("surface");
+  for (const one of surface) {
+    if (one.from !== undefined) one.points = [one.from, one.to];
+  }
+  const run = filled("run", given.run ?? {});
+  run.until ??= outgoing === null ? "settled" : "landed";
+  const count = streams.reduce((sum, stream) => sum + stream.count, 0);
+  const scene: Scene = {
+    title: given.title ?? lab.tables.scene.title.default,
+    gravity: given.gravity ?? lab.tables.scene.gravity.default,
+    particles, materials, pair: given.pair ?? [], incoming, plates, outgoing,
+    conveyor: rows("conveyor"), surface, streams, run, kinds, view: given.view ?? null,
+    crowded: count > 1 && streams.some((stream) => stream.interact),
+    most: lab.tables.stream.count.high ?? Infinity,
+  };
+  for (const wrong of conflictsOf(scene, given)) throw new Fault(...wrong);
+  return scene;
+}
+
+/** Fills in the mean radius of particles, and the mass that goes with that. */
+function fillMass(kind: any, materials: Map<string, Record<string, number>>) {
+  let density = kind.density;
+  if (density === undefined && kind.material !== undefined && !("mass" in kind.given)) {
+    density = materials.get(kind.material)?.density;
+  }
+  if (Array.isArray(kind.radius)) {
+    kind.span = kind.radius;
+    kind.radius = 0.5 * (kind.span[0] + kind.span[1]);
+  }
+  if (density !== undefined) {
+    const size = kind.radius;
+    kind.mass = density * (4.0 / 3.0 * Math.PI) * (size * size * size);
+  }
+}
+
+/** Fills in a stream's name, and its rate in particles per second. */
+function fillRate(stream: any, number: number, kind: Particle) {
+  stream.name ??= number ? `stream${number + 1}` : "stream";
+  if (typeof stream.rate !== "string") return;
+  const found = /^ *(\d+\.?\d*(?:[eE][+-]?\d+)?) *t\/h *$/.exec(stream.rate);
+  let mass = kind.mass;
+  if (kind.span !== undefined) {
+    const [low, high] = kind.span;
+    const cube = kind.radius * kind.radius * kind.radius;
+    mass = kind.mass * 0.25 * (low + high) * (low * low + high * high) / cube;
+  }
+  stream.rate = Number(found?.[1]) / 3.6 / mass / slices(stream, kind);
+}
+
+/** Returns how many slices, each one particle thick, the material of a stream is wide. */
+export function slices({ width }: Stream, kind: Particle) {
+  return width === undefined ? 1.0 : width / (2.0 * kind.radius);
+}
+
+/**
+ * Returns restitution and friction of a kind of particles and another kind, or a surface.
+ * What a pair says counts first, then what the surface (or a stream of the kind) says, then the
+ * material, then the default. Of two kinds that nothing is said of it is the geometric mean of
+ * what each has with itself.
+ * @param other a kind, or the name of a surface
+ * @returns friction is Infinity with adhesion
+ */
+export function met(scene: Scene, kind: number, other: number | string): [number, number] {
+  const particle = scene.particles[kind];
+  let partner: string | undefined;
+  let values: [number, any];
+  if (typeof other === "string") {
+    partner = other;
+    const { steel, home, belt } = surfaceTable(scene, other);
+    values = ownValues(scene, particle, [home], steel ? "_steel" : "_rubber", belt);
+  } else if (other === kind) {
+    partner = particle.name;
+    const own = scene.streams.filter((_, n) => scene.kinds[n] === kind);
+    const homes = own.length ? own : [{ restitution: 0.5, friction: 0.3, given: {} }];
+    values = ownValues(scene, particle, homes, "", false);
+  } else {
+    partner = scene.particles[other].name;
+    const [a, b] = [met(scene, kind, kind), met(scene, other, other)];
+    values = [Math.sqrt(a[0] * b[0]), Math.sqrt(a[1] * b[1])];
+  }
+  let [restitution, friction] = values;
+  for (const pair of scene.pair.slice().reverse()) {
+    const [a, b] = pair.between;
+    const { name } = particle;
+    if ((a === name && b === partner) || (b === name && a === partner)) {
+      restitution = pair.restitution ?? restitution;
+      friction = pair.friction ?? friction;
+    }
+  }
+  return [restitution, friction === "adhesion" ? Infinity : friction];
+}
+
+/**
+ * @param homes tables that may say them
+ * @param column of the material
+ * @param grips whether friction is the belt's own matter
+ */
+function ownValues(
+  scene: Scene, particle: Particle, homes: { restitution: number, friction: any, given: Given }[],
+  column: string, grips: boolean,
+): [number, any] {
+  const material = particle.material === undefined ? null
+    : scene.materials.get(particle.material) ?? null;
+  const value = (key: "restitution" | "friction") => {
+    const said = homes.find((home) => key in home.given);
+    const own = said === undefined && !(grips && key === "friction");
+    return own && material !== null ? material[key + column] : (said ?? homes[0])[key];
+  };
+  return [value("restitution"), value("friction")];
+}
+
+/** Returns the table that a surface is from, by its name, and what it is made of. */
+export function surfaceTable(
+  scene: Scene, name: string,
+): { home: any, steel: boolean, belt: boolean } {
+  if (name === "incoming") return { home: scene.incoming, steel: false, belt: true };
+  if (name === "outgoing") return { home: scene.outgoing, steel: false, belt: false };
+  const plate = scene.plates.find((one) => (one.pivot ? one.name : "plate") === name);
+  if (plate !== undefined) return { home: plate, steel: true, belt: false };
+  const conveyor = scene.conveyor.find((one) => one.name === name);
+  if (conveyor !== undefined) return { home: conveyor, steel: false, belt: false };
+  const surface = scene.surface.find((one) => one.name === name);
+  return { home: surface, steel: surface?.material === "steel", belt: false };
+}

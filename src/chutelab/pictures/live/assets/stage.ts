@@ -1,0 +1,508 @@
+// The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
+
+import { openHandles } from "./controls.ts";
+import { ARROW, Handles, roundTo, valuesOf, type Handle } from "./handles.ts";
+import { historyOf } from "./stages.ts";
+import { View, boxOf } from "./view.ts";
+import type { Lab } from "./lab.ts";
+import type { Arc } from "./machine.ts";
+import type { Recording, Track } from "./recording.ts";
+import type { Words } from "./words.ts";
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** Tracks that are drawn at most; more are a blot. */
+const MOST_TRACKS = 40;
+
+/** Pixels of radius that a particle has at least, and where there are few, which one looks for. */
+const LEAST = 1.2, LEAST_FEW = 3;
+
+/** Pixels between the dashes that show a belt run. */
+const DASH = 26;
+
+/** By how much a line that is drawn may miss the track: pixels, and before there are any, the share
+ * of the machine. */
+const FINE = 0.2, FINE_SHARE = 1e-3;
+
+function svg(name: string, attributes: Record<string, unknown> = {}): any {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+  return element;
+}
+
+class Stage {
+  view;
+  show;
+  back;
+  canvas;
+  front;
+  surfaces;
+  paths;
+  grips;
+  over;
+  handles: Handle[] = [];
+  gripOf: Map<string, any> = new Map();
+  held: Handle | null = null;
+  fitted = false;
+
+  constructor(readonly home: HTMLElement, readonly lab: Lab, readonly words: Words) {
+    this.view = new View();
+    this.show = { strobe: true, trails: true, velocity: false, forces: false, handles: true };
+    this.back = svg("svg", { "aria-hidden": "true" });
+    this.canvas = document.createElement("canvas");
+    this.front = svg("svg", { role: "group" });
+    this.front.setAttribute("aria-label", words.say("stage"));
+    this.canvas.setAttribute("aria-hidden", "true");
+    home.append(this.back, this.canvas, this.front);
+    this.surfaces = svg("g", { class: "surfaces" });
+    this.paths = svg("g", { class: "paths" });
+    this.back.append(this.surfaces, this.paths);
+    this.grips = svg("g", { class: "grips" });
+    /** Further layers, of tools, lie below the handles. */
+    this.over = svg("g", { class: "over" });
+    this.front.append(this.over, this.grips);
+    new ResizeObserver(() => this.resize()).observe(home);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      this.colours.clear();
+      this.paint();
+    });
+    lab.on("scene", () => {
+      if (JSON.stringify(lab.scene?.view) === this.chosen) this.rebuild();
+      else this.fit();
+    });
+    lab.on("run", () => this.traced());
+    lab.on("time", () => this.paint());
+    this.listen();
+    this.resize();
+  }
+
+  /** A page in a frame that is hidden has no size yet: all is drawn once it has one. */
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.home;
+    if (!width || !height) return;
+    this.view.resize(width, height);
+    const dense = globalThis.devicePixelRatio || 1;
+    this.canvas.width = Math.round(width * dense);
+    this.canvas.height = Math.round(height * dense);
+    for (const layer of [this.back, this.front]) {
+      layer.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    }
+    if (!this.fitted || !this.moved) this.fit();
+    else this.rebuild();
+  }
+
+  /** Whether nothing of the run is shown yet that somebody is to predict. */
+  blind = false;
+
+  /** Whether somebody has chosen what is shown. */
+  moved = false;
+
+  fit() {
+    const { machine, recording, scene } = this.lab;
+    if (!machine) return;
+    const bare = boxOf(machine, []);
+    const fine = FINE_SHARE * Math.max(bare.right - bare.left, bare.top - bare.bottom);
+    const points = recording ? this.trackPoints(recording, fine).flat() : [];
+    const chosen = scene?.view;
+    if (chosen) {
+      const [[left, bottom], [right, top]] = [chosen.from, chosen.to];
+      this.view.fit({ left, bottom, right, top }, 0);
+    } else this.view.fit(boxOf(machine, points));
+    this.chosen = JSON.stringify(chosen);
+    this.fitted = points.length > 0;
+    this.moved = false;
+    this.rebuild();
+  }
+
+  /** `[view]` of the scene that is shown, as text. */
+  chosen: string | undefined;
+
+  /** @param fine m */
+  trackPoints(recording: Recording, fine: number) {
+    const shown = recording.machine.interact ? [] : recording.tracks.slice(0, MOST_TRACKS);
+    return shown.map((_, i) => recording.points(i, fine));
+  }
+
+  /** The run has come on: its tracks, and the first view once there is one. */
+  traced() {
+    const { recording } = this.lab;
+    if (recording && !this.fitted && recording.state !== "running") this.fit();
+    this.drawTracks();
+    this.paint();
+    for (const draw of this.drawers) draw();
+  }
+
+  /** What tools draw anew when the view, the machine or its run has changed. */
+  drawers: (() => void)[] = [];
+
+  rebuild() {
+    if (this.view.width < 2) return;
+    this.drawSurfaces();
+    this.drawTracks();
+    this.placeHandles();
+    this.paint();
+    for (const draw of this.drawers) draw();
+  }
+
+  drawSurfaces() {
+    const { machine } = this.lab;
+    if (!machine) return;
+    const { view } = this;
+    this.surfaces.replaceChildren();
+    this.running = [];
+    const line = (piece: any, path: string) => {
+      const gate = isFinite(piece.appears) || isFinite(piece.vanishes);
+      const name = machine.surfaces[piece.surface];
+      const kind = piece.speed ? "belt" : name === "plate" ? "plate" : "wall";
+      const element = svg("path", { d: path, class: `${kind}${gate ? " gate" : ""}` });
+      element.append(Object.assign(svg("title"), { textContent: name }));
+      this.surfaces.append(element);
+      if (gate) this.gates.push({ element, appears: piece.appears, vanishes: piece.vanishes });
+      if (piece.speed) this.run(path, piece.speed);
+    };
+    this.gates = [];
+    if (machine.pulley) {
+      const { radius, speed } = machine.pulley;
+      this.surfaces.append(this.wheel(0, 0, radius, speed));
+    }
+    for (const piece of machine.segments) {
+      const end = [piece.x + piece.tx * piece.length, piece.y + piece.ty * piece.length];
+      line(piece, `M${view.px(piece.x)} ${view.py(piece.y)}L${view.px(end[0])} ${view.py(end[1])}`);
+    }
+    for (const arc of machine.arcs) {
+      if (arc.extent >= 2 * Math.PI && arc.speed) {
+        this.surfaces.append(this.wheel(arc.x, arc.y, arc.radius, arc.speed));
+      } else line(arc, this.arcPath(arc));
+    }
+  }
+
+  gates: { element: any, appears: number, vanishes: number }[] = [];
+
+  running: { element: any, speed: number, x?: number, y?: number, radius?: number }[] = [];
+
+  arcPath({ x, y, radius, begin, extent }: Arc) {
+    const { view } = this, r = radius * view.scale;
+    const at = (angle: number) =>
+      `${view.px(x + radius * Math.cos(angle))} ${view.py(y + radius * Math.sin(angle))}`;
+    const parts = extent >= 2 * Math.PI ? 2 : 1;
+    let path = `M${at(begin)}`;
+    for (let n = 1; n <= parts; n += 1) {
+      const wide = extent / parts > Math.PI ? 1 : 0;
+      path += `A${r} ${r} 0 ${wide} 0 ${at(begin + (extent * n) / parts)}`;
+    }
+    return path;
+  }
+
+  /** Dashes along a belt that move with it. @param speed m/s */
+  run(path: string, speed: number) {
+    const element = svg("path", { d: path, class: "dashes", "stroke-dasharray": `3 ${DASH - 3}` });
+    this.surfaces.append(element);
+    this.running.push({ element, speed });
+  }
+
+  /** A pulley with spokes. @param speed m/s, clockwise */
+  wheel(x: number, y: number, radius: number, speed: number) {
+    const { view } = this, r = radius * view.scale, group = svg("g", { class: "wheel" });
+    const spokes = svg("g");
+    group.append(svg("circle", { cx: view.px(x), cy: view.py(y), r }), spokes);
+    for (let n = 0; n < 3; n += 1) {
+      const [c, s] = [Math.cos((n * Math.PI) / 3) * r * 0.8, Math.sin((n * Math.PI) / 3) * r * 0.8];
+      spokes.append(svg("path", {
+        d: `M${view.px(x) - c} ${view.py(y) - s}L${view.px(x) + c} ${view.py(y) + s}`,
+      }));
+    }
+    this.running.push({ element: spokes, speed, x: view.px(x), y: view.py(y), radius });
+    return group;
+  }
+
+  drawTracks() {
+    const { recording } = this.lab, { view } = this;
+    this.paths.replaceChildren();
+    if (!recording || !this.show.trails || this.blind) return;
+    const { envelopes = [] } = historyOf(this.lab) ?? {};
+    for (const { stream, lines } of envelopes) this.drawEnvelope(stream, lines);
+    if (envelopes.length) return;
+    for (const points of this.trackPoints(recording, FINE / view.scale)) {
+      if (points.length < 2) continue;
+      const line = points.map(({ x, y }) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`);
+      this.paths.append(svg("polyline", { points: line.join(" "), class: "track" }));
+    }
+  }
+
+  /** Lines of an envelope: the band between the outer two, and the middle one.
+   * @param lines m */
+  drawEnvelope(stream: number, lines: [number, number][][]) {
+    const { view } = this;
+    const [right, middle, left] = lines.map((line) => line.filter(([x]) => isFinite(x))
+      .map(([x, y]) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`));
+    const band = svg("polygon", { points: [...right, ...left.reverse()].join(" "), class: "envelope" });
+    if (this.isMixed) band.style.fill = `var(--kind-${stream % 5})`;
+    band.append(Object.assign(svg("title"), { textContent: this.words.say("envelope") }));
+    this.paths.append(band, svg("polyline", { points: middle.join(" "), class: "track" }));
+  }
+
+  /** Whether particles are coloured by their stream. */
+  get isMixed() {
+    return (this.lab.scene?.kinds.length ?? 0) > 1;
+  }
+
+  /** Particles, and what moves. */
+  paint() {
+    const { lab, view, canvas } = this;
+    const { recording, machine, t } = lab;
+    const context = canvas.getContext("2d");
+    if (!context || !recording || !machine) return;
+    const dense = globalThis.devicePixelRatio || 1;
+    context.setTransform(dense, 0, 0, dense, 0, 0);
+    context.clearRect(0, 0, view.width, view.height);
+    for (const { element, speed, x, y, radius } of this.running) {
+      const turned = radius ? ((speed * t) / radius) * (180 / Math.PI) : 0;
+      if (radius) element.setAttribute("transform", `rotate(${turned} ${x} ${y})`);
+      else element.setAttribute("stroke-dashoffset", String(-((speed * t * view.scale) % DASH)));
+    }
+    for (const { element, appears, vanishes } of this.gates) {
+      element.classList.toggle("absent", t < appears || t >= vanishes);
+    }
+    const few = recording.tracks.length <= MOST_TRACKS;
+    const ink = this.colour(few ? "few" : "particle"), rim = this.colour("ink");
+    if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
+    const spins = machine.inertia.some((value) => value > 0);
+    context.lineWidth = 1;
+    const { isMixed } = this;
+    for (let i = 0; i < recording.tracks.length; i += 1) {
+      const state = recording.tracks[i].state(t);
+      if (!state || (state.ended && recording.tracks.length > 1)) continue;
+      const x = view.px(state.x), y = view.py(state.y);
+      const r = Math.max(few ? LEAST_FEW : LEAST, (machine.radius[i] ?? 0) * view.scale);
+      if (x < -r || x > view.width + r || y < -r || y > view.height + r) continue;
+      context.beginPath();
+      context.arc(x, y, r, 0, 2 * Math.PI);
+      const stream = machine.releases[i]?.stream ?? 0;
+      context.fillStyle = isMixed ? this.colour(`kind-${stream % 5}`) : ink;
+      context.fill();
+      if (r > 3) {
+        context.strokeStyle = rim;
+        context.stroke();
+      }
+      if (spins && r > 3) this.mark(context, recording.tracks[i], t, x, y, r, rim);
+    }
+    for (const draw of this.painters) draw(context);
+  }
+
+  /** Further things that are painted over the particles. */
+  painters: ((context: CanvasRenderingContext2D) => void)[] = [];
+
+  /** A colour of page.css, of the theme that is on. */
+  colour(name: string) {
+    const known = this.colours.get(name)
+      ?? getComputedStyle(this.home).getPropertyValue(`--${name}`);
+    this.colours.set(name, known);
+    return known;
+  }
+
+  /** To ask for each takes longer than to paint a particle. */
+  colours: Map<string, string> = new Map();
+
+  /** A radius that shows how a particle turns. */
+  mark(
+    context: CanvasRenderingContext2D, track: Track, t: number, x: number, y: number, r: number,
+    ink: string,
+  ) {
+    const angle = track.angle(t);
+    context.strokeStyle = ink;
+    context.beginPath();
+    context.moveTo(x, y);
+    context.lineTo(x + r * Math.cos(angle), y - r * Math.sin(angle));
+    context.stroke();
+  }
+
+  /** Dots at round times on the first tracks. */
+  strobe(context: CanvasRenderingContext2D) {
+    const { recording } = this.lab;
+    if (!recording) return;
+    const step = this.strobeStep;
+    context.fillStyle = this.colour("track");
+    for (const track of recording.tracks.slice(0, 1)) {
+      for (let n = Math.ceil(track.begin / step - 1e-9); n * step <= track.end; n += 1) {
+        const state = track.state(n * step);
+        if (!state) continue;
+        context.beginPath();
+        context.arc(this.view.px(state.x), this.view.py(state.y), 2.6, 0, 2 * Math.PI);
+        context.fill();
+      }
+    }
+  }
+
+  /** A round time, s, that gives a track some twenty dots. */
+  get strobeStep() {
+    const track = this.lab.recording?.tracks[0];
+    const span = track?.count ? track.end - track.begin : 1;
+    const rough = Math.max(span, 1e-6) / 20, ten = 10 ** Math.floor(Math.log10(rough));
+    return [1, 2, 5, 10].map((n) => n * ten).find((step) => step >= rough) ?? 10 * ten;
+  }
+
+  placeHandles() {
+    const { machine, scene } = this.lab;
+    if (!machine || !scene) return;
+    const { data } = this.lab;
+    this.handles = this.show.handles
+      ? openHandles(new Handles(scene, machine, data).list, data) : [];
+    for (const more of this.further) this.handles.push(...more());
+    const wanted = new Set(this.handles.map(({ id }) => id));
+    for (const [id, grip] of this.gripOf) {
+      if (wanted.has(id)) continue;
+      // Where its focus went to, the space bar plays as it does on a handle.
+      if (grip === document.activeElement) document.getElementById("play")?.focus();
+      grip.remove();
+      this.gripOf.delete(id);
+    }
+    for (const handle of this.handles) {
+      const grip = this.gripOf.get(handle.id) ?? this.newGrip(handle.id);
+      this.describe(grip, handle);
+      // Put in anew it would lose the focus.
+      if (!grip.isConnected) this.grips.append(grip);
+    }
+  }
+
+  /** Handles of tools. */
+  further: (() => Handle[])[] = [];
+
+  newGrip(id: string) {
+    const grip = svg("g", { class: "grip", role: "slider", tabindex: 0, "data-id": id });
+    grip.append(svg("path", { class: "stem" }), svg("circle", { class: "room", r: 20 }),
+      svg("path", { class: "knob" }));
+    this.gripOf.set(id, grip);
+    return grip;
+  }
+
+  describe(grip: any, handle: Handle) {
+    const { view, words } = this, x = view.px(handle.x), y = view.py(handle.y);
+    grip.setAttribute("transform", `translate(${x} ${y})`);
+    const [stem, , knob] = grip.children;
+    knob.setAttribute("d", KNOBS[handle.shape]);
+    if (handle.from) {
+      const [u, v] = [view.px(handle.from[0]) - x, view.py(handle.from[1]) - y];
+      stem.setAttribute("d", `M${u} ${v}L0 0`);
+      const angle = (Math.atan2(-v, -u) * 180) / Math.PI;
+      knob.setAttribute("transform", u || v ? `rotate(${angle})` : "");
+    }
+    const [first] = handle.axes;
+    const name = `${words.name(handle.surface)}: ${words.say(`handle-${handle.what}`)}`;
+    const values = handle.says ? [handle.says]
+      : handle.axes.filter(({ step }) => step).map((axis) => words.value(axis));
+    grip.setAttribute("aria-label", name);
+    // Such an attribute has no exponent: a bound above 0 may be the least number that is.
+    const plain = (value: number) => String(Math.round(1e6 * value) / 1e6);
+    grip.setAttribute("aria-valuenow", plain(first.value));
+    grip.setAttribute("aria-valuetext", values.join(", "));
+    if (isFinite(first.low)) grip.setAttribute("aria-valuemin", plain(first.low));
+    if (isFinite(first.high)) grip.setAttribute("aria-valuemax", plain(first.high));
+    handle.axes.forEach(({ value }, n) => { if (!isFinite(value)) handle.axes[n].value = 0; });
+  }
+
+  listen() {
+    this.front.addEventListener("pointerdown", (event: PointerEvent) => {
+      const grip = (event.target as Element).closest(".grip");
+      if (!grip || !this.take(grip.getAttribute("data-id") ?? "")) return;
+      event.preventDefault();
+      (grip as any).focus();
+      this.front.setPointerCapture(event.pointerId);
+    });
+    this.front.addEventListener("pointermove", (event: PointerEvent) => {
+      if (!this.held) return;
+      const [px, py] = this.placeOf(event);
+      this.latest = [this.view.worldX(px), this.view.worldY(py)];
+      // More events than frames come: the latest counts.
+      if (!this.waiting) this.waiting = requestAnimationFrame(() => this.follow());
+    });
+    for (const end of ["pointerup", "pointercancel"]) {
+      this.front.addEventListener(end, () => {
+        if (!this.held) return;
+        this.follow();
+        this.letGo();
+      });
+    }
+    this.front.addEventListener("keydown", (event: KeyboardEvent) => {
+      const grip = (event.target as Element).closest(".grip");
+      const handle = this.handles.find(({ id }) => id === grip?.getAttribute("data-id"));
+      if (handle && this.nudge(handle, event)) event.preventDefault();
+    });
+  }
+
+  /** Where the pointer has moved since the last frame. */
+  latest: [number, number] | undefined;
+
+  waiting = 0;
+
+  placeOf(event: PointerEvent): [number, number] {
+    const box = this.front.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  follow() {
+    cancelAnimationFrame(this.waiting);
+    this.waiting = 0;
+    if (this.latest) this.dragTo(...this.latest);
+    this.latest = undefined;
+  }
+
+  /** Take hold of a handle. */
+  take(id: string) {
+    this.held = this.handles.find((handle) => handle.id === id) ?? null;
+    this.gripOf.get(id)?.classList.add("held");
+    return this.held;
+  }
+
+  /** Move what is held to a place in the world, m. */
+  dragTo(x: number, y: number) {
+    if (!this.held) return;
+    const { snap } = this.view, { axes } = this.held;
+    const fine: Record<string, number> = {
+      degrees: 0.5, "m/s": Math.max(0.01, 0.5 * 10 ** Math.ceil(Math.log10(snap / ARROW))),
+    };
+    if (this.held.change) {
+      this.held.change(this.held.drag(x, y));
+      return;
+    }
+    const numbers = this.held.drag(x, y).map((value, n) =>
+      roundTo(value, fine[axes[n].unit] ?? snap));
+    this.lab.change(valuesOf(this.held, numbers), { done: false });
+  }
+
+  letGo() {
+    if (!this.held) return;
+    this.gripOf.get(this.held.id)?.classList.remove("held");
+    this.held = null;
+    this.lab.settle();
+  }
+
+  nudge(handle: Handle, { key, shiftKey }: KeyboardEvent): boolean {
+    const ways: Record<string, [number, number]> = {
+      ArrowRight: [0, 1], ArrowLeft: [0, -1], ArrowUp: [1, 1], ArrowDown: [1, -1],
+      PageUp: [0, 10], PageDown: [0, -10],
+    };
+    if (!(key in ways)) return false;
+    const [which, sign] = ways[key];
+    const free = handle.axes.map(({ step }, n) => (step ? n : -1)).filter((n) => n >= 0);
+    const n = free[Math.min(which, free.length - 1)];
+    const numbers = handle.axes.map(({ value }) => value);
+    const step = handle.axes[n].step * (shiftKey ? 0.1 : 1);
+    numbers[n] = roundTo(numbers[n] + sign * step, step);
+    if (handle.change) {
+      handle.change(numbers);
+      return true;
+    }
+    const axes = handle.axes.filter((axis, i) => i === n || axis.part !== undefined || !axis.step);
+    const kept = axes.map((axis) => numbers[handle.axes.indexOf(axis)]);
+    this.lab.change(valuesOf({ ...handle, axes }, kept));
+    return true;
+  }
+}
+
+const KNOBS = {
+  point: "M-7 0A7 7 0 1 0 7 0A7 7 0 1 0 -7 0Z",
+  turn: "M0 -8L8 0L0 8L-8 0Z",
+  arrow: "M-6 -7L8 0L-6 7Z",
+};
+
+export { Stage, svg };

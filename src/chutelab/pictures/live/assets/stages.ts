@@ -1,0 +1,125 @@
+// What has happened to each particle, kept as the events of a run come in.
+
+import { Arrivals } from "./arrival.ts";
+import { FEWEST } from "./crowd.ts";
+import { envelopesOf, type Envelope } from "./envelope.ts";
+import type { Event } from "./core.ts";
+import type { Lab } from "./lab.ts";
+import type { Recording } from "./recording.ts";
+import type { Scene } from "./scene.ts";
+
+/** Separation, impact, landing */
+export type Stages = { left?: Event, hit?: Event, down?: Event };
+/** Impulse, N s */
+type Blow = { t: number, x: number, y: number, px: number, py: number };
+
+const STAGE = { separation: 1, impact: 3, landing: 4, collision: 5 };
+
+/** By how much longer a run has to be for its envelopes to be made anew. */
+const LONGER = 1.2;
+
+/** The name of the plate that the paper's numbers are about. */
+const plateName = ({ plates }: Scene) => (plates[0]?.pivot && plates[0].name) || "plate";
+
+class RunHistory {
+  events;
+  target;
+  seen = 0;
+  /** The first separation, impact on the damping plate and landing of each particle. */
+  stages: Stages[];
+  /** First landings in the order of time. */
+  landings: Event[] = [];
+  /** All impacts in the order of time. */
+  blows: Blow[] = [];
+  largestBlow = 0;
+  arrivals;
+  state;
+  /** s from which on envelopes are made anew. */
+  enveloped = -Infinity;
+
+  /** @param plate its name */
+  constructor(readonly recording: Recording, plate: string) {
+    this.events = recording.events;
+    this.target = recording.machine.surfaces.indexOf(plate);
+    this.stages = recording.machine.releases.map(() => ({}));
+    this.arrivals = new Arrivals(recording);
+    this.state = recording.state;
+    this.update();
+  }
+
+  /** Whether it is of this run, and nothing has been forgotten of it since. */
+  isOf(recording: Recording) {
+    return this.recording === recording && this.events === recording.events
+      && this.stages.length === recording.machine.releases.length;
+  }
+
+  /** The envelopes of the streams, as far as the run has come. */
+  get envelopes() {
+    const { recording, arrivals } = this, { now, begin, state } = recording;
+    const t = state === "running" ? now : Infinity;
+    const released = recording.tracks.filter(({ count }) => count).length;
+    if (released >= FEWEST && t > this.enveloped) {
+      this.enveloped = begin + LONGER * (t - begin);
+      this.paths = envelopesOf(recording, arrivals.found);
+    }
+    return this.paths;
+  }
+
+  paths: Envelope[] = [];
+
+  /** Take in what is new. */
+  update() {
+    const { events, recording } = this, begin = this.seen;
+    // At the end the whole run is looked at, as in Python.
+    if (recording.state === this.state) this.arrivals.update();
+    else this.arrivals = new Arrivals(recording);
+    this.state = recording.state;
+    for (; this.seen < events.length; this.seen += 1) this.add(events[this.seen]);
+    if (begin === this.seen) return;
+    // Particles that do not meet are run one after the other.
+    this.landings.sort((a, b) => a.t - b.t);
+    this.blows.sort((a, b) => a.t - b.t);
+  }
+
+  add(event: Event) {
+    const { kind, disk, before, after, t, x, y } = event, its = this.stages[disk];
+    if ([STAGE.impact, STAGE.landing, STAGE.collision].includes(kind)) {
+      const mass = this.recording.machine.mass[disk];
+      const px = mass * (after[0] - before[0]), py = mass * (after[1] - before[1]);
+      this.blows.push({ t, x, y, px, py });
+      this.largestBlow = Math.max(this.largestBlow, Math.hypot(px, py));
+    }
+    if (kind === STAGE.separation) its.left ??= event;
+    else if (kind === STAGE.impact && event.surface === this.target) its.hit ??= event;
+    else if (kind === STAGE.landing && !its.down) {
+      its.down = event;
+      this.landings.push(event);
+    }
+  }
+
+  /** Impacts after one time, up to another. @param to s */
+  blowsBetween(from: number, to: number) {
+    const { blows } = this;
+    let low = 0, high = blows.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (blows[middle].t > from) high = middle;
+      else low = middle + 1;
+    }
+    let end = low;
+    while (end < blows.length && blows[end].t <= to) end += 1;
+    return blows.slice(low, end);
+  }
+}
+
+let latest: RunHistory | undefined;
+
+/** The history of a lab's run as it is now; all that show it share it. */
+function historyOf({ recording, scene }: Lab) {
+  if (!recording || !scene) return null;
+  if (latest?.isOf(recording)) latest.update();
+  else latest = new RunHistory(recording, plateName(scene));
+  return latest;
+}
+
+export { RunHistory, historyOf };

@@ -1,0 +1,162 @@
+// The paper's symbols in the picture, at what they stand for: angle, speeds, times and lengths of
+// the first particle's transfer.
+
+import { SYMBOLS } from "./numbers.ts";
+import { historyOf } from "./stages.ts";
+import { svg, type Stage } from "./stage.ts";
+import type { Event } from "./core.ts";
+
+/** Its middle, px, and the side of its point that is tried first, rad counterclockwise from the
+ * right */
+type Label = { text: string, x: number, y: number, side?: number };
+type Space = { left: number, top: number, right: number, bottom: number };
+
+/** Height of a letter and width of one, px. */
+const TALL = 16, WIDE = 8;
+
+/** A label's distance from its point, px, in the order in which they are tried. */
+const AWAY = [15, 24, 34, 46, 60];
+
+/** An angle that is smaller is not drawn, rad. */
+const LEAST_ANGLE = 0.03;
+
+const overlap = (a: Space, b: Space) =>
+  a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+
+function spaceOf({ text, x, y }: Label): Space {
+  const half = 0.5 * WIDE * text.length + 1;
+  return { left: x - half, right: x + half, top: y - 0.5 * TALL, bottom: y + 0.5 * TALL };
+}
+
+/** Labels near their points, each where none is yet, or at the first place if there is none free.
+ * @param wanted at their points */
+function placed(wanted: Label[], taken: Space[]): Label[] {
+  const spaces = [...taken];
+  return wanted.map(({ text, x, y, side = Math.PI / 4 }) => {
+    const places = AWAY.flatMap((far) => Array.from({ length: 8 }, (_, n) => {
+      const angle = side + (n * Math.PI) / 4;
+      return { text, x: x + far * Math.cos(angle), y: y - far * Math.sin(angle) };
+    }));
+    const place = places.find((one) => !spaces.some((space) => overlap(space, spaceOf(one))))
+      ?? places[0];
+    spaces.push(spaceOf(place));
+    return place;
+  });
+}
+
+class Symbols {
+  layer;
+
+  constructor(readonly stage: Stage) {
+    this.layer = svg("g", { class: "symbols" });
+    stage.back.append(this.layer);
+    stage.drawers.push(() => this.draw());
+  }
+
+  shown = true;
+
+  draw() {
+    const { stage, layer } = this, { recording } = stage.lab;
+    layer.replaceChildren();
+    if (!this.shown || !recording || recording.machine.interact) return;
+    const { left, hit, down } = historyOf(stage.lab)?.stages[0] ?? {}, { view } = stage;
+    this.wanted = [];
+    const edges = [
+      { left: -Infinity, right: Infinity, top: -Infinity, bottom: 0 },
+      { left: -Infinity, right: Infinity, top: view.height, bottom: Infinity },
+    ];
+    const taken: Space[] = edges.concat(stage.handles.map(({ x, y }) => {
+      const [px, py] = [view.px(x), view.py(y)];
+      return { left: px - 9, right: px + 9, top: py - 9, bottom: py + 9 };
+    }));
+    if (left) this.separation(left);
+    if (hit) {
+      this.dot(hit);
+      this.label("v2", hit.x, hit.y, [-1, 1]);
+      this.label("v2r", hit.x, hit.y, [-1, -1]);
+    }
+    if (left && hit) this.flight("t2", left, hit);
+    if (hit && down) {
+      this.flight("t3", hit, down);
+      const below = view.py(down.y) + 16, beside = Math.max(view.px(hit.x), view.px(down.x));
+      this.measure("x3", [view.px(down.x), below], [view.px(hit.x), below],
+        [view.py(down.y), view.py(hit.y)]);
+      this.measure("d2", [beside + 22, view.py(hit.y)], [beside + 22, view.py(down.y)],
+        [view.px(hit.x), view.px(down.x)]);
+      const { pulley, radius } = recording.machine;
+      if (pulley) {
+        this.measure("d3", [beside + 48, view.py(pulley.radius + radius[0])],
+          [beside + 48, view.py(down.y)], [view.px(0), view.px(down.x)]);
+      }
+    }
+    if (down) {
+      this.dot(down);
+      this.label("v3", down.x, down.y, [-1, 1]);
+    }
+    for (const { text, x, y } of placed(this.wanted, taken)) {
+      const element = svg("text", { x, y: y + 5, "text-anchor": "middle" });
+      element.textContent = text;
+      layer.append(element);
+    }
+  }
+
+  wanted: Label[] = [];
+
+  /** @param y m
+   * @param way from the point to its label */
+  label(id: string, x: number, y: number, way: number[] = [1, 1]) {
+    const { view } = this.stage;
+    const side = Math.atan2(way[1], way[0]);
+    this.wanted.push({ text: SYMBOLS[id][0], x: view.px(x), y: view.py(y), side });
+  }
+
+  dot({ x, y }: { x: number, y: number }) {
+    const { view } = this.stage;
+    this.layer.append(svg("circle", { cx: view.px(x), cy: view.py(y), r: 3 }));
+  }
+
+  /** Where the particle leaves, and the angle of that from the top of the pulley. */
+  separation(left: Event) {
+    const { view } = this.stage;
+    const far = Math.hypot(left.x, left.y), angle = Math.atan2(left.x, left.y);
+    this.dot(left);
+    this.label("v1", left.x, left.y);
+    if (angle < LEAST_ANGLE) {
+      this.wanted.push({ text: "φ₁ = 0", x: view.px(left.x), y: view.py(left.y) });
+      return;
+    }
+    const r = 0.6 * far, [x, y] = [view.px(0), view.py(0)];
+    const tip = [view.px(r * Math.sin(angle)), view.py(r * Math.cos(angle))];
+    this.layer.append(svg("path", {
+      d: `M${x} ${view.py(far)}V${y}L${view.px(left.x)} ${view.py(left.y)}`
+        + `M${x} ${view.py(r)}A${r * view.scale} ${r * view.scale} 0 0 1 ${tip[0]} ${tip[1]}`,
+    }));
+    const way = [Math.sin(0.5 * angle), Math.cos(0.5 * angle)];
+    this.label("phi1", r * way[0], r * way[1], way);
+  }
+
+  /** A name at the middle of a flight. */
+  flight(id: string, from: Event, to: Event) {
+    const { recording } = this.stage.lab;
+    const state = recording?.tracks[0].state(0.5 * (from.t + to.t));
+    if (state) this.label(id, state.x, state.y);
+  }
+
+  /** A length, upright or level, between the tips of two arrows.
+   * @param from px @param to px
+   * @param points px: where the lines from the ends to what is measured begin */
+  measure(id: string, from: number[], to: number[], points: number[]) {
+    const level = from[1] === to[1];
+    if (Math.hypot(to[0] - from[0], to[1] - from[1]) < 6) return;
+    const ends = [from, to].map(([x, y], n) => (level ? `M${x} ${points[n]}V${y + 4}`
+      : `M${points[n]} ${y}H${x + 4}`));
+    this.layer.append(svg("path", { d: ends.join(""), class: "thin" }),
+      svg("path", { d: `M${from[0]} ${from[1]}L${to[0]} ${to[1]}`, class: "length" }));
+    this.wanted.push({
+      text: SYMBOLS[id][0], x: 0.5 * (from[0] + to[0]), y: 0.5 * (from[1] + to[1]),
+      side: level ? Math.PI : 0,
+    });
+  }
+}
+
+export { Symbols, placed, spaceOf };

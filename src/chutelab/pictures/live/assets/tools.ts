@@ -1,0 +1,369 @@
+// What measures in the picture, tape, angle, stop watch and tracer, and what the picture shows.
+
+import { roundUp } from "./chart.ts";
+import { eased, html } from "./panels.ts";
+import { svg, type Stage } from "./stage.ts";
+import type { Handle } from "./handles.ts";
+import type { Lab } from "./lab.ts";
+import type { Track, State } from "./recording.ts";
+import type { Symbols } from "./symbols.ts";
+import type { Words } from "./words.ts";
+
+type Point = [number, number];
+
+/** A strobe dot that is so near is meant, px; a track farther away is not. */
+const MAGNET = 8, REACH = 26;
+
+/** Tracks that are traced at most, as many as are drawn. */
+const MOST_TRACED = 40;
+
+/** Steps of the search for the nearest point of a track. */
+const COARSE = 200, FINER = 30;
+
+/** When a track is nearest to a place: the nearest of many points, then closed in on.
+ * @param y m
+ * @returns s and m */
+function nearestOn(track: Track, x: number, y: number): { t: number, far: number } {
+  const { begin, end } = track;
+  const far = (t: number) => {
+    const state = track.state(Math.min(end, Math.max(begin, t)));
+    return state ? Math.hypot(state.x - x, state.y - y) : Infinity;
+  };
+  const step = (end - begin) / COARSE;
+  let at = begin;
+  for (let n = 1; n <= COARSE; n += 1) if (far(begin + n * step) < far(at)) at = begin + n * step;
+  let [low, high] = [Math.max(begin, at - step), Math.min(end, at + step)];
+  for (let n = 0; n < FINER; n += 1) {
+    const a = low + (high - low) / 3, b = high - (high - low) / 3;
+    if (far(a) < far(b)) high = b;
+    else low = a;
+  }
+  const t = 0.5 * (low + high);
+  return { t, far: far(t) };
+}
+
+/** The angle at a corner between the ways to two points, degrees from 0 to 180. */
+function angleBetween([x, y]: Point, [ax, ay]: Point, [bx, by]: Point) {
+  const [ux, uy, vx, vy] = [ax - x, ay - y, bx - x, by - y];
+  return (Math.atan2(Math.abs(ux * vy - uy * vx), ux * vx + uy * vy) * 180) / Math.PI;
+}
+
+/** A watch that runs with the picture's time, backwards too. */
+class StopWatch {
+  /** s before it was started last */
+  before = 0;
+
+  /** When it was started; null while it stands. */
+  since: number | null = null;
+
+  laps: number[] = [];
+
+  reading(t: number) {
+    return this.before + (this.since === null ? 0 : t - this.since);
+  }
+
+  /** Start or stop it. */
+  toggle(t: number) {
+    const reading = this.reading(t);
+    this.since = this.since === null ? t : null;
+    this.before = reading;
+  }
+
+  lap(t: number) {
+    this.laps.push(this.reading(t));
+  }
+
+  reset() {
+    this.before = 0;
+    this.since = null;
+    this.laps = [];
+  }
+}
+
+class Tools {
+  layer;
+  bar;
+  strobe;
+  panel;
+  dial?: any;
+  laps?: any;
+  starter?: any;
+
+  constructor(
+    home: Element, readonly lab: Lab, readonly stage: Stage, readonly words: Words,
+    symbols: Symbols,
+  ) {
+    this.layer = svg("g", { class: "measures", "aria-hidden": "true" });
+    stage.over.append(this.layer);
+    this.bar = html("div", { class: "tools", role: "group", "aria-label": words.say("tools") });
+    home.append(this.bar);
+    for (const name of ["tape", "protractor", "watch", "tracer"] as const) {
+      const button = html("button", { type: "button", id: `tool-${name}`, "aria-pressed": "false" },
+        words.say(`name-${name}`));
+      button.addEventListener("click", () => this.toggle(name, button));
+      this.bar.append(button);
+    }
+    const show = stage.show as Record<string, boolean>;
+    this.box("trails", show.trails, (on) => { show.trails = on; });
+    this.strobe = this.box("strobe", show.strobe, (on) => { show.strobe = on; });
+    this.box("velocity-arrows", show.velocity, (on) => { show.velocity = on; });
+    this.box("force-arrows", show.forces, (on) => { show.forces = on; });
+    this.box("symbols", symbols.shown, (on) => { symbols.shown = on; });
+    this.panel = this.watchPanel();
+    home.append(this.panel);
+    stage.further.push(() => this.handles());
+    stage.drawers.push(() => this.draw());
+    lab.on("run", () => {
+      this.nameStrobe();
+      if (this.on.has("tracer")) stage.placeHandles();
+    });
+    lab.on("time", () => this.readWatch());
+    const hover = eased(() => this.hover());
+    for (const news of ["pointermove", "pointerdown"]) {
+      stage.front.addEventListener(news, (event: PointerEvent) => {
+        this.pointer = stage.placeOf(event);
+        if (this.on.has("tracer") && !stage.held) hover();
+      });
+    }
+  }
+
+  on: Set<string> = new Set();
+
+  tape: Point[] = [];
+
+  /** Corner, and a point on each side. */
+  protractor: Point[] = [];
+
+  /** What is traced: when, and which particle from 0. */
+  traced = { t: 0, index: 0 };
+
+  watch = new StopWatch();
+
+  /** Where the pointer was last, px. */
+  pointer: Point = [0, 0];
+
+  box(name: string, on: boolean, act: (on: boolean) => void) {
+    const input = html("input", { type: "checkbox", id: `show-${name}` });
+    input.checked = on;
+    input.addEventListener("change", () => {
+      act(input.checked);
+      this.stage.rebuild();
+    });
+    const text = html("span", {}, this.words.say(name));
+    this.bar.append(html("label", { class: "check" }, input, text));
+    return text;
+  }
+
+  nameStrobe() {
+    const { words, stage } = this;
+    this.strobe.textContent = words.say("strobe-every", { step: words.number(stage.strobeStep, 1) });
+  }
+
+  toggle(name: string, button: any) {
+    const { view } = this.stage, on = !this.on.has(name);
+    button.setAttribute("aria-pressed", String(on));
+    if (on) this.on.add(name);
+    else this.on.delete(name);
+    // A tool lies in the middle of what is shown when it is taken out.
+    const size = roundUp((0.12 * Math.min(view.width, view.height)) / view.scale);
+    const at = (dx: number, dy: number) =>
+      [this.tidy(view.x + dx * size), this.tidy(view.y + dy * size)] as Point;
+    if (name === "tape") this.tape = [at(-1, -1.5), at(1, -1.5)];
+    if (name === "protractor") this.protractor = [at(-1, -1), at(1, -1), at(0, 1)];
+    if (name === "watch") this.panel.hidden = !on;
+    if (name === "tracer") this.traced = { t: this.lab.t, index: 0 };
+    this.readWatch();
+    this.refresh();
+  }
+
+  /** @param value m */
+  tidy(value: number) {
+    const { snap } = this.stage.view;
+    return Number((Math.round(value / snap) * snap).toPrecision(12));
+  }
+
+  refresh() {
+    this.stage.placeHandles();
+    this.draw();
+  }
+
+  handles(): Handle[] {
+    const list: Handle[] = [];
+    const point = (tool: string, points: Point[],
+      names: string[]) => {
+      points.forEach(([x, y], n) => list.push({
+        id: `${tool}-${n}`, surface: tool, what: names[n], shape: "point", x, y,
+        axes: [x, y].map((value, part) => ({
+          key: tool, part, value, unit: "m", step: 0.01, low: -Infinity, high: Infinity,
+        })),
+        drag: (px, py) => [this.tidy(px), this.tidy(py)],
+        change: ([px, py]) => {
+          points[n] = [px, py];
+          this.refresh();
+        },
+        says: `${tool === "tape" ? this.tapeTexts().join(", ") : this.angleText()}; `
+          + `x = ${this.words.fixed(x, 3)} m, y = ${this.words.fixed(y, 3)} m`,
+      }));
+    };
+    if (this.on.has("tape")) point("tape", this.tape, ["first", "second"]);
+    if (this.on.has("protractor")) point("protractor", this.protractor, ["vertex", "first", "second"]);
+    const tracer = this.on.has("tracer") && this.tracerHandle();
+    return tracer ? [...list, tracer] : list;
+  }
+
+  tracerHandle(): Handle | null {
+    const { recording } = this.lab, track = recording?.tracks[this.traced.index];
+    if (!recording || !track?.count) return null;
+    const { begin, end } = track;
+    const t = Math.min(end, Math.max(begin, this.traced.t));
+    const state = track.state(t) as State;
+    const many = recording.tracks.length;
+    const axes = [{
+      key: "tracer", value: t, unit: "s", step: this.stage.strobeStep, low: begin, high: end,
+    }];
+    if (many > 1) {
+      axes.push({ key: "particle", value: this.traced.index + 1, unit: "", step: 1, low: 1, high: many });
+    }
+    return {
+      id: "tracer", surface: "tracer", what: "point", shape: "point", x: state.x, y: state.y, axes,
+      drag: (x, y) => this.nearest(x, y) ?? axes.map(({ value }) => value),
+      change: ([when, which = 1]) => {
+        const index = Math.min(many, Math.max(1, which)) - 1, its = recording.tracks[index];
+        this.traced = { t: Math.min(its.end, Math.max(its.begin, when)), index };
+        this.refresh();
+      },
+      says: this.tracerTexts(t, state).join(", "),
+    };
+  }
+
+  /** What can be traced that is nearest: a point of a track that is drawn, a strobe dot if one is
+   * close; of a crowd, whose tracks are not drawn, a particle where it is now.
+   * @param y m  @returns s and number from 1 */
+  nearest(x: number, y: number): [number, number] | null {
+    const { stage, lab } = this, { recording } = lab;
+    if (!recording) return null;
+    const found: { t: number, far: number, index: number }[] = [];
+    const crowd = recording.machine.interact;
+    recording.tracks.slice(0, crowd ? Infinity : MOST_TRACED).forEach((track, index) => {
+      if (!track.count) return;
+      if (!crowd) {
+        found.push({ ...nearestOn(track, x, y), index });
+        return;
+      }
+      const state = track.state(lab.t);
+      if (state) found.push({ t: lab.t, far: Math.hypot(state.x - x, state.y - y), index });
+    });
+    if (!found.length) return null;
+    const { t, index } = found.reduce((best, one) => (one.far < best.far ? one : best));
+    const step = stage.strobeStep, dot = Math.round(t / step) * step;
+    const state = crowd ? null : recording.tracks[index].state(dot);
+    const close = state && Math.hypot(state.x - x, state.y - y) * stage.view.scale < MAGNET;
+    return [close ? dot : t, index + 1];
+  }
+
+  /** Trace what the pointer is over. */
+  hover() {
+    const { stage, lab } = this, { view } = stage, [px, py] = this.pointer;
+    const found = this.nearest(view.worldX(px), view.worldY(py));
+    if (!found) return;
+    const [t, which] = found, state = lab.recording?.tracks[which - 1].state(t);
+    if (!state || Math.hypot(view.px(state.x) - px, view.py(state.y) - py) > REACH) return;
+    this.traced = { t, index: which - 1 };
+    this.refresh();
+  }
+
+  tapeTexts() {
+    const [[x, y], [u, v]] = this.tape, { words } = this;
+    return [`${words.fixed(Math.hypot(u - x, v - y), 3)} m`, `Δx = ${words.fixed(u - x, 3)} m`,
+      `Δy = ${words.fixed(v - y, 3)} m`];
+  }
+
+  angleText() {
+    const [corner, a, b] = this.protractor;
+    return `${this.words.fixed(angleBetween(corner, a, b), 1)}°`;
+  }
+
+  tracerTexts(t: number, { x, y, vx, vy }: State) {
+    const tell = (value: number) => this.words.fixed(value, 3);
+    return [`t = ${tell(t)} s`, `x = ${tell(x)} m`, `y = ${tell(y)} m`,
+      `v = ${tell(Math.hypot(vx, vy))} m/s`];
+  }
+
+  draw() {
+    const { layer, lab } = this, { view } = this.stage;
+    const at = ([x, y]: Point) => [view.px(x), view.py(y)] as Point;
+    layer.replaceChildren();
+    if (this.on.has("tape")) {
+      const [[x, y], [u, v]] = this.tape.map(at);
+      layer.append(svg("path", { d: `M${x} ${y}L${u} ${v}`, class: "tape" }),
+        svg("path", { d: `M${x} ${y}H${u}V${v}`, class: "thin" }));
+      this.texts([0.5 * (x + u), 0.5 * (y + v)], this.tapeTexts());
+    }
+    if (this.on.has("protractor")) {
+      const [[x, y], [ax, ay], [bx, by]] = this.protractor.map(at);
+      const r = Math.min(34, 0.6 * Math.hypot(ax - x, ay - y), 0.6 * Math.hypot(bx - x, by - y));
+      const [alpha, beta] = [Math.atan2(ay - y, ax - x), Math.atan2(by - y, bx - x)];
+      // The smaller of the two angles, clockwise on the screen or not.
+      const sweep = Math.sin(beta - alpha) > 0 ? 1 : 0;
+      const arc = [alpha, beta].map((angle) =>
+        `${x + r * Math.cos(angle)} ${y + r * Math.sin(angle)}`);
+      layer.append(svg("path", { d: `M${ax} ${ay}L${x} ${y}L${bx} ${by}`, class: "tape" }),
+        svg("path", { d: `M${arc[0]}A${r} ${r} 0 0 ${sweep} ${arc[1]}`, class: "tape" }));
+      this.texts([x, y], [this.angleText()]);
+    }
+    const track = this.on.has("tracer") && lab.recording?.tracks[this.traced.index];
+    if (track && track.count) {
+      const t = Math.min(track.end, Math.max(track.begin, this.traced.t));
+      const state = track.state(t) as State;
+      this.texts(at([state.x, state.y]), this.tracerTexts(t, state));
+    }
+  }
+
+  /** Lines of text beside a place, on the side where there is room.
+   * @param place px */
+  texts([x, y]: Point, lines: string[]) {
+    const { view } = this.stage, right = x < view.width - 150;
+    const top = Math.min(Math.max(y + 22, 22), view.height - 18 * lines.length + 8);
+    lines.forEach((line, n) => {
+      const element = svg("text", { x: right ? x + 14 : x - 14, y: top + 18 * n,
+        "text-anchor": right ? "start" : "end" });
+      element.textContent = line;
+      this.layer.append(element);
+    });
+  }
+
+  watchPanel() {
+    const { words, watch, lab } = this;
+    this.dial = html("output", { class: "dial" });
+    this.laps = html("ol", { class: "laps", "aria-label": words.say("watch-laps") });
+    const button = (id: string, act: () => void) => {
+      const element = html("button", { type: "button", id }, words.say(id));
+      element.addEventListener("click", () => {
+        act();
+        this.readWatch();
+      });
+      return element;
+    };
+    this.starter = button("watch-start", () => watch.toggle(lab.t));
+    const named = { class: "watch", role: "group", "aria-label": words.say("name-watch") };
+    const panel = html("div", named,
+      this.dial, this.starter, button("watch-lap", () => watch.lap(lab.t)),
+      button("watch-reset", () => watch.reset()), this.laps);
+    panel.hidden = true;
+    return panel;
+  }
+
+  readWatch() {
+    if (this.panel.hidden) return;
+    const { words, watch } = this;
+    this.dial.textContent = `${words.fixed(watch.reading(this.lab.t), 3)} s`;
+    this.starter.textContent = words.say(watch.since === null ? "watch-start" : "watch-stop");
+    if (this.laps.children.length !== watch.laps.length) {
+      this.laps.replaceChildren(...watch.laps.map((
+        lap,
+      ) => html("li", {}, `${words.fixed(lap, 3)} s`)));
+    }
+  }
+}
+
+export { StopWatch, Tools, angleBetween, nearestOn };

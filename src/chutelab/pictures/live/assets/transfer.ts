@@ -1,0 +1,212 @@
+// The paper's equations (2) to (16) in closed form, as Python's `theory/transfer.py` has them, to
+// the last bit: any plate angle, finite particles, friction and spin at the plate, and belts that
+// rise, on which particles are carried by adhesion.
+import { arcCos, atan2, lengthOf, sinCos } from "./trig.ts";
+
+/** Why there is no number: `claim` says what a simulation would show, as Python's `Reason`. */
+export interface Reason {
+  claim: "outside" | "early" | "no-impact" | "second" | "misses";
+  text: string; // id of a text in the catalogue
+  words: Record<string, number | string>; // names and numbers for that text
+}
+
+/** Of a transfer, SI units */
+interface Parameters {
+  speed: number; // of the incoming belt
+  pulleyRadius: number;
+  distance: number; // from the pulley's leading edge to the plate's pivot
+  angle?: number; // of the plate, rad
+  pivotHeight?: number; // above the pulley's axis; its radius if not given
+  restitution?: number;
+  drop?: number; // of the centre from impact to landing
+  beltSpeed?: number; // of the outgoing belt; `speed` if not given
+  particleRadius?: number;
+  mass?: number;
+  gravity?: number;
+  spin?: boolean;
+  inertia?: number; // I/(m r²)
+  incline?: number; // rad
+  plateFriction?: number;
+  interval?: number; // time per particle
+  asPrinted?: boolean; // Eq. (9) as it is printed, for an upright plate without friction
+  unboundedPlate?: boolean; // false: do not object to what its line would do elsewhere
+}
+
+/** Quantities by the stage that yields them, in the order of events. */
+const STAGES = {
+  separation: ["phi1", "v1", "omega1"],
+  impact: ["t2", "x2", "y2", "v2", "v2x", "v2y", "phi2"],
+  rebound: ["phi2r", "v2r", "omega2"],
+  landing: ["t3", "x3", "y3", "v3", "v3x", "v3y", "d3", "dEk", "P", "belt_work", "slip_heat"],
+};
+
+export type Stage = keyof typeof STAGES;
+/** By the paper's symbols; NaN where there is none */
+type Numbers = Record<string, number>;
+export type Transfer = { numbers: Numbers, reason: Reason | null };
+
+export function because(
+  claim: Reason["claim"], text: string, words: Record<string, number | string> = {},
+): Reason {
+  return { claim, text, words };
+}
+
+/** Returns a transfer without a stage and all later ones, and says why. */
+export function cutFrom(found: Transfer, stage: Stage, reason: Reason | null): Transfer {
+  const numbers = { ...found.numbers };
+  let lost = false;
+  for (const [name, symbols] of Object.entries(STAGES)) {
+    lost ||= name === stage;
+    if (lost) for (const symbol of symbols) numbers[symbol] = NaN;
+  }
+  return { numbers, reason };
+}
+
+export function unanswered(): Transfer {
+  return cutFrom({ numbers: {}, reason: null }, "separation", null);
+}
+
+/**
+ * Where the pulley is left: angle from its top with cosine and sine, speed, and after what time a
+ * flight that is thrown up comes down on the pulley again.
+ */
+function separationOf(speed: number, rideRadius: number, gravity: number, incline: number) {
+  const unit = gravity * rideRadius;
+  const square = speed * speed;
+  const u = square / unit;
+  if (incline === 0.0) {
+    // Eq. (2), generalised to Rc
+    const cos = Math.min(u, 1.0);
+    const sin = Math.sqrt((1.0 - cos) * (1.0 + cos));
+    return { phi1: atan2(sin, cos), cos, sin, again: Infinity };
+  }
+  const [rise, level] = sinCos(incline);
+  const lifts = u >= level;
+  const up = gravity * (speed * rise + Math.sqrt(Math.max(level * (unit - square * level), 0.0)));
+  const hops = lifts && incline > 0.0 && square * level < unit;
+  const again = hops ? 2.0 * (square - unit * level) / up : Infinity;
+  const phi1 = lifts ? -incline : arcCos(u);
+  const [sin, cos] = sinCos(phi1);
+  return { phi1, cos, sin, again };
+}
+
+/**
+ * Carries a particle from the incoming belt over the plate to the outgoing belt.
+ * Plate and outgoing belt are unbounded here; `prediction.ts` takes the finite machine into
+ * account.
+ */
+export function transfer({
+  speed, pulleyRadius, distance, angle = 0.0, pivotHeight = pulleyRadius, restitution = 0.5,
+  drop = 0.5, beltSpeed = speed, particleRadius = 0.0, mass = 0.008, gravity = 9.81, spin = false,
+  inertia = 0.5, incline = 0.0, plateFriction = 0.0, interval, asPrinted = false,
+  unboundedPlate = true,
+}: Parameters): Transfer {
+  const found = unanswered();
+  const { numbers } = found;
+  const fail = (when: boolean, reason: Reason) => {
+    if (when) found.reason ??= reason;
+  };
+  const require = (key: string, holds: boolean) => {
+    fail(!holds, because("outside", "parameter", { key }));
+  };
+  const keep = (values: Numbers) => {
+    if (found.reason === null) Object.assign(numbers, values);
+  };
+  const turning = (rim: number) => (spin ? rim / particleRadius : 0.0) + 0.0;
+  const quarter = 0.5 * Math.PI;
+
+  // Ride the belt and the pulley.
+  require("speed", speed > 0.0 && speed < Infinity);
+  require("pulleyRadius", pulleyRadius > 0.0 && pulleyRadius < Infinity);
+  require("particleRadius", particleRadius >= 0.0 && particleRadius < Infinity);
+  require("spin", !spin || particleRadius > 0.0);
+  require("gravity", gravity >= 0.0 && gravity < Infinity);
+  require("inertia", inertia > 0.0 && inertia <= 1.0);
+  require("incline", Math.abs(incline) < quarter);
+  const rideRadius = pulleyRadius + particleRadius;
+  const left = separationOf(speed, rideRadius, gravity, incline);
+  let rim = 0.0;
+  keep({ phi1: left.phi1, v1: speed, omega1: turning(rim) });
+
+  // Fly to the plate: the gap between disk and plate's line is a quadratic in time.
+  require("angle", Math.abs(angle) < quarter);
+  require("distance", Number.isFinite(distance + pivotHeight));
+  const [sin, cos] = sinCos(angle);
+  const toPivot = (pulleyRadius + distance) * cos + pivotHeight * sin - particleRadius;
+  // The gap on the pulley is least where the centre's radius is square to the plate.
+  const closest = Math.min(Math.max(quarter - angle, -incline), left.phi1);
+  const behind = toPivot < rideRadius * sinCos(closest + angle)[0] && found.reason === null;
+  if (behind && unboundedPlate) for (const name of STAGES.separation) numbers[name] = NaN;
+  fail(behind, unboundedPlate
+    ? because("early", "ride-meets-line", { surface: "plate" })
+    : because("no-impact", "ride-passes-line"));
+  const gap = toPivot - rideRadius * (left.sin * cos + left.cos * sin);
+  const closing = speed * (left.cos * cos - left.sin * sin);
+  const discriminant = closing * closing - 2.0 * gravity * sin * gap;
+  const normal = Math.sqrt(discriminant);
+  const t2 = 2.0 * gap / (closing + normal); // Eq. (5)
+  // Thrown up steeply, it meets a plate that leans away when it comes down again.
+  const parts = closing <= 0.0 && sin >= 0.0;
+  const comesDown = Number.isFinite(left.again) && !(!parts && t2 <= left.again);
+  fail(comesDown, because("early", "comes-down-again", { surface: "pulley" }));
+  fail(parts, because("no-impact", "flies-off"));
+  fail(discriminant <= 0.0, because("no-impact", "turns-away"));
+  const x2 = speed * t2 * left.cos; // Eq. (3)
+  const y2 = 0.5 * gravity * (t2 * t2) + speed * t2 * left.sin; // Eq. (4)
+  const v2x = speed * left.cos;
+  const v2y = speed * left.sin + gravity * t2;
+  const tangential = v2x * sin + v2y * cos;
+  const v2 = lengthOf(v2x, v2y); // Eq. (6)
+  keep({ t2, x2, y2, v2x, v2y, v2, phi2: atan2(normal, tangential) }); // Eq. (7)
+
+  // Leave the plate. Coulomb: the impulse that stops the slip, or as much as friction can give.
+  require("restitution", restitution >= 0.0 && restitution <= 1.0);
+  require("plateFriction", plateFriction >= 0.0);
+  require("asPrinted", !asPrinted || (plateFriction === 0.0 && angle === 0.0));
+  const limit = plateFriction * (1.0 + restitution) * normal;
+  const share = spin ? inertia / (1.0 + inertia) : 1.0;
+  const impulse = Math.min(Math.max((tangential - rim) * share, -limit), limit);
+  let away = restitution * normal;
+  let down = tangential - impulse;
+  rim += spin ? impulse / inertia : 0.0;
+  const phi2r = atan2(away, down); // Eq. (8)
+  const v2r = asPrinted ? lengthOf(normal, restitution * tangential) : lengthOf(away, down);
+  if (asPrinted) [away, down] = sinCos(phi2r).map((part) => v2r * part);
+  keep({ phi2r, v2r, omega2: turning(rim) }); // Eq. (9)
+
+  // Fall on the outgoing belt, and be taken along by it.
+  require("drop", drop >= 0.0 && drop < Infinity);
+  require("beltSpeed", Number.isFinite(beltSpeed));
+  require("mass", mass > 0.0 && mass < Infinity);
+  require("interval", interval === undefined || interval > 0.0);
+  const v3x = away * cos - down * sin;
+  const sinking = away * sin + down * cos;
+  const v3y = Math.sqrt(sinking * sinking + 2.0 * gravity * drop);
+  // Eq. (12), the root that does not cancel for either sign of b
+  let t3 = sinking >= 0.0 ? 2.0 * drop / (sinking + v3y) : (v3y - sinking) / gravity;
+  if (drop === 0.0 && sinking >= 0.0) t3 = 0.0;
+  fail(!Number.isFinite(t3), because("misses", "never-comes-down"));
+  if (unboundedPlate) {
+    const pressing = -gravity * sin;
+    const again = pressing > 0.0 && 2.0 * away < pressing * t3;
+    fail(again, because("second", "meets-line-again", { surface: "plate" }));
+  }
+  const dEk = 0.5 * mass * (v3x * v3x + beltSpeed * beltSpeed); // Eq. (14)
+  const slip = beltSpeed + v3x - rim;
+  const carried = spin ? mass / ((1.0 + inertia) / inertia) : mass;
+  const lostHeight = left.sin * left.sin / (1.0 + left.cos); // 1 - cos φ1
+  keep({
+    t3,
+    x3: v3x * t3, // Eq. (10)
+    y3: drop, // Eq. (11), solved for t3
+    v3x,
+    v3y,
+    v3: lengthOf(v3x, v3y), // Eq. (13)
+    d3: rideRadius * lostHeight + y2 + drop, // Eq. (16)
+    dEk,
+    P: dEk / (interval ?? NaN), // Eq. (15)
+    belt_work: carried * beltSpeed * slip,
+    slip_heat: 0.5 * carried * (slip * slip),
+  });
+  return found;
+}

@@ -1,0 +1,101 @@
+// Play, pause, step, scrub, and how fast; undo and redo.
+
+import { RATES, type Lab } from "./lab.ts";
+import type { Stage } from "./stage.ts";
+import type { Words } from "./words.ts";
+
+/** Positions of the slider of time. */
+const PLACES = 1000;
+
+/** No frame counts for more than this, s: a page that was hidden goes on where it was. */
+const LONGEST = 0.1;
+
+class Transport {
+  playButton;
+  time;
+  clock;
+  rate;
+  undoButton;
+  redoButton;
+  fault;
+  then;
+
+  constructor(readonly lab: Lab, stage: Stage, readonly words: Words) {
+    const element = (id: string) => document.getElementById(id) as any;
+    this.playButton = element("play");
+    this.time = element("time");
+    this.clock = element("clock");
+    this.rate = element("rate");
+    const buttons: Record<string, () => void> = {
+      restart: () => lab.restart(),
+      back: () => this.step(-1),
+      play: () => (lab.playing ? lab.pause() : lab.play()),
+      forward: () => this.step(1),
+      undo: () => lab.undo(),
+      redo: () => lab.redo(),
+      reset: () => lab.reset(),
+      fit: () => stage.fit(),
+    };
+    for (const [id, act] of Object.entries(buttons)) {
+      const button = element(id);
+      if (button.classList.contains("text")) button.textContent = words.say(id);
+      else button.title = words.say(id);
+      button.setAttribute("aria-label", words.say(id));
+      button.addEventListener("click", act);
+    }
+    for (const rate of RATES) {
+      const text = `${words.local(String(rate))}×`;
+      this.rate.append(new Option(text, String(rate), rate === 1, rate === 1));
+    }
+    this.rate.addEventListener("change", () => { lab.rate = Number(this.rate.value); });
+    this.time.addEventListener("input", () => {
+      // A pause puts the slider back to the time that is shown.
+      const share = Number(this.time.value) / PLACES;
+      lab.pause();
+      lab.seek(lab.start + (lab.end - lab.start) * share);
+    });
+    this.undoButton = element("undo");
+    this.redoButton = element("redo");
+    this.fault = element("fault");
+    for (const news of ["scene", "run", "time", "play"] as const) {
+      lab.on(news, () => this.refresh());
+    }
+    this.refresh();
+    this.then = performance.now();
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  /** @param now ms */
+  frame(now: number) {
+    this.lab.tick(Math.min((now - this.then) / 1000, LONGEST));
+    this.then = now;
+    requestAnimationFrame((next) => this.frame(next));
+  }
+
+  /** A sixtieth of a second of what is shown, in the pace it is shown. */
+  step(sign: number) {
+    this.lab.pause();
+    this.lab.seek(this.lab.t + (sign * this.lab.rate) / 60);
+  }
+
+  refresh() {
+    const { lab, words } = this;
+    const span = lab.end - lab.start;
+    this.time.value = String(span > 0 ? Math.round(((lab.t - lab.start) / span) * PLACES) : 0);
+    const clock = `${words.fixed(lab.t, 3)} s`;
+    this.clock.textContent = clock;
+    this.time.setAttribute("aria-valuetext", clock);
+    this.playButton.classList.toggle("playing", lab.playing);
+    this.playButton.setAttribute("aria-label", words.say(lab.playing ? "pause" : "play"));
+    const { undoButton, redoButton } = this, { activeElement } = document;
+    undoButton.disabled = !lab.past.length;
+    redoButton.disabled = !lab.future.length;
+    // What cannot be pressed any more loses the focus.
+    if (undoButton.disabled && activeElement === undoButton) redoButton.focus();
+    if (redoButton.disabled && activeElement === redoButton) undoButton.focus();
+    this.fault.hidden = !lab.fault;
+    if (lab.fault) this.fault.textContent = words.fault(lab.fault);
+  }
+}
+
+export { Transport };

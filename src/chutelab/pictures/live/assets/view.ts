@@ -1,0 +1,118 @@
+// Between the world, m with y up, and the picture, pixels with y down.
+
+import { EXIT_MARGIN, type Machine, type Segment } from "./machine.ts";
+
+type Box = { left: number, bottom: number, right: number, top: number };
+
+class View {
+  width = 1;
+
+  height = 1;
+
+  /** Pixels per metre. */
+  scale = 100;
+
+  /** The world's point in the middle. */
+  x = 0;
+
+  y = 0;
+
+  resize(width: number, height: number) {
+    this.width = width;
+    this.height = height;
+  }
+
+  /** Show all of a box, with some room round it. @param margin px */
+  fit({ left, bottom, right, top }: Box, margin: number = 34) {
+    const across = Math.max(1, this.width - 2 * margin), up = Math.max(1, this.height - 2 * margin);
+    this.scale = Math.min(across / Math.max(right - left, 1e-6), up / Math.max(top - bottom, 1e-6));
+    this.x = 0.5 * (left + right);
+    this.y = 0.5 * (bottom + top);
+  }
+
+  /** @param py the point that stays, pixels */
+  zoom(factor: number, px: number, py: number) {
+    const [x, y] = [this.worldX(px), this.worldY(py)];
+    this.scale *= factor;
+    this.x += x - this.worldX(px);
+    this.y += y - this.worldY(py);
+  }
+
+  px(x: number) {
+    return 0.5 * this.width + (x - this.x) * this.scale;
+  }
+
+  py(y: number) {
+    return 0.5 * this.height - (y - this.y) * this.scale;
+  }
+
+  worldX(px: number) {
+    return this.x + (px - 0.5 * this.width) / this.scale;
+  }
+
+  worldY(py: number) {
+    return this.y - (py - 0.5 * this.height) / this.scale;
+  }
+
+  /** To what a place that is dragged is rounded: no finer than a pixel, m. */
+  get snap() {
+    return 10 ** Math.floor(Math.log10(1.5 / this.scale));
+  }
+}
+
+/** m of belts and walls that are shown beyond all that matters. */
+const BEYOND = 0.35;
+
+/** Share of the machine's size, of the fall of what has fallen off that is shown. */
+const FALL = 0.35;
+
+/** What is shown of a machine at first: its tracks and all that they can meet, but only so much of
+ * belts and walls, which may be long, and of the fall of what leaves the scene. */
+function boxOf(machine: Machine, points: { x: number, y: number }[]): Box {
+  const box = { left: Infinity, bottom: Infinity, right: -Infinity, top: -Infinity };
+  const widen = (x: number, y: number, r = 0) => {
+    box.left = Math.min(box.left, x - r);
+    box.right = Math.max(box.right, x + r);
+    box.bottom = Math.min(box.bottom, y - r);
+    box.top = Math.max(box.top, y + r);
+  };
+  for (const arc of machine.arcs) {
+    for (let n = 0; n <= 32; n += 1) {
+      const angle = arc.begin + (arc.extent * n) / 32;
+      widen(arc.x + arc.radius * Math.cos(angle), arc.y + arc.radius * Math.sin(angle));
+    }
+  }
+  if (machine.pulley) widen(0, 0, machine.pulley.radius);
+  let [west, east, south, north] = [Infinity, -Infinity, Infinity, -Infinity];
+  for (const [left, right, bottom, top] of machine.exitBoxes) {
+    west = Math.min(west, left + EXIT_MARGIN);
+    east = Math.max(east, right - EXIT_MARGIN);
+    south = Math.min(south, bottom + EXIT_MARGIN);
+    north = Math.max(north, top - EXIT_MARGIN);
+  }
+  // Without a surface nothing is left.
+  const all = !machine.segments.length && !machine.arcs.length;
+  const inside = ({ x, y }: { x: number, y: number }) =>
+    all || (x >= west && x <= east && y >= south && y <= north);
+  points.filter(inside).forEach(({ x, y }) => widen(x, y));
+  if (!points.length) machine.releases.forEach(({ x, y }, i) => widen(x, y, machine.radius[i]));
+  const ends = ({ x, y, tx, ty, length }: Segment) =>
+    [[x, y], [x + tx * length, y + ty * length]];
+  // Walls may reach far above all that ever was up there.
+  const highest = [...points, ...machine.releases]
+    .reduce((top, { y }) => Math.max(top, y), -Infinity);
+  const still = machine.segments.filter(({ speed }) => !speed);
+  for (const [x, y] of still.flatMap(ends)) widen(x, Math.min(y, highest + BEYOND));
+  const [left, right] = [box.left - BEYOND, box.right + BEYOND];
+  for (const [x, y] of machine.segments.filter(({ speed }) => speed).flatMap(ends)) {
+    widen(isFinite(left) ? Math.min(Math.max(x, left), right) : x, y);
+  }
+  const held = { ...box }, room = FALL * Math.max(box.right - box.left, box.top - box.bottom);
+  for (const point of points.filter((one) => !inside(one))) {
+    widen(Math.min(Math.max(point.x, held.left - room), held.right + room),
+      Math.min(Math.max(point.y, held.bottom - room), held.top + room));
+  }
+  return box;
+}
+
+export { View, boxOf };

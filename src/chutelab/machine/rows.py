@@ -24,7 +24,7 @@ WORDS = {"adhesion": inf, "impact": 0.0, "top": 1.0}
 REAL = np.dtype("<f8")
 
 ROOM = 64
-"""Segments and arcs of one scene for which there is room at first."""
+"""Segments and arcs of all members for which there is room at first."""
 
 
 @cache
@@ -106,7 +106,7 @@ def lay(scene: Scene, friction: Numbers) -> Laid:
             rows[:, column] = value
     else:
         rows[0] = numbers
-    module, segments, arcs = borrow(), ROOM, ROOM
+    module, segments, arcs = borrow(), ROOM // every, ROOM // every
     try:
         plan = module.structs["Plan"]
         while True:

@@ -25,7 +25,7 @@ WORD = 2**32
 """Seeds are handed over as two numbers below it."""
 
 ROOM = 64
-"""Segments and arcs of one scene for which there is room at first."""
+"""Segments and arcs of all members for which there is room at first."""
 
 
 @cache
@@ -109,7 +109,7 @@ def lay(module: Module, scene: Scene, friction: Numbers) -> Laid:
             rows[:, column] = value
     else:
         rows[0] = numbers
-    segments, arcs = ROOM, ROOM
+    segments, arcs = ROOM // every, ROOM // every
     while True:
         module.place(
             ("rows", REAL, rows.size), ("nominal", dtype("Nominal"), every),

@@ -194,8 +194,8 @@ def draw(module: Module, scene: Scene, watch: Watch) -> tuple[Releases, Floats |
         watch()
     refused = array("refusals")
     if np.count_nonzero(refused["why"]):
-        members = refused["why"].nonzero()[0].tolist()
-        raise RefusedError(scene.source, {n: _fault(scene, refused[n]) for n in members})
+        which = refused["why"].nonzero()[0].tolist()
+        raise RefusedError(scene.source, {n: _fault(scene, refused[n]) for n in which})
     starts, carried = array("starts"), array("carried").astype(bool)
     releases = Releases(
         t=starts["t"].copy(),

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from chutelab import machine, scene, theory
 from chutelab.checks.agreement import ANSWERS, agreement, order, verify
@@ -308,3 +309,79 @@ def test_what_places_the_belt_is_shared_by_the_engines_and_told_by_the_theory(mo
     before = right.select(Kind.LANDING)[0]["position"][1]
     assert heights == pytest.approx([before - lower] * 3, abs=1e-9)
     assert all(compare(one).max > 0.05 for one in wrong)
+
+
+LATE = {"exact": 1e-12, "contact": 2e-6, "pymunk": 2e-6}
+"""s by which an engine may be off where a surface ends on which a particle slides or rolls."""
+
+
+@pytest.mark.parametrize("engine", LATE)
+@pytest.mark.parametrize(
+    ("spin", "friction", "speed", "told"),
+    [
+        (False, 0.2, 3.0, ["SLIP", "STICK"]),
+        (False, 0.0, -1.0, ["SLIP"]),
+        (True, 0.9, 3.0, ["SLIP", "STICK"]),
+        (True, 0.9, 0.0, ["STICK"]),
+    ],
+)
+def test_what_goes_over_to_another_surface_slips_or_grips_there_from_then_on(
+    engine, spin, friction, speed, told
+):
+    """From rest down a chute of length s: s = a t²/2 with a = g (sin β - µ cos β), or rolling
+    a = 2/3 g sin β. There a belt goes on in its line.
+    """
+    beta, s, r = radians(30.0), 0.3, 0.01
+    along = np.array([cos(beta), -sin(beta)])
+    chute = {"from": (-along).tolist(), "to": [0.0, 0.0], "friction": friction}
+    belt = {"from": [0.0, 0.0], "to": (3.0 * along).tolist(), "friction": 0.7, "speed": speed}
+    start = -s * along + r * np.array([sin(beta), cos(beta)])
+    recording = simulate(
+        {
+            "gravity": GRAVITY,
+            "particle": {"radius": r, "spin": spin},
+            "surface": [{"name": "chute", **chute}, {"name": "belt", **belt}],
+            "stream": {"at": start.tolist(), "velocity": [0.0, 0.0]},
+            "run": {"until": 0.8},
+        },
+        engine=engine,
+    )
+    pull = 2.0 / 3.0 * sin(beta) if spin else sin(beta) - friction * cos(beta)
+    events = recording.select(surface="belt")
+    assert [Kind(kind).name for kind in events["kind"]] == told
+    assert events["t"][0] == pytest.approx((2.0 * s / (GRAVITY * pull)) ** 0.5, abs=LATE[engine])
+
+
+@pytest.mark.parametrize("engine", LATE)
+def test_what_slides_down_a_round_chute_on_to_the_outgoing_belt_has_landed(engine):
+    """Without friction v² = v1² + 2 g h from an angle φ off the lowest point on: t = ∫ ρ dφ / v."""
+    size, r, low, first = 0.5, 0.01, -0.6, radians(50.0)
+    path, center = size - r, np.array([0.0, low + size])
+    chute = {"radius": size, "from_deg": 200.0, "to_deg": 270.0, "friction": 0.0}
+    out = np.array([-sin(first), -cos(first)])
+    recording = simulate(
+        {
+            "gravity": GRAVITY,
+            "incoming": {"speed": 1.0, "pulley_radius": 0.05},
+            "outgoing": {"drop": 0.65, "drop_from": "top", "start": 0.0, "length": 2.0},
+            "particle": {"radius": r},
+            "surface": [{"name": "chute", "center": center.tolist(), **chute}],
+            "stream": {
+                "at": (center + path * out).tolist(),
+                "velocity": [cos(first), -sin(first)],
+            },
+            "run": {"until": "landed"},
+        },
+        engine=engine,
+    )
+
+    def rate(angle):
+        return path / (1.0 + 2.0 * GRAVITY * path * (cos(angle) - cos(first))) ** 0.5
+
+    (landing,) = recording.select(Kind.LANDING)
+    assert landing["t"] == pytest.approx(quad(rate, 0.0, first)[0], abs=LATE[engine])
+    speed = path / rate(0.0)
+    # The stepped ones to second order: 100 dt².
+    off = 1e-12 if engine == "exact" else 1e-4
+    np.testing.assert_allclose(landing["velocity_after"], [speed, 0.0], rtol=0, atol=off)
+    assert [REASONS[n] for n in recording.ended] == ["landed"]

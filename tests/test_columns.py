@@ -1,10 +1,12 @@
-"""Tall columns and silos: no solve makes energy, however contacts wedge."""
+"""Tall columns and silos: no solve and no blow makes energy, however contacts wedge."""
 
 import shutil
 import subprocess
 import sys
+from math import sqrt
 from pathlib import Path
 
+import numpy as np
 import pytest
 import wasmtime
 
@@ -26,41 +28,97 @@ def test_a_column_makes_no_energy(seed):
     assert found.laws == ()
 
 
-FASTER = pytest.mark.xfail(
-    strict=True, reason="one of 1,787 disks gets 4 % faster than a free fall, with no energy gained"
-)
+@pytest.mark.parametrize(("seed", "count"), [(8, 200), (9, 150)])
+def test_what_jams_is_not_pressed_into_each_other(seed, count):
+    """By 5 % of the lesser radius, the promise of the engine, at most."""
+    found = run(build(from_dict(column(seed, count))))
+    i, j = np.triu_indices(count, 1)
+    radii, deepest = np.broadcast_to(found.machine.particle.radius, count), 0.0
+    for places in found.at(np.linspace(0.0, found.knots["t"].max(), 200))[0]:
+        depth = radii[i] + radii[j] - np.hypot(*(places[i] - places[j]).T)
+        deepest = max(deepest, np.nanmax(depth / np.minimum(radii[i], radii[j]), initial=0.0))
+    assert deepest < 0.05
+    assert found.laws == ()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=FASTER if seed == 10 else ()) for seed in range(20)]
-)
+@pytest.mark.parametrize("seed", range(20))
 def test_twenty_columns_and_silos_make_no_energy(seed):
     assert faults(run(build(from_dict(column(seed, 1000 + 379 * seed % 1001))))) == []
 
 
-@pytest.mark.slow
-def test_without_the_line_searches_columns_make_energy_and_a_law_tells(tmp_path, monkeypatch):
-    """The planted fault: impulses of the step before are taken as they are, and none are eased."""
+@pytest.fixture
+def with_fault(tmp_path, monkeypatch):
+    """Return a function: from then on the core runs with a text in one of its files replaced."""
     pytest.importorskip("ziglang")
-    core = tmp_path / "src" / "chutelab" / "core"
-    for path in (ROOT / "src").glob("chutelab/core/*.[ch]"):
-        core.mkdir(parents=True, exist_ok=True)
-        shutil.copy(path, core)
-    (tmp_path / "tools").mkdir()
-    tool = shutil.copy(ROOT / "tools" / "build_core.py", tmp_path / "tools")
-    source = (core / "solver.c").read_text()
-    search = "if (!(all > 0)) return;"
-    assert source.count(search) == 1
-    (core / "solver.c").write_text(source.replace(search, "if (list) return;"))
-    subprocess.run([sys.executable, tool], check=True, timeout=120)
-    engine = module._compiled()[0]
-    built = wasmtime.Module(engine, (core / "core.wasm").read_bytes())
-    monkeypatch.setattr(module, "_compiled", lambda: (engine, built))
-    monkeypatch.setattr(module, "_idle", [])
+
+    def plant(name, text, fault):
+        core = tmp_path / "src" / "chutelab" / "core"
+        for path in (ROOT / "src").glob("chutelab/core/*.[ch]"):
+            core.mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, core)
+        (tmp_path / "tools").mkdir()
+        tool = shutil.copy(ROOT / "tools" / "build_core.py", tmp_path / "tools")
+        source = (core / name).read_text()
+        assert source.count(text) == 1
+        (core / name).write_text(source.replace(text, fault))
+        subprocess.run([sys.executable, tool], check=True, timeout=120)
+        engine = module._compiled()[0]
+        built = wasmtime.Module(engine, (core / "core.wasm").read_bytes())
+        monkeypatch.setattr(module, "_compiled", lambda: (engine, built))
+        monkeypatch.setattr(module, "_idle", [])
+
+    return plant
+
+
+@pytest.mark.slow
+def test_without_the_line_searches_columns_make_energy_and_a_law_tells(with_fault):
+    """The planted fault: impulses of the step before are taken as they are, and none are eased."""
+    with_fault("solver.c", "if (!(all > 0)) return;", "if (list) return;")
     spoilt = [run(build(from_dict(column(seed, 60)))) for seed in (8, 16, 20, 22, 24)]
     assert all(any("solves gained" in fault for fault in faults(found)) for found in spoilt)
     assert all(laws.ENERGY in {broken.law for broken in found.laws} for found in spoilt)
+
+
+@pytest.mark.slow
+def test_where_blows_make_energy_disks_are_too_fast(with_fault):
+    """The planted fault: two disks part 1.2 times as fast as they met."""
+    with_fault("impacts.c", "-c.rest * u[0]", "-(c.two ? 1.2 : c.rest) * u[0]")
+    spoilt = [run(build(from_dict(column(seed, 60)))) for seed in (5, 9, 13, 16)]
+    assert all("no other lost that" in faults(found)[0] for found in spoilt)
+
+
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+@pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
+def test_one_of_two_disks_may_leave_faster_than_both_came(engine, e):
+    """Both have the speed V = 1: why in a column a disk may be faster than a free fall.
+
+    One has A, the other B, and they meet along the normal n. Then B keeps its part along the
+    surface, and its normal part becomes c A_n + (1 - c) B_n, c = (1 + e) / 2 of equal masses. That
+    is most with A along n and B_n = (1 - e) / (3 - e): 2 / sqrt(3 - e).
+    """
+    most, c = 2.0 / sqrt(3.0 - e), 0.5 * (1.0 + e)
+    # Speeds below V would not do better, as the result is convex in A and in B.
+    a, b = np.meshgrid(*2 * [np.linspace(0.0, np.pi, 1001)])
+    after = np.hypot(np.sin(b), c * np.cos(a) + (1.0 - c) * np.cos(b))
+    assert most - 1e-5 < after[np.cos(a) > np.cos(b)].max() <= most + 1e-15
+    r, until, normal = 0.01, 0.04, (1.0 - e) / (3.0 - e)
+    ways = [1.0, 0.0], [normal, sqrt(1.0 - normal**2)]
+    scene = {
+        "gravity": 0.0,
+        "particle": {"radius": r},
+        "stream": [
+            {"at": [x - until * vx, -until * vy], "velocity": [vx, vy], "interact": True,
+             "restitution": e, "friction": 0.0}
+            for x, (vx, vy) in zip((0.0, 2.0 * r), ways, strict=True)
+        ],
+        "run": {"until": 2.0 * until, "dt": 1e-5},
+    }  # fmt: skip
+    found = simulate(from_dict(scene), engine=engine)
+    speeds = np.hypot(*found.ends()[1]["velocity"].T)
+    # Pymunk sees them meet up to a step late.
+    assert abs(speeds[1] - most) < {"contact": 1e-14, "pymunk": 1e-6}[engine]
+    assert speeds[1] > 1.15 > 1.0 > speeds[0]
 
 
 @pytest.mark.parametrize("engine", ["contact", "pymunk"])

@@ -47,15 +47,27 @@ def test_a_nip_that_no_impulses_hold_open_lets_the_belt_slip(count, alpha, frict
     assert lowest == pytest.approx(edge + R / np.tan(0.5 * alpha), abs=0.02 * R / alpha)
 
 
-def nip(friction, dt, angle, wall=0.0, **particle):
-    """A belt of 2 m/s draws a disk under a wall that leans back over it, by `angle` to the belt."""
+def nip(friction, dt, angle, wall=0.0, count=1, until=2.0, **particle):
+    """A belt of 2 m/s draws a row of disks under a wall that leans back over it, by `angle`."""
     edge = np.array([0.1, 0.005])
     top = edge + 0.3 * np.array([-cos(angle), sin(angle)])
     faces = [face("belt", (-1.0, 0.0), (1.0, 0.0), speed=2.0, friction=friction, restitution=0.2),
              face("wall", edge, top, friction=wall, restitution=0.3)]  # fmt: skip
     machine = scene_of(particle={"radius": R, "mass": 0.008, **particle}, surface=faces,
-                       run={"until": 2.0, "dt": dt})  # fmt: skip
-    return run(thrown(machine, [-0.5, 2.0 * R], [1.0, 0.0]))
+                       stream={"restitution": 0.1, "friction": 0.3},
+                       run={"until": until, "dt": dt})  # fmt: skip
+    row = np.arange(count)
+    places = np.stack([-0.5 - 2.05 * R * row, np.where(row == 0, 2.0, 1.2) * R], axis=1)
+    return run(thrown(machine, places, [1.0, 0.0]))
+
+
+def paid(recording, start, end):
+    """Power of the three entries of all particles together from one time to another, (3,), W."""
+    books = [
+        [np.interp([start, end], track["t"], entry) for entry in track["entries"].T]
+        for track in map(recording.track, range(recording.count))
+    ]
+    return np.diff(np.sum(books, axis=0))[:, 0] / (end - start)
 
 
 @pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
@@ -67,16 +79,49 @@ def test_a_belt_slips_under_what_it_cannot_move_and_stalls_where_that_locks(fric
     """
     angle = radians(60.0)
     recording = nip(friction, dt, angle, spin=False)
-    knots = recording.track(0)
-    late = np.array([np.interp([1.5, 2.0], knots["t"], entry) for entry in knots["entries"].T])
-    paid, restitution, heat = np.diff(late)[:, 0] / 0.5
     locks = friction > np.tan(angle)
     load = 0.0 if locks else 0.008 * G / (1.0 - friction / np.tan(angle))
-    assert [paid, heat] == pytest.approx(
+    power, restitution, heat = paid(recording, 1.5, 2.0)
+    assert [power, heat] == pytest.approx(
         2 * [0.0 if locks else friction * load * 2.0], rel=1e-6, abs=1e-9
     )
     assert abs(restitution) < 1e-9
-    assert np.hypot(*knots["velocity"][-1]) < 1e-9
+    assert np.hypot(*recording.track(0)["velocity"][-1]) < 1e-9
+
+
+@pytest.mark.parametrize(("count", "dt"), [(2, 1e-3), (2, 5e-4), (4, 1e-3)])
+@pytest.mark.parametrize(
+    ("friction", "angle"), [(0.3, 30.0), (1.0, 30.0), (0.3, 60.0), (1.0, 60.0)]
+)
+def test_in_a_row_that_is_pushed_into_a_nip_each_pays_for_its_load(count, friction, angle, dt):
+    """The others push the first with F = (n - 1) µ m g: N2 sin α = µ N1 + F, N1 = m g + N2 cos α.
+
+    So N1 = (m g + F cot α) / (1 - µ cot α), and the belt pays (F + µ N1) v. Where µ > tan α the
+    first stalls it, and the others, which are blocked, slip on.
+    """
+    recording = nip(friction, dt, radians(angle), count=count, until=0.8, spin=False)
+    weight, slope = 0.008 * G, 1.0 / np.tan(radians(angle))
+    push = (count - 1) * friction * weight
+    first = (weight + push * slope) / (1.0 - friction * slope)
+    force = push + (friction * first if friction * slope < 1.0 else 0.0)
+    power, _, heat = paid(recording, 0.6, 0.8)
+    assert [power, heat] == pytest.approx(2 * [force * 2.0], rel=2e-3)
+    assert recording.laws == ()
+
+
+@pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
+@pytest.mark.parametrize(
+    ("count", "angle", "wall"), [(2, 30.0, 0.0), (2, 60.0, 0.5), (4, 30.0, 0.0)]
+)
+def test_a_row_on_a_belt_that_grips_without_bound_stalls_it(count, angle, wall, dt):
+    """What cannot move blocks it, and nothing is paid; before, a blow costs m v² at most.
+
+    From the first touch of the wall on there are at most 200 blows on each.
+    """
+    recording = nip(1e6, dt, radians(angle), wall, count, until=0.6, spin=False)
+    assert np.abs(paid(recording, 0.35, 0.6)).max() < 1e-6 * 0.008 * G * 2.0
+    assert 0.0 < recording.by_surface[:, 0].sum() < 200.0 * count * 0.008 * 2.0**2
+    assert recording.laws == ()
 
 
 @pytest.mark.parametrize("wall", [0.1, 0.8])
@@ -152,7 +197,9 @@ def test_off_a_curved_chute_the_error_is_of_second_order_at_every_step(slope, en
         recording = run(thrown(bent(machine, arc), joint - way * onward + R * up))
         assert np.abs(recording.track(0)[-1]["position"] - place).max() < 40.0 * dt * dt, dt
         # Neither the joint nor the end is struck.
-        assert recording.events["kind"].tolist() == [Kind.RELEASE, Kind.SEPARATION]
+        assert recording.events["kind"].tolist() == [Kind.RELEASE, Kind.SLIP, Kind.SEPARATION]
+        onto = sqrt(2.0 * way / pull)
+        assert recording.select(Kind.SLIP)["t"] == pytest.approx(onto, abs=10.0 * dt * dt)
         assert recording.select(Kind.SEPARATION)["t"] == pytest.approx(left, abs=60.0 * dt * dt)
 
 

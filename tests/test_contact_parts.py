@@ -10,6 +10,7 @@ import pytest
 
 from chutelab.engines.contact import run
 from chutelab.results import REASONS, Kind
+from chutelab.results.laws import LOSSES
 from chutelab.results.ledger import ledger
 from machines import bent, face, gated, of_sizes, scene_of, thrown
 
@@ -78,9 +79,9 @@ def test_no_joint_of_a_smooth_chute_is_felt(slope, joint, crowded):
         errors.append(abs(last["velocity"][0] - speed))
         assert abs(last["velocity"][1]) < 1e-12
         assert last["position"][1] == pytest.approx(R, abs=1e-3 * R)
-        # It never leaves, and the next piece is no blow, though it is another surface.
+        # It never leaves, and each next piece is no blow: it goes on slipping on another surface.
         told = recording.events["kind"][recording.events["particle"] == 0]
-        assert told.tolist() == [Kind.RELEASE]
+        assert told.tolist() == [Kind.RELEASE, Kind.SLIP, Kind.SLIP, Kind.SLIP]
         assert residual(recording) < 1e-12
     # Of second order; a bump, of half of what gravity does in a step, would be of first.
     assert (np.array(errors) < 20.0 * speed * np.square(steps)).all(), errors
@@ -92,6 +93,37 @@ def test_a_joint_written_with_some_digits_is_smooth_too():
         machine, speed = slide_down(0.7, 0.4, 1e-3, apart=2e-6, crowded=crowded)
         last = run(machine).track(0)[-1]
         assert last["velocity"][0] == pytest.approx(speed, rel=1e-3)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.6])
+@pytest.mark.parametrize("dt", [1e-3, 2e-5])
+def test_a_ledge_is_felt_as_far_as_steps_resolve_it(dt, restitution):
+    """A floor ends a ledge a below the lowest point of an arc: a disk meets its edge at θ.
+
+    cos θ = 1 - a/r, and what goes into the edge, v sin θ, comes back times ε. Over a smooth joint
+    the disk is lifted by a in a step: that is slower where the step's way is longer than r θ / 2.
+    """
+    ledge, v, radius = 1e-6, 1.0, 0.3
+    theta = acos(1.0 - ledge / R)
+    values = {"friction": 0.0, "restitution": restitution}
+    floor = face("floor", (-1.0, 0.0), (0.0, 0.0), **values)
+    arc = {"center": (0.0, radius + ledge), "radius": radius, "begin": 1.5 * pi, "extent": 1.0}
+    machine = arc_machine({**arc, **values}, surface=[floor], run={"until": 0.06, "dt": dt})
+    recording = run(thrown(machine, (-0.05, R), (v, 0.0)))
+    blows = recording.select(Kind.IMPACT)
+    if v * dt > R * theta / 2.0:
+        assert not len(blows)
+        vx, vy = recording.at([0.0515])[1][0, 0]
+        # On the arc it rises by (v t)^2 / (2 (R - r)).
+        assert vx == pytest.approx(v, rel=1e-4)
+        assert vy == pytest.approx(0.0015 * v * v / (radius - R), abs=2.0 * ledge / dt)
+    else:
+        back = (1.0 + restitution) * v * sin(theta)
+        struck = 0.05 - R * sin(theta)
+        assert blows["t"][0] == pytest.approx(struck / v, abs=1e-7)
+        after = [v - back * sin(theta), back * cos(theta)]
+        # It comes to the edge from a hop of one step.
+        np.testing.assert_allclose(blows["velocity_after"][0], after, rtol=0, atol=2.0 * G * dt)
 
 
 # Inside and outside of arcs
@@ -179,6 +211,69 @@ def test_pieces_in_one_place_are_one(crowded):
         recording = run(thrown(machine, starts, np.array([[0.0, 0.0], [0.1, 0.0]])[: 1 + crowded]))
         ends.append(recording.at(np.linspace(0.0, 0.459, 100))[0])
     assert np.abs(ends[1] - ends[0]).max() < 1e-9 * R
+
+
+@pytest.mark.parametrize("dt", [4e-3, 1e-3])
+def test_a_disk_of_a_crowd_keeps_its_speed_in_a_drum_without_gravity(dt):
+    """Its path is a row of chords v dt long between points of a circle of radius l = R - r.
+
+    Each turns it by 2 asin(v dt / 2 l), and none of the impulses between them does work.
+    """
+    length, speed, end = 0.2, 1.5, 0.8
+    drum = {"center": (0.0, 0.0), "radius": length + R, "begin": 0.3, "extent": 2.0 * pi}
+    machine = arc_machine(drum, gravity=0.0, run={"until": end, "dt": dt})
+    recording = run(thrown(machine, [(0.0, -length), (5.0, 5.0)], [(speed, 0.0), (0.0, 0.0)]))
+    track = recording.track(0)
+    turned = round(end / dt) * 2.0 * asin(speed * dt / (2.0 * length))
+    np.testing.assert_allclose(np.hypot(*track["velocity"].T), speed, rtol=1e-12)
+    np.testing.assert_allclose(
+        track["position"][-1], length * np.array([sin(turned), -cos(turned)]), atol=1e-9 * length
+    )
+    assert np.abs(track["entries"]).max() < 1e-12 * speed**2 * recording.particle.mass
+
+
+def hollow_crowd(seed, extent, restitution, friction, **tables):
+    """Twelve disks that slide along a hollow of 0.3 m, or fly in it, without gravity."""
+    draw, size, count = np.random.default_rng(seed), 0.3, 12
+    angle = pi + 0.15 + (np.arange(count) + draw.uniform(0.1, 0.4, count)) * (pi - 0.3) / count
+    away = (size - R) * np.where(draw.random(count) < 0.5, 1.0, draw.uniform(0.7, 1.0, count))
+    speed = draw.uniform(-2.0, 2.0, count)
+    places = away * np.array([np.cos(angle), np.sin(angle)])
+    arc = {"center": (0.0, 0.0), "radius": size, "begin": pi, "extent": extent,
+           "restitution": restitution, "friction": friction}  # fmt: skip
+    machine = arc_machine(
+        arc, gravity=0.0, **tables, stream={"restitution": restitution, "friction": friction}
+    )
+    return run(thrown(machine, places.T, (speed * [-np.sin(angle), np.cos(angle)]).T))
+
+
+@pytest.mark.parametrize("extent", [pi, 2.0 * pi])
+@pytest.mark.parametrize("seed", range(6))
+def test_in_an_elastic_hollow_without_gravity_a_crowd_keeps_its_energy(seed, extent):
+    """Sliding along it, struck off it, and over its ends: Σ m v² / 2 stays, at every knot."""
+    recording = hollow_crowd(seed, extent, 1.0, 0.0, run={"until": 0.5})
+    books = ledger(recording)
+    assert books.kinetic[1] == pytest.approx(books.kinetic[0], rel=1e-12)
+    steps = np.concatenate([np.diff(recording.track(n)["entries"], axis=0) for n in range(12)])
+    assert np.abs(steps).max() < 1e-12 * books.kinetic[0]
+    # What the first chord of the fastest would gain, J: nothing allows for it.
+    knots, mass = recording.knots.copy(), recording.particle.mass
+    row = int((np.hypot(*knots["velocity"].T) * (knots["t"] > 0.0)).argmax())
+    lift = 0.5 * recording.machine.dt * np.hypot(*knots["velocity"][row]) ** 2 / (0.3 - R)
+    knots["entries"][row:, 1] -= 0.5 * mass * lift**2
+    planted = replace(recording, knots=knots)
+    assert recording.laws == ()
+    assert LOSSES in {broken.law for broken in planted.laws}
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+@pytest.mark.parametrize("seed", range(6))
+def test_in_a_hollow_without_gravity_a_crowd_only_loses(seed, friction):
+    recording = hollow_crowd(seed, pi, 0.5, friction, spin=True, run={"until": 0.5})
+    books = ledger(recording)
+    assert residual(recording) < 1e-12
+    assert recording.laws == ()
+    assert min(books.restitution_loss, books.friction_loss) >= 0.0
 
 
 @pytest.mark.parametrize("crowded", [False, True])

@@ -144,10 +144,11 @@ def flanks(recording):
 
 
 def test_a_heap_stands_and_all_of_it_lies_still():
-    poured = heap()
+    # Settled is less: no contact slips or closes by 1e-3 m/s. A second later all sleep.
+    poured = heap(0, "run.until=3.5")
     assert len(poured.select(Kind.EXIT)) == 0
     assert 10.0 < np.mean(flanks(poured)) < 40.0
-    assert np.hypot(*poured.ends()[1]["velocity"].T).max() < 1e-3
+    assert not poured.ends()[1]["velocity"].any()
 
 
 @pytest.mark.parametrize(("slope", "moves"), [(0.29, False), (0.31, True)])

@@ -12,6 +12,46 @@
 /* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
 #define REST 2.5e-3
 
+/* How long ago the foot of a disk passed the end at which it comes on to a surface, s, and the direction of the
+   surface there; below 0: it will. 0 where it is none within a step. */
+static double since_passage(const Contact *c, double *way) {
+    const Disk *d = W.disks + c->i;
+    const Surface *s = W.surfaces + (-1 - c->j);
+    double since = 0, least = INFINITY;
+    way[0] = c->ny;
+    way[1] = -c->nx;
+    for (int n = 0; n < 4 && s->shape != CIRCLE; n += 2) {
+        double x = s->end[n], y = s->end[n + 1];
+        double tx = s->shape == SEGMENT ? s->tx : (s->y - y) / s->radius;
+        double ty = s->shape == SEGMENT ? s->ty : (x - s->x) / s->radius;
+        double past = (d->x - x) * tx + (d->y - y) * ty, along = d->ux * tx + d->uy * ty;
+        if (fabs(past) > fabs(along) * MAX(W.length_before, W.length) || fabs(past) >= least) continue;
+        least = fabs(past);
+        since = past / along;
+        way[0] = tx;
+        way[1] = ty;
+    }
+    return since;
+}
+
+/* Tell that a disk has gone over to another surface without a blow, when it did: as fast along both as its
+   last two steps on the one before lead to. */
+static void tell_passage(const Contact *c, int kind) {
+    const Disk *d = W.disks + c->i;
+    const Track *track = W.tracks + c->i;
+    const double *last = track->held, *past = track->past;
+    double way[2], t = d->t - since_passage(c, way), on = t - last[0];
+    double then[5] = {d->x, d->y, d->ux, d->uy, d->uspin};
+    for (int n = 0; n < 3 && track->lasted > 1; n++) {
+        then[2 + n] = last[3 + n] + on / (last[0] - past[0]) * (last[3 + n] - past[3 + n]);
+        if (n < 2) then[n] = last[1 + n] + 0.5 * on * (last[3 + n] + then[2 + n]);
+    }
+    double along = then[2] * way[0] + then[3] * way[1];
+    then[2] = along * way[0];
+    then[3] = along * way[1];
+    write_event(kind, c->i, -1, c->owner, t, then, then + 2, then + 2, 0, 0);
+}
+
 /* Note whether a disk that lasts on one surface slips there, sticks, or has come to rest. */
 static void note_grip(Disk *d, const Contact *c, const double *u, const double *v, double h) {
     int i = c->i;
@@ -26,14 +66,15 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     }
     track->load[0] = c->impulse[0] / span;
     track->load_t[0] = d->t;
-    /* A smooth way may go on as another surface. */
-    if (d->on >= 0 && d->on == c->was) d->on = c->owner;
-    if (d->on != c->owner) {
+    if (d->on < 0) {
         /* It came to lie there without an impact that was told. */
         write_event(IMPACT, i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
-        d->on = c->owner;
         d->slips = 1;
+    } else if (d->on != c->owner) {
+        tell_passage(c, grips ? STICK : SLIP);
+        d->slips = !grips;
     }
+    d->on = c->owner;
     if (grips && d->slips) {
         /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
         double s = u[1] - c->pull * past, pull = c->pull;
@@ -128,8 +169,9 @@ void close_step(double h) {
            step is: that is no blow, and of endless friction it would be one however soft. */
         if (d->mode == FREE && (W.interact || !d->supports)) d->held_count = 0;
         d->supports = 0;
-        if (W.length_before > 0.01 * W.dt) d->impacts = 0;
+        if (W.length_before > 0.01 * W.step) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
+        d->lacks = 0;
         if (d->mode == FREE) {
             d->calm += h;
             d->rest += h;
@@ -142,7 +184,7 @@ void close_step(double h) {
     for (int n = 0; n < W.contact_count; n++) {
         Contact *c = W.contacts + n;
         Disk *a = W.disks + c->i, *b = c->j >= 0 ? W.disks + c->j : 0;
-        double u[3], v[3], given[3] = {c->given[0], 0, 0};
+        double u[3], v[3], way[2], given[3] = {c->given[0], 0, 0};
         c->next = a->before;
         a->before = n;
         W.links[2 * n] = a->links;
@@ -165,9 +207,10 @@ void close_step(double h) {
         }
         a->supports++;
         if (b) b->supports++;
-        else if (c->owner == W.landing && !a->landed) {
-            write_event(LANDING, c->i, -1, c->owner, a->t, &a->x, &a->ux, &a->vx, c->impulse[0],
-                        c->impulse[1]);
+        else if (c->owner == W.landing && !a->landed && (a->on < 0 || since_passage(c, way) >= 0)) {
+            if (a->on >= 0) tell_passage(c, LANDING);
+            else write_event(LANDING, c->i, -1, c->owner, a->t, &a->x, &a->ux, &a->vx, c->impulse[0],
+                             c->impulse[1]);
             a->landed = 1;
             a->on = c->owner;
             a->slips = 1;

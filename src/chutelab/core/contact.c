@@ -2,6 +2,32 @@
 
 #include "core.h"
 
+/* Of what a hollow turns a disk by in a step: so much more is still its doing, not a blow's. */
+#define CHORD 1.01
+/* Sine of half the angle that a step may turn a disk in a hollow by, at most. */
+#define STEEPEST 0.9
+
+/* Whether a disk touches the same place of two surfaces: pieces on each other, or the point that they share. */
+static int same_place(const Disk *d, int k, int other) {
+    double nx, ny, mx, my;
+    double gap = gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny);
+    double off = gap - gap_to(W.surfaces + other, d->x, d->y, d->radius, &mx, &my);
+    return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;
+}
+
+/* The surface that acts where a disk touches k: of those in the same place the first in the file. */
+static int acting(int i, int k) {
+    const Disk *d = W.disks + i;
+    const int *list;
+    int count = surfaces_near(i, &list), first = W.surfaces[k].there == THERE ? k : W.surface_count;
+    for (int n = 0; n < count && list[n] < first; n++) {
+        const Surface *s = W.surfaces + list[n];
+        if (list[n] == k || s->there != THERE || !is_near(s, d)) continue;
+        if (same_place(d, k, list[n]) && face_at(s, d->x, d->y) == s) first = list[n];
+    }
+    return first < W.surface_count ? first : k;
+}
+
 /* Fill in a contact of disk i as both partners are now; impulses are left alone. */
 void describe(Contact *c, int i, int j) {
     const Disk *a = W.disks + i;
@@ -15,8 +41,10 @@ void describe(Contact *c, int i, int j) {
     c->mass[1] = mass + r * r * turn;
     if (j < 0) {
         const Surface *s = W.surfaces + (-1 - j);
+        int acts = -1 - j;
         c->gap = gap_to(s, a->x, a->y, r, &c->nx, &c->ny);
-        pair = surface_pair(a, -1 - j);
+        if (c->gap <= TOUCH * r) s = W.surfaces + (acts = acting(i, acts));
+        pair = surface_pair(a, acts);
         c->owner = s->owner;
         c->other[0] = 0;
         c->other[1] = surface_speed(s, c->nx, c->ny, a->x, a->y, r);
@@ -47,7 +75,7 @@ void describe(Contact *c, int i, int j) {
     c->rest = pair->restitution;
     c->share = 1;
     c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx : 0;
-    c->gives = c->change = 0;
+    c->gives = c->change = c->turns = 0;
     c->most = INFINITY;
     c->eases = c->mass[0];
     c->friction = pair->friction;
@@ -124,6 +152,17 @@ static void pool(Contact *list, int count, int later) {
     }
 }
 
+/* Kinetic energy by which a disk of a crowd that moves on in a hollow is short halfway through this
+   step's impulses, J: in between its velocity turns, and is larger than the mean. */
+static double lacks(const Contact *c, const double *u, const double *v) {
+    const Disk *d = W.disks + c->i;
+    double f = W.before, x = d->ux + f * (d->vx - d->ux), y = d->uy + f * (d->vy - d->uy);
+    double most = CHORD * c->turns * (0.5 * W.length_before + (c->leaves ? 1 : 0.5) * W.length);
+    double change = v[0] - u[0];
+    if (!(c->impulse[0] > 0 && change > 0) || x * x + y * y < 0.5 * (d->ux * d->ux + d->uy * d->uy)) return 0;
+    return 0.5 * f * (1 - f) * MIN(c->impulse[0], d->mass * change) * MIN(change, most);
+}
+
 /* Work out the ledger entries of contacts that were solved together. */
 void account(Contact *list, int count) {
     for (int n = 0; n < count; n++) {
@@ -135,6 +174,10 @@ void account(Contact *list, int count) {
         c->given[0] = given[0];
         share_out(c, u, v, W.before, c->later, given);
         c->given[1] = given[0];
+        if (c->turns == 0) continue;
+        double more = lacks(c, u, v);
+        c->later[1] += more;
+        W.disks[c->i].lacks += more;
     }
     if (!W.interact) return;
     pool(list, count, 0);
@@ -143,12 +186,7 @@ void account(Contact *list, int count) {
 
 /* Hardly ever asked to the end: inline it would slow all that asks. */
 __attribute__((noinline)) int is_one(const Disk *d, int k, int other) {
-    double nx, ny, mx, my;
-    if (other < 0) return 0;
-    if (goes_on(-1 - k, -1 - other)) return 1;
-    double gap = gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny);
-    double off = gap - gap_to(W.surfaces + other, d->x, d->y, d->radius, &mx, &my);
-    return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;
+    return other >= 0 && (goes_on(-1 - k, -1 - other) || same_place(d, k, other));
 }
 
 int is_held(const Disk *d, int k) {
@@ -181,4 +219,39 @@ double turning_time(const Disk *d, const Surface *s) {
 double press_on(const Disk *d, const Surface *s, double nx, double ny) {
     double along = d->vx * ny - d->vy * nx;
     return -(W.gx * nx + W.gy * ny) - along * along * bending(s, d->x, d->y, d->radius);
+}
+
+/* Sine of the angle to the surface of the chord on which a disk goes on in a hollow for a time h. */
+double chord(const Contact *c, double h) {
+    const Disk *d = W.disks + c->i;
+    const Surface *s = W.surfaces + (-1 - c->j);
+    double bends = -bending(s, d->x, d->y, d->radius), way = sqrt(square(d->vx) + square(d->vy)) * h;
+    if (!(bends > 0 && way > 0)) return 0;
+    double away = square(d->x - s->x) + square(d->y - s->y), to = MAX(away, square(1 / bends));
+    return (away - to + way * way) / (2 * way * sqrt(away));
+}
+
+/* Turn the normal of a contact in a crowd to where a hollow leads the disk; return the cosine of that turn.
+
+   There a path is a row of chords, and an impulse stands for half of the step before (`past`; 0 if it
+   did not last) and half of this one: its normal is that of their middle. Then it turns the velocity and
+   does no work. Along the normal where it begins, chords would be faster than the arc by
+   1/2 (v^2 h / 2 (R - r))^2, which the first makes and nothing takes back when a blow ends the row.
+   Gravity bends a chord to a parabola: that part is a hop as everywhere. `in` and `out` are the sines of
+   the angles of both chords to the surface. */
+double follow(Contact *c, double past, double out) {
+    const Disk *d = W.disks + c->i;
+    double x = d->vx - 0.5 * W.gx * past, y = d->vy - 0.5 * W.gy * past, speed = sqrt(x * x + y * y);
+    double bends = MAX(-bending(W.surfaces + (-1 - c->j), d->x, d->y, d->radius), 0);
+    c->turns = MAX(bends * speed * speed, pressed_inside(d, -1 - c->j));
+    if (!(c->turns > 0)) return 1;
+    double most = MIN(CHORD * 0.5 * c->turns * W.step / speed, STEEPEST);
+    double in = MIN(MAX(-(x * c->nx + y * c->ny) / speed, -most), most);
+    most = MIN(2 * most, STEEPEST);
+    out = MIN(MAX(out, -most), most);
+    double tilt = (out - in) / (sqrt(1 - in * in) + sqrt(1 - out * out)), cosine = 1 / sqrt(1 + tilt * tilt);
+    double nx = c->nx, ny = c->ny, sine = x * ny - y * nx > 0 ? tilt * cosine : -tilt * cosine;
+    c->nx = cosine * nx - sine * ny;
+    c->ny = cosine * ny + sine * nx;
+    return cosine;
 }

@@ -42,6 +42,8 @@ extern World W;
 #define JAMMED 30
 /* Contacts per disk that a jam may have: disks in a plane have three pairs each at most. */
 #define TOUCHES 8
+/* Sweeps that a jam may take: what they leave open rattles on, and is the next jam after a few impacts. */
+#define JAM_SWEEPS 2000
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */
 #define GRAZE 1e-6
 /* Friction, 76 degrees, that takes all slip in any blow; where sweeps diverge it is lowered from here. */
@@ -73,10 +75,12 @@ static inline int is_near(const Surface *s, const Disk *d) {
     return s->there && s->box[0] < d->right && s->box[2] > d->left && s->box[1] < d->top
         && s->box[3] > d->bottom && !is_spared(s, d);
 }
+/* The piece that goes on smoothly beyond an end of a surface, of a circle one that leads to it, or -1. */
+static inline int mate_of(const Surface *s, int n) { return s->ledges[n] <= W.ledge ? s->mates[n] : -1; }
 /* Whether two partners of a disk, in the numbers of `Contact.j`, are one or go on smoothly. */
 static inline int is_mate(int j, int other) {
-    const int *mates = W.surfaces[-1 - j].mates;
-    return mates[0] == -1 - other || mates[1] == -1 - other;
+    const Surface *s = W.surfaces + (-1 - j);
+    return mate_of(s, 0) == -1 - other || mate_of(s, 1) == -1 - other;
 }
 static inline int goes_on(int j, int other) {
     return j == other || (j < 0 && other < 0 && (is_mate(j, other) || is_mate(other, j)));
@@ -87,7 +91,7 @@ int is_one(const Disk *d, int k, int other);
 int is_held(const Disk *d, int k);
 /* Whether a disk that is on a piece at the beginning of a step is on no hollow at its end. */
 static inline int is_flat(const Surface *s) {
-    return s->shape == SEGMENT && s->mates[0] < 0 && s->mates[1] < 0;
+    return s->shape == SEGMENT && mate_of(s, 0) < 0 && mate_of(s, 1) < 0;
 }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
@@ -156,6 +160,8 @@ void account(Contact *list, int count);
 double pressed_inside(const Disk *d, int surface);
 double turning_time(const Disk *d, const Surface *s);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
+double chord(const Contact *c, double h);
+double follow(Contact *c, double past, double out);
 
 /* impacts.c */
 void foresee(int i);
@@ -165,7 +171,7 @@ int next_disk(void);
 void shock(int i, int j, double t);
 void hold(Disk *d, int k);
 double soft_approach(const Disk *d, double radius);
-double left_over(const Disk *d, int impacts, int surface, double radius);
+double left_over(const Disk *d, int impacts, int surface, double radius, int sunk);
 void lie_down(int i);
 void was_moved(int i);
 
@@ -175,7 +181,8 @@ double time_unloaded(const double *load, const double *t);
 int find_contacts(double h, int *woke);
 
 /* solver.c */
-void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough);
+void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
+                    double enough);
 void solve_contacts(void);
 
 /* closing.c */

@@ -33,14 +33,14 @@ static int hides(const Surface *s, const Surface *circle, double x, double y) {
    and of a circle the one that hides it. So the end between two such pieces is not felt, even by a
    disk that has sunk in a little. */
 const Surface *face_at(const Surface *s, double x, double y) {
-    if (s->mates[0] < 0 && s->mates[1] < 0) return s;
+    if (mate_of(s, 0) < 0 && mate_of(s, 1) < 0) return s;
     if (s->shape == CIRCLE) {
         for (int n = 0; n < 2; n++)
-            if (s->mates[n] >= 0 && hides(W.surfaces + s->mates[n], s, x, y))
+            if (mate_of(s, n) >= 0 && hides(W.surfaces + s->mates[n], s, x, y))
                 return W.surfaces + s->mates[n];
         return s;
     }
-    int end = beyond(s, x - s->x, y - s->y), mate = end ? s->mates[end > 0] : -1;
+    int end = beyond(s, x - s->x, y - s->y), mate = end ? mate_of(s, end > 0) : -1;
     const Surface *next = W.surfaces + MAX(mate, 0);
     return mate >= 0 && next->there && !beyond(next, x - next->x, y - next->y) ? next : s;
 }

@@ -62,7 +62,7 @@ double soft_approach(const Disk *d, double radius) {
 /* Approach up to which a contact is left to the next step, m/s. What lies on a surface comes back to
    it at the end of each step, as fast as gravity makes it in one, and on the inside of an arc as the
    curved way does; not what has sunk into it. */
-double left_over(const Disk *d, int impacts, int surface, double radius) {
+double left_over(const Disk *d, int impacts, int surface, double radius, int sunk) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
     for (int n = 0; n < d->held_count; n++) {
         if (!is_one(d, d->held[n], surface)) continue;
@@ -71,7 +71,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius) {
         least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface)) * W.step);
     }
     /* Surfaces do not give way: with them it grows only if jams do not help. */
-    int many = surface >= 0 ? 2 * JAM : MANY;
+    int many = sunk ? STUCK : surface >= 0 ? 2 * JAM : MANY;
     if (impacts <= many) return least;
     double most = skip * (MOST_SKIP / SKIP) * pow(GROW, MIN(MAX(impacts - STUCK, 0), 1000));
     return MAX(least, MIN(skip * pow(GROW, MIN(impacts - many, 1000)), most));
@@ -83,8 +83,10 @@ static void foresee_pair(int i, int j, double *due, int *partner) {
     double x = a->x + (a->vx + 0.5 * W.gx * ta) * ta - b->x - (b->vx + 0.5 * W.gx * tb) * tb;
     double y = a->y + (a->vy + 0.5 * W.gy * ta) * ta - b->y - (b->vy + 0.5 * W.gy * tb) * tb;
     double u = a->vx + W.gx * ta - b->vx - W.gx * tb, v = a->vy + W.gy * ta - b->vy - W.gy * tb;
-    double t = W.now + meet_disk(x, y, u, v, a->radius + b->radius, W.step_end - W.now, &approach);
-    double least = left_over(a, MAX(a->impacts, b->impacts), -1, MIN(a->radius, b->radius));
+    double small = MIN(a->radius, b->radius), reach = a->radius + b->radius;
+    int sunk = x * x + y * y < square(reach - SUNK * small);
+    double t = W.now + meet_disk(x, y, u, v, reach, W.step_end - W.now, &approach);
+    double least = left_over(a, MAX(a->impacts, b->impacts), -1, small, sunk);
     if (t < *due && t < W.step_end && approach > least) {
         *due = t;
         *partner = j;
@@ -100,7 +102,7 @@ static void foresee_surfaces(int i, double *due, int *partner) {
         int k = list[n];
         if (W.surfaces[k].there != THERE || !is_near(W.surfaces + k, d)) continue;
         double t = d->t + meet_surface(W.surfaces + k, d, W.step_end - d->t, &approach);
-        if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius)) {
+        if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius, 0)) {
             *due = MAX(t, W.now);
             *partner = -1 - k;
         }
@@ -163,6 +165,7 @@ void was_moved(int i) {
     Disk *d = W.disks + i;
     d->impacts++;
     d->calm = d->rest = 0;
+    if (W.interact && d->impacts > STUCK) W.step_end = MIN(W.step_end, MAX(d->t, W.t + SHORTEST * W.step));
     if (d->moved != W.shocks) {
         d->moved = W.shocks;
         W.moved[W.moved_count++] = i;
@@ -212,9 +215,10 @@ static void support(int i, int k, double t) {
     hold(d, k);
     double press = press_on(d, W.surfaces + k, c.nx, c.ny), left = W.step_end - t, u[3];
     if (press <= 0 || !W.interact) return;
+    double cosine = follow(&c, 0, chord(&c, left));
     relative(&c, 0, u);
     c.drift = 0.5 * left * c.pull;
-    give(&c, 0.5 * press * d->mass * left);
+    give(&c, 0.5 * press * d->mass * left / cosine);
     /* Friction that need not slow it can hold it from now on. */
     if (fabs(u[1]) <= 1e-12 * W.g * W.dt && fabs(c.impulse[1]) < c.friction * c.impulse[0]) {
         d->slips = 0;
@@ -281,12 +285,12 @@ static void jam(Contact *struck, double t) {
         const Disk *a = W.disks + c->i;
         double u[3], r = c->j >= 0 ? MIN(a->radius, W.disks[c->j].radius) : a->radius;
         relative(c, 0, u);
-        c->need = -u[0] <= left_over(a, 0, -1 - c->j, r) ? MIN(-u[0], 0) : -u[0];
+        c->need = -u[0] <= left_over(a, 0, -1 - c->j, r, 0) ? MIN(-u[0], 0) : -u[0];
     }
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
-    /* Not hastened: then what rattles may never be as calm as it must be. */
-    sweep_contacts(list, count, 0, W.sweeps, 0.1 * left, left);
+    /* Not hastened at first: then what rattles may never be as calm as it must be. */
+    sweep_contacts(list, count, 0, JAM_SWEEPS, W.sweeps, 0.1 * left, left);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
         Disk *d = W.disks + m;
         double v[3] = {d->vx, d->vy, d->spin};
@@ -377,6 +381,19 @@ static void let_fly(Disk *d) {
     d->held_count = kept;
 }
 
+/* Whether a disk meets a face in line with another surface that it lasts on: it only goes over to it. */
+static int goes_straight_on(const Contact *c) {
+    const Disk *d = W.disks + c->i;
+    const Surface *s = W.surfaces + (-1 - c->j);
+    if (d->on < 0 || d->on == c->owner || s->shape != SEGMENT) return 0;
+    for (int link = d->links; link >= 0; link = W.links[link]) {
+        const Contact *last = W.contacts + link / 2;
+        if (last->owner == d->on && last->impulse[0] > 0
+            && fabs(last->nx * s->tx + last->ny * s->ty) <= GRAZE) return 1;
+    }
+    return 0;
+}
+
 /* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, by Newton's restitution
    and Coulomb's friction. */
 static void strike(int i, int j, double t) {
@@ -415,11 +432,12 @@ static void strike(int i, int j, double t) {
     W.impact_count++;
     int landing = j < 0 && c.owner == W.landing && !a->landed, kind = COLLISION;
     if (j < 0) kind = landing ? LANDING : IMPACT;
-    if (landing || -u[0] > W.soft || W.g == 0 || (j < 0 && a->on != c.owner))
+    int passes = j < 0 && -u[0] <= W.soft && goes_straight_on(&c);
+    if (!passes && (landing || -u[0] > W.soft || W.g == 0 || (j < 0 && a->on != c.owner)))
         write_event(kind, i, j >= 0 ? j : -1, c.owner, t, &a->x, before, &a->vx,
                     c.impulse[0], c.impulse[1]);
-    if (landing) a->landed = 1;
-    if (j < 0) {
+    if (landing && !passes) a->landed = 1;
+    if (j < 0 && !passes) {
         a->on = c.owner;
         a->slips = 1;
     }
@@ -440,14 +458,14 @@ static int struck_too(const Contact *c, double t, int *j) {
         double gap = gap_to(s, a->x, a->y, a->radius, &nx, &ny);
         *j = -1 - k;
         return gap < TOUCH * a->radius
-            && -(a->vx * nx + a->vy * ny) > left_over(a, a->impacts, k, a->radius);
+            && -(a->vx * nx + a->vy * ny) > left_over(a, a->impacts, k, a->radius, 0);
     }
     if (b->mode != FREE) return 0;
     advance(b, t);
     double x = a->x - b->x, y = a->y - b->y, d = sqrt(x * x + y * y), r = MIN(a->radius, b->radius);
     double approach = -(x * (a->vx - b->vx) + y * (a->vy - b->vy)) / d;
     return d < a->radius + b->radius + TOUCH * r
-        && approach > left_over(a, MAX(a->impacts, b->impacts), -1, r);
+        && approach > left_over(a, MAX(a->impacts, b->impacts), -1, r, d < a->radius + b->radius - SUNK * r);
 }
 
 static void queue_up(int i, int *tail) {

@@ -54,6 +54,8 @@ typedef struct {
     double entries[3];          /* J; belt work, restitution loss, friction loss so far */
     double gain[3];             /* J; what this step's lasting contacts add to them */
     double ahead[3];            /* J; the second half of it */
+    double lacks;               /* J; kinetic energy that the mean velocity of this step's impulses lacks
+                                   in a hollow, see `account` */
     int kind;                   /* [in] row of the table of pairs */
     int rides;                  /* [in] the incoming belt carries it by adhesion */
     int goes_on;                /* [in] it was under way before: released wherever others are */
@@ -119,6 +121,7 @@ typedef struct {
     int owner;              /* [in] number of the surface it is part of */
     int mates[2];           /* pieces that go on smoothly beyond its ends, of a circle that lead to it;
                                or -1 */
+    double ledges[2];       /* m; how far their ends are apart there */
     int gate;               /* column of `spared` if it comes and goes, else -1 */
     int there;              /* whether it is there in this step; LEAVING: until just now */
     double box[4];          /* m; left, bottom, right, top */
@@ -149,6 +152,7 @@ typedef struct {
     double entries[3], later[3]; /* J; what its impulses do to the ledger, and what the part of them
                                     does that belongs to this step; see `account` */
     double given[2];        /* J; the same for the belt that carries the partner */
+    double turns;           /* m/s2; by which a hollow turns the way of a disk in a crowd, else 0 */
     double free_gap, bend;     /* m; its gap at the step's end without impulses, and what they change of it
                                but for the straight way: see `bends` */
     int i, j;
@@ -157,7 +161,6 @@ typedef struct {
     int island;             /* a disk by which it is known */
     int next;               /* of the contacts of disk i in the step before */
     int leaves;             /* it parts in this step */
-    int was;                /* owner of the one of the step before that it goes on from, or -1 */
 } Contact;
 
 typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; } Knot;       /* [out] */
@@ -191,12 +194,14 @@ typedef struct {
     int *found;          /* (2 disks) */
     int *nearby;         /* (disks, MAX_NEARBY) surfaces near each, ascending */
     int *everything;     /* (surfaces) 0, 1, ... */
+    int *ends;           /* (2 surfaces) ends of segments and arcs, sorted by place ... */
+    int *circles;        /* ... and within, behind them, the circles */
     int *spared;         /* (disks, gates) 1: what shut on this disk, and does not touch it yet */
     /* sizes */
     int disk_count, surface_count, kind_count, material_count, owner_count;
     int knot_room, event_room, contact_room, near_room, cell_room;
     int bucket_count;    /* a power of two */
-    int gate_count;
+    int gate_count, end_count, circle_count;
     /* the run */
     int interact;        /* disks meet each other */
     int until;
@@ -229,6 +234,7 @@ typedef struct {
     double pace;         /* sqrt(g / EARTH), 1 without gravity: bounds on speeds grow with it, bounds
                             on times shrink: a film of the run shown faster is a run */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
+    double ledge;        /* m; up to which a joint is smooth in this step, see `ledge_in` */
     double room;         /* m; least that a hollow leaves a disk by itself, INFINITY without one */
     double skip;         /* 1/s; SKIP in a step: radii that it may go */
 } World;

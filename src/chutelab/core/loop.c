@@ -298,6 +298,14 @@ static double hollow_step(const Disk *d, double h) {
     return h;
 }
 
+/* Height of a ledge up to which a joint is smooth to a disk by itself in a step, m. Closing the gap there
+   in one step gives it ledge / h. By a ledge that is felt its way would be turned by sqrt(2 ledge / r), the angle at
+   which it meets the edge: where that is less, the step is short enough for the blow. */
+static double ledge_in(const Disk *d, double h) {
+    double way = (sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * h) * h;
+    return MAX(2 * way * way / d->radius, TOUCHING * d->radius);
+}
+
 /* Begin a step: where prescribed paths lead, who may meet, what lasts. A status other than DONE says
    what was too small, and nothing has happened yet. */
 static int begin_step(void) {
@@ -310,6 +318,7 @@ static int begin_step(void) {
     W.step = h;
     W.soft = 2 * W.g * h;
     W.skip = SKIP / h;
+    if (!W.interact) W.ledge = ledge_in(W.disks + W.low, h);
     /* Steps end where a surface comes or goes, and at the end of the run; none is a short rest: two
        shorter ones share what is left. At the very end a step is solved for what lasts, and not gone
        through. */
@@ -368,6 +377,8 @@ static int go_through(void) {
         Disk *d = W.disks + i;
         double t = d->due;
         int j = d->partner;
+        /* The step was cut short. */
+        if (t >= W.step_end) return DONE;
         if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
         if (W.event_count + SHOCKS * W.contact_count + 64 > W.event_room)
             return FULL_EVENTS;

@@ -96,46 +96,90 @@ static void at_end(const Surface *s, int end, double *place, double *onward) {
     onward[1] = way * (s->shape == SEGMENT ? s->ty : (place[0] - s->x) / s->radius);
 }
 
-/* Which piece goes on smoothly beyond an end: an arc, or beyond a segment an arc or circle; or -1. */
-static int mate_of(int k, int end, double r) {
-    const Surface *s = W.surfaces + k;
-    double place[2], onward[2], other[2], back[2];
-    at_end(s, end, place, onward);
-    for (int m = 0; m < W.surface_count; m++) {
-        const Surface *next = W.surfaces + m;
-        if (m == k || next->shape == CIRCLE || (next->shape == SEGMENT && s->shape == SEGMENT))
-            continue;
-        for (int n = 0; n < 2; n++) {
-            at_end(next, n, other, back);
-            if (hypot(other[0] - place[0], other[1] - place[1]) <= JOINED * r
-                && hypot(back[0] + onward[0], back[1] + onward[1]) <= SMOOTH) return m;
+/* How far an end lies in a skew direction, which few joints lie across: ends in one place are close in it,
+   by no more than 1.2 times their distance. */
+static double rank(int end) {
+    const double *place = W.surfaces[end / 2].end + 2 * (end % 2);
+    return place[0] + 0.61803398875 * place[1];
+}
+
+/* Sort all ends of segments and arcs, as 2 k and 2 k + 1 of surface k, into `W.ends`; behind them stand
+   the circles but the pulley. */
+static void sort_ends(void) {
+    W.end_count = 0;
+    for (int k = 0; k < W.surface_count; k++)
+        for (int n = 0; n < 2 && W.surfaces[k].shape != CIRCLE; n++) W.ends[W.end_count++] = 2 * k + n;
+    W.circles = W.ends + W.end_count;
+    W.circle_count = 0;
+    for (int k = 0; k < W.surface_count; k++)
+        if (W.surfaces[k].shape == CIRCLE && k != W.pulley) W.circles[W.circle_count++] = k;
+    for (int step = W.end_count / 2; step > 0; step = step == 2 ? 1 : step * 5 / 11)
+        for (int row = step; row < W.end_count; row++) {
+            int end = W.ends[row], to = row;
+            for (; to >= step && rank(W.ends[to - step]) > rank(end); to -= step) W.ends[to] = W.ends[to - step];
+            W.ends[to] = end;
         }
+}
+
+/* The first row of `W.ends` that may be in the place of an end; from there on they are up to `last`. */
+static int first_near(int end, double r, double *last) {
+    double first = rank(end) - 2 * JOINED * r;
+    int low = 0, high = W.end_count;
+    *last = rank(end) + 2 * JOINED * r;
+    while (low < high) {
+        int middle = (low + high) / 2;
+        if (rank(W.ends[middle]) < first) low = middle + 1;
+        else high = middle;
     }
-    for (int m = 0; m < W.surface_count; m++) {
+    return low;
+}
+
+/* Note which piece goes on smoothly beyond an end: an arc, or beyond a segment an arc or circle; or -1. */
+static void find_mate(int k, int end, double r) {
+    Surface *s = W.surfaces + k;
+    double place[2], onward[2], other[2], back[2], last;
+    int mate = W.surface_count;
+    s->mates[end] = -1;
+    s->ledges[end] = 0;
+    if (s->shape == CIRCLE) return;
+    at_end(s, end, place, onward);
+    for (int row = first_near(2 * k + end, r, &last); row < W.end_count; row++) {
+        int m = W.ends[row] / 2;
         const Surface *next = W.surfaces + m;
-        if (next->shape != CIRCLE || m == W.pulley) continue;
-        double x = place[0] - next->x, y = place[1] - next->y, d = hypot(x, y);
-        if (fabs(d - next->radius) <= JOINED * r
-            && fabs(x * onward[0] + y * onward[1]) <= SMOOTH * d) return m;
+        if (rank(W.ends[row]) > last) break;
+        if (m == k || m >= mate || (next->shape == SEGMENT && s->shape == SEGMENT)) continue;
+        at_end(next, W.ends[row] % 2, other, back);
+        double off = hypot(other[0] - place[0], other[1] - place[1]);
+        if (off > JOINED * r || hypot(back[0] + onward[0], back[1] + onward[1]) > SMOOTH) continue;
+        s->mates[end] = mate = m;
+        s->ledges[end] = off;
     }
-    return -1;
+    if (mate < W.surface_count) return;
+    for (int n = 0; n < W.circle_count; n++) {
+        const Surface *next = W.surfaces + W.circles[n];
+        double x = place[0] - next->x, y = place[1] - next->y, reach = next->radius + JOINED * r;
+        if (fabs(x) > reach || fabs(y) > reach) continue;
+        double d = hypot(x, y), off = fabs(d - next->radius);
+        if (off > JOINED * r || fabs(x * onward[0] + y * onward[1]) > SMOOTH * d) continue;
+        s->mates[end] = W.circles[n];
+        s->ledges[end] = off;
+        return;
+    }
 }
 
 /* Ends in one place but for rounding are one point, of the first piece that ends there. */
-static void share_ends(int k, double near) {
-    Surface *s = W.surfaces + k;
-    if (s->shape == CIRCLE) return;
-    for (int m = 0; m < k; m++) {
-        const Surface *first = W.surfaces + m;
-        if (first->shape == CIRCLE) continue;
-        for (int n = 0; n < 4; n++) {
-            double *end = s->end + (n & 2);
-            const double *other = first->end + 2 * (n & 1);
-            if (fabs(end[0] - other[0]) > near || fabs(end[1] - other[1]) > near) continue;
-            end[0] = other[0];
-            end[1] = other[1];
-        }
+static void share_end(int k, int n, double near, double r) {
+    double *end = W.surfaces[k].end + 2 * n, last;
+    int first = 2 * k;
+    for (int row = first_near(2 * k + n, r, &last); row < W.end_count; row++) {
+        const double *other = W.surfaces[W.ends[row] / 2].end + 2 * (W.ends[row] % 2);
+        if (rank(W.ends[row]) > last) break;
+        if (W.ends[row] < first && fabs(end[0] - other[0]) <= near && fabs(end[1] - other[1]) <= near)
+            first = W.ends[row];
     }
+    if (first == 2 * k) return;
+    end[0] = W.surfaces[first / 2].end[2 * (first % 2)];
+    end[1] = W.surfaces[first / 2].end[2 * (first % 2) + 1];
 }
 
 /* The host has laid out the arrays and filled in what is marked [in]: fill in what follows. */
@@ -156,18 +200,21 @@ __attribute__((visibility("default"))) void prepare(void) {
     for (int k = 0; k < W.surface_count; k++) {
         Surface *piece = W.surfaces + k;
         derive(piece);
-        share_ends(k, TOUCHING * least);
         piece->gate = piece->opens > -INFINITY || piece->closes < INFINITY ? W.gate_count++ : -1;
         W.everything[k] = k;
     }
+    sort_ends();
+    for (int k = 0; k < 2 * W.surface_count; k++)
+        if (W.surfaces[k / 2].shape != CIRCLE) share_end(k / 2, k % 2, TOUCHING * least, least);
     for (int k = 0; k < W.surface_count; k++)
-        for (int end = 0; end < 2; end++)
-            W.surfaces[k].mates[end] = W.surfaces[k].shape == CIRCLE ? -1 : mate_of(k, end, least);
+        for (int end = 0; end < 2; end++) find_mate(k, end, least);
     for (int k = 0; k < 2 * W.surface_count; k++) {
         int mate = W.surfaces[k / 2].mates[k % 2], *of = W.surfaces[MAX(mate, 0)].mates;
         if (W.surfaces[k / 2].shape == CIRCLE || mate < 0 || W.surfaces[mate].shape != CIRCLE) continue;
+        W.surfaces[mate].ledges[of[0] >= 0] = W.surfaces[k / 2].ledges[k % 2];
         of[of[0] >= 0] = k / 2;
     }
+    W.ledge = INFINITY;
     W.gx = 0;
     W.gy = -W.g;
     W.sweeps = alone ? SWEEPS_ALONE : SWEEPS;

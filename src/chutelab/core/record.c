@@ -123,6 +123,13 @@ void track_lasting(int i) {
     double state[6] = {d->t, d->x, d->y, d->ux + f * (d->vx - d->ux), d->uy + f * (d->vy - d->uy),
                        d->uspin + f * (d->spin - d->uspin)};
     double entries[3];
+    if (d->lacks > 0) {
+        /* In a hollow the velocity turns, so that its mean is too small. */
+        double square_speed = square(state[3]) + square(state[4]);
+        double longer = sqrt(1 + 2 * d->lacks * d->inv_mass / square_speed);
+        state[3] *= longer;
+        state[4] *= longer;
+    }
     for (int n = 0; n < 3; n++) entries[n] = d->entries[n] + d->gain[n] - d->ahead[n];
     if (!track->lasted) {
         knot_before(i, d->t, d->ux, d->uy, d->uspin);

@@ -214,6 +214,24 @@ static double sweep(Contact *list, int count, int sweeps, int plain, double accu
 /* Whether a surface that moves drives a disk. */
 static int drives(const Contact *c) { return c->j < 0 && c->other[1] != 0; }
 
+/* Stall the drives, for this step, of disks that do not turn and that block them: contacts that change by
+   `least`, m/s, or more, and those that grip without bound and slip by more than `enough` all the same. Return
+   whether there is one. */
+static int stall(Contact *list, int count, double least, double enough) {
+    int stalled = 0;
+    for (int n = 0; n < count; n++) {
+        Contact *c = list + n;
+        double v[3];
+        if (W.disks[c->i].inertia > 0 || !drives(c)) continue;
+        relative(c, 0, v);
+        int slips = c->friction > ROUGH && c->impulse[0] > 0 && fabs(v[1] + c->drift) > enough;
+        if (!slips && c->change < least) continue;
+        c->other[1] = c->other[2] = 0;
+        stalled = 1;
+    }
+    return stalled;
+}
+
 /* Take back friction beyond what contacts allow: sweeps that did not come to an end have pressed less
    since. */
 static void keep_bounds(Contact *list, int count) {
@@ -229,49 +247,49 @@ static void keep_bounds(Contact *list, int count) {
     }
 }
 
-/* Solve contacts by sweeps until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
+/* Solve contacts by `sweeps` until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
    will do. A crowd is swept again, up to so many rounds, of which the last is good enough if it crawls,
    and more finely where small changes leave gaps open. By itself (0 rounds), and where sweeps diverge,
    rigid bodies with all of the friction may have no solution, driven into a wedge that locks itself:
    there it is lowered until they have one. Gaps tell nothing of that where a drive presses: it presses
    harder in each sweep, so there the changes have to end, too. A disk that cannot turn is held where
-   friction locks, and would slip away from a lower one: it stalls the drive, for this step. */
-void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough) {
+   friction locks, and would slip away from a lower one: it stalls the drive, for this step, and so does
+   one that others block on a belt that grips without bound, which never slips. */
+void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
+                    double enough) {
     double first = INFINITY;
     for (int left = TRIES, more = rounds;;) {
-        double change = sweep(list, count, W.sweeps, plain, accurate), worst = change;
+        double change = sweep(list, count, sweeps, plain, accurate), worst = change;
         int ended = change <= accurate;
         if (!ended) keep_bounds(list, count);
         if (!ended || W.interact) lessen(list, count);
-        if ((ended && more < 2) || left == 0) break;
-        if (ended) accurate *= 0.1;
-        if (change < INFINITY) {
-            worst = 0;
-            for (int n = 0; n < count; n++) {
-                const Contact *c = list + n;
-                double u[3], v[3];
-                relative(c, 1, u);
-                relative(c, 0, v);
-                worst = MAX(worst, asks(c) - v[0] + u[0]);
-                if (drives(c)) worst = MAX(worst, change);
+        if (left == 0) break;
+        int stalled = change < INFINITY && stall(list, count, INFINITY, enough);
+        if (!stalled) {
+            if (ended && more < 2) break;
+            if (ended) accurate *= 0.1;
+            if (change < INFINITY) {
+                worst = 0;
+                for (int n = 0; n < count; n++) {
+                    const Contact *c = list + n;
+                    double u[3], v[3];
+                    relative(c, 1, u);
+                    relative(c, 0, v);
+                    worst = MAX(worst, asks(c) - v[0] + u[0]);
+                    if (drives(c)) worst = MAX(worst, change);
+                }
             }
+            if (worst <= enough) break;
+            if (change < INFINITY && more > 1) {
+                if (more-- == rounds) first = change;
+                continue;
+            }
+            if (more == 1 && change < CRAWLS * first) break;
+            worst = 0;
+            for (int n = 0; n < count; n++) worst = MAX(worst, list[n].change);
+            stalled = stall(list, count, FOLLOWS * worst, INFINITY);
         }
-        if (worst <= enough) break;
-        if (change < INFINITY && more > 1) {
-            if (more-- == rounds) first = change;
-            continue;
-        }
-        if (more == 1 && change < CRAWLS * first) break;
         more = rounds;
-        worst = 0;
-        for (int n = 0; n < count; n++) worst = MAX(worst, list[n].change);
-        int stalled = 0;
-        for (int n = 0; n < count; n++) {
-            Contact *c = list + n;
-            if (W.interact || W.disks[c->i].inertia > 0 || !drives(c) || c->change < FOLLOWS * worst) continue;
-            c->other[1] = c->other[2] = 0;
-            stalled = 1;
-        }
         for (int n = 0; n < count; n++) {
             Contact *c = list + n;
             Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
@@ -308,7 +326,7 @@ static void solve_alone(Contact *list, int count) {
     double h = W.step_end - W.t, r = W.disks[list->i].radius;
     for (double last = INFINITY;;) {
         double most = 0;
-        sweep_contacts(list, count, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9 * W.pace));
+        sweep_contacts(list, count, 0, W.sweeps, W.sweeps, W.accurate, MAX(W.accurate, 1e-9 * W.pace));
         for (int n = 0; n < count; n++) most = MAX(most, fabs(bends(list + n, h) - list[n].bend));
         if (most <= FINE * r || most >= SHRINKS * last) return;
         last = most;
@@ -412,8 +430,8 @@ void solve_contacts(void) {
         }
         start_warm(list, to - from);
         if (W.interact)
-            sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), PLAIN,
-                           W.accurate, W.skip * least);
+            sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,
+                           PLAIN, W.accurate, W.skip * least);
         else solve_alone(list, to - from);
         for (int n = from; n < to; n++) {
             /* Rounding does not press; with endless friction even that would pull. */

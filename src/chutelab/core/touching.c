@@ -54,7 +54,7 @@ static double time_on_face(const Contact *c) {
         length = 2 * half;
     }
     if (along < 0 || along > length || run == 0) return INFINITY;
-    if (s->mates[run > 0] >= 0) {
+    if (mate_of(s, run > 0) >= 0) {
         const Surface *next = W.surfaces + s->mates[run > 0];
         double load = -(W.gx * c->nx + W.gy * c->ny), fast = d->vx * c->ny - d->vy * c->nx;
         int round = next->shape != SEGMENT
@@ -67,6 +67,22 @@ static double time_on_face(const Contact *c) {
 /* When a load (N s of impulse per time, newest first) falls to nothing, by the line through two. */
 double time_unloaded(const double *load, const double *t) {
     return load[1] > load[0] ? t[0] + load[0] / (load[1] - load[0]) * (t[0] - t[1]) : INFINITY;
+}
+
+/* The change of velocity along its normal that brings a disk of a crowd where its gap is `aim` at the
+   step's end, m/s: in a hollow the wall bends towards it on its way. */
+static double closes(const Contact *c, double aim, double h) {
+    const Disk *d = W.disks + c->i;
+    double need = c->need, nx, ny;
+    for (int n = 0; n < 2; n++) {
+        double x = d->x + (d->vx + need * c->nx + 0.5 * W.gx * h) * h;
+        double y = d->y + (d->vy + need * c->ny + 0.5 * W.gy * h) * h;
+        double gap = gap_to(face_at(W.surfaces + (-1 - c->j), x, y), x, y, d->radius, &nx, &ny);
+        double slope = nx * c->nx + ny * c->ny;
+        if (slope < 0.5) break;
+        need += (aim - gap) / (slope * h);
+    }
+    return need;
 }
 
 /* Add a contact if it touches and hardly approaches; `least` is the smaller radius. */
@@ -103,12 +119,12 @@ static int add(int i, int j, double least, double bound, double h) {
     c->need = (aim - later) / h;
     c->drift = 0.5 * h * c->pull;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
-    c->was = -1;
-    for (int k = d->before; k >= 0; k = W.earlier[k].next)
-        if (goes_on(W.earlier[k].j, j)) {
-            for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
-            c->was = W.earlier[k].owner;
-        }
+    int lasted = 0;
+    for (int k = d->before; k >= 0; k = W.earlier[k].next) {
+        if (!goes_on(W.earlier[k].j, j)) continue;
+        lasted = 1;
+        for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
+    }
     int pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
        above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
@@ -138,6 +154,10 @@ static int add(int i, int j, double least, double bound, double h) {
         c->drift = (until < h ? until : 0) * c->pull;
     } else if (gone) c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     else if (pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
+    if (j < 0 && W.interact && !gone && !c->leaves) {
+        follow(c, lasted ? W.length_before : 0, chord(c, h));
+        if (c->turns > 0) c->need = closes(c, aim, h);
+    }
     W.contact_count++;
     return 1;
 }
@@ -203,7 +223,7 @@ int find_contacts(double h, int *woke) {
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
         /* What the step before left over is taken up here. */
         int impacts = MAX(a->impacts, b->impacts);
-        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least);
+        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least, 0);
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
             bound = MAX(bound, MAX(W.soft, W.skip * least));
         if (a->mode == ASLEEP || b->mode == ASLEEP) {
@@ -218,7 +238,7 @@ int find_contacts(double h, int *woke) {
         Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         int first = W.contact_count;
-        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius);
+        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius, 0);
         if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
         const int *list;
         int count = surfaces_near(i, &list);
@@ -229,6 +249,11 @@ int find_contacts(double h, int *woke) {
             if (!add(i, -1 - k, d->radius, most, h)) return 0;
         }
         if (W.contact_count > first) carry_to_end(i, first, h);
+        for (Contact *c = W.contacts + first; W.interact && c < W.contacts + W.contact_count; c++) {
+            if (!c->leaves) continue;
+            double speed = sqrt(d->vx * d->vx + d->vy * d->vy), rate = d->vx * c->nx + d->vy * c->ny;
+            c->need /= follow(c, W.length_before, speed > 0 ? (rate + c->need) / speed : 0);
+        }
     }
     return 1;
 }

@@ -143,7 +143,7 @@ class Job:
             ("heads", INTEGER, buckets), ("heap", INTEGER, n), ("queue", INTEGER, n + 1),
             ("moved", INTEGER, n), ("found", INTEGER, 2 * n),
             ("nearby", INTEGER, number("MAX_NEARBY") * n), ("everything", INTEGER, room),
-            ("spared", INTEGER, gates * n),
+            ("ends", INTEGER, 2 * room), ("spared", INTEGER, gates * n),
         )  # fmt: skip
         self.make_room("knot", (100 if machine.releases.carried.any() else 30) * n + 200)
         self.make_room("event", 40 * n + 1200)

@@ -46,7 +46,18 @@ def go_on(s: State, index: Ints, obstacle: Ints, side: Floats, joint: Ints) -> N
     flush = ends | (obstacle < o.segments) | (obstacle >= o.first_arc)
     last, last_side = np.where(flush, obstacle, left), np.where(flush, side, face)
     s.fly(index[off], last[off], last_side[off], 2, joint[off])
+    # Another surface is come on to without a blow: what it did on the one before ends there.
+    surface = o.surface[obstacle]
+    onto = stays & (surface != o.surface[left])
+    lands = onto & (surface == s.machine.landing) & ~s.landed[index]
+    s.slip[index[onto]], s.landed[index[lands]] = 1.0, True
+    s.event(int(Kind.LANDING), index[lands], surface[lands])
+    if s.machine.until == "landed":
+        s.finish(index[lands], "landed")
+        stays &= ~lands
     rest_on(s, index[stays], obstacle[stays], side[stays], np.zeros(np.count_nonzero(stays)))
+    slips = onto & stays & ~lands & (s.slip[index] != 0.0)
+    s.event(int(Kind.SLIP), index[slips], surface[slips])
 
 
 def carry_round(s: State, index: Ints, start: Floats, v: Floats) -> None:

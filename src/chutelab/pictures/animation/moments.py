@@ -85,14 +85,14 @@ def sentence(recording: Recording, event: Any) -> str:
         Kind.RELEASE: "is released",
         Kind.SEPARATION: pulley if name == "incoming" else f"leaves {on} at {after}",
         Kind.SLIP: f"begins to slip on {on}",
-        Kind.STICK: f"no longer slips on {on}",
+        Kind.STICK: f"is on {on} without slip",
         Kind.IMPACT: f"strikes {on} at {before}",
         Kind.LANDING: f"lands on {on} at {before}",
         Kind.COLLISION: f"is hit by particle {i}" if (i := int(event["particle"])) else hits,
         Kind.SETTLE: f"has settled on {on}",
         Kind.EXIT: "has left the scene",
     }[kind]
-    if kind not in (Kind.IMPACT, Kind.LANDING):
+    if kind not in (Kind.IMPACT, Kind.LANDING) or event["normal_impulse"] == 0.0:
         return text
     normal = contact_normal(recording.machine, event)
     into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))

@@ -161,6 +161,7 @@ class Core extends Memory {
     this.place("found", "int", 2 * n);
     this.place("nearby", "int", this.layout.constants.MAX_NEARBY * n);
     this.place("everything", "int", room);
+    this.place("ends", "int", 2 * room);
     this.place("spared", "int", 2 * n * gates);
     this.makeRoom("knot", (releases.some(({ carried }) => carried) ? 100 : 30) * n + 200);
     this.makeRoom("event", 40 * n + 1200);

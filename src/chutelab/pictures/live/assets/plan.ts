@@ -3,6 +3,7 @@
 
 import { Memory, type Layout } from "./core.ts";
 import { Fault, met, type Point, type Scene } from "./scene.ts";
+import { useCore } from "./trig.ts";
 
 type Segment = { start: Point, end: Point, tangent: Point, length: number, speed: number,
   appears: number, vanishes: number, surface: number };
@@ -21,9 +22,10 @@ let core: Memory;
 /** The core of this thread, with what is laid. */
 export const memory = () => core;
 
-/** Start the core of this thread, which builds machines. */
+/** Start the core of this thread, which builds machines, and knows sines. */
 export async function startPlan(module: WebAssembly.Module, layout: Layout) {
   core = new Memory(await WebAssembly.instantiate(module, {}), layout);
+  useCore(core);
 }
 
 /** Returns the keys of a struct of layout.h as numbers, NaN for what is not given. */

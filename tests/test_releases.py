@@ -16,6 +16,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.machine.releases import DEEP, squeeze
 from chutelab.results import Kind
+from chutelab.scene.variants import family
 
 G, V, r = 9.81, 2.0, 0.0063
 RC = 0.1 + r
@@ -205,6 +206,20 @@ def packed_at_once(left, bottom, right, top, radius, seed):
                 places.append([x, bottom + room + row * rise])
     moved = np.random.default_rng(seed).uniform(-1.0, 1.0, (len(places), 2))
     return np.array(places) + 0.01 * radius * moved
+
+
+def test_each_of_a_family_starts_as_it_would_by_itself():
+    one = scene.load("inclined-conveyor", ["stream.count=1"])
+    columns = {
+        "incoming.incline_deg": np.array([0.0, 4.0, -3.0, 12.0]),
+        "incoming.pulley_radius": np.array([0.2, 0.25, 0.2, 0.3]),
+        "stream.start": np.array([0.0, 0.5, 0.0, 2.0]),
+    }
+    found = vars(build(family(one, columns)).releases)
+    for n in range(4):
+        alone = vars(build(one.with_values({key: own[n] for key, own in columns.items()})).releases)
+        for name in ("t", "position", "velocity", "carried"):
+            assert found[name][n].tobytes() == alone[name][0].tobytes()
 
 
 @pytest.mark.parametrize("count", [10, 20_000])

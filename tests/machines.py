@@ -7,6 +7,7 @@ from math import cos, inf, sin
 
 import numpy as np
 
+from chutelab.core.module import Module
 from chutelab.machine import build
 from chutelab.machine.parts import Arcs, Particle
 from chutelab.machine.rows import lay
@@ -53,7 +54,7 @@ def scene_of(**tables):
 
 def nominal(scene):
     """Return where free flight of the nominal particle begins, its velocity, and where it hits."""
-    found = lay(scene, scene.met(scene.kinds[0], "incoming")[1]).nominal
+    found = lay(Module(), scene, scene.met(scene.kinds[0], "incoming")[1]).nominal
     return found["position"], found["velocity"], found["hit"]
 
 

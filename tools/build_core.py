@@ -18,8 +18,8 @@ from pathlib import Path
 CORE = Path(__file__).parents[1] / "src" / "chutelab" / "core"
 
 EXPORTS = (
-    "run", "prepare", "world", "build", "plan",
-    "sine", "cosine", "angle_of", "angle_of_cosine", "__heap_base",
+    "run", "prepare", "world", "build", "plan", "draw", "drawing", "sine", "cosine", "angle_of",
+    "angle_of_cosine", "__heap_base",
 )  # fmt: skip
 """What a host can call."""
 

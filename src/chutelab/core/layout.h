@@ -245,23 +245,31 @@ typedef struct {
 
 enum DropFrom { FROM_IMPACT, FROM_TOP };
 
-typedef struct { double gravity; } SceneKeys;
+typedef struct {
+    double gravity;
+    double crowded;         /* whether particles meet each other */
+} SceneKeys;
 
 /* Of a kind of particles. */
 typedef struct {
     double radius;          /* m; the mean */
     double span[2];         /* m; of radii that differ */
     double moment;          /* I/(m r2); 0 if it never turns */
+    double corners;         /* of a box or polygon, see `Drawing.corners`; 0 of what is round */
 } ParticleKeys;
 
 typedef struct {
     double kind;            /* which of the particles it consists of */
     double at[2], to[2], fill[4], velocity[2];
+    double count, rate, start, bed_height, speed_spread;
+    double seed[2];         /* its lower 32 bits and the others */
+    double at_once;         /* whether all are released at once */
 } StreamKeys;
 
 typedef struct {
     double speed, pulley_radius, length, incline_deg;
     double friction;        /* with the nominal particle; INFINITY is adhesion */
+    double adheres;         /* whether adhesion is what the belt's own table says */
 } IncomingKeys;
 
 /* With a pivot it is a further plate, else the damping plate. */
@@ -315,5 +323,42 @@ typedef struct {
     int segment_room, arc_room;   /* [in] of all members */
     int segment_count, arc_count; /* [out] of each */
 } Plan;
+
+/* Where and how a particle starts. */
+typedef struct { double t, position[2], velocity[2], radius; } Start;                     /* [out] */
+
+/* An earlier particle as one that is drawn sees it: how far it has come (m), and how far apart they
+   have to be. */
+typedef struct { double dx, dy, reach; int particle, next; } Near;
+
+/* Why releases of a scene cannot be drawn: a box has room for so many of this radius only, or one would
+   start inside a surface, at this distance from it instead of `reach` (m). */
+enum Refused { ACCEPTED, BOX_FULL, RELEASE_INSIDE };
+
+typedef struct {                                                                         /* [out] */
+    double distance, reach;
+    int why, stream;
+    int particle;           /* which of the scene's, or how many */
+    int surface;
+} Refusal;
+
+/* The releases of the machines of a `Plan`, of each member as many, stream by stream. */
+typedef struct {
+    Start *starts;          /* [out] (members, count) */
+    Refusal *refusals;      /* [out] (members) */
+    int *carried;           /* [out] (members, streams) whether the incoming belt carries them by
+                               adhesion */
+    double *corners;        /* [in] of boxes and polygons round their centroid, m; kind by kind */
+    Near *near;             /* (count) */
+    int *links;             /* (count) */
+    int *heads;             /* (head_room) lists of a grid */
+    int *listed;            /* (pieces) */
+    int count;              /* [in] particles of each member */
+    int head_room;          /* [in] a power of two */
+    int looks;              /* [in] particles and places that a call looks at before it comes back */
+    /* how far it has come */
+    int member, stream, first, is_begun, next, near_count, found, listed_count;
+    double looked, cell;
+} Drawing;
 
 #endif

@@ -2,8 +2,6 @@
 
 #include "plan.h"
 
-/* m; how near to the belt's height R + r a release counts as lying on the belt. */
-#define ON_BELT 1e-9
 /* Share of a speed across the belt that is rounding. */
 #define ALONG 1e-12
 

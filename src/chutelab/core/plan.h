@@ -8,6 +8,9 @@
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 
+/* m; how near to the belt's height R + r a release counts as lying on the belt. */
+#define ON_BELT 1e-9
+
 extern Plan P;
 
 /* The tables of one scene, and the points of its polylines. */

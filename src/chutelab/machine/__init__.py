@@ -6,7 +6,7 @@
 - `builder`: `build`, from a validated scene to a machine.
 """
 
-from chutelab.machine.builder import RefusedError, build
+from chutelab.machine.builder import build
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
     Arcs,
@@ -19,6 +19,7 @@ from chutelab.machine.parts import (
     moved,
     origin,
 )
+from chutelab.machine.releases import RefusedError
 
 __all__ = [
     "DRIVE_PULLEY",

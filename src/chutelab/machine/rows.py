@@ -14,14 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import borrow, dtype, give_back
+from chutelab.core.module import REAL, Module, dtype
 from chutelab.scene import Scene
 from chutelab.util.arrays import Numbers
 
 WORDS = {"adhesion": inf, "impact": 0.0, "top": 1.0}
 """Numbers of what keys may say in words; `drop_from` as in layout.h."""
 
-REAL = np.dtype("<f8")
+WORD = 2**32
+"""Seeds are handed over as two numbers below it."""
 
 ROOM = 64
 """Segments and arcs of all members for which there is room at first."""
@@ -61,11 +62,13 @@ def row(scene: Scene, friction: Numbers) -> list[Numbers]:
     """
     found = _numbers("SceneKeys", scene)
     for kind in scene.particles:
-        found += _numbers("ParticleKeys", kind)
+        found += _numbers("ParticleKeys", kind, corners=len(kind.outline))
     for stream, number in zip(scene.streams, scene.kinds, strict=True):
-        found += _numbers("StreamKeys", stream, kind=number)
+        seed = stream.seed % WORD, stream.seed // WORD
+        found += _numbers("StreamKeys", stream, kind=number, seed=seed)
     if scene.incoming is not None:
-        found += _numbers("IncomingKeys", scene.incoming, friction=friction)
+        adheres = isinstance(scene.incoming.friction, str)
+        found += _numbers("IncomingKeys", scene.incoming, friction=friction, adheres=adheres)
     for plate in scene.plates:
         found += _numbers("PlateKeys", plate)
     if scene.outgoing is not None:
@@ -96,7 +99,7 @@ class Laid:
     nominal: NDArray[Any]
 
 
-def lay(scene: Scene, friction: Numbers) -> Laid:
+def lay(module: Module, scene: Scene, friction: Numbers) -> Laid:
     """Have the core lay the surfaces of a scene, or of a family's."""
     numbers = row(scene, friction)
     every = scene.shape[0] if scene.shape else 1
@@ -106,36 +109,32 @@ def lay(scene: Scene, friction: Numbers) -> Laid:
             rows[:, column] = value
     else:
         rows[0] = numbers
-    module, segments, arcs = borrow(), ROOM // every, ROOM // every
-    try:
+    segments, arcs = ROOM // every, ROOM // every
+    while True:
+        module.place(
+            ("rows", REAL, rows.size), ("nominal", dtype("Nominal"), every),
+            ("segments", dtype("Segment"), every * segments),
+            ("arcs", dtype("Arc"), every * arcs), of="Plan",
+        )  # fmt: skip
         plan = module.structs["Plan"]
-        while True:
-            module.place(
-                ("rows", REAL, rows.size), ("nominal", dtype("Nominal"), every),
-                ("segments", dtype("Segment"), every * segments),
-                ("arcs", dtype("Arc"), every * arcs), of="Plan",
-            )  # fmt: skip
-            plan = module.structs["Plan"]
-            module.array("rows", REAL, rows.size, of="Plan")[:] = rows.ravel()
-            plan.members, plan.width = rows.shape
-            plan.particles, plan.streams = len(scene.particles), len(scene.streams)
-            plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
-            plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
-            plan.surfaces = len(scene.surface)
-            plan.segment_room, plan.arc_room = every * segments, every * arcs
-            if module.call("build"):
-                break
-            segments, arcs = plan.segment_count, plan.arc_count
-        found = (
-            module.array(name, dtype(struct), every * count, of="Plan")
-            .copy()
-            .reshape((*scene.shape, *more))
-            for name, struct, count, more in (
-                ("segments", "Segment", plan.segment_count, (plan.segment_count,)),
-                ("arcs", "Arc", plan.arc_count, (plan.arc_count,)),
-                ("nominal", "Nominal", 1, ()),
-            )
+        module.array("rows", REAL, rows.size, of="Plan")[:] = rows.ravel()
+        plan.members, plan.width = rows.shape
+        plan.particles, plan.streams = len(scene.particles), len(scene.streams)
+        plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
+        plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
+        plan.surfaces = len(scene.surface)
+        plan.segment_room, plan.arc_room = every * segments, every * arcs
+        if module.call("build"):
+            break
+        segments, arcs = plan.segment_count, plan.arc_count
+    found = (
+        module.array(name, dtype(struct), every * count, of="Plan")
+        .copy()
+        .reshape((*scene.shape, *more))
+        for name, struct, count, more in (
+            ("segments", "Segment", plan.segment_count, (plan.segment_count,)),
+            ("arcs", "Arc", plan.arc_count, (plan.arc_count,)),
+            ("nominal", "Nominal", 1, ()),
         )
-        return Laid(*found)
-    finally:
-        give_back(module)
+    )
+    return Laid(*found)

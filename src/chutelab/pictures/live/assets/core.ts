@@ -52,15 +52,18 @@ class Memory {
     this.exports = instance.exports;
     this.exports._initialize();
     this.base = this.exports.__heap_base.value;
-    this.begins = { World: this.exports.world(), Plan: this.exports.plan() };
+    const { world, plan, drawing } = this.exports;
+    this.begins = { World: world(), Plan: plan(), Drawing: drawing() };
     this.end = this.base;
     this.look();
   }
 
-  /** Free all arrays, and reset a struct. */
-  forget(of = "World") {
+  /** Free all arrays, and reset all structs. */
+  forget() {
     this.end = this.base;
-    this.bytes.fill(0, this.begins[of], this.begins[of] + this.layout.structs[of].size);
+    for (const [name, begin] of Object.entries(this.begins)) {
+      this.bytes.fill(0, begin, begin + this.layout.structs[name].size);
+    }
   }
 
   /** Look at the memory anew; it moves when it grows. */

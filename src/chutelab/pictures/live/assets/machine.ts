@@ -1,8 +1,7 @@
 // `build`: a scene as a machine, the same numbers as those of Python's `chutelab.machine`, to the
-// last bit. The core lays the surfaces; releases are drawn by Python's operations in their order.
+// last bit: the core lays the surfaces and draws the releases.
 import { lay } from "./plan.ts";
 import { draw, type Release } from "./releases.ts";
-import { clearOf, movedOut } from "./room.ts";
 import { met, type Scene } from "./scene.ts";
 import { RADIANS, modulo, sinCos } from "./trig.ts";
 
@@ -90,15 +89,12 @@ export function build(scene: Scene): Machine {
   const arcs: Arc[] = laid.arcs.map(({ center, ...own }) => ({
     ...own, x: center[0], y: center[1], ...values[own.surface],
   }));
-  const room = { segments, arcs, names };
-  const drawn = draw(scene, (places, radius) => clearOf(scene, room, places, radius));
-  const releases = movedOut(scene, room, drawn.releases, drawn.radius);
+  const { releases, radius } = draw(scene, names);
   const { incoming: belt, run, particles } = scene;
   let last = -Infinity, unnamed = 0;
   for (const release of releases) last = Math.max(last, release.t);
   const bound = last + run.max_time;
   const pairs = every.map((a) => every.map((b) => met(scene, a, b)));
-  const radius = drawn.radius;
   return {
     surfaces: names,
     gravity: scene.gravity,

@@ -19,6 +19,9 @@ const ROOM = 64;
 /** The core of this thread. */
 let core: Memory;
 
+/** The core of this thread, with what is laid. */
+export const memory = () => core;
+
 /** Start the core of this thread, which builds machines, and knows sines. */
 export async function startPlan(module: WebAssembly.Module, layout: Layout) {
   core = new Memory(await WebAssembly.instantiate(module, {}), layout);
@@ -28,11 +31,16 @@ export async function startPlan(module: WebAssembly.Module, layout: Layout) {
 /** Returns the keys of a struct of layout.h as numbers, NaN for what is not given. */
 function numbersOf(struct: string, table: any) {
   return Object.entries(core.layout.structs[struct].fields).flatMap(([key, [, , many]]) => {
-    const given: (number | string)[] = table[key] === undefined ? [] : [table[key]].flat(2);
-    const numbers = given.map((value) => (typeof value === "string" ? WORDS[value] : value));
+    const given: (number | string | boolean)[] = [table[key] ?? []].flat(2);
+    const numbers = given.map((value) => {
+      return typeof value === "string" ? WORDS[value] : Number(value);
+    });
     return [...numbers, ...Array<number>(many - numbers.length).fill(NaN)];
   });
 }
+
+/** Returns the lower 32 bits of a seed, and the others. */
+const wordsOf = (seed: bigint) => [Number(seed & 0xffffffffn), Number(seed >> 32n)];
 
 /** Returns all numbers of a scene. */
 function rowOf(scene: Scene): number[] {
@@ -42,11 +50,16 @@ function rowOf(scene: Scene): number[] {
   return [
     ...numbersOf("SceneKeys", scene),
     ...all("ParticleKeys", scene.particles.map((one) => ({
-      ...one, moment: !one.spin ? 0.0 : one.shape === "sphere" ? 0.4 : 0.5,
+      ...one, moment: !one.spin ? 0.0 : one.shape === "sphere" ? 0.4 : 0.5, corners: 0,
     }))),
-    ...all("StreamKeys", scene.streams.map((one, n) => ({ ...one, kind: scene.kinds[n] }))),
-    ...all("IncomingKeys", incoming
-      ? [{ ...incoming, friction: met(scene, kind, "incoming")[1] }] : []),
+    ...all("StreamKeys", scene.streams.map((one, n) => ({
+      ...one, kind: scene.kinds[n], seed: wordsOf(BigInt(one.seed)),
+      at_once: one.fill !== undefined || (one.to !== undefined && !("rate" in one.given)),
+    }))),
+    ...all("IncomingKeys", incoming ? [{
+      ...incoming, friction: met(scene, kind, "incoming")[1],
+      adheres: incoming.friction === "adhesion",
+    }] : []),
     ...all("PlateKeys", scene.plates),
     ...all("OutgoingKeys", outgoing ? [outgoing] : []),
     ...all("ConveyorKeys", scene.conveyor),
@@ -63,7 +76,7 @@ export function lay(scene: Scene): { segments: Segment[], arcs: Arc[] } {
   const row = rowOf(scene);
   let [segments, arcs] = [ROOM, ROOM];
   for (let done = false; !done;) {
-    core.forget("Plan");
+    core.forget();
     for (const [name, kind, count] of [
       ["rows", "double", row.length], ["nominal", "Nominal", 1], ["segments", "Segment", segments],
       ["arcs", "Arc", arcs],

@@ -279,17 +279,6 @@ def test_a_scene_that_expects_nothing_has_its_answers_compared():
 # The shipped scenes.
 
 
-LONG = (
-    *("hopper", "heap", "stream", "slip", "rock-box", "cradle", "dominoes", "cascade", "spoon"),
-    *("galton", "mixture"),
-)
-
-
-def quick():
-    """Those that take long are left to `chutelab verify`, which CI runs of all."""
-    return [name for name in sc.shipped() if name not in LONG]
-
-
 @pytest.mark.parametrize("name", sc.shipped())
 def test_each_shipped_scene_says_what_it_shows_and_who_says_so(name):
     scene = sc.load(name)
@@ -297,18 +286,12 @@ def test_each_shipped_scene_says_what_it_shows_and_who_says_so(name):
     assert all(len(expect.source) > 5 for expect in scene.expect)
 
 
-@pytest.mark.parametrize("name", quick())
+@pytest.mark.slow  # `chutelab verify` is a stage of CI of its own
+@pytest.mark.parametrize("name", sc.shipped())
 def test_each_shipped_scene_shows_what_it_is_expected_to(name):
     found = verify(sc.load(name))
     broken = [row for row in (*found.findings, *found.agreements) if not row.holds]
     assert broken == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", LONG)
-def test_what_takes_long_shows_what_it_is_expected_to_too(name):
-    found = verify(sc.load(name))
-    assert [row for row in (*found.findings, *found.agreements) if not row.holds] == []
 
 
 def value_of(name, quantity, which=0):

@@ -34,9 +34,11 @@ def field(page, label):
 
 
 def spot(page, u, v):
-    """Where a share of the picture is on the screen, in whole pixels."""
+    """Where a share of the picture's free part is on the screen, in whole pixels."""
     box = page.locator("#stage").bounding_box()
-    return round(box["x"] + u * box["width"]), round(box["y"] + v * box["height"])
+    free = page.evaluate("chutelab.stage.view.free")
+    across, up = free["right"] - free["left"], free["bottom"] - free["top"]
+    return round(box["x"] + free["left"] + u * across), round(box["y"] + free["top"] + v * up)
 
 
 def world(page, x, y):
@@ -400,7 +402,8 @@ def test_scene_tables_and_picture_are_saved(shown):
     image = np.asarray(Image.open(BytesIO(data)).convert("RGB")).astype(int)
     box = page.locator("#stage").bounding_box()
     assert image.shape[:2] == (round(2 * box["height"]), round(2 * box["width"]))
-    for colour in ((213, 94, 0), (0, 158, 115), (0, 114, 178)):
+    # The struck face, the belt's body and the path.
+    for colour in ((201, 84, 0), (43, 56, 65), (0, 114, 178)):
         assert np.mean(np.abs(image - np.array(colour)).max(axis=-1) < 30) > 5e-4
 
 

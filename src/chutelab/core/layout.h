@@ -357,6 +357,7 @@ typedef struct {
     int head_room;          /* [in] a power of two */
     int looks;              /* [in] particles and places that a call looks at before it comes back */
     /* how far it has come */
+    int left;               /* of the looks of this call */
     int member, stream, first, is_begun, next, near_count, found, listed_count;
     double looked, cell;
 } Drawing;

@@ -1,7 +1,7 @@
 /* The random numbers of NumPy's `default_rng`, to the last bit: PCG64 (M. O'Neill, 2014, XSL-RR),
    seeded by what NumPy calls a SeedSequence. */
 
-#include "random.h"
+#include "releases.h"
 
 #define POOL 4 /* words; of a seed there are no more */
 

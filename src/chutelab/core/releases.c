@@ -20,7 +20,6 @@
 
 Drawing D;
 static Generator generator;
-static int budget; /* looks at particles and places that are left to this call */
 
 /* The stream that is drawn. */
 static Tables tables;
@@ -101,17 +100,20 @@ static void begin_stream(void) {
     }
 }
 
-/* The row of a height above the lowest layer, in strips that are no lower than what reaches furthest. */
-static int strip_of(double height, double strip, int strips) {
-    double row = floor(height / strip);
-    return row < 0.0 ? 0 : row >= strips ? strips - 1 : (int)row;
+/* The list of a cell of a grid. */
+static int *cell_of(double column, double row) {
+    unsigned hash = (unsigned)(long long)column * 73856093u ^ (unsigned)(long long)row * 19349663u;
+    return D.heads + ((hash ^ hash >> 15) & (unsigned)(D.head_room - 1));
 }
 
-/* Whether a particle at that height would be away from those nearby; `strip` as above. */
-static int is_free(double height, double strip, int strips) {
-    int row = strip_of(height, strip, strips);
-    for (int next = MAX(row - 1, 0); next <= MIN(row + 1, strips - 1); next++)
-        for (int k = D.heads[next]; k >= 0; k = D.near[k].next) {
+static void empty_cells(void) { memset(D.heads, 0xff, (unsigned long)D.head_room * sizeof(int)); }
+
+/* Whether a particle at that height would be away from those nearby, listed by rows of a height that
+   reaches as far as they do. */
+static int is_free(double height, double row_height) {
+    double row = floor(height / row_height);
+    for (int n = -1; n <= 1; n++)
+        for (int k = *cell_of(0.0, row + n); k >= 0; k = D.near[k].next) {
             const Near *o = D.near + k;
             double up = o->dy - height;
             if (o->dx * o->dx + up * up < o->reach * o->reach) return 0;
@@ -121,21 +123,17 @@ static int is_free(double height, double strip, int strips) {
 
 /* Draw heights until one is free; after TRIES the last one is kept as it is. */
 static double free_height(double diameter) {
-    double bed = stream->bed_height, strip = MAX(WIDER * diameter, bed / D.head_room), height = 0.0;
-    int strips = strip_of(bed, strip, D.head_room) + 1;
+    double height = 0.0, row_height = WIDER * diameter;
     for (int k = 0; k < D.near_count; k++) {
-        Near *o = D.near + k;
-        if (o->dy <= -diameter || o->dy - bed >= diameter) continue;
-        int row = strip_of(o->dy, strip, strips);
-        o->next = D.heads[row];
-        D.heads[row] = k;
+        int *head = cell_of(0.0, floor(D.near[k].dy / row_height));
+        D.near[k].next = *head;
+        *head = k;
     }
-    for (int left = TRIES; left > 0; left--) {
-        height = bed * draw_share();
-        if (left == 1 || is_free(height, strip, strips)) break;
-        budget -= 1;
+    for (int left = TRIES; left > 0; left--, D.left--) {
+        height = stream->bed_height * draw_share();
+        if (left == 1 || is_free(height, row_height)) break;
     }
-    for (int k = 0; k < D.near_count; k++) D.heads[strip_of(D.near[k].dy, strip, strips)] = -1;
+    for (int k = 0; k < D.near_count; k++) *cell_of(0.0, floor(D.near[k].dy / row_height)) = -1;
     return height;
 }
 
@@ -149,9 +147,9 @@ static int spread_apart(void) {
     double diameter = 0.0, fall = carried ? 0.0 : 0.5 * tables.scene->gravity;
     double lowest = rides ? 0.0 : -INFINITY;
     for (int i = 0; i < count; i++) diameter = MAX(diameter, 2.0 * starts[i].radius);
-    if (D.next == 1) memset(D.heads, 0xff, (unsigned long)D.head_room * sizeof(int));
+    if (D.next == 1) empty_cells();
     for (; D.next < count; D.next++) {
-        if (budget <= 0) return 0;
+        if (D.left <= 0) return 0;
         Start *own = starts + D.next;
         int kept = 0, is_taken = 0;
         D.near[D.near_count++].particle = D.next - 1;
@@ -166,7 +164,7 @@ static int spread_apart(void) {
             if (dx * dx + up * up < reach * reach) is_taken = 1;
             D.near[kept++] = (Near){ dx, dy, reach, D.near[k].particle, -1 };
         }
-        budget -= D.near_count;
+        D.left -= D.near_count;
         D.near_count = kept;
         if (is_taken) own->position[1] = free_height(diameter);
     }
@@ -191,19 +189,13 @@ static void place_stream(void) {
     }
 }
 
-/* The list of the cell of a grid that holds (x, y). */
-static int *cell_of(double column, double row) {
-    unsigned hash = (unsigned)(long long)column * 73856093u ^ (unsigned)(long long)row * 19349663u;
-    return D.heads + ((hash ^ hash >> 15) & (unsigned)(D.head_room - 1));
-}
-
 /* Sort the particles of the streams before into cells of a grid, of the size that is returned. */
 static double sort_earlier(double largest) {
     Start *first = D.starts + (long)D.member * D.count;
     double size = 0.0;
     for (const Start *o = first; o < starts; o++) size = MAX(size, o->radius);
     size = WIDER * (size + largest);
-    memset(D.heads, 0xff, (unsigned long)D.head_room * sizeof(int));
+    empty_cells();
     for (int k = 0; k < starts - first; k++) {
         int *head = cell_of(floor(first[k].position[0] / size), floor(first[k].position[1] / size));
         D.links[k] = *head;
@@ -236,7 +228,7 @@ static int pour(void) {
     int is_first = starts == D.starts + (long)D.member * D.count;
     if (D.looked == 0.0 && !is_first) D.cell = sort_earlier(largest);
     while (D.looked < most && D.found < count) {
-        if (budget <= 0) return 0;
+        if (D.left <= 0) return 0;
         int many = 0;
         double row = floor(D.looked / across), column = D.looked - row * across;
         for (int n = 0; n < HANDFUL && D.looked < most; n++, D.looked += 1.0, column += 1.0) {
@@ -249,7 +241,7 @@ static int pour(void) {
             p->y += JITTER * largest * draw_uniform(&generator, -1.0, 1.0);
             p->taken = 0;
         }
-        budget -= take_what_is_in_surfaces(handful, many, largest) + HANDFUL;
+        D.left -= take_what_is_in_surfaces(handful, many, largest) + HANDFUL;
         if (!is_first) take_what_is_in_others(many, largest);
         for (const Place *p = handful; p < handful + many && D.found < count; p++) {
             if (p->taken) continue;
@@ -262,38 +254,27 @@ static int pour(void) {
     return 1;
 }
 
-/* Draw one stream on: 1 if it is done. */
+/* Draw a stream on: 1 if it is done. */
 static int draw_stream(void) {
+    starts = D.starts + (long)D.member * D.count + D.first;
     if (!D.is_begun) begin_stream();
     D.is_begun = 1;
-    int is_spread = !is_fill() && !is_line() && meets_others() && stream->bed_height > 0.0;
-    if (is_fill() ? !pour() : is_spread && !spread_apart()) return 0;
+    int is_bed = !is_fill() && !is_line() && meets_others() && stream->bed_height > 0.0;
+    if (is_fill() ? !pour() : is_bed && !spread_apart()) return 0;
     if (!is_fill()) place_stream();
+    D.carried[D.member * P.streams + D.stream] = carried;
+    D.first += count;
     return 1;
 }
 
 /* Draw on, for about `looks`: DONE, or PAUSED. */
 EXPORT int draw(void) {
-    budget = D.looks;
+    D.left = D.looks;
     for (; D.member < P.members; D.member++, D.stream = D.first = 0) {
-        Refusal *refusal = D.refusals + D.member;
         tables = tables_of(D.member);
         enter_room(&tables);
-        for (; D.stream < P.streams && refusal->why == ACCEPTED; D.stream++) {
-            starts = D.starts + (long)D.member * D.count + D.first;
-            if (!draw_stream()) return PAUSED;
-            D.carried[D.member * P.streams + D.stream] = carried;
-            D.first += count;
-            D.is_begun = 0;
-        }
-        if (!D.is_begun && refusal->why == ACCEPTED) list_near_releases();
-        D.is_begun = 1;
-        for (; D.next < D.listed_count && refusal->why == ACCEPTED; D.next++) {
-            if (budget <= 0) return PAUSED;
-            budget -= D.count;
-            clear_piece(D.listed[D.next], refusal);
-        }
-        D.is_begun = 0;
+        for (; D.stream <= P.streams && !D.refusals[D.member].why; D.stream++, D.is_begun = 0)
+            if (!(D.stream < P.streams ? draw_stream() : clear_releases())) return PAUSED;
     }
     return DONE;
 }

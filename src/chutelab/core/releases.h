@@ -3,17 +3,20 @@
 #ifndef RELEASES_H
 #define RELEASES_H
 #include "plan.h"
-#include "random.h"
 
 extern Drawing D;
 
 /* A place that a disk may be put to. */
 typedef struct { double x, y; int taken; } Place;
 
+/* random.c */
+typedef struct { unsigned __int128 state, step; } Generator;
+void seed_generator(Generator *g, const unsigned *words, int count);
+double draw_uniform(Generator *g, double low, double high);
+
 /* room.c */
 void enter_room(const Tables *t);
 int take_what_is_in_surfaces(Place *places, int count, double radius);
-void list_near_releases(void);
-void clear_piece(int k, Refusal *refusal);
+int clear_releases(void);
 
 #endif

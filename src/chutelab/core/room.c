@@ -138,19 +138,6 @@ int take_what_is_in_surfaces(Place *places, int count, double radius) {
     return D.listed_count * count;
 }
 
-/* List the pieces that releases of a member may be in. */
-void list_near_releases(void) {
-    double box[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY };
-    const Start *o = D.starts + (long)D.member * D.count;
-    for (const Start *end = o + D.count; o < end; o++)
-        for (int n = 0; n < 2; n++) {
-            box[n] = MIN(box[n], o->position[n] - o->radius);
-            box[2 + n] = MAX(box[2 + n], o->position[n] + o->radius);
-        }
-    list_pieces(box[0], box[1], box[2], box[3]);
-    D.next = 0;
-}
-
 /* How far a box or polygon reaches towards (dx, dy), m: as far as its furthest corner. */
 static double reach_of_corners(const double *corners, int many, double dx, double dy) {
     double most = -INFINITY;
@@ -186,14 +173,34 @@ static void clear_release(const Piece *p, int stream, int i, double *deepest, Re
     o->position[1] = y + dy * (depth / distance);
 }
 
-/* Move all releases of a member out of a piece that is there then. */
-void clear_piece(int k, Refusal *refusal) {
-    Piece p = piece_of(k);
-    double deepest = -INFINITY;
-    for (int stream = 0, i = 0; stream < P.streams; stream++) {
-        int last = i + (int)t->streams[stream].count;
-        int rides = P.incoming && p.surface == 0 && D.carried[D.member * P.streams + stream];
-        for (; i < last; i++)
-            if (!rides) clear_release(&p, stream, i, &deepest, refusal);
+/* List the pieces that releases of a member may be in. */
+static void list_near_releases(void) {
+    double box[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY };
+    const Start *o = D.starts + (long)D.member * D.count;
+    for (const Start *end = o + D.count; o < end; o++)
+        for (int n = 0; n < 2; n++) {
+            box[n] = MIN(box[n], o->position[n] - o->radius);
+            box[2 + n] = MAX(box[2 + n], o->position[n] + o->radius);
+        }
+    list_pieces(box[0], box[1], box[2], box[3]);
+}
+
+/* Move the releases of a member out of all pieces that are there then: 1 if that is done. */
+int clear_releases(void) {
+    Refusal *refusal = D.refusals + D.member;
+    if (!D.is_begun) list_near_releases(), D.next = 0;
+    D.is_begun = 1;
+    for (; D.next < D.listed_count && !refusal->why; D.next++) {
+        if (D.left <= 0) return 0;
+        D.left -= D.count;
+        Piece p = piece_of(D.listed[D.next]);
+        double deepest = -INFINITY;
+        for (int stream = 0, i = 0; stream < P.streams; stream++) {
+            int last = i + (int)t->streams[stream].count;
+            int rides = P.incoming && p.surface == 0 && D.carried[D.member * P.streams + stream];
+            for (; i < last; i++)
+                if (!rides) clear_release(&p, stream, i, &deepest, refusal);
+        }
     }
+    return 1;
 }

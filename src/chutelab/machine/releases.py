@@ -174,12 +174,13 @@ def draw(module: Module, scene: Scene, watch: Watch) -> tuple[Releases, Floats |
     corners = np.array([corner for kind in scene.particles for corner in kind.outline])
     members, streams, count = plan.members, len(counts), sum(counts)
     pieces = plan.segment_count + plan.arc_count + 1 + 2 * plan.conveyors
-    meeting = count if scene.crowded or streams > 1 else 1
-    heads = 1 << (2 * meeting).bit_length()
+    beds = scene.crowded and any(stream.bed_height > 0.0 for stream in scene.streams)
+    near, links = count if beds else 1, count if streams > 1 else 1
+    heads = 1 << (2 * max(near, links)).bit_length()
     shapes: dict[str, tuple[Any, int]] = {
         "starts": (dtype("Start"), members * count), "refusals": (dtype("Refusal"), members),
         "carried": (INTEGER, members * streams), "corners": (REAL, corners.size),
-        "near": (dtype("Near"), meeting), "links": (INTEGER, meeting), "heads": (INTEGER, heads),
+        "near": (dtype("Near"), near), "links": (INTEGER, links), "heads": (INTEGER, heads),
         "listed": (INTEGER, pieces),
     }  # fmt: skip
     module.place(*((name, *shape) for name, shape in shapes.items()), of="Drawing")
@@ -194,8 +195,8 @@ def draw(module: Module, scene: Scene, watch: Watch) -> tuple[Releases, Floats |
         watch()
     refused = array("refusals")
     if np.count_nonzero(refused["why"]):
-        members = refused["why"].nonzero()[0].tolist()
-        raise RefusedError(scene.source, {n: _fault(scene, refused[n]) for n in members})
+        which = refused["why"].nonzero()[0].tolist()
+        raise RefusedError(scene.source, {n: _fault(scene, refused[n]) for n in which})
     starts, carried = array("starts"), array("carried").astype(bool)
     releases = Releases(
         t=starts["t"].copy(),

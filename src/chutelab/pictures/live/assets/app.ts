@@ -49,7 +49,9 @@ async function start() {
     element.textContent = words.say((element as HTMLElement).dataset.say ?? "");
   }
   for (const element of document.querySelectorAll("[data-label]")) {
-    element.setAttribute("aria-label", words.say(element.getAttribute("data-label") ?? ""));
+    const name = words.say(element.getAttribute("data-label") ?? "");
+    element.setAttribute("aria-label", name);
+    if (element.matches("button")) (element as HTMLElement).title = name;
   }
   try {
     await startPlan(await compiled(wasm), data.layout);
@@ -72,8 +74,8 @@ async function start() {
   new Keep(byId("panels"), stage, lab, words);
   if (data.live?.predict) new Prediction(stage, lab, words);
   listenToKeys(bench, lab, words);
-  for (const panel of document.querySelectorAll("#panels > .card, .tools, .watch")) {
-    const name = panel.id || "tools";
+  for (const panel of document.querySelectorAll("#panels > .card, .tools, .looks, .watch")) {
+    const name = panel.matches(".card") ? panel.id : "tools";
     if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
   }
   const exercise = data.exercise

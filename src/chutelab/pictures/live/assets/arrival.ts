@@ -40,9 +40,8 @@ class Arrivals {
   /** @param recording as far as it has come */
   constructor(readonly recording: Recording) {
     const { machine } = recording;
-    const own = ({ surface }: { surface: number }) => surface === machine.landing;
-    this.flat = machine.segments.filter(own);
-    this.bent = machine.arcs.filter(own);
+    this.flat = machine.segments.filter(this.own);
+    this.bent = machine.arcs.filter(this.own);
     this.found = recording.tracks.map(() => undefined);
     this.read();
     const first = this.since, last = this.reach, step = (last - first) / (RESTS - 1);
@@ -50,6 +49,10 @@ class Arrivals {
       this.look(n < RESTS - 1 ? n * step + first : last);
     }
   }
+
+  /** Whether something is of the outgoing belt; there may be none. */
+  own = ({ surface }: { surface: number }) =>
+    surface >= 0 && surface === this.recording.machine.landing;
 
   /** s up to which all is recorded. */
   get reach() {
@@ -73,7 +76,7 @@ class Arrivals {
     const more = events.slice(this.seen);
     this.seen = events.length;
     // All that happens on it: what passes on to it from a tangential chute gives no blow.
-    const direct = more.filter(({ surface }) => surface === machine.landing);
+    const direct = more.filter(this.own);
     if (!machine.interact) {
       for (const event of direct) this.found[event.disk] ??= arrivalOf(event);
       return;

@@ -2,15 +2,22 @@
 
 import { mayDraw } from "./controls.ts";
 import { surfaceAt, withArc, withLine, withParticle } from "./edit.ts";
-import { roundTo } from "./handles.ts";
-import { html } from "./panels.ts";
-import { svg, type Stage } from "./stage.ts";
+import { bodyOf, roundTo, type Handle } from "./handles.ts";
+import { html, iconButton } from "./panels.ts";
+import { svg } from "./scenery.ts";
+import type { Stage } from "./stage.ts";
 import type { Inspector } from "./inspector.ts";
 import type { Lab } from "./lab.ts";
 import type { Words } from "./words.ts";
 
 type Place = [number, number];
 type Mode = "move" | "line" | "arc" | "drop";
+
+/** What stands on the buttons, see page.html. */
+const DRAWINGS: Record<string, string> = {
+  move: "select", line: "line", arc: "arc", drop: "ball", delete: "bin", "zoom-in": "plus",
+  "zoom-out": "minus",
+};
 
 /** Points that a thing is drawn by. */
 const POINTS = { move: 0, line: 2, arc: 3, drop: 1 };
@@ -56,7 +63,7 @@ class Bench {
   tools(home: any) {
     const { words, lab, stage } = this, free = mayDraw(lab.data);
     const button = (id: string, act: (event: MouseEvent) => void) => {
-      const made = html("button", { type: "button", id: `tool-${id}` }, words.say(id));
+      const made = iconButton(`tool-${id}`, DRAWINGS[id], words.say(id));
       made.addEventListener("click", act);
       return made;
     };
@@ -68,16 +75,10 @@ class Bench {
       })] as [Mode, any]);
     this.remove = button("delete", () => this.inspector.takeAway());
     const middle = (factor: number) =>
-      this.zoom(factor, 0.5 * stage.view.width, 0.5 * stage.view.height);
-    const zooms = ([
-      ["zoom-in", "+", ZOOM], ["zoom-out", "−", 1 / ZOOM],
-    ] as [string, string, number][]).map(([id, sign, factor]) => {
-      const made = button(id, () => middle(factor));
-      made.textContent = sign;
-      made.setAttribute("aria-label", words.say(id));
-      made.title = words.say(id);
-      return made;
-    });
+      this.zoom(factor, stage.view.px(stage.view.middle[0]), stage.view.py(stage.view.middle[1]));
+    const zooms = [
+      button("zoom-in", () => middle(ZOOM)), button("zoom-out", () => middle(1 / ZOOM)),
+    ];
     home.prepend(...this.modes.map(([, made]) => made), ...(free ? [this.remove] : []), ...zooms);
     const presets = lab.data.live?.presets ?? [];
     if (!presets.length) return;
@@ -110,12 +111,20 @@ class Bench {
       const at = this.stage.placeOf(event);
       this.fingers.set(event.pointerId, at);
       this.pressed = this.fingers.size === 1 ? at : null;
+      this.grabbed = this.pressed && this.mode === "move"
+        ? this.bodyAt(at, event.pointerType) : null;
       if (this.mode !== "move" && this.pressed) this.put(at);
     });
     front.addEventListener("pointermove", (event: PointerEvent) => {
       const at = this.stage.placeOf(event);
       if (this.mode !== "move") this.sketch(at);
-      else if (this.fingers.has(event.pointerId)) this.look(event.pointerId, at);
+      else if (this.grabbed) this.carry(at, event);
+      else if (this.fingers.has(event.pointerId)) {
+        const alone = this.fingers.size === 1 && event.pointerType === "touch";
+        // One finger on an empty place scrolls the page.
+        if (alone) this.fingers.set(event.pointerId, at);
+        else this.look(event.pointerId, at);
+      }
     });
     front.addEventListener("pointerup", (event: PointerEvent) => {
       if (!this.fingers.delete(event.pointerId) || !this.pressed) return;
@@ -124,13 +133,22 @@ class Bench {
       if (this.mode === "move") {
         if (still) this.pick(at);
       } else if (!still) this.put(at);
-      this.pressed = null;
+      this.pressed = this.grabbed = null;
     });
+    front.addEventListener("touchstart", (event: TouchEvent) => {
+      const { touches } = event, box = front.getBoundingClientRect();
+      const at: Place = [touches[0].clientX - box.left, touches[0].clientY - box.top];
+      // The page must not scroll away under what is moved.
+      const body = this.mode === "move" && this.bodyAt(at, "touch");
+      if (touches.length > 1 || body) event.preventDefault();
+    }, { passive: false });
     front.addEventListener("pointercancel", (event: PointerEvent) => {
       this.fingers.delete(event.pointerId);
       this.pressed = null;
     });
     front.addEventListener("wheel", (event: WheelEvent) => {
+      const page = document.documentElement;
+      if (!event.ctrlKey && page.scrollHeight > page.clientHeight + 1) return;
       event.preventDefault();
       const lines = event.deltaMode === 1 ? 20 : 1;
       this.zoom(2 ** (-(event.deltaY * lines) / (event.ctrlKey ? 80 : 400)),
@@ -141,6 +159,29 @@ class Bench {
       const handle = this.stage.handles.find((one) => one.id === id);
       if (handle) this.inspector.choose(handle.surface);
     });
+  }
+
+  /** The body that is grabbed, and moves once the pointer has moved. */
+  grabbed: Handle | null = null;
+
+  /** The body at a place, px, to move it: with a finger only one that is chosen. */
+  bodyAt([px, py]: Place, pointer: string) {
+    const { view, handles } = this.stage, { machine } = this.lab;
+    const [x, y] = [view.worldX(px), view.worldY(py)];
+    const name = machine ? surfaceAt(machine, x, y, CLICK_REACH / view.scale) : "";
+    if (!name || (pointer === "touch" && name !== this.inspector.part)) return null;
+    return bodyOf(handles, name, x, y);
+  }
+
+  /** Move the body that is grabbed along. @param at pixels */
+  carry(at: Place, event: PointerEvent) {
+    const { stage, grabbed, pressed } = this;
+    if (stage.held || !grabbed || !pressed) return;
+    if (Math.hypot(at[0] - pressed[0], at[1] - pressed[1]) < STRAY) return;
+    if (this.inspector.part !== grabbed.surface) this.inspector.choose(grabbed.surface);
+    stage.held = grabbed;
+    // This move may be the only one: where all comes late, many are told as one.
+    stage.aim(event);
   }
 
   /** Where a finger came down that does nothing else. */
@@ -214,9 +255,9 @@ class Bench {
 
   /** A place for something new in the middle of what is seen. */
   example(): Place[] {
-    const { width, height } = this.stage.view;
+    const { left, right, top, bottom } = this.stage.view.free;
     const at = (u: number, v: number) =>
-      this.worldOf([u * width, v * height]);
+      this.worldOf([left + u * (right - left), top + v * (bottom - top)]);
     return this.mode === "line" ? [at(0.4, 0.5), at(0.6, 0.6)]
       : this.mode === "arc" ? [at(0.4, 0.5), at(0.5, 0.65), at(0.6, 0.5)] : [at(0.5, 0.25)];
   }
@@ -232,13 +273,17 @@ class Bench {
   /** Show what is chosen. */
   mark() {
     const { lab, stage, inspector } = this, { machine } = lab;
+    stage.part = inspector.part;
+    for (const { id, surface } of stage.handles) {
+      stage.gripOf.get(id)?.classList.toggle("own", surface === inspector.part);
+    }
     if (!machine || !this.remove) return;
     this.remove.disabled = !inspector.canDelete;
     const { view } = stage, surface = machine.surfaces.indexOf(inspector.part);
     const own = (piece: { surface: number }) => piece.surface === surface;
     const lines = machine.segments.filter(own).map(({ x, y, tx, ty, length }) =>
       `M${view.px(x)} ${view.py(y)}L${view.px(x + tx * length)} ${view.py(y + ty * length)}`);
-    const arcs = machine.arcs.filter(own).map((arc) => stage.arcPath(arc));
+    const arcs = machine.arcs.filter(own).map((arc) => stage.scenery.arcPath(arc));
     this.chosen.setAttribute("d", [...lines, ...arcs].join(""));
     this.seen = `${view.scale} ${view.x} ${view.y} ${view.width} ${view.height}`;
   }

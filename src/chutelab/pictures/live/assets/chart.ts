@@ -1,6 +1,6 @@
 // A small diagram in SVG: axes with round numbers, lines, and what is put over them.
 
-import { svg } from "./stage.ts";
+import { svg } from "./scenery.ts";
 import type { Words } from "./words.ts";
 
 type Range = [number, number];

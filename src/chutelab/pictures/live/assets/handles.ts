@@ -7,11 +7,12 @@ import type { Scene } from "./scene.ts";
 type Axis = { key: string, part?: number, value: number, unit: string, step: number,
   low: number, high: number };
 /** `what` is a word of the catalogue; `drag` tells the axes' values for a place in the world.
- * One of a tool takes them by `change` itself, and may say more than its values. */
+ * One of a tool takes them by `change` itself, and may say more than its values. One of a `whole`
+ * body has the axes of all its places. */
 export type Handle = { id: string, surface: string, what: string, shape: "point" | "turn" | "arrow",
   x: number, y: number, from?: [number, number], axes: Axis[],
   drag: (x: number, y: number) => number[], change?: (numbers: number[]) => void,
-  says?: string };
+  says?: string, whole?: boolean };
 
 /** m of arrow for each m/s. */
 const ARROW = 0.08;
@@ -205,6 +206,20 @@ class Handles {
   }
 }
 
+/** What places a body, by the name of the handle. */
+const PLACES = ["pivot", "center", "height"], ENDS = ["begin", "end", "corner"];
+
+/** What moves a whole body by what it is grabbed at, m; null if it has a place of its own. */
+function bodyOf(handles: Handle[], name: string, x: number, y: number): Handle | null {
+  const own = handles.filter(({ id, surface, what }) => surface === name
+    && (PLACES.includes(what) || (ENDS.includes(what) && /^(surface|conveyor)/.test(id))));
+  if (!own.length) return null;
+  return {
+    ...own[0], id: `body-${name}`, x, y, axes: own.flatMap(({ axes }) => axes), whole: true,
+    drag: (px, py) => own.flatMap((one) => one.drag(one.x + px - x, one.y + py - y)),
+  };
+}
+
 /** The values of the scene that a handle's axes stand for, by key. */
 function valuesOf({ axes }: Handle, numbers: number[]): Record<string, unknown> {
   const values: Record<string, any> = {};
@@ -221,4 +236,4 @@ const roundTo = (
   value: number, step: number,
 ) => Number((Math.round(value / step) * step).toPrecision(12));
 
-export { ARROW, Handles, roundTo, valuesOf };
+export { ARROW, Handles, bodyOf, roundTo, valuesOf };

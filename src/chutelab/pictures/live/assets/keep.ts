@@ -15,7 +15,7 @@ import type { Words } from "./words.ts";
 /** What a picture of its own needs of the page's style. */
 const KEPT = ["fill", "stroke", "stroke-width", "stroke-linecap", "stroke-dasharray", "opacity",
   "font-family", "font-size", "font-style", "paint-order", "text-anchor", "dominant-baseline",
-  "display"];
+  "display", "stop-color", "stroke-linejoin", "font-weight"];
 
 /** Pixels of a saved picture for each of the page's. */
 const DENSE = 2;

@@ -3,7 +3,7 @@
 
 import { Chart, onWidth, rangeOf, roundUp } from "./chart.ts";
 import { card, follow, html } from "./panels.ts";
-import { svg } from "./stage.ts";
+import { svg } from "./scenery.ts";
 import { historyOf } from "./stages.ts";
 import type { Lab } from "./lab.ts";
 import type { Words } from "./words.ts";

@@ -1,5 +1,6 @@
 // What every panel beside the picture is made of: elements, a card, and when it is drawn again.
 
+import { svg } from "./scenery.ts";
 import type { Lab, News } from "./lab.ts";
 
 /** Of the time that passes, panels take at most one part in so many. */
@@ -14,10 +15,25 @@ function html(
   return element;
 }
 
+/** A drawing of the page's sprite, see page.html. */
+function icon(name: string) {
+  const drawn = svg("svg", { class: "i", "aria-hidden": "true" });
+  drawn.append(svg("use", { href: `#i-${name}` }));
+  return drawn;
+}
+
+/** A button with a drawing, and a name for those who point at it or hear it. */
+function iconButton(id: string, drawing: string, name: string): HTMLButtonElement {
+  return html("button", { type: "button", class: "ib", id, title: name, "aria-label": name },
+    icon(drawing));
+}
+
 /** A panel with a title, which can be folded. */
 function card(id: string, title: string, ...children: (string | Node)[]) {
+  const head = DRAWINGS[id] ? [icon(DRAWINGS[id])] : [];
   const body = html("div", { class: "body" }, ...children);
-  return html("details", { class: "card", id, open: "" }, html("summary", {}, title), body);
+  const summary = html("summary", {}, ...head, title, icon("down"));
+  return html("details", { class: "card", id, open: "" }, summary, body);
 }
 
 /** What takes longer, ms, is done alone in its frame. */
@@ -60,4 +76,10 @@ function follow(lab: Lab, panel: HTMLDetailsElement, news: News[], act: () => vo
   panel.addEventListener("toggle", again);
 }
 
-export { card, eased, follow, html };
+/** What stands before the title of a panel. */
+const DRAWINGS: Record<string, string> = {
+  edit: "slow", energy: "sum", numbers: "digits", landing: "bars", curves: "graph", share: "share",
+  exercise: "flag",
+};
+
+export { card, eased, follow, html, icon, iconButton };

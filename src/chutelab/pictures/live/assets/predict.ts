@@ -1,7 +1,8 @@
 // First say where it will land, then see: path, landing and numbers are hidden until then.
 
 import { historyOf } from "./stages.ts";
-import { svg, type Stage } from "./stage.ts";
+import { svg } from "./scenery.ts";
+import type { Stage } from "./stage.ts";
 import type { Lab } from "./lab.ts";
 import type { Scene } from "./scene.ts";
 import type { Words } from "./words.ts";

@@ -2,14 +2,13 @@
 
 import { openHandles } from "./controls.ts";
 import { ARROW, Handles, roundTo, valuesOf, type Handle } from "./handles.ts";
+import { Balls } from "./balls.ts";
+import { Scenery, svg } from "./scenery.ts";
 import { historyOf } from "./stages.ts";
 import { View, boxOf } from "./view.ts";
 import type { Lab } from "./lab.ts";
-import type { Arc } from "./machine.ts";
 import type { Recording, Track } from "./recording.ts";
 import type { Words } from "./words.ts";
-
-const SVG = "http://www.w3.org/2000/svg";
 
 /** Tracks that are drawn at most; more are a blot. */
 const MOST_TRACKS = 40;
@@ -17,18 +16,9 @@ const MOST_TRACKS = 40;
 /** Pixels of radius that a particle has at least, and where there are few, which one looks for. */
 const LEAST = 1.2, LEAST_FEW = 3;
 
-/** Pixels between the dashes that show a belt run. */
-const DASH = 26;
-
 /** By how much a line that is drawn may miss the track: pixels, and before there are any, the share
  * of the machine. */
 const FINE = 0.2, FINE_SHARE = 1e-3;
-
-function svg(name: string, attributes: Record<string, unknown> = {}): any {
-  const element = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
-  return element;
-}
 
 class Stage {
   view;
@@ -36,13 +26,16 @@ class Stage {
   back;
   canvas;
   front;
-  surfaces;
+  scenery;
+  balls;
   paths;
   grips;
   over;
   handles: Handle[] = [];
   gripOf: Map<string, any> = new Map();
   held: Handle | null = null;
+  /** The part that is chosen, whose handles are seen. */
+  part = "";
   fitted = false;
 
   constructor(readonly home: HTMLElement, readonly lab: Lab, readonly words: Words) {
@@ -54,9 +47,11 @@ class Stage {
     this.front.setAttribute("aria-label", words.say("stage"));
     this.canvas.setAttribute("aria-hidden", "true");
     home.append(this.back, this.canvas, this.front);
-    this.surfaces = svg("g", { class: "surfaces" });
+    this.scenery = new Scenery(this.view, words);
+    this.balls = new Balls(lab, (name) => this.colour(name));
     this.paths = svg("g", { class: "paths" });
-    this.back.append(this.surfaces, this.paths);
+    const { ground, layer, scale } = this.scenery;
+    this.back.append(steel(), ground, layer, this.paths, scale);
     this.grips = svg("g", { class: "grips" });
     /** Further layers, of tools, lie below the handles. */
     this.over = svg("g", { class: "over" });
@@ -81,6 +76,13 @@ class Stage {
     const { clientWidth: width, clientHeight: height } = this.home;
     if (!width || !height) return;
     this.view.resize(width, height);
+    const style = getComputedStyle(this.home);
+    const inset = (side: string) => parseFloat(style.getPropertyValue(`padding-${side}`)) || 0;
+    this.view.free = {
+      left: inset("left"), top: inset("top"), right: width - inset("right"),
+      bottom: height - inset("bottom"),
+    };
+    this.corner = [inset("bottom") + 20, inset("left") + 24];
     const dense = globalThis.devicePixelRatio || 1;
     this.canvas.width = Math.round(width * dense);
     this.canvas.height = Math.round(height * dense);
@@ -132,87 +134,21 @@ class Stage {
     for (const draw of this.drawers) draw();
   }
 
+  /** Pixels from below and from the left of the bar that tells the scale. */
+  corner: [number, number] = [20, 24];
+
   /** What tools draw anew when the view, the machine or its run has changed. */
   drawers: (() => void)[] = [];
 
   rebuild() {
     if (this.view.width < 2) return;
-    this.drawSurfaces();
+    const { machine, scene } = this.lab;
+    this.scenery.drawGround(...this.corner);
+    if (machine) this.scenery.draw(machine, scene);
     this.drawTracks();
     this.placeHandles();
     this.paint();
     for (const draw of this.drawers) draw();
-  }
-
-  drawSurfaces() {
-    const { machine } = this.lab;
-    if (!machine) return;
-    const { view } = this;
-    this.surfaces.replaceChildren();
-    this.running = [];
-    const line = (piece: any, path: string) => {
-      const gate = isFinite(piece.appears) || isFinite(piece.vanishes);
-      const name = machine.surfaces[piece.surface];
-      const kind = piece.speed ? "belt" : name === "plate" ? "plate" : "wall";
-      const element = svg("path", { d: path, class: `${kind}${gate ? " gate" : ""}` });
-      element.append(Object.assign(svg("title"), { textContent: name }));
-      this.surfaces.append(element);
-      if (gate) this.gates.push({ element, appears: piece.appears, vanishes: piece.vanishes });
-      if (piece.speed) this.run(path, piece.speed);
-    };
-    this.gates = [];
-    if (machine.pulley) {
-      const { radius, speed } = machine.pulley;
-      this.surfaces.append(this.wheel(0, 0, radius, speed));
-    }
-    for (const piece of machine.segments) {
-      const end = [piece.x + piece.tx * piece.length, piece.y + piece.ty * piece.length];
-      line(piece, `M${view.px(piece.x)} ${view.py(piece.y)}L${view.px(end[0])} ${view.py(end[1])}`);
-    }
-    for (const arc of machine.arcs) {
-      if (arc.extent >= 2 * Math.PI && arc.speed) {
-        this.surfaces.append(this.wheel(arc.x, arc.y, arc.radius, arc.speed));
-      } else line(arc, this.arcPath(arc));
-    }
-  }
-
-  gates: { element: any, appears: number, vanishes: number }[] = [];
-
-  running: { element: any, speed: number, x?: number, y?: number, radius?: number }[] = [];
-
-  arcPath({ x, y, radius, begin, extent }: Arc) {
-    const { view } = this, r = radius * view.scale;
-    const at = (angle: number) =>
-      `${view.px(x + radius * Math.cos(angle))} ${view.py(y + radius * Math.sin(angle))}`;
-    const parts = extent >= 2 * Math.PI ? 2 : 1;
-    let path = `M${at(begin)}`;
-    for (let n = 1; n <= parts; n += 1) {
-      const wide = extent / parts > Math.PI ? 1 : 0;
-      path += `A${r} ${r} 0 ${wide} 0 ${at(begin + (extent * n) / parts)}`;
-    }
-    return path;
-  }
-
-  /** Dashes along a belt that move with it. @param speed m/s */
-  run(path: string, speed: number) {
-    const element = svg("path", { d: path, class: "dashes", "stroke-dasharray": `3 ${DASH - 3}` });
-    this.surfaces.append(element);
-    this.running.push({ element, speed });
-  }
-
-  /** A pulley with spokes. @param speed m/s, clockwise */
-  wheel(x: number, y: number, radius: number, speed: number) {
-    const { view } = this, r = radius * view.scale, group = svg("g", { class: "wheel" });
-    const spokes = svg("g");
-    group.append(svg("circle", { cx: view.px(x), cy: view.py(y), r }), spokes);
-    for (let n = 0; n < 3; n += 1) {
-      const [c, s] = [Math.cos((n * Math.PI) / 3) * r * 0.8, Math.sin((n * Math.PI) / 3) * r * 0.8];
-      spokes.append(svg("path", {
-        d: `M${view.px(x) - c} ${view.py(y) - s}L${view.px(x) + c} ${view.py(y) + s}`,
-      }));
-    }
-    this.running.push({ element: spokes, speed, x: view.px(x), y: view.py(y), radius });
-    return group;
   }
 
   drawTracks() {
@@ -255,35 +191,19 @@ class Stage {
     const dense = globalThis.devicePixelRatio || 1;
     context.setTransform(dense, 0, 0, dense, 0, 0);
     context.clearRect(0, 0, view.width, view.height);
-    for (const { element, speed, x, y, radius } of this.running) {
-      const turned = radius ? ((speed * t) / radius) * (180 / Math.PI) : 0;
-      if (radius) element.setAttribute("transform", `rotate(${turned} ${x} ${y})`);
-      else element.setAttribute("stroke-dashoffset", String(-((speed * t * view.scale) % DASH)));
-    }
-    for (const { element, appears, vanishes } of this.gates) {
-      element.classList.toggle("absent", t < appears || t >= vanishes);
-    }
+    this.scenery.turn(t);
     const few = recording.tracks.length <= MOST_TRACKS;
-    const ink = this.colour(few ? "few" : "particle"), rim = this.colour("ink");
+    const rim = this.colour("ink");
     if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
     const spins = machine.inertia.some((value) => value > 0);
     context.lineWidth = 1;
-    const { isMixed } = this;
     for (let i = 0; i < recording.tracks.length; i += 1) {
       const state = recording.tracks[i].state(t);
       if (!state || (state.ended && recording.tracks.length > 1)) continue;
       const x = view.px(state.x), y = view.py(state.y);
       const r = Math.max(few ? LEAST_FEW : LEAST, (machine.radius[i] ?? 0) * view.scale);
       if (x < -r || x > view.width + r || y < -r || y > view.height + r) continue;
-      context.beginPath();
-      context.arc(x, y, r, 0, 2 * Math.PI);
-      const stream = machine.releases[i]?.stream ?? 0;
-      context.fillStyle = isMixed ? this.colour(`kind-${stream % 5}`) : ink;
-      context.fill();
-      if (r > 3) {
-        context.strokeStyle = rim;
-        context.stroke();
-      }
+      this.balls.paint(context, i, x, y, r, Math.hypot(state.vx, state.vy));
       if (spins && r > 3) this.mark(context, recording.tracks[i], t, x, y, r, rim);
     }
     for (const draw of this.painters) draw(context);
@@ -378,6 +298,7 @@ class Stage {
   describe(grip: any, handle: Handle) {
     const { view, words } = this, x = view.px(handle.x), y = view.py(handle.y);
     grip.setAttribute("transform", `translate(${x} ${y})`);
+    grip.classList.toggle("own", handle.surface === this.part);
     const [stem, , knob] = grip.children;
     knob.setAttribute("d", KNOBS[handle.shape]);
     if (handle.from) {
@@ -408,13 +329,7 @@ class Stage {
       (grip as any).focus();
       this.front.setPointerCapture(event.pointerId);
     });
-    this.front.addEventListener("pointermove", (event: PointerEvent) => {
-      if (!this.held) return;
-      const [px, py] = this.placeOf(event);
-      this.latest = [this.view.worldX(px), this.view.worldY(py)];
-      // More events than frames come: the latest counts.
-      if (!this.waiting) this.waiting = requestAnimationFrame(() => this.follow());
-    });
+    this.front.addEventListener("pointermove", (event: PointerEvent) => this.aim(event));
     for (const end of ["pointerup", "pointercancel"]) {
       this.front.addEventListener(end, () => {
         if (!this.held) return;
@@ -427,6 +342,15 @@ class Stage {
       const handle = this.handles.find(({ id }) => id === grip?.getAttribute("data-id"));
       if (handle && this.nudge(handle, event)) event.preventDefault();
     });
+  }
+
+  /** Have what is held follow the pointer. */
+  aim(event: PointerEvent) {
+    if (!this.held) return;
+    const [px, py] = this.placeOf(event);
+    this.latest = [this.view.worldX(px), this.view.worldY(py)];
+    // More events than frames come: the latest counts.
+    if (!this.waiting) this.waiting = requestAnimationFrame(() => this.follow());
   }
 
   /** Where the pointer has moved since the last frame. */
@@ -464,8 +388,11 @@ class Stage {
       this.held.change(this.held.drag(x, y));
       return;
     }
-    const numbers = this.held.drag(x, y).map((value, n) =>
-      roundTo(value, fine[axes[n].unit] ?? snap));
+    const { held } = this, near = (value: number) => roundTo(value, snap);
+    // A body moves by round steps, and keeps its shape.
+    const numbers = held.whole ? held.drag(held.x + near(x - held.x), held.y + near(y - held.y))
+      .map((value) => Number(value.toPrecision(12)))
+      : held.drag(x, y).map((value, n) => roundTo(value, fine[axes[n].unit] ?? snap));
     this.lab.change(valuesOf(this.held, numbers), { done: false });
   }
 
@@ -499,10 +426,20 @@ class Stage {
   }
 }
 
+/** How plates and wheels shine. */
+function steel() {
+  const shine = svg("linearGradient", { id: "steel", x1: 0, y1: 0, x2: 1, y2: 1 });
+  shine.append(svg("stop", { offset: 0, class: "steel-a" }),
+    svg("stop", { offset: 1, class: "steel-b" }));
+  const found = svg("defs");
+  found.append(shine);
+  return found;
+}
+
 const KNOBS = {
   point: "M-7 0A7 7 0 1 0 7 0A7 7 0 1 0 -7 0Z",
   turn: "M0 -8L8 0L0 8L-8 0Z",
   arrow: "M-6 -7L8 0L-6 7Z",
 };
 
-export { Stage, svg };
+export { Stage };

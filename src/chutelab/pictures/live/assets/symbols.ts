@@ -3,7 +3,8 @@
 
 import { SYMBOLS } from "./numbers.ts";
 import { historyOf } from "./stages.ts";
-import { svg, type Stage } from "./stage.ts";
+import { svg } from "./scenery.ts";
+import type { Stage } from "./stage.ts";
 import type { Event } from "./core.ts";
 
 /** Its middle, px, and the side of its point that is tried first, rad counterclockwise from the

@@ -1,8 +1,9 @@
 // What measures in the picture, tape, angle, stop watch and tracer, and what the picture shows.
 
 import { roundUp } from "./chart.ts";
-import { eased, html } from "./panels.ts";
-import { svg, type Stage } from "./stage.ts";
+import { eased, html, icon, iconButton } from "./panels.ts";
+import { svg } from "./scenery.ts";
+import type { Stage } from "./stage.ts";
 import type { Handle } from "./handles.ts";
 import type { Lab } from "./lab.ts";
 import type { Track, State } from "./recording.ts";
@@ -95,20 +96,30 @@ class Tools {
   ) {
     this.layer = svg("g", { class: "measures", "aria-hidden": "true" });
     stage.over.append(this.layer);
-    this.bar = html("div", { class: "tools", role: "group", "aria-label": words.say("tools") });
-    home.append(this.bar);
+    const bar = html("div", { class: "tools", role: "group", "aria-label": words.say("tools") });
+    document.getElementById("fit")?.after(bar);
     for (const name of ["tape", "protractor", "watch", "tracer"] as const) {
-      const button = html("button", { type: "button", id: `tool-${name}`, "aria-pressed": "false" },
-        words.say(`name-${name}`));
+      const button = iconButton(`tool-${name}`, name, words.say(`name-${name}`));
+      button.setAttribute("aria-pressed", "false");
       button.addEventListener("click", () => this.toggle(name, button));
-      this.bar.append(button);
+      bar.append(button);
     }
+    const name = words.say("show"), named = { class: "ib", title: name, "aria-label": name };
+    const head = html("summary", named, icon("eye"));
+    this.bar = html("div", { class: "float choices" });
+    const menu = html("details", { class: "menu looks", id: "show" }, head, this.bar);
+    document.getElementById("views")?.prepend(menu);
+    addEventListener("pointerdown", ({ target }) => {
+      if (!menu.contains(target as Node)) menu.open = false;
+    });
     const show = stage.show as Record<string, boolean>;
     this.box("trails", show.trails, (on) => { show.trails = on; });
     this.strobe = this.box("strobe", show.strobe, (on) => { show.strobe = on; });
     this.box("velocity-arrows", show.velocity, (on) => { show.velocity = on; });
     this.box("force-arrows", show.forces, (on) => { show.forces = on; });
     this.box("symbols", symbols.shown, (on) => { symbols.shown = on; });
+    this.box("grid", true, (on) => { stage.scenery.ground.classList.toggle("off", !on); });
+    this.hues();
     this.panel = this.watchPanel();
     home.append(this.panel);
     stage.further.push(() => this.handles());
@@ -154,6 +165,31 @@ class Tools {
     return text;
   }
 
+  /** What colour a particle has. */
+  hues() {
+    const { stage, words } = this, { balls } = stage;
+    const legend = html("div", { class: "ramp num" });
+    const buttons = (["material", "speed", "kind"] as const).map((hue) => {
+      const button = html("button", { type: "button", id: `hue-${hue}`, "aria-pressed": "false" },
+        words.say(`hue-${hue}`));
+      button.addEventListener("click", () => {
+        balls.hue = hue;
+        balls.measure();
+        for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
+        legend.hidden = hue !== "speed";
+        legend.replaceChildren(html("i"), html("span", {}, "0"),
+          html("span", {}, `${words.plain(0.5 * balls.fastest)}`),
+          html("span", {}, `${words.plain(balls.fastest)} m/s`));
+        stage.paint();
+      });
+      return button;
+    });
+    buttons[0].setAttribute("aria-pressed", "true");
+    legend.hidden = true;
+    const choice = html("div", { class: "seg" }, ...buttons);
+    this.bar.append(html("p", {}, words.say("hue")), choice, legend);
+  }
+
   nameStrobe() {
     const { words, stage } = this;
     this.strobe.textContent = words.say("strobe-every", { step: words.number(stage.strobeStep, 1) });
@@ -165,11 +201,13 @@ class Tools {
     if (on) this.on.add(name);
     else this.on.delete(name);
     // A tool lies in the middle of what is shown when it is taken out.
-    const size = roundUp((0.12 * Math.min(view.width, view.height)) / view.scale);
+    const least = Math.min(view.free.right - view.free.left, view.height);
+    const size = roundUp((0.12 * least) / view.scale);
+    const [x, y] = view.middle;
     const at = (dx: number, dy: number) =>
-      [this.tidy(view.x + dx * size), this.tidy(view.y + dy * size)] as Point;
-    if (name === "tape") this.tape = [at(-1, -1.5), at(1, -1.5)];
-    if (name === "protractor") this.protractor = [at(-1, -1), at(1, -1), at(0, 1)];
+      [this.tidy(x + dx * size), this.tidy(y + dy * size)] as Point;
+    if (name === "tape") this.tape = [at(-1, -0.5), at(1, -0.5)];
+    if (name === "protractor") this.protractor = [at(-1, -0.5), at(1, -0.5), at(0, 0.7)];
     if (name === "watch") this.panel.hidden = !on;
     if (name === "tracer") this.traced = { t: this.lab.t, index: 0 };
     this.readWatch();

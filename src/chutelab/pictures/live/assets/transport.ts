@@ -35,11 +35,11 @@ class Transport {
       redo: () => lab.redo(),
       reset: () => lab.reset(),
       fit: () => stage.fit(),
+      full: () => project(),
     };
     for (const [id, act] of Object.entries(buttons)) {
       const button = element(id);
-      if (button.classList.contains("text")) button.textContent = words.say(id);
-      else button.title = words.say(id);
+      button.title = words.say(id);
       button.setAttribute("aria-label", words.say(id));
       button.addEventListener("click", act);
     }
@@ -96,6 +96,15 @@ class Transport {
     this.fault.hidden = !lab.fault;
     if (lab.fault) this.fault.textContent = words.fault(lab.fault);
   }
+}
+
+/** Large and on the full screen, or as before. */
+function project() {
+  const { classList } = document.documentElement, on = classList.toggle("projector");
+  document.getElementById("full")?.setAttribute("aria-pressed", String(on));
+  // Where a page may not take the screen, it is large all the same.
+  if (on) document.documentElement.requestFullscreen?.().catch(() => {});
+  else if (document.fullscreenElement) document.exitFullscreen();
 }
 
 export { Transport };

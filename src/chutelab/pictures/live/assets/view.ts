@@ -22,12 +22,23 @@ class View {
     this.height = height;
   }
 
-  /** Show all of a box, with some room round it. @param margin px */
-  fit({ left, bottom, right, top }: Box, margin: number = 34) {
-    const across = Math.max(1, this.width - 2 * margin), up = Math.max(1, this.height - 2 * margin);
+  /** The part of the picture that no card covers, px. */
+  free = { left: 0, top: 0, right: 1, bottom: 1 };
+
+  /** The world's point in the middle of the free part. */
+  get middle(): [number, number] {
+    const { left, right, top, bottom } = this.free;
+    return [this.worldX(0.5 * (left + right)), this.worldY(0.5 * (top + bottom))];
+  }
+
+  /** Show all of a box in the free part, with some room round it. @param margin px */
+  fit({ left, bottom, right, top }: Box, margin: number = 30) {
+    const { free } = this;
+    const across = Math.max(1, free.right - free.left - 2 * margin);
+    const up = Math.max(1, free.bottom - free.top - 2 * margin);
     this.scale = Math.min(across / Math.max(right - left, 1e-6), up / Math.max(top - bottom, 1e-6));
-    this.x = 0.5 * (left + right);
-    this.y = 0.5 * (bottom + top);
+    this.x = 0.5 * (left + right) + (0.5 * (this.width - free.left - free.right)) / this.scale;
+    this.y = 0.5 * (bottom + top) - (0.5 * (this.height - free.top - free.bottom)) / this.scale;
   }
 
   /** @param py the point that stays, pixels */
@@ -94,7 +105,11 @@ function boxOf(machine: Machine, points: { x: number, y: number }[]): Box {
   const all = !machine.segments.length && !machine.arcs.length;
   const inside = ({ x, y }: { x: number, y: number }) =>
     all || (x >= west && x <= east && y >= south && y <= north);
-  points.filter(inside).forEach(({ x, y }) => widen(x, y));
+  // Of the ride on the incoming belt as much as half of what comes after it.
+  const onward = machine.pulley ? points.filter((one) => one.x >= 0 && inside(one)) : [];
+  const span = onward.reduce((most, { x, y }) => Math.max(most, x, Math.abs(y)), 0);
+  const from = onward.length ? -Math.max(0.5 * span, 2 * (machine.pulley?.radius ?? 0)) : -Infinity;
+  points.filter(inside).forEach(({ x, y }) => widen(Math.max(x, from), y));
   if (!points.length) machine.releases.forEach(({ x, y }, i) => widen(x, y, machine.radius[i]));
   const ends = ({ x, y, tx, ty, length }: Segment) =>
     [[x, y], [x + tx * length, y + ty * length]];

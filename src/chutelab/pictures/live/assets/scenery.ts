@@ -1,0 +1,334 @@
+// What a machine looks like: belts that run, pulleys, plates with a struck face, walls, the grid.
+//
+// Bodies have volume. The surface that particles meet is the outer edge of a belt and the coloured
+// face of a plate; what is drawn of their thickness lies on the other side.
+
+import type { Arc, Machine, Segment } from "./machine.ts";
+import type { Scene } from "./scene.ts";
+import type { View } from "./view.ts";
+import type { Words } from "./words.ts";
+
+const SVG = "http://www.w3.org/2000/svg";
+
+function svg(name: string, attributes: Record<string, unknown> = {}): any {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+  return element;
+}
+
+/** Pixels from one cleat of a belt to the next, and of a cleat. */
+const PITCH = 24, CLEAT = 5;
+
+/** Thickness of belts, px: least, most, and as a share of the picture's height. */
+const THICK = [3.5, 9, 0.0117];
+
+/** Of a belt without pulleys of its own: distance of its two strands in its thickness. */
+const STRANDS = 4.5;
+
+/** Thickness of plates in that of belts. */
+const PLATE = 1.4;
+
+/** Pixels of radius from which on a pulley has spokes; and from one roller to the next. */
+const SPOKED = 9, ROLLERS = 128;
+
+/** Pixels between two lines of the grid, at least. */
+const MESH = 70;
+
+/** What moves with the time that is shown: cleats, or a wheel that turns. */
+type Moving = { element: any, speed: number, x?: number, y?: number, radius?: number };
+type Gate = { element: any, appears: number, vanishes: number };
+
+class Scenery {
+  moving: Moving[] = [];
+  gates: Gate[] = [];
+  layer: any;
+  ground: any;
+  scale: any;
+  thick = 6;
+
+  constructor(readonly view: View, readonly words: Words) {
+    this.ground = svg("g", { class: "ground", "aria-hidden": "true" });
+    this.scale = svg("g", { class: "scale", "aria-hidden": "true" });
+    this.layer = svg("g", { class: "surfaces" });
+  }
+
+  draw(machine: Machine, scene: Scene | undefined) {
+    const { height } = this.view, [least, most, share] = THICK;
+    this.thick = Math.min(most, Math.max(least, share * height));
+    this.layer.replaceChildren();
+    this.moving = [];
+    this.gates = [];
+    const bodies: [any, Segment | Arc][] = [];
+    const plates = new Set(scene?.plates.map(({ name }) => name ?? "plate") ?? []);
+    const round = (arc: Arc) => arc.extent >= 2 * Math.PI && arc.speed !== 0;
+    const belts = new Map<number, { lines: Segment[], wheels: Arc[] }>();
+    for (const line of machine.segments.filter(({ speed }) => speed)) {
+      const its = belts.get(line.surface) ?? { lines: [], wheels: [] };
+      belts.set(line.surface, its);
+      its.lines.push(line);
+    }
+    for (const arc of machine.arcs) {
+      if (round(arc) && belts.has(arc.surface)) belts.get(arc.surface)?.wheels.push(arc);
+      else bodies.push([round(arc) ? this.drum(arc, machine) : this.bend(arc), arc]);
+    }
+    for (const { lines, wheels } of belts.values()) {
+      if (wheels.length) bodies.push([this.conveyor(wheels), lines[0]]);
+      else if (lines[0].surface === machine.pulley?.surface) {
+        bodies.push([this.incoming(lines[0], machine), lines[0]]);
+      } else for (const line of lines) bodies.push([this.belt(line), line]);
+    }
+    for (const line of machine.segments.filter(({ speed }) => !speed)) {
+      const isPlate = plates.has(machine.surfaces[line.surface]);
+      bodies.push([isPlate ? this.plate(line) : this.wall(line), line]);
+    }
+    for (const [element, { surface, appears, vanishes }] of bodies) {
+      element.append(Object.assign(svg("title"), {
+        textContent: this.words.name(machine.surfaces[surface]),
+      }));
+      if (isFinite(appears) || isFinite(vanishes)) {
+        element.classList.add("gate");
+        this.gates.push({ element, appears, vanishes });
+      }
+      this.layer.append(element);
+    }
+  }
+
+  /** Move what moves to a time, s. */
+  turn(t: number) {
+    const { scale } = this.view;
+    for (const { element, speed, x, y, radius } of this.moving) {
+      if (radius === undefined) {
+        element.setAttribute("stroke-dashoffset", String(-((speed * t * scale) % PITCH)));
+      } else {
+        const angle = ((speed * t) / radius) * (180 / Math.PI);
+        element.setAttribute("transform", `rotate(${angle % 360} ${x} ${y})`);
+      }
+    }
+    for (const { element, appears, vanishes } of this.gates) {
+      element.classList.toggle("absent", t < appears || t >= vanishes);
+    }
+  }
+
+  /** Lines at round numbers of metres, and a bar that tells how long one is. */
+  drawGround(bottom: number, left: number) {
+    const { view, ground } = this, { width, height, scale } = view;
+    const rough = MESH / scale, ten = 10 ** Math.floor(Math.log10(rough));
+    const step = ten * ([1, 2, 5].find((n) => n * ten >= rough) ?? 10);
+    const lines = (offset: number) => {
+      let path = "";
+      for (let n = Math.ceil(view.worldX(0) / step - offset); ; n += 1) {
+        const x = view.px((n + offset) * step);
+        if (x > width) break;
+        path += `M${x.toFixed(1)} 0V${height}`;
+      }
+      for (let n = Math.ceil(view.worldY(height) / step - offset); ; n += 1) {
+        const y = view.py((n + offset) * step);
+        if (y < 0) break;
+        path += `M0 ${y.toFixed(1)}H${width}`;
+      }
+      return path;
+    };
+    const long = step * scale, y = height - bottom;
+    const text = svg("text", { x: left + 0.5 * long, y: y - 8, "text-anchor": "middle" });
+    const [value, unit] = step < 0.01 ? [1e3 * step, "mm"] : [step, "m"];
+    text.textContent = `${this.words.plain(Number(value.toPrecision(3)))} ${unit}`;
+    ground.replaceChildren(
+      svg("path", { d: lines(0.5), class: "minor" }), svg("path", { d: lines(0), class: "major" }));
+    const bar = `M${left} ${y - 5}v10m0-5h${long}m0-5v10`;
+    this.scale.replaceChildren(svg("path", { d: bar, class: "halo" }), svg("path", { d: bar }),
+      text);
+  }
+
+  /** A belt along a path in px, its outer edge on the path's left; with cleats that run. */
+  band(path: string, speed: number, edge = "") {
+    const group = svg("g");
+    const cleats = svg("path", {
+      d: path, class: "cleat", "stroke-width": 0.42 * this.thick,
+      "stroke-dasharray": `${CLEAT} ${PITCH - CLEAT}`,
+    });
+    group.append(svg("path", { d: path, class: "belt", "stroke-width": this.thick }), cleats);
+    if (edge) group.append(svg("path", { d: edge, class: "belt-edge" }));
+    this.moving.push({ element: cleats, speed });
+    return group;
+  }
+
+  /** The frame that carries a belt: a bar in the coordinates of the belt, px. */
+  frame(group: any, from: number, to: number, y: number, thick: number) {
+    if (to - from < 20 || thick < 3) return;
+    group.append(svg("rect", {
+      class: "frame", x: from, y: y - 0.5 * thick, width: to - from, height: thick,
+      rx: Math.min(5, thick / 4),
+    }));
+  }
+
+  /** Write the speed of a belt on its frame where that can be seen. */
+  tell(
+    group: any, from: number, to: number, y: number, thick: number, speed: number, upright = 1,
+  ) {
+    if (thick < 15 || to - from < 150) return;
+    const said = `${this.words.fixed(Math.abs(speed), 1)} m/s`;
+    const text = svg("text", {
+      class: "on-frame", x: 0.5 * (from + to), y: y + 5, "text-anchor": "middle",
+      transform: upright < 0 ? `rotate(180 ${0.5 * (from + to)} ${y})` : "",
+    });
+    text.textContent = speed * upright > 0 ? `${said} →` : `← ${said}`;
+    group.append(text);
+  }
+
+  wheel(x: number, y: number, r: number, speed: number, radius: number) {
+    const group = svg("g", { class: "wheel" });
+    group.append(svg("circle", { cx: x, cy: y, r, class: "steel" }));
+    if (r < SPOKED) return group;
+    const spokes = svg("g"), wide = Math.max(1.5, 0.12 * r);
+    for (let n = 0; n < 5; n += 1) {
+      const [c, s] = [Math.cos(0.4 * Math.PI * n), Math.sin(0.4 * Math.PI * n)];
+      spokes.append(svg("path", {
+        class: "spoke", "stroke-width": wide,
+        d: `M${x + 0.3 * r * c} ${y + 0.3 * r * s}L${x + 0.8 * r * c} ${y + 0.8 * r * s}`,
+      }));
+    }
+    group.append(spokes, svg("circle", { cx: x, cy: y, r: 0.16 * r, class: "bolt" }));
+    this.moving.push({ element: spokes, speed, x, y, radius });
+    return group;
+  }
+
+  /** The incoming belt: a loop round the drive pulley and, at its other end, another like it. */
+  incoming({ length, speed }: Segment, { pulley }: Machine) {
+    const { view, thick } = this, group = svg("g", { class: "part" });
+    const { radius, incline } = pulley as { radius: number, incline: number };
+    const [x, y, scale] = [view.px(0), view.py(0), view.scale];
+    const r = radius * scale, inner = Math.max(r - 0.5 * thick, 0.5 * r), long = length * scale;
+    group.setAttribute("transform", `rotate(${(-incline * 180) / Math.PI} ${x} ${y})`);
+    const loop = stadium(x - long, x, y, inner), out = inner + 0.36 * thick;
+    const edge = `M${x - long} ${y - out}H${x}A${out} ${out} 0 0 1 ${x + out} ${y}`;
+    const wheel = Math.max(r - thick - 1, 0.4 * r);
+    // As far to the left as is seen, so that the speed stands in sight.
+    const seen = Math.max(x - long + r, -0.02 * view.width);
+    if (r > 2 * thick) {
+      const wide = Math.min(26, 0.6 * wheel);
+      this.frame(group, x - long + 1.3 * r, x - 1.3 * r, y, wide);
+      this.tell(group, Math.max(seen, this.view.free.left), x - 1.3 * r, y, wide, speed);
+    }
+    group.append(this.band(loop, speed, edge),
+      this.wheel(x - long, y, wheel, speed, radius), this.wheel(x, y, wheel, speed, radius));
+    return group;
+  }
+
+  /** A belt without pulleys of its own: a loop below what it carries, on rollers. */
+  belt({ x, y, tx, ty, length, speed }: Segment) {
+    const { view, thick } = this, group = svg("g", { class: "part" });
+    const long = length * view.scale, back = Math.abs(tx) > 1e-9 ? tx < 0 : ty < 0;
+    // Along the belt, from its left end; what it carries is above.
+    const [ax, ay] = back ? [x + tx * length, y + ty * length] : [x, y];
+    const angle = Math.atan2(back ? -ty : ty, back ? -tx : tx);
+    const [px, py] = [view.px(ax), view.py(ay)];
+    group.setAttribute("transform", `translate(${px} ${py}) rotate(${(-angle * 180) / Math.PI})`);
+    const turn = Math.min(0.5 * STRANDS * thick, 0.25 * long), top = 0.5 * thick;
+    const onward = back ? -speed : speed;
+    const middle = top + turn, loop = stadium(0, long, middle, turn);
+    const roller = Math.max(turn - 0.8 * thick, 1);
+    this.frame(group, 0, long, middle, Math.min(24, 2 * turn - 1.6 * thick));
+    const rollers = Math.max(1, Math.round(long / ROLLERS));
+    for (let n = 0; n <= rollers && rollers < 400; n += 1) {
+      group.append(svg("circle", { cx: (long * n) / rollers, cy: middle, r: roller, class: "bolt" }));
+    }
+    group.append(this.band(loop, onward, `M0 ${0.14 * thick}H${long}`));
+    const level = Math.abs(angle) < 0.02;
+    const { free } = view;
+    const left = level ? Math.max(0, free.left - px) : 0;
+    const right = level ? Math.min(long, free.right - px) : long;
+    const between = (right - left) / Math.max(1, Math.round((right - left) / ROLLERS));
+    if (between > 90 && 2 * turn - 1.6 * thick >= 15) {
+      // Between two rollers, near the middle of what is seen.
+      const spacing = long / rollers, n = Math.round(0.5 * (left + right) / spacing - 0.5);
+      const at = (n + 0.5) * spacing;
+      this.tell(group, at - 80, at + 80, middle, 24, onward);
+    }
+    return group;
+  }
+
+  /** A belt round two pulleys, which carries on both strands. */
+  conveyor(wheels: Arc[]) {
+    const { view, thick } = this, group = svg("g", { class: "part" });
+    const [a, b] = wheels, scale = view.scale;
+    const r = a.radius * scale, inner = Math.max(r - 0.5 * thick, 0.5 * r);
+    const angle = Math.atan2(b.y - a.y, b.x - a.x), long = Math.hypot(b.x - a.x, b.y - a.y) * scale;
+    const [px, py] = [view.px(a.x), view.py(a.y)];
+    group.setAttribute("transform", `translate(${px} ${py}) rotate(${(-angle * 180) / Math.PI})`);
+    const loop = stadium(0, long, 0, inner);
+    const speed = a.speed, wheel = Math.max(r - thick - 1, 0.4 * r);
+    const upright = Math.cos(angle) >= 0 ? 1 : -1, wide = Math.min(24, 0.6 * wheel);
+    if (wheel > SPOKED) {
+      this.frame(group, 1.3 * r, long - 1.3 * r, 0, wide);
+      this.tell(group, 1.3 * r, long - 1.3 * r, 0, wide, speed, upright);
+    }
+    group.append(this.band(loop, speed), this.wheel(0, 0, wheel, speed, a.radius),
+      this.wheel(long, 0, wheel, speed, a.radius));
+    return group;
+  }
+
+  /** A whole circle that turns: a wheel, or round what is inside of it a drum. */
+  drum(arc: Arc, { releases }: Machine) {
+    const { view, thick } = this, { x, y, radius, speed } = arc;
+    const group = svg("g", { class: "part" });
+    const [px, py, r] = [view.px(x), view.py(y), radius * view.scale];
+    const holds = releases.some((one) => Math.hypot(one.x - x, one.y - y) < radius);
+    const line = r + (holds ? 0.5 : -0.5) * thick;
+    const ring = stadium(px, px, py, line);
+    if (!holds) group.append(this.wheel(px, py, Math.max(r - thick - 1, 0.4 * r), speed, radius));
+    group.append(this.band(ring, speed));
+    return group;
+  }
+
+  /** A bend, which may run. */
+  bend(arc: Arc) {
+    const group = svg("g", { class: "part" });
+    if (arc.speed) group.append(this.band(this.arcPath(arc), arc.speed));
+    else group.append(svg("path", { d: this.arcPath(arc), class: "wall" }));
+    return group;
+  }
+
+  arcPath({ x, y, radius, begin, extent }: Arc) {
+    const { view } = this, r = radius * view.scale;
+    const at = (angle: number) =>
+      `${view.px(x + radius * Math.cos(angle))} ${view.py(y + radius * Math.sin(angle))}`;
+    const parts = extent >= 2 * Math.PI ? 2 : 1;
+    let path = `M${at(begin)}`;
+    for (let n = 1; n <= parts; n += 1) {
+      const wide = extent / parts > Math.PI ? 1 : 0;
+      path += `A${r} ${r} 0 ${wide} 0 ${at(begin + (extent * n) / parts)}`;
+    }
+    return path;
+  }
+
+  /** A plate: steel behind its struck face, which is on the left on the way up. */
+  plate({ x, y, tx, ty, length }: Segment) {
+    const { view, thick } = this, group = svg("g", { class: "part" });
+    const long = length * view.scale, deep = PLATE * thick;
+    const angle = Math.atan2(ty, tx);
+    group.setAttribute("transform",
+      `translate(${view.px(x)} ${view.py(y)}) rotate(${(-angle * 180) / Math.PI})`);
+    const face = 0.25 * thick;
+    group.append(
+      svg("rect", { class: "steel", x: 0, y: face, width: long, height: deep, rx: 1.5 }),
+      svg("path", { class: "face", d: `M0 ${face}H${long}`, "stroke-width": 2 * face }),
+    );
+    return group;
+  }
+
+  wall({ x, y, tx, ty, length }: Segment) {
+    const { view } = this, group = svg("g", { class: "part" });
+    const end = [x + tx * length, y + ty * length];
+    group.append(svg("path", {
+      d: `M${view.px(x)} ${view.py(y)}L${view.px(end[0])} ${view.py(end[1])}`, class: "wall",
+    }));
+    return group;
+  }
+}
+
+/** The way of a belt round two wheels, clockwise from the left one's top, px. */
+const stadium = (left: number, right: number, y: number, r: number) =>
+  `M${left} ${y - r}H${right}A${r} ${r} 0 0 1 ${right} ${y + r}H${left}`
+  + `A${r} ${r} 0 0 1 ${left} ${y - r}`;
+
+export { Scenery, svg };

@@ -1,0 +1,158 @@
+"""The picture of the live page: where it lies, what is grabbed in it, what it looks like."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+playwright = pytest.importorskip(
+    "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
+)
+
+PIXELS = """([x, y]) => {
+  const { canvas } = chutelab.stage, dense = canvas.width / canvas.clientWidth;
+  return [...canvas.getContext("2d").getImageData(x * dense, y * dense, 1, 1).data];
+}"""
+
+SCREEN = """([x, y]) => {
+  const { view, front } = chutelab.stage, box = front.getBoundingClientRect();
+  return [box.left + view.px(x), box.top + view.py(y)];
+}"""
+
+
+def drag(page, start, end):
+    page.mouse.move(*start)
+    page.mouse.down()
+    # One move only: a slow machine tells many as one.
+    page.mouse.move(*end)
+    page.mouse.up()
+
+
+def test_a_plate_is_moved_by_its_body_and_a_line_keeps_its_shape(shown):
+    line = '[[surface]]\nname = "chute"\npoints = [[0.7, -0.2], [0.8, -0.25], [0.9, -0.25]]\n'
+    page = shown("inclined-40", more=line)
+    given = page.evaluate("chutelab.lab.scene.plates[0].distance")
+    angle = np.radians(40.0)
+    # A place on the plate that is no handle: 0.3 m below its pivot at (R + d, 0).
+    pivot = page.evaluate("chutelab.stage.handles.find(({ id }) => id === 'plate.pivot')")
+    body = pivot["x"] + 0.3 * np.sin(angle), pivot["y"] - 0.3 * np.cos(angle)
+    x, y = page.evaluate(SCREEN, body)
+    scale = page.evaluate("chutelab.stage.view.scale")
+    drag(page, (x, y), (x + 0.05 * scale, y))
+    moved = page.evaluate("chutelab.lab.scene.plates[0]")
+    assert moved["distance"] == pytest.approx(given + 0.05, abs=2.0 / scale)
+    assert moved["angle_deg"] == 40.0
+    assert page.locator("#edit select").input_value() == "plate"
+
+    before = np.array(page.evaluate("chutelab.lab.scene.surface[0].points"))
+    x, y = page.evaluate(SCREEN, [0.85, -0.25])
+    drag(page, (x, y), (x - 40, y + 25))
+    way = np.array(page.evaluate("chutelab.lab.scene.surface[0].points")) - before
+    # All corners go the same way: that of the pointer, to a pixel's rounding.
+    assert np.ptp(way, axis=0) == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert way[0] == pytest.approx([-40 / scale, -25 / scale], abs=2.0 / scale)
+    page.click("#undo")
+    assert np.array_equal(page.evaluate("chutelab.lab.scene.surface[0].points"), before)
+
+
+def test_one_finger_on_an_empty_place_moves_neither_view_nor_machine(shown):
+    page = shown("perpendicular", viewport={"width": 390, "height": 844}, has_touch=True)
+    view = "JSON.stringify([chutelab.stage.view.x, chutelab.stage.view.y])"
+    before, given = page.evaluate(view), page.evaluate("JSON.stringify(chutelab.lab.given)")
+    touch = """([kind, points]) => {
+      const { front } = chutelab.stage, box = front.getBoundingClientRect();
+      points.forEach(([x, y], id) => front.dispatchEvent(new PointerEvent(kind, {
+        pointerId: id + 5, pointerType: "touch", isPrimary: id === 0, bubbles: true, button: 0,
+        clientX: box.left + x, clientY: box.top + y,
+      })));
+    }"""
+    page.evaluate("Element.prototype.setPointerCapture = () => {}")
+    for kind, at in (("pointerdown", 40), ("pointermove", 90), ("pointerup", 90)):
+        page.evaluate(touch, [kind, [[30, at]]])
+    assert page.evaluate(view) == before
+    for kind, at in (("pointerdown", 40), ("pointermove", 90), ("pointerup", 90)):
+        page.evaluate(touch, [kind, [[30, at], [60, at]]])
+    assert page.evaluate(view) != before
+    assert page.evaluate("JSON.stringify(chutelab.lab.given)") == given
+
+
+@pytest.mark.parametrize("size", [(1366, 768), (1920, 1080), (390, 844)])
+@pytest.mark.parametrize("name", ["perpendicular", "inclined-40", "cascade", "galton", "spoon"])
+def test_the_machine_is_fitted_into_what_the_cards_leave_free(shown, name, size):
+    page = shown(name, viewport={"width": size[0], "height": size[1]})
+    free = page.evaluate("chutelab.stage.view.free")
+    box = page.locator("#stage").bounding_box()
+    for card in page.locator(".float:visible, #panels > .card:visible").all():
+        its = card.bounding_box()
+        left, top = its["x"] - box["x"], its["y"] - box["y"]
+        # Each card is beside the free part, or below the picture.
+        assert (
+            left >= free["right"] or left + its["width"] <= free["left"]
+            or top >= free["bottom"] or top + its["height"] <= free["top"]
+        ), card.get_attribute("class")  # fmt: skip
+    assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+    # What particle 0 does after it has left the belt is in sight.
+    track = page.evaluate("""() => {
+      const { lab: { recording }, stage: { view } } = chutelab;
+      const [first] = recording.machine.interact ? [] : recording.tracks;
+      const seen = first ? recording.points(0, 0.002) : [];
+      return seen.filter(({ x }) => x > 0).map(({ x, y }) => [view.px(x), view.py(y)]);
+    }""")
+    for x, y in track:
+        assert free["left"] <= x <= free["right"]
+        assert free["top"] - 1 <= y <= free["bottom"] + 1
+
+
+def test_belts_run_with_their_speed_and_wheels_turn_with_them(shown):
+    page = shown("perpendicular")
+    at = """t => { chutelab.lab.seek(t);
+      return new Promise((then) => requestAnimationFrame(() => requestAnimationFrame(() => then(
+        [...document.querySelectorAll(".surfaces .cleat")].map((cleat) =>
+          [parseFloat(cleat.getAttribute("stroke-dashoffset")), 24])
+        .concat([...document.querySelectorAll(".wheel g")].map((wheel) => [parseFloat(
+          wheel.getAttribute("transform").match(/rotate\\((.*?) /)[1]), 360])))))); }"""
+    scale = page.evaluate("chutelab.stage.view.scale")
+    before, after = (np.array(page.evaluate(at, t)) for t in (0.1, 0.12))
+    cleats, wheels = before[:, 1] == 24, before[:, 1] == 360
+    assert cleats.sum() == 2
+    assert wheels.sum() == 2
+    # Both belts run with 2 m/s, the pulley of 0.1 m turns with v / R, clockwise on the screen.
+    gone = (before[cleats, 0] - after[cleats, 0]) % 24
+    assert gone == pytest.approx(0.04 * scale % 24, abs=1e-6)
+    turned = (after[wheels, 0] - before[wheels, 0]) % 360
+    assert turned == pytest.approx(np.degrees(0.04 / 0.1) % 360, abs=1e-6)
+
+
+def test_particles_have_the_colour_of_their_material_or_of_their_speed(shown):
+    page = shown("perpendicular", ["particle.material=glass", "particle.radius=0.03"])
+    middle = """() => { const state = chutelab.lab.recording.tracks[0].state(chutelab.lab.t);
+      return [chutelab.stage.view.px(state.x), chutelab.stage.view.py(state.y)]; }"""
+    red, _, blue, alpha = page.evaluate(PIXELS, page.evaluate(middle))
+    assert alpha == 255
+    assert blue > red  # glass is bluish
+    page.locator("#show summary").click()
+    page.click("#hue-speed")
+    page.evaluate("() => new Promise((then) => requestAnimationFrame(then))")
+    x, y = page.evaluate(middle)
+    found = page.evaluate(PIXELS, [x, y + 3])[:3]
+    most = float(re.findall(r"([\d.]+) m/s", page.inner_text(".ramp"))[0])
+    # 2 m/s on the belt, of eight equal steps up to the largest.
+    step = int(8 * 2.0 / most)
+    colour = page.evaluate(f"chutelab.stage.colour('v{step}')").strip().lstrip("#")
+    assert found == [int(colour[n : n + 2], 16) for n in (0, 2, 4)]
+
+
+def test_the_projector_shows_the_machine_large_and_little_else(shown):
+    page = shown("perpendicular")
+    size = "parseFloat(getComputedStyle(document.documentElement).fontSize)"
+    before = page.evaluate(size)
+    page.click("#full")
+    assert page.evaluate(size) > 1.15 * before
+    assert page.locator("#bench").is_hidden()
+    assert page.locator("#numbers").is_hidden()
+    assert page.locator("#energy").is_visible()
+    page.click("#full")
+    assert page.evaluate(size) == before
+    assert page.locator("#bench").is_visible()

@@ -168,16 +168,16 @@ def test_each_law_is_broken_by_what_breaks_it_and_by_nothing_else(name):
     sound, *broken = ask(faulty=[{"machine": machine, "fault": law} for law in ("none", *LAWS)])[
         "faulty"
     ]
-    assert "law" not in sound
+    assert sound["laws"] == []
     for law, told in zip(LAWS, broken, strict=True):
-        assert told["law"] == law
+        first = next(one for one in told["laws"] if one["law"] == law)
         if law in ("law-inside", "law-through"):
-            assert (told["name"], told["particle"]) == ("outgoing", told["disk"])
-            assert told["t"] == pytest.approx(told["at"], abs=0.2)
+            assert (first["name"], first["particle"]) == ("outgoing", told["disk"])
+            assert first["t"] == pytest.approx(told["at"], abs=0.2)
 
 
 def test_sound_runs_keep_the_laws(runs):
-    assert [name for name, (_, answer) in runs.items() if answer["law"]] == []
+    assert [name for name, (_, answer) in runs.items() if answer["laws"]] == []
     drawn = [build(sandbox.draw(seed)) for seed in range(60)]
     told = ask(sound=[as_page_has_it(machine) for machine in drawn])["laws"]
     assert [seed for seed, law in enumerate(told) if law] == []

@@ -169,7 +169,7 @@ def test_the_page_shows_the_machine_not_the_fall_and_what_a_view_says(shown):
 DAMAGE = """([column, change]) => {
   const { lab } = chutelab, [track] = lab.recording.tracks;
   track.rows[(track.count - 1) * 10 + column] += change;
-  lab.tell("run");
+  lab.judge(lab.recording);
 }"""
 
 
@@ -177,7 +177,7 @@ def test_a_broken_law_is_told_below_the_picture(shown):
     """A sound run has no such line; one whose last knot is off has it, in the page's language."""
     page = shown("perpendicular", language="de")
     line = page.locator("#law")
-    page.evaluate("chutelab.lab.tell('run')")
+    page.evaluate(DAMAGE, [3, 0.0])
     page.wait_for_timeout(300)
     assert line.is_hidden()
     page.evaluate(DAMAGE, [3, 0.5])

@@ -42,7 +42,8 @@ def layout(text: str) -> dict[str, object]:
         If a line is neither, or of a type that is not known.
     """
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    constants = {name: int(value) for name, value in re.findall(r"#define (\w+) (\d+)", text)}
+    numbers = re.findall(r"#define (\w+) ([\d.e-]+)", text)
+    constants = {name: int(one) if one.isdigit() else float(one) for name, one in numbers}
     enums = {
         name: {value.strip(): n for n, value in enumerate(values.split(","))}
         for name, values in re.findall(r"enum (\w+) \{([^}]*)\}", text)

@@ -2,12 +2,13 @@
 // answers on stdout.
 import { readFileSync } from "node:fs";
 
-import { load, recordingOf } from "./run.mjs";
+import { core, load, recordingOf } from "./run.mjs";
 
 const { groundedLedger, stacks } = await load("energy.js");
 const { Arrivals } = await load("arrival.js");
 const { crowdOf } = await load("crowd.js");
-const { Laws } = await load("laws.js");
+const { judge, runOf: judged } = await load("breaches.js");
+const { SAID } = await load("laws.js");
 const { numbersOf } = await load("numbers.js");
 const { RunHistory } = await load("stages.js");
 const { histogram, runningMean } = await load("landing.js");
@@ -17,11 +18,9 @@ const { ticks } = await load("chart.js");
 const { placed, spaceOf } = await load("symbols.js");
 const { StopWatch, angleBetween, nearestOn } = await load("tools.js");
 
-function lawOf(recording) {
-  const laws = new Laws(recording);
-  // Each look is at a few, until all is seen.
-  for (let n = 0; n < 1000; n += 1) laws.update();
-  return laws.broken;
+function lawsOf(recording) {
+  return judge(core, judged(recording)).map(({ law, surface, particle, t }) =>
+    ({ law: SAID[law], name: recording.machine.surfaces[surface], particle, t }));
 }
 
 // What a run may not do, each done to a sound one.
@@ -33,9 +32,12 @@ const FAULTS = {
   "law-through": ({ set, touch, last, radius }) => {
     for (let n = touch + 1; n <= last; n += 1) set(n, Y, (y) => y - 4 * radius);
   },
-  "law-energy": ({ recording }) => { recording.gained = 1e-3; },
+  "law-energy": ({ recording, set, last }) => {
+    if (recording.machine.interact) recording.gained = 1e-3;
+    else set(last, VX, (vx) => 1.1 * vx + 0.1);
+  },
   "law-losses": ({ set, last }) => set(last, FRICTION, -1),
-  "law-ledger": ({ set, last }) => set(last, VX, (vx) => 1.001 * vx + 0.001),
+  "law-ledger": ({ set, last }) => set(last, VX, (vx) => 1.1 * vx + 0.1),
 };
 
 function faultyOf({ machine, fault }) {
@@ -49,7 +51,7 @@ function faultyOf({ machine, fault }) {
   const touch = Array.from({ length: track.count }, (_, n) => n)
     .find((n) => track.at(n, T) >= event.t);
   FAULTS[fault]({ recording, set, touch, last: track.count - 1, radius });
-  return { ...lawOf(recording), disk, at: event.t };
+  return { laws: lawsOf(recording), disk, at: event.t };
 }
 
 function runOf(machine) {
@@ -63,7 +65,7 @@ function runOf(machine) {
     crowd: crowdOf(recording, arrivals, landings.length),
     arrivals: arrivals.found,
     envelopes: history.envelopes,
-    law: lawOf(recording),
+    laws: lawsOf(recording),
     points: recording.points(0, 1e-4).map(({ x, y }) => [x, y]),
     landings: landings.map(({ t, x }) => [t, x]),
     ledgers: times.map((t) => {
@@ -90,7 +92,7 @@ const asked = JSON.parse(readFileSync(0, "utf8"), revive);
 process.stdout.write(JSON.stringify({
   runs: asked.machines?.map(runOf),
   arrivals: asked.crowds?.map((machine) => new Arrivals(recordingOf(machine)).found),
-  laws: asked.sound?.map((machine) => lawOf(recordingOf(machine))),
+  laws: asked.sound?.map((machine) => lawsOf(recordingOf(machine))),
   faulty: asked.faulty?.map(faultyOf),
   histograms: asked.values?.map((values) => histogram(values)),
   means: asked.values?.map(runningMean),

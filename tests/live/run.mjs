@@ -22,7 +22,10 @@ export function recordingOf(machine, many = Infinity) {
   for (let state = "running"; state === "running" && recording.events.length < many;) {
     state = core.proceed(50);
     const books = state === "running" ? null : core.books();
-    recording.add({ ...core.take(), tips: new Float64Array(), now: core.get("t"), state, books });
+    recording.add({
+      ...core.take(), tips: new Float64Array(), now: core.get("t"), state, books,
+      contacts: core.get("impact_count"), steps: core.get("step_count"),
+    });
   }
   return recording;
 }

@@ -17,7 +17,6 @@ from typing import Any
 from chutelab.checks.stress import Evidence, Verdict, judge
 from chutelab.checks.stress.laws import unseen
 from chutelab.engines.simulation import judged
-from chutelab.machine import build
 from chutelab.scene import SceneError
 from stress.case import PATIENCE, Case, Tables, by_name, scene_of, surface, thrown
 from stress.demands import UNSEEN, demands, symmetric
@@ -72,7 +71,7 @@ def run(
     scene = scene_of(tables, name, engine, dt)
     with bounded(patience) as progress:
         recording = judged(scene, engine=by_name(engine), progress=progress)
-    return Evidence(build(scene), recording)
+    return Evidence(recording)
 
 
 def findings(case: Case, engine: str, dt: float | None) -> list[Verdict]:

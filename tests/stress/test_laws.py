@@ -120,12 +120,12 @@ def test_a_passage_there_and_back_within_one_interval_is_seen():
     built = machine.build(scene_of({**thrown_up, "surface": [ceiling]}, "test", "exact", None))
     assert np.count_nonzero(np.abs(recording.knots["position"][:, 1]) < 0.02) == 2
     under = replace(recording, knots=recording.knots.copy())
-    assert barriers.no_one_through(Evidence(built, under)).holds
+    assert barriers.no_one_through(Evidence(replace(under, machine=built))).holds
     up = recording.knots.copy()
     up["velocity"][:, 1] *= 2.0
-    over = Evidence(built, replace(recording, knots=up))
+    over = Evidence(replace(recording, machine=built, knots=up))
     assert barriers.no_one_through(over).figure == 2
-    first, *_ = replace(over.recording, machine=built).laws
+    first, *_ = over.recording.laws
     assert first.law == "nothing through a surface"
 
 
@@ -285,7 +285,7 @@ def test_what_rides_on_a_belt_that_will_throw_it_has_not_settled():
     e = evidence(lying)
     assert barriers.settled_to_stay(e).holds
     moving = scene_of(merged(lying, {"surface": [{**FLOOR, "speed": 1.0}]}), "test", "exact", None)
-    bad = barriers.settled_to_stay(replace(e, machine=machine.build(moving)))
+    bad = barriers.settled_to_stay(Evidence(replace(e.recording, machine=machine.build(moving))))
     assert bad.figure == 1
     assert "0 on floor" in bad.detail
     carried = evidence(merged(TRANSFER, {"run": {"until": "settled"}}))

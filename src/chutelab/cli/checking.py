@@ -136,7 +136,6 @@ def stress(
     """
     from chutelab.checks.stress import Evidence, judge, need_judged
     from chutelab.engines.simulation import judged
-    from chutelab.machine import build
     from chutelab.results.recorder import StalledError
     from chutelab.util.tables import Sheet, plain
 
@@ -147,7 +146,7 @@ def stress(
             recording = judged(loaded, progress=update)
     except StalledError as stalled:
         raise click.ClickException(str(stalled)) from stalled
-    run = Evidence(build(loaded), recording)
+    run = Evidence(recording)
     found = judge(run)
     broken = sum(one.broken for one in found)
     about = {"scene": scene, "title": recording.title, "engine": run.engine, "dt": run.dt}

@@ -362,4 +362,112 @@ typedef struct {
     double looked, cell;
 } Drawing;
 
+/* ---- What a run is judged by: a subject of its own, which shares nothing with the engine's. ---- */
+
+/* The laws, in the order in which they are told. */
+enum Law { LAW_FINITE, LAW_THROUGH, LAW_INSIDE, LAW_ENERGY, LAW_LOSSES, LAW_LEDGER, LAW_STEP };
+
+enum Engine { ENGINE_EXACT, ENGINE_CONTACT, ENGINE_PYMUNK };
+
+#define EPS 2.220446049250313e-16
+/* Roundings that one number may have gone through between two contacts: some ten operations, each on
+   numbers up to some ten times as large as what comes out. */
+#define ROUNDINGS 500
+/* EPS that one contact may move an energy by: half an ulp for each of two velocity components, a
+   height and a sum. */
+#define A_CONTACT 2
+/* Share of the radius by which disks of a crowd may be pressed into each other or into a surface: what
+   the contact engine promises. A solver that iterates leaves some. */
+#define PRESSED 0.05
+/* Share of its radius by which a cubic between two knots may leave a circle: the recording's
+   contract. */
+#define ON_ARCS 1e-9
+/* Breaches that are told at most: of losses there may be two. */
+#define BREACHES 8
+
+/* A piece of a surface as it is told to the laws. */
+typedef struct {
+    double x, y;            /* [in] first end of a straight piece; centre of a bent one */
+    double tx, ty, length;  /* [in] of a straight piece: unit tangent, and m */
+    double radius;          /* [in] of a bent piece, m; 0 of a straight one */
+    double begin, extent;   /* [in] of a bent piece: angle of its first end, and from there on, rad */
+    double speed;           /* [in] m/s */
+    double appears, vanishes; /* [in] s; it is there from the one to the other */
+    double end[4];          /* both ends, x and y */
+    double box[4];          /* m; left, bottom, right, top */
+    double side;            /* m; how far a mass point got beside it in the interval before */
+    double clear;           /* s; when a particle got clear of a gate, see `forgiven`; NAN: not known */
+    int surface;            /* [in] which surface it is part of */
+    int whole;              /* whether it is bent all round */
+    int near;               /* of a list of pieces that may be met */
+    int pad;
+} Barrier;
+
+/* A particle as it is told to the laws. */
+typedef struct {                                                                          /* [in] */
+    double radius;          /* m; of one with corners that of the circle inside */
+    double mass, inertia;   /* kg, kg m2 */
+    double gravity;         /* m/s2 */
+} Body;
+
+/* A place where a particle is deeper in a piece than it may be, or passes it. */
+typedef struct {                                                                         /* [out] */
+    double t, x, y, depth;  /* s, m */
+    int particle, piece;
+    int passes;             /* its centre gets to the other side, between the piece's ends */
+    int pad;
+} Hit;
+
+/* A law that is broken, where it was first. */
+typedef struct {                                                                         /* [out] */
+    double t, x, y;         /* s, m; NAN of what is about the whole run */
+    double amount, bound;   /* what was found, and what it must not exceed */
+    int law;
+    int particles;          /* how many broke it; 0 if it is about all together */
+    int particle;           /* the first of them, or -1 */
+    int surface, piece;     /* which it is about, or -1 */
+    int pad;
+} Breach;
+
+typedef struct {
+    /* arrays, laid out by the host */
+    double *knots;          /* [in] rows of t, x, y, vx, vy, spin, three entries of the ledger */
+    int *offsets;           /* [in] (particles + 1) first knot of each, and behind the last */
+    Body *bodies;           /* [in] (particles) */
+    Barrier *barriers;      /* [in] (pieces), of a family (particles, pieces) */
+    double *books;          /* [in] (book_rows, 3) entries of each surface, J */
+    Breach *breaches;       /* (BREACHES) */
+    Hit *hits;              /* (hit_room) in the order of particles and knots */
+    int *order;             /* (knots) in crowds of the contact engine */
+    double *places;         /* (particles, 2) there, too */
+    /* sizes */
+    int particle_count, piece_count, row; /* [in] row: doubles from knot to knot */
+    int book_rows, surface_count; /* [in] with the particles' own, which is the last */
+    int hit_room;           /* [in] */
+    /* the run */
+    int engine;             /* [in] */
+    int interact;           /* [in] particles meet each other */
+    int alike;              /* [in] all is left to steps that are all alike, and to Chipmunk */
+    int family;             /* [in] each particle has pieces of its own */
+    int pulley;             /* [in] piece 0 ends on a drive pulley */
+    int contacts, steps;    /* [in] that were made */
+    int unreal;             /* [in] numbers that are not finite, beside knots and books */
+    double dt;              /* [in] s; step, 0 of the exact engine */
+    double gained;          /* [in] J; by which solves broke their law of energy */
+    double largest;         /* [in] m; radius of the largest particle, with its corners */
+    /* [out] */
+    int breach_count, hit_count;
+    double speed;           /* m/s; the largest of anything that moves, belts included */
+    double length;          /* m; the largest in play */
+    double rounding;        /* m; what rounding may do to a length */
+    double arcs;            /* m; by which a curve between two knots may leave an arc */
+    double bent;            /* m/s2; largest acceleration along the inside of an arc */
+    double late;            /* m; by which a step may take a disk beyond a surface */
+    double allowed;         /* m; how deep a disk may be in a surface */
+    double energy;          /* J; in play */
+    double energy_bound;    /* what numbers may do to it, as a share of it */
+    double parted;          /* J; what parting overlaps may give */
+    double untold;          /* J; what a crowd's tracks may leave out between two knots */
+} Laws;
+
 #endif

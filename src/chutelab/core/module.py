@@ -29,7 +29,7 @@ PAGE = 65536
 LARGE = 64 * 2**20
 """Bytes beyond which a used memory is let go rather than kept for the next run."""
 
-SUBJECTS = ("World", "Plan", "Drawing")
+SUBJECTS = ("World", "Plan", "Drawing", "Laws")
 """Structs of layout.h of which the core has one each."""
 
 TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}
@@ -80,10 +80,9 @@ def constants(enum: str) -> dict[str, int]:
 
 
 @cache
-def number(name: str) -> int:
-    """Return a number that layout.h defines."""
-    value: int = _layout()["constants"][name]
-    return value
+def number(name: str) -> Any:
+    """Return a number that layout.h defines: a float if it has a point or an exponent."""
+    return _layout()["constants"][name]
 
 
 class Status(IntEnum):
@@ -153,17 +152,30 @@ class Module:
 
     def place(self, *arrays: tuple[str, np.dtype[Any], int], of: str = "World") -> None:
         """Make room for arrays of zeros, to which the fields of a struct point from now on."""
-        begins, first = [], self._end
-        for _, kind, count in arrays:
-            begin = (self._end + 15) // 16 * 16
-            begins.append(begin)
-            self._end = begin + kind.itemsize * max(1, count)
+        first = self._end
+        self._reserve(of, [(name, kind.itemsize * count) for name, kind, count in arrays])
+        self._bytes[first : self._end] = 0
+
+    def put(self, of: str, **arrays: NDArray[Any]) -> None:
+        """Copy arrays, flat and contiguous, to which the fields of a struct point from now on."""
+        begins = self._reserve(of, [(name, array.nbytes) for name, array in arrays.items()])
+        whole = self._bytes.data
+        for begin, array in zip(begins, arrays.values(), strict=True):
+            whole[begin : begin + array.nbytes] = array.view(np.uint8).data
+
+    def _reserve(self, of: str, sizes: list[tuple[str, int]]) -> list[int]:
+        """Set bytes apart, to which fields of a struct point; return where each begins."""
+        begins = []
+        for _, size in sizes:
+            begins.append((self._end + 15) // 16 * 16)
+            self._end = begins[-1] + max(1, size)
         if self._end > self.size:
             self._memory.grow(self._store, -(-(self._end - self.size) // PAGE))
             self._look()
-        self._bytes[first : self._end] = 0
-        for (name, _, _), begin in zip(arrays, begins, strict=True):
-            setattr(self.structs[of], name, begin)
+        struct = self.structs[of]
+        for (name, _), begin in zip(sizes, begins, strict=True):
+            setattr(struct, name, begin)
+        return begins
 
     def array(self, name: str, kind: np.dtype[Any], count: int, of: str = "World") -> NDArray[Any]:
         """Return a view of the array that a struct's field points to; `place` makes it invalid."""

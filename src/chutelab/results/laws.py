@@ -1,20 +1,22 @@
 """The laws that every run is judged by as it ends: those that cost little.
 
 They look at what is recorded, and at where the machine's surfaces are, and share nothing with the
-engines. `Recording.laws` is what they find; `chutelab stress` has more of them, which take longer.
+engines. The core finds what is broken (laws.c, barriers.c); the words are here. `Recording.laws` is
+what comes of it; `chutelab stress` has more laws, which take longer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from chutelab.results.evidence import Evidence
-from chutelab.results.recording import EVENT, Recording, blocks
-from chutelab.util.arrays import Floats, Ints
+from chutelab.core import module as core
+from chutelab.machine import Machine
+from chutelab.results.recording import EVENT, Recording
 from chutelab.util.tables import number
 
 FINITE, THROUGH, INSIDE = "finite numbers", "nothing through a surface", "nothing inside a surface"
@@ -22,10 +24,15 @@ ENERGY, LOSSES, LEDGER = "energy rises only by drives", "no loss is negative", "
 STEP = "speed times step below the radius"
 
 LAWS = (FINITE, THROUGH, INSIDE, ENERGY, LOSSES, LEDGER, STEP)
-"""Their names, in the order in which they are told."""
+"""Their names, in the order in which they are told, and in that of the core's enum Law."""
 
-INSTANTS = 24
-"""Times at which the energy of all particles together is summed."""
+UNITS = {FINITE: "", THROUGH: "", INSIDE: "m", STEP: "m"}
+"""Units of what is found; of the others J."""
+
+HITS = 64
+"""Places inside or beyond surfaces for which there is room at first."""
+
+INTEGER, REAL = np.dtype("<i4"), np.dtype("<f8")
 
 _NUMBERS = np.dtype(
     {"names": ["t", "rest"], "formats": ["f8", ("f8", 10)],
@@ -87,197 +94,168 @@ class Broken:
         return f"LAW BROKEN, {self.told}; do not trust these numbers; {self.advice}"
 
 
+@dataclass(frozen=True)
+class Findings:
+    """What the core finds of a run.
+
+    Attributes
+    ----------
+    breaches : ndarray, (B,)
+        The laws that are broken, in the order of `LAWS`: rows of the core's `Breach`.
+    hits : ndarray, (H,)
+        Where particles are deeper in surfaces than `allowed`, or pass them, by particle and time:
+        rows of the core's `Hit`.
+    figures : object
+        Bounds, and what they follow from: the core's `Laws`, whose arrays are no more.
+    """
+
+    breaches: NDArray[Any]
+    hits: NDArray[Any]
+    figures: Any
+
+
 def judge(recording: Recording) -> tuple[Broken, ...]:
     """Judge a run: return the laws that it breaks, each once, in the order of `LAWS`."""
-    e = Evidence(recording.machine, recording)
     if not len(recording.knots):
         return ()
-    if (found := _unreal(e)) is not None:
-        # The other laws say nothing about what is no number.
-        return (found,)
-    found_all = [*_barriers(e), *_books(e), *_steps(e)]
-    return tuple(sorted(found_all, key=lambda one: LAWS.index(one.law))) if found_all else ()
+    found = examine(recording)
+    return tuple(_broken(recording, row, found.figures) for row in found.breaches)
 
 
-def _told(
-    e: Evidence, law: str, rows: Ints, amount: float, bound: float, unit: str = "J"
-) -> Broken:
-    """Return a law that is broken at some knots (k,), in the order in which they are held."""
-    knots, offsets = e.recording.knots, e.recording.offsets
-    owners = np.searchsorted(offsets, rows, side="right") - 1
-    first = rows[np.argmin(knots["t"][rows])]
-    x, y = knots["position"][first].tolist()
-    return Broken(
-        law, len(np.unique(owners)), int(np.searchsorted(offsets, first, side="right")) - 1,
-        float(knots["t"][first]), (x, y), "", float(amount), float(bound), unit, _advice(e, law),
+def examine(recording: Recording) -> Findings:
+    """Have the core look at a run, of one knot or more."""
+    module, hit, breach = core.borrow(), core.dtype("Hit"), core.dtype("Breach")
+    crowd = recording.machine.interact and recording.engine == "contact"
+    try:
+        _lay_out(module, recording)
+        module.place(
+            ("breaches", breach, core.number("BREACHES")),
+            ("order", INTEGER, len(recording.knots) if crowd else 1),
+            ("places", REAL, 2 * recording.count if crowd else 1), of="Laws",
+        )  # fmt: skip
+        room = HITS
+        while room:
+            module.place(("hits", hit, room), of="Laws")
+            figures: Any = module.structs["Laws"]
+            figures.hit_room = room
+            module.call("judge")
+            room = figures.hit_count if figures.hit_count > room else 0
+        figures = type(figures).from_buffer_copy(figures)
+        breaches = module.array("breaches", breach, figures.breach_count, of="Laws")
+        hits = module.array("hits", hit, figures.hit_count, of="Laws")
+        return Findings(breaches.copy(), np.sort(hits, order=("particle", "t")), figures)
+    finally:
+        core.give_back(module)
+
+
+def _lay_out(module: core.Module, recording: Recording) -> None:
+    """Hand a run over to the core."""
+    machine, count = recording.machine, recording.count
+    bodies = np.empty(count, core.dtype("Body"))
+    bodies["radius"], bodies["mass"] = inner_radius(machine), machine.particle.mass
+    bodies["inertia"], bodies["gravity"] = machine.particle.inertia, machine.gravity
+    rows = barriers(machine)
+    books = recording.by_surface.reshape(-1)
+    module.put(
+        "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
+        barriers=rows.reshape(-1), books=books,
     )  # fmt: skip
+    events = recording.events.view(_NUMBERS)
+    unreal = sum(int(np.count_nonzero(~np.isfinite(events[name]))) for name in ("t", "rest"))
+    exact = recording.engine == "exact"
+    laws: Any = module.structs["Laws"]
+    for name, value in (
+        ("particle_count", count), ("piece_count", rows.shape[-1]),
+        ("row", recording.knots.dtype.itemsize // 8), ("book_rows", len(books) // 3),
+        ("surface_count", len(recording.surfaces)), ("engine", _ENGINES.index(recording.engine)),
+        ("interact", machine.interact), ("alike", alike(recording)), ("family", rows.ndim > 1),
+        ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
+        ("steps", recording.steps), ("unreal", unreal), ("dt", 0.0 if exact else machine.dt),
+        ("gained", recording.gained), ("largest", np.max(machine.particle.radius)),
+    ):  # fmt: skip
+        setattr(laws, name, value)
 
 
-def _of_all(e: Evidence, law: str, surface: str, amount: float, bound: float) -> Broken:
-    end, nowhere = float(e.recording.knots["t"].max()), (np.nan, np.nan)
-    advice = _advice(e, law)
-    return Broken(law, 0, -1, end, nowhere, surface, float(amount), float(bound), "J", advice)
+_ENGINES = ("exact", "contact", "pymunk")
+"""In the order of the core's enum Engine."""
 
 
-def _advice(e: Evidence, law: str) -> str:
-    """Return what may help."""
-    report = "if it stays so, report it with the scene"
-    if e.engine == "exact":
-        return f"run it with --engine contact, and {report}"
-    step = f"a step of less than {number(e.machine.dt)} s (--dt)"
-    if law == STEP or (e.alike and law in (THROUGH, INSIDE)):
-        fastest = float(np.min(e.radii) / e.speed)
-        other = "" if e.alike and (e.machine.threads or not _round(e)) else ", or --engine contact"
-        return f"take a step of less than {number(min(fastest, e.machine.dt))} s (--dt){other}"
-    return f"take {step}; {report}"
+def alike(recording: Recording) -> bool:
+    """Tell whether all is left to Chipmunk, in steps that are all alike."""
+    m = recording.machine
+    return recording.engine == "pymunk" and (
+        m.interact or not m.align or len(m.threads) > 0 or not _round(m)
+    )
 
 
-def _round(e: Evidence) -> bool:
-    return all(outline is None for outline in e.machine.outlines)
+def _round(machine: Machine) -> bool:
+    return all(outline is None for outline in machine.outlines)
 
 
-def _unreal(e: Evidence) -> Broken | None:
-    events = e.recording.events.view(_NUMBERS)
-    parts = e.recording.by_surface, events["t"], events["rest"]
-    if all(np.isfinite(part).all() for part in (e.sizes, *parts)):
-        return None
-    bad = np.flatnonzero(~np.isfinite(e.columns).all(axis=0))
-    count = float(sum((~np.isfinite(part)).sum() for part in (e.columns, *parts)))
-    if len(bad):
-        return _told(e, FINITE, bad, count, 0.0, "")
-    return _of_all(e, FINITE, "", count, 0.0)
+def inner_radius(machine: Machine) -> Any:
+    """Return the radius of the particles, m, or of each, (N,): the circle inside their corners."""
+    if _round(machine):
+        return machine.particle.radius
+    found = np.broadcast_to(np.asarray(machine.particle.radius, dtype=float), machine.count).copy()
+    for kind, corners in enumerate(machine.outlines):
+        if corners is not None:
+            edge = np.roll(corners, -1, axis=0) - corners
+            off = corners[:, 0] * edge[:, 1] - corners[:, 1] * edge[:, 0]
+            found[machine.releases.kind == kind] = (off / np.hypot(*edge.T)).min()
+    return found
 
 
-def _barriers(e: Evidence) -> Iterator[Broken]:
-    passed = {(hit.particle, hit.piece) for hit in e.hits if hit.passes}
-    for law, passes in ((THROUGH, True), (INSIDE, False)) if e.hits else ():
-        some = [
-            hit
-            for hit in e.hits
-            if hit.passes == passes and (passes or (hit.particle, hit.piece) not in passed)
-        ]
-        if some:
-            one = min(some, key=lambda hit: hit.t)
-            deepest = max(hit.depth for hit in some)
-            amount, bound = (len(some), 0.0) if passes else (deepest, e.allowed)
-            yield Broken(
-                law, len({hit.particle for hit in some}), one.particle, one.t, one.position,
-                e.pieces_of(one.particle)[one.piece].name, float(amount), float(bound),
-                "" if passes else "m", _advice(e, law),
-            )  # fmt: skip
+def barriers(machine: Machine) -> NDArray[Any]:
+    """Return all pieces of surfaces as rows of the core's `Barrier`, as far as it asks.
 
-
-def _books(e: Evidence) -> Iterator[Broken]:
-    """Judge energy and ledger.
-
-    Of lone particles what is unexplained may not change from knot to knot; particles that meet give
-    energy to each other, so of them it is the sum of all at some times, and what the solves of the
-    contact engine gained. Losses that are booked are never less than before but by what parting
-    overlaps gives: where many do so at one instant, those that overlap there. Where the contact
-    engine holds a particle by itself in a nip, impulses of any size hold each other, and along
-    normals seems to be given what friction takes: only the sum is known.
+    Straight ones, bent ones, and the drive pulley last; (P,), of a family (N, P).
     """
-    recording, gain, within = e.recording, e.gain, e.within
-    bound = e.energy_bound * e.energy
-    booked, most = e.columns[7:], bound + e.parted
-    losses = booked[:, 1:] - booked[:, :-1]
-    if losses.min(initial=0.0) < -most:
-        together = e.engine == "contact" and not e.crowd
-        back = np.where(within, losses.sum(axis=0) if together else losses.min(axis=0), 0.0)
-        rows = (back < -most).nonzero()[0]
-        rows, least = _beyond_overlaps(e, rows, back[rows], most)
-        if len(rows):
-            yield _told(e, LOSSES, rows + 1, back[rows].min(), -least)
-    total = recording.by_surface[..., 1:]
-    if total.min(initial=0.0) < -most:
-        low = total.reshape(-1, *total.shape[-2:]).min(axis=(0, 2))
-        name = recording.surfaces[int(low.argmin())]
-        yield _of_all(e, LOSSES, name, low.min(), -most)
-    first, last = e.ends
-    residual = float((gain[last] - gain[first]).sum())
-    if abs(residual) > bound:
-        yield _of_all(e, LEDGER, "", abs(residual), bound)
-    if not e.crowd:
-        rises = gain[1:] - gain[:-1]
-        if len(rises) and max(rises.max(), -rises.min()) > most:
-            rises = np.abs(np.where(within, rises, 0.0))
-            rows = (rises > most).nonzero()[0]
-            if len(rows):
-                yield _told(e, ENERGY, rows + 1, rises[rows].max(), most)
-        return
-    if recording.gained > bound:
-        yield _of_all(e, ENERGY, "", recording.gained, bound)
-    elif (rise := _rise(e).max(initial=0.0)) > most + e.untold:
-        yield _of_all(e, ENERGY, "", rise, most + e.untold)
-
-
-def _rise(e: Evidence) -> Floats:
-    """Return what all together have at some times (T,) that is unexplained, J: the least it may be.
-
-    When between its knots one got energy from another is not told, only how much: at any time
-    between them it has at least the lesser of what is unexplained at the two.
-    """
-    recording, gain, t = e.recording, e.gain, e.columns[0]
-    times = np.sort(t[:: max(1, len(t) // INSTANTS)])
-    first, last = e.ends
-    at_release = np.zeros(recording.count)
-    at_release[recording.released] = gain[first]
-    found = ((gain[last] - gain[first]) * (t[last] < times[:, None])).sum(axis=1)
-    for row, particle, left, _ in blocks(recording.knots, recording.offsets, times):
-        least = np.minimum(gain[left], gain[left + 1]) - at_release[particle]
-        np.add.at(found, row, least)
-    return np.asarray(found)
-
-
-def _beyond_overlaps(e: Evidence, rows: Ints, back: Floats, most: float) -> tuple[Ints, float]:
-    """Return which of some intervals (k,) give back more than overlaps may, and what these may, J.
-
-    In a crowd of the contact engine all that ends at an instant is one sum, and of the instants
-    those are judged at which most is given back.
-    """
-    if not (e.crowd and e.engine == "contact" and len(rows)):
-        return rows, most
-    times, which = np.unique(e.columns[0][rows + 1], return_inverse=True)
-    given = np.bincount(which, back)
-    worst = np.argsort(given)[:INSTANTS]
-    allowed = most + np.maximum(e.opened(times[worst]), e.opened(times[worst] - e.machine.dt))
-    bad = (given[worst] < -allowed).nonzero()[0]
-    if not len(bad):
-        return rows[:0], most
-    return rows[np.isin(which, worst[bad])], float(allowed[bad].min())
-
-
-def _steps(e: Evidence) -> Iterator[Broken]:
-    """Where Chipmunk looks for contacts at the ends of steps only, none may go past one in a step.
-
-    What flies where nothing is does no harm: judged is what may reach a surface or another in it.
-    """
-    if not e.alike or e.dt is None:
-        return
-    if e.speed * e.dt < e.radii.min():
-        return
-    knots = e.recording.knots
-    way = np.hypot(*knots["velocity"].T) * e.dt
-    radii = e.radii[e.recording.owner]
-    fast = way >= radii
-    corners = _corners(e)
-    if len(corners):
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        reach = (radii + way)[:, None]
-        places = knots["position"]
-        fast &= ((places >= low - reach) & (places <= high + reach)).all(axis=1)
-    elif not e.crowd:
-        return
-    rows = fast.nonzero()[0]
-    if len(rows):
-        worst = rows[(way[rows] / radii[rows]).argmax()]
-        yield _told(e, STEP, rows, way[worst], radii[worst], "m")
-
-
-def _corners(e: Evidence) -> Floats:
-    """Return points round which the box of all surfaces goes, (C, 2), m."""
-    wheel: Any = e.machine.pulley
-    found = e.machine.corners
+    lines, arcs, wheel = machine.segments, machine.arcs, machine.pulley
+    straight = lines.length.shape[-1]
+    bent = straight + arcs.radius.shape[-1]
+    ahead = () if lines.length.ndim == 1 else (machine.count,)
+    rows = np.zeros((*ahead, bent + (wheel is not None)), core.dtype("Barrier"))
+    for part, own in ((lines, rows[..., :straight]), (arcs, rows[..., straight:bent])):
+        if own.shape[-1]:
+            own["speed"], own["surface"] = part.speed, part.surface
+            own["appears"], own["vanishes"] = part.appears, part.vanishes
+            place = lines.start if part is lines else arcs.center
+            own["x"], own["y"] = place[..., 0], place[..., 1]
+    own = rows[..., :straight]
+    own["length"] = lines.length
+    own["tx"], own["ty"] = lines.tangent[..., 0], lines.tangent[..., 1]
+    if bent > straight:
+        own = rows[..., straight:bent]
+        own["radius"], own["begin"], own["extent"] = arcs.radius, arcs.begin, arcs.extent
     if wheel is not None:
-        found = np.concatenate([found, [[wheel.radius] * 2, [-wheel.radius] * 2]])
-    return np.asarray(found)
+        own = rows[..., -1]
+        own["radius"], own["speed"], own["surface"] = wheel.radius, wheel.speed, wheel.surface
+        own["extent"], own["appears"], own["vanishes"] = inf, -inf, inf
+    return rows
+
+
+def _broken(recording: Recording, row: NDArray[Any], figures: Any) -> Broken:
+    """Return a law that is broken in words."""
+    t, x, y, amount, bound, which, particles, particle, surface, piece, _ = row.tolist()
+    law, m = LAWS[which], recording.machine
+    name = recording.surfaces[surface] if surface >= 0 else ""
+    if m.pulley is not None and piece == m.segments.length.shape[-1] + m.arcs.radius.shape[-1]:
+        name = "pulley"
+    advice = _advice(recording, law, figures)
+    return Broken(
+        law, particles, particle, t, (x, y), name, amount, bound, UNITS.get(law, "J"), advice
+    )
+
+
+def _advice(recording: Recording, law: str, figures: Any) -> str:
+    """Return what may help."""
+    report, machine = "if it stays so, report it with the scene", recording.machine
+    if recording.engine == "exact":
+        return f"run it with --engine contact, and {report}"
+    step = f"a step of less than {number(machine.dt)} s (--dt)"
+    if law == STEP or (alike(recording) and law in (THROUGH, INSIDE)):
+        fastest = float(np.min(inner_radius(machine))) / figures.speed
+        only = alike(recording) and (machine.threads or not _round(machine))
+        other = "" if only else ", or --engine contact"
+        return f"take a step of less than {number(min(fastest, machine.dt))} s (--dt){other}"
+    return f"take {step}; {report}"

@@ -1,18 +1,19 @@
 """Numerical stability: the laws that a run must keep, whatever the scene.
 
 ===============  ==================================================================================
+`evidence`       what a law looks at, and how it answers
+`surfaces`       where surfaces are
 `barriers`       laws on where no particle may be
 `blows`          laws on what a blow may do: restitution and friction of the pair
 `laws`           laws on energy, ledger, momentum and the record; all by name, `judge`
 ===============  ==================================================================================
 
-What every run is judged by is `results.laws`; `results.evidence` is what a law looks at, and
-`results.barriers` and `results.surfaces` tell what is inside what, for both.
+What every run is judged by is `results.laws`, which also finds what is inside a surface.
 
 The scenes that are hard on an engine, and what each asks for besides, are in ``tests/stress``.
 """
 
+from chutelab.checks.stress.evidence import A_CONTACT, EPS, ROUNDINGS, Evidence, Verdict
 from chutelab.checks.stress.laws import LAWS, judge, need_judged
-from chutelab.results.evidence import A_CONTACT, EPS, ROUNDINGS, Evidence, Verdict
 
 __all__ = ["A_CONTACT", "EPS", "LAWS", "ROUNDINGS", "Evidence", "Verdict", "judge", "need_judged"]

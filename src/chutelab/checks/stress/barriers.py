@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chutelab.checks.stress.evidence import ON_ARCS, PRESSED, Evidence, Verdict, worst
 from chutelab.results import REASONS, Kind
-from chutelab.results.barriers import Hit
-from chutelab.results.evidence import ON_ARCS, PRESSED, Evidence, Verdict, worst
 from chutelab.util.arrays import Floats, Ints
 
 AT_SURFACES = (Kind.IMPACT, Kind.LANDING, Kind.STICK, Kind.SLIP, Kind.SETTLE)
@@ -28,7 +27,7 @@ def no_one_through(e: Evidence) -> Verdict | None:
     """No centre passes a surface between its ends; the figure counts the passages."""
     if not e.pieces or not len(e.recording.knots):
         return None
-    found = [hit for hit in e.hits if hit.passes]
+    found = e.hits[e.hits["passes"] == 1]
     return Verdict(len(found), 0.0, _first(e, "particle {} through {} at t = {:.6g} s", found))
 
 
@@ -39,18 +38,18 @@ def depth(e: Evidence) -> Verdict | None:
     """
     if not e.pieces or not len(e.recording.knots):
         return None
-    found = sorted(e.hits, key=lambda hit: -hit.depth)
-    deepest = found[0].depth if found else 0.0
+    found = e.hits[np.argsort(-e.hits["depth"], kind="stable")]
+    deepest = float(found["depth"].max(initial=0.0))
     return Verdict(
         deepest, e.allowed, f"m, {_first(e, 'particle {} in {} at t = {:.6g} s', found)}"
     )
 
 
-def _first(e: Evidence, said: str, found: list[Hit]) -> str:
-    if not found:
+def _first(e: Evidence, said: str, found: NDArray[Any]) -> str:
+    if not len(found):
         return "none"
     one = found[0]
-    return said.format(one.particle, e.pieces_of(one.particle)[one.piece].name, one.t)
+    return said.format(one["particle"], e.pieces[one["piece"]].name, one["t"])
 
 
 def overlap(e: Evidence) -> Verdict | None:

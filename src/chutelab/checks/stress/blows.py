@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict, worst
 from chutelab.results import Kind
-from chutelab.results.evidence import EPS, ROUNDINGS, Evidence, Verdict, worst
 from chutelab.util.arrays import Floats, Ints
 
 LEAST = 1e-12

@@ -26,7 +26,7 @@ from chutelab.checks.stress.barriers import (
     settled_to_stay,
 )
 from chutelab.checks.stress.blows import cone, rebound
-from chutelab.results.evidence import A_CONTACT, EPS, ROUNDINGS, Evidence, Verdict, worst
+from chutelab.checks.stress.evidence import A_CONTACT, EPS, ROUNDINGS, Evidence, Verdict, worst
 from chutelab.results.ledger import ledger
 from chutelab.scene import Fault, Scene, SceneError
 

@@ -218,4 +218,4 @@ function gapToArc({ x, y, radius, begin, extent }: Arc, px: number, py: number) 
     Math.hypot(u - radius * Math.cos(angle), v - radius * Math.sin(angle))));
 }
 
-export { Arrivals, gapToArc, gapToSegment };
+export { Arrivals };

@@ -42,8 +42,9 @@ async function startCore(module: WebAssembly.Module, layout: Layout) {
 class Memory {
   exports: any;
   base;
+  /** Where the structs of the core's subjects are, by their names. */
+  subjects: Record<string, number>;
   end;
-  begins: Record<string, number>;
   bytes = new Uint8Array();
   doubles = new Float64Array();
   ints = new Int32Array();
@@ -52,8 +53,8 @@ class Memory {
     this.exports = instance.exports;
     this.exports._initialize();
     this.base = this.exports.__heap_base.value;
-    const { world, plan, drawing } = this.exports;
-    this.begins = { World: world(), Plan: plan(), Drawing: drawing() };
+    const { world, plan, drawing, laws } = this.exports;
+    this.subjects = { World: world(), Plan: plan(), Drawing: drawing(), Laws: laws() };
     this.end = this.base;
     this.look();
   }
@@ -61,9 +62,12 @@ class Memory {
   /** Free all arrays, and reset all structs. */
   forget() {
     this.end = this.base;
-    for (const [name, begin] of Object.entries(this.begins)) {
-      this.bytes.fill(0, begin, begin + this.layout.structs[name].size);
-    }
+    Object.keys(this.subjects).forEach((name) => this.reset(name));
+  }
+
+  /** Set all fields of a struct to 0. */
+  reset(of: string) {
+    this.bytes.fill(0, this.subjects[of], this.subjects[of] + this.layout.structs[of].size);
   }
 
   /** Look at the memory anew; it moves when it grows. */
@@ -76,13 +80,13 @@ class Memory {
 
   get(name: string, of = "World") {
     const [offset, type] = this.layout.structs[of].fields[name];
-    const at = this.begins[of] + offset;
+    const at = this.subjects[of] + offset;
     return type === "double" ? this.doubles[at >> 3] : this.ints[at >> 2];
   }
 
   set(name: string, value: number, of = "World") {
     const [offset, type] = this.layout.structs[of].fields[name];
-    const at = this.begins[of] + offset;
+    const at = this.subjects[of] + offset;
     if (type === "double") this.doubles[at >> 3] = value;
     else this.ints[at >> 2] = value;
   }
@@ -125,9 +129,10 @@ class Core extends Memory {
   }
 
   /** Fill in fields of one row of an array. */
-  fill(name: string, struct: string, row: number, values: Record<string, number | number[]>) {
+  fill(name: string, struct: string, row: number, values: Record<string, number | number[]>,
+    of = "World") {
     const { size, fields } = this.layout.structs[struct];
-    const begin = this.get(name) + row * size;
+    const begin = this.get(name, of) + row * size;
     for (const [key, value] of Object.entries(values)) {
       const [offset, type] = fields[key];
       if (typeof value !== "number") this.doubles.set(value, (begin + offset) >> 3);

@@ -1,21 +1,24 @@
 // The picture's side of the worker: asks for runs, and hands on what comes back of the latest.
 
+import type { Breach, Run } from "./breaches.ts";
 import type { Event } from "./core.ts";
 import type { Machine } from "./machine.ts";
 
 type Chunk = { type: "chunk", id: number, knots: Float64Array, tips: Float64Array,
   events: Event[], now: number, state: string, books: number[][] | null,
-  reasons: number[] | null, gained: number };
+  reasons: number[] | null, gained: number, contacts: number, steps: number };
 
 class Engine {
   id = 0;
   until = 0;
   onChunk: (chunk: Chunk) => void = () => {};
+  onLaws: (breaches: Breach[]) => void = () => {};
 
   constructor(readonly worker: Worker, wasm: ArrayBuffer, layout: object) {
     worker.onmessage = ({ data }) => {
       if (data.type === "broken") this.fail();
       if (data.type === "chunk" && data.id === this.id) this.onChunk(data);
+      if (data.type === "laws" && data.id === this.id) this.onLaws(data.breaches);
     };
     worker.onerror = () => this.fail();
     worker.postMessage({ type: "load", wasm, layout });
@@ -38,6 +41,12 @@ class Engine {
     this.until = until;
     this.onChunk = onChunk;
     this.worker.postMessage({ type: "run", id: this.id, machine, until });
+  }
+
+  /** Have the latest run judged by the laws that every run must keep. */
+  judge(run: Run, onLaws: (breaches: Breach[]) => void) {
+    this.onLaws = onLaws;
+    this.worker.postMessage({ type: "judge", id: this.id, run });
   }
 
   /** Let the run go on to a later time. */

@@ -1,5 +1,6 @@
 // The scene under somebody's hands: its values, its run, its clock. Nothing here draws.
 
+import { runOf } from "./breaches.ts";
 import { withValues } from "./keys.ts";
 import { build, type Machine } from "./machine.ts";
 import { Recording } from "./recording.ts";
@@ -88,6 +89,16 @@ class Lab {
     const { recording } = this;
     this.engine.run(job, AHEAD + (from > 0 ? 0 : this.t), (chunk) => {
       recording.add(chunk);
+      this.tellSoon();
+      // After a change a track may well lie where a surface is now.
+      if (recording.state === "done" && !recording.renamed) this.judge(recording);
+    });
+  }
+
+  /** Find the laws that a run breaks, which is over. */
+  judge(recording: Recording) {
+    this.engine.judge(runOf(recording), (breaches) => {
+      recording.breaches = breaches;
       this.tellSoon();
     });
   }

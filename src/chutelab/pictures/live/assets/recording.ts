@@ -1,6 +1,7 @@
 // What a run leaves: where each particle is at any time, and its energy ledger.
 // Between the engine's knots a track is the cubic Hermite curve, as in Python's recordings.
 
+import type { Breach } from "./breaches.ts";
 import { KNOT_ROW, type Machine, type Event } from "./core.ts";
 
 export type State = { x: number, y: number, vx: number, vy: number, spin: number, ended: boolean };
@@ -235,16 +236,23 @@ class Recording {
   books: number[][] | null = null;
   /** By which the engine's solves broke their law of energy, J. */
   gained = 0;
+  /** Impacts and steps so far. */
+  contacts = 0;
+  steps = 0;
+  /** The laws that it breaks, once it is over and has been judged. */
+  breaches: Breach[] = [];
 
   constructor(public machine: Machine) {
     this.tracks = machine.releases.map(() => new Track());
   }
 
-  add({ knots, tips, events, now, state, books = null, gained = 0 }: {
+  add({ knots, tips, events, now, state, books = null, gained = 0, contacts = 0, steps = 0 }: {
     knots: Float64Array, tips: Float64Array, events: Event[], now: number, state: string,
-    books?: number[][] | null, gained?: number,
+    books?: number[][] | null, gained?: number, contacts?: number, steps?: number,
   }) {
     this.gained = gained;
+    this.contacts = contacts;
+    this.steps = steps;
     this.books = this.renamed ? null : books;
     const its = (disk: number) =>
       this.renamed ? this.renamed[disk] : { index: disk, entries: null, goesOn: false };

@@ -6,8 +6,10 @@
 // Out: {type: "chunk", id, knots, tips, events, now, state, books, reasons, gained}, where
 //      state is "running", "done", "stalled" or "failed"; books and reasons come with the end;
 //      gained is the energy by which solves broke their law so far, J.
+//      {type: "laws", id, breaches}, in answer to {type: "judge", id, run}.
 //      {type: "broken"}, where the core cannot be loaded.
 
+import { judge } from "./breaches.ts";
 import { compiled, startCore, type Core, type Layout } from "./core.ts";
 
 /** ms between two looks at the messages. */
@@ -64,7 +66,8 @@ function work() {
   postMessage({
     type: "chunk", id: job.id, knots: all, tips, events, now: core.get("t"), state,
     books: over ? core.books() : null, reasons: over ? core.reasons() : null,
-    gained: core.get("gained"),
+    gained: core.get("gained"), contacts: core.get("impact_count"),
+    steps: core.get("step_count"),
   }, { transfer: [all.buffer, tips.buffer] });
   if (over) job = null;
   else schedule();
@@ -98,7 +101,9 @@ addEventListener("message", async ({ data }) => {
   } catch {
     return;
   }
-  if (data.type === "run") {
+  if (data.type === "judge") {
+    postMessage({ type: "laws", id: data.id, breaches: judge(core, data.run) });
+  } else if (data.type === "run") {
     core.begin(data.machine);
     job = { id: data.id, until: data.until, steps: 64 };
     work();

@@ -33,17 +33,6 @@ class Piece(ABC):
     def away(self, position: Floats) -> Floats:
         """Return the way from the nearest point of it to places (c, 2), m."""
 
-    @abstractmethod
-    def beside(self, position: Floats) -> Floats:
-        """Return distances (c,) from its line, the side on the left or outside positive, m."""
-
-    @abstractmethod
-    def within(self, position: Floats, margin: float) -> Bools:
-        """Tell which places (c, 2) are beside it, and not beyond its ends or nearer than a margin.
-
-        Ends are `margin` (m) inside of what they are.
-        """
-
     def gap(self, position: Floats, radius: Floats) -> Floats:
         """Return distances (c,) from disks round places (c, 2), m."""
         return np.asarray(np.hypot(*self.away(position).T) - radius)
@@ -68,14 +57,6 @@ class Line(Piece):
         from_start = position - self.start
         foot = np.clip(from_start @ self.tangent, 0.0, self.length)
         return np.asarray(from_start - foot[:, None] * self.tangent)
-
-    def beside(self, position: Floats) -> Floats:  # noqa: D102
-        from_start = position - self.start
-        return np.asarray(self.tangent[0] * from_start[:, 1] - self.tangent[1] * from_start[:, 0])
-
-    def within(self, position: Floats, margin: float) -> Bools:  # noqa: D102
-        foot = (position - self.start) @ self.tangent
-        return np.asarray((foot > margin) & (foot < self.length - margin))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,27 +91,10 @@ class Bow(Piece):
             away[beyond] = np.where(nearer[:, None], first, last)
         return np.asarray(away)
 
-    def beside(self, position: Floats) -> Floats:  # noqa: D102
-        return np.asarray(np.hypot(*(position - self.center).T) - self.radius)
 
-    def within(self, position: Floats, margin: float) -> Bools:  # noqa: D102
-        if self.extent >= 2.0 * pi:
-            return np.ones(len(position), dtype=bool)
-        foot = self._along(position) * self.radius
-        return np.asarray((foot > margin) & (foot < self.extent * self.radius - margin))
-
-
-def pieces(machine: Machine, member: int | None = None) -> list[Piece]:
-    """Return all pieces: the straight ones, the bent ones, and the drive pulley last.
-
-    Of a family of machines those of one member.
-    """
+def pieces(machine: Machine) -> list[Piece]:
+    """Return all pieces: the straight ones, the bent ones, and the drive pulley last."""
     found: list[Piece] = []
-
-    def own(values: Any, last: int) -> Any:
-        """Return what is the member's, of values with so many axes else."""
-        return values[member] if member is not None and np.ndim(values) > last else values
-
     for part in (machine.segments, machine.arcs):
         straight = part is machine.segments
         shape = ("start", "tangent", "length") if straight else (
@@ -140,25 +104,24 @@ def pieces(machine: Machine, member: int | None = None) -> list[Piece]:
             common: dict[str, Any] = {
                 "name": machine.surfaces[surface],
                 "surface": surface,
-                "speed": float(own(part.speed, 1)[k]),
+                "speed": float(part.speed[k]),
                 "restitution": part.restitution[..., k],
                 "friction": part.friction[..., k],
                 "appears": float(part.appears[k]),
                 "vanishes": float(part.vanishes[k]),
             }
-            places = {"start": 2, "tangent": 2, "center": 2}
-            at = {name: own(getattr(part, name), places.get(name, 1))[k] for name in shape}
+            at = {name: getattr(part, name)[k] for name in shape}
             found.append(Line(**common, **at) if straight else Bow(**common, **at))
     if (wheel := machine.pulley) is not None:
         found.append(
             Bow(
                 name="pulley",
                 surface=wheel.surface,
-                speed=own(wheel.speed, 0),
+                speed=wheel.speed,
                 restitution=wheel.restitution,
                 friction=wheel.friction,
                 center=np.zeros(2),
-                radius=own(wheel.radius, 0),
+                radius=wheel.radius,
             )
         )
     return found

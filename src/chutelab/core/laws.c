@@ -1,0 +1,501 @@
+/* The laws that every run is judged by: of the numbers, of energy and ledger, of long steps; those of
+   places are in barriers.c. Bounds are argued, not fitted: for the exact engine rounding, for the
+   others also what can happen within a step.
+
+   A check shares nothing with what it checks: nothing here is from the engine's files. */
+
+#include <stdlib.h>
+#include <string.h>
+#include "laws.h"
+
+Laws L;
+
+/* Times at which the energy of all particles together is summed, and instants at which overlaps are. */
+#define INSTANTS 24
+/* Share of the radius that Chipmunk and the contact engine leave alone. */
+#define SLOP 1e-3
+/* How the contact engine parts overlaps in a crowd: which share of one in a step, that of one as deep as
+   DEEP radii all; by how many radii at most; and how much less for an impulse, in m/s times the heaviest
+   mass. Steps are no longer than FALL times the time in which a radius is fallen, squared. */
+#define PARTS 0.1
+#define DEEP 0.03
+#define OPENS 1e-2
+#define GIVES 3e-3
+#define FALL 8e-3
+/* m/s on Earth: what a track of the contact engine in a crowd may leave out. */
+#define SMOOTH 1e-4
+#define EARTH 9.81
+/* Share of the radius by which the cubic between two knots may be off the way of a particle by itself
+   with the contact engine, which writes a knot where it would be more. */
+#define BULGE 1e-5
+/* Share of the energy turned over that the contact engine may misbook in a crowd: its promise. */
+#define BOOKED 1e-9
+/* Share of the radius by which a track of the pymunk engine may be off between two knots. */
+#define LEAVES_OUT 1e-4
+/* Share of the radius by which the pymunk engine's disks are larger, and so their levers. */
+#define HAIR 1e-10
+
+/* What all particles have together, and the largest and least of one. */
+static struct { double mass, heaviest, smallest, gravity, knot_t; } All;
+
+static double square(double a) { return a * a; }
+
+static int last_of(int i) { return L.offsets[i + 1] - 1; }
+
+static int is_released(int i) { return L.offsets[i + 1] > L.offsets[i]; }
+
+static double pace(const double *knot) { return square(knot[3]) + square(knot[4]); }
+
+static double kinetic(int i, const double *knot) {
+    return 0.5 * L.bodies[i].mass * pace(knot) + 0.5 * L.bodies[i].inertia * square(knot[5]);
+}
+
+static double potential(int i, const double *knot) { return L.bodies[i].mass * L.bodies[i].gravity * knot[2]; }
+
+/* Energy at a knot, less what the books say it got, J: what is unexplained. */
+static double gain(int i, const double *knot) {
+    return kinetic(i, knot) + potential(i, knot) - (knot[6] - knot[7] - knot[8]);
+}
+
+/* Breaches. */
+
+static Breach *tell(int law, double amount, double bound) {
+    Breach *one = L.breaches + L.breach_count++;
+    *one = (Breach){All.knot_t, NAN, NAN, amount, bound, law, 0, -1, -1, -1, 0};
+    return one;
+}
+
+/* Knots that break a law, as they are found in the order of particles. */
+typedef struct { int particles, particle, latest, knot; } Group;
+
+static void add(Group *group, int i, int knot) {
+    const double *now = KNOT(knot), *first = KNOT(group->knot);
+    if (!group->particles || now[0] < first[0] || (isnan(now[0]) && !isnan(first[0]))) {
+        group->knot = knot;
+        group->particle = i;
+    }
+    group->particles += !group->particles || group->latest != i;
+    group->latest = i;
+}
+
+static void tell_group(int law, const Group *group, double amount, double bound) {
+    if (!group->particles) return;
+    const double *knot = KNOT(group->knot);
+    Breach *one = tell(law, amount, bound);
+    one->t = knot[0];
+    one->x = knot[1];
+    one->y = knot[2];
+    one->particles = group->particles;
+    one->particle = group->particle;
+}
+
+/* Bounds. */
+
+/* Look at all numbers: tell whether they are finite, and find the largest of each kind; also the energy in
+   play, J: what every particle had at most, and what was booked on it, or of a crowd what was turned over.
+   The clock's own rounding moves a particle: half an ulp of t, times its speed. */
+static int weigh(void) {
+    double t = 0, place = 0, fastest = 0, size[4] = {0}, entries[3] = {0}, lifted = 0;
+    Group bad = {0};
+    int unreal = L.unreal;
+    L.energy = 0;
+    for (int i = 0; i < L.particle_count; i++) {
+        const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
+        double mass = L.bodies[i].mass, highest = 0;
+        All.mass += mass;
+        All.heaviest = MAX(All.heaviest, mass);
+        All.gravity = MAX(All.gravity, L.bodies[i].gravity);
+        All.smallest = i ? MIN(All.smallest, L.bodies[i].radius) : L.bodies[i].radius;
+        for (const double *knot = first; knot <= last; knot += L.row) {
+            double sum = 0;
+            for (int n = 0; n < 9; n++) sum += 0 * knot[n];
+            if (sum != 0) { /* NAN: one of them is not finite. */
+                for (int n = 0; n < 9; n++) unreal += !isfinite(knot[n]);
+                add(&bad, i, L.offsets[i] + (knot - first) / L.row);
+            }
+            t = MAX(t, fabs(knot[0]));
+            All.knot_t = MAX(All.knot_t, knot[0]);
+            place = MAX(place, MAX(fabs(knot[1]), fabs(knot[2])));
+            fastest = MAX(fastest, pace(knot));
+            if (L.interact) continue;
+            highest = MAX(highest, fabs(knot[6]) + fabs(knot[7]) + fabs(knot[8])
+                + fabs(potential(i, knot)) + kinetic(i, knot));
+        }
+        if (L.interact && is_released(i)) {
+            highest = kinetic(i, first);
+            lifted += potential(i, last) - potential(i, first);
+            for (int n = 0; n < 3; n++) entries[n] += last[6 + n];
+        }
+        L.energy += highest;
+    }
+    L.energy += fabs(lifted) + fabs(entries[0]) + fabs(entries[1]) + fabs(entries[2]);
+    for (int n = 0; n < 3 * L.book_rows; n++) unreal += !isfinite(L.books[n]);
+    if (bad.particles) tell_group(LAW_FINITE, &bad, unreal, 0);
+    else if (unreal) tell(LAW_FINITE, unreal, 0);
+    if (unreal) return 0;
+    L.speed = sqrt(fastest);
+    double *start = size, *length = size + 1, *center = size + 2, *radius = size + 3;
+    for (int k = 0; k < L.piece_count * (L.family ? L.particle_count : 1); k++) {
+        const Barrier *b = L.barriers + k;
+        double *from = b->radius ? center : start;
+        *from = MAX(*from, MAX(fabs(b->x), fabs(b->y)));
+        *length = MAX(*length, b->length);
+        *radius = MAX(*radius, b->radius);
+        L.speed = MAX(L.speed, fabs(b->speed));
+    }
+    L.rounding = ROUNDINGS * EPS;
+    L.length = MAX(MAX(L.largest, *start + *length), MAX(place, L.speed * t));
+    if (*radius) L.length = MAX(L.length, *center + *radius + L.largest);
+    L.rounding *= L.length;
+    L.arcs = ON_ARCS * (L.largest + *radius);
+    return 1;
+}
+
+/* Largest acceleration towards the centre of an arc that a particle moves along inside, m/s2. Outside it
+   is never more than gravity's: what is faster leaves. No particle is inside the drive pulley. */
+static double bent_inside(void) {
+    double found = 0;
+    for (int n = 0; n < L.piece_count; n++) {
+        const Barrier *b = L.barriers + n;
+        if (b->radius == 0 || (L.pulley && n == L.piece_count - 1)) continue;
+        for (int i = 0; i < L.particle_count; i++) {
+            double r = L.bodies[i].radius, inner = b->radius - r, low = MAX(inner - 0.1 * r, 0);
+            for (int k = L.offsets[i]; k < L.offsets[i + 1] && inner > 0; k++) {
+                const double *knot = KNOT(k);
+                double far = square(knot[1] - b->x) + square(knot[2] - b->y);
+                if (far < square(low) || far >= square(inner + 0.1 * r)) continue;
+                if (!is_within(b, knot[1], knot[2], 0)) continue;
+                found = MAX(found, pace(knot) / inner);
+            }
+        }
+    }
+    return found;
+}
+
+/* How far beyond a surface a step may take a disk, m. Where steps are all alike a contact is seen up to a
+   step late, so by the way of a step, and Chipmunk leaves its slop. A lone particle's blows are found at
+   their own instants; where it stays in contact a step goes straight on, off by less than a dt2. On a
+   straight surface a is the weight, on a rim it is v2 / rho besides, which is no more than g where it
+   does not lift off; inside an arc it may be more. In a crowd of the contact engine disks are pressed. */
+static double lateness(void) {
+    if (L.engine == ENGINE_EXACT) return 0;
+    if (L.alike) return L.speed * L.dt + SLOP * L.largest;
+    if (L.interact) return PRESSED * L.largest;
+    return (2 * All.gravity + L.bent) * square(L.dt);
+}
+
+/* What numbers may do to the energy, as a share of the energy in play. Contacts round it. In a stepped
+   engine each contact moves it, besides, by the weight times `late`, where an overlap is parted: impulses
+   themselves are booked to the last bit. */
+static double energy_share(void) {
+    double share = EPS * (ROUNDINGS + A_CONTACT * (double)L.contacts), touched = MAX(1, L.contacts);
+    if (L.engine == ENGINE_EXACT) return share;
+    if (L.interact && L.engine == ENGINE_CONTACT) return BOOKED;
+    share += EPS * A_CONTACT * L.steps;
+    if (L.engine != ENGINE_CONTACT) share += touched * HAIR;
+    return share + (L.energy ? touched * All.heaviest * All.gravity * L.late / L.energy : 0);
+}
+
+/* Energy that parting overlaps may give, J: no more than lifts all by how deep they were. Of lone
+   particles a knot in contact holds the mean velocity of a step, half a step's pull off its books: that
+   of the weight along the way, and across it that of an arc's inside. */
+static double energy_parted(void) {
+    if (L.engine == ENGINE_EXACT) return 0;
+    if (!L.interact) {
+        double across = 0.5 * square(0.5 * L.bent * L.dt);
+        return All.heaviest * (L.speed * All.gravity * L.dt + across);
+    }
+    double allowed = All.mass * All.gravity * L.late;
+    if (L.alike) {
+        /* The pymunk engine leaves out touches that move a track by less than LEAVES_OUT of the radius.
+           A cubic whose end velocity is off by w is off by 4/27 w tau in place, tau a step or more. */
+        double off = 27.0 / 4 * LEAVES_OUT * L.largest / L.dt;
+        allowed += 2 * All.heaviest * L.speed * off;
+    }
+    return allowed;
+}
+
+static void find_bounds(void) {
+    L.bent = L.engine == ENGINE_EXACT ? 0 : bent_inside();
+    L.late = lateness();
+    int lone = L.engine == ENGINE_CONTACT && !L.interact;
+    L.allowed = L.rounding + L.arcs + L.late + (lone ? BULGE * L.largest : 0);
+    L.energy_bound = energy_share();
+    L.parted = energy_parted();
+    /* m v w, where constant acceleration is as good as the true way but for a velocity w. */
+    double swift = All.gravity > 0 ? sqrt(All.gravity / EARTH) : 1;
+    int crowd = L.interact && L.engine == ENGINE_CONTACT;
+    L.untold = crowd ? All.mass * L.speed * SMOOTH * swift : 0;
+}
+
+/* Places. */
+
+static int goes_through(int n) {
+    const Hit *hit = L.hits + n;
+    for (int k = n; k >= 0 && L.hits[k].particle == hit->particle; k--) {
+        if (L.hits[k].passes && L.hits[k].piece == hit->piece) return 1;
+    }
+    for (int k = n; k < L.hit_count && L.hits[k].particle == hit->particle; k++) {
+        if (L.hits[k].passes && L.hits[k].piece == hit->piece) return 1;
+    }
+    return 0;
+}
+
+static void tell_hits(int passes) {
+    const Hit *first = 0;
+    double deepest = 0;
+    int count = 0, particles = 0, latest = -1;
+    for (int n = 0; n < L.hit_count; n++) {
+        const Hit *hit = L.hits + n;
+        if (hit->passes != passes || (!passes && goes_through(n))) continue;
+        if (!first || hit->t < first->t) first = hit;
+        deepest = MAX(deepest, hit->depth);
+        particles += hit->particle != latest;
+        latest = hit->particle;
+        count++;
+    }
+    if (!first) return;
+    Breach *one = tell(passes ? LAW_THROUGH : LAW_INSIDE, passes ? count : deepest,
+                       passes ? 0 : L.allowed);
+    int row = first->piece + (L.family ? first->particle * L.piece_count : 0);
+    one->t = first->t;
+    one->x = first->x;
+    one->y = first->y;
+    one->particles = particles;
+    one->particle = first->particle;
+    one->surface = L.barriers[row].surface;
+    one->piece = first->piece;
+}
+
+/* Energy. */
+
+/* The last knot of a particle that is not after a time, but the last of all; -1 if it is not there. */
+static int knot_before(int i, double t) {
+    int low = L.offsets[i], high = last_of(i);
+    if (high < low || t < KNOT(low)[0] || t > KNOT(high)[0]) return -1;
+    while (high - low > 1) {
+        int middle = (low + high) / 2;
+        if (KNOT(middle)[0] <= t) low = middle;
+        else high = middle;
+    }
+    return low;
+}
+
+/* What all together have at some time that is unexplained, J: the most of the least that it may be. When
+   between its knots a particle got energy from another is not told, only how much: at any time between
+   them it has at least the lesser of what is unexplained at the two. */
+static double risen(void) {
+    double found = 0;
+    int end = L.offsets[L.particle_count], stride = MAX(1, end / INSTANTS);
+    for (int n = 0; n < end; n += stride) {
+        double t = KNOT(n)[0], sum = 0;
+        for (int i = 0; i < L.particle_count; i++) {
+            if (!is_released(i)) continue;
+            const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
+            int k = knot_before(i, t);
+            if (last[0] < t) {
+                sum += gain(i, last) - gain(i, first);
+            } else if (k >= 0) {
+                sum += MIN(gain(i, KNOT(k)), gain(i, KNOT(k + 1))) - gain(i, first);
+            }
+        }
+        found = MAX(found, sum);
+    }
+    return found;
+}
+
+/* What a knot gives back of the losses that were booked, J, at most 0. Where the contact engine holds a
+   particle by itself in a nip, impulses of any size hold each other, and along normals seems to be given
+   what friction takes: only the sum is known. */
+static double given_back(int k) {
+    const double *before = KNOT(k - 1), *now = KNOT(k);
+    double normal = now[7] - before[7], slip = now[8] - before[8];
+    if (L.engine == ENGINE_CONTACT && !L.interact) return normal + slip;
+    return MIN(normal, slip);
+}
+
+static double sum_opened(double depth, double least, double step) {
+    double deep = depth / least, share = MIN(MAX(PARTS, deep / DEEP), 1) * MAX(deep - SLOP, 0);
+    return depth > 0 ? square(MIN(share, OPENS) * least / step) : 0;
+}
+
+/* Orders numbers of rows by the first number of each. */
+static const double *Rows;
+static int Row;
+
+static int compare(const void *one, const void *other) {
+    double a = Rows[(long)*(const int *)one * Row], b = Rows[(long)*(const int *)other * Row];
+    return (a > b) - (a < b);
+}
+
+static void sort(int *numbers, int count, const double *rows, int row) {
+    Rows = rows;
+    Row = row;
+    qsort(numbers, count, sizeof(int), compare);
+}
+
+/* Energy that parting overlaps may give in a step at a time, J. A solve raises the kinetic energy by at most
+   the sum of J a, J the impulse of a contact and a the speed with which it is to open. Of an overlap d that
+   is a = p d / h - c J, a spring's, with c = GIVES / M: J a is at most (p d / h)2 / (4 c). */
+static double opened(double t) {
+    double step = L.dt, sum = 0, *at = L.places;
+    int *there = L.order, count = 0;
+    if (All.gravity > 0) step = MIN(step, sqrt(FALL * All.smallest / All.gravity));
+    for (int i = 0; i < L.particle_count; i++) {
+        int k = knot_before(i, t);
+        if (k < 0) continue;
+        const double *knot = KNOT(k);
+        double h = knot[L.row] - knot[0];
+        place_at(knot, h > 0 ? (t - knot[0]) / h : 1, at + 2 * i, at + 2 * i + 1);
+        there[count++] = i;
+    }
+    sort(there, count, at, 2);
+    for (int n = 0; n < count; n++) {
+        int i = there[n];
+        double x = at[2 * i], y = at[2 * i + 1], r = L.bodies[i].radius;
+        for (int k = n + 1; k < count && at[2 * there[k]] <= x + 2 * L.largest; k++) {
+            int j = there[k];
+            double depth = r + L.bodies[j].radius - hypot(at[2 * j] - x, at[2 * j + 1] - y);
+            sum += sum_opened(depth, MIN(r, L.bodies[j].radius), step);
+        }
+        for (int k = 0; k < L.piece_count; k++) {
+            const Barrier *b = L.barriers + k;
+            if (t < b->appears || t >= b->vanishes) continue;
+            if (x < b->box[0] - r || x > b->box[2] + r || y < b->box[1] - r || y > b->box[3] + r) {
+                continue;
+            }
+            sum += sum_opened(r - distance(b, x, y), r, step);
+        }
+    }
+    return All.heaviest / (4 * GIVES) * sum;
+}
+
+/* An instant of a crowd, and all that is given back there, J. */
+typedef struct { double t, given; } Instant;
+
+/* Find the instants at which more is given back than overlaps may give, among those at which most is: in a
+   crowd of the contact engine all that ends at one instant is one sum. */
+static int beyond_overlaps(double most, Instant *worst, double *least) {
+    int count = 0, found = 0, bad = 0, *rows = L.order;
+    for (int i = 0; i < L.particle_count; i++) {
+        for (int k = L.offsets[i] + 1; k < L.offsets[i + 1]; k++) {
+            if (given_back(k) < -most) rows[count++] = k;
+        }
+    }
+    sort(rows, count, L.knots, L.row);
+    for (int n = 0; n < count;) {
+        Instant now = {KNOT(rows[n])[0], 0};
+        for (; n < count && KNOT(rows[n])[0] == now.t; n++) now.given += given_back(rows[n]);
+        if (found == INSTANTS && now.given >= worst[found - 1].given) continue;
+        int at = found < INSTANTS ? found++ : found - 1;
+        for (; at > 0 && worst[at - 1].given > now.given; at--) worst[at] = worst[at - 1];
+        worst[at] = now;
+    }
+    for (int n = 0; n < found; n++) {
+        double allowed = most + MAX(opened(worst[n].t), opened(worst[n].t - L.dt));
+        if (worst[n].given >= -allowed) continue;
+        *least = bad ? MIN(*least, allowed) : allowed;
+        worst[bad++] = worst[n];
+    }
+    return bad;
+}
+
+/* Energy and ledger. Of lone particles what is unexplained may not change from knot to knot; particles that
+   meet give energy to each other, so of them it is the sum of all at some times, and what the solves of the
+   contact engine gained. Losses that are booked are never less than before but by what parting overlaps
+   gives: where many do so at one instant, those that overlap there. */
+static void judge_books(double bound) {
+    double most = bound + L.parted, least = most, rise = 0, back = 0, residual = 0, low = 0;
+    int crowd = L.interact && L.engine == ENGINE_CONTACT, count = 0, surface = -1;
+    Group rises = {0}, backs = {0};
+    Instant instants[INSTANTS];
+    if (crowd) count = beyond_overlaps(most, instants, &least);
+    for (int i = 0; i < L.particle_count; i++) {
+        if (!is_released(i)) continue;
+        double first = gain(i, KNOT(L.offsets[i])), before = first;
+        if (L.interact) residual += gain(i, KNOT(last_of(i))) - first;
+        for (int k = L.offsets[i] + 1; k < L.offsets[i + 1] && (!crowd || count); k++) {
+            double own = given_back(k);
+            int told = own < -most;
+            if (told && crowd) {
+                told = 0;
+                for (int n = 0; n < count; n++) told |= KNOT(k)[0] == instants[n].t;
+            }
+            if (told) {
+                back = MIN(back, own);
+                add(&backs, i, k);
+            }
+            if (L.interact) continue;
+            double now = gain(i, KNOT(k)), change = fabs(now - before);
+            before = now;
+            if (change <= most) continue;
+            rise = MAX(rise, change);
+            add(&rises, i, k);
+        }
+        if (!L.interact) residual += before - first;
+    }
+    if (L.interact && L.gained > bound) {
+        tell(LAW_ENERGY, L.gained, bound);
+    } else if (L.interact) {
+        rise = risen();
+        if (rise > most + L.untold) tell(LAW_ENERGY, rise, most + L.untold);
+    }
+    tell_group(LAW_ENERGY, &rises, rise, most);
+    tell_group(LAW_LOSSES, &backs, back, -least);
+    for (int n = 0; n < L.book_rows; n++) {
+        double loss = MIN(L.books[3 * n + 1], L.books[3 * n + 2]);
+        if (loss >= low) continue;
+        low = loss;
+        surface = n % L.surface_count;
+    }
+    if (low < -most) tell(LAW_LOSSES, low, -most)->surface = surface;
+    if (fabs(residual) > bound) tell(LAW_LEDGER, fabs(residual), bound);
+}
+
+/* Where Chipmunk looks for contacts at the ends of steps only, none may go past one in a step. What flies
+   where nothing is does no harm: judged is what may reach a surface or another in it. */
+static void judge_steps(void) {
+    double box[4] = {INFINITY, INFINITY, -INFINITY, -INFINITY}, way = 0, radius = 1;
+    if (!L.alike || L.speed * L.dt < All.smallest || !(L.piece_count || L.interact)) return;
+    for (int k = 0; k < L.piece_count; k++) {
+        const double *own = L.barriers[k].box;
+        for (int n = 0; n < 2; n++) {
+            box[n] = MIN(box[n], own[n]);
+            box[n + 2] = MAX(box[n + 2], own[n + 2]);
+        }
+    }
+    Group bad = {0};
+    for (int i = 0; i < L.particle_count; i++) {
+        double r = L.bodies[i].radius;
+        for (int k = L.offsets[i]; k < L.offsets[i + 1]; k++) {
+            const double *knot = KNOT(k);
+            double own = sqrt(pace(knot)) * L.dt, reach = r + own;
+            if (own < r) continue;
+            if (L.piece_count && (knot[1] < box[0] - reach || knot[1] > box[2] + reach
+                || knot[2] < box[1] - reach || knot[2] > box[3] + reach)) continue;
+            add(&bad, i, k);
+            if (own * radius <= way * r) continue;
+            way = own;
+            radius = r;
+        }
+    }
+    tell_group(LAW_STEP, &bad, way, radius);
+}
+
+/* Judge a run: tell the laws that it breaks, each once, losses twice at most, in their order. */
+__attribute__((export_name("judge"))) void judge(void) {
+    L.breach_count = L.hit_count = 0;
+    memset(&All, 0, sizeof All);
+    shape_barriers();
+    if (!weigh()) return; /* The other laws say nothing about what is no number. */
+    find_bounds();
+    find_hits();
+    if (L.hit_count > L.hit_room) return; /* It is asked again, with more room. */
+    double bound = L.energy_bound * L.energy;
+    tell_hits(1);
+    tell_hits(0);
+    judge_books(bound);
+    judge_steps();
+}
+
+__attribute__((export_name("laws"))) Laws *laws(void) { return &L; }

@@ -15,7 +15,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import Kind
 from chutelab.results.comparison import compare
-from chutelab.results.quantities import QUANTITIES
+from chutelab.scene.quantities import THEORY
 from chutelab.studies.accuracy import (
     FLOOR,
     MOST_STEPS,
@@ -219,7 +219,7 @@ def test_what_a_double_cannot_give_is_not_met():
 def test_a_length_speaks_of_places_only():
     _, found = reach(sc.load("perpendicular"), "1um")
     assert (found.asked, found.unit, found.met) == (1e-6, "m", True)
-    assert QUANTITIES[found.worst] == "length"
+    assert THEORY[found.worst].kind == "length"
     _, found = reach(sc.load("belt-landing", ["particle.radius=0.004"]), "1um")
     assert found.met
     assert found.worst.startswith("place")

@@ -22,7 +22,7 @@ from chutelab.machine import builder
 from chutelab.mechanics import ballistics, contact
 from chutelab.results import REASONS, Kind
 from chutelab.results.comparison import compare
-from chutelab.results.quantities import QUANTITIES
+from chutelab.scene.quantities import THEORY
 from chutelab.studies.accuracy import reach
 from drawn import draw
 
@@ -108,7 +108,7 @@ def test_exact_is_the_closed_form_wherever_that_speaks(seeds):
         else:
             assert contacts_of(recording)[:2] == ["plate", "outgoing"], seed
             # All but the two that only a particle has that settles.
-            assert len(compared.errors) >= len(QUANTITIES) - 2, (seed, compared.errors)
+            assert len(compared.errors) >= len(THEORY) - 2, (seed, compared.errors)
             tally["landed"] += 1
     assert tally["compared"] > 0.5 * len(seeds), tally
     assert tally["landed"] >= 0.1 * len(seeds), tally

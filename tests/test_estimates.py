@@ -14,7 +14,7 @@ import pytest
 from chutelab.checks.preflight.trial import effort, trial
 from chutelab.engines.simulation import choose, follow, simulate
 from chutelab.machine import build
-from chutelab.results.quantities import stopped
+from chutelab.results.notes import stopped
 from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.scene import from_dict, load
 from crowds import crowd

@@ -16,10 +16,11 @@ from chutelab import theory
 from chutelab.checks.agreement import MOST_ALONE, verify
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
-from chutelab.results.quantities import measure
+from chutelab.results.quantities import measure, measured
 from chutelab.results.summary import summary
-from chutelab.scene.rules import SYMBOLS, unit_of
+from chutelab.scene.quantities import FIRST, REGISTRY, STATISTICS, THEORY, lookup, whose
 from chutelab.scene.units import read_size, write_size
+from chutelab.studies.sweep.batch import Block, together
 from machines import PERPENDICULAR
 
 G = 9.81
@@ -97,19 +98,27 @@ def test_names_are_the_keys_of_the_json_and_give_its_numbers(name):
     tables = [table for table in ("incoming", "plate", "outgoing") if getattr(scene, table)]
     surfaces = [*tables, *(free.name for free in scene.surface)]
     found = json.loads(json.dumps(summary(recording)))
-    compared = 0
+    compared = set()
     for key, value in flat(found):
-        if unit_of(key, surfaces) is None:
+        if lookup(key, surfaces) is None:
             continue
-        measured = measure(recording, key)
+        measured = measure(recording, FIRST + key if isinstance(value, list) else key)
         first = value[0] if isinstance(value, list) else value
         assert measured == first or (first is None and isnan(measured)), key
-        compared += 1
-    # separation, impact, landing, arrival, as far as their tables are there; contacts; ended.t;
-    # the ledger.
-    columns = 5 * ("incoming" in tables) + 7 * ("plate" in tables) + 12 * ("outgoing" in tables)
-    assert compared == columns + 1 + 1 + 5 + 3 * (len(surfaces) + 1)
-    assert set(SYMBOLS) == set(found["theory"]) - {"reason"}
+        compared.add(key)
+    before = ["t", "x", "y", "vx", "vy"]
+    keys = {"incoming": ["flight.t", *(f"separation.{key}" for key in before)]}
+    keys["plate"] = [f"impact.{key}" for key in (*before, "vx_after", "vy_after")]
+    keys["outgoing"] = [f"landing.{key}" for key in (*before, "vx_after", "vy_after")]
+    keys["outgoing"] += [f"arrival.{key}" for key in before]
+    entries = ["belt_work", "restitution_loss", "friction_loss"]
+    expected = {"contacts", "error.max", "track.t", "ended.t", "ended.x", "ended.y"}
+    expected |= {f"ledger.{key}" for key in (*entries, "residual", "turned_over")}
+    expected |= {
+        f"ledger.by_surface.{n}.{key}" for n in (*surfaces, "particles") for key in entries
+    }
+    assert compared >= expected.union(*(keys[table] for table in tables))
+    assert {row.name for row in THEORY.values()} == set(found["theory"]) - {"reason"}
 
 
 def test_statistics_are_over_all_particles_it_happened_to():
@@ -127,6 +136,11 @@ def test_statistics_are_over_all_particles_it_happened_to():
     }.items():
         found = measure(recording, f"landing.{statistic}")
         assert found == pytest.approx(value, rel=1e-13, abs=0.0)
+    tracks = [recording.track(particle)["t"] for particle in range(40)]
+    assert tracks[1][0] > 0.0, "released later"
+    lasted = sum(t[-1] - t[0] for t in tracks) / 40
+    assert measure(recording, "track.t.mean") == pytest.approx(lasted, rel=1e-13, abs=0.0)
+    assert measure(recording, "misses") == 40 - len(x)
     assert measure(recording, "ended.landed") == len(x)
     assert measure(recording, "ended.exit") == 40 - len(x)
     assert measure(recording, "ended.settled") == 0
@@ -139,6 +153,35 @@ def test_what_did_not_happen_is_nan_and_unknown_names_are_errors():
     assert measure(recording, "landing.count") == 0.0
     with pytest.raises(KeyError):
         measure(recording, "landings")
+
+
+def names_of(scene):
+    """Every name that a scene of one stream has for a quantity of one particle, or of all."""
+    surfaces = [*scene.surfaces, "particles"]
+    for row in REGISTRY.values():
+        for surface in surfaces if "SURFACE" in row.name else [""]:
+            base = row.name.replace("SURFACE", surface)
+            for name in (base, FIRST + base, *(f"{base}.{statistic}" for statistic in STATISTICS)):
+                found = lookup(name, scene.surfaces)
+                if found is not None and not whose(found, scene.count):
+                    yield name
+
+
+def test_each_row_of_the_registry_is_read_alone_in_a_crowd_and_in_a_family():
+    """A family of variants gives each the numbers that it has alone, but for rounding."""
+    _, crowd = shipped("spoon", "stream.count=4")
+    for name in names_of(crowd.scene):
+        assert isinstance(measure(crowd, name), float), name
+    scene = sc.load("belt-landing")
+    block = Block(scene, ("plate.restitution",), np.array([[0.3], [0.5]]))
+    ((family, rows),), _, _ = together(block)
+    alone = [simulate(scene.with_values(block.settings(row))) for row in rows]
+    names = [name for name in names_of(scene) if name != "contacts"]
+    assert len(names) > 400
+    for name in names:
+        expected = [measure(recording, name) for recording in alone]
+        kind = pytest.approx(expected, rel=1e-12, abs=1e-13, nan_ok=True)
+        assert measured(family, name) == kind, name
 
 
 def test_stored_energies_have_a_start_and_an_end():
@@ -233,7 +276,7 @@ def test_the_theory_is_asked_for_its_own_symbols_only():
     assert [row.engine for row in verify(expecting("t2", 0.29685, 1e-6)).findings] == [
         *("exact", "contact", "pymunk", "theory")
     ]
-    for quantity, value in (("t2", '"theory"'), ("impact.t", "0.79685")):
+    for quantity, value in (("t2", '"theory"'), ("impact.t", "0.79685"), ("t2.mean", "0.29685")):
         engines = [row.engine for row in verify(expecting(quantity, value, 1e-6)).findings]
         assert engines == ["exact", "contact", "pymunk"]
 
@@ -336,14 +379,16 @@ def test_the_end_of_the_slip_follows_from_its_whole_impulse():
     v3y = sqrt(fallen**2 + 2 * G * 0.5)
     landing = 0.5 + 0.29685 + (v3y - fallen) / G
     end = landing + ((2.0 + 1.0) / 0.08 - v3y) / G
-    assert value_of("belt-landing", "ended.t") == pytest.approx(end, rel=1e-14, abs=0.0)
+    found = value_of("belt-landing", "particles[0].ended.t")
+    assert found == pytest.approx(end, rel=1e-14, abs=0.0)
 
 
 def test_the_ramp_is_met_a_radius_before_its_line():
     cosine = 0.8 / hypot(0.8, 0.3)
     above = 0.8 - (0.6 - 0.3 * 0.3 / 0.8)
     expected = sqrt(2.0 * (above - 0.0063 / cosine) / G)
-    assert value_of("free-fall", "impact.ramp.t") == pytest.approx(expected, rel=1e-14, abs=0.0)
+    found = value_of("free-fall", "particles[0].impact.ramp.t")
+    assert found == pytest.approx(expected, rel=1e-14, abs=0.0)
 
 
 def test_the_mean_landing_point_is_an_integral_over_the_bed():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from math import sqrt
+from math import atan2, degrees, sqrt
 
 import pytest
 from click.testing import CliRunner
@@ -146,6 +146,16 @@ def test_a_book_runs_what_is_said_as_on_the_command_line():
     assert page.count("<details>") == len(runs) == 2
     assert "time of flight, from the first to the second" in page
     assert not re.search(r"engine|rounds|residual|turned over|e-1\d", page + repr(runs[0]))
+    # What was not simulated is the theory's, in the same unit; of several particles there is none.
+    sheet = (
+        Book("the-bounce")
+        .run("perpendicular --set run.until=0.6", "perpendicular --set stream.count=2")
+        .sheet()
+    )
+    rows = {words: cells for words, *cells in sheet.rows}
+    phi2 = rows["angle between plate and velocity, before the impact, degrees"]
+    expected = degrees(atan2(2.0, 0.29685 * G))
+    assert [float(cell) for cell in phi2] == pytest.approx([expected, expected], rel=1e-5)
     told = str(book.compare({1: 0.4, 2: None, 3: "the same"}))
     assert "You predicted: 1. 0.4; 3. the same" in told
     assert "throw.toml --set incoming.speed=4" in told

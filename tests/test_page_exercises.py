@@ -6,7 +6,6 @@ import json
 import re
 import sys
 from hashlib import sha256
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -30,8 +29,7 @@ from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.reading import scene_of
 from chutelab.classroom.words import LANGUAGES, words
 from chutelab.engines.simulation import simulate
-from chutelab.results import Kind
-from chutelab.results.ledger import ENTRIES
+from chutelab.scene.quantities import lookup
 from live.node import ask as ask_node
 from live.node import needs_node
 
@@ -233,24 +231,16 @@ def compare(task, found, say):
 # What machines say
 
 
-KINDS = {"separation": Kind.SEPARATION, "impact": Kind.IMPACT, "landing": Kind.LANDING}
+class Told:
+    """Quantities of a run by their names, as `measured` has them."""
 
+    def __init__(self, recording, name=""):
+        self.recording, self.name = recording, name
 
-def told_by(recording):
-    """The first events of each kind, and energies by surface, as `measured` has them."""
-    told = {
-        name: SimpleNamespace(**dict(zip(ENTRIES, row, strict=True)))
-        for name, row in zip(recording.surfaces, recording.by_surface.tolist(), strict=True)
-    }
-    for name, kind in KINDS.items():
-        for event in recording.events[recording.events["kind"] == kind][:1]:
-            before, after = (
-                SimpleNamespace(vx=event[f"velocity_{when}"][0], vy=event[f"velocity_{when}"][1])
-                for when in ("before", "after")
-            )
-            x, y = event["position"]
-            told[name] = SimpleNamespace(t=event["t"], x=x, y=y, before=before, after=after)
-    return told
+    def __getattr__(self, key):
+        name = f"{self.name}.{key}"
+        known = lookup(name, self.recording.scene.surfaces)
+        return self.recording.measure(name) if known else Told(self.recording, name)
 
 
 @pytest.mark.parametrize("many", [2, pytest.param(100, marks=pytest.mark.slow)])
@@ -263,7 +253,8 @@ def test_the_machine_with_a_students_numbers_gives_the_answers(name, many):
         cases = draw(exercise, student)[1]
         numbers = cases[0].numbers
         values = {key: numbers.of(formula) for key, formula in exercise.machine.items()}
-        told = told_by(simulate(scene.with_values(values), engine="contact"))
+        ran = simulate(scene.with_values(values), engine="contact")
+        told = {key: Told(ran, key) for key in ("separation", "impact", "landing", "ledger")}
         for case in cases:
             if case.question.measured:
                 found = eval(case.question.measured, {**numbers.known, **told}, numbers)

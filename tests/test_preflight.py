@@ -19,8 +19,8 @@ from chutelab.engines.pymunk.world import Bend, World
 from chutelab.engines.simulation import simulate
 from chutelab.machine import Arcs, build
 from chutelab.results import REASONS
-from chutelab.results.quantities import QUANTITIES
 from chutelab.results.recorder import StalledError
+from chutelab.scene.quantities import THEORY
 from machines import MOVING_CORNER, PERPENDICULAR
 
 LONE = [name for name in sc.shipped() if sc.load(name).count == 1]
@@ -362,8 +362,8 @@ def test_the_closed_form_covers_what_the_theory_answers(overrides):
     scene = sc.load("perpendicular", overrides)
     prediction = theory.predict(scene)
     found = preflight(scene).theory
-    assert set(found.covers) | set(found.leaves_out) == set(QUANTITIES)
-    for name in QUANTITIES:
+    assert set(found.covers) | set(found.leaves_out) == set(THEORY)
+    for name in THEORY:
         answered = abs(float(getattr(prediction, name))) < inf
         assert (name in found.covers) is answered
         assert (name in found.leaves_out) is not answered

@@ -53,6 +53,8 @@ EVERY = [
     "tables --json",
     "scenes --json",
     "schema",
+    "schema --run",
+    "quantities --json",
     "materials --json",
     "new untitled.toml",
     "run untitled.toml --out untitled --only npz,json,png -q",

@@ -48,7 +48,7 @@ def test_the_spoon_turns_a_particle_as_impact_and_slide_say():
     c = (speed**2 / (G * rho) - a * cos(begin) - b * sin(begin)) * exp(-2.0 * mu * begin)
     u = a * cos(end) + b * sin(end) + c * exp(2.0 * mu * end)
     wanted = sqrt(u * G * rho) * cos(end)
-    assert measure(run("spoon"), "landing.vx") == pytest.approx(wanted, rel=1e-12)
+    assert measure(run("spoon"), "particles[0].landing.vx") == pytest.approx(wanted, rel=1e-12)
     name = "particles[0].landing.vx"
     (written,) = [e.value for e in sc.load("spoon").expect if e.quantity == name]
     assert written == pytest.approx(wanted, rel=1e-12)

@@ -22,6 +22,7 @@ from chutelab.results import Kind
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.scene import SceneError, load, parse
+from chutelab.scene.units import with_unit
 from chutelab.scene.variants import (
     Vary,
     accepted,
@@ -33,8 +34,8 @@ from chutelab.scene.variants import (
 )
 from chutelab.scene.variants import parse as parse_vary
 from chutelab.studies.sweep import (
+    COLUMNS,
     MOST_VARIANTS,
-    NUMBERS,
     REASON,
     TEXTS,
     TOUCHES,
@@ -86,7 +87,7 @@ def block_of(scene, varies, **options):
     return plan.block(0, plan.count)
 
 
-ROUNDING = {"error": 1e-12, "residual": 1e-15}
+ROUNDING = {"error.max": 1e-12, "ledger.residual": 1e-15}
 """What is an error itself agrees absolutely: relative, and in J."""
 
 
@@ -249,15 +250,16 @@ def test_a_row_holds_what_the_run_shows():
             "landing.y.mean": down["position"][1],
             "landing.vx.mean": down["velocity_before"][0], "landing.vx.spread": 0.0,
             "landing.vy.mean": down["velocity_before"][1], "landing.vy.spread": 0.0,
-            "landing.t.mean": down["t"], "time": recording.knots["t"][-1],
+            "landing.t.mean": down["t"], "track.t.mean": recording.knots["t"][-1],
             "arrival.x.mean": down["position"][0], "arrival.x.spread": 0.0,
             "arrival.vx.mean": down["velocity_before"][0], "arrival.vx.spread": 0.0,
             PAID: outgoing["belt_work"], HEAT: outgoing["friction_loss"],
-            "restitution_loss": books.restitution_loss, "power": outgoing["belt_work"] * rate,
-            "plate_hits": 1.0, "misses": 0.0, "residual": books.residual,
+            "ledger.restitution_loss": books.restitution_loss,
+            "ledger.power": outgoing["belt_work"] * rate,
+            "impact.count": 1.0, "misses": 0.0, "ledger.residual": books.residual,
         }  # fmt: skip
         assert {name: swept.columns[name][row] for name in expected} == expected
-        assert set(expected) | {"error"} == set(NUMBERS)
+        assert set(expected) | {"error.max"} == set(COLUMNS)
 
 
 def test_a_stream_has_means_and_spreads():
@@ -269,14 +271,15 @@ def test_a_stream_has_means_and_spreads():
         ]))  # fmt: skip
         down = recording.first(recording.select(Kind.LANDING))
         x, vx = down["position"][:, 0], down["velocity_before"][:, 0]
-        found = {name: swept.columns[name][row] for name in NUMBERS}
+        found = {name: swept.columns[name][row] for name in COLUMNS}
         assert found["landing.x.mean"] == pytest.approx(x.mean(), rel=1e-14, abs=0.0)
         assert found["landing.x.spread"] == pytest.approx(x.std(), rel=1e-12, abs=0.0)
         assert found["landing.vx.spread"] == pytest.approx(vx.std(), rel=1e-12, abs=1e-15)
         assert found["landing.t.mean"] == pytest.approx(down["t"].mean(), rel=1e-13, abs=0.0)
         work = ledger(recording).by_surface["outgoing"]["belt_work"]
         assert found[PAID] == work
-        assert found["power"] == pytest.approx(work / 40 * scene.stream.rate, rel=1e-15, abs=0.0)
+        power = work / 40 * scene.stream.rate
+        assert found["ledger.power"] == pytest.approx(power, rel=1e-15, abs=0.0)
         assert found["misses"] == 40 - len(down)
 
 
@@ -290,7 +293,7 @@ def test_what_the_belt_pays_is_that_of_solve_and_theory_only_where_runs_go_on_un
     assert landed.columns[PAID][0] == pytest.approx(m * vb * mu * down, rel=1e-12, abs=0.0)
     assert settled.columns[PAID][0] == pytest.approx(m * vb * (vb - vx), rel=1e-12, abs=0.0)
     assert settled.columns[HEAT][0] == pytest.approx(0.5 * m * (vb - vx) ** 2, rel=1e-12, abs=0.0)
-    for column, name in ((PAID, "belt_work"), (HEAT, "slip_heat"), ("power", "power")):
+    for column, name in ((PAID, "belt_work"), (HEAT, "slip_heat"), ("ledger.power", "power")):
         expected = value(load("perpendicular"), name)
         assert settled.columns[column][0] == pytest.approx(expected, rel=1e-12, abs=0.0)
     assert "counted up to run.until" in str(landed)
@@ -326,7 +329,7 @@ def test_the_error_is_that_of_a_comparison(name, varies):
             expected = compare(simulate(load(name, [f"{k}={v!r}" for k, v in values.items()]))).max
         except SceneError:
             expected = None
-        error = swept.columns["error"][row]
+        error = swept.columns["error.max"][row]
         if expected is None:
             assert np.isnan(error)
         else:
@@ -347,7 +350,7 @@ def test_a_variant_that_cannot_be_or_misses_is_a_row_with_its_reason():
     missed = reasons.index("it missed the outgoing belt: left the scene")
     assert swept.columns["misses"][missed] == 1.0
     assert np.isnan(swept.columns["landing.x.mean"][missed])
-    assert swept.columns["restitution_loss"][missed] > 0.0
+    assert swept.columns["ledger.restitution_loss"][missed] > 0.0
 
 
 def test_a_run_that_gets_stuck_is_a_row(monkeypatch):
@@ -611,7 +614,7 @@ def test_a_row_says_what_is_touched():
     assert 0 < missed.sum() < 21
     expected = np.where(missed, "outgoing", "plate, outgoing")
     assert swept.columns[TOUCHES].tolist() == expected.tolist()
-    assert swept.columns["plate_hits"].tolist() == (~missed).astype(float).tolist()
+    assert swept.columns["impact.count"].tolist() == (~missed).astype(float).tolist()
     assert f"{(~missed).sum()} touch plate, outgoing; {missed.sum()} touch outgoing" in repr(swept)
 
 
@@ -670,8 +673,8 @@ def test_samples_are_dots_and_crosses_where_there_is_nothing():
 
 def test_help_names_the_columns():
     said = " ".join(call("sweep", "--help").stdout.split())
-    for name in NUMBERS:
-        assert name.removesuffix(".mean").removesuffix(".spread") in said
+    for name, row in COLUMNS.items():
+        assert f"{name} {with_unit(row.meaning, row.unit)}" in said
 
 
 def test_a_sweep_shows_itself():

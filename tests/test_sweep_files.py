@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from chutelab.scene import load
 from chutelab.studies.sweep import (
-    NUMBERS,
+    COLUMNS,
     REASON,
     TEXTS,
     crew,
@@ -36,7 +36,7 @@ def test_a_file_has_every_bit_of_the_rows():
     swept = sweep(load("perpendicular"), SMALL)
     with swept.to_csv("rows.csv").open(newline="") as file:
         head, *rows = csv.reader(file)
-    assert head == ["plate.angle_deg", "incoming.speed", *NUMBERS, *TEXTS]
+    assert head == ["plate.angle_deg", "incoming.speed", *COLUMNS, *TEXTS]
     for name, cells in zip(head, zip(*rows, strict=True), strict=True):
         if name in TEXTS:
             assert list(cells) == swept.columns[name].tolist()

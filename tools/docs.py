@@ -31,6 +31,7 @@ from chutelab.classroom.lessons.building import LIVE, live_page
 from chutelab.pictures.live.page import write
 from chutelab.scene import SceneError, load
 from chutelab.scene.loading import about
+from chutelab.scene.quantities import REGISTRY, STATISTICS
 
 ROOT = Path(__file__).resolve().parent.parent
 DEVELOPERS = ("CONTRIBUTING", "CODE_OF_CONDUCT", "SECURITY", "CHANGELOG")
@@ -49,6 +50,21 @@ PLAY = """\
 </details>
 
 <p><a href="{page}">Play with it in a window of its own</a></p>
+"""
+
+
+QUANTITIES = """\
+# Quantities of a run
+
+These names mean the same in `[[expect]]`, `sweep`, `solve`, `measure` and the JSON of a run.
+`SURFACE` is the name of any surface. What each particle has goes by its bare name where there is
+one particle; of several, `particles[0].landing.x` is that of the first one, and with {statistics}
+it is of all of them, such as `landing.x.mean`; `by_stream.NAME.landing.x.mean` is of one stream.
+What is nominal is of particle 0, and what is of a lone particle there is only where it is the
+only one. The ledger counts up to `run.until`.
+
+| name | unit | meaning | of |
+|---|---|---|---|
 """
 
 
@@ -78,7 +94,7 @@ def readme(pages: Path) -> None:
     contents = [
         tree(
             *("start", "tour", "Gallery <docs/gallery>", "lessons/index", "docs/physics"),
-            *("Accuracy and speed <accuracy>", "api"),
+            *("Quantities <quantities>", "Accuracy and speed <accuracy>", "api"),
         ),
         tree(*DEVELOPERS, options=":caption: For developers"),
     ]
@@ -206,6 +222,15 @@ def words_under(name: str, package: str) -> list[str]:
     return said
 
 
+def quantities(pages: Path) -> None:
+    """Make the page of the registry."""
+    rows = [
+        f"| `{row.name}` | {row.unit} | {row.meaning} | {row.of} |\n" for row in REGISTRY.values()
+    ]
+    text = QUANTITIES.format(statistics=", ".join(f"`.{name}`" for name in STATISTICS))
+    (pages / "quantities.md").write_text(text + "".join(rows), encoding="utf-8")
+
+
 def gather(pages: Path, extra: Path) -> None:
     """Lay out the sources of all pages, and beside them what is copied as it is."""
     readme(pages)
@@ -216,6 +241,7 @@ def gather(pages: Path, extra: Path) -> None:
         shutil.copyfile(ROOT / name, pages / name)
     gallery(pages, extra)
     lessons(pages, extra)
+    quantities(pages)
     reference(pages)
     # A folder's README is its first page.
     for page in pages.rglob("*.md"):

@@ -41,7 +41,7 @@ TRACK = "mass_A\nt\tx\ty\n" + "".join(
 )
 COMMANDS = (
     "run", "check", "show", "sweep", "solve", "compare", "live", "figure", "scenes",
-    "materials", "new", "schema", "tables",
+    "materials", "quantities", "new", "schema", "tables",
     "lesson list", "lesson show", "lesson new",
 )  # fmt: skip
 USUAL = {

@@ -10,18 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby
-from math import degrees, inf, isfinite, log, nan, radians
+from math import inf, isfinite, log, nan, radians
 from typing import Final
 
 import numpy as np
 
 from chutelab.machine import build
 from chutelab.results import Recording
-from chutelab.results.comparison import compare, relative_error, scales
+from chutelab.results.comparison import compare, predicted, relative_error, scales
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import KINDS, each, measure
+from chutelab.results.quantities import each, measure
 from chutelab.scene import Scene, SceneError
-from chutelab.scene.rules import FIRST, SYMBOLS, unit_of
+from chutelab.scene.quantities import lookup
 from chutelab.scene.units import with_unit, write_size
 from chutelab.studies.accuracy import STIR, UNABLE, answer, because, distance, stirred
 from chutelab.theory import predict
@@ -335,38 +335,35 @@ def verify(
     findings: list[Finding] = []
     for expect in scene.expect:
         quantity, names = expect.quantity, [str(stream.name) for stream in scene.streams]
-        unit = unit_of(quantity, scene.surfaces, names)
-        assert unit is not None
-        predicted = nan
-        if (symbol := quantity.removeprefix(FIRST)) in SYMBOLS:
-            predicted = float(getattr(prediction, symbol.removesuffix("_deg")))
-            predicted = degrees(predicted) if quantity.endswith("_deg") else predicted
+        row = lookup(quantity, scene.surfaces, names)
+        assert row is not None
+        told = predicted(prediction, row)
         values = {engine: measure(recordings[engine], quantity) for engine in recordings}
         if not values:
             values = dict.fromkeys(skipped, nan)
-        expected = predicted
+        expected = told
         if not isinstance(expect.value, str):
             expected = float(expect.value)
             # What the theory has to say of an expectation that is not its own.
-            if isfinite(predicted):
-                values["theory"] = predicted
+            if isfinite(told):
+                values["theory"] = told
         for engine, simulated in values.items():
             tolerance, size = expect.allowed(engine) or (None, "%")
             # An entry is measured by itself, but what should be nothing by what was turned over.
             scale = 0.0
             if quantity == "ledger.residual":
                 scale = ledger(recordings[engine]).turned_over if recordings else nan
-            elif unit and not quantity.startswith("ledger."):
-                scale = scales(scene, prediction)[KINDS[unit]]
+            elif row.unit and not quantity.startswith("ledger."):
+                scale = scales(scene, prediction)[row.kind]
             off = abs(simulated - expected)
             if size == "%":
                 one, other = simulated, expected
-                if unit == "degrees":
+                if row.unit == "degrees":
                     one, other = radians(one), radians(other)
                 off = float(relative_error(one, other, scale))
             findings.append(
                 Finding(
-                    quantity, unit, expect.source, engine, expected, simulated, off,
+                    quantity, row.unit, expect.source, engine, expected, simulated, off,
                     tolerance, relative=size == "%",
                 )
             )  # fmt: skip

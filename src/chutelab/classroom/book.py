@@ -15,19 +15,20 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
-from math import isnan
+from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chutelab.classroom.lessons.reading import Lesson, beside, find, scene_of, unit_in
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
-from chutelab.results.comparison import compare
+from chutelab.results.comparison import compare, predicted
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import measure
 from chutelab.results.report import facts, sheets
 from chutelab.scene import Scene
 from chutelab.scene.overrides import Override
+from chutelab.scene.quantities import lookup, whose
 from chutelab.util.errors import InputError
 from chutelab.util.tables import Sheet, Shown, number
 
@@ -72,12 +73,15 @@ class Runs(Shown):
 
 
 def _value(recording: Recording, name: str) -> float:
-    """Return a quantity: of what was not simulated, such as work until no slip, the theory's."""
+    """Return a quantity: of what was not simulated, such as work until no slip, the theory's.
+
+    NaN where the scene has none, or one for each of several particles.
+    """
+    row = lookup(name, recording.scene.surfaces, recording.machine.streams)
+    if row is None or whose(row, recording.count):
+        return nan
     found = measure(recording, name)
-    symbol = name.removesuffix("_deg")
-    if isnan(found) and hasattr(recording.prediction, symbol):
-        found = float(getattr(recording.prediction, symbol))
-    return found
+    return predicted(recording.prediction, row) if isnan(found) else found
 
 
 class Book:

@@ -4,7 +4,8 @@
 `program`        the command ``chutelab`` itself, and what becomes of errors
 `running`        ``run``, ``show``, ``live``
 `checking`       ``check``, ``verify``, ``stress``
-`scenes`         ``scenes``, ``materials``, ``schema``, ``new``, ``tables``, ``figure``
+`scenes`         ``scenes``, ``materials``, ``quantities``, ``schema``, ``new``, ``tables``,
+                 ``figure``
 `comparing`      ``compare``
 `sweeping`       ``sweep``
 `solving`        ``solve``
@@ -25,13 +26,13 @@ from chutelab.cli.comparing import compare
 from chutelab.cli.lessons import lesson
 from chutelab.cli.program import main
 from chutelab.cli.running import live, run, show
-from chutelab.cli.scenes import figure, materials, new, scenes, schema, tables
+from chutelab.cli.scenes import figure, materials, new, quantities, scenes, schema, tables
 from chutelab.cli.solving import solve
 from chutelab.cli.sweeping import sweep
 
 for _command in (
     run, live, check, show, sweep, solve, compare, lesson,
-    figure, tables, scenes, materials, new, schema, verify, stress, bench,
+    figure, tables, scenes, materials, quantities, new, schema, verify, stress, bench,
 ):  # fmt: skip
     main.add_command(_command)
 

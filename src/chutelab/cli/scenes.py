@@ -1,7 +1,7 @@
-"""What one needs to write a scene, and the paper: six commands.
+"""What one needs to write a scene, and the paper: seven commands.
 
-``scenes``, ``materials``, ``schema`` and ``new``; ``tables`` and ``figure``, the paper's tables and
-figures as printed beside computed.
+``scenes``, ``materials``, ``quantities``, ``schema`` and ``new``; ``tables`` and ``figure``, the
+paper's tables and figures as printed beside computed.
 """
 
 from __future__ import annotations
@@ -189,11 +189,34 @@ def _listed(numbers: dict[str, int]) -> tuple[str, ...]:
 
 
 @click.command(short_help="Print the JSON Schema of scene files, for editors.")
-def schema() -> None:
+@click.option("--run", "of_run", is_flag=True, help="Print that of `chutelab run --json` instead.")
+def schema(of_run: bool) -> None:
     """Print the JSON Schema of scene files, for editors that complete them."""
-    from chutelab.scene import schema as schema_of_scenes
+    if of_run:
+        from chutelab.results.summary import schema as described
+    else:
+        from chutelab.scene import schema as described
 
-    console.say(json.dumps(schema_of_scenes(), indent=2))
+    console.say(json.dumps(described(), indent=2))
+
+
+@click.command(short_help="List the quantities of a run: names, units, meanings.")
+@json_option("Print one JSON object instead of a table.")
+def quantities(as_json: bool) -> None:
+    """List the quantities of a run, for [[expect]], solve and sweep, and from Python measure.
+
+    SURFACE is the name of any surface. Of several particles, particles[0].landing.x is that of the
+    first one, landing.x.mean the stream's (likewise .spread, .min, .max, .q02, .q50 and .q98), and
+    by_stream.NAME.landing.x.mean that of one stream. The ledger counts up to run.until.
+    """
+    from chutelab.scene.quantities import REGISTRY
+    from chutelab.util.tables import Sheet
+
+    keys = ("name", "symbol", "unit", "meaning", "of")
+    told = [{key: getattr(row, key) for key in keys} for row in REGISTRY.values()]
+    rows = tuple((row.name, row.unit, row.meaning) for row in REGISTRY.values())
+    listed = Sheet("Quantities of a run", ("", "", ""), rows, texts=3)
+    console.tell({"quantities": told}, listed, as_json=as_json)
 
 
 @click.command(short_help="Write a complete, commented scene to start from.")

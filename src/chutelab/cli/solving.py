@@ -86,12 +86,11 @@ def solve(
     chutelab solve inclined-20 --vary plate.angle_deg=20:60 \\
         --vary plate.restitution=0.1:0.9 --target landing.vx=1 --target landing.x=0.3
 
-    Quantities are the keys of `chutelab run --json`, such as landing.x, landing.t or
-    ledger.by_surface.plate.restitution_loss, the paper's symbols, such as x3, and belt_work,
-    slip_heat, power (what the outgoing belt pays until nothing slips on it), restitution_loss and
-    friction_loss. Of several particles say whose: particles[0].landing.x is the first one's,
-    landing.x.mean and arrival.vx.spread are the stream's. Belt work falls steadily as particles
-    land faster, and is negative above the belt's speed; what is least at that speed is slip_heat.
+    Quantities are those of `chutelab quantities`, such as landing.x, x3, belt_work or
+    ledger.by_surface.plate.restitution_loss. Of several particles say whose: particles[0].landing.x
+    is the first one's, landing.x.mean and arrival.vx.spread are the stream's. Belt work falls
+    steadily as particles land faster, and is negative above the belt's speed; what is least at that
+    speed is slip_heat.
 
     With one key all solutions in its range are found, and jumps are not taken for solutions. The
     exit code is 1 if there is no solution; the nearest thing to one is shown then. It needs pip

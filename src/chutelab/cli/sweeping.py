@@ -33,16 +33,30 @@ if TYPE_CHECKING:
 def _complete_column(
     _ctx: click.Context, _parameter: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
-    from chutelab.studies.sweep import NUMBERS
+    from chutelab.scene.quantities import COLUMNS
 
     return [
-        CompletionItem(name, help=what)
-        for name, (what, _) in NUMBERS.items()
+        CompletionItem(name, help=row.meaning)
+        for name, row in COLUMNS.items()
         if name.startswith(incomplete)
     ]
 
 
-@click.command(short_help="Simulate many variants of a scene; a row for each.")
+class _Listing(click.Command):
+    """A command whose help ends with the columns of a sweep."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the columns; the registry is loaded for this help only."""
+        from chutelab.scene.quantities import COLUMNS
+        from chutelab.scene.units import with_unit
+
+        with formatter.section("Columns"):
+            formatter.write_dl(
+                [(n, with_unit(row.meaning, row.unit)) for n, row in COLUMNS.items()]
+            )
+
+
+@click.command(cls=_Listing, short_help="Simulate many variants of a scene; a row for each.")
 @scene_argument
 @click.option(
     "--vary",
@@ -119,25 +133,19 @@ def sweep(
     and writes the same file as a sweep that was not interrupted. Rows that were changed meanwhile
     are refused, and so is a file that another sweep is writing.
 
-    Columns are the varied keys, then, in SI units, of all particles: arrival.x and arrival.vx (the
-    first touch of the outgoing belt, or of what lies on it), landing.x, landing.y, landing.vx,
-    landing.vy and landing.t (that of the belt itself), with .mean and .spread, the standard
-    deviation; time (from the release to the end), ledger.by_surface.outgoing.belt_work and
-    ledger.by_surface.outgoing.friction_loss, restitution_loss, power (belt work at the stream's
-    rate), plate_hits and misses (particles that met the plate, and that never arrived), residual
-    (of the ledger), error (of particle 0 against the theory), touches (the surfaces that particles
-    meet, in order, up to the landing; bounces in a row on one count once), and reason (why there
-    are no numbers, or not all). Maps are hatched where no particle meets the plate.
+    Columns are the varied keys, then those below, in SI units, then touches (the surfaces that
+    particles meet, in order, up to the landing; bounces in a row on one count once) and reason
+    (why there are no numbers, or not all). Maps are hatched where no particle meets the plate.
 
     With --uncertainty, statistics are also told by what is touched: a stream that misses the plate
     in half of all cases has two kinds of outcome, and their mean may be near to neither.
 
-    Belt work, slip heat and power are counted up to run.until, which is the landing unless said: a
-    slip that goes on after it is not in them. With --set run.until=settled it is, as it always is
-    in chutelab solve and with --uncertainty.
+    What the ledger has is counted up to run.until, which is the landing unless said: a slip that
+    goes on after it is not in it. With --set run.until=settled it is, as it always is in belt_work
+    and slip_heat, of chutelab solve and with --uncertainty.
     """
     from chutelab.studies.sweep import (
-        NUMBERS,
+        COLUMNS,
         LostWorkersError,
         crew,
         no_column,
@@ -163,7 +171,7 @@ def sweep(
         console.tell(as_dict(spread), spread, as_json=as_json, quiet=quiet, wrote=wrote)
         return
     loaded = loaded_as_told(scene, overrides)
-    if column not in NUMBERS:
+    if column not in COLUMNS:
         raise RefusedError(f"--of {no_column(column)}")
     check_file("--plot", plot, PICTURES)
     check_file("--out", out)

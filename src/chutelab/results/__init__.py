@@ -3,7 +3,9 @@
 - `recording`: `Recording`, a finished run: knots, events, and the ledger entries they carry.
 - `recorder`: what engines write a run into.
 - `ledger`: where the energy went, in total and by surface.
-- `quantities`: the one reader of a run's numbers, by name and by particle.
+- `quantities`: the readers of the registry: a run's numbers by name and by particle.
+- `firsts`: the first events of each particle, and the paper's symbols from them.
+- `notes`: what there is to say of a run, such as that particles got stuck.
 - `arrival`: which particles have come to a surface, or to what lies on it.
 - `stream`: a stream as a whole: the envelope of its paths.
 - `comparison`: `compare`, particle 0 against the theory.

@@ -12,38 +12,17 @@ from math import degrees, isfinite, nan
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from chutelab.results.quantities import QUANTITIES, observed
-from chutelab.results.recording import Recording
+from chutelab.results.arrival import never
+from chutelab.results.firsts import from_events, symbols, until_no_slip
+from chutelab.results.recording import Kind, Recording
 from chutelab.scene import Scene
-from chutelab.scene.rules import SYMBOLS
+from chutelab.scene.quantities import NEEDED, THEORY, Quantity
 from chutelab.scene.units import with_unit
-from chutelab.theory import Transfer
-from chutelab.util.arrays import Floats
+from chutelab.theory import Transfer, unbounded
+from chutelab.util.arrays import Bools, Floats
 from chutelab.util.tables import Sheet, Shown, number
-
-MEANINGS = {
-    "phi1": "angle of separation",
-    "t2": "time of flight to the plate",
-    "x2": "distance forward to the plate",
-    "y2": "fall to the plate",
-    "v2": "speed at the plate",
-    "phi2": "angle to the plate, before",
-    "phi2r": "angle to the plate, after",
-    "v2r": "speed after the impact",
-    "t3": "time of flight to the landing",
-    "x3": "distance back from the plate",
-    "y3": "fall from impact to landing",
-    "v3x": "landing velocity, back",
-    "v3y": "landing velocity, down",
-    "v3": "landing speed",
-    "d3": "height of the transfer",
-    "dEk": "the paper's energy, Eq. (14)",
-    "P": "the paper's power, Eq. (15)",
-    "belt_work": "belt work until no slip",
-    "slip_heat": "slip heat until no slip",
-}
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,7 +32,7 @@ class Comparison(Shown):
     Attributes
     ----------
     simulated, theory : dict of float
-        All `QUANTITIES`; NaN where the particle, or the theory, does not get so far.
+        All of `THEORY`; NaN where the particle, or the theory, does not get so far.
     errors : dict of float
         Relative errors of the quantities that both have.
     reason : str
@@ -83,13 +62,13 @@ class Comparison(Shown):
         rows = []
         energy, power = self.theory["dEk"], self.theory["P"]
         rate = power / energy if energy > 0.0 else nan
-        for name, unit in zip(QUANTITIES, SYMBOLS.values(), strict=True):
+        for name, row in THEORY.items():
             simulated, theory = self.simulated[name], self.theory[name]
-            if unit == "degrees":
+            if row.unit == "degrees":
                 simulated, theory = degrees(simulated), degrees(theory)
             if isfinite(simulated) or isfinite(theory):
                 error = written(self.errors[name]) if name in self.errors else ""
-                what = with_unit(MEANINGS[name], unit)
+                what = with_unit(row.meaning, row.unit)
                 rows.append((name, what, number(simulated), number(theory), error))
                 if name == "belt_work" and isfinite(rate):
                     true = (number(rate * simulated), number(rate * theory))
@@ -109,18 +88,24 @@ class Comparison(Shown):
         )
 
 
+def predicted(prediction: Transfer, row: Quantity) -> float:
+    """Return what the theory predicts of a quantity, in its unit; NaN where it has none."""
+    value = float(getattr(prediction, row.field)) if row.theory else nan
+    return degrees(value) if row.unit == "degrees" else value
+
+
 def compare(recording: Recording) -> Comparison:
     """Compare particle 0 with the theory's prediction for its scene."""
     scene, prediction = recording.scene, recording.prediction
-    theory = {name: float(getattr(prediction, name)) for name in QUANTITIES}
-    found = observed(recording)
+    theory = {name: float(getattr(prediction, name)) for name in THEORY}
+    found = {name: float(values[0]) for name, values in symbols(recording).items()}
     sizes = scales(scene, prediction)
     return Comparison(
         simulated=found,
         theory=theory,
         errors={
-            name: float(relative_error(found[name], theory[name], sizes[kind]))
-            for name, kind in QUANTITIES.items()
+            name: float(relative_error(found[name], theory[name], sizes[row.kind]))
+            for name, row in THEORY.items()
             if isfinite(theory[name]) and isfinite(found[name])
         },
         reason=str(prediction.reason),
@@ -156,3 +141,66 @@ def scales(scene: Scene, prediction: Transfer) -> dict[str, Any]:
         "power": energy * scene.rate,
     }
     return {kind: float(size) if np.ndim(size) == 0 else size for kind, size in found.items()}
+
+
+OTHER = (Kind.COLLISION, Kind.STICK, Kind.SETTLE)
+"""Events that the theory's equations do not know of, before the landing or on another surface."""
+
+
+def worst(recording: Recording) -> Floats:
+    """Return the largest relative error of particle 0 of each of V variants, (V,); NaN without one.
+
+    V is 1, or of a family as many as there are particles: `predict` takes one scene at a time, so
+    of a family the events tell how far the equations hold.
+    """
+    scene, count = recording.scene, recording.count
+    if not scene.shape:
+        found = compare(recording).max
+        return np.array([nan if found is None else found])
+    if scene.incoming is None or scene.plate is None:
+        return np.full(count, nan)
+    # It has to be released on the belt, as fast as the belt is.
+    belt, start = scene.incoming, recording.offsets[:-1]
+    release = recording.knots[np.where(recording.released, start, 0)]
+    (x, y), (vx, vy) = release["position"].T, release["velocity"].T
+    begins = recording.released & (y == belt.pulley_radius + scene.particle.radius) & (x <= 0.0)
+    begins &= (-belt.length <= x) & (vx == belt.speed) & (vy == 0.0)
+    left, hit, down = _described(recording, begins)
+    own = scene.particle
+    simulated = from_events(scene, left, hit, down, own.radius, own.mass)
+    simulated |= until_no_slip(recording, down["t"])
+    theory = unbounded(scene)
+    sizes = scales(scene, theory)
+    largest = np.full(count, nan)
+    for name, values in simulated.items():
+        errors = relative_error(values, getattr(theory, name), sizes[THEORY[name].kind])
+        largest = np.fmax(largest, np.where(np.isfinite(errors), errors, nan))
+    return largest
+
+
+def _described(recording: Recording, holds: Bools) -> list[NDArray[Any]]:
+    """Return separation, impact and landing of each of N variants of one particle.
+
+    The equations hold where these are its first three events, in this order. They did not happen
+    from the first event on that is another one, nor in variants whose `holds`, (N,), is false.
+    """
+    events = recording.events
+    kinds = [int(kind) for kind in (Kind.SEPARATION, Kind.IMPACT, Kind.LANDING, *OTHER)]
+    # Grip and slip on the belt and the pulley are in the equations.
+    known = events["kind"] == Kind.STICK
+    known &= events["surface"] == recording.surface_index("incoming")
+    order = (np.isin(events["kind"], kinds) & ~known).nonzero()[0]
+    own = events.take(order[np.argsort(events["particle"][order], kind="stable")])
+    place = np.arange(len(own)) - np.searchsorted(own["particle"], own["particle"])
+    found = []
+    for n in range(len(NEEDED)):
+        at, one = place == n, never(len(holds))
+        one[own["particle"][at]] = own[at]
+        found.append(one)
+    # A carried particle leaves the belt with a blow that throws it off, too.
+    holds = holds & ~(found[0]["t"] >= found[1]["t"])
+    for one, (event, surface) in zip(found, NEEDED.items(), strict=True):
+        holds = holds & (one["kind"] == Kind[event.upper()])
+        holds &= one["surface"] == recording.surface_index(surface)
+        one[~holds] = never(1)
+    return found

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine, Particle
-from chutelab.scene import Scene, rules
+from chutelab.scene import Scene, quantities
 from chutelab.theory import Transfer, predict
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.errors import InputError, did_you_mean
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from chutelab.results.laws import Broken
     from chutelab.results.ledger import Ledger
 
-ENTRIES = rules.ENTRIES
+ENTRIES = quantities.ENTRIES
 """The three entries of the energy ledger, in the order of every array that holds them."""
 
-REASONS = rules.ENDINGS
+REASONS = quantities.ENDINGS
 """Why a particle's track ends; `Recording.ended` holds indices into this tuple."""
 
 PARTICLES = "particles"

@@ -10,7 +10,7 @@ import numpy as np
 
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import (
+from chutelab.results.notes import (
     air_drag,
     layers,
     plugged,

@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 
 from chutelab.results.arrival import Places, arrivals, fates
-from chutelab.results.quantities import CARRIED, each, measure
+from chutelab.results.notes import CARRIED
+from chutelab.results.quantities import each, measure
 from chutelab.results.recording import ENTRIES, REASONS, Recording
 from chutelab.scene import Scene
+from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.units import with_unit
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.tables import Sheet, Shown, number
@@ -326,7 +328,9 @@ class Crowd(Shown):
                     if not details and values["spread"] < 1e-9 * abs(values["mean"]):
                         values["spread"] = 0.0
                     cells = (number(values[name]) for name in COLUMNS)
-                    rows.append((with_unit(f"{what}.{key}", UNITS[key]), *cells))
+                    rows.append(
+                        (with_unit(f"{what}.{key}", REGISTRY[f"{what}.{key}"].unit), *cells)
+                    )
         if self.flow is not None:
             said = f"{number(self.flow)} t/h in the simulated slice, one particle thick"
             if self.whole_flow is not None:
@@ -341,7 +345,6 @@ class Crowd(Shown):
         return Sheet("All particles", heads, tuple(rows), notes=written)
 
 
-UNITS = {"t": "s", "x": "m", "vx": "m/s", "vy": "m/s"}
 COLUMNS = ("mean", "spread", "q02", "q50", "q98")
 
 

@@ -2,14 +2,14 @@
 
 - `units`: sizes with their units, and what a key may hold: strict types and ranges.
 - `materials`: ``[[material]]``, and presets with their spread and sources.
-- `rules`: ``[[expect]]``, and the names of a run's quantities.
+- `quantities`: the registry of a run's quantities, from which all that names them comes.
 - `conflicts`: what no single key can answer for.
 - `tables`: the tables of a scene as frozen Pydantic models, with the defaults.
-- `schema`: `Scene`, all tables together, and what follows from one for another.
+- `schema`: all tables together, and what follows from one for another.
 - `overrides`: keys by their full path: JSON Schema, limits, ``KEY=VALUE`` texts.
 - `messages`: what Pydantic says of a scene, in words.
 - `live`: ``[live]``, what its page offers, and whether its keys are there.
-- `loading`: read, parse, override, validate, write; the shipped scenes.
+- `loading`: `Scene`; read, parse, override, validate, write; the shipped scenes.
 - `variants`: one scene with other values: ``--vary``, combinations, families.
 """
 
@@ -17,6 +17,7 @@ from chutelab.scene.loading import (
     About,
     AnyScene,
     Overrides,
+    Scene,
     SceneError,
     about,
     find,
@@ -29,10 +30,9 @@ from chutelab.scene.loading import (
     to_toml,
 )
 from chutelab.scene.overrides import schema
-from chutelab.scene.rules import Expect
-from chutelab.scene.schema import Scene
 from chutelab.scene.tables import (
     Conveyor,
+    Expect,
     Incoming,
     Outgoing,
     Particle,

@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import Any, Final
 
 from chutelab.scene.materials import PRESETS
-from chutelab.scene.rules import FIRST, SYMBOLS, THEORY, UNPROMISED, suggestion, unit_of, whose
+from chutelab.scene.quantities import REGISTRY, lookup, suggestion, whose
 from chutelab.scene.units import (
     LIGHTEST,
     MOST_PARTICLES,
@@ -26,6 +26,10 @@ from chutelab.scene.units import (
 )
 from chutelab.util.errors import MISSING, Fault, did_you_mean
 from chutelab.util.trig import RADIANS, sin_cos
+
+THEORY: Final = "theory"
+UNPROMISED: Final = "none"
+"""What an expectation may have for its value and for a tolerance."""
 
 ON_BELT: Final = 1e-9
 """How near to the belt's height R + r a release counts as lying on the belt, m."""
@@ -567,16 +571,17 @@ def _expectations(look: Look) -> Iterator[Fault]:
         name = given.get("quantity")
         if not isinstance(name, str):
             continue
-        unit = unit_of(name, surfaces, streams)
-        if unit is None:
+        about = lookup(name, surfaces, streams)
+        if about is None:
             text = f"no such quantity here; {suggestion(name, surfaces)}"
             yield Fault(f"{path}.quantity", name, text)
             continue
-        if text := whose(name, sum(counts)):
+        if text := whose(about, sum(counts)):
             yield Fault(f"{path}.quantity", name, text)
             continue
-        if given.get("value") == THEORY and name.removeprefix(FIRST) not in SYMBOLS:
-            text = f"a number; the theory has no {name}, only {', '.join(SYMBOLS)}"
+        if given.get("value") == THEORY and not about.theory:
+            has = ", ".join(one.name for one in REGISTRY.values() if one.theory)
+            text = f"a number; the theory has no {name}, only {has}"
             yield Fault(f"{path}.value", THEORY, text)
         for key in ("tolerance", "tolerance_contact", "tolerance_pymunk"):
             tolerance, none = given.get(key), "" if key == "tolerance" else f' or "{UNPROMISED}"'
@@ -584,10 +589,10 @@ def _expectations(look: Look) -> Iterator[Fault]:
                 continue
             with suppress(ValueError):
                 size, found = read_size(tolerance)
-                if size >= 0.0 and found in (unit, "%"):
+                if size >= 0.0 and found in (about.unit, "%"):
                     continue
             examples = {"": "3", "degrees": "0.1 degrees"}
-            example = examples.get(unit) or write_size(0.0005, unit)
+            example = examples.get(about.unit) or write_size(0.0005, about.unit)
             text = f'must be a number from 0 to 1 (relative), a string such as "{example}"{none}'
-            kind = f"in {unit}" if unit else "a number of things"
+            kind = f"in {about.unit}" if about.unit else "a number of things"
             yield Fault(f"{path}.{key}", tolerance, f"{text}; {name} is {kind}")

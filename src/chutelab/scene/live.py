@@ -24,7 +24,7 @@ from chutelab.scene.overrides import (
     resolved,
     rule_at,
 )
-from chutelab.scene.schema import TABLES, Scene
+from chutelab.scene.schema import TABLES, SceneTables
 from chutelab.scene.tables import Live
 from chutelab.util.errors import MISSING, Fault, InputError
 
@@ -59,14 +59,14 @@ def live_faults(document: Mapping[str, Any], live: Live) -> Iterator[Fault]:
         sound = {key: value for key, value in preset.set.items() if key not in refused}
         apply(changed, [Override(key, value) for key, value in sound.items()])
         try:
-            Scene.validated(changed)
+            SceneTables.validated(changed)
         except ValidationError as error:
             # Nothing of a change that does not go together with the rest.
             for fault in faults_of(error, changed):
                 yield Fault(f"{path}.set", None, str(fault))
 
 
-def live_of(scene: Scene, document: Mapping[str, Any]) -> dict[str, Any]:
+def live_of(scene: SceneTables, document: Mapping[str, Any]) -> dict[str, Any]:
     """Return ``[live]`` for a page: defaults filled in, and every key by index, not by name.
 
     Parameters

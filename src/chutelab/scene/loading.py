@@ -17,7 +17,7 @@ from chutelab.scene.conflicts import ConflictError, Look, conflicts
 from chutelab.scene.live import live_faults
 from chutelab.scene.messages import faults_of, nearest
 from chutelab.scene.overrides import Override, apply, joined, sized
-from chutelab.scene.schema import DEFAULTS, Scene, as_written, plain_number
+from chutelab.scene.schema import DEFAULTS, SceneTables, as_written, plain_number
 from chutelab.scene.units import flat
 from chutelab.util.errors import Fault, InputError, cut, did_you_mean, printable
 from chutelab.util.files import first_bytes
@@ -124,6 +124,64 @@ _STARTER: Final = "`chutelab new` writes a complete scene to start from."
 
 Overrides = str | Override | Mapping[str, object] | Iterable["Overrides"]
 """What is laid over a scene: a text ``KEY=VALUE``, values by key, or several of these."""
+
+
+class Scene(SceneTables):
+    """A validated scene, all defaults filled in that need no geometry.
+
+    Of tables of which there may be one or several, `particles`, `plates` and `streams` are all;
+    `stream` is the first, `particle` its kind, and `plate` the one at a distance from the pulley.
+
+    Raises
+    ------
+    SceneError
+        With all faults.
+    """
+
+    def __init__(self, **tables: Any) -> None:
+        try:
+            super().__init__(**tables)
+        except ValidationError as error:
+            raise refused(error, tables) from None
+
+    def with_values(self, values: Mapping[str, object]) -> Scene:
+        """Return the scene with other values, validated, and with defaults filled in anew.
+
+        Parameters
+        ----------
+        values
+            By full path, such as ``plate.angle_deg``, ``surface.hood.speed`` or
+            ``surface[0].speed``; also whole tables. None takes a key away, so that it has its
+            default. A whole float such as 3.0 will do for a whole number.
+
+        Raises
+        ------
+        SceneError
+            With all values that the scene refuses, and those that do not go together.
+
+        Examples
+        --------
+        >>> from chutelab.scene import load
+        >>> load("perpendicular").with_values({"plate.angle_deg": 20.0}).plate.angle_deg
+        20.0
+        """
+        overrides = [Override(key, plain_number(plain(value))) for key, value in values.items()]
+        return from_dict(to_dict(self), self.source, overrides)
+
+    def alone(self) -> Scene:
+        """Return the scene with its first particle only; nothing is expected of that, nor shown."""
+        tables = as_written(self)
+        streams = tables.get("stream", {})
+        first = streams[0] if isinstance(streams, tuple) else streams
+        changes: dict[str, object] = {
+            "stream": {**first, "count": 1, "interact": False},
+            "expect": None,
+            "live": None,
+        }
+        if self.string:
+            held = [row for row in tables["string"] if row.get("particle", 0) == 0]
+            changes["string"] = held or None
+        return self.with_values(changes)
 
 
 AnyScene = Scene | str | Path | Mapping[str, Any]

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from chutelab.scene.conflicts import EITHER, ConflictError
 from chutelab.scene.overrides import at_path, joined, rule_at
-from chutelab.scene.schema import Scene
+from chutelab.scene.schema import SceneTables
 from chutelab.util.errors import MISSING, Fault
 
 Location = tuple[str | int, ...]
@@ -133,7 +133,7 @@ def unknown(parts: Sequence[str | int]) -> str:
     key, known = str(last), _keys(above)
     homes = [
         f"[[{name}]]" if name in LISTS else f"[{name}]"
-        for name in Scene.tables()
+        for name in SceneTables.tables()
         if key in _keys([name, 0] if name in LISTS else [name])
     ]
     if not homes and (near := nearest(key, known)):

@@ -20,7 +20,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from chutelab.scene.conflicts import EITHER
-from chutelab.scene.schema import Scene, as_written
+from chutelab.scene.schema import SceneTables, as_written
 from chutelab.scene.units import WORDS, size_in
 from chutelab.util.errors import MISSING, Fault, InputError, printable
 
@@ -48,7 +48,7 @@ def schema() -> dict[str, Any]:
     With the Even Better TOML extension or taplo, the first line ``#:schema ./scene.schema.json``
     of a scene connects the two. Quantities carry their unit as ``x-unit`` too.
     """
-    described = Scene.model_json_schema(by_alias=True, schema_generator=_TomlSchema)
+    described = SceneTables.model_json_schema(by_alias=True, schema_generator=_TomlSchema)
     described["title"] = "Chutelab scene"
     described["dependentRequired"] = {"plate": ["incoming"], "outgoing": ["incoming"]}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
@@ -127,7 +127,7 @@ def at_path(document: Any, parts: Sequence[str | int]) -> Any:
     return found
 
 
-def value_at(scene: Scene, path: str) -> Any:
+def value_at(scene: SceneTables, path: str) -> Any:
     """Return what a scene has at a path, defaults filled in.
 
     `MISSING` if there is no such thing; an array for a varied key of a family of scenes.

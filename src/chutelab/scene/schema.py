@@ -1,4 +1,4 @@
-"""`Scene`: the tables of a scene file together, and what follows from one for another."""
+"""The tables of a scene file together, and what follows from one for another."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from functools import partial
 from math import hypot, sqrt
 from typing import Annotated, Any, Final, Self
 
-from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts, stream_name
 from chutelab.scene.materials import PRESETS, Material
-from chutelab.scene.rules import Expect
 from chutelab.scene.tables import (
     Conveyor,
+    Expect,
     Incoming,
     Live,
     Outgoing,
@@ -79,17 +79,8 @@ def _several(default: Any, **limits: Any) -> Any:
     return Field(default, json_schema_extra=_as_either, validate_default=False, **limits)
 
 
-class Scene(Table):
-    """A validated scene, all defaults filled in that need no geometry.
-
-    Of tables of which there may be one or several, `particles`, `plates` and `streams` are all;
-    `stream` is the first, `particle` its kind, and `plate` the one at a distance from the pulley.
-
-    Raises
-    ------
-    SceneError
-        With all faults.
-    """
+class SceneTables(Table):
+    """The tables of a scene, with all defaults that need no geometry."""
 
     title: Text = described("Untitled scene", "What the scene is called", max_length=200)
     gravity: Gravity = described(9.81, "Gravity g, downward", "m/s²")
@@ -116,15 +107,6 @@ class Scene(Table):
 
     _source: str = PrivateAttr("<scene>")
     _shape: tuple[int, ...] = PrivateAttr(())
-
-    def __init__(self, **tables: Any) -> None:
-        try:
-            super().__init__(**tables)
-        except ValidationError as error:
-            # Here, because `loading` builds on the tables above.
-            from chutelab.scene.loading import refused
-
-            raise refused(error, tables) from None
 
     @classmethod
     def validated(cls, document: Mapping[str, Any]) -> Self:
@@ -293,49 +275,6 @@ class Scene(Table):
         private: dict[str, tuple[int, ...]] = self.__pydantic_private__ or {}
         return private.get("_shape", ())
 
-    def with_values(self, values: Mapping[str, object]) -> Scene:
-        """Return the scene with other values, validated, and with defaults filled in anew.
-
-        Parameters
-        ----------
-        values
-            By full path, such as ``plate.angle_deg``, ``surface.hood.speed`` or
-            ``surface[0].speed``; also whole tables. None takes a key away, so that it has its
-            default. A whole float such as 3.0 will do for a whole number.
-
-        Raises
-        ------
-        SceneError
-            With all values that the scene refuses, and those that do not go together.
-
-        Examples
-        --------
-        >>> from chutelab.scene import load
-        >>> load("perpendicular").with_values({"plate.angle_deg": 20.0}).plate.angle_deg
-        20.0
-        """
-        # Here, because `loading` builds on the tables above.
-        from chutelab.scene.loading import from_dict, plain, to_dict
-        from chutelab.scene.overrides import Override
-
-        overrides = [Override(key, plain_number(plain(value))) for key, value in values.items()]
-        return from_dict(to_dict(self), self.source, overrides)
-
-    def alone(self) -> Scene:
-        """Return the scene with its first particle only; nothing is expected of that, nor shown."""
-        tables = as_written(self)
-        streams = tables.get("stream", {})
-        first = streams[0] if isinstance(streams, tuple) else streams
-        changes: dict[str, object] = {
-            "stream": {**first, "count": 1, "interact": False},
-            "expect": None,
-            "live": None,
-        }
-        if self.string:
-            held = [row for row in tables["string"] if row.get("particle", 0) == 0]
-            changes["string"] = held or None
-        return self.with_values(changes)
-
     def __repr__(self) -> str:
         particles = "1 particle" if self.count == 1 else f"{self.count:,} particles"
         names = self.surfaces
@@ -344,7 +283,7 @@ class Scene(Table):
 
     def __eq__(self, other: object) -> bool:
         # The same machine from another file is the same scene.
-        return self.__dict__ == other.__dict__ if isinstance(other, Scene) else NotImplemented
+        return self.__dict__ == other.__dict__ if isinstance(other, SceneTables) else NotImplemented
 
     @model_validator(mode="after")
     def _judge_and_fill(self) -> Self:
@@ -416,7 +355,7 @@ class Scene(Table):
         return filled
 
 
-def as_written(scene: Scene, *, defaults: bool = False) -> dict[str, Any]:
+def as_written(scene: SceneTables, *, defaults: bool = False) -> dict[str, Any]:
     """Return the keys that were set, nested as in the file; one table is no list of one.
 
     With `defaults`, all keys.

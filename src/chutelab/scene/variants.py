@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from chutelab.scene.conflicts import EITHER, NO_MACHINE, Look, conflicts
-from chutelab.scene.loading import SceneError, from_dict, plain, to_dict
+from chutelab.scene.loading import Scene, SceneError, from_dict, plain, to_dict
 from chutelab.scene.overrides import (
     Override,
     apply,
@@ -24,7 +24,7 @@ from chutelab.scene.overrides import (
     parts_of,
     rule_at,
 )
-from chutelab.scene.schema import DEFAULTS, Scene, plain_number
+from chutelab.scene.schema import DEFAULTS, plain_number
 from chutelab.scene.units import SIZE, read_size
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.errors import MISSING, InputError, about_comma

@@ -24,11 +24,11 @@ from chutelab.engines.simulation import judged
 from chutelab.machine import build
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
 from chutelab.results.comparison import compare, scales
+from chutelab.results.firsts import first
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import QUANTITIES, first
 from chutelab.results.recorder import StalledError
 from chutelab.scene import AnyScene, Scene, SceneError, load
-from chutelab.scene.rules import NEEDED
+from chutelab.scene.quantities import NEEDED, THEORY
 from chutelab.scene.units import read_size, write_size
 from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
@@ -461,7 +461,7 @@ class Search:
             errors = {
                 name: abs(compared.simulated[name] - compared.theory[name])
                 for name in errors
-                if QUANTITIES[name] == "length"
+                if THEORY[name].kind == "length"
             }
         else:
             errors["energy ledger"] = ledger(found).relative_residual

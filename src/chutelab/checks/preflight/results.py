@@ -11,9 +11,10 @@ import numpy as np
 
 from chutelab.machine import Machine
 from chutelab.machine.parts import Pieces
-from chutelab.results.quantities import QUANTITIES, air_drag
+from chutelab.results.notes import air_drag
 from chutelab.results.recording import Recording
 from chutelab.scene import Scene
+from chutelab.scene.quantities import THEORY
 from chutelab.scene.units import write_size
 from chutelab.theory import Reason, drag, predict
 from chutelab.util.arrays import Floats
@@ -145,7 +146,7 @@ WORDS = {
 def coverage(scene: Scene) -> Coverage:
     """Ask the theory about a scene; it speaks of particle 0."""
     found, lone = predict(scene), scene.count == 1
-    given = tuple(name for name in QUANTITIES if isfinite(float(getattr(found, name))))
+    given = tuple(name for name in THEORY if isfinite(float(getattr(found, name))))
     reason = str(found.reason)
     kind = Reason.of(reason)
     words = "All of the transfer, belt to belt."
@@ -156,7 +157,7 @@ def coverage(scene: Scene) -> Coverage:
     if "belt_work" in given and not (lone and scene.run.until == "settled"):
         words += " A simulation has belt_work and slip_heat to compare in a run"
         words += " until settled." if lone else " of one particle until settled."
-    return Coverage(given, tuple(name for name in QUANTITIES if name not in given), reason, words)
+    return Coverage(given, tuple(name for name in THEORY if name not in given), reason, words)
 
 
 MANY = 12

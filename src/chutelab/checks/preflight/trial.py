@@ -14,7 +14,7 @@ from chutelab.engines.exact.engine import ROUNDS
 from chutelab.engines.simulation import follow
 from chutelab.machine import Machine, build
 from chutelab.results import EVENT, KNOT, REASONS, Recording
-from chutelab.results.quantities import stopped
+from chutelab.results.notes import stopped
 from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.scene import SceneError
 from chutelab.util.arrays import Floats

@@ -185,8 +185,8 @@ class Question:
     hints: Sequence[str]  # each says more than the one before
     working: str  # the way to the answer, line by line
     source: str  # equation or law behind it
-    # The answer as a formula of what a run of `Exercise.machine` tells: the first ``separation``,
-    # ``impact`` and ``landing``, as in ``impact.after.vx``, and by surface ``outgoing.belt_work``.
+    # The answer as a formula of quantities of a run of `Exercise.machine`, by their names: of
+    # ``separation``, ``impact`` and ``landing``, and of ``ledger.by_surface``.
     measured: str = ""
 
 

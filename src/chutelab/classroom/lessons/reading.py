@@ -18,7 +18,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 from chutelab.classroom.words import words
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene.overrides import Override, at_path, joined
-from chutelab.scene.rules import suggestion, unit_of
+from chutelab.scene.quantities import lookup, suggestion
 from chutelab.scene.units import Number, Table, Text, Whole
 from chutelab.util.errors import did_you_mean
 
@@ -362,7 +362,7 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
     if len(scenes) == len(lesson.scenes):  # one that is broken may be the one that has a quantity
         surfaces = [scene.surfaces for scene in scenes.values()]
         for name, words in lesson.quantities.items():
-            if all(unit_of(name, names) is None for names in surfaces):
+            if all(lookup(name, names) is None for names in surfaces):
                 text = f"no such quantity in its scenes; {suggestion(name, surfaces[0])}"
                 yield Fault(f"quantities.{name}", words, text)
     for table in TABLES:
@@ -387,8 +387,8 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
 
 def unit_in(lesson: Lesson, quantity: str) -> str:
     """Return the unit of a quantity in the first of a lesson's scenes that has it."""
-    found = (unit_of(quantity, scene_of(lesson, name).surfaces) for name in lesson.scenes)
-    return next((unit for unit in found if unit is not None), "")
+    found = (lookup(quantity, scene_of(lesson, name).surfaces) for name in lesson.scenes)
+    return next((row.unit for row in found if row is not None), "")
 
 
 def _faults(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:

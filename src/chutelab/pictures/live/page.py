@@ -18,6 +18,7 @@ from chutelab.pictures.live.describe import describe
 from chutelab.pictures.plots import style
 from chutelab.scene import Scene
 from chutelab.scene.live import live_of
+from chutelab.scene.quantities import REGISTRY
 from chutelab.util.files import whole
 from chutelab.util.versions import own_version
 
@@ -56,12 +57,18 @@ def html(
     if given := facts["scene"].get("live"):
         # As what is saved from the page will have it.
         facts["scene"]["live"] = {key: live[key] for key in given}
+    # What the page's language has no words for is called as in the registry.
+    shown = [row for row in REGISTRY.values() if row.symbol]
     data = {
         **facts,
         "live": live,
         "version": own_version(),
         "language": language,
-        "strings": json.loads(_file(f"assets/strings/{language}.json")),
+        "strings": {
+            **{f"number-{row.name}": row.meaning for row in shown},
+            **json.loads(_file(f"assets/strings/{language}.json")),
+        },
+        "quantities": {row.name: {"symbol": row.symbol, "unit": row.unit} for row in shown},
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
         **({} if exercise is None else {"exercise": exercise}),
         "wasm": b64encode(zlib.compress((core / "core.wasm").read_bytes(), 9)).decode("ascii"),

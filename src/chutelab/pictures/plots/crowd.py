@@ -10,8 +10,10 @@ from chutelab.pictures.plots.bodies import stream_colours
 from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import layers
+from chutelab.results.notes import layers
 from chutelab.results.stream import QUANTILES, envelopes, flows
+from chutelab.scene.quantities import REGISTRY
+from chutelab.scene.units import with_unit
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import number
 
@@ -49,7 +51,8 @@ def draw_arrivals(ax: Axes, recording: Recording, title: str = "Arrivals") -> Ax
     """
     found = arrivals(recording)["position"][:, 0]
     found = found[np.isfinite(found)]
-    style.dress(ax, "place of the arrival x, m", "particles", title)
+    place = REGISTRY["arrival.x"]
+    style.dress(ax, with_unit(place.meaning, place.unit), "particles", title)
     if len(found) == 0:
         return ax
     mean, deviation = float(found.mean()), float(found.std())

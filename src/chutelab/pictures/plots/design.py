@@ -19,7 +19,7 @@ from chutelab.pictures.plots import style
 from chutelab.pictures.plots.style import Picture
 from chutelab.scene.units import symbol, with_unit
 from chutelab.studies.design import Solution, Uncertainty
-from chutelab.studies.sweep import NUMBERS, REASON, Sweep, no_column
+from chutelab.studies.sweep import COLUMNS, REASON, Sweep, no_column
 from chutelab.studies.sweep.rows import RARE
 from chutelab.util.arrays import Bools, Floats
 
@@ -219,7 +219,7 @@ def sweep_figure(swept: Sweep, column: str) -> Picture:
     ValueError
         If more than two keys vary, or there is no such column.
     """
-    if column not in NUMBERS:
+    if column not in COLUMNS:
         raise ValueError(no_column(column))
     figure = Picture(SWEEP_SIZE)
     draw_sweep(figure.add_subplot(), swept, column)
@@ -243,7 +243,7 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
     if len(keys) > 2:
         raise ValueError(f"a picture shows one or two varied keys, not {len(keys)}")
     keys = keys or list(swept.quantities)[:1]
-    what, unit = NUMBERS[column][0].split(",")[0], swept.unit(column)
+    what, unit = COLUMNS[column].meaning.split(",")[0], swept.unit(column)
     what = what if what.startswith(("x ", "y ")) else what[0].upper() + what[1:]
     if column.endswith(".spread"):
         what = f"Standard deviation of {column.removesuffix('.spread')}"
@@ -266,7 +266,7 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
                 first[known], second[known], c=z[known], cmap=COLORS, s=16.0
             )
         else:
-            painted = _draw_heat(ax, first, second, z, swept.columns["plate_hits"] == 0.0)
+            painted = _draw_heat(ax, first, second, z, swept.columns["impact.count"] == 0.0)
         if known.any():
             bar = ax.figure.colorbar(painted, ax=ax, pad=0.02)
             bar.set_label(label, fontsize=style.NORMAL)

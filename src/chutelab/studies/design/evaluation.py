@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.engines.simulation import judged, simulate
-from chutelab.results import ENTRIES, Recording
+from chutelab.results import Recording
 from chutelab.results.recorder import StalledError
-from chutelab.scene import AnyScene, Scene, SceneError, load, rules
+from chutelab.scene import AnyScene, Scene, SceneError, load
 from chutelab.scene.overrides import value_at
 from chutelab.scene.variants import Range, Varied, Vary, is_plain, quantity, reason, varied
 from chutelab.studies.design.quantities import (
@@ -25,7 +25,6 @@ from chutelab.studies.design.quantities import (
     courses_of,
     each_once,
     measured,
-    own_key,
 )
 from chutelab.studies.sweep.batch import Block, one_line, together
 from chutelab.studies.sweep.rows import touches
@@ -100,27 +99,12 @@ def ranges(scene: Scene, vary: Varied) -> tuple[Span, ...]:
 
 def suits(scene: Scene, keys: Sequence[str], quantities: Sequence[Quantity]) -> bool:
     """Tell whether variants of a scene can run at once, and all quantities be read off that."""
-
-    def readable(quantity: Quantity) -> bool:
-        match own_key(quantity.key).split("."):
-            case _ if quantity.source != "run":
-                return True
-            case ["separation" | "impact" | "landing" | "arrival", *column]:
-                return column[-1] not in ("count", *rules.STATISTICS)
-            case ["ledger", name]:
-                return name in ENTRIES
-            case ["ledger", "by_surface", *_]:
-                return True
-            case [symbol]:
-                return symbol in rules.SYMBOLS and symbol not in ("belt_work", "slip_heat")
-        return False
-
     return (
         scene.count == 1
         and scene.stream.at is None
         and scene.run.engine not in ("contact", "pymunk")
         and all(map(is_plain, keys))
-        and all(map(readable, quantities))
+        and all(quantity.key != "contacts" for quantity in quantities)
     )
 
 

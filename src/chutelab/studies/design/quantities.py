@@ -17,15 +17,14 @@ from itertools import groupby
 from math import nan
 from typing import Any, Final, Literal, TypeVar
 
-import numpy as np
-
 from chutelab.results import REASONS, Kind, Recording
-from chutelab.results.quantities import each, measure
-from chutelab.scene import MISSING, Scene, rules
+from chutelab.results.quantities import measured as read
+from chutelab.scene import MISSING, Scene
 from chutelab.scene.overrides import value_at
+from chutelab.scene.quantities import Ending, lookup, suggestion, whose
 from chutelab.scene.units import read_size
 from chutelab.scene.variants import Vary, quantity
-from chutelab.util.errors import InputError, did_you_mean
+from chutelab.util.errors import InputError
 from chutelab.util.versions import library
 
 T = TypeVar("T")
@@ -98,21 +97,6 @@ def courses_of(recording: Recording) -> list[str]:
     return [course(tuple(one), end) for one, end in zip(touched, ends, strict=True)]
 
 
-Ending = Literal["any", "scene", "settled"]
-"""How a run must end for a quantity: it does not matter, as the scene says, or without slip."""
-
-SHORT: Final[dict[str, tuple[str, Ending]]] = {
-    "belt_work": ("ledger.by_surface.outgoing.belt_work", "settled"),
-    "slip_heat": ("ledger.by_surface.outgoing.friction_loss", "settled"),
-    "power": ("ledger.by_surface.outgoing.belt_work", "settled"),
-    "restitution_loss": ("ledger.restitution_loss", "scene"),
-    "friction_loss": ("ledger.friction_loss", "scene"),
-}
-"""Short names: what each stands for, and how the run must end. The first three are what the
-outgoing belt pays until nothing slips on it any more, however the scene itself ends; `power` is
-that work per particle times the stream's rate."""
-
-
 @dataclass(frozen=True)
 class Quantity:
     """A number of a run, the value of a key of the scene, or a plain number."""
@@ -123,7 +107,7 @@ class Quantity:
     unit: str
 
     key: str = ""
-    """Of a run: its full name, see `chutelab.scene.rules`. Of the scene: the full path."""
+    """Of a run: its name, see `chutelab.scene.quantities`. Of the scene: the full path."""
 
     source: Literal["run", "scene", "number"] = "run"
     ending: Ending = "any"
@@ -136,52 +120,26 @@ class Quantity:
             value = value_at(recording.scene, self.key)
             return nan if value is None or value is MISSING or isinstance(value, str) else value
         if self.source == "run":
-            settled = recording.ended == REASONS.index("settled")
-            rate = recording.scene.rate
-            if recording.scene.shape:
-                value = each(recording, own_key(self.key))
-            else:
-                value = measure(recording, self.key)
-                settled, rate = settled.all(), rate / recording.count
-            if self.ending == "settled":
-                value = np.where(settled, value, nan)
-            if self.name == "power":
-                value = value * rate
+            value = read(recording, self.key)
+            value = value if recording.scene.shape else value[0]
         return value
 
 
-def own_key(key: str) -> str:
-    """Return what a lone particle has of a quantity that is named as particle 0's, or a mean.
-
-    >>> own_key("particles[0].landing.x"), own_key("landing.x.mean")
-    ('landing.x', 'landing.x')
-    """
-    return key.removeprefix(rules.FIRST).removesuffix(".mean")
-
-
 def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
-    """Return the quantity of a scene that has this name, short or full; messages call it `typed`.
+    """Return the quantity of a scene that has this name; messages call it `typed`.
 
     Raises
     ------
     InputError
         If the scene has no such quantity.
     """
-    # What comes before the landing, and the landing itself, is there however the run ends.
-    if which := rules.whose(name, scene.count):
+    row = lookup(name, scene.surfaces, [str(stream.name) for stream in scene.streams])
+    if row is None:
+        allowed = f"no such quantity here; {suggestion(name, scene.surfaces)}"
+        raise InputError(allowed, typed or name)
+    if which := whose(row, scene.count):
         raise InputError(which, typed or name)
-    own = name.removeprefix(rules.FIRST)
-    early = own.partition(".")[0] in (*rules.NEEDED, rules.ARRIVAL, *rules.SYMBOLS)
-    key, ending = SHORT.get(name, (name, "any" if early else "scene"))
-    unit = rules.unit_of(key, scene.surfaces)
-    if unit is None:
-        advice = rules.suggestion(key, scene.surfaces)
-        if not advice.startswith(("did", "it needs")):
-            advice += f"; short are {', '.join(SHORT)}"
-        if name not in SHORT:
-            advice = did_you_mean(name, SHORT, advice, cutoff=0.75)
-        raise InputError(f"no such quantity here; {advice}", typed or name)
-    return Quantity(name, "W" if name == "power" else unit, key, ending=ending)
+    return Quantity(name, row.unit, name, ending=row.ending)
 
 
 def target(scene: Scene, text: str) -> tuple[Quantity, Quantity]:
@@ -223,7 +181,7 @@ def _right(scene: Scene, text: str, typed: str, left: Quantity) -> Quantity:
         if text[0].isdigit() or text[0] in "+-.":
             allowed = f"{text} is no number of a quantity {_in(left.unit)}; {error}"
             raise InputError(allowed, typed) from None
-    if text in SHORT or rules.unit_of(text, scene.surfaces) is not None:
+    if lookup(text, scene.surfaces) is not None:
         return measured(scene, text, typed)
     try:
         found = quantity(scene, Vary(text, (0.0,), typed))

@@ -16,10 +16,11 @@
 SciPy, pyarrow, Dask and pandas are imported when they are needed.
 """
 
+from chutelab.scene.quantities import COLUMNS
 from chutelab.studies.sweep.batch import row_of
 from chutelab.studies.sweep.plan import DESIGNS, MOST_VARIANTS, Plan, planned
 from chutelab.studies.sweep.result import Sweep
-from chutelab.studies.sweep.rows import NUMBERS, REASON, TEXTS, TOUCHES, no_column
+from chutelab.studies.sweep.rows import REASON, TEXTS, TOUCHES, no_column
 from chutelab.studies.sweep.sweeping import (
     Crew,
     LostWorkersError,
@@ -30,9 +31,9 @@ from chutelab.studies.sweep.sweeping import (
 )
 
 __all__ = [
+    "COLUMNS",
     "DESIGNS",
     "MOST_VARIANTS",
-    "NUMBERS",
     "REASON",
     "TEXTS",
     "TOUCHES",

@@ -24,9 +24,10 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 
 from chutelab.scene import to_dict
+from chutelab.scene.quantities import COLUMNS
 from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.result import columns_of, synced, text_of
-from chutelab.studies.sweep.rows import NUMBERS, TEXTS, Columns
+from chutelab.studies.sweep.rows import TEXTS, Columns
 from chutelab.util.errors import InputError
 from chutelab.util.files import writing
 from chutelab.util.versions import version_of
@@ -176,7 +177,7 @@ class Part:
         begin, text, _ = json.loads(line)
         if line != self._line(begin, text) or begin in self.done or begin not in self._plan.begins:
             raise ValueError
-        columns = columns_of((*self._plan.keys, *NUMBERS, *TEXTS), text)
+        columns = columns_of((*self._plan.keys, *COLUMNS, *TEXTS), text)
         given = np.stack([columns[key] for key in self._plan.keys], axis=1)
         planned = self._plan.block(begin, begin + self._plan.begins.step).values
         if not np.array_equal(given, planned):

@@ -20,8 +20,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chutelab.scene.quantities import COLUMNS, HEAT
 from chutelab.scene.variants import Quantity
-from chutelab.studies.sweep.rows import HEAT, NUMBERS, REASON, TEXTS, TOUCHES, Named
+from chutelab.studies.sweep.rows import REASON, TEXTS, TOUCHES, Named
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, number
@@ -124,7 +125,7 @@ class Sweep(Shown):
     quantities : dict of str to Quantity
         What each varied key is.
     columns : dict of str to ndarray, (N,)
-        Read-only: the varied keys, then what came of each variant, see `NUMBERS`
+        Read-only: the varied keys, then what came of each variant, see `COLUMNS`
         (NaN where there is nothing to tell), then ``touches``: which surfaces the particles meet,
         and ``reason``: why there are no numbers, or not all.
     shape : tuple of int or None
@@ -149,7 +150,7 @@ class Sweep(Shown):
 
     def unit(self, column: str) -> str:
         """Return the unit of a column, "" for a pure number."""
-        return self.quantities[column].unit if column in self.quantities else NUMBERS[column][1]
+        return self.quantities[column].unit if column in self.quantities else COLUMNS[column].unit
 
     def frame(self) -> Any:
         """Return a pandas DataFrame; a varied key or a result is a column. Needs pandas."""

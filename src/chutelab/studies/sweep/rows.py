@@ -14,59 +14,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.results import ENTRIES, REASONS, Kind, Recording, balance
-from chutelab.results.arrival import arrivals, fates, never
-from chutelab.results.comparison import relative_error, scales
-from chutelab.results.quantities import (
-    QUANTITIES,
-    column,
-    end_times,
-    first,
-    from_events,
-)
+from chutelab.results import REASONS, Kind, Recording
+from chutelab.results.arrival import arrivals, fates
+from chutelab.results.quantities import measured
 from chutelab.results.stream import told_fates
-from chutelab.scene.rules import NEEDED
-from chutelab.theory import unbounded
-from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.scene.quantities import COLUMNS, FORMER, PAID, REGISTRY, lookup
+from chutelab.util.arrays import Bools, Ints
 
 Columns = dict[str, NDArray[Any]]
-
-PAID, HEAT = (f"ledger.by_surface.outgoing.{entry}" for entry in ("belt_work", "friction_loss"))
-
-NUMBERS: dict[str, tuple[str, str]] = {
-    "arrival.x.mean": (
-        "x where particles come to the outgoing belt, or what lies on it, mean",
-        "m",
-    ),
-    "arrival.x.spread": ("its standard deviation", "m"),
-    "arrival.vx.mean": ("forward velocity just before the arrival, mean", "m/s"),
-    "arrival.vx.spread": ("its standard deviation", "m/s"),
-    "landing.x.mean": ("x of the landing on the outgoing belt itself, mean", "m"),
-    "landing.x.spread": ("its standard deviation", "m"),
-    "landing.y.mean": ("y of the landing, mean", "m"),
-    "landing.vx.mean": ("forward velocity just before the landing, mean", "m/s"),
-    "landing.vx.spread": ("its standard deviation", "m/s"),
-    "landing.vy.mean": ("upward velocity just before the landing, mean", "m/s"),
-    "landing.vy.spread": ("its standard deviation", "m/s"),
-    "landing.t.mean": ("time of the landing, mean", "s"),
-    "time": ("time from a particle's release to the end of its track, mean", "s"),
-    PAID: ("what the outgoing belt's drive pays up to run.until, all particles", "J"),
-    HEAT: ("heat of the slip on the outgoing belt up to run.until", "J"),
-    "restitution_loss": ("loss of all bounces", "J"),
-    "power": ("belt work up to run.until per particle times the rate of all the width", "W"),
-    "plate_hits": ("particles that met the plate before a landing", ""),
-    "misses": ("particles that never came to the outgoing belt, nor to what lies on it", ""),
-    "residual": ("energy that the ledger cannot explain: the numerical error", "J"),
-    "error": ("largest relative error of particle 0 against the theory", ""),
-}
-"""Columns of numbers, with their definitions and units; NaN where there is nothing to tell."""
-
-EARLIER = {
-    "belt_work": PAID, "slip_heat": HEAT,
-    **{f"landing.{key}": f"landing.{key}.mean" for key in ("x", "y", "vx", "vy", "t")},
-    **{f"landing.{key}_spread": f"landing.{key}.spread" for key in ("x", "vx", "vy")},
-}  # fmt: skip
-"""What columns were called that had a name which means another thing in a run, and are called."""
 
 TOUCHES: Final = "touches"
 """The column that says which surfaces the particles meet, see `touches`; "" without a run."""
@@ -79,18 +34,19 @@ TEXTS: Final = (TOUCHES, REASON)
 
 
 def no_column(name: str) -> str:
-    """Say which columns of numbers there are, or what an earlier name has become.
+    """Say which columns of numbers there are, or what is called otherwise in a sweep.
 
     >>> no_column("landing.x")
     'landing.x is called landing.x.mean now: in a run landing.x is of one particle'
     """
-    if name in EARLIER:
-        if name in ("belt_work", "slip_heat"):
-            why = f"{name} is what is paid until nothing slips, this is up to run.until"
-        else:
-            why = f"in a run {name.partition('_')[0]} is of one particle"
-        return f"{name} is called {EARLIER[name]} now: {why}"
-    return f"{name}: one of {', '.join(NUMBERS)}"
+    if (row := REGISTRY.get(name)) and row.of == "lone":
+        why = f"{name} is what is paid until nothing slips, this is up to run.until"
+        return f"{name} is called {row.together} now: {why}"
+    if f"{name}.mean" in COLUMNS:
+        return f"{name} is called {name}.mean now: in a run {name} is of one particle"
+    if name in FORMER:
+        return f"{name} is called {FORMER[name]} now"
+    return f"{name}: one of {', '.join(COLUMNS)}"
 
 
 class Named(dict[str, NDArray[Any]]):
@@ -103,7 +59,7 @@ class Named(dict[str, NDArray[Any]]):
 
 def empty(count: int) -> Columns:
     """Return rows that tell nothing yet."""
-    found: Columns = {name: np.full(count, np.nan) for name in NUMBERS}
+    found: Columns = {name: np.full(count, np.nan) for name in COLUMNS}
     found |= {name: np.full(count, "", dtype=object) for name in TEXTS}
     return found
 
@@ -111,73 +67,6 @@ def empty(count: int) -> Columns:
 def joined(parts: Sequence[Mapping[str, NDArray[Any]]]) -> Columns:
     """Put rows below each other."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-OTHER = (Kind.COLLISION, Kind.STICK, Kind.SETTLE)
-"""Events that the theory's equations do not know of, before the landing or on another surface."""
-
-
-def deviation(recording: Recording, shape: tuple[int, int]) -> Floats:
-    """Return the largest relative error against the theory of V variants, (V,); NaN without one.
-
-    Measured as in `results.comparison`. `predict` takes one scene at a time; so of each variant,
-    of M particles, the events tell how far the equations hold. `shape` is (V, M).
-    """
-    (count, every), scene = shape, recording.scene
-    if scene.incoming is None or scene.plate is None or (scene.stream.interact and every > 1):
-        return np.full(count, np.nan)
-    # Particle 0 has to be released on the belt, as fast as the belt is.
-    belt, start = scene.incoming, recording.offsets[:-1:every]
-    released = recording.offsets[1::every] > start
-    release = recording.knots[np.where(released, start, 0)]
-    (x, y), (vx, vy) = release["position"].T, release["velocity"].T
-    begins = released & (y == belt.pulley_radius + scene.particle.radius) & (x <= 0.0)
-    begins &= (-belt.length <= x) & (vx == belt.speed) & (vy == 0.0)
-    left, hit, down = _described(recording, begins)
-    own = scene.particle
-    simulated = from_events(scene, left, hit, down, own.radius, own.mass)
-    if every == 1 and "outgoing" in recording.surfaces:
-        # What the outgoing belt paid is comparable where nothing slips on it any more.
-        paid, over = _paid(recording, count), recording.ended == REASONS.index("settled")
-        simulated["belt_work"] = np.where(over, paid["belt_work"], np.nan)
-        simulated["slip_heat"] = np.where(over, paid["friction_loss"], np.nan)
-    theory = unbounded(scene)
-    sizes = scales(scene, theory)
-    worst = np.full(count, np.nan)
-    for name, found in simulated.items():
-        errors = relative_error(found, getattr(theory, name), sizes[QUANTITIES[name]])
-        worst = np.fmax(worst, np.where(np.isfinite(errors), errors, np.nan))
-    return worst
-
-
-def _described(recording: Recording, holds: Bools) -> list[NDArray[Any]]:
-    """Return separation, impact and landing of particle 0 of each of V variants.
-
-    The equations hold where these are its first three events, in this order. They did not happen
-    from the first event on that is another one, nor in variants whose `holds`, (V,), is false.
-    """
-    events, every = recording.events, recording.count // len(holds)
-    kinds = [int(kind) for kind in (Kind.SEPARATION, Kind.IMPACT, Kind.LANDING, *OTHER)]
-    # Grip and slip on the belt and the pulley are in the equations.
-    known = events["kind"] == Kind.STICK
-    known &= events["surface"] == recording.surface_index("incoming")
-    some = np.isin(events["kind"], kinds) & (events["particle"] % every == 0) & ~known
-    order = some.nonzero()[0]
-    own = events.take(order[np.argsort(events["particle"][order], kind="stable")])
-    variant = own["particle"] // every
-    place = np.arange(len(own)) - np.searchsorted(variant, variant)
-    found = []
-    for n in range(len(NEEDED)):
-        at, one = place == n, never(len(holds))
-        one[variant[at]] = own[at]
-        found.append(one)
-    # A carried particle leaves the belt with a blow that throws it off, too.
-    holds = holds & ~(found[0]["t"] >= found[1]["t"])
-    for one, (event, surface) in zip(found, NEEDED.items(), strict=True):
-        holds = holds & (one["kind"] == Kind[event.upper()])
-        holds &= one["surface"] == recording.surface_index(surface)
-        one[~holds] = never(1)
-    return found
 
 
 FATES = {
@@ -201,58 +90,14 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
     variants : int
         How many.
     """
-    found, scene, released = empty(variants), recording.scene, recording.released
-    shape = variants, recording.count // variants
-    begin, end = recording.ends()
-    began = np.full(recording.count, np.nan)
-    began[released] = begin["t"]
-    came = arrivals(recording)
-    for event, its in (("landing", first(recording, "landing")), ("arrival", came)):
-        for key in ("x", "y", "vx", "vy", "t"):
-            mean, spread = _mean_and_spread(column(its, key).reshape(shape))
-            for statistic, value in (("mean", mean), ("spread", spread)):
-                if (name := f"{event}.{key}.{statistic}") in found:
-                    found[name] = value
-    found["time"], _ = _mean_and_spread((end_times(recording) - began).reshape(shape))
-    who = np.flatnonzero(released)
-    kinetic_first, potential_first = recording.energies(begin, who)
-    kinetic, potential = recording.energies(end, who)
-    change = (kinetic - kinetic_first) + (potential - potential_first)
-    whole = np.zeros((2, recording.count))
-    whole[0, released] = change - balance(end["entries"])
-    whole[1, released] = end["entries"][:, ENTRIES.index("restitution_loss")]
-    found["residual"], found["restitution_loss"] = whole.reshape(2, *shape).sum(axis=2)
+    found, scene = empty(variants), recording.scene
+    for name in found:
+        if name in COLUMNS and lookup(name, scene.surfaces):
+            found[name] = measured(recording, name)
     found[TOUCHES] = touches(recording, variants)
-    if scene.plate is not None:
-        who, surface = _met(recording)
-        met = np.unique(who[surface == recording.surface_index("plate")])
-        found["plate_hits"] = np.bincount(met // shape[1], minlength=variants).astype(np.float64)
     if scene.outgoing is not None:
-        paid = _paid(recording, variants)
-        found[PAID], found[HEAT] = paid["belt_work"], paid["friction_loss"]
-        found["power"] = np.asarray(found[PAID] / shape[1] * scene.rate)
-        missed = np.isnan(came["t"]).reshape(shape)
-        found["misses"] = missed.sum(axis=1).astype(np.float64)
-        _tell(found[REASON], recording, missed)
-    found["error"] = deviation(recording, shape)
+        _tell(found[REASON], recording, np.isnan(arrivals(recording)["t"]).reshape(variants, -1))
     return found
-
-
-def _mean_and_spread(values: Floats) -> tuple[Floats, Floats]:
-    """Return mean and standard deviation over the particles that have a value, (V,) of (V, M)."""
-    has = np.isfinite(values)
-    count = has.sum(axis=1)
-    some = np.maximum(count, 1)
-    mean = np.where(has, values, 0.0).sum(axis=1) / some
-    square = np.where(has, (values - mean[:, None]) ** 2, 0.0).sum(axis=1) / some
-    return np.where(count > 0, mean, np.nan), np.where(count > 0, np.sqrt(square), np.nan)
-
-
-def _paid(recording: Recording, count: int) -> dict[str, Floats]:
-    """Return the ledger's entries of the outgoing belt, (V,) each."""
-    entries = recording.by_surface.reshape(count, -1, len(ENTRIES))
-    belt = entries[:, recording.surface_index("outgoing")].T.copy()
-    return dict(zip(ENTRIES, belt, strict=True))
 
 
 def _tell(reasons: NDArray[Any], recording: Recording, missed: Bools) -> None:

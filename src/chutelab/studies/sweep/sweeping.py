@@ -30,12 +30,13 @@ from types import ModuleType
 from typing import Any, Final
 
 from chutelab.scene import AnyScene
+from chutelab.scene.quantities import COLUMNS
 from chutelab.scene.variants import Varied
 from chutelab.studies.sweep.batch import swept
 from chutelab.studies.sweep.part import unfinished
 from chutelab.studies.sweep.plan import Plan, planned
 from chutelab.studies.sweep.result import Sweep, format_of, synced, write, write_csv
-from chutelab.studies.sweep.rows import NUMBERS, REASON, TEXTS, Columns, joined
+from chutelab.studies.sweep.rows import REASON, TEXTS, Columns, joined
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import InputError
 from chutelab.util.files import writing
@@ -371,7 +372,7 @@ def sweep_to(
         result = _gathered(plan, blocks)
         with writing(out):
             if form == "csv":
-                write_csv((*plan.keys, *NUMBERS, *TEXTS), texts, out)
+                write_csv((*plan.keys, *COLUMNS, *TEXTS), texts, out)
             else:
                 write(result.columns, out, form)
             synced(out)

@@ -60,7 +60,10 @@ class Keep {
     const found = numbersOf(historyOf(lab)?.stages ?? [], numbers,
       machine.pulley?.radius ?? NaN, machine.radius);
     return [["", words.say("simulated"), words.say("analytic"), ""],
-      ...found.map(({ symbol, simulated, analytic, unit }) => [symbol, simulated, analytic, unit])];
+      ...found.map(({ id, simulated, analytic }) => {
+        const { symbol, unit } = lab.data.quantities[id];
+        return [symbol, simulated, analytic, words.unit(unit)];
+      })];
   }
 
   /** Take over the scene of the address, if it can be. */

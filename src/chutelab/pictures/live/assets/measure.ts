@@ -20,18 +20,15 @@ function machineOf(scene: Given, numbers: DrawnNumbers): Given {
   return withValues(scene, Object.fromEntries(values));
 }
 
-/** What a run tells, by name: the first events of each kind, and energies (J) by surface. */
+/** What a run tells, by the names of quantities: first events, and energies (J) by surface. */
 function toldByRun(events: Event[], books: number[][], surfaces: string[]) {
-  const told: Record<string, object> = {};
-  surfaces.forEach((name, row) => {
+  const by_surface = Object.fromEntries(surfaces.map((name, row) => {
     const [belt_work, restitution_loss, friction_loss] = books[row];
-    told[name] = { belt_work, restitution_loss, friction_loss };
-  });
-  for (const { kind, t, x, y, before, after } of events) {
-    const velocity = (v: ArrayLike<number>) => ({ vx: v[0], vy: v[1] });
-    if (kind in READ_OFF) {
-      told[READ_OFF[kind]] ??= { t, x, y, before: velocity(before), after: velocity(after) };
-    }
+    return [name, { belt_work, restitution_loss, friction_loss }];
+  }));
+  const told: Record<string, object> = { ledger: { by_surface } };
+  for (const { kind, t, x, y, before: [vx, vy], after: [vx_after, vy_after] } of events) {
+    if (kind in READ_OFF) told[READ_OFF[kind]] ??= { t, x, y, vx, vy, vx_after, vy_after };
   }
   return told;
 }

@@ -10,13 +10,8 @@ import type { Recording } from "./recording.ts";
 import type { Scene } from "./scene.ts";
 import type { Words } from "./words.ts";
 
-type Row = { id: string, symbol: string, unit: string, simulated: number, analytic: number };
-
-const SYMBOLS: Record<string, [string, string]> = {
-  phi1: ["φ₁", "°"], v1: ["v₁", "m/s"], t2: ["t₂", "s"], x2: ["x₂", "m"], v2: ["v₂", "m/s"],
-  v2r: ["v₂′", "m/s"], t3: ["t₃", "s"], x3: ["x₃", "m"], v3: ["v₃", "m/s"], d2: ["d₂", "m"],
-  d3: ["d₃", "m"], x: ["x", "m"], t: ["t", "s"],
-};
+/** By the name of the quantity; its symbol and unit are in the page's data. */
+type Row = { id: string, simulated: number, analytic: number };
 
 /** What is below this is rounding, in any of the units. */
 const ROUNDED = 1e-12;
@@ -47,7 +42,7 @@ function numbersOf(
   const over = (value: (its: Stages, i: number) => number) => mean(stages.map(value));
   // The paper counts x3 back from the plate, and heights down.
   const simulated: Record<string, number> = {
-    phi1: over(({ left }) => (left ? (Math.atan2(left.x, left.y) * 180) / Math.PI : NaN)),
+    phi1_deg: over(({ left }) => (left ? (Math.atan2(left.x, left.y) * 180) / Math.PI : NaN)),
     v1: over(({ left }) => (left ? speed(left.after) : NaN)),
     t2: over(({ left, hit }) => (left && hit ? hit.t - left.t : NaN)),
     x2: over(({ left, hit }) => (left && hit ? hit.x - left.x : NaN)),
@@ -56,21 +51,20 @@ function numbersOf(
     t3: over(({ hit, down }) => (hit && down ? down.t - hit.t : NaN)),
     x3: over(({ hit, down }) => (hit && down ? hit.x - down.x : NaN)),
     v3: over(({ down }) => (down ? speed(down.before) : NaN)),
-    d2: over(({ hit, down }) => (hit && down ? hit.y - down.y : NaN)),
+    y3: over(({ hit, down }) => (hit && down ? hit.y - down.y : NaN)),
     d3: over(({ down }, i) => (down ? pulley + radius[i] - down.y : NaN)),
-    x: over(({ down }) => (down ? down.x : NaN)),
+    "landing.x": over(({ down }) => (down ? down.x : NaN)),
     // With a plate between, t2 and t3 say it.
-    t: over(({ left, hit, down }) => (left && down && !hit ? down.t - left.t : NaN)),
+    "flight.t": over(({ left, hit, down }) => (left && down && !hit ? down.t - left.t : NaN)),
   };
-  const { phi1, x2, x3, y3 } = found;
+  const { phi1, x2, x3 } = found;
   const analytic: Record<string, number> = {
     ...found,
-    phi1: (phi1 * 180) / Math.PI,
-    d2: y3,
-    x: (pulley + radius[0]) * Math.sin(phi1) + x2 - x3,
+    phi1_deg: (phi1 * 180) / Math.PI,
+    "landing.x": (pulley + radius[0]) * Math.sin(phi1) + x2 - x3,
   };
-  return Object.entries(SYMBOLS).map(([id, [symbol, unit]]) => ({
-    id, symbol, unit, simulated: simulated[id], analytic: analytic[id] ?? NaN,
+  return Object.keys(simulated).map((id) => ({
+    id, simulated: simulated[id], analytic: analytic[id] ?? NaN,
   }));
 }
 
@@ -114,11 +108,14 @@ class NumbersPanel {
     const rows = numbersOf(crowd ? stages.slice(0, 1) : stages, numbers,
       machine.pulley?.radius ?? NaN, machine.radius)
       .filter(({ simulated, analytic }) => isFinite(simulated) || isFinite(analytic));
-    this.body.replaceChildren(...rows.map(({ id, symbol, unit, simulated, analytic }) =>
-      html("tr", { "data-id": id },
-        html("th", { scope: "row" }, html("b", {}, symbol), ` ${words.say(`number-${id}`)}, ${unit}`),
+    this.body.replaceChildren(...rows.map(({ id, simulated, analytic }) => {
+      const { symbol, unit } = lab.data.quantities[id];
+      return html("tr", { "data-id": id },
+        html("th", { scope: "row" }, html("b", {}, symbol),
+          ` ${words.say(`number-${id}`)}, ${words.unit(unit)}`),
         ...[simulated, analytic].map((value) =>
-          html("td", {}, words.number(Math.abs(value) < ROUNDED ? 0 : tidy(value)))))));
+          html("td", {}, words.number(Math.abs(value) < ROUNDED ? 0 : tidy(value)))));
+    }));
     this.simulated.textContent = many > 1 && !crowd ? words.say("simulated-mean", { n: many })
       : words.say("simulated");
     const why = reason ? words.say(`reason-${reason.text}`, Object.fromEntries(Object
@@ -151,4 +148,4 @@ class NumbersPanel {
   }
 }
 
-export { NumbersPanel, SYMBOLS, numbersOf };
+export { NumbersPanel, numbersOf };

@@ -1,7 +1,6 @@
 // The paper's symbols in the picture, at what they stand for: angle, speeds, times and lengths of
 // the first particle's transfer.
 
-import { SYMBOLS } from "./numbers.ts";
 import { historyOf } from "./stages.ts";
 import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
@@ -82,7 +81,7 @@ class Symbols {
       const below = view.py(down.y) + 16, beside = Math.max(view.px(hit.x), view.px(down.x));
       this.measure("x3", [view.px(down.x), below], [view.px(hit.x), below],
         [view.py(down.y), view.py(hit.y)]);
-      this.measure("d2", [beside + 22, view.py(hit.y)], [beside + 22, view.py(down.y)],
+      this.measure("y3", [beside + 22, view.py(hit.y)], [beside + 22, view.py(down.y)],
         [view.px(hit.x), view.px(down.x)]);
       const { pulley, radius } = recording.machine;
       if (pulley) {
@@ -103,12 +102,16 @@ class Symbols {
 
   wanted: Label[] = [];
 
+  symbol(id: string): string {
+    return this.stage.lab.data.quantities[id].symbol;
+  }
+
   /** @param y m
    * @param way from the point to its label */
   label(id: string, x: number, y: number, way: number[] = [1, 1]) {
     const { view } = this.stage;
     const side = Math.atan2(way[1], way[0]);
-    this.wanted.push({ text: SYMBOLS[id][0], x: view.px(x), y: view.py(y), side });
+    this.wanted.push({ text: this.symbol(id), x: view.px(x), y: view.py(y), side });
   }
 
   dot({ x, y }: { x: number, y: number }) {
@@ -133,7 +136,7 @@ class Symbols {
         + `M${x} ${view.py(r)}A${r * view.scale} ${r * view.scale} 0 0 1 ${tip[0]} ${tip[1]}`,
     }));
     const way = [Math.sin(0.5 * angle), Math.cos(0.5 * angle)];
-    this.label("phi1", r * way[0], r * way[1], way);
+    this.label("phi1_deg", r * way[0], r * way[1], way);
   }
 
   /** A name at the middle of a flight. */
@@ -154,7 +157,7 @@ class Symbols {
     this.layer.append(svg("path", { d: ends.join(""), class: "thin" }),
       svg("path", { d: `M${from[0]} ${from[1]}L${to[0]} ${to[1]}`, class: "length" }));
     this.wanted.push({
-      text: SYMBOLS[id][0], x: 0.5 * (from[0] + to[0]), y: 0.5 * (from[1] + to[1]),
+      text: this.symbol(id), x: 0.5 * (from[0] + to[0]), y: 0.5 * (from[1] + to[1]),
       side: level ? Math.PI : 0,
     });
   }

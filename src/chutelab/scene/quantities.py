@@ -1,0 +1,321 @@
+"""The registry: every quantity of a run, a row each.
+
+From it come the names that scenes, sweeps, searches and lessons ask for, the keys of the JSON
+summary and their schema, the lists in ``--help``, the columns of sweeps, labels of plots, and what
+the page calls its numbers. `chutelab.results.quantities` reads them off a recording.
+
+A name means the same everywhere. Each particle has a ``landing.x``: the bare name is for scenes of
+one particle, ``particles[0].landing.x`` is that of the first one of several, and with a statistic
+it is the stream's, ``landing.x.mean``. ``landing.count`` is how many have landed, and
+``by_stream.left.landing.x.mean`` is of the particles of one stream. The paper's symbols are those
+of particle 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from itertools import chain
+from typing import Any, Final, Literal, NamedTuple
+
+from chutelab.util.errors import did_you_mean
+
+Of = Literal["particle", "total", "nominal", "lone", "stream", "run"]
+"""What has a quantity: each particle; each particle, and the run their sum; particle 0, and others
+by a statistic; the only particle of a run; a stream, or all together; the run."""
+
+Ending = Literal["any", "scene", "settled"]
+"""How a run must end for a quantity: it does not matter, as the scene says, or without slip."""
+
+
+class Quantity(NamedTuple):
+    """A quantity of a run; ``SURFACE`` in its name and meaning stands for any surface."""
+
+    name: str
+
+    unit: str
+    """ "" for a number of things."""
+
+    meaning: str
+
+    of: Of = "particle"
+
+    needs: tuple[str, ...] = ()
+    """Tables without which a scene has none."""
+
+    ending: Ending = "any"
+
+    columns: tuple[str, ...] = ()
+    """Statistics that are columns of a sweep; "" is the quantity itself."""
+
+    symbol: str = ""
+    """What the page calls it in short, the paper's symbol if there is one."""
+
+    theory: bool = False
+    """Whether the closed form has it, too."""
+
+    together: str = ""
+    """What a run of several particles has in its place."""
+
+    @property
+    def field(self) -> str:
+        """Its name in `chutelab.theory.Transfer`, where angles are in radians."""
+        return self.name.removeprefix(FIRST).removesuffix("_deg")
+
+    @property
+    def kind(self) -> str:
+        """What it is an example of: errors of lengths are measured by a length, and so on."""
+        return KINDS[self.unit]
+
+
+KINDS: Final = {
+    "degrees": "angle", "s": "time", "m": "length", "m/s": "speed", "J": "energy", "W": "power",
+}  # fmt: skip
+"""Kinds of quantities by their units."""
+
+STATISTICS: Final = {
+    "mean": "mean", "spread": "standard deviation", "min": "least", "max": "largest",
+    "q02": "2 % have less", "q50": "median", "q98": "98 % have less",
+}  # fmt: skip
+"""What is told of all particles together; those without a value do not count."""
+
+EVENTS: Final = {
+    "separation": ("incoming", "the separation", "left the incoming belt"),
+    "impact": ("plate", "the impact on the plate", "met the plate"),
+    "landing": ("outgoing", "the landing on the belt itself", "touched the outgoing belt itself"),
+    "arrival": ("outgoing", "the arrival on the belt or its load", "arrived on the outgoing belt"),
+    "impact.SURFACE": ("", "the impact on SURFACE", "met SURFACE"),
+}
+"""What happens to a particle, for the first time: the table that it needs, a noun and a verb."""
+
+NEEDED: Final = {event: EVENTS[event][0] for event in ("separation", "impact", "landing")}
+"""Events of the transfer, and their surfaces; impacts on free surfaces go by name."""
+
+ENTRIES: Final = ("belt_work", "restitution_loss", "friction_loss")
+ENDINGS: Final = ("time", "landed", "settled", "exit", "stopped", "unreleased")
+"""Why a track ends; the last is that of a particle that was not released until the run was over."""
+
+FIRST: Final = "particles[0]."
+"""What a quantity of particle 0 begins with; it has to where there are several particles."""
+
+BOTH, MEAN, ITSELF = ("mean", "spread"), ("mean",), ("",)
+PAID: Final = "ledger.by_surface.outgoing.belt_work"
+HEAT: Final = "ledger.by_surface.outgoing.friction_loss"
+
+
+def _event(event: str) -> Iterator[Quantity]:
+    """Yield the rows of what is known of each particle at an event, and how many it happened to."""
+    home, what, verb = EVENTS[event]
+    needs = (home,) if home else ()
+    for key, unit, text, swept in (
+        ("t", "s", "time of {}", {"landing": MEAN}),
+        ("x", "m", "x of {}", {"landing": BOTH, "arrival": BOTH}),
+        ("y", "m", "y of {}", {"landing": MEAN}),
+        ("vx", "m/s", "forward velocity just before {}", {"landing": BOTH, "arrival": BOTH}),
+        ("vy", "m/s", "upward velocity just before {}", {"landing": BOTH}),
+        ("vx_after", "m/s", "forward velocity just after {}", {}),
+        ("vy_after", "m/s", "upward velocity just after {}", {}),
+        ("count", "", f"particles that {verb}", {"impact": ITSELF}),
+    ):
+        if not (key.endswith("_after") and event in ("separation", "arrival")):
+            of: Of = "stream" if key == "count" else "particle"
+            columns = swept.get(event, ())
+            yield Quantity(
+                f"{event}.{key}", unit, text.format(what), of, needs, columns=columns,
+                symbol=key if event == "landing" and of == "particle" else "",
+            )  # fmt: skip
+
+
+def _paper(name: str, symbol: str, unit: str, meaning: str) -> Quantity:
+    """Return a row of what the paper tells of a transfer."""
+    needs = ("incoming", "plate")
+    return Quantity(name, unit, meaning, "nominal", needs, symbol=symbol, theory=True)
+
+
+def _paid(name: str, unit: str, meaning: str, together: str, *, theory: bool = True) -> Quantity:
+    """Return a row of what the outgoing belt pays until nothing slips on it any more."""
+    return Quantity(
+        name, unit, meaning, "lone", ("outgoing",), "settled", theory=theory, together=together
+    )
+
+
+def _run(
+    name: str, meaning: str, unit: str = "J", of: Of = "run", needs: str = "", **swept: Any
+) -> Quantity:
+    """Return a row of what there is once a run."""
+    return Quantity(name, unit, meaning, of, tuple(needs.split()), "scene", **swept)
+
+
+REGISTRY: Final = {
+    row.name: row
+    for row in (
+        *chain.from_iterable(map(_event, EVENTS)),
+        Quantity("flight.t", "s", "time of flight from the incoming belt",
+                 needs=("incoming",), symbol="t"),
+        Quantity("track.t", "s", "time from the release to the end", ending="scene", columns=MEAN),
+        Quantity("ended.t", "s", "time at which the track ends", ending="scene"),
+        Quantity("ended.x", "m", "x where the track ends", ending="scene"),
+        Quantity("ended.y", "m", "y where the track ends", ending="scene"),
+        _paper("phi1_deg", "φ₁", "degrees", "angle of separation"),
+        _paper("v1", "v₁", "m/s", "speed at separation"),
+        _paper("t2", "t₂", "s", "time of flight to the plate"),
+        _paper("x2", "x₂", "m", "distance forward to the plate"),
+        _paper("y2", "y₂", "m", "fall to the plate"),
+        _paper("v2", "v₂", "m/s", "speed at the plate"),
+        _paper("phi2_deg", "φ₂", "degrees", "angle to the plate, before"),
+        _paper("phi2r_deg", "φ₂′", "degrees", "angle to the plate, after"),
+        _paper("v2r", "v₂′", "m/s", "speed after the impact"),
+        _paper("t3", "t₃", "s", "time of flight to the landing"),
+        _paper("x3", "x₃", "m", "distance back from the plate"),
+        _paper("y3", "d₂", "m", "fall from impact to landing"),
+        _paper("v3x", "v₃ₓ", "m/s", "landing velocity, back"),
+        _paper("v3y", "v₃ᵧ", "m/s", "landing velocity, down"),
+        _paper("v3", "v₃", "m/s", "landing speed"),
+        _paper("d3", "d₃", "m", "height of the transfer"),
+        _paper("dEk", "ΔEₖ", "J", "the paper's energy, Eq. (14)"),
+        _paper("P", "P", "W", "the paper's power, Eq. (15)"),
+        _paid("belt_work", "J", "belt work until no slip", PAID),
+        _paid("slip_heat", "J", "slip heat until no slip", HEAT),
+        _paid("power", "W", "belt work until no slip, by the rate", "ledger.power", theory=False),
+        _run("contacts", "contacts of particles with anything", ""),
+        _run("misses", "particles that never arrived", "", needs="outgoing", columns=ITSELF),
+        *(_run(f"ended.{why}", f"particles whose track ended: {why}", "") for why in ENDINGS),
+        _run("ledger.belt_work", "what the drives of all belts pay", of="total"),
+        _run("ledger.restitution_loss", "loss of all bounces", of="total", columns=ITSELF),
+        _run("ledger.friction_loss", "heat of all slip", of="total"),
+        _run("ledger.residual", "energy that the ledger cannot explain: the numerical error",
+             columns=ITSELF),
+        _run("ledger.turned_over", "energy turned over, which the residual is measured by"),
+        _run("ledger.kinetic.start", "kinetic energy at the releases"),
+        _run("ledger.kinetic.end", "kinetic energy at the ends of the tracks"),
+        _run("ledger.potential.start", "potential energy at the releases"),
+        _run("ledger.potential.end", "potential energy at the ends of the tracks"),
+        _run(PAID, "what the outgoing belt's drive pays", needs="outgoing", columns=ITSELF),
+        _run(HEAT, "heat of the slip on the outgoing belt", needs="outgoing", columns=ITSELF),
+        _run("ledger.power", "the outgoing belt's work per particle, times the rate of all the"
+             " width", "W", needs="outgoing", columns=ITSELF),
+        _run("ledger.by_surface.SURFACE.belt_work", "what the drive of SURFACE pays"),
+        _run("ledger.by_surface.SURFACE.restitution_loss", "loss of the bounces on SURFACE"),
+        _run("ledger.by_surface.SURFACE.friction_loss", "heat of the slip on SURFACE"),
+        _run("error.max", "largest relative error of particle 0 against the theory", "",
+             columns=ITSELF),
+    )
+}  # fmt: skip
+"""Every quantity by its name. What the ledger has is counted up to ``run.until``."""
+
+THEORY: Final = {row.field: row for row in REGISTRY.values() if row.theory}
+"""What the closed form has, too, by its name there."""
+
+FORMER: Final = {
+    "time": "track.t.mean", "restitution_loss": "ledger.restitution_loss",
+    "friction_loss": "ledger.friction_loss", "residual": "ledger.residual", "error": "error.max",
+    "plate_hits": "impact.count",
+    **{f"landing.{key}_spread": f"landing.{key}.spread" for key in ("x", "vx", "vy")},
+}  # fmt: skip
+"""Names that quantities had once, and have now."""
+
+
+def _told(row: Quantity, statistic: str) -> Quantity | None:
+    """Return a statistic of a quantity; "" is the quantity itself."""
+    if not statistic:
+        return row
+    if row.of not in ("particle", "nominal") or statistic not in STATISTICS:
+        return None
+    meaning = f"{row.meaning}, {STATISTICS[statistic]}"
+    return row._replace(name=f"{row.name}.{statistic}", meaning=meaning, of="stream", theory=False)
+
+
+COLUMNS: Final = {
+    row.name: row
+    for base in REGISTRY.values()
+    for statistic in base.columns
+    if (row := _told(base, statistic)) is not None
+}
+"""The columns of numbers of a sweep."""
+
+
+def lookup(name: str, surfaces: Collection[str], streams: Collection[str] = ()) -> Quantity | None:
+    """Return a quantity by its name; None if the scene has none such.
+
+    Names are such as ``x2``, ``landing.x``, ``particles[0].landing.x``, ``landing.x.mean``,
+    ``arrival.vx.spread``, ``flight.t``, ``impact.ramp.t``, ``landing.count``, ``ended.settled``,
+    ``ledger.belt_work``, ``ledger.kinetic.end`` or
+    ``ledger.by_surface.outgoing.belt_work``; the surfaces are all that the scene has. What has a
+    statistic or a count is also of one stream, by its name: ``by_stream.left.landing.x.mean``.
+
+    Examples
+    --------
+    >>> lookup("landing.x.mean", ["incoming", "outgoing"]).unit, lookup("impact.t", [])
+    ('m', None)
+    """
+    own = name.removeprefix(FIRST)
+    found = _row(own, surfaces)
+    if own != name:
+        single = found is not None and found.of not in ("stream", "run")
+        return found._replace(name=name, of="nominal") if found and single else None
+    match name.split(".", 2):
+        case ["by_stream", stream, rest] if stream in streams:
+            found = lookup(rest, surfaces)
+            return found._replace(name=name) if found and found.of == "stream" else None
+    if found is None:
+        base, _, statistic = name.rpartition(".")
+        row = _row(base, surfaces)
+        found = _told(row, statistic) if row and statistic else None
+    return found
+
+
+def _row(name: str, surfaces: Collection[str]) -> Quantity | None:
+    """Return the row of a quantity without statistic."""
+    row = REGISTRY.get(name)
+    if row is None or "SURFACE" in name:
+        parts = name.split(".")
+        place = {"impact": 1, "ledger": 2}.get(parts[0], len(parts))
+        surface = parts[place] if place < len(parts) else ""
+        row = REGISTRY.get(".".join([*parts[:place], "SURFACE", *parts[place + 1 :]]))
+        there = surface in surfaces or (place == 2 and surface == "particles")
+        if row is None or not there or (place == 1 and surface in NEEDED.values()):
+            return None
+        row = row._replace(name=name, meaning=row.meaning.replace("SURFACE", surface))
+    return row if all(table in surfaces for table in row.needs) else None
+
+
+def whose(row: Quantity, count: int) -> str:
+    """Say how a name has to go on where there are several particles; "" if it says whose it is.
+
+    Examples
+    --------
+    >>> whose(REGISTRY["landing.x"], 1)
+    ''
+    >>> whose(REGISTRY["landing.x"], 200)
+    'of 200 particles: particles[0].landing.x, or landing.x.mean of the stream'
+    """
+    if count <= 1 or row.of not in ("particle", "lone"):
+        return ""
+    together = row.together or f"{row.name}.mean"
+    return f"of {count} particles: {FIRST}{row.name}, or {together} of the stream"
+
+
+def suggestion(name: str, surfaces: Collection[str]) -> str:
+    """Say what a quantity is called now, or which one was probably meant, or which there are."""
+    if name in FORMER:
+        return f"it is called {FORMER[name]} now"
+    missing = [table for table in NEEDED.values() if table not in surfaces]
+    if row := lookup(name, [*surfaces, *missing]):
+        return f"it needs {' and '.join(f'[{table}]' for table in row.needs if table in missing)}"
+    some = [f"{event}.x" for event, home in NEEDED.items() if home in surfaces]
+    keys = ", ".join([*some, "contacts", "ledger.belt_work"])
+    theirs = "phi1_deg to slip_heat, " if {"incoming", "plate"} <= {*surfaces} else ""
+    there_are = f"there are {theirs}{keys} and other keys of `chutelab run --json`"
+    return did_you_mean(name, _names(surfaces), there_are)
+
+
+def _names(surfaces: Collection[str]) -> list[str]:
+    """Return the names of a scene with these surfaces, or with the first ones of very many."""
+    found: list[str] = []
+    for row in REGISTRY.values():
+        statistics = STATISTICS if row.of == "particle" else ()
+        # Of a thousand surfaces some will do: looking for likeness takes long.
+        for surface in list(surfaces)[:50] if "SURFACE" in row.name else [""]:
+            name = row.name.replace("SURFACE", surface)
+            if lookup(name, surfaces):
+                found += [name, *(f"{name}.{statistic}" for statistic in statistics)]
+    return found

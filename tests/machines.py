@@ -7,8 +7,10 @@ from math import cos, inf, sin
 
 import numpy as np
 
+from chutelab.core.module import Module
 from chutelab.machine import build
 from chutelab.machine.parts import Arcs, Particle
+from chutelab.machine.rows import lay
 from chutelab.scene import from_dict
 
 PERPENDICULAR = """
@@ -48,6 +50,12 @@ def scene_of(**tables):
         else:
             document[name] = values
     return build(from_dict(document))
+
+
+def nominal(scene):
+    """Return where free flight of the nominal particle begins, its velocity, and where it hits."""
+    found = lay(Module(), scene, scene.met(scene.kinds[0], "incoming")[1]).nominal
+    return found["position"], found["velocity"], found["hit"]
 
 
 def face(name, start, end, **values):

@@ -1,4 +1,4 @@
-"""What gets loaded: text waits for no pictures, the exact engine for no pymunk."""
+"""What gets loaded: text waits for no pictures, a machine for the core alone."""
 
 import ast
 import json
@@ -60,7 +60,7 @@ def loaded_by(*arguments, cwd=None):
         (["materials", "coal", "--json"], {"click", "pydantic"}),
         (["schema"], {"click", "pydantic"}),
         (["new", "-"], {"click", "pydantic"}),
-        (["check", "perpendicular"], {"click", "pydantic", "numpy", "rich"}),
+        (["check", "perpendicular"], {"click", "pydantic", "numpy", "rich", "wasmtime"}),
         (["tables", "4", "--json"], {"click", "numpy"}),
         (["run", "perpendicular", "--json"], {"click", "pydantic", "numpy", "wasmtime"}),
         (["run", "perpendicular", "--quiet"], {"click", "pydantic", "numpy", "wasmtime"}),

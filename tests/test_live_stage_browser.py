@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
+from io import BytesIO
 
 import numpy as np
 import pytest
+from PIL import Image
 
 playwright = pytest.importorskip(
     "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
 )
 
-PIXELS = """([x, y]) => {
-  const { canvas } = chutelab.stage, dense = canvas.width / canvas.clientWidth;
-  return [...canvas.getContext("2d").getImageData(x * dense, y * dense, 1, 1).data];
-}"""
+
+def pixel(page, place):
+    """The colour of a pixel of the window."""
+    image = Image.open(BytesIO(page.screenshot())).convert("RGB")
+    return image.getpixel(tuple(map(round, place)))
+
 
 SCREEN = """([x, y]) => {
   const { view, front } = chutelab.stage, box = front.getBoundingClientRect();
@@ -127,21 +131,19 @@ def test_belts_run_with_their_speed_and_wheels_turn_with_them(shown):
 
 def test_particles_have_the_colour_of_their_material_or_of_their_speed(shown):
     page = shown("perpendicular", ["particle.material=glass", "particle.radius=0.03"])
-    middle = """() => { const state = chutelab.lab.recording.tracks[0].state(chutelab.lab.t);
-      return [chutelab.stage.view.px(state.x), chutelab.stage.view.py(state.y)]; }"""
-    red, _, blue, alpha = page.evaluate(PIXELS, page.evaluate(middle))
-    assert alpha == 255
+    ball = "chutelab.lab.recording.tracks[0].state(chutelab.lab.t)"
+    x, y = page.evaluate(SCREEN, page.evaluate(f"(({{ x, y }}) => [x, y])({ball})"))
+    red, _, blue = pixel(page, (x, y))
     assert blue > red  # glass is bluish
     page.locator("#show summary").click()
     page.click("#hue-speed")
     page.evaluate("() => new Promise((then) => requestAnimationFrame(then))")
-    x, y = page.evaluate(middle)
-    found = page.evaluate(PIXELS, [x, y + 3])[:3]
+    found = pixel(page, (x, y + 3))
     most = float(re.findall(r"([\d.]+) m/s", page.inner_text(".ramp"))[0])
     # 2 m/s on the belt, of eight equal steps up to the largest.
     step = int(8 * 2.0 / most)
     colour = page.evaluate(f"chutelab.stage.colour('v{step}')").strip().lstrip("#")
-    assert found == [int(colour[n : n + 2], 16) for n in (0, 2, 4)]
+    assert found == tuple(int(colour[n : n + 2], 16) for n in (0, 2, 4))
 
 
 def test_the_projector_shows_the_machine_large_and_little_else(shown):
@@ -156,3 +158,32 @@ def test_the_projector_shows_the_machine_large_and_little_else(shown):
     page.click("#full")
     assert page.evaluate(size) == before
     assert page.locator("#bench").is_visible()
+
+
+LABELS = """() => {
+  const home = chutelab.stage.front.getBoundingClientRect();
+  return [...document.querySelectorAll(".symbols text, .surfaces .on-frame, .scale text")]
+    .map((text) => [
+      text.textContent, text.getBoundingClientRect(), text.closest(".symbols") !== null])
+    .map(([text, { left, right, top, bottom }, own]) =>
+      [text, [left - home.left, right - home.left, top - home.top, bottom - home.top], own]);
+}"""
+
+
+@pytest.mark.parametrize("size", [(1366, 768), (1920, 1080), (390, 844)])
+@pytest.mark.parametrize(
+    "name",
+    ["perpendicular", "inclined-20", "inclined-60", "inclined-conveyor", "low-speed", "cascade"],
+)
+def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
+    page = shown(name, viewport={"width": size[0], "height": size[1]})
+    found, free = page.evaluate(LABELS), page.evaluate("chutelab.stage.view.free")
+    assert sum(own for *_, own in found) >= 3
+    for n, (text, (left, right, top, bottom), own) in enumerate(found):
+        if own:
+            assert free["left"] - 4 <= left < right <= free["right"] + 4, text
+            assert free["top"] - 4 <= top < bottom <= free["bottom"] + 4, text
+        for other, (left2, right2, top2, bottom2), own2 in found[n + 1 :]:
+            # A line of text is taller than its letters.
+            apart = min(right, right2) - max(left, left2), min(bottom, bottom2) - max(top, top2)
+            assert not (own or own2) or min(apart) <= 5.0, (text, other, apart)

@@ -14,8 +14,9 @@ from chutelab import scene
 from chutelab.engines import contact
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.machine.releases import DEEP, _free_height, squeeze
+from chutelab.machine.releases import DEEP, squeeze
 from chutelab.results import Kind
+from chutelab.scene.variants import family
 
 G, V, r = 9.81, 2.0, 0.0063
 RC = 0.1 + r
@@ -138,25 +139,58 @@ def test_in_a_bed_with_no_room_everybody_is_due_all_the_same():
     assert np.ptp(found.position[:, 1]) <= 0.025
 
 
-def one_after_the_other(rng, dx, dy, reach, bed):
-    """Draw heights until one is free, a thousand at most, of which the last is kept as it is."""
-    for _ in range(1000):
-        height = bed * rng.random()
-        if all(x * x + (y - height) ** 2 >= r * r for x, y, r in zip(dx, dy, reach, strict=True)):
-            break
-    return height
+def bed_of_numpy(seeds, count, rate, height, speed, spread, radii, fall, floor):
+    """Heights, speeds and radii of a bed: all drawn, then each height anew until it is free.
+
+    It is kept as it is after a thousand.
+    """
+    rng, t = np.random.default_rng(seeds), np.arange(count) / rate
+    y = height * rng.random(count)
+    u = speed + spread * rng.uniform(-1.0, 1.0, count)
+    size = rng.uniform(*radii, count) if radii[0] < radii[1] else np.full(count, radii[0])
+    y[0], u[0], size[0] = 0.0, speed, 0.5 * sum(radii)
+    for i in range(1, count):
+        age = t[i] - t[:i]
+        dx, dy = u[:i] * age, np.maximum(y[:i] - fall * age**2, floor)
+        for _ in range(1000):
+            if (dx**2 + (dy - y[i]) ** 2 >= (size[:i] + size[i]) ** 2).all():
+                break
+            y[i] = height * rng.random()
+    return y, u, size
 
 
-@given(seed=st.integers(0, 10_000), many=st.integers(1, 60), bed=st.floats(0.01, 0.5))
-def test_heights_are_those_that_are_drawn_one_after_the_other(seed, many, bed):
-    """A thousandth draw is not looked at, for then the particle waits."""
-    known = np.random.default_rng(seed)
-    dx, dy = known.uniform(-0.012, 0.012, many), known.uniform(-0.01, bed + 0.01, many)
-    reach = known.uniform(0.008, 0.012, many)
-    slow, quick = (np.random.default_rng(seed + 1) for _ in range(2))
-    wanted = one_after_the_other(slow, dx, dy, reach, bed)
-    assert _free_height(dx, dy, reach, bed, quick) == wanted
-    assert quick.random() == slow.random()
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.sampled_from([0, 2**32 - 1, 2**32, 2**63 - 1]) | st.integers(0, 2**63 - 1),
+    second=st.booleans(), carried=st.booleans(), count=st.integers(2, 100),
+    rate=st.floats(50.0, 5000.0), height=st.floats(0.01, 0.3), spread=st.floats(0.1, 0.5),
+    radii=st.sampled_from([(0.004, 0.004), (0.003, 0.008)]),
+)  # fmt: skip
+def test_beds_are_those_of_numpys_random_numbers(
+    seed, second, carried, count, rate, height, spread, radii
+):
+    """To the last bit, for seeds of one word and of two, of the first stream and of others."""
+    bed = {"count": count, "rate": rate, "bed_height": height, "seed": seed, "interact": True}
+    if not carried:
+        bed |= {"at": [0.0, 3.0], "velocity": [1.5, 0.0], "speed_spread": spread}
+    other = {"at": [0.0, 9.0], "velocity": [0.0, 0.0]}
+    tables = {
+        "incoming": {"speed": V, "pulley_radius": 0.1},
+        "particle": {"radius": list(radii) if radii[0] < radii[1] else radii[0]},
+        "stream": [other, bed] if second else [bed],
+    }
+    machine = build(scene.from_dict(tables))
+    found, own = machine.releases, slice(int(second), None)
+    speed, spread, fall, floor = (V, 0.0, 0.0, 0.0) if carried else (1.5, spread, 0.5 * G, -np.inf)
+    seeds = [seed, 1] if second else seed
+    y, u, size = bed_of_numpy(seeds, count, rate, height, speed, spread, radii, fall, floor)
+    mean = 0.5 * sum(radii)
+    lowest = 0.1 + mean if carried else 3.0
+    rides = size - mean if carried else 0.0
+    assert found.carried[own].tolist() == [carried] * count
+    assert found.position[own, 1].tolist() == (lowest + (y + rides)).tolist()
+    assert found.velocity[own].tolist() == [[v, 0.0] for v in u.tolist()]
+    assert np.broadcast_to(machine.particle.radius, machine.count)[own].tolist() == size.tolist()
 
 
 def packed_at_once(left, bottom, right, top, radius, seed):
@@ -172,6 +206,20 @@ def packed_at_once(left, bottom, right, top, radius, seed):
                 places.append([x, bottom + room + row * rise])
     moved = np.random.default_rng(seed).uniform(-1.0, 1.0, (len(places), 2))
     return np.array(places) + 0.01 * radius * moved
+
+
+def test_each_of_a_family_starts_as_it_would_by_itself():
+    one = scene.load("inclined-conveyor", ["stream.count=1"])
+    columns = {
+        "incoming.incline_deg": np.array([0.0, 4.0, -3.0, 12.0]),
+        "incoming.pulley_radius": np.array([0.2, 0.25, 0.2, 0.3]),
+        "stream.start": np.array([0.0, 0.5, 0.0, 2.0]),
+    }
+    found = vars(build(family(one, columns)).releases)
+    for n in range(4):
+        alone = vars(build(one.with_values({key: own[n] for key, own in columns.items()})).releases)
+        for name in ("t", "position", "velocity", "carried"):
+            assert found[name][n].tobytes() == alone[name][0].tobytes()
 
 
 @pytest.mark.parametrize("count", [10, 20_000])

@@ -119,6 +119,7 @@ belt-landing | | plate.restitution=0:1.2:4 outgoing.friction=0.1,0.5 outgoing.re
 low-speed | | incoming.speed=0:1:5 incoming.pulley_radius=0.05,0.2
 slip | | incoming.speed=0.1:1:3 incoming.friction=0:1:3
 slip | particle.spin=true | incoming.speed=0.3,1 incoming.friction=0.2,0.5
+free-fall | stream.count=1 | surface.ramp.opens_at=0.1,0.3,0.6 stream.start=0,0.2
 free-fall | stream.count=1 | gravity=0,9.81 surface.ramp.restitution=0,0.5 surface.floor.speed=-1,1
 """  # noqa: E501
 """A scene, what is set, what is varied."""

@@ -8,6 +8,7 @@ from math import isnan, nan, pi
 import numpy as np
 import pytest
 
+from chutelab.core.module import Module
 from chutelab.util.trig import FEW, LARGEST_ANGLE, RADIANS, arc_cos, atan2, hypot, sin_cos
 
 LONG = np.longdouble
@@ -95,3 +96,23 @@ def test_a_quarter_turn_is_as_far_from_its_double_as_it_is():
     """π to 60 digits: the cosine of the double nearest to π/2 is what that lacks."""
     exact = Fraction("3.14159265358979323846264338327950288419716939937510582097494") / 2
     assert sin_cos(pi / 2.0)[1] == float(exact - Fraction(pi / 2.0))
+
+
+def test_the_core_has_the_same_bits():
+    core = Module()
+    for angles in ANGLES.values():
+        up, across = sin_cos(angles)
+        assert [core.call("sine", angle) for angle in angles.tolist()] == up.tolist()
+        assert [core.call("cosine", angle) for angle in angles.tolist()] == across.tolist()
+    y, x = RNG.uniform(-20.0, 20.0, (2, 20_000))
+    found = [core.call("angle_of", *pair) for pair in zip(y.tolist(), x.tolist(), strict=True)]
+    assert found == atan2(y, x).tolist()
+    directions = [(0.0, 0.0), (-0.0, -1.0), (1.0, 1.0), (1.0, 0.0), (-1.0, 0.0), (-1.0, -1.0)]
+    assert [core.call("angle_of", *pair) for pair in directions] == [
+        atan2(*pair) for pair in directions
+    ]
+    cosines = RNG.uniform(-1.0, 1.0, 20_000)
+    found = [core.call("angle_of_cosine", one) for one in cosines.tolist()]
+    assert found == arc_cos(cosines).tolist()
+    assert all(isnan(core.call(name, 1.5e6)) for name in ("sine", "cosine"))
+    assert isnan(core.call("angle_of_cosine", 1.5))

@@ -17,10 +17,16 @@ from pathlib import Path
 
 CORE = Path(__file__).parents[1] / "src" / "chutelab" / "core"
 
+EXPORTS = (
+    "run", "prepare", "world", "build", "plan", "draw", "drawing", "sine", "cosine", "angle_of",
+    "angle_of_cosine", "__heap_base",
+)  # fmt: skip
+"""What a host can call."""
+
 FLAGS = (
     "-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O3", "-flto", "-Wall",
-    "-Wextra", "-Werror", "-ffp-contract=off", "-fvisibility=hidden", "-Wl,--export=run",
-    "-Wl,--export=prepare", "-Wl,--export=world", "-Wl,--export=__heap_base", "-Wl,--strip-all",
+    "-Wextra", "-Werror", "-ffp-contract=off", "-fvisibility=hidden",
+    *(f"-Wl,--export={name}" for name in EXPORTS), "-Wl,--strip-all",
 )  # fmt: skip
 """No fused multiply-add: every engine that runs the file has to round alike."""
 

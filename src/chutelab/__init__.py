@@ -16,8 +16,10 @@ The rooms of the house; each imports only those below it:
 - `results`: recordings, ledger, comparison, summary;
 - `theory` and `machine`: the paper in closed form; a scene resolved to arrays for the engines;
 - `mechanics`: flight, impact, ride;
-- `scene`: scene files; `core`: the contact engine and the laws of a run, in C; `util`: small
-  things for all.
+- `scene`: scene files;
+- `core`: what runs in Python and in the page alike, in C: builds machines, runs contact,
+  judges runs;
+- `util`: small things for all.
 
 What most people need is here: `scenes`, `load`, `Scene`, `SceneError`, `simulate`, `Recording`,
 `Kind`, `LawWarning`, `theory`, `compare`, `measure`, `sweep`, `solve`, `overlay`, `animate`,

@@ -6,12 +6,14 @@ const modules = pathToFileURL(`${process.argv[2]}/`);
 export const load = (name) => import(new URL(name, modules));
 
 const { startCore } = await load("core.js");
+const { startPlan } = await load("plan.js");
 const { Recording } = await load("recording.js");
 
 const home = new URL("../../src/chutelab/core/", import.meta.url);
 const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
-export const core = await startCore(
-  await WebAssembly.compile(readFileSync(new URL("core.wasm", home))), layout);
+const module = await WebAssembly.compile(readFileSync(new URL("core.wasm", home)));
+export const core = await startCore(module, layout);
+await startPlan(module, layout);
 
 /** The recording of a run, up to so many events, or whole. */
 export function recordingOf(machine, many = Infinity) {

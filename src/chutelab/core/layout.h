@@ -239,6 +239,129 @@ typedef struct {
     double skip;         /* 1/s; SKIP in a step: radii that it may go */
 } World;
 
+/* A scene as one row of numbers: keys of its tables, by their own names, NaN where nothing is given.
+   Tables follow each other in the order of `Plan`'s counts, those of one kind in that of the file. A
+   family of scenes are several such rows. All of these structs are of doubles alone. */
+
+enum DropFrom { FROM_IMPACT, FROM_TOP };
+
+typedef struct {
+    double gravity;
+    double crowded;         /* whether particles meet each other */
+} SceneKeys;
+
+/* Of a kind of particles. */
+typedef struct {
+    double radius;          /* m; the mean */
+    double span[2];         /* m; of radii that differ */
+    double moment;          /* I/(m r2); 0 if it never turns */
+    double corners;         /* of a box or polygon, see `Drawing.corners`; 0 of what is round */
+} ParticleKeys;
+
+typedef struct {
+    double kind;            /* which of the particles it consists of */
+    double at[2], to[2], fill[4], velocity[2];
+    double count, rate, start, bed_height, speed_spread;
+    double seed[2];         /* its lower 32 bits and the others */
+    double at_once;         /* whether all are released at once */
+} StreamKeys;
+
+typedef struct {
+    double speed, pulley_radius, length, incline_deg;
+    double friction;        /* with the nominal particle; INFINITY is adhesion */
+    double adheres;         /* whether adhesion is what the belt's own table says */
+} IncomingKeys;
+
+/* With a pivot it is a further plate, else the damping plate. */
+typedef struct { double distance, pivot_height, pivot[2], angle_deg, above, below; } PlateKeys;
+
+typedef struct { double speed, drop, drop_from, start, length; } OutgoingKeys;
+
+typedef struct { double from[2], to[2], pulley_radius, speed; } ConveyorKeys;
+
+typedef struct {
+    double corners;         /* of `points`, which stand behind all tables, surface by surface; 0: an arc */
+    double center[2], radius, from_deg, to_deg, speed, opens_at, closes_at;
+    double repeat[6];       /* up to two of count, dx, dy */
+} SurfaceKeys;
+
+/* Pieces of surfaces. Speeds are along the tangent, and clockwise round an arc. */
+typedef struct {                                                                         /* [out] */
+    double start[2], end[2], tangent[2], length, speed;
+    double appears, vanishes; /* s; it is there from the one to the other */
+    int surface;              /* which it belongs to */
+} Segment;
+
+typedef struct {                                                                         /* [out] */
+    double center[2], radius, begin, extent, speed; /* `Surface` says more */
+    double appears, vanishes;
+    int surface;
+} Arc;
+
+/* What contradicts itself: no impact to place the outgoing belt by, a plate without a length, or
+   one that the impact lies above or below of. */
+enum Contradiction { SOUND, NO_IMPACT, NO_LENGTH, HIT_ABOVE, HIT_BELOW };
+
+/* The flight that places plate and belt: that of particle 0, without spread. */
+typedef struct {                                                                         /* [out] */
+    double position[2], velocity[2]; /* where it begins; NaN if it never leaves forwards */
+    double hit[2];          /* m; its centre as it meets the plate's unbounded line; NaN if never */
+    double along;           /* m; how far above the pivot that is, along the plate */
+    double below;           /* m; how far the damping plate reaches below its pivot */
+    int contradiction;
+    int off;                /* the hit is above or below the plate: HIT_ABOVE, HIT_BELOW, or SOUND */
+} Nominal;
+
+/* Machines: rows of numbers in, surfaces out; of each member of a family as many. */
+typedef struct {
+    double *rows;           /* [in] (members, width) */
+    int members, width;     /* [in] */
+    int particles, streams, incoming, plates, outgoing, conveyors, surfaces; /* [in] counts */
+    Segment *segments;      /* [out] (members, segment_count) */
+    Arc *arcs;
+    Nominal *nominal;       /* [out] (members) */
+    int segment_room, arc_room;   /* [in] of all members */
+    int segment_count, arc_count; /* [out] of each */
+} Plan;
+
+/* Where and how a particle starts. */
+typedef struct { double t, position[2], velocity[2], radius; } Start;                     /* [out] */
+
+/* An earlier particle as one that is drawn sees it: how far it has come (m), and how far apart they
+   have to be. */
+typedef struct { double dx, dy, reach; int particle, next; } Near;
+
+/* Why releases of a scene cannot be drawn: a box has room for so many of this radius only, or one would
+   start inside a surface, at this distance from it instead of `reach` (m). */
+enum Refused { ACCEPTED, BOX_FULL, RELEASE_INSIDE };
+
+typedef struct {                                                                         /* [out] */
+    double distance, reach;
+    int why, stream;
+    int particle;           /* which of the scene's, or how many */
+    int surface;
+} Refusal;
+
+/* The releases of the machines of a `Plan`, of each member as many, stream by stream. */
+typedef struct {
+    Start *starts;          /* [out] (members, count) */
+    Refusal *refusals;      /* [out] (members) */
+    int *carried;           /* [out] (members, streams) whether the incoming belt carries them by
+                               adhesion */
+    double *corners;        /* [in] of boxes and polygons round their centroid, m; kind by kind */
+    Near *near;             /* (count) */
+    int *links;             /* (count) */
+    int *heads;             /* (head_room) lists of a grid */
+    int *listed;            /* (pieces) */
+    int count;              /* [in] particles of each member */
+    int head_room;          /* [in] a power of two */
+    int looks;              /* [in] particles and places that a call looks at before it comes back */
+    /* how far it has come */
+    int left;               /* of the looks of this call */
+    int member, stream, first, is_begun, next, near_count, found, listed_count;
+    double looked, cell;
+} Drawing;
+
 /* ---- What a run is judged by: a subject of its own, which shares nothing with the engine's. ---- */
 
 /* The laws, in the order in which they are told. */

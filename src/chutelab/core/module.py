@@ -29,10 +29,12 @@ PAGE = 65536
 LARGE = 64 * 2**20
 """Bytes beyond which a used memory is let go rather than kept for the next run."""
 
-SUBJECTS = ("World", "Laws")
+SUBJECTS = ("World", "Plan", "Drawing", "Laws")
 """Structs of layout.h of which the core has one each."""
 
 TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}
+
+REAL, INTEGER = np.dtype(TYPES["double"]), np.dtype(TYPES["int"])
 
 
 @cache
@@ -111,22 +113,24 @@ class Module:
         except wasmtime.WasmtimeError as error:
             # Addresses for all that it may grow to are set apart, and there may be too few.
             raise MemoryError(" ".join(str(error).split())) from error
+        self._functions: dict[str, Any] = {}
         self.call("_initialize")
         self._memory: Any = self._exports["memory"]
         base: Any = self._exports["__heap_base"]
         self._base: int = base.value(self._store)
         self._begins = {name: self.call(name.lower()) for name in SUBJECTS}
+        self._look()
         self.forget()
 
     def call(self, name: str, *numbers: float) -> Any:
         """Call a function of the core."""
-        function: Any = self._exports[name]
-        return function(self._store, *numbers)
+        if name not in self._functions:
+            self._functions[name] = self._exports[name]
+        return self._functions[name](self._store, *numbers)
 
     def forget(self) -> None:
         """Free all arrays and reset all structs."""
         self._end = self._base
-        self._look()
         for struct in self.structs.values():
             ctypes.memset(ctypes.addressof(struct), 0, ctypes.sizeof(struct))
 

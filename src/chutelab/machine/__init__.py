@@ -2,11 +2,11 @@
 
 - `parts`: `Machine`, its particle, segments and pulley.
 - `releases`: where, when and how fast each particle starts.
-- `nominal`: the flight of particle 0, which settles the geometry.
+- `rows`: a scene as one row of numbers, of which the core lays the surfaces.
 - `builder`: `build`, from a validated scene to a machine.
 """
 
-from chutelab.machine.builder import RefusedError, build
+from chutelab.machine.builder import build
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
     Arcs,
@@ -19,6 +19,7 @@ from chutelab.machine.parts import (
     moved,
     origin,
 )
+from chutelab.machine.releases import RefusedError
 
 __all__ = [
     "DRIVE_PULLEY",

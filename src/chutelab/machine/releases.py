@@ -1,22 +1,22 @@
-"""Where, when and how fast each particle of the stream starts."""
+"""Where, when and how fast each particle of the stream starts: the core draws it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
-from math import acos, degrees, floor, inf, prod, sqrt
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import acos, degrees
 from typing import Any
 
 import numpy as np
 
-from chutelab.scene import Fault, Scene, SceneError, Stream
-from chutelab.scene.conflicts import beside
-from chutelab.util.arrays import Bools, Floats, Ints, Numbers, Watch, unwatched
+from chutelab.core.module import INTEGER, REAL, Module, Status, constants, dtype
+from chutelab.scene import Fault, Scene, SceneError
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers, Watch
 from chutelab.util.tables import number
-from chutelab.util.trig import RADIANS, hypot, sin_cos
+from chutelab.util.trig import RADIANS, sin_cos
 
-TRIES = 1000
-"""Draws of a height that may overlap an earlier particle before it has to wait for its place."""
+LOOKS = 1_000_000
+"""Particles and places that the core looks at between two looks at the clock; 10 ms."""
 
 DEEP = 0.01
 """Share of the radius. Riders of one layer that touch, 2 r of arc apart, are by r³/(3 ρ²) nearer on
@@ -51,57 +51,6 @@ class Releases:
     def __post_init__(self) -> None:
         for array in vars(self).values():
             array.flags.writeable = False
-
-
-FIELDS = tuple(field.name for field in fields(Releases))
-
-
-def up_belt(scene: Scene) -> tuple[float, float]:
-    """Return the direction in which the incoming belt runs, (cos β, sin β)."""
-    assert scene.incoming is not None
-    if not np.count_nonzero(scene.incoming.incline_deg):
-        return 1.0, 0.0
-    sine, cosine = sin_cos(scene.incoming.incline_deg * RADIANS)
-    return cosine, sine
-
-
-def release_point(scene: Scene, stream: int = 0) -> tuple[float, float]:
-    """Return the nominal release point of a stream, m; on the belt exactly at the riding height."""
-    its, belt = scene.streams[stream], scene.incoming
-    if belt is None:
-        assert its.at is not None
-        return its.at
-    radius = scene.particles[scene.kinds[stream]].radius
-    riding = belt.pulley_radius + radius
-    if its.at is not None and not on_belt(scene, stream):
-        return its.at
-    cosine, sine = up_belt(scene)
-    along = -belt.length if its.at is None else its.at[0] * cosine + its.at[1] * sine
-    return along * cosine - riding * sine, along * sine + riding * cosine
-
-
-def release_velocity(scene: Scene, stream: int = 0) -> tuple[float, float]:
-    """Return the nominal release velocity of a stream, m/s."""
-    its = scene.streams[stream]
-    if its.velocity is not None:
-        return its.velocity
-    if its.fill is not None:
-        return 0.0, 0.0
-    assert scene.incoming is not None
-    speed, (cosine, sine) = scene.incoming.speed, up_belt(scene)
-    # 0 is a number, also where the speeds of a family are an array.
-    return speed * cosine, speed * sine if np.count_nonzero(sine) else 0.0
-
-
-def on_belt(scene: Scene, stream: int = 0) -> bool:
-    """Tell whether a stream is released on the incoming belt."""
-    its, belt = scene.streams[stream], scene.incoming
-    if belt is None or its.fill is not None or its.to is not None:
-        return False
-    if its.at is None:
-        return True
-    riding = belt.pulley_radius + scene.particles[scene.kinds[stream]].radius
-    return beside(*its.at, riding, belt.length, belt.incline_deg)
 
 
 @dataclass(frozen=True)
@@ -147,7 +96,7 @@ def squeeze(
         return None
     if not scene.crowded or belt.speed == 0.0 or scene.gravity == 0.0:
         return None
-    (cosine, sine), (x, y) = up_belt(scene), position.T
+    (sine, cosine), (x, y) = sin_cos(belt.incline_deg * RADIANS), position.T
     along, rho = x * cosine + y * sine, y * cosine - x * sine
     top = t - along / belt.speed
     grip = belt.speed**2 / (scene.gravity * rho)
@@ -177,42 +126,36 @@ def squeeze(
     return Squeeze(particles, float(depth.max()), float(grip.min())) if particles else None
 
 
-@dataclass(frozen=True, eq=False)
-class Draw:
-    """What was drawn of one stream: its releases, and radii (n,), m, if they differ."""
-
-    releases: Releases
-    radius: Floats | None
-
-
-def _releases(
-    scene: Scene, n: int, t: Floats, position: Floats, velocity: Floats, carried: bool
-) -> Releases:
-    """Return the releases of stream n, of which all are carried or none."""
-    every = len(t)
-    rides = np.empty(every, dtype=bool)
-    stream, kind = np.empty((2, every), dtype=np.int64)
-    rides[:], stream[:], kind[:] = carried, n, np.arange(every) if scene.shape else scene.kinds[n]
-    return Releases(t, position, velocity, rides, stream, kind)
-
-
-Clear = Callable[[Floats, float], Bools]
-"""Tells which of some places (n, 2), m, a disk of a radius (m) can be in: not in any surface."""
-
-
-def draw(scene: Scene, clear: Clear, watch: Watch = unwatched) -> tuple[Releases, Floats | None]:
-    """Draw the releases of a scene; the same scene and seed give the same numbers.
-
-    Of a family each scene has one particle. Particles that meet start where no other of their
-    stream is, as far as the bed has room: an engine lets the others wait until their place is free.
+class RefusedError(SceneError):
+    """Scenes of a family that contradict themselves; its faults are those of the first one.
 
     Parameters
     ----------
+    source : str
+        What messages call the scenes.
+    members : mapping of int to Fault
+        What is wrong with each, by their numbers; a scene that is no family is number 0.
+    """
+
+    def __init__(self, source: str, members: Mapping[int, Fault]) -> None:
+        super().__init__(source, [members[min(members)]])
+        self.members = dict(members)
+
+
+def draw(module: Module, scene: Scene, watch: Watch) -> tuple[Releases, Floats | None]:
+    """Have the core draw the releases of a scene; the same scene and seed give the same numbers.
+
+    Of a family each scene has one particle. Particles that meet start where no other of their
+    stream is, as far as the bed has room: an engine lets the others wait until their place is free.
+    None starts in a surface: one that is in it by rounding is moved out.
+
+    Parameters
+    ----------
+    module : Module
+        In which the scene's surfaces are laid, see `machine.rows.lay`.
     scene : Scene
         What is released.
-    clear : callable
-        Which places a packed box may use.
-    watch : callable, optional
+    watch : callable
         Called now and then; what it raises ends the drawing.
 
     Returns
@@ -224,258 +167,66 @@ def draw(scene: Scene, clear: Clear, watch: Watch = unwatched) -> tuple[Releases
 
     Raises
     ------
-    SceneError
-        If a box has not room for all.
+    RefusedError
+        If a box has not room for all, or a particle would start inside a surface.
     """
-    drawn: list[Draw] = []
-    for n, stream in enumerate(scene.streams):
-        if stream.fill is None:
-            drawn.append(_draw(scene, n, watch))
-        else:
-            drawn.append(_pour(scene, n, drawn, clear, watch))
-    if len(drawn) == 1:
-        return drawn[0].releases, drawn[0].radius
-    releases = Releases(
-        *(np.concatenate([getattr(one.releases, name) for one in drawn]) for name in FIELDS)
-    )
-    alike = len({particle.radius for particle in scene.particles}) == 1
-    if alike and all(one.radius is None for one in drawn):
-        return releases, None
-    radii = [
-        np.full(len(one.releases.t), scene.particles[kind].radius)
-        if one.radius is None
-        else one.radius
-        for one, kind in zip(drawn, scene.kinds, strict=True)
-    ]
-    return releases, np.concatenate(radii)
+    plan, counts = module.structs["Plan"], [stream.count for stream in scene.streams]
+    corners = np.array([corner for kind in scene.particles for corner in kind.outline])
+    members, streams, count = plan.members, len(counts), sum(counts)
+    pieces = plan.segment_count + plan.arc_count + 1 + 2 * plan.conveyors
+    beds = scene.crowded and any(stream.bed_height > 0.0 for stream in scene.streams)
+    near, links = count if beds else 1, count if streams > 1 else 1
+    heads = 1 << (2 * max(near, links)).bit_length()
+    shapes: dict[str, tuple[Any, int]] = {
+        "starts": (dtype("Start"), members * count), "refusals": (dtype("Refusal"), members),
+        "carried": (INTEGER, members * streams), "corners": (REAL, corners.size),
+        "near": (dtype("Near"), near), "links": (INTEGER, links), "heads": (INTEGER, heads),
+        "listed": (INTEGER, pieces),
+    }  # fmt: skip
+    module.place(*((name, *shape) for name, shape in shapes.items()), of="Drawing")
 
+    def array(name: str) -> Any:
+        return module.array(name, *shapes[name], of="Drawing")
 
-def _dice(scene: Scene, n: int) -> np.random.Generator:
-    seed = scene.streams[n].seed
-    return np.random.default_rng([seed, n] if n else seed)
-
-
-def _radii(scene: Scene, n: int, rng: np.random.Generator) -> Floats | None:
-    """Draw radii from the range of a stream's kind, m; the first has the mean."""
-    particle = scene.particles[scene.kinds[n]]
-    if particle.span is None:
-        return None
-    radii = rng.uniform(*particle.span, scene.streams[n].count)
-    radii[0] = particle.radius
-    return radii
-
-
-def _draw(scene: Scene, n: int, watch: Watch) -> Draw:
-    """Draw the releases of one stream, at a point or along a line."""
-    stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
-    every = stream.count * prod(scene.shape)
-    # Those of each scene of a family follow another.
-    t = np.arange(every) % stream.count / stream.rate
-    if stream.at_once:
-        t = np.zeros(every)
-    if stream.start:
-        t += stream.start
-    position, velocity = np.empty((2, every, 2))
-    velocity[:, 0], velocity[:, 1] = release_velocity(scene, n)
-    height, radii = np.zeros(every), None
-    crowded = stream.count > 1 and scene.crowded
-    # The first one has no spread. Making a generator takes as long as all other preparations.
-    spread = stream.bed_height > 0.0 or stream.speed_spread > 0.0
-    if stream.count > 1 and (crowded or spread or stream.to or particle.span):
-        rng = _dice(scene, n)
-        height = stream.bed_height * rng.random(every)
-        height[0] = 0.0
-        faster = stream.speed_spread * rng.uniform(-1.0, 1.0, every)
-        faster[0] = 0.0
-        x, y = release_velocity(scene, n)
-        speed = float(hypot(x, y))
-        velocity += faster[:, None] * ((x / speed, y / speed) if speed > 0.0 else (1.0, 0.0))
-        radii = _radii(scene, n, rng)
-    if stream.to is not None:
-        assert stream.at is not None
-        share = np.linspace(0.0, 1.0, every)
-        if not stream.at_once and every > 1:
-            share[1:] = rng.random(every - 1)
-        begin, end = np.array(stream.at), np.array(stream.to)
-        position = begin + share[:, None] * (end - begin)
-        return Draw(_releases(scene, n, t, position, velocity, False), radii)
-    rides = on_belt(scene, n)
-    adheres = rides and scene.incoming is not None and isinstance(scene.incoming.friction, str)
-    cosine, sine = up_belt(scene) if rides else (1.0, 0.0)
-    if crowded:
-        fall = 0.0 if adheres else 0.5 * scene.gravity
-        lowest = 0.0 if rides else -inf
-        # Seen from the belt, if it rises.
-        along = np.stack([
-            velocity[:, 0] * cosine + velocity[:, 1] * sine,
-            velocity[:, 1] * cosine - velocity[:, 0] * sine,
-        ], axis=1)  # fmt: skip
-        each = np.full(every, particle.radius) if radii is None else radii
-        _spread_apart(stream, t, height, along, each, fall, lowest, rng, watch)
-    if rides and radii is not None:
-        height += radii - particle.radius
-    x, low = release_point(scene, n)
-    position[:, 0], position[:, 1] = x - sine * height, low + cosine * height
-    return Draw(_releases(scene, n, t, position, velocity, adheres), radii)
-
-
-PITCH = 2.04
-"""Distance of neighbours in a packed box, in radii of the largest."""
-
-JITTER = 0.01
-"""How far a place in it is moved at random each way, in the same unit: no pile is that even."""
-
-
-HANDFUL = 4096
-"""Places of a box that are looked at together; what is above the particles never is."""
-
-LOOKS = 1_000_000
-"""Places of a box that are looked at, at most, and `TRIES` more for each particle."""
-
-
-def _packed(stream: Stream, largest: float, rng: np.random.Generator) -> Iterator[Floats]:
-    """Yield the places of a stream's box (n, 2), m, from below, a handful at a time.
-
-    They are in rows, every other one shifted by half a pitch.
-    """
-    assert stream.fill is not None
-    (left, bottom), (right, top) = stream.fill
-    pitch, room = PITCH * largest, largest * (1.0 + JITTER)
-    rise = pitch * sqrt(0.75)
-    rows = max(0, floor((top - bottom - 2.0 * room) / rise) + 1)
-    across = max(0, floor((right - left - 2.0 * room) / pitch) + 1)
-    most = min(rows * across, LOOKS + TRIES * stream.count)
-    for first in range(0, most, HANDFUL):
-        begin, along = divmod(first, across)
-        row, column = divmod(along + np.arange(min(HANDFUL, most - first)), across)
-        row += begin
-        x, y = column * pitch, row * rise
-        x += 0.5 * pitch * (row % 2)
-        places = np.stack([left + room + x, bottom + room + y], axis=1)
-        places = places[places[:, 0] <= right - room]
-        places += JITTER * largest * rng.uniform(-1.0, 1.0, places.shape)
-        yield places
-
-
-def _away(places: Floats, others: Floats, reach: Floats) -> Bools:
-    """Tell which places (n, 2), m, are at least a reach (k,) away from each of others (k, 2)."""
-    free, most = np.ones(len(places), dtype=bool), reach.max(initial=0.0)
-    low, high = places.min(axis=0) - most, places.max(axis=0) + most
-    near = ((others >= low) & (others <= high)).all(axis=1).nonzero()[0]
-    # Neighbours are side by side along the longer side of the places' box.
-    axis = int(np.argmax(high - low))
-    near = near[others[near, axis].argsort(kind="stable")]
-    line, there = others[near, axis], places[:, axis]
-    first, last = line.searchsorted(there - most), line.searchsorted(there + most, side="right")
-    many = last - first
-    place = np.arange(len(places)).repeat(many)
-    other = near[np.arange(len(place)) + (first - (many.cumsum() - many)).repeat(many)]
-    free[place[hypot(*(places[place] - others[other]).T) < reach[other]]] = False
-    return free
-
-
-def _pour(scene: Scene, n: int, before: Sequence[Draw], clear: Clear, watch: Watch) -> Draw:
-    """Pack a stream's box, as far up as it takes."""
-    stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
-    rng = _dice(scene, n)
-    radii = _radii(scene, n, rng)
-    largest = particle.radius if particle.span is None else particle.span[1]
-    others, reach = np.empty((0, 2)), np.empty(0)
-    for kind, one in zip(scene.kinds, before, strict=False):
-        other = scene.particles[kind].radius if one.radius is None else one.radius
-        others = np.concatenate([others, one.releases.position])
-        reach = np.concatenate([reach, np.broadcast_to(largest + other, len(one.releases.t))])
-    found, count = [np.empty((0, 2))], 0
-    for places in _packed(stream, largest, rng):
+    array("corners")[:] = corners.ravel()
+    drawing = module.structs["Drawing"]
+    drawing.count, drawing.head_room, drawing.looks = count, heads, LOOKS
+    while Status(module.call("draw")) is Status.PAUSED:
         watch()
-        places = places[clear(places, largest)]
-        if len(others) and len(places):
-            places = places[_away(places, others, reach)]
-        found.append(places)
-        count += len(places)
-        if count >= stream.count:
-            break
-    if count < stream.count:
-        several = f"[{n}]" * (len(scene.streams) > 1)
-        fewer = f", or stream{several}.count = {count} at most" if count else ""
+    refused = array("refusals")
+    if np.count_nonzero(refused["why"]):
+        which = refused["why"].nonzero()[0].tolist()
+        raise RefusedError(scene.source, {n: _fault(scene, refused[n]) for n in which})
+    starts, carried = array("starts"), array("carried").astype(bool)
+    releases = Releases(
+        t=starts["t"].copy(),
+        position=starts["position"].copy(),
+        velocity=starts["velocity"].copy(),
+        carried=carried if scene.shape else carried.repeat(counts),
+        stream=np.arange(streams).repeat(members * np.array(counts)),
+        kind=np.arange(members) if scene.shape else np.array(scene.kinds).repeat(counts),
+    )
+    radius = starts["radius"].copy()
+    alike = scene.shape or bool((radius == radius[0]).all())
+    return releases, None if alike else radius
+
+
+def _fault(scene: Scene, refusal: Any) -> Fault:
+    """Return in words why the releases of a scene, or of one of a family, cannot be drawn."""
+    which, particle = refusal["stream"].item(), refusal["particle"].item()
+    several = f"[{which}]" * (len(scene.streams) > 1)
+    stream, reach = scene.streams[which], refusal["reach"].item()
+    if refusal["why"] == constants("Refused")["BOX_FULL"]:
+        fewer = f", or stream{several}.count = {particle} at most" if particle else ""
         allowed = (
-            f"a larger box{fewer}: {count or 'none'} of radius {largest:.4g} m have room in it,"
+            f"a larger box{fewer}: {particle or 'none'} of radius {reach:.4g} m have room in it,"
             " away from all surfaces"
         )
         value = [list(corner) for corner in stream.fill or ()]
-        raise SceneError(scene.source, [Fault(f"stream{several}.fill", value, allowed)])
-    velocity = np.empty((stream.count, 2))
-    velocity[:] = release_velocity(scene, n)
-    t = np.full(stream.count, stream.start)
-    position = np.concatenate(found)[: stream.count].copy()
-    return Draw(_releases(scene, n, t, position, velocity, False), radii)
-
-
-def _spread_apart(
-    stream: Stream,
-    t: Floats,
-    height: Floats,
-    velocity: Floats,
-    radius: Floats,
-    fall: float,
-    lowest: float,
-    rng: np.random.Generator,
-    watch: Watch,
-) -> None:
-    """Redraw heights, in place, so that no particle starts inside one released before it.
-
-    If no height is free, the last draw is kept, and the release is delayed.
-
-    Earlier particles are taken to have moved on at their release velocity, and to have fallen by
-    ``fall`` (m/s²) times their age squared, but not below ``lowest`` (m above the lowest layer).
-    """
-    # What may still be in the way: what has moved on by a diameter, or has fallen below the bed
-    # by one, stays away for good.
-    close = np.zeros(0, dtype=np.int64)
-    diameter = 2.0 * radius.max()
-    for i in range(1, stream.count) if stream.bed_height > 0.0 else ():
-        watch()
-        close = np.append(close, i - 1)
-        age = t[i] - t[close]
-        dx = velocity[close, 0] * age
-        dy = height[close] + velocity[close, 1] * age - fall * age**2
-        sinks = velocity[close, 1] <= 2.0 * fall * age
-        near = (np.abs(dx) < diameter) & ~(sinks & (np.maximum(dy, lowest) <= -diameter))
-        close, dx, dy = close[near], dx[near], np.maximum(dy[near], lowest)
-        reach = radius[close] + radius[i]
-        if np.all(dx**2 + (dy - height[i]) ** 2 >= reach**2):
-            continue
-        height[i] = _free_height(dx, dy, reach, stream.bed_height, rng)
-
-
-SURELY = 1e-6
-"""Share of a distance by which a height must be nearer than that to be taken whatever rounds."""
-
-
-def _free_height(
-    dx: Floats, dy: Floats, reach: Floats, bed: float, rng: np.random.Generator
-) -> float:
-    """Draw heights up to `bed` until one is a `reach` away from all at (dx, dy), m.
-
-    After `TRIES` the last one is kept as it is. The generator then stands where drawing one after
-    the other would have left it.
-    """
-    aside, square, drawn = dx**2, reach**2, 0
-    half = np.sqrt(np.maximum(square - aside, 0.0)) - SURELY * reach
-    # What is surely taken, from `low` to `top`: intervals that overlap are as good as one.
-    order = (dy - half)[half > 0.0].argsort()
-    low, top = ((dy + side * half)[half > 0.0][order] for side in (-1.0, 1.0))
-    top = np.maximum.accumulate(top)
-    while drawn < TRIES:
-        # Few at first, which mostly will do.
-        tried = bed * rng.random(min(max(8, 7 * drawn), TRIES - drawn))
-        drawn += len(tried)
-        below = low.searchsorted(tried)
-        taken = np.concatenate([[-inf], top])[below] > tried
-        for n in (~taken).nonzero()[0].tolist():
-            last = drawn - len(tried) + n + 1 == TRIES
-            if last or np.all(aside + (dy - tried[n]) ** 2 >= square):
-                generator: Any = rng.bit_generator
-                generator.advance(n + 1 - len(tried))
-                return float(tried[n])
-    return float(tried[-1])
+        return Fault(f"stream{several}.fill", value, allowed)
+    key, name = f"stream{several}.at", scene.surfaces[refusal["surface"]]
+    allowed = (
+        f"at least {reach:g} m from {name}: particle {particle} would start"
+        f" {refusal['distance']:.6g} m from it, inside; move {key}, or the surface"
+    )
+    return Fault(key, stream.at, allowed)

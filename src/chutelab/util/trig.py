@@ -1,8 +1,8 @@
 """Sine, cosine and their inverses of + - * / and square roots alone: the same bits everywhere.
 
-Those of libraries differ in the last bit from one to another, and JavaScript's are not NumPy's.
-``pictures/live/assets/trig.ts`` has the same operations in the same order. The polynomials are
-those of fdlibm (Sun Microsystems, 1993), which are free to use.
+Those of libraries differ in the last bit from one to another. The core's ``trig.c``, which the page
+uses too, has the same operations in the same order. The polynomials are those of fdlibm (Sun
+Microsystems, 1993), which are free to use.
 
 All take plain numbers, for which NumPy is not loaded, or arrays.
 """

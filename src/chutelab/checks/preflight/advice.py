@@ -28,7 +28,6 @@ from chutelab.checks.preflight.results import (
 from chutelab.checks.preflight.trial import Trial, effort, peak, stepping, trial
 from chutelab.engines.simulation import choose
 from chutelab.machine import DRIVE_PULLEY, Caution, Machine, build
-from chutelab.machine.builder import CLEARANCE, CLEARANCE_RADII
 from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
@@ -207,7 +206,7 @@ def _candidates(scene: Scene, machine: Machine, caution: Caution) -> Iterator[Se
             yield {"plate.above" if caution.hit > 0.0 else "plate.below": _up(off)}
             if out is not None:
                 # The belt is so high that the plate above it ends too early.
-                room = off + max(CLEARANCE, CLEARANCE_RADII * r)
+                room = off + max(0.05, 3.0 * r)
                 yield {"outgoing.drop": _up(pulley.radius - (plate.pivot_height or 0.0) + room)}
     elif caution.surface == "outgoing" and out is not None and pulley is not None:
         if caution.crosses == DRIVE_PULLEY:

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core.module import (
+    INTEGER,
+    REAL,
     Module,
     Status,
     borrow,
@@ -26,8 +28,6 @@ from chutelab.util.arrays import Progress
 
 GREATEST = 1e300
 """Friction without a bound, as a number that can be multiplied by zero."""
-
-INTEGER, REAL = np.dtype("<i4"), np.dtype("<f8")
 
 GROWING = {
     "knot": (("knots", dtype("Knot"), 1),),

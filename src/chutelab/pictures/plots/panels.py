@@ -14,7 +14,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
-from chutelab.machine.releases import on_belt, release_velocity, up_belt
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.bodies import stream_colours
 from chutelab.pictures.plots.scenery import (
@@ -32,9 +31,11 @@ from chutelab.pictures.plots.scenery import (
 from chutelab.results import Recording
 from chutelab.results.quantities import each
 from chutelab.scene import Scene
+from chutelab.scene.conflicts import beside
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
 from chutelab.util.arrays import Floats
+from chutelab.util.trig import RADIANS, sin_cos
 
 
 @dataclass(frozen=True)
@@ -77,11 +78,14 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
         return ()
     riding = belt.pulley_radius + scene.particle.radius
     if scene.plate is None:
-        up, v = np.array(up_belt(scene)), belt.speed
-        carried = on_belt(scene) and np.array_equal(release_velocity(scene), v * up) and v > 0
+        its, v, (sine, cosine) = scene.stream, belt.speed, sin_cos(belt.incline_deg * RADIANS)
+        rides = its.fill is None and its.to is None
+        if its.at is not None:
+            rides &= beside(*its.at, riding, belt.length, belt.incline_deg)
+        carried = rides and its.velocity in (None, (v * cosine, v * sine)) and v > 0
         met = scene.surface or scene.crowded or scene.plates or scene.conveyor
         # Where on the belt it starts matters to one that slips.
-        somewhere = up[1] != 0.0 and belt.friction != "adhesion" and scene.stream.at is not None
+        somewhere = sine != 0.0 and belt.friction != "adhesion" and scene.stream.at is not None
         if out is None or met or not g or not carried or somewhere:
             return ()
         left = separation(

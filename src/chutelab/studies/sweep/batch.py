@@ -134,9 +134,11 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
     if template is None:
         return [], faults, which.tolist()
     stepped = (block.engine or template.run.engine) in ("contact", "pymunk")
+    # Members of a family are released, and have their gates, at the same times.
+    timed = any(path.endswith(("opens_at", "closes_at", "stream.start")) for path in block.paths)
     # Whether a release lies on the belt is a matter of the last digits.
     close = {"particle.radius", "incoming.pulley_radius", "incoming.length"} & {*block.paths}
-    if stepped or template.count > 1 or (close and template.stream.at is not None):
+    if stepped or timed or template.count > 1 or (close and template.stream.at is not None):
         return [], faults, which.tolist()
 
     def scenes(some: Ints) -> Scene:

@@ -1,6 +1,7 @@
 // The page: reads its data, starts the engine's thread, and joins the parts.
 
 import { Bench } from "./bench.ts";
+import { compiled } from "./core.ts";
 import { Engine } from "./engine.ts";
 import { Arrows } from "./arrows.ts";
 import { CurvesPanel } from "./curves.ts";
@@ -14,6 +15,7 @@ import { Lab } from "./lab.ts";
 import { watchLaws } from "./laws.ts";
 import { LandingPanel } from "./landing.ts";
 import { NumbersPanel } from "./numbers.ts";
+import { startPlan } from "./plan.ts";
 import { Prediction } from "./predict.ts";
 import { Stage } from "./stage.ts";
 import { Symbols } from "./symbols.ts";
@@ -36,12 +38,13 @@ function bytesOf(text: string) {
   return bytes;
 }
 
-function start() {
+async function start() {
   const data = JSON.parse(byId("lab").textContent);
   const words = new Words(data.language, data.strings);
   const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
+  const wasm = bytesOf(data.wasm).buffer;
   const newEngine = () => new Engine(
-    new Worker(URL.createObjectURL(source)), bytesOf(data.wasm).buffer, data.layout);
+    new Worker(URL.createObjectURL(source)), wasm, data.layout);
   for (const element of document.querySelectorAll("[data-say]")) {
     element.textContent = words.say((element as HTMLElement).dataset.say ?? "");
   }
@@ -49,6 +52,14 @@ function start() {
     const name = words.say(element.getAttribute("data-label") ?? "");
     element.setAttribute("aria-label", name);
     if (element.matches("button")) (element as HTMLElement).title = name;
+  }
+  try {
+    await startPlan(await compiled(wasm), data.layout);
+  } catch {
+    byId("broken").remove();
+    byId("fault").textContent = words.say("fault-no-engine");
+    byId("fault").hidden = false;
+    return;
   }
   const lab = new Lab(data, newEngine());
   const stage = new Stage(byId("stage"), lab, words);

@@ -1,6 +1,5 @@
 // What no scene may say: values that do not have the form of their key, keys that contradict each
 // other, names that lead nowhere. The rules are Python's, of `chutelab.scene`.
-import { onBelt } from "./belt.ts";
 import { fits, type Form } from "./forms.ts";
 import { RADIANS, sinCos } from "./trig.ts";
 import type { Given, Lab, Point, Scene, Rule, Surface } from "./scene.ts";
@@ -17,6 +16,9 @@ const RESERVED = ["incoming", "plate", "outgoing", "particles"];
 
 /** Least width and height of a view, m. */
 const LEAST_VIEW = 1e-6;
+
+/** How near to the belt's height a release counts as lying on the belt, m. */
+const ON_BELT = 1e-9;
 
 /** Tables that are for other programs. */
 const FOREIGN = ["expect", "live"];
@@ -269,6 +271,23 @@ function* layoutConflicts(one: Surface, key: string): Generator<Wrong> {
     const last = given.points === undefined ? "to" : "points";
     yield [`${key}.${last}`, given[last], "same-points"];
   }
+}
+
+/**
+ * Tells whether a stream is released on the incoming belt.
+ * @param number of the stream
+ */
+function onBelt(scene: Scene, number: number) {
+  const stream = scene.streams[number];
+  const belt = scene.incoming;
+  if (belt === null || stream.fill !== undefined || stream.to !== undefined) return false;
+  if (stream.at === undefined) return true;
+  const riding = belt.pulley_radius + scene.particles[scene.kinds[number]].radius;
+  const [x, y] = stream.at;
+  const [sine, cosine] = sinCos(belt.incline_deg * RADIANS);
+  const along = x * cosine + y * sine;
+  const above = y * cosine - x * sine;
+  return -belt.length <= along && along <= 0.0 && Math.abs(above - riding) <= ON_BELT;
 }
 
 /** @param n of the stream */

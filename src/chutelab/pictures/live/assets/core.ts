@@ -1,5 +1,5 @@
-// The contact engine in memory: what engines/contact/engine.py is in Python. A machine goes in,
-// knots and events come out.
+// The core in memory, what core/module.py is in Python: `Memory`; and its contact engine, what
+// engines/contact/engine.py is: `Core`. A machine goes in, knots and events come out.
 
 type Struct = { size: number, fields: Record<string, [number, string, number]> };
 export type Layout = { structs: Record<string, Struct>, enums: Record<string, Record<string,
@@ -28,18 +28,23 @@ const GROWING = {
 
 const SIZES: Record<string, number> = { double: 8, int: 4, int2: 8 };
 
+/** Compile what a page carries: the core, compressed by zlib. */
+async function compiled(wasm: ArrayBuffer) {
+  const plain = new Blob([wasm]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return WebAssembly.compile(await new Response(plain).arrayBuffer());
+}
+
 async function startCore(module: WebAssembly.Module, layout: Layout) {
   return new Core(await WebAssembly.instantiate(module, {}), layout);
 }
 
-/** One run at a time: `begin` lays a machine out, `proceed` runs on, `take` hands over. */
-class Core {
+/** Structs of which the core has one each, and arrays that their fields point to. */
+class Memory {
   exports: any;
   base;
   /** Where the structs of the core's subjects are, by their names. */
   subjects: Record<string, number>;
   end;
-  machine: Machine | null = null;
   bytes = new Uint8Array();
   doubles = new Float64Array();
   ints = new Int32Array();
@@ -48,9 +53,21 @@ class Core {
     this.exports = instance.exports;
     this.exports._initialize();
     this.base = this.exports.__heap_base.value;
-    this.subjects = { World: this.exports.world(), Laws: this.exports.laws() };
+    const { world, plan, drawing, laws } = this.exports;
+    this.subjects = { World: world(), Plan: plan(), Drawing: drawing(), Laws: laws() };
     this.end = this.base;
     this.look();
+  }
+
+  /** Free all arrays, and reset all structs. */
+  forget() {
+    this.end = this.base;
+    Object.keys(this.subjects).forEach((name) => this.reset(name));
+  }
+
+  /** Set all fields of a struct to 0. */
+  reset(of: string) {
+    this.bytes.fill(0, this.subjects[of], this.subjects[of] + this.layout.structs[of].size);
   }
 
   /** Look at the memory anew; it moves when it grows. */
@@ -74,7 +91,7 @@ class Core {
     else this.ints[at >> 2] = value;
   }
 
-  /** Make room for an array of zeros, to which a struct's field points from now on. */
+  /** Make room for an array of zeros, to which a field points from now on. */
   place(name: string, kind: string, count: number, of = "World") {
     const size = SIZES[kind] ?? this.layout.structs[kind].size;
     const begin = Math.ceil(this.end / 16) * 16;
@@ -86,6 +103,25 @@ class Core {
     this.bytes.fill(0, begin, this.end);
     this.set(name, begin, of);
   }
+
+  /** The rows of an array, field by field. */
+  rows(name: string, struct: string, count: number, of = "World"): any[] {
+    const { size, fields } = this.layout.structs[struct];
+    return Array.from({ length: count }, (_, row) => {
+      const begin = this.get(name, of) + row * size;
+      const values = Object.entries(fields).map(([field, [offset, type, many]]) => {
+        const array = type === "double" ? this.doubles : this.ints;
+        const at = (begin + offset) >> (type === "double" ? 3 : 2);
+        return [field, many > 1 ? [...array.subarray(at, at + many)] : array[at]];
+      });
+      return Object.fromEntries(values);
+    });
+  }
+}
+
+/** One run at a time: `begin` lays a machine out, `proceed` runs on, `take` hands over. */
+class Core extends Memory {
+  machine: Machine | null = null;
 
   makeRoom(what: keyof typeof GROWING, room: number) {
     for (const [name, kind] of GROWING[what]) this.place(name, kind, room);
@@ -105,16 +141,10 @@ class Core {
     }
   }
 
-  /** Set all fields of a struct to 0. */
-  reset(of: string) {
-    this.bytes.fill(0, this.subjects[of], this.subjects[of] + this.layout.structs[of].size);
-  }
-
   /** Lay out a machine: the run is at its beginning then. */
   begin(machine: Machine) {
     this.machine = machine;
-    this.end = this.base;
-    this.reset("World");
+    this.forget();
     const { interact, releases, rolling } = machine;
     const n = releases.length;
     const rows = surfaceRows(machine, this.layout.enums.Shape);
@@ -218,7 +248,7 @@ class Core {
     for (let i = 0; i < count; i += 1) {
       knots[i * KNOT_ROW + 9] = this.ints[(this.get("knots") + i * 8 * KNOT_ROW + disk[0]) >> 2];
     }
-    const events = this.events();
+    const events: Event[] = this.rows("events", "Event", this.get("event_count"));
     this.set("knot_count", 0);
     this.set("event_count", 0);
     if (this.grow) this.makeRoom(this.grow.what as "knot", this.grow.room);
@@ -264,24 +294,6 @@ class Core {
 
   grow: { what: string, room: number } | null = null;
 
-  events() {
-    return this.rows("events", "Event", this.get("event_count")) as Event[];
-  }
-
-  /** Rows of an array, with all their fields. */
-  rows(name: string, struct: string, count: number, of = "World"): Record<string, any>[] {
-    const { size, fields } = this.layout.structs[struct];
-    return Array.from({ length: count }, (_, row) => {
-      const begin = this.get(name, of) + row * size;
-      const values = Object.entries(fields).map(([name, [offset, type, many]]) => {
-        const array = type === "double" ? this.doubles : this.ints;
-        const at = (begin + offset) >> (type === "double" ? 3 : 2);
-        return [name, many > 1 ? [...array.subarray(at, at + many)] : array[at]];
-      });
-      return Object.fromEntries(values);
-    });
-  }
-
   /** Why each track ended, see enum Reason; only once the run is done. */
   reasons() {
     const { size, fields } = this.layout.structs.Disk;
@@ -319,4 +331,4 @@ function surfaceRows({ segments, arcs, pulley }: Machine, shapes: Record<string,
   return [...flat, ...wheels, ...bent];
 }
 
-export { Core, KNOT_ROW, startCore };
+export { Core, KNOT_ROW, Memory, compiled, startCore };

@@ -5,17 +5,24 @@ import { historyOf } from "./stages.ts";
 import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
 import type { Event } from "./core.ts";
+import type { Recording } from "./recording.ts";
 
 /** Its middle, px, and the side of its point that is tried first, rad counterclockwise from the
  * right */
 type Label = { text: string, x: number, y: number, side?: number };
+/** Where a label stands, and if that is away from its point, the line to it. */
+type Placed = Label & { from?: [number, number] };
 type Space = { left: number, top: number, right: number, bottom: number };
 
 /** Height of a letter and width of one, px. */
-const TALL = 16, WIDE = 8;
+const TALL = 18, WIDE = 9;
 
-/** A label's distance from its point, px, in the order in which they are tried. */
-const AWAY = [15, 24, 34, 46, 60];
+/** A label's distance from its point, px, in the order in which they are tried; and from where on a
+ * line leads to it. */
+const AWAY = [15, 24, 34, 46, 60], LED = 30;
+
+/** Pixels from one of the boxes to the next that stand for a line, and half the size of one. */
+const ALONG = 9, THIN = 5;
 
 /** An angle that is smaller is not drawn, rad. */
 const LEAST_ANGLE = 0.03;
@@ -28,19 +35,37 @@ function spaceOf({ text, x, y }: Label): Space {
   return { left: x - half, right: x + half, top: y - 0.5 * TALL, bottom: y + 0.5 * TALL };
 }
 
-/** Labels near their points, each where none is yet, or at the first place if there is none free.
- * @param wanted at their points */
-function placed(wanted: Label[], taken: Space[]): Label[] {
+/** Labels near their points, each where nothing is yet; what has no place is left out.
+ * @param wanted at their points, the most important first */
+function placed(wanted: Label[], taken: Space[]): Placed[] {
   const spaces = [...taken];
-  return wanted.map(({ text, x, y, side = Math.PI / 4 }) => {
-    const places = AWAY.flatMap((far) => Array.from({ length: 8 }, (_, n) => {
-      const angle = side + (n * Math.PI) / 4;
-      return { text, x: x + far * Math.cos(angle), y: y - far * Math.sin(angle) };
-    }));
-    const place = places.find((one) => !spaces.some((space) => overlap(space, spaceOf(one))))
-      ?? places[0];
-    spaces.push(spaceOf(place));
-    return place;
+  return wanted.flatMap(({ text, x, y, side = Math.PI / 4 }) => {
+    for (const far of AWAY) {
+      for (let n = 0; n < 8; n += 1) {
+        // The side that is wanted, then those next to it.
+        const turn = (n % 2 ? -1 : 1) * Math.ceil(n / 2), angle = side + (turn * Math.PI) / 4;
+        const at = { text, x: x + far * Math.cos(angle), y: y - far * Math.sin(angle) };
+        const space = spaceOf(at);
+        if (spaces.some((other) => overlap(other, space))) continue;
+        spaces.push(space);
+        return [far < LED ? at : { ...at, from: [x, y] as [number, number] }];
+      }
+    }
+    return [];
+  });
+}
+
+/** Arcs that labels keep clear of; more are a board of pegs. */
+const MOST_ARCS = 40;
+
+/** Boxes along a line through points, px. */
+function along(points: [number, number][]): Space[] {
+  return points.slice(1).flatMap(([x, y], i) => {
+    const [u, v] = points[i], parts = Math.ceil(Math.hypot(x - u, y - v) / ALONG);
+    return Array.from({ length: Math.min(parts, 1000) + 1 }, (_, n) => {
+      const share = parts ? n / parts : 0, px = u + share * (x - u), py = v + share * (y - v);
+      return { left: px - THIN, right: px + THIN, top: py - THIN, bottom: py + THIN };
+    });
   });
 }
 
@@ -61,14 +86,15 @@ class Symbols {
     if (!this.shown || !recording || recording.machine.interact) return;
     const { left, hit, down } = historyOf(stage.lab)?.stages[0] ?? {}, { view } = stage;
     this.wanted = [];
-    const edges = [
-      { left: -Infinity, right: Infinity, top: -Infinity, bottom: 0 },
-      { left: -Infinity, right: Infinity, top: view.height, bottom: Infinity },
+    const { free } = view, all = { left: -1e9, right: 1e9, top: -1e9, bottom: 1e9 };
+    const taken: Space[] = [
+      { ...all, bottom: free.top }, { ...all, top: free.bottom }, { ...all, right: free.left },
+      { ...all, left: free.right }, ...this.lines(recording),
+      ...stage.handles.map(({ x, y }) => {
+        const [px, py] = [view.px(x), view.py(y)];
+        return { left: px - 9, right: px + 9, top: py - 9, bottom: py + 9 };
+      }),
     ];
-    const taken: Space[] = edges.concat(stage.handles.map(({ x, y }) => {
-      const [px, py] = [view.px(x), view.py(y)];
-      return { left: px - 9, right: px + 9, top: py - 9, bottom: py + 9 };
-    }));
     if (left) this.separation(left);
     if (hit) {
       this.dot(hit);
@@ -93,7 +119,14 @@ class Symbols {
       this.dot(down);
       this.label("v3", down.x, down.y, [-1, 1]);
     }
-    for (const { text, x, y } of placed(this.wanted, taken)) {
+    for (const { text, x, y, from } of placed(this.wanted, taken)) {
+      if (from) {
+        const far = Math.hypot(x - from[0], y - from[1]), share = 1 - 13 / far;
+        layer.append(svg("path", {
+          d: `M${from[0]} ${from[1]}l${share * (x - from[0])} ${share * (y - from[1])}`,
+          class: "leader",
+        }));
+      }
       const element = svg("text", { x, y: y + 5, "text-anchor": "middle" });
       element.textContent = text;
       layer.append(element);
@@ -101,6 +134,31 @@ class Symbols {
   }
 
   wanted: Label[] = [];
+
+  /** What the path and the surfaces cover, as far as it is seen. */
+  lines(recording: Recording): Space[] {
+    const { view } = this.stage, { segments, arcs } = recording.machine;
+    const px = (x: number, y: number) => [
+      Math.min(Math.max(view.px(x), -50), view.width + 50),
+      Math.min(Math.max(view.py(y), -50), view.height + 50),
+    ] as [number, number];
+    const path = recording.points(0, 2 / view.scale).map(({ x, y }) => px(x, y));
+    const home = this.stage.front.getBoundingClientRect();
+    const speeds = [...this.stage.scenery.layer.querySelectorAll(".on-frame")].map((text) => {
+      const { left, right, top, bottom } = text.getBoundingClientRect();
+      return { left: left - home.left, right: right - home.left, top: top - home.top,
+        bottom: bottom - home.top };
+    });
+    return [
+      ...along(path), ...speeds,
+      ...segments.flatMap(({ x, y, tx, ty, length }) =>
+        along([px(x, y), px(x + tx * length, y + ty * length)])),
+      ...arcs.slice(0, MOST_ARCS).flatMap(({ x, y, radius, begin, extent }) =>
+        along(Array.from({ length: 25 }, (_, n) => px(
+          x + radius * Math.cos(begin + (n * extent) / 24),
+          y + radius * Math.sin(begin + (n * extent) / 24))))),
+    ];
+  }
 
   symbol(id: string): string {
     return this.stage.lab.data.quantities[id].symbol;

@@ -10,7 +10,7 @@
 //      {type: "broken"}, where the core cannot be loaded.
 
 import { judge } from "./breaches.ts";
-import { startCore, type Core, type Layout } from "./core.ts";
+import { compiled, startCore, type Core, type Layout } from "./core.ts";
 
 /** ms between two looks at the messages. */
 const TURN = 10;
@@ -87,9 +87,7 @@ function joined(parts: Float64Array[]) {
 let ready: Promise<void>;
 
 async function load({ wasm, layout }: { wasm: ArrayBuffer, layout: Layout }) {
-  const plain = new Blob([wasm]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const bytes = await new Response(plain).arrayBuffer();
-  core = await startCore(await WebAssembly.compile(bytes), layout);
+  core = await startCore(await compiled(wasm), layout);
 }
 
 addEventListener("message", async ({ data }) => {

@@ -1,0 +1,196 @@
+/* The machine of a scene: its belts, plates, conveyors and free surfaces as segments and arcs.
+
+   The outgoing belt hangs from where the nominal particle meets the plate, and the plate's lower end
+   stays above that belt. */
+
+#include "plan.h"
+
+/* m of plate below the pivot where there is no outgoing belt to stop short of. */
+#define REACH_WITHOUT_BELT 2.0
+/* m of a further plate below its pivot. */
+#define REACH_HANGING 0.5
+/* m that the plate's lower end stays above the outgoing belt, at least; the same in radii: a disk
+   that lies on the belt passes under the plate, with one to spare. */
+#define CLEARANCE 0.05
+#define CLEARANCE_RADII 3.0
+
+Plan P;
+
+__attribute__((visibility("default"))) Plan *plan(void) { return &P; }
+
+/* The tables of a member, found by their counts. */
+Tables tables_of(int member) {
+    const double *row = P.rows + (long)member * P.width;
+    Tables t;
+#define NEXT(name, Type, count) \
+    t.name = (const Type *)row, row += (count) * (int)(sizeof(Type) / sizeof(double))
+    NEXT(scene, SceneKeys, 1);
+    NEXT(particles, ParticleKeys, P.particles);
+    NEXT(streams, StreamKeys, P.streams);
+    NEXT(incoming, IncomingKeys, P.incoming);
+    NEXT(plates, PlateKeys, P.plates);
+    NEXT(outgoing, OutgoingKeys, P.outgoing);
+    NEXT(conveyors, ConveyorKeys, P.conveyors);
+    NEXT(surfaces, SurfaceKeys, P.surfaces);
+#undef NEXT
+    t.points = row;
+    t.particle = t.particles + (int)t.streams->kind;
+    if (!P.incoming) t.incoming = 0;
+    if (!P.outgoing) t.outgoing = 0;
+    t.plate = 0;
+    for (int n = P.plates - 1; n >= 0; n--)
+        if (isnan(t.plates[n].pivot[0])) t.plate = t.plates + n;
+    return t;
+}
+
+/* Where the pieces of this member are written, and how many there are. */
+static Segment *segments;
+static Arc *arcs;
+static int segment_count, arc_count, segment_room, arc_room;
+
+/* Lay a straight piece of a surface. What has no room is only counted. */
+static void lay_segment(int surface, double x, double y, double x1, double y1, double speed,
+                        const double *gate) {
+    if (segment_count++ >= segment_room) return;
+    double dx = x1 - x, dy = y1 - y, length = length_of(dx, dy);
+    segments[segment_count - 1] = (Segment){
+        { x, y }, { x1, y1 }, { dx / length, dy / length }, length, speed, gate[0], gate[1], surface,
+    };
+}
+
+static void lay_arc(int surface, double x, double y, double radius, double begin, double extent,
+                    double speed, const double *gate) {
+    if (arc_count++ >= arc_room) return;
+    arcs[arc_count - 1] = (Arc){ { x, y }, radius, begin, extent, speed, gate[0], gate[1], surface };
+}
+
+static const double ALWAYS[] = { -INFINITY, INFINITY };
+
+/* A plate that hangs from a pivot: upwards, so that its struck face (-cos a, -sin a) is on the left. */
+static void lay_plate(int surface, double x, double y, double angle_deg, double below,
+                      double above) {
+    double sine, cosine;
+    sin_cos(angle_deg * RADIANS, &sine, &cosine);
+    lay_segment(surface, x + below * sine, y - below * cosine, x - above * sine, y + above * cosine,
+                0.0, ALWAYS);
+}
+
+/* A belt round two pulleys: forward on top, which is clockwise to the right, and back. */
+static void lay_conveyor(int surface, const ConveyorKeys *c) {
+    double x0 = c->from[0], y0 = c->from[1], x1 = c->to[0], y1 = c->to[1], r = c->pulley_radius;
+    double way = length_of(x1 - x0, y1 - y0), dx = (x1 - x0) / way, dy = (y1 - y0) / way;
+    double clockwise = dx >= 0.0 ? 1.0 : -1.0, nx = -clockwise * dy * r, ny = clockwise * dx * r;
+    lay_segment(surface, x0 + nx, y0 + ny, x1 + nx, y1 + ny, c->speed, ALWAYS);
+    lay_segment(surface, x1 - nx, y1 - ny, x0 - nx, y0 - ny, c->speed, ALWAYS);
+    lay_arc(surface, x0, y0, r, 0.0, 2.0 * PI, clockwise * c->speed, ALWAYS);
+    lay_arc(surface, x1, y1, r, 0.0, 2.0 * PI, clockwise * c->speed, ALWAYS);
+}
+
+/* One copy of a free surface, moved by (dx, dy), from its gate's opening to its closing. */
+static void lay_copy(int surface, const SurfaceKeys *s, const double *points, double dx, double dy,
+                     const double *gate) {
+    int last = (int)s->corners - 1;
+    for (int n = 0; n < last; n++, points += 2)
+        lay_segment(surface, points[0] + dx, points[1] + dy, points[2] + dx, points[3] + dy,
+                    s->speed, gate);
+    if (last > 0) return;
+    double first = s->from_deg * RADIANS, end = s->to_deg * RADIANS;
+    lay_arc(surface, s->center[0] + dx, s->center[1] + dy, s->radius, MIN(first, end),
+            fabs(end - first), s->to_deg < s->from_deg ? s->speed : -s->speed, gate);
+}
+
+/* A free surface with all its copies, and when they are there. */
+static void lay_surface(int surface, const SurfaceKeys *s, const double *points) {
+    double opens = isnan(s->opens_at) ? INFINITY : s->opens_at;
+    double closes = isnan(s->closes_at) ? -INFINITY : s->closes_at;
+    double gates[2][2] = { { closes, opens }, { closes, INFINITY } };
+    int times = isfinite(opens) && isfinite(closes) && opens < closes ? 2 : 1;
+    if (times == 2) gates[0][0] = -INFINITY;
+    const double *rows = s->repeat;
+    int columns = isnan(rows[0]) ? 1 : (int)rows[0], lines = isnan(rows[3]) ? 1 : (int)rows[3];
+    for (int gate = 0; gate < times; gate++)
+        for (int line = 0; line < lines; line++)
+            for (int column = 0; column < columns; column++) {
+                double dx = 0.0, dy = 0.0;
+                if (!isnan(rows[0])) dx += column * rows[1], dy += column * rows[2];
+                if (!isnan(rows[3])) dx += line * rows[4], dy += line * rows[5];
+                lay_copy(surface, s, points, dx, dy, gates[gate]);
+            }
+}
+
+/* The incoming belt, the damping plate and the outgoing belt; the number of the next surface. */
+static int lay_transfer(const Tables *t, Nominal *found) {
+    const IncomingKeys *belt = t->incoming;
+    const PlateKeys *plate = t->plate;
+    const OutgoingKeys *out = t->outgoing;
+    double dx, dy, top = belt->pulley_radius, r = t->particle->radius, height = NAN;
+    int surface = 0, hangs = out && out->drop_from == FROM_IMPACT;
+    up_belt(belt, &dx, &dy);
+    double x = -top * dy, y = top * dx;
+    lay_segment(surface++, x - belt->length * dx, y - belt->length * dy, x, y, belt->speed, ALWAYS);
+    if (hangs && isnan(found->hit[1])) found->contradiction = NO_IMPACT;
+    if (out) height = hangs ? found->hit[1] - out->drop - r : top - out->drop;
+    if (plate) {
+        double sine, cosine, below = plate->below;
+        sin_cos(plate->angle_deg * RADIANS, &sine, &cosine);
+        x = top + plate->distance;
+        y = plate->pivot_height;
+        if (isnan(below) && out) {
+            double lowest = height + MAX(CLEARANCE, CLEARANCE_RADII * r);
+            below = MAX((y - lowest) / cosine, 0.0);
+        } else if (isnan(below)) {
+            below = REACH_WITHOUT_BELT;
+        }
+        found->below = below;
+        found->along = (y - found->hit[1]) * -cosine + (x - found->hit[0]) * sine;
+        found->off = found->along > plate->above ? HIT_ABOVE
+            : found->along < -below ? HIT_BELOW : SOUND;
+        if (found->contradiction == SOUND && below + plate->above <= 0.0)
+            found->contradiction = NO_LENGTH;
+        else if (found->contradiction == SOUND && hangs)
+            found->contradiction = found->off;
+        lay_plate(surface++, x, y, plate->angle_deg, below, plate->above);
+    }
+    if (out)
+        lay_segment(surface++, out->start, height, out->start + out->length, height, out->speed,
+                    ALWAYS);
+    return surface;
+}
+
+/* All surfaces of a member, in the order of the ledger. */
+static void lay_all(const Tables *t, Nominal *found) {
+    const double *points = t->points;
+    int surface = t->incoming ? lay_transfer(t, found) : 0;
+    for (int n = 0; n < P.plates; n++) {
+        const PlateKeys *plate = t->plates + n;
+        if (isnan(plate->pivot[0])) continue;
+        lay_plate(surface++, plate->pivot[0], plate->pivot[1], plate->angle_deg,
+                  isnan(plate->below) ? REACH_HANGING : plate->below, plate->above);
+    }
+    for (int n = 0; n < P.conveyors; n++) lay_conveyor(surface++, t->conveyors + n);
+    for (int n = 0; n < P.surfaces; n++) {
+        lay_surface(surface++, t->surfaces + n, points);
+        points += 2 * (int)t->surfaces[n].corners;
+    }
+}
+
+/* Build the machine of each member: 1 if there was room for all pieces. Where there was none, only
+   `segment_count` and `arc_count` are right. */
+__attribute__((visibility("default"))) int build(void) {
+    segment_room = P.segment_room / P.members;
+    arc_room = P.arc_room / P.members;
+    for (int member = 0; member < P.members; member++) {
+        Tables t = tables_of(member);
+        Nominal found = { .along = NAN, .below = NAN };
+        fly_nominal(&t, &found);
+        segments = P.segments + (long)member * P.segment_count;
+        arcs = P.arcs + (long)member * P.arc_count;
+        segment_count = arc_count = 0;
+        lay_all(&t, &found);
+        P.nominal[member] = found;
+        P.segment_count = segment_count;
+        P.arc_count = arc_count;
+        if (segment_count > segment_room || arc_count > arc_room) return 0;
+    }
+    return 1;
+}

@@ -1,0 +1,45 @@
+/* What the files share that build machines: the plan, the tables of one scene, a line a function. */
+
+#ifndef PLAN_H
+#define PLAN_H
+#include "layout.h"
+#include "trig.h"
+
+#define MIN(a, b) ((a) < (b) ? (a) : (b))
+#define MAX(a, b) ((a) > (b) ? (a) : (b))
+
+/* m; how near to the belt's height R + r a release counts as lying on the belt. */
+#define ON_BELT 1e-9
+
+extern Plan P;
+
+/* The tables of one scene, and the points of its polylines. */
+typedef struct {
+    const SceneKeys *scene;
+    const ParticleKeys *particles, *particle; /* all kinds; that of the nominal particle */
+    const StreamKeys *streams;
+    const IncomingKeys *incoming; /* or NULL */
+    const PlateKeys *plates, *plate; /* all; the damping plate or NULL */
+    const OutgoingKeys *outgoing; /* or NULL */
+    const ConveyorKeys *conveyors;
+    const SurfaceKeys *surfaces;
+    const double *points;
+} Tables;
+
+Tables tables_of(int member);
+
+/* nominal.c */
+double falls_below(double gap, double rate, double acceleration);
+void up_belt(const IncomingKeys *belt, double *dx, double *dy);
+int is_on_belt(const Tables *t, int stream);
+void release_point(const Tables *t, int stream, double *place);
+void release_velocity(const Tables *t, int stream, double *velocity);
+void fly_nominal(const Tables *t, Nominal *out);
+
+/* ride.c */
+int ride_to_pulley(double *w, double *z, double gap, double length, double gravity, double friction,
+                   double share, double belt, double incline);
+int ride_round(double *phi, double *w, double z, double rho, double gravity, double friction,
+               double share, double belt);
+
+#endif

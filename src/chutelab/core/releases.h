@@ -1,0 +1,22 @@
+/* What the files share that draw releases: the drawing, a line a function. */
+
+#ifndef RELEASES_H
+#define RELEASES_H
+#include "plan.h"
+
+extern Drawing D;
+
+/* A place that a disk may be put to. */
+typedef struct { double x, y; int taken; } Place;
+
+/* random.c */
+typedef struct { unsigned __int128 state, step; } Generator;
+void seed_generator(Generator *g, const unsigned *words, int count);
+double draw_uniform(Generator *g, double low, double high);
+
+/* room.c */
+void enter_room(const Tables *t);
+int take_what_is_in_surfaces(Place *places, int count, double radius);
+int clear_releases(void);
+
+#endif

@@ -1,0 +1,181 @@
+/* The nominal particle's ride with Coulomb friction: along the incoming belt, round its pulley.
+
+   Round the pulley its centre moves on a circle of radius rho. phi is the angle of the normal from
+   the top, clockwise; with w the speed along the circle, z = r omega, and N and F the normal and the
+   tangential force per mass,
+
+       phi' = w/rho,  w' = g sin phi + F,  z' = (m r^2/I) F,  N = g cos phi - w^2/rho,
+
+   where F = -share g sin phi while it grips, share = I/(I + m r^2), and -sign mu N while it slips. All
+   are expanded in a Taylor series in time; a step is as long as its last terms are rounding. */
+
+#include "plan.h"
+
+/* Degree of the series. */
+#define ORDER 20
+/* Share of the angle (rad) and of the speeds that the last terms of a step may be. */
+#define LEFT_OUT 1e-16
+/* rad of the pulley between two looks for an event: no two changes of one kind are nearer. */
+#define LOOK 2.4e-2
+#define MOST_LOOKS 32
+/* Bisections of a step for the time of an event, past the last bit. */
+#define HALVINGS 64
+/* Steps after which a ride counts as one without an end: the slowest fall off the very top takes
+   2,000. */
+#define STEPS 100000
+/* rad that a particle may slide back from where it came on to the pulley. */
+#define BACK 1e-9
+/* Sliding, gripping or not, and sliding back: what can follow each other on a belt. */
+#define PHASES 3
+
+/* What may end a step, and that nothing does. It ends where the particle turns round, so that it is
+   seen whether that is before the pulley. */
+enum { LIFTS, ONSET_BACK, ONSET_FORWARD, GRIPS, RETURNS, TURNS, GAUGES, GOES_ON = GAUGES };
+
+static double sign(double a) { return (a > 0.0) - (a < 0.0); }
+
+/* 0 if friction holds a contact that has no slip now, else the way that gravity makes it slip. */
+static double slips_to(double pull, double normal, double friction, double share) {
+    return share * fabs(pull) <= friction * normal ? 0.0 : sign(pull);
+}
+
+/* Slide or roll along the belt until the pulley is reached, `gap` m ahead, at w (m/s) and z; 0 if it
+   never is. `incline` is the belt's angle from the horizontal, rad, clockwise. */
+int ride_to_pulley(double *w, double *z, double gap, double length, double gravity, double friction,
+                   double share, double belt, double incline) {
+    double up, across, lever = 1.0 / share - 1.0;
+    sin_cos(incline, &up, &across);
+    double load = gravity * across, pull = gravity * up;
+    int still = *w + *z == belt;
+    for (int n = 0; n < PHASES; n++) {
+        double slip = *w + *z - belt, slides = still ? sign(pull) : sign(slip);
+        int holds = still && share * fabs(pull) <= friction * load;
+        double force = holds ? -share * pull : -slides * friction * load;
+        double pace = pull + force, twist = lever * force;
+        int fades = !still && slides * (pace + twist) < 0.0;
+        double grips = fades ? fabs(slip) / fabs(pace + twist) : INFINITY;
+        double ahead = falls_below(gap, -*w, -pace), back = falls_below(length - gap, *w, pace);
+        if (!(ahead >= 0.0)) ahead = INFINITY;
+        if (!(back >= 0.0)) back = INFINITY;
+        double when = MIN(MIN(grips, ahead), back);
+        if (isinf(when) || back < MIN(ahead, grips)) return 0;
+        gap -= when * (*w + 0.5 * pace * when);
+        *w += pace * when;
+        *z += twist * when;
+        still |= fades;
+        if (ahead <= grips) return 1;
+    }
+    return 0;
+}
+
+static double horner(const double *c, int degree, double t) {
+    double value = 0.0;
+    for (int n = degree; n >= 0; n--) value = value * t + c[n];
+    return value;
+}
+
+/* The terms of a product of two series, of degree n. */
+static double product(const double *a, const double *b, int n) {
+    double sum = 0.0;
+    for (int i = 0; i <= n; i++) sum += a[i] * b[n - i];
+    return sum;
+}
+
+typedef struct { double phi[ORDER + 1], w[ORDER + 1], z[ORDER + 1], normal[ORDER + 1]; } Series;
+typedef struct {
+    double phi, w, z;                            /* state */
+    double rho, gravity, friction, share, belt;
+    double slip, least;                          /* sign of the slip; angle where it is back */
+} Ride;
+
+/* Expand a ride in time, and what turns negative at an event. */
+static void expand(const Ride *r, Series *s, double gauges[GAUGES][ORDER + 1]) {
+    double sine[ORDER + 1], cosine[ORDER + 1], rates[ORDER + 1], lever = 1.0 / r->share - 1.0;
+    int grips = r->slip == 0.0;
+    double stick = grips ? -r->share : 0.0, load = grips ? 0.0 : -r->slip * r->friction;
+    s->phi[0] = r->phi, s->w[0] = r->w, s->z[0] = r->z;
+    sin_cos(r->phi, sine, cosine);
+    for (int n = 0; n <= ORDER; n++) {
+        s->normal[n] = r->gravity * cosine[n] - product(s->w, s->w, n) / r->rho;
+        double force = stick * r->gravity * sine[n] + load * s->normal[n];
+        double limit = grips ? r->friction * s->normal[n] : 0.0;
+        gauges[LIFTS][n] = s->normal[n];
+        gauges[ONSET_BACK][n] = grips ? limit - force : 0.0;
+        gauges[ONSET_FORWARD][n] = grips ? limit + force : 0.0;
+        gauges[GRIPS][n] = r->slip * (s->w[n] + s->z[n]) - (n ? 0.0 : r->slip * r->belt);
+        gauges[RETURNS][n] = s->phi[n] - (n ? 0.0 : r->least);
+        gauges[TURNS][n] = sign(r->w) * s->w[n];
+        if (n == ORDER) break;
+        s->w[n + 1] = (r->gravity * sine[n] + force) / (n + 1);
+        s->z[n + 1] = lever * force / (n + 1);
+        s->phi[n + 1] = s->w[n] / r->rho / (n + 1);
+        rates[n] = (n + 1) * s->phi[n + 1];
+        sine[n + 1] = product(rates, cosine, n) / (n + 1);
+        cosine[n + 1] = -product(rates, sine, n) / (n + 1);
+    }
+}
+
+/* How long a step is, s: INFINITY for what rests. */
+static double step_of(const Ride *r, const Series *s) {
+    double pace = fabs(r->w) + fabs(r->z) + fabs(r->belt) + sqrt(r->gravity * r->rho);
+    double weight = r->gravity + r->w * r->w / r->rho, dt = INFINITY;
+    for (int n = ORDER - 1; n <= ORDER; n++) {
+        double share = MAX(MAX(fabs(s->phi[n]), fabs(s->w[n]) / pace),
+                           MAX(fabs(s->z[n]) / pace, fabs(s->normal[n]) / weight));
+        if (share > 0.0) dt = MIN(dt, pow(LEFT_OUT / share, 1.0 / n));
+    }
+    return dt;
+}
+
+/* When a gauge that is negative at `high` became so. */
+static double turns_negative(const double *gauge, double low, double high) {
+    for (int n = 0; n < HALVINGS; n++) {
+        double middle = 0.5 * (low + high);
+        if (horner(gauge, ORDER, middle) >= 0.0) low = middle;
+        else high = middle;
+    }
+    return high;
+}
+
+/* Ride round the pulley until it lifts off, at an angle (rad) and a speed (m/s); 0 if it never does. */
+int ride_round(double *phi, double *w, double z, double rho, double gravity, double friction,
+               double share, double belt) {
+    Ride r = { *phi, *w, z, rho, gravity, friction, share, belt, 0.0, *phi - BACK };
+    r.slip = sign(r.w + r.z - belt);
+    for (int step = 0; step < STEPS; step++) {
+        double sine, cosine, gauges[GAUGES][ORDER + 1];
+        sin_cos(r.phi, &sine, &cosine);
+        double normal = gravity * cosine - r.w * r.w / rho;
+        if (step == 0 && r.slip == 0.0) r.slip = slips_to(gravity * sine, normal, friction, share);
+        *phi = r.phi, *w = r.w;
+        if (normal <= 0.0) return 1;
+        Series s;
+        expand(&r, &s, gauges);
+        double dt = step_of(&r, &s);
+        if (isinf(dt)) return 0;
+        double turn = fabs(horner(s.phi, ORDER, dt) - r.phi) / LOOK;
+        int looks = turn < MOST_LOOKS ? (int)ceil(turn) : MOST_LOOKS, event = GOES_ON;
+        double before = 0.0, at = dt;
+        looks = MAX(looks, 4);
+        for (int look = 1; look <= looks && event == GOES_ON; look++) {
+            double now = dt * look / looks;
+            for (int gauge = 0; gauge < GAUGES; gauge++) {
+                if (horner(gauges[gauge], ORDER, now) >= 0.0) continue;
+                double when = turns_negative(gauges[gauge], before, now);
+                if (event == GOES_ON || when < at) at = when, event = gauge;
+            }
+            before = now;
+        }
+        r.phi = horner(s.phi, ORDER, at);
+        r.w = horner(s.w, ORDER, at);
+        r.z = horner(s.z, ORDER, at);
+        if (event == RETURNS) return 0;
+        *phi = r.phi, *w = r.w;
+        if (event == LIFTS) return 1;
+        sin_cos(r.phi, &sine, &cosine);
+        normal = gravity * cosine - r.w * r.w / rho;
+        if (event == GRIPS) r.slip = slips_to(gravity * sine, normal, friction, share);
+        if (event == ONSET_BACK || event == ONSET_FORWARD) r.slip = sign(sine);
+    }
+    return 0;
+}

@@ -1,0 +1,206 @@
+/* Where disks may be released: not in a surface that is there then. */
+
+#include "releases.h"
+
+/* Share of the largest coordinate by which a contact may seem to overlap: the engines see to it. */
+#define ROUNDING (64.0 * 0x1p-52)
+
+/* A straight piece of a surface, a bent one, or neither: a pulley, which is solid. */
+typedef struct {
+    const Segment *segment;
+    const Arc *arc;
+    double x, y, radius;       /* m; of an arc or pulley */
+    double appears, vanishes;  /* s */
+    double box[4];             /* m; left, bottom, right, top */
+    int surface;
+} Piece;
+
+static const Tables *t;
+static const Segment *segments;
+static const Arc *arcs;
+
+void enter_room(const Tables *tables) {
+    t = tables;
+    segments = P.segments + (long)D.member * P.segment_count;
+    arcs = P.arcs + (long)D.member * P.arc_count;
+}
+
+static Piece straight_piece(const Segment *s) {
+    const double *a = s->start, *b = s->end;
+    return (Piece){
+        s, 0, 0.0, 0.0, 0.0, s->appears, s->vanishes,
+        { MIN(a[0], b[0]), MIN(a[1], b[1]), MAX(a[0], b[0]), MAX(a[1], b[1]) }, s->surface,
+    };
+}
+
+static Piece round_piece(const Arc *arc, double x, double y, double r, int surface) {
+    /* Rounding must not leave one out that just touches. */
+    double reach = r + ROUNDING * (MAX(fabs(x), fabs(y)) + r);
+    return (Piece){
+        0, arc, x, y, r, arc ? arc->appears : -INFINITY, arc ? arc->vanishes : INFINITY,
+        { x - reach, y - reach, x + reach, y + reach }, surface,
+    };
+}
+
+/* How many pieces there are: segments, arcs, the drive pulley, and those of the conveyors. */
+static int piece_count(void) {
+    return P.segment_count + P.arc_count + P.incoming + 2 * P.conveyors;
+}
+
+static Piece piece_of(int k) {
+    if (k < P.segment_count) return straight_piece(segments + k);
+    const Arc *arc = arcs + (k -= P.segment_count);
+    if (k < P.arc_count)
+        return round_piece(arc, arc->center[0], arc->center[1], arc->radius, arc->surface);
+    if ((k -= P.arc_count) < P.incoming) return round_piece(0, 0.0, 0.0, t->incoming->pulley_radius, 0);
+    /* The arcs of conveyors, two each, come before all others. */
+    arc = arcs + (k - P.incoming);
+    return round_piece(0, arc->center[0], arc->center[1], arc->radius, arc->surface);
+}
+
+/* List the pieces that may reach into a box. */
+static void list_pieces(double left, double bottom, double right, double top) {
+    D.listed_count = 0;
+    for (int k = 0; k < piece_count(); k++) {
+        Piece p = piece_of(k);
+        if (p.box[2] > left && p.box[0] < right && p.box[3] > bottom && p.box[1] < top)
+            D.listed[D.listed_count++] = k;
+    }
+}
+
+/* Whether a disk may reach a piece, or seem to. */
+static int is_beside(const Piece *p, double x, double y, double reach) {
+    double room = reach + ON_BELT + ROUNDING * (fabs(x) + fabs(y));
+    return p->box[2] > x - room && p->box[0] < x + room && p->box[3] > y - room
+        && p->box[1] < y + room;
+}
+
+static void nearest_on_segment(const Segment *s, double x, double y, double *place) {
+    double x0 = s->start[0], y0 = s->start[1], dx = s->end[0] - x0, dy = s->end[1] - y0;
+    double square = dx * dx + dy * dy, along = (x - x0) * dx + (y - y0) * dy;
+    double share = MIN(MAX(along / (square > 0.0 ? square : 1.0), 0.0), 1.0);
+    place[0] = x0 + share * dx;
+    place[1] = y0 + share * dy;
+}
+
+/* An end of an arc from its centre, of the point: its digits are those of its coordinates. */
+static void end_of_arc(const Arc *arc, double angle, double *end) {
+    double dx, dy;
+    sin_cos(angle, &dy, &dx);
+    end[0] = (arc->center[0] + arc->radius * dx) - arc->center[0];
+    end[1] = (arc->center[1] + arc->radius * dy) - arc->center[1];
+}
+
+static void nearest_on_arc(const Arc *arc, double x, double y, double *place) {
+    double dx = x - arc->center[0], dy = y - arc->center[1], first[2], last[2], *end = place;
+    if (!(length_of(dx, dy) > 0.0)) dx = 1.0, dy = 0.0;
+    if (modulo(angle_of(dy, dx) - arc->begin, 2.0 * PI) <= arc->extent) {
+        double far = length_of(dx, dy);
+        place[0] = arc->radius * dx / far;
+        place[1] = arc->radius * dy / far;
+    } else {
+        end_of_arc(arc, arc->begin, first);
+        end_of_arc(arc, arc->begin + arc->extent, last);
+        end = length_of(dx - first[0], dy - first[1]) <= length_of(dx - last[0], dy - last[1])
+            ? first : last;
+    }
+    place[0] = end[0] + arc->center[0];
+    place[1] = end[1] + arc->center[1];
+}
+
+/* The point of a piece that is nearest to a place; of a pulley its axis. */
+static void nearest_point(const Piece *p, double x, double y, double *place) {
+    place[0] = p->x;
+    place[1] = p->y;
+    if (p->segment) nearest_on_segment(p->segment, x, y, place);
+    if (p->arc) nearest_on_arc(p->arc, x, y, place);
+}
+
+/* Mark places where a disk would be in a surface, whenever that is there; how many looks it took. */
+int take_what_is_in_surfaces(Place *places, int count, double radius) {
+    double box[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY }, point[2];
+    for (const Place *o = places; o < places + count; o++) {
+        box[0] = MIN(box[0], o->x);
+        box[1] = MIN(box[1], o->y);
+        box[2] = MAX(box[2], o->x);
+        box[3] = MAX(box[3], o->y);
+    }
+    list_pieces(box[0] - radius, box[1] - radius, box[2] + radius, box[3] + radius);
+    for (int n = 0; n < D.listed_count; n++) {
+        Piece p = piece_of(D.listed[n]);
+        double reach = p.segment || p.arc ? radius : p.radius + radius;
+        for (Place *o = places; o < places + count; o++) {
+            if (o->taken || !is_beside(&p, o->x, o->y, radius)) continue;
+            nearest_point(&p, o->x, o->y, point);
+            if (!(length_of(o->x - point[0], o->y - point[1]) >= reach)) o->taken = 1;
+        }
+    }
+    return D.listed_count * count;
+}
+
+/* How far a box or polygon reaches towards (dx, dy), m: as far as its furthest corner. */
+static double reach_of_corners(const double *corners, int many, double dx, double dy) {
+    double most = -INFINITY;
+    for (int n = 0; n < many; n++) most = MAX(most, corners[2 * n] * dx + corners[2 * n + 1] * dy);
+    return most;
+}
+
+/* Move a release out of a piece. One less than ON_BELT inside, as one written with ten digits may be, is
+   moved; another is a reason to refuse, and the deepest is told. */
+static void clear_release(const Piece *p, int stream, int i, double *deepest, Refusal *refusal) {
+    Start *o = D.starts + (long)D.member * D.count + i;
+    double x = o->position[0], y = o->position[1], reach = o->radius, point[2];
+    if (!(p->appears <= o->t && o->t < p->vanishes) || !is_beside(p, x, y, o->radius)) return;
+    nearest_point(p, x, y, point);
+    double dx = x - point[0], dy = y - point[1], distance = length_of(dx, dy);
+    /* A point may start anywhere in a pulley. */
+    if (!p->segment && !p->arc) reach = reach > 0.0 ? p->radius + reach : 0.0;
+    int kind = (int)t->streams[stream].kind, corners = (int)t->particles[kind].corners;
+    if (corners) {
+        const double *first = D.corners;
+        for (int n = 0; n < kind; n++) first += 2 * (int)t->particles[n].corners;
+        reach += reach_of_corners(first, corners, -dx / distance, -dy / distance)
+            - t->particles[kind].radius;
+    }
+    double depth = reach - distance;
+    double rounding = ROUNDING * MAX(MAX(fabs(point[0]), fabs(point[1])), MAX(fabs(x), fabs(y)));
+    if (depth > MAX(ON_BELT, rounding) && depth >= *deepest) {
+        *deepest = depth;
+        *refusal = (Refusal){ distance, reach, RELEASE_INSIDE, stream, i, p->surface };
+    }
+    if (!(depth > rounding)) return;
+    o->position[0] = x + dx * (depth / distance);
+    o->position[1] = y + dy * (depth / distance);
+}
+
+/* List the pieces that releases of a member may be in. */
+static void list_near_releases(void) {
+    double box[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY };
+    const Start *o = D.starts + (long)D.member * D.count;
+    for (const Start *end = o + D.count; o < end; o++)
+        for (int n = 0; n < 2; n++) {
+            box[n] = MIN(box[n], o->position[n] - o->radius);
+            box[2 + n] = MAX(box[2 + n], o->position[n] + o->radius);
+        }
+    list_pieces(box[0], box[1], box[2], box[3]);
+}
+
+/* Move the releases of a member out of all pieces that are there then: 1 if that is done. */
+int clear_releases(void) {
+    Refusal *refusal = D.refusals + D.member;
+    if (!D.is_begun) list_near_releases(), D.next = 0;
+    D.is_begun = 1;
+    for (; D.next < D.listed_count && !refusal->why; D.next++) {
+        if (D.left <= 0) return 0;
+        D.left -= D.count;
+        Piece p = piece_of(D.listed[D.next]);
+        double deepest = -INFINITY;
+        for (int stream = 0, i = 0; stream < P.streams; stream++) {
+            int last = i + (int)t->streams[stream].count;
+            int rides = P.incoming && p.surface == 0 && D.carried[D.member * P.streams + stream];
+            for (; i < last; i++)
+                if (!rides) clear_release(&p, stream, i, &deepest, refusal);
+        }
+    }
+    return 1;
+}

@@ -1,0 +1,104 @@
+// A scene as the core takes it, one row of numbers, and the surfaces that it lays of that: what
+// `machine/rows.py` is in Python.
+
+import { Memory, type Layout } from "./core.ts";
+import { Fault, met, type Point, type Scene } from "./scene.ts";
+import { useCore } from "./trig.ts";
+
+type Segment = { start: Point, end: Point, tangent: Point, length: number, speed: number,
+  appears: number, vanishes: number, surface: number };
+type Arc = { center: Point, radius: number, begin: number, extent: number, speed: number,
+  appears: number, vanishes: number, surface: number };
+
+/** Numbers of what keys may say in words; `drop_from` as in layout.h. */
+const WORDS: Record<string, number> = { adhesion: Infinity, impact: 0.0, top: 1.0 };
+
+/** Segments and arcs for which there is room at first. */
+const ROOM = 64;
+
+/** The core of this thread. */
+let core: Memory;
+
+/** The core of this thread, with what is laid. */
+export const memory = () => core;
+
+/** Start the core of this thread, which builds machines, and knows sines. */
+export async function startPlan(module: WebAssembly.Module, layout: Layout) {
+  core = new Memory(await WebAssembly.instantiate(module, {}), layout);
+  useCore(core);
+}
+
+/** Returns the keys of a struct of layout.h as numbers, NaN for what is not given. */
+function numbersOf(struct: string, table: any) {
+  return Object.entries(core.layout.structs[struct].fields).flatMap(([key, [, , many]]) => {
+    const given: (number | string | boolean)[] = [table[key] ?? []].flat(2);
+    const numbers = given.map((value) => {
+      return typeof value === "string" ? WORDS[value] : Number(value);
+    });
+    return [...numbers, ...Array<number>(many - numbers.length).fill(NaN)];
+  });
+}
+
+/** Returns the lower 32 bits of a seed, and the others. */
+const wordsOf = (seed: bigint) => [Number(seed & 0xffffffffn), Number(seed >> 32n)];
+
+/** Returns all numbers of a scene. */
+function rowOf(scene: Scene): number[] {
+  const { incoming, outgoing, surface } = scene;
+  const [kind] = scene.kinds, all = (struct: string, tables: object[]) =>
+    tables.flatMap((table) => numbersOf(struct, table));
+  return [
+    ...numbersOf("SceneKeys", scene),
+    ...all("ParticleKeys", scene.particles.map((one) => ({
+      ...one, moment: !one.spin ? 0.0 : one.shape === "sphere" ? 0.4 : 0.5, corners: 0,
+    }))),
+    ...all("StreamKeys", scene.streams.map((one, n) => ({
+      ...one, kind: scene.kinds[n], seed: wordsOf(BigInt(one.seed)),
+      at_once: one.fill !== undefined || (one.to !== undefined && !("rate" in one.given)),
+    }))),
+    ...all("IncomingKeys", incoming ? [{
+      ...incoming, friction: met(scene, kind, "incoming")[1],
+      adheres: incoming.friction === "adhesion",
+    }] : []),
+    ...all("PlateKeys", scene.plates),
+    ...all("OutgoingKeys", outgoing ? [outgoing] : []),
+    ...all("ConveyorKeys", scene.conveyor),
+    ...all("SurfaceKeys", surface.map((one) => ({ ...one, corners: one.points?.length ?? 0 }))),
+    ...surface.flatMap(({ points }) => (points ?? []).flat()),
+  ];
+}
+
+/**
+ * Has the core lay the surfaces of a scene.
+ * @throws {Fault} if the plate has no length
+ */
+export function lay(scene: Scene): { segments: Segment[], arcs: Arc[] } {
+  const row = rowOf(scene);
+  let [segments, arcs] = [ROOM, ROOM];
+  for (let done = false; !done;) {
+    core.forget();
+    for (const [name, kind, count] of [
+      ["rows", "double", row.length], ["nominal", "Nominal", 1], ["segments", "Segment", segments],
+      ["arcs", "Arc", arcs],
+    ] as const) core.place(name, kind, count, "Plan");
+    core.doubles.set(row, core.get("rows", "Plan") >> 3);
+    for (const [name, count] of Object.entries({
+      members: 1, width: row.length, particles: scene.particles.length,
+      streams: scene.streams.length, incoming: Number(scene.incoming !== null),
+      plates: scene.plates.length, outgoing: Number(scene.outgoing !== null),
+      conveyors: scene.conveyor.length, surfaces: scene.surface.length, segment_room: segments,
+      arc_room: arcs,
+    })) core.set(name, count, "Plan");
+    done = core.exports.build() === 1;
+    [segments, arcs] = [core.get("segment_count", "Plan"), core.get("arc_count", "Plan")];
+  }
+  const [{ contradiction }] = core.rows("nominal", "Nominal", 1, "Plan");
+  if (contradiction === core.layout.enums.Contradiction.NO_LENGTH) {
+    const plate = scene.plates.find(({ pivot }) => pivot === undefined);
+    throw new Fault("plate.above", plate?.above, "no-length");
+  }
+  return {
+    segments: core.rows("segments", "Segment", segments, "Plan"),
+    arcs: core.rows("arcs", "Arc", arcs, "Plan"),
+  };
+}

@@ -24,7 +24,7 @@ from PIL import Image, ImageDraw
 
 from chutelab import scene
 from chutelab.cli import main
-from chutelab.engines.simulation import simulate
+from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import Machine, build
 from chutelab.machine.parts import Thread
 from chutelab.pictures.animation import Moment, Stage, VideoError, animate, film, moments
@@ -249,6 +249,15 @@ def test_a_landing_tells_of_the_flight_if_nothing_was_in_between() -> None:
         assert any(f"after {flown:.3f} s of flight" in words for words in said)
     said = {shot.words for shot in film(by_hand(), 0.4, 2.0, fps=25, slow=8.0)}
     assert not any("of flight" in words for words in said)
+
+
+def test_words_tell_what_is_lost_in_the_step_of_an_engine_that_steps() -> None:
+    """At v = 2 m/s on the plate, with m = 2.1 g: m v² (1 - ε²) / 2 = 3.15 mJ."""
+    trust = Path(__file__).parent.parent / "lessons" / "08-trust" / "fixed-steps.toml"
+    stepped = judged(scene.load(trust))
+    said = [shot.words for shot in film(stepped, 0.4, 0.9, fps=25, slow=6.0)]
+    assert any("strikes the plate" in words and "−3.15 mJ in" in words for words in said)
+    assert not any("no energy lost" in words for words in said)
 
 
 def test_words_tell_the_numbers_of_the_impacts() -> None:

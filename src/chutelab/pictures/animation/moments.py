@@ -102,10 +102,12 @@ def sentence(recording: Recording, event: Any) -> str:
     before_it = events[(events["particle"] == 0) & (events["t"] < event["t"])]
     if kind == Kind.LANDING and list(before_it["kind"][-1:]) == [Kind.SEPARATION]:
         text += f", after {event['t'] - before_it['t'][-1]:.3f} s of flight"
-    # What the impact booked: its first knot is the state before, its last the one after.
+    # Booked from the state before to the one after, or, of an engine that steps, in its step.
     track = recording.track(0)
-    booked = track["entries"][track["t"] == event["t"]]
-    belt, restitution, friction = booked[-1] - booked[0] if len(booked) else np.zeros(3)
+    start, end = (int(np.searchsorted(track["t"], event["t"], side)) for side in ("left", "right"))
+    after_it = max(start, end - 1)
+    entries = track["entries"]
+    belt, restitution, friction = entries[after_it] - entries[max(0, min(start, after_it - 1))]
     said = [
         f"{'+' if value > 0.0 else ''}{quantity(value, 'J')} {what}"
         for value, what in (

@@ -1087,8 +1087,10 @@ def test_shells_complete_scenes_and_kinds():
 
 def test_a_run_that_takes_too_long_ends_with_what_is_recorded():
     """Exit code 0; tables, JSON and `show` say that it was stopped, and the files are all there."""
-    # A bed has its places before the run begins: a time that is over by then is refused.
-    assert "stream.count = 200" in refused("run", "stream", "--max-seconds", "1e-9")
+    # Places are drawn before the run begins, a million looks at a time: a time that is over by then
+    # is refused.
+    many = ("--set", "stream.count=5000", "--set", "stream.rate=5000")
+    assert "stream.count = 5000" in refused("run", "stream", *many, "--max-seconds", "1e-9")
     flat = ("--set", "stream.bed_height=0")
     run = ("run", "stream", *flat, "--max-seconds", "1e-9", "--out", "out")
     text = " ".join(call(*run).stdout.split())

@@ -646,4 +646,5 @@ def test_comparing_in_text_imports_neither_pictures_nor_scipy():
         "print({'matplotlib', 'scipy', 'pymunk', 'wasmtime'} & set(sys.modules), file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr.strip() == "set()"
+    # The core judges every run.
+    assert done.stderr.strip() == "{'wasmtime'}"

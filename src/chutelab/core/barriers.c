@@ -250,9 +250,10 @@ static double forgiven(double t) {
     return t > At.piece->clear ? 0 : INFINITY;
 }
 
-/* From now on only places of this interval that are deeper than that, and passages, are looked for. */
+/* From now on only places of this interval that are deeper than that, and passages, are looked for: what
+   has come to the very middle of a piece may still pass it. */
 static void ask_for(double depth) {
-    if (At.radius > 0) At.limit = MAX(At.radius - depth, 0);
+    if (At.radius > 0) At.limit = MAX(At.radius - depth, L.rounding);
 }
 
 /* What is left of an interval: note it if it is bad. */

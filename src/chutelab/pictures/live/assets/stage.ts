@@ -109,7 +109,7 @@ class Stage {
     if (chosen) {
       const [[left, bottom], [right, top]] = [chosen.from, chosen.to];
       this.view.fit({ left, bottom, right, top }, 0);
-    } else this.view.fit(boxOf(machine, points));
+    } else this.view.fit(boxOf(machine, points, this.lab.data.live?.predict));
     this.chosen = JSON.stringify(chosen);
     this.fitted = points.length > 0;
     this.moved = false;

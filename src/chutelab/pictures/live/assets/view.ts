@@ -78,8 +78,11 @@ const BEYOND = 0.35;
 const FALL = 0.35;
 
 /** What is shown of a machine at first: its tracks and all that they can meet, but only so much of
- * belts and walls, which may be long, and of the fall of what leaves the scene. */
-function boxOf(machine: Machine, points: { x: number, y: number }[]): Box {
+ * belts and walls, which may be long, and of the fall of what leaves the scene.
+ * @param ride whether all of the way on the incoming belt is shown, however long */
+function boxOf(
+  machine: Machine, points: { x: number, y: number }[], ride: boolean = false,
+): Box {
   const box = { left: Infinity, bottom: Infinity, right: -Infinity, top: -Infinity };
   const widen = (x: number, y: number, r = 0) => {
     box.left = Math.min(box.left, x - r);
@@ -105,10 +108,10 @@ function boxOf(machine: Machine, points: { x: number, y: number }[]): Box {
   const all = !machine.segments.length && !machine.arcs.length;
   const inside = ({ x, y }: { x: number, y: number }) =>
     all || (x >= west && x <= east && y >= south && y <= north);
-  // Of the ride on the incoming belt as much as half of what comes after it.
+  // Of the ride on the incoming belt no more than a little more than what comes after it.
   const onward = machine.pulley ? points.filter((one) => one.x >= 0 && inside(one)) : [];
   const span = onward.reduce((most, { x, y }) => Math.max(most, x, Math.abs(y)), 0);
-  const from = onward.length ? -Math.max(0.5 * span, 2 * (machine.pulley?.radius ?? 0)) : -Infinity;
+  const from = onward.length && !ride ? -1.25 * span : -Infinity;
   points.filter(inside).forEach(({ x, y }) => widen(Math.max(x, from), y));
   if (!points.length) machine.releases.forEach(({ x, y }, i) => widen(x, y, machine.radius[i]));
   const ends = ({ x, y, tx, ty, length }: Segment) =>

@@ -468,16 +468,16 @@ STATED = {
     },
     10: {
         "than 2^(3/2) = {2.83} times": 2.0**1.5,
-        "| 24 | 144 ± 3 | {27} |": 144.0 ** (2.0 / 3.0),
-        "| 30 | 236 ± 18 | {38} |": 236.0 ** (2.0 / 3.0),
-        "| 36 | 325 ± 18 | {47} |": 325.0 ** (2.0 / 3.0),
-        "| 48 | 548 ± 30 | {67} |": 548.0 ** (2.0 / 3.0),
+        "| 24 | 144 ± 9 | {27} |": 144.0 ** (2.0 / 3.0),
+        "| 30 | 226 ± 16 | {37} |": 226.0 ** (2.0 / 3.0),
+        "| 36 | 334 ± 16 | {48} |": 334.0 ** (2.0 / 3.0),
+        "| 48 | 582 ± 35 | {70} |": 582.0 ** (2.0 / 3.0),
     },
     11: {
         "tan α = µ on, {26.6}° here": degrees(atan(0.5)),
         "With c = 0.3 that is {16.7}°": degrees(atan(0.3)),
         "of the height, {71} %, and": 100.0 / sqrt(2.0),
-        "uncertain by 3° / √5, about {1.3}°": 3.0 / sqrt(5.0),
+        "uncertain by 4° / √5, about {1.8}°": 4.0 / sqrt(5.0),
     },
     "physics": {
         "up to {1} m/s. A faster": sqrt(G * 0.1),
@@ -629,10 +629,10 @@ def numbers_in(text):
 
 
 # Of the answers' numbers, those that the questions give: a row of the paper's table, the plates'
-# angles, the textbook's and its belt's µ, rates to choose from, steps, and the end of a range.
+# angles, the textbook's and its belt's µ, rates to choose from, steps, the end of a range, a width.
 TOLD = {
     3: {"0.137"}, 4: {"20", "40", "60"}, 6: {"0.5", "36.4"}, 7: {"10", "50"},
-    8: {"0.1", "0.2"}, 9: {"60"},
+    8: {"0.1", "0.2"}, 9: {"60"}, 10: {"48"},
 }  # fmt: skip
 
 

@@ -170,7 +170,12 @@ class Module:
             begins.append((self._end + 15) // 16 * 16)
             self._end = begins[-1] + max(1, size)
         if self._end > self.size:
-            self._memory.grow(self._store, -(-(self._end - self.size) // PAGE))
+            try:
+                self._memory.grow(self._store, -(-(self._end - self.size) // PAGE))
+            except wasmtime.WasmtimeError as error:
+                raise MemoryError(
+                    f"{self._end / 2**30:.1f} GiB are more than the core can have"
+                ) from error
             self._look()
         struct = self.structs[of]
         for (name, _), begin in zip(sizes, begins, strict=True):

@@ -55,6 +55,10 @@ function placed(wanted: Label[], taken: Space[]): Placed[] {
   });
 }
 
+/** Boxes that fill a disc, px. */
+const discs = (x: number, y: number, r: number): Space[] => [[1, 0.4], [0.8, 0.7], [0.4, 1]]
+  .map(([u, v]) => ({ left: x - u * r, right: x + u * r, top: y - v * r, bottom: y + v * r }));
+
 /** Arcs that labels keep clear of; more are a board of pegs. */
 const MOST_ARCS = 40;
 
@@ -137,7 +141,7 @@ class Symbols {
 
   /** What the path and the surfaces cover, as far as it is seen. */
   lines(recording: Recording): Space[] {
-    const { view } = this.stage, { segments, arcs } = recording.machine;
+    const { view } = this.stage, { segments, arcs, pulley } = recording.machine;
     const px = (x: number, y: number) => [
       Math.min(Math.max(view.px(x), -50), view.width + 50),
       Math.min(Math.max(view.py(y), -50), view.height + 50),
@@ -151,6 +155,7 @@ class Symbols {
     });
     return [
       ...along(path), ...speeds,
+      ...(pulley ? discs(view.px(0), view.py(0), pulley.radius * view.scale) : []),
       ...segments.flatMap(({ x, y, tx, ty, length }) =>
         along([px(x, y), px(x + tx * length, y + ty * length)])),
       ...arcs.slice(0, MOST_ARCS).flatMap(({ x, y, radius, begin, extent }) =>

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.theory.results import STAGES, Reason, Transfer
-from chutelab.theory.separation import FAULTS, separation
+from chutelab.theory.slide import FAULTS, separation
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.trig import atan2, hypot, sin_cos
 

@@ -33,7 +33,7 @@ from chutelab.results.quantities import each
 from chutelab.scene import Scene
 from chutelab.scene.conflicts import beside
 from chutelab.theory import Transfer
-from chutelab.theory.separation import separation
+from chutelab.theory.slide import separation
 from chutelab.util.arrays import Floats
 from chutelab.util.trig import RADIANS, sin_cos
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from chutelab.theory.prediction import Course
 from chutelab.theory.results import Transfer
-from chutelab.theory.transfer import rebound
+from chutelab.theory.transfer import rebounded
 
 if TYPE_CHECKING:
     from chutelab.scene import Scene
@@ -151,7 +151,7 @@ def drag(
 def _shifts(course: Course) -> tuple[float, float]:
     """Return `Drag.impact_shift` and `Drag.landing_shift`."""
     found, own = course.found, course.own
-    restitution, friction = course.scene.met(course.kind, "plate")
+    restitution, friction = course.scene.met(course.scene.kinds[0], "plate")
 
     def rate(vx: float, vy: float) -> tuple[float, float]:
         slow = slowing(hypot(vx, vy), own.radius, own.mass)
@@ -171,7 +171,7 @@ def _shifts(course: Course) -> tuple[float, float]:
     shift = float(y - course.impact[1])
     if not np.isfinite(found.t3):
         return shift, nan
-    away, down, _ = rebound(
+    away, down, _ = rebounded(
         normal=np.array(-vx * nx - vy * ny), tangential=np.array(-vx * ux - vy * uy),
         rim=np.array(own.radius * float(found.omega1)), restitution=np.array(restitution),
         friction=np.array(friction), spin=np.array(own.spin), inertia=np.array(own.moment or 0.5),

@@ -13,19 +13,22 @@ rounding makes of the numbers, so a graze to within rounding is one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.util.arrays import Bools, Floats
+from chutelab.util.arrays import Bools, Floats, Ints
 
 Line = tuple[str, ArrayLike, ArrayLike]
 """A straight surface: its name and both ends, m."""
 
 Bend = tuple[str, ArrayLike, float, float, float]
-"""A round one: its name, centre and radius, m, begin and extent, rad, as `Arcs` has them."""
+"""A round one: its name, centre and radius, m; the angle of its first end from the x axis,
+counter-clockwise, and how far it reaches from there, rad. 2π is a whole circle, without ends."""
+
+WHOLE = 2.0 * np.pi
 
 HALVINGS = 60
 """Bisections of a contact time: they exhaust a double's digits."""
@@ -36,131 +39,88 @@ place."""
 
 
 @dataclass(frozen=True, eq=False)
-class Segments:
-    """Named straight surfaces: names (S,), first and second ends (S, 2), m."""
+class Obstacles:
+    """Straight and round surfaces, and all their ends.
 
-    names: tuple[str, ...]
-    start: Floats
-    end: Floats
-
-    @classmethod
-    def of(cls, lines: Sequence[Line]) -> Segments:
-        """Collect (name, first end, second end) triples."""
-        ends = np.array([line[1:] for line in lines], dtype=np.float64).reshape(-1, 2, 2)
-        return cls(tuple(line[0] for line in lines), ends[:, 0], ends[:, 1])
-
-    @property
-    def points(self) -> Floats:
-        """All ends, (2S, 2): end i and end S + i belong to segment i."""
-        return np.concatenate([self.start, self.end])
-
-    def frames(self) -> tuple[Floats, Floats, Floats]:
-        """Return unit tangents (S, 2), unit normals to their left (S, 2), lengths (S,)."""
-        along = self.end - self.start
-        length = np.hypot(along[:, 0], along[:, 1])
-        tangent = along / length[:, None]
-        return tangent, np.stack([-tangent[:, 1], tangent[:, 0]], axis=1), length
-
-    def distances(self, point: Floats) -> Floats:
-        """Return how far a point is from each, (S,), m."""
-        tangent, _, length = self.frames()
-        share = np.clip(np.sum((point - self.start) * tangent, axis=1), 0.0, length)
-        gap = self.start + share[:, None] * tangent - point
-        return np.asarray(np.hypot(gap[:, 0], gap[:, 1]))
-
-
-@dataclass(frozen=True, eq=False)
-class Arcs:
-    """Named round surfaces: names (A,), centres (A, 2) and radii (A,), m, and where they are.
-
-    `begin` is the angle of the first end from the x axis, counter-clockwise, and `extent` >= 0 how
-    far an arc reaches from there, rad; 2π is a whole circle, which has no ends.
+    Attributes
+    ----------
+    names : tuple of str
+        Of the S straight ones, then of the others.
+    start, tangent, normal, length : ndarray, (S, 2) and (S,)
+        First ends of the straight ones (m), unit vectors along them and to their left, lengths.
+    center, size, begin, extent : ndarray, (C, 2) and (C,)
+        What is round, as `Bend` has it; an end of a surface is a circle of no size.
+    owner : ndarray of int, (C,)
+        To which of the names each of these belongs.
     """
 
     names: tuple[str, ...]
+    start: Floats
+    tangent: Floats
+    normal: Floats
+    length: Floats
     center: Floats
-    radius: Floats
+    size: Floats
     begin: Floats
     extent: Floats
-
-    @classmethod
-    def of(cls, bends: Sequence[Bend]) -> Arcs:
-        """Collect (name, centre, radius, begin, extent) tuples."""
-        center = np.array([bend[1] for bend in bends], dtype=np.float64).reshape(-1, 2)
-        numbers = np.array([bend[2:] for bend in bends], dtype=np.float64).reshape(-1, 3)
-        return cls(tuple(bend[0] for bend in bends), center, *numbers.T)
-
-    @property
-    def points(self) -> Floats:
-        """All ends, (2A, 2): end i and end A + i belong to arc i; NaN of a whole circle."""
-        angles = np.concatenate([self.begin, self.begin + self.extent])
-        whole = np.tile(self.extent >= 2.0 * np.pi, 2)
-        radius = np.where(whole, np.nan, np.tile(self.radius, 2))
-        direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        return np.asarray(np.tile(self.center, (2, 1)) + radius[:, None] * direction)
-
-    @property
-    def box(self) -> Floats:
-        """Corners of boxes round the circles, (2A, 2), m."""
-        return np.concatenate([
-            self.center - self.radius[:, None], self.center + self.radius[:, None],
-        ])  # fmt: skip
-
-    def holds(self, index: int, points: Floats) -> Bools:
-        """Tell whether the directions from an arc's centre to points (..., 2) are on the arc."""
-        away = points - self.center[index]
-        turned = np.arctan2(away[..., 1], away[..., 0]) - self.begin[index]
-        return np.asarray(np.mod(turned, 2.0 * np.pi) <= self.extent[index])
-
-    def distances(self, point: Floats) -> Floats:
-        """Return how far a point is from each, (A,), m."""
-        found = np.empty(len(self.names))
-        ends = np.hypot(*(self.points - point).T).reshape(2, -1)
-        for index, center in enumerate(self.center):
-            on_it = abs(float(np.hypot(*(point - center))) - self.radius[index])
-            found[index] = on_it if self.holds(index, point) else ends[:, index].min()
-        return found
-
-    def rings(self, radius: float) -> Iterator[tuple[int, float, float]]:
-        """Yield where a disk can touch: arc, the arc's radius (m), and 1 outside or -1 inside."""
-        for index, size in enumerate(self.radius.tolist()):
-            yield index, size, 1.0
-            if size > radius:
-                yield index, size, -1.0
-
-
-NO_ARCS = Arcs.of([])
-
-
-@dataclass(frozen=True, eq=False)
-class Obstacles:
-    """Straight and round surfaces together; indices count the segments first."""
-
-    segments: Segments
-    arcs: Arcs
+    owner: Ints
 
     @classmethod
     def of(cls, lines: Sequence[Line], bends: Sequence[Bend] = ()) -> Obstacles:
-        """Collect both, see `Segments.of` and `Arcs.of`."""
-        return cls(Segments.of(lines), Arcs.of(bends) if bends else NO_ARCS)
+        """Collect surfaces."""
+        ends = np.array([line[1:] for line in lines], dtype=np.float64).reshape(-1, 2, 2)
+        way = ends[:, 1] - ends[:, 0]
+        length = np.hypot(*way.T)
+        tangent = way / length[:, None]
+        # Of two that are met at once the first of faces, points, rings and tips counts.
+        points = [(x, y, 0.0, 0.0, WHOLE, i) for k in (0, 1) for i, (x, y) in enumerate(ends[:, k])]
+        rings, tips = [], []
+        for i, (_, center, size, begin, extent) in enumerate(bends, start=len(lines)):
+            x, y = np.asarray(center)
+            rings.append((x, y, size, begin, extent, i))
+            for angle in (begin, begin + extent) if extent < WHOLE else ():
+                tip = x + size * np.cos(angle), y + size * np.sin(angle)
+                tips.append((*tip, 0.0, 0.0, WHOLE, i))
+        table = np.array([*points, *rings, *tips], dtype=np.float64).reshape(-1, 6)
+        size, begin, extent, owner = table[:, 2:].T
+        return cls(
+            (*(line[0] for line in lines), *(bend[0] for bend in bends)),
+            ends[:, 0], tangent, np.stack([-tangent[:, 1], tangent[:, 0]], axis=1), length,
+            table[:, :2], size, begin, extent, owner.astype(np.int64),
+        )  # fmt: skip
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Their names."""
-        return self.segments.names + self.arcs.names
+    def corners(self) -> Floats:
+        """Corners of boxes round all that is round, ends too, (2C, 2), m."""
+        return np.concatenate([self.center - self.size[:, None], self.center + self.size[:, None]])
 
-    @property
-    def points(self) -> Floats:
-        """Points round which the box of all goes, m."""
-        return np.concatenate([self.segments.points, self.arcs.box])
+    def on_face(self, points: Floats) -> Bools:
+        """Tell whether the feet of points (S, 2) are on the straight surfaces."""
+        foot = np.sum((points - self.start) * self.tangent, axis=1)
+        return np.asarray((foot >= 0.0) & (foot <= self.length))
+
+    def on_arc(self, points: Floats) -> Bools:
+        """Tell whether the directions from the centres to points (C, 2) are on the arcs."""
+        away = points - self.center
+        turned = np.arctan2(away[:, 1], away[:, 0]) - self.begin
+        return np.asarray(np.mod(turned, WHOLE) <= self.extent)
 
     def overlapped(self, point: Floats, radius: float) -> int:
         """Return the first that is closer to `point` than `radius`, -1 if none."""
-        far = self.segments.distances(point)
-        if self.arcs.names:
-            far = np.append(far, self.arcs.distances(point))
-        near = np.flatnonzero(far < radius)
-        return int(near[0]) if near.size else -1
+        height = np.abs(np.sum((point - self.start) * self.normal, axis=1))
+        faces = np.flatnonzero((height < radius) & self.on_face(point))
+        gap = np.abs(np.hypot(*(point - self.center).T) - self.size)
+        rings = self.owner[(gap < radius) & self.on_arc(point)]
+        return min([*faces.tolist(), *rings.tolist()], default=-1)
+
+    def earliest(self, faces: Floats, rings: Floats) -> tuple[float, int]:
+        """Return the least of two rows of numbers, (S,) and (C,), and whose it is; (inf, -1)."""
+        both = np.append(faces, rings)
+        if not np.isfinite(both).any():
+            return np.inf, -1
+        index = int(np.argmin(both))
+        owners = np.append(np.arange(len(faces)), self.owner)
+        return float(both[index]), int(owners[index])
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,33 +140,16 @@ class Flight:
     def horizon(self, targets: Obstacles, radius: float) -> float:
         """Return a time after which a disk has passed all targets."""
         if self.gravity > 0.0:
-            rise = self.position[1] - (float(targets.points[:, 1].min()) - radius)
+            rise = self.position[1] - (float(targets.corners[:, 1].min()) - radius)
             speed = self.velocity[1]
             square = speed**2 + 2.0 * self.gravity * rise
             if square <= 0.0:
                 return 0.0
             return max(float((speed + np.sqrt(square)) / self.gravity), 0.0)
-        apart = targets.points - self.position
+        apart = targets.corners - self.position
         reach = float(np.hypot(apart[:, 0], apart[:, 1]).max()) + 2.0 * radius
         pace = float(np.hypot(*self.velocity))
         return reach / pace if pace > 0.0 else 0.0
-
-
-def corner_times(flight: Flight, points: Floats, radius: float, horizon: float) -> Floats:
-    """Return when the centre first comes as close as `radius` to each point, (P,); inf if not."""
-    first = np.full(len(points), np.inf)
-    if radius <= 0.0 or horizon <= 0.0:
-        return first
-    stops = np.array([0.0, horizon])
-    if flight.gravity > 0.0:
-        apex = np.clip(flight.velocity[1] / flight.gravity, 0.0, horizon)
-        stops = np.append(stops, apex)
-    places = flight.at(stops)
-    room = 1.001 * radius
-    reach = (points >= places.min(axis=0) - room) & (points <= places.max(axis=0) + room)
-    for index in np.flatnonzero(reach.all(axis=1)):
-        first[index] = next(ring_times(flight, points[index], 0.0, radius, horizon), np.inf)
-    return first
 
 
 def ring_times(
@@ -253,13 +196,14 @@ def first_in_flight(
     flight: Flight, obstacles: Obstacles, radius: float, horizon: float
 ) -> tuple[float, int]:
     """Return when and with what the disk first collides up to `horizon`; (inf, -1)."""
-    segments, arcs = obstacles.segments, obstacles.arcs
-    tangent, normal, length = segments.frames()
-    height = np.sum((flight.position - segments.start) * normal, axis=1)
+    start, normal, center, size = (
+        obstacles.start, obstacles.normal, obstacles.center, obstacles.size,
+    )  # fmt: skip
+    height = np.sum((flight.position - start) * normal, axis=1)
     speed = normal @ flight.velocity
     bend = -0.5 * flight.gravity * normal[:, 1]
-    faces = np.full(len(length), np.inf)
-    off = ROUNDING * (np.abs(flight.position).sum() + np.abs(segments.start).sum(axis=1) + radius)
+    faces, rings = np.full(len(start), np.inf), np.full(len(size), np.inf)
+    off = ROUNDING * (np.abs(flight.position).sum() + np.abs(start).sum(axis=1) + radius)
     for side in (1.0, -1.0):
         # Where c + b t + a t² falls to 0, without cancellation; NaN if nowhere.
         c, b, a = side * height - radius, side * speed, side * bend
@@ -270,22 +214,22 @@ def first_in_flight(
             t = np.where(b > 0.0, -(b + root) / (2.0 * a), 2.0 * c / (root - b))
         t[(c == 0.0) & (b == 0.0) & (a < 0.0)] = 0.0
         met = (t >= 0.0) & (t <= horizon)
-        foot = np.full(len(t), -1.0)
-        foot[met] = np.sum((flight.at(t[met]) - segments.start[met]) * tangent[met], axis=1)
-        faces = np.minimum(faces, np.where((foot >= 0.0) & (foot <= length), t, np.inf))
-    corners = corner_times(flight, segments.points, radius, horizon)
-    straight = _earliest(np.concatenate([faces, corners]), len(segments.names))
-    if not arcs.names or horizon <= 0.0:
-        return straight
-    faces = np.full(len(arcs.names), np.inf)
-    for index, size, side in arcs.rings(radius):
-        for time in ring_times(flight, arcs.center[index], size, radius, horizon, side):
-            if arcs.holds(index, flight.at(np.array(time))):
-                faces[index] = min(faces[index], time)
-                break
-    corners = corner_times(flight, arcs.points, radius, horizon)
-    time, index = _earliest(np.concatenate([faces, corners]), len(faces))
-    return straight if straight[0] <= time else (time, len(segments.names) + index)
+        met &= obstacles.on_face(flight.at(np.where(met, t, 0.0)))
+        faces = np.minimum(faces, np.where(met, t, np.inf))
+    # Circles that the box of the flight comes near.
+    turn = flight.velocity[1] / flight.gravity if flight.gravity > 0.0 else 0.0
+    places = flight.at(np.array([0.0, horizon, np.clip(turn, 0.0, horizon)]))
+    room = 1.001 * (size + radius)[:, None]
+    near = (center >= places.min(axis=0) - room) & (center <= places.max(axis=0) + room)
+    for index in np.flatnonzero(near.all(axis=1)) if horizon > 0.0 else ():
+        for side in (1.0, -1.0):
+            if size[index] + side * radius <= 0.0:
+                continue
+            for time in ring_times(flight, center[index], size[index], radius, horizon, side):
+                if obstacles.on_arc(flight.at(np.array(time)))[index]:
+                    rings[index] = min(rings[index], time)
+                    break
+    return obstacles.earliest(faces, rings)
 
 
 def first_on_pulley(
@@ -296,62 +240,29 @@ def first_on_pulley(
     The centre's path has radius Rc (m) round the origin and goes from the angle `begin` from the
     top to `last` (rad); the angle returned is counted from `begin`.
     """
-    segments, arcs = obstacles.segments, obstacles.arcs
-    tangent, normal, length = segments.frames()
-    level = np.sum(segments.start * normal, axis=1)
-    angles = []
-    with np.errstate(invalid="ignore"):
-        for side in (radius, -radius):
-            lean = np.arctan2(normal[:, 0], normal[:, 1])
-            spread = _spread((level + side) / ride_radius)
-            for angle in (lean - spread, lean + spread):
-                place = ride_radius * np.stack([np.sin(angle), np.cos(angle)], axis=1)
-                foot = np.sum((place - segments.start) * tangent, axis=1)
-                angles.append(np.where((foot >= 0.0) & (foot <= length), angle, np.inf))
-        if radius > 0.0:
-            angles += _on_circle(ride_radius, segments.points, radius)
-        touched = _turned(np.concatenate(angles), begin)
-        touched[~(touched <= last - begin)] = np.inf
-        straight = _earliest(touched, len(segments.names))
-        if not arcs.names:
-            return straight
-        angles = list(_on_circle(ride_radius, arcs.points, radius)) if radius > 0.0 else []
-        for index, size, side in arcs.rings(radius):
-            for angle in _on_circle(ride_radius, arcs.center[index], size + side * radius):
-                place = ride_radius * np.array([np.sin(angle), np.cos(angle)])
-                row = np.full(len(arcs.names), np.inf)
-                row[index] = angle if arcs.holds(index, place) else np.inf
-                angles.append(row)
-        touched = _turned(np.concatenate(angles), begin)
-        touched[~(touched <= last - begin)] = np.inf
-    turned, index = _earliest(touched, len(arcs.names))
-    return straight if straight[0] <= turned else (turned, len(segments.names) + index)
 
+    def turned(lean: Floats, cosine: Floats, on_it: Callable[[Floats], Bools]) -> Floats:
+        """Return how far from `begin` it is to the first of the angles lean ± acos; inf if none."""
+        # A cosine may be beyond 1 by rounding.
+        over = np.abs(cosine) - 1.0
+        spread = np.arccos(np.where(np.abs(over) <= ROUNDING, np.sign(cosine), cosine))
+        first = np.full(len(lean), np.inf)
+        for angle in (lean - spread, lean + spread):
+            way = np.mod(angle - begin, WHOLE)
+            way = np.where(way >= WHOLE - ROUNDING, 0.0, way)
+            there = on_it(ride_radius * np.stack([np.sin(angle), np.cos(angle)], axis=1))
+            first = np.where(there & (way <= last - begin), np.minimum(first, way), first)
+        return first
 
-def _on_circle(ride_radius: float, points: Floats, radius: float) -> tuple[Floats, Floats]:
-    """Return from the top where the ride is `radius` away from points (..., 2); NaN if nowhere."""
-    far = np.hypot(points[..., 0], points[..., 1])
-    lean = np.arctan2(points[..., 0], points[..., 1])
+    normal, center, size = obstacles.normal, obstacles.center, obstacles.size
+    level = np.sum(obstacles.start * normal, axis=1)
+    far = np.hypot(*center.T)
+    faces, rings = np.full(len(level), np.inf), np.full(len(size), np.inf)
     with np.errstate(all="ignore"):
-        cosine = (ride_radius**2 + far**2 - radius**2) / (2.0 * ride_radius * far)
-        spread = _spread(cosine)
-    return lean - spread, lean + spread
-
-
-def _spread(cosine: Floats) -> Floats:
-    """Return the angle of a cosine, which may be beyond 1 by rounding; NaN if it is by more."""
-    over = np.abs(cosine) - 1.0
-    return np.asarray(np.arccos(np.where(np.abs(over) <= ROUNDING, np.sign(cosine), cosine)))
-
-
-def _turned(angle: Floats, begin: float) -> Floats:
-    """Return how far angles are from where a ride begins, from 0 to 2π, rad."""
-    turned = np.mod(angle - begin, 2.0 * np.pi)
-    return np.asarray(np.where(turned >= 2.0 * np.pi - ROUNDING, 0.0, turned))
-
-
-def _earliest(times: Floats, count: int) -> tuple[float, int]:
-    if not times.size or not np.isfinite(times).any():
-        return np.inf, -1
-    index = int(np.argmin(times))
-    return float(times[index]), index % count
+        for side in (radius, -radius):
+            lean, cosine = np.arctan2(*normal.T), (level + side) / ride_radius
+            faces = np.minimum(faces, turned(lean, cosine, obstacles.on_face))
+            reach = np.where(size + side > 0.0, size + side, np.nan)
+            cosine = (ride_radius**2 + far**2 - reach**2) / (2.0 * ride_radius * far)
+            rings = np.minimum(rings, turned(np.arctan2(*center.T), cosine, obstacles.on_arc))
+    return obstacles.earliest(faces, rings)

@@ -7,17 +7,17 @@ the plate is there, what is touched between rebound and landing, whether the bel
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.theory.obstacles import (
+    WHOLE,
     Bend,
     Flight,
     Line,
     Obstacles,
-    corner_times,
     first_in_flight,
     first_on_pulley,
     ring_times,
@@ -55,9 +55,7 @@ class Course:
         assert scene.plate is not None
         self.scene, self.found = scene, found
         self.belt, plate, out = scene.incoming, scene.plate, scene.outgoing
-        self.kind = scene.kinds[0]
-        self.own = scene.particles[self.kind]
-        self.radius = self.own.radius
+        self.own, self.radius = scene.particle, scene.particle.radius
         self.ride_radius = self.belt.pulley_radius + self.radius
         self.angle = plate.angle_deg * RADIANS
         # Up along the plate, and out of its struck face.
@@ -153,10 +151,6 @@ def free_surfaces(scene: Scene) -> tuple[list[Line], list[Bend]]:
     return lines, bends
 
 
-ON_BELT = 1e-12
-"""m; a release this close to the riding height differs from it by the rounding of a sum only."""
-
-
 def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     """Predict particle 0 of a scene in closed form.
 
@@ -186,7 +180,7 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     from chutelab.scene import load
 
     scene = load(scene)
-    fault = _outside(scene)
+    fault = outside(scene)
     if fault:
         return cut(unanswered(), "separation", Reason.OUTSIDE.because(fault))
     found = unbounded(scene, rebound)
@@ -196,14 +190,7 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     if scene.outgoing is not None and course.belt_height is None:
         # Nothing places the belt, nor the plate's lower end: there is no machine to look at.
         return cut(found, "separation", str(found.reason))
-    low, high = course.plate_reach
-    if high <= low:
-        return cut(found, "impact", Reason.OUTSIDE.because("the plate has no length"))
-    trouble = _on_the_ride(course) or _before_the_plate(course)
-    if trouble is None and scene.outgoing is None and np.isfinite(found.v2r):
-        trouble = "landing", Reason.OUTSIDE.because("there is no outgoing conveyor")
-    if trouble is None and Reason.of(found.reason) in (None, Reason.MISSES):
-        trouble = _after_the_rebound(course)
+    trouble = hindrance(course)
     return found if trouble is None else cut(found, *trouble)
 
 
@@ -217,34 +204,18 @@ def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     belt, plate, out = scene.incoming, scene.plate, scene.outgoing
     assert belt is not None
     assert plate is not None
-    kind, stream = scene.kinds[0], scene.stream
-    own = scene.particles[kind]
-    restitution, plate_friction = scene.met(kind, "plate")
-    _, friction = scene.met(kind, "incoming")
-    incline = belt.incline_deg * RADIANS
-    ride_length = belt.length
-    if stream.at is not None:
-        sin, cos = sin_cos(incline)
-        ride_length = -(stream.at[0] * cos + stream.at[1] * sin)
+    own, (restitution, plate_friction) = scene.particle, scene.met(scene.kinds[0], "plate")
 
     def found(drop: ArrayLike, belt_speed: ArrayLike) -> Transfer:
         return transfer(
-            speed=belt.speed,
-            pulley_radius=belt.pulley_radius,
+            **ride_of(scene),
             distance=plate.distance,
             angle=plate.angle_deg * RADIANS,
             pivot_height=plate.pivot_height,
             restitution=restitution,
             drop=drop,
             belt_speed=belt_speed,
-            particle_radius=own.radius,
             mass=own.mass,
-            gravity=scene.gravity,
-            friction=np.inf if isinstance(friction, str) else friction,
-            spin=own.spin,
-            inertia=0.4 if own.shape == "sphere" else 0.5,
-            incline=incline,
-            ride_length=ride_length,
             plate_friction=plate_friction,
             interval=1.0 / scene.rate,
             rebound=rebound,
@@ -262,59 +233,87 @@ def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     return found(np.maximum(out.drop - sunk, 0.0), out.speed)
 
 
-def _outside(scene: Scene) -> str:
+def ride_of(scene: Scene) -> dict[str, Any]:
+    """Return what `transfer` takes, as numbers, of particle 0's ride on the incoming conveyor."""
+    belt, own, at = scene.incoming, scene.particle, scene.stream.at
+    assert belt is not None
+    incline, ride_length = belt.incline_deg * RADIANS, belt.length
+    if at is not None:
+        sin, cos = sin_cos(incline)
+        ride_length = -(at[0] * cos + at[1] * sin)
+    friction = scene.met(scene.kinds[0], "incoming")[1]
+    return {
+        "speed": belt.speed,
+        "pulley_radius": belt.pulley_radius,
+        "particle_radius": own.radius,
+        "gravity": scene.gravity,
+        "friction": np.inf if isinstance(friction, str) else friction,
+        "spin": own.spin,
+        "inertia": 0.4 if own.shape == "sphere" else 0.5,
+        "incline": incline,
+        "ride_length": ride_length,
+    }
+
+
+def not_carried(scene: Scene) -> str:
+    """Return why particle 0 is not released on the incoming belt, at its speed; "" if it is."""
+    from chutelab.scene.conflicts import beside
+
+    stream, belt = scene.stream, scene.incoming
+    assert belt is not None
+    if stream.fill is not None or stream.to is not None:
+        return "the stream is not released at a point of the incoming belt"
+    height = belt.pulley_radius + scene.particle.radius
+    if stream.at is not None and not beside(*stream.at, height, belt.length, belt.incline_deg):
+        return "the release point stream.at is not on the incoming belt"
+    sin, cos = sin_cos(belt.incline_deg * RADIANS)
+    if stream.velocity not in (None, (belt.speed * cos, belt.speed * sin)):
+        return "the release velocity stream.velocity is not the incoming belt's"
+    return ""
+
+
+def outside(scene: Scene) -> str:
     """Return what makes the scene another problem than the paper's, "" if nothing does."""
+    own = scene.particle
     if scene.incoming is None:
         return "there is no incoming conveyor"
     if scene.plate is None:
         return "there is no damping plate"
-    own, stream, belt = scene.particles[scene.kinds[0]], scene.stream, scene.incoming
     if own.outline:
         return "it is about disks and spheres"
     if own.spin and own.rolling_friction > 0.0:
         return "rolling friction"
     if any(string.particle == 0 for string in scene.string):
         return "the particle hangs on a string"
-    if stream.fill is not None or stream.to is not None:
-        return "the stream is not released at a point of the incoming belt"
-    sin, cos = sin_cos(belt.incline_deg * RADIANS)
-    if stream.at is not None:
-        x, y = stream.at
-        above = y * cos - x * sin - belt.pulley_radius - own.radius
-        if abs(above) > ON_BELT or not -belt.length <= x * cos + y * sin <= 0.0:
-            return "the release point stream.at is not on the incoming belt"
-    if stream.velocity is not None and stream.velocity != (belt.speed * cos, belt.speed * sin):
-        return "the release velocity stream.velocity is not the incoming belt's"
-    if scene.crowded:
-        return "particles interact"
-    return ""
+    return not_carried(scene) or ("particles interact" if scene.crowded else "")
 
 
-Trouble = tuple[str, str] | None
-"""The first stage that is not reached as the equations assume, and the reason; None if all are."""
+def hindrance(course: Course) -> tuple[str, str] | None:
+    """Return the first stage that is not reached as the equations assume, and why; None if all are.
 
+    What is in the way is looked for along the ride, the flight to the plate, and the fall from it.
+    """
+    found, radius, out = course.found, course.radius, course.scene.outgoing
+    low, high = course.plate_reach
+    if high <= low:
+        return "impact", Reason.OUTSIDE.because("the plate has no length")
 
-def _on_the_ride(course: Course) -> Trouble:
+    # The ride on the belt and round the pulley.
     obstacles = Obstacles.of(course.lines, course.bends)
-    at, radius, begin = course.scene.stream.at, course.radius, -course.incline
-    way = course.belt.length if at is None else -float(np.array(at) @ course.along)
+    way = float(ride_of(course.scene)["ride_length"])
     start = course.ride_radius * course.above - way * course.along
     index = obstacles.overlapped(start, radius)
     if index < 0:
-        straight = Flight(start, course.along, 0.0)
-        index = first_in_flight(straight, obstacles, radius, way)[1]
+        index = first_in_flight(Flight(start, course.along, 0.0), obstacles, radius, way)[1]
     if index < 0:
-        last = float(course.found.phi1)
-        index = first_on_pulley(course.ride_radius, begin, last, obstacles, radius)[1]
-    if index < 0:
-        return None
-    what = "it is in the way of the ride"
-    return "separation", course.meets(Reason.EARLY, obstacles.names[index], what)
+        last = float(found.phi1)
+        index = first_on_pulley(course.ride_radius, -course.incline, last, obstacles, radius)[1]
+    if index >= 0:
+        what = "it is in the way of the ride"
+        return "separation", course.meets(Reason.EARLY, obstacles.names[index], what)
 
-
-def _before_the_plate(course: Course) -> Trouble:
-    found, radius, flight = course.found, course.radius, course.separation
-    low, high = course.plate_reach
+    # The flight to the plate.
+    flight = course.separation
     foot = float((course.impact - course.pivot) @ course.up)
     hit = low <= foot <= high  # false for NaN: the line is not met
     plate = Obstacles.of(course.lines[:1])
@@ -322,10 +321,11 @@ def _before_the_plate(course: Course) -> Trouble:
     horizon = float(found.t2) if hit else flight.horizon(plate, radius)
     # Thrown up slowly, it may come down on the pulley again. Faster, it would only seem to at once,
     # by rounding: it starts on the circle.
-    centre, rides, again = np.zeros(2), course.ride_radius, np.inf
-    slow = found.v1 * found.v1 * sin_cos(found.phi1)[1] < flight.gravity * rides
+    again = np.inf
+    slow = found.v1 * found.v1 * sin_cos(found.phi1)[1] < flight.gravity * course.ride_radius
     if found.phi1 < 0.0 and slow:
-        again = next(ring_times(flight, centre, rides, 0.0, horizon), np.inf)
+        falls = ring_times(flight, np.zeros(2), course.ride_radius, 0.0, horizon)
+        again = next(falls, np.inf)
     hops = again < horizon
     index = first_in_flight(flight, obstacles, radius, min(horizon, again))[1]
     # What is in the way of a flight that misses the plate anyway does not matter.
@@ -336,58 +336,44 @@ def _before_the_plate(course: Course) -> Trouble:
         return "impact", course.meets(Reason.EARLY, name, how)
     if hops:
         return "impact", Reason.EARLY.because("pulley: the flight comes down on it again")
-    if hit:
-        return None
     if np.isnan(foot):
         return "impact", str(found.reason)
-    where = f"{foot - high:.4g} m above" if foot > high else f"{low - foot:.4g} m below"
-    what = f"the plate's line is met {where} the end of the plate"
-    return "impact", Reason.NO_IMPACT.because(what)
+    if not hit:
+        where = f"{foot - high:.4g} m above" if foot > high else f"{low - foot:.4g} m below"
+        what = f"the plate's line is met {where} the end of the plate"
+        return "impact", Reason.NO_IMPACT.because(what)
+    if out is None and np.isfinite(found.v2r):
+        return "landing", Reason.OUTSIDE.because("there is no outgoing conveyor")
+    if Reason.of(found.reason) not in (None, Reason.MISSES):
+        return None
 
-
-def _after_the_rebound(course: Course) -> Trouble:
-    found, radius, out = course.found, course.radius, course.scene.outgoing
+    # The fall to the outgoing belt.
     height = course.belt_height
     assert out is not None
     assert height is not None
     if course.impact[1] - radius < height:
         return "landing", Reason.MISSES.because("the plate is met below the belt")
-    lands = bool(np.isfinite(found.t3))
-    flight, top = course.rebounded, course.belt.pulley_radius
-    around = Obstacles.of([("pulley", (-top, -top), (top, top)), *course.lines], course.bends)
-    horizon = float(found.t3) if lands else flight.horizon(around, radius)
-    solid = Obstacles.of([course.belt_line, *course.lines[2:]], course.bends)
-    time, index = first_in_flight(flight, solid, radius, horizon)
-    time, name = min(
-        (time, solid.names[index]),
-        (_plate_again(course, horizon), "plate"),
-        (corner_times(flight, np.zeros((1, 2)), course.ride_radius, horizon)[0], "pulley"),
-    )
+    lands, flight = bool(np.isfinite(found.t3)), course.rebounded
+    pulley: Bend = ("pulley", (0.0, 0.0), course.belt.pulley_radius, 0.0, WHOLE)
     # The outgoing belt is not among them: no part of it, ends included, is met above its level.
-    if np.isfinite(time):
-        what = f"{time:.4g} s after the rebound"
+    bends = [*course.bends, pulley]
+    around = Obstacles.of(course.lines, bends)
+    horizon = float(found.t3) if lands else flight.horizon(around, radius)
+    again, pressing = np.inf, -flight.gravity * sin_cos(course.angle)[0]
+    if pressing > 0.0:
+        # Gravity takes it back to a plate that leans away: to its face, where it is now, or an end.
+        bends += [("plate", end, 0.0, 0.0, WHOLE) for end in course.lines[0][1:]]
+        back = 2.0 * float(flight.velocity @ course.normal) / pressing
+        foot = float((flight.at(np.array(back)) - course.pivot) @ course.up)
+        again = back if back < horizon and low <= foot <= high else np.inf
+    obstacles = Obstacles.of([course.belt_line, *course.lines[2:]], bends)
+    time, index = first_in_flight(flight, obstacles, radius, horizon)
+    if min(time, again) < np.inf:
+        name = obstacles.names[index] if time <= again else "plate"
+        what = f"{min(time, again):.4g} s after the rebound"
         return "landing", course.meets(Reason.SECOND, name, what)
     x = float(course.impact[0] - found.x3)
     if lands and not out.start <= x <= out.start + out.length:
         what = f"it comes down at x = {x:.4g} m, off the belt"
         return "landing", Reason.MISSES.because(what)
     return None
-
-
-def _plate_again(course: Course, horizon: float) -> float:
-    """Return when the plate is touched again, inf if not before `horizon`."""
-    flight = course.rebounded
-    pressing = -flight.gravity * sin_cos(course.angle)[0]
-    if pressing <= 0.0:
-        return np.inf
-    low, high = course.plate_reach
-    face = np.inf
-    away = flight.velocity @ course.normal
-    if 2.0 * away < pressing * horizon:
-        again = 2.0 * away / pressing
-        foot = float((flight.at(np.array(again)) - course.pivot) @ course.up)
-        face = float(again) if low <= foot <= high else np.inf
-    clipped = corner_times(
-        flight, Obstacles.of(course.lines[:1]).segments.points, course.radius, horizon
-    )
-    return float(min(face, clipped.min()))

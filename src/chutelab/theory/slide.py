@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.theory.results import Arrays, Reason
+from chutelab.theory.results import Answers, Arrays, Reason
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 from chutelab.util.trig import arc_cos, sin_cos
 
@@ -258,30 +258,28 @@ def slide(
     shape = whole[0].shape
     within, turns, *flat = (part.ravel() for part in whole)
     radius, start, end, speed, friction, r, inertia, gravity = flat
-    reason = np.full(len(start), "", dtype=object)
-    for what, holds in (
-        ("0 <= particle_radius < inf", (r >= 0.0) & (r < np.inf)),
-        ("0 < radius < inf", (radius > 0.0) & (radius < np.inf)),
-        ("particle_radius < radius inside", ~within | (r < radius)),
-        ("particle_radius > 0 with spin", ~turns | (r > 0.0)),
-        ("|end - start| <= 2π", np.abs(end - start) <= 2.0 * np.pi),
-        ("0 <= speed < inf", (speed >= 0.0) & (speed < np.inf)),
-        ("0 <= friction < inf", (friction >= 0.0) & (friction < np.inf)),
-        ("0 < inertia <= 1", (inertia > 0.0) & (inertia <= 1.0)),
-        ("0 < gravity < inf", (gravity > 0.0) & (gravity < np.inf)),
-    ):
-        fault = Reason.OUTSIDE.because(f"{what} is required")
-        reason[~holds & (reason == "")] = fault
+    found = Answers(len(start))
+    found.require(
+        {
+            "0 <= particle_radius < inf": (r >= 0.0) & (r < np.inf),
+            "0 < radius < inf": (radius > 0.0) & (radius < np.inf),
+            "particle_radius < radius inside": ~within | (r < radius),
+            "particle_radius > 0 with spin": ~turns | (r > 0.0),
+            "|end - start| <= 2π": np.abs(end - start) <= 2.0 * np.pi,
+            "0 <= speed < inf": (speed >= 0.0) & (speed < np.inf),
+            "0 <= friction < inf": (friction >= 0.0) & (friction < np.inf),
+            "0 < inertia <= 1": (inertia > 0.0) & (inertia <= 1.0),
+            "0 < gravity < inf": (gravity > 0.0) & (gravity < np.inf),
+        }
+    )
     side = np.where(within, 1.0, -1.0)
     sense = np.where(end < start, -1.0, 1.0)
     rho = radius - side * r
     with np.errstate(all="ignore"):
         u = speed**2 / (gravity * rho)
         load = side * (u - np.sin(start))
-        reason[(load < 0.0) & (reason == "")] = Reason.OUTSIDE.because(
-            "it is off the chute at the start"
-        )
-        fine = reason == ""
+        found.fail(load < 0.0, Reason.OUTSIDE.because("it is off the chute at the start"))
+        fine = found.fine
         way = np.where(fine, np.abs(end - start), np.nan)
         about = {"sense": sense, "side": side, "friction": friction, "inertia": inertia}
         leg = Leg(start, u, load, way, rolls=turns, **about)
@@ -299,15 +297,18 @@ def slide(
             lasts, pressed = leg.integrals()
             time[onward] += lasts
             spun[onward] += about["friction"] / about["inertia"] * pressed
-        speed = np.sqrt(u) * pace
         # Adding 0 turns -0 into 0.
         omega = np.where(turns, -side * sense * spun * pace / r, 0.0) + 0.0
         time *= rho / pace
-    reached = fine & (why == "")
-    angle = np.where(reached, end, np.where(fine, angle, np.nan))
-    reason = np.where(fine, why, reason)
-    found = (np.where(fine, part, np.nan) for part in (angle, speed, omega, time, load))
-    return Slide(*(part.reshape(shape) for part in (*found, reason.astype(np.str_))))
+    found.keep(
+        angle=np.where(why == "", end, angle),
+        speed=np.sqrt(u) * pace,
+        omega=omega,
+        time=time,
+        load=load,
+    )
+    reason = np.where(fine, why, found.reason).astype(np.str_).reshape(shape)
+    return Slide(reason=reason, **{k: v.reshape(shape) for k, v in found.values.items()})
 
 
 MOST_FRICTION = 1e100

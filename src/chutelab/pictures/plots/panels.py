@@ -31,11 +31,10 @@ from chutelab.pictures.plots.scenery import (
 from chutelab.results import Recording
 from chutelab.results.quantities import each
 from chutelab.scene import Scene
-from chutelab.scene.conflicts import beside
 from chutelab.theory import Transfer
+from chutelab.theory.prediction import not_carried, ride_of
 from chutelab.theory.slide import separation
 from chutelab.util.arrays import Floats
-from chutelab.util.trig import RADIANS, sin_cos
 
 
 @dataclass(frozen=True)
@@ -78,26 +77,12 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
         return ()
     riding = belt.pulley_radius + scene.particle.radius
     if scene.plate is None:
-        its, v, (sine, cosine) = scene.stream, belt.speed, sin_cos(belt.incline_deg * RADIANS)
-        rides = its.fill is None and its.to is None
-        if its.at is not None:
-            rides &= beside(*its.at, riding, belt.length, belt.incline_deg)
-        carried = rides and its.velocity in (None, (v * cosine, v * sine)) and v > 0
         met = scene.surface or scene.crowded or scene.plates or scene.conveyor
-        # Where on the belt it starts matters to one that slips.
-        somewhere = sine != 0.0 and belt.friction != "adhesion" and scene.stream.at is not None
-        if out is None or met or not g or not carried or somewhere:
+        if out is None or met or not (g and belt.speed) or not_carried(scene):
             return ()
-        left = separation(
-            speed=np.array([belt.speed]),
-            ride_radius=np.array([riding]),
-            gravity=np.array([g]),
-            friction=np.array([np.inf if belt.friction == "adhesion" else float(belt.friction)]),
-            spin=np.array([scene.particle.spin]),
-            inertia=scene.particle.moment or 0.5,
-            incline=np.array([np.radians(belt.incline_deg)]),
-            ride_length=belt.length,
-        )
+        ride = ride_of(scene)
+        ride["ride_radius"] = ride.pop("pulley_radius") + ride.pop("particle_radius")
+        left = separation(**{name: np.atleast_1d(value) for name, value in ride.items()})
         sine, cosine, speed = (float(part[0]) for part in (left.sin, left.cos, left.v1))
         fall = riding * cosine - (riding - out.drop)
         # Thrown up slowly, it comes down on the pulley again.

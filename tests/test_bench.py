@@ -18,8 +18,8 @@ from chutelab.checks.workprecision import MANY_STEPS, METHODS, Stopwatch, Timing
 from chutelab.cli import benching, main
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.pictures.plots.workprecision import LOOKS
-from chutelab.pictures.plots.workprecision import workprecision as draw
+from chutelab.pictures.plots.studies import LOOKS
+from chutelab.pictures.plots.studies import workprecision as draw
 from chutelab.scene import load
 from chutelab.util.files import tsv_text
 from chutelab.util.versions import environment
@@ -275,7 +275,7 @@ def test_what_bench_cannot_use_is_refused(arguments, allowed, tmp_path, monkeypa
     "where",
     [
         "chutelab.checks.workprecision.measure",
-        "chutelab.pictures.plots.workprecision.workprecision",
+        "chutelab.pictures.plots.studies.workprecision",
     ],
 )
 def test_an_interrupt_leaves_no_files(where, tmp_path, monkeypatch):

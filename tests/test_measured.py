@@ -20,7 +20,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.scene import SceneError, load
 from chutelab.scene.schema import as_written
 from chutelab.studies.measured import MeasuredError
-from chutelab.studies.measured.parameters import numbers, resolve
+from chutelab.studies.measured.fitting import numbers, resolve
 from chutelab.studies.measured.result import COLUMNS, advice, plus_minus
 from chutelab.studies.measured.track import best_t0
 
@@ -580,7 +580,7 @@ def test_writes_a_picture_the_points_and_the_fit(tmp_path, found):
 
 
 def test_draws_points_tracks_and_residuals(found):
-    from chutelab.pictures.plots.measured import measured as draw
+    from chutelab.pictures.plots.studies import measured as draw
 
     figure = draw(found.after, found)
     view, *panels = figure.axes

@@ -560,7 +560,7 @@ def test_the_command_prints_a_table_and_writes_files():
 
 
 def test_lines_go_through_the_rows_and_stop_where_there_are_none():
-    from chutelab.pictures.plots.design import sweep_figure
+    from chutelab.pictures.plots.studies import sweep_figure
 
     swept = sweep(load("perpendicular"), ["plate.angle_deg=0:30:16", "incoming.speed=2,4"])
     (ax, *_) = sweep_figure(swept, "landing.vx.mean").axes
@@ -575,7 +575,7 @@ def test_lines_go_through_the_rows_and_stop_where_there_are_none():
 
 
 def test_two_keys_with_many_values_make_a_heat_map():
-    from chutelab.pictures.plots.design import sweep_figure
+    from chutelab.pictures.plots.studies import sweep_figure
 
     swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:9", "incoming.speed=2:4:10"])
     figure = sweep_figure(swept, PAID)
@@ -641,7 +641,7 @@ def test_a_crowds_ways_are_told_from_a_fiftieth_on(edge, told):
 
 
 def test_a_map_is_hatched_where_the_plate_is_missed():
-    from chutelab.pictures.plots.design import sweep_figure
+    from chutelab.pictures.plots.studies import sweep_figure
 
     swept = sweep(parse(PASSED), ["incoming.speed=1.9:2.1:11", "plate.restitution=0:1:10"])
     figure = sweep_figure(swept, "landing.vx.mean")
@@ -655,7 +655,7 @@ def test_a_map_is_hatched_where_the_plate_is_missed():
 
 
 def test_samples_are_dots_and_crosses_where_there_is_nothing():
-    from chutelab.pictures.plots.design import sweep_figure
+    from chutelab.pictures.plots.studies import sweep_figure
 
     scene = load("perpendicular")
     swept = sweep(scene, ["plate.angle_deg=0:40", "incoming.speed=1:4"], sample=30)

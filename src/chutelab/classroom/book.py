@@ -182,7 +182,7 @@ class Book:
 
     def landings(self, runs: Runs) -> Picture:
         """Draw where the particles of some runs land, mean, spread, lowest and highest layer."""
-        from chutelab.pictures.plots.crowd import draw_arrivals
+        from chutelab.pictures.plots.panels import draw_arrivals
         from chutelab.pictures.plots.style import Picture
 
         figure = Picture((9.0, 2.2 * len(runs) + 0.8))

@@ -146,7 +146,7 @@ def compare(
             fit = measured.fit(loaded, film, keys, robust=robust) if keys else None
             found = measured.residuals(loaded, film) if fit is None else fit.after
         if place is not None:
-            from chutelab.pictures.plots.measured import measured as draw
+            from chutelab.pictures.plots.studies import measured as draw
 
             with progress("drawing"):
                 draw(found, fit).write(place / "compare.png")

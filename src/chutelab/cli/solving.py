@@ -117,7 +117,7 @@ def solve(
             found = search(loaded, vary, points=points, seed=seed, progress=meter)
         if place is not None:
             from chutelab.pictures.plots import overlay
-            from chutelab.pictures.plots.design import scan
+            from chutelab.pictures.plots.studies import scan
 
             with progress("drawing", quiet=quiet):
                 write_json(as_dict(found), place / "solve.json")

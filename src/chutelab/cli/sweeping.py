@@ -197,7 +197,7 @@ def sweep(
             console.say(f"\n{said}", err=True)
         raise
     if plot is not None:
-        from chutelab.pictures.plots.design import sweep_figure
+        from chutelab.pictures.plots.studies import sweep_figure
 
         with writing(f"--plot {plot}"):
             sweep_figure(found, column).write(plot)
@@ -227,7 +227,7 @@ def _propagated(
         if out is not None:
             write_lines(out, [found.csv()])
         if plot is not None:
-            from chutelab.pictures.plots.design import spread
+            from chutelab.pictures.plots.studies import spread
 
             spread(found).write(plot)
     return found

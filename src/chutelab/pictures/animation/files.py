@@ -15,6 +15,7 @@ from typing import Any, cast
 import numpy as np
 from PIL import Image
 
+from chutelab.pictures import PURPLE
 from chutelab.pictures.animation.moments import Moment, asked, film, slowness, span
 from chutelab.pictures.animation.stage import Stage, lay_out
 from chutelab.pictures.plots import style
@@ -23,18 +24,9 @@ from chutelab.results import Recording
 from chutelab.util.errors import MissingLibraryError
 from chutelab.util.files import whole
 
-GREYS = (style.MUTED, style.STEEL, style.STEEL_LIGHT, style.ENERGY["start"])
-BETWEEN = ("#303030", "#686868", "#787878", "#D4D4D4")
-"""Greys where a grey edge would otherwise be shown in a dull colour."""
-
 HUES = (
-    style.TRACK,
-    style.ANALYTIC,
-    style.BELT,
-    style.STRIKE,
-    style.STREAM,
-    style.ENERGY["friction_loss"],
-)
+    style.TRACK, style.ANALYTIC, style.BELT, style.STRIKE, style.STREAM, PURPLE,
+)  # fmt: skip
 
 
 def palette() -> tuple[str, ...]:
@@ -46,9 +38,17 @@ def palette() -> tuple[str, ...]:
     edges = [style.tint(hue, share) for share in (0.5, 0.75, 0.25) for hue in HUES]
     meeting = [style.tint(one, 0.5, other) for one, other in combinations(HUES, 2)]
     dark = [style.tint(hue, 0.6, "#000000") for hue in HUES]
-    return tuple(
-        dict.fromkeys(["#FFFFFF", "#000000", *GREYS, *BETWEEN, *HUES, *edges, *meeting, *dark])
-    )
+    greys = [
+        "#FFFFFF",
+        "#000000",
+        style.MUTED,
+        style.STEEL,
+        style.STEEL_LIGHT,
+        style.ENERGY["start"],
+    ]
+    # Where a grey edge would otherwise be shown in a dull colour.
+    greys += ["#303030", "#686868", "#787878", "#D4D4D4"]
+    return tuple(dict.fromkeys([*greys, *HUES, *edges, *meeting, *dark]))
 
 
 def write_gif(
@@ -88,10 +88,6 @@ VIDEOS = {
 Lines and letters stay sharp; the file begins to play before it is all there.
 """
 
-ALIKE = ("-threads", "4", "-flags:v", "+bitexact", "-fflags", "+bitexact")
-"""Options by which the same pictures make the same bytes: the encoders' work depends on how many
-threads share it, and ffmpeg gives a webm a random number unless told."""
-
 
 class VideoError(MissingLibraryError):
     """A video cannot be written, and what to do about it."""
@@ -119,12 +115,15 @@ def write_video(
     from imageio.v2 import get_writer
 
     codec, parameters = VIDEOS[kind]
+    # The same pictures make the same bytes: the encoders' work depends on how many threads share
+    # it, and ffmpeg gives a webm a random number unless told.
+    parameters += " -threads 4 -flags:v +bitexact -fflags +bitexact"
     options: dict[str, Any] = {
         "codec": codec,
         "quality": None,
         "pixelformat": "yuv420p",
         "macro_block_size": 2,
-        "output_params": [*parameters.split(), *ALIKE],
+        "output_params": parameters.split(),
         "ffmpeg_log_level": "error",
     }
     with cast(Any, get_writer(path, format="FFMPEG", mode="I", fps=fps, **options)) as video:
@@ -225,10 +224,6 @@ def animate(
     return path
 
 
-STILL = 2
-"""Pixels of a still for each of the film's: it is for print."""
-
-
 def still(recording: Recording, path: str | Path, *, width: int = 800, height: int = 450) -> Path:
     """Write the machine as the film begins, without a path, as a PNG: the scene of the film alone.
 
@@ -254,7 +249,7 @@ def still(recording: Recording, path: str | Path, *, width: int = 800, height: i
         If the file cannot be written.
     """
     shows = frozenset(("velocity", "energy"))
-    wide, high = STILL * width, STILL * height
+    wide, high = 2 * width, 2 * height  # it is for print
     layout = lay_out(recording, width=wide, height=high, question="?", shows=shows)
     begin = span(recording, layout.window)[0]
     stage = Stage(recording, layout, (Moment(begin, 0, ""),), slow=1.0, ask=begin)

@@ -14,7 +14,6 @@ from matplotlib.transforms import Bbox
 from PIL import Image, ImageDraw
 
 from chutelab.pictures.animation.actors import (
-    Moving,
     Writing,
     arrows,
     bars,
@@ -22,6 +21,7 @@ from chutelab.pictures.animation.actors import (
     crowd,
     drives,
     gates,
+    seen,
     strobe,
     strung,
     trail,
@@ -41,13 +41,9 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
-from chutelab.util.arrays import Bools
 
 SHOWS = ("parabola", "trails", "strobe", "velocity", "energy")
 """What a picture can show besides the machine and the particles."""
-
-NOMINAL = frozenset(("strobe", "velocity"))
-"""What of it is of particle 0."""
 
 INCHES = (8.0, 4.5)
 """Width and height of the picture at least: text keeps its share of it at any pixel size."""
@@ -60,12 +56,6 @@ LONGEST = 0.10
 
 TRAIL = 0.07
 """Share of the window's width that the trail of the fastest particle is long."""
-
-NAME = 0.21
-"""Share of the window's width for the incoming belt's name, which stands left of the pulley."""
-
-LETTER_ROOM = 0.015
-"""Share of the window's width between its edges and what moves."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +130,7 @@ def lay_out(
     if unknown := sorted(shows - set(SHOWS)):
         raise ValueError(f"show = {unknown[0]!r}: allowed are {', '.join(SHOWS)}")
     if one_of_many(recording) or (wanted is None and as_crowd(recording)):
-        shows -= NOMINAL
+        shows -= {"strobe", "velocity"}  # of particle 0
     view = (0.015, 0.135, 0.675 if "energy" in shows else 0.97, 0.65 if question else 0.71)
     aspect = view[2] * width / (view[3] * height)
     pulley = recording.machine.pulley
@@ -157,10 +147,11 @@ def lay_out(
     tight = Layout(width, height, said, question, shows, view, window, fastest)
     corners = [(window.left, window.bottom), (window.right, window.top)]
     if pulley is not None:
-        corners.append((-pulley.radius - NAME * window.width, 0.0))
+        # The incoming belt's name stands left of it.
+        corners.append((-pulley.radius - 0.21 * window.width, 0.0))
     if recording.scene.view is not None:
         return tight
-    room = LETTER_ROOM * window.width
+    room = 0.015 * window.width
     tips = position + tight.arrow * velocity
     grown = around(np.concatenate([corners, tips - room, tips + room]))
     return replace(tight, window=grown.fitted(aspect))
@@ -210,7 +201,9 @@ class Stage:
             spine.set_color(style.STEEL_LIGHT)
         _draw_scale(view)
         parts = analytic_of(recording)[0] if "parabola" in shows else ()
+        drawn = len(view.lines)
         draw_analytic(view, parts)
+        parabola = view.lines[drawn:]
         position, velocity = nominal(recording, times)
         reach = layout.reach(TRAIL, "trails")
         others, named = crowd(view, recording, times, reach)
@@ -220,9 +213,10 @@ class Stage:
             *strung(view, recording, times),
             *others,
         ]
-        if ask is not None:
+        for dashed in [] if ask is None else parabola:
             # Below all that moves.
-            self.moving = [*_after(view, "analytic", times > ask), *self.moving]
+            dashed.set_animated(True)
+            self.moving.insert(0, seen(dashed, times > ask))
         # What the legend names, in its order.
         dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0}
         handles = [Line2D([], [], **dot, color=style.STRIKE, label="particle 0"), *named]
@@ -297,18 +291,6 @@ class Stage:
         ]
 
 
-def _after(ax: Axes, gid: str, there: Bools) -> list[Moving]:
-    """Take the lines of a name off the background: each is seen at the moments of `there`, (T,)."""
-    found = [line for line in ax.lines if line.get_gid() == gid]
-    for line in found:
-        line.set_animated(True)
-
-    def moving(line: Line2D) -> Moving:
-        return line, lambda index: line.set_visible(bool(there[index]))
-
-    return list(map(moving, found))
-
-
 ALWAYS = 5
 """Entries of a legend that are there in any case."""
 
@@ -380,15 +362,16 @@ def _draw_scale(ax: Axes) -> None:
     said = ax.text(0.0, 0.0, f"{length:g} m", ha="center", va="bottom")
     said.set(fontsize=style.SMALL, color=style.MUTED)
     edge = 0.015 * (right - left)
-    corners: list[tuple[int, int, float, float]] = []
-    for y in (top - 0.08 * (top - bottom), bottom + 0.03 * (top - bottom)):
-        for x in (left + edge, right - edge - length):
-            said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
-            ends = ax.transData.transform([(x, y), (x + length, y)])
-            box = Bbox.union([said.get_window_extent(), Bbox(ends)])
-            crossed = sum(line.intersects_bbox(box, filled=False) for line in lines)
-            hides = int(100 * box.count_overlaps(taken) + crossed)
-            corners.append((hides, len(corners), x, y))
-    _, _, x, y = min(corners)
-    bar.set_data([x, x + length], [y, y])
-    said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
+
+    def hides(place: tuple[float, float]) -> int:
+        """Put it there, and return what it would hide: a name counts more than lines."""
+        x, y = place
+        bar.set_data([x, x + length], [y, y])
+        said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
+        ends = ax.transData.transform([(x, y), (x + length, y)])
+        box = Bbox.union([said.get_window_extent(), Bbox(ends)])
+        crossed = sum(line.intersects_bbox(box, filled=False) for line in lines)
+        return int(100 * box.count_overlaps(taken) + crossed)
+
+    rows = top - 0.08 * (top - bottom), bottom + 0.03 * (top - bottom)
+    hides(min(((x, y) for y in rows for x in (left + edge, right - edge - length)), key=hides))

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import groupby
+from itertools import groupby, product
 from math import nan
 from typing import Any, Final, Literal, NamedTuple, TypeVar
 
@@ -166,7 +166,14 @@ def target(scene: Scene, text: str) -> tuple[Quantity, Quantity]:
             "must be QUANTITY=VALUE, such as landing.x=1.2 or landing.vx=outgoing.speed", typed
         )
     left = measured(scene, name, typed)
-    right = _right(scene, given, typed, left)
+    try:
+        number, unit = read_size(given)
+        right = Quantity(f"{number:.12g} {unit}".strip(), unit, source="number", number=number)
+    except ValueError as error:
+        if given[0].isdigit() or given[0] in "+-.":
+            allowed = f"{given} is no number of a quantity {_in(left.unit)}; {error}"
+            raise InputError(allowed, typed) from None
+        right = _named(scene, given, typed)
     if right.source == "number" and right.unit == "":
         right = replace(right, name=f"{right.name} {left.unit}".strip(), unit=left.unit)
     if right.unit != left.unit:
@@ -178,18 +185,8 @@ def target(scene: Scene, text: str) -> tuple[Quantity, Quantity]:
     return left, right
 
 
-def _in(unit: str) -> str:
-    return f"in {unit}" if unit else "a pure number"
-
-
-def _right(scene: Scene, text: str, typed: str, left: Quantity) -> Quantity:
-    try:
-        number, unit = read_size(text)
-        return Quantity(f"{number:.12g} {unit}".strip(), unit, source="number", number=number)
-    except ValueError as error:
-        if text[0].isdigit() or text[0] in "+-.":
-            allowed = f"{text} is no number of a quantity {_in(left.unit)}; {error}"
-            raise InputError(allowed, typed) from None
+def _named(scene: Scene, text: str, typed: str) -> Quantity:
+    """Return the quantity or the key of a scene that a text names."""
     if lookup(text, scene.surfaces) is not None:
         return measured(scene, text, typed)
     try:
@@ -200,6 +197,10 @@ def _right(scene: Scene, text: str, typed: str, left: Quantity) -> Quantity:
     if not isinstance(value_at(scene, found.path), (int, float)):
         raise InputError(f"{found.path} has no number as its value in this scene", typed)
     return Quantity(found.path, found.unit, found.path, "scene")
+
+
+def _in(unit: str) -> str:
+    return f"in {unit}" if unit else "a pure number"
 
 
 FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=0:80"
@@ -323,14 +324,6 @@ class Evaluator:
     def __call__(self, points: ArrayLike) -> Outcomes:
         """Run the variants at points, shape (N, K), K values of the keys each."""
         table = np.asarray(points, dtype=np.float64)
-        if len(table) > BLOCK:
-            parts = list(map(self, np.split(table, range(BLOCK, len(table), BLOCK))))
-            return Outcomes(
-                np.concatenate([part.values for part in parts]),
-                [course for part in parts for course in part.courses],
-                [fault for part in parts for fault in part.faults],
-                [kind for part in parts for kind in part.touches],
-            )
         values = np.full((len(table), len(self.quantities)), np.nan)
         courses, faults, kinds = np.full((3, len(table)), "", dtype=object)
         # The run that ends as the scene says comes last: what both runs know is read off that.
@@ -347,15 +340,15 @@ class Evaluator:
         left = set(range(len(table)))
         if len(table) >= FEWEST and suits(self.scene, self.keys, self.quantities):
             left = set()
-            for ending in endings:
-                base = self.scene.with_values(_until(ending))
-                runs, refused, alone = together(Block(base, tuple(self.keys), table))
+            for start, ending in product(range(0, len(table), BLOCK), endings):
+                base, part = self.scene.with_values(_until(ending)), table[start : start + BLOCK]
+                runs, refused, alone = together(Block(base, tuple(self.keys), part))
                 for recording, rows in runs:
-                    read(ending, recording, rows)
+                    read(ending, recording, start + rows)
                 for row, fault in refused.items():
-                    faults[row] = one_line(fault)
-                left.update(alone)
-                self._ran(len(table) / len(endings))
+                    faults[start + row] = one_line(fault)
+                left.update(start + row for row in alone)
+                self._ran(len(part) / len(endings))
         for row in sorted(left):
             given = dict(zip(self.keys, table[row].tolist(), strict=True))
             try:

@@ -147,26 +147,23 @@ class Spread:
     high: float
 
     @property
-    def cut(self) -> float:
-        """Share of the distribution that the scene does not allow."""
+    def whole(self) -> Any:
+        """The distribution, as SciPy has it, uncut."""
         stats = scipy("stats")
         if self.law == "uniform":
-            whole = stats.uniform(self.mean - self.spread, 2.0 * self.spread)
-        else:
-            whole = stats.norm(self.mean, self.spread)
-        return float(whole.cdf(self.low) + whole.sf(self.high))
+            return stats.uniform(self.mean - self.spread, 2.0 * self.spread)
+        return stats.norm(self.mean, self.spread)
+
+    @property
+    def cut(self) -> float:
+        """Share of the distribution that the scene does not allow."""
+        return float(self.whole.cdf(self.low) + self.whole.sf(self.high))
 
     def values(self, shares: Floats) -> Floats:
         """Return the values below which given shares, 0 to 1, of the (cut) distribution lie."""
+        low, high = self.whole.cdf([self.low, self.high])
         # Sobol points begin at 0, where a normal distribution has no value.
-        shares = np.clip(shares, 1e-12, 1.0 - 1e-12)
-        if self.law == "uniform":
-            low = max(self.low, self.mean - self.spread)
-            high = min(self.high, self.mean + self.spread)
-            found = low + shares * (high - low)
-        else:
-            low, high = ((end - self.mean) / self.spread for end in (self.low, self.high))
-            found = scipy("stats").truncnorm.ppf(shares, low, high, self.mean, self.spread)
+        found = self.whole.ppf(low + np.clip(shares, 1e-12, 1.0 - 1e-12) * (high - low))
         # Rounding must not take a value past what the scene allows.
         return np.asarray(np.clip(found, self.low, self.high))
 
@@ -380,10 +377,11 @@ class Uncertainty(Shown):
                     foot += [(f"{100.0 * found.share:.1f} % touch {kind}",), *_lines(found)]
         return Sheet(
             f"{self.scene}: {given}", tuple(columns), tuple(rows), foot=tuple(foot),
-            notes=tuple(self._notes()),
+            notes=tuple(self.notes()),
         )  # fmt: skip
 
-    def _notes(self) -> list[str]:
+    def notes(self) -> list[str]:
+        """Return what to know beside the numbers, in sentences."""
         said = [
             "Each ± is a standard deviation, of a uniform input the half-width.",
             "Shares are first-order Sobol indices, the part of the variance that an input explains"
@@ -395,29 +393,24 @@ class Uncertainty(Shown):
             for one in self.spreads
             if one.cut > NOTHING
         ]
-        said += self._of_kinds()
+        rare = [one.share for one in self.kinds.values() if one.share <= RARE]
+        often = len(self.kinds) - len(rare)
+        if len(self.kinds) == 1:
+            said.append(f"All samples touch {', '.join(self.kinds)}.")
+        elif often > 1:
+            said.append(
+                f"These are {often} kinds of outcome: the mean over all of them need not be near to"
+                " any, and the shares above are of the variance between them, too."
+            )
+        if rare and len(self.kinds) > 1:
+            others = f"{len(rare)} other ways" if len(rare) > 1 else "another way"
+            said.append(f"{100.0 * sum(rare):.2g} % of the samples go {others}.")
         total = len(self.inputs)
         for why, count in sorted(self.lost.items(), key=lambda item: -item[1])[:3]:
             said.append(f"{count} of {total} samples are left out: {why}.")
         for name, found in zip(self.quantities, self.indices, strict=True):
             if np.isnan(found.first).all() and np.isfinite(self.outputs).any():
                 said.append(f"{name} does not depend on these inputs.")
-        return said
-
-    def _of_kinds(self) -> list[str]:
-        often = [kind for kind, one in self.kinds.items() if one.share > RARE]
-        if len(self.kinds) == 1:
-            return [f"All samples touch {', '.join(self.kinds)}."]
-        said = []
-        if len(often) > 1:
-            said += [
-                f"These are {len(often)} kinds of outcome: the mean over all of them need not be"
-                " near to any, and the shares above are of the variance between them, too."
-            ]
-        if rare := len(self.kinds) - len(often):
-            share = 100.0 * sum(one.share for one in self.kinds.values() if one.share <= RARE)
-            others = f"{rare} other ways" if rare > 1 else "another way"
-            said += [f"{share:.2g} % of the samples go {others}."]
         return said
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from math import floor, log10
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -196,24 +197,20 @@ def fullest(recording: Recording) -> float:
     return float(times[np.flatnonzero(2 * there >= there.max())[-1]])
 
 
-MOMENTS = 4
-"""Moments at which all particles are shown beneath the scene."""
-
-GRIDS = ((1, 4), (2, 2), (4, 1))
-"""Rows and columns in which they may stand."""
-
-
 def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, crowd: bool) -> None:
-    """Draw the scene small, without names, with all particles, at even times from first to last."""
+    """Draw the scene small, without names, with all particles, at four even times."""
     window, clock = window_of(recording), recording.knots["t"]
     room = place.get_position(figure)
     size = np.array([room.height * SIZE[1], room.width * SIZE[0]])
-    grid = max(GRIDS, key=lambda grid: float((size / grid / (window.height, window.width)).min()))
+    # Rows and columns in which they are largest.
+    grid = max(
+        ((1, 4), (2, 2), (4, 1)),
+        key=lambda grid: float((size / grid / (window.height, window.width)).min()),
+    )
     cells = place.subgridspec(*grid, wspace=0.08, hspace=0.2)
-    times = np.linspace(clock.min(), clock.max(), MOMENTS)
-    for row, column in np.ndindex(*grid):
-        t = times[row * grid[1] + column]
-        ax = figure.add_subplot(cells[row, column])
+    times = np.linspace(clock.min(), clock.max(), 4)
+    for t, cell in zip(times, np.ndindex(*grid), strict=True):
+        ax = figure.add_subplot(cells[cell])
         draw_scene(ax, recording.machine, window, small=True)
         draw_bodies(ax, recording, t, crowd=crowd)
         ax.set(xticks=[], yticks=[])
@@ -229,12 +226,15 @@ def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, c
 WIDE = 185
 """Characters of a line of text below the panels."""
 
-COLOURS = {
-    "first": style.TRACK, "second": style.STRIKE, "third": style.BELT, "fourth": style.ANALYTIC,
-    "plate": style.INK, "belt": style.BELT,
-}  # fmt: skip
-DASHES = {"second": (0, (5, 2)), "third": (0, (2, 1.4)), "fourth": (0, (6, 1.5, 1.2, 1.5))}
-"""So that lines are told apart without colour, too."""
+ROLES: dict[str, tuple[str, Any]] = {
+    "first": (style.TRACK, "-"),
+    "second": (style.STRIKE, (0, (5, 2))),
+    "third": (style.BELT, (0, (2, 1.4))),
+    "fourth": (style.ANALYTIC, (0, (6, 1.5, 1.2, 1.5))),
+    "plate": (style.INK, "-"),
+    "belt": (style.BELT, "-"),
+}
+"""Colour and dashes of lines, which so are told apart without colour, too."""
 
 MARGIN = 0.06
 """Of the range of what is drawn, on each side."""
@@ -286,10 +286,11 @@ def draw_panel(ax: Axes, panel: Panel) -> Axes:
     """Draw one panel."""
     style.dress(ax, panel.x_label, panel.y_label, panel.title)
     for line in panel.lines:
-        color, solid = COLOURS[line.role], line.role in ("plate", "belt")
-        (drawn,) = ax.plot(line.x, line.y, color=color, label=line.label, gid=line.role)
-        drawn.set(linewidth=3.0 if solid else 1.8, zorder=3.0 if solid else 4.0)
-        drawn.set_linestyle(DASHES.get(line.role, "-"))
+        (color, dashes), solid = ROLES[line.role], line.role in ("plate", "belt")
+        ax.plot(
+            line.x, line.y, color=color, ls=dashes, lw=3.0 if solid else 1.8, label=line.label,
+            zorder=3.0 if solid else 4.0, gid=line.role,
+        )  # fmt: skip
         if line.marks is not None:
             ax.plot(*line.marks.T, "o", color=color, ms=4.5, mfc="white", zorder=5.0)
     if panel.to_scale:
@@ -301,9 +302,6 @@ def draw_panel(ax: Axes, panel: Panel) -> Axes:
 
 AWAY = 9.0
 """pt from the middle of a dot to the text beside it."""
-
-GAP = 1.5
-"""pt that stay free around such a text."""
 
 SIDES = ((0, 0.8), (1, 0), (-1, 0), (0.7, 0.6), (-0.7, 0.6), (0.7, -0.6), (-0.7, -0.6), (0, -0.8))
 """Directions from a dot in which its text may stand, the best first."""
@@ -353,7 +351,7 @@ def draw_times(ax: Axes, recording: Recording) -> Axes:
     digits = max(0, -floor(log10(strobe_step(recording)) + 1e-9))
     # All in pixels from here on: dots, texts and lines that are drawn already.
     pixels = ax.transData.transform(dots)
-    half, gap = np.array([0.4 * AWAY, GAP]) * ax.figure.dpi / 72.0
+    half, gap = np.array([0.4 * AWAY, 1.5]) * ax.figure.dpi / 72.0
     taken = [text.get_window_extent() for text in ax.texts]
     taken += [Bbox([dot - half, dot + half]) for dot in pixels]
     lines = [line for line in ax.lines if line.get_linestyle() != "None"]

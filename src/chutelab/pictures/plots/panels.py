@@ -301,9 +301,6 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
     return ax
 
 
-INSTANTS = 200
-"""At which speeds are told."""
-
 EDGES = f"{100 * QUANTILES[0]:.0f} to {100 * QUANTILES[-1]:.0f} % of the paths"
 """What a legend says of an envelope."""
 
@@ -391,7 +388,7 @@ def draw_flow(ax: Axes, recording: Recording) -> Axes:
 def draw_speeds(ax: Axes, recording: Recording) -> Axes:
     """Draw the speeds of all particles over time: the middle one, and between which most are."""
     clock = recording.knots["t"]
-    times = np.linspace(clock.min(), clock.max(), INSTANTS)
+    times = np.linspace(clock.min(), clock.max(), 200)
     speeds = np.hypot(*np.moveaxis(recording.at(times)[1], 2, 0))
     low, middle, high = np.nanquantile(speeds, QUANTILES, axis=1)
     style.dress(ax, "time, s", "speed, m/s", "Speed of all")
@@ -403,14 +400,10 @@ def draw_speeds(ax: Axes, recording: Recording) -> Axes:
     return ax
 
 
-PARTS = 40
-"""Parts of the time in which the belts' power is told."""
-
-
 def draw_power(ax: Axes, recording: Recording) -> Axes:
-    """Draw what all drives pay over time: the mean power in each of `PARTS` parts of the run."""
+    """Draw what all drives pay over time: the mean power in each of 40 parts of the run."""
     clock = recording.knots["t"]
-    times = np.linspace(clock.min(), clock.max(), PARTS + 1)
+    times = np.linspace(clock.min(), clock.max(), 41)
     paid = recording.energy_at(times)["belt_work"]
     power = np.diff(paid) / np.diff(times)
     factor, unit = style.scaled(power, "W")

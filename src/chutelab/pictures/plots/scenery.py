@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from math import floor, isnan, log10
 from typing import Any
 
@@ -19,9 +19,6 @@ from chutelab.util.errors import InputError
 
 STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
 """Kinds of event in which something is hit."""
-
-STROBES = 10
-"""Strobe dots aimed at from separation to the last impact."""
 
 
 def subset(recording: Recording, particles: Sequence[int] | Ints) -> Recording:
@@ -97,7 +94,7 @@ def strobe_step(recording: Recording) -> float:
     begin, end = action(recording)
     struck = struck_by_nominal(recording)["t"]
     last = float(struck[-1]) if len(struck) and struck[-1] > begin else end
-    return round_step(max(last - begin, 1e-3), STROBES)
+    return round_step(max(last - begin, 1e-3), 10)
 
 
 def strobe_times(recording: Recording) -> Floats:
@@ -108,9 +105,6 @@ def strobe_times(recording: Recording) -> Floats:
 
 FINE = 2e-4
 """Share of what is seen by which a line that is drawn may miss the curve."""
-
-MOST_CHORDS = 500
-"""Straight parts in which a piece of a track is drawn at most."""
 
 
 def track_times(
@@ -149,7 +143,7 @@ def track_times(
         np.hypot(*(6.0 * way - 2.0 * first - 4.0 * last).T),
     )
     parts = np.ceil(np.sqrt(bent / 8.0 / max(fine, 1e-300)))
-    parts = np.clip(parts, 1, MOST_CHORDS).astype(np.int64)
+    parts = np.clip(parts, 1, 500).astype(np.int64)
     number = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
     even = np.repeat(t[:-1], parts) + number * np.repeat(h / parts, parts)
     jumps = np.nextafter(t[1:][h == 0.0], -np.inf)
@@ -284,12 +278,8 @@ class Window:
     def padded(self, left: float, right: float, bottom: float, top: float) -> Window:
         """Return a window larger by shares of its own larger side."""
         size = max(self.width, self.height)
-        return Window(
-            self.left - left * size,
-            self.right + right * size,
-            self.bottom - bottom * size,
-            self.top + top * size,
-        )
+        shifts = np.array([-left, right, -bottom, top]) * size
+        return Window(*(np.array(astuple(self)) + shifts).tolist())
 
     def fitted(self, aspect: float) -> Window:
         """Return the smallest window of that width / height which holds this one, centred."""
@@ -300,12 +290,8 @@ class Window:
 
     def joined(self, other: Window) -> Window:
         """Return the smallest window that holds both."""
-        return Window(
-            min(self.left, other.left),
-            max(self.right, other.right),
-            min(self.bottom, other.bottom),
-            max(self.top, other.top),
-        )
+        least, most = np.sort([astuple(self), astuple(other)], axis=0).tolist()
+        return Window(least[0], most[1], least[2], most[3])
 
     def holds(self, points: Floats) -> Bools:
         """Tell which points, (..., 2), lie inside."""

@@ -359,8 +359,6 @@ def _edges(middles: Floats) -> Floats:
 PARAMETERS = 6
 """Fitted parameters that are written into the figure."""
 
-AXES = ("x", "y")
-
 POINTS: dict[str, Any] = {"ls": "none", "marker": "+", "ms": 7.0, "mew": 1.3}
 """How measured points are drawn."""
 
@@ -435,7 +433,7 @@ def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
     used = found.used
     times, values = found.track.t[used], found.values[used, axis]
     factor, unit = style.scaled(values, "m")
-    name, rms = AXES[axis], found.rms[axis]
+    name, rms = "xy"[axis], found.rms[axis]
     style.dress(
         ax,
         "time, s",

@@ -106,19 +106,6 @@ def test_rides_and_arcs(
     assert low - 1e-9 <= angle <= high + 1e-9
 
 
-def test_a_point_is_caught_in_the_hollow_of_an_arc_and_on_its_back() -> None:
-    hollow = ("hollow", (0.0, 0.0), 1.0, -math.pi, math.pi)
-    falls = Flight(np.array([0.5, 0.5]), np.zeros(2), G)
-    time, index = first_in_flight(falls, Obstacles.of([], [hollow]), 0.0, 2.0)
-    assert index == 0
-    assert time == pytest.approx(math.sqrt(2.0 * (0.5 + math.sqrt(0.75)) / G), rel=1e-14)
-    back = ("back", (0.0, 0.0), 1.0, 0.0, math.pi)
-    time, _ = first_in_flight(
-        Flight(np.array([0.5, 2.0]), np.zeros(2), G), Obstacles.of([], [back]), 0.1, 2.0
-    )
-    assert time == pytest.approx(math.sqrt(2.0 * (2.0 - math.sqrt(1.1**2 - 0.25)) / G), rel=1e-14)
-
-
 def test_the_first_of_straight_and_round_ones_wins_and_has_its_number() -> None:
     lines = [("floor", (-5.0, -1.0), (5.0, -1.0)), ("far", (-5.0, -9.0), (5.0, -9.0))]
     falls = Flight(np.zeros(2), np.zeros(2), G)
@@ -182,18 +169,3 @@ def test_a_touch_is_a_contact_and_a_miss_is_none(lines: Any, bends: Any, time: f
         throw = Flight(np.array([0.0, -less]), np.array([0.0, 2.0]), 10.0)
         found, _ = first_in_flight(throw, Obstacles.of(lines, bends), 0.03, 0.35)
         assert found == pytest.approx(met, abs=1e-6)
-
-
-def test_what_lies_on_a_surface_touches_it_and_what_leaves_it_does_not() -> None:
-    tilt = np.array([math.cos(0.3), math.sin(0.3)])
-    above = np.array([-tilt[1], tilt[0]])
-    for lines, bends, gap in [
-        ([("slope", -tilt, tilt)], [], 0.02 * above),
-        ([], [("hollow", (0.3, 0.7), 0.3, math.pi, math.pi)], np.array([0.3, 0.7]) - 0.28 * above),
-        ([], [("round", (0.3, 0.7), 0.3, 0.0, math.pi)], np.array([0.3, 0.7]) + 0.32 * above),
-    ]:
-        obstacles = Obstacles.of(lines, bends)
-        for velocity, time in [(0.0 * tilt, 0.0), (-0.1 * above, 0.0), (above, math.inf)]:
-            flight = Flight(gap, velocity, G)
-            found, _ = first_in_flight(flight, obstacles, 0.02, 0.01)
-            assert found == time, (lines, bends, velocity)

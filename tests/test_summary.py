@@ -144,20 +144,6 @@ def test_where_theory_ends_it_says_null_and_why():
     assert part["ended"]["reason"] == ["exit"]
 
 
-def test_the_printed_equation_has_the_sine_and_cosine_the_wrong_way_round():
-    """Printed (9): v2' = v2 sqrt(sin²φ2 + ε² cos²φ2), φ2 measured from the plate."""
-    found = printed(run("perpendicular"))
-    right, as_printed = found["theory"], found["theory_as_printed"]
-    assert list(as_printed) == THEORY
-    sine, cosine = (f(np.radians(right["phi2_deg"])) for f in (np.sin, np.cos))
-    v2 = right["v2"]
-    assert right["v2r"] == pytest.approx(v2 * np.hypot(cosine, 0.5 * sine), rel=1e-14, abs=0.0)
-    assert as_printed["v2r"] == pytest.approx(v2 * np.hypot(sine, 0.5 * cosine), rel=1e-14, abs=0.0)
-    same = [key for key in THEORY if right[key] == as_printed[key]]
-    assert {"phi1_deg", "v1", "t2", "x2", "y2", "v2", "phi2_deg"} <= set(same)
-    assert "x3" not in same
-
-
 @pytest.mark.parametrize(
     ("name", "override"),
     [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tracemalloc
 from time import process_time
 
 import numpy as np
@@ -97,46 +96,6 @@ def test_only_what_starts_on_an_adhesive_belt_is_carried(changes, carried):
     found = drawn(**changes)
     assert found.carried.tolist() == [carried]
     assert found.position.tolist() == [list(changes.get("at", [-1.0, RC]))]
-
-
-def gaps(found, fall, floor):
-    """Distances of every particle, at its release, from all released before it."""
-    for i in range(1, len(found.t)):
-        age = found.t[i] - found.t[:i, None]
-        there = found.position[:i] + found.velocity[:i] * age - [0.0, fall] * age**2
-        there[:, 1] = np.maximum(there[:, 1], floor)
-        yield np.hypot(*(there - found.position[i]).T).min()
-
-
-@settings(max_examples=25)
-@given(seed=st.integers(0, 1000), rate=st.floats(50.0, 1000.0), bed=st.floats(0.1, 0.2))
-@pytest.mark.parametrize("kind", ["carried", "slipping", "dropped"])
-def test_interacting_particles_never_start_inside_each_other(kind, seed, rate, bed):
-    stream = {"count": 100, "rate": rate, "bed_height": bed, "seed": seed, "interact": True}
-    small = {"radius": 0.004}
-    fall, floor = 0.5 * G, -np.inf
-    if kind == "carried":
-        found, fall = drawn(**stream, particle=small), 0.0
-    elif kind == "slipping":
-        # 5 mm apart, and 3 mm fallen where there is so much room above the belt
-        slow = {"velocity": [0.2, 0.0], "rate": 40.0, "bed_height": 0.014}
-        belt = {"friction": 0.5}
-        found, floor = drawn(**{**stream, **slow}, incoming=belt, particle=small), 0.104
-    else:
-        found = drawn(**stream, at=[0.0, 3.0], velocity=[1.5, 0.4], particle=small)
-    assert min(gaps(found, fall, floor)) >= 0.008 * (1.0 - 1e-12)
-    assert found.position[0, 1] == found.position[:, 1].min()
-    assert np.ptp(found.position[:, 1]) <= bed
-
-
-def test_in_a_bed_with_no_room_everybody_is_due_all_the_same():
-    # one every millimetre of belt, in a single layer, 13 mm across: they wait, see test_summary
-    found = drawn(count=20, rate=2000.0, interact=True)
-    assert found.t.tolist() == [i / 2000.0 for i in range(20)]
-    assert found.position.tolist() == [[-1.0, RC]] * 20
-    # in two layers' height at most a few find a place, and nobody is put outside the bed
-    found = drawn(count=20, rate=2000.0, interact=True, bed_height=0.025)
-    assert np.ptp(found.position[:, 1]) <= 0.025
 
 
 def bed_of_numpy(seeds, count, rate, height, speed, spread, radii, fall, floor):
@@ -247,30 +206,6 @@ def test_what_is_poured_into_what_was_poured_lies_beside_it():
     radius = machine.particle.radius
     free = np.hypot(*apart.T) - radius[:, None] - radius + np.eye(300)
     assert free.min() >= -1e-15
-
-
-@pytest.mark.parametrize(
-    "stream",
-    [
-        {"count": 10, "fill": [[0.0, 0.0], [15.0, 15.0]]},
-        {"count": 2000, "at": [0.0, 0.5], "velocity": [1.0, 0.0], "rate": 1e5, "bed_height": 0.1},
-    ],
-    ids=["box", "bed"],
-)
-def test_places_are_found_at_once(stream):
-    """It took 37 s and 3.5 GB, and 14 s: the bounds are of processor time and of memory."""
-    line = {"name": "line", "from": [0.0, -0.1], "to": [15.0, -0.1]}
-    stream = {**stream, "interact": True}
-    made = scene.from_dict({"particle": {"radius": 0.001}, "surface": [line], "stream": stream})
-    began = process_time()
-    build(made)
-    assert process_time() - began < 3.0
-    if "fill" in stream:
-        tracemalloc.start()
-        build(made)
-        _, peak = tracemalloc.get_traced_memory()
-        tracemalloc.stop()
-        assert peak < 1e8
 
 
 def test_a_box_is_not_looked_through_for_ever():

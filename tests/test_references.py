@@ -32,12 +32,9 @@ from references import (
     henderson,
     inside_surfaces,
     likeness,
-    maxwell_boltzmann,
     overlaps,
-    pair_overlaps,
     round_the_pulley,
     slide,
-    surface_depths,
     virial,
     wall_pressure,
 )
@@ -203,12 +200,6 @@ def test_henderson_has_the_virial_coefficients_of_hard_disks():
     assert third == pytest.approx(16.0 / 3.0 - 4.0 * sqrt(3.0) / pi, rel=1e-3)
 
 
-def test_maxwell_boltzmann_tells_normal_components_from_others():
-    rng = np.random.default_rng(3)
-    assert maxwell_boltzmann(rng.normal(0.0, 2.5, (2000, 2))) > 0.01
-    assert maxwell_boltzmann(rng.uniform(-1.0, 1.0, (2000, 2))) < 1e-6
-
-
 # Overlaps
 
 
@@ -230,29 +221,3 @@ def test_overlaps_are_those_of_what_touches_in_radii():
     assert depth.percentile_99 == pytest.approx(0.1, rel=1e-12, abs=0.0)
     depth = inside_surfaces(recording, built, [0.0])
     assert (depth.worst, depth.count) == (pytest.approx(0.1, rel=1e-12, abs=0.0), 1)
-
-
-def test_overlaps_of_two_sizes_count_in_radii_of_the_smaller():
-    """1 and 4 mm, 4.8 mm apart: 0.2 mm deep, and 0.2 of the smaller."""
-    deep = pair_overlaps(np.array([[0.0, 0.0], [0.0048, 0.0], [0.02, 0.0]]), [0.001, 0.004, 0.004])
-    assert deep == pytest.approx([0.2], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("place", "deep"),
-    [
-        ((0.0, -0.485), -0.005),  # inside, at the lowest point
-        ((0.0, -0.505), 0.005),  # outside, beyond it
-        ((0.0, 0.5), -0.697106781186548),  # above: sqrt(1/2) m from both ends
-        ((0.5, 0.003), 0.007),  # above the right end
-        ((-0.5, -0.003), 0.009991),  # beside the left one, rather: 9 um from the arc
-    ],
-)
-def test_disks_are_as_deep_in_an_arc_as_its_nearest_point_is_near(place, deep):
-    """A half circle of 0.5 m below the origin, that comes at 1 s and goes at 2 s."""
-    bowl = {"name": "bowl", "center": [0.0, 0.0], "radius": 0.5, "from_deg": 180.0,
-            "to_deg": 360.0, "closes_at": 1.0}  # fmt: skip
-    built = scene_of(surface=[bowl])
-    (found,) = surface_depths(built, np.array([place]), 0.01, 1.5).values()
-    assert found == pytest.approx([deep], abs=1e-9)
-    assert surface_depths(built, np.array([place]), 0.01, 0.5) == {}

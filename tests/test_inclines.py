@@ -1,9 +1,6 @@
 """The pulley of an inclined conveyor, and bodies with any moment of inertia, against ODEs."""
 
-from __future__ import annotations
-
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +15,7 @@ INERTIA = {"disk": 0.5, "sphere": 0.4, "hoop": 1.0}
 INCLINE = st.floats(-0.5, 0.5)
 
 
-def crossing(function: Any, direction: float = 0.0) -> Any:
+def crossing(function, direction=0.0):
     function.terminal, function.direction = True, direction
     return function
 
@@ -29,19 +26,19 @@ class Rider:
     k is I/(m r²), None if it does not turn. Positions are counted along the path of the centre.
     """
 
-    def __init__(self, v0: float, radius: float, mu: float, k: float | None, beta: float) -> None:
+    def __init__(self, v0, radius, mu, k, beta):
         self.v0, self.radius, self.mu, self.k, self.beta = v0, radius, mu, k, beta
         self.share = 1.0 if k is None else k / (1.0 + k)
 
-    def along(self, place: float) -> float:
+    def along(self, place):
         """Weight along the path, m/s²; the belt ends at 0."""
         return G * math.sin(-self.beta + max(place, 0.0) / self.radius)
 
-    def load(self, place: float, v: float, *, belt: bool) -> float:
+    def load(self, place, v, *, belt):
         turn = 0.0 if belt else v * v / self.radius
         return G * math.cos(-self.beta + max(place, 0.0) / self.radius) - turn
 
-    def go(self, place: float, v: float, rim: float, *, belt: bool) -> tuple[str, Any]:
+    def go(self, place, v, rim, *, belt):
         """Ride until the belt ends, or the pulley is left, or it stands."""
         slip = None
         for _ in range(9):
@@ -54,12 +51,10 @@ class Rider:
             slip = math.copysign(1.0, self.along(place)) if name == "slips" else None
         raise AssertionError
 
-    def phase(
-        self, place: float, v: float, rim: float, slip: float | None, *, belt: bool
-    ) -> tuple[str, float, float, float]:
+    def phase(self, place, v, rim, slip, *, belt):
         """Hold, or slip in one direction, up to the next event."""
 
-        def rate(_: float, y: Any) -> list[float]:
+        def rate(_, y):
             weight, load = self.along(y[0]), self.load(y[0], y[1], belt=belt)
             if slip is None:
                 gain = (1.0 - self.share) * weight
@@ -67,7 +62,7 @@ class Rider:
             drag = -slip * self.mu * load
             return [y[1], weight + drag, drag / self.k if self.k else 0.0]
 
-        def need(_: float, y: Any) -> float:
+        def need(_, y):
             load = self.load(y[0], y[1], belt=belt)
             return self.share * abs(self.along(y[0])) - self.mu * load
 
@@ -95,7 +90,7 @@ class Rider:
         raise AssertionError
 
 
-def ride(rider: Rider, length: float) -> tuple[float, float, float] | None:
+def ride(rider, length):
     """φ1, v1 and r ω1; None if it does not get so far."""
     name, (_, v, rim, slip) = rider.go(-length, rider.v0, 0.0, belt=True)
     if name == "stands":
@@ -114,7 +109,7 @@ SEEDS = [*range(8), *(pytest.param(seed, marks=pytest.mark.slow) for seed in ran
 
 @pytest.mark.parametrize("kind", ["lump", *INERTIA])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_inclined_conveyor_against_an_ode(seed: int, kind: str) -> None:
+def test_inclined_conveyor_against_an_ode(seed, kind):
     draw = np.random.default_rng(seed)
     beta = draw.uniform(-0.45, 0.45)
     rider = Rider(
@@ -143,7 +138,7 @@ def test_inclined_conveyor_against_an_ode(seed: int, kind: str) -> None:
 
 
 @given(st.floats(1.0, 3.0), st.floats(0.1, 0.6), st.floats(0.02, 0.5))
-def test_a_slow_throw_up_the_pulley_comes_down_on_it(v: float, radius: float, beta: float) -> None:
+def test_a_slow_throw_up_the_pulley_comes_down_on_it(v, radius, beta):
     # A parabola that touches the circle from outside at -β; sampled, does it come inside again?
     ratio = v**2 / (G * radius)
     assume(ratio > math.cos(beta) * (1.0 + 1e-4))
@@ -161,9 +156,7 @@ def test_a_slow_throw_up_the_pulley_comes_down_on_it(v: float, radius: float, be
 
 
 @given(INCLINE, st.floats(1.5, 6.0), st.floats(0.03, 0.2), st.floats(0.1, 1.0), st.floats(-1, 1))
-def test_the_flight_from_the_tangent_point_meets_the_plate(
-    beta: float, v: float, pulley: float, d: float, alpha: float
-) -> None:
+def test_the_flight_from_the_tangent_point_meets_the_plate(beta, v, pulley, d, alpha):
     r = 0.005
     found = transfer(
         speed=v, pulley_radius=pulley, particle_radius=r, distance=d, angle=alpha, incline=beta,
@@ -182,7 +175,7 @@ def test_the_flight_from_the_tangent_point_meets_the_plate(
 
 
 @pytest.mark.parametrize("kind", INERTIA)
-def test_bodies_that_turn_by_their_moment_of_inertia(kind: str) -> None:
+def test_bodies_that_turn_by_their_moment_of_inertia(kind):
     k, r, m, belt = INERTIA[kind], 0.01, 0.3, 1.5
     found = transfer(
         speed=1.0, pulley_radius=0.5, distance=0.3, particle_radius=r, spin=True, inertia=k,
@@ -204,9 +197,7 @@ def test_bodies_that_turn_by_their_moment_of_inertia(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", INERTIA)
 @given(st.floats(0.1, 1.5), st.floats(0.2, 0.6))
-def test_with_endless_grip_it_leaves_where_a_rolling_body_would(
-    kind: str, speed: float, radius: float
-) -> None:
+def test_with_endless_grip_it_leaves_where_a_rolling_body_would(kind, speed, radius):
     # Energy of a body that rolls round, N = 0: u = u0 + 2/(1+k) (1 - cos φ) = cos φ.
     k, ratio = INERTIA[kind], speed**2 / (G * radius)
     assume(ratio < 0.99)

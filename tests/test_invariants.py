@@ -1,7 +1,5 @@
 """Laws that no scene may break: random machines of free surfaces, any particle."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import inf
 
@@ -73,7 +71,7 @@ def most(recording):
 
 fuzz = settings(
     deadline=None,
-    max_examples=120,
+    max_examples=80,
     suppress_health_check=list(HealthCheck),
     phases=[Phase.generate],
 )

@@ -1,7 +1,5 @@
 """``[live]``: what the page of a scene offers; its keys are the scene's, and no engine sees it."""
 
-from __future__ import annotations
-
 import pytest
 
 from chutelab import scene as sc

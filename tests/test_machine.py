@@ -1,7 +1,5 @@
 """From a scene to surfaces, releases and the nominal particle, against formulas by hand."""
 
-from __future__ import annotations
-
 import re
 from math import atan2, cos, hypot, inf, radians, sin, sqrt
 
@@ -113,18 +111,6 @@ def test_the_other_surfaces_stand_where_the_scene_says():
         found.segments.start[0] = 0.0
 
 
-def test_plates_have_the_lengths_the_scene_says_or_two_metres():
-    assert segment(built(outgoing=None), "plate")[0][1] == pytest.approx(R - 2.0, abs=1e-15)
-    assert segment(built(plate={"below": 0.45}), "plate")[0][1] == pytest.approx(
-        R - 0.45, abs=1e-15
-    )
-    # a pivot under where the belt lets the plate end: nothing below it
-    low, high, _ = segment(
-        built(plate={"pivot_height": -1.0}, outgoing={"drop_from": "top"}), "plate"
-    )
-    assert (low[1], high[1]) == pytest.approx((-1.0, -0.7), abs=1e-15)
-
-
 @pytest.mark.parametrize(
     ("tables", "key", "words"),
     [
@@ -214,13 +200,6 @@ def test_arcs_that_touch_do_not_cross():
         assert crossed(surface=[ring, other]) == set()
         wider = {**other, "radius": radius + 0.01}
         assert len(crossed(surface=[ring, wider])) == (1 if x else 0)
-
-
-def test_arcs_in_the_drive_pulley_are_warned_of():
-    for angle, said in ((0.0, ()), (180.0, (machine.Caution("bow", machine.DRIVE_PULLEY),))):
-        bow = {"name": "bow", "center": [0.2, 0.0], "radius": 0.12, "from_deg": angle - 60.0,
-               "to_deg": angle + 60.0}  # fmt: skip
-        assert built(surface=[bow]).warnings == said
 
 
 def test_crossing_surfaces_are_warned_of():

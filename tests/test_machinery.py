@@ -1,41 +1,37 @@
 """Arcs, pegs, conveyors and gates drawn to scale; each surface named once, no name on another."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from chutelab.machine import Machine
 from chutelab.pictures.plots import Window, draw_scene, style
 from handmade import Line, Round, conveyor, machine_of
 
 
-def drawn(machine: Machine, window: Window | None = None, **options: bool) -> Axes:
+def drawn(machine, window=None, **options):
     figure = Figure(figsize=(7.0, 5.0))
     FigureCanvasAgg(figure)
     return draw_scene(figure.add_axes((0.0, 0.0, 1.0, 1.0)), machine, window, **options)
 
 
-def lines(ax: Axes, name: str) -> list[np.ndarray]:
+def lines(ax, name):
     return [np.asarray(one.get_xydata()) for one in ax.lines if one.get_gid() == f"surface {name}"]
 
 
-def circles(ax: Axes) -> list[Circle]:
+def circles(ax):
     return [one for one in ax.patches if isinstance(one, Circle)]
 
 
-def said(ax: Axes) -> list[str]:
+def said(ax):
     return [text.get_text() for text in ax.texts]
 
 
-def assert_apart_and_inside(ax: Axes) -> None:
+def assert_apart_and_inside(ax):
     frame = ax.get_window_extent()
     boxes = [text.get_window_extent() for text in ax.texts]
     for i, box in enumerate(boxes):
@@ -46,7 +42,7 @@ def assert_apart_and_inside(ax: Axes) -> None:
         assert not box.count_overlaps(boxes[:i]), ax.texts[i]
 
 
-def test_an_arc_is_drawn_round_its_centre_from_end_to_end() -> None:
+def test_an_arc_is_drawn_round_its_centre_from_end_to_end():
     ax = drawn(machine_of(Round("spoon", (0.3, -0.1), 0.25, begin=170.0, extent=110.0)))
     (points,) = lines(ax, "spoon")
     away = points - (0.3, -0.1)
@@ -60,7 +56,7 @@ def test_an_arc_is_drawn_round_its_centre_from_end_to_end() -> None:
     assert np.hypot(*middles.T).min() > 0.25 * np.cos(np.radians(1.51))
 
 
-def test_a_conveyor_is_a_belt_round_two_pulleys_named_once() -> None:
+def test_a_conveyor_is_a_belt_round_two_pulleys_named_once():
     ax = drawn(machine_of(*conveyor("second", (0.0, 0.0), (1.0, 0.3), 0.1, 1.5)))
     top, bottom = lines(ax, "second")
     along = np.array([1.0, 0.3]) / np.hypot(1.0, 0.3)
@@ -79,19 +75,17 @@ def test_a_conveyor_is_a_belt_round_two_pulleys_named_once() -> None:
         ((0.0, 1.0), 2.0, "↑"), ((0.7, -0.7), 2.0, "↘"), ((0.7, 0.7), -2.0, "↙"),
     ],
 )  # fmt: skip
-def test_the_arrow_of_a_belt_shows_where_it_moves_to(
-    end: tuple[float, float], speed: float, arrow: str
-) -> None:
+def test_the_arrow_of_a_belt_shows_where_it_moves_to(end, speed, arrow):
     assert said(drawn(machine_of(Line("belt", (0.0, 0.0), end, speed)))) == [f"belt, 2 m/s {arrow}"]
 
 
 @pytest.mark.parametrize(("speed", "arrow"), [(0.5, "↻"), (-0.5, "↺")])
-def test_a_roller_shows_how_it_turns(speed: float, arrow: str) -> None:
+def test_a_roller_shows_how_it_turns(speed, arrow):
     ax = drawn(machine_of(Round("roller", (0.0, 0.0), 0.1, speed=speed)))
     assert said(ax) == [f"roller, 0.5 m/s {arrow}"]
 
 
-def test_a_surface_of_many_pieces_is_named_once_beside_them() -> None:
+def test_a_surface_of_many_pieces_is_named_once_beside_them():
     pegs = [
         Round("pegs", (0.06 * i - 0.03 * j, -0.05 * j), 0.01) for j in range(8) for i in range(8)
     ]
@@ -104,7 +98,7 @@ def test_a_surface_of_many_pieces_is_named_once_beside_them() -> None:
     assert_apart_and_inside(ax)
 
 
-def test_a_gate_is_dashed_and_faded_and_says_when_it_moves() -> None:
+def test_a_gate_is_dashed_and_faded_and_says_when_it_moves():
     ax = drawn(
         machine_of(
             Line("wall", (-1.0, 0.5), (-0.1, 0.0)),
@@ -126,7 +120,7 @@ def test_a_gate_is_dashed_and_faded_and_says_when_it_moves() -> None:
     }  # fmt: skip
 
 
-def test_the_name_of_a_gate_is_not_where_it_lets_fall() -> None:
+def test_the_name_of_a_gate_is_not_where_it_lets_fall():
     hopper = [Line("hopper", (s * 0.3, 0.4), (s * 0.05, 0.0)) for s in (-1.0, 1.0)]
     gate = Line("gate", (-0.05, 0.0), (0.05, 0.0), vanishes=0.4)
     bin_ = Line("bin", (-0.4, -0.5), (0.4, -0.5))
@@ -142,10 +136,8 @@ PLACES = st.tuples(st.floats(-1.0, 1.0), st.floats(-0.7, 0.7))
 
 @given(st.lists(st.tuples(PLACES, PLACES, st.booleans()), min_size=1, max_size=14))
 @settings(max_examples=25, deadline=None)
-def test_names_never_lie_on_each_other_or_leave_the_picture(
-    drawn_pieces: list[tuple[tuple[float, float], tuple[float, float], bool]],
-) -> None:
-    pieces: list[Line | Round] = []
+def test_names_never_lie_on_each_other_or_leave_the_picture(drawn_pieces):
+    pieces = []
     for i, (a, b, bent) in enumerate(drawn_pieces):
         if bent or np.hypot(b[0] - a[0], b[1] - a[1]) < 1e-3:
             pieces.append(Round(f"surface {i}", a, 0.02 + abs(b[0]), 180.0 * b[1], 200.0))

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 import re
 import sys
@@ -211,6 +209,14 @@ FILMED = [[0.0, 1.0, -2.0], [0.25, 1.5, -2.5], [0.5, 2.0, -3.5]]
 def test_reads_columns_that_are_chosen_or_alone(tmp_path, text, given):
     track = measured.read(written(tmp_path, text), **given)
     assert np.column_stack([track.t, track.position]) == pytest.approx(np.array(FILMED), abs=1e-15)
+
+
+def test_a_frame_without_a_mark_takes_its_time(tmp_path):
+    path = written(tmp_path, "x,y\n,\n1,2\n,\n\n2,3\n3,4\n")
+    for columns in ((), (1, 2), ("x", "y")):
+        track = measured.read(path, fps=10.0, columns=columns)
+        assert track.t.tolist() == [0.1, 0.3, 0.4]
+        assert track.skipped == 2
 
 
 @pytest.mark.parametrize(

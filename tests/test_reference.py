@@ -1,7 +1,5 @@
 """The reference: one particle as an ODE, against closed forms written out here, and exact."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections import Counter

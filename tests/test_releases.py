@@ -1,7 +1,5 @@
 """The stream: when, where and how fast each particle starts."""
 
-from __future__ import annotations
-
 from time import process_time
 
 import numpy as np
@@ -27,13 +25,6 @@ def drawn(*, incoming=None, particle=None, **stream):
     return build(scene.from_dict(tables, "mine.toml")).releases
 
 
-def same(one, other):
-    return all(
-        a.tobytes() == b.tobytes()
-        for a, b in zip(vars(one).values(), vars(other).values(), strict=True)
-    )
-
-
 @given(count=st.integers(1, 400), rate=st.floats(1e-3, 1e6), seed=st.integers(0, 2**63 - 1))
 def test_particle_i_starts_at_i_over_the_rate_on_the_belt(count, rate, seed):
     found = drawn(count=count, rate=rate, seed=seed, bed_height=0.05)
@@ -50,36 +41,10 @@ def test_particle_i_starts_at_i_over_the_rate_on_the_belt(count, rate, seed):
         found.t[0] = 1.0
 
 
-def test_heights_and_speeds_are_spread_uniformly():
-    changes = {"count": 20_000, "bed_height": 0.05, "speed_spread": 0.5, "velocity": [3.0, 4.0]}
-    found = drawn(**changes, at=[0.0, 1.0])
-    height = (found.position[1:, 1] - 1.0) / 0.05
-    along = (found.velocity[1:] @ [0.6, 0.8] - 5.0) / 0.5
-    across = found.velocity @ [-0.8, 0.6]
-    # five standard errors of a uniform distribution's mean and variance
-    five = 5.0 / np.sqrt(20_000)
-    assert height.mean() == pytest.approx(0.5, abs=five * np.sqrt(1 / 12))
-    assert height.var() == pytest.approx(1 / 12, abs=five * np.sqrt(1 / 180))
-    assert along.mean() == pytest.approx(0.0, abs=five * np.sqrt(1 / 3))
-    assert along.var() == pytest.approx(1 / 3, abs=five * np.sqrt(4 / 45))
-    assert np.abs(along).max() <= 1.0 + 1e-14
-    assert np.abs(across).max() < 1e-14
-    assert found.velocity[0].tolist() == [3.0, 4.0]
-    assert not found.carried.any()
-
-
 def test_a_particle_let_go_from_rest_has_its_spread_forwards():
     found = drawn(count=50, at=[0.0, 1.0], velocity=[0.0, 0.0], speed_spread=0.3)
     assert (found.velocity[:, 1] == 0.0).all()
     assert 0.0 < np.abs(found.velocity[1:, 0]).max() <= 0.3
-
-
-def test_the_seed_decides():
-    changes = {"count": 100, "bed_height": 0.1, "rate": 100.0}
-    for interact in (False, True):
-        one = drawn(**changes, interact=interact, seed=3)
-        assert same(one, drawn(**changes, interact=interact, seed=3))
-        assert not same(one, drawn(**changes, interact=interact, seed=4))
 
 
 @pytest.mark.parametrize(
@@ -118,7 +83,7 @@ def bed_of_numpy(seeds, count, rate, height, speed, spread, radii, fall, floor):
     return y, u, size
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     seed=st.sampled_from([0, 2**32 - 1, 2**32, 2**63 - 1]) | st.integers(0, 2**63 - 1),
     second=st.booleans(), carried=st.booleans(), count=st.integers(2, 100),

@@ -125,6 +125,14 @@ def test_the_defaults_are_the_contract():
     assert scene.source == "somewhere/machine.toml"
 
 
+def test_free_surfaces_have_the_contract_defaults_and_points():
+    hood, floor = sc.parse(CONVEYOR + HOOD).surface
+    assert hood.points == ((0.8, 0.5), (1.0, 0.1))
+    assert (hood.name, hood.restitution, hood.friction, hood.speed) == ("hood", 0.3, 0.4, 0.0)
+    assert floor.points == ((-1.0, 0.0), (0.0, 0.0), (1.0, 0.5))
+    assert floor.speed == 1.0
+
+
 def test_a_view_is_two_corners_the_second_right_of_the_first_and_above_it():
     view = sc.parse(MACHINE + "[view]\nfrom = [-1, -2]\nto = [1.5, 0.5]").view
     assert (view.from_, view.to) == ((-1.0, -2.0), (1.5, 0.5))
@@ -167,19 +175,6 @@ def test_scenes_are_frozen_all_the_way_down():
         with pytest.raises(ValidationError, match="frozen"):
             setattr(table, key, 1.0)
     assert hash(scene) == hash(sc.parse(MACHINE + HOOD))
-
-
-def test_a_direct_call_judges_and_fills_as_a_file_does():
-    incoming = sc.Incoming(speed=2.0, pulley_radius=0.1)
-    plate = sc.Plate(distance=0.5)
-    scene = sc.Scene(incoming=incoming, plate=plate)
-    assert scene.plate is not None
-    assert scene.plate.pivot_height == 0.1
-    assert plate.pivot_height is None, "the caller's own table stays as it was"
-    with pytest.raises(sc.SceneError, match=r"\[plate\] needs the table \[incoming\]"):
-        sc.Scene(plate=plate)
-    with pytest.raises(sc.SceneError, match=r"gravity = -1: must be .*, in m/s²"):
-        sc.Scene(gravity=-1)
 
 
 def test_the_title_is_the_files_name_unless_given(tmp_path):
@@ -242,32 +237,52 @@ def test_any_value_in_range_comes_back_unchanged(document):
     assert sc.from_dict(json.loads(scene.model_dump_json(by_alias=True))) == scene
 
 
+# Each key with the least and the largest value it takes, and values that are just outside.
+RANGES = """
+gravity 0 1e-9 1e6 | -1 9e-10 1.1e6
+particle.radius 1e-9 | -1 9e-10
+particle.mass 1e-27 1e6 | 0 9e-28 1.1e6
+incoming.speed 0 1e-9 1e6 | -2 1e-12 1.1e6
+incoming.pulley_radius 1e-9 1e6 | 0 9e-10
+incoming.length 1e-9 1e6 | 5e-324 9e-10
+incoming.incline_deg -60 60 | -60.1 60.1
+incoming.friction 0 1e6 | -0.1 1.1e6
+plate.distance 1e-9 1e6 | 0 9e-10
+plate.restitution 0 1 | -0.1 1.1
+outgoing.drop 1e-9 1e6 | 0 9e-10
+outgoing.speed -1e6 1e6 | -1.1e6 1.1e6
+stream.count 1 10000000 | 0 10000001
+stream.rate 1e-6 1e9 | 0 9e-7 1.1e9
+stream.seed 0 9223372036854775807 | -1 9223372036854775808
+stream.start 0 | -1
+run.dt 1e-7 0.1 | 0 9e-8 0.11
+run.until 1e-9 1e6 | 0 9e-10
+run.max_time 1e-9 1e6 | 0 9e-10
+surface.hood.speed -1e6 1e6 | -1.1e6 1.1e6
+surface.hood.opens_at -1e6 1e6 | -1.1e6
+"""
+
+
+@pytest.mark.parametrize("line", RANGES.strip().splitlines())
+def test_a_key_takes_the_values_of_its_range_and_no_others(line):
+    inside, outside = (part.split() for part in line.split("|"))
+    key, *inside = inside
+    for value in inside:
+        sc.parse(MACHINE + HOOD, overrides=[f"{key}={value}"])
+    for value in outside:
+        with pytest.raises(sc.SceneError) as told:
+            sc.parse(MACHINE + HOOD, overrides=[f"{key}={value}"])
+        assert [fault.key.replace("[0]", ".hood") for fault in told.value.faults] == [key], value
+
+
 # The shipped scenes.
 
 SHIPPED = (
-    "belt-landing",
-    "cascade",
-    "cradle",
-    "dominoes",
-    "free-fall",
-    "galton",
-    "heap",
-    "hopper",
-    "inclined-20",
-    "inclined-40",
-    "inclined-60",
-    "inclined-conveyor",
-    "low-speed",
-    "mixture",
-    "perpendicular",
-    "perpendicular-fast",
-    "rock-box",
-    "slip",
-    "spoon",
-    "stream",
-    "stream-independent",
-    "two-sizes",
-)
+    "belt-landing", "cascade", "cradle", "dominoes", "free-fall", "galton", "heap", "hopper",
+    "inclined-20", "inclined-40", "inclined-60", "inclined-conveyor", "low-speed", "mixture",
+    "perpendicular", "perpendicular-fast", "rock-box", "slip", "spoon", "stream",
+    "stream-independent", "two-sizes",
+)  # fmt: skip
 
 
 def test_exactly_the_promised_scenes_are_shipped():
@@ -380,14 +395,6 @@ def test_an_override_sets_its_key_and_no_other(override, path, value):
     assert leaves(as_written(changed, defaults=True)) == expected
 
 
-def test_the_last_of_several_overrides_wins_and_tables_are_made():
-    scene = sc.parse(CONVEYOR, overrides=["plate.distance=1", "plate.distance=2"])
-    assert scene.plate is not None
-    assert scene.plate.distance == 2.0
-    scene = sc.parse(CONVEYOR, overrides=["surface=[{name='a', from=[0, 0], to=[1, 1]}]"])
-    assert scene.surface[0].points == ((0.0, 0.0), (1.0, 1.0))
-
-
 def test_overrides_leave_the_callers_mapping_alone():
     document = tomllib.loads(MACHINE + HOOD)
     before = json.dumps(document)
@@ -492,24 +499,6 @@ def test_refused_values_are_named_by_their_keys_all_at_once():
     assert faults["plate.angle_deg"].value == 95.0
     assert faults["plate.angle_deg"].allowed.endswith("in degrees")
     assert "from" not in str(faults["plate.angle_deg"])
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        ("incoming.speed=3", "plate.angle_deg=20"),
-        (["incoming.speed=3", "plate.angle_deg=20"],),
-        ({"incoming.speed": 3, "plate.angle_deg": np.float64(20.0)},),
-        ({"incoming": {"speed": 3}, "plate": {"angle_deg": 20}},),
-        ("incoming.speed=9", {"incoming.speed": 3}, [{"plate": {"angle_deg": 20}}]),
-    ],
-)
-def test_overrides_are_texts_values_by_key_or_several_of_these(given):
-    found = sc.load("perpendicular", *given)
-    assert (found.incoming.speed, found.plate.angle_deg) == (3.0, 20.0)
-    assert found.plate.distance == 0.5
-    tables = sc.to_dict(sc.load("perpendicular"))
-    assert sc.load(tables, *given) == found
 
 
 def test_faults_of_a_shipped_scene_name_it_and_no_path(tmp_path):

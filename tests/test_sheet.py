@@ -1,7 +1,5 @@
 """Tables that read well in a terminal and in a notebook."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from html.parser import HTMLParser

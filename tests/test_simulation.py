@@ -1,7 +1,5 @@
 """From a scene to a recording: which engine runs, and the same numbers every time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -108,12 +106,9 @@ def test_progress_goes_from_0_to_1(engine):
 
 STOPPABLE = (
     # scene, engine, what is changed, looks until the end
-    ("stream", "contact", (), 7),
+    ("stream", "contact", ("stream.count=60",), 4),
     ("stream", "pymunk", ("stream.count=20", "run.until=0.7"), 9),
-    ("stream-independent", "exact", ("stream.count=6000",), 4),
     ("stream-independent", "exact", ("stream.count=6000", "run.until=settled"), 6),
-    ("stream-independent", "contact", ("stream.count=300",), 8),
-    ("stream-independent", "pymunk", ("stream.count=5", "run.until=settled"), 9),
     ("belt-landing", "exact", (), 3),
     ("belt-landing", "contact", (), 5),
     ("belt-landing", "pymunk", (), 9),
@@ -163,13 +158,6 @@ def test_a_run_that_is_stopped_keeps_what_was_recorded(name, engine, changes, lo
     assert same(recording, again)
     assert summary(again)["stopped"] == vars(found)
     assert waits(again) is None
-
-
-def test_who_has_not_been_reached_is_not_said_to_have_waited():
-    """The engine for particles that do not meet takes one block after the other."""
-    recording = simulate(loaded("stream-independent"), engine="exact", progress=after(2))
-    assert stopped(recording).unreleased > 5000
-    assert waits(recording) is None
 
 
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])

@@ -1,7 +1,5 @@
 """A stream as a whole, against sums written here."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -22,7 +20,7 @@ from chutelab.studies.sweep import sweep
 G = 9.81
 
 
-def test_envelope_of_parabolas() -> None:
+def test_envelope_of_parabolas():
     """Of parabolas from many heights: where 2, 50 and 98 % of them cross each cut."""
     thrown = {"count": 300, "rate": 1e6, "at": [0.0, 1.0], "velocity": [2.0, 0.0]}
     scene = from_dict({

@@ -1,7 +1,5 @@
 """Texts that somebody else wrote, titles, names, paths: shown as they are, and never obeyed."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 

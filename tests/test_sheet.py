@@ -94,7 +94,9 @@ def test_a_recording_says_what_it_holds(recording):
 def test_a_comparison_shows_what_one_of_the_two_has(recording):
     rows = {row[0]: row[1:] for row in chutelab.compare(recording).sheet().rows}
     assert rows["x2"][:3] == ("distance forward to the plate, m", "0.5937", "0.5937")
-    assert rows["phi2"][0] == "angle to the plate, before, °"
+    # tan φ2 = v0 / (g t2)
+    angle = f"{np.degrees(np.arctan(2.0 / (9.81 * 0.29685))):.4f}"
+    assert rows["phi2"][:3] == ("angle to the plate, before, °", angle, angle)
     assert rows["belt_work"][1] == "-"
     assert rows["belt_work"][3] == ""
     missed = chutelab.simulate(chutelab.load("free-fall"))

@@ -160,6 +160,21 @@ def test_rows_that_were_changed_are_refused_with_their_line(interrupted, harm):
     assert Path("rows.csv").read_bytes() == whole
 
 
+def test_a_first_line_that_was_changed_is_refused(interrupted):
+    plan, _, kept = interrupted
+    part = part_of(Path("rows.csv"))
+    for changed in (
+        kept.replace(b'", "', b'",  "', 1),
+        kept.replace(b"}\n", b', "more": 1}\n', 1),
+        b"[" * 100_000 + b"\n" + kept,
+        b"\n" + kept,
+    ):
+        part.write_bytes(changed)
+        with crew() as team, pytest.raises(InputError, match=r"line 1: not|no rows of a sweep"):
+            sweep_to(plan, "rows.csv", team, resume=True)
+        assert part.read_bytes() == changed
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no FIFO")
 def test_the_file_of_finished_rows_is_a_file():
     plan = planned(load("perpendicular"), ["plate.angle_deg=0:20:5"])

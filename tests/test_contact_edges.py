@@ -70,8 +70,8 @@ def paid(recording, start, end):
     return np.diff(np.sum(books, axis=0))[:, 0] / (end - start)
 
 
-@pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
-@pytest.mark.parametrize("friction", [0.3, 1.0, 1.6, 1.9, 1e6])
+@pytest.mark.parametrize("dt", [1e-3, 5e-4])
+@pytest.mark.parametrize("friction", [0.3, 1.6, 1.9])
 def test_a_belt_slips_under_what_it_cannot_move_and_stalls_where_that_locks(friction, dt):
     """The smooth wall gives N2 sin α = µ N1, the belt N1 = m g + N2 cos α: N1 = m g/(1 - µ cot α).
 
@@ -89,7 +89,7 @@ def test_a_belt_slips_under_what_it_cannot_move_and_stalls_where_that_locks(fric
     assert np.hypot(*recording.track(0)["velocity"][-1]) < 1e-9
 
 
-@pytest.mark.parametrize(("count", "dt"), [(2, 1e-3), (2, 5e-4), (4, 1e-3)])
+@pytest.mark.parametrize(("count", "dt"), [(2, 5e-4), (4, 1e-3)])
 @pytest.mark.parametrize(
     ("friction", "angle"), [(0.3, 30.0), (1.0, 30.0), (0.3, 60.0), (1.0, 60.0)]
 )
@@ -109,9 +109,9 @@ def test_in_a_row_that_is_pushed_into_a_nip_each_pays_for_its_load(count, fricti
     assert recording.laws == ()
 
 
-@pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
 @pytest.mark.parametrize(
-    ("count", "angle", "wall"), [(2, 30.0, 0.0), (2, 60.0, 0.5), (4, 30.0, 0.0)]
+    ("count", "angle", "wall", "dt"),
+    [(1, 60.0, 0.0, 1e-3), (2, 30.0, 0.0, 5e-4), (2, 60.0, 0.5, 1e-3), (4, 30.0, 0.0, 1e-3)],
 )
 def test_a_row_on_a_belt_that_grips_without_bound_stalls_it(count, angle, wall, dt):
     """What cannot move blocks it, and nothing is paid; before, a blow costs m v² at most.
@@ -124,12 +124,12 @@ def test_a_row_on_a_belt_that_grips_without_bound_stalls_it(count, angle, wall, 
     assert recording.laws == ()
 
 
-@pytest.mark.parametrize("wall", [0.1, 0.8])
-@pytest.mark.parametrize("friction", [0.5, 1e6])
-@pytest.mark.parametrize("angle", [30.0, 60.0])
+@pytest.mark.parametrize(
+    ("angle", "friction", "wall"), [(30.0, 0.5, 0.8), (60.0, 0.5, 0.1), (30.0, 1e6, 0.1)]
+)
 def test_what_a_nip_costs_is_the_same_at_a_finer_step(angle, friction, wall):
     """A disk that turns rolls on the belt as far as the wall lets it."""
-    costs = [nip(friction, dt, radians(angle), wall, spin=True) for dt in (1e-3, 2.5e-4)]
+    costs = [nip(friction, dt, radians(angle), wall, spin=True) for dt in (1e-3, 5e-4)]
     coarse, fine = (run.by_surface.sum(axis=0) for run in costs)
     np.testing.assert_allclose(coarse, fine, rtol=0.02)
     assert (costs[0].by_surface[:, 1:] >= 0.0).all()
@@ -146,7 +146,7 @@ def test_who_leaves_a_crest_flies(dt):
     machine = bent(scene_of(particle={"radius": R, "spin": True}, surface=[FAR],
                             run={"until": 0.5, "dt": dt}), crest)  # fmt: skip
     length = 0.2 + R
-    for v0 in np.linspace(0.3, 1.4, 23):
+    for v0 in np.linspace(0.3, 1.4, 8):
         recording = run(thrown(machine, [0.0, length], [v0, 0.0]))
         left = recording.select(Kind.SEPARATION)
         assert len(left) == 1
@@ -160,7 +160,7 @@ def test_who_leaves_a_crest_flies(dt):
         assert np.ptp(last["velocity"][:, 0]) == 0.0
 
 
-STEPS = np.geomspace(2e-3, 3e-5, 30)
+STEPS = np.geomspace(2e-3, 6e-5, 12)
 """s. An end comes at another place in the step each time: at some of them luck is out."""
 
 
@@ -248,8 +248,8 @@ def test_who_is_struck_off_a_ramp_has_left_the_ramp(crowded):
 
 
 @pytest.mark.parametrize("crowded", [False, True])
-@pytest.mark.parametrize("aside", [0.1, 0.2, 0.4])
-@pytest.mark.parametrize("share", [1.0, 1.0001, 1.003])
+@pytest.mark.parametrize("aside", [0.1, 0.4])
+@pytest.mark.parametrize("share", [1.0, 1.003])
 def test_a_disk_squeezes_through_the_gap_of_a_ring_and_feels_both_ends(share, aside, crowded):
     """The gap is hardly wider than the disk: next to one end it may not be in the other.
 
@@ -272,7 +272,7 @@ def test_a_disk_squeezes_through_the_gap_of_a_ring_and_feels_both_ends(share, as
 
 
 @pytest.mark.parametrize("engine", [contact, exact])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_corner_is_of_the_first_piece_that_ends_there(engine, seed):
     """Onto the top where two hollow belts meet: it leaves as fast along as the first of them runs.
 

@@ -75,6 +75,9 @@ def test_a_rising_belt_lets_go_where_its_equation_of_motion_says(
     left, known = (run.select(Kind.SEPARATION)[0] for run in (found, reference.run(built)))
     for name in ("t", "position", "velocity_after"):
         np.testing.assert_allclose(left[name], known[name], rtol=1e-12, atol=1e-13)
+    stepped = contact.run(built).select(Kind.SEPARATION)[0]
+    off = 1e-12 if friction == "adhesion" else 200.0 * built.dt**2
+    np.testing.assert_allclose(stepped["position"], left["position"], rtol=0, atol=off)
     place, velocity, _ = nominal(built.scene)
     np.testing.assert_allclose(place, left["position"], atol=1e-12)
     np.testing.assert_allclose(velocity, left["velocity_after"], atol=1e-12)

@@ -125,7 +125,7 @@ def same(one, other):
 
 
 @both
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(vx=st.floats(-5.0, 5.0), vy=st.floats(-5.0, 5.0), end=st.floats(0.01, 1.0))
 def test_free_flight_is_the_parabola(engine, vx, vy, end):
     recording = lone(engine, (0.3, 2.0), (vx, vy), end, surface=floor(height=-50.0))
@@ -141,7 +141,7 @@ def test_free_flight_is_the_parabola(engine, vx, vy, end):
 
 
 @both
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     restitution=st.one_of(st.just(0.0), st.floats(0.05, 1.0)),
     friction=st.floats(0.0, 1.5),
@@ -169,43 +169,8 @@ def test_a_bounce_keeps_newtons_and_coulombs_laws(engine, restitution, friction,
 
 
 @both
-@settings(max_examples=40)
-@given(angle=st.floats(-170.0, 170.0), restitution=st.floats(0.1, 1.0), skew=st.floats(-60.0, 60.0))
-def test_a_surface_is_struck_r_in_front_of_it_whatever_its_direction(
-    engine, angle, restitution, skew
-):
-    # Through the origin, struck from 0.1 m away without gravity.
-    t = np.array([cos(radians(angle)), sin(radians(angle))])
-    n = np.array([-t[1], t[0]])
-    course = -(cos(radians(skew)) * n + sin(radians(skew)) * t)
-    start = -0.1 * course
-    recording = simulated(
-        engine,
-        f"""
-gravity = 0.0
-[stream]
-at = [{start[0]}, {start[1]}]
-velocity = [{course[0]}, {course[1]}]
-[run]
-until = 0.15
-[[surface]]
-name = "wall"
-from = [{-t[0]}, {-t[1]}]
-to = [{t[0]}, {t[1]}]
-restitution = {restitution}
-friction = 0.0
-""",
-    )
-    hit = recording.select(Kind.IMPACT)[0]
-    assert hit["position"] @ n == pytest.approx(R, abs=1e-12)
-    assert hit["velocity_after"] @ n == pytest.approx(restitution * cos(radians(skew)), abs=1e-11)
-    assert hit["velocity_after"] @ t == pytest.approx(course @ t, abs=1e-11)
-
-
-@both
 @pytest.mark.parametrize("dt", [1 / 60, 1e-3])
-@pytest.mark.parametrize("speed", [20.0, 2000.0])
-@pytest.mark.parametrize("lean", [0.0, 40.0, -70.0])
+@pytest.mark.parametrize(("speed", "lean"), [(20.0, -70.0), (2000.0, 0.0), (2000.0, 40.0)])
 def test_nothing_is_too_fast_to_be_stopped(engine, dt, speed, lean):
     # r = 2 mm against a plate 1 m away, whose normal leans by an angle; without gravity.
     r, a = 0.002, radians(lean)
@@ -242,31 +207,15 @@ friction = 0.0
 
 
 @settings(max_examples=40)
-@given(u=st.floats(0.1, 3.0), v=st.floats(-3.0, 0.0), restitution=st.floats(0.0, 1.0))
-def test_equal_disks_head_on(u, v, restitution):
-    reach = 0.1 - 2.0 * R - 0.05 * u
-    if reach < 1e-3:  # they would meet before the second is there
-        return
-    recording = contact.run(pair([(u, 0.0), (v, 0.0)], restitution=restitution, until=1.5))
-    hit, *more = recording.select(Kind.COLLISION)
-    # Without restitution they touch from then on, and may meet again with a rounding error's speed.
-    assert restitution < 1e-10 or not more
-    assert all(again["normal_impulse"] < 1e-15 * M for again in more)
-    assert hit["t"] == pytest.approx(0.05 + reach / (u - v), rel=1e-10)
-    first, second = last(recording, "velocity")[:, 0]
-    assert first == pytest.approx(0.5 * ((u + v) - restitution * (u - v)), abs=1e-10)
-    assert second == pytest.approx(0.5 * ((u + v) + restitution * (u - v)), abs=1e-10)
-    lost = 0.25 * M * (1.0 - restitution**2) * (u - v) ** 2
-    books = ledger(recording)
-    assert books.by_surface["particles"]["restitution_loss"] == pytest.approx(lost, abs=1e-12)
-    assert books.relative_residual < 1e-12
-
-
-@settings(max_examples=40)
-@given(offset=st.floats(-1.8 * R, 1.8 * R), friction=st.floats(0.0, 2.0), spin=st.booleans())
-def test_oblique_disks_keep_momentum_and_turn(offset, friction, spin):
-    velocities, restitution = [(1.0, 0.0), (-1.0, 0.0)], 0.7
-    recording = contact.run(pair(velocities, offset=offset, friction=friction, spin=spin))
+@given(
+    offset=st.floats(-1.8 * R, 1.8 * R),
+    restitution=st.floats(0.05, 1.0),
+    friction=st.floats(0.0, 2.0),
+    spin=st.booleans(),
+)
+def test_two_disks_keep_momentum_and_turn(offset, restitution, friction, spin):
+    given_ = {"restitution": restitution, "friction": friction, "spin": spin, "until": 0.1}
+    recording = contact.run(pair([(1.0, 0.0), (-1.0, 0.0)], offset=offset, **given_))
     # Line of centres at the touch, from the first to the second.
     c = np.array([sqrt(4.0 * R**2 - offset**2), offset]) / (2.0 * R)
     t = np.array([-c[1], c[0]])
@@ -279,7 +228,10 @@ def test_oblique_disks_keep_momentum_and_turn(offset, friction, spin):
     assert last(recording, "velocity") == pytest.approx(np.array([first, second]), abs=1e-9)
     spun = -rub * R / (0.5 * M * R**2) if spin else 0.0
     assert last(recording, "omega") == pytest.approx([spun, spun], abs=1e-6)
-    assert ledger(recording).relative_residual < 1e-12
+    books = ledger(recording)
+    lost = 0.25 * M * (1.0 - restitution**2) * (relative @ c) ** 2
+    assert books.by_surface["particles"]["restitution_loss"] == pytest.approx(lost, abs=1e-12)
+    assert books.relative_residual < 1e-12
 
 
 def test_a_blow_goes_through_a_row_within_one_step():
@@ -296,10 +248,7 @@ def test_a_blow_goes_through_a_row_within_one_step():
     assert ends[[0, 1, 2, 3, 5]] == pytest.approx(np.zeros((5, 2)), abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    "engine",
-    ["contact", "pymunk"],
-)
+@both
 def test_bounces_come_to_rest_in_the_time_of_the_closed_form(engine):
     fall, e = 0.1, 0.5
     recording = lone(engine, (0.0, R + fall), (0.0, 0.0), '"settled"', surface=floor(restitution=e))
@@ -331,21 +280,6 @@ def test_a_belt_pays_for_the_speed_it_gives(engine, spin, speed, work, heat):
     end = speed / 3.0 if spin else speed
     assert last(recording, "velocity")[0, 0] == pytest.approx(end, rel=1e-10)
     assert books.relative_residual < 1e-10
-
-
-@pytest.mark.parametrize("spin", [False, True])
-def test_accounts_of_surfaces_and_particles_agree_however_a_slide_is_cut(spin):
-    # Around the end of the slip, µ g t = v, and a third of it for a disk that may turn.
-    mu, v = 0.3, 1.0
-    end = v / (mu * G) / (3.0 if spin else 1.0)
-    belt = floor(friction=mu, speed=v)
-    for until in np.linspace(end - 3e-3, end + 3e-3, 25):
-        recording = lone("contact", (0.0, R), (0.0, 0.0), until, surface=belt, spin=spin)
-        entries = recording.track(0)[-1]["entries"]
-        assert recording.by_surface.sum(axis=0) == pytest.approx(entries, abs=1e-15)
-        # Steps: the last one may end within the slip.
-        paid = mu * M * G * v * min(until, end)
-        assert entries[0] == pytest.approx(paid, abs=0.5 * mu * M * G * v * 1e-3)
 
 
 @pytest.mark.parametrize("until", [0.2, 3.0])
@@ -423,33 +357,6 @@ until = 0.55
     assert hit["velocity_after"] == pytest.approx(after, abs=1e-9)
 
 
-@pytest.mark.parametrize("align", ["true", "false"])
-def test_a_ride_along_a_surface_ends_where_it_meets_it(align):
-    # A ceiling 2 r above the belt is touched all the way; a floor goes straight on at the top.
-    recording = simulated(
-        "pymunk",
-        f"""
-[incoming]
-speed = 1.0
-pulley_radius = 0.1
-[[surface]]
-name = "ceiling"
-from = [-0.5, {0.1 + 2.0 * R + 1e-14}]
-to = [-0.3, {0.1 + 2.0 * R + 1e-14}]
-[[surface]]
-name = "floor"
-from = [-0.2, 0.1]
-to = [0.5, 0.1]
-[run]
-until = 1.2
-align = {align}
-""",
-    )
-    away = recording.select(Kind.SEPARATION, surface="incoming")[0]
-    assert away["t"] == pytest.approx(1.0, abs=1e-6)
-    assert recording.seconds < 5.0
-
-
 def in_the_way(place, end):
     """Machine with one dropped in the way of a carried one."""
     machine = build(load("stream", ["stream.count=2", "stream.rate=1.0", f"run.max_time={end}"]))
@@ -499,15 +406,9 @@ speed = {speed}
     )
 
 
-@pytest.mark.parametrize("restitution", [0.0, 0.3, 0.8])
 @pytest.mark.parametrize(
-    ("until", "spin"),
-    [
-        (3.0, True),
-        (3.0, False),
-        ('"settled"\nmax_time = 3.0', True),
-        ('"settled"\nmax_time = 3.0', False),
-    ],
+    ("until", "spin", "restitution"),
+    [(3.0, True, 0.3), (3.0, False, 0.8), ('"settled"\nmax_time = 3.0', False, 0.0)],
 )
 def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restitution):
     # tan 20° < µ: friction holds it against any push. Both belts slip past it: it has not settled.
@@ -529,8 +430,7 @@ def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restit
     assert ledger(recording).relative_residual < 1e-10
 
 
-@pytest.mark.parametrize("speed", [0.1, 2.0])
-@pytest.mark.parametrize("degrees", [0.5, 2.0, 8.0])
+@pytest.mark.parametrize(("speed", "degrees"), [(2.0, 0.5), (0.1, 2.0), (2.0, 8.0)])
 def test_a_narrow_wedge_of_belts_is_no_way_through(speed, degrees):
     # Both faces touch a disk at the origin, and go on below it.
     r, c, s = 0.02, cos(radians(degrees)), sin(radians(degrees))
@@ -616,16 +516,6 @@ restitution = 0.3
         assert ledger(recording).relative_residual < 0.05
 
 
-def test_energy_never_rises_where_nothing_is_driven():
-    recording = shipped("contact", "free-fall")
-    for particle in range(recording.count):
-        track = recording.track(particle)
-        energy = np.sum(recording.energies(track), axis=0)
-        # In contact a hop's m (g dt)²/8, twice, is what the halfway velocity may have or not.
-        assert np.diff(energy).max() <= 2.0 * M * (G * 1e-3) ** 2 / 8.0
-        assert energy[-1] < 0.1 * energy[0]
-
-
 # Ends, hosts
 
 
@@ -652,12 +542,11 @@ def test_what_misses_everything_leaves_a_metre_below(engine, until):
     assert books.belt_work == books.restitution_loss == books.friction_loss == 0.0
 
 
-@pytest.mark.parametrize("until", ['"settled"', "6.0"])
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk", "reference"])
-def test_without_gravity_it_leaves_a_metre_outside_the_box_of_all(engine, until):
+def test_without_gravity_it_leaves_a_metre_outside_the_box_of_all(engine):
     step = '\n[[surface]]\nname = "step"\npoints = [[-1.0, -0.25], [0.5, 0.75]]'
     without = f"gravity = 0.0\n[stream]\nat = [0.0, 2.0]\nvelocity = [0.5, -0.125]\n{step}"
-    made = build(parse(f"{without}\n[run]\nuntil = {until}"))
+    made = build(parse(f"{without}\n[run]\nuntil = 6.0"))
     (gone,) = ran(engine, made).select(Kind.EXIT)
     assert gone["t"] == pytest.approx((0.5 + 1.0) / 0.5, rel=1e-12, abs=0.0)
     assert gone["position"] == pytest.approx([1.5, 2.0 - 0.125 * 3.0], rel=1e-12, abs=0.0)
@@ -700,29 +589,6 @@ def test_independent_particles_pass_through_each_other(engine):
     assert together.track(0).tobytes() == alone.track(0).tobytes()
 
 
-@both
-def test_a_machine_far_away_moves_as_one_here(engine):
-    def off_the_edge(far):
-        table = floor(friction=0.3, height=far, ends=(far - 2.0, far + 0.125))
-        return lone(engine, (-0.25, 0.0078125), (1.5, 0.0), 0.5, surface=table, far=far)
-
-    # A power of two, so that it adds without rounding; half a last place of it is 6e-11 m.
-    here, there = off_the_edge(0.0), off_the_edge(2.0**19)
-    times = np.linspace(0.0, 0.5, 100)
-    shifted = there.at(times)[0] - 2.0**19
-    np.testing.assert_allclose(shifted, here.at(times)[0], rtol=0.0, atol=1e-9)
-    assert there.events["kind"].tolist() == here.events["kind"].tolist()
-
-
-@both
-def test_progress_is_rare(engine):
-    shares = []
-    recording = ran(engine, build(load("belt-landing", ["run.until=settled"])), shares.append)
-    assert shares == sorted(shares)
-    assert shares[-1] == 1.0
-    assert len(shares) <= 2 + recording.steps / 64 + recording.seconds / 0.05
-
-
 def test_who_stalls_is_named_and_what_was_recorded_is_kept(monkeypatch):
     # The core's word for it, when it comes back for the third time.
     statuses = iter([None, None, host.Status.STALLED])
@@ -762,11 +628,10 @@ def test_an_interrupt_leaves_nothing_behind_for_the_next_run():
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-@both
-def test_ctrl_c_stops_a_long_run_at_once(engine):
+def test_ctrl_c_stops_a_long_run_at_once():
     environment = {**os.environ, "PYTHONPATH": str(Path(chutelab.__file__).parents[1])}
     words = ["run", "stream", "--set", "stream.count=20000", "--set", "stream.rate=1000"]
-    command = [sys.executable, "-m", "chutelab", *words, "--engine", engine, "--json"]
+    command = [sys.executable, "-m", "chutelab", *words, "--engine", "contact", "--json"]
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as running:
@@ -779,7 +644,7 @@ def test_ctrl_c_stops_a_long_run_at_once(engine):
     assert said.strip().endswith("Interrupted.")
 
 
-@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+@both
 def test_a_crowd_on_a_gate_that_is_still_to_open_has_not_settled(engine):
     gate = {"name": "gate", "from": [-0.2, 0.0], "to": [0.2, 0.0], "restitution": 0.0}
     row = {"count": 5, "at": [-0.06, 0.01], "to": [0.06, 0.01], "velocity": [0.0, 0.0]}

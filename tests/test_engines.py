@@ -24,7 +24,8 @@ from chutelab.machine import build
 from chutelab.results import REASONS, Kind, balance
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
-from chutelab.scene import from_dict, load, parse
+from chutelab.scene import from_dict, load
+from machines import face
 
 G, R, M = 9.81, 0.0063, 0.008
 
@@ -35,69 +36,37 @@ def ran(engine, machine, progress=None):
     return import_module(f"chutelab.engines.{engine}").run(machine, progress)
 
 
-def simulated(engine, text, *overrides):
-    return ran(engine, build(parse(text, overrides=overrides)))
+def simulated(engine, *surfaces, at, velocity, until, **tables):
+    """Run a lone particle; more tables are named, and keys of `run` and `particle` go into them."""
+    run = {"until": until} | {key: tables.pop(key) for key in ("dt", "max_time") if key in tables}
+    particle = {key: tables.pop(key) for key in ("radius", "spin") if key in tables}
+    stream = {"at": list(at), "velocity": list(velocity)}
+    tables |= {"surface": list(surfaces), "stream": stream, "particle": particle, "run": run}
+    return ran(engine, build(from_dict(tables)))
 
 
 def shipped(engine, name, *overrides):
     return ran(engine, build(load(name, overrides)))
 
 
-def lone(engine, at, velocity, until, *, surface="", spin=False, dt=1e-3, far=0.0):
-    return simulated(
-        engine,
-        f"""
-[particle]
-spin = {str(spin).lower()}
-[stream]
-at = [{at[0] + far}, {at[1] + far}]
-velocity = [{velocity[0]}, {velocity[1]}]
-[run]
-until = {until}
-dt = {dt}
-{surface}
-""",
-    )
+def floor(*, height=0.0, ends=(-20.0, 20.0), **values):
+    usual = {"restitution": 0.0, "friction": 0.0}
+    return face("floor", (ends[0], height), (ends[1], height), **usual | values)
 
 
-def floor(*, restitution=0.0, friction=0.0, speed=0.0, height=0.0, ends=(-20.0, 20.0)):
-    return f"""
-[[surface]]
-name = "floor"
-from = [{ends[0]}, {height}]
-to = [{ends[1]}, {height}]
-restitution = {restitution}
-friction = {friction}
-speed = {speed}
-"""
+FAR = {"name": "far", "points": [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0]]}
 
 
-def released(places, velocities, times, *, surface="", until=0.2, dt=1e-3, spin=False, **pair):
+def released(places, velocities, times, *, surface=FAR, until=0.2, dt=1e-3, spin=False, **pair):
     """Machine of particles that meet, each released where and when told."""
-    told = {"gravity": 0.0, "restitution": 0.7, "friction": 0.4, **pair}
-    far = '[[surface]]\nname = "far"\npoints = [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0]]'
-    machine = build(
-        parse(
-            f"""
-gravity = {told["gravity"]}
-[particle]
-spin = {str(spin).lower()}
-[stream]
-count = {len(times)}
-rate = 1.0
-at = [0.0, 1.0]
-velocity = [1.0, 0.0]
-bed_height = 0.01
-interact = true
-restitution = {told["restitution"]}
-friction = {told["friction"]}
-[run]
-until = {until}
-dt = {dt}
-{surface or far}
-"""
-        )
-    )
+    values = {"restitution": 0.7, "friction": 0.4, **pair}
+    gravity = values.pop("gravity", 0.0)
+    stream = {"count": len(times), "rate": 1.0, "at": [0.0, 1.0], "velocity": [1.0, 0.0],
+              "bed_height": 0.01, "interact": True, **values}  # fmt: skip
+    machine = build(from_dict({
+        "gravity": gravity, "particle": {"spin": spin}, "surface": [surface], "stream": stream,
+        "run": {"until": until, "dt": dt},
+    }))  # fmt: skip
     releases = replace(
         machine.releases,
         t=np.array(times, dtype=float),
@@ -128,7 +97,7 @@ def same(one, other):
 @settings(max_examples=20)
 @given(vx=st.floats(-5.0, 5.0), vy=st.floats(-5.0, 5.0), end=st.floats(0.01, 1.0))
 def test_free_flight_is_the_parabola(engine, vx, vy, end):
-    recording = lone(engine, (0.3, 2.0), (vx, vy), end, surface=floor(height=-50.0))
+    recording = simulated(engine, floor(height=-50.0), at=(0.3, 2.0), velocity=(vx, vy), until=end)
     knot = recording.track(0)[-1]
     scale = hypot(0.3, 2.0) + hypot(vx, vy) * end + G * end**2
     x, y = 0.3 + vx * end, 2.0 + vy * end - 0.5 * G * end**2
@@ -152,7 +121,9 @@ def test_free_flight_is_the_parabola(engine, vx, vy, end):
 def test_a_bounce_keeps_newtons_and_coulombs_laws(engine, restitution, friction, speed, vx, spin):
     fall = 0.2
     belt = floor(restitution=restitution, friction=friction, speed=speed)
-    recording = lone(engine, (0.0, R + fall), (vx, 0.0), 0.25, surface=belt, spin=spin)
+    recording = simulated(
+        engine, belt, at=(0.0, R + fall), velocity=(vx, 0.0), until=0.25, spin=spin
+    )
     hit = recording.select(Kind.IMPACT)[0]
     approach = sqrt(2.0 * G * fall)
     normal = M * (1.0 + restitution) * approach
@@ -174,26 +145,11 @@ def test_a_bounce_keeps_newtons_and_coulombs_laws(engine, restitution, friction,
 def test_nothing_is_too_fast_to_be_stopped(engine, dt, speed, lean):
     # r = 2 mm against a plate 1 m away, whose normal leans by an angle; without gravity.
     r, a = 0.002, radians(lean)
+    wall = face("wall", (-sin(a), -cos(a)), (sin(a), cos(a)), restitution=0.5, friction=0.0)
     recording = simulated(
-        engine,
-        f"""
-gravity = 0.0
-[particle]
-radius = {r}
-[stream]
-at = [-1.0, 0.0]
-velocity = [{speed}, 0.0]
-[run]
-until = {1.5 / speed}
-dt = {dt}
-[[surface]]
-name = "wall"
-from = [{-sin(a)}, {-cos(a)}]
-to = [{sin(a)}, {cos(a)}]
-restitution = 0.5
-friction = 0.0
-""",
-    )
+        engine, wall, at=(-1.0, 0.0), velocity=(speed, 0.0), until=1.5 / speed, dt=dt, radius=r,
+        gravity=0.0,
+    )  # fmt: skip
     (hit,) = recording.select(Kind.IMPACT)
     way = 1.0 - r / cos(a)
     assert hit["t"] == pytest.approx(way / speed, rel=1e-12, abs=0.0)
@@ -251,7 +207,9 @@ def test_a_blow_goes_through_a_row_within_one_step():
 @both
 def test_bounces_come_to_rest_in_the_time_of_the_closed_form(engine):
     fall, e = 0.1, 0.5
-    recording = lone(engine, (0.0, R + fall), (0.0, 0.0), '"settled"', surface=floor(restitution=e))
+    recording = simulated(
+        engine, floor(restitution=e), at=(0.0, R + fall), velocity=(0.0, 0.0), until="settled"
+    )
     # Down once, then 2 ε^n times as long for every further bounce; a few steps of rest at the end.
     total = sqrt(2.0 * fall / G) * (1.0 + 2.0 * e / (1.0 - e))
     assert recording.track(0)[-1]["t"] == pytest.approx(total, abs=5e-3)
@@ -273,7 +231,7 @@ def test_bounces_come_to_rest_in_the_time_of_the_closed_form(engine):
 )
 def test_a_belt_pays_for_the_speed_it_gives(engine, spin, speed, work, heat):
     belt = floor(friction=0.3, speed=speed)
-    recording = lone(engine, (0.0, R), (0.0, 0.0), 3.0, surface=belt, spin=spin)
+    recording = simulated(engine, belt, at=(0.0, R), velocity=(0.0, 0.0), until=1.0, spin=spin)
     books = ledger(recording)
     assert books.belt_work == pytest.approx(work, rel=1e-10)
     assert books.friction_loss == pytest.approx(heat, rel=1e-10)
@@ -284,7 +242,9 @@ def test_a_belt_pays_for_the_speed_it_gives(engine, spin, speed, work, heat):
 
 @pytest.mark.parametrize("until", [0.2, 3.0])
 def test_a_slide_leaves_few_knots_and_is_a_parabola_between_them(until):
-    recording = lone("contact", (0.0, R), (9.0, 0.0), until, surface=floor(friction=0.2))
+    recording = simulated(
+        "contact", floor(friction=0.2), at=(0.0, R), velocity=(9.0, 0.0), until=until
+    )
     assert len(recording.track(0)) < 10
     times = np.linspace(0.0, until, 50)
     position, velocity = recording.at(times)
@@ -303,7 +263,7 @@ def test_off_the_end_of_a_table_it_flies(engine, crowded):
         machine = released(places, velocities, (0.0, 0.0), surface=table, until=1.0, gravity=G)
         recording = ran(engine, machine)
     else:
-        recording = lone(engine, (0.0, R), (1.0, 0.0), 1.0, surface=table)
+        recording = simulated(engine, table, at=(0.0, R), velocity=(1.0, 0.0), until=1.0)
     speed = sqrt(1.0 - 2.0 * 0.1 * G * 0.3)
     end = recording.track(0)[-1]
     fall = end["t"] - (1.0 - speed) / (0.1 * G)
@@ -334,22 +294,11 @@ def test_the_ride_stays_on_its_circle_and_is_braked_by_the_belt(engine, name):
 @both
 def test_a_ride_ends_where_something_is_in_its_way(engine):
     # A wedge at 45° whose tip lies on the belt: n = (-1, 1)/√2, met r in front of its face.
+    scraper = face("scraper", (-0.5, 0.1), (-0.3, 0.3), restitution=0.5, friction=0.0)
     recording = simulated(
-        engine,
-        """
-[incoming]
-speed = 1.0
-pulley_radius = 0.1
-[[surface]]
-name = "scraper"
-from = [-0.5, 0.1]
-to = [-0.3, 0.3]
-restitution = 0.5
-friction = 0.0
-[run]
-until = 0.55
-""",
-    )
+        engine, scraper, at=(-1.0, 0.1 + R), velocity=(1.0, 0.0), until=0.55,
+        incoming={"speed": 1.0, "pulley_radius": 0.1},
+    )  # fmt: skip
     hit = recording.select(Kind.IMPACT, surface="scraper")[0]
     assert hit["t"] == pytest.approx(0.5 + R - R * sqrt(2.0), abs=1e-12)
     # (1 + ε) of the normal velocity, 1/√2, is given back along n.
@@ -390,33 +339,24 @@ def test_what_a_carried_partner_gives_is_booked_when_it_is_given():
     assert np.ptp(track["entries"][:, 0]) > 1e-3
 
 
-def belts(friction=0.6, restitution=0.0, speed=0.7):
-    """Belts that lean at 20° to either side and draw down what lies between them."""
-    return "".join(
-        f"""
-[[surface]]
-name = "{name}"
-from = [{side * 0.37}, 1.0]
-to = [{side * 0.01}, 0.0]
-friction = {friction}
-restitution = {restitution}
-speed = {speed}
-"""
+def belts(places, **values):
+    """Belts that run from the first place to the second, and their mirror image."""
+    return [
+        face(name, *([side * x, y] for x, y in places), friction=0.6, **values)
         for name, side in (("left", -1.0), ("right", 1.0))
-    )
+    ]
 
 
 @pytest.mark.parametrize(
     ("until", "spin", "restitution"),
-    [(3.0, True, 0.3), (3.0, False, 0.8), ('"settled"\nmax_time = 3.0', False, 0.0)],
+    [(3.0, True, 0.3), (3.0, False, 0.8), ("settled", False, 0.0)],
 )
 def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restitution):
     # tan 20° < µ: friction holds it against any push. Both belts slip past it: it has not settled.
     recording = simulated(
-        "contact",
-        f"[particle]\nradius = 0.05\nspin = {str(spin).lower()}\n[stream]\nat = [0.0, 1.2]\n"
-        f"velocity = [0.0, 0.0]\n[run]\nuntil = {until}\n{belts(restitution=restitution)}",
-    )
+        "contact", *belts([(0.37, 1.0), (0.01, 0.0)], speed=0.7, restitution=restitution),
+        at=(0.0, 1.2), velocity=(0.0, 0.0), until=until, max_time=3.0, radius=0.05, spin=spin,
+    )  # fmt: skip
     end = recording.track(0)[-1]
     # From the lower end (-0.01, 0) of a face along (0.36, -1), its normal (1, 0.36): r away.
     height = (0.05 * hypot(1.0, 0.36) - 0.01) / 0.36
@@ -434,22 +374,11 @@ def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restit
 def test_a_narrow_wedge_of_belts_is_no_way_through(speed, degrees):
     # Both faces touch a disk at the origin, and go on below it.
     r, c, s = 0.02, cos(radians(degrees)), sin(radians(degrees))
-    walls = "".join(
-        f"""
-[[surface]]
-name = "{name}"
-from = [{side * (r * c + s)}, {-r * s + c}]
-to = [{side * (r * c - 0.1 * s)}, {-r * s - 0.1 * c}]
-friction = 0.6
-speed = {speed}
-"""
-        for name, side in (("left", -1.0), ("right", 1.0))
-    )
+    places = (r * c + s, c - r * s), (r * c - 0.1 * s, -r * s - 0.1 * c)
     recording = simulated(
-        "contact",
-        f"[particle]\nradius = {r}\n[stream]\nat = [0.0, 0.1]\nvelocity = [0.0, 0.0]\n"
-        f"[run]\nuntil = 1.0\n{walls}",
-    )
+        "contact", *belts(places, speed=speed),
+        at=(0.0, 0.1), velocity=(0.0, 0.0), until=1.0, radius=r,
+    )  # fmt: skip
     end = recording.track(0)[-1]
     assert end["velocity"] == pytest.approx([0.0, 0.0], abs=1e-6)
     # Half a percent of the radius in each face at most.
@@ -459,51 +388,23 @@ speed = {speed}
 
 def test_no_belt_wedges_a_disk_that_it_rolls_out_of_a_corner():
     # The belt under it runs away from the wall: it rests there only as long as it does not grip.
-    corner = """
-[particle]
-radius = 0.05
-[stream]
-at = [0.06, 0.3]
-velocity = [-0.5, 0.0]
-[run]
-until = 1.0
-[[surface]]
-name = "wall"
-from = [0.0, 1.0]
-to = [0.0, -0.1]
-[[surface]]
-name = "belt"
-from = [-0.1, 0.0]
-to = [3.0, 0.0]
-friction = 0.6
-speed = 0.7
-"""
-    end = simulated("contact", corner).track(0)[-1]
+    wall = face("wall", (0.0, 1.0), (0.0, -0.1))
+    belt = face("belt", (-0.1, 0.0), (3.0, 0.0), friction=0.6, speed=0.7)
+    end = simulated(
+        "contact", wall, belt, at=(0.06, 0.3), velocity=(-0.5, 0.0), until=1.0, radius=0.05
+    ).track(0)[-1]
     assert end["velocity"] == pytest.approx([0.7, 0.0], abs=1e-6)
     assert end["position"][1] == pytest.approx(0.05, abs=1e-3 * 0.05)
 
 
 @both
 def test_a_pile_in_a_box_stays_in_it_and_gains_nothing(engine):
-    recording = simulated(
-        engine,
-        """
-[stream]
-count = 30
-rate = 100.0
-at = [0.0, 0.05]
-velocity = [0.3, 0.0]
-bed_height = 0.1
-interact = true
-[run]
-until = 2.0
-[[surface]]
-name = "box"
-points = [[-0.05, 0.2], [-0.05, 0.0], [0.05, 0.0], [0.05, 0.2]]
-friction = 0.5
-restitution = 0.3
-""",
-    )
+    box = {"name": "box", "points": [[-0.05, 0.2], [-0.05, 0.0], [0.05, 0.0], [0.05, 0.2]],
+           "friction": 0.5, "restitution": 0.3}  # fmt: skip
+    stream = {"count": 30, "rate": 100.0, "at": [0.0, 0.05], "velocity": [0.3, 0.0],
+              "bed_height": 0.1, "interact": True}  # fmt: skip
+    recording = ran(engine, build(from_dict({"surface": [box], "stream": stream,
+                                             "run": {"until": 2.0}})))  # fmt: skip
     ends = last(recording)
     assert np.all(np.abs(ends[:, 0]) < 0.05 - 0.9 * R)
     assert np.all(ends[:, 1] > 0.9 * R)
@@ -519,12 +420,12 @@ restitution = 0.3
 # Ends, hosts
 
 
-@pytest.mark.parametrize("until", ['"settled"', "6.0"])
+@pytest.mark.parametrize("until", ["settled", 6.0])
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk", "reference"])
 def test_what_misses_everything_leaves_a_metre_below(engine, until):
     vx, vy, begin, lowest = 0.75, 1.5, 1.0, -0.25
-    step = f'[[surface]]\nname = "step"\npoints = [[-1.0, {lowest}], [0.5, {lowest}]]'
-    recording = lone(engine, (30.0, begin), (vx, vy), until, surface=floor() + step)
+    step = face("step", (-1.0, lowest), (0.5, lowest))
+    recording = simulated(engine, floor(), step, at=(30.0, begin), velocity=(vx, vy), until=until)
     (gone,) = recording.select(Kind.EXIT)
     fall = begin - (lowest - 1.0)
     time = (vy + sqrt(vy**2 + 2.0 * G * fall)) / G
@@ -544,10 +445,11 @@ def test_what_misses_everything_leaves_a_metre_below(engine, until):
 
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk", "reference"])
 def test_without_gravity_it_leaves_a_metre_outside_the_box_of_all(engine):
-    step = '\n[[surface]]\nname = "step"\npoints = [[-1.0, -0.25], [0.5, 0.75]]'
-    without = f"gravity = 0.0\n[stream]\nat = [0.0, 2.0]\nvelocity = [0.5, -0.125]\n{step}"
-    made = build(parse(f"{without}\n[run]\nuntil = 6.0"))
-    (gone,) = ran(engine, made).select(Kind.EXIT)
+    step = face("step", (-1.0, -0.25), (0.5, 0.75))
+    recording = simulated(
+        engine, step, at=(0.0, 2.0), velocity=(0.5, -0.125), until=6.0, gravity=0.0
+    )
+    (gone,) = recording.select(Kind.EXIT)
     assert gone["t"] == pytest.approx((0.5 + 1.0) / 0.5, rel=1e-12, abs=0.0)
     assert gone["position"] == pytest.approx([1.5, 2.0 - 0.125 * 3.0], rel=1e-12, abs=0.0)
 
@@ -572,9 +474,8 @@ def test_of_a_crowd_each_leaves_where_it_falls_off(engine):
 
 
 def test_what_hangs_on_a_string_has_not_left():
-    ball = "at = [3.0, 0.0]\nvelocity = [0.0, 0.0]"
-    string = "[[string]]\nfrom = [0.0, 0.0]"
-    recording = simulated("pymunk", f"[stream]\n{ball}\n{string}\n[run]\nuntil = 1.0")
+    string = {"from": [0.0, 0.0]}
+    recording = simulated("pymunk", at=(3.0, 0.0), velocity=(0.0, 0.0), until=1.0, string=[string])
     # From the horizontal it is at its lowest, 3 m below, after K(1/2) √(L/g) = 1.854 √(L/g).
     end = recording.track(0)[-1]
     assert (REASONS[recording.ended[0]], end["t"]) == ("time", 1.0)

@@ -403,3 +403,13 @@ def test_nobody_settles_on_the_belt_that_throws(friction):
     assert len(np.unique(recording.select(Kind.LANDING)["particle"])) > 35
     assert recording.ends()[1]["position"][:, 0].min() > 0.6
     assert {REASONS[k] for k in recording.ended} == {"settled"}
+
+
+@pytest.mark.parametrize("name", ["galton", "rock-box"])
+def test_in_a_crowd_who_parts_from_a_surface_does_so_on_its_track(name):
+    recording = run(build(scene.load(name, ["stream.count=40"])))
+    events = recording.events[recording.events["kind"] == Kind.SEPARATION]
+    assert len(events) > 40
+    places = np.stack([recording.at([e["t"]])[0][0, e["particle"]] for e in events])
+    # NaN, before the release, is no place.
+    assert np.hypot(*(places - events["position"]).T).max() < 1e-3 * 0.003

@@ -323,7 +323,8 @@ def test_an_arc_that_opens_lets_go_of_what_rides_in_it():
     np.testing.assert_allclose(end, velocity - [0.0, G * 0.3], atol=1e-11)
 
 
-def test_gates_across_the_way_of_a_carried_particle():
+@pytest.mark.parametrize("engine", [exact, contact])
+def test_gates_across_the_way_of_a_carried_particle(engine):
     """A bar beside the pulley, in the way at 30°: passed before it is there, else struck."""
     built = inclined(10.0, 0.8, "adhesion")
     bar = {"radius": 0.02, "begin": 0.0, "extent": 2.0 * pi}
@@ -332,7 +333,7 @@ def test_gates_across_the_way_of_a_carried_particle():
     beta, apart = radians(10.0), acos((RHO**2 + 0.35**2 - 0.04**2) / (2.0 * RHO * 0.35))
     there = (1.0 + RHO * (beta + radians(30.0) - apart)) / 0.8
     for appears, struck in ((there - 0.01, True), (there + 0.01, False), (0.5, True)):
-        run = exact.run(bent(built, {**bar, "appears": appears}))
+        run = engine.run(bent(built, {**bar, "appears": appears}))
         hits = run.select(Kind.IMPACT)
         hits = hits[np.abs(hits["t"] - there) < 1e-9]
         assert bool(len(hits)) is struck

@@ -297,9 +297,8 @@ def test_a_stick_right_after_release_is_told_if_the_speed_changed(rode: float, s
         else "rides the incoming belt"
     }
     # One that comes later is news at any speed.
-    recording = recorded(
-        release, (Kind.SLIP, 0.05, 2.0, 0.0), stick, (Kind.SEPARATION, 0.5, 2.0, 0.0)
-    )
+    slip, left = (Kind.SLIP, 0.05, 2.0, 0.0), (Kind.SEPARATION, 0.5, 2.0, 0.0)
+    recording = recorded(release, slip, stick, left)
     shots = film(recording, 0.0, 1.0, fps=25, slow=5.0)
     words = {shot.words for shot in shots if 0.15 < shot.t < 0.45}
     assert words == {f"t = 0.100 s: {sentence(recording, recording.events[2])}"}
@@ -395,29 +394,12 @@ def test_actors_stand_where_the_particle_is() -> None:
         flown = passed > BELT_TIME + 1e-9
         assert strobe[flown] == pytest.approx(expected(passed[flown] - BELT_TIME)[0], abs=1e-13)
         assert f"t = {t:.2f} s" == clock(stage, i)
-        # The corner opposite the shaft's middle is the tip of an arrow.
+        # A component is drawn only beside another: here both, and the velocity itself.
         arrows = drawn["arrows"]
-        corners = np.array([path.vertices[3] for path in arrows.get_paths()])
-        scale = stage.view.transData.transform([(0.0, 0.0), (layout.arrow, 0.0)])
-        tips = np.array([(pace[0], 0.0), (0.0, pace[1]), pace])
-        assert corners / np.ptp(scale[:, 0]) == pytest.approx(tips, abs=1e-9)
+        assert np.stack([arrows.U, arrows.V], axis=1) == pytest.approx(
+            np.array([(pace[0], 0.0), (0.0, pace[1]), pace]), abs=1e-9
+        )
         assert np.asarray(arrows.get_offsets()) == pytest.approx(np.tile(known, (3, 1)), abs=1e-14)
-
-
-def test_everything_that_moves_and_its_arrow_is_in_the_window(runs: dict[str, Recording]) -> None:
-    for name, recording in runs.items():
-        layout = laid_out(recording)
-        shots, _ = filmed(recording)
-        ends = float(recording.track(0)["t"][-1])
-        times = [shot.t for shot in shots if shot.t <= ends]
-        position, velocity = (values[:, 0] for values in recording.at(times))
-        aspect = layout.view[2] * WIDTH / (layout.view[3] * HEIGHT)
-        # What leaves the window for good takes its arrow with it.
-        inside = window_of(recording).fitted(aspect).holds(position)
-        tips = position + layout.arrow * velocity
-        assert layout.window.holds(tips[inside]).all(), name
-        fastest = np.hypot(*(layout.arrow * velocity[inside]).T).max()
-        assert 0.05 < fastest / layout.window.width < 0.11, name
 
 
 def test_crowd_is_at_the_recorded_positions_and_says_how_many() -> None:
@@ -435,8 +417,7 @@ def test_crowd_is_at_the_recorded_positions_and_says_how_many() -> None:
         drawn = moved(stage, i)
         positions = recording.at([t])[0][0, particles]
         np.testing.assert_array_equal(drawn["crowd"].get_xydata(), positions)
-        # Each trail begins in the picture before and ends at its particle, and NaN comes before
-        # the next one.
+        # Each trail ends at its particle, and NaN comes before the next one.
         trails = np.asarray(drawn["trails"].get_xydata()).reshape(299, min(i, 1) + 2, 2)
         np.testing.assert_array_equal(trails[:, -2], positions)
         assert np.isnan(trails[:, -1]).all()
@@ -575,24 +556,6 @@ def test_a_gate_is_seen_while_it_is_there() -> None:
         [False, True],
         [False, True],
     ]
-
-
-def test_streams_have_colours_and_names_of_their_own() -> None:
-    spots = [(0.1 * i - 0.4, 0.3) for i in range(6)]
-    names = ("coarse", "fine ones")
-    sizes = np.array([0.02, 0.02, 0.03, 0.01, 0.01, 0.01])
-    recording = falling(at=spots, stream=[0, 0, 0, 1, 1, 1], streams=names, radius=sizes)
-    stage = stage_of(recording, moments_at([0.5]))
-    drawn = moved(stage, 0)
-    assert len(drawn["crowd coarse"].get_offsets()) == 2
-    assert len(np.asarray(drawn["crowd fine ones"].get_xydata())) == 3
-    legend = stage.view.get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()][:3] == ["particle 0", *names]
-    diameter = stage.view.transData.transform([(0, 0), (0.02, 0)])[:, 0]
-    fine = drawn["crowd fine ones"].get_markersize() / 72.0 * stage.figure.dpi
-    assert fine == pytest.approx(np.ptp(diameter), rel=1e-9)
-    assert_readable(stage, 0)
 
 
 def test_a_film_of_many_is_of_all_of_them_to_the_end() -> None:
@@ -758,23 +721,7 @@ def test_gif_reads_back_frame_by_frame(fps: int, delay: int, tmp_path: Path) -> 
     assert all(frame.width * frame.height < 320 * 180 for frame in frames[1:])
 
 
-def test_gif_frames_are_the_stage_s_in_nearly_its_colours(tmp_path: Path) -> None:
-    recording = by_hand()
-    path = animate(recording, tmp_path / "lesson.gif", slow=2.0, fps=5)
-    shots = film(recording, *span(recording, laid_out(recording).window), fps=5, slow=2.0)
-    stage = stage_of(recording, shots, 2.0)
-    with Image.open(path) as gif:
-        for i in range(len(shots)):
-            gif.seek(i)
-            seen_in_file = np.asarray(gif.convert("RGB")).astype(int)
-            drawn = np.asarray(stage.frame(i)).astype(int)
-            off = np.abs(seen_in_file - drawn).max(axis=2)
-            assert off.mean() < 0.8
-            assert np.quantile(off, 0.999) <= 40
-            assert (seen_in_file[drawn.min(axis=2) == 255] == 255).all()
-
-
-def test_what_stands_still_never_changes_its_colour(
+def test_colours_are_nearly_the_stages_and_what_stands_still_keeps_its_own(
     runs: dict[str, Recording], tmp_path: Path
 ) -> None:
     recording = runs["free-fall"]
@@ -782,13 +729,18 @@ def test_what_stands_still_never_changes_its_colour(
     shots, slow = filmed(recording)
     shots = film(recording, shots[0].t, shots[-1].t, fps=2, slow=slow)
     stage = stage_of(recording, shots, slow)
-    drawn = np.array([stage.frame(i) for i in range(len(shots))])
+    drawn = np.array([stage.frame(i) for i in range(len(shots))]).astype(int)
     with Image.open(path) as gif:
         assert gif.n_frames == len(shots)
         shown = []
         for i in range(len(shots)):
             gif.seek(i)
             shown.append(np.asarray(gif.convert("RGB")))
+    # Nearly the stage's own colours, and white is white.
+    off = np.abs(np.array(shown).astype(int) - drawn).max(axis=3)
+    assert off.mean() < 0.8
+    assert np.quantile(off, 0.999) <= 40
+    assert (np.array(shown)[drawn.min(axis=3) == 255] == 255).all()
     still = (drawn == drawn[0]).all(axis=(0, 3))
     assert 0.8 < still.mean() < 1.0
     assert (np.array(shown)[:, still] == shown[0][still]).all()
@@ -811,26 +763,11 @@ def test_a_film_is_small_and_a_streams_has_fewer_pictures_a_second(
     assert path.stat().st_size < 200_000
 
 
-def test_palette_is_small_and_shows_the_colours_that_mean_something_as_they_are() -> None:
-    held = palette()
-    assert len(held) == len(set(held)) < 64
-    meant = {"#FFFFFF", "#000000", style.TRACK, style.STREAM, style.ANALYTIC, style.BELT}
-    assert meant | {colour.upper() for colour in style.ENERGY.values()} <= set(held)
-    table = np.array([list(bytes.fromhex(colour[1:])) for colour in held], dtype=np.uint8)
-    np.testing.assert_array_equal(shown_as(table[None]), table[None])
-
-
 def written(pictures: list[NDArray[np.uint8]], delays: list[int]) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "written.gif"
         write_gif(path, map(Image.fromarray, pictures), delays)
         return path.read_bytes()
-
-
-def shown_as(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return how a picture (height, width, 3) reads back from a file."""
-    with Image.open(BytesIO(written([picture], [4]))) as gif:
-        return np.asarray(gif.convert("RGB"))
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.integers(1, 30), st.integers(2, 5))

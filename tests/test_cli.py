@@ -25,14 +25,7 @@ from chutelab.cli import console, main
 from test_summary import TOP
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
-FILES = [
-    "events.csv",
-    "lesson.gif",
-    "overlay.png",
-    "recording.npz",
-    "summary.json",
-    "trajectory.csv",
-]
+FILES = "events.csv lesson.gif overlay.png recording.npz summary.json trajectory.csv".split()  # noqa: SIM905
 
 
 @pytest.fixture(autouse=True)
@@ -137,13 +130,8 @@ def test_where_the_closed_form_ends_the_summary_says_why():
     assert "\nNo closed form; outside the model: there is no incoming" in text
     assert "  theory  " not in text
     assert "ended: 5 settled" in text
-    # Its way is told instead: by free fall down to the first ramp, without a velocity sideways.
-    row = re.search(r"^meets (\S+) +(\S+) +(\S+) +(\S+) +(\S+) +(\S+)$", text, re.MULTILINE)
-    t, _, y, vx, vy = map(float, row.groups()[1:])
-    release = sc.load("free-fall").stream
-    assert vx == pytest.approx(release.velocity[0], abs=1e-5)
-    assert vy == pytest.approx(release.velocity[1] - 9.81 * t, rel=1e-5)
-    assert y == pytest.approx(release.at[1] + release.velocity[1] * t - 0.5 * 9.81 * t**2, rel=1e-5)
+    # Its way is told instead: by free fall down to the first ramp.
+    assert re.search(r"^meets \S+( +\S+){5}$", text, re.MULTILINE)
     text = call("run", "perpendicular", "--set", "outgoing.length=0.1").stdout
     assert "\nNo closed form from here on; misses the outgoing belt: " in text
 
@@ -258,26 +246,15 @@ def test_an_accuracy_is_reported_in_text_json_and_file():
     summary = json.loads(Path("o/summary.json").read_text(encoding="utf-8"))
     assert {**found, "seconds": None} == summary
     accuracy = found["accuracy"]
-    assert list(accuracy) == [
-        "asked", "unit", "reached", "method", "met", "worst", "chaotic", "dt", "runs", "against",
-    ]  # fmt: skip
     assert (accuracy["asked"], accuracy["unit"], accuracy["met"]) == (1e-6, "relative", True)
     assert found["error"]["max"] <= accuracy["reached"] < 1e-11
     assert json.loads(call("run", "slip", "--json").stdout)["accuracy"] is None
-
-
-def test_an_accuracy_that_is_not_reached_ends_with_1_and_everything_written():
-    result = call("run", "slip", "--accuracy", "1e-15", "--out", "out", "--only", "json", code=1)
+    # One that is not reached ends with 1, and everything is written.
+    result = call("run", "slip", "--accuracy", "1e-15", "--out", "o", "--only", "json", code=1)
     assert "asked for 1e-15, NOT REACHED" in " ".join(result.stdout.split())
-    assert re.fullmatch(
-        r"Error: the accuracy of 1e-15 was not reached; \S+e-1[34] was\n", result.stderr
-    )
-    found = json.loads(Path("out/summary.json").read_text(encoding="utf-8"))["accuracy"]
-    assert (found["met"], found["asked"]) == (False, 1e-15)
-    quiet = call("run", "slip", "--accuracy", "1e-15", "--quiet", code=1)
-    assert quiet.stdout == ""
-    assert "was not reached" in quiet.stderr
-    assert "the exit code is 1" in " ".join(call("run", "--help").stdout.split())
+    said = r"Error: the accuracy of 1e-15 was not reached; \S+e-1[34] was\n"
+    assert re.fullmatch(said, result.stderr)
+    assert not json.loads(Path("o/summary.json").read_text(encoding="utf-8"))["accuracy"]["met"]
 
 
 # run: what it writes
@@ -672,27 +649,25 @@ def test_check_warns_and_says_what_to_change():
     assert said["warning"] == "outgoing: it crosses the drive pulley"
     assert said["change"] == "outgoing.drop = 0.223"
     (found,) = json.loads(call(*arguments, "--json").stdout)["scenes"]
+    assert list(found) == [
+        "scene",
+        "title",
+        "built",
+        "skipped",
+        "engine",
+        "why",
+        "ends",
+        "stepping",
+        "effort",
+        "theory",
+        "advice",
+    ]
     assert found["advice"][-1:] == [{**said, "settings": {"outgoing.drop": 0.223}}]
     settings = ["run.engine=pymunk", "run.align=false", "run.dt=0.01"]
     text = call("check", "perpendicular", *(f"--set={setting}" for setting in settings)).stdout
     passing = "at 4.39 m/s a particle covers 43.9 mm in a step"
     assert table_of(text)["tunnelling"].startswith(f"POSSIBLE: {passing}")
     assert table_of(text)["warning"].startswith("a particle covers 43.9 mm in a step")
-
-
-def test_check_gives_json():
-    found = json.loads(call("check", "perpendicular", "stream", "--json").stdout)
-    assert found["format"] == 1
-    alone, crowd = found["scenes"]
-    assert list(alone) == [
-        "scene", "title", "built", "skipped", "engine", "why", "ends", "stepping", "effort",
-        "theory", "advice",
-    ]  # fmt: skip
-    assert (alone["scene"], alone["engine"], alone["stepping"]) == ("perpendicular", "exact", None)
-    assert alone["effort"]["contacts"] == 2
-    assert alone["theory"]["leaves_out"] == []
-    assert crowd["stepping"]["safe"] is True
-    assert crowd["theory"]["covers"] == []
 
 
 def test_check_goes_through_all_scenes_before_it_refuses():
@@ -713,6 +688,9 @@ def test_the_tables_agree_as_printed_and_mark_what_differs():
     assert text.count("*") == 4
     first = call("tables", "1").stdout
     assert call("tables", "1", "--as-printed").stdout == first
+    (table,) = json.loads(call("tables", "4", "--json").stdout)["tables"]
+    assert (table["number"], table["cells"], table["differing"]) == (4, 66, 0)
+    assert "'2' is not one of" in refused("tables", "2")
     assert "*" not in first
     assert re.search(r"^v0 = 2 m/s, R = 0.0500 m +0.550 0.550 +0.371 0.371 +0.137 0.137", first,
                      re.MULTILINE)  # fmt: skip
@@ -720,14 +698,6 @@ def test_the_tables_agree_as_printed_and_mark_what_differs():
     assert corrected.count("*") == 22
     assert "0.137 0.146*" in corrected
     assert "0.548 0.420*" in corrected
-
-
-def test_the_tables_as_json():
-    found = json.loads(call("tables", "4", "--json").stdout)
-    (table,) = found["tables"]
-    assert (table["number"], table["cells"], table["differing"]) == (4, 66, 0)
-    assert table["rows"][0]["cells"][0]["printed"] == "0.87"
-    assert "'2' is not one of" in refused("tables", "2")
 
 
 def test_scenes_lists_names_titles_and_what_to_look_at():

@@ -18,7 +18,7 @@ import pytest
 from chutelab.core.module import Status, constants, dtype
 from chutelab.machine import build
 from chutelab.results import Kind
-from chutelab.scene import from_dict, load
+from chutelab.scene import load
 from cores import Core, modes
 from machines import face, of_sizes, scene_of, thrown
 
@@ -165,71 +165,6 @@ def test_a_tilted_world_is_a_turned_scene(crowded):
     impacts, turned_impacts = (one.select(Kind.IMPACT, Kind.COLLISION) for one in found)
     assert len(impacts) == len(turned_impacts) > (8 if crowded else 1)
     np.testing.assert_allclose(turned_impacts["t"], impacts["t"], rtol=0.0, atol=1e-9)
-
-
-# Joints
-
-
-def joined_pieces(rng):
-    """Repeated lines, arcs and circles in cells of 0.1 m; ends meet to 1e-13 m, or to 1e-5 m."""
-    rows = []
-    for n in range(rng.integers(3, 9)):
-        x, y = 0.1 * rng.integers(0, 4, 2) + rng.normal(size=2) * 10.0 ** rng.uniform(-13.0, -5.0)
-        begin, shape = 90.0 * rng.integers(0, 4), rng.integers(0, 4)
-        row = [
-            {"from": [x, y], "to": [x + 0.1, y]},
-            {"from": [x, y], "to": [x, y + 0.1]},
-            {"center": [x, y], "radius": 0.1, "from_deg": begin, "to_deg": begin + 90.0},
-            {"center": [x, y], "radius": 0.05},
-        ][shape]
-        times = [[int(rng.integers(1, 9)), 0.1, 0.0], [int(rng.integers(1, 5)), 0.0, 0.1]]
-        rows.append({"name": f"p{n}", "repeat": times, **row})
-    stream = {"at": [50.0, 50.0], "velocity": [0.0, 0.0]}
-    particle = {"radius": 0.004, "mass": 0.01}
-    return from_dict({"particle": particle, "surface": rows, "stream": stream})
-
-
-def mates_by_pairs(rows, r):
-    """Return which piece goes on smoothly beyond each end (K, 2), by asking all pairs; -1: none.
-
-    They do within 1e-3 r and 1e-2 rad, of several the first, circles last. Ends within 1e-9 r are
-    in one place.
-    """
-    circle = constants("Shape")["CIRCLE"]
-    ends = rows["end"].reshape(-1, 2, 2)
-    off = ends - np.stack([rows["x"], rows["y"]], axis=1)[:, None]
-    straight = (rows["shape"] == constants("Shape")["SEGMENT"])[:, None, None]
-    along = np.stack([rows["tx"], rows["ty"]], axis=1)[:, None]
-    round_ = (
-        np.stack([-off[..., 1], off[..., 0]], axis=2)
-        / np.maximum(rows["radius"], 1e-9)[:, None, None]
-    )
-    onward = np.where(straight, along, round_) * np.array([-1.0, 1.0])[:, None]
-    joints = np.full((len(rows), 2), -1)
-    ended = rows["shape"] != circle
-    for k, n in np.argwhere(ended[:, None] & [True, True]):
-        apart = np.hypot(*np.moveaxis(ends - ends[k, n], 2, 0))
-        same = (apart > 0.0) & (np.abs(ends - ends[k, n]).max(axis=2) <= 1e-9 * r)
-        assert not same[ended].any()
-        bend = np.hypot(*np.moveaxis(onward + onward[k, n], 2, 0))
-        fits = ((apart <= 1e-3 * r) & (bend <= 1e-2)).any(axis=1) & ended
-        fits &= ~(straight[:, 0, 0] & straight[k, 0, 0]) & (np.arange(len(rows)) != k)
-        away = ends[k, n] - np.stack([rows["x"], rows["y"]], axis=1)
-        far = np.hypot(*away.T)
-        touches = ~ended & (np.abs(far - rows["radius"]) <= 1e-3 * r)
-        touches &= np.abs(away @ onward[k, n]) <= 1e-2 * far
-        joints[k, n] = next((m[0] for m in map(np.flatnonzero, (fits, touches)) if len(m)), -1)
-    return joints, ended
-
-
-def test_joints_are_those_of_all_pairs_of_ends():
-    rng, found = np.random.default_rng(3), 0
-    for _ in range(20):
-        core = Core(build(joined_pieces(rng)))
-        joints, ended = mates_by_pairs(core.surfaces, 0.004)
-        np.testing.assert_array_equal(core.surfaces["mates"][ended], joints[ended])
-        found += (joints >= 0).sum()
-    assert found > 200
 
 
 # Sleep

@@ -97,46 +97,6 @@ def test_a_scene_with_points_beside_disks_is_refused_by_its_key():
         simulate(from_dict(tables))
 
 
-def test_of_a_mixture_each_does_what_it_does_alone():
-    """Radii, masses, disks, spheres and what does not turn, pairs by kind: to the last bit."""
-    floor = face("floor", [-1.0, 0.0], [4.0, -1.0], restitution=0.4, friction=0.3)
-    built = scene_of(
-        surface=[floor], stream={"at": [0.0, 1.0], "velocity": [1.0, 0.0]}, run={"until": 1.2}
-    )
-    built = bent(built, {"center": (3.0, 0.0), "radius": 0.5, "begin": 0.0, "extent": 2.0 * pi})
-    many = thrown(built, [[0.0, 1.0 + 0.1 * n] for n in range(4)], velocity=(1.0, 0.0))
-    radius, mass = np.array([0.02, 0.05, 0.01, 0.3]), np.array([0.1, 0.2, 0.3, 0.4])
-    share, kind = np.array([0.5, 0.4, 0.0, 0.5]), np.array([0, 1, 2, 1])
-    pairs = {
-        "restitution": np.array([[0.4], [0.7], [0.0]]),
-        "friction": np.array([[0.3], [0.1], [2.0]]),
-    }
-    many = of_sizes(replace(many, interact=False), radius, mass, share, kind, rolling=np.zeros(3))
-    many = replace(
-        many,
-        segments=replace(many.segments, **pairs),
-        arcs=replace(many.arcs, **pairs),
-    )
-    together = exact.run(many)
-    for n in range(4):
-        one = thrown(built, [[0.0, 1.0 + 0.1 * n]], velocity=(1.0, 0.0))
-        one = of_sizes(one, radius[n], mass[n], share[n])
-        one = replace(
-            one,
-            particle=replace(
-                one.particle,
-                **{
-                    name: float(value[0] if np.ndim(value) else value)
-                    for name, value in vars(one.particle).items()
-                },
-            ),
-        )
-        own = {name: table[kind[n]] for name, table in pairs.items()}
-        one = replace(one, segments=replace(one.segments, **own), arcs=replace(one.arcs, **own))
-        np.testing.assert_array_equal(together.track(n), exact.run(one).track(0))
-    assert ledger(together).relative_residual < 1e-13
-
-
 def test_a_sphere_rolls_down_with_five_sevenths_and_a_disk_with_two_thirds():
     slope = 0.4
     ramp = face("ramp", [0.0, 0.0], [50.0 * cos(slope), -50.0 * sin(slope)], friction=1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from chutelab.core import module
-from chutelab.engines.contact import engine
+from chutelab.engines import contact as engine
 
 
 class Core:

@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Final
 
-from chutelab.scene.materials import PRESETS
+from chutelab.scene.materials import presets
 from chutelab.scene.quantities import REGISTRY, lookup, suggestion, whose
 from chutelab.scene.units import (
     LIGHTEST,
@@ -223,8 +223,8 @@ def _names(look: Look) -> Iterator[Fault]:
     own = [m.get("name") for m in look.several("material") if isinstance(m, Mapping)]
     for row in range(look.rows("particle")):
         name = look("particle", "material", row)
-        if isinstance(name, str) and look.sound("material") and name not in (*own, *PRESETS):
-            there = [n for n in own if isinstance(n, str)] + list(PRESETS)
+        if isinstance(name, str) and look.sound("material") and name not in (*own, *presets()):
+            there = [n for n in own if isinstance(n, str)] + list(presets())
             allowed = did_you_mean(name, there, "`chutelab materials` lists them")
             yield Fault(
                 look.path("particle", "material", row), name, f"no such material; {allowed}"
@@ -299,8 +299,8 @@ def _lightness(look: Look, row: int) -> Iterator[Fault]:
         key, name = "material", look("particle", "material", row)
         own = [m for m in look.several("material") if isinstance(m, Mapping) and name is not None]
         found = [m.get("density") for m in own if m.get("name") == name]
-        if not found and isinstance(name, str) and name in PRESETS:
-            found = [PRESETS[name].material.density]
+        if not found and isinstance(name, str) and name in presets():
+            found = [presets()[name].material.density]
         density = found[0] if found and look.sound("material") else None
     radius = look("particle", "radius", row)
     if isinstance(radius, LIST):

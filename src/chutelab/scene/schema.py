@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts, stream_name
-from chutelab.scene.materials import PRESETS, Material
+from chutelab.scene.materials import Material, presets
 from chutelab.scene.tables import (
     Conveyor,
     Expect,
@@ -249,7 +249,7 @@ class SceneTables(Table):
         if particle.material is None:
             return None
         own = {material.name: material for material in self.material}
-        return own.get(particle.material) or PRESETS[particle.material].material
+        return own.get(particle.material) or presets()[particle.material].material
 
     @property
     def free(self) -> tuple[Plate | Conveyor | Surface, ...]:

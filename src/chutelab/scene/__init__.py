@@ -7,8 +7,7 @@
 - `tables`: the tables of a scene as frozen Pydantic models, with the defaults.
 - `schema`: all tables together, and what follows from one for another.
 - `overrides`: keys by their full path: JSON Schema, limits, ``KEY=VALUE`` texts.
-- `messages`: what Pydantic says of a scene, in words.
-- `live`: ``[live]``, what its page offers, and whether its keys are there.
+- `messages`: what Pydantic says of a scene, in words; ``[live]``, whether its keys are there.
 - `loading`: `Scene`; read, parse, override, validate, write; the shipped scenes.
 - `variants`: one scene with other values: ``--vary``, combinations, families.
 """

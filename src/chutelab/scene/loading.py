@@ -14,8 +14,7 @@ import tomli_w
 from pydantic import ValidationError
 
 from chutelab.scene.conflicts import ConflictError, Look, conflicts
-from chutelab.scene.live import live_faults
-from chutelab.scene.messages import faults_of, nearest
+from chutelab.scene.messages import faults_of, live_faults, nearest
 from chutelab.scene.overrides import Override, apply, joined, sized
 from chutelab.scene.schema import DEFAULTS, SceneTables, as_written, plain_number
 from chutelab.scene.units import flat

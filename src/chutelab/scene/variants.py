@@ -20,8 +20,8 @@ from chutelab.scene.overrides import (
     apply,
     joined,
     limits_of,
-    names_of,
     parts_of,
+    resolved,
     rule_at,
 )
 from chutelab.scene.schema import DEFAULTS, plain_number
@@ -204,7 +204,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
     faults, _ = apply(document, [Override(vary.key, plain_number(vary.values[0]))])
     if faults:
         raise InputError(faults[0].allowed, vary.typed)
-    parts = parts_of(vary.key, names_of(document))
+    parts = resolved(document, vary.key)
     path, indexed = joined(parts), isinstance(parts[-1], int)
     while isinstance(parts[-1], int):
         parts.pop()

@@ -17,6 +17,7 @@ from chutelab.engines import exact
 from chutelab.engines.exact import engine, particle_state
 from chutelab.machine.releases import Releases
 from chutelab.results import Kind
+from chutelab.results.comparison import prediction
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
 
@@ -901,4 +902,4 @@ def test_a_recording_knows_what_was_run():
     recording = exact.run(built)
     assert recording.machine is built
     assert recording.scene is drawn
-    assert recording.prediction is recording.prediction
+    assert prediction(recording) is prediction(recording)

@@ -19,7 +19,7 @@ from chutelab.engines import exact
 from chutelab.engines.simulation import choose
 from chutelab.machine import Particle
 from chutelab.results import ENTRIES, REASONS, Kind
-from chutelab.results import recording as tracks
+from chutelab.results import record as tracks
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import Recorder
 from chutelab.util.errors import InputError

@@ -1,6 +1,7 @@
 """What a run leaves behind, and how it is read.
 
-- `recording`: `Recording`, a finished run: knots, events, and the ledger entries they carry.
+- `record`: `Record`, a finished run: knots, events, and the ledger entries they carry.
+- `recording`: `Recording`, the same with all that is read off it, for those who use it.
 - `recorder`: what engines write a run into.
 - `ledger`: where the energy went, in total and by surface.
 - `quantities`: the readers of the registry: a run's numbers by name and by particle.
@@ -15,7 +16,7 @@
 - `storage`: recordings as files.
 """
 
-from chutelab.results.recording import (
+from chutelab.results.record import (
     ENTRIES,
     EVENT,
     KNOT,
@@ -23,9 +24,10 @@ from chutelab.results.recording import (
     REASONS,
     Kind,
     Motion,
-    Recording,
+    Record,
     balance,
 )
+from chutelab.results.recording import Recording
 
 __all__ = [
     "ENTRIES",
@@ -35,6 +37,7 @@ __all__ = [
     "REASONS",
     "Kind",
     "Motion",
+    "Record",
     "Recording",
     "balance",
 ]

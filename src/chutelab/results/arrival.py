@@ -11,13 +11,12 @@ The fate of a particle is where it is when its track ends, or by which way it ha
 from __future__ import annotations
 
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.machine import Arcs, Machine, Segments
-from chutelab.results.recording import EVENT, PARTICLES, REASONS, Kind, Recording, hermite
+from chutelab.results.record import EVENT, PARTICLES, REASONS, Kind, Record, hermite, kept
 from chutelab.util.arrays import Bools, Floats, Ints
 
 TOUCH = 0.01
@@ -33,23 +32,17 @@ LOOKS = 100
 HALVINGS = 24
 """Of the time between two such instants, until the one is known at which a contact began."""
 
-_known: WeakKeyDictionary[Recording, dict[str, NDArray[Any]]] = WeakKeyDictionary()
 
-
-def arrivals(recording: Recording, surface: str = "outgoing") -> NDArray[Any]:
+def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
     """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
 
     Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
     for the surface itself) say something of an arrival on what lies there. Not of a family.
     """
-    known = _known.setdefault(recording, {})
-    if surface not in known:
-        known[surface] = _arrivals(recording, surface)
-        known[surface].flags.writeable = False
-    return known[surface]
+    return _arrivals(recording, surface)
 
 
-def fates(recording: Recording) -> NDArray[Any]:
+def fates(recording: Record) -> NDArray[Any]:
     """Return what became of each particle, in words, (N,); each has one fate. Not of a family.
 
     ``on NAME``
@@ -111,7 +104,7 @@ def moving(machine: Machine) -> set[str]:
     return {machine.surfaces[owner] for owner in owners | {machine.landing} - {-1}}
 
 
-def _ways_out(recording: Recording, gone: Ints, ends: Floats) -> list[str]:
+def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
     """Return by which way particles have left the scene that end outside of it, (n, 2), m."""
     machine = recording.machine
     corners = machine.corners if machine.corners.size else machine.releases.position
@@ -157,7 +150,8 @@ def never(count: int) -> NDArray[Any]:
     return events
 
 
-def _arrivals(recording: Recording, surface: str) -> NDArray[Any]:
+@kept
+def _arrivals(recording: Record, surface: str) -> NDArray[Any]:
     found = never(recording.count)
     if surface not in recording.surfaces:
         return found
@@ -214,7 +208,7 @@ def _is_there(pieces: Segments | Arcs, k: int, t: Any) -> Any:
 class Places:
     """Where particles are at an instant, and what of them lies on a surface then."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Record) -> None:
         self.recording = recording
         self.radius = np.broadcast_to(recording.particle.radius, recording.count)
         knots, corners = recording.knots, recording.machine.corners

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.results.arrival import never
 from chutelab.results.firsts import from_events, symbols, until_no_slip
-from chutelab.results.recording import Kind, Recording
+from chutelab.results.record import Kind, Record, kept
 from chutelab.scene import Scene
 from chutelab.scene.quantities import NEEDED, THEORY, Quantity
 from chutelab.scene.units import with_unit
-from chutelab.theory import Transfer, unbounded
+from chutelab.theory import Transfer, predict, unbounded
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.tables import Sheet, Shown, number
 
@@ -94,12 +94,18 @@ def predicted(prediction: Transfer, row: Quantity) -> float:
     return degrees(value) if row.unit == "degrees" else value
 
 
-def compare(recording: Recording) -> Comparison:
+@kept
+def prediction(recording: Record) -> Transfer:
+    """Return what the theory predicts for the scene of a recording, see `chutelab.theory`."""
+    return predict(recording.scene)
+
+
+def compare(recording: Record) -> Comparison:
     """Compare particle 0 with the theory's prediction for its scene."""
-    scene, prediction = recording.scene, recording.prediction
-    theory = {name: float(getattr(prediction, name)) for name in THEORY}
+    answer = prediction(recording)
+    theory = {name: float(getattr(answer, name)) for name in THEORY}
     found = {name: float(values[0]) for name, values in symbols(recording).items()}
-    sizes = scales(scene, prediction)
+    sizes = scales(recording.scene, answer)
     return Comparison(
         simulated=found,
         theory=theory,
@@ -108,7 +114,7 @@ def compare(recording: Recording) -> Comparison:
             for name, row in THEORY.items()
             if isfinite(theory[name]) and isfinite(found[name])
         },
-        reason=str(prediction.reason),
+        reason=str(answer.reason),
     )
 
 
@@ -147,7 +153,7 @@ OTHER = (Kind.COLLISION, Kind.STICK, Kind.SETTLE)
 """Events that the theory's equations do not know of, before the landing or on another surface."""
 
 
-def worst(recording: Recording) -> Floats:
+def worst(recording: Record) -> Floats:
     """Return the largest relative error of particle 0 of each of V variants, (V,); NaN without one.
 
     V is 1, or of a family as many as there are particles: `predict` takes one scene at a time, so
@@ -178,7 +184,7 @@ def worst(recording: Recording) -> Floats:
     return largest
 
 
-def _described(recording: Recording, holds: Bools) -> list[NDArray[Any]]:
+def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
     """Return separation, impact and landing of each of N variants of one particle.
 
     The equations hold where these are its first three events, in this order. They did not happen

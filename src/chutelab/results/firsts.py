@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from math import nan
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.results.arrival import never
-from chutelab.results.recording import ENTRIES, REASONS, Recording
+from chutelab.results.record import ENTRIES, REASONS, Record, kept
 from chutelab.scene import Scene
 from chutelab.scene.quantities import NEEDED
 from chutelab.util.arrays import Floats, Numbers
@@ -19,24 +18,23 @@ ALONG = 1e-14
 """Share of the rebound speed below which its part away from the plate is rounding."""
 
 
-_known: WeakKeyDictionary[Recording, dict[tuple[str, str], NDArray[Any]]] = WeakKeyDictionary()
-
-
-def first(recording: Recording, event: str, surface: str | None = None) -> NDArray[Any]:
+def first(recording: Record, event: str, surface: str | None = None) -> NDArray[Any]:
     """Return the first "separation", "impact" or "landing" of each particle, (N,), dtype `EVENT`.
 
     From the incoming belt, on the plate and on the outgoing belt, unless another surface is given.
     NaN throughout where it did not happen. Read-only.
     """
-    known, key = _known.setdefault(recording, {}), (event, surface or NEEDED[event])
-    if key not in known:
-        events = never(recording.count)
-        if key[1] in recording.surfaces:
-            found = recording.first(recording.select(event, surface=key[1]))
-            events[found["particle"]] = found
-        events.flags.writeable = False
-        known[key] = events
-    return known[key]
+    return _first(recording, event, surface or NEEDED[event])
+
+
+@kept
+def _first(recording: Record, event: str, surface: str) -> NDArray[Any]:
+    events = never(recording.count)
+    if surface in recording.surfaces:
+        found = recording.first(recording.select(event, surface=surface))
+        events[found["particle"]] = found
+    events.flags.writeable = False
+    return events
 
 
 def column(events: NDArray[Any], name: str) -> Floats:
@@ -49,13 +47,13 @@ def column(events: NDArray[Any], name: str) -> Floats:
     return np.asarray(events[f"velocity_{when}"][:, "xy".index(name[1])])
 
 
-def paid(recording: Recording, surface: str, entry: str) -> Floats:
+def paid(recording: Record, surface: str, entry: str) -> Floats:
     """Return an entry of a surface of each variant, (V,), J; of a family V = N, else 1."""
     books = recording.by_surface.reshape(-1, len(recording.surfaces), len(ENTRIES))
     return np.asarray(books[:, recording.surface_index(surface), ENTRIES.index(entry)])
 
 
-def symbols(recording: Recording) -> dict[str, Floats]:
+def symbols(recording: Record) -> dict[str, Floats]:
     """Return `THEORY` of each particle, (N,), SI units and radians; NaN without one."""
     left, hit, down = (first(recording, event).copy() for event in NEEDED)
     # In the paper's frame an impact is counted from the separation, a landing from the impact.
@@ -66,7 +64,7 @@ def symbols(recording: Recording) -> dict[str, Floats]:
     return found | until_no_slip(recording, down["t"])
 
 
-def until_no_slip(recording: Recording, landed: Floats) -> dict[str, Floats]:
+def until_no_slip(recording: Record, landed: Floats) -> dict[str, Floats]:
     """Return the theory's belt work and slip heat of each particle that landed then (s), (N,), J.
 
     Known of a lone particle that slips no more, and met nothing but the belt since it landed.

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.results.recording import ENTRIES, Recording, balance
+from chutelab.results.record import ENTRIES, Record, balance, kept
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
 
@@ -102,7 +102,8 @@ class Ledger(Shown):
         )
 
 
-def ledger(recording: Recording) -> Ledger:
+@kept
+def ledger(recording: Record) -> Ledger:
     """Close the books of a recording."""
     first, last = recording.ends()
     index = np.flatnonzero(recording.released)

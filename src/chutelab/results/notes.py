@@ -11,9 +11,10 @@ import numpy as np
 
 from chutelab.machine.releases import Squeeze, squeeze
 from chutelab.results.arrival import arrivals
+from chutelab.results.comparison import prediction
 from chutelab.results.firsts import column, first
 from chutelab.results.ledger import ledger
-from chutelab.results.recording import REASONS, Kind, Recording
+from chutelab.results.record import REASONS, Kind, Record
 from chutelab.theory import Drag, drag
 from chutelab.util.tables import number
 
@@ -45,7 +46,7 @@ class Stopped:
         )
 
 
-def stopped(recording: Recording) -> Stopped | None:
+def stopped(recording: Record) -> Stopped | None:
     """Return where a run was stopped; None if it was not."""
     halted = recording.ended == REASONS.index("stopped")
     if not halted.any():
@@ -87,7 +88,7 @@ class Waits:
         return "; ".join(said)
 
 
-def waits(recording: Recording) -> Waits | None:
+def waits(recording: Record) -> Waits | None:
     """Return which particles waited for a place; None if none did."""
     due, dt = recording.machine.releases.t, recording.machine.dt
     # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
@@ -122,7 +123,7 @@ class Plug:
         )
 
 
-def plugged(recording: Recording) -> Plug | None:
+def plugged(recording: Record) -> Plug | None:
     """Return which particles got stuck; None if none did, or there was nowhere to go.
 
     Told of particles that meet, where some got through or an outgoing belt waits for them, of a
@@ -144,11 +145,11 @@ def plugged(recording: Recording) -> Plug | None:
     return Plug(lying, gone)
 
 
-def air_drag(recording: Recording) -> Drag | None:
+def air_drag(recording: Record) -> Drag | None:
     """Return what air drag would do, by the fastest moment of a recording; None for mass points."""
     speeds = np.hypot(*recording.knots["velocity"].T)
     if not len(speeds):
-        return drag(recording.scene, recording.prediction, 0.0)
+        return drag(recording.scene, prediction(recording), 0.0)
     fastest = int(np.argmax(speeds))
     speed = float(speeds[fastest])
     # Not every knot has the speed just before an impact; events do.
@@ -160,10 +161,10 @@ def air_drag(recording: Recording) -> Drag | None:
         float(np.broadcast_to(part, recording.count)[particle])
         for part in (recording.particle.radius, recording.particle.mass)
     )
-    return drag(recording.scene, recording.prediction, speed, radius, mass)
+    return drag(recording.scene, prediction(recording), speed, radius, mass)
 
 
-def squeezed(recording: Recording) -> Squeeze | None:
+def squeezed(recording: Record) -> Squeeze | None:
     """Return what rode into others by adhesion, see `machine.releases.squeeze`; or None."""
     released = recording.select(Kind.RELEASE)
     released = released[recording.machine.releases.carried[released["particle"]]]
@@ -197,7 +198,7 @@ class Rolling:
         )
 
 
-def rolling(recording: Recording) -> Rolling | None:
+def rolling(recording: Record) -> Rolling | None:
     """Return what settled on the outgoing belt without being carried; None if nothing did."""
     belt = recording.scene.outgoing
     if belt is None or belt.speed is None or np.all(recording.particle.inertia == 0.0):
@@ -213,7 +214,7 @@ def rolling(recording: Recording) -> Rolling | None:
     return Rolling(int(astray.sum()), paid, paid + due)
 
 
-def layers(recording: Recording) -> tuple[float, float] | None:
+def layers(recording: Record) -> tuple[float, float] | None:
     """Return where the lowest and the highest layer of a bed land on the outgoing belt, x, m.
 
     None if all are released at one height, or one of the two does not land there.

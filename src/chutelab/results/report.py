@@ -19,7 +19,8 @@ from chutelab.results.notes import (
     stopped,
     waits,
 )
-from chutelab.results.recording import REASONS, Kind, Recording
+from chutelab.results.record import REASONS, Kind
+from chutelab.results.recording import Recording
 from chutelab.results.stream import crowd, steady
 from chutelab.util.tables import Sheet, number
 

@@ -8,11 +8,12 @@ from dataclasses import fields
 from typing import Any
 
 from chutelab.results.arrival import fates
-from chutelab.results.comparison import compare, predicted
-from chutelab.results.ledger import Ledger
+from chutelab.results.comparison import compare, predicted, prediction
+from chutelab.results.laws import judge
+from chutelab.results.ledger import Ledger, ledger
 from chutelab.results.notes import air_drag, plugged, rolling, squeezed, stopped, waits
 from chutelab.results.quantities import each
-from chutelab.results.recording import REASONS, Recording
+from chutelab.results.record import REASONS, Record
 from chutelab.results.stream import crowd, steady
 from chutelab.scene.quantities import REGISTRY, THEORY, Quantity
 from chutelab.theory import Transfer, predict
@@ -62,7 +63,7 @@ OTHERS = {
 """Keys that hold no list a particle: type and meaning. Null is what there is nothing to say of."""
 
 
-def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def summary(recording: Record, accuracy: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return a recording's numbers as plain lists and floats, None for what did not happen.
 
     What they are `schema` says. Lists have one entry a particle. Lengths, times and energies are in
@@ -94,12 +95,12 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "plugged": plugged(recording),
         "waited": waits(recording),
         "squeezed": squeezed(recording),
-        "laws": recording.laws,
+        "laws": judge(recording),
         "instead": recording.instead or None,
         "drag": air_drag(recording),
         "steady": steady(recording),
-        "ledger": recording.ledger,
-        "theory": _theory(recording.prediction),
+        "ledger": ledger(recording),
+        "theory": _theory(prediction(recording)),
         "theory_as_printed": as_printed,
         "error": {**error.errors, "max": error.max},
         "accuracy": accuracy,
@@ -107,9 +108,9 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     return told
 
 
-def _theory(prediction: Transfer) -> dict[str, Any]:
-    told = {row.name: predicted(prediction, row) for row in THEORY.values()}
-    return {**told, "reason": str(prediction.reason) or None}
+def _theory(answer: Transfer) -> dict[str, Any]:
+    told = {row.name: predicted(answer, row) for row in THEORY.values()}
+    return {**told, "reason": str(answer.reason) or None}
 
 
 def schema() -> dict[str, Any]:

@@ -32,7 +32,7 @@ from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.notes import waits
-from chutelab.results.recording import blocks, hermite
+from chutelab.results.record import blocks, hermite
 from chutelab.scene import AnyScene, Scene, SceneError, load, shown
 from chutelab.scene.materials import DENSEST, LIGHTEST, presets
 from chutelab.scene.units import write_size

@@ -99,7 +99,9 @@ def _timed(machine: Machine, patience: float) -> Trial:
     try:
         recording = follow(machine, None, watch)
     except StalledError as stalled:
-        recording, trouble = stalled.recording, str(stalled)
+        trouble = str(stalled)
+        if stalled.recording is not None:
+            recording = Recording.of(stalled.recording)
     seconds = process_time() - begin
     return Trial(recording, seconds, np.array(marks).reshape(-1, 2), trouble=trouble)
 

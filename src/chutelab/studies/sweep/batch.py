@@ -156,7 +156,7 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
     while groups:
         which = groups.pop()
         with suppress(CornerError, StalledError):
-            recording = run(build(scenes(which)), apart=True)
+            recording = Recording.of(run(build(scenes(which)), apart=True))
             if not recording.laws:
                 runs.append((recording, which))
                 continue

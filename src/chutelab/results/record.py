@@ -1,0 +1,510 @@
+"""`Record`: a finished run as an engine leaves it, and the names of its events and ledger entries.
+
+A particle's track is a list of *knots*; between two knots it is the cubic Hermite curve through
+them. With exact end velocities that curve is the parabola of free flight, so a flight costs two
+knots however long it lasts; along arcs the exact engine's is within 1e-9 of the radius. An impact
+is two knots at one time.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import cached_property, wraps
+from math import isnan, nan
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.machine import Machine, Particle
+from chutelab.scene import Scene, quantities
+from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.errors import InputError, did_you_mean
+from chutelab.util.tables import Sheet, Shown
+
+ENTRIES = quantities.ENTRIES
+"""The three entries of the energy ledger, in the order of every array that holds them."""
+
+REASONS = quantities.ENDINGS
+"""Why a particle's track ends; `Recording.ended` holds indices into this tuple."""
+
+PARTICLES = "particles"
+"""Name under which the losses of particle-particle contacts are booked."""
+
+
+class Kind(IntEnum):
+    """What happened in an event."""
+
+    RELEASE = 0
+    SEPARATION = 1
+    SLIP = 2
+    IMPACT = 3
+    LANDING = 4
+    COLLISION = 5
+    STICK = 6
+    SETTLE = 7
+    EXIT = 8
+
+
+def kind_of(kind: Kind | str) -> Kind:
+    """Return a kind of event by its name, in small letters or capitals; `InputError` if none."""
+    if isinstance(kind, str):
+        names = [one.lower() for one in Kind.__members__]
+        if kind.lower() not in names:
+            there = f"there are {', '.join(names)}"
+            raise InputError(did_you_mean(kind, names, there), "kind", kind)
+        return Kind[kind.upper()]
+    return Kind(kind)
+
+
+EVENT = np.dtype(
+    [
+        ("t", "f8"),
+        ("particle", "i4"),
+        ("other", "i4"),
+        ("kind", "i1"),
+        ("surface", "i2"),
+        ("position", "f8", 2),
+        ("velocity_before", "f8", 2),
+        ("velocity_after", "f8", 2),
+        ("omega_before", "f8"),
+        ("omega_after", "f8"),
+        ("normal_impulse", "f8"),
+        ("tangential_impulse", "f8"),
+    ]
+)
+"""One event, in SI units.
+
+- ``t``: when, s.
+- ``particle``, ``other``: its number, and that of the particle it meets, or -1.
+- ``kind``: a `Kind`.
+- ``surface``: index into `Recording.surfaces`, or -1.
+- ``position``: of the particle's centre, m.
+- ``velocity_before``, ``velocity_after``: of its centre, m/s.
+- ``omega_before``, ``omega_after``: its angular velocity, counterclockwise, rad/s.
+- ``normal_impulse``: on the particle along n, away from the surface or the other particle, N s.
+- ``tangential_impulse``: along (n_y, -n_x), N s.
+"""
+
+KNOT = np.dtype(
+    [
+        ("t", "f8"),
+        ("position", "f8", 2),
+        ("velocity", "f8", 2),
+        ("omega", "f8"),
+        ("entries", "f8", 3),
+    ]
+)
+"""One knot, in SI units.
+
+- ``t``: when, s.
+- ``position``, ``velocity``: of the particle's centre, m and m/s.
+- ``omega``: its angular velocity, counterclockwise, rad/s.
+- ``entries``: of the energy ledger of this particle since its release, J, see `ENTRIES`.
+"""
+
+
+def balance(entries: NDArray[Any]) -> Floats:
+    """Return the energy (J) that entries (..., 3) bring: belt work less both losses."""
+    return np.asarray(entries[..., 0] - entries[..., 1] - entries[..., 2])
+
+
+CELLS = 2**18
+"""Times × particles in one block: some 30 arrays of 2 MB each, near enough to the cache."""
+
+Cells = tuple[Ints, Ints, Ints, Floats]
+"""Times at which particles are on their way, arrays (c,): index of the time, and of the particle;
+index of the last knot that is not later (``left``; ``left + 1`` closes the interval, so at the end
+of a track it is the last knot but one); and the share of the interval that has passed, 0 to 1, 1
+where a track ends with an impact."""
+
+
+def blocks(knots: NDArray[Any], offsets: Ints, times: Floats) -> Iterator[Cells]:
+    """Find the interval of every cell, block by block in the order of `times` (s, any order).
+
+    Knots and offsets are those of a `Recording`.
+    """
+    t = knots["t"]
+    released = np.flatnonzero(offsets[1:] > offsets[:-1])
+    first, last = offsets[released], offsets[released + 1] - 1
+    rows = max(1, CELLS // max(1, len(released)))
+    for begin in range(0, len(times), rows):
+        now = times[begin : begin + rows, None]
+        row, column = np.nonzero((now >= t[first]) & (now <= t[last]))
+        at = times[begin + row]
+        # The last knot in [left, right) whose time is not later, by bisection of all cells at once.
+        left, right = first[column], last[column]
+        while np.any(right - left > 1):
+            middle = (left + right) // 2
+            passed = t[middle] <= at
+            left, right = np.where(passed, middle, left), np.where(passed, right, middle)
+        h = t[left + 1] - t[left]
+        share = np.divide(at - t[left], h, out=np.ones_like(h), where=h > 0.0)
+        yield begin + row, released[column], left, share
+
+
+def hermite(knots: NDArray[Any], left: Ints, share: Floats, axis: int) -> tuple[Floats, Floats]:
+    """Return one coordinate (m) and its velocity (m/s) on the cubic between two knots, (c,)."""
+    s, h = share, knots["t"][left + 1] - knots["t"][left]
+    position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
+    pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
+    dx = pb - pa
+    # Written around the left knot, so that a long flight loses no digits.
+    where = pa + s * (
+        h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
+    )
+    slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
+    pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
+    over = s >= 1.0
+    return np.where(over, pb, where), np.where(over, vb, pace)
+
+
+class Motion(tuple[Floats, Floats]):
+    """Positions (m) and velocities (m/s) at some times, (T, N, 2), a pair; and how particles turn.
+
+    NaN before a particle's release and after its end; at an impact the state after it.
+    """
+
+    _record: Record
+    _times: Floats
+
+    def __new__(cls, position: Floats, velocity: Floats, record: Record, times: Floats) -> Motion:
+        """Return the pair, of a recording at times (T,), s."""
+        self = super().__new__(cls, (position, velocity))
+        self._record, self._times = record, times
+        return self
+
+    @property
+    def position(self) -> Floats:
+        """Where the centres are, (T, N, 2), m."""
+        return self[0]
+
+    @property
+    def velocity(self) -> Floats:
+        """Their velocities, (T, N, 2), m/s."""
+        return self[1]
+
+    @property
+    def omega(self) -> Floats:
+        """Angular velocity, counterclockwise, (T, N), rad/s: linear between knots."""
+        found, omega = np.full(self[0].shape[:2], np.nan), self._record.knots["omega"]
+        for row, particle, left, share in self._record.blocks(self._times):
+            found[row, particle] = omega[left] + share * (omega[left + 1] - omega[left])
+        return found
+
+    @property
+    def angle(self) -> Floats:
+        """How far particles have turned counterclockwise since their release, (T, N), rad.
+
+        The integral of `omega`; where the recording says more, see `Recording.angle`, it is
+        corrected evenly from knot to knot.
+        """
+        some, found = self._record, np.full(self[0].shape[:2], np.nan)
+        t, omega, first = some.knots["t"], some.knots["omega"], some.offsets[:-1]
+        passed = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
+        told = some.angle if len(some.angle) else passed
+        for row, particle, left, share in some.blocks(self._times):
+            h = t[left + 1] - t[left]
+            gained = h * share * (omega[left] + 0.5 * share * (omega[left + 1] - omega[left]))
+            missed = share * (np.diff(told)[left] - np.diff(passed)[left])
+            found[row, particle] = told[left] - told[first[particle]] + gained + missed
+        return found
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Record(Shown):
+    """A finished run: read-only arrays, the same type from every engine.
+
+    The base of `Recording`, which is what `simulate` returns. Engines write it and the readers of
+    this room read it, so it imports none of them.
+
+    Attributes
+    ----------
+    machine : Machine
+        What was run; it knows the scene.
+    engine : str
+        ``"exact"``, ``"contact"`` or ``"pymunk"``.
+    knots : ndarray, shape (K,), dtype `KNOT`
+        All tracks, one after the other.
+    offsets : ndarray, shape (N + 1,)
+        Particle i owns ``knots[offsets[i]:offsets[i + 1]]``: two or more, in the order of time, or
+        none if it was never released.
+    ended : ndarray, shape (N,)
+        Indices into `REASONS`.
+    events : ndarray, shape (E,), dtype `EVENT`
+        Sorted by time; at one time by particle, and of one particle as they came.
+    by_surface : ndarray, shape (len(surfaces), 3)
+        Ledger entries (J) of each surface, summed over particles. Of a family of machines (see
+        `chutelab.engines.exact`), and of none else, those of each particle, (N, len(surfaces), 3).
+    steps : int
+        Rounds (exact) or steps (contact, pymunk) taken.
+    contacts : int
+        Impacts and collisions resolved.
+    seconds : float
+        Wall time from the validated scene to the recording; NaN in one that was loaded.
+    angle : ndarray, shape (K,), or (0,)
+        How far a particle has turned counterclockwise since its release at each knot, rad, where
+        some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not tell.
+        Empty where all are round: there it is the integral of ω.
+    instead : str
+        Where the engine that runs first broke a law of every run, and this one ran instead: which,
+        and how; else empty.
+    gained : float
+        Energy (J) that the contact engine's solves made beyond what moving surfaces and the parting
+        of overlaps give, summed over all steps: rounding of the energy turned over, or the solver
+        is wrong (docs/physics.md, "The law of a solve"). 0 of other engines.
+    """
+
+    machine: Machine
+    engine: str
+    knots: NDArray[Any]
+    offsets: Ints
+    ended: NDArray[np.int8]
+    events: NDArray[Any]
+    by_surface: Floats
+    steps: int
+    contacts: int
+    seconds: float = nan
+    angle: Floats = field(default_factory=lambda: np.zeros(0))
+    instead: str = ""
+    gained: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("knots", "offsets", "ended", "events", "by_surface", "angle"):
+            getattr(self, name).flags.writeable = False
+
+    @property
+    def scene(self) -> Scene:
+        """The scene that was run."""
+        return self.machine.scene
+
+    @property
+    def title(self) -> str:
+        """The scene's title."""
+        return self.scene.title
+
+    @property
+    def particle(self) -> Particle:
+        """Radius, mass and inertia."""
+        return self.machine.particle
+
+    @property
+    def gravity(self) -> float:
+        """m/s²."""
+        return self.machine.gravity
+
+    @cached_property
+    def surfaces(self) -> tuple[str, ...]:
+        """Names that `events["surface"]` indexes; the last is always ``"particles"``."""
+        return (*self.machine.surfaces, PARTICLES)
+
+    @cached_property
+    def found(self) -> dict[Any, Any]:
+        """What readers have found so far, see `kept`."""
+        return {}
+
+    @cached_property
+    def t(self) -> Floats:
+        """Times of all knots, s, in order and each once: what happens, happens between two."""
+        return np.unique(self.knots["t"])
+
+    @property
+    def count(self) -> int:
+        """Number of particles."""
+        return len(self.offsets) - 1
+
+    @property
+    def released(self) -> Bools:
+        """Which particles were released, (N,)."""
+        return self.offsets[1:] > self.offsets[:-1]
+
+    def sheet(self, *, details: bool = False) -> Sheet:
+        """Return what it holds, in a few lines; with `details` also how it was computed."""
+        first, last = self.ends()
+        happened = sorted(Counter(self.events["kind"].tolist()).items())
+        ended = sorted(Counter(self.ended.tolist()).items())
+        told = {
+            "particles": f"{self.count:,}",
+            "time": f"{first['t'].min():.6g} to {last['t'].max():.6g} s" if len(first) else "none",
+            "events": ", ".join(f"{n:,} {Kind(k).name.lower()}" for k, n in happened),
+            "ended": ", ".join(f"{n:,} {REASONS[k]}" for k, n in ended),
+        }
+        if details:
+            told |= {"engine": self.engine, "knots": f"{len(self.knots):,}"}
+        if details and not isnan(self.seconds):
+            told["run time"] = f"{self.seconds:.3g} s"
+        return Sheet(self.title, ("", ""), tuple(told.items()), texts=2)
+
+    @property
+    def owner(self) -> Ints:
+        """Whose each knot is, (K,)."""
+        return np.repeat(np.arange(self.count), np.diff(self.offsets))
+
+    def track(self, particle: int) -> NDArray[Any]:
+        """Return the knots of one particle, shape (k,)."""
+        return self.knots[self.offsets[particle] : self.offsets[particle + 1]]
+
+    def ends(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the first and last knots of all released particles, each of shape (n,)."""
+        first, end = self.offsets[:-1][self.released], self.offsets[1:][self.released]
+        return self.knots[first], self.knots[end - 1]
+
+    def surface_index(self, name: str) -> int:
+        """Return the index of a surface, or -1 if the scene has none of that name."""
+        return self.surfaces.index(name) if name in self.surfaces else -1
+
+    def select(self, *kinds: Kind | str, surface: str | None = None) -> NDArray[Any]:
+        """Return events, sorted by time.
+
+        Parameters
+        ----------
+        *kinds : Kind or str
+            Their kinds, ``Kind.IMPACT`` or ``"impact"``; all if none is given.
+        surface : str, optional
+            Only those on this surface of the scene.
+
+        Raises
+        ------
+        InputError
+            If there is no such kind, or the scene has no such surface.
+        """
+        kinds = tuple(kind_of(kind) for kind in kinds)
+        if surface is not None and surface not in self.surfaces:
+            there = f"the scene has {', '.join(self.surfaces)}"
+            raise InputError(did_you_mean(surface, self.surfaces, there), "surface", surface)
+        keep = np.ones(len(self.events), dtype=bool)
+        if kinds:
+            # Several times as fast as `np.isin` where events are few, as those of one particle.
+            keep &= np.logical_or.reduce([self.events["kind"] == kind for kind in kinds])
+        if surface is not None:
+            keep &= self.events["surface"] == self.surface_index(surface)
+        return self.events[keep]
+
+    def first(self, events: NDArray[Any]) -> NDArray[Any]:
+        """Reduce events to the first one of each particle, in the order of the particles."""
+        _, index = np.unique(events["particle"], return_index=True)
+        return events[index]
+
+    def blocks(self, times: Floats) -> Iterator[Cells]:
+        """Find the knots before and after every particle's place at times (T,), s: see `Cells`."""
+        return blocks(self.knots, self.offsets, times)
+
+    def at(self, times: ArrayLike) -> Motion:
+        """Return positions (m) and velocities (m/s), (T, N, 2), at times (T,), s, in any order.
+
+        What it returns is a pair of arrays, and has `Motion.angle` and `Motion.omega`, (T, N).
+        """
+        times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        position, velocity = np.full((2, len(times), self.count, 2), np.nan)
+        for row, particle, left, share in self.blocks(times):
+            for axis in (0, 1):
+                where, pace = hermite(self.knots, left, share, axis)
+                position[row, particle, axis], velocity[row, particle, axis] = where, pace
+        return Motion(position, velocity, self, times)
+
+    def energy_at(self, times: ArrayLike) -> dict[str, Floats]:
+        """Return the energy ledger of all released particles up to each time.
+
+        A particle that has ended keeps its last state. Between two knots the entries follow from
+        what goes on there: the restitution loss changes in impacts only, at knots. While a particle
+        slips, the force and so the power of the belt is constant on a face, and the friction loss
+        is what the energy balance asks for, with the residuals of the two knots interpolated
+        linearly. While it is carried without slip, the belt work is. In flight nothing is booked,
+        and what the balance leaves over is the residual.
+
+        Parameters
+        ----------
+        times : array_like, shape (T,)
+            s, in any order.
+
+        Returns
+        -------
+        dict of ndarray, shape (T,)
+            ``kinetic``, ``potential`` (y = 0 is the zero), the three `ENTRIES`, and ``residual``:
+            what the balance since each release leaves over. J.
+        """
+        times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        firsts, lasts = self.ends()
+        at_release = np.zeros(self.count)
+        particles = np.flatnonzero(self.released)
+        at_release[particles] = sum(self.energies(firsts, particles))
+
+        final = np.empty((6, len(lasts)))
+        final[:2] = self.energies(lasts, particles)
+        final[2:5] = lasts["entries"].T
+        final[5] = final[:2].sum(axis=0) - at_release[particles] - balance(lasts["entries"])
+        order = np.argsort(lasts["t"], kind="stable")
+        sums = np.concatenate([np.zeros((6, 1)), final[:, order].cumsum(axis=1)], axis=1)
+        out = sums[:, np.searchsorted(lasts["t"][order], times, side="left")]
+
+        for row, particle, left, share in self.blocks(times):
+            values = self._under_way(particle, left, share, at_release[particle])
+            for total, value in zip(out, values, strict=True):
+                np.add.at(total, row, value)
+        return dict(zip(("kinetic", "potential", *ENTRIES, "residual"), out, strict=True))
+
+    def _under_way(
+        self, particle: Ints, left: Ints, share: Floats, at_release: Floats
+    ) -> tuple[Floats, ...]:
+        """Return what `energy_at` does, of each cell, (c,)."""
+        a, b = self.knots[left], self.knots[left + 1]
+        (_, vx), (y, vy) = (hermite(self.knots, left, share, axis) for axis in (0, 1))
+        omega = a["omega"] + share * (b["omega"] - a["omega"])
+        body = self.particle.of(particle)
+        kinetic = body.kinetic(vx, vy, omega)
+        potential = body.mass * self.gravity * y
+        gain = kinetic + potential - at_release
+
+        (belt_a, restitution_a, friction_a), (belt_b, restitution_b, friction_b) = (
+            knot["entries"].T for knot in (a, b)
+        )
+        residual_a, residual_b = (
+            sum(self.energies(knot, particle)) - at_release - balance(knot["entries"])
+            for knot in (a, b)
+        )
+        slips, driven = friction_a != friction_b, belt_a != belt_b
+        restitution = np.where(share < 1.0, restitution_a, restitution_b)
+        residual = residual_a + share * (residual_b - residual_a)
+        belt = np.where(
+            driven & ~slips,
+            gain + restitution + friction_a - residual,
+            belt_a + share * (belt_b - belt_a),
+        )
+        friction = np.where(slips, belt - restitution + residual - gain, friction_a)
+        residual = np.where(slips | driven, residual, gain - (belt - restitution - friction))
+        return kinetic, potential, belt, restitution, friction, residual
+
+    def energies(
+        self, knots: NDArray[Any], particle: Ints | int | None = None
+    ) -> tuple[Floats, Floats]:
+        """Return kinetic (rotation included) and potential energy (J) of knots of any shape.
+
+        `particle` says whose each is; it is not needed where all particles are alike.
+        """
+        body = self.particle if particle is None else self.particle.of(particle)
+        vx, vy = knots["velocity"][..., 0], knots["velocity"][..., 1]
+        potential = body.mass * self.gravity * knots["position"][..., 1]
+        return body.kinetic(vx, vy, knots["omega"]), potential
+
+
+Args = ParamSpec("Args")
+Result = TypeVar("Result")
+
+
+def kept(
+    reader: Callable[Concatenate[Record, Args], Result],
+) -> Callable[Concatenate[Record, Args], Result]:
+    """Keep with a record what a reader found there, for each set of further arguments."""
+
+    @wraps(reader)
+    def read(record: Record, /, *args: Args.args, **more: Args.kwargs) -> Result:
+        key = (reader.__module__, reader.__name__, *args, *more.items())
+        if key not in record.found:
+            record.found[key] = reader(record, *args, **more)
+        result: Result = record.found[key]
+        return result
+
+    return read

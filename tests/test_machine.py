@@ -565,7 +565,7 @@ def test_what_a_pair_meets_with_is_said_by_pair_then_surface_then_material():
         ],
     }
     found = machine.build(scene.from_dict(document))
-    material = scene.materials.presets()["coal"].material
+    material = scene.materials.PRESETS["coal"].material
     assert found.segments.restitution.tolist() == [
         [material.restitution_steel, 0.9, material.restitution_rubber], [0.3, 0.9, 0.3]
     ]  # fmt: skip

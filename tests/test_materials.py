@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from pydantic import ValidationError
 
 from chutelab.cli import main
-from chutelab.scene.materials import DENSEST, LIGHTEST, Material, presets
+from chutelab.scene.materials import DENSEST, LIGHTEST, PRESETS, Material
 
 # The contract of the scene file, copied by hand.
 NUMBERS = (
@@ -93,9 +93,9 @@ def test_a_material_that_cannot_be_is_refused(wrong):
     assert [error["loc"] for error in refused.value.errors()] == [(key,)]
 
 
-@pytest.mark.parametrize("name", presets())
+@pytest.mark.parametrize("name", PRESETS)
 def test_a_preset_lies_within_its_spread_and_has_sources(name):
-    preset = presets()[name]
+    preset = PRESETS[name]
     assert preset.material.name == name
     values = preset.material.model_dump(exclude={"name"})
     assert tuple(values) == tuple(preset.spread) == tuple(preset.sources) == NUMBERS
@@ -116,7 +116,7 @@ def test_a_preset_lies_within_its_spread_and_has_sources(name):
 
 @pytest.mark.parametrize(("name", "key", "found"), MEASURED)
 def test_what_was_measured_lies_within_the_spread(name, key, found):
-    low, high = presets()[name].spread[key]
+    low, high = PRESETS[name].spread[key]
     assert low <= min(found)
     assert max(found) <= high
 
@@ -128,7 +128,7 @@ def test_densities_of_solids_span_from_foam_to_osmium():
 
 
 def test_a_pair_is_the_same_from_both_sides():
-    steel, rubber = presets()["steel"], presets()["rubber"]
+    steel, rubber = PRESETS["steel"], PRESETS["rubber"]
     for kind in ("restitution", "friction"):
         pairs = [
             ((steel, kind), (steel, f"{kind}_steel")),
@@ -151,7 +151,7 @@ def test_the_list_has_every_number_and_is_not_cut():
     notes = " ".join(f"[1] {notes}".split())
     densities, restitutions, frictions = re.split(r"\nCoefficient of \w+ .\n", tables)
     cited = set()
-    for name, preset in presets().items():
+    for name, preset in PRESETS.items():
         rows = {}
         for kind, table in (("", densities), ("e", restitutions), ("µ", frictions)):
             (row,) = re.findall(rf"^{name} .*$", table, re.MULTILINE)
@@ -174,7 +174,7 @@ def test_the_list_has_every_number_and_is_not_cut():
     assert sorted(cited) == list(range(1, len(cited) + 1))
 
 
-@pytest.mark.parametrize("name", presets())
+@pytest.mark.parametrize("name", PRESETS)
 def test_one_material_ends_with_tables_to_copy(name):
     text = call(name).stdout
     assert max(len(line.rstrip()) for line in text.splitlines()) <= 80
@@ -183,9 +183,9 @@ def test_one_material_ends_with_tables_to_copy(name):
     assert tomllib.loads(as_it_is) == {"particle": {"material": name}}
     (own,) = tomllib.loads(block)["material"]
     assert own.pop("name") == changed == f"my-{name}"
-    assert Material(name=name, **own) == presets()[name].material
+    assert Material(name=name, **own) == PRESETS[name].material
     said = " ".join(table.split())
-    for sources in presets()[name].sources.values():
+    for sources in PRESETS[name].sources.values():
         assert all(source in said for source in sources)
 
 
@@ -193,9 +193,9 @@ def test_one_material_ends_with_tables_to_copy(name):
 def test_json_gives_the_presets_back(arguments):
     found = json.loads(call(*arguments, "--json").stdout)
     assert list(found) == ["format", "materials", "sources"]
-    assert [one["material"]["name"] for one in found["materials"]] == list(arguments or presets())
+    assert [one["material"]["name"] for one in found["materials"]] == list(arguments or PRESETS)
     for one in found["materials"]:
-        preset = presets()[one["material"]["name"]]
+        preset = PRESETS[one["material"]["name"]]
         assert Material(**one["material"]) == preset.material
         assert one["about"] == preset.about
         assert {key: tuple(ends) for key, ends in one["spread"].items()} == preset.spread
@@ -212,8 +212,8 @@ def test_json_gives_the_presets_back(arguments):
         ("coall", "did you mean coal?"),
         ("iron ore", "did you mean iron-ore?"),
         ("Steel", "did you mean steel?"),
-        ("x", f"there are {', '.join(presets())}"),
-        ("", f"there are {', '.join(presets())}"),
+        ("x", f"there are {', '.join(PRESETS)}"),
+        ("", f"there are {', '.join(PRESETS)}"),
     ],
 )
 def test_an_unknown_material_is_refused_with_what_was_meant(name, hint):

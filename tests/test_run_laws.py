@@ -267,7 +267,7 @@ def test_a_billiard_break_is_sound():
 
 
 def report(run):
-    from chutelab.results.report import sheets
+    from chutelab.results.summary import sheets
 
     return sheets(run)
 

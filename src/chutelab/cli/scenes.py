@@ -44,11 +44,11 @@ def complete_material(
     _ctx: click.Context, _parameter: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
     """Offer the materials that begin so."""
-    from chutelab.scene.materials import presets
+    from chutelab.scene.materials import PRESETS
 
     return [
         CompletionItem(name, help=preset.about)
-        for name, preset in presets().items()
+        for name, preset in PRESETS.items()
         if name.startswith(incomplete)
     ]
 
@@ -70,13 +70,13 @@ def materials(material: str | None, as_json: bool) -> None:
     chutelab materials
     chutelab materials coal
     """  # noqa: D301 - click wants the backspace
-    from chutelab.scene.materials import presets
+    from chutelab.scene.materials import PRESETS
     from chutelab.util.errors import InputError, did_you_mean
 
-    if material is not None and material not in presets():
-        known = f"there are {', '.join(presets())}"
-        raise InputError(did_you_mean(material, presets(), known), "material", material)
-    shown = list(presets().values()) if material is None else [presets()[material]]
+    if material is not None and material not in PRESETS:
+        known = f"there are {', '.join(PRESETS)}"
+        raise InputError(did_you_mean(material, PRESETS, known), "material", material)
+    shown = list(PRESETS.values()) if material is None else [PRESETS[material]]
     texts = dict.fromkeys(text for one in shown for row in one.sources.values() for text in row)
     numbers = {text: number for number, text in enumerate(texts, 1)}
     told = [

@@ -26,6 +26,9 @@ lets a contact open that lasts, ten times what the pymunk engine lets them overl
 POINT = 1e-9
 """Distance up to which a mass point touches a surface, as a share of the size of the machine."""
 
+CARRIED = 1e-3
+"""m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
+
 LOOKS = 100
 """Instants at which particles on a surface are looked for, beside recorded blows."""
 

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from chutelab.results.arrival import arrivals
-from chutelab.results.comparison import worst
-from chutelab.results.firsts import column, first, paid, symbols
+from chutelab.results.comparison import column, first, paid, symbols, worst
 from chutelab.results.ledger import ledger
 from chutelab.results.record import ENTRIES, REASONS, Record, balance
 from chutelab.scene.quantities import FIRST, lookup, suggestion, whose

@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Final
 
-from chutelab.scene.materials import presets
+from chutelab.scene.materials import PRESETS
 from chutelab.scene.quantities import REGISTRY, lookup, suggestion, whose
 from chutelab.scene.units import (
     LIGHTEST,
@@ -237,10 +237,8 @@ def _names(look: Look) -> Iterator[Fault]:
     own = _texts(look.rows("material"))
     for row in look.rows("particle"):
         name = row["material"]
-        if isinstance(name, str) and name not in own and look.sound("material"):
-            if name in (there := presets()):
-                continue
-            allowed = did_you_mean(name, [*own, *there], "`chutelab materials` lists them")
+        if isinstance(name, str) and name not in (*own, *PRESETS) and look.sound("material"):
+            allowed = did_you_mean(name, [*own, *PRESETS], "`chutelab materials` lists them")
             yield row.fault("material", f"no such material; {allowed}")
 
 
@@ -320,8 +318,8 @@ def _density(look: Look, kind: Row) -> tuple[str, float | None]:
     if density is not None or kind.given("mass") or not isinstance(name, str):
         return "density", density
     found = [own["density"] for own in look.rows("material") if own["name"] == name]
-    if not found and name in (known := presets()):
-        found = [known[name].material.density]
+    if not found and name in PRESETS:
+        found = [PRESETS[name].material.density]
     return "material", found[0] if found and look.sound("material") else None
 
 

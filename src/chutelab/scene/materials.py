@@ -9,7 +9,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Final, Self
 
@@ -79,9 +78,8 @@ class Preset:
     sources: Mapping[str, tuple[str, ...]]
 
 
-@cache
-def presets() -> dict[str, Preset]:
-    """Return the materials that every scene may name; what they are is in ``materials.toml``."""
+def _presets() -> dict[str, Preset]:
+    """Read ``materials.toml``, which says what a row holds."""
     tables = tomllib.loads((Path(__file__).parent / "materials.toml").read_text(encoding="utf-8"))
     sources, found = tables.pop("sources"), {}
     for name, table in tables.items():
@@ -93,3 +91,7 @@ def presets() -> dict[str, Preset]:
             {key: tuple(sources[source] for source in row[3:]) for key, row in rows},
         )
     return found
+
+
+PRESETS: Final = _presets()
+"""The materials that every scene may name."""

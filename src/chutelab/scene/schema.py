@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts, stream_name
-from chutelab.scene.materials import Material, presets
+from chutelab.scene.materials import PRESETS, Material
 from chutelab.scene.tables import (
     Conveyor,
     Expect,
@@ -37,6 +37,7 @@ from chutelab.scene.units import (
     sphere_mass,
     tonnes_per_hour,
 )
+from chutelab.util.tables import many
 
 TABLES: Final[dict[str, type[Table]]] = {
     "particle": Particle,
@@ -249,7 +250,7 @@ class SceneTables(Table):
         if particle.material is None:
             return None
         own = {material.name: material for material in self.material}
-        return own.get(particle.material) or presets()[particle.material].material
+        return own.get(particle.material) or PRESETS[particle.material].material
 
     @property
     def free(self) -> tuple[Plate | Conveyor | Surface, ...]:
@@ -276,10 +277,11 @@ class SceneTables(Table):
         return private.get("_shape", ())
 
     def __repr__(self) -> str:
-        particles = "1 particle" if self.count == 1 else f"{self.count:,} particles"
         names = self.surfaces
         surfaces = ", ".join(names) if len(names) <= 6 else f"{len(names):,} surfaces"
-        return f"<Scene {self.source}: {self.title}; {particles}, {surfaces}>"
+        return (
+            f"<Scene {self.source}: {self.title}; {many(self.count, 'particle', ',')}, {surfaces}>"
+        )
 
     def __eq__(self, other: object) -> bool:
         # The same machine from another file is the same scene.

@@ -31,10 +31,10 @@ from chutelab.machine import DRIVE_PULLEY, Caution, Machine, build
 from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
-from chutelab.results.notes import waits
 from chutelab.results.record import blocks, hermite
+from chutelab.results.summary import waits
 from chutelab.scene import AnyScene, Scene, SceneError, load, shown
-from chutelab.scene.materials import DENSEST, LIGHTEST, presets
+from chutelab.scene.materials import DENSEST, LIGHTEST, PRESETS
 from chutelab.scene.units import write_size
 from chutelab.util.arrays import Floats, Ints
 
@@ -75,7 +75,7 @@ def _densities(scene: Scene) -> Iterator[Advice]:
         if LIGHTEST <= density <= DENSEST:
             continue
         path = f"particle[{n}]" if len(scene.particles) > 1 else "particle"
-        steel = (kind.mass / (4.0 / 3.0 * pi * presets()["steel"].material.density)) ** (1.0 / 3.0)
+        steel = (kind.mass / (4.0 / 3.0 * pi * PRESETS["steel"].material.density)) ** (1.0 / 3.0)
         yield Advice(
             f"{path}: a sphere of {kind.radius:.4g} m radius and {kind.mass:.4g} kg would have a"
             f" density of {density:,.0f} kg/m³, {'less' if density < LIGHTEST else 'more'} than any"

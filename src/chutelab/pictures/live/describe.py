@@ -7,7 +7,7 @@ from typing import Any, Final
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.scene.conflicts import EITHER
-from chutelab.scene.materials import VALUES, presets
+from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.schema import as_written
 from chutelab.scene.units import LARGEST, SHORTEST
@@ -68,7 +68,7 @@ def describe(scene: Scene) -> dict[str, Any]:
                 row["seed"] = str(row["seed"])
     materials = {
         name: {key: getattr(preset.material, key) for key in VALUES}
-        for name, preset in presets().items()
+        for name, preset in PRESETS.items()
     }
     return {"scene": tables, "tables": _rules(), "presets": materials}
 

@@ -18,7 +18,7 @@ from chutelab import measured
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.scene import SceneError, load
-from chutelab.scene.schema import as_written
+from chutelab.scene.schema import to_dict
 from chutelab.studies.measured import MeasuredError
 from chutelab.studies.measured.parameters import numbers, resolve
 from chutelab.studies.measured.result import COLUMNS, advice, plus_minus
@@ -459,7 +459,7 @@ def test_names_what_the_points_cannot_tell(scene, film):
 
 def test_no_search_reaches_what_cannot_be_run(scene, film):
     """What the points do not tell is driven to a bound by rounding, another on each processor."""
-    keys = list(numbers(as_written(scene, defaults=True)))
+    keys = list(numbers(to_dict(scene, defaults=True)))
     positive = [one for key in keys for one in resolve(scene, film, [key]) if one.low > 0.0]
     assert {"incoming.length", "plate.distance", "particle.mass"} <= {one.key for one in positive}
     for one in positive:

@@ -20,7 +20,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from chutelab.scene.conflicts import EITHER
-from chutelab.scene.schema import SceneTables, as_written
+from chutelab.scene.schema import SceneTables, to_dict
 from chutelab.scene.units import WORDS, size_in
 from chutelab.util.errors import MISSING, Fault, InputError, printable
 
@@ -118,7 +118,7 @@ def value_at(scene: SceneTables, path: str) -> Any:
     `MISSING` if there is no such thing; an array for a varied key of a family of scenes.
     """
     try:
-        parts = resolved(as_written(scene), path)
+        parts = resolved(to_dict(scene), path)
     except InputError:
         return MISSING
     if len(parts) > 1 and isinstance(parts[1], int):

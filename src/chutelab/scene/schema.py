@@ -289,7 +289,7 @@ class SceneTables(Table):
 
     @model_validator(mode="after")
     def _judge_and_fill(self) -> Self:
-        faults = list(conflicts(Look(as_written(self), DEFAULTS)))
+        faults = list(conflicts(Look(to_dict(self), DEFAULTS)))
         if faults:
             raise ConflictError(faults)
         self._fill_defaults()
@@ -357,10 +357,10 @@ class SceneTables(Table):
         return filled
 
 
-def as_written(scene: SceneTables, *, defaults: bool = False) -> dict[str, Any]:
-    """Return the keys that were set, nested as in the file; one table is no list of one.
+def to_dict(scene: SceneTables, *, defaults: bool = False) -> dict[str, Any]:
+    """Return the keys that were set, nested as in the file: `from_dict` makes the scene again.
 
-    With `defaults`, all keys.
+    One table is no list of one. With `defaults`, all keys.
     """
     tables: dict[str, Any] = scene.model_dump(
         by_alias=True, exclude_unset=not defaults, warnings=False

@@ -13,8 +13,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from chutelab.scene import Scene, SceneError, from_dict, plain, to_dict
 from chutelab.scene.conflicts import EITHER, NO_MACHINE, Look, conflicts
-from chutelab.scene.loading import Scene, SceneError, from_dict, plain, to_dict
 from chutelab.scene.overrides import (
     Override,
     apply,

@@ -10,9 +10,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
-from chutelab.scene import MISSING, Fault, Scene, shown
+from chutelab.scene import MISSING, Fault, Scene, shown, to_dict
 from chutelab.scene.overrides import at_path, joined, limits_of, names_of, resolved, rule_at
-from chutelab.scene.schema import as_written
 from chutelab.studies.measured.track import LARGEST, MeasuredError, Track
 from chutelab.util.errors import did_you_mean
 
@@ -69,7 +68,7 @@ def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter,
     MeasuredError
         With all keys that are unknown, no number, without a value to start from, or given twice.
     """
-    document, placed = as_written(scene, defaults=True), placements(track)
+    document, placed = to_dict(scene, defaults=True), placements(track)
     faults: list[Fault] = []
     found: list[Parameter] = []
     if not keys:

@@ -36,15 +36,6 @@ HALVINGS = 24
 """Of the time between two such instants, until the one is known at which a contact began."""
 
 
-def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
-    """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
-
-    Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
-    for the surface itself) say something of an arrival on what lies there. Not of a family.
-    """
-    return _arrivals(recording, surface)
-
-
 def fates(recording: Record) -> NDArray[Any]:
     """Return what became of each particle, in words, (N,); each has one fate. Not of a family.
 
@@ -154,7 +145,12 @@ def never(count: int) -> NDArray[Any]:
 
 
 @kept
-def _arrivals(recording: Record, surface: str) -> NDArray[Any]:
+def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
+    """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
+
+    Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
+    for the surface itself) say something of an arrival on what lies there. Not of a family.
+    """
     found = never(recording.count)
     if surface not in recording.surfaces:
         return found

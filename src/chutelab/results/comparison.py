@@ -27,22 +27,17 @@ ALONG = 1e-14
 """Share of the rebound speed below which its part away from the plate is rounding."""
 
 
+@kept
 def first(recording: Record, event: str, surface: str | None = None) -> NDArray[Any]:
     """Return the first "separation", "impact" or "landing" of each particle, (N,), dtype `EVENT`.
 
     From the incoming belt, on the plate and on the outgoing belt, unless another surface is given.
     NaN throughout where it did not happen. Read-only.
     """
-    return _first(recording, event, surface or NEEDED[event])
-
-
-@kept
-def _first(recording: Record, event: str, surface: str) -> NDArray[Any]:
-    events = never(recording.count)
+    surface, events = surface or NEEDED[event], never(recording.count)
     if surface in recording.surfaces:
         found = recording.first(recording.select(event, surface=surface))
         events[found["particle"]] = found
-    events.flags.writeable = False
     return events
 
 

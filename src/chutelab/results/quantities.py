@@ -15,8 +15,8 @@ import numpy as np
 
 from chutelab.results.arrival import arrivals
 from chutelab.results.comparison import column, first, paid, symbols, worst
-from chutelab.results.ledger import ledger
-from chutelab.results.record import ENTRIES, REASONS, Record, balance
+from chutelab.results.ledger import books, ledger
+from chutelab.results.record import ENTRIES, REASONS, Record
 from chutelab.scene.quantities import FIRST, lookup, suggestion, whose
 from chutelab.util.arrays import Bools, Floats
 
@@ -46,8 +46,14 @@ def each(recording: Record, name: str) -> Floats:
         case ["track", "t"]:
             begin, end = recording.ends()
             return _at_end(recording, end["t"] - begin["t"])
-        case ["ledger", *entry]:
-            return _at_end(recording, _balance(recording, ".".join(entry)))
+        case ["ledger", *rest]:
+            found, entry = books(recording), ".".join(rest)
+            entries, fall = found["entries"], found["potential.end"] - found["potential.start"]
+            found |= dict(zip(ENTRIES, entries.T, strict=True))
+            found["turned_over"] = (
+                found["kinetic.start"] + np.abs(entries).sum(axis=1) + np.abs(fall)
+            )
+            return _at_end(recording, found[entry])
         case ["flight", "t"]:
             # From the incoming belt to what is met next.
             left = column(first(recording, "separation"), "t")
@@ -70,22 +76,6 @@ def _at_end(recording: Record, values: Any) -> Floats:
     found = np.full(recording.count, nan)
     found[recording.released] = values
     return found
-
-
-def _balance(recording: Record, entry: str) -> Floats:
-    """Return an entry of the ledger of each released particle, (n,), J."""
-    first, last = recording.ends()
-    if entry in ENTRIES:
-        return np.asarray(last["entries"][:, ENTRIES.index(entry)])
-    who = np.flatnonzero(recording.released)
-    (k0, p0), (k1, p1) = recording.energies(first, who), recording.energies(last, who)
-    entries = last["entries"]
-    found: dict[str, Floats] = {
-        "kinetic.start": k0, "kinetic.end": k1, "potential.start": p0, "potential.end": p1,
-        "residual": (k1 - k0) + (p1 - p0) - balance(entries),
-        "turned_over": k0 + np.abs(entries).sum(axis=1) + np.abs(p1 - p0),
-    }  # fmt: skip
-    return found[entry]
 
 
 def _until_no_slip(recording: Record, what: str) -> Floats:

@@ -13,6 +13,7 @@ from chutelab.results.arrival import never
 from chutelab.results.recording import ENTRIES, REASONS, Recording
 from chutelab.scene import Scene
 from chutelab.scene.quantities import NEEDED
+from chutelab.scene.variants import Family
 from chutelab.util.arrays import Floats, Numbers
 
 ALONG = 1e-14
@@ -62,7 +63,7 @@ def symbols(recording: Recording) -> dict[str, Floats]:
     hit[np.isnan(left["t"])] = never(1)
     down[np.isnan(hit["t"])] = never(1)
     own = recording.particle
-    found = from_events(recording.scene, left, hit, down, own.radius, own.mass)
+    found = from_events(recording.machine.scenes, left, hit, down, own.radius, own.mass)
     return found | until_no_slip(recording, down["t"])
 
 
@@ -72,7 +73,7 @@ def until_no_slip(recording: Recording, landed: Floats) -> dict[str, Floats]:
     Known of a lone particle that slips no more, and met nothing but the belt since it landed.
     """
     found = np.full((2, recording.count), nan)
-    if (recording.count == 1 or recording.scene.shape) and "outgoing" in recording.surfaces:
+    if (recording.count == 1 or recording.family) and "outgoing" in recording.surfaces:
         events = recording.events
         there = np.isfinite(landed) & (recording.ended == REASONS.index("settled"))
         away = events["surface"] != recording.surface_index("outgoing")
@@ -84,7 +85,7 @@ def until_no_slip(recording: Recording, landed: Floats) -> dict[str, Floats]:
 
 
 def from_events(
-    scene: Scene,
+    scenes: Scene | Family,
     left: NDArray[Any],
     hit: NDArray[Any],
     down: NDArray[Any],
@@ -97,10 +98,11 @@ def from_events(
     are (N,), of one scene or a family of N, and NaN, as `never` has it, where one did not happen;
     radius (m) and mass (kg) are the particles'.
     """
+    value, scene = scenes.value, scenes.scene
     plate = scene.plate
-    top = nan if scene.incoming is None else scene.incoming.pulley_radius
-    belt = nan if scene.outgoing is None else scene.outgoing.speed
-    alpha = np.radians(nan if plate is None else plate.angle_deg)
+    top = nan if scene.incoming is None else value(scene.incoming, "pulley_radius")
+    belt = nan if scene.outgoing is None else value(scene.outgoing, "speed")
+    alpha = np.radians(nan if plate is None else value(plate, "angle_deg"))
     (x1, y1), (x2, y2), (x3, y3) = (event["position"].T for event in (left, hit, down))
     (ux, uy), (wx, wy) = hit["velocity_before"].T, hit["velocity_after"].T
     vx, vy = down["velocity_before"].T
@@ -127,5 +129,5 @@ def from_events(
         "v3": np.hypot(vx, vy),
         "d3": top + radius - y3,
         "dEk": energy,
-        "P": energy * scene.rate,
+        "P": energy * scenes.rate,
     }

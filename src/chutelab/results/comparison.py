@@ -19,6 +19,7 @@ from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
 from chutelab.scene import Scene
 from chutelab.scene.quantities import NEEDED, THEORY, Quantity
 from chutelab.scene.units import with_unit
+from chutelab.scene.variants import Family
 from chutelab.theory import Transfer, predict, unbounded
 from chutelab.util.arrays import Bools, Floats, Numbers
 from chutelab.util.tables import Sheet, Shown, number
@@ -64,7 +65,7 @@ def symbols(recording: Record) -> dict[str, Floats]:
     hit[np.isnan(left["t"])] = never(1)
     down[np.isnan(hit["t"])] = never(1)
     own = recording.particle
-    found = from_events(recording.scene, left, hit, down, own.radius, own.mass)
+    found = from_events(recording.machine.scenes, left, hit, down, own.radius, own.mass)
     return found | until_no_slip(recording, down["t"])
 
 
@@ -74,7 +75,7 @@ def until_no_slip(recording: Record, landed: Floats) -> dict[str, Floats]:
     Known of a lone particle that slips no more, and met nothing but the belt since it landed.
     """
     found = np.full((2, recording.count), nan)
-    if (recording.count == 1 or recording.scene.shape) and "outgoing" in recording.surfaces:
+    if (recording.count == 1 or recording.family) and "outgoing" in recording.surfaces:
         events = recording.events
         there = np.isfinite(landed) & (recording.ended == REASONS.index("settled"))
         away = events["surface"] != recording.surface_index("outgoing")
@@ -86,7 +87,7 @@ def until_no_slip(recording: Record, landed: Floats) -> dict[str, Floats]:
 
 
 def from_events(
-    scene: Scene,
+    scenes: Scene | Family,
     left: NDArray[Any],
     hit: NDArray[Any],
     down: NDArray[Any],
@@ -99,10 +100,11 @@ def from_events(
     are (N,), of one scene or a family of N, and NaN, as `never` has it, where one did not happen;
     radius (m) and mass (kg) are the particles'.
     """
+    value, scene = scenes.value, scenes.scene
     plate = scene.plate
-    top = nan if scene.incoming is None else scene.incoming.pulley_radius
-    belt = nan if scene.outgoing is None else scene.outgoing.speed
-    alpha = np.radians(nan if plate is None else plate.angle_deg)
+    top = nan if scene.incoming is None else value(scene.incoming, "pulley_radius")
+    belt = nan if scene.outgoing is None else value(scene.outgoing, "speed")
+    alpha = np.radians(nan if plate is None else value(plate, "angle_deg"))
     (x1, y1), (x2, y2), (x3, y3) = (event["position"].T for event in (left, hit, down))
     (ux, uy), (wx, wy) = hit["velocity_before"].T, hit["velocity_after"].T
     vx, vy = down["velocity_before"].T
@@ -129,7 +131,7 @@ def from_events(
         "v3": np.hypot(vx, vy),
         "d3": top + radius - y3,
         "dEk": energy,
-        "P": energy * scene.rate,
+        "P": energy * scenes.rate,
     }
 
 
@@ -236,23 +238,24 @@ def relative_error(simulated: ArrayLike, theory: ArrayLike, scale: ArrayLike) ->
     return np.asarray(off / np.where(size > 0.0, size, 1.0))
 
 
-def scales(scene: Scene, prediction: Transfer) -> dict[str, Any]:
+def scales(scenes: Scene | Family, prediction: Transfer) -> dict[str, Any]:
     """Return the scale of each kind of quantity in a scene; NaN where the theory has none.
 
     Floats, or arrays (N,) where scene and prediction have such.
     """
+    scene = scenes.scene
     v2, t2, t3 = prediction.v2, prediction.t2, prediction.t3
-    energy = 0.5 * scene.particles[scene.kinds[0]].mass * (v2 * v2)
+    energy = 0.5 * scenes.value(scene.particle, "mass") * (v2 * v2)
     d1: Any = nan
     if scene.incoming is not None and scene.plate is not None:
-        d1 = scene.incoming.pulley_radius + scene.plate.distance
+        d1 = scenes.value(scene.incoming, "pulley_radius") + scenes.value(scene.plate, "distance")
     found = {
         "length": d1,
         "speed": v2,
         "time": np.where(np.isfinite(t3), t2 + t3, t2),
         "angle": 1.0,
         "energy": energy,
-        "power": energy * scene.rate,
+        "power": energy * scenes.rate,
     }
     return {kind: float(size) if np.ndim(size) == 0 else size for kind, size in found.items()}
 
@@ -267,8 +270,8 @@ def worst(recording: Record) -> Floats:
     V is 1, or of a family as many as there are particles: `predict` takes one scene at a time, so
     of a family the events tell how far the equations hold.
     """
-    scene, count = recording.scene, recording.count
-    if not scene.shape:
+    scene, family, count = recording.scene, recording.family, recording.count
+    if family is None:
         found = compare(recording).max
         return np.array([nan if found is None else found])
     if scene.incoming is None or scene.plate is None:
@@ -277,14 +280,15 @@ def worst(recording: Record) -> Floats:
     belt, start = scene.incoming, recording.offsets[:-1]
     release = recording.knots[np.where(recording.released, start, 0)]
     (x, y), (vx, vy) = release["position"].T, release["velocity"].T
-    begins = recording.released & (y == belt.pulley_radius + scene.particle.radius) & (x <= 0.0)
-    begins &= (-belt.length <= x) & (vx == belt.speed) & (vy == 0.0)
+    radius, mass = recording.particle.radius, recording.particle.mass
+    begins = recording.released & (y == family.value(belt, "pulley_radius") + radius) & (x <= 0.0)
+    begins &= -family.value(belt, "length") <= x
+    begins &= (vx == family.value(belt, "speed")) & (vy == 0.0)
     left, hit, down = _described(recording, begins)
-    own = scene.particle
-    simulated = from_events(scene, left, hit, down, own.radius, own.mass)
+    simulated = from_events(family, left, hit, down, radius, mass)
     simulated |= until_no_slip(recording, down["t"])
-    theory = unbounded(scene)
-    sizes = scales(scene, theory)
+    theory = unbounded(family)
+    sizes = scales(family, theory)
     largest = np.full(count, nan)
     for name, values in simulated.items():
         errors = relative_error(values, getattr(theory, name), sizes[THEORY[name].kind])

@@ -80,12 +80,12 @@ def _at_end(recording: Record, values: Any) -> Floats:
 
 def _until_no_slip(recording: Record, what: str) -> Floats:
     """Return what the outgoing belt pays until a lone particle does not slip, (N,)."""
-    if recording.count > 1 and not recording.scene.shape:
+    if recording.count > 1 and not recording.family:
         return np.full(recording.count, nan)
     settled = recording.ended == REASONS.index("settled")
     entry = "friction_loss" if what == "slip_heat" else "belt_work"
     work = np.where(settled, paid(recording, "outgoing", entry), nan)
-    return np.asarray(work * (recording.scene.rate if what == "power" else 1.0))
+    return np.asarray(work * (recording.machine.scenes.rate if what == "power" else 1.0))
 
 
 def measured(recording: Record, name: str) -> Floats:
@@ -93,7 +93,7 @@ def measured(recording: Record, name: str) -> Floats:
 
     V is 1, or of a family as many as there are particles.
     """
-    many = recording.count if recording.scene.shape else 1
+    many = recording.count if recording.family else 1
     shape = many, recording.count // many
     parts, own = name.split("."), np.ones(recording.count, dtype=bool)
     if name.startswith(FIRST):
@@ -108,7 +108,7 @@ def measured(recording: Record, name: str) -> Floats:
     match parts:
         case ["contacts"]:
             # Of a family they are counted together.
-            return np.full(many, nan if recording.scene.shape else float(recording.contacts))
+            return np.full(many, nan if recording.family else float(recording.contacts))
         case ["ended", reason] if reason in REASONS:
             return count(recording.ended == REASONS.index(reason))
         case ["misses"]:
@@ -119,8 +119,8 @@ def measured(recording: Record, name: str) -> Floats:
             return paid(recording, surface, entry)
         case ["ledger", "power"]:
             work = paid(recording, "outgoing", "belt_work")
-            return np.asarray(work / shape[1] * recording.scene.rate)
-        case ["ledger", *_] if recording.scene.shape:
+            return np.asarray(work / shape[1] * recording.machine.scenes.rate)
+        case ["ledger", *_] if recording.family:
             return each(recording, name)
         case ["ledger", stored, end]:
             return np.array([getattr(ledger(recording), stored)[("start", "end").index(end)]])

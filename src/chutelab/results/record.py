@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine, Particle
 from chutelab.scene import Scene, quantities
+from chutelab.scene.variants import Family
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.tables import Sheet, Shown
@@ -263,8 +264,13 @@ class Record(Shown):
 
     @property
     def scene(self) -> Scene:
-        """The scene that was run."""
+        """The scene that was run; of a family one of its scenes."""
         return self.machine.scene
+
+    @property
+    def family(self) -> Family | None:
+        """All scenes that were run at once, if each particle is of another one."""
+        return self.machine.family
 
     @property
     def title(self) -> str:

@@ -115,7 +115,7 @@ def at_path(document: Any, parts: Sequence[str | int]) -> Any:
 def value_at(scene: SceneTables, path: str) -> Any:
     """Return what a scene has at a path, defaults filled in.
 
-    `MISSING` if there is no such thing; an array for a varied key of a family of scenes.
+    `MISSING` if there is no such thing.
     """
     try:
         parts = resolved(to_dict(scene), path)

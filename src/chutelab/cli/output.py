@@ -175,7 +175,7 @@ def _report(
     """
     from rich.text import Text
 
-    from chutelab.results.report import facts, sheets
+    from chutelab.results.summary import facts, sheets
     from chutelab.studies.accuracy import written
 
     head = Text(recording.title, style="bold")

@@ -88,6 +88,7 @@ def run(
     run the same way: with --out its files are written, and the exit code is 130.
     """
     from chutelab.engines.simulation import judged
+    from chutelab.results import Recording
     from chutelab.results.recorder import StalledError
 
     if partial and output.out is None:
@@ -118,7 +119,8 @@ def run(
             )
             if kept or stalled.recording is None:
                 raise click.ClickException(f"{stalled}{kept}") from stalled
-            recording, stuck = stalled.recording, f"{stalled}; what is written ends there"
+            recording = Recording.of(stalled.recording)
+            stuck = f"{stalled}; what is written ends there"
         except KeyboardInterrupt as error:
             if folder is None or not hasattr(error, "recording"):
                 raise

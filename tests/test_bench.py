@@ -15,7 +15,7 @@ from PIL import Image
 
 from chutelab.checks import workprecision as bench
 from chutelab.checks.workprecision import MANY_STEPS, METHODS, Stopwatch, Timing, clocked, measure
-from chutelab.cli import benching, main
+from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.pictures.plots.workprecision import LOOKS
@@ -208,8 +208,9 @@ def test_a_scene_in_which_all_fails_makes_a_picture():
 
 
 def test_the_command_knows_the_engines():
-    assert benching.METHODS == METHODS == tuple(sorted(LOOKS, key=METHODS.index))
-    assert benching.REPEATS == bench.REPEATS
+    options = {option.name: option for option in main.commands["bench"].params}
+    assert options["engine"].type.choices == METHODS == tuple(sorted(LOOKS, key=METHODS.index))
+    assert options["repeats"].default == bench.REPEATS
 
 
 def test_bench_prints_a_table_and_writes_both_files(tmp_path):

@@ -9,14 +9,12 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
-from chutelab.cli.output import check_file, destination
-from chutelab.cli.parameters import FileName, json_option, out_option
+from chutelab.cli.options import FileName, Folder, beginning, check_file, command, destination
 from chutelab.cli.program import RefusedError
 from chutelab.util.files import whole, writing
 
@@ -27,9 +25,8 @@ if TYPE_CHECKING:
 STANDARD_OUTPUT = Path("-")
 
 
-@click.command()
-@json_option()
-def scenes(as_json: bool) -> None:
+@command("List the shipped scenes; `run` takes their names.")
+def scenes(*, json_: bool) -> None:
     """List the shipped scenes; `run` takes their names."""
     from chutelab.scene import about
     from chutelab.util.tables import Sheet
@@ -37,26 +34,18 @@ def scenes(as_json: bool) -> None:
     listed = [{**asdict(scene), "path": str(scene.path)} for scene in about()]
     rows = [(s.name, f"{s.title}\n{s.look[0] if s.look else ''}") for s in about()]
     table = Sheet("", ("scene", "what it shows"), tuple(rows), texts=2)
-    console.tell({"scenes": listed}, table, as_json=as_json)
+    console.tell({"scenes": listed}, table, as_json=json_)
 
 
-def complete_material(
-    _ctx: click.Context, _parameter: click.Parameter, incomplete: str
-) -> list[CompletionItem]:
+def complete_material(begun: str) -> list[CompletionItem]:
     """Offer the materials that begin so."""
     from chutelab.scene.materials import PRESETS
 
-    return [
-        CompletionItem(name, help=preset.about)
-        for name, preset in PRESETS.items()
-        if name.startswith(incomplete)
-    ]
+    return beginning({name: preset.about for name, preset in PRESETS.items()}, begun)
 
 
-@click.command(short_help="List the materials of particles: density, bounce, friction.")
-@click.argument("material", required=False, metavar="[MATERIAL]", shell_complete=complete_material)
-@json_option()
-def materials(material: str | None, as_json: bool) -> None:
+@command("List the materials of particles: density, bounce, friction.")
+def materials(material: Annotated[str | None, complete_material] = None, *, json_: bool) -> None:
     """List the materials that a scene may name, or show MATERIAL alone, to copy and change.
 
     The density is that of the solid, without the voids of a heap. A coefficient of restitution (how
@@ -66,10 +55,9 @@ def materials(material: str | None, as_json: bool) -> None:
     Behind each number is how far it usually spreads, and its source. Where a result depends on
     one, run both ends of its spread, and measure your own material.
 
-    \b
     chutelab materials
     chutelab materials coal
-    """  # noqa: D301 - click wants the backspace
+    """
     from chutelab.scene.materials import PRESETS
     from chutelab.util.errors import InputError, did_you_mean
 
@@ -91,7 +79,7 @@ def materials(material: str | None, as_json: bool) -> None:
     console.tell(
         {"materials": told, "sources": list(numbers)},
         *(_of_all(shown, numbers) if material is None else [_alone(shown[0], numbers)]),
-        as_json=as_json,
+        as_json=json_,
         wrote="" if material is None else _to_copy(shown[0]),
     )
 
@@ -188,11 +176,13 @@ def _listed(numbers: dict[str, int]) -> tuple[str, ...]:
     return tuple(f"[{number}] {text}" for text, number in numbers.items())
 
 
-@click.command(short_help="Print the JSON Schema of scene files, for editors.")
-@click.option("--run", "of_run", is_flag=True, help="Print that of `chutelab run --json` instead.")
-def schema(of_run: bool) -> None:
-    """Print the JSON Schema of scene files, for editors that complete them."""
-    if of_run:
+@command("Print the JSON Schema of scene files, for editors.")
+def schema(*, run: bool) -> None:
+    """Print the JSON Schema of scene files, for editors that complete them.
+
+    --run  Print that of `chutelab run --json` instead.
+    """
+    if run:
         from chutelab.results.summary import schema as described
     else:
         from chutelab.scene import schema as described
@@ -200,9 +190,8 @@ def schema(of_run: bool) -> None:
     console.say(json.dumps(described(), indent=2))
 
 
-@click.command(short_help="List the quantities of a run: names, units, meanings.")
-@json_option("Print one JSON object instead of a table.")
-def quantities(as_json: bool) -> None:
+@command("List the quantities of a run: names, units, meanings.")
+def quantities(*, json_: bool) -> None:
     """List the quantities of a run, for [[expect]], solve and sweep, and from Python measure.
 
     SURFACE is the name of any surface. Of several particles, particles[0].landing.x is that of the
@@ -216,14 +205,19 @@ def quantities(as_json: bool) -> None:
     told = [{key: getattr(row, key) for key in keys} for row in REGISTRY.values()]
     rows = tuple((row.name, row.unit, row.meaning) for row in REGISTRY.values())
     listed = Sheet("Quantities of a run", ("", "", ""), rows, texts=3)
-    console.tell({"quantities": told}, listed, as_json=as_json)
+    console.tell({"quantities": told}, listed, as_json=json_)
 
 
-@click.command(short_help="Write a complete, commented scene to start from.")
-@click.argument("path", default="scene.toml", type=FileName(path_type=Path, allow_dash=True))
-@click.option("--force", is_flag=True, help="Overwrite a file that is there.")
-def new(path: Path, force: bool) -> None:
-    """Write a complete, commented scene to start from (scene.toml, or PATH; - prints it)."""
+@command("Write a complete, commented scene to start from.")
+def new(
+    path: Annotated[Path, FileName(path_type=Path, allow_dash=True)] = Path("scene.toml"),
+    *,
+    force: bool,
+) -> None:
+    """Write a complete, commented scene to start from (scene.toml, or PATH; - prints it).
+
+    --force  Overwrite a file that is there.
+    """
     from chutelab.scene import template
 
     if path == STANDARD_OUTPUT:
@@ -237,52 +231,42 @@ def new(path: Path, force: bool) -> None:
     console.say(f"wrote {path}; run it with: chutelab run {path}")
 
 
-NUMBERS = (1, 3, 4, 5)
-
-
-@click.command(short_help="Compute the paper's tables anew, beside what is printed.")
-@click.argument(
-    "number", required=False, metavar="[NUMBER]", type=click.Choice([str(n) for n in NUMBERS])
-)
-@click.option(
-    "--as-printed",
-    "rebound",
-    flag_value="as-printed",
-    default=True,
-    help="Compute with Eq. (9) as the paper prints it (the default here).",
-)
-@click.option(
-    "--corrected", "rebound", flag_value="corrected", help="Compute with Eq. (9) corrected."
-)
-@json_option()
-def tables(number: str | None, rebound: Literal["as-printed", "corrected"], as_json: bool) -> None:
+@command("Compute the paper's tables anew, beside what is printed.")
+def tables(
+    number: Literal["1", "3", "4", "5"] | None = None,
+    *,
+    as_printed: bool = True,
+    json_: bool,
+) -> None:
     """Compute Table 1, 3, 4 or 5 of the paper anew (all of them without NUMBER).
 
     Each cell holds the printed number, then the computed one, marked with * where it differs in a
     printed digit.
+
+    --as-printed / --corrected  Compute with Eq. (9) as the paper prints it (the default here), or
+        corrected.
     """
     from chutelab.theory import table
 
-    found = [table(n, rebound) for n in ([int(number)] if number else NUMBERS)]
+    rebound: Literal["as-printed", "corrected"] = "as-printed" if as_printed else "corrected"
+    found = [table(int(n), rebound) for n in ([number] if number else "1345")]
     told = [{**asdict(t), "cells": t.cells, "differing": t.differing} for t in found]
-    console.tell({"tables": told}, *found, as_json=as_json)
+    console.tell({"tables": told}, *found, as_json=json_)
 
 
-@click.command(short_help="Draw the paper's figures again, as printed and corrected.")
-@click.argument("number", type=int, metavar="NUMBER")
-@out_option("Write the picture, its numbers and its scenes into this folder.")
-@json_option()
-def figure(number: int, out: Path | None, as_json: bool) -> None:
+@command("Draw the paper's figures again, as printed and corrected.")
+def figure(number: int, *, out: Folder, json_: bool) -> None:
     """Compute Figure 6, 7, 8, 9, 11, 12 or 13 of the paper anew.
 
     Side by side: what follows from Eq. (9) as the paper prints it, and what follows from it
     corrected; and in words what the misprint does to the figure's conclusion. What the paper's text
     does not give is said, not guessed.
 
-    \b
     chutelab figure 6
     chutelab figure 6 --out out
-    """  # noqa: D301 - click wants the backspace
+
+    --out DIR  Write the picture, its numbers and its scenes into this folder.
+    """
     from chutelab.scene import to_toml
     from chutelab.theory.figures import figure as compute
 
@@ -304,4 +288,4 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
             f" -v3y: {found.sweep}"
         )
     told = {key: getattr(found, key) for key in ("title", "meaning", "missing", "columns")}
-    console.tell({"figure": found.number, **told}, found, as_json=as_json, wrote=wrote)
+    console.tell({"figure": found.number, **told}, found, as_json=json_, wrote=wrote)

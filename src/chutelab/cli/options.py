@@ -64,7 +64,7 @@ _ENTRY = re.compile(r"^(-.*?)  +(.*(?:\n    .*)*)\n?", re.MULTILINE)
 
 
 def command(
-    short: str, group: click.Group = main, *, cls: type[click.Command] = click.Command
+    short: str | None = None, group: click.Group = main, *, cls: type[click.Command] = click.Command
 ) -> Callable[[Callable[..., None]], click.Command]:
     """Make a command of a group of a function, whose docstring becomes its help.
 

@@ -20,12 +20,11 @@ from chutelab.util.files import whole, writing
 
 if TYPE_CHECKING:
     from chutelab.scene.materials import Preset
-    from chutelab.util.tables import Sheet
 
 STANDARD_OUTPUT = Path("-")
 
 
-@command("List the shipped scenes; `run` takes their names.")
+@command()
 def scenes(*, json_: bool) -> None:
     """List the shipped scenes; `run` takes their names."""
     from chutelab.scene import about
@@ -58,8 +57,9 @@ def materials(material: Annotated[str | None, complete_material] = None, *, json
     chutelab materials
     chutelab materials coal
     """
-    from chutelab.scene.materials import PRESETS
+    from chutelab.scene.materials import PRESETS, VALUES
     from chutelab.util.errors import InputError, did_you_mean
+    from chutelab.util.tables import Sheet
 
     if material is not None and material not in PRESETS:
         known = f"there are {', '.join(PRESETS)}"
@@ -67,6 +67,7 @@ def materials(material: Annotated[str | None, complete_material] = None, *, json
     shown = list(PRESETS.values()) if material is None else [PRESETS[material]]
     texts = dict.fromkeys(text for one in shown for row in one.sources.values() for text in row)
     numbers = {text: number for number, text in enumerate(texts, 1)}
+    notes = tuple(f"[{number}] {text}" for text, number in numbers.items())
     told = [
         {
             "about": one.about,
@@ -76,104 +77,62 @@ def materials(material: Annotated[str | None, complete_material] = None, *, json
         }
         for one in shown
     ]
-    console.tell(
-        {"materials": told, "sources": list(numbers)},
-        *(_of_all(shown, numbers) if material is None else [_alone(shown[0], numbers)]),
-        as_json=json_,
-        wrote="" if material is None else _to_copy(shown[0]),
-    )
 
+    def said(one: Preset, key: str) -> tuple[str, str]:
+        digits = "g" if key == "density" else ".2f"
+        low, high = one.spread[key]
+        return f"{getattr(one.material, key):{digits}}", f"{low:{digits}}-{high:{digits}}"
 
-def _of_all(presets: list[Preset], numbers: dict[str, int]) -> list[Sheet]:
-    """Return tables of densities, restitutions and frictions, with the sources below the last."""
-    from chutelab.util.tables import Sheet
+    def cited(one: Preset, *keys: str) -> str:
+        cited = {numbers[text] for key in keys for text in one.sources[key]}
+        return " ".join(map(str, sorted(cited)))
 
-    def pairs(title: str, kind: str, notes: tuple[str, ...] = ()) -> Sheet:
-        keys = (kind, f"{kind}_steel", f"{kind}_rubber")
-        rows = tuple(
-            (
-                one.material.name,
-                *("  ".join(_number(one, key)) for key in keys),
-                _cited(one, keys, numbers),
-            )
-            for one in presets
-        )
+    if material is None:
+        rows = [
+            (one.material.name, one.about, *said(one, "density"), cited(one, "density"))
+            for one in shown
+        ]
+        heads: tuple[str, ...] = ("", "", "kg/m³", "spread", "source")
+        tables = [Sheet("Materials, and their density", heads, tuple(rows), texts=2, tail=1)]
         heads = ("", "with itself", "with steel", "with rubber", "source")
-        return Sheet(title, heads, rows, tail=1, notes=notes)
-
-    densities = tuple(
-        (
-            one.material.name,
-            one.about,
-            *_number(one, "density"),
-            _cited(one, ("density",), numbers),
-        )
-        for one in presets
-    )
-    heads = ("", "", "kg/m³", "spread", "source")
-    return [
-        Sheet("Materials, and their density", heads, densities, texts=2, tail=1),
-        pairs("Coefficient of restitution ε", "restitution"),
-        pairs("Coefficient of friction µ", "friction", _listed(numbers)),
-    ]
-
-
-def _alone(one: Preset, numbers: dict[str, int]) -> Sheet:
-    """Return a table of one material, a row for each of its keys."""
-    from chutelab.scene.materials import VALUES
-    from chutelab.util.tables import Sheet
-
-    return Sheet(
-        f"{one.material.name}: {one.about}",
-        ("", "value", "usual spread", "source"),
-        tuple(
-            (
-                f"{key}, kg/m³" if key == "density" else key,
-                *_number(one, key),
-                _cited(one, (key,), numbers),
-            )
+        for kind, symbol in (("restitution", "ε"), ("friction", "µ")):
+            keys = (kind, f"{kind}_steel", f"{kind}_rubber")
+            cells = (["  ".join(said(one, key)) for key in keys] for one in shown)
+            pairs = [
+                (one.material.name, *found, cited(one, *keys))
+                for one, found in zip(shown, cells, strict=True)
+            ]
+            last = notes if kind == "friction" else ()
+            title = f"Coefficient of {kind} {symbol}"
+            tables.append(Sheet(title, heads, tuple(pairs), tail=1, notes=last))
+        to_copy = ""
+    else:
+        (one,) = shown
+        values = [
+            (f"{key}, kg/m³" if key == "density" else key, *said(one, key), cited(one, key))
             for key in VALUES
-        ),
-        tail=1,
-        notes=_listed(numbers),
+        ]
+        heads = ("", "value", "usual spread", "source")
+        tables = [Sheet(f"{material}: {one.about}", heads, tuple(values), tail=1, notes=notes)]
+        to_copy = TO_COPY.format(name=material) + "\n".join(
+            f"{key} = {getattr(one.material, key)!r}" for key in VALUES
+        )
+    console.tell(
+        {"materials": told, "sources": list(numbers)}, *tables, as_json=json_, wrote=to_copy
     )
 
 
-def _to_copy(one: Preset) -> str:
-    """Return how a material gets into a scene, as it is and changed."""
-    from chutelab.scene.materials import VALUES
+TO_COPY = """
+In a scene:
 
-    name = one.material.name
-    lines = [
-        "",
-        "In a scene:",
-        "",
-        "[particle]",
-        f'material = "{name}"',
-        "",
-        f'Or with what you measured, as material = "my-{name}":',
-        "",
-        "[[material]]",
-        f'name = "my-{name}"',
-        *(f"{key} = {getattr(one.material, key)!r}" for key in VALUES),
-    ]
-    return "\n".join(lines)
+[particle]
+material = "{name}"
 
+Or with what you measured, as material = "my-{name}":
 
-def _number(one: Preset, key: str) -> tuple[str, str]:
-    """Return a number and its spread, as cells."""
-    digits = "g" if key == "density" else ".2f"
-    low, high = one.spread[key]
-    return f"{getattr(one.material, key):{digits}}", f"{low:{digits}}-{high:{digits}}"
-
-
-def _cited(one: Preset, keys: tuple[str, ...], numbers: dict[str, int]) -> str:
-    cited = {numbers[text] for key in keys for text in one.sources[key]}
-    return " ".join(map(str, sorted(cited)))
-
-
-def _listed(numbers: dict[str, int]) -> tuple[str, ...]:
-    return tuple(f"[{number}] {text}" for text, number in numbers.items())
+[[material]]
+name = "my-{name}"
+"""
 
 
 @command("Print the JSON Schema of scene files, for editors.")

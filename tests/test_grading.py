@@ -19,9 +19,8 @@ from click.testing import CliRunner
 import chutelab
 from chutelab.classroom import grading
 from chutelab.classroom.exercises import EXERCISES, lesson
-from chutelab.classroom.grading import Grade, grade, write_csv
+from chutelab.classroom.grading import LARGEST, Grade, grade, write_csv
 from chutelab.classroom.kernel import Ran
-from chutelab.classroom.returned import LARGEST
 from chutelab.cli import main
 
 pytest.importorskip("nbclient")

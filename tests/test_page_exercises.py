@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from chutelab.classroom.exercises import EXERCISES, catalogue, lesson
-from chutelab.classroom.exercises.catalogue import told
+from chutelab.classroom.exercises.catalogue import data_of, told, tree
 from chutelab.classroom.exercises.exercise import (
     Case,
     Exercise,
@@ -23,7 +23,6 @@ from chutelab.classroom.exercises.exercise import (
     plain,
     shown,
 )
-from chutelab.classroom.exercises.in_page import data_of, tree
 from chutelab.classroom.exercises.judging import in_words, judge
 from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.reading import scene_of

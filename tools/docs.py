@@ -27,7 +27,7 @@ from sphinx.pycode import ModuleAnalyzer
 
 import chutelab
 from chutelab.classroom.lessons import Lesson, shipped_lessons
-from chutelab.classroom.lessons.building import LIVE, live_page
+from chutelab.classroom.lessons.pages import LIVE, live_page
 from chutelab.pictures.live.page import write
 from chutelab.scene import SceneError, load
 from chutelab.scene.loading import about

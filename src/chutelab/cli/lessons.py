@@ -148,7 +148,7 @@ def show(
 
 def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | None) -> None:
     """Print one sheet of each lesson, or write it into a file or a folder."""
-    from chutelab.classroom.lessons.printing import FORMATS, printed
+    from chutelab.classroom.lessons.sheets import FORMATS, printed
     from chutelab.classroom.lessons.texts import without_tex
 
     if out is None:
@@ -259,7 +259,7 @@ def page(
         [default]
     --wheel / --no-wheel  With what students install, or without.
     """
-    from chutelab.classroom.lessons.building import bundle, live_page
+    from chutelab.classroom.lessons.pages import bundle, live_page
 
     if out.suffix == ".html":
         chosen = _lessons(lessons, language)
@@ -315,7 +315,7 @@ def scorm(
     --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
         [default]
     """
-    from chutelab.classroom.lessons.scorm import package
+    from chutelab.classroom.lessons.pages import package
 
     if all_ == bool(lessons):
         raise RefusedError("give lessons, such as: chutelab lesson scorm 3; or --all")
@@ -394,8 +394,8 @@ def grade(
     --time-limit S  Seconds that a notebook may run. [default]
     -q, --quiet  Print no table, and show no progress bar.
     """
-    from chutelab.classroom.class_report import report as class_report
     from chutelab.classroom.grading import grade as grade_returned
+    from chutelab.classroom.grading import report as class_report
     from chutelab.classroom.grading import write_csv
     from chutelab.util.tables import Sheet
 

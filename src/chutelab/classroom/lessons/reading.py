@@ -188,6 +188,9 @@ def shipped_lessons(language: str = "en") -> list[Lesson]:
 
 PLAN: Final = "lesson.toml"
 
+OWN_WORDS: Final = "explanation"
+"""Id of the cell of a notebook in which a student writes in words."""
+
 LARGEST: Final = 1 << 20
 """Bytes of it, and characters of a worksheet or an explanation."""
 

@@ -16,10 +16,9 @@ import re
 import stat
 import textwrap
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
-from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -133,18 +132,22 @@ LONGEST_TEXT: Final = 10_000
 Name = Annotated[
     str, StringConstraints(strip_whitespace=True, min_length=1, max_length=LONGEST_NAME)
 ]
-QuestionNumber = Annotated[str, StringConstraints(pattern=r"^[1-9][0-9]?$")]
+# JSON has texts for keys.
+QuestionNumber = Annotated[int, Field(strict=False)]
 Answer = Annotated[float, Field(allow_inf_nan=False)]
 Key = Annotated[str, StringConstraints(max_length=40)]
 Words = Annotated[str, StringConstraints(max_length=LONGEST_TEXT)]
 
 
-class Result(BaseModel):
-    """A result file: numbers and words, no verdicts. What else is in it is for the page alone."""
+class Work(BaseModel):
+    """What a student did in one lesson: numbers and words, no verdicts.
 
-    model_config = ConfigDict(strict=True, frozen=True)
+    A result file has it, with more that is for the page alone, and the kernel tells it.
+    """
 
-    chutelab_result: Literal[1]
+    model_config = ConfigDict(strict=True)
+
+    chutelab_result: Literal[1] = 1
     lesson: Key
     student: Name
     answers: Annotated[dict[QuestionNumber, Answer], Field(max_length=MOST_QUESTIONS)] = {}
@@ -152,7 +155,23 @@ class Result(BaseModel):
     words: Annotated[dict[Key, Words], Field(max_length=MOST_QUESTIONS)] = {}
 
 
-def result_of(path: Path) -> Result:
+def _work(found: object) -> Work:
+    """Return what a student did; a `ValueError` says what no chutelab writes so."""
+    try:
+        work = Work.model_validate(found)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        why = first["msg"][:1].lower() + first["msg"][1:]
+        raise ValueError(": ".join([*map(str, first["loc"]), why])) from None
+    if work.lesson not in EXERCISES:
+        raise ValueError(f"no lesson {work.lesson!r} has an exercise")
+    count = len(EXERCISES[work.lesson].questions)
+    if not {*work.answers, *work.revealed} <= set(range(1, count + 1)):
+        raise ValueError(f"the lesson has questions 1 to {count} only")
+    return work
+
+
+def result_of(path: Path) -> Work:
     """Return what is in a result file.
 
     Raises
@@ -169,12 +188,9 @@ def result_of(path: Path) -> Result:
         case _:
             raise ReturnedError('not a result file: it has no "chutelab_result"')
     try:
-        return Result.model_validate(found)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        why = first["msg"][:1].lower() + first["msg"][1:]
-        said = ": ".join(["not a result file", *map(str, first["loc"]), why])
-        raise ReturnedError(cut(said, 200)) from None
+        return _work(found)
+    except ValueError as error:
+        raise ReturnedError(cut(f"not a result file: {error}", 200)) from None
 
 
 def is_result(path: Path) -> bool:
@@ -240,7 +256,7 @@ def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
     for file in files:
         try:
             result = is_result(Path(file))
-            row = _of_result(file) if result else _of_notebook(file, time_limit)
+            row = _marked(file, result_of(Path(file))) if result else _of_notebook(file, time_limit)
         except ReturnedError as error:
             row = Grade(file, reason=str(error))
         except ForgedError as error:
@@ -326,17 +342,6 @@ def write_csv(grades: Iterable[Grade], path: str | Path) -> Path:
     return part.replace(path)
 
 
-@dataclass
-class _Work:
-    """What a student did in one lesson, as the kernel or a result file reports it."""
-
-    lesson: str
-    student: str
-    answers: dict[int, float] = field(default_factory=dict)
-    revealed: set[int] = field(default_factory=set)
-    words: dict[str, str] = field(default_factory=dict)
-
-
 def _of_notebook(file: str, time_limit: float) -> Grade:
     ran = run(code_of(Path(file)), time_limit)
     works = _works(ran.tasks)
@@ -350,20 +355,7 @@ def _of_notebook(file: str, time_limit: float) -> Grade:
     return _marked(file, work, [ran.trouble, *also])
 
 
-def _of_result(file: str) -> Grade:
-    result = result_of(Path(file))
-    if result.lesson not in EXERCISES:
-        raise ReturnedError(f"not a result file: no lesson {result.lesson!r} has an exercise")
-    numbers = {str(n): n for n in range(1, len(EXERCISES[result.lesson].questions) + 1)}
-    if not {*result.answers, *map(str, result.revealed)} <= {*numbers}:
-        raise ReturnedError(f"not a result file: the lesson has questions 1 to {len(numbers)} only")
-    answers = {numbers[key]: answer for key, answer in result.answers.items()}
-    words = {key: text.strip() for key, text in result.words.items() if text.strip()}
-    work = _Work(result.lesson, result.student, answers, set(result.revealed), words)
-    return _marked(file, work, [])
-
-
-def _marked(file: str, work: _Work, reasons: list[str]) -> Grade:
+def _marked(file: str, work: Work, reasons: Sequence[str] = ()) -> Grade:
     # The right answers come from here, whatever was made of them in the kernel or the page.
     _, cases = draw(EXERCISES[work.lesson], work.student)
     replies = [judge(cases[n - 1], answer) for n, answer in sorted(work.answers.items())]
@@ -376,15 +368,15 @@ def _marked(file: str, work: _Work, reasons: list[str]) -> Grade:
         lesson=work.lesson,
         marks=tuple(int(case.number in right) for case in cases),
         out_of=len(cases),
-        revealed=tuple(sorted(work.revealed)),
+        revealed=tuple(sorted({*work.revealed})),
         reason="; ".join(filter(None, reasons)),
         answers=work.answers,
         mistakes={reply.question: reply.mistake for reply in replies if reply.mistake},
-        words=work.words,
+        words={key: text.strip() for key, text in work.words.items() if text.strip()},
     )
 
 
-def _works(reports: object) -> list[_Work]:
+def _works(reports: object) -> list[Work]:
     """Return what was worked on, each lesson and student once, in the order they were opened.
 
     Raises
@@ -394,26 +386,15 @@ def _works(reports: object) -> list[_Work]:
     """
     if not isinstance(reports, list) or len(reports) > (OPENED.maxlen or 0):
         raise ForgedError("its report is not a list of tasks, or too long a one")
-    works: dict[tuple[str, str], _Work] = {}
-    for report in reports:
-        match report:
-            case {
-                "lesson": str(name),
-                "student": str(student),
-                "answers": dict(answers),
-                "revealed": list(revealed),
-            } if name in EXERCISES and 0 < len(student) <= LONGEST_NAME:
-                work = works.setdefault((name, plain(student)), _Work(name, student))
-            case _:
-                raise ForgedError("its report is of no lesson, or of no student")
-        numbers = {str(n): n for n in range(1, len(EXERCISES[name].questions) + 1)}
-        # Answers come as floats and numbers of questions as integers; true is no 1.
-        if not all(key in numbers and type(x) is float for key, x in answers.items()):
-            raise ForgedError("its report has answers to no question, or that are no numbers")
-        if not all(type(n) is int and n in numbers.values() for n in revealed):
-            raise ForgedError("its report has workings of no question")
-        work.answers |= {numbers[key]: x for key, x in answers.items() if isfinite(x)}
-        work.revealed |= set(revealed)
+    works: dict[tuple[str, str], Work] = {}
+    for one in reports:
+        try:
+            work = _work(one)
+        except ValueError as error:
+            raise ForgedError(f"its report is none of chutelab's: {error}") from None
+        first = works.setdefault((work.lesson, plain(work.student)), work)
+        first.answers |= work.answers
+        first.revealed += work.revealed
     return list(works.values())
 
 

@@ -20,6 +20,7 @@ from typing import Any, Final
 
 from chutelab.classroom.exercises import judging
 from chutelab.classroom.exercises.exercise import (
+    GENERAL,
     ROUNDED,
     TOLERANCE,
     Case,
@@ -178,34 +179,33 @@ class Task:
         text = words(self.language).say("python-unknown", count=len(self._standings))
         return Reply(0, Verdict.UNKNOWN, text, language=self.language)
 
-    def _rows(self) -> list[tuple[str, str, str]]:
-        said = words(self.language)
-        return [
+    def _told(self) -> tuple[str, list[tuple[str, str, str]], str]:
+        """Return the title, the rows of numbers, and the story."""
+        exercise, said = _exercise(self), words(self.language)
+        rows = [
             (one.symbol, with_unit(self.given[one.name], one.unit, said), one.meaning)
-            for one in _exercise(self).parameters
+            for one in exercise.parameters
         ]
-
-    def _head(self) -> str:
-        exercise = _exercise(self)
-        say = words(self.language).say
-        return say("lesson-title", number=exercise.number, title=exercise.title)
+        story = _case(self, 1).numbers.text(exercise.story)
+        if not exercise.whole:
+            story = f"{story}\n{said.say('untranslated')}"
+        return said.say("lesson-title", number=exercise.number, title=exercise.title), rows, story
 
     def __repr__(self) -> str:
-        rows = self._rows()
+        title, rows, story = self._told()
+        say = words(self.language).say
         left, middle = (max(len(row[i]) for row in rows) for i in (0, 1))
         lines = [f"  {s:<{left}} = {value:<{middle}}  {meaning}" for s, value, meaning in rows]
-        say = words(self.language).say
-        head = f"{self._head()}\n{say('numbers-of', student=self.student)}"
+        head = f"{title}\n{say('numbers-of', student=self.student)}"
         questions = [f"  {one.number} {one.title}" for one in self._standings]
-        story = judging.filled(_story(self))
-        return "\n".join([head, *lines, story, say("questions"), *questions])
+        return "\n".join([head, *lines, judging.filled(story), say("questions"), *questions])
 
     def _repr_html_(self) -> str:
-        head = words(self.language).say(
-            "numbers-of-title", title=self._head(), student=self.student
-        )
-        rows = [(f"{s} = {value}", meaning) for s, value, meaning in self._rows()]
-        return f"{judging.box(head, _story(self))}{judging.table(rows)}"
+        title, rows, story = self._told()
+        say = words(self.language).say
+        head = say("numbers-of-title", title=title, student=self.student)
+        cells = [(f"{s} = {value}", meaning) for s, value, meaning in rows]
+        return f"{judging.box(head, story)}{judging.table(cells)}"
 
 
 def _exercise(task: Task) -> Exercise:
@@ -213,39 +213,30 @@ def _exercise(task: Task) -> Exercise:
     return told(task.lesson, task.language)
 
 
-def _case(task: Task, number: int) -> Case:
-    """Return a question with a student's numbers, and all that follows from them."""
-    return _case_of(_exercise(task), task.given, number)
-
-
-def _case_of(exercise: Exercise, given: Values, number: int) -> Case:
-    drawn = {name: given[name] for name in given}
-    numbers = Numbers(drawn, exercise.formulas, language=exercise.language)
+def _case(task: Task, number: int, given: Values | None = None) -> Case:
+    """Return a question with a student's numbers, or those given, and what follows from them."""
+    exercise, drawn = _exercise(task), given or task.given
+    numbers = Numbers(
+        {name: drawn[name] for name in drawn}, exercise.formulas, language=exercise.language
+    )
     return Case(number, exercise.questions[number - 1], numbers)
 
 
 def _of_others(task: Task, number: int) -> Iterator[tuple[str, float]]:
     """Yield the right answers for the other names of this process's tasks, and for no name."""
-    exercise = EXERCISES[task.lesson]
-    given = {plain(UNNAMED): (UNNAMED, _of_nobody(exercise.name))}
+    given = {plain(UNNAMED): (UNNAMED, _unnamed(task.lesson))}
     for one in list(OPENED):  # another thread may be opening one
         if one.lesson == task.lesson:
             given.setdefault(plain(one.student), (one.student, one.given))
     given.pop(plain(task.student), None)
     for name, values in given.values():
-        yield name, _case_of(exercise, values, number).right
+        yield name, _case(task, number, values).right
 
 
 @cache
-def _of_nobody(name: str) -> Values:
-    """Return the parameters that belong to no name."""
+def _unnamed(name: str) -> Values:
+    """Return the parameters of an exercise for `UNNAMED`."""
     return draw(EXERCISES[name], UNNAMED)[0]
-
-
-def _story(task: Task) -> str:
-    exercise = _exercise(task)
-    story = _case(task, 1).numbers.text(exercise.story)
-    return story if exercise.whole else f"{story}\n{words(task.language).say('untranslated')}"
 
 
 def _asked(case: Case) -> Passage:
@@ -360,12 +351,6 @@ SAID: Final = (
 )  # fmt: skip
 """How keys of the catalogue begin that pages need: with nothing of cells, sheets and packages."""
 
-GENERAL: Final = (
-    "mistake-sign", "mistake-half-missing", "mistake-half-too-many", "mistake-ten",
-    "mistake-radians",
-)  # fmt: skip
-"""Keys of the mistakes that any question knows, the last of them if an angle is asked for."""
-
 OPERATORS: Final[dict[type[ast.AST], str]] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**",
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
@@ -461,7 +446,9 @@ def data_of(exercise: Exercise, explain: str = "") -> dict[str, Any]:
 
 def _question(asked: Question, language: str) -> dict[str, Any]:
     own = {mistake.name for mistake in asked.mistakes}
-    known = GENERAL if asked.unit == "degrees" else GENERAL[:-1]
+    known = [key for key, *_ in GENERAL] + ["mistake-ten"]
+    if asked.unit == "degrees":
+        known.append("mistake-radians")
     return {
         "title": asked.title,
         "text": _line(asked.text),

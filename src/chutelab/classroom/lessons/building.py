@@ -19,9 +19,10 @@ import json
 import re
 import shutil
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from errno import ELOOP
+from functools import partial
 from io import BytesIO
 from math import prod
 from pathlib import Path
@@ -33,6 +34,7 @@ from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import UNNAMED
 from chutelab.classroom.lessons.reading import (
     OWN_WORDS,
+    PARTS,
     Lesson,
     LessonError,
     read,
@@ -251,13 +253,6 @@ def check_inside(folder: Path) -> None:
 
 OWN: Final = "notebook.py"
 
-PARTS: Final = {"Predict": "part-predict", "Run": "part-run", "Compare": "part-compare"}
-"""Those of the worksheet, in the order of the notebook, with the keys of their headings."""
-
-_NEEDS: Final = re.compile(r"^# needs: *(.*)$", re.MULTILINE)
-
-Cell = dict[str, Any]
-
 
 def name_of(language: str) -> str:
     """Return the name of a notebook's file."""
@@ -274,35 +269,102 @@ def notebook_of(lesson: Lesson) -> str:
     LessonError
         If a cell of ``notebook.py`` belongs to no part.
     """
-    text = lesson.text("README")
-    opening, *pieces = re.split(r"^## (.*)\n+", text, flags=re.MULTILINE)
-    found = dict(zip(pieces[::2], pieces[1::2], strict=True))
-    heads = {name: words(lesson.language).say(key) for name, key in PARTS.items()}
-    if not found.keys() >= set(heads.values()):
+    say = words(lesson.language).say
+    heading, *pieces = re.split(r"^## (.*)\n+", lesson.text("README"), flags=re.MULTILINE)
+    parts = dict(zip(pieces[::2], pieces[1::2], strict=True))
+    heads = [say(key) for key in PARTS]
+    if not parts.keys() >= {*heads}:
         return ""
-    parts = {name: found[head] for name, head in heads.items()}
+    predict, run, compare = (parts[head] for head in heads)
     own = _own(lesson)
-    title, _, opening = opening.partition("\n")
+    left = dict.fromkeys(own)
+    cells: list[dict[str, Any]] = []
+
+    def add(kind: str, name: str, source: str, place: str = "") -> None:
+        cell: dict[str, Any] = {"cell_type": kind, "id": name, "metadata": {}}
+        if kind == "code":
+            cell |= {"execution_count": None, "outputs": []}
+        cells.append(cell | {"source": source.splitlines(keepends=True)})
+        left.pop(place, None)
+
+    text, code = partial(add, "markdown"), partial(add, "code")
+
+    def add_own(place: str) -> None:
+        for n, (kind, source) in enumerate(own.get(place, ()), start=1):
+            add(kind, f"{place}-own-{n}".lower().replace(" ", "-"), source, place)
+
+    def prose(part: str) -> str:
+        """Return paragraphs on a line each, without those that are for a terminal."""
+        paragraphs = re.split(r"\n{2,}", part.strip())
+        terminal = f"*{say('notebook-terminal')}"
+        return "\n\n".join(_unbroken(one) for one in paragraphs if not one.startswith(terminal))
+
+    exercise = EXERCISES.get(lesson.name)
+    title, _, opening = heading.partition("\n")
     # The notebook draws the machine itself: it may be all that a student has.
-    opening = re.sub(r"^!\[.*\n+", "", opening, flags=re.MULTILINE)
-    needs = _NEEDS.search(_source(lesson))
-    opened = f"{title}\n\n{_prose(opening, words(lesson.language).say('notebook-terminal'))}"
-    cells = list(_cells(lesson, parts, own, needs[1] if needs else "notebook", opened))
-    if left := [place for place in own if place not in {cell["of"] for cell in cells}]:
-        said = f"there is no place for a cell # %% {left[0]}"
-        raise unusable(lesson.folder / OWN, said)
-    for cell in cells:
-        del cell["of"]
-    book = {
-        "cells": cells,
-        "metadata": {
-            "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
-            "language_info": {"name": "python"},
-        },
-        "nbformat": 4,
-        "nbformat_minor": 5,
-    }
-    return json.dumps(book, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
+    opening = prose(re.sub(r"^!\[.*\n+", "", opening, flags=re.MULTILINE))
+    order = say("notebook-order-exercise" if exercise is not None else "notebook-order")
+    needs = re.search(r"^# needs: *(.*)$", _source(lesson), re.MULTILINE)
+    extras = say("notebook-needs", extras=needs[1] if needs else "notebook")
+    text("title", f"{title}\n\n{opening}\n\n{order}\n\n{extras}")
+    shipped = any(one.folder == lesson.folder for one in shipped_lessons())
+    book = f"book = Book({json.dumps(lesson.name if shipped else '.')})\nbook.machine()"
+    code("machine", f"from chutelab.classroom.book import Book\n\n{book}")
+    if exercise is not None:
+        text("name-text", f"## {say('notebook-name-head')}\n\n{say('notebook-name')}")
+        language = "" if lesson.language == "en" else f', language="{lesson.language}"'
+        task = f'task = lesson("{exercise.name}", student=student{language})\ntask'
+        given = f'from chutelab.classroom.exercises import lesson\n\nstudent = "{UNNAMED}"\n'
+        code("name", given + task)
+    text("predict-text", f"## {heads[0]}\n\n{prose(predict)}\n\n{say('notebook-predict')}")
+    asked = re.findall(r"^(\d+)\. ", predict, flags=re.MULTILINE)
+    lines = "".join(f"    {number}: None,\n" for number in asked)
+    code("predict", f"predictions = {{\n{lines}}}")
+    add_own("Predict")
+
+    # The texts under "Run", and a cell for each block of commands.
+    before, *pieces = re.split(r"^```sh\n(.*?)^```$", run, flags=re.MULTILINE | re.DOTALL)
+    head = f"## {heads[1]}\n\n"
+    for n, (block, after) in enumerate(zip(pieces[::2], pieces[1::2], strict=True), start=1):
+        name, place = "run" if n == 1 else f"run-{n}", f"Run {n}"
+        if said := f"{head}{prose(before)}".strip():
+            text(f"{name}-text", said)
+        for i, (kind, source) in enumerate(own.get(place) or [("code", _commands(block))]):
+            add(kind, name if i == 0 else f"run-{n}-own-{i}", source, place)
+        if place not in own and " --out " in block:
+            code(f"{name}-picture", "import chutelab\n\nchutelab.overlay(runs[0])")
+        head, before = "", after
+    if rest := prose(before):
+        text("run-end", rest)
+    add_own("Run")
+
+    compared = prose(compare)
+    fill = f"\n\n{say('notebook-fill')}" if "|---" in compared else ""
+    text("compare-text", f"## {heads[2]}\n\n{compared}{fill}")
+    code("compare", "book.compare(predictions)")
+    add_own("Compare")
+    text("explain-text", f"## {say('notebook-explain-head')}\n\n{say('notebook-explain')}")
+    text(OWN_WORDS, say("notebook-words"))
+    if exercise is not None:
+        questions = say("notebook-questions", first=exercise.parameters[0].name)
+        text("questions-text", f"## {say('notebook-questions-head')}\n\n{questions}")
+        add_own("Questions")
+        for n in range(1, len(exercise.questions) + 1):
+            code(f"question-{n}", f"task.question({n})")
+            code(f"answer-{n}", f"answer_{n} = None\ntask.check({n}, answer_{n})")
+    if lesson.page is not None:
+        (_, said), *_ = own.get("Try it live", [("markdown", "")])
+        text("live-text", f"## {say('notebook-live')}\n\n{said}".strip(), "Try it live")
+        code("live", "book.live()")
+    if exercise is not None:
+        text("progress-text", f"## {say('notebook-progress')}")
+        code("progress", "task.progress()")
+    if left:
+        raise unusable(lesson.folder / OWN, f"there is no place for a cell # %% {next(iter(left))}")
+    kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
+    about = {"kernelspec": kernel, "language_info": {"name": "python"}}
+    made = {"cells": cells, "metadata": about, "nbformat": 4, "nbformat_minor": 5}
+    return json.dumps(made, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
 
 
 def _source(lesson: Lesson, name: str = OWN) -> str:
@@ -336,113 +398,6 @@ def _cells_in(source: str) -> dict[str, list[tuple[str, str]]]:
     return found
 
 
-def _cells(
-    lesson: Lesson,
-    parts: dict[str, str],
-    own: dict[str, list[tuple[str, str]]],
-    needs: str,
-    opening: str,
-) -> Iterator[Cell]:
-    exercise = EXERCISES.get(lesson.name)
-
-    def added(place: str) -> Iterator[Cell]:
-        for n, (kind, source) in enumerate(own.get(place, ()), start=1):
-            name = f"{place}-own-{n}".lower().replace(" ", "-")
-            yield _cell(kind, name, source, place)
-
-    say = words(lesson.language).say
-
-    language = "" if lesson.language == "en" else f', language="{lesson.language}"'
-
-    def head(part: str) -> str:
-        return f"## {say(PARTS[part])}\n\n"
-
-    def prose(text: str) -> str:
-        return _prose(text, say("notebook-terminal"))
-
-    order = say("notebook-order-exercise" if exercise is not None else "notebook-order")
-    yield _cell(
-        "markdown",
-        "title",
-        f"{opening}\n\n{order}\n\n{say('notebook-needs', extras=needs)}",
-    )
-    shipped = any(one.folder == lesson.folder for one in shipped_lessons())
-    called = json.dumps(lesson.name if shipped else ".")
-    yield _cell(
-        "code",
-        "machine",
-        f"from chutelab.classroom.book import Book\n\nbook = Book({called})\nbook.machine()",
-    )
-    if exercise is not None:
-        yield _cell(
-            "markdown", "name-text", f"## {say('notebook-name-head')}\n\n{say('notebook-name')}"
-        )
-        yield _cell(
-            "code",
-            "name",
-            "from chutelab.classroom.exercises import lesson\n"
-            f'\nstudent = "{UNNAMED}"\n'
-            f'task = lesson("{exercise.name}", student=student{language})\ntask',
-        )
-    asked = re.findall(r"^(\d+)\. ", parts["Predict"], flags=re.MULTILINE)
-    yield _cell(
-        "markdown",
-        "predict-text",
-        f"{head('Predict')}{prose(parts['Predict'])}\n\n{say('notebook-predict')}",
-    )
-    lines = "".join(f"    {number}: None,\n" for number in asked)
-    yield _cell("code", "predict", f"predictions = {{\n{lines}}}")
-    yield from added("Predict")
-    yield from _run(parts["Run"], own, head("Run"), prose)
-    yield from added("Run")
-    text = prose(parts["Compare"])
-    fill = f"\n\n{say('notebook-fill')}" if "|---" in text else ""
-    yield _cell("markdown", "compare-text", f"{head('Compare')}{text}{fill}")
-    yield _cell("code", "compare", "book.compare(predictions)")
-    yield from added("Compare")
-    explain = f"## {say('notebook-explain-head')}\n\n{say('notebook-explain')}"
-    yield _cell("markdown", "explain-text", explain)
-    yield _cell("markdown", OWN_WORDS, say("notebook-words"))
-    if exercise is not None:
-        first = exercise.parameters[0].name
-        text = f"## {say('notebook-questions-head')}\n\n{say('notebook-questions', first=first)}"
-        yield _cell("markdown", "questions-text", text)
-        yield from added("Questions")
-        for n in range(1, len(exercise.questions) + 1):
-            yield _cell("code", f"question-{n}", f"task.question({n})")
-            answer = f"answer_{n}"
-            yield _cell("code", f"answer-{n}", f"{answer} = None\ntask.check({n}, {answer})")
-    if lesson.page is not None:
-        (_, text), *_ = own.get("Try it live", [("markdown", "")])
-        yield _cell(
-            "markdown", "live-text", f"## {say('notebook-live')}\n\n{text}".strip(), "Try it live"
-        )
-        yield _cell("code", "live", "book.live()")
-    if exercise is not None:
-        yield _cell("markdown", "progress-text", f"## {say('notebook-progress')}")
-        yield _cell("code", "progress", "task.progress()")
-
-
-def _run(
-    part: str, own: dict[str, list[tuple[str, str]]], head: str, prose: Callable[[str], str]
-) -> Iterator[Cell]:
-    """Yield the texts under "Run", and a cell for each block of commands."""
-    text, *pieces = re.split(r"^```sh\n(.*?)^```$", part, flags=re.MULTILINE | re.DOTALL)
-    for n, (block, after) in enumerate(zip(pieces[::2], pieces[1::2], strict=True), start=1):
-        name, place = "run" if n == 1 else f"run-{n}", f"Run {n}"
-        if said := f"{head}{prose(text)}".strip():
-            yield _cell("markdown", f"{name}-text", said)
-        cells = own.get(place) or [("code", _commands(block))]
-        for i, (kind, source) in enumerate(cells):
-            yield _cell(kind, name if i == 0 else f"run-{n}-own-{i}", source, place)
-        if place not in own and " --out " in block:
-            drawn = "import chutelab\n\nchutelab.overlay(runs[0])"
-            yield _cell("code", f"{name}-picture", drawn, place)
-        head, text = "", after
-    if rest := prose(text):
-        yield _cell("markdown", "run-end", rest)
-
-
 def _commands(block: str) -> str:
     """Return the cell that runs the scenes of ``chutelab run`` in a block; other commands are left.
 
@@ -454,27 +409,6 @@ def _commands(block: str) -> str:
     return f"runs = book.run(\n{lines})\nruns"
 
 
-def _prose(text: str, terminal: str) -> str:
-    """Return paragraphs on a line each, without those that are for a terminal."""
-    paragraphs = re.split(r"\n{2,}", text.strip())
-    kept = (one for one in paragraphs if not one.startswith(f"*{terminal}"))
-    return "\n\n".join(map(_unbroken, kept))
-
-
 def _unbroken(paragraph: str) -> str:
     """Return a paragraph without its line breaks; lists and tables keep theirs."""
-    lines: list[str] = []
-    for line in textwrap.dedent(paragraph).splitlines():
-        begins = re.match(r"\s*(?:[-*] |\||\d+\. )|#", line)
-        if lines and not begins:
-            lines[-1] += f" {line.strip()}"
-        else:
-            lines.append(line)
-    return "\n".join(lines)
-
-
-def _cell(kind: str, name: str, source: str, place: str = "") -> Cell:
-    cell: Cell = {"cell_type": kind, "id": name, "metadata": {}, "of": place}
-    if kind == "code":
-        cell |= {"execution_count": None, "outputs": []}
-    return cell | {"source": source.splitlines(keepends=True)}
+    return re.sub(r"\n(?!\s*(?:[-*] |\||\d+\. )|#)\s*", " ", textwrap.dedent(paragraph))

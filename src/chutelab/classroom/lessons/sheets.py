@@ -24,15 +24,13 @@ from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import UNNAMED, told
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import with_unit
-from chutelab.classroom.lessons.reading import Lesson, Teacher, unusable
+from chutelab.classroom.lessons.reading import PARTS, Lesson, Teacher, unusable
 from chutelab.classroom.lessons.texts import asset, parsed, parser, typeset
 from chutelab.classroom.words import Words, words
 from chutelab.util.errors import MissingLibraryError
 from chutelab.util.versions import own_version
 
 SHEETS: Final = ("student", "teacher", "explanation")
-PARTS: Final = ("part-predict", "part-run", "part-compare")
-"""What a worksheet has, by the keys of their headings."""
 
 
 def sheet(lesson: Lesson, which: str) -> str:

@@ -13,10 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from latex2mathml.converter import convert
 from markdown_it import MarkdownIt
 from markdown_it.tree import SyntaxTreeNode
-from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 SYMBOLS: Final = {
     "alpha": "α", "varepsilon": "ε", "mu": "µ", "varphi": "φ", "omega": "ω", "pi": "π",
@@ -188,6 +186,8 @@ def asset(name: str) -> str:
 
 def parser() -> MarkdownIt:
     """Return a parser of lessons' Markdown, for which raw HTML is text."""
+    from mdit_py_plugins.dollarmath import dollarmath_plugin
+
     made = MarkdownIt("commonmark", {"html": False}).enable("table")
     return made.use(dollarmath_plugin, allow_space=False, renderer=_mathematics)
 
@@ -206,6 +206,8 @@ def mathml(tex: str, *, display: bool = False) -> str:
     >>> mathml(r"2 \sin x").count("<mspace")
     2
     """
+    from latex2mathml.converter import convert
+
     made: str = convert(tex.strip(), display="block" if display else "inline")
     return _BESIDE.sub(r'\g<0><mspace width="0.167em" />', made)
 

@@ -280,7 +280,7 @@ def test_pieces_are_held_against_each_other_some_at_a_time(abreast, monkeypatch)
     tick = {"name": "tick", "from": [0.1, 5.1], "to": [0.5, 5.4], "repeat": [[4, 0.45, 0.0]]}
     line = {"name": "line", "from": [-1.0, 5.2], "to": [3.0, 5.2]}
     far = {"name": "far", "from": [-1.0, 7.0], "to": [3.0, 7.0], "repeat": [[2, 0.0, 0.1]]}
-    monkeypatch.setattr(machine.parts, "ABREAST", abreast)
+    monkeypatch.setattr(machine.shapes, "ABREAST", abreast)
     found = falling(surface=[line, tick, far, ring]).warnings
     assert found == tuple(
         machine.Caution(one, crosses=other)

@@ -29,6 +29,7 @@ from chutelab.util.trig import RADIANS, hypot, sin_cos
 if TYPE_CHECKING:
     # The paper's tables are there without the model of a scene.
     from chutelab.scene import AnyScene, Scene
+    from chutelab.scene.variants import Family
 
 LEAST_CLEARANCE = 0.05
 """m of the default plate's lower end above the outgoing belt, for particles below 17 mm."""
@@ -194,59 +195,63 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     return found if trouble is None else cut(found, *trouble)
 
 
-def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
+def unbounded(scenes: Scene | Family, rebound: Rebound = "corrected") -> Transfer:
     """Return what the equations say of a scene if nothing else were in the way.
 
     Plate and outgoing belt are without ends, the pulley is met no more, and what the scene says of
     releases is not looked at. The scene has an incoming conveyor and a plate; the arrays are 0-d,
-    those of a family of such scenes (see `chutelab.scene.variants`) are (N,).
+    those of a family of such scenes (see `chutelab.scene.variants.Family`) are (N,).
     """
+    value, scene = scenes.value, scenes.scene
     belt, plate, out = scene.incoming, scene.plate, scene.outgoing
     assert belt is not None
     assert plate is not None
-    own, (restitution, plate_friction) = scene.particle, scene.met(scene.kinds[0], "plate")
+    restitution, plate_friction = scenes.met(scene.kinds[0], "plate")
+    ride = ride_of(scenes)
 
     def found(drop: ArrayLike, belt_speed: ArrayLike) -> Transfer:
         return transfer(
-            **ride_of(scene),
-            distance=plate.distance,
-            angle=plate.angle_deg * RADIANS,
-            pivot_height=plate.pivot_height,
+            **ride,
+            distance=value(plate, "distance"),
+            angle=value(plate, "angle_deg") * RADIANS,
+            pivot_height=value(plate, "pivot_height"),
             restitution=restitution,
             drop=drop,
             belt_speed=belt_speed,
-            mass=own.mass,
+            mass=value(scene.particle, "mass"),
             plate_friction=plate_friction,
-            interval=1.0 / scene.rate,
+            interval=1.0 / scenes.rate,
             rebound=rebound,
             unbounded_plate=False,
         )
 
     if out is None:
         return found(0.0, 0.0)
+    drop, belt_speed = value(out, "drop"), value(out, "speed")
     if out.drop_from == "impact":
-        return found(out.drop, out.speed)
-    impact = found(0.0, out.speed)
+        return found(drop, belt_speed)
+    impact = found(0.0, belt_speed)
     # Eq. (16) solved for d2; `predict` refuses a belt above the impact
-    ride_radius = belt.pulley_radius + own.radius
+    ride_radius = ride["pulley_radius"] + ride["particle_radius"]
     sunk = ride_radius * (1.0 - sin_cos(impact.phi1)[1]) + impact.y2
-    return found(np.maximum(out.drop - sunk, 0.0), out.speed)
+    return found(np.maximum(drop - sunk, 0.0), belt_speed)
 
 
-def ride_of(scene: Scene) -> dict[str, Any]:
+def ride_of(scenes: Scene | Family) -> dict[str, Any]:
     """Return what `transfer` takes, as numbers, of particle 0's ride on the incoming conveyor."""
+    value, scene = scenes.value, scenes.scene
     belt, own, at = scene.incoming, scene.particle, scene.stream.at
     assert belt is not None
-    incline, ride_length = belt.incline_deg * RADIANS, belt.length
+    incline, ride_length = value(belt, "incline_deg") * RADIANS, value(belt, "length")
     if at is not None:
         sin, cos = sin_cos(incline)
         ride_length = -(at[0] * cos + at[1] * sin)
-    friction = scene.met(scene.kinds[0], "incoming")[1]
+    friction = scenes.met(scene.kinds[0], "incoming")[1]
     return {
-        "speed": belt.speed,
-        "pulley_radius": belt.pulley_radius,
-        "particle_radius": own.radius,
-        "gravity": scene.gravity,
+        "speed": value(belt, "speed"),
+        "pulley_radius": value(belt, "pulley_radius"),
+        "particle_radius": value(own, "radius"),
+        "gravity": value(scene, "gravity"),
         "friction": np.inf if isinstance(friction, str) else friction,
         "spin": own.spin,
         "inertia": 0.4 if own.shape == "sphere" else 0.5,

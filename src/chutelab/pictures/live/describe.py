@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any, Final
 
 from chutelab.machine import build
-from chutelab.scene import Fault, Scene, SceneError
+from chutelab.scene import Fault, Scene, SceneError, to_dict
 from chutelab.scene.conflicts import EITHER
 from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
-from chutelab.scene.schema import as_written
 from chutelab.scene.units import LARGEST, SHORTEST
 
 MOST: Final = 100_000
@@ -44,7 +43,7 @@ def describe(scene: Scene) -> dict[str, Any]:
         if the scene contradicts itself where it is laid out.
     """
     _need_disks(scene)
-    tables = as_written(scene)
+    tables = to_dict(scene)
     machine, out = build(scene), scene.outgoing
     if out is not None and out.drop_from == "impact":
         height = machine.segments.start[machine.segments.surface == machine.landing][0, 1].item()
@@ -64,11 +63,11 @@ def describe(scene: Scene) -> dict[str, Any]:
             # JavaScript's numbers have all digits of whole numbers up to here.
             if row.get("seed", 0) > 2**53:
                 row["seed"] = str(row["seed"])
-    presets = {
+    materials = {
         name: {key: getattr(preset.material, key) for key in VALUES}
         for name, preset in PRESETS.items()
     }
-    return {"scene": tables, "tables": _rules(), "presets": presets}
+    return {"scene": tables, "tables": _rules(), "presets": materials}
 
 
 def _need_disks(scene: Scene) -> None:

@@ -31,10 +31,11 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
+from chutelab.results.comparison import prediction as predicted
 from chutelab.results.ledger import ledger
-from chutelab.results.notes import layers
 from chutelab.results.quantities import each
 from chutelab.results.stream import QUANTILES, envelopes, flows
+from chutelab.results.summary import layers
 from chutelab.scene import Scene
 from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.units import with_unit
@@ -144,7 +145,7 @@ def analytic_of(
     left = float(each(recording, "separation.t")[0])
     if isnan(left):
         return (), 0.0
-    return arcs(recording.prediction if prediction is None else prediction, recording.scene), left
+    return arcs(prediction or predicted(recording), recording.scene), left
 
 
 def draw_tracks(ax: Axes, recording: Recording, *, marks: bool = True) -> Axes:

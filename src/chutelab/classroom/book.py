@@ -106,8 +106,7 @@ class Book:
 
     def machine(self) -> Picture:
         """Draw the lesson's machine before anything happens."""
-        from chutelab.pictures.plots.bodies import draw_bodies
-        from chutelab.pictures.plots.machinery import draw_scene
+        from chutelab.pictures.plots.machinery import draw_bodies, draw_scene
         from chutelab.pictures.plots.scenery import action, window_of
         from chutelab.pictures.plots.style import Picture, dress
 

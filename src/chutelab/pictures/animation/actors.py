@@ -20,16 +20,18 @@ from PIL import ImageDraw, ImageFont
 
 from chutelab.machine import Arcs, Machine, Pieces
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.bodies import (
+from chutelab.pictures.plots.machinery import (
     LEAST,
     WHITE,
     Bodies,
+    draw_piece,
     motion,
+    pieces,
+    points_of,
     stream_colours,
     stream_handles,
     strings,
 )
-from chutelab.pictures.plots.machinery import draw_piece, pieces, points_of
 from chutelab.pictures.plots.scenery import (
     FINE,
     nominal,

@@ -3,8 +3,7 @@
 ===============  ==================================================================================
 `style`          colours, text sizes, units; a figure that shows itself
 `scenery`        what of a recording is worth drawing: particles, times, part of the world
-`machinery`      the machine to scale, with names
-`bodies`         particles to scale, turned as they are, strings
+`machinery`      machine and particles to scale, with names
 `panels`         tracks, parabola, velocity, ledger; envelope, arrivals, flow, power, losses
 `figure`         the overlay, a still for print, the velocity at an impact, the paper's figures
 `studies`        searches, uncertainty, sweeps, measured points, run time against error

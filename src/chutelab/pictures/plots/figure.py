@@ -19,8 +19,7 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.transforms import Bbox
 
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.bodies import draw_bodies, stream_handles
-from chutelab.pictures.plots.machinery import HALO, draw_scene
+from chutelab.pictures.plots.machinery import HALO, draw_bodies, draw_scene, stream_handles
 from chutelab.pictures.plots.panels import (
     Arc,
     analytic_of,

@@ -16,7 +16,7 @@ from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.bodies import stream_colours
+from chutelab.pictures.plots.machinery import stream_colours
 from chutelab.pictures.plots.scenery import (
     FINE,
     drawn_tracks,

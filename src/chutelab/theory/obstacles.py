@@ -114,7 +114,7 @@ class Obstacles:
         return min([*faces.tolist(), *rings.tolist()], default=-1)
 
     def earliest(self, faces: Floats, rings: Floats) -> tuple[float, int]:
-        """Return the least of two rows of numbers, (S,) and (C,), and whose it is; (inf, -1)."""
+        """Return the least of two rows of numbers, (S,) and (C,), and its surface; (inf, -1)."""
         both = np.append(faces, rings)
         if not np.isfinite(both).any():
             return np.inf, -1

@@ -160,7 +160,7 @@ def cut(found: Transfer, stage: str, reason: str) -> Transfer:
 
 
 class Answers:
-    """Results of N motions as they come in, and why they stop coming."""
+    """Results of N motions, stage by stage, and the reason where they end."""
 
     def __init__(self, count: int) -> None:
         self.values: dict[str, Floats] = {}

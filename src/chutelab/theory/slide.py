@@ -24,10 +24,10 @@ HALVINGS = 64
 """Bisections of an angle: they exhaust a double's digits."""
 
 LEAST = 1e-18
-"""rad; a shorter motion is what bisection leaves of one that stands at once."""
+"""rad; a shorter motion is rounding: the body does not move."""
 
 LARGEST = 700.0
-"""Largest exponent: what grows so far has left the surface, or come to rest, long before."""
+"""Largest exponent; by then the body has left the surface, or come to rest."""
 
 _x = np.arange(-64, 65) / 16.0
 _share = 1.0 / (1.0 + np.exp(-np.pi * np.sinh(_x)))
@@ -312,7 +312,7 @@ def slide(
 
 
 MOST_FRICTION = 1e100
-"""Squares safely; by far too large to tell from infinity once slip has begun."""
+"""Its square does not overflow, and slip at it cannot be told from slip at infinite friction."""
 
 FAULTS = (
     "",

@@ -86,7 +86,7 @@ def transfer(
         Which Eq. (9). The printed one is defined for α = 0 without plate friction only.
     unbounded_plate : bool
         False: do not object when ride or rebound meet the plate's line elsewhere, as a rebound must
-        for α < 0; for callers who know where the plate ends.
+        for α < 0; for callers that know where the plate ends.
 
     Returns
     -------

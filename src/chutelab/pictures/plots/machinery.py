@@ -372,7 +372,7 @@ class Bodies:
     ax : Axes
         With its limits set.
     recording : Recording
-        Whose particles.
+        The run.
     particles : ndarray of int, (n,)
         Which.
     gid, color : str

@@ -124,7 +124,7 @@ def track_times(
     Parameters
     ----------
     recording : Recording
-        Whose track.
+        The run.
     begin, end : float, optional
         s; by default all of the track.
     particle : int
@@ -211,9 +211,9 @@ def as_crowd(recording: Recording) -> bool:
 
 
 def one_of_many(recording: Recording) -> bool:
-    """Tell whether what all particles do matters, not the way of particle 0.
+    """Tell whether pictures show what all particles do, not the way of particle 0.
 
-    So it is where there are many, and no conveyor brings one after the other.
+    They do if there are many, and no conveyor brings one after the other.
     """
     return recording.count > MANY and recording.machine.pulley is None
 
@@ -241,8 +241,7 @@ def places(recording: Recording, particles: Sequence[int] | Ints, times: Floats)
 
 
 STREAM_TRACKS, FEW_TRACKS = 60, 12
-"""Tracks that are drawn of a stream, and of many particles that nothing brings one after the other;
-more would be one blot."""
+"""Most tracks that are drawn: of a stream, and of many particles that are there at once."""
 
 
 def drawn_tracks(recording: Recording) -> Ints:
@@ -252,8 +251,8 @@ def drawn_tracks(recording: Recording) -> Ints:
 
 
 NEARBY, FAR = 0.35, 1.0
-"""Shares of the action's size: around it within the first the ends of belts are shown, within the
-second those of what stands still, and what happens later."""
+"""Margins around the action, in shares of its size: within the first, ends of belts are shown;
+within the second, ends of surfaces at rest, and what happens later."""
 
 
 @dataclass(frozen=True)
@@ -372,10 +371,10 @@ def _path(recording: Recording) -> tuple[Floats, Floats, Floats]:
     What falls has left the scene, and touched nothing since.
     """
     begin, end = action(recording)
-    mine = recording.events[recording.events["particle"] == 0]
-    gone = mine["kind"] == Kind.EXIT
-    mine = mine[~gone & (mine["t"] > begin)]
-    rests = float(mine["t"][-1]) if gone.any() and len(mine) else end
+    events = recording.events[recording.events["particle"] == 0]
+    gone = events["kind"] == Kind.EXIT
+    events = events[~gone & (events["t"] > begin)]
+    rests = float(events["t"][-1]) if gone.any() and len(events) else end
     struck = struck_by_nominal(recording)
     # What it struck before, on the way to the end of a ramp, is not where it goes.
     struck = struck[struck["t"] > begin]

@@ -311,11 +311,11 @@ def _draw_lines(ax: Axes, x: Floats, others: Floats, z: Floats) -> None:
     values = np.unique(others)
     shades = mpl.colormaps[COLORS](np.linspace(0.0, LIGHTEST, len(values)))
     for value, shade in zip(values.tolist(), shades, strict=True):
-        mine = np.flatnonzero(others == value)
-        mine = mine[np.argsort(x[mine], kind="stable")]
+        chosen = np.flatnonzero(others == value)
+        chosen = chosen[np.argsort(x[chosen], kind="stable")]
         ax.plot(
-            x[mine], z[mine], color=shade if len(values) > 1 else style.TRACK, linewidth=1.8,
-            marker="o" if len(mine) <= DOTS else "", markersize=4.0, label=f"{value:g}",
+            x[chosen], z[chosen], color=shade if len(values) > 1 else style.TRACK, linewidth=1.8,
+            marker="o" if len(chosen) <= DOTS else "", markersize=4.0, label=f"{value:g}",
         )  # fmt: skip
 
 
@@ -480,8 +480,8 @@ LOOKS: dict[str, dict[str, Any]] = {
     "contact": {"color": SKY, "marker": "P", "markersize": 8.0},
     "exact": {"color": BLUE, "marker": "*", "markersize": 15.0},
 }
-"""Colour and marker of each method: two signs, for readers who tell colours apart
-badly. In the order of drawing: of two at one place, the upper is the smaller."""
+"""Colour and marker of each method: readers need not tell the colours apart. In the order of
+drawing: of two at one place, the upper is the smaller."""
 
 TITLES = {"pymunk": "pymunk, aligned", "fixed": "pymunk, fixed step"}
 

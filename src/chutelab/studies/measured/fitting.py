@@ -249,7 +249,7 @@ SEARCHED = 41
 """Values tried of each parameter, over twice its size, when a fit is caught in a wrong minimum."""
 
 KEPT = 0.9
-"""Share of the points that a better minimum must keep: it must not do by losing them."""
+"""Least share of the points that a better minimum keeps: with fewer points every sum is smaller."""
 
 TUNING = 2.0
 """Standard deviations from which on a robust fit begins to believe a point less."""
@@ -352,7 +352,7 @@ def _descended(problem: Problem, values: Floats, *, robust: bool) -> _Minimum | 
         )
         values = np.asarray(solved.x)
         left = problem.residuals(values)
-        # Neither 0, for points without noise, nor so large that it could not be told from none.
+        # Clamp; 1.0 means off.
         deviation = result.MAD * float(np.median(np.abs(left)))
         previous, threshold = threshold, min(max(TUNING * deviation, 1e-9), 0.99)
         # From the third turn on points only leave: one at the very end could come and go forever.

@@ -72,7 +72,7 @@ def notes(fit: Fit, bent: Floats, *, settled: bool) -> Iterator[str]:
     relatively; `settled`, whether the fit ended with the same points within the simulated time.
     """
     if doubt := advice(fit.after):
-        # Then nothing else that could be said means anything.
+        # The other notes would mean nothing then.
         yield doubt
         return
     for key, parameter, value, error in zip(

@@ -138,8 +138,8 @@ ASKED, ASK = 300, "Predict: what comes next?"
 """Hundredths of a second that a film waits for a prediction, and what it says meanwhile."""
 
 EDGE = 0.012
-"""Least distance of particle 0 from the window's edges as the film begins, in shares of the window's
-larger side."""
+"""Least distance of particle 0 from the window's edges as the film begins, in shares of its larger
+side."""
 
 TOLD = 1.2
 """s on the screen, holds not counted, for which the caption tells what happened."""

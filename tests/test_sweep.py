@@ -15,6 +15,7 @@ from click.testing import CliRunner
 
 import chutelab
 from chutelab.cli import main
+from chutelab.cli.studies import varied
 from chutelab.engines.exact import CornerError, kinds, run
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
@@ -29,10 +30,8 @@ from chutelab.scene.variants import (
     family,
     is_plain,
     judged_by,
-    parse_range,
     quantity,
 )
-from chutelab.scene.variants import parse as parse_vary
 from chutelab.studies.sweep import (
     COLUMNS,
     MOST_VARIANTS,
@@ -40,12 +39,11 @@ from chutelab.studies.sweep import (
     TEXTS,
     TOUCHES,
     batch,
-    planned,
-    sweep,
 )
 from chutelab.studies.sweep.batch import alone
 from chutelab.studies.sweep.rows import joined
 from chutelab.util.errors import InputError
+from typed import planned, sweep
 
 PAID, HEAT = (f"ledger.by_surface.outgoing.{name}" for name in ("belt_work", "friction_loss"))
 
@@ -476,15 +474,18 @@ def test_three_varied_keys_make_no_picture():
 
 
 def test_units_are_read():
-    assert parse_vary("particle.mass=8g,1kg").values == (0.008, 1.0)
-    assert parse_vary("plate.distance=50cm,1m").values == (0.5, 1.0)
-    assert parse_vary("plate.restitution=0:50%:3").values == (0.0, 0.25, 0.5)
-    assert parse_range("particle.mass=1kg:2kg").values == (1.0, 2.0)
+    def read(text, ranges=False):
+        return varied([text], ranges=ranges)[0]
+
+    assert read("particle.mass=8g,1kg").values == (0.008, 1.0)
+    assert read("plate.distance=50cm,1m").values == (0.5, 1.0)
+    assert read("plate.restitution=0:50%:3").values == (0.0, 0.25, 0.5)
+    assert read("particle.mass=1kg:2kg", ranges=True).values == (1.0, 2.0)
     scene = load("perpendicular")
     for text in ("plate.angle_deg=0:60°:3", "particle.mass=1kg,2kg", "incoming.speed=20cm/s,1m/s"):
-        quantity(scene, parse_vary(text))
+        quantity(scene, read(text))
     with pytest.raises(InputError, match="in kg, not in m"):
-        quantity(scene, parse_vary("particle.mass=1mm"))
+        quantity(scene, read("particle.mass=1mm"))
 
 
 # grids and samples -------------------------------------------------------------------------------
@@ -531,9 +532,9 @@ def test_whole_numbers_are_drawn_as_such_with_both_ends():
 
 def test_samples_need_ranges_and_grids_need_counts():
     scene = load("perpendicular")
-    with pytest.raises(InputError, match="samples are drawn between two ends"):
+    with pytest.raises(InputError, match="between two ends"):
         planned(scene, ["plate.angle_deg=1,2,3"], sample=4)
-    with pytest.raises(InputError, match="from ranges"):
+    with pytest.raises(InputError, match="between two ends, not from lists"):
         planned(scene, [Vary("plate.angle_deg", (1.0, 2.0))], sample=4)
     with pytest.raises(InputError, match="lhs, sobol"):
         planned(scene, ["plate.angle_deg=1:2"], sample=4, design="grid")
@@ -695,7 +696,7 @@ def test_a_frame_has_the_columns():
 def test_nothing_heavy_is_imported_before_it_is_needed():
     code = (
         "import sys, chutelab; from chutelab.studies.sweep import sweep;"
-        "sweep(chutelab.load('perpendicular'), ['plate.angle_deg=0,10']);"
+        "sweep(chutelab.load('perpendicular'), {'plate.angle_deg': [0, 10]});"
         "heavy = 'scipy', 'pyarrow', 'distributed', 'pandas', 'matplotlib', 'pymunk', 'rich';"
         "print([name for name in heavy if name in sys.modules])"
     )

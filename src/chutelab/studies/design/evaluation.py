@@ -7,7 +7,7 @@ numbers are smooth functions of the keys; where it changes, they may jump.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -31,9 +31,7 @@ from chutelab.studies.sweep.rows import touches
 from chutelab.util.arrays import Floats, Ints, Progress
 from chutelab.util.errors import InputError
 
-FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=0:80"
-
-ASK = f"say what may vary; it {FORM}"
+ASK: Final = "say what may vary, and between which ends, such as plate.angle_deg from 0 to 80"
 
 MOST: Final = 8
 """Keys that may vary at once: beyond, a search over the whole range takes too long to be one."""
@@ -91,9 +89,6 @@ def ranges(scene: Scene, vary: Varied) -> tuple[Span, ...]:
         start = float(value) if isinstance(value, (int, float)) else None
         return Span(about.path, about.unit, low, high, start)
 
-    for text in [vary] if isinstance(vary, str) else vary:
-        if not isinstance(vary, Mapping) and isinstance(text, str) and text.count(":") != 1:
-            raise InputError(FORM, f"--vary {text}")
     return each_once("--vary", varied(vary, Range), read, ASK, MOST)
 
 

@@ -1,7 +1,7 @@
 """What can be aimed at: numbers of a run, keys of the scene and plain numbers, with their units.
 
 >>> from chutelab.scene import load
->>> left, right = target(load("perpendicular"), "landing.vx = outgoing.speed")
+>>> left, right = target(load("perpendicular"), "landing.vx", "outgoing.speed")
 >>> left.unit, right.name
 ('m/s', 'outgoing.speed')
 
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import groupby
 from math import nan
-from typing import Any, Final, Literal, TypeVar
+from typing import Any, Final, Literal, Protocol, TypeVar
 
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.quantities import measured as read
@@ -30,23 +30,31 @@ from chutelab.util.versions import library
 T = TypeVar("T")
 
 
+class Typed(Protocol):
+    """What an option takes once; messages call it `typed`."""
+
+    @property
+    def typed(self) -> str:
+        """The option and its value, as on the command line."""
+        ...
+
+
+G = TypeVar("G", bound=Typed)
+
+
 def each_once(
-    option: str, given: Sequence[Any], read: Callable[[Any], T], ask: str, most: int
+    option: str, given: Sequence[G], read: Callable[[G], T], ask: str, most: int
 ) -> tuple[T, ...]:
     """Read what an option takes, given 1 to `most` times; each result has another `key`."""
-
-    def typed(one: Any) -> str:
-        return one.typed if isinstance(one, Vary) else f"{option} {one}"
-
     if not given:
         raise InputError(ask, option)
     if len(given) > most:
-        raise InputError(f"at most {most} keys are allowed", typed(given[most]))
+        raise InputError(f"at most {most} keys are allowed", given[most].typed)
     found: dict[str, T] = {}
-    for text in given:
-        one: Any = read(text)
+    for asked in given:
+        one: Any = read(asked)
         if one.key in found:
-            raise InputError(f"{one.key} is given already", typed(text))
+            raise InputError(f"{one.key} is given already", asked.typed)
         found[one.key] = one
     return tuple(found.values())
 
@@ -142,22 +150,17 @@ def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
     return Quantity(name, row.unit, name, ending=row.ending)
 
 
-def target(scene: Scene, text: str) -> tuple[Quantity, Quantity]:
-    """Read ``QUANTITY=VALUE``: a quantity, and the number, key or quantity that it is to equal.
+def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quantity]:
+    """Return a quantity, and the number, key of the scene or quantity that it is to equal.
 
     Raises
     ------
     InputError
-        If it is not of that form, one of them is unknown, or their units differ.
+        If one of them is unknown, or their units differ.
     """
-    typed = f"--target {text}"
-    name, equals, given = (part.strip() for part in text.partition("="))
-    if not (name and equals and given):
-        raise InputError(
-            "must be QUANTITY=VALUE, such as landing.x=1.2 or landing.vx=outgoing.speed", typed
-        )
+    typed = f"--target {name}={value}"
     left = measured(scene, name, typed)
-    right = _right(scene, given, typed, left)
+    right = _right(scene, value, typed, left)
     if right.source == "number" and right.unit == "":
         right = replace(right, name=f"{right.name} {left.unit}".strip(), unit=left.unit)
     if right.unit != left.unit:
@@ -173,7 +176,9 @@ def _in(unit: str) -> str:
     return f"in {unit}" if unit else "a pure number"
 
 
-def _right(scene: Scene, text: str, typed: str, left: Quantity) -> Quantity:
+def _right(scene: Scene, text: float | str, typed: str, left: Quantity) -> Quantity:
+    if not isinstance(text, str):
+        return Quantity(f"{text:.12g}", "", source="number", number=float(text))
     try:
         number, unit = read_size(text)
         return Quantity(f"{number:.12g} {unit}".strip(), unit, source="number", number=number)

@@ -99,7 +99,7 @@ def by_hand(residual: float = 0.0, shift: float = 0.0) -> Recording:
         normal_impulse=MASS * abs(down[1]), tangential_impulse=push,
     )  # fmt: skip
     recorder.ended[:] = 1
-    return recorder.finish(engine="exact", steps=3)
+    return Recording.of(recorder.finish(engine="exact", steps=3))
 
 
 class Line(NamedTuple):
@@ -195,7 +195,7 @@ def recording_of(machine: Machine, *tracks: Any, ended: str = "time") -> Recordi
         recorder.knots(np.full(len(rows), i), t, rows[:, 1:3], rows[:, 3:5], omega, angle)
         recorder.events(Kind.RELEASE, i, rows[0, 0], rows[0, 1:3], rows[0, 3:5])
     recorder.ended[:] = REASONS.index(ended)
-    return recorder.finish(engine="exact", steps=0)
+    return Recording.of(recorder.finish(engine="exact", steps=0))
 
 
 def seen(figure: Figure) -> list[Text]:

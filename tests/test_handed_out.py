@@ -4,8 +4,6 @@ Read are the sheet in each format, the lesson's page, its card and its live page
 what is written in the film's first part and in the picture of the machine, and its pixels.
 """
 
-from __future__ import annotations
-
 import io
 import re
 from functools import cache

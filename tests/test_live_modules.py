@@ -1,7 +1,5 @@
 """The live page's modules: types and style where node is; the words that they say."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Every lesson's page, played through by mouse and by keyboard: it says what Python says."""
 
-from __future__ import annotations
-
 import json
 from collections import deque
 from pathlib import Path

@@ -190,7 +190,7 @@ def _report(
     """
     from rich.text import Text
 
-    from chutelab.results.report import facts, sheets
+    from chutelab.results.summary import facts, sheets
     from chutelab.studies.accuracy import written
 
     head = Text(recording.title, style="bold")
@@ -247,6 +247,7 @@ def run(
     --partial  With --out: if the run gets stuck, write what was recorded until then.
     """
     from chutelab.engines.simulation import judged
+    from chutelab.results import Recording
     from chutelab.results.recorder import StalledError
 
     wanted: Wanted | None = None
@@ -283,7 +284,8 @@ def run(
             )
             if kept or stalled.recording is None:
                 raise click.ClickException(f"{stalled}{kept}") from stalled
-            recording, stuck = stalled.recording, f"{stalled}; what is written ends there"
+            recording = Recording.of(stalled.recording)
+            stuck = f"{stalled}; what is written ends there"
         except KeyboardInterrupt as error:
             if folder is None or not hasattr(error, "recording"):
                 raise

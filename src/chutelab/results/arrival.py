@@ -11,13 +11,12 @@ The fate of a particle is where it is when its track ends, or by which way it ha
 from __future__ import annotations
 
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.machine import Arcs, Machine, Segments
-from chutelab.results.recording import EVENT, PARTICLES, REASONS, Kind, Recording, hermite
+from chutelab.results.record import EVENT, PARTICLES, REASONS, Kind, Record, hermite, kept
 from chutelab.util.arrays import Bools, Floats, Ints
 
 TOUCH = 0.01
@@ -27,29 +26,17 @@ lets a contact open that lasts, ten times what the pymunk engine lets them overl
 POINT = 1e-9
 """Distance up to which a mass point touches a surface, as a share of the size of the machine."""
 
+CARRIED = 1e-3
+"""m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
+
 LOOKS = 100
 """Instants at which particles on a surface are looked for, beside recorded blows."""
 
 HALVINGS = 24
 """Of the time between two such instants, until the one is known at which a contact began."""
 
-_known: WeakKeyDictionary[Recording, dict[str, NDArray[Any]]] = WeakKeyDictionary()
 
-
-def arrivals(recording: Recording, surface: str = "outgoing") -> NDArray[Any]:
-    """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
-
-    Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
-    for the surface itself) say something of an arrival on what lies there. Not of a family.
-    """
-    known = _known.setdefault(recording, {})
-    if surface not in known:
-        known[surface] = _arrivals(recording, surface)
-        known[surface].flags.writeable = False
-    return known[surface]
-
-
-def fates(recording: Recording) -> NDArray[Any]:
+def fates(recording: Record) -> NDArray[Any]:
     """Return what became of each particle, in words, (N,); each has one fate. Not of a family.
 
     ``on NAME``
@@ -111,7 +98,7 @@ def moving(machine: Machine) -> set[str]:
     return {machine.surfaces[owner] for owner in owners | {machine.landing} - {-1}}
 
 
-def _ways_out(recording: Recording, gone: Ints, ends: Floats) -> list[str]:
+def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
     """Return by which way particles have left the scene that end outside of it, (n, 2), m."""
     machine = recording.machine
     corners = machine.corners if machine.corners.size else machine.releases.position
@@ -157,7 +144,13 @@ def never(count: int) -> NDArray[Any]:
     return events
 
 
-def _arrivals(recording: Recording, surface: str) -> NDArray[Any]:
+@kept
+def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
+    """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
+
+    Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
+    for the surface itself) say something of an arrival on what lies there. Not of a family.
+    """
     found = never(recording.count)
     if surface not in recording.surfaces:
         return found
@@ -214,7 +207,7 @@ def _is_there(pieces: Segments | Arcs, k: int, t: Any) -> Any:
 class Places:
     """Where particles are at an instant, and what of them lies on a surface then."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Record) -> None:
         self.recording = recording
         self.radius = np.broadcast_to(recording.particle.radius, recording.count)
         knots, corners = recording.knots, recording.machine.corners

@@ -11,8 +11,8 @@ import numpy as np
 
 from chutelab.machine import Machine
 from chutelab.machine.parts import Pieces
-from chutelab.results.notes import air_drag
-from chutelab.results.recording import Recording
+from chutelab.results import Recording
+from chutelab.results.summary import air_drag
 from chutelab.scene import Scene
 from chutelab.scene.quantities import THEORY
 from chutelab.scene.units import write_size

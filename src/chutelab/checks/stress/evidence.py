@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from chutelab.checks.stress.surfaces import Bow, Piece, pieces
 from chutelab.core.module import number
 from chutelab.machine import Machine
+from chutelab.results import Recording
 from chutelab.results.laws import Findings, alike, examine, inner_radius
-from chutelab.results.recording import Recording
 from chutelab.util.arrays import Floats
 
 EPS: float = number("EPS")

@@ -17,7 +17,7 @@ from typing import Any
 from chutelab.pictures.live.describe import describe
 from chutelab.pictures.plots import style
 from chutelab.scene import Scene
-from chutelab.scene.live import live_of
+from chutelab.scene.messages import live_of
 from chutelab.scene.quantities import REGISTRY
 from chutelab.util.files import whole
 from chutelab.util.versions import own_version

@@ -58,7 +58,7 @@ def lesson() -> None:
 
 @command("List the lessons.", lesson)
 def list_(*, json_: bool) -> None:
-    """List the lessons: number, name, for whom, how long, and the question of each."""
+    """List the lessons: number, name, level, duration, and the question of each."""
     from chutelab.classroom.lessons.reading import shipped_lessons
     from chutelab.util.tables import Sheet
 
@@ -229,7 +229,7 @@ def new(name: Path, *, from_: LessonName | None) -> None:
     copied = None if from_ is None else find(from_)
     with writing(instead="another place"):
         made = start(name, copied)
-    # A name with a folder in front is taken for a folder, even if a shipped lesson has it.
+    # With a folder in front it means the folder, even if a shipped lesson has this name.
     said = made if len(made.parts) > 1 else f"./{made}"
     console.say(f"wrote {made}; edit it, and make its picture with: chutelab lesson build {said}")
 
@@ -356,7 +356,7 @@ def _plain(lesson: Lesson) -> dict[str, object]:
 
 @command("Mark what students returned: notebooks, result files.", lesson)
 def grade(
-    # One that cannot be read has its row.
+    # A file that cannot be read gets a row of its own.
     files: Annotated[tuple[Path, ...], FileName(exists=True, readable=False, path_type=Path)],
     *,
     out: Annotated[Path | None, FileName(dir_okay=False, path_type=Path)],

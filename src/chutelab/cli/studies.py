@@ -85,7 +85,7 @@ def varied(texts: Sequence[str], *, ranges: bool) -> list[Vary]:
 
 
 MOST_VALUES = 10_000
-"""Values of one key; more would be a slip of the keyboard."""
+"""Most values of one key; more would be a typing error."""
 
 
 def _spaced(first: float, last: float, written: str, typed: str) -> tuple[float, ...]:
@@ -302,7 +302,7 @@ def _propagated(
 
 @contextmanager
 def _unlogged() -> Iterator[None]:
-    """Keep Dask from logging tracebacks of what is said in one message here."""
+    """Keep Dask from logging tracebacks: one message here says what failed."""
     before = logging.root.manager.disable
     logging.disable()
     try:

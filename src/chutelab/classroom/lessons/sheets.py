@@ -47,7 +47,7 @@ def sheet(lesson: Lesson, which: str) -> str:
         case "student":
             text = lesson.text("README")
             heads = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
-            # A worksheet that is not translated has the English ones.
+            # A worksheet that is not translated has the English headings.
             for language in dict.fromkeys((lesson.language, "en")):
                 parts = [words(language).say(key) for key in PARTS]
                 if not (missing := [name for name in parts if name not in heads]):
@@ -180,7 +180,7 @@ def _pictures(lesson: Lesson, tree: SyntaxTreeNode) -> Iterator[tuple[SyntaxTree
 
 
 def _page(lesson: Lesson, tree: SyntaxTreeNode, asked: list[SyntaxTreeNode]) -> str:
-    """Return a page that is whole: pictures are in it."""
+    """Return a page in one file, pictures included."""
     for node in asked:
         node.attrs["class"] = "answer"
     for node, path in _pictures(lesson, tree):
@@ -212,7 +212,7 @@ def _pdf(lesson: Lesson, tree: SyntaxTreeNode, asked: list[SyntaxTreeNode], kind
                 node.attrs["src"] = ""  # its words stand for it
         for node, path in found.items():
             with Image.open(path) as picture:
-                # Of a film its end, when all has happened.
+                # Of a film its last picture.
                 picture.seek(getattr(picture, "n_frames", 1) - 1)
                 picture.convert("RGB").save(folder / f"{path.stem}.png")
             node.attrs["src"] = f"{path.stem}.png"
@@ -222,12 +222,12 @@ def _pdf(lesson: Lesson, tree: SyntaxTreeNode, asked: list[SyntaxTreeNode], kind
         body = _blocks(tree.children, asked)
         source = folder / "sheet.typ"
         source.write_text(f"{look}\n#show: sheet.with({options})\n{body}", encoding="utf-8")
-        # The fonts are Typst's own, and no time is in the file: it is the same everywhere.
+        # With Typst's own fonts and no date, the file is the same everywhere.
         return typst.compile(source, format="pdf", ignore_system_fonts=True)
 
 
 def _text(text: str) -> str:
-    """Return a text as Typst writes one, in which nothing is markup."""
+    """Return a text as a Typst string, without markup."""
     kept = "".join(sign for sign in text if sign.isprintable() or sign == "\n")
     escaped = kept.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     return f'"{escaped}"'
@@ -263,7 +263,7 @@ def _blocks(nodes: Iterable[SyntaxTreeNode], asked: list[SyntaxTreeNode]) -> str
 
 
 def _table(table: SyntaxTreeNode) -> str:
-    """Return a table; columns with cells to be filled in share what room there is."""
+    """Return a table; columns with cells to be filled in share the free width."""
     rows = [
         [_inline(cell) for cell in row.children] for part in table.children for row in part.children
     ]
@@ -271,7 +271,7 @@ def _table(table: SyntaxTreeNode) -> str:
     columns = ", ".join("1fr" if one else "auto" for one in blank)
     head, *body = ("".join(f"[{cell or '#blank'}]" for cell in row) for row in rows)
     made = f"#table(columns: ({columns},), table.header{head}){''.join(body)}"
-    # It is filled in by hand, so it stays on one page.
+    # A table that is filled in by hand stays on one page.
     return f"#block(breakable: false)[{made}]" if any(blank) else made
 
 

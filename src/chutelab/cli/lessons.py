@@ -100,8 +100,6 @@ def show(
     --format  Markdown, a web page in one file, or A4 to print (which needs the extra
         chutelab[pdf]); default: as the file's name says, in a folder pdf.
     --all  The sheet of every shipped lesson.
-    --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
-        [default]
     --json  Print one JSON object instead of text.
     """
     if (lesson is None) is not all_:
@@ -255,8 +253,6 @@ def page(
     file of that name.
 
     -o, --out DIR  The folder, or FILE.html; files that are there are replaced. [required]
-    --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
-        [default]
     --wheel / --no-wheel  With what students install, or without.
     """
     from chutelab.classroom.lessons.pages import bundle, live_page
@@ -312,8 +308,6 @@ def scorm(
     --all  All lessons that are shipped.
     -o, --out DIR|FILE.zip  The folder for the packages, NN-name.scorm.zip each, by default this
         one; or, for one lesson, the zip file itself. Files that are there are replaced.
-    --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
-        [default]
     """
     from chutelab.classroom.lessons.pages import package
 

@@ -56,6 +56,8 @@ SHARED = """
 --engine  Same as --set run.engine=...
 --dt S  Same as --set run.dt=S.
 --json  Print one JSON object instead of tables.
+--language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
+    [default]
 -q, --quiet  Print nothing, and show no progress bar.
 """
 """Options of several commands."""

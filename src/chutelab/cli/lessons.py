@@ -39,6 +39,8 @@ def complete_lesson(begun: str) -> list[CompletionItem]:
     return beginning(titles, begun)
 
 
+HEADS = ("file", "student", "lesson", "marks (*: working shown)", "remarks")
+
 LessonName = Annotated[str, FileName(), complete_lesson]
 LessonNames = Annotated[Texts, FileName(), complete_lesson]
 
@@ -424,7 +426,12 @@ def grade(
             )
     done: list[Grade] = []
 
-    def rows(update: Callable[[float], None] | None) -> Iterator[Grade]:
+    def marks(one: Grade) -> str:
+        given = enumerate(one.marks, 1)
+        shown = " ".join(f"{mark}*" if n in one.revealed else str(mark) for n, mark in given)
+        return f"{one.total} of {one.out_of} ({shown})" if one.marks else "-"
+
+    def marked(update: Callable[[float], None] | None) -> Iterator[Grade]:
         for row in grade_returned(returned, time_limit=time_limit):
             done.append(row)
             yield row
@@ -439,30 +446,21 @@ def grade(
     try:
         with progress("marking", quiet=quiet) as update, writing(f"--out {out}"):
             if out is None:
-                deque(rows(update), maxlen=0)
+                deque(marked(update), maxlen=0)
             else:
-                write_csv(rows(update), out)
+                write_csv(marked(update), out)
     finally:
         if done and json_:
             console.show_json({"format": 1, "grades": done})
         elif done and not quiet:
-            console.show(Sheet("", HEADS, tuple(map(_cells, done)), texts=5))
+            rows = [(one.file, one.student, one.lesson, marks(one), one.reason) for one in done]
+            console.show(Sheet("", HEADS, tuple(rows), texts=5))
         if out is not None and part.exists():
-            marked = f"{len(done)} of {len(returned)} files"
-            console.say(f"the marks of {marked} are in {part}", err=True)
+            count = f"{len(done)} of {len(returned)} files"
+            console.say(f"the marks of {count} are in {part}", err=True)
     if report is not None:
         with writing(f"--report {report}"):
             write_lines(report, [class_report(done)], errors="replace")
     for target in filter(None, (out, report)):
         if not json_:
             console.say(f"wrote {target}")
-
-
-HEADS = ("file", "student", "lesson", "marks (*: working shown)", "remarks")
-
-
-def _cells(one: Grade) -> tuple[str, ...]:
-    """Return the cells of a row in the table, see `HEADS`."""
-    shown = (f"{mark}*" if n in one.revealed else str(mark) for n, mark in enumerate(one.marks, 1))
-    marks = f"{one.total} of {one.out_of} ({' '.join(shown)})"
-    return (one.file, one.student, one.lesson, marks if one.marks else "-", one.reason)

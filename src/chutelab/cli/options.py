@@ -104,10 +104,11 @@ def _parameters(taker: Callable[..., Any], parts: dict[str, Any]) -> Iterator[cl
             parts[name] = kind
             yield from _parameters(kind, parts)  # type: ignore[arg-type]
             continue
-        while (form := get_origin(kind)) in (Annotated, tuple, Union, UnionType):
-            several = several or form is tuple
+        # `X | None`, `tuple[X, ...]` and `Annotated[X, ...]` take an X.
+        while (outer := get_origin(kind)) in (Annotated, tuple, Union, UnionType):
+            several = several or outer is tuple
             kind, *others = get_args(kind)
-            extras += others if form is Annotated else []
+            extras += others if outer is Annotated else []
         usual: Any = FileName(path_type=Path) if kind is Path else kind
         if get_origin(kind) is Literal:
             usual = click.Choice(get_args(kind))

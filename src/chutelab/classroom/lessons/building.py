@@ -294,10 +294,15 @@ def notebook_of(lesson: Lesson) -> str:
             add(kind, f"{place}-own-{n}".lower().replace(" ", "-"), source, place)
 
     def prose(part: str) -> str:
-        """Return paragraphs on a line each, without those that are for a terminal."""
-        paragraphs = re.split(r"\n{2,}", part.strip())
+        """Return paragraphs on a line each, without those that are for a terminal.
+
+        Lists and tables keep their line breaks.
+        """
         terminal = f"*{say('notebook-terminal')}"
-        return "\n\n".join(_unbroken(one) for one in paragraphs if not one.startswith(terminal))
+        paragraphs = re.split(r"\n{2,}", part.strip())
+        kept = [textwrap.dedent(one) for one in paragraphs if not one.startswith(terminal)]
+        broken = r"\n(?!\s*(?:[-*] |\||\d+\. )|#)\s*"
+        return "\n\n".join(re.sub(broken, " ", one) for one in kept)
 
     exercise = EXERCISES.get(lesson.name)
     title, _, opening = heading.partition("\n")
@@ -407,8 +412,3 @@ def _commands(block: str) -> str:
     runs = [re.sub(r" --(out|only) \S+", "", line) for line in found]
     lines = "".join(f"    {json.dumps(run, ensure_ascii=False)},\n" for run in runs)
     return f"runs = book.run(\n{lines})\nruns"
-
-
-def _unbroken(paragraph: str) -> str:
-    """Return a paragraph without its line breaks; lists and tables keep theirs."""
-    return re.sub(r"\n(?!\s*(?:[-*] |\||\d+\. )|#)\s*", " ", textwrap.dedent(paragraph))

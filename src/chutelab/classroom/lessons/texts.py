@@ -189,11 +189,11 @@ def parser() -> MarkdownIt:
     from mdit_py_plugins.dollarmath import dollarmath_plugin
 
     made = MarkdownIt("commonmark", {"html": False}).enable("table")
-    return made.use(dollarmath_plugin, allow_space=False, renderer=_mathematics)
-
-
-def _mathematics(tex: str, options: dict[str, bool]) -> str:
-    return mathml(tex, display=options["display_mode"])
+    return made.use(
+        dollarmath_plugin,
+        allow_space=False,
+        renderer=lambda tex, options: mathml(tex, display=options["display_mode"]),
+    )
 
 
 _NAMED: Final = r"(?:<mi>[a-z]{2,}</mi>|<(msu[bp])><mi>[a-z]{2,}</mi>.*?</\1>)"

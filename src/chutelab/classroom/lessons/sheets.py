@@ -66,59 +66,58 @@ def sheet(lesson: Lesson, which: str) -> str:
             if lesson.number is not None:
                 title = say("sheet-title", number=lesson.number, title=title)
             head = f"# {say('sheet-teacher', title=title)}"
-            made = "\n\n".join([head, *_for_the_teacher(lesson)]) + "\n"
+            made = f"{head}\n\n{_for_the_teacher(lesson)}\n"
     if lesson.untranslated:
         title, _, rest = made.partition("\n")
         made = f"{title}\n\n*{say('untranslated')}*\n{rest}"
     return made
 
 
-def _for_the_teacher(lesson: Lesson) -> Iterator[str]:
+def _for_the_teacher(lesson: Lesson) -> str:
+    """Return the sections of the teacher's sheet; those without a text are left out."""
     said = words(lesson.language)
-    say = said.say
-    level = say("sheet-level", level=say(f"level-{lesson.level}"), minutes=lesson.minutes)
-    yield f"{lesson.question}\n\n{level}"
-    teacher = lesson.teacher or Teacher()
-    if teacher.goals:
-        yield f"## {say('sheet-goals')}\n\n" + "\n".join(f"- {goal}" for goal in teacher.goals)
-    if teacher.say:
-        yield f"## {say('sheet-say')}\n\n{teacher.say}"
-    if teacher.predictions:
-        key = "\n".join(f"{n}. {answer}" for n, answer in enumerate(teacher.predictions, 1))
-        yield f"## {say('sheet-predictions')}\n\n{key}"
-    yield from _of_exercise(lesson, said)
+    say, teacher = said.say, lesson.teacher or Teacher()
     lengths = (("sheet-basic", teacher.basic), ("sheet-stretch", teacher.stretch))
-    if lines := [f"- {say(key)}: {text}" for key, text in lengths if text]:
-        yield f"## {say('sheet-lengths')}\n\n" + "\n".join(lines)
-    if teacher.curriculum:
-        yield f"## {say('sheet-curriculum')}\n\n{teacher.curriculum}"
+    sections = {
+        "sheet-goals": "\n".join(f"- {goal}" for goal in teacher.goals),
+        "sheet-say": teacher.say,
+        "sheet-predictions": "\n".join(
+            f"{n}. {answer}" for n, answer in enumerate(teacher.predictions, 1)
+        ),
+        **_of_exercise(lesson, said),
+        "sheet-lengths": "\n".join(f"- {say(key)}: {text}" for key, text in lengths if text),
+        "sheet-curriculum": teacher.curriculum,
+    }
+    level = say("sheet-level", level=say(f"level-{lesson.level}"), minutes=lesson.minutes)
+    parts = (f"## {say(key)}\n\n{text}" for key, text in sections.items() if text)
+    return "\n\n".join([f"{lesson.question}\n\n{level}", *parts])
 
 
-def _of_exercise(lesson: Lesson, said: Words) -> Iterator[str]:
-    """Yield the key to the exercise, and the mistakes that its replies name."""
+def _of_exercise(lesson: Lesson, said: Words) -> dict[str, str]:
+    """Return the key to the exercise, and the mistakes that its replies name, as sections."""
     if lesson.name not in EXERCISES:
-        return
+        return {}
     exercise, say = told(lesson.name, lesson.language), said.say
     given, cases = draw(exercise, UNNAMED)
-    lines = []
+    lines, rows = [], [f"| {say('sheet-columns')} |", "|---|---|---|"]
     for case in cases:
-        asked = case.question
-        way = "; ".join(case.numbers.text(line) for line in asked.working.strip().splitlines())
+        asked, text = case.question, case.numbers.text
+        way = "; ".join(map(text, asked.working.strip().splitlines()))
         answer = say("answer", answer=with_unit(case.right, asked.unit, said))
         lines.append(f"{case.number}. *{asked.title}*: {way}. {answer}.")
+        rows += [
+            f"| {case.number} | {known.called or known.name} | {text(known.says)} |"
+            for known in asked.mistakes
+        ]
     numbers = "; ".join(
         f"{one.symbol} = {with_unit(given[one.name], one.unit, said)}"
         for one in exercise.parameters
     )
     shipped = say("sheet-shipped", name=UNNAMED, numbers=numbers)
-    yield f"## {say('sheet-key')}\n\n{shipped}\n\n" + "\n".join(lines)
-    rows = [
-        f"| {case.number} | {known.called or known.name} | {case.numbers.text(known.says)} |"
-        for case in cases
-        for known in case.question.mistakes
-    ]
-    head = f"| {say('sheet-columns')} |\n|---|---|---|\n"
-    yield f"## {say('sheet-mistakes')}\n\n{say('sheet-besides')}\n\n{head}" + "\n".join(rows)
+    return {
+        "sheet-key": "\n".join([f"{shipped}\n", *lines]),
+        "sheet-mistakes": "\n".join([f"{say('sheet-besides')}\n", *rows]),
+    }
 
 
 FORMATS: Final = ("md", "html", "pdf")

@@ -12,6 +12,7 @@ from importlib import import_module
 from io import StringIO
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -555,7 +556,7 @@ def test_what_cannot_be_written_to_is_refused_before_the_work(arguments, monkeyp
         "classroom.grading.grade",
         "pictures.plots.figure.paper_figure",
         "classroom.lessons.building.judged",
-        "classroom.lessons.building._lesson",
+        "classroom.lessons.pages._lesson",
     )
     # All imported first: one that is imported later would keep what stands for another's.
     modules = [import_module(f"chutelab.{work.rpartition('.')[0]}") for work in works]
@@ -852,6 +853,22 @@ def test_help_lists_the_commands():
     assert call("-h").stdout == text
     for command in commands:
         assert call(command, "--help").stdout.startswith(f"Usage: main {command} ")
+
+
+def test_options_and_docstrings_name_the_same():
+    """What a docstring tells of an option is of one that is there, and each option is told."""
+
+    def commands(group):
+        for one in group.commands.values():
+            yield from commands(one) if isinstance(one, click.Group) else [one]
+
+    for command in commands(main):
+        options = [one for one in command.params if isinstance(one, click.Option)]
+        names = {name for one in options for name in (*one.opts, *one.secondary_opts)}
+        assert all(one.help for one in options)
+        told = re.findall(r"^    (-[^\n]*?)  ", command.callback.__doc__, re.MULTILINE)
+        assert {name for form in told for name in re.findall(r"--?[a-z][\w-]*", form)} <= names
+        assert not re.search(r"^-.*?  ", command.help, re.MULTILINE)
 
 
 def test_shells_complete_scenes_and_kinds():

@@ -17,6 +17,8 @@ SCENES = [
     ("perpendicular",), ("inclined-40",), ("stream", "stream.count=60"), ("slip",), ("spoon",),
     ("cascade",), ("two-sizes",), ("hopper", "stream.count=150"), ("inclined-conveyor",),
     ("belt-landing",), ("free-fall",), ("low-speed",), ("mixture", "stream.fines.count=30"),
+    ("slip", "particle.shape=sphere", "particle.spin=true"),
+    *(("stream", "stream.count=20", f"stream.seed={seed}") for seed in (2**32, 2**53 - 1)),
 ]  # fmt: skip
 
 

@@ -5,7 +5,7 @@ import pytest
 
 import sandbox
 from chutelab.core import module
-from chutelab.engines.contact import engine
+from chutelab.engines import contact as engine
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
 from chutelab.scene import from_dict, load, parse

@@ -1,11 +1,10 @@
 """The references against closed forms, and against the exact engine where that has an answer."""
 
 from dataclasses import replace
-from math import cos, exp, hypot, pi, sin, sqrt
+from math import pi, sqrt
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from chutelab import scene
 from chutelab.engines import exact
@@ -13,14 +12,7 @@ from chutelab.machine import build
 from chutelab.results import Kind
 from drawn import draw, only_blows
 from machines import (
-    BELT,
-    LENGTH,
-    SLIDES,
-    WHEEL,
     box,
-    over_the_pulley,
-    ramp,
-    round_the_wheel,
     scene_of,
     thrown,
 )
@@ -31,8 +23,6 @@ from references import (
     inside_surfaces,
     likeness,
     overlaps,
-    round_the_pulley,
-    slide,
     virial,
     wall_pressure,
 )
@@ -134,57 +124,6 @@ def test_a_gas_presses_on_its_walls_as_the_virial_theorem_says(end):
     assert abs(inside - outside) < 4.0 * spread / (2.0 * kinetic * end) < 0.16 / end
     pressure = wall_pressure(walls, perimeter=4.0 * side, time=end)
     assert pressure == pytest.approx(walls.sum() / (4.0 * side * end), rel=1e-15, abs=0.0)
-
-
-# Lasting contacts
-
-
-@pytest.mark.parametrize("friction", [0.15, 0.5, 2.0])
-@pytest.mark.parametrize("turning", [0.0, 2.0])
-def test_round_the_pulley_as_the_exact_engine_and_the_slip_law_say(friction, turning):
-    r = 0.004
-    ride = WHEEL + r
-    found = round_the_pulley(
-        belt=BELT, ride=ride, friction=friction, turning=turning, way=-LENGTH, speed=0.8
-    )
-    u0 = BELT**2 / (G * ride)
-    if turning == 0.0 and friction > 0.15:
-        # It has the belt's speed before it comes to the pulley.
-        # u' = 2 (sin φ - µ (cos φ - u)); u = A cos φ - B sin φ + C exp(2 µ φ), from the onset on.
-        onset = brentq(lambda f: sin(f) - friction * (cos(f) - u0), 0.0, 1.5, xtol=1e-15)
-        a, b = (
-            (4.0 * friction**2 - 2.0) / (1.0 + 4.0 * friction**2),
-            6.0 * friction / (1.0 + 4.0 * friction**2),
-        )
-        c = (u0 - a * cos(onset) + b * sin(onset)) * exp(-2.0 * friction * onset)
-        leaves = brentq(
-            lambda f: a * cos(f) - b * sin(f) + c * exp(2.0 * friction * f) - cos(f),
-            onset + 1e-6, 1.5, xtol=1e-15,
-        )  # fmt: skip
-        assert [what for _, what in found.phases] == ["slip", "grip", "grip", "slip"]
-        assert found.angle == pytest.approx(leaves, abs=1e-9)
-    recording = exact.run(over_the_pulley(r, friction, turning, 0.8, until=3.0))
-    left = recording.select(Kind.SEPARATION)[0]
-    assert found.t == pytest.approx(left["t"], rel=1e-9)
-    assert found.angle == pytest.approx(np.arctan2(*left["position"]), abs=1e-9)
-    assert found.speed == pytest.approx(hypot(*left["velocity_after"]), rel=1e-9)
-    assert found.rim == pytest.approx(r * left["omega_after"], abs=1e-9)
-    times = np.linspace(0.0, found.t, 200)
-    place = round_the_wheel(found.state(times)[0], r)
-    np.testing.assert_allclose(recording.at(times)[0][:-1, 0], place[:-1], rtol=0, atol=1e-8)
-
-
-@pytest.mark.parametrize("options", SLIDES)
-def test_slide_as_the_exact_engine_says(options):
-    machine, start, along = ramp(options)
-    recording = exact.run(machine)
-    times = np.linspace(0.0, 1.99, 50)
-    way, speed, _ = slide(times, **options)
-    place, velocity = recording.at(times)
-    np.testing.assert_allclose(place[:, 0], start + way[:, None] * along, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(velocity[:, 0], speed[:, None] * along, rtol=0, atol=1e-12)
-    r = machine.particle.radius
-    assert r * recording.track(0)[-1]["omega"] == pytest.approx(slide(2.0, **options)[2], abs=1e-12)
 
 
 # Gas

@@ -27,8 +27,8 @@ from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
 from chutelab.results import laws
 from chutelab.results.ledger import ledger
+from chutelab.results.record import hermite
 from chutelab.results.recorder import StalledError
-from chutelab.results.recording import hermite
 from chutelab.scene import SceneError
 from chutelab.studies.sweep import sweep
 from stress.case import TRANSFER, merged, surface, thrown
@@ -186,7 +186,7 @@ def test_steps_longer_than_the_radius_are_told_where_something_may_be_passed():
 
 
 def report(run):
-    from chutelab.results.report import sheets
+    from chutelab.results.summary import sheets
 
     return sheets(run)
 

@@ -54,13 +54,9 @@ def refused(*arguments):
 def process(*arguments, **options):
     environment = {**os.environ, "PYTHONPATH": SOURCES, **options.pop("env", {})}
     return subprocess.Popen(
-        [sys.executable, "-m", "chutelab", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment,
-        **options,
-    )
+        [sys.executable, "-m", "chutelab", *arguments], stderr=subprocess.PIPE, text=True,
+        env=environment, **{"stdout": subprocess.PIPE, **options},
+    )  # fmt: skip
 
 
 # run: what it prints
@@ -470,11 +466,17 @@ def test_a_failure_of_ours_ends_with_1_one_line_and_nothing_written(monkeypatch)
     assert "not enough memory; fewer particles need less. (Unable to allocate" in said
 
 
-def test_a_reader_that_has_gone_is_no_reason_for_a_traceback():
+def test_a_reader_that_has_gone_or_a_full_device_is_no_reason_for_a_traceback():
     with process("schema") as writer:
         writer.stdout.close()
         assert writer.stderr.read() == ""
         assert writer.wait(timeout=60) == 1
+    if Path("/dev/full").exists():
+        with Path("/dev/full").open("w") as full, process("--help", stdout=full) as writer:
+            said = writer.stderr.read()
+        assert (writer.returncode, said) == (
+            1, "chutelab failed: standard output: No space left on device\n"
+        )  # fmt: skip
 
 
 @pytest.mark.parametrize(

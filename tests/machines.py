@@ -8,8 +8,7 @@ from math import cos, inf, sin
 import numpy as np
 
 from chutelab.core.module import Module
-from chutelab.machine import build
-from chutelab.machine.parts import Arcs, Particle
+from chutelab.machine import Arcs, Particle, build
 from chutelab.machine.rows import lay
 from chutelab.scene import from_dict
 

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from chutelab.engines import contact, exact
-from chutelab.engines.exact import detect, joints
+from chutelab.engines.exact import detect, obstacles
 from chutelab.machine import build
 from chutelab.scene import from_dict
 from judge import faults
@@ -125,8 +125,8 @@ def test_the_laws_see_an_engine_that_overlooks_rims_or_sorts_no_joint(monkeypatc
     drawn, run = ran({"radius": 0.1}, [PIPE], (-0.9, 0.5), until=2.0)
     assert any(said.startswith("through p0") for said in faults(run, drawn))
     monkeypatch.undo()
-    by_bend = joints._by_bend
-    monkeypatch.setattr(joints, "_by_bend", lambda rays: by_bend(rays)[::-1])
+    by_bend = obstacles._by_bend
+    monkeypatch.setattr(obstacles, "_by_bend", lambda rays: by_bend(rays)[::-1])
     drawn, run = ran({"radius": 0.008}, JOINTS["end"], (-0.5, 0.0081), (2.0, 0.0))
     assert any(said.startswith("in p1") for said in faults(run, drawn))
 

@@ -1,7 +1,5 @@
 """The references against closed forms, and against the exact engine where that has an answer."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi, sqrt
 
@@ -24,10 +22,7 @@ from references import (
     henderson,
     inside_surfaces,
     likeness,
-    maxwell_boltzmann,
     overlaps,
-    pair_overlaps,
-    surface_depths,
     virial,
     wall_pressure,
 )
@@ -44,7 +39,7 @@ def own_impacts(recording, particle):
 
 
 @pytest.mark.parametrize(
-    ("count", "least"), [(40, 10), pytest.param(150, 50, marks=pytest.mark.slow)]
+    ("count", "least"), [(20, 5), pytest.param(150, 50, marks=pytest.mark.slow)]
 )
 def test_lone_disks_meet_what_they_meet_in_the_exact_engine(count, least):
     compared = 0
@@ -108,7 +103,7 @@ def test_a_pair_meets_when_and_as_fast_as_written_here():
     assert (found[0][0].partner, found[1][0].partner) == (1, 0)
 
 
-@pytest.mark.parametrize("end", [1.5, pytest.param(8.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("end", [0.75, pytest.param(8.0, marks=pytest.mark.slow)])
 def test_a_gas_presses_on_its_walls_as_the_virial_theorem_says(end):
     # d/dt Σ m x·v = 2 K + Σ σ J (pairs) - (walls) ½ a J, with x from the middle and a = side - 2 r.
     count, side, r = 64, 1.0, 0.02
@@ -142,12 +137,6 @@ def test_henderson_has_the_virial_coefficients_of_hard_disks():
     assert third == pytest.approx(16.0 / 3.0 - 4.0 * sqrt(3.0) / pi, rel=1e-3)
 
 
-def test_maxwell_boltzmann_tells_normal_components_from_others():
-    rng = np.random.default_rng(3)
-    assert maxwell_boltzmann(rng.normal(0.0, 2.5, (2000, 2))) > 0.01
-    assert maxwell_boltzmann(rng.uniform(-1.0, 1.0, (2000, 2))) < 1e-6
-
-
 # Overlaps
 
 
@@ -169,29 +158,3 @@ def test_overlaps_are_those_of_what_touches_in_radii():
     assert depth.percentile_99 == pytest.approx(0.1, rel=1e-12, abs=0.0)
     depth = inside_surfaces(recording, built, [0.0])
     assert (depth.worst, depth.count) == (pytest.approx(0.1, rel=1e-12, abs=0.0), 1)
-
-
-def test_overlaps_of_two_sizes_count_in_radii_of_the_smaller():
-    """1 and 4 mm, 4.8 mm apart: 0.2 mm deep, and 0.2 of the smaller."""
-    deep = pair_overlaps(np.array([[0.0, 0.0], [0.0048, 0.0], [0.02, 0.0]]), [0.001, 0.004, 0.004])
-    assert deep == pytest.approx([0.2], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("place", "deep"),
-    [
-        ((0.0, -0.485), -0.005),  # inside, at the lowest point
-        ((0.0, -0.505), 0.005),  # outside, beyond it
-        ((0.0, 0.5), -0.697106781186548),  # above: sqrt(1/2) m from both ends
-        ((0.5, 0.003), 0.007),  # above the right end
-        ((-0.5, -0.003), 0.009991),  # beside the left one, rather: 9 um from the arc
-    ],
-)
-def test_disks_are_as_deep_in_an_arc_as_its_nearest_point_is_near(place, deep):
-    """A half circle of 0.5 m below the origin, that comes at 1 s and goes at 2 s."""
-    bowl = {"name": "bowl", "center": [0.0, 0.0], "radius": 0.5, "from_deg": 180.0,
-            "to_deg": 360.0, "closes_at": 1.0}  # fmt: skip
-    built = scene_of(surface=[bowl])
-    (found,) = surface_depths(built, np.array([place]), 0.01, 1.5).values()
-    assert found == pytest.approx([deep], abs=1e-9)
-    assert surface_depths(built, np.array([place]), 0.01, 0.5) == {}

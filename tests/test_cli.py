@@ -546,7 +546,7 @@ def test_what_cannot_be_written_to_is_refused_before_the_work(arguments, monkeyp
         "classroom.grading.grade",
         "pictures.plots.figure.paper_figure",
         "classroom.lessons.building.judged",
-        "classroom.lessons.building._lesson",
+        "classroom.lessons.pages._lesson",
     )
     # All imported first: one that is imported later would keep what stands for another's.
     modules = [import_module(f"chutelab.{work.rpartition('.')[0]}") for work in works]

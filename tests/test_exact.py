@@ -598,7 +598,7 @@ def test_particles_may_have_surfaces_of_their_own():
     }
     releases = [
         np.concatenate([getattr(m.releases, name) for m in built])
-        for name in ("t", "position", "velocity", "carried", "stream", "kind")
+        for name in ("t", "position", "velocity", "carried", "stream", "kind", "exit_box")
     ]
     batch = replace(
         built[0],

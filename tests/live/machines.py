@@ -39,9 +39,6 @@ def as_page_has_it(machine):
         "endTime": float(machine.end_time),
         "dt": machine.dt,
         "interact": machine.interact,
-        "exitBoxes": np.stack(
-            [np.broadcast_to(side, machine.count) for side in machine.exit_box], axis=1
-        ).tolist(),
         "segments": rows(
             segments,
             {
@@ -79,6 +76,7 @@ def as_page_has_it(machine):
                 "y": releases.position[i, 1].item(),
                 "vx": releases.velocity[i, 0].item(),
                 "vy": releases.velocity[i, 1].item(),
+                "exitBox": releases.exit_box[i].tolist(),
                 "carried": releases.carried[i].item(),
                 "stream": releases.stream[i].item(),
                 "kind": releases.kind[i].item(),

@@ -1,9 +1,10 @@
 /* What the core shares with its host: every array, every number, in SI units.
 
-   The host lays the arrays out in the memory of the module, writes their places into `World`, fills
-   in what is marked [in], and reads what is marked [out]. `tools/build_core.py` reads this file and
-   writes `layout.json`, from which hosts take sizes, offsets and names: so a field is declared once.
-   Only `double`, `int`, arrays of these and pointers stand here. */
+   The host fills in the counts marked [in] of a subject, has the core lay its arrays out (`lay_out_...`),
+   fills in what of them is marked [in], calls what does the work, and reads what is marked [out].
+   `tools/build_core.py` reads this file and writes `layout.json`, from which hosts take sizes, offsets
+   and names: so a field is declared once. Only `double`, `int`, arrays of these and pointers stand
+   here. */
 
 #ifndef LAYOUT_H
 #define LAYOUT_H
@@ -28,8 +29,9 @@ enum There { ABSENT, THERE, LEAVING };
 /* When a run ends: `run.until`. */
 enum Until { UNTIL_LANDED, UNTIL_SETTLED, UNTIL_TIME };
 
-/* Why `run` came back. PAUSED: the budget of steps is used up. FULL_...: make room and go on. */
-enum Status { DONE, PAUSED, FULL_KNOTS, FULL_EVENTS, FULL_NEAR, FULL_CONTACTS, STALLED };
+/* Why `run` came back. PAUSED: the budget of steps is used up. FULL: take knots and events, and go on.
+   LACKING: the core gets no more memory. */
+enum Status { DONE, PAUSED, FULL, STALLED, LACKING };
 
 typedef struct {
     double x, y, vx, vy, spin;  /* [in] at time t: centre, velocity, angular velocity */
@@ -174,11 +176,11 @@ typedef struct {                                                                
 typedef struct { int disk, next, ix, iy; } Cell; /* one disk in one cell of the grid */
 
 typedef struct {
-    /* arrays, laid out by the host */
     Disk *disks;
-    Track *tracks;
-    Surface *surfaces;   /* with room for twice the arcs */
+    Surface *surfaces;   /* with room for twice as many: narrow arcs become two */
     Pair *pairs;         /* (kinds, kinds + materials) */
+    /* arrays that `prepare` lays out */
+    Track *tracks;
     double *books;       /* (owners + 1, 3), J; the last row is the disks' among themselves */
     Knot *knots;
     Event *events;
@@ -198,8 +200,10 @@ typedef struct {
     int *circles;        /* ... and within, behind them, the circles */
     int *spared;         /* (disks, gates) 1: what shut on this disk, and does not touch it yet */
     /* sizes */
-    int disk_count, surface_count, kind_count, material_count, owner_count;
+    int disk_count, surface_count, kind_count, owner_count; /* [in] */
+    int material_count;
     int knot_room, event_room, contact_room, near_room, cell_room;
+    int full;            /* what `run` makes room for as it goes on: see `Full` */
     int bucket_count;    /* a power of two */
     int gate_count, end_count, circle_count;
     /* the run */
@@ -285,6 +289,9 @@ typedef struct {
     double repeat[6];       /* up to two of count, dx, dy */
 } SurfaceKeys;
 
+/* A string from a point to a particle; without a length as long as it has to be at the release. */
+typedef struct { double from[2], length, particle; } StringKeys;
+
 /* Pieces of surfaces. Speeds are along the tangent, and clockwise round an arc. */
 typedef struct {                                                                         /* [out] */
     double start[2], end[2], tangent[2], length, speed;
@@ -316,16 +323,22 @@ typedef struct {                                                                
 typedef struct {
     double *rows;           /* [in] (members, width) */
     int members, width;     /* [in] */
-    int particles, streams, incoming, plates, outgoing, conveyors, surfaces; /* [in] counts */
+    int particles, streams, incoming, plates, outgoing, conveyors, surfaces, strings; /* [in] counts */
     Segment *segments;      /* [out] (members, segment_count) */
     Arc *arcs;
     Nominal *nominal;       /* [out] (members) */
-    int segment_room, arc_room;   /* [in] of all members */
     int segment_count, arc_count; /* [out] of each */
 } Plan;
 
-/* Where and how a particle starts. */
-typedef struct { double t, position[2], velocity[2], radius; } Start;                     /* [out] */
+/* m below the lowest surface and release, or outside the box of all without gravity, where a track
+   ends. */
+#define EXIT_MARGIN 1.0
+
+/* Where and how a particle starts, and where its track ends if nothing holds it. */
+typedef struct {                                                                         /* [out] */
+    double t, position[2], velocity[2], radius;
+    double exit_box[4];     /* m; left, bottom, right, top */
+} Start;
 
 /* An earlier particle as one that is drawn sees it: how far it has come (m), and how far apart they
    have to be. */
@@ -353,8 +366,8 @@ typedef struct {
     int *links;             /* (count) */
     int *heads;             /* (head_room) lists of a grid */
     int *listed;            /* (pieces) */
-    int count;              /* [in] particles of each member */
-    int head_room;          /* [in] a power of two */
+    int count;              /* [out] particles of each member */
+    int head_room;          /* a power of two */
     int looks;              /* [in] particles and places that a call looks at before it comes back */
     /* how far it has come */
     int left;               /* of the looks of this call */
@@ -430,20 +443,19 @@ typedef struct {                                                                
 } Breach;
 
 typedef struct {
-    /* arrays, laid out by the host */
     double *knots;          /* [in] rows of t, x, y, vx, vy, spin, three entries of the ledger */
     int *offsets;           /* [in] (particles + 1) first knot of each, and behind the last */
     Body *bodies;           /* [in] (particles) */
     Barrier *barriers;      /* [in] (pieces), of a family (particles, pieces) */
     double *books;          /* [in] (book_rows, 3) entries of each surface, J */
     Breach *breaches;       /* (BREACHES) */
-    Hit *hits;              /* (hit_room) in the order of particles and knots */
+    Hit *hits;              /* in the order of particles and knots */
     int *order;             /* (knots) in crowds of the contact engine */
     double *places;         /* (particles, 2) there, too */
     /* sizes */
-    int particle_count, piece_count, row; /* [in] row: doubles from knot to knot */
+    int particle_count, piece_count, knot_count, row; /* [in] row: doubles from knot to knot */
     int book_rows, surface_count; /* [in] with the particles' own, which is the last */
-    int hit_room;           /* [in] */
+    int hit_room;
     /* the run */
     int engine;             /* [in] */
     int interact;           /* [in] particles meet each other */

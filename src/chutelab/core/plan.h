@@ -3,6 +3,7 @@
 #ifndef PLAN_H
 #define PLAN_H
 #include "layout.h"
+#include "memory.h"
 #include "trig.h"
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
@@ -23,6 +24,7 @@ typedef struct {
     const OutgoingKeys *outgoing; /* or NULL */
     const ConveyorKeys *conveyors;
     const SurfaceKeys *surfaces;
+    const StringKeys *strings;
     const double *points;
 } Tables;
 

@@ -409,7 +409,7 @@ def _end(s: State, motion: Motion) -> Floats:
 
 def _exit(s: State, motion: Motion) -> Floats:
     """Time until a flight leaves the scene."""
-    left, right, bottom, top = s.exit_box[:, motion.rows]
+    left, bottom, right, top = s.exit_box[:, motion.rows]
     (x, y), (vx, vy) = motion.position, motion.velocity
     fall = rows_of(s.fall, motion.rows)
     time = _when(y - bottom, vy, fall[1])

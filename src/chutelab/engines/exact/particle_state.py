@@ -181,8 +181,8 @@ class State:
 
     @cached_property
     def exit_box(self) -> Floats:
-        """Left, right, bottom and top beyond which each particle has left the scene, (4, k), m."""
-        return np.stack([self.each(side) for side in self.machine.exit_box])
+        """Left, bottom, right and top beyond which each particle has left the scene, (4, k), m."""
+        return self.machine.releases.exit_box[self.first : self.first + self.count].T
 
     @cached_property
     def up_belt(self) -> Floats:

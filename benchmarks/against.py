@@ -1,12 +1,12 @@
 """Processor time of some fifteen cases, this checkout against an earlier commit, interleaved.
 
-    OMP_NUM_THREADS=1 python benchmarks/against.py COMMIT [--repeats N] [CASE...]
+    OMP_NUM_THREADS=1 python benchmarks/against.py COMMIT [--repeats N] [CASE|SCENE...]
 
-The commit is unpacked into a temporary folder and imported from there, by a process of its own, as
-this checkout is by another one. Both run a case in turn, as often as it takes to fill `SLICE`, so
-that whatever else the computer does slows both. The ratio is that of the medians, now over then,
-beside the quartiles of the ratios of single turns; "bits" tells whether the recordings are the same
-to the last bit. Exit code 1 if a ratio is above `WORST`.
+A shipped scene is a case of its own. The commit is unpacked into a temporary folder and imported
+from there, by a process of its own, as this checkout is by another one. Both run a case in turn, as
+often as it takes to fill `SLICE`, so that whatever else the computer does slows both. The ratio is
+that of the medians, now over then, beside the quartiles of the ratios of single turns; "bits" tells
+whether the recordings are the same to the last bit. Exit code 1 if a ratio is above `WORST`.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ def worked(source: str) -> None:
         case, times = json.loads(line)
         bits = ""
         try:
-            if case in RUNS:
-                name, *settings = RUNS[case]
+            if case not in COMMANDS:
+                name, *settings = RUNS.get(case, [case])
                 scene = chutelab.load(name, settings)
                 begin = process_time()
                 for _ in range(times):

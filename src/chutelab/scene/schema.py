@@ -37,6 +37,7 @@ from chutelab.scene.units import (
     sphere_mass,
     tonnes_per_hour,
 )
+from chutelab.util.tables import many
 
 TABLES: Final[dict[str, type[Table]]] = {
     "particle": Particle,
@@ -284,10 +285,11 @@ class SceneTables(Table):
         return (*tables, *(str(free.name) for free in self.free))
 
     def __repr__(self) -> str:
-        particles = "1 particle" if self.count == 1 else f"{self.count:,} particles"
         names = self.surfaces
         surfaces = ", ".join(names) if len(names) <= 6 else f"{len(names):,} surfaces"
-        return f"<Scene {self.source}: {self.title}; {particles}, {surfaces}>"
+        return (
+            f"<Scene {self.source}: {self.title}; {many(self.count, 'particle', ',')}, {surfaces}>"
+        )
 
     def __eq__(self, other: object) -> bool:
         # The same machine from another file is the same scene.
@@ -295,7 +297,7 @@ class SceneTables(Table):
 
     @model_validator(mode="after")
     def _judge_and_fill(self) -> Self:
-        faults = list(conflicts(Look(as_written(self), DEFAULTS)))
+        faults = list(conflicts(Look(to_dict(self), DEFAULTS)))
         if faults:
             raise ConflictError(faults)
         if self.run.until is None:
@@ -361,10 +363,10 @@ class SceneTables(Table):
         return filled
 
 
-def as_written(scene: SceneTables, *, defaults: bool = False) -> dict[str, Any]:
-    """Return the keys that were set, nested as in the file; one table is no list of one.
+def to_dict(scene: SceneTables, *, defaults: bool = False) -> dict[str, Any]:
+    """Return the keys that were set, nested as in the file: `from_dict` makes the scene again.
 
-    With `defaults`, all keys.
+    One table is no list of one. With `defaults`, all keys.
     """
     tables: dict[str, Any] = scene.model_dump(
         by_alias=True, exclude_unset=not defaults, warnings=False

@@ -14,16 +14,16 @@ from typing import Any, Final
 
 import numpy as np
 
+from chutelab.scene import Scene, SceneError, from_dict, plain, to_dict
 from chutelab.scene.conflicts import EITHER, NO_MACHINE, Look, conflicts
-from chutelab.scene.loading import Scene, SceneError, from_dict, plain, to_dict
 from chutelab.scene.materials import Material
 from chutelab.scene.overrides import (
     Override,
     apply,
     joined,
     limits_of,
-    names_of,
     parts_of,
+    resolved,
     rule_at,
 )
 from chutelab.scene.schema import DEFAULTS, plain_number
@@ -207,7 +207,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
     faults, _ = apply(document, [Override(vary.key, plain_number(vary.values[0]))])
     if faults:
         raise InputError(faults[0].allowed, vary.typed)
-    parts = parts_of(vary.key, names_of(document))
+    parts = resolved(document, vary.key)
     path, indexed = joined(parts), isinstance(parts[-1], int)
     while isinstance(parts[-1], int):
         parts.pop()

@@ -3,8 +3,8 @@
 One round resolves the next event of all particles of a block at once. There is no contact between
 particles.
 
-- `obstacles`: a machine's surfaces as faces and circles to meet.
-- `joints`: how the pieces of a machine join: what goes on where one ends.
+- `obstacles`: faces and circles to meet, and how they join: what goes on where one ends.
+- `layout`: a machine's surfaces as these.
 - `detect`: the next contact: of flight and slide, and of a ride round a circle.
 - `particle_state`: the state of a block of particles, and what it leaves behind.
 - `contacts`: what a contact does: blows, rest, grip and slip.

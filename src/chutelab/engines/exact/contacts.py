@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from chutelab.engines.exact.detect import bounds
-from chutelab.engines.exact.joints import NONE
-from chutelab.engines.exact.obstacles import dot, length_of, pick
+from chutelab.engines.exact.obstacles import NONE, dot, length_of, pick
 from chutelab.engines.exact.particle_state import COLLAPSE, NO_SLIP, Contact, Mode, State
 from chutelab.mechanics.contact import grip_limit, impulses, limited, shared
-from chutelab.results import Kind
+from chutelab.results.record import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
 WEIGHTLESS = 1e-9

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.engines.exact.joints import FACES, NONE
-from chutelab.engines.exact.obstacles import Obstacles, dot, length_of, pick, rows_of
+from chutelab.engines.exact.obstacles import FACES, NONE, Obstacles, dot, length_of, pick, rows_of
 from chutelab.mechanics.ballistics import descent, descents
 from chutelab.util.arrays import Bools, Floats, Ints
 

@@ -10,25 +10,23 @@ from time import perf_counter
 
 import numpy as np
 
-from chutelab.engines.exact.joints import COLLINEAR, FOLDED
-from chutelab.engines.exact.motion import carry, fly, ride, slide
-from chutelab.engines.exact.obstacles import (
+from chutelab.engines.exact.layout import (
     JOINT,
     Bends,
     ahead_of,
-    along,
     beginnings,
     corners_of,
     curvatures_of,
-    dot,
     obstacles,
     resting,
     size_of,
     touch_of,
 )
+from chutelab.engines.exact.motion import carry, fly, ride, slide
+from chutelab.engines.exact.obstacles import COLLINEAR, FOLDED, along, dot
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.machine import Machine, moved, origin
-from chutelab.results import REASONS, Kind, Recording
+from chutelab.results.record import REASONS, Kind, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Bools, Ints, Progress
 
@@ -119,7 +117,7 @@ def run(
     progress: Progress | None = None,
     *,
     apart: bool = False,
-) -> Recording:
+) -> Record:
     """Run a machine whose particles do not interact.
 
     Parameters
@@ -134,7 +132,7 @@ def run(
 
     Returns
     -------
-    Recording
+    Record
         Events to rounding error; bit-identical for the same machine.
 
     Raises

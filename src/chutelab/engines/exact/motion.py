@@ -20,12 +20,11 @@ from chutelab.engines.exact.contacts import (
     strike,
 )
 from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
-from chutelab.engines.exact.joints import NONE
-from chutelab.engines.exact.obstacles import dot, length_of, pick, rows_of
+from chutelab.engines.exact.obstacles import NONE, dot, length_of, pick, rows_of
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.contact import STEP_ANGLE, Circle, Outcome, advance, normal_force
-from chutelab.results import Kind
+from chutelab.results.record import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
 

@@ -1,4 +1,4 @@
-"""The machine as the exact engine sees it: faces to meet, and circles to meet.
+"""The machine as the exact engine sees it: faces and circles to meet, and how they join.
 
 A disk of radius r touches a segment's face when its centre is r away, and its end when the centre
 is on a circle of radius r about it. An arc of radius R is met from outside on a circle of radius
@@ -15,18 +15,17 @@ reads lies together.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
-from sys import float_info
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from chutelab.engines.exact.joints import COLLINEAR, NONE, Joints
-from chutelab.machine import Machine
 from chutelab.util.arrays import Bools, Floats, Ints
+
+NONE = -1
+"""No obstacle, no piece."""
 
 PER_PARTICLE = (
     "faces", "length", "center", "rho", "span", "bend", "material", "low", "high", "touch",
@@ -228,372 +227,324 @@ FOOT = 1e-12
 """Share of a segment's length by which its face reaches past its ends, so that no particle slips
 through the joint of two segments by rounding."""
 
-JOINT = 1e-12
-"""Share of the scene's size within which two ends are one joint."""
+TURN = 2.0 * np.pi
 
-TOUCH_ULPS = 256.0
-"""Rounding of a coordinate, in units of the last place of the scene's size: closer is touching."""
+FOLDED = 1e-9
+"""Difference of two directions below which one piece lies on the other where they meet."""
 
-NEVER = np.empty(0)
-"""Changes of a machine without gates."""
+COLLINEAR = 1e-12
+"""Sine of the angle at a joint below which one piece simply goes on as the next."""
 
-BOX_TOUCHES = 64.0
-"""Width, in `Obstacles.touch`, by which the boxes of faces are larger than they need be."""
+FACES = (1, -1)
+"""The left and the right face of a piece."""
 
 
-@dataclass(frozen=True, eq=False)
-class Bends:
-    """The A arcs of a machine, the O with ends first; n is 1 or the number of particles."""
+CIRCULAR = 1e-9
+"""Share of a curvature by which two pieces that leave a place in one direction differ at least."""
 
-    center: Floats  # (2, A, n), m
-    shape: Floats  # (3, A, n): radius (m), first angle and extent counterclockwise (rad)
-    order: Ints  # (A,), their numbers in the machine
-    open: int  # O
+THROUGH = 2
+"""In place of an end: a piece that goes on through a place, first along it, then (3) back."""
 
-    @classmethod
-    def of(cls, machine: Machine) -> Bends:
-        """Sort the arcs of a machine."""
-        arcs = machine.arcs
-        if not len(arcs.surface):
-            return STRAIGHT
-        whole = np.atleast_2d(arcs.whole)[0]
-        order = np.argsort(whole, kind="stable")
-        shape = np.stack([_scalars(array) for array in (arcs.radius, arcs.begin, arcs.extent)])
-        shape[2] = np.minimum(shape[2], 2.0 * np.pi)
-        open_ = len(whole) - int(np.count_nonzero(whole))
-        return cls(_vectors(arcs.center)[:, order], shape[:, order], order, open_)
+
+class Handover(NamedTuple):
+    """A place on a circle where a ride goes over into another piece, without a blow."""
+
+    piece: int  # at which end of which piece, and its face there
+    end: int
+    face: int
+    onto: bool  # whether it is the piece that is gone over to; else the one that ends
+
+
+class Ray(NamedTuple):
+    """A piece seen from a place where it ends, or which it passes."""
+
+    piece: int
+    end: int  # or `THROUGH`, where the way out is along the piece, and `THROUGH` + 1
+    angle: float  # of the way out, rad, 0 to 2 π
+    bend: float  # curvature of the way out, 1/m, positive counterclockwise
 
     @property
-    def ends(self) -> tuple[Floats, Floats]:
-        """First and second ends, seen clockwise, of those that have any, (2, O, n) each, m."""
-        radius, begin, extent = self.shape[:, : self.open]
-        center = self.center[:, : self.open]
-        first, second = (center + radius * _out(angle) for angle in (begin + extent, begin))
-        return first, second
+    def left(self) -> int:
+        """Face of the piece on the left of the way out; the right one has the other sign."""
+        return 1 if self.end in (0, THROUGH) else -1
 
 
-STRAIGHT = Bends(np.empty((2, 0, 1)), np.empty((3, 0, 1)), np.empty(0, dtype=np.int64), 0)
-"""No arcs."""
+class Joints:
+    """Where pieces end; arrays over their two ends, and over their left and right faces.
 
+    The pieces that share a place, sorted by the angles at which they leave it, divide its
+    surroundings into sectors. A disk is in one of them and can touch only the two faces that bound
+    that. Where the angle between these is π they are *flush*, and a ride on one goes on on the
+    other; where it is more, round the place; where it is less, the ride is stopped before.
 
-def _out(angle: Floats) -> Floats:
-    """Return directions at angles (...) from the x axis, (2, ...)."""
-    return np.stack([np.cos(angle), np.sin(angle)])
-
-
-def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
-    """Resolve the surfaces of a machine, moved here from that far away (m), into obstacles.
-
-    How pieces join, and whether particles are points, is read off the first row where each
-    particle has its own: see `chutelab.engines.exact.kinds`. Of segments that
-    lie on each other the first one counts, as it does when two are met at once.
+    Parameters
+    ----------
+    obstacles : Obstacles
+        Directions are compared in its first row.
     """
-    seg, wheel = machine.segments, machine.pulley
-    radius = np.atleast_1d(machine.particle.radius)
-    tangent, length = _vectors(seg.tangent), _scalars(seg.length)
-    bends = Bends.of(machine)
-    corners = corners_of(machine, bends)
-    size = size_of(corners, bends, machine.releases.position)
-    touch = touch_of(size, far)
-    near = JOINT * size
-    widest = touch if touch.shape[-1] == corners.shape[-1] else touch.max()
-    on = beginnings(machine, bends, corners[..., :1], near[:1])
-    if on:
-        return obstacles(_cut(machine, corners, list(on), near[0].item()), far)
-    spots = spots_of(corners[..., 0], near[0].item())
-    came, went, changes = seg.appears, seg.vanishes, NEVER
-    if len(bends.order):
-        came = np.concatenate([came, machine.arcs.appears])
-        went = np.concatenate([went, machine.arcs.vanishes])
-    if np.count_nonzero(np.isinf(came)) + np.count_nonzero(np.isinf(went)) < 2 * len(came):
-        times = np.concatenate([came, went])
-        changes = np.unique(times[np.isfinite(times)])
-    seen: dict[tuple[object, ...], int] = {}
-    for s, pair in enumerate(spots[: len(length)]):
-        # A gate that shuts again is there twice, at different times.
-        window = (came[s], went[s]) if len(changes) else ()
-        seen.setdefault((frozenset(pair), *window), s)
-    kept = list(seen.values())
-    if len(kept) < len(length):
-        pieces = [*kept, *range(len(length), len(spots))]
-        corners = corners[:, [*pieces, *(s + len(spots) for s in pieces)]]
-        spots, tangent, length = [spots[s] for s in pieces], tangent[:, kept], length[kept]
-    flat, arcs = len(length), len(bends.order)
 
-    owner = [*kept, *(len(seg.surface) + bends.order).tolist()]
-    first_to_stay = list(range(len(spots)))
-    if len(changes):
-        stays = (np.isinf(came) & np.isinf(went))[owner]
-        first_to_stay.sort(key=lambda s: not stays[s])
-    # Each place where pieces of disks end is a circle; a point meets it with probability zero. An
-    # end that lies on an arc, or that of the belt on the pulley, cannot be met.
-    rests = np.full((len(spots), 2), NONE)
-    if arcs:
-        for arc, lie in enumerate(resting(corners, bends, near)):
-            if not len(changes) or stays[flat + arc]:
-                rests[lie[..., 0].reshape(2, -1).T] = arc
-    if wheel is not None:
-        rests[0, 1] = arcs
-    known: dict[int, int] = {}
-    ends: list[tuple[int, int]] = []
-    end_circle = np.full((flat + arcs, 2), NONE)
-    for s in first_to_stay if radius[0] > 0.0 else ():
-        for e, spot in enumerate(spots[s]):
-            if rests[s, e] != NONE:
+    def __init__(self, obstacles: Obstacles) -> None:
+        self._o = obstacles
+
+    @cached_property
+    def tips(self) -> tuple[Floats, Floats, Floats]:
+        """Places of ends (m), directions out of the piece, left normals there; (2, P, 2, n)."""
+        o = self._o
+        first, last = o.start, o.start + o.length * o.tangent
+        place, ahead, left = (
+            np.stack(pair, axis=2)
+            for pair in ((first, last), (-o.tangent, o.tangent), (o.normal, o.normal))
+        )
+        bent = len(o.spots) - o.segments
+        if not bent:
+            return place, ahead, left
+        radius, begin, extent = o.bend[:, :bent]
+        center = o.center[:, o.first_arc - o.segments :][:, :bent]
+        angle = np.stack([begin + extent, begin], axis=1)
+        out = np.stack([np.cos(angle), np.sin(angle)])
+        clockwise = np.stack([out[1], -out[0]]) * np.array([-1.0, 1.0])[:, None]
+        there = center[:, :, None] + radius[:, None] * out
+        pairs = ((place, there), (ahead, clockwise), (left, out))
+        one, two, three = (np.concatenate(pair, axis=1) for pair in pairs)
+        return one, two, three
+
+    def obstacle(self, piece: int, face: int) -> int:
+        """Return the obstacle number of a face of a piece."""
+        o = self._o
+        if piece < o.segments:
+            return piece
+        if piece == o.segments + o.arcs:
+            return o.pulley if face > 0 else NONE
+        return piece - o.segments + o.first_arc + (0 if face > 0 else o.arcs)
+
+    @cached_property
+    def _places(self) -> list[list[Ray]]:
+        """The rays of each place where pieces end, counterclockwise; of two alike the first."""
+        o, ahead = self._o, self.tips[1][..., 0]
+        places: dict[int, list[Ray]] = defaultdict(list)
+        for piece, pair in enumerate(o.spots):
+            arc = piece - o.segments
+            curvature = 1.0 / o.bend[0, arc, 0] if arc >= 0 else 0.0
+            for end, spot in enumerate(pair):
+                x, y = -ahead[:, piece, end]
+                bend = curvature if end else -curvature
+                places[spot].append(Ray(piece, end, _angle(x, y), bend))
+        for piece, end in np.argwhere(o.rests != NONE).tolist():
+            rays, arc = places[o.spots[piece][end]], o.rests[piece, end]
+            through = o.segments + arc
+            if any(ray.piece == through for ray in rays):
                 continue
-            if spot not in known:
-                known[spot] = flat + len(ends)
-                ends.append((s, e))
-            end_circle[s, e] = known[spot]
-    where = [s + e * len(spots) for s, e in ends]
-    own = [*owner[:flat], *(owner[s] for s, _ in ends), *owner[flat:], *owner[flat:]]
-    center = [corners.take(np.array(where, dtype=np.int64), axis=1)]
-    rho = [radius[None].repeat(len(ends), axis=0)]
-    if arcs:
-        room = bends.shape[0] - radius
-        center += [bends.center, bends.center]
-        rho += [bends.shape[0] + radius, np.where(room > widest, -room, np.nan)]
-    if wheel is not None:
-        center.append(np.zeros((2, 1, 1)))
-        rho.append(np.asarray(wheel.radius + radius).reshape(1, -1))
-        # It takes the first segment's values until its own are put in.
-        own.append(0)
-    centers, rhos, which = joined(center, 1), joined(rho, 0), np.array(own, dtype=np.int64)
-    material = _materials(machine).take(which, axis=1)
-    surface = np.concatenate([seg.surface, machine.arcs.surface]).take(which)
-    first, pulley = flat + len(ends), NONE
-    if wheel is not None:
-        pulley, surface[-1] = first + 2 * arcs, wheel.surface
-        for row, value in enumerate((wheel.speed, wheel.restitution, wheel.friction)):
-            several = isinstance(value, np.ndarray)
-            material[row, -1] = _of_kind(machine, value) if several else value
-    start, stop = corners[:, :flat], corners[:, len(spots) : len(spots) + flat]
-    faces = np.empty((2, 4, flat, 1, length.shape[1]))
-    faces[0, 0], faces[1, 0] = -tangent[1][:, None], tangent[0][:, None]
-    faces[:, 1, :, 0], faces[:, 2, :, 0] = tangent, start
-    over = FOOT * length[:, None]
-    faces[0, 3], faces[1, 3] = -over, over + length[:, None]
-    # A circle's box is smaller, met from outside: what only touches it does not meet it.
-    beside, inner = radius + BOX_TOUCHES * widest, np.abs(rhos - widest)
-    low = [np.minimum(start, stop) - beside, centers - inner]
-    high = [np.maximum(start, stop) + beside, centers + inner]
-    if arcs:
-        # A particle does not fit inside such a narrow arc.
-        low[1] = np.where(np.isnan(low[1]), np.inf, low[1])
-        high[1] = np.where(np.isnan(high[1]), -np.inf, high[1])
-    present, vanishes = np.ones((len(changes) + 1, len(which)), dtype=bool), went.take(which)
-    if len(changes):
-        since = np.concatenate([[-np.inf], changes])[:, None]
-        there = (came <= since) & (went > since)
-        present = there[:, which]
-        # A shared end exists while any of its pieces exists.
-        for s, e in np.argwhere(end_circle != NONE).tolist():
-            present[:, end_circle[s, e]] |= there[:, owner[s]]
-    span = np.empty((2, 0, 1))
-    if bends.open:
-        span = np.zeros((2, *centers.shape[1:]))
-        span[1] = 2.0 * np.pi
-        span[:, first - flat : first - flat + 2 * arcs] = np.tile(bends.shape[1:], (1, 2, 1))
-    return Obstacles(
-        faces=faces,
-        length=length,
-        center=centers,
-        rho=rhos,
-        span=span,
-        bend=bends.shape,
-        material=material,
-        low=joined(low, 1),
-        high=joined(high, 1),
-        surface=surface,
-        spots=tuple(spots),
-        rests=rests,
-        end_circle=end_circle,
-        first_arc=first,
-        pulley=pulley,
-        touch=touch,
-        changes=changes,
-        present=present,
-        vanishes=vanishes,
-    )
+            if arc == o.arcs:
+                # By rounding the place is not quite on top of the pulley, but the belt is flush.
+                (x, y), radius = self.tips[2][:, piece, end, 0], o.rho[-1, 0]
+            else:
+                x, y = (
+                    self.tips[0][:, piece, end, 0] - o.center[:, o.first_arc - o.segments + arc, 0]
+                )
+                radius = o.bend[0, arc, 0]
+            bend = 1.0 / radius
+            rays.append(Ray(through, THROUGH, _angle(y, -x), -bend))
+            rays.append(Ray(through, THROUGH + 1, _angle(-y, x), bend))
+        return list(places.values())
 
+    def _sectors(self, present: Bools) -> list[tuple[Ray, Ray, float]]:
+        """Return the two rays of each sector, the right one first, and its angle, rad.
 
-def joined(parts: Sequence[Floats], axis: int) -> Floats:
-    """Join arrays along an axis; along the last one, one column stands for all."""
-    try:
-        return np.concatenate(parts, axis)
-    except ValueError:
-        most = max(part.shape[-1] for part in parts)
-        alike = [part if part.shape[-1] == most else part.repeat(most, axis=-1) for part in parts]
-        return np.concatenate(alike, axis)
-
-
-def _of_kind(machine: Machine, values: Floats) -> Floats:
-    """Return values of each particle, (N, ...), from those of each kind, (K, ...)."""
-    return values if machine.segments.start.ndim == 3 else values[machine.releases.kind]
-
-
-def _materials(machine: Machine) -> Floats:
-    """Return `Obstacles.material` of all segments and then all arcs, (3, S + A, n)."""
-    parts = []
-    for part in (
-        (machine.segments, machine.arcs) if len(machine.arcs.surface) else (machine.segments,)
-    ):
-        rows = part.speed, part.restitution, part.friction
-        each = (row if row.ndim == 1 else _of_kind(machine, row) for row in rows)
-        parts.append(joined([_scalars(row)[None] for row in each], 0))
-    return joined(parts, 1)
-
-
-def corners_of(machine: Machine, bends: Bends) -> Floats:
-    """Return all first ends of the P pieces that have any, then all second ones, (2, 2 P, n), m."""
-    segments = machine.segments
-    ends = [_vectors(segments.start), _vectors(segments.end)]
-    if bends.open:
-        first, second = bends.ends
-        ends = [ends[0], first, ends[1], second]
-    return np.concatenate(ends, axis=1)
-
-
-def size_of(corners: Floats, bends: Bends, places: Floats) -> Floats:
-    """Return the largest coordinate that each particle meets, m, (n,); n is 1 if all have one.
-
-    It is that of the surfaces and of the particle's own release: of no other particle's.
-    """
-    # Not their methods, which take twice as long.
-    size = np.maximum.reduce(np.abs(corners), axis=(0, 1), initial=0.0)
-    if len(bends.order):
-        size = np.maximum(size, (np.abs(bends.center) + bends.shape[0]).max(axis=(0, 1)))
-    size = np.maximum(size, np.maximum.reduce(np.abs(places), axis=1))
-    several = corners.shape[-1] > 1 or np.count_nonzero(size != size[0])
-    return np.asarray(size if several else size[:1])
-
-
-def touch_of(size: Floats, far: float = 0.0) -> Floats:
-    """Return `Obstacles.touch` of a scene of a size, counted from a point that far away, m."""
-    # Far away the scene's own numbers are rounded, each by half a last place.
-    return float_info.epsilon * (TOUCH_ULPS * size + far)
-
-
-def _vectors(array: Floats) -> Floats:
-    """(S, 2) or (N, S, 2) to (2, S, n)."""
-    return np.array(array, ndmin=3).T.copy()
-
-
-def _scalars(array: Floats) -> Floats:
-    """(S,) or (N, S) to (S, n)."""
-    return np.array(array, ndmin=2).T.copy()
-
-
-def ahead_of(machine: Machine, bends: Bends) -> Floats:
-    """Return the directions out of the pieces at those ends, (2, 2 P, n)."""
-    along = _vectors(machine.segments.tangent)
-    if bends.open:
-        _, begin, extent = bends.shape[:, : bends.open]
-        (x, y), (u, v) = _out(begin + extent), _out(begin)
-        return np.concatenate([-along, np.stack([-y, x]), along, np.stack([v, -u])], axis=1)
-    return np.concatenate([-along, along], axis=1)
-
-
-def curvatures_of(machine: Machine, bends: Bends) -> Floats:
-    """Return the curvatures of the pieces at those ends, seen from there, to the left, (2 P, n)."""
-    straight = np.zeros((len(machine.segments.surface), 1))
-    bent = 1.0 / bends.shape[0, : bends.open]
-    return joined([straight, -bent, straight, bent], 0)
-
-
-def beginnings(
-    machine: Machine, bends: Bends, ends: Floats, near: Floats
-) -> dict[tuple[int, int], Bools]:
-    """Tell which of the ends (2 P, n) lie inside a segment and are tangent to it, each (n,).
-
-    By the numbers of segment and end; those that none of the rows has are left out. What the
-    incoming belt carries comes to nothing that begins on it.
-    """
-    pieces, segments = ends.shape[1] // 2, len(machine.segments.surface)
-    found: dict[tuple[int, int], Bools] = {}
-    starts, stops = ends[:, :segments], ends[:, pieces : pieces + segments]
-    low, high, least, most = np.minimum(starts, stops), np.maximum(starts, stops), ends, ends
-    if ends.shape[-1] > 1:
-        low, high = low.min(axis=-1)[:, :, None], high.max(axis=-1)[:, :, None]
-        least, most = ends.min(axis=-1), ends.max(axis=-1)
-    reach = near.max()
-    inside = (most.reshape(2, 1, -1) >= low - reach) & (least.reshape(2, 1, -1) <= high + reach)
-    inside = inside[0] & inside[1]
-    # Most have none but their own two ends inside.
-    if np.count_nonzero(inside) == 2 * segments:
+        Of the pieces that are there, (S + C,). What lies on another piece has no sector.
+        """
+        found = []
+        for rays in self._places:
+            ring: list[list[Ray]] = []
+            for ray in sorted(rays, key=lambda ray: ray.angle):
+                if not present[self.obstacle(ray.piece, 1)]:
+                    continue
+                if ring and ray.angle - ring[-1][0].angle <= COLLINEAR:
+                    ring[-1].append(ray)
+                else:
+                    ring.append([ray])
+            if len(ring) > 1 and ring[0][0].angle + TURN - ring[-1][0].angle <= COLLINEAR:
+                ring[0] += ring.pop()
+            flat = [ray for alike in ring for ray in _by_bend(alike)]
+            for n, ray in enumerate(flat):
+                after = flat[(n + 1) % len(flat)]
+                angle = (after.angle - ray.angle) % TURN
+                if TURN - angle <= COLLINEAR:
+                    angle = 0.0
+                if len(flat) == 1 or (len(ring) == 1 and n == len(flat) - 1):
+                    angle = TURN
+                found.append((ray, after, angle))
         return found
-    own = np.arange(segments)
-    inside[own, own] = inside[own, pieces + own] = False
-    if machine.pulley is not None:
-        inside[0] = False
-    ahead = ahead_of(machine, bends)[..., : ends.shape[-1]]
-    for s, end in zip(*(number.tolist() for number in inside.nonzero()), strict=True):
-        away, tangent, outward = ends[:, end] - starts[:, s], ahead[:, pieces + s], ahead[:, end]
-        foot, length = dot(away, tangent), dot(stops[:, s] - starts[:, s], tangent)
-        on = np.abs(tangent[0] * away[1] - tangent[1] * away[0]) <= near
-        on &= (foot > near) & (foot < length - near)
-        on &= np.abs(tangent[0] * outward[1] - tangent[1] * outward[0]) <= COLLINEAR
-        if on.any():
-            found[s, end] = on
-    return found
+
+    @cached_property
+    def onward(self) -> tuple[Ints, Floats]:
+        """Return what faces go over into at their ends, and its side, (T + 1, P, 2, 2).
+
+        Another face if that is flush, else the circle round the end, whose side is left open, 0;
+        -1 for nothing. Before the first change of what is there, and after each.
+        """
+        o, found = self._o, []
+        for present in o.present:
+            obstacle = np.repeat(o.end_circle[: len(o.spots), :, None], 2, axis=2)
+            side = np.zeros(obstacle.shape)
+            for right, left, angle in self._sectors(present):
+                if abs(angle - np.pi) > COLLINEAR:
+                    continue
+                faces = (right, right.left, left, -left.left), (left, -left.left, right, right.left)
+                for ray, face, other, onto in faces:
+                    if ray.end < THROUGH:
+                        n = FACES.index(face)
+                        obstacle[ray.piece, ray.end, n] = self.obstacle(other.piece, onto)
+                        side[ray.piece, ray.end, n] = onto
+            found.append((obstacle, side))
+        obstacles, sides = zip(*found, strict=True)
+        return np.stack(obstacles), np.stack(sides)
+
+    @cached_property
+    def groups(self) -> tuple[Ints, Bools, Bools]:
+        """What a disk touches at once where faces end: number of each set, (P, 2, 2), and the sets.
+
+        Faces that share a place and the normal there, and the circle round it; which obstacles, and
+        which faces of segments, are in a set: (G, S + C, 2). Last, which ends of the circles that
+        are arcs are there, (G, C, 2).
+        """
+        o, left = self._o, self.tips[2][..., 0]
+        number = np.full((len(o.spots), 2, 2), NONE, dtype=np.int64)
+        sets: list[Bools] = []
+        edges: list[Bools] = []
+        for rays in self._places:
+            known: list[tuple[Floats, int]] = []
+            for ray in rays:
+                for n, face in enumerate(FACES):
+                    if ray.end < THROUGH:
+                        normal = face * left[:, ray.piece, ray.end]
+                    elif ray.end == THROUGH:
+                        normal = face * np.array([-np.sin(ray.angle), np.cos(ray.angle)])
+                    else:
+                        continue
+                    same = [g for m, g in known if np.abs(normal - m).max() <= COLLINEAR]
+                    group = same[0] if same else len(sets)
+                    if not same:
+                        known.append((normal, group))
+                        sets.append(np.zeros((len(o.surface), 2), dtype=bool))
+                        edges.append(np.zeros((len(o.rho), 2), dtype=bool))
+                    own = self.obstacle(ray.piece, face)
+                    if own != NONE:
+                        sets[group][own, n if own < o.segments else slice(None)] = True
+                    if ray.end < THROUGH:
+                        if own >= o.segments:
+                            edges[group][own - o.segments, ray.end] = True
+                        number[ray.piece, ray.end, n] = group
+                        circle = o.end_circle[ray.piece, ray.end]
+                        if circle != NONE:
+                            sets[group][circle] = True
+        if not sets:
+            none = np.zeros((0, len(o.surface), 2), dtype=bool)
+            return number, none, none
+        return number, np.stack(sets), np.stack(edges)
+
+    def shares(self, group: Ints, obstacle: Ints, face: Ints | int) -> Bools:
+        """Tell which obstacles, by the index of the face of a segment, are in sets `groups`."""
+        sets = self.groups[1]
+        return np.asarray((group != NONE) & sets[group, obstacle, face])
+
+    @cached_property
+    def meeting(self) -> Ints:
+        """Numbers of the ends that lie on a circle, 2 piece + end, (M, C); -1 if there is none."""
+        o = self._o
+        found: list[list[int]] = [[] for _ in range(len(o.rho))]
+        for piece, end in np.argwhere(o.end_circle != NONE).tolist():
+            found[o.end_circle[piece, end] - o.segments].append(2 * piece + end)
+        most = max(map(len, found), default=0)
+        rows = [ends + [NONE] * (most - len(ends)) for ends in found]
+        return np.array(rows, dtype=np.int64).reshape(len(found), most).T
+
+    @cached_property
+    def alike(self) -> Ints:
+        """Return a number for each circle that those with its centre and radius share, (C,)."""
+        o = self._o
+        shape = np.stack(np.broadcast_arrays(*o.center, o.rho), axis=1)
+        rows = np.round(np.nan_to_num(shape) / (4.0 * o.touch.max())).reshape(len(o.rho), -1)
+        return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1))
+
+    @cached_property
+    def owns(self) -> Bools:
+        """Tell of which segments a circle is an end, (C, S)."""
+        o = self._o
+        circle = np.arange(o.segments, len(o.surface))[:, None]
+        ends = o.end_circle[: o.segments]
+        return np.asarray((ends[:, 0] == circle) | (ends[:, 1] == circle))
+
+    @cached_property
+    def crown(self) -> Floats:
+        """Vectors, (2, C, n), to the middle of the half that joins the left face of a piece.
+
+        At an end that is the piece's left normal, at a joint the sum of both. Arcs and the pulley,
+        which turn clockwise all round, have 0.
+        """
+        o, left = self._o, self.tips[2]
+        follow = np.full((2, len(o.spots), 2), NONE, dtype=np.int64)
+        for right, other, angle in self._sectors(np.ones(len(o.surface), dtype=bool)):
+            if angle >= np.pi - COLLINEAR and right is not other:
+                for one, two in ((right, other), (other, right)):
+                    if one.end < THROUGH and two.end < THROUGH:
+                        follow[:, one.piece, one.end] = two.piece, two.end
+        crown = np.zeros((2, len(o.rho), left.shape[-1]))
+        for piece, end in reversed(list(np.ndindex(len(o.spots), 2))):
+            circle, (other, there) = o.end_circle[piece, end], follow[:, piece, end]
+            if circle == NONE:
+                continue
+            crown[:, circle - o.segments] = left[:, piece, end]
+            if other != NONE:
+                sign = 1 if there != end else -1
+                crown[:, circle - o.segments] += sign * left[:, other, there]
+        return crown
+
+    @cached_property
+    def handovers(self) -> dict[int, list[Handover]]:
+        """Where rides round a circle, by its obstacle number, go over into another piece."""
+        o, (onward, _) = self._o, self.onward
+        found: dict[int, list[Handover]] = defaultdict(list)
+        for piece, end in np.ndindex(len(o.spots), 2):
+            # Left and then right of the direction out of the piece.
+            for face in FACES if end else FACES[::-1]:
+                circle, n = int(o.end_circle[piece, end]), FACES.index(face)
+                if circle != NONE:
+                    found[circle].append(Handover(piece, end, face, True))
+                next_ = int(onward[0, piece, end, n])
+                if o.rests[piece, end] != NONE and next_ != NONE:
+                    found[next_].append(Handover(piece, end, face, True))
+                if piece >= o.segments:
+                    found[self.obstacle(piece, face)].append(Handover(piece, end, face, False))
+        return found
+
+    @cached_property
+    def beside(self) -> Bools:
+        """Tell what touches a circle without being met, as both share a place, (C, S + C, 2).
+
+        The last axis is the face of a segment; both are the same for a circle. Such a circle and
+        such a face are tangent to each other there, and have no other point in common.
+        """
+        o, (_, sets, _) = self._o, self.groups
+        beside = np.zeros((len(o.rho), len(o.surface), 2), dtype=bool)
+        arcs = np.arange(o.first_arc, o.first_arc + o.arcs)
+        # To a point both faces of a piece are in one place.
+        points = o.arcs > 0 and o.rho[arcs[0] - o.segments, 0] <= o.bend[0, 0, 0] + o.touch[0]
+        for members in sets:
+            if points:
+                members = members | members[:, ::-1]
+                members[arcs] = members[arcs + o.arcs] = members[arcs] | members[arcs + o.arcs]
+            beside[members[o.segments :, 0]] |= members
+        return beside
 
 
-def _cut(machine: Machine, ends: Floats, places: Sequence[tuple[int, int]], near: float) -> Machine:
-    """Cut segments where other pieces begin on them: there three join."""
-    segments = machine.segments
-    starts, tangents = _vectors(segments.start), _vectors(segments.tangent)
-    which: list[int] = []
-    feet: list[tuple[Floats, Floats]] = []
-    for s, length in enumerate(_scalars(segments.length)):
-        at = [dot(ends[:, end] - starts[:, s], tangents[:, s]) for on, end in places if on == s]
-        at = [np.zeros(1), *sorted(at, key=lambda foot: float(foot[0])), length]
-        for low, high in pairwise(at):
-            if (high - low)[0] > near:
-                which.append(s)
-                feet.append((low, high))
-    low, high = (joined([pair[n][None] for pair in feet], 0) for n in (0, 1))
-    start = starts[:, which] + low * tangents[:, which]
-    own: dict[str, Any] = {
-        name: array.take(which, axis=-1)
-        for name, array in vars(segments).items()
-        if name not in ("start", "tangent", "length")
-    }
-    several = segments.start.ndim == 3
-    own["start"], own["length"] = start.T, (high - low).T
-    own["tangent"] = segments.tangent.take(which, axis=-2)
-    if not several:
-        own["start"], own["length"] = own["start"][0], own["length"][0]
-    return replace(machine, segments=replace(segments, **own))
+def _angle(x: float, y: float) -> float:
+    return float(np.arctan2(y, x) % TURN)
 
 
-def resting(corners: Floats, bends: Bends, near: Floats) -> Iterator[Bools]:
-    """Yield of each arc which ends (2 P, n) lie on it, but not where it ends."""
-    arcs = zip(bends.center.swapaxes(0, 1), bends.shape.swapaxes(0, 1), strict=True)
-    for center, (radius, begin, extent) in arcs:
-        x, y = corners - center[:, None]
-        on = np.abs(np.hypot(x, y) - radius) <= near
-        if on.any():
-            turn = np.mod(np.arctan2(y, x) - begin, 2.0 * np.pi)
-            edge = np.where(extent < 2.0 * np.pi, near / radius, 0.0)
-            on &= (turn >= edge) & (turn <= extent - edge)
-        yield on
-
-
-def spots_of(ends: Floats, tolerance: float) -> list[tuple[int, int]]:
-    """Return numbers of the places where segments begin and end; within the tolerance one place.
-
-    `ends` is (2, 2 S): all the first ones, then all the second ones.
-    """
-    x, y = ends.tolist()
-    count = len(x) // 2
-    number = list(range(2 * count))
-    window: list[int] = []
-    for n in sorted(number, key=x.__getitem__):
-        while window and x[n] - x[window[0]] > tolerance:
-            del window[0]
-        for m in window:
-            if abs(y[n] - y[m]) <= tolerance:
-                number[n] = number[m]
-                break
-        window.append(n)
-    return list(zip(number[:count], number[count:], strict=True))
+def _by_bend(rays: list[Ray]) -> list[Ray]:
+    """Sort rays of one angle counterclockwise; of those that lie on each other keep the first."""
+    kept: list[Ray] = []
+    for ray in rays:
+        if all(abs(ray.bend - o.bend) > CIRCULAR * abs(o.bend) for o in kept):
+            kept.append(ray)
+    return sorted(kept, key=lambda ray: ray.bend)

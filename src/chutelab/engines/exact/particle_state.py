@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.engines.exact.detect import BOUND, Past
-from chutelab.engines.exact.joints import NONE
-from chutelab.engines.exact.obstacles import Obstacles, along, dot, pick
+from chutelab.engines.exact.obstacles import NONE, Obstacles, along, dot, pick
 from chutelab.machine import Machine
 from chutelab.mechanics.contact import rim_share
-from chutelab.results import EVENT, KNOT, REASONS, Kind
+from chutelab.results.record import EVENT, KNOT, REASONS, Kind
 from chutelab.results.recorder import Recorder, StalledError
 from chutelab.util.arrays import Floats, Ints, Numbers
 

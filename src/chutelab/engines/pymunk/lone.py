@@ -31,7 +31,7 @@ from chutelab.engines.pymunk.world import (
     bisected,
 )
 from chutelab.machine import Machine
-from chutelab.results import REASONS, Kind
+from chutelab.results.record import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 

@@ -158,7 +158,8 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
         which = groups.pop()
         with suppress(CornerError, StalledError):
             every = len(which) == machine.count
-            recording = run(machine if every else build(scenes(which)), apart=True)
+            some = machine if every else build(scenes(which))
+            recording = Recording.of(run(some, apart=True))
             if not recording.laws:
                 runs.append((recording, which))
                 continue

@@ -19,9 +19,8 @@ from typing import Any
 CORE = Path(__file__).parents[1] / "src" / "chutelab" / "core"
 
 EXPORTS = (
-    "forget", "reserved", "world", "lay_out_world", "prepare", "run", "plan", "lay_out_plan",
-    "build", "drawing", "lay_out_drawing", "draw", "laws", "lay_out_laws", "judge", "sine",
-    "cosine", "angle_of", "angle_of_cosine",
+    "room", "world", "lay_out_world", "prepare", "run", "plan", "lay_out_plan", "build", "drawing",
+    "draw", "laws", "lay_out_laws", "judge", "sine", "cosine", "angle_of", "angle_of_cosine",
 )  # fmt: skip
 """What a host can call."""
 

@@ -33,6 +33,12 @@ enum Until { UNTIL_LANDED, UNTIL_SETTLED, UNTIL_TIME };
    LACKING: the core gets no more memory. */
 enum Status { DONE, PAUSED, FULL, STALLED, LACKING };
 
+/* The memory of arrays. Zeros in it, and in all other subjects, free all arrays. */
+typedef struct {
+    double end;             /* where the next array begins; 0: at the beginning */
+    int lacks;              /* whether there was too little */
+} Room;
+
 typedef struct {
     double x, y, vx, vy, spin;  /* [in] at time t: centre, velocity, angular velocity */
     double t;

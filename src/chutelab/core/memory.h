@@ -8,7 +8,7 @@
 /* Set bytes apart, all zero, for so many rows; NULL if there are none to be had. */
 __attribute__((noinline)) void *reserve(double count, unsigned size);
 
-/* Whether all that was reserved since `forget` is there. */
+/* Whether all that was reserved is there. */
 int has_room(void);
 
 /* Have a field point to so many rows. */

@@ -26,7 +26,7 @@ from chutelab.util.files import whole
 LARGE = 64 * 2**20
 """Bytes beyond which a used memory is let go rather than kept for the next run."""
 
-SUBJECTS = ("World", "Plan", "Drawing", "Laws")
+SUBJECTS = ("Room", "World", "Plan", "Drawing", "Laws")
 """Structs of layout.h of which the core has one each."""
 
 TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}
@@ -124,7 +124,8 @@ class Module:
 
     def forget(self) -> None:
         """Free all arrays and reset all structs."""
-        self.call("forget", 0.0)
+        for struct in self.structs.values():
+            ctypes.memset(ctypes.addressof(struct), 0, ctypes.sizeof(struct))
 
     def work(self, name: str) -> None:
         """Call a function that may take more memory; it makes all views of arrays invalid.

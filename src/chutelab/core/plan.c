@@ -196,7 +196,7 @@ static void build_member(int member) {
     P.nominal[member] = found;
 }
 
-/* Build the machine of each member, which have as many pieces each. */
+/* Build the machine of each member, which have as many pieces each; and lay out what is drawn into. */
 EXPORT int build(void) {
     segments = 0;
     arcs = 0;
@@ -210,5 +210,6 @@ EXPORT int build(void) {
         arcs = P.arcs + (long)member * P.arc_count;
         build_member(member);
     }
+    lay_out_drawing();
     return has_room();
 }

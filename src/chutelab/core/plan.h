@@ -38,6 +38,9 @@ void release_point(const Tables *t, int stream, double *place);
 void release_velocity(const Tables *t, int stream, double *velocity);
 void fly_nominal(const Tables *t, Nominal *out);
 
+/* releases.c */
+void lay_out_drawing(void);
+
 /* ride.c */
 int ride_to_pulley(double *w, double *z, double gap, double length, double gravity, double friction,
                    double share, double belt, double incline);

@@ -31,8 +31,8 @@ static Place handful[HANDFUL];
 
 EXPORT Drawing *drawing(void) { return &D; }
 
-/* Lay out what is drawn into, once the machines of the plan are built. */
-EXPORT int lay_out_drawing(void) {
+/* Lay out what is drawn into. */
+void lay_out_drawing(void) {
     Tables t = tables_of(0);
     double corners = 0.0, beds = 0.0;
     D.count = 0;
@@ -51,7 +51,6 @@ EXPORT int lay_out_drawing(void) {
     RESERVE(D.links, links);
     RESERVE(D.heads, D.head_room);
     RESERVE(D.listed, P.segment_count + P.arc_count + 1 + 2 * P.conveyors);
-    return has_room();
 }
 
 static int is_line(void) { return !isnan(stream->to[0]); }

@@ -180,7 +180,6 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
     scene, family = scenes.scene, isinstance(scenes, Family)
     counts = [stream.count for stream in scene.streams]
     corners = np.array([corner for kind in scene.particles for corner in kind.outline])
-    module.work("lay_out_drawing")
     members, streams = module.structs["Plan"].members, len(counts)
     drawing = module.structs["Drawing"]
     drawing.looks = LOOKS

@@ -29,7 +29,7 @@ function runOf({ machine, tracks, events, books, gained, contacts, steps }: Reco
  * stays as it is. */
 function judge(core: Core, { machine, knots, offsets, books, ...run }: Run): Breach[] {
   const { gravity, interact, dt, pulley, radius, mass, inertia } = machine;
-  const { enums } = core.layout, end = core.exports.reserved();
+  const { enums } = core.layout, end = core.get("end", "Room");
   const pieces = barriersOf(machine), count = radius.length;
   core.reset("Laws");
   core.setAll("Laws", {
@@ -48,7 +48,7 @@ function judge(core: Core, { machine, knots, offsets, books, ...run }: Run): Bre
   });
   pieces.forEach((row, k) => core.fill("barriers", "Barrier", k, row, "Laws"));
   core.work("judge");
-  core.exports.forget(end);
+  core.set("end", end, "Room");
   return core.rows("breaches", "Breach", core.get("breach_count", "Laws"), "Laws") as Breach[];
 }
 

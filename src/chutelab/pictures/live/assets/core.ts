@@ -26,8 +26,8 @@ async function startCore(module: WebAssembly.Module, layout: Layout) {
   return new Core(await WebAssembly.instantiate(module, {}), layout);
 }
 
-/** Structs of which the core has one each, and arrays that their fields point to; the core lays
- * these out, and its `forget(0)` frees them all. */
+/** Structs of which the core has one each, and arrays that their fields point to, which it lays
+ * out. */
 class Memory {
   exports: any;
   /** Where the structs of the core's subjects are, by their names. */
@@ -39,10 +39,16 @@ class Memory {
   constructor(instance: WebAssembly.Instance, readonly layout: Layout) {
     this.exports = instance.exports;
     this.exports._initialize();
-    const { world, plan, drawing, laws } = this.exports;
-    this.subjects = { World: world(), Plan: plan(), Drawing: drawing(), Laws: laws() };
-    this.exports.forget(0);
+    const { room, world, plan, drawing, laws } = this.exports;
+    this.subjects = {
+      Room: room(), World: world(), Plan: plan(), Drawing: drawing(), Laws: laws(),
+    };
     this.look();
+  }
+
+  /** Free all arrays, and reset all structs. */
+  forget() {
+    Object.keys(this.subjects).forEach((name) => this.reset(name));
   }
 
   /** Call a function that may take more memory; the views of it are made anew. */
@@ -120,7 +126,7 @@ class Core extends Memory {
   /** Lay out a machine: the run is at its beginning then. */
   begin(machine: Machine) {
     this.machine = machine;
-    this.exports.forget(0);
+    this.forget();
     const { releases, rolling, pulley } = machine, kinds = rolling.length;
     const rows = surfaceRows(machine, this.layout.enums.Shape);
     this.setAll("World", {

@@ -71,7 +71,7 @@ function rowOf(scene: Scene): number[] {
  */
 export function lay(scene: Scene): { segments: Segment[], arcs: Arc[] } {
   const row = rowOf(scene);
-  core.exports.forget(0);
+  core.forget();
   core.setAll("Plan", {
     members: 1, width: row.length, particles: scene.particles.length,
     streams: scene.streams.length, incoming: Number(scene.incoming !== null),

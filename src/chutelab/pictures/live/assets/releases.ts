@@ -29,7 +29,6 @@ const LOOKS = 2 ** 31 - 1;
  */
 export function draw(scene: Scene, names: string[]): { releases: Release[], radius: number[] } {
   const core = memory(), { Refused, Status } = core.layout.enums, { streams, kinds } = scene;
-  core.work("lay_out_drawing");
   core.set("looks", LOOKS, "Drawing");
   while (core.exports.draw() === Status.PAUSED);
   const [refusal]: Refusal[] = core.rows("refusals", "Refusal", 1, "Drawing");

@@ -248,7 +248,7 @@ def all_bytes(core):
     """Run in slices of 64 steps, as the other host does, and return knots, events and ledger."""
     drained, status = {"knot": [], "event": []}, None
     while True:
-        status = core.module.run(64)
+        status = Status(core.module.run("run", 64, Status.LACKING))
         for what, kept in drained.items():
             count = getattr(core.world, f"{what}_count")
             kept.append(core.module.array(f"{what}s", dtype(what.title()), count).tobytes())

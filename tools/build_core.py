@@ -20,7 +20,8 @@ CORE = Path(__file__).parents[1] / "src" / "chutelab" / "core"
 
 EXPORTS = (
     "room", "world", "lay_out_world", "prepare", "run", "plan", "lay_out_plan", "build", "drawing",
-    "draw", "laws", "lay_out_laws", "judge", "sine", "cosine", "angle_of", "angle_of_cosine",
+    "draw", "exact", "lay_out_exact", "follow_all", "laws", "lay_out_laws", "judge", "sine",
+    "cosine", "angle_of", "angle_of_cosine",
 )  # fmt: skip
 """What a host can call."""
 

@@ -26,7 +26,7 @@ from chutelab.util.files import whole
 LARGE = 64 * 2**20
 """Bytes beyond which a used memory is let go rather than kept for the next run."""
 
-SUBJECTS = ("Room", "World", "Plan", "Drawing", "Laws")
+SUBJECTS = ("Room", "World", "Plan", "Drawing", "Laws", "Exact")
 """Structs of layout.h of which the core has one each."""
 
 TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}
@@ -169,11 +169,11 @@ class Module:
         for name, array in arrays.items():
             self.array(name, np.dtype(np.uint8), array.nbytes, of)[:] = array.view(np.uint8)
 
-    def run(self, steps: int) -> Status:
-        """Run on for at most so many steps; see `work`."""
-        status = Status(self.call("run", steps))
+    def run(self, name: str, steps: int, lacking: int) -> int:
+        """Call a function for so many steps at most, as `work`; `lacking` tells of no memory."""
+        status: int = self.call(name, steps)
         self._look()
-        if status is Status.LACKING:
+        if status == lacking:
             raise MemoryError(f"the core has {self.size / 2**30:.1f} GiB, and gets no more")
         return status
 

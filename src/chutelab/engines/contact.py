@@ -193,7 +193,7 @@ class Job:
     def proceed(self, steps: int) -> Status:
         """Run on for at most so many steps, and take what was written."""
         module = self.module
-        status = module.run(steps)
+        status = Status(module.run("run", steps, Status.LACKING))
         for what, kept in (("knot", self.knots), ("event", self.events)):
             if count := getattr(module.world, f"{what}_count"):
                 kept.append(module.array(f"{what}s", dtype(what.title()), count).copy())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import acos, asin, cos, hypot, pi, sin, sqrt
+from math import acos, asin, atan, cos, hypot, pi, sin, sqrt
 
 import numpy as np
 import pytest
@@ -303,6 +303,32 @@ def test_in_an_elastic_drum_without_gravity_all_chords_are_alike(size, crowded):
     assert len(met) == int(0.1 / chord + 0.5)
     np.testing.assert_allclose(met["t"], (np.arange(len(met)) + 0.5) * chord, rtol=1e-9, atol=1e-14)
     assert hypot(*met["velocity_after"][-1]) == pytest.approx(speed, rel=1e-12)
+
+
+@pytest.mark.parametrize("crowded", [False, True])
+@pytest.mark.parametrize("dt", [1e-3, 1e-5])
+@pytest.mark.parametrize("room", [5e-6, 1e-4, 1e-2])
+def test_a_disk_comes_off_a_hollow_however_tight_it_is(room, dt, crowded):
+    """It is struck with u and comes off with ε u: at α = atan(ε u / v) to the wall.
+
+    The arc ends before α, so that it passes the end. That is so whatever the arc's radius and the
+    step are, down to α of a hundredth.
+    """
+    v, u, bounce = 3.0, 1.0, 0.3
+    half = 0.5 * atan(bounce * u / v)
+    cup = {
+        "center": (0.0, 0.0),
+        "radius": R + room,
+        "begin": -0.5 * pi - half,
+        "extent": 2.0 * half,
+    }
+    machine = arc_machine(
+        {**cup, "restitution": bounce}, gravity=0.0, run={"until": 0.02, "dt": dt}
+    )
+    places = [(0.0, -room), (5.0, 5.0)] if crowded else [(0.0, -room)]
+    last = run(thrown(machine, places, [(v, -u), (0.0, 0.0)][: len(places)])).track(0)[-1]
+    np.testing.assert_allclose(last["velocity"], [v, bounce * u], rtol=1e-12)
+    np.testing.assert_allclose(last["position"], [0.02 * v, 0.02 * bounce * u - room], rtol=1e-12)
 
 
 def test_a_disk_larger_than_the_inside_of_a_cup_comes_to_rest_on_its_rims():

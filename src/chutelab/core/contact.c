@@ -6,6 +6,9 @@
 #define CHORD 1.01
 /* Sine of half the angle that a step may turn a disk in a hollow by, at most. */
 #define STEEPEST 0.9
+/* rad; what comes off the inside of an arc by less, however short steps are, stays on it: bounces that go on without an
+   end are left out at last. */
+#define FLAT 0.01
 /* Of the radius: hops of what lies stay below it, else the step is shorter than asked for. */
 #define HOP 1e-3
 
@@ -236,10 +239,10 @@ double hop_time(const Disk *d) {
     return W.g + inside > 0 ? sqrt(8 * HOP * d->radius / (W.g + inside)) : INFINITY;
 }
 
-/* Time in which a disk that slides inside an arc is turned by TURN, INFINITY on what is not hollow. */
+/* Time in which a disk that slides inside an arc is turned by FLAT, INFINITY on what is not hollow. */
 double turning_time(const Disk *d, const Surface *s) {
     double bends = -bending(s, d->x, d->y, d->radius) * sqrt(d->vx * d->vx + d->vy * d->vy);
-    return bends > 0 ? TURN / bends : INFINITY;
+    return bends > 0 ? FLAT / bends : INFINITY;
 }
 
 /* How hard gravity and the curved way press a disk on a surface, m/s2. */

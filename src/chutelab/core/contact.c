@@ -274,8 +274,9 @@ double chord(const Contact *c, double parted, double h) {
 double follow(Contact *c, double past, double out) {
     const Disk *d = W.disks + c->i;
     double x = d->vx - 0.5 * W.gx * past, y = d->vy - 0.5 * W.gy * past, speed = sqrt(x * x + y * y);
+    double fast = square(d->vx) + square(d->vy), inside = pressed_inside(d, -1 - c->j);
     double bends = MAX(-bending(W.surfaces + (-1 - c->j), d->x, d->y, d->radius), 0);
-    c->turns = MAX(bends * speed * speed, pressed_inside(d, -1 - c->j));
+    c->turns = MAX(bends, fast > 0 ? inside / fast : 0) * speed * speed;
     if (!(c->turns > 0)) return 1;
     double most = MIN(CHORD * 0.5 * c->turns * W.step / speed, STEEPEST);
     double in = MIN(MAX(-(x * c->nx + y * c->ny) / speed, -most), most);

@@ -252,15 +252,29 @@ double press_on(const Disk *d, const Surface *s, double nx, double ny) {
 }
 
 /* Sine of the angle to the surface of the chord on which a disk goes on in a hollow for a time h, to where
-   its gap is 0, or of its overlap so much (m) is parted. */
+   its gap is 0, or of its overlap so much (m) is parted; past an end of a hollow that it comes to or from, by
+   Newton's steps. */
 double chord(const Contact *c, double parted, double h) {
     const Disk *d = W.disks + c->i;
     const Surface *s = W.surfaces + (-1 - c->j);
-    double bends = -bending(s, d->x, d->y, d->radius), way = sqrt(square(d->vx) + square(d->vy)) * h;
-    if (!(bends > 0 && way > 0)) return 0;
-    double away = square(d->x - s->x) + square(d->y - s->y), to = MAX(away, square(1 / bends));
-    if (parted > 0) to = square(sqrt(to) - parted);
-    return (away - to + way * way) / (2 * way * sqrt(away));
+    double bends = -bending(s, d->x, d->y, d->radius), way = sqrt(square(d->vx) + square(d->vy)) * h, out = 0;
+    if (!(way > 0) || (bends <= 0 && !(pressed_inside(d, -1 - c->j) > 0))) return 0;
+    if (bends > 0) {
+        double away = square(d->x - s->x) + square(d->y - s->y), to = MAX(away, square(1 / bends));
+        if (parted > 0) to = square(sqrt(to) - parted);
+        return (away - to + way * way) / (2 * way * sqrt(away));
+    }
+    double forth = d->vx * c->ny - d->vy * c->nx > 0 ? way : -way, nx, ny;
+    for (int n = 0; n < 4; n++) {
+        double cosine = sqrt(1 - out * out);
+        double x = d->x + cosine * forth * c->ny + out * way * c->nx;
+        double y = d->y - cosine * forth * c->nx + out * way * c->ny;
+        double gap = gap_to(face_at(s, x, y), x, y, d->radius, &nx, &ny);
+        double slope = way * (nx * c->nx + ny * c->ny) - out / cosine * forth * (nx * c->ny - ny * c->nx);
+        if (slope < 0.5 * way) break;
+        out = MIN(MAX(out + (MIN(c->gap, 0) + parted - gap) / slope, -STEEPEST), STEEPEST);
+    }
+    return out;
 }
 
 /* Turn the normal of a contact in a crowd to where a hollow leads the disk; return the cosine of that turn.

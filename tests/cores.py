@@ -1,11 +1,9 @@
 """A door to the core's arrays, for what no scene file can ask for."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from chutelab.core import module
-from chutelab.engines.contact import engine
+from chutelab.engines import contact as engine
 
 
 class Core:

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from chutelab import scene
-from chutelab.machine import Machine, build
-from chutelab.machine.parts import Arcs, Particle, Segments
+from chutelab.machine import Arcs, Machine, Particle, Segments, build
 from chutelab.machine.releases import Releases
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.recorder import Recorder
@@ -99,7 +98,7 @@ def by_hand(residual: float = 0.0, shift: float = 0.0) -> Recording:
         normal_impulse=MASS * abs(down[1]), tangential_impulse=push,
     )  # fmt: skip
     recorder.ended[:] = 1
-    return recorder.finish(engine="exact", steps=3)
+    return Recording.of(recorder.finish(engine="exact", steps=3))
 
 
 class Line(NamedTuple):
@@ -195,7 +194,7 @@ def recording_of(machine: Machine, *tracks: Any, ended: str = "time") -> Recordi
         recorder.knots(np.full(len(rows), i), t, rows[:, 1:3], rows[:, 3:5], omega, angle)
         recorder.events(Kind.RELEASE, i, rows[0, 0], rows[0, 1:3], rows[0, 3:5])
     recorder.ended[:] = REASONS.index(ended)
-    return recorder.finish(engine="exact", steps=0)
+    return Recording.of(recorder.finish(engine="exact", steps=0))
 
 
 def seen(figure: Figure) -> list[Text]:

@@ -1,16 +1,11 @@
 """Tall columns and silos: no solve and no blow makes energy, however contacts wedge."""
 
-import shutil
-import subprocess
-import sys
 from math import sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
-import wasmtime
 
-from chutelab.core import module
 from chutelab.engines.contact import run
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
@@ -21,24 +16,26 @@ from columns import column, faults
 ROOT = Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize("seed", [2, 3, 4, 8, 16, 20, 22, 24])
+@pytest.mark.parametrize("seed", [2, 8, 16, 20])
 def test_a_column_makes_no_energy(seed):
     found = run(build(from_dict(column(seed, 60))))
     assert faults(found) == []
-    assert found.laws == ()
+    assert laws.judge(found) == ()
 
 
-@pytest.mark.parametrize(("seed", "count"), [(8, 200), (9, 150)])
+@pytest.mark.parametrize(
+    ("seed", "count"), [(8, 120), pytest.param(9, 150, marks=pytest.mark.slow)]
+)
 def test_what_jams_is_not_pressed_into_each_other(seed, count):
     """By 5 % of the lesser radius, the promise of the engine, at most."""
     found = run(build(from_dict(column(seed, count))))
     i, j = np.triu_indices(count, 1)
     radii, deepest = np.broadcast_to(found.machine.particle.radius, count), 0.0
-    for places in found.at(np.linspace(0.0, found.knots["t"].max(), 200))[0]:
+    for places in found.at(np.linspace(0.0, found.knots["t"].max(), 60))[0]:
         depth = radii[i] + radii[j] - np.hypot(*(places[i] - places[j]).T)
         deepest = max(deepest, np.nanmax(depth / np.minimum(radii[i], radii[j]), initial=0.0))
     assert deepest < 0.05
-    assert found.laws == ()
+    assert laws.judge(found) == ()
 
 
 @pytest.mark.slow
@@ -47,37 +44,13 @@ def test_twenty_columns_and_silos_make_no_energy(seed):
     assert faults(run(build(from_dict(column(seed, 1000 + 379 * seed % 1001))))) == []
 
 
-@pytest.fixture
-def with_fault(tmp_path, monkeypatch):
-    """Return a function: from then on the core runs with a text in one of its files replaced."""
-    pytest.importorskip("ziglang")
-
-    def plant(name, text, fault):
-        core = tmp_path / "src" / "chutelab" / "core"
-        for path in (ROOT / "src").glob("chutelab/core/*.[ch]"):
-            core.mkdir(parents=True, exist_ok=True)
-            shutil.copy(path, core)
-        (tmp_path / "tools").mkdir()
-        tool = shutil.copy(ROOT / "tools" / "build_core.py", tmp_path / "tools")
-        source = (core / name).read_text()
-        assert source.count(text) == 1
-        (core / name).write_text(source.replace(text, fault))
-        subprocess.run([sys.executable, tool], check=True, timeout=120)
-        engine = module._compiled()[0]
-        built = wasmtime.Module(engine, (core / "core.wasm").read_bytes())
-        monkeypatch.setattr(module, "_compiled", lambda: (engine, built))
-        monkeypatch.setattr(module, "_idle", [])
-
-    return plant
-
-
 @pytest.mark.slow
 def test_without_the_line_searches_columns_make_energy_and_a_law_tells(with_fault):
     """The planted fault: impulses of the step before are taken as they are, and none are eased."""
     with_fault("solver.c", "if (!(all > 0)) return;", "if (list) return;")
     spoilt = [run(build(from_dict(column(seed, 60)))) for seed in (8, 16, 20, 22, 24)]
     assert all(any("solves gained" in fault for fault in faults(found)) for found in spoilt)
-    assert all(laws.ENERGY in {broken.law for broken in found.laws} for found in spoilt)
+    assert all(laws.ENERGY in {broken.law for broken in laws.judge(found)} for found in spoilt)
 
 
 @pytest.mark.slow
@@ -88,8 +61,9 @@ def test_where_blows_make_energy_disks_are_too_fast(with_fault):
     assert all("no other lost that" in faults(found)[0] for found in spoilt)
 
 
-@pytest.mark.parametrize("engine", ["contact", "pymunk"])
-@pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize(
+    ("engine", "e"), [("contact", 0.0), ("contact", 0.4), ("contact", 1.0), ("pymunk", 0.4)]
+)
 def test_one_of_two_disks_may_leave_faster_than_both_came(engine, e):
     """Both have the speed V = 1: why in a column a disk may be faster than a free fall.
 

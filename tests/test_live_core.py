@@ -1,11 +1,9 @@
 """The page's host of the core does what Python's does, to the last bit."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from chutelab.core import module
-from chutelab.engines.contact import engine
+from chutelab.engines import contact as engine
 from chutelab.machine import build
 from chutelab.scene import load
 from live.machines import as_page_has_it, plain

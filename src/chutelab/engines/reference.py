@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from chutelab.machine import Machine
-from chutelab.results import Kind, Recording
+from chutelab.results.record import Kind, Record
 from chutelab.results.recorder import Recorder
 from chutelab.util.arrays import Floats, Progress
 
@@ -107,12 +107,12 @@ class _Lasting:
     carried: bool = False
 
 
-def run(machine: Machine, progress: Progress | None = None) -> Recording:
+def run(machine: Machine, progress: Progress | None = None) -> Record:
     """Integrate the only particle of a machine; `progress`, told the share done, may end it.
 
     Returns
     -------
-    Recording
+    Record
         With engine ``"dop853"``.
 
     Raises
@@ -174,7 +174,7 @@ class _Run:
         self.sides: dict[int, bool] = {}
         self.steps, self.landed, self.reason = 0, False, ""
 
-    def result(self) -> Recording:
+    def result(self) -> Record:
         self.tell(Kind.RELEASE, -1)
         self.knot()
         lasting: _Lasting | None

@@ -70,7 +70,7 @@ def simulate(
         Called now and then with the share of the run that is done, 0 to 1.
     max_seconds : float, optional
         Wall time, s, after which the run ends with what is recorded: particles that have not ended
-        have reason ``"stopped"``, and `results.notes.stopped` says up to when all is there.
+        have reason ``"stopped"``, and `results.summary.stopped` says up to when all is there.
         Looked at after each step or so, which of a large crowd may take some tenths of a second.
 
     Returns
@@ -140,7 +140,7 @@ def judged(
         except StalledError as stalled:
             if not cut or stalled.recording is None:
                 raise
-            recording = stalled.recording
+            recording = Recording.of(stalled.recording)
         if (engine or machine.engine) == "auto" and not cut and recording.laws:
             recording = _instead(machine, recording, watched)
     # In place: a copy would be judged anew.
@@ -207,7 +207,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
         from chutelab.engines.exact import CornerError, run
 
         try:
-            return run(machine, progress)
+            return Recording.of(run(machine, progress))
         except CornerError as error:
             if "exact" in (engine, scene.run.engine):
                 raise _refused(scene, "run.engine", "exact", str(error)) from error
@@ -218,7 +218,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
         from chutelab.engines.contact import run as stepped
     else:
         from chutelab.engines.pymunk import run as stepped
-    return stepped(machine, progress)
+    return Recording.of(stepped(machine, progress))
 
 
 def _refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:

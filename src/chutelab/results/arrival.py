@@ -11,13 +11,12 @@ The fate of a particle is where it is when its track ends, or by which way it ha
 from __future__ import annotations
 
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.machine import Arcs, Machine, Segments
-from chutelab.results.recording import EVENT, PARTICLES, REASONS, Kind, Recording, hermite
+from chutelab.machine import Machine, Pieces
+from chutelab.results.record import EVENT, PARTICLES, REASONS, Kind, Record, hermite, kept
 from chutelab.util.arrays import Bools, Floats, Ints
 
 TOUCH = 0.01
@@ -27,29 +26,17 @@ lets a contact open that lasts, ten times what the pymunk engine lets them overl
 POINT = 1e-9
 """Distance up to which a mass point touches a surface, as a share of the size of the machine."""
 
+CARRIED = 1e-3
+"""m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
+
 LOOKS = 100
 """Instants at which particles on a surface are looked for, beside recorded blows."""
 
 HALVINGS = 24
 """Of the time between two such instants, until the one is known at which a contact began."""
 
-_known: WeakKeyDictionary[Recording, dict[str, NDArray[Any]]] = WeakKeyDictionary()
 
-
-def arrivals(recording: Recording, surface: str = "outgoing") -> NDArray[Any]:
-    """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
-
-    Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
-    for the surface itself) say something of an arrival on what lies there. Not of a family.
-    """
-    known = _known.setdefault(recording, {})
-    if surface not in known:
-        known[surface] = _arrivals(recording, surface)
-        known[surface].flags.writeable = False
-    return known[surface]
-
-
-def fates(recording: Recording) -> NDArray[Any]:
+def fates(recording: Record) -> NDArray[Any]:
     """Return what became of each particle, in words, (N,); each has one fate. Not of a family.
 
     ``on NAME``
@@ -106,12 +93,11 @@ def fates(recording: Recording) -> NDArray[Any]:
 
 def moving(machine: Machine) -> set[str]:
     """Return the names of the belts: the outgoing one, and all surfaces that move."""
-    pieces = (machine.segments, machine.arcs)
-    owners = {owner for p in pieces for owner in p.surface[p.speed != 0.0].tolist()}
+    owners = {owner for p in machine.parts for owner in p.surface[p.speed != 0.0].tolist()}
     return {machine.surfaces[owner] for owner in owners | {machine.landing} - {-1}}
 
 
-def _ways_out(recording: Recording, gone: Ints, ends: Floats) -> list[str]:
+def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
     """Return by which way particles have left the scene that end outside of it, (n, 2), m."""
     machine = recording.machine
     corners = machine.corners if machine.corners.size else machine.releases.position
@@ -157,7 +143,13 @@ def never(count: int) -> NDArray[Any]:
     return events
 
 
-def _arrivals(recording: Recording, surface: str) -> NDArray[Any]:
+@kept
+def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
+    """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
+
+    Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
+    for the surface itself) say something of an arrival on what lies there. Not of a family.
+    """
     found = never(recording.count)
     if surface not in recording.surfaces:
         return found
@@ -207,17 +199,14 @@ def _arrivals(recording: Recording, surface: str) -> NDArray[Any]:
     return found
 
 
-def _is_there(pieces: Segments | Arcs, k: int, t: Any) -> Any:
-    return (pieces.appears[k] <= t) & (t < pieces.vanishes[k])
-
-
 class Places:
     """Where particles are at an instant, and what of them lies on a surface then."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Record) -> None:
         self.recording = recording
         self.radius = np.broadcast_to(recording.particle.radius, recording.count)
         knots, corners = recording.knots, recording.machine.corners
+        self._pieces: dict[int, list[Pieces]] = {}
         self._point = POINT * float(np.ptp(corners, axis=0).max()) if corners.size else 0.0
         self._t0 = float(knots["t"].min(initial=0.0))
         self._span = 2.0 * (float(knots["t"].max(initial=0.0)) - self._t0) + 1.0
@@ -270,17 +259,10 @@ class Places:
         """Tell which particles touch a surface itself at t (s, one or (n,)), (n,)."""
         machine, owner = self.recording.machine, self.recording.surface_index(surface)
         gap = np.full(len(particles), np.inf)
-        flat, bent, wheel = machine.segments, machine.arcs, machine.pulley
-        for k in np.flatnonzero(flat.surface == owner).tolist():
-            away = places - flat.start[k]
-            along = np.clip(away @ flat.tangent[k], 0.0, flat.length[k])
-            far = np.hypot(*(away - along[:, None] * flat.tangent[k]).T)
-            gap = np.where(_is_there(flat, k, t), np.minimum(gap, far), gap)
-        for k in np.flatnonzero(bent.surface == owner).tolist():
-            far = np.hypot(*(places.T - bent.nearest(k, places)))
-            gap = np.where(_is_there(bent, k, t), np.minimum(gap, far), gap)
-        if wheel is not None and wheel.surface == owner:
-            gap = np.minimum(gap, np.abs(np.hypot(*places.T) - wheel.radius))
+        if owner not in self._pieces:
+            self._pieces[owner] = [one for one in machine.pieces if one.surface == owner]
+        for piece in self._pieces[owner]:
+            gap = np.where(piece.there(t), np.minimum(gap, piece.gap(places)), gap)
         radius = self.radius[particles]
         return np.asarray(gap <= np.where(radius > 0.0, radius * (1.0 + TOUCH), self._point))
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from chutelab.core import module as core
 from chutelab.machine import Machine
-from chutelab.results.recording import EVENT, Recording
+from chutelab.results.record import EVENT, Record, kept
 from chutelab.util.tables import number
 
 FINITE, THROUGH, INSIDE = "finite numbers", "nothing through a surface", "nothing inside a surface"
@@ -114,7 +114,8 @@ class Findings:
     figures: Any
 
 
-def judge(recording: Recording) -> tuple[Broken, ...]:
+@kept
+def judge(recording: Record) -> tuple[Broken, ...]:
     """Judge a run: return the laws that it breaks, each once, in the order of `LAWS`."""
     if not len(recording.knots):
         return ()
@@ -122,7 +123,7 @@ def judge(recording: Recording) -> tuple[Broken, ...]:
     return tuple(_broken(recording, row, found.figures) for row in found.breaches)
 
 
-def examine(recording: Recording) -> Findings:
+def examine(recording: Record) -> Findings:
     """Have the core look at a run, of one knot or more."""
     module, hit, breach = core.borrow(), core.dtype("Hit"), core.dtype("Breach")
     crowd = recording.machine.interact and recording.engine == "contact"
@@ -148,7 +149,7 @@ def examine(recording: Recording) -> Findings:
         core.give_back(module)
 
 
-def _lay_out(module: core.Module, recording: Recording) -> None:
+def _lay_out(module: core.Module, recording: Record) -> None:
     """Hand a run over to the core."""
     machine, count = recording.machine, recording.count
     bodies = np.empty(count, core.dtype("Body"))
@@ -180,7 +181,7 @@ _ENGINES = ("exact", "contact", "pymunk")
 """In the order of the core's enum Engine."""
 
 
-def alike(recording: Recording) -> bool:
+def alike(recording: Record) -> bool:
     """Tell whether all is left to Chipmunk, in steps that are all alike."""
     m = recording.machine
     return recording.engine == "pymunk" and (
@@ -234,7 +235,7 @@ def barriers(machine: Machine) -> NDArray[Any]:
     return rows
 
 
-def _broken(recording: Recording, row: NDArray[Any], figures: Any) -> Broken:
+def _broken(recording: Record, row: NDArray[Any], figures: Any) -> Broken:
     """Return a law that is broken in words."""
     t, x, y, amount, bound, which, particles, particle, surface, piece, _ = row.tolist()
     law, m = LAWS[which], recording.machine
@@ -247,7 +248,7 @@ def _broken(recording: Recording, row: NDArray[Any], figures: Any) -> Broken:
     )
 
 
-def _advice(recording: Recording, law: str, figures: Any) -> str:
+def _advice(recording: Record, law: str, figures: Any) -> str:
     """Return what may help."""
     report, machine = "if it stays so, report it with the scene", recording.machine
     if recording.engine == "exact":

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from chutelab.results.arrival import arrivals
-from chutelab.results.comparison import worst
-from chutelab.results.firsts import column, first, paid, symbols
-from chutelab.results.recording import ENTRIES, REASONS, Recording, balance
+from chutelab.results.comparison import column, first, paid, symbols, worst
+from chutelab.results.ledger import books, ledger
+from chutelab.results.record import ENTRIES, REASONS, Record
 from chutelab.scene.quantities import FIRST, lookup, suggestion, whose
 from chutelab.util.arrays import Bools, Floats
 
@@ -27,7 +27,7 @@ _STATISTICS: dict[str, Callable[[Floats], Any]] = {
 }  # fmt: skip
 
 
-def each(recording: Recording, name: str) -> Floats:
+def each(recording: Record, name: str) -> Floats:
     """Return a quantity of each particle, (N,), in its unit; NaN without one.
 
     Names are such as ``x2``, ``landing.x``, ``flight.t``, ``impact.hood.t``, ``ended.t`` or
@@ -46,8 +46,14 @@ def each(recording: Recording, name: str) -> Floats:
         case ["track", "t"]:
             begin, end = recording.ends()
             return _at_end(recording, end["t"] - begin["t"])
-        case ["ledger", *entry]:
-            return _at_end(recording, _balance(recording, ".".join(entry)))
+        case ["ledger", *rest]:
+            found, entry = books(recording), ".".join(rest)
+            entries, fall = found["entries"], found["potential.end"] - found["potential.start"]
+            found |= dict(zip(ENTRIES, entries.T, strict=True))
+            found["turned_over"] = (
+                found["kinetic.start"] + np.abs(entries).sum(axis=1) + np.abs(fall)
+            )
+            return _at_end(recording, found[entry])
         case ["flight", "t"]:
             # From the incoming belt to what is met next.
             left = column(first(recording, "separation"), "t")
@@ -65,45 +71,29 @@ def each(recording: Recording, name: str) -> Floats:
     return np.degrees(values) if name.endswith("_deg") else values
 
 
-def _at_end(recording: Recording, values: Any) -> Floats:
+def _at_end(recording: Record, values: Any) -> Floats:
     """Return what the released particles have, (n,), as that of all, (N,)."""
     found = np.full(recording.count, nan)
     found[recording.released] = values
     return found
 
 
-def _balance(recording: Recording, entry: str) -> Floats:
-    """Return an entry of the ledger of each released particle, (n,), J."""
-    first, last = recording.ends()
-    if entry in ENTRIES:
-        return np.asarray(last["entries"][:, ENTRIES.index(entry)])
-    who = np.flatnonzero(recording.released)
-    (k0, p0), (k1, p1) = recording.energies(first, who), recording.energies(last, who)
-    entries = last["entries"]
-    found: dict[str, Floats] = {
-        "kinetic.start": k0, "kinetic.end": k1, "potential.start": p0, "potential.end": p1,
-        "residual": (k1 - k0) + (p1 - p0) - balance(entries),
-        "turned_over": k0 + np.abs(entries).sum(axis=1) + np.abs(p1 - p0),
-    }  # fmt: skip
-    return found[entry]
-
-
-def _until_no_slip(recording: Recording, what: str) -> Floats:
+def _until_no_slip(recording: Record, what: str) -> Floats:
     """Return what the outgoing belt pays until a lone particle does not slip, (N,)."""
-    if recording.count > 1 and not recording.scene.shape:
+    if recording.count > 1 and not recording.family:
         return np.full(recording.count, nan)
     settled = recording.ended == REASONS.index("settled")
     entry = "friction_loss" if what == "slip_heat" else "belt_work"
     work = np.where(settled, paid(recording, "outgoing", entry), nan)
-    return np.asarray(work * (recording.scene.rate if what == "power" else 1.0))
+    return np.asarray(work * (recording.machine.scenes.rate if what == "power" else 1.0))
 
 
-def measured(recording: Recording, name: str) -> Floats:
+def measured(recording: Record, name: str) -> Floats:
     """Return a quantity that the scene has of each of V variants, (V,); NaN without one.
 
     V is 1, or of a family as many as there are particles.
     """
-    many = recording.count if recording.scene.shape else 1
+    many = recording.count if recording.family else 1
     shape = many, recording.count // many
     parts, own = name.split("."), np.ones(recording.count, dtype=bool)
     if name.startswith(FIRST):
@@ -118,7 +108,7 @@ def measured(recording: Recording, name: str) -> Floats:
     match parts:
         case ["contacts"]:
             # Of a family they are counted together.
-            return np.full(many, nan if recording.scene.shape else float(recording.contacts))
+            return np.full(many, nan if recording.family else float(recording.contacts))
         case ["ended", reason] if reason in REASONS:
             return count(recording.ended == REASONS.index(reason))
         case ["misses"]:
@@ -129,13 +119,13 @@ def measured(recording: Recording, name: str) -> Floats:
             return paid(recording, surface, entry)
         case ["ledger", "power"]:
             work = paid(recording, "outgoing", "belt_work")
-            return np.asarray(work / shape[1] * recording.scene.rate)
-        case ["ledger", *_] if recording.scene.shape:
+            return np.asarray(work / shape[1] * recording.machine.scenes.rate)
+        case ["ledger", *_] if recording.family:
             return each(recording, name)
         case ["ledger", stored, end]:
-            return np.array([getattr(recording.ledger, stored)[("start", "end").index(end)]])
+            return np.array([getattr(ledger(recording), stored)[("start", "end").index(end)]])
         case ["ledger", entry]:
-            return np.array([getattr(recording.ledger, entry)])
+            return np.array([getattr(ledger(recording), entry)])
         case [*event, "count"]:
             return count(np.isfinite(each(recording, ".".join([*event, "t"]))))
         case [*quantity, statistic] if statistic in _STATISTICS:
@@ -148,7 +138,7 @@ def measured(recording: Recording, name: str) -> Floats:
     return each(recording, name)[:: shape[1]]
 
 
-def measure(recording: Recording, name: str) -> float:
+def measure(recording: Record, name: str) -> float:
     """Return a quantity of a recording, in its unit; NaN if it did not happen.
 
     Names are those of `chutelab.scene.quantities`, such as ``x2``, ``landing.x.mean`` or

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine
-from chutelab.results.recording import EVENT, KNOT, REASONS, Kind, Recording
+from chutelab.results.record import EVENT, KNOT, REASONS, Kind, Record
 from chutelab.util.arrays import Floats, Ints
 
 
@@ -31,7 +31,7 @@ class StalledError(RuntimeError):
         t: float,
         position: tuple[float, float],
         reason: str,
-        recording: Recording | None = None,
+        recording: Record | None = None,
     ) -> None:
         super().__init__(particle, t, position, reason)
         self.particle = particle
@@ -55,7 +55,7 @@ class EnoughError(Exception):
 
 
 class Recorder:
-    """Grows by chunks; `finish` turns it into a frozen `Recording` of the machine's run.
+    """Grows by chunks; `finish` turns it into a frozen `Record` of the machine's run.
 
     With `apart` the books of each particle are kept apart: `by_surface` is (N, S, 3) then.
     """
@@ -157,7 +157,7 @@ class Recorder:
         steps: int,
         seconds: float = nan,
         origin: tuple[float, float] = (0.0, 0.0),
-    ) -> Recording:
+    ) -> Record:
         """Sort what was collected, counted from `origin` (m), and freeze it."""
         count = len(self.ended)
         knots = _joined(self._knots, KNOT)
@@ -197,7 +197,7 @@ class Recorder:
             knots = knots.copy()
             for rows in (knots, events):
                 rows["position"] += origin
-        return Recording(
+        return Record(
             machine=self.machine,
             engine=engine,
             knots=knots,

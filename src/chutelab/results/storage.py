@@ -20,7 +20,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from chutelab.machine import build
-from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Recording
+from chutelab.results.record import ENTRIES, EVENT, KNOT, REASONS, Kind, Record
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
@@ -73,7 +73,7 @@ class RecordingError(InputError):
     """A file is not a recording that this version can read."""
 
 
-def save(recording: Recording, path: str | Path) -> Path:
+def save(recording: Record, path: str | Path) -> Path:
     """Write a recording to an npz file, whole or not at all."""
     path = Path(path)
     header = json.dumps(_about(recording))
@@ -85,7 +85,7 @@ def save(recording: Recording, path: str | Path) -> Path:
     return path
 
 
-def load(path: str | Path) -> Recording:
+def load(path: str | Path) -> Record:
     """Read what `save` wrote.
 
     Nothing is unpacked whose size is not known, and sane, before.
@@ -155,7 +155,7 @@ def _array(archive: zipfile.ZipFile, name: str, room: int = 0) -> NDArray[Any]:
     return array
 
 
-def _about(recording: Recording) -> dict[str, Any]:
+def _about(recording: Record) -> dict[str, Any]:
     """Return the header of the file."""
     return {
         "format": FORMAT,
@@ -173,7 +173,7 @@ def _about(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Recording:
+def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     """Return what header and arrays hold; an error if they contradict each other or the scene.
 
     Every index has to lead somewhere. The scene's text may be an older one, without later keys.
@@ -195,7 +195,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Recording:
     about.setdefault("gained", 0.0)  # ... and not this
     told = {name: about[name] for name in ("engine", "steps", "contacts", "gained")}
     instead = str(about.get("instead", ""))
-    recording = Recording(machine=build(scene), instead=instead, **told, **arrays)
+    recording = Record(machine=build(scene), instead=instead, **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
         raise _UnfitError("the header is of another scene")
     numbers = {"by_surface": arrays["by_surface"], "angle": recording.angle}
@@ -233,7 +233,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Recording:
 
 
 def to_csv(
-    recording: Recording,
+    recording: Record,
     folder: str | Path,
     *,
     step: float | None = None,
@@ -243,7 +243,7 @@ def to_csv(
 
     Parameters
     ----------
-    recording : Recording
+    recording : Record
         What to write.
     folder : path
         Existing directory.
@@ -264,12 +264,12 @@ def to_csv(
     ]
 
 
-def frame(recording: Recording, table: str = "trajectory", *, step: float | None = None) -> Any:
+def frame(recording: Record, table: str = "trajectory", *, step: float | None = None) -> Any:
     """Return what `to_csv` writes as a pandas DataFrame.
 
     Parameters
     ----------
-    recording : Recording
+    recording : Record
         What to show.
     table : {"trajectory", "events"}
         Positions (m) and velocities (m/s) of all particles at even times (s); or what happened to
@@ -290,7 +290,7 @@ def frame(recording: Recording, table: str = "trajectory", *, step: float | None
     return data_frame({str(name): [row[i] for row in rows] for i, name in enumerate(names)})
 
 
-def _table(recording: Recording, name: str, step: float | None) -> Iterator[Sequence[object]]:
+def _table(recording: Record, name: str, step: float | None) -> Iterator[Sequence[object]]:
     """Return the rows of a table, the names of its columns first."""
     if step is not None:
         if not 0.0 < step < inf:
@@ -308,7 +308,7 @@ def _table(recording: Recording, name: str, step: float | None) -> Iterator[Sequ
     return _events(recording) if name == "events" else _trajectory(recording, step)
 
 
-def instants(recording: Recording) -> int:
+def instants(recording: Record) -> int:
     """Return how many instants trajectory.csv has where no interval is asked for.
 
     `SAMPLES`, or as many as keep it to `MOST_ROWS` rows.
@@ -322,7 +322,7 @@ def instants(recording: Recording) -> int:
     return max(2, min(SAMPLES, 1 + int((MOST_ROWS - len(first)) / share))) if share else SAMPLES
 
 
-def _events(recording: Recording) -> Iterator[Sequence[object]]:
+def _events(recording: Record) -> Iterator[Sequence[object]]:
     places = ("x", "y", "vx_before", "vy_before", "vx_after", "vy_after")
     vectors = ("position", "velocity_before", "velocity_after")
     scalars = ("omega_before", "omega_after", "normal_impulse", "tangential_impulse")
@@ -336,7 +336,7 @@ def _events(recording: Recording) -> Iterator[Sequence[object]]:
         yield t, particle, None if other < 0 else other, kinds[kind], names[surface], *row
 
 
-def _trajectory(recording: Recording, step: float | None) -> Iterator[Sequence[object]]:
+def _trajectory(recording: Record, step: float | None) -> Iterator[Sequence[object]]:
     yield "t", "particle", "x", "y", "vx", "vy"
     if not len(recording.knots):
         return

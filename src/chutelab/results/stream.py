@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.results.arrival import Places, arrivals, fates
-from chutelab.results.notes import CARRIED
+from chutelab.results.arrival import CARRIED, Places, arrivals, fates
 from chutelab.results.quantities import each, measure
-from chutelab.results.recording import ENTRIES, REASONS, Recording
+from chutelab.results.record import ENTRIES, REASONS, Record
 from chutelab.scene import Scene
 from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.units import with_unit
@@ -69,7 +68,7 @@ class Envelope:
         return np.asarray(self.middle + self.offset[..., None] * self.normal)
 
 
-def envelopes(recording: Recording, places: int = 60) -> dict[str, Envelope]:
+def envelopes(recording: Record, places: int = 60) -> dict[str, Envelope]:
     """Return the envelopes of the streams of a recording, by name, each cut at so many places.
 
     A path is that of a particle from its release to its arrival on the outgoing belt, or to its
@@ -94,7 +93,7 @@ def envelopes(recording: Recording, places: int = 60) -> dict[str, Envelope]:
     return found
 
 
-def _envelope(recording: Recording, own: Ints, end: Floats, places: int) -> Envelope | None:
+def _envelope(recording: Record, own: Ints, end: Floats, places: int) -> Envelope | None:
     """Return the envelope of the paths of some particles up to their ends (s)."""
     begin = recording.knots["t"][recording.offsets[own]]
     since = np.linspace(0.0, float(np.median(end - begin)), INSTANTS)
@@ -180,7 +179,7 @@ class Steady:
         return f"outgoing belt, steady: P = {power} W {said}"
 
 
-def works(recording: Recording) -> Floats:
+def works(recording: Record) -> Floats:
     """Return what the outgoing belt has paid for each particle that settled on it, J, (N,).
 
     NaN of the others. Where particles do not meet each other and do not turn, that is
@@ -213,7 +212,7 @@ def works(recording: Recording) -> Floats:
     return found
 
 
-def steady(recording: Recording) -> Steady | None:
+def steady(recording: Record) -> Steady | None:
     """Return what streams in t/h take of the outgoing belt; None without any that has arrived."""
     scene = recording.scene
     fed = [stream.mass_rate for stream in scene.streams]
@@ -237,7 +236,7 @@ def steady(recording: Recording) -> Steady | None:
     )
 
 
-def _per_mass(recording: Recording, paid: Floats, own: Bools) -> tuple[float, float]:
+def _per_mass(recording: Record, paid: Floats, own: Bools) -> tuple[float, float]:
     """Return the work per mass of some particles, J/kg, and its standard error; NaN unless known.
 
     The error is that of the mean of blocks. Where each particle is alone, a block is particles in
@@ -357,7 +356,7 @@ def told_fates(counts: dict[str, int]) -> str:
     return ", ".join(f"{n} {fate}" for fate, n in sorted(counts.items(), key=lambda one: -one[1]))
 
 
-def crowd(recording: Recording) -> Crowd | None:
+def crowd(recording: Record) -> Crowd | None:
     """Return a run of several particles as a whole; None of one."""
     scene = recording.scene
     if recording.count < 2:
@@ -382,7 +381,7 @@ def crowd(recording: Recording) -> Crowd | None:
     )
 
 
-def flows(recording: Recording) -> tuple[float | None, float | None]:
+def flows(recording: Record) -> tuple[float | None, float | None]:
     """Return the flow onto the outgoing belt in t/h, of the slice and of all the width.
 
     Either is None where too few arrive to tell, the second one without ``stream.width`` as well.

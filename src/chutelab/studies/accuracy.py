@@ -23,8 +23,7 @@ from chutelab.engines import reference
 from chutelab.engines.simulation import judged
 from chutelab.machine import build
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
-from chutelab.results.comparison import compare, scales
-from chutelab.results.firsts import first
+from chutelab.results.comparison import compare, first, prediction, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
 from chutelab.scene import AnyScene, Scene, SceneError, load
@@ -158,7 +157,7 @@ def sizes(recording: Recording) -> dict[str, float]:
     Otherwise by the extent of the way, its duration and the highest speed; energies always by the
     energy that was turned over.
     """
-    known, knots = scales(recording.scene, recording.prediction), recording.knots
+    known, knots = scales(recording.scene, prediction(recording)), recording.knots
     own = {"length": 0.0, "time": 0.0, "speed": 0.0}
     if len(knots):
         own["length"] = float(np.hypot(*np.ptp(knots["position"], axis=0)))
@@ -235,7 +234,7 @@ def answer(
             raise LateError(f"it takes longer than {max_seconds:g} s")
 
     if engine == "dop853":
-        return reference.run(build(scene), bounded)
+        return Recording.of(reference.run(build(scene), bounded))
     return judged(scene, engine=engine, progress=progress if max_seconds is None else bounded)
 
 

@@ -10,12 +10,12 @@ from time import process_time
 import numpy as np
 
 from chutelab.checks.preflight.results import Effort, Stepping
-from chutelab.engines.exact.engine import ROUNDS
+from chutelab.engines.exact import ROUNDS
 from chutelab.engines.simulation import follow
 from chutelab.machine import Machine, build
 from chutelab.results import EVENT, KNOT, REASONS, Recording
-from chutelab.results.notes import stopped
 from chutelab.results.recorder import EnoughError, StalledError
+from chutelab.results.summary import stopped
 from chutelab.scene import SceneError
 from chutelab.util.arrays import Floats
 
@@ -99,7 +99,9 @@ def _timed(machine: Machine, patience: float) -> Trial:
     try:
         recording = follow(machine, None, watch)
     except StalledError as stalled:
-        recording, trouble = stalled.recording, str(stalled)
+        trouble = str(stalled)
+        if stalled.recording is not None:
+            recording = Recording.of(stalled.recording)
     seconds = process_time() - begin
     return Trial(recording, seconds, np.array(marks).reshape(-1, 2), trouble=trouble)
 

@@ -19,7 +19,7 @@ from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.pymunk.shared import Shared
 from chutelab.engines.pymunk.world import World
 from chutelab.machine import Machine, moved, origin
-from chutelab.results import REASONS, Recording
+from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 
@@ -27,7 +27,7 @@ LOOK, SLICE = 64, 0.05
 """Steps and s of wall time between two reports of progress, about: whichever is over first."""
 
 
-def run(machine: Machine, progress: Progress | None = None) -> Recording:
+def run(machine: Machine, progress: Progress | None = None) -> Record:
     """Run a machine in Pymunk.
 
     Parameters
@@ -39,7 +39,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
 
     Returns
     -------
-    Recording
+    Record
         With `align`, a lone particle's blows to rounding error and its lasting contacts of order 2
         in the step, which is no longer than `dt` and half a radius' way. Particles that meet,
         boxes, what hangs on strings, and steps that are all alike, of order 1: `dt` times the speed
@@ -59,7 +59,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
     recorder, place = Recorder(machine), origin(machine)
     machine = moved(machine, -place[0], -place[1])
 
-    def finished() -> Recording:
+    def finished() -> Record:
         return recorder.finish(
             engine="pymunk", steps=steps, seconds=perf_counter() - begin, origin=place
         )

@@ -32,7 +32,7 @@ from chutelab.engines.pymunk.world import (
     exit_box,
 )
 from chutelab.machine import Machine
-from chutelab.results import REASONS, Kind
+from chutelab.results.record import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 

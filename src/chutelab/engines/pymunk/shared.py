@@ -30,7 +30,7 @@ from pymunk import Vec2d, batch
 from chutelab.engines.pymunk.shapes import Shapes
 from chutelab.engines.pymunk.world import Bend, Carriage, Flight, Tracks, World, exit_box
 from chutelab.machine import Machine
-from chutelab.results import REASONS, Kind
+from chutelab.results.record import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder
 from chutelab.util.arrays import Floats, Ints, Progress
 

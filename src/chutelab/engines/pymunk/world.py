@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pymunk import Vec2d
 
 from chutelab.machine import Arcs, Machine, Segments
-from chutelab.results import KNOT
+from chutelab.results.record import KNOT
 from chutelab.results.recorder import Recorder
 from chutelab.util.arrays import Bools, Floats
 

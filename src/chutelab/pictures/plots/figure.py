@@ -42,6 +42,7 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
+from chutelab.results.comparison import prediction as predicted
 from chutelab.theory import Transfer
 from chutelab.theory.figures import Panel, PaperFigure
 
@@ -90,7 +91,7 @@ def overlay(
         If both `path` and `ax` are given.
     """
     if prediction is None:
-        prediction = recording.prediction
+        prediction = predicted(recording)
     parts, start = analytic_of(recording, prediction)
     all_of_them = not parts and bodily(recording)
     if ax is not None:

@@ -29,6 +29,7 @@ from chutelab.pictures.plots.scenery import (
     upright,
 )
 from chutelab.results import Recording
+from chutelab.results.comparison import prediction as predicted
 from chutelab.results.quantities import each
 from chutelab.scene import Scene
 from chutelab.scene.conflicts import beside
@@ -151,7 +152,7 @@ def analytic_of(
     left = float(each(recording, "separation.t")[0])
     if isnan(left):
         return (), 0.0
-    return arcs(recording.prediction if prediction is None else prediction, recording.scene), left
+    return arcs(prediction or predicted(recording), recording.scene), left
 
 
 def draw_tracks(ax: Axes, recording: Recording, *, marks: bool = True) -> Axes:

@@ -1,4 +1,4 @@
-"""`Recording`: a finished run, its tracks, and the names of its events and ledger entries.
+"""`Record`: a finished run as an engine leaves it, and the names of its events and ledger entries.
 
 A particle's track is a list of *knots*; between two knots it is the cubic Hermite curve through
 them. With exact end velocities that curve is the parabola of free flight, so a flight costs two
@@ -9,27 +9,23 @@ is two knots at one time.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import cached_property
+from functools import cached_property, wraps
+from inspect import signature
 from math import isnan, nan
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine, Particle
 from chutelab.scene import Scene, quantities
-from chutelab.theory import Transfer, predict
+from chutelab.scene.variants import Family
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.tables import Sheet, Shown
-
-if TYPE_CHECKING:
-    from chutelab.results.laws import Broken
-    from chutelab.results.ledger import Ledger
 
 ENTRIES = quantities.ENTRIES
 """The three entries of the energy ledger, in the order of every array that holds them."""
@@ -66,22 +62,12 @@ def kind_of(kind: Kind | str) -> Kind:
     return Kind(kind)
 
 
-EVENT = np.dtype(
-    [
-        ("t", "f8"),
-        ("particle", "i4"),
-        ("other", "i4"),
-        ("kind", "i1"),
-        ("surface", "i2"),
-        ("position", "f8", 2),
-        ("velocity_before", "f8", 2),
-        ("velocity_after", "f8", 2),
-        ("omega_before", "f8"),
-        ("omega_after", "f8"),
-        ("normal_impulse", "f8"),
-        ("tangential_impulse", "f8"),
-    ]
-)
+EVENT = np.dtype([
+    ("t", "f8"), ("particle", "i4"), ("other", "i4"), ("kind", "i1"), ("surface", "i2"),
+    ("position", "f8", 2), ("velocity_before", "f8", 2), ("velocity_after", "f8", 2),
+    ("omega_before", "f8"), ("omega_after", "f8"),
+    ("normal_impulse", "f8"), ("tangential_impulse", "f8"),
+])  # fmt: skip
 """One event, in SI units.
 
 - ``t``: when, s.
@@ -95,15 +81,9 @@ EVENT = np.dtype(
 - ``tangential_impulse``: along (n_y, -n_x), N s.
 """
 
-KNOT = np.dtype(
-    [
-        ("t", "f8"),
-        ("position", "f8", 2),
-        ("velocity", "f8", 2),
-        ("omega", "f8"),
-        ("entries", "f8", 3),
-    ]
-)
+KNOT = np.dtype([
+    ("t", "f8"), ("position", "f8", 2), ("velocity", "f8", 2), ("omega", "f8"), ("entries", "f8", 3)
+])  # fmt: skip
 """One knot, in SI units.
 
 - ``t``: when, s.
@@ -174,15 +154,13 @@ class Motion(tuple[Floats, Floats]):
     NaN before a particle's release and after its end; at an impact the state after it.
     """
 
-    _recording: Recording
+    _record: Record
     _times: Floats
 
-    def __new__(
-        cls, position: Floats, velocity: Floats, recording: Recording, times: Floats
-    ) -> Motion:
+    def __new__(cls, position: Floats, velocity: Floats, record: Record, times: Floats) -> Motion:
         """Return the pair, of a recording at times (T,), s."""
         self = super().__new__(cls, (position, velocity))
-        self._recording, self._times = recording, times
+        self._record, self._times = record, times
         return self
 
     @property
@@ -198,8 +176,8 @@ class Motion(tuple[Floats, Floats]):
     @property
     def omega(self) -> Floats:
         """Angular velocity, counterclockwise, (T, N), rad/s: linear between knots."""
-        found, omega = np.full(self[0].shape[:2], np.nan), self._recording.knots["omega"]
-        for row, particle, left, share in self._recording.blocks(self._times):
+        found, omega = np.full(self[0].shape[:2], np.nan), self._record.knots["omega"]
+        for row, particle, left, share in self._record.blocks(self._times):
             found[row, particle] = omega[left] + share * (omega[left + 1] - omega[left])
         return found
 
@@ -210,7 +188,7 @@ class Motion(tuple[Floats, Floats]):
         The integral of `omega`; where the recording says more, see `Recording.angle`, it is
         corrected evenly from knot to knot.
         """
-        some, found = self._recording, np.full(self[0].shape[:2], np.nan)
+        some, found = self._record, np.full(self[0].shape[:2], np.nan)
         t, omega, first = some.knots["t"], some.knots["omega"], some.offsets[:-1]
         passed = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
         told = some.angle if len(some.angle) else passed
@@ -223,8 +201,11 @@ class Motion(tuple[Floats, Floats]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(Shown):
+class Record(Shown):
     """A finished run: read-only arrays, the same type from every engine.
+
+    The base of `Recording`, which is what `simulate` returns. Engines write it and the readers of
+    this room read it, so it imports none of them.
 
     Attributes
     ----------
@@ -283,8 +264,13 @@ class Recording(Shown):
 
     @property
     def scene(self) -> Scene:
-        """The scene that was run."""
+        """The scene that was run; of a family one of its scenes."""
         return self.machine.scene
+
+    @property
+    def family(self) -> Family | None:
+        """All scenes that were run at once, if each particle is of another one."""
+        return self.machine.family
 
     @property
     def title(self) -> str:
@@ -307,35 +293,9 @@ class Recording(Shown):
         return (*self.machine.surfaces, PARTICLES)
 
     @cached_property
-    def prediction(self) -> Transfer:
-        """What the theory predicts for the scene, see `chutelab.theory.predict`."""
-        return predict(self.scene)
-
-    @cached_property
-    def laws(self) -> tuple[Broken, ...]:
-        """The laws of every run that this one breaks, empty if it keeps all; see `results.laws`."""
-        from chutelab.results.laws import judge
-
-        return judge(self)
-
-    @cached_property
-    def ledger(self) -> Ledger:
-        """Where the energy went, in total and by surface; see `results.ledger.Ledger`."""
-        from chutelab.results.ledger import ledger
-
-        return ledger(self)
-
-    def measure(self, quantity: str) -> float:
-        """Return a quantity by its name, such as ``landing.x.mean``; see `chutelab.measure`."""
-        from chutelab.results.quantities import measure
-
-        return measure(self, quantity)
-
-    def summary(self) -> dict[str, Any]:
-        """Return what ``chutelab run --json`` prints; see `results.summary.summary`."""
-        from chutelab.results.summary import summary
-
-        return summary(self)
+    def found(self) -> dict[Any, Any]:
+        """What readers have found so far, see `kept`."""
+        return {}
 
     @cached_property
     def t(self) -> Floats:
@@ -368,37 +328,6 @@ class Recording(Shown):
         if details and not isnan(self.seconds):
             told["run time"] = f"{self.seconds:.3g} s"
         return Sheet(self.title, ("", ""), tuple(told.items()), texts=2)
-
-    def save(self, path: str | Path) -> Path:
-        """Write an npz file, whole or not at all; `load` gives the recording back bit for bit."""
-        from chutelab.results.storage import save
-
-        return save(self, path)
-
-    @classmethod
-    def load(cls, path: str | Path) -> Recording:
-        """Read what `save` wrote; a `results.storage.RecordingError` says what is wrong."""
-        from chutelab.results.storage import load
-
-        return load(path)
-
-    def to_csv(
-        self,
-        folder: str | Path,
-        *,
-        step: float | None = None,
-        only: Collection[str] = ("events", "trajectory"),
-    ) -> list[Path]:
-        """Write events.csv and trajectory.csv into a folder; see `results.storage.to_csv`."""
-        from chutelab.results.storage import to_csv
-
-        return to_csv(self, folder, step=step, only=only)
-
-    def frame(self, table: str = "trajectory", *, step: float | None = None) -> Any:
-        """Return positions over time, or ``"events"``, as a DataFrame; see `storage.frame`."""
-        from chutelab.results.storage import frame
-
-        return frame(self, table, step=step)
 
     @property
     def owner(self) -> Ints:
@@ -550,3 +479,31 @@ class Recording(Shown):
         vx, vy = knots["velocity"][..., 0], knots["velocity"][..., 1]
         potential = body.mass * self.gravity * knots["position"][..., 1]
         return body.kinetic(vx, vy, knots["omega"]), potential
+
+
+Args = ParamSpec("Args")
+Result = TypeVar("Result")
+
+
+def kept(
+    reader: Callable[Concatenate[Record, Args], Result],
+) -> Callable[Concatenate[Record, Args], Result]:
+    """Keep with a record what a reader found there, for each set of further arguments.
+
+    Arrays become read-only.
+    """
+    form = signature(reader)
+
+    @wraps(reader)
+    def read(record: Record, /, *args: Args.args, **more: Args.kwargs) -> Result:
+        given = form.bind(record, *args, **more)
+        given.apply_defaults()
+        key = (reader.__module__, reader.__name__, *given.args[1:])
+        if key not in record.found:
+            record.found[key] = found = reader(record, *args, **more)
+            if isinstance(found, np.ndarray):
+                found.flags.writeable = False
+        result: Result = record.found[key]
+        return result
+
+    return read

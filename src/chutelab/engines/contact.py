@@ -1,4 +1,7 @@
-"""`run`: a machine in, a recording out; the core does the rest."""
+"""Particles that meet: impacts at their own instants, lasting contacts by contact dynamics.
+
+The engine itself is in C, in `chutelab.core`; here `run` goes from a machine to a recording.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ from chutelab.core.module import (
     number,
 )
 from chutelab.machine import Machine, moved, origin
-from chutelab.results import EVENT, KNOT, REASONS, Recording
+from chutelab.results.record import EVENT, KNOT, REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 
@@ -51,7 +54,7 @@ MOST_STEPS = 512
 """Steps between two looks, at most: what follows may take a thousand times as long as what was."""
 
 
-def run(machine: Machine, progress: Progress | None = None) -> Recording:
+def run(machine: Machine, progress: Progress | None = None) -> Record:
     """Run a machine with the contact engine.
 
     Parameters
@@ -63,7 +66,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
 
     Returns
     -------
-    Recording
+    Record
         Flights and blows to rounding error, lasting contacts of second order in `machine.dt`;
         bit-identical on every machine, but for `seconds`.
 
@@ -272,7 +275,7 @@ class Job:
         passed = (world.t - begin) / (end - begin) if begin < world.t < end else 0.0
         return float(min(1.0, ended + passed / n))
 
-    def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Recording:
+    def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Record:
         """Return what was recorded."""
         recorder = Recorder(machine)
         world, module = self.module.world, self.module

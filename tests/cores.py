@@ -3,7 +3,7 @@
 import numpy as np
 
 from chutelab.core import module
-from chutelab.engines.contact import engine
+from chutelab.engines import contact as engine
 
 
 class Core:

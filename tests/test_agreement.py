@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from chutelab import machine, scene, theory
 from chutelab.checks.agreement import agreement, order, verify
 from chutelab.engines import exact, reference
-from chutelab.engines.contact.engine import Job
+from chutelab.engines.contact import Job
 from chutelab.engines.exact import contacts
 from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.simulation import simulate
@@ -254,7 +254,7 @@ def heavier_ode(run, *given, honest=reference._Run.__init__):
     ("name", "where", "wrong"),
     [
         ("exact", "chutelab.engines.exact.detect.descent", late_descent),
-        ("contact", "chutelab.engines.contact.engine.Job.settings", heavier_core),
+        ("contact", "chutelab.engines.contact.Job.settings", heavier_core),
         ("pymunk", "chutelab.engines.pymunk.lone.Lone.__init__", heavier_flight),
         ("dop853", "chutelab.engines.reference._Run.__init__", heavier_ode),
     ],

@@ -17,7 +17,8 @@ import pytest
 from click.testing import CliRunner
 
 from chutelab.classroom.lessons import find, shipped_lessons
-from chutelab.classroom.lessons.building import bundle, start
+from chutelab.classroom.lessons.building import start
+from chutelab.classroom.lessons.pages import bundle
 from chutelab.classroom.lessons.texts import html_of
 from chutelab.cli import main
 

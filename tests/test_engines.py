@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 import chutelab
 from chutelab.engines import contact
-from chutelab.engines.contact import engine as host
+from chutelab.engines import contact as host
 from chutelab.machine import build
 from chutelab.results import REASONS, Kind, balance
 from chutelab.results.ledger import ledger

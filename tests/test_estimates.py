@@ -14,8 +14,8 @@ import pytest
 from chutelab.checks.preflight.trial import effort, trial
 from chutelab.engines.simulation import choose, follow, simulate
 from chutelab.machine import build
-from chutelab.results.notes import stopped
 from chutelab.results.recorder import EnoughError, StalledError
+from chutelab.results.summary import stopped
 from chutelab.scene import from_dict, load
 from crowds import crowd
 from drawn import draw

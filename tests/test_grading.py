@@ -17,9 +17,8 @@ from click.testing import CliRunner
 import chutelab
 from chutelab.classroom import grading
 from chutelab.classroom.exercises import EXERCISES, lesson
-from chutelab.classroom.grading import Grade, grade, write_csv
+from chutelab.classroom.grading import LARGEST, Grade, grade, write_csv
 from chutelab.classroom.kernel import Ran
-from chutelab.classroom.returned import LARGEST
 from chutelab.cli import main
 
 pytest.importorskip("nbclient")
@@ -312,6 +311,7 @@ def one(**changes):
         [one(answers={"1": True})],
         [one(answers={"1": "1.0"})],
         [one(answers={"1": 10**400})],
+        [one(answers={"1": float("nan")})],  # a task takes no such answer
         [one(revealed=[True])],
         [one(revealed=[[1]])],
         [one(revealed=list(range(1000)))],

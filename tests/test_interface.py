@@ -11,7 +11,7 @@ import chutelab
 from chutelab import design, theory
 from chutelab.checks.preflight import preflight
 from chutelab.machine import build
-from chutelab.results.notes import stopped
+from chutelab.results.summary import stopped
 from chutelab.scene import shipped, to_dict
 from chutelab.util.errors import InputError
 

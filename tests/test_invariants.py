@@ -12,8 +12,7 @@ from chutelab import machine, scene
 from chutelab.engines import exact
 from chutelab.engines.simulation import simulate
 from chutelab.results.ledger import ledger
-from chutelab.scene import Scene
-from chutelab.scene.loading import plain, to_dict
+from chutelab.scene import Scene, plain, to_dict
 from chutelab.scene.tables import Stream
 from sandbox import draw
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from chutelab.core import module
-from chutelab.engines.contact import engine
+from chutelab.engines import contact as engine
 from chutelab.machine import build
 from chutelab.scene import load
 from live.machines import as_page_has_it, plain

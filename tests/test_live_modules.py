@@ -5,7 +5,7 @@ import re
 import subprocess
 
 from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.in_page import SAID, data_of
+from chutelab.classroom.exercises.catalogue import SAID, data_of
 from chutelab.pictures.live.page import LANGUAGES
 from chutelab.scene.quantities import REGISTRY
 from live.node import ASSETS, HERE, NODE, needs_node

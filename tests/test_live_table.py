@@ -5,7 +5,7 @@ import pytest
 from chutelab import scene as sc
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
-from chutelab.scene.live import live_of
+from chutelab.scene.messages import live_of
 
 MACHINE = """
 [incoming]

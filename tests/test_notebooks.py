@@ -9,10 +9,9 @@ from click.testing import CliRunner
 from matplotlib.lines import Line2D
 
 from chutelab.classroom.book import Book
+from chutelab.classroom.grading import words_of as written_in
 from chutelab.classroom.lessons import LessonError, read, shipped_lessons
-from chutelab.classroom.lessons.building import build_notebook, start
-from chutelab.classroom.lessons.cells import notebook_of
-from chutelab.classroom.returned import words_of as written_in
+from chutelab.classroom.lessons.building import build_notebook, notebook_of, start
 from chutelab.cli import main
 from chutelab.results.quantities import measure
 from chutelab.util.errors import InputError

@@ -7,9 +7,14 @@ import numpy as np
 import pytest
 
 from chutelab.classroom.exercises import EXERCISES, catalogue, lesson
-from chutelab.classroom.exercises.catalogue import told
-from chutelab.classroom.exercises.exercise import Case, Numbers, draw, plain, shown
-from chutelab.classroom.exercises.in_page import data_of, tree
+from chutelab.classroom.exercises.catalogue import data_of, told, tree
+from chutelab.classroom.exercises.exercise import (
+    Case,
+    Numbers,
+    draw,
+    plain,
+    shown,
+)
 from chutelab.classroom.exercises.judging import judge
 from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.reading import scene_of

@@ -9,7 +9,7 @@ from chutelab.classroom.exercises import lesson
 from chutelab.classroom.exercises.catalogue import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.lessons import find
-from chutelab.classroom.lessons.building import live_page
+from chutelab.classroom.lessons.pages import live_page
 from live.browser import DONE
 
 AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"

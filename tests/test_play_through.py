@@ -11,7 +11,7 @@ from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import MARKS
 from chutelab.classroom.grading import grade
 from chutelab.classroom.lessons import find
-from chutelab.classroom.lessons.building import live_page
+from chutelab.classroom.lessons.pages import live_page
 from chutelab.classroom.words import words
 from live.browser import DONE
 

@@ -13,7 +13,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.machine.releases import DEEP, squeeze
 from chutelab.results import Kind
-from chutelab.scene.variants import family
+from chutelab.scene.variants import Family
 
 G, V, r = 9.81, 2.0, 0.0063
 RC = 0.1 + r
@@ -139,7 +139,7 @@ def test_each_of_a_family_starts_as_it_would_by_itself():
         "incoming.pulley_radius": np.array([0.2, 0.25, 0.2, 0.3]),
         "stream.start": np.array([0.0, 0.5, 0.0, 2.0]),
     }
-    found = vars(build(family(one, columns)).releases)
+    found = vars(build(Family(one, columns)).releases)
     for n in range(4):
         alone = vars(build(one.with_values({key: own[n] for key, own in columns.items()})).releases)
         for name in ("t", "position", "velocity", "carried"):

@@ -9,8 +9,7 @@ from click.testing import CliRunner
 from markdown_it import MarkdownIt
 
 from chutelab.classroom.exercises import EXERCISES, lesson
-from chutelab.classroom.grading import Grade, grade
-from chutelab.classroom.returned import LARGEST_RESULT
+from chutelab.classroom.grading import LARGEST_RESULT, Grade, grade
 from chutelab.cli import main
 
 

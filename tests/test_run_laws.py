@@ -175,7 +175,7 @@ def test_steps_longer_than_the_radius_are_told_where_something_may_be_passed():
 
 
 def report(run):
-    from chutelab.results.report import sheets
+    from chutelab.results.summary import sheets
 
     return sheets(run)
 

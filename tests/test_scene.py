@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from chutelab import scene as sc
-from chutelab.scene.schema import as_written
+from chutelab.scene.schema import to_dict
 
 CONVEYOR = """
 [incoming]
@@ -121,7 +121,7 @@ EXPECT = {"quantity", "value", "tolerance", "tolerance_contact", "tolerance_pymu
 
 def test_the_defaults_are_the_contract():
     scene = sc.parse(MACHINE, "somewhere/machine.toml")
-    assert as_written(scene, defaults=True) == CONTRACT
+    assert to_dict(scene, defaults=True) == CONTRACT
     assert scene.source == "somewhere/machine.toml"
 
 
@@ -391,8 +391,8 @@ def test_an_override_sets_its_key_and_no_other(override, path, value):
             return {above: tree}
         return {k: v for key, branch in branches for k, v in leaves(branch, (*above, key)).items()}
 
-    expected = leaves(as_written(plain, defaults=True)) | {path: value}
-    assert leaves(as_written(changed, defaults=True)) == expected
+    expected = leaves(to_dict(plain, defaults=True)) | {path: value}
+    assert leaves(to_dict(changed, defaults=True)) == expected
 
 
 def test_overrides_leave_the_callers_mapping_alone():

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.lessons import find
-from chutelab.classroom.lessons.scorm import package
+from chutelab.classroom.lessons.pages import package
 from chutelab.cli import main
 
 LIVE = Path(__file__).parent / "live"

@@ -11,10 +11,8 @@ from PIL import Image
 
 from chutelab.classroom.lessons import find, read, shipped_lessons
 from chutelab.classroom.lessons.building import start
-from chutelab.classroom.lessons.formulas import parsed, plain, typeset
-from chutelab.classroom.lessons.printing import printed
-from chutelab.classroom.lessons.sheets import SHEETS, sheet
-from chutelab.classroom.lessons.texts import html_of, without_tex
+from chutelab.classroom.lessons.sheets import SHEETS, printed, sheet
+from chutelab.classroom.lessons.texts import html_of, parsed, plain, typeset, without_tex
 from chutelab.cli import main
 
 
@@ -94,7 +92,7 @@ def test_sheets_go_into_a_folder_with_names_of_their_own(tmp_path):
 
 def test_without_the_library_a_pdf_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "typst", None)
-    monkeypatch.setattr("chutelab.classroom.lessons.printing.find_spec", lambda name: None)
+    monkeypatch.setattr("chutelab.classroom.lessons.sheets.find_spec", lambda name: None)
     result = chutelab("lesson", "show", 1, "--sheet", "student", "-o", tmp_path / "a.pdf")
     assert result.exit_code == 2
     assert 'pip install "chutelab[pdf]"' in result.output

@@ -7,9 +7,8 @@ from chutelab import machine, scene
 from chutelab.engines.simulation import ENGINES, choose, simulate
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.ledger import ledger
-from chutelab.results.notes import stopped, waits
 from chutelab.results.recorder import EnoughError
-from chutelab.results.summary import summary
+from chutelab.results.summary import stopped, summary, waits
 from machines import MOVING_CORNER
 
 ARRAYS = ("knots", "offsets", "ended", "events", "by_surface")

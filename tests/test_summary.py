@@ -16,10 +16,8 @@ from chutelab.results.summary import schema, summary
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
     "impact", "landing", "arrival", "flight", "track", "ended", "fates", "crowd", "stopped",
-    "rolling", "plugged", "waited", "squeezed",
-    "laws", "instead", "drag", "steady", "ledger", "theory", "theory_as_printed",
-    "error",
-    "accuracy",
+    "plugged", "waited", "squeezed", "rolling", "steady", "drag", "laws", "instead", "ledger",
+    "theory", "theory_as_printed", "error", "accuracy",
 ]  # fmt: skip
 BEFORE = ["t", "x", "y", "vx", "vy"]
 LEDGER = [

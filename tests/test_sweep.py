@@ -16,8 +16,15 @@ from chutelab.results import Kind
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.scene import SceneError, load, parse
+from chutelab.scene.overrides import value_at
 from chutelab.scene.units import with_unit
-from chutelab.scene.variants import Vary, accepted, family, parse_range, quantity
+from chutelab.scene.variants import (
+    Family,
+    Vary,
+    accepted,
+    parse_range,
+    quantity,
+)
 from chutelab.scene.variants import parse as parse_vary
 from chutelab.studies.sweep import (
     COLUMNS,
@@ -148,7 +155,7 @@ def test_surfaces_that_join_in_some_variants_only_are_told_apart():
     scene = parse(JOINED)
     block = block_of(scene, ["outgoing.drop=0.3,0.5,0.6", "surface.ramp.friction=0:0.4:3"])
     heights = np.array([0.3, 0.5, 0.6])
-    alike = kinds(build(family(scene, {"outgoing.drop": heights})))
+    alike = kinds(build(Family(scene, {"outgoing.drop": heights})))
     assert sorted(map(len, alike)) == [1, 2]
     assert [1] in [part.tolist() for part in alike]
     found = batch.swept(block)
@@ -315,6 +322,45 @@ def test_a_column_of_values_is_judged_as_each_by_itself():
         except SceneError:
             fine = False
         assert good == fine
+
+
+DEPENDENT = """
+perpendicular | | incoming.speed=1,3 incoming.pulley_radius=0.1,0.2 | outgoing.speed plate.pivot_height
+perpendicular | outgoing.speed=1.5 | incoming.speed=1,3 | outgoing.speed
+perpendicular | particle.density=2000 | particle.radius=0.004,0.01 | particle.mass
+perpendicular | particle.material=coal | particle.radius=0.004,0.01 | particle.mass
+perpendicular | stream.rate=120t/h stream.width=0.8 | particle.mass=0.01,0.02 particle.radius=0.004,0.01 | stream.rate
+own | | material[0].density=900,1900 | particle.mass stream.rate
+own | | material[0].restitution=0.1,0.3 | material[0].restitution_steel material[0].restitution_rubber
+"""  # noqa: E501
+"""A scene, what is set, what varies, and what follows from it."""
+
+
+@pytest.mark.parametrize("line", DEPENDENT.strip().splitlines())
+def test_a_family_has_the_numbers_that_each_of_its_scenes_has(line):
+    name, settings, varies, keys = (part.split() for part in line.split("|"))
+    scene = load("perpendicular" if name == ["own"] else name[0], settings)
+    if name == ["own"]:
+        scene = scene.with_values(
+            {
+                "material": [{"name": "own", "density": 1000, "restitution": 0.2, "friction": 0.3}],
+                "particle": {"material": "own", "radius": 0.01},
+                "stream": {"rate": "90 t/h"},
+                "plate": {"distance": 0.3},
+            }
+        )
+    columns = {vary.key: np.array(vary.values) for vary in map(parse_vary, varies)}
+    each = [scene.with_values({key: own[n] for key, own in columns.items()}) for n in range(2)]
+    family = Family(each[0], columns)
+    assert len(family) == 2
+    for key in keys:
+        expected = [value_at(one, key) for one in each]
+        assert np.broadcast_to(family.at(key), 2).tolist() == expected
+    pairs = [np.array([one.met(0, surface) for one in each]) for surface in scene.surfaces[1:]]
+    for expected, surface in zip(pairs, scene.surfaces[1:], strict=True):
+        for column, own in zip(expected.T, family.met(0, surface), strict=True):
+            assert np.broadcast_to(own, 2).tolist() == column.tolist()
+    assert np.broadcast_to(family.rate, 2).tolist() == [one.rate for one in each]
 
 
 # what is refused before anything runs ------------------------------------------------------------

@@ -25,7 +25,7 @@ from chutelab.results import Recording
 from chutelab.results.comparison import compare, predicted
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import measure
-from chutelab.results.report import facts, sheets
+from chutelab.results.summary import facts, sheets
 from chutelab.scene import Scene
 from chutelab.scene.overrides import Override
 from chutelab.scene.quantities import lookup, whose

@@ -74,11 +74,11 @@ static double horner(const double *c, int degree, double t) {
     return value;
 }
 
-/* The terms of a product of two series, of degree n. */
-static double product(const double *a, const double *b, int n) {
-    double sum = 0.0;
-    for (int i = 0; i <= n; i++) sum += a[i] * b[n - i];
-    return sum;
+/* All gauges at a time, which together take as long as one. */
+static void read_gauges(double gauges[GAUGES][ORDER + 1], double t, double values[GAUGES]) {
+    for (int k = 0; k < GAUGES; k++) values[k] = 0.0;
+    for (int n = ORDER; n >= 0; n--)
+        for (int k = 0; k < GAUGES; k++) values[k] = values[k] * t + gauges[k][n];
 }
 
 typedef struct { double phi[ORDER + 1], w[ORDER + 1], z[ORDER + 1], normal[ORDER + 1]; } Series;
@@ -95,8 +95,9 @@ static void expand(const Ride *r, Series *s, double gauges[GAUGES][ORDER + 1]) {
     double stick = grips ? -r->share : 0.0, load = grips ? 0.0 : -r->slip * r->friction;
     s->phi[0] = r->phi, s->w[0] = r->w, s->z[0] = r->z;
     sin_cos(r->phi, sine, cosine);
+    double square = s->w[0] * s->w[0] + 0.0; /* its terms, one degree after the other */
     for (int n = 0; n <= ORDER; n++) {
-        s->normal[n] = r->gravity * cosine[n] - product(s->w, s->w, n) / r->rho;
+        s->normal[n] = r->gravity * cosine[n] - square / r->rho;
         double force = stick * r->gravity * sine[n] + load * s->normal[n];
         double limit = grips ? r->friction * s->normal[n] : 0.0;
         gauges[LIFTS][n] = s->normal[n];
@@ -110,8 +111,16 @@ static void expand(const Ride *r, Series *s, double gauges[GAUGES][ORDER + 1]) {
         s->z[n + 1] = lever * force / (n + 1);
         s->phi[n + 1] = s->w[n] / r->rho / (n + 1);
         rates[n] = (n + 1) * s->phi[n + 1];
-        sine[n + 1] = product(rates, cosine, n) / (n + 1);
-        cosine[n + 1] = -product(rates, sine, n) / (n + 1);
+        double up = 0.0, across = 0.0;
+        square = 0.0;
+        for (int i = 0; i <= n; i++) {
+            up += rates[i] * cosine[n - i];
+            across += rates[i] * sine[n - i];
+            square += s->w[i] * s->w[n + 1 - i];
+        }
+        square += s->w[n + 1] * s->w[0];
+        sine[n + 1] = up / (n + 1);
+        cosine[n + 1] = -across / (n + 1);
     }
 }
 
@@ -131,6 +140,7 @@ static double step_of(const Ride *r, const Series *s) {
 static double turns_negative(const double *gauge, double low, double high) {
     for (int n = 0; n < HALVINGS; n++) {
         double middle = 0.5 * (low + high);
+        if (middle == low || middle == high) break;
         if (horner(gauge, ORDER, middle) >= 0.0) low = middle;
         else high = middle;
     }
@@ -158,9 +168,10 @@ int ride_round(double *phi, double *w, double z, double rho, double gravity, dou
         double before = 0.0, at = dt;
         looks = MAX(looks, 4);
         for (int look = 1; look <= looks && event == GOES_ON; look++) {
-            double now = dt * look / looks;
+            double now = dt * look / looks, values[GAUGES];
+            read_gauges(gauges, now, values);
             for (int gauge = 0; gauge < GAUGES; gauge++) {
-                if (horner(gauges[gauge], ORDER, now) >= 0.0) continue;
+                if (values[gauge] >= 0.0) continue;
                 double when = turns_negative(gauges[gauge], before, now);
                 if (event == GOES_ON || when < at) at = when, event = gauge;
             }

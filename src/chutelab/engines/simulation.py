@@ -70,7 +70,7 @@ def simulate(
         Called now and then with the share of the run that is done, 0 to 1.
     max_seconds : float, optional
         Wall time, s, after which the run ends with what is recorded: particles that have not ended
-        have reason ``"stopped"``, and `results.notes.stopped` says up to when all is there.
+        have reason ``"stopped"``, and `results.summary.stopped` says up to when all is there.
         Looked at after each step or so, which of a large crowd may take some tenths of a second.
 
     Returns

@@ -19,20 +19,21 @@ from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Thread
 from chutelab.machine.releases import RefusedError, Releases, draw
 from chutelab.machine.rows import lay
 from chutelab.machine.shapes import Arcs, Segments
-from chutelab.scene import Fault, Scene
+from chutelab.scene import Fault, Plate, Scene
 from chutelab.scene.units import polygon_moment
+from chutelab.scene.variants import Family
 from chutelab.util.arrays import Floats, Ints, Watch, unwatched
 from chutelab.util.trig import RADIANS, hypot
 
 
-def build(scene: Scene, watch: Watch = unwatched) -> Machine:
+def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     """Resolve a validated scene, or a family of them.
 
     Parameters
     ----------
-    scene : Scene
-        Of a family (`chutelab.scene.variants`) each is resolved as it would be by itself; the
-        machine has one particle for each, with surfaces of its own.
+    scenes : Scene or Family
+        Of a family each scene, of one particle, is resolved as it would be by itself; the machine
+        has a particle for each, with surfaces of its own.
     watch : callable, optional
         Called now and then while particles are given their places, which may take long; what it
         raises ends the building.
@@ -44,55 +45,62 @@ def build(scene: Scene, watch: Watch = unwatched) -> Machine:
         place the outgoing belt, the impact lies off the finite plate, or a particle starts inside a
         surface.
     """
-    names, meeting = scene.surfaces, scene.meetings()
-    kinds = range(1 if scene.shape else len(scene.particles))
-    met = [[_with_grip(*meeting(kind, name)) for kind in kinds] for name in names]
+    family = isinstance(scenes, Family)
+    scene, value = scenes.scene, scenes.value
+    names, meeting = scene.surfaces, scene.meetings(value)
+    kinds = 1 if family else len(scene.particles)
+    met = [[_with_grip(*meeting(kind, name)) for kind in range(kinds)] for name in names]
     grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
     module = borrow()
     try:
-        laid = lay(module, scene, grip)
-        warnings = _judged(scene, laid.nominal)
-        releases, radius = draw(module, scene, watch)
+        laid = lay(module, scenes, grip)
+        warnings = _judged(scenes, laid.nominal)
+        releases, radius = draw(module, scenes, watch)
     finally:
         give_back(module)
-    segments = _pieces(Segments, laid.segments, scene, met)
-    arcs = _pieces(Arcs, laid.arcs, scene, met) if laid.arcs.size else NO_ARCS
-    belt, until, particles = scene.incoming, scene.run.until, scene.particles
-    particle = _particle(scene, releases.kind, radius)
-    bound = releases.t.max().item() + scene.run.max_time
+    segments = _pieces(Segments, laid.segments, met, kinds)
+    arcs = _pieces(Arcs, laid.arcs, met, kinds) if laid.arcs.size else NO_ARCS
+    belt, particles = scene.incoming, scene.particles
+    until: Any = value(scene.run, "until")
+    worded = isinstance(until, str)
+    particle = _particle(scenes, releases.kind, radius)
+    bound = releases.t.max().item() + value(scene.run, "max_time")
     pulley = None
     if belt is not None:
         bounces, grips = zip(*met[0], strict=True)
         pulley = Pulley(
-            radius=belt.pulley_radius,
-            speed=belt.speed,
+            radius=value(belt, "pulley_radius"),
+            speed=value(belt, "speed"),
             friction=np.array(grips) if len(grips) > 1 else grips[0],
             restitution=np.array(bounces) if len(grips) > 1 else bounces[0],
             surface=0,
-            incline=belt.incline_deg * RADIANS,
+            incline=value(belt, "incline_deg") * RADIANS,
         )
-    every = range(len(particles))
-    pairs = np.array([[meeting(a, b) for b in every] for a in every])
+    # Particles of a family never meet.
+    pairs = np.zeros((1, 1, 2))
+    if not family:
+        every = range(len(particles))
+        pairs = np.array([[meeting(a, b) for b in every] for a in every])
     return Machine(
-        scene=scene,
+        scenes=scenes,
         surfaces=names,
-        gravity=scene.gravity,
+        gravity=value(scene, "gravity"),
         particle=particle,
         segments=segments,
         arcs=arcs,
         pulley=pulley,
         releases=releases,
         landing=names.index("outgoing") if "outgoing" in names else -1,
-        until=until if isinstance(until, str) else "time",
-        end_time=bound if isinstance(until, str) else np.minimum(bound, until),
-        dt=scene.run.dt,
+        until=until if worded else "time",
+        end_time=bound if worded else np.minimum(bound, until),
+        dt=value(scene.run, "dt"),
         align=scene.run.align,
         interact=scene.crowded,
         pair_restitution=pairs[..., 0],
         pair_friction=pairs[..., 1],
-        rolling=np.array([kind.rolling_friction for kind in particles]),
+        rolling=np.array([value(kind, "rolling_friction") for kind in particles]),
         outlines=tuple(np.array(kind.outline) if kind.outline else None for kind in particles),
-        threads=_threads(scene, releases),
+        threads=() if family else _threads(scene, releases),
         streams=tuple(str(stream.name) for stream in scene.streams),
         engine=scene.run.engine,
         plate_warnings=warnings,
@@ -104,18 +112,22 @@ Met = Sequence[Sequence[tuple[Any, Any]]]
 
 Some = TypeVar("Some", Segments, Arcs)
 
+SHARED = ("surface", "appears", "vanishes")
+"""What pieces have alike in all scenes of a family."""
 
-def _pieces(kind: type[Some], rows: NDArray[Any], scene: Scene, met: Met) -> Some:
+
+def _pieces(kind: type[Some], rows: NDArray[Any], met: Met, kinds: int) -> Some:
     """Return segments or arcs of their rows, (S,) or of a family (N, S)."""
     known = [name for name in kind.__dataclass_fields__ if name in (rows.dtype.names or ())]
     own = {name: rows[name] for name in known}
-    if scene.shape:
+    if rows.ndim > 1:
         # Those of all members lie side by side; they are there at the same times.
-        own = {name: array.T.copy().T for name, array in own.items()}
-        own |= {name: own[name][0] for name in ("surface", "appears", "vanishes")}
+        own = {
+            name: array[0].copy() if name in SHARED else array.T.copy().T
+            for name, array in own.items()
+        }
     surface = own["surface"].astype(np.int64)
-    kinds = 1 if scene.shape else len(scene.particles)
-    values = np.empty((2, len(met), kinds, *scene.shape))
+    values = np.empty((2, len(met), kinds, *rows.shape[:-1]))
     for number, pairs in enumerate(met):
         for n, pair in enumerate(pairs):
             values[0, number, n], values[1, number, n] = pair
@@ -140,15 +152,19 @@ NO_ARCS = Arcs(
 """Of a machine of straight surfaces only."""
 
 
-def _particle(scene: Scene, kind: Ints, radius: Floats | None) -> Particle:
+def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Particle:
     """Return the particles: numbers if all are alike, else arrays (N,)."""
-    masses, inertias = [], []
+    scene, masses, inertias = scenes.scene, list[Any](), list[Any]()
     for one in scene.particles:
-        masses.append(one.mass)
-        turning = one.moment * one.mass * (one.radius * one.radius)
+        mass, size = scenes.value(one, "mass"), scenes.value(one, "radius")
+        turning = one.moment * mass * (size * size)
         if one.outline:
-            turning = one.mass * polygon_moment(one.outline) if one.spin else 0.0
+            turning = mass * polygon_moment(one.outline) if one.spin else 0.0
+        masses.append(mass)
         inertias.append(turning)
+    if isinstance(scenes, Family):
+        first = scene.kinds[0]
+        return Particle(scenes.value(scene.particle, "radius"), masses[first], inertias[first])
     if radius is None and (len(masses) == 1 or len({*zip(masses, inertias, strict=True)}) == 1):
         return Particle(scene.particle.radius, masses[0], inertias[0])
     nominal = np.array([one.radius for one in scene.particles])[kind]
@@ -170,11 +186,13 @@ def _threads(scene: Scene, releases: Releases) -> tuple[Thread, ...]:
     return tuple(threads)
 
 
-def _judged(scene: Scene, nominal: NDArray[Any]) -> tuple[Caution, ...]:
+def _judged(scenes: Scene | Family, nominal: NDArray[Any]) -> tuple[Caution, ...]:
     """Return what may surprise about the plate; raise if the geometry contradicts itself."""
-    plate, members = scene.plate, nominal.reshape(-1)
+    scene, members = scenes.scene, nominal.reshape(-1)
+    plate = scene.plate
     faults = {
-        n: _fault(scene, members[n], n) for n in members["contradiction"].nonzero()[0].tolist()
+        n: _fault(scenes, plate, members[n], n)
+        for n in members["contradiction"].nonzero()[0].tolist()
     }
     if faults:
         raise RefusedError(scene.source, faults)
@@ -189,9 +207,9 @@ def _judged(scene: Scene, nominal: NDArray[Any]) -> tuple[Caution, ...]:
     return tuple(found)
 
 
-def _fault(scene: Scene, nominal: Any, member: int) -> Fault:
+def _fault(scenes: Scene | Family, plate: Plate | None, nominal: Any, member: int) -> Fault:
     """Return in words what is wrong with the geometry of a scene, or a member of a family."""
-    kinds, plate = constants("Contradiction"), scene.plate
+    kinds = constants("Contradiction")
     if nominal["contradiction"] == kinds["NO_IMPACT"]:
         text = (
             "the nominal particle never meets the plate, so there is no impact to measure from;"
@@ -199,7 +217,8 @@ def _fault(scene: Scene, nominal: Any, member: int) -> Fault:
         )
         return Fault("outgoing.drop_from", "impact", text)
     assert plate is not None
-    above = np.broadcast_to(plate.above, scene.shape).flat[member].item()
+    above = np.ravel(scenes.value(plate, "above"))
+    above = above[member if len(above) > 1 else 0].item()
     if nominal["contradiction"] == kinds["NO_LENGTH"]:
         return Fault("plate.above", above, "above + below must be more than 0 m")
     hit = nominal["along"].item()

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from chutelab.machine.releases import Releases
 from chutelab.machine.shapes import Arcs, Pieces, Segments, crossings
 from chutelab.scene import Scene
+from chutelab.scene.variants import Family
 from chutelab.util.arrays import Floats, Numbers
 
 DRIVE_PULLEY = "the drive pulley"
@@ -136,7 +137,7 @@ class Machine:
     and mass of the particle, the pulley's numbers and the end time have a value for each, (N,).
     """
 
-    scene: Scene  # what it was built from; a family of scenes for a family of machines
+    scenes: Scene | Family  # what it was built from
     surfaces: tuple[str, ...]  # names; several segments, or one and the pulley, may share one
     gravity: float  # m/s², pointing down
     particle: Particle
@@ -161,6 +162,16 @@ class Machine:
 
     def __repr__(self) -> str:
         return f"<Machine of {self.scene!r}>"
+
+    @property
+    def scene(self) -> Scene:
+        """What it was built from; of a family one of its scenes."""
+        return self.scenes.scene
+
+    @property
+    def family(self) -> Family | None:
+        """All scenes that it was built from, if there are several."""
+        return self.scenes if isinstance(self.scenes, Family) else None
 
     @cached_property
     def pace(self) -> Any:

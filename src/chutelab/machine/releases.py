@@ -11,6 +11,7 @@ import numpy as np
 
 from chutelab.core.module import INTEGER, REAL, Module, Status, constants, dtype
 from chutelab.scene import Fault, Scene, SceneError
+from chutelab.scene.variants import Family
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers, Watch
 from chutelab.util.tables import number
 from chutelab.util.trig import RADIANS, sin_cos
@@ -142,7 +143,7 @@ class RefusedError(SceneError):
         self.members = dict(members)
 
 
-def draw(module: Module, scene: Scene, watch: Watch) -> tuple[Releases, Floats | None]:
+def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases, Floats | None]:
     """Have the core draw the releases of a scene; the same scene and seed give the same numbers.
 
     Of a family each scene has one particle. Particles that meet start where no other of their
@@ -153,7 +154,7 @@ def draw(module: Module, scene: Scene, watch: Watch) -> tuple[Releases, Floats |
     ----------
     module : Module
         In which the scene's surfaces are laid, see `machine.rows.lay`.
-    scene : Scene
+    scenes : Scene or Family
         What is released.
     watch : callable
         Called now and then; what it raises ends the drawing.
@@ -170,6 +171,7 @@ def draw(module: Module, scene: Scene, watch: Watch) -> tuple[Releases, Floats |
     RefusedError
         If a box has not room for all, or a particle would start inside a surface.
     """
+    scene, family = scenes.scene, isinstance(scenes, Family)
     plan, counts = module.structs["Plan"], [stream.count for stream in scene.streams]
     corners = np.array([corner for kind in scene.particles for corner in kind.outline])
     members, streams, count = plan.members, len(counts), sum(counts)
@@ -202,12 +204,12 @@ def draw(module: Module, scene: Scene, watch: Watch) -> tuple[Releases, Floats |
         t=starts["t"].copy(),
         position=starts["position"].copy(),
         velocity=starts["velocity"].copy(),
-        carried=carried if scene.shape else carried.repeat(counts),
+        carried=carried if family else carried.repeat(counts),
         stream=np.arange(streams).repeat(members * np.array(counts)),
-        kind=np.arange(members) if scene.shape else np.array(scene.kinds).repeat(counts),
+        kind=np.arange(members) if family else np.array(scene.kinds).repeat(counts),
     )
     radius = starts["radius"].copy()
-    alike = scene.shape or bool((radius == radius[0]).all())
+    alike = family or bool((radius == radius[0]).all())
     return releases, None if alike else radius
 
 

@@ -1,5 +1,7 @@
 """A scene as the core takes it, one row of numbers, and the surfaces that it makes of that.
 
+A family of scenes is as many rows, one below the other.
+
 The keys of the scene's tables stand under their own names in `layout.h`; NaN is what is not given.
 """
 
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, dtype
 from chutelab.scene import Scene
+from chutelab.scene.variants import Family
 from chutelab.util.arrays import Numbers
 
 WORDS = {"adhesion": inf, "impact": 0.0, "top": 1.0}
@@ -38,45 +41,42 @@ def _keys(struct: str) -> list[tuple[str, int]]:
     ]
 
 
-def _numbers(struct: str, table: Any, **own: Any) -> list[Numbers]:
-    """Return the keys of a table as numbers; `own` has those that it does not hold itself."""
-    found: list[Any] = []
-    for name, width in _keys(struct):
-        value = own[name] if name in own else getattr(table, name)
-        if type(value) is float:
-            found.append(value)
-        elif value is None:
-            found += [nan] * width
-        elif isinstance(value, tuple):
-            flat = [*chain(*value)] if value and isinstance(value[0], tuple) else value
-            found += [*flat, *[nan] * (width - len(flat))]
-        else:
-            found.append(WORDS[value] if isinstance(value, str) else value)
-    return found
-
-
-def row(scene: Scene, friction: Numbers) -> list[Numbers]:
+def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
     """Return all numbers of a scene; of a family what varies is an array (N,).
 
     `friction` is that of the nominal particle on the incoming belt, inf with adhesion.
     """
-    found = _numbers("SceneKeys", scene)
+    scene, value, found = scenes.scene, scenes.value, list[Any]()
+
+    def add(struct: str, table: Any, **own: Any) -> None:
+        for name, width in _keys(struct):
+            one = own[name] if name in own else value(table, name)
+            if type(one) is float:
+                found.append(one)
+            elif one is None:
+                found.extend([nan] * width)
+            elif isinstance(one, tuple):
+                flat = [*chain(*one)] if one and isinstance(one[0], tuple) else one
+                found.extend([*flat, *[nan] * (width - len(flat))])
+            else:
+                found.append(WORDS[one] if isinstance(one, str) else one)
+
+    add("SceneKeys", scene)
     for kind in scene.particles:
-        found += _numbers("ParticleKeys", kind, corners=len(kind.outline))
+        add("ParticleKeys", kind, corners=len(kind.outline))
     for stream, number in zip(scene.streams, scene.kinds, strict=True):
-        seed = stream.seed % WORD, stream.seed // WORD
-        found += _numbers("StreamKeys", stream, kind=number, seed=seed)
+        add("StreamKeys", stream, kind=number, seed=(stream.seed % WORD, stream.seed // WORD))
     if scene.incoming is not None:
-        adheres = isinstance(scene.incoming.friction, str)
-        found += _numbers("IncomingKeys", scene.incoming, friction=friction, adheres=adheres)
+        adheres = isinstance(value(scene.incoming, "friction"), str)
+        add("IncomingKeys", scene.incoming, friction=friction, adheres=adheres)
     for plate in scene.plates:
-        found += _numbers("PlateKeys", plate)
+        add("PlateKeys", plate)
     if scene.outgoing is not None:
-        found += _numbers("OutgoingKeys", scene.outgoing)
+        add("OutgoingKeys", scene.outgoing)
     for conveyor in scene.conveyor:
-        found += _numbers("ConveyorKeys", conveyor)
+        add("ConveyorKeys", conveyor)
     for surface in scene.surface:
-        found += _numbers("SurfaceKeys", surface, corners=len(surface.points or ()))
+        add("SurfaceKeys", surface, corners=len(surface.points or ()))
     return [*found, *chain(*(point for one in scene.surface for point in one.points or ()))]
 
 
@@ -99,25 +99,24 @@ class Laid:
     nominal: NDArray[Any]
 
 
-def lay(module: Module, scene: Scene, friction: Numbers) -> Laid:
-    """Have the core lay the surfaces of a scene, or of a family's."""
-    numbers = row(scene, friction)
-    every = scene.shape[0] if scene.shape else 1
-    rows = np.empty((every, len(numbers)))
-    if scene.shape:
-        for column, value in enumerate(numbers):
-            rows[:, column] = value
-    else:
-        rows[0] = numbers
+def lay(module: Module, scenes: Scene | Family, friction: Numbers) -> Laid:
+    """Have the core lay the surfaces of a scene, or of all scenes of a family."""
+    scene, numbers = scenes.scene, row(scenes, friction)
+    shape = (len(scenes),) if isinstance(scenes, Family) else ()
+    every = shape[0] if shape else 1
     segments, arcs = ROOM // every, ROOM // every
     while True:
         module.place(
-            ("rows", REAL, rows.size), ("nominal", dtype("Nominal"), every),
+            ("rows", REAL, every * len(numbers)), ("nominal", dtype("Nominal"), every),
             ("segments", dtype("Segment"), every * segments),
             ("arcs", dtype("Arc"), every * arcs), of="Plan",
         )  # fmt: skip
         plan = module.structs["Plan"]
-        module.array("rows", REAL, rows.size, of="Plan")[:] = rows.ravel()
+        rows = module.array("rows", REAL, every * len(numbers), of="Plan").reshape(every, -1)
+        varies = [n for n, number in enumerate(numbers) if isinstance(number, np.ndarray)]
+        rows[:] = [nan if n in varies else number for n, number in enumerate(numbers)]
+        for column in varies:
+            rows[:, column] = numbers[column]
         plan.members, plan.width = rows.shape
         plan.particles, plan.streams = len(scene.particles), len(scene.streams)
         plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
@@ -128,9 +127,7 @@ def lay(module: Module, scene: Scene, friction: Numbers) -> Laid:
             break
         segments, arcs = plan.segment_count, plan.arc_count
     found = (
-        module.array(name, dtype(struct), every * count, of="Plan")
-        .copy()
-        .reshape((*scene.shape, *more))
+        module.array(name, dtype(struct), every * count, of="Plan").copy().reshape((*shape, *more))
         for name, struct, count, more in (
             ("segments", "Segment", plan.segment_count, (plan.segment_count,)),
             ("arcs", "Arc", plan.arc_count, (plan.arc_count,)),

@@ -1,20 +1,27 @@
 """What a run leaves behind, and how it is read.
 
 - `record`: `Record`, a finished run: knots, events, and the ledger entries they carry.
-- `recording`: `Recording`, the same with all that is read off it, for those who use it.
 - `recorder`: what engines write a run into.
 - `ledger`: where the energy went, in total and by surface.
-- `quantities`: the readers of the registry: a run's numbers by name and by particle.
-- `firsts`: the first events of each particle, and the paper's symbols from them.
-- `notes`: what there is to say of a run, such as that particles got stuck.
 - `arrival`: which particles have come to a surface, or to what lies on it.
+- `comparison`: the first events of each particle, the paper's symbols, particle 0 and the theory.
+- `quantities`: the readers of the registry: a run's numbers by name and by particle.
 - `stream`: a stream as a whole: the envelope of its paths.
-- `comparison`: `compare`, particle 0 against the theory.
-- `report`: what a run leaves to read, as tables.
-- `laws`: what every run is judged by, with `evidence`, `surfaces` and `barriers`.
-- `summary`: all of it as the JSON object of ``chutelab run --json``.
+- `laws`: what every run is judged by.
+- `summary`: notes, tables, and the JSON object of ``chutelab run --json``.
 - `storage`: recordings as files.
+
+A `Recording` is a record with all that is read off it as its own properties and methods. The
+readers import `Record`, so that no circle of imports arises, and are imported when they are first
+asked for: most runs need few of them.
 """
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from chutelab.results.record import (
     ENTRIES,
@@ -27,7 +34,12 @@ from chutelab.results.record import (
     Record,
     balance,
 )
-from chutelab.results.recording import Recording
+
+if TYPE_CHECKING:
+    from chutelab.results.laws import Broken
+    from chutelab.results.ledger import Ledger
+    from chutelab.theory import Transfer
+
 
 __all__ = [
     "ENTRIES",
@@ -41,3 +53,79 @@ __all__ = [
     "Recording",
     "balance",
 ]
+
+
+class Recording(Record):
+    """A finished run: what `simulate` returns, the same type from every engine.
+
+    Its arrays and numbers are those of `results.record.Record`.
+    """
+
+    @classmethod
+    def of(cls, record: Record) -> Recording:
+        """Return a record as a recording; they share their arrays."""
+        return cls(**{field.name: getattr(record, field.name) for field in fields(record)})
+
+    @property
+    def prediction(self) -> Transfer:
+        """What the theory predicts for the scene, see `chutelab.theory.predict`."""
+        from chutelab.results.comparison import prediction
+
+        return prediction(self)
+
+    @property
+    def laws(self) -> tuple[Broken, ...]:
+        """The laws of every run that this one breaks, empty if it keeps all; see `results.laws`."""
+        from chutelab.results.laws import judge
+
+        return judge(self)
+
+    @property
+    def ledger(self) -> Ledger:
+        """Where the energy went, in total and by surface; see `results.ledger.Ledger`."""
+        from chutelab.results.ledger import ledger
+
+        return ledger(self)
+
+    def measure(self, quantity: str) -> float:
+        """Return a quantity by its name, such as ``landing.x.mean``; see `chutelab.measure`."""
+        from chutelab.results.quantities import measure
+
+        return measure(self, quantity)
+
+    def summary(self) -> dict[str, Any]:
+        """Return what ``chutelab run --json`` prints; see `results.summary.summary`."""
+        from chutelab.results.summary import summary
+
+        return summary(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write an npz file, whole or not at all; `load` gives the recording back bit for bit."""
+        from chutelab.results.storage import save
+
+        return save(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Recording:
+        """Read what `save` wrote; a `results.storage.RecordingError` says what is wrong."""
+        from chutelab.results.storage import load
+
+        return cls.of(load(path))
+
+    def to_csv(
+        self,
+        folder: str | Path,
+        *,
+        step: float | None = None,
+        only: Collection[str] = ("events", "trajectory"),
+    ) -> list[Path]:
+        """Write events.csv and trajectory.csv into a folder; see `results.storage.to_csv`."""
+        from chutelab.results.storage import to_csv
+
+        return to_csv(self, folder, step=step, only=only)
+
+    def frame(self, table: str = "trajectory", *, step: float | None = None) -> Any:
+        """Return positions over time, or ``"events"``, as a DataFrame; see `storage.frame`."""
+        from chutelab.results.storage import frame
+
+        return frame(self, table, step=step)

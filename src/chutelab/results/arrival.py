@@ -26,20 +26,14 @@ lets a contact open that lasts, ten times what the pymunk engine lets them overl
 POINT = 1e-9
 """Distance up to which a mass point touches a surface, as a share of the size of the machine."""
 
+CARRIED = 1e-3
+"""m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
+
 LOOKS = 100
 """Instants at which particles on a surface are looked for, beside recorded blows."""
 
 HALVINGS = 24
 """Of the time between two such instants, until the one is known at which a contact began."""
-
-
-def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
-    """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
-
-    Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
-    for the surface itself) say something of an arrival on what lies there. Not of a family.
-    """
-    return _arrivals(recording, surface)
 
 
 def fates(recording: Record) -> NDArray[Any]:
@@ -150,7 +144,12 @@ def never(count: int) -> NDArray[Any]:
 
 
 @kept
-def _arrivals(recording: Record, surface: str) -> NDArray[Any]:
+def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
+    """Return how each particle first came to a surface, (N,), dtype `EVENT`; NaN where none did.
+
+    Of the fields only time, place, the velocity before and `other` (the particle that it met, -1
+    for the surface itself) say something of an arrival on what lies there. Not of a family.
+    """
     found = never(recording.count)
     if surface not in recording.surfaces:
         return found

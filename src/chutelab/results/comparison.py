@@ -1,4 +1,4 @@
-"""Simulated against theory, quantity by quantity, for particle 0.
+"""The first events of each particle, the paper's symbols from them, and these against the theory.
 
 One error serves everywhere: |simulated - theory| / max(|theory|, scale), where the scale is what
 the quantity is measured by in its scene: d1 for lengths, v2 for speeds, t2 + t3 for times, 1 rad
@@ -15,14 +15,124 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.results.arrival import never
-from chutelab.results.firsts import from_events, symbols, until_no_slip
-from chutelab.results.record import Kind, Record, kept
+from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
 from chutelab.scene import Scene
 from chutelab.scene.quantities import NEEDED, THEORY, Quantity
 from chutelab.scene.units import with_unit
+from chutelab.scene.variants import Family
 from chutelab.theory import Transfer, predict, unbounded
-from chutelab.util.arrays import Bools, Floats
+from chutelab.util.arrays import Bools, Floats, Numbers
 from chutelab.util.tables import Sheet, Shown, number
+
+ALONG = 1e-14
+"""Share of the rebound speed below which its part away from the plate is rounding."""
+
+
+@kept
+def first(recording: Record, event: str, surface: str | None = None) -> NDArray[Any]:
+    """Return the first "separation", "impact" or "landing" of each particle, (N,), dtype `EVENT`.
+
+    From the incoming belt, on the plate and on the outgoing belt, unless another surface is given.
+    NaN throughout where it did not happen. Read-only.
+    """
+    surface, events = surface or NEEDED[event], never(recording.count)
+    if surface in recording.surfaces:
+        found = recording.first(recording.select(event, surface=surface))
+        events[found["particle"]] = found
+    return events
+
+
+def column(events: NDArray[Any], name: str) -> Floats:
+    """Return ``t``, ``x``, ``y``, ``vx``, ``vy``, ``vx_after`` or ``vy_after`` of events, SI."""
+    if name == "t":
+        return np.asarray(events["t"])
+    if name in ("x", "y"):
+        return np.asarray(events["position"][:, "xy".index(name)])
+    when = "after" if name.endswith("_after") else "before"
+    return np.asarray(events[f"velocity_{when}"][:, "xy".index(name[1])])
+
+
+def paid(recording: Record, surface: str, entry: str) -> Floats:
+    """Return an entry of a surface of each variant, (V,), J; of a family V = N, else 1."""
+    books = recording.by_surface.reshape(-1, len(recording.surfaces), len(ENTRIES))
+    return np.asarray(books[:, recording.surface_index(surface), ENTRIES.index(entry)])
+
+
+def symbols(recording: Record) -> dict[str, Floats]:
+    """Return `THEORY` of each particle, (N,), SI units and radians; NaN without one."""
+    left, hit, down = (first(recording, event).copy() for event in NEEDED)
+    # In the paper's frame an impact is counted from the separation, a landing from the impact.
+    hit[np.isnan(left["t"])] = never(1)
+    down[np.isnan(hit["t"])] = never(1)
+    own = recording.particle
+    found = from_events(recording.machine.scenes, left, hit, down, own.radius, own.mass)
+    return found | until_no_slip(recording, down["t"])
+
+
+def until_no_slip(recording: Record, landed: Floats) -> dict[str, Floats]:
+    """Return the theory's belt work and slip heat of each particle that landed then (s), (N,), J.
+
+    Known of a lone particle that slips no more, and met nothing but the belt since it landed.
+    """
+    found = np.full((2, recording.count), nan)
+    if (recording.count == 1 or recording.family) and "outgoing" in recording.surfaces:
+        events = recording.events
+        there = np.isfinite(landed) & (recording.ended == REASONS.index("settled"))
+        away = events["surface"] != recording.surface_index("outgoing")
+        away &= events["t"] > landed[events["particle"]]
+        there[events["particle"][away]] = False
+        for row, entry in zip(found, ("belt_work", "friction_loss"), strict=True):
+            row[there] = paid(recording, "outgoing", entry)[there]
+    return dict(zip(("belt_work", "slip_heat"), found, strict=True))
+
+
+def from_events(
+    scenes: Scene | Family,
+    left: NDArray[Any],
+    hit: NDArray[Any],
+    down: NDArray[Any],
+    radius: Numbers,
+    mass: Numbers,
+) -> dict[str, Floats]:
+    """Return what separation, impact and landing tell of `THEORY`, in the paper's frame.
+
+    x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate. The events
+    are (N,), of one scene or a family of N, and NaN, as `never` has it, where one did not happen;
+    radius (m) and mass (kg) are the particles'.
+    """
+    value, scene = scenes.value, scenes.scene
+    plate = scene.plate
+    top = nan if scene.incoming is None else value(scene.incoming, "pulley_radius")
+    belt = nan if scene.outgoing is None else value(scene.outgoing, "speed")
+    alpha = np.radians(nan if plate is None else value(plate, "angle_deg"))
+    (x1, y1), (x2, y2), (x3, y3) = (event["position"].T for event in (left, hit, down))
+    (ux, uy), (wx, wy) = hit["velocity_before"].T, hit["velocity_after"].T
+    vx, vy = down["velocity_before"].T
+    sine, cosine = np.sin(alpha), np.cos(alpha)
+    away, along = -(wx * cosine + wy * sine), wx * sine - wy * cosine
+    # Rounding must not choose between π and -π for a rebound up along the plate.
+    away = np.where(np.abs(away) <= ALONG * np.hypot(wx, wy), 0.0, away)
+    energy = 0.5 * mass * (vx * vx + belt * belt)
+    return {
+        "phi1": np.arctan2(x1, y1),
+        "v1": np.hypot(*left["velocity_after"].T),
+        "t2": hit["t"] - left["t"],
+        "x2": x2 - x1,
+        "y2": y1 - y2,
+        "v2": np.hypot(ux, uy),
+        "v2r": np.hypot(wx, wy),
+        "phi2": np.arctan2(ux * cosine + uy * sine, ux * sine - uy * cosine),
+        "phi2r": np.arctan2(away, along + 0.0),  # + 0.0: the angle of no rebound is 0, not -π
+        "t3": down["t"] - hit["t"],
+        "x3": x2 - x3,
+        "y3": y2 - y3,
+        "v3x": -vx,
+        "v3y": -vy,
+        "v3": np.hypot(vx, vy),
+        "d3": top + radius - y3,
+        "dEk": energy,
+        "P": energy * scenes.rate,
+    }
 
 
 @dataclass(frozen=True, repr=False)
@@ -128,23 +238,24 @@ def relative_error(simulated: ArrayLike, theory: ArrayLike, scale: ArrayLike) ->
     return np.asarray(off / np.where(size > 0.0, size, 1.0))
 
 
-def scales(scene: Scene, prediction: Transfer) -> dict[str, Any]:
+def scales(scenes: Scene | Family, prediction: Transfer) -> dict[str, Any]:
     """Return the scale of each kind of quantity in a scene; NaN where the theory has none.
 
     Floats, or arrays (N,) where scene and prediction have such.
     """
+    scene = scenes.scene
     v2, t2, t3 = prediction.v2, prediction.t2, prediction.t3
-    energy = 0.5 * scene.particles[scene.kinds[0]].mass * (v2 * v2)
+    energy = 0.5 * scenes.value(scene.particle, "mass") * (v2 * v2)
     d1: Any = nan
     if scene.incoming is not None and scene.plate is not None:
-        d1 = scene.incoming.pulley_radius + scene.plate.distance
+        d1 = scenes.value(scene.incoming, "pulley_radius") + scenes.value(scene.plate, "distance")
     found = {
         "length": d1,
         "speed": v2,
         "time": np.where(np.isfinite(t3), t2 + t3, t2),
         "angle": 1.0,
         "energy": energy,
-        "power": energy * scene.rate,
+        "power": energy * scenes.rate,
     }
     return {kind: float(size) if np.ndim(size) == 0 else size for kind, size in found.items()}
 
@@ -159,8 +270,8 @@ def worst(recording: Record) -> Floats:
     V is 1, or of a family as many as there are particles: `predict` takes one scene at a time, so
     of a family the events tell how far the equations hold.
     """
-    scene, count = recording.scene, recording.count
-    if not scene.shape:
+    scene, family, count = recording.scene, recording.family, recording.count
+    if family is None:
         found = compare(recording).max
         return np.array([nan if found is None else found])
     if scene.incoming is None or scene.plate is None:
@@ -169,14 +280,15 @@ def worst(recording: Record) -> Floats:
     belt, start = scene.incoming, recording.offsets[:-1]
     release = recording.knots[np.where(recording.released, start, 0)]
     (x, y), (vx, vy) = release["position"].T, release["velocity"].T
-    begins = recording.released & (y == belt.pulley_radius + scene.particle.radius) & (x <= 0.0)
-    begins &= (-belt.length <= x) & (vx == belt.speed) & (vy == 0.0)
+    radius, mass = recording.particle.radius, recording.particle.mass
+    begins = recording.released & (y == family.value(belt, "pulley_radius") + radius) & (x <= 0.0)
+    begins &= -family.value(belt, "length") <= x
+    begins &= (vx == family.value(belt, "speed")) & (vy == 0.0)
     left, hit, down = _described(recording, begins)
-    own = scene.particle
-    simulated = from_events(scene, left, hit, down, own.radius, own.mass)
+    simulated = from_events(family, left, hit, down, radius, mass)
     simulated |= until_no_slip(recording, down["t"])
-    theory = unbounded(scene)
-    sizes = scales(scene, theory)
+    theory = unbounded(family)
+    sizes = scales(family, theory)
     largest = np.full(count, nan)
     for name, values in simulated.items():
         errors = relative_error(values, getattr(theory, name), sizes[THEORY[name].kind])

@@ -102,48 +102,53 @@ class Ledger(Shown):
         )
 
 
+def books(recording: Record) -> dict[str, Floats]:
+    """Return the ledger of each released particle, (n,), J; its three `ENTRIES` together, (n, 3).
+
+    The other names are those of the registry, without "ledger.".
+    """
+    (first, last), index = recording.ends(), np.flatnonzero(recording.released)
+    (k0, p0), (k1, p1) = recording.energies(first, index), recording.energies(last, index)
+    entries = last["entries"]
+    return {
+        "kinetic.start": k0, "kinetic.end": k1, "potential.start": p0, "potential.end": p1,
+        "entries": entries, "residual": (k1 - k0) + (p1 - p0) - balance(entries),
+    }  # fmt: skip
+
+
 @kept
 def ledger(recording: Record) -> Ledger:
     """Close the books of a recording."""
-    first, last = recording.ends()
-    index = np.flatnonzero(recording.released)
-    energies = np.stack([*recording.energies(first, index), *recording.energies(last, index)])
-    streams, stream = recording.machine.streams, recording.machine.releases.stream[index]
+    found, names = books(recording), recording.machine.streams
+    stream = recording.machine.releases.stream[recording.released]
+    by_stream: dict[str, dict[str, Any]] = {}
+    for n, name in enumerate(names if len(names) > 1 else ()):
+        share = _closed({entry: values[stream == n] for entry, values in found.items()})
+        del share["turned_over"]
+        share["from_others"] = share.pop("residual")
+        by_stream[name] = share
     return Ledger(
-        **_closed(energies, last["entries"]),
+        **_closed(found),
         by_surface={
             name: dict(zip(ENTRIES, row, strict=True))
             for name, row in zip(recording.surfaces, recording.by_surface.tolist(), strict=True)
         },
-        by_stream={
-            name: _of_stream(_closed(energies[:, stream == n], last["entries"][stream == n]))
-            for n, name in enumerate(streams if len(streams) > 1 else ())
-        },
+        by_stream=by_stream,
     )
 
 
-def _of_stream(books: dict[str, Any]) -> dict[str, Any]:
-    kept = {name: books[name] for name in ("kinetic", "potential", *ENTRIES)}
-    return {**kept, "from_others": books["residual"]}
-
-
-def _closed(energies: Floats, entries: Floats) -> dict[str, Any]:
-    """Close the books of n particles.
-
-    `energies`, (4, n), are kinetic and potential energy at the start, then at the end; `entries`,
-    (n, 3), those at the end, J.
-    """
-    change = (energies[2] - energies[0]) + (energies[3] - energies[1])
-    belt_work, restitution_loss, friction_loss = entries.sum(axis=0).tolist()
-    kinetic = float(energies[0].sum()), float(energies[2].sum())
-    potential = float(energies[1].sum()), float(energies[3].sum())
-    sizes = map(abs, (belt_work, restitution_loss, friction_loss, potential[1] - potential[0]))
+def _closed(found: dict[str, Floats]) -> dict[str, Any]:
+    """Sum the `books` of some particles."""
+    kinetic, potential = (
+        (float(found[f"{energy}.start"].sum()), float(found[f"{energy}.end"].sum()))
+        for energy in ("kinetic", "potential")
+    )
+    entries = found["entries"].sum(axis=0).tolist()
+    sizes = map(abs, (*entries, potential[1] - potential[0]))
     return {
         "kinetic": kinetic,
         "potential": potential,
-        "belt_work": belt_work,
-        "restitution_loss": restitution_loss,
-        "friction_loss": friction_loss,
-        "residual": float((change - balance(entries)).sum()),
+        **dict(zip(ENTRIES, entries, strict=True)),
+        "residual": float(found["residual"].sum()),
         "turned_over": sum(sizes, kinetic[0]),
     }

@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 
 from chutelab.results.arrival import arrivals
-from chutelab.results.comparison import worst
-from chutelab.results.firsts import column, first, paid, symbols
-from chutelab.results.ledger import ledger
-from chutelab.results.record import ENTRIES, REASONS, Record, balance
+from chutelab.results.comparison import column, first, paid, symbols, worst
+from chutelab.results.ledger import books, ledger
+from chutelab.results.record import ENTRIES, REASONS, Record
 from chutelab.scene.quantities import FIRST, lookup, suggestion, whose
 from chutelab.util.arrays import Bools, Floats
 
@@ -47,8 +46,14 @@ def each(recording: Record, name: str) -> Floats:
         case ["track", "t"]:
             begin, end = recording.ends()
             return _at_end(recording, end["t"] - begin["t"])
-        case ["ledger", *entry]:
-            return _at_end(recording, _balance(recording, ".".join(entry)))
+        case ["ledger", *rest]:
+            found, entry = books(recording), ".".join(rest)
+            entries, fall = found["entries"], found["potential.end"] - found["potential.start"]
+            found |= dict(zip(ENTRIES, entries.T, strict=True))
+            found["turned_over"] = (
+                found["kinetic.start"] + np.abs(entries).sum(axis=1) + np.abs(fall)
+            )
+            return _at_end(recording, found[entry])
         case ["flight", "t"]:
             # From the incoming belt to what is met next.
             left = column(first(recording, "separation"), "t")
@@ -73,30 +78,14 @@ def _at_end(recording: Record, values: Any) -> Floats:
     return found
 
 
-def _balance(recording: Record, entry: str) -> Floats:
-    """Return an entry of the ledger of each released particle, (n,), J."""
-    first, last = recording.ends()
-    if entry in ENTRIES:
-        return np.asarray(last["entries"][:, ENTRIES.index(entry)])
-    who = np.flatnonzero(recording.released)
-    (k0, p0), (k1, p1) = recording.energies(first, who), recording.energies(last, who)
-    entries = last["entries"]
-    found: dict[str, Floats] = {
-        "kinetic.start": k0, "kinetic.end": k1, "potential.start": p0, "potential.end": p1,
-        "residual": (k1 - k0) + (p1 - p0) - balance(entries),
-        "turned_over": k0 + np.abs(entries).sum(axis=1) + np.abs(p1 - p0),
-    }  # fmt: skip
-    return found[entry]
-
-
 def _until_no_slip(recording: Record, what: str) -> Floats:
     """Return what the outgoing belt pays until a lone particle does not slip, (N,)."""
-    if recording.count > 1 and not recording.scene.shape:
+    if recording.count > 1 and not recording.family:
         return np.full(recording.count, nan)
     settled = recording.ended == REASONS.index("settled")
     entry = "friction_loss" if what == "slip_heat" else "belt_work"
     work = np.where(settled, paid(recording, "outgoing", entry), nan)
-    return np.asarray(work * (recording.scene.rate if what == "power" else 1.0))
+    return np.asarray(work * (recording.machine.scenes.rate if what == "power" else 1.0))
 
 
 def measured(recording: Record, name: str) -> Floats:
@@ -104,7 +93,7 @@ def measured(recording: Record, name: str) -> Floats:
 
     V is 1, or of a family as many as there are particles.
     """
-    many = recording.count if recording.scene.shape else 1
+    many = recording.count if recording.family else 1
     shape = many, recording.count // many
     parts, own = name.split("."), np.ones(recording.count, dtype=bool)
     if name.startswith(FIRST):
@@ -119,7 +108,7 @@ def measured(recording: Record, name: str) -> Floats:
     match parts:
         case ["contacts"]:
             # Of a family they are counted together.
-            return np.full(many, nan if recording.scene.shape else float(recording.contacts))
+            return np.full(many, nan if recording.family else float(recording.contacts))
         case ["ended", reason] if reason in REASONS:
             return count(recording.ended == REASONS.index(reason))
         case ["misses"]:
@@ -130,8 +119,8 @@ def measured(recording: Record, name: str) -> Floats:
             return paid(recording, surface, entry)
         case ["ledger", "power"]:
             work = paid(recording, "outgoing", "belt_work")
-            return np.asarray(work / shape[1] * recording.scene.rate)
-        case ["ledger", *_] if recording.scene.shape:
+            return np.asarray(work / shape[1] * recording.machine.scenes.rate)
+        case ["ledger", *_] if recording.family:
             return each(recording, name)
         case ["ledger", stored, end]:
             return np.array([getattr(ledger(recording), stored)[("start", "end").index(end)]])

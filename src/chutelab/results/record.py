@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property, wraps
+from inspect import signature
 from math import isnan, nan
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
@@ -21,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine, Particle
 from chutelab.scene import Scene, quantities
+from chutelab.scene.variants import Family
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.tables import Sheet, Shown
@@ -60,22 +62,12 @@ def kind_of(kind: Kind | str) -> Kind:
     return Kind(kind)
 
 
-EVENT = np.dtype(
-    [
-        ("t", "f8"),
-        ("particle", "i4"),
-        ("other", "i4"),
-        ("kind", "i1"),
-        ("surface", "i2"),
-        ("position", "f8", 2),
-        ("velocity_before", "f8", 2),
-        ("velocity_after", "f8", 2),
-        ("omega_before", "f8"),
-        ("omega_after", "f8"),
-        ("normal_impulse", "f8"),
-        ("tangential_impulse", "f8"),
-    ]
-)
+EVENT = np.dtype([
+    ("t", "f8"), ("particle", "i4"), ("other", "i4"), ("kind", "i1"), ("surface", "i2"),
+    ("position", "f8", 2), ("velocity_before", "f8", 2), ("velocity_after", "f8", 2),
+    ("omega_before", "f8"), ("omega_after", "f8"),
+    ("normal_impulse", "f8"), ("tangential_impulse", "f8"),
+])  # fmt: skip
 """One event, in SI units.
 
 - ``t``: when, s.
@@ -89,15 +81,9 @@ EVENT = np.dtype(
 - ``tangential_impulse``: along (n_y, -n_x), N s.
 """
 
-KNOT = np.dtype(
-    [
-        ("t", "f8"),
-        ("position", "f8", 2),
-        ("velocity", "f8", 2),
-        ("omega", "f8"),
-        ("entries", "f8", 3),
-    ]
-)
+KNOT = np.dtype([
+    ("t", "f8"), ("position", "f8", 2), ("velocity", "f8", 2), ("omega", "f8"), ("entries", "f8", 3)
+])  # fmt: skip
 """One knot, in SI units.
 
 - ``t``: when, s.
@@ -278,8 +264,13 @@ class Record(Shown):
 
     @property
     def scene(self) -> Scene:
-        """The scene that was run."""
+        """The scene that was run; of a family one of its scenes."""
         return self.machine.scene
+
+    @property
+    def family(self) -> Family | None:
+        """All scenes that were run at once, if each particle is of another one."""
+        return self.machine.family
 
     @property
     def title(self) -> str:
@@ -497,13 +488,21 @@ Result = TypeVar("Result")
 def kept(
     reader: Callable[Concatenate[Record, Args], Result],
 ) -> Callable[Concatenate[Record, Args], Result]:
-    """Keep with a record what a reader found there, for each set of further arguments."""
+    """Keep with a record what a reader found there, for each set of further arguments.
+
+    Arrays become read-only.
+    """
+    form = signature(reader)
 
     @wraps(reader)
     def read(record: Record, /, *args: Args.args, **more: Args.kwargs) -> Result:
-        key = (reader.__module__, reader.__name__, *args, *more.items())
+        given = form.bind(record, *args, **more)
+        given.apply_defaults()
+        key = (reader.__module__, reader.__name__, *given.args[1:])
         if key not in record.found:
-            record.found[key] = reader(record, *args, **more)
+            record.found[key] = found = reader(record, *args, **more)
+            if isinstance(found, np.ndarray):
+                found.flags.writeable = False
         result: Result = record.found[key]
         return result
 

@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.results.arrival import Places, arrivals, fates
-from chutelab.results.notes import CARRIED
+from chutelab.results.arrival import CARRIED, Places, arrivals, fates
 from chutelab.results.quantities import each, measure
 from chutelab.results.record import ENTRIES, REASONS, Record
 from chutelab.scene import Scene

@@ -1,26 +1,334 @@
-"""The JSON object of a run: what ``chutelab run --json`` prints and summary.json holds."""
+"""What there is to say of a run: notes, tables for people, and the JSON object.
+
+A note is there where there is something to say: particles that waited, got stuck or roll. It is a
+key of the object, and ``str`` says it below the tables.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from math import ceil, isnan
 from typing import Any
 
-from chutelab.results.arrival import fates
-from chutelab.results.comparison import compare, predicted, prediction
+import numpy as np
+
+from chutelab.machine.releases import Squeeze, squeeze
+from chutelab.results.arrival import CARRIED, arrivals, fates
+from chutelab.results.comparison import column, compare, first, predicted, prediction
 from chutelab.results.laws import judge
 from chutelab.results.ledger import Ledger, ledger
-from chutelab.results.notes import air_drag, plugged, rolling, squeezed, stopped, waits
 from chutelab.results.quantities import each
-from chutelab.results.record import REASONS, Record
-from chutelab.results.stream import crowd, steady
+from chutelab.results.record import REASONS, Kind, Record
+from chutelab.results.stream import FLOW, crowd, steady
 from chutelab.scene.quantities import REGISTRY, THEORY, Quantity
-from chutelab.theory import Transfer, predict
-from chutelab.util.tables import plain
+from chutelab.theory import Drag, Transfer, drag, predict
+from chutelab.util.tables import Sheet, many, number, plain
 
 FORMAT = 1
 """Version of the object; keys are only ever added to a version."""
+
+STATIONS = 6
+"""Contacts of particle 0 that are listed where no theory speaks of them."""
+
+STILL = 1e-3
+"""m/s; a bed that trembles is slower, what slides or falls is not for long."""
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """A run that was ended before it was over, as ``--max-seconds`` does.
+
+    How many particles were under way then, how many not yet released, and up to which time all that
+    happened is recorded, s.
+    """
+
+    particles: int
+    unreleased: int
+    t: float
+
+    def __str__(self) -> str:
+        after = f" and {self.unreleased:,} not yet released" if self.unreleased else ""
+        return (
+            f"STOPPED before it was over, with {many(self.particles, 'particle', ',')} under way"
+            f"{after}: all of it is recorded up to t = {number(self.t)} s, and sums are of what is"
+            " recorded"
+        )
+
+
+def stopped(recording: Record) -> Stopped | None:
+    """Return where a run was stopped; None if it was not."""
+    halted = recording.ended == REASONS.index("stopped")
+    if not halted.any():
+        return None
+    under_way = halted & recording.released
+    t = float(recording.knots["t"].max(initial=0.0))
+    if not recording.machine.interact:
+        # Each by itself: some are ahead of others.
+        last = recording.knots["t"][recording.offsets[1:][under_way] - 1]
+        due = recording.machine.releases.t[halted & ~recording.released]
+        t = min(float(last.min(initial=t)), float(due.min(initial=t)))
+    released = int(np.count_nonzero(under_way))
+    return Stopped(released, int(np.count_nonzero(halted)) - released, t)
+
+
+@dataclass(frozen=True)
+class Waits:
+    """Particles that were released late because their place was taken.
+
+    How many waited and were released, and how long these did at most and on average, s (0 if none
+    did); `never` is how many were due and found no place until the end of the run.
+    """
+
+    particles: int
+    longest: float
+    mean: float
+    never: int
+
+    def __str__(self) -> str:
+        said = []
+        if self.particles:
+            said.append(
+                f"{many(self.particles, 'particle')} waited for a free place to be released,"
+                f" {number(self.longest)} s at most and {number(self.mean)} s on average"
+            )
+        if self.never:
+            said.append(f"{self.never} found no free place until the end")
+        return "; ".join(said)
+
+
+def waits(recording: Record) -> Waits | None:
+    """Return which particles waited for a place; None if none did."""
+    due, dt = recording.machine.releases.t, recording.machine.dt
+    # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
+    least = (1.0 + 1e-6) * dt if recording.engine == "pymunk" else 1e-9
+    released = recording.select(Kind.RELEASE)
+    late = released["t"] - due[released["particle"]]
+    late = late[late > least]
+    halt = stopped(recording)
+    end = recording.knots["t"].max(initial=0.0) if halt is None else halt.t
+    missing = int(np.count_nonzero(due[~recording.released] < end - dt))
+    if not len(late) and not missing:
+        return None
+    longest, mean = (float(late.max()), float(late.mean())) if len(late) else (0.0, 0.0)
+    return Waits(len(late), longest, mean, missing)
+
+
+@dataclass(frozen=True)
+class Plug:
+    """Particles that meet each other and lie still in the machine when a run is over.
+
+    How many these are, and how many have left it or arrived on the outgoing belt.
+    """
+
+    still: int
+    through: int
+
+    def __str__(self) -> str:
+        return (
+            f"{many(self.still, 'particle', ',')} {'lies' if self.still == 1 else 'lie'} still in"
+            f" the machine at the end, {self.through:,} got through: it is plugged, or something"
+            " holds them where nothing carries them on"
+        )
+
+
+def plugged(recording: Record) -> Plug | None:
+    """Return which particles got stuck; None if none did, or there was nowhere to go.
+
+    Told of particles that meet, where some got through or an outgoing belt waits for them, of a
+    run that was not stopped. Still is what moves with less than `STILL`, and what has settled: its
+    contacts are at rest, though a grain on trembling ones may be a little faster.
+    """
+    machine = recording.machine
+    if not machine.interact or stopped(recording) is not None:
+        return None
+    through = recording.ended == REASONS.index("exit")
+    if recording.scene.outgoing is not None:
+        through |= np.isfinite(arrivals(recording)["t"])
+    still = np.zeros(recording.count, dtype=bool)
+    still[recording.released] = np.hypot(*recording.ends()[1]["velocity"].T) < STILL
+    still |= recording.ended == REASONS.index("settled")
+    lying, gone = int(np.count_nonzero(still & ~through)), int(np.count_nonzero(through))
+    if not lying or not (gone or recording.scene.outgoing is not None):
+        return None
+    return Plug(lying, gone)
+
+
+def air_drag(recording: Record) -> Drag | None:
+    """Return what air drag would do, by the fastest moment of a recording; None for mass points."""
+    speeds = np.hypot(*recording.knots["velocity"].T)
+    if not len(speeds):
+        return drag(recording.scene, prediction(recording), 0.0)
+    fastest = int(np.argmax(speeds))
+    speed = float(speeds[fastest])
+    # Not every knot has the speed just before an impact; events do.
+    met = np.hypot(*recording.events["velocity_before"].T)
+    particle = int(np.searchsorted(recording.offsets, fastest, side="right")) - 1
+    if len(met) and met.max() > speed:
+        speed, particle = float(met.max()), int(recording.events["particle"][np.argmax(met)])
+    radius, mass = (
+        float(np.broadcast_to(part, recording.count)[particle])
+        for part in (recording.particle.radius, recording.particle.mass)
+    )
+    return drag(recording.scene, prediction(recording), speed, radius, mass)
+
+
+def squeezed(recording: Record) -> Squeeze | None:
+    """Return what rode into others by adhesion, see `machine.releases.squeeze`; or None."""
+    released = recording.select(Kind.RELEASE)
+    released = released[recording.machine.releases.carried[released["particle"]]]
+    radius = np.broadcast_to(recording.particle.radius, recording.count)[released["particle"]]
+    return squeeze(recording.scene, released["t"], released["position"], radius)
+
+
+@dataclass(frozen=True)
+class Rolling:
+    """Disks that settled on the outgoing belt without being carried by it.
+
+    A free disk stops slipping when its contact point runs with the belt. Its centre, v_x, may then
+    be far from the belt's speed v_b: it rolls, and the belt pays no more. Belt work so far and
+    m v_b (v_b - v_x) together are what loads that are carried take.
+
+    `particles` is how many roll, `belt_work` what the outgoing belt has paid for all particles, J,
+    and `belt_work_carried` what it would have paid if those that roll were carried, J.
+    """
+
+    particles: int
+    belt_work: float
+    belt_work_carried: float
+
+    def __str__(self) -> str:
+        rolls = "rolls" if self.particles == 1 else "roll"
+        return (
+            f"{many(self.particles, 'disk')} {rolls} on the outgoing belt: nothing slips, and"
+            f" nothing is carried along. The belt has paid {number(self.belt_work)} J, loads that"
+            f" are carried take {number(self.belt_work_carried)} J (a disk that arrives without"
+            " turning takes a third of a carried load's work)"
+        )
+
+
+def rolling(recording: Record) -> Rolling | None:
+    """Return what settled on the outgoing belt without being carried; None if nothing did."""
+    belt = recording.scene.outgoing
+    if belt is None or belt.speed is None or np.all(recording.particle.inertia == 0.0):
+        return None
+    settled = recording.select(Kind.SETTLE, surface="outgoing")
+    missing = belt.speed - settled["velocity_after"][:, 0]
+    astray = np.abs(missing) > CARRIED
+    if not astray.any():
+        return None
+    paid = ledger(recording).by_surface["outgoing"]["belt_work"]
+    masses = np.broadcast_to(recording.particle.mass, recording.count)[settled["particle"]]
+    due = belt.speed * float((masses * missing)[astray].sum())
+    return Rolling(int(astray.sum()), paid, paid + due)
+
+
+def layers(recording: Record) -> tuple[float, float] | None:
+    """Return where the lowest and the highest layer of a bed land on the outgoing belt, x, m.
+
+    None if all are released at one height, or one of the two does not land there.
+    """
+    if recording.count < 2 or recording.scene.stream.bed_height == 0.0:
+        return None
+    landed = column(first(recording, "landing"), "x")[recording.released]
+    heights = recording.ends()[0]["position"][:, 1]
+    ends = landed[[np.argmin(heights), np.argmax(heights)]]
+    return (float(ends[0]), float(ends[1])) if np.isfinite(ends).all() else None
+
+
+NOTES: dict[str, tuple[Callable[[Record], Any], str]] = {
+    "stopped": (stopped, "how far a run got that was ended before, see `results.summary.Stopped`"),
+    "plugged": (plugged, "particles that got stuck, see `results.summary.Plug`"),
+    "waited": (waits, "particles that found their place taken, see `results.summary.Waits`"),
+    "squeezed": (squeezed, "riders by adhesion that got into each other, see"
+                 " `machine.releases.Squeeze`"),
+    "rolling": (rolling, "disks that settled on the outgoing belt without being carried by it, see"
+                " `results.summary.Rolling`"),
+    "steady": (steady, "what the outgoing belt needs for streams that were given in t/h, see"
+               " `results.stream.Steady`"),
+    "drag": (air_drag, "what air drag, left out, would do, see `theory.Drag`"),
+}  # fmt: skip
+"""Notes by their keys in the JSON object: reader and meaning, in the order in which they are told.
+"""
+
+
+def facts(recording: Record, *, details: bool = False) -> str:
+    """Return how much there was of what, and how it ended, in two lines.
+
+    With `details` also the engine and its steps.
+    """
+    counted = Counter(recording.ended.tolist())
+    told = [many(recording.count, "particle"), many(recording.contacts, "contact")]
+    if details:
+        steps = f"{recording.steps} {'rounds' if recording.engine == 'exact' else 'steps'}"
+        told = [f"engine {recording.engine}", *told, steps]
+    if not isnan(recording.seconds):
+        told.append(f"computed in {recording.seconds:.3g} s")
+    ended = ", ".join(f"{counted[k]} {REASONS[k]}" for k in sorted(counted))
+    return f"{', '.join(told)}\nended: {ended}"
+
+
+def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
+    """Return the tables of a run, and what there is to know about it, a sheet each.
+
+    Of several particles these are all of them; particle 0 alone comes after them with `details`.
+    With `details` errors are told down to rounding.
+    """
+    together = crowd(recording)
+    parts = [] if together is None else [together.sheet(details=details)]
+    nominal = []
+    if together is None or details:
+        nominal = [compare(recording).sheet(details=details)]
+        if nominal[0].notes and (way := _way(recording)).rows:
+            nominal.append(way)
+    if together is None:
+        parts += nominal
+    until = recording.scene.run.until
+    # Belt work goes on after the landing: `belt_work` above is until nothing slips any more.
+    ends = {"landed": "the landing", "settled": "all have settled"}.get(
+        str(until), f"t = {until} s"
+    )
+    books = ledger(recording).sheet(details=details)
+    parts.append(replace(books, title=f"Energy ledger until {ends}, J"))
+    notes = [str(note) for read, _ in NOTES.values() if (note := read(recording)) is not None]
+    if (layered := layers(recording)) is not None:
+        notes.insert(
+            0,
+            "the lowest layer lands at x = {} m, the highest at {} m".format(*map(number, layered)),
+        )
+    left = np.sort(recording.select(Kind.EXIT)["t"])
+    if recording.machine.interact and len(left) >= FLOW:
+        quarters = (f"{left[ceil(part * len(left) / 4) - 1]:.3f}" for part in (1, 2, 3, 4))
+        said = "{} fell out of the machine: a quarter by {} s, half by {} s, three quarters by {} s"
+        notes.insert(0, f"{said}, the last at {{}} s".format(len(left), *quarters))
+    if recording.instead:
+        notes.insert(0, f"{recording.instead}; {recording.engine} ran instead, and keeps them")
+    notes = [*map(str, judge(recording)), *notes]
+    return [
+        *parts,
+        *(Sheet("", (), (), notes=(f"{note[0].upper()}{note[1:]}.",)) for note in notes),
+        *(nominal if together is not None else ()),
+    ]
+
+
+def _way(recording: Record) -> Sheet:
+    """Return where and when particle 0 touched or left something first, as no theory says it."""
+    own = recording.events[recording.events["particle"] == 0]
+    own = own[np.isin(own["kind"], [Kind.SEPARATION, Kind.IMPACT, Kind.LANDING])][:STATIONS]
+    rows = []
+    for event in own:
+        name = recording.surfaces[event["surface"]]
+        what = "leaves" if event["kind"] == Kind.SEPARATION else "meets"
+        numbers = (event["t"], *event["position"], *event["velocity_before"])
+        rows.append((f"{what} {name}", *(number(float(value)) for value in numbers)))
+    heads = ("", "t, s", "x, m", "y, m", "vx, m/s", "vy, m/s")
+    notes: tuple[str, ...] = ()
+    if len(own) > 1 and own["kind"][0] == Kind.SEPARATION:
+        flown = float(own["t"][1] - own["t"][0])
+        notes = (f"time of flight, from the first to the second: {number(flown)} s",)
+    return Sheet("Particle 0, its first contacts", heads, tuple(rows), notes=notes)
+
 
 LISTS: dict[str, dict[str, Quantity]] = {}
 """What each particle has, a list each: rows of the registry by the two parts of their names."""
@@ -41,18 +349,9 @@ OTHERS = {
     "contacts": ("integer", REGISTRY["contacts"].meaning),
     "fates": ("object", "how many particles ended where, see `results.arrival.fates`"),
     "crowd": ("object", "all particles together, see `results.stream.Crowd`; null of one"),
-    "stopped": ("object", "how far a run got that was ended before, see `results.notes.Stopped`"),
-    "rolling": ("object", "disks that settled on the outgoing belt without being carried by it, see"
-                " `results.notes.Rolling`"),
-    "plugged": ("object", "particles that got stuck, see `results.notes.Plug`"),
-    "waited": ("object", "particles that found their place taken, see `results.notes.Waits`"),
-    "squeezed": ("object", "riders by adhesion that got into each other, see"
-                 " `machine.releases.Squeeze`"),
+    **{key: ("object", meaning) for key, (_, meaning) in NOTES.items()},
     "laws": ("array", "laws of every run that this one broke, see `results.laws.Broken`"),
     "instead": ("string", "why another engine ran first, see `Recording.instead`"),
-    "drag": ("object", "what air drag, left out, would do, see `theory.Drag`"),
-    "steady": ("object", "what the outgoing belt needs for streams that were given in t/h, see"
-               " `results.stream.Steady`"),
     "ledger": ("object", "where the energy went, see `results.ledger.Ledger`"),
     "theory": ("object", "what the closed form predicts of particle 0, and why it stops"),
     "theory_as_printed": ("object", "the same with Eq. (9) as it is printed; null with friction of"
@@ -90,15 +389,9 @@ def summary(recording: Record, accuracy: Mapping[str, Any] | None = None) -> dic
         **lists,
         "fates": Counter(fates(recording).tolist()),
         "crowd": crowd(recording),
-        "stopped": stopped(recording),
-        "rolling": rolling(recording),
-        "plugged": plugged(recording),
-        "waited": waits(recording),
-        "squeezed": squeezed(recording),
+        **{key: read(recording) for key, (read, _) in NOTES.items()},
         "laws": judge(recording),
         "instead": recording.instead or None,
-        "drag": air_drag(recording),
-        "steady": steady(recording),
         "ledger": ledger(recording),
         "theory": _theory(prediction(recording)),
         "theory_as_printed": as_printed,

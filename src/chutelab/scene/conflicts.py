@@ -61,13 +61,58 @@ SURFACES: Final = ("plate", "conveyor", "surface")
 """Lists of tables that are surfaces with names of their own."""
 
 
+class Row:
+    """A table, or one of several, sound or not; keys that are not written have their defaults."""
+
+    def __init__(self, look: Look, table: str, number: int) -> None:
+        found: Any = look.document.get(table)
+        several = isinstance(found, LIST)
+        if several:
+            found = found[number] if number < len(found) else None
+        self.head = f"{table}[{number}]" if several else table
+        self.content: dict[str, Any] = found if isinstance(found, dict) else {}
+        self._look = look
+        self._defaults = look.defaults[table]
+        self._there = table in ALWAYS or look.has(table)
+
+    def path(self, key: str) -> str:
+        """Return the full path of a key."""
+        return f"{self.head}.{key}"
+
+    def given(self, key: str) -> bool:
+        """Whether the key is written out, sound or not."""
+        return self.content.get(key) is not None
+
+    def sound(self, key: str = "") -> bool:
+        """Whether a key, or else all of the table, is not at fault."""
+        return self._look.sound(self.path(key) if key else self.head)
+
+    def __getitem__(self, key: str) -> Any:
+        """Return the value of a key, or its default; NaN if it is at fault or its table absent."""
+        path = self.path(key)
+        self._look.asked.add(path)
+        if not self._look.sound(path):
+            return math.nan
+        value = self.content.get(key)
+        if value is not None:
+            return value
+        return self._defaults[key] if self._there else math.nan
+
+    def fault(self, key: str, allowed: str) -> Fault:
+        """Say that a key has a value that it should not have."""
+        return Fault(self.path(key), self[key], allowed)
+
+    def missing(self, key: str, wanted: str) -> Fault:
+        """Say that a key is missing."""
+        return Fault(self.path(key), MISSING, wanted)
+
+
 class Look:
     """Read-only look at a scene's tables, as its file has them or as it dumps them, sound or not.
 
     `defaults` has those of the keys of each table; `faulty` holds the full paths that are already
     known to be at fault, `asked` the keys whose values were asked for: the rules can depend on no
-    others. Of tables of which there may be several, a key is that of the first unless a row says
-    otherwise, a number from 0.
+    others.
     """
 
     def __init__(
@@ -76,8 +121,8 @@ class Look:
         defaults: Mapping[str, Mapping[str, Any]],
         faulty: Collection[str] = (),
     ) -> None:
-        self._document = document
-        self._defaults = defaults
+        self.document = document
+        self.defaults = defaults
         self._faulty = faulty
         self.asked: set[str] = set()
 
@@ -92,81 +137,57 @@ class Look:
 
     def has(self, table: str) -> bool:
         """Whether the table is there, sound or not; one that is only misspelt is at fault."""
-        return self._document.get(table) not in (None, (), []) or table in self._faulty
+        return self.document.get(table) not in (None, (), []) or table in self._faulty
 
-    def rows(self, table: str) -> int:
-        """Return how many there are of a table of which there may be several."""
-        found = self._document.get(table)
-        return len(found) if isinstance(found, LIST) else int(isinstance(found, dict))
+    def row(self, table: str) -> Row:
+        """Return a table, or the first of several."""
+        return Row(self, table, 0)
 
-    def path(self, table: str, key: str = "", row: int = 0) -> str:
-        """Return the full path of a key, or of a table."""
-        several = isinstance(self._document.get(table), LIST)
-        head = f"{table}[{row}]" if several else table
-        return f"{head}.{key}" if key else head
+    def rows(self, table: str, least: int = 0) -> list[Row]:
+        """Return all of a table of which there may be several; at least so many."""
+        found = self.document.get(table)
+        one = isinstance(found, dict) and table in EITHER
+        count = len(found) if isinstance(found, LIST) else int(one)
+        return [Row(self, table, number) for number in range(max(count, least))]
 
-    def given(self, table: str, key: str, row: int = 0) -> bool:
-        """Whether the key is written out, sound or not."""
-        return self._content(table, row).get(key) is not None
-
-    def __call__(self, table: str, key: str, row: int = 0) -> Any:
-        """Return the value of a key, or its default; NaN if it is at fault or its table absent."""
-        path = self.path(table, key, row)
-        self.asked.add(path)
-        if self._faulty and not self.sound(path):
-            return math.nan
-        value = self._content(table, row).get(key)
-        if value is not None:
-            return value
-        if table not in ALWAYS and not self.has(table):
-            return math.nan
-        return self._defaults[table][key]
-
-    def several(self, key: str) -> list[Any]:
-        """Return a list of tables such as ``[[surface]]``, as far as it is one at all."""
-        found = self._document.get(key)
-        return list(found) if isinstance(found, LIST) else []
-
-    def _content(self, table: str, row: int) -> dict[str, Any]:
-        """Return the keys of a table, none of what is no table."""
-        found = self._document.get(table)
-        if isinstance(found, dict):
-            return {} if row else found
-        found = found[row] if isinstance(found, LIST) and row < len(found) else None
-        return found if isinstance(found, dict) else {}
+    @property
+    def damps(self) -> bool:
+        """Whether there is a damping plate."""
+        return any(plate.given("distance") for plate in self.rows("plate"))
 
 
 def conflicts(look: Look) -> Iterator[Fault]:
     """Yield every conflict between keys; each names all the keys concerned."""
+    kinds, streams = look.rows("particle", 1), look.rows("stream", 1)
     yield from _tables(look)
     yield from _names(look)
-    for row in range(max(1, look.rows("particle"))):
-        yield from _kind(look, row)
-    yield from _engine(look)
-    for row in range(max(1, look.rows("stream"))):
-        yield from _release(look, row)
-    for row in range(look.rows("plate")):
-        yield from _plate(look, row)
-    for row, surface in enumerate(look.several("surface")):
-        if isinstance(surface, Mapping):
-            path = f"surface[{row}]"
+    yield from _pairs(look)
+    for kind in kinds:
+        yield from _kind(look, kind)
+    yield from _engine(look, kinds, streams)
+    for stream in streams:
+        yield from _release(look, stream, kinds)
+    for number, plate in enumerate(look.rows("plate")):
+        yield from _plate(plate, look.rows("plate")[:number])
+    for surface in look.rows("surface"):
+        if surface.content or surface.sound():
             known = {
-                key: value if look.sound(f"{path}.{key}") else math.nan
-                for key, value in surface.items()
+                key: value if surface.sound(key) else math.nan
+                for key, value in surface.content.items()
             }
-            yield from surface_conflicts(path, known)
-    for row, conveyor in enumerate(look.several("conveyor")):
-        path = f"conveyor[{row}]"
-        if (
-            isinstance(conveyor, Mapping)
-            and look.sound(path)
-            and not apart(conveyor["from"], conveyor["to"])
-        ):
-            yield Fault(f"{path}.to", conveyor["to"], _differ(path))
+            yield from surface_conflicts(surface.head, known)
+    for conveyor in look.rows("conveyor"):
+        if conveyor.sound() and not apart(conveyor["from"], conveyor["to"]):
+            yield conveyor.fault("to", _differ(conveyor.head))
     yield from _pieces(look)
-    yield from _strings(look)
-    yield from _expectations(look)
-    low, high = look("view", "from"), look("view", "to")
+    count = sum(stream["count"] for stream in streams)
+    for string in look.rows("string"):
+        if string["particle"] >= count:
+            text = f"there are {count} particles, from 0; stream.count says how many"
+            yield string.fault("particle", text)
+    yield from _expectations(look, streams)
+    view = look.row("view")
+    low, high = view["from"], view["to"]
     corners = isinstance(low, LIST) and isinstance(high, LIST)
     if corners and any(b - a < LEAST_VIEW for a, b in zip(low, high, strict=True)):
         text = f"must lie right of view.from = {list(low)} and above it, by 1e-6 m at least"
@@ -174,23 +195,20 @@ def conflicts(look: Look) -> Iterator[Fault]:
 
 
 def _tables(look: Look) -> Iterator[Fault]:
-    damps = any(look.given("plate", "distance", row) for row in range(look.rows("plate")))
-    damps |= look.has("plate") and not look.rows("plate")
+    plates = look.rows("plate")
+    damps = look.damps or (look.has("plate") and not plates)
     needy = ["[plate]"] * damps + ["[outgoing]"] * look.has("outgoing")
     if needy and not look.has("incoming"):
         need = "needs" if len(needy) == 1 else "need"
         yield Fault("incoming", MISSING, f"{' and '.join(needy)} {need} the table [incoming]")
-    if look("outgoing", "drop_from") == "impact" and not (damps or _broken_plate(look)):
+    # A plate without pivot lacks what would tell of which sort it is: it has a fault of its own.
+    damps |= any(not plate.given("pivot") for plate in plates)
+    if look.row("outgoing")["drop_from"] == "impact" and not damps:
         text = 'needs the table [plate]; without one write outgoing.drop_from = "top"'
         yield Fault("outgoing.drop_from", "impact", text)
-    if look("run", "until") == "landed" and not look.has("outgoing"):
+    if look.row("run")["until"] == "landed" and not look.has("outgoing"):
         text = 'needs the table [outgoing]; without one "settled" or a number of seconds'
         yield Fault("run.until", "landed", text)
-
-
-def _broken_plate(look: Look) -> bool:
-    """Whether there is a plate that lacks what would tell of which sort it is."""
-    return any(not look.given("plate", "pivot", row) for row in range(look.rows("plate")))
 
 
 def _names(look: Look) -> Iterator[Fault]:
@@ -198,226 +216,192 @@ def _names(look: Look) -> Iterator[Fault]:
     surfaces: dict[object, str] = {}
     for table in (*SURFACES, "particle", "stream", "material"):
         known = surfaces if table in SURFACES else {}
-        for row in range(look.rows(table)):
-            name = look(table, "name", row)
-            if name is None and table != "particle":
-                continue
-            path = look.path(table, "name", row)
+        rows = look.rows(table)
+        for row in rows:
+            name, path = row["name"], row.path("name")
             if not isinstance(name, str):
-                if table == "particle" and look.rows(table) > 1 and look.sound(path):
-                    yield Fault(path, MISSING, "a name; needed where there are several kinds")
+                if table == "particle" and len(rows) > 1 and row.sound("name"):
+                    yield row.missing("name", "a name; needed where there are several kinds")
                 continue
             if name in known:
-                yield Fault(path, name, f"must be unique; {known[name]} is the same")
+                yield row.fault("name", f"must be unique; {known[name]} is the same")
             known.setdefault(name, path)
             if table == "particle" and name in surfaces:
-                yield Fault(path, name, f"must be unique; {surfaces[name]} is the same")
-    kinds = [look("particle", "name", row) for row in range(look.rows("particle"))]
-    for row in range(look.rows("stream")):
-        name = look("stream", "particle", row)
+                yield row.fault("name", f"must be unique; {surfaces[name]} is the same")
+    kinds = _texts(look.rows("particle"))
+    for row in look.rows("stream"):
+        name = row["particle"]
         if isinstance(name, str) and name not in kinds and look.sound("particle"):
-            allowed = did_you_mean(
-                name, [k for k in kinds if isinstance(k, str)], _there_are(kinds)
-            )
-            yield Fault(look.path("stream", "particle", row), name, f"no such kind; {allowed}")
-    own = [m.get("name") for m in look.several("material") if isinstance(m, Mapping)]
-    for row in range(look.rows("particle")):
-        name = look("particle", "material", row)
-        if isinstance(name, str) and look.sound("material") and name not in (*own, *PRESETS):
-            there = [n for n in own if isinstance(n, str)] + list(PRESETS)
-            allowed = did_you_mean(name, there, "`chutelab materials` lists them")
-            yield Fault(
-                look.path("particle", "material", row), name, f"no such material; {allowed}"
-            )
-    tables = [table for table in ("incoming", "plate", "outgoing") if look.has(table)]
-    anything = [n for n in (*kinds, *surfaces, *tables) if isinstance(n, str)]
+            allowed = did_you_mean(name, kinds, _there_are(kinds))
+            yield row.fault("particle", f"no such kind; {allowed}")
+    own = _texts(look.rows("material"))
+    for row in look.rows("particle"):
+        name = row["material"]
+        if isinstance(name, str) and name not in (*own, *PRESETS) and look.sound("material"):
+            allowed = did_you_mean(name, [*own, *PRESETS], "`chutelab materials` lists them")
+            yield row.fault("material", f"no such material; {allowed}")
+
+
+def _texts(rows: Iterable[Row], key: str = "name") -> list[str]:
+    """Return the texts that rows have under a key."""
+    return [text for row in rows if isinstance(text := row[key], str)]
+
+
+def _there_are(names: Sequence[str]) -> str:
+    return f"there are {', '.join(names)}" if names else "none has a name"
+
+
+def _pairs(look: Look) -> Iterator[Fault]:
     # Skip checks of references if names are invalid.
-    if not all(map(look.sound, ("particle", *SURFACES))):
+    if not look.has("pair") or not all(map(look.sound, ("particle", *SURFACES))):
         return
-    for row, pair in enumerate(look.several("pair")):
-        between = pair.get("between") if isinstance(pair, Mapping) else None
-        if not (isinstance(between, list | tuple) and look.sound(f"pair[{row}]")):
+    kinds = _texts(look.rows("particle"))
+    free = dict.fromkeys(name for table in SURFACES for name in _texts(look.rows(table)))
+    anything = [*kinds, *free, *filter(look.has, ("incoming", "plate", "outgoing"))]
+    for pair in look.rows("pair"):
+        between = pair["between"]
+        if not (isinstance(between, LIST) and pair.sound()):
             continue
         if not any(name in kinds for name in between):
             text = f"one of them must be the name of a [[particle]]; {_there_are(kinds)}"
-            yield Fault(f"pair[{row}].between", list(between), text)
+            yield Fault(pair.path("between"), list(between), text)
         for place, name in enumerate(between):
             if name not in anything:
                 allowed = did_you_mean(str(name), anything, _there_are(anything))
-                yield Fault(
-                    f"pair[{row}].between[{place}]", name, f"no such kind or surface; {allowed}"
-                )
+                path = pair.path(f"between[{place}]")
+                yield Fault(path, name, f"no such kind or surface; {allowed}")
 
 
-def _there_are(names: Iterable[object]) -> str:
-    known = [name for name in names if isinstance(name, str)]
-    return f"there are {', '.join(known)}" if known else "none has a name"
-
-
-def _kind(look: Look, row: int) -> Iterator[Fault]:
+def _kind(look: Look, kind: Row) -> Iterator[Fault]:
     """Say what is wrong with a kind of particles."""
-
-    def path(key: str) -> str:
-        return look.path("particle", key, row)
-
-    shape, radius = look("particle", "shape", row), look("particle", "radius", row)
-    spin = look("particle", "spin", row)
-    density, shaped = look("particle", "density", row), shape in ("box", "polygon")
-    if look.given("particle", "mass", row) and look.given("particle", "density", row):
-        yield Fault(path("density"), density, f"give either {path('mass')} or this, not both")
+    path, given = kind.path, kind.given
+    shape, radius, spin = kind["shape"], kind["radius"], kind["spin"]
+    shaped = shape in ("box", "polygon")
+    if given("mass") and given("density"):
+        yield kind.fault("density", f"give either {path('mass')} or this, not both")
     if radius == 0.0 and not shaped:
         if spin is True:
-            text = f"{path('radius')} is 0, and a mass point cannot turn"
-            yield Fault(path("spin"), True, text)
-        if look.given("particle", "density", row):
-            yield Fault(path("density"), density, f"{path('radius')} is 0: give a mass")
-        if look.given("particle", "material", row) and not look.given("particle", "mass", row):
-            yield Fault(path("mass"), MISSING, f"kg, because {path('radius')} is 0")
+            yield kind.fault("spin", f"{path('radius')} is 0, and a mass point cannot turn")
+        if given("density"):
+            yield kind.fault("density", f"{path('radius')} is 0: give a mass")
+        if given("material") and not given("mass"):
+            yield kind.missing("mass", f"kg, because {path('radius')} is 0")
     elif not shaped:
-        yield from _lightness(look, row)
-    if look("particle", "rolling_friction", row) > 0.0 and spin is False and not shaped:
+        key, density = _density(look, kind)
+        radius = _mean(radius)
+        if density is not None and (mass := sphere_mass(density, radius)) < LIGHTEST:
+            text = f"with {path('radius')} = {radius:g} m a mass of at least {LIGHTEST:g} kg"
+            yield kind.fault(key, f"{text}, not {mass:.3g} kg")
+    if kind["rolling_friction"] > 0.0 and spin is False and not shaped:
         text = f"needs {path('spin')} = true: what never turns never rolls"
-        yield Fault(path("rolling_friction"), look("particle", "rolling_friction", row), text)
+        yield kind.fault("rolling_friction", text)
     for key, needed in (("size", "box"), ("points", "polygon")):
-        if shape == needed and not look.given("particle", key, row) and look.sound(path(key)):
+        if shape == needed and not given(key) and kind.sound(key):
             what = "[width, height]" if key == "size" else "its corners [[x, y], ...]"
-            yield Fault(path(key), MISSING, f"{what}, m; a {needed} needs them")
-        elif look.given("particle", key, row) and shape != needed and look.sound(path("shape")):
-            text = f'is for {path("shape")} = "{needed}"'
-            yield Fault(path(key), look("particle", key, row), text)
-    if shaped:
-        for key in ("radius", "density"):
-            if look.given("particle", key, row):
-                text = f"is for what is round; a {shape} has a mass, and a size of its own"
-                yield Fault(path(key), look("particle", key, row), text)
+            yield kind.missing(key, f"{what}, m; a {needed} needs them")
+        elif given(key) and shape != needed and kind.sound("shape"):
+            yield kind.fault(key, f'is for {path("shape")} = "{needed}"')
+    for key in ("radius", "density") if shaped else ():
+        if given(key):
+            text = f"is for what is round; a {shape} has a mass, and a size of its own"
+            yield kind.fault(key, text)
 
 
-def _lightness(look: Look, row: int) -> Iterator[Fault]:
-    """Say if a density makes a kind of particles lighter than anything."""
-    key, density = "density", look("particle", "density", row)
-    if density is None and not look.given("particle", "mass", row):
-        key, name = "material", look("particle", "material", row)
-        own = [m for m in look.several("material") if isinstance(m, Mapping) and name is not None]
-        found = [m.get("density") for m in own if m.get("name") == name]
-        if not found and isinstance(name, str) and name in PRESETS:
-            found = [PRESETS[name].material.density]
-        density = found[0] if found and look.sound("material") else None
-    radius = look("particle", "radius", row)
-    if isinstance(radius, LIST):
-        radius = 0.5 * sum(radius)
-    if density is not None and sphere_mass(density, radius) < LIGHTEST:
-        path = look.path("particle", key, row)
-        text = f"with {look.path('particle', 'radius', row)} = {radius:g} m a mass of at least"
-        mass = sphere_mass(density, radius)
-        yield Fault(path, look("particle", key, row), f"{text} {LIGHTEST:g} kg, not {mass:.3g} kg")
+def _mean(radius: Any) -> Any:
+    """Return a radius, or the mean of a range of radii."""
+    return 0.5 * sum(radius) if isinstance(radius, LIST) else radius
 
 
-def _engine(look: Look) -> Iterator[Fault]:
-    engine = look("run", "engine")
-    streams, kinds = max(1, look.rows("stream")), max(1, look.rows("particle"))
-    counts = [look("stream", "count", row) for row in range(streams)]
-    sizes = [look("particle", "radius", row) for row in range(kinds)]
-    for row in range(kinds):
-        path = look.path("particle", "radius", row)
-        shape = look("particle", "shape", row)
+def _density(look: Look, kind: Row) -> tuple[str, float | None]:
+    """Return the key that a kind's density comes from, and the density; None if it has a mass."""
+    density, name = kind["density"], kind["material"]
+    if density is not None or kind.given("mass") or not isinstance(name, str):
+        return "density", density
+    found = [own["density"] for own in look.rows("material") if own["name"] == name]
+    if not found and name in PRESETS:
+        found = [PRESETS[name].material.density]
+    return "material", found[0] if found and look.sound("material") else None
+
+
+def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterator[Fault]:
+    run = look.row("run")
+    engine, count = run["engine"], sum(stream["count"] for stream in streams)
+    sizes, meet = [kind["radius"] for kind in kinds], [s for s in streams if s["interact"] is True]
+    for kind, size in zip(kinds, sizes, strict=True):
+        shape, path = kind["shape"], kind.path("radius")
         if shape in ("box", "polygon"):
             if engine in ("exact", "contact"):
-                text = f'{look.path("particle", "shape", row)} = "{shape}" needs pymunk'
-                yield Fault("run.engine", engine, text)
-        elif sizes[row] == 0.0:
+                yield run.fault("engine", f'{kind.path("shape")} = "{shape}" needs pymunk')
+        elif size == 0.0:
             if any(size != 0.0 for size in sizes if size is not math.nan):
                 text = "more than 0, or 0 of all kinds: no engine has points beside disks"
-                yield Fault(path, 0.0, text)
+                yield kind.fault("radius", text)
             if engine in ("contact", "pymunk"):
-                text = f"{path} is 0, and {engine} needs disks (> 0)"
-                yield Fault("run.engine", engine, text)
-            for stream in range(streams):
-                if look("stream", "interact", stream) is True:
-                    text = f"{path} is 0, and mass points never meet"
-                    yield Fault(look.path("stream", "interact", stream), True, text)
-    for row in range(streams):
-        if look("stream", "interact", row) is True and engine == "exact" and sum(counts) > 1:
-            path = look.path("stream", "interact", row)
-            many = f"{look.path('stream', 'count', row)} = {counts[row]}"
-            text = f"{path} with {many} needs contact or pymunk"
-            yield Fault("run.engine", engine, text)
-    if sum(counts) > MOST_PARTICLES:
-        text = f"at most {MOST_PARTICLES} particles in all streams together, not {sum(counts)}"
-        yield Fault(look.path("stream", "count", counts.index(max(counts))), max(counts), text)
-    if look.several("string") and engine in ("exact", "contact"):
-        yield Fault("run.engine", engine, "string[0] needs pymunk")
+                yield run.fault("engine", f"{path} is 0, and {engine} needs disks (> 0)")
+            for stream in meet:
+                yield stream.fault("interact", f"{path} is 0, and mass points never meet")
+    for stream in meet:
+        if engine == "exact" and count > 1:
+            many = f"{stream.path('count')} = {stream['count']}"
+            text = f"{stream.path('interact')} with {many} needs contact or pymunk"
+            yield run.fault("engine", text)
+    if count > MOST_PARTICLES:
+        text = f"at most {MOST_PARTICLES} particles in all streams together, not {count}"
+        yield max(streams, key=lambda stream: stream["count"]).fault("count", text)
+    if look.rows("string") and engine in ("exact", "contact"):
+        yield run.fault("engine", "string[0] needs pymunk")
 
 
-def _release(look: Look, row: int) -> Iterator[Fault]:
+def _release(look: Look, stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
     """Say what is wrong with where and how fast a stream is released."""
-
-    def path(key: str) -> str:
-        return look.path("stream", key, row)
-
-    def given(key: str) -> bool:
-        return look.given("stream", key, row)
-
-    start, until = look("stream", "start", row), look("run", "until")
-    if isinstance(until, int | float) and start >= until:
+    path, given = stream.path, stream.given
+    until, fills = look.row("run")["until"], given("fill")
+    if isinstance(until, int | float) and stream["start"] >= until:
         text = f"less than run.until = {until:g} s, when the run ends: nothing would be released"
-        yield Fault(path("start"), start, text)
-    fills = given("fill")
+        yield stream.fault("start", text)
     for key in ("at", "to", "rate", "bed_height", "speed_spread"):
         if fills and given(key):
-            text = f"{path('fill')} releases all at once in its box"
-            yield Fault(path(key), look("stream", key, row), text)
+            yield stream.fault(key, f"{path('fill')} releases all at once in its box")
     if given("to") and not (given("at") or fills):
-        yield Fault(path("at"), MISSING, f"a point [x, y], m, to go with {path('to')}")
+        yield stream.missing("at", f"a point [x, y], m, to go with {path('to')}")
     if given("to") and given("bed_height"):
         text = f"is a height above a point; {path('to')} makes a line of it"
-        yield Fault(path("bed_height"), look("stream", "bed_height", row), text)
-    kind = _kind_of(look, row)
-    if (
-        given("width")
-        and look.sound(path("width"))
-        and look.sound(look.path("particle", "radius", kind))
-    ):
-        width, radius = look("stream", "width", row), look("particle", "radius", kind)
-        size = sum(radius) if isinstance(radius, list | tuple) else 2.0 * radius
-        if look("particle", "shape", kind) in ("box", "polygon") or size == 0.0:
+        yield stream.fault("bed_height", text)
+    name = stream["particle"]
+    kind = next((kind for kind in kinds if kind["name"] == name), kinds[0])
+    radius, width = kind["radius"], stream["width"] if given("width") else math.nan
+    if width == width and kind.sound("radius"):
+        size = sum(radius) if isinstance(radius, LIST) else 2.0 * radius
+        if kind["shape"] in ("box", "polygon") or size == 0.0:
             text = "is for disks and spheres: the slice that is simulated is as thick as they are"
-            yield Fault(path("width"), width, text)
+            yield stream.fault("width", text)
         elif width < size:
             text = f"must be at least the diameter of a particle, {size:g} m: one slice"
-            yield Fault(path("width"), width, text)
+            yield stream.fault("width", text)
     if not look.has("incoming"):
         for key, what in (("at", "release point [x, y], m"), ("velocity", "[vx, vy], m/s")):
-            if not given(key) and not fills and look.sound(path(key)):
-                yield Fault(path(key), MISSING, f"{what}; required without [incoming]")
+            if not given(key) and not fills and stream.sound(key):
+                yield stream.missing(key, f"{what}; required without [incoming]")
         return
+    belt = look.row("incoming")
     on_belt = not given("at") and not fills
-    if given("at") and look.sound(path("at")) and not given("to"):
-        x, y = look("stream", "at", row)
-        radius = look("particle", "radius", kind)
-        if isinstance(radius, list | tuple):
-            radius = 0.5 * sum(radius)
-        height = look("incoming", "pulley_radius") + radius
-        on_belt = beside(x, y, height, look("incoming", "length"), look("incoming", "incline_deg"))
-    if look("incoming", "friction") != "adhesion" or not on_belt:
+    if given("at") and stream.sound("at") and not given("to"):
+        x, y = stream["at"]
+        height = belt["pulley_radius"] + _mean(radius)
+        on_belt = beside(x, y, height, belt["length"], belt["incline_deg"])
+    if belt["friction"] != "adhesion" or not on_belt:
         return
     advice = 'incoming.friction = "adhesion" releases every particle at incoming.speed'
-    if look("stream", "speed_spread", row) > 0.0:
+    if stream["speed_spread"] > 0.0:
         text = f"{advice}; give a Coulomb coefficient, or speed_spread = 0"
-        yield Fault(path("speed_spread"), look("stream", "speed_spread", row), text)
-    if given("velocity") and look.sound(path("velocity")):
-        velocity, speed = look("stream", "velocity", row), look("incoming", "speed")
-        sine, cosine = sin_cos(look("incoming", "incline_deg") * RADIANS)
+        yield stream.fault("speed_spread", text)
+    if given("velocity") and stream.sound("velocity"):
+        speed, (sine, cosine) = belt["speed"], sin_cos(belt["incline_deg"] * RADIANS)
         wanted = speed * cosine, speed * sine
-        if any(abs(v - w) > 1e-12 * abs(speed) for v, w in zip(velocity, wanted, strict=True)):
+        off = (abs(v - w) for v, w in zip(stream["velocity"], wanted, strict=True))
+        if any(each > 1e-12 * abs(speed) for each in off):
             text = f"{advice}; give a Coulomb coefficient, or leave the velocity out"
-            yield Fault(path("velocity"), velocity, text)
-
-
-def _kind_of(look: Look, stream: int) -> int:
-    """Return the row of a stream's kind of particles, the first if that is not to be found."""
-    name = look("stream", "particle", stream)
-    rows = range(look.rows("particle"))
-    return next((row for row in rows if look("particle", "name", row) == name), 0)
+            yield stream.fault("velocity", text)
 
 
 def beside(x: float, y: float, height: float, length: float, incline_deg: float) -> bool:
@@ -432,64 +416,50 @@ def beside(x: float, y: float, height: float, length: float, incline_deg: float)
     return -length <= along <= 0.0 and abs(above - height) <= ON_BELT
 
 
-def _plate(look: Look, row: int) -> Iterator[Fault]:
+def _plate(plate: Row, earlier: Sequence[Row]) -> Iterator[Fault]:
     """Say what is wrong with a plate: of two sorts, of which the first is there once at most."""
-
-    def path(key: str) -> str:
-        return look.path("plate", key, row)
-
-    hangs, damps = look.given("plate", "pivot", row), look.given("plate", "distance", row)
-    if look("plate", "above", row) == 0.0 and look("plate", "below", row) == 0.0:
-        yield Fault(path("above"), 0.0, f"a plate needs a length; {path('below')} is 0 too")
+    path, given, sound = plate.path, plate.given, plate.sound
+    hangs, damps = given("pivot"), given("distance")
+    if plate["above"] == 0.0 and plate["below"] == 0.0:
+        yield plate.fault("above", f"a plate needs a length; {path('below')} is 0 too")
     if hangs and damps:
         text = f"give either {path('distance')}, of the damping plate, or this, of a further one"
-        yield Fault(path("pivot"), look("plate", "pivot", row), text)
+        yield plate.fault("pivot", text)
     elif hangs:
-        if not look.given("plate", "name", row) and look.sound(path("name")):
-            yield Fault(path("name"), MISSING, "a name; a plate with a pivot needs one")
-        if look.given("plate", "pivot_height", row):
+        if not given("name") and sound("name"):
+            yield plate.missing("name", "a name; a plate with a pivot needs one")
+        if given("pivot_height"):
             text = f"is the damping plate's; {path('pivot')} has the height"
-            yield Fault(path("pivot_height"), look("plate", "pivot_height", row), text)
-    elif not damps and look.sound(path("distance")) and look.sound(path("pivot")):
+            yield plate.fault("pivot_height", text)
+    elif not damps and sound("distance") and sound("pivot"):
         text = "m from the pulley to the pivot; or of a further plate name and pivot = [x, y]"
-        yield Fault(path("distance"), MISSING, text)
+        yield plate.missing("distance", text)
     elif damps:
-        if look.given("plate", "name", row):
+        if given("name"):
             text = f"is for a further plate, with {path('pivot')}; this one is called plate"
-            yield Fault(path("name"), look("plate", "name", row), text)
-        if any(look.given("plate", "distance", other) for other in range(row)):
+            yield plate.fault("name", text)
+        if any(other.given("distance") for other in earlier):
             text = "there is a damping plate already; a further one has name and pivot"
-            yield Fault(path("distance"), look("plate", "distance", row), text)
+            yield plate.fault("distance", text)
 
 
 def _pieces(look: Look) -> Iterator[Fault]:
     """Say if surfaces and their copies are more pieces than an engine can look at."""
-    belts = ("incoming", "outgoing")
-    count = sum(map(look.has, belts)) + look.rows("plate") + 4 * look.rows("conveyor")
-    for row in range(look.rows("surface")):
-        if not look.sound(f"surface[{row}]"):
+    count = look.has("incoming") + look.has("outgoing")
+    count += len(look.rows("plate")) + 4 * len(look.rows("conveyor"))
+    for surface in look.rows("surface"):
+        if not surface.sound():
             continue
-        points, repeat = (look("surface", key, row) for key in ("points", "repeat"))
-        opens, closes = (look("surface", key, row) for key in ("opens_at", "closes_at"))
+        points, repeat = surface["points"], surface["repeat"]
+        opens, closes = surface["opens_at"], surface["closes_at"]
         pieces = max(1, len(points or ()) - 1) * math.prod(copies[0] for copies in repeat)
         if opens is not None and closes is not None and opens < closes:
             pieces *= 2
         count += pieces
         if count > MOST_PIECES:
-            key = "repeat" if repeat else "points"
-            value = look("surface", key, row)
-            text = f"at most {MOST_PIECES} pieces of surfaces, copies too, in all"
-            yield Fault(f"surface[{row}].{key}", value, f"{text}, not {count}")
+            text = f"at most {MOST_PIECES} pieces of surfaces, copies too, in all, not {count}"
+            yield surface.fault("repeat" if repeat else "points", text)
             return
-
-
-def _strings(look: Look) -> Iterator[Fault]:
-    counts = [look("stream", "count", row) for row in range(max(1, look.rows("stream")))]
-    for row, string in enumerate(look.several("string")):
-        number = string.get("particle", 0) if isinstance(string, Mapping) else math.nan
-        if isinstance(number, int) and number >= sum(counts):
-            text = f"there are {sum(counts)} particles, from 0; stream.count says how many"
-            yield Fault(f"string[{row}].particle", number, text)
 
 
 ARC: Final = ("radius", "from_deg", "to_deg")
@@ -550,41 +520,32 @@ def stream_name(row: int) -> str:
     return f"stream{row + 1}" if row else "stream"
 
 
-def _expectations(look: Look) -> Iterator[Fault]:
-    if not look.several("expect") or not all(map(look.sound, SURFACES)):
+def _expectations(look: Look, streams: Sequence[Row]) -> Iterator[Fault]:
+    if not all(map(look.sound, SURFACES)):
         return
-    surfaces = [table for table in ("incoming", "outgoing") if look.has(table)]
-    if any(look.given("plate", "distance", row) for row in range(look.rows("plate"))):
-        surfaces.append("plate")
-    free = [look(table, "name", row) for table in SURFACES for row in range(look.rows(table))]
-    surfaces += [name for name in free if isinstance(name, str)]
-    streams, counts = [], []
-    for row in range(max(1, look.rows("stream"))):
-        many = look("stream", "count", row)
-        counts.append(many if isinstance(many, int) else 1)
-        called = look("stream", "name", row)
-        streams.append(called if isinstance(called, str) else stream_name(row))
-    for index, given in enumerate(look.several("expect")):
-        path = f"expect[{index}]"
-        if not (isinstance(given, Mapping) and look.sound(path)):
+    surfaces = [*filter(look.has, ("incoming", "outgoing")), *["plate"] * look.damps]
+    surfaces += [name for table in SURFACES for name in _texts(look.rows(table))]
+    names = [
+        name if isinstance(name := stream["name"], str) else stream_name(number)
+        for number, stream in enumerate(streams)
+    ]
+    count = sum(many if isinstance(many := stream["count"], int) else 1 for stream in streams)
+    for row in look.rows("expect"):
+        name = row["quantity"]
+        if not (row.sound() and isinstance(name, str)):
             continue
-        name = given.get("quantity")
-        if not isinstance(name, str):
-            continue
-        about = lookup(name, surfaces, streams)
+        about = lookup(name, surfaces, names)
         if about is None:
-            text = f"no such quantity here; {suggestion(name, surfaces)}"
-            yield Fault(f"{path}.quantity", name, text)
+            yield row.fault("quantity", f"no such quantity here; {suggestion(name, surfaces)}")
             continue
-        if text := whose(about, sum(counts)):
-            yield Fault(f"{path}.quantity", name, text)
+        if text := whose(about, count):
+            yield row.fault("quantity", text)
             continue
-        if given.get("value") == THEORY and not about.theory:
+        if row["value"] == THEORY and not about.theory:
             has = ", ".join(one.name for one in REGISTRY.values() if one.theory)
-            text = f"a number; the theory has no {name}, only {has}"
-            yield Fault(f"{path}.value", THEORY, text)
+            yield row.fault("value", f"a number; the theory has no {name}, only {has}")
         for key in ("tolerance", "tolerance_contact", "tolerance_pymunk"):
-            tolerance, none = given.get(key), "" if key == "tolerance" else f' or "{UNPROMISED}"'
+            tolerance, none = row[key], "" if key == "tolerance" else f' or "{UNPROMISED}"'
             if not isinstance(tolerance, str) or (none and tolerance == UNPROMISED):
                 continue
             with suppress(ValueError):
@@ -595,4 +556,4 @@ def _expectations(look: Look) -> Iterator[Fault]:
             example = examples.get(about.unit) or write_size(0.0005, about.unit)
             text = f'must be a number from 0 to 1 (relative), a string such as "{example}"{none}'
             kind = f"in {about.unit}" if about.unit else "a number of things"
-            yield Fault(f"{path}.{key}", tolerance, f"{text}; {name} is {kind}")
+            yield row.fault(key, f"{text}; {name} is {kind}")

@@ -20,7 +20,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from chutelab.scene.conflicts import EITHER
-from chutelab.scene.schema import SceneTables, as_written
+from chutelab.scene.schema import SceneTables, to_dict
 from chutelab.scene.units import WORDS, size_in
 from chutelab.util.errors import MISSING, Fault, InputError, printable
 
@@ -59,28 +59,15 @@ _schema = cache(schema)
 NAMED: Final = ("particle", "material", "plate", "conveyor", "surface", "stream")
 """Tables of which there may be several, with names."""
 
-NO_NAMES: Final[Mapping[str, Sequence[object]]] = {}
-
 _SEGMENT: Final = re.compile(rf"({WORDS})((?:\[\d{{1,9}}\])*)")
 _FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
 _BARE_KEY: Final = re.compile(r"[\w-]+")
 
 
-def parts_of(path: str, names: Mapping[str, Sequence[object]] = NO_NAMES) -> list[str | int]:
-    """Return the keys and indices of a full path, such as ``stream.at[0]``.
+def parts_of(path: str) -> list[str | int]:
+    """Return the keys and indices of a full path, or raise an `InputError`.
 
-    A table of which there are several goes by index or, if it is one of the names given, by name.
-
-    Raises
-    ------
-    InputError
-        If it is no path.
-
-    Examples
-    --------
     >>> parts_of("surface[1].speed")
-    ['surface', 1, 'speed']
-    >>> parts_of("surface.hood.speed", {"surface": ["floor", "hood"]})
     ['surface', 1, 'speed']
     """
     parts: list[str | int] = []
@@ -89,8 +76,6 @@ def parts_of(path: str, names: Mapping[str, Sequence[object]] = NO_NAMES) -> lis
         if match is None:
             raise InputError(_FORM)
         parts += [match[1], *(int(index) for index in re.findall(r"\d+", match[2]))]
-    if len(parts) > 1 and parts[1] in names.get(str(parts[0]), ()):
-        parts[1] = list(names[str(parts[0])]).index(parts[1])
     return parts
 
 
@@ -130,10 +115,10 @@ def at_path(document: Any, parts: Sequence[str | int]) -> Any:
 def value_at(scene: SceneTables, path: str) -> Any:
     """Return what a scene has at a path, defaults filled in.
 
-    `MISSING` if there is no such thing; an array for a varied key of a family of scenes.
+    `MISSING` if there is no such thing.
     """
     try:
-        parts = parts_of(path, names_of(as_written(scene)))
+        parts = resolved(to_dict(scene), path)
     except InputError:
         return MISSING
     if len(parts) > 1 and isinstance(parts[1], int):
@@ -148,24 +133,17 @@ def rule_at(parts: Sequence[str | int]) -> Mapping[str, Any] | None:
         if rule is None:
             return None
         # Of what may be a table or a list of tables the one that the path goes on in.
-        below = (_below(_referred(choice), part) for choice in rule.get("anyOf", [_referred(rule)]))
-        rule = next((found for found in below if found is not None), None)
+        below = [_below(_referred(choice), part) for choice in rule.get("anyOf", [_referred(rule)])]
+        rule = next((found for found in below if isinstance(found, Mapping)), None)
     return None if rule is None else _referred(rule)
 
 
-def _below(rule: Mapping[str, Any], part: str | int) -> Mapping[str, Any] | None:
+def _below(rule: Mapping[str, Any], part: str | int) -> Any:
     """Return what a rule says of a key, or of an entry of a list."""
-    below: Mapping[str, Any] | None
     if isinstance(part, str):
-        others = rule.get("additionalProperties")
-        below = rule.get("properties", {}).get(
-            part, others if isinstance(others, Mapping) else None
-        )
-    elif part < len(rule.get("prefixItems", [])):
-        below = rule["prefixItems"][part]
-    else:
-        below = rule.get("items")
-    return below
+        return rule.get("properties", {}).get(part, rule.get("additionalProperties"))
+    first = rule.get("prefixItems", [])
+    return first[part] if part < len(first) else rule.get("items")
 
 
 def limits_of(
@@ -219,13 +197,13 @@ def apply(
     """Lay overrides over a scene's tables, in place and in order; the last one wins.
 
     Texts are as `read` takes them; a missing table is made; "4 mm" is a number where one is wanted.
-    Returns the faults of those that could
-    not be laid over, and what was typed for each of the others by the full path that it set.
+    Returns the faults of those that could not be laid over, and what was typed for each of the
+    others by the full path that it set.
     """
     faults: list[Fault] = []
     given: dict[str, str] = {}
-    for given_one in overrides:
-        one = read(given_one) if isinstance(given_one, str) else given_one
+    for override in overrides:
+        one = read(override) if isinstance(override, str) else override
         try:
             path = resolved(document, one.key)
             _put(document, path, sized(one.value, path))
@@ -272,18 +250,24 @@ def value_of(text: str) -> object:
 
 
 def resolved(document: Mapping[str, Any], key: str) -> list[str | int]:
-    """Return the parts of a key, with the index of a table of which there are several.
+    """Return the parts of a key; a table of which there are several goes by its index then.
 
     Raises
     ------
     InputError
         If it is no path, or if it is not clear which of several tables is meant.
+
+    Examples
+    --------
+    >>> resolved({"surface": [{"name": "floor"}, {"name": "hood"}]}, "surface.hood.speed")
+    ['surface', 1, 'speed']
     """
-    names = names_of(document)
-    path = parts_of(key, names)
+    names, path = names_of(document), parts_of(key)
     table = str(path[0])
     if table not in NAMED or len(path) < 2:
         return path
+    if path[1] in names.get(table, ()):
+        return [table, names[table].index(path[1]), *path[2:]]
     if table in EITHER and path[1] == 0 and table not in names:
         return [table, *path[2:]]
     if not isinstance(path[1], str) or (table in EITHER and table not in names):

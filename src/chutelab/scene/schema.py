@@ -37,6 +37,7 @@ from chutelab.scene.units import (
     sphere_mass,
     tonnes_per_hour,
 )
+from chutelab.util.tables import many
 
 TABLES: Final[dict[str, type[Table]]] = {
     "particle": Particle,
@@ -79,6 +80,10 @@ def _several(default: Any, **limits: Any) -> Any:
     return Field(default, json_schema_extra=_as_either, validate_default=False, **limits)
 
 
+Reader = Callable[[Table, str], Any]
+"""Returns what a table has under a key."""
+
+
 class SceneTables(Table):
     """The tables of a scene, with all defaults that need no geometry."""
 
@@ -106,7 +111,6 @@ class SceneTables(Table):
     live: Live = Field(default_factory=Live)
 
     _source: str = PrivateAttr("<scene>")
-    _shape: tuple[int, ...] = PrivateAttr(())
 
     @classmethod
     def validated(cls, document: Mapping[str, Any]) -> Self:
@@ -154,17 +158,26 @@ class SceneTables(Table):
         """Number of particles of all streams."""
         return sum(stream.count for stream in self.streams)
 
-    def slices(self, number: int = 0) -> float:
+    @property
+    def scene(self) -> Self:
+        """Itself; of a family (`chutelab.scene.variants.Family`) one of its scenes."""
+        return self
+
+    def value(self, table: Table, key: str) -> Any:
+        """Return what one of its tables has under a key; arrays where those of a family differ."""
+        return getattr(table, key)
+
+    def slices(self, number: int = 0, value: Reader = getattr) -> Any:
         """Return how many slices a stream's material is wide, each one particle thick.
 
         The width over the mean diameter of its particles; 1 without a width. What a slice takes, or
         brings, per time is so many times less than what all of the material does.
         """
-        width, particle = self.streams[number].width, self.particles[self.kinds[number]]
-        return 1.0 if width is None else width / (2.0 * particle.radius)
+        width, particle = value(self.streams[number], "width"), self.particles[self.kinds[number]]
+        return 1.0 if width is None else width / (2.0 * value(particle, "radius"))
 
     @property
-    def rate(self) -> float:
+    def rate(self) -> Any:
         """Particles per second of the first stream, of all its width."""
         return self.stream.rate * self.slices()
 
@@ -177,7 +190,7 @@ class SceneTables(Table):
         """Return restitution and friction of a kind of particles and another, see `meetings`."""
         return self.meetings()(kind, other)
 
-    def meetings(self) -> Callable[[int, int | str], tuple[float, float]]:
+    def meetings(self, value: Reader = getattr) -> Callable[[int, int | str], tuple[float, float]]:
         """Return what tells restitution and friction of a kind and another kind, or a surface.
 
         What ``[[pair]]`` says of the two counts first, then what the surface (or a stream of the
@@ -192,16 +205,17 @@ class SceneTables(Table):
         tables |= {str(free.name): free for free in self.free}
         pairs: dict[frozenset[str | None], dict[str, float]] = {}
         for pair in self.pair:
-            said = {"restitution": pair.restitution, "friction": pair.friction}
-            told = {key: value for key, value in said.items() if value is not None}
+            said = {key: value(pair, key) for key in ("restitution", "friction")}
+            told = {key: one for key, one in said.items() if one is not None}
             # The first one counts.
             names = frozenset(pair.between)
             pairs[names] = told | pairs.get(names, {})
         # A function in a function that calls itself would only be freed by the garbage collector.
-        return partial(self._met, tables, pairs, {})
+        return partial(self._met, value, tables, pairs, {})
 
     def _met(
-        self, tables: Mapping[str, Any], pairs: Mapping[frozenset[str | None], dict[str, float]],
+        self, value: Reader, tables: Mapping[str, Any],
+        pairs: Mapping[frozenset[str | None], dict[str, float]],
         known: dict[tuple[int, int | str], tuple[float, float]], kind: int, other: int | str,
     ) -> tuple[float, float]:  # fmt: skip
         if (kind, other) in known:
@@ -213,14 +227,14 @@ class SceneTables(Table):
             steel = isinstance(table, Plate) or (
                 isinstance(table, Surface) and table.material == "steel"
             )
-            values = self._own(particle, (table,), "_steel" if steel else "_rubber")
+            values = self._own(value, particle, (table,), "_steel" if steel else "_rubber")
         elif other == kind:
             with_it, rows = particle.name, zip(self.streams, self.kinds, strict=True)
             own = [stream for stream, its in rows if its == kind]
-            values = self._own(particle, own or [Stream()])
+            values = self._own(value, particle, own or [Stream()])
         else:
             with_it = self.particles[other].name
-            mine, theirs = (self._met(tables, pairs, known, k, k) for k in (kind, other))
+            mine, theirs = (self._met(value, tables, pairs, known, k, k) for k in (kind, other))
             products: list[Any] = [a * b for a, b in zip(mine, theirs, strict=True)]
             # A power of a half is no square root to the last bit.
             values = tuple(sqrt(p) if isinstance(p, float) else p**0.5 for p in products)
@@ -230,19 +244,21 @@ class SceneTables(Table):
         known[kind, other] = found
         return found
 
-    def _own(self, particle: Particle, homes: Sequence[Any], column: str = "") -> Any:
+    def _own(
+        self, value: Reader, particle: Particle, homes: Sequence[Any], column: str = ""
+    ) -> Any:
         """Return what tables say, else the material, else the default of the first."""
         if particle.material is None and len(homes) == 1:
-            return homes[0].restitution, homes[0].friction
+            return value(homes[0], "restitution"), value(homes[0], "friction")
         material, values = self._material(particle), []
         for key in ("restitution", "friction"):
             said = [home for home in homes if key in home.model_fields_set]
-            value = None
             # Whether the incoming belt grips is its own matter.
             grips = key == "friction" and isinstance(homes[0], Incoming)
             if material is not None and not said and not grips:
-                value = getattr(material, key + column)
-            values.append(getattr((said or homes)[0], key) if value is None else value)
+                values.append(value(material, key + column))
+            else:
+                values.append(value((said or homes)[0], key))
         return values
 
     def _material(self, particle: Particle) -> Any:
@@ -268,18 +284,12 @@ class SceneTables(Table):
         tables = [name for name in ("incoming", "plate", "outgoing") if getattr(self, name)]
         return (*tables, *(str(free.name) for free in self.free))
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(N,) of a family of scenes, see `chutelab.scene.variants.family`; () of one scene."""
-        # As `self._shape`, for which pydantic takes ten times as long.
-        private: dict[str, tuple[int, ...]] = self.__pydantic_private__ or {}
-        return private.get("_shape", ())
-
     def __repr__(self) -> str:
-        particles = "1 particle" if self.count == 1 else f"{self.count:,} particles"
         names = self.surfaces
         surfaces = ", ".join(names) if len(names) <= 6 else f"{len(names):,} surfaces"
-        return f"<Scene {self.source}: {self.title}; {particles}, {surfaces}>"
+        return (
+            f"<Scene {self.source}: {self.title}; {many(self.count, 'particle', ',')}, {surfaces}>"
+        )
 
     def __eq__(self, other: object) -> bool:
         # The same machine from another file is the same scene.
@@ -287,13 +297,9 @@ class SceneTables(Table):
 
     @model_validator(mode="after")
     def _judge_and_fill(self) -> Self:
-        faults = list(conflicts(Look(as_written(self), DEFAULTS)))
+        faults = list(conflicts(Look(to_dict(self), DEFAULTS)))
         if faults:
             raise ConflictError(faults)
-        self._fill_defaults()
-        return self
-
-    def _fill_defaults(self) -> None:
         if self.run.until is None:
             run = self.run.model_copy()
             run._fill("until", "landed" if self.outgoing else "settled")
@@ -307,7 +313,7 @@ class SceneTables(Table):
             ),
         )
         if self.incoming is None:
-            return
+            return self
         if self.outgoing is not None and self.outgoing.speed is None:
             outgoing = self.outgoing.model_copy()
             outgoing._fill("speed", self.incoming.speed)
@@ -317,16 +323,19 @@ class SceneTables(Table):
             filled = plate.model_copy()
             filled._fill("pivot_height", self.incoming.pulley_radius)
             self._fill("plates", tuple(filled if p is plate else p for p in self.plates))
+        return self
+
+    def density(self, particle: Particle, value: Reader = getattr) -> Any:
+        """Return the density that the mass of a kind of particles follows from; None if none."""
+        if particle.shape in ("box", "polygon"):
+            return None
+        material = self._material(particle)
+        own = material is None or "mass" in particle.model_fields_set
+        return value(particle if own or particle.density is not None else material, "density")
 
     def _with_mass(self, particle: Particle) -> Particle:
         """Return a kind of particles with its mean radius and the mass that goes with that."""
-        material = self._material(particle)
-        density = particle.density
-        if density is None and material is not None and "mass" not in particle.model_fields_set:
-            density = material.density
-        shaped = particle.shape in ("box", "polygon")
-        if shaped:
-            density = None
+        density, shaped = self.density(particle), particle.shape in ("box", "polygon")
         span: Any = particle.radius
         if density is None and not isinstance(span, tuple) and not shaped:
             return particle
@@ -350,15 +359,14 @@ class SceneTables(Table):
         if isinstance(typed, str):
             filled._fill("rate", typed)
             mass = self.particles[kind].mean_mass
-            slices = self.slices(number)
-            filled._resolve("rate", tonnes_per_hour(typed) / 3.6 / mass / slices)
+            filled._resolve("rate", tonnes_per_hour(typed) / 3.6 / mass / self.slices(number))
         return filled
 
 
-def as_written(scene: SceneTables, *, defaults: bool = False) -> dict[str, Any]:
-    """Return the keys that were set, nested as in the file; one table is no list of one.
+def to_dict(scene: SceneTables, *, defaults: bool = False) -> dict[str, Any]:
+    """Return the keys that were set, nested as in the file: `from_dict` makes the scene again.
 
-    With `defaults`, all keys.
+    One table is no list of one. With `defaults`, all keys.
     """
     tables: dict[str, Any] = scene.model_dump(
         by_alias=True, exclude_unset=not defaults, warnings=False

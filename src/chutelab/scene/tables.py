@@ -5,7 +5,7 @@ Attributes mirror the TOML keys. Angles are degrees here (``_deg``) and nowhere 
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -101,13 +101,17 @@ class Particle(Resolved):
         return span
 
     @property
-    def mean_mass(self) -> float:
+    def mean_mass(self) -> Any:
         """Mean mass, kg, which goes with the cube of the radius."""
+        return self.mean_of(self.mass)
+
+    def mean_of(self, mass: Any) -> Any:
+        """Return the mean mass, kg, if one of the mean radius has a mass (kg)."""
         if self.span is None:
-            return self.mass
+            return mass
         low, high = self.span
         cube = self.radius * self.radius * self.radius
-        return self.mass * 0.25 * (low + high) * (low * low + high * high) / cube
+        return mass * 0.25 * (low + high) * (low * low + high * high) / cube
 
     @property
     def moment(self) -> float:

@@ -1,6 +1,6 @@
 """One scene, varied: what ``--vary`` takes, and what the keys are.
 
-Scenes that differ in numbers only can be held as one, a family, whose varied keys hold arrays (N,).
+Scenes that differ in plain numbers only are a `Family`: one of them, and a column for each key.
 """
 
 from __future__ import annotations
@@ -8,24 +8,27 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import inf, isfinite, nan, prod
 from typing import Any, Final
 
 import numpy as np
 
+from chutelab.scene import Scene, SceneError, from_dict, plain, to_dict
 from chutelab.scene.conflicts import EITHER, NO_MACHINE, Look, conflicts
-from chutelab.scene.loading import Scene, SceneError, from_dict, plain, to_dict
+from chutelab.scene.materials import Material
 from chutelab.scene.overrides import (
     Override,
     apply,
     joined,
     limits_of,
-    names_of,
     parts_of,
+    resolved,
     rule_at,
 )
 from chutelab.scene.schema import DEFAULTS, plain_number
-from chutelab.scene.units import SIZE, read_size
+from chutelab.scene.tables import Particle, Stream
+from chutelab.scene.units import SIZE, Table, read_size, sphere_mass
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.errors import MISSING, InputError, about_comma
 
@@ -204,7 +207,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
     faults, _ = apply(document, [Override(vary.key, plain_number(vary.values[0]))])
     if faults:
         raise InputError(faults[0].allowed, vary.typed)
-    parts = parts_of(vary.key, names_of(document))
+    parts = resolved(document, vary.key)
     path, indexed = joined(parts), isinstance(parts[-1], int)
     while isinstance(parts[-1], int):
         parts.pop()
@@ -289,36 +292,79 @@ def judged_by(scene: Scene, values: Mapping[str, object]) -> set[str]:
     return look.asked
 
 
-def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
-    """Return N scenes that differ in plain numbers as one, of shape (N,); it is not validated.
+@dataclass(frozen=True, eq=False)
+class Family:
+    """N scenes that differ in plain numbers only: a batch, of which each is a row of numbers.
 
-    `columns` has the values of each varied key, (N,), by its full path. They stand under these
-    keys, and under those whose defaults they are; the rest is that of `scene`.
+    Attributes
+    ----------
+    scene : Scene
+        One of them, validated: what does not vary is its.
+    columns : mapping of str to ndarray, (N,)
+        The numbers of each key that varies, by its full path.
     """
-    changes: dict[str, Any] = {}
-    for path, values in columns.items():
-        match parts_of(path):
-            case [str(key)]:
-                changes[key] = values
-            case [str(table), str(key)] if table not in EITHER:
-                given = changes.get(table, getattr(scene, table))
-                changes[table] = given.model_copy(update={key: values})
-            case [str(table), *index, str(key)]:
-                rows = EITHER.get(table, table)
-                tables = list(changes.get(rows, getattr(scene, rows)))
-                number = int(index[0]) if index else 0
-                tables[number] = tables[number].model_copy(update={key: values})
-                changes[rows] = tuple(tables)
-    out, plates = changes.get("outgoing", scene.outgoing), changes.get("plates", scene.plates)
-    if out is not None and "speed" not in out.model_fields_set:
-        changes["outgoing"] = out.model_copy(update={"speed": None})
-    changes["plates"] = tuple(
-        plate
-        if "pivot_height" in plate.model_fields_set or plate.pivot is not None
-        else plate.model_copy(update={"pivot_height": None})
-        for plate in plates
-    )
-    many = scene.model_copy(update=changes)
-    many._source, many._shape = scene.source, next(iter(columns.values())).shape
-    many._fill_defaults()
-    return many
+
+    scene: Scene
+    columns: Mapping[str, Floats]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    @cached_property
+    def _own(self) -> dict[tuple[int, str], Floats]:
+        """The columns by table and key."""
+        homes = map(self._home, self.columns)
+        return {
+            (id(table), key): numbers
+            for (table, key), numbers in zip(homes, self.columns.values(), strict=True)
+        }
+
+    def _home(self, path: str) -> tuple[Table, str]:
+        """Return the table that a path leads to, and its key there."""
+        *parts, key = parts_of(path)
+        table: Any = self.scene
+        if parts:
+            table = getattr(table, EITHER.get(str(parts[0]), str(parts[0])))
+        if isinstance(table, tuple):
+            table = table[int(parts[1]) if len(parts) > 1 else 0]
+        return table, str(key)
+
+    def at(self, path: str) -> Any:
+        """Return the plain number at a path, see `is_plain`; an array (N,) if it varies."""
+        return self.value(*self._home(path))
+
+    def value(self, table: Table, key: str) -> Any:
+        """Return what a table of `scene` has under a key.
+
+        An array (N,) if that varies, or is a default that follows from what varies.
+        """
+        if (id(table), key) in self._own:
+            return self._own[id(table), key]
+        scene = self.scene
+        if isinstance(table, Particle) and key == "mass":
+            density = scene.density(table, self.value)
+            if density is not None:
+                return sphere_mass(density, self.value(table, "radius"))
+        elif isinstance(table, Stream) and key == "rate" and table.mass_rate is not None:
+            number = next(n for n, stream in enumerate(scene.streams) if stream is table)
+            kind = scene.particles[scene.kinds[number]]
+            mass = kind.mean_of(self.value(kind, "mass"))
+            return table.mass_rate / mass / scene.slices(number, self.value)
+        elif key in table.model_fields_set:
+            return getattr(table, key)
+        elif isinstance(table, Material) and key.endswith(("_steel", "_rubber")):
+            return self.value(table, key.partition("_")[0])
+        elif table is scene.outgoing and key == "speed" and scene.incoming is not None:
+            return self.value(scene.incoming, "speed")
+        elif table is scene.plate and key == "pivot_height" and scene.incoming is not None:
+            return self.value(scene.incoming, "pulley_radius")
+        return getattr(table, key)
+
+    def met(self, kind: int, other: int | str) -> tuple[Any, Any]:
+        """Return restitution and friction of two, see `Scene.met`; arrays (N,) where they vary."""
+        return self.scene.meetings(self.value)(kind, other)
+
+    @property
+    def rate(self) -> Any:
+        """Particles per second of the first stream, of all its width."""
+        return self.value(self.scene.stream, "rate") * self.scene.slices(0, self.value)

@@ -23,8 +23,7 @@ from chutelab.engines import reference
 from chutelab.engines.simulation import judged
 from chutelab.machine import build
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
-from chutelab.results.comparison import compare, prediction, scales
-from chutelab.results.firsts import first
+from chutelab.results.comparison import compare, first, prediction, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
 from chutelab.scene import AnyScene, Scene, SceneError, load

@@ -29,6 +29,7 @@ from chutelab.util.trig import RADIANS, hypot, sin_cos
 if TYPE_CHECKING:
     # The paper's tables are there without the model of a scene.
     from chutelab.scene import AnyScene, Scene
+    from chutelab.scene.variants import Family
 
 LEAST_CLEARANCE = 0.05
 """m of the default plate's lower end above the outgoing belt, for particles below 17 mm."""
@@ -207,59 +208,61 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     return found if trouble is None else cut(found, *trouble)
 
 
-def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
+def unbounded(scenes: Scene | Family, rebound: Rebound = "corrected") -> Transfer:
     """Return what the equations say of a scene if nothing else were in the way.
 
     Plate and outgoing belt are without ends, the pulley is met no more, and what the scene says of
     releases is not looked at. The scene has an incoming conveyor and a plate; the arrays are 0-d,
-    those of a family of such scenes (see `chutelab.scene.variants`) are (N,).
+    those of a family of such scenes (see `chutelab.scene.variants.Family`) are (N,).
     """
+    value, scene = scenes.value, scenes.scene
     belt, plate, out = scene.incoming, scene.plate, scene.outgoing
     assert belt is not None
     assert plate is not None
     kind, stream = scene.kinds[0], scene.stream
     own = scene.particles[kind]
-    restitution, plate_friction = scene.met(kind, "plate")
-    _, friction = scene.met(kind, "incoming")
-    incline = belt.incline_deg * RADIANS
-    ride_length = belt.length
+    restitution, plate_friction = scenes.met(kind, "plate")
+    _, friction = scenes.met(kind, "incoming")
+    pulley_radius, radius = value(belt, "pulley_radius"), value(own, "radius")
+    incline = value(belt, "incline_deg") * RADIANS
+    ride_length = value(belt, "length")
     if stream.at is not None:
         sin, cos = sin_cos(incline)
         ride_length = -(stream.at[0] * cos + stream.at[1] * sin)
 
     def found(drop: ArrayLike, belt_speed: ArrayLike) -> Transfer:
         return transfer(
-            speed=belt.speed,
-            pulley_radius=belt.pulley_radius,
-            distance=plate.distance,
-            angle=plate.angle_deg * RADIANS,
-            pivot_height=plate.pivot_height,
+            speed=value(belt, "speed"),
+            pulley_radius=pulley_radius,
+            distance=value(plate, "distance"),
+            angle=value(plate, "angle_deg") * RADIANS,
+            pivot_height=value(plate, "pivot_height"),
             restitution=restitution,
             drop=drop,
             belt_speed=belt_speed,
-            particle_radius=own.radius,
-            mass=own.mass,
-            gravity=scene.gravity,
+            particle_radius=radius,
+            mass=value(own, "mass"),
+            gravity=value(scene, "gravity"),
             friction=np.inf if isinstance(friction, str) else friction,
             spin=own.spin,
             inertia=0.4 if own.shape == "sphere" else 0.5,
             incline=incline,
             ride_length=ride_length,
             plate_friction=plate_friction,
-            interval=1.0 / scene.rate,
+            interval=1.0 / scenes.rate,
             rebound=rebound,
             unbounded_plate=False,
         )
 
     if out is None:
         return found(0.0, 0.0)
+    drop, belt_speed = value(out, "drop"), value(out, "speed")
     if out.drop_from == "impact":
-        return found(out.drop, out.speed)
-    impact = found(0.0, out.speed)
+        return found(drop, belt_speed)
+    impact = found(0.0, belt_speed)
     # Eq. (16) solved for d2; `predict` refuses a belt above the impact
-    ride_radius = belt.pulley_radius + own.radius
-    sunk = ride_radius * (1.0 - sin_cos(impact.phi1)[1]) + impact.y2
-    return found(np.maximum(out.drop - sunk, 0.0), out.speed)
+    sunk = (pulley_radius + radius) * (1.0 - sin_cos(impact.phi1)[1]) + impact.y2
+    return found(np.maximum(drop - sunk, 0.0), belt_speed)
 
 
 def _outside(scene: Scene) -> str:

@@ -190,6 +190,15 @@ def number(value: float) -> str:
     return f"{value + 0.0:.6g}" if isfinite(value) else "-"
 
 
+def many(count: int, what: str, style: str = "") -> str:
+    """Return a number of things; `style` is how the number is written, "," in groups of three.
+
+    >>> many(1, "particle"), many(2000, "particle", ",")
+    ('1 particle', '2,000 particles')
+    """
+    return f"{count:{style}} {what}{'' if count == 1 else 's'}"
+
+
 def plain(value: Any) -> Any:
     """Return a value as JSON has it.
 

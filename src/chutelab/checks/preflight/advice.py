@@ -31,8 +31,8 @@ from chutelab.machine import DRIVE_PULLEY, Caution, Machine, build
 from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
-from chutelab.results.notes import waits
 from chutelab.results.record import blocks, hermite
+from chutelab.results.summary import waits
 from chutelab.scene import AnyScene, Scene, SceneError, load, shown
 from chutelab.scene.materials import DENSEST, LIGHTEST, PRESETS
 from chutelab.scene.units import write_size

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from chutelab.machine import Machine, Pieces
-from chutelab.results.notes import air_drag
-from chutelab.results.recording import Recording
+from chutelab.results import Recording
+from chutelab.results.summary import air_drag
 from chutelab.scene import Scene
 from chutelab.scene.quantities import THEORY
 from chutelab.scene.units import write_size

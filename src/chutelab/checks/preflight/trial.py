@@ -14,8 +14,8 @@ from chutelab.engines.exact.engine import ROUNDS
 from chutelab.engines.simulation import follow
 from chutelab.machine import Machine, build
 from chutelab.results import EVENT, KNOT, REASONS, Recording
-from chutelab.results.notes import stopped
 from chutelab.results.recorder import EnoughError, StalledError
+from chutelab.results.summary import stopped
 from chutelab.scene import SceneError
 from chutelab.util.arrays import Floats
 

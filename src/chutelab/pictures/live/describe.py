@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any, Final
 
 from chutelab.machine import build
-from chutelab.scene import Fault, Scene, SceneError
+from chutelab.scene import Fault, Scene, SceneError, to_dict
 from chutelab.scene.conflicts import EITHER
 from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
-from chutelab.scene.schema import as_written
 from chutelab.scene.units import LARGEST, SHORTEST
 
 SAFE: Final = 2**53
@@ -47,7 +46,7 @@ def describe(scene: Scene) -> dict[str, Any]:
         if the scene contradicts itself where it is laid out.
     """
     _need_disks(scene)
-    tables = as_written(scene)
+    tables = to_dict(scene)
     machine, out = build(scene), scene.outgoing
     if out is not None and out.drop_from == "impact":
         height = machine.segments.start[machine.segments.surface == machine.landing][0, 1].item()
@@ -66,11 +65,11 @@ def describe(scene: Scene) -> dict[str, Any]:
         for row in (rows,) if isinstance(rows, dict) else rows:
             if row.get("seed", 0) > SAFE:
                 row["seed"] = str(row["seed"])
-    presets = {
+    materials = {
         name: {key: getattr(preset.material, key) for key in VALUES}
         for name, preset in PRESETS.items()
     }
-    return {"scene": tables, "tables": _rules(), "presets": presets}
+    return {"scene": tables, "tables": _rules(), "presets": materials}
 
 
 def _need_disks(scene: Scene) -> None:

@@ -17,7 +17,7 @@ from typing import Any
 from chutelab.pictures.live.describe import describe
 from chutelab.pictures.plots import style
 from chutelab.scene import Scene
-from chutelab.scene.live import live_of
+from chutelab.scene.messages import live_of
 from chutelab.scene.quantities import REGISTRY
 from chutelab.util.files import whole
 from chutelab.util.versions import own_version
@@ -43,7 +43,7 @@ def html(
     home : tuple of str, optional
         Text and address of a link back, for a page that is one of several.
     exercise : mapping, optional
-        What `chutelab.classroom.exercises.in_page.data_of` makes of an exercise.
+        What `chutelab.classroom.exercises.catalogue.data_of` makes of an exercise.
 
     Raises
     ------

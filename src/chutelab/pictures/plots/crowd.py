@@ -10,8 +10,8 @@ from chutelab.pictures.plots.bodies import stream_colours
 from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
-from chutelab.results.notes import layers
 from chutelab.results.stream import QUANTILES, envelopes, flows
+from chutelab.results.summary import layers
 from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.units import with_unit
 from chutelab.util.arrays import Floats

@@ -23,7 +23,7 @@ from chutelab.scene import MISSING, Scene
 from chutelab.scene.overrides import value_at
 from chutelab.scene.quantities import Ending, lookup, suggestion, whose
 from chutelab.scene.units import read_size
-from chutelab.scene.variants import Vary, quantity
+from chutelab.scene.variants import Vary, is_plain, quantity
 from chutelab.util.errors import InputError
 from chutelab.util.versions import library
 
@@ -117,11 +117,12 @@ class Quantity:
         """Return its value, of each scene of a family (N,); NaN where it did not happen."""
         value: Any = self.number
         if self.source == "scene":
-            value = value_at(recording.scene, self.key)
+            family = recording.family if is_plain(self.key) else None
+            value = family.at(self.key) if family else value_at(recording.scene, self.key)
             return nan if value is None or value is MISSING or isinstance(value, str) else value
         if self.source == "run":
             value = read(recording, self.key)
-            value = value if recording.scene.shape else value[0]
+            value = value if recording.family else value[0]
         return value
 
 

@@ -10,9 +10,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
-from chutelab.scene import MISSING, Fault, Scene, shown
-from chutelab.scene.overrides import at_path, joined, limits_of, names_of, parts_of, rule_at
-from chutelab.scene.schema import as_written
+from chutelab.scene import MISSING, Fault, Scene, shown, to_dict
+from chutelab.scene.overrides import at_path, joined, limits_of, names_of, resolved, rule_at
 from chutelab.studies.measured.track import LARGEST, MeasuredError, Track
 from chutelab.util.errors import did_you_mean
 
@@ -69,8 +68,7 @@ def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter,
     MeasuredError
         With all keys that are unknown, no number, without a value to start from, or given twice.
     """
-    document, placed = as_written(scene, defaults=True), placements(track)
-    names = names_of(document)
+    document, placed = to_dict(scene, defaults=True), placements(track)
     faults: list[Fault] = []
     found: list[Parameter] = []
     if not keys:
@@ -79,7 +77,7 @@ def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter,
         known = placed.get(key) or _of_scene(document, key, placed)
         if isinstance(known, str):
             faults.append(Fault(f"fit {key}", None, known))
-        elif any(parts_of(key, names) == parts_of(other.key, names) for other in found):
+        elif any(resolved(document, key) == resolved(document, one.key) for one in found):
             faults.append(Fault(f"fit {key}", None, "given twice"))
         else:
             found.append(known)
@@ -109,7 +107,7 @@ def _of_scene(document: Mapping[str, Any], key: str, others: Iterable[str]) -> P
     """Return the parameter of a key of the scene, or why there is none, with other known keys."""
     rule = None
     with suppress(ValueError):
-        parts = parts_of(key, names_of(document))
+        parts = resolved(document, key)
         rule = rule_at(parts)
     if rule is None:
         known = [*numbers(document), *others]

@@ -18,7 +18,7 @@ from chutelab.machine import RefusedError, build
 from chutelab.results import Recording
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError
-from chutelab.scene.variants import accepted, family, is_plain, judged_by, reason
+from chutelab.scene.variants import Family, accepted, is_plain, judged_by, reason
 from chutelab.studies.sweep.rows import REASON, Columns, empty, rows
 from chutelab.util.arrays import Floats, Ints
 
@@ -127,7 +127,7 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
     Returns
     -------
     runs, faults, left
-        Recordings with a particle for each of N variants, whose scene is a family, and their rows
+        Recordings with a particle for each of N variants, of a family, and their rows
         in the block, (N,); why there is no run, by row; and the rows that have to be run alone.
     """
     template, which, faults = screened(block)
@@ -141,13 +141,14 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
     if stepped or timed or template.count > 1 or (close and template.stream.at is not None):
         return [], faults, which.tolist()
 
-    def scenes(some: Ints) -> Scene:
-        return family(template, dict(zip(block.paths, block.values[some].T.copy(), strict=True)))
+    def scenes(some: Ints) -> Family:
+        return Family(template, dict(zip(block.paths, block.values[some].T.copy(), strict=True)))
 
     groups: list[Ints] = []
     while len(which) and not groups:
         try:
-            groups = [which[alike] for alike in kinds(build(scenes(which)))]
+            machine = build(scenes(which))
+            groups = [which[alike] for alike in kinds(machine)]
         except RefusedError as refused:
             faults |= {int(which[n]): str(fault) for n, fault in refused.members.items()}
             which = np.delete(which, list(refused.members))
@@ -156,7 +157,9 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
     while groups:
         which = groups.pop()
         with suppress(CornerError, StalledError):
-            recording = Recording.of(run(build(scenes(which)), apart=True))
+            every = len(which) == machine.count
+            some = machine if every else build(scenes(which))
+            recording = Recording.of(run(some, apart=True))
             if not recording.laws:
                 runs.append((recording, which))
                 continue

@@ -1,5 +1,5 @@
 // The core in memory, what core/module.py is in Python: `Memory`; and its contact engine, what
-// engines/contact/engine.py is: `Core`. A machine goes in, knots and events come out.
+// engines/contact.py is: `Core`. A machine goes in, knots and events come out.
 
 type Struct = { size: number, fields: Record<string, [number, string, number]> };
 export type Layout = { structs: Record<string, Struct>, enums: Record<string, Record<string,

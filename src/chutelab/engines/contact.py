@@ -1,4 +1,7 @@
-"""`run`: a machine in, a recording out; the core does the rest."""
+"""Particles that meet: impacts at their own instants, lasting contacts by contact dynamics.
+
+The engine itself is in C, in `chutelab.core`; here `run` goes from a machine to a recording.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Random crowds of disks: 50 to 500 in a box, a funnel, on belts or in a transfer.
+"""Random crowds of disks.
+
+- `crowd`: the machine of a seed: 50 to 500 disks in a box, a funnel, on belts or in a transfer.
+- `hollow`: the machine of a seed: 2 to 12 disks in and about the insides of arcs.
 
 Lengths are drawn in radii and speeds in √(G r), so that a scene of 0.1 mm is one of 1 m made small;
 G is gravity, or 1 m/s² if that is less.
@@ -7,12 +10,14 @@ G is gravity, or 1 m/s² if that is less.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, radians, sin, sqrt
+from math import cos, inf, radians, sin, sqrt
 
 import numpy as np
 
 from chutelab.machine import build
 from chutelab.scene import SceneError, from_dict
+from machines import thrown
+from references import surface_depths
 
 KINDS = ("box", "funnel", "belts", "transfer")
 
@@ -29,6 +34,67 @@ def crowd(seed, *, count=None):
             return kind, _Draw(rng, count).machine(kind)
         except SceneError:
             continue  # a release inside a surface, a plate that is missed
+
+
+def hollow(seed):
+    """Return the machine of a seed: disks that slide, fly and pile up in one or two hollow arcs.
+
+    The radius r is 0.05 to 0.9 of that of the first arc, which spans 20° to all round; friction and
+    restitution are 0 to 1; with and without gravity, spin, a speed of the arcs, and a floor below.
+    """
+    rng = np.random.default_rng([26, seed])
+
+    def one_of(*values):
+        return values[int(rng.integers(len(values)))]
+
+    def pair():
+        return {
+            "restitution": one_of(0.0, 0.0, 1.0, rng.uniform()),
+            "friction": one_of(0.0, 1.0, rng.uniform(), rng.uniform()),
+        }
+
+    r = 0.01
+    size = r / np.exp(rng.uniform(np.log(0.05), np.log(0.9)))
+    gravity = one_of(0.0, 9.81, 9.81, rng.uniform(0.0, 50.0))
+    fast = one_of(0.0, 0.3, 1.0, 3.0, rng.uniform(0.0, 10.0))
+    arcs = []
+    for _ in range(one_of(1, 1, 2)):
+        middle = one_of(-90.0, -90.0 + rng.uniform(-90.0, 90.0))
+        half = 0.5 * one_of(180.0, 360.0, rng.uniform(20.0, 180.0), rng.uniform(180.0, 360.0))
+        away = 2.0 * size * rng.uniform(-1.0, 1.0, 2) if arcs else np.zeros(2)
+        arcs.append({
+            "name": f"arc{len(arcs)}", "center": away.tolist(),
+            "radius": size * (rng.uniform(0.7, 1.3) if arcs else 1.0),
+            "from_deg": middle - half, "to_deg": middle + half,
+            "speed": one_of(0.0, 0.0, 0.0, rng.uniform(-2.0, 2.0)), **pair(),
+        })  # fmt: skip
+    low = -4.0 * size
+    floor = {"name": "floor", "from": [-20.0 * size, low], "to": [20.0 * size, low], **pair()}
+    drawn = {
+        "gravity": gravity,
+        "particle": {"radius": r, "mass": 0.01, "spin": one_of(True, False)},
+        "surface": [*arcs, floor],
+        "stream": {"at": [0.0, 9.0 * size], "velocity": [0.0, 0.0], "count": 2, "interact": True,
+                   "rate": 1.0, **pair()},
+        "run": {"until": 0.5, "max_time": 0.5, "dt": one_of(1e-3, 1e-3, 3e-4, 2e-3)},
+    }  # fmt: skip
+    built, places, velocities, count = build(from_dict(drawn)), [], [], int(rng.integers(2, 13))
+    for _ in range(1000):
+        arc, turned = one_of(*arcs), rng.uniform(-np.pi, np.pi)
+        room = arc["radius"] - r
+        # At the wall, inside, or anywhere near.
+        away = one_of(room, room * sqrt(rng.uniform()), arc["radius"] * rng.uniform(0.0, 2.5))
+        x = arc["center"] + max(away, 0.0) * np.array([cos(turned), sin(turned)])
+        depths = surface_depths(built, x[None], r, 0.0).values()
+        apart = min((np.hypot(*(x - other)) for other in places), default=inf)
+        if apart < 2.0 * r or max(float(depth[0]) for depth in depths) > 1e-9 * r:
+            continue
+        places.append(x)
+        angle = turned + one_of(-0.5, 0.5, rng.uniform(-1.0, 1.0)) * np.pi
+        velocities.append(fast * rng.uniform() * np.array([cos(angle), sin(angle)]))
+        if len(places) == count:
+            break
+    return thrown(built, places, velocities)
 
 
 class _Draw:

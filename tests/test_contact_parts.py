@@ -14,6 +14,7 @@ from chutelab.results import Kind
 from chutelab.results.laws import LOSSES, judge
 from chutelab.results.ledger import ledger
 from cores import Core
+from crowds import hollow
 from machines import bent, face, gated, of_sizes, scene_of, thrown
 
 G = 9.81
@@ -254,14 +255,21 @@ def test_in_an_elastic_hollow_without_gravity_a_crowd_keeps_its_energy(seed, ext
     assert LOSSES in {broken.law for broken in judge(planted)}
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.5])
-@pytest.mark.parametrize("seed", range(3))
-def test_in_a_hollow_without_gravity_a_crowd_only_loses(seed, friction):
-    recording = hollow_crowd(seed, pi, 0.5, friction, spin=True, run={"until": 0.5})
-    books = ledger(recording)
-    assert residual(recording) < 1e-12
-    assert judge(recording) == ()
-    assert min(books.restitution_loss, books.friction_loss) >= 0.0
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize("friction", [0.0, 0.2, 0.5])
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 24, 60])
+def test_in_a_hollow_without_gravity_a_crowd_only_loses(seed, friction, restitution):
+    for spin in (False, True):
+        recording = hollow_crowd(seed, pi, restitution, friction, spin=spin, run={"until": 0.5})
+        books = ledger(recording)
+        assert residual(recording) < 1e-12
+        assert judge(recording) == ()
+        assert min(books.restitution_loss, books.friction_loss) >= 0.0
+
+
+def test_no_crowd_in_hollows_breaks_a_law():
+    broken = {seed: [law.told for law in judge(run(hollow(seed)))] for seed in range(300)}
+    assert {seed: told for seed, told in broken.items() if told} == {}
 
 
 @pytest.mark.parametrize("crowded", [False, True])

@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
-from math import inf, nan
+from math import inf, nan, prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, dtype
+from chutelab.machine.shapes import KINDS
 from chutelab.scene import Scene
 from chutelab.scene.variants import Family
 from chutelab.util.arrays import Numbers
@@ -86,16 +87,13 @@ class Laid:
 
     Attributes
     ----------
-    segments : ndarray, (S,) or (N, S)
-        Rows as `Segment` in layout.h.
-    arcs : ndarray, (A,) or (N, A)
-        As `Arc`.
+    parts : dict of ndarray, (S,) or (N, S)
+        For each of `KINDS` rows as that in layout.h, by the part of a machine.
     nominal : ndarray, () or (N,)
         As `Nominal`.
     """
 
-    segments: NDArray[Any]
-    arcs: NDArray[Any]
+    parts: dict[str, NDArray[Any]]
     nominal: NDArray[Any]
 
 
@@ -104,12 +102,12 @@ def lay(module: Module, scenes: Scene | Family, friction: Numbers) -> Laid:
     scene, numbers = scenes.scene, row(scenes, friction)
     shape = (len(scenes),) if isinstance(scenes, Family) else ()
     every = shape[0] if shape else 1
-    segments, arcs = ROOM // every, ROOM // every
+    rooms = dict.fromkeys(KINDS, ROOM // every)
     while True:
         module.place(
             ("rows", REAL, every * len(numbers)), ("nominal", dtype("Nominal"), every),
-            ("segments", dtype("Segment"), every * segments),
-            ("arcs", dtype("Arc"), every * arcs), of="Plan",
+            *((f"{kind.lower()}s", dtype(kind), every * room) for kind, room in rooms.items()),
+            of="Plan",
         )  # fmt: skip
         plan = module.structs["Plan"]
         rows = module.array("rows", REAL, every * len(numbers), of="Plan").reshape(every, -1)
@@ -122,16 +120,17 @@ def lay(module: Module, scenes: Scene | Family, friction: Numbers) -> Laid:
         plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
         plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
         plan.surfaces = len(scene.surface)
-        plan.segment_room, plan.arc_room = every * segments, every * arcs
-        if module.call("build"):
+        for kind, room in rooms.items():
+            setattr(plan, f"{kind.lower()}_room", every * room)
+        done = module.call("build")
+        rooms = {kind: getattr(plan, f"{kind.lower()}_count") for kind in KINDS}
+        if done:
             break
-        segments, arcs = plan.segment_count, plan.arc_count
-    found = (
-        module.array(name, dtype(struct), every * count, of="Plan").copy().reshape((*shape, *more))
-        for name, struct, count, more in (
-            ("segments", "Segment", plan.segment_count, (plan.segment_count,)),
-            ("arcs", "Arc", plan.arc_count, (plan.arc_count,)),
-            ("nominal", "Nominal", 1, ()),
-        )
-    )
-    return Laid(*found)
+
+    def found(name: str, kind: str, *count: int) -> NDArray[Any]:
+        rows = module.array(name, dtype(kind), every * prod(count), of="Plan")
+        return rows.copy().reshape((*shape, *count))
+
+    names = {kind: f"{kind.lower()}s" for kind in KINDS}
+    parts = {name: found(name, kind, rooms[kind]) for kind, name in names.items()}
+    return Laid(parts, found("nominal", "Nominal"))

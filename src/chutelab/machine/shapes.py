@@ -321,6 +321,10 @@ class Arcs(Pieces):
         return f"{said}, {first:.6g}° to {last:.6g}°"
 
 
+KINDS: dict[str, type[Segments] | type[Arcs]] = {"Segment": Segments, "Arc": Arcs}
+"""Each kind of piece by the name of the core's rows, which with an s is that of the part of a
+`Machine` in small letters."""
+
 TOUCHES = 1e-9
 """Share of the machine's size by which an arc and another piece must cross; joints only touch."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from time import perf_counter
@@ -134,7 +133,14 @@ def judged(
                 cut.append(error)
                 raise EnoughError from None
 
-        machine = _built(scene, look)
+        try:
+            machine = build(scene, look)
+        except EnoughError:
+            counts = [stream.count for stream in scene.streams]
+            most = counts.index(max(counts))
+            key = f"stream[{most}].count" if len(counts) > 1 else "stream.count"
+            allowed = "fewer, or more seconds: those allowed were over before all had a place to"
+            raise _refused(scene, key, counts[most], f"{allowed} start") from None
         try:
             recording = follow(machine, engine, watched)
         except StalledError as stalled:
@@ -149,17 +155,6 @@ def judged(
         error.recording = recording  # type: ignore[attr-defined]
         raise error
     return recording
-
-
-def _built(scene: Scene, look: Callable[[], None]) -> Machine:
-    try:
-        return build(scene, look)
-    except EnoughError:
-        counts = [stream.count for stream in scene.streams]
-        most = counts.index(max(counts))
-        several = f"[{most}]" * (len(counts) > 1)
-        allowed = "fewer, or more seconds: those allowed were over before all had a place to start"
-        raise _refused(scene, f"stream{several}.count", counts[most], allowed) from None
 
 
 def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> Recording:

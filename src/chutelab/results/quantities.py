@@ -15,7 +15,7 @@ import numpy as np
 
 from chutelab.results.arrival import arrivals
 from chutelab.results.comparison import column, first, paid, symbols, worst
-from chutelab.results.ledger import books, ledger
+from chutelab.results.ledger import ledger, ledger_of_each
 from chutelab.results.record import ENTRIES, REASONS, Record
 from chutelab.scene.quantities import FIRST, lookup, suggestion, whose
 from chutelab.util.arrays import Bools, Floats
@@ -47,7 +47,7 @@ def each(recording: Record, name: str) -> Floats:
             begin, end = recording.ends()
             return _at_end(recording, end["t"] - begin["t"])
         case ["ledger", *rest]:
-            found, entry = books(recording), ".".join(rest)
+            found, entry = ledger_of_each(recording), ".".join(rest)
             entries, fall = found["entries"], found["potential.end"] - found["potential.start"]
             found |= dict(zip(ENTRIES, entries.T, strict=True))
             found["turned_over"] = (

@@ -47,7 +47,7 @@ class StalledError(RuntimeError):
 
 
 class EnoughError(Exception):
-    """Raised by who watches a run's progress: the run is to end here.
+    """Raised by what watches a run's progress: the run is to end here.
 
     An engine closes the tracks that are under way with reason ``"stopped"``, which is also that of
     particles not yet released, and returns the recording.
@@ -57,7 +57,7 @@ class EnoughError(Exception):
 class Recorder:
     """Grows by chunks; `finish` turns it into a frozen `Record` of the machine's run.
 
-    With `apart` the books of each particle are kept apart: `by_surface` is (N, S, 3) then.
+    With `apart`, `by_surface` is kept for each particle, (N, S, 3).
     """
 
     def __init__(self, machine: Machine, *, apart: bool = False) -> None:
@@ -170,7 +170,7 @@ class Recorder:
             knots = knots.take(order)
             angle = angle.take(order) if self._angular else angle
         if self.machine.interact:
-            # Of several blows at one instant the states between them are seen by nobody.
+            # Of several blows at one instant the states between them are dropped.
             owners = np.sort(owners)
             same = (np.diff(knots["t"]) == 0.0) & (np.diff(owners) == 0)
             kept = ~np.concatenate([[False], same[:-1] & same[1:], [False]])[: len(knots)]

@@ -289,8 +289,8 @@ def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
     ends = {"landed": "the landing", "settled": "all have settled"}.get(
         str(until), f"t = {until} s"
     )
-    books = ledger(recording).sheet(details=details)
-    parts.append(replace(books, title=f"Energy ledger until {ends}, J"))
+    balance = ledger(recording).sheet(details=details)
+    parts.append(replace(balance, title=f"Energy ledger until {ends}, J"))
     notes = [str(note) for read, _ in NOTES.values() if (note := read(recording)) is not None]
     if (layered := layers(recording)) is not None:
         notes.insert(

@@ -467,7 +467,7 @@ class Expect(Table):
         None, 'The same for the pymunk engine, or "none"; default: tolerance'
     )
     source: Text = described(
-        ..., "Who says so: an equation or a table of the paper, a closed form", max_length=200
+        ..., "Where it is from: an equation or a table of the paper, a closed form", max_length=200
     )
 
     def allowed(self, engine: str) -> tuple[float, str] | None:

@@ -27,7 +27,7 @@ from chutelab.util.errors import about_comma
 
 
 class Table(BaseModel):
-    """What all tables share: frozen, and strangers refused."""
+    """What all tables share: frozen, and unknown keys refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

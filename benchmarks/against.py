@@ -4,9 +4,9 @@
 
 A shipped scene is a case of its own. The commit is unpacked into a temporary folder and imported
 from there, by a process of its own, as this checkout is by another one. Both run a case in turn, as
-often as it takes to fill `SLICE`, so that whatever else the computer does slows both. The ratio is that of the medians, now over then,
-beside the quartiles of the ratios of single turns; "bits" tells whether the recordings are the same
-to the last bit. Exit code 1 if a ratio is above `WORST`.
+often as it takes to fill `SLICE`, so that whatever else the computer does slows both. The ratio is
+that of the medians, now over then, beside the quartiles of the ratios of single turns; "bits" tells
+whether the recordings are the same to the last bit. Exit code 1 if a ratio is above `WORST`.
 """
 
 from __future__ import annotations

@@ -18,10 +18,9 @@ from rich.text import Text
 
 import workprecision as wp
 from chutelab.checks.workprecision import REPEATS
-from chutelab.cli.benching import duration
+from chutelab.cli.checking import duration
 from chutelab.cli.console import progress, show, show_json
-from chutelab.cli.output import destination
-from chutelab.cli.parameters import out_option
+from chutelab.cli.options import FolderName, destination
 from chutelab.util.files import tsv_text
 from chutelab.util.tables import Sheet
 from chutelab.util.versions import environment, measured_on
@@ -153,7 +152,12 @@ def _bytes(size: int | None) -> str:
     help="Measure time and memory against the number of particles instead:"
     " 1 to a million independent, 10 to 3,000 interacting.",
 )
-@out_option("Write work-precision.tsv and .png (scaling.tsv and .png) into this folder.")
+@click.option(
+    "--out",
+    metavar="DIR",
+    type=FolderName(),
+    help="Write work-precision.tsv and .png (scaling.tsv and .png) into this folder.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
 def main(
     cases: tuple[str, ...],

@@ -31,33 +31,24 @@ BROKEN = {
     "number for table": ("plate = 3\n" + IN, ["plate"], "a table"),
     "list for table": ("run = []\n" + IN, ["run"], "a table"),
     "table for surfaces": (IN + '[surface]\nname = "a"', ["surface"], "[[surface]]"),
-    "number for surface": ("surface = [1]\n" + IN, ["surface[0]"], "a table"),
     "number for point": (FREE.replace("[0, 1]", "1"), ["stream.at"], "[x, y]"),
     "text in point": (FREE.replace("[0, 1]", '[0, "1"]'), ["stream.at[1]"], "a number"),
     "short point": (FREE.replace("[0, 1]", "[0]"), ["stream.at"], "[x, y]"),
-    "long point": (FREE.replace("[0, 1]", "[0, 1, 2]"), ["stream.at"], "[x, y]"),
     # out of range
-    "negative radius": (IN + "[particle]\nradius = -1", ["particle.radius"], "to 1000000, 0 or"),
-    "zero mass": (IN + "[particle]\nmass = 0", ["particle.mass"], "from 1e-27"),
-    "negative gravity": ("gravity = -9.81\n" + IN, ["gravity"], "from 1e-09 to 1000000 or 0"),
-    "negative speed": (IN.replace("2", "-2"), ["incoming.speed"], "from 1e-09 to 1000000 or 0"),
-    "zero pulley": (IN.replace("0.1", "0"), ["incoming.pulley_radius"], "from 1e-09"),
-    "restitution above 1": (IN + PLATE + "restitution = 1.1", ["plate.restitution"], "from 0 to 1"),
-    "negative friction": (IN + PLATE + "friction = -0.1", ["plate.friction"], "from 0"),
-    "plate on its side": (IN + PLATE + "angle_deg = 90", ["plate.angle_deg"], "< 90, in degrees"),
-    "plate overturned": (IN + PLATE + "angle_deg = -90", ["plate.angle_deg"], "> -90"),
-    "zero drop": (IN + PLATE + OUT.replace("0.5", "0"), ["outgoing.drop"], "from 1e-09"),
-    "no particles": (IN + "[stream]\ncount = 0", ["stream.count"], "from 1"),
-    "huge count": (IN + "[stream]\ncount = 10_000_001", ["stream.count"], "to 10000000"),
     "absurd count": (IN + f"[stream]\ncount = {BIG}", ["stream.count"], "to 10000000"),
-    "negative seed": (IN + "[stream]\nseed = -1", ["stream.seed"], "from 0"),
-    "zero rate": (IN + "[stream]\nrate = 0", ["stream.rate"], "a number from"),
-    "zero step": (IN + "[run]\ndt = 0.0", ["run.dt"], "a number from"),
     "NaN": (IN + PLATE + "angle_deg = nan", ["plate.angle_deg"], "a number"),
     "infinity": (IN.replace("2", "inf"), ["incoming.speed"], "a number"),
     "overflow": (IN.replace("2", "1e999"), ["incoming.speed"], "a number"),
     "NaN in point": (FREE.replace("[0, 1]", "[nan, 1]"), ["stream.at[0]"], "a number"),
     "endless title": (f'title = "{BIG}"\n' + IN, ["title"], "at most 200 characters"),
+    "a million copies": (
+        FREE + HOOD + "repeat = [[1000, 0.1, 0], [1000, 0, 0.1]]",
+        ["surface[0].repeat"],
+        "at most 10000 pieces of surfaces, copies too, in all, not 1000000",
+    ),
+    "plate on its side": (IN + PLATE + "angle_deg = 90", ["plate.angle_deg"], "< 90, in degrees"),
+    "plate overturned": (IN + PLATE + "angle_deg = -90", ["plate.angle_deg"], "> -90"),
+    "other end": (FREE + HOOD.replace("from", "# "), ["surface[0].from"], "missing"),
     # unknown words
     "unknown engine": (
         IN + '[run]\nengine = "box2d"',
@@ -66,13 +57,6 @@ BROKEN = {
     ),
     "unknown ending": (IN + '[run]\nuntil = "end"', ["run.until"], '"settled" or a number'),
     # next to nothing: 0, or as much as means something
-    "hardly any gravity": ("gravity = 1e-300\n" + IN, ["gravity"], "from 1e-09 to 1000000 or 0"),
-    "hardly any speed": (IN.replace("2", "1e-12"), ["incoming.speed"], "from 1e-09 to 1000000 or"),
-    "hardly any radius": (IN + "[particle]\nradius = 1e-200", ["particle.radius"], "from 1e-09"),
-    "hardly any belt": (IN + "length = 5e-324", ["incoming.length"], "from 1e-09"),
-    "hardly any time": (IN + "[run]\nuntil = 5e-324", ["run.until"], "from 1e-09"),
-    "hardly any patience": (IN + "[run]\nmax_time = 1e-12", ["run.max_time"], "from 1e-09"),
-    "hardly any density": (IN + "[particle]\ndensity = 1e-9", ["particle.density"], "from 0.001"),
     "density without mass": (
         IN + "[particle]\ndensity = 0.001\nradius = 2e-9",
         ["particle.density", "particle.radius"],
@@ -95,12 +79,6 @@ BROKEN = {
         ["stream.start", "run.until"],
         "nothing would be released",
     ),
-    "a million copies": (
-        FREE + HOOD + "repeat = [[1000, 0.1, 0], [1000, 0, 0.1]]",
-        ["surface[0].repeat"],
-        "at most 10000 pieces of surfaces, copies too, in all, not 1000000",
-    ),
-    "zero ending": (IN + "[run]\nuntil = 0", ["run.until"], "from 1e-09"),
     "unknown grip": (IN + 'friction = "glue"', ["incoming.friction"], '"adhesion" or a number'),
     "unknown drop_from": (
         IN + PLATE + OUT + 'drop_from = "here"',
@@ -132,9 +110,6 @@ BROKEN = {
     "name twice": (FREE + HOOD + HOOD, ["surface[1].name", "surface[0].name"], "unique"),
     "name with a dot": (FREE + HOOD.replace("hood", "a.b"), ["surface[0].name"], "dots"),
     "empty name": (FREE + HOOD.replace("hood", ""), ["surface[0].name"], "1 to 40"),
-    "no ends": (FREE + '[[surface]]\nname = "a"', ["surface[0].points"], "from and to"),
-    "one end": (FREE + HOOD.replace("to", "# to"), ["surface[0].to", "surface[0].from"], "missing"),
-    "other end": (FREE + HOOD.replace("from", "# "), ["surface[0].from"], "missing"),
     "no extent": (FREE + HOOD.replace("[1, 0]", "[0, 0.0]"), ["surface[0].to"], "differ"),
     "ends and points": (
         FREE + HOOD + "points = [[0, 0], [1, 1]]",
@@ -150,11 +125,6 @@ BROKEN = {
         FREE + '[[surface]]\nname = "a"\npoints = [[0, 0], [1, 1], [1, 1.0]]',
         ["surface[0].points"],
         "[1.0, 1.0] repeats",
-    ),
-    "second surface": (
-        FREE + HOOD + HOOD.replace("hood", "b") + "restitution = 2",
-        ["surface[1].restitution"],
-        "from 0 to 1",
     ),
     # conflicts, naming both keys
     "interact and exact": (
@@ -207,11 +177,7 @@ BROKEN = {
     # expectations
     "number for expectations": ("expect = 3\n" + IN, ["expect"], "each headed by [[expect]]"),
     "table for expectations": (IN + "[expect]\nvalue = 1", ["expect"], "[[expect]]"),
-    "number for expectation": ("expect = [1]\n" + IN, ["expect[0]"], "a table"),
-    "nothing expected": (expect(quantity=None), ["expect[0].quantity"], "is missing"),
     "no value expected": (expect(value=None), ["expect[0].value"], '"theory" or a number'),
-    "no tolerance": (expect(tolerance=None), ["expect[0].tolerance"], "is missing"),
-    "no source": (expect(source=None), ["expect[0].source"], "is missing"),
     "misspelt quantity": (
         expect(quantity='"landing.xx"'),
         ["expect[0].quantity"],
@@ -238,21 +204,12 @@ BROKEN = {
         ["expect[0].quantity"],
         "no such quantity",
     ),
-    "statistic of a statistic": (
-        expect(quantity='"landing.x.mean.mean"'),
-        ["expect[0].quantity"],
-        "landing.x.mean?",
-    ),
     "theory of a mean": (
         expect(quantity='"landing.x"', value='"theory"'),
         ["expect[0].value"],
         "only phi1_deg",
     ),
     "unknown expected word": (expect(value='"thery"'), ["expect[0].value"], '"theory" or a num'),
-    "expected NaN": (expect(value="nan"), ["expect[0].value"], "a number"),
-    "expected boolean": (expect(value="true"), ["expect[0].value"], "a number"),
-    "negative tolerance": (expect(tolerance="-1"), ["expect[0].tolerance"], "from 0 to 1"),
-    "generous tolerance": (expect(tolerance="1.5"), ["expect[0].tolerance"], "from 0 to 1"),
     "tolerance of another unit": (
         expect(tolerance='"1 s"'),
         ["expect[0].tolerance"],
@@ -261,7 +218,6 @@ BROKEN = {
     "tolerance of no unit": (expect(tolerance='"1"'), ["expect[0].tolerance"], "x2 is in m"),
     "tolerance in words": (expect(tolerance='"little"'), ["expect[0].tolerance"], "0.5 mm"),
     "negative length": (expect(tolerance='"-1 mm"'), ["expect[0].tolerance"], "0.5 mm"),
-    "nothing promised": (expect(tolerance='"none"'), ["expect[0].tolerance"], "0.5 mm"),
     "tolerance for contact": (
         expect(tolerance_contact='"no"'),
         ["expect[0].tolerance_contact"],
@@ -276,11 +232,6 @@ BROKEN = {
         expect(quantity='"landing.count"', tolerance='"1 m"'),
         ["expect[0].tolerance"],
         'such as "3"; landing.count is a number of things',
-    ),
-    "key of an expectation": (
-        expect(valu="1"),
-        ["expect[0].valu"],
-        "did you mean expect[0].value?",
     ),
     # not TOML
     "no value": (IN + "length = ", ["line 4, column 10"], "Invalid value"),

@@ -1,11 +1,8 @@
 """Scenes of all parts, each broken in one place: which key is at fault, and what is said of it."""
 
-from __future__ import annotations
-
 import copy
 import re
 from math import inf, nan
-from typing import Any
 
 MACHINE = {
     "title": "All parts",
@@ -73,7 +70,7 @@ GONE = object()
 """Instead of a value: the key is taken out."""
 
 # Base, what is changed, the key at fault, and a word of what is allowed.
-BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
+BY_HAND = [
     # keys and names that lead nowhere
     ("machine", {"particle[0].densty": 3.0}, "particle[0].densty", "particle[0].density?"),
     ("machine", {"particle[1].radios": 3.0}, "particle[1].radios", "particle[1].radius?"),
@@ -81,25 +78,10 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
     ("machine", {"stream[2].fil": [1.0, 1.0]}, "stream[2].fil", "stream[2].fill?"),
     ("machine", {"surface[1].centre": [1.0, 1.0]}, "surface[1].centre", "surface[1].center?"),
     ("machine", {"surface[1].from_degrees": 3}, "surface[1].from_degrees", "surface[1].from_deg?"),
-    ("machine", {"surface[2].opens": 1.0}, "surface[2].opens", "surface[2].opens_at?"),
-    ("machine", {"surface[3].repeats": [[2, 0, 1]]}, "surface[3].repeats", "surface[3].repeat?"),
     ("machine", {"conveyor[0].length": 1.0}, "conveyor[0].length", "belongs in"),
-    ("machine", {"conveyor[0].pully_radius": 1.0}, "conveyor[0].pully_radius", "pulley_radius?"),
-    ("machine", {"plate[1].pivots": [1, 1]}, "plate[1].pivots", "plate[1].pivot?"),
-    ("machine", {"material[0].dense": 1.0}, "material[0].dense", "material[0].density?"),
-    ("machine", {"pair[0].frictions": 1.0}, "pair[0].frictions", "pair[0].friction?"),
-    ("machine", {"incoming.inclined_deg": 1.0}, "incoming.inclined_deg", "incoming.incline_deg?"),
-    ("machine", {"conveyer": [{"name": "a"}]}, "conveyer", "conveyor?"),
-    ("machine", {"pairs": []}, "pairs", "pair?"),
     ("machine", {"stream[0].center": [0.0, 0.0]}, "stream[0].center", "belongs in [[surface]]"),
-    ("dominoes", {"string[0].lenght": 1.0}, "string[0].lenght", "string[0].length?"),
-    ("dominoes", {"strings": []}, "strings", "string?"),
-    ("machine", {"stream[0].particle": "smal"}, "stream[0].particle", "did you mean small?"),
     ("machine", {"stream[1].particle": "x"}, "stream[1].particle", "there are small, big"),
-    ("machine", {"particle[0].material": "oar"}, "particle[0].material", "did you mean ore?"),
     ("machine", {"particle[1].material": "cheese"}, "particle[1].material", "chutelab materials"),
-    ("machine", {"pair[0].between": ["small", "hod"]}, "pair[0].between[1]", "did you mean hood?"),
-    ("machine", {"pair[0].between": ["smal", "hood"]}, "pair[0].between[0]", "did you mean small?"),
     ("machine", {"pair[0].between": ["hood", "gate"]}, "pair[0].between", "small, big"),
     ("machine", {"pair[1].between": ["big", "left"]}, "pair[1].between[1]",
      "no such kind or surface"),
@@ -108,14 +90,6 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
     ("machine", {"surface[0].name": "flap"}, "surface[0].name", "plate[1].name is the same"),
     ("machine", {"conveyor[0].name": "flap"}, "conveyor[0].name", "plate[1].name is the same"),
     ("machine", {"surface[3].name": "hood"}, "surface[3].name", "surface[0].name is the same"),
-    ("machine", {"particle[+]": {"name": "gate"}}, "particle[2].name",
-     "surface[2].name is the same"),
-    ("machine", {"particle[+]": {"name": "small"}}, "particle[2].name",
-     "particle[0].name is the same"),
-    ("machine", {"stream[1].name": "left"}, "stream[1].name", "stream[0].name is the same"),
-    ("machine", {"material[+]": {"name": "ore", "density": 1.0, "restitution": 0.0,
-                                 "friction": 0.0}},
-     "material[1].name", "material[0].name is the same"),
     ("machine", {"conveyor[0].name": "incoming"}, "conveyor[0].name", "reserved"),
     ("machine", {"plate[1].name": "plate"}, "plate[1].name", "reserved"),
     ("machine", {"particle[0].name": "a  b"}, "particle[0].name", "1 to 40 characters"),
@@ -135,10 +109,8 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
     ("machine", {"particle[1].radius": [0.0, 0.01]}, "particle[1].radius", "from < to"),
     ("machine", {"particle[1].radius": [0.01]}, "particle[1].radius", "[from, to]"),
     ("machine", {"particle[1].radius": [0.01, 0.02, 0.03]}, "particle[1].radius", "[from, to]"),
-    ("machine", {"particle[1].density": 0.0}, "particle[1].density", "from 0.001"),
     ("machine", {"particle[0].spin": False}, "particle[0].rolling_friction", "spin = true"),
     ("machine", {"particle[0].spin": GONE}, "particle[0].rolling_friction", "spin = true"),
-    ("machine", {"particle[0].rolling_friction": -0.1}, "particle[0].rolling_friction", "from 0"),
     ("machine", {"particle[0].shape": "ball"}, "particle[0].shape", '"disk", "sphere", "box"'),
     ("machine", {"particle[0].radius": 0.0}, "particle[0].spin", "cannot turn"),
     ("machine", {"particle[1].radius": 0.0}, "particle[1].density", "give a mass"),
@@ -153,36 +125,24 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
     ("dominoes", {"particle[2].density": 1e3}, "particle[2].density", "is for what is round"),
     ("dominoes", {"particle[1].size": [0.1]}, "particle[1].size", "[width, height]"),
     ("dominoes", {"particle[1].size": [0.1, -0.1]}, "particle[1].size[1]", "a number from 1e-09"),
-    ("dominoes", {"particle[1].size": [0.1, 0.2, 0.3]}, "particle[1].size", "[width, height]"),
     ("dominoes", {"particle[2].points": [[0.0, 0.0], [1.0, 0.0]]}, "particle[2].points",
      "3 to 32 points"),
     ("dominoes", {"particle[2].points": [[0.0, 0.0], [1.0, 0.0], [0.2, 0.2], [0.0, 1.0]]},
      "particle[2].points", "convex polygon"),
     ("dominoes", {"particle[2].points": [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]},
      "particle[2].points", "convex polygon"),
-    ("dominoes", {"particle[2].points": [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]},
-     "particle[2].points", "convex polygon"),
     ("dominoes", {"particle[2].points": [[float(n), float(n * n)] for n in range(33)]},
      "particle[2].points", "3 to 32 points"),
     # materials and pairs
-    ("machine", {"material[0].density": -1.0}, "material[0].density", "from 0.001"),
     ("machine", {"material[0].density": GONE}, "material[0].density", "is missing"),
-    ("machine", {"material[0].restitution": 1.5}, "material[0].restitution", "from 0 to 1"),
-    ("machine", {"material[0].friction_rubber": -1.0}, "material[0].friction_rubber", "from 0"),
     ("machine", {"pair[0].between": ["small"]}, "pair[0].between", "two names"),
     ("machine", {"pair[0].between": ["small", "big", "gate"]}, "pair[0].between", "two names"),
-    ("machine", {"pair[0].between": "small, big"}, "pair[0].between", "two names"),
     ("machine", {"pair[0].between": GONE}, "pair[0].between", "is missing"),
-    ("machine", {"pair[1].friction": -0.1}, "pair[1].friction", "from 0"),
-    ("machine", {"pair[1].restitution": 1.01}, "pair[1].restitution", "from 0 to 1"),
     ("machine", {"material": {"name": "ore"}}, "material", "[[material]]"),
     ("machine", {"pair": {"between": ["small", "big"]}}, "pair", "[[pair]]"),
     # belts and plates
-    ("machine", {"incoming.incline_deg": 61.0}, "incoming.incline_deg", "from -60 to 60"),
     ("machine", {"conveyor[0].to": [2.0, -2.0]}, "conveyor[0].to", "differ from conveyor[0].from"),
     ("machine", {"conveyor[0].to": GONE}, "conveyor[0].to", "is missing"),
-    ("machine", {"conveyor[0].speed": GONE}, "conveyor[0].speed", "is missing"),
-    ("machine", {"conveyor[0].pulley_radius": 0.0}, "conveyor[0].pulley_radius", "from 1e-09"),
     ("machine", {"conveyor[0].friction": "adhesion"}, "conveyor[0].friction", "a number"),
     ("machine", {"conveyor": {"name": "a"}}, "conveyor", "[[conveyor]]"),
     ("machine", {"plate[1].pivot": GONE}, "plate[1].distance", "name and pivot = [x, y]"),
@@ -193,18 +153,12 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
     ("machine", {"plate[0].name": "bang"}, "plate[0].name", "is for a further plate"),
     ("machine", {"plate[1].pivot_height": 0.5}, "plate[1].pivot_height", "damping plate's"),
     ("machine", {"plate[1].above": 0.0, "plate[1].below": 0.0}, "plate[1].above", "length"),
-    ("machine", {"plate[1].angle_deg": 90.0}, "plate[1].angle_deg", "< 90"),
     ("alone", {"plate.distance": 0.3, "plate.pivot": GONE, "plate.name": GONE}, "incoming",
      "[plate] needs the table [incoming]"),
     ("machine", {"incoming": GONE}, "incoming", "need the table [incoming]"),
     # surfaces
-    ("machine", {"surface[1].radius": GONE}, "surface[1].radius", "to go with surface[1].center"),
-    ("machine", {"surface[1].center": GONE}, "surface[1].center", "to go with surface[1].radius"),
-    ("machine", {"surface[1].radius": -0.3}, "surface[1].radius", "from 1e-09"),
     ("machine", {"surface[1].to_deg": 180.0}, "surface[1].to_deg", "surface[1].from_deg"),
     ("machine", {"surface[1].to_deg": 541.0}, "surface[1].to_deg", "at most 360"),
-    ("machine", {"surface[1].to_deg": 900.0}, "surface[1].to_deg", "from -720 to 720"),
-    ("machine", {"surface[0].to_deg": 90.0}, "surface[0].center", "to go with surface[0].to_deg"),
     ("machine", {"surface[1].from": [0.0, 0.0]}, "surface[1].from", "surface[1].center"),
     ("machine", {"surface[1].points": [[0.0, 0.0], [1.0, 1.0]]}, "surface[1].points",
      "surface[1].center"),
@@ -212,22 +166,14 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
     ("machine", {"surface[2].points": [[0.0, 0.0]]}, "surface[2].points", "2 to 10000 points"),
     ("machine", {"surface[2].points": [[0.0, 0.0], [0.0, 0.0]]}, "surface[2].points", "differ"),
     ("machine", {"surface[0].material": "wood"}, "surface[0].material", '"steel" or "rubber"'),
-    ("machine", {"surface[0].to": GONE}, "surface[0].to", "to go with surface[0].from"),
     ("machine", {"surface[3].repeat": [3, 0.1, 0.0]}, "surface[3].repeat[0]", "[n, dx, dy]"),
-    ("machine", {"surface[3].repeat": [[0, 0.1, 0.0]]}, "surface[3].repeat[0][0]",
-     "from 1 to 1000"),
     ("machine", {"surface[3].repeat": [[2.5, 0.1, 0.0]]}, "surface[3].repeat[0][0]",
      "whole number"),
     ("machine", {"surface[3].repeat": [[2, 0.1]]}, "surface[3].repeat[0]", "[n, dx, dy]"),
     ("machine", {"surface[3].repeat": [[2, 0.1, 0.0]] * 3}, "surface[3].repeat", "one or two"),
-    ("machine", {"surface[0].repeat": [[2000, 0.1, 0.0]]}, "surface[0].repeat[0][0]", "to 1000"),
     # streams
     ("machine", {"stream[0].rate": "120 kg"}, "stream[0].rate", '"120 t/h"'),
     ("machine", {"stream[0].rate": "0 t/h"}, "stream[0].rate", '"120 t/h"'),
-    ("machine", {"stream[0].rate": "-5 t/h"}, "stream[0].rate", '"120 t/h"'),
-    ("machine", {"stream[0].rate": "t/h"}, "stream[0].rate", '"120 t/h"'),
-    ("machine", {"stream[0].rate": "nan t/h"}, "stream[0].rate", '"120 t/h"'),
-    ("machine", {"stream[0].rate": 0.0}, "stream[0].rate", '"120 t/h"'),
     ("machine", {"stream[2].fill": [[1.0, 1.0], [1.01, 1.01]]}, "stream[2].fill", "a larger box"),
     ("machine", {"stream[2].count": 500}, "stream[2].fill", "stream[2].count = "),
     ("machine", {"stream[2].fill": [[1.3, 1.3], [1.0, 1.0]]}, "stream[2].fill",
@@ -239,12 +185,8 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
     ("machine", {"stream[2].at": [1.0, 1.0]}, "stream[2].at", "stream[2].fill"),
     ("machine", {"stream[2].to": [1.0, 1.0]}, "stream[2].to", "stream[2].fill"),
     ("machine", {"stream[2].bed_height": 0.1}, "stream[2].bed_height", "releases all at once"),
-    ("machine", {"stream[2].speed_spread": 0.1}, "stream[2].speed_spread", "releases all at once"),
-    ("machine", {"stream[1].at": GONE}, "stream[1].at", "to go with stream[1].to"),
     ("machine", {"stream[1].bed_height": 0.1}, "stream[1].bed_height", "stream[1].to makes a line"),
-    ("machine", {"stream[1].count": 0}, "stream[1].count", "from 1"),
     ("machine", {"stream[1].count": 2.5}, "stream[1].count", "a whole number"),
-    ("machine", {"stream[1].start": -1.0}, "stream[1].start", "from 0"),
     ("machine", {"stream[0].count": 9_999_999}, "stream[0].count", "10000000 particles in all"),
     ("machine", {"stream": []}, "stream", "tables"),
     ("machine", {"particle": []}, "particle", "tables"),
@@ -252,9 +194,6 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
     ("alone", {"stream.at": GONE}, "stream.at", "required without [incoming]"),
     # a release in something
     ("alone", {"stream.at": [0.0, 0.5]}, "stream.at", "at least 0.01 m from drum"),
-    ("machine", {"stream[1].at": [1.5, -0.9], "stream[1].to": [1.9, -0.9]}, "stream[1].at",
-     "from flap"),
-    ("machine", {"stream[1].at": [4.0, 0.0]}, "stream[1].at", "from gate"),
     ("machine", {"stream[1].at": [2.0, -1.9]}, "stream[1].at", "carrier"),
     # engines that cannot
     ("machine", {"stream[1].interact": True, "run.engine": "exact"}, "run.engine",
@@ -267,7 +206,6 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
     ("alone", {"particle.radius": 0.0, "run.engine": "contact"}, "run.engine", "needs disks"),
     ("dominoes", {"string[0].particle": 5}, "string[0].particle", "there are 5 particles"),
     ("dominoes", {"string[0].particle": -1}, "string[0].particle", ">= 0"),
-    ("dominoes", {"string[0].length": 0.0}, "string[0].length", "from 1e-09"),
     ("dominoes", {"string[0].from": GONE}, "string[0].from", "is missing"),
     ("dominoes", {"string": {"from": [0.0, 0.5]}}, "string", "[[string]]"),
     ("alone", {"run.until": "landed"}, "run.until", "[outgoing]"),
@@ -277,7 +215,7 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
 ]  # fmt: skip
 
 
-def leaves(value: Any, path: str = "") -> list[str]:
+def leaves(value, path=""):
     """Return the paths of all values of a scene."""
     match value:
         case dict():
@@ -291,7 +229,7 @@ WRONG = ({"x": 1.0}, nan, [[1.0]], True, inf, "wrong")
 """What stands where a number belongs, in turn."""
 
 
-def of_wrong_type() -> list[tuple[str, dict[str, Any], str, str]]:
+def of_wrong_type():
     """Return a variant for every leaf of the scenes that is no text."""
     found = []
     for name, base in BASES.items():
@@ -310,17 +248,17 @@ def of_wrong_type() -> list[tuple[str, dict[str, Any], str, str]]:
     return found
 
 
-def at(tables: Any, path: str) -> Any:
+def at(tables, path):
     for step in steps(path):
         tables = tables[step]
     return tables
 
 
-def steps(path: str) -> list[str | int]:
+def steps(path):
     return [int(n) if n else key for n, key in re.findall(r"\[(\d+)\]|([^.\[\]]+)", path)]
 
 
-def broken(name: str, changes: dict[str, Any]) -> dict[str, Any]:
+def broken(name, changes):
     """Return a base with some values changed, by their paths, [+] for one more of a list."""
     tables = copy.deepcopy(BASES[name])
     for path, value in changes.items():

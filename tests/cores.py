@@ -1,7 +1,5 @@
 """A door to the core's arrays, for what no scene file can ask for."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from chutelab.core import module

@@ -1,7 +1,7 @@
-"""Random crowds of disks, and the laws that each run of one has to obey.
+"""Random crowds of disks.
 
 - `crowd`: the machine of a seed: 50 to 500 disks in a box, a funnel, on belts or in a transfer.
-- `faults`: what a recording does that no crowd may do, in words.
+- `hollow`: the machine of a seed: 2 to 12 disks in and about the insides of arcs.
 
 Lengths are drawn in radii and speeds in √(G r), so that a scene of 0.1 mm is one of 1 m made small;
 G is gravity, or 1 m/s² if that is less.
@@ -10,16 +10,14 @@ G is gravity, or 1 m/s² if that is less.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import ceil, cos, inf, radians, sin, sqrt
+from math import cos, inf, radians, sin, sqrt
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from chutelab.machine import build
-from chutelab.results import REASONS, Kind
-from chutelab.results.ledger import ledger
 from chutelab.scene import SceneError, from_dict
-from references import free_from, surface_depths
+from machines import thrown
+from references import surface_depths
 
 KINDS = ("box", "funnel", "belts", "transfer")
 
@@ -36,6 +34,67 @@ def crowd(seed, *, count=None):
             return kind, _Draw(rng, count).machine(kind)
         except SceneError:
             continue  # a release inside a surface, a plate that is missed
+
+
+def hollow(seed):
+    """Return the machine of a seed: disks that slide, fly and pile up in one or two hollow arcs.
+
+    The radius r is 0.05 to 0.9 of that of the first arc, which spans 20° to all round; friction and
+    restitution are 0 to 1; with and without gravity, spin, a speed of the arcs, and a floor below.
+    """
+    rng = np.random.default_rng([26, seed])
+
+    def one_of(*values):
+        return values[int(rng.integers(len(values)))]
+
+    def pair():
+        return {
+            "restitution": one_of(0.0, 0.0, 1.0, rng.uniform()),
+            "friction": one_of(0.0, 1.0, rng.uniform(), rng.uniform()),
+        }
+
+    r = 0.01
+    size = r / np.exp(rng.uniform(np.log(0.05), np.log(0.9)))
+    gravity = one_of(0.0, 9.81, 9.81, rng.uniform(0.0, 50.0))
+    fast = one_of(0.0, 0.3, 1.0, 3.0, rng.uniform(0.0, 10.0))
+    arcs = []
+    for _ in range(one_of(1, 1, 2)):
+        middle = one_of(-90.0, -90.0 + rng.uniform(-90.0, 90.0))
+        half = 0.5 * one_of(180.0, 360.0, rng.uniform(20.0, 180.0), rng.uniform(180.0, 360.0))
+        away = 2.0 * size * rng.uniform(-1.0, 1.0, 2) if arcs else np.zeros(2)
+        arcs.append({
+            "name": f"arc{len(arcs)}", "center": away.tolist(),
+            "radius": size * (rng.uniform(0.7, 1.3) if arcs else 1.0),
+            "from_deg": middle - half, "to_deg": middle + half,
+            "speed": one_of(0.0, 0.0, 0.0, rng.uniform(-2.0, 2.0)), **pair(),
+        })  # fmt: skip
+    low = -4.0 * size
+    floor = {"name": "floor", "from": [-20.0 * size, low], "to": [20.0 * size, low], **pair()}
+    drawn = {
+        "gravity": gravity,
+        "particle": {"radius": r, "mass": 0.01, "spin": one_of(True, False)},
+        "surface": [*arcs, floor],
+        "stream": {"at": [0.0, 9.0 * size], "velocity": [0.0, 0.0], "count": 2, "interact": True,
+                   "rate": 1.0, **pair()},
+        "run": {"until": 0.5, "max_time": 0.5, "dt": one_of(1e-3, 1e-3, 3e-4, 2e-3)},
+    }  # fmt: skip
+    built, places, velocities, count = build(from_dict(drawn)), [], [], int(rng.integers(2, 13))
+    for _ in range(1000):
+        arc, turned = one_of(*arcs), rng.uniform(-np.pi, np.pi)
+        room = arc["radius"] - r
+        # At the wall, inside, or anywhere near.
+        away = one_of(room, room * sqrt(rng.uniform()), arc["radius"] * rng.uniform(0.0, 2.5))
+        x = arc["center"] + max(away, 0.0) * np.array([cos(turned), sin(turned)])
+        depths = surface_depths(built, x[None], r, 0.0).values()
+        apart = min((np.hypot(*(x - other)) for other in places), default=inf)
+        if apart < 2.0 * r or max(float(depth[0]) for depth in depths) > 1e-9 * r:
+            continue
+        places.append(x)
+        angle = turned + one_of(-0.5, 0.5, rng.uniform(-1.0, 1.0)) * np.pi
+        velocities.append(fast * rng.uniform() * np.array([cos(angle), sin(angle)]))
+        if len(places) == count:
+            break
+    return thrown(built, places, velocities)
 
 
 class _Draw:
@@ -216,156 +275,8 @@ class _Draw:
         return {**bed, **tables}
 
 
-# Laws
-
-DEEP = 0.05
-"""Overlap, in radii, that may last no longer than a step."""
-
-INSIDE = 0.5
-"""Overlap, in radii, that may not be at any time: beyond it a disk is on its way through."""
-
-STRIDE = 0.25
-"""Way, in radii, between two looks; two disks that pass through each other are seen inside."""
-
-LOOKS = 8000
-"""Looks at a run beyond two a step, at most; what flies fast is seen less often then."""
-
-RESIDUAL = 1e-9
-"""Share of the energy turned over that the ledger may miss."""
-
-
-def faults(machine, recording):
-    """Return what a run did that no crowd may do: a list of sentences, empty if all is well."""
-    found = []
-    residual = ledger(recording).relative_residual
-    if not residual <= RESIDUAL:
-        found.append(f"ledger: the residual is {residual:.1e} of the energy turned over")
-    found += _releases(machine, recording)
-    found += _depths(machine, recording)
-    found += _crossings(machine, recording)
-    return found
-
-
 def hop_step(machine, longest):
     """Return the longest step, s; a hop g h²/8 is a thousandth of the radius at most."""
     if machine.gravity == 0.0:
         return longest
     return min(longest, sqrt(8e-3 * machine.particle.radius / machine.gravity))
-
-
-def step_of(machine):
-    """Return the steps that the contact engine takes, s."""
-    return hop_step(machine, machine.dt)
-
-
-def _releases(machine, recording):
-    """Tell who starts too early, or inside another."""
-    found, r = [], machine.particle.radius
-    for event in recording.select(Kind.RELEASE):
-        i, t = int(event["particle"]), float(event["t"])
-        if t < machine.releases.t[i]:
-            found.append(f"release: {i} starts at {t} s, due at {machine.releases.t[i]}")
-        x = recording.at([t])[0][0]
-        x[i] = event["position"]
-        away = np.hypot(*(np.delete(x, i, axis=0) - x[i]).T)
-        depth = 2.0 - np.nanmin(away, initial=inf) / r
-        # A track may leave out 1e-4 of the radius of what lasts.
-        if depth > 1e-3:
-            found.append(f"release: {i} starts {depth:.2g} r inside another at {t:.6g} s")
-    return found
-
-
-def _depths(machine, recording):
-    """Tell who is pressed into another or into a surface, and for how long."""
-    r, h = machine.particle.radius, step_of(machine)
-    first, last = recording.ends()
-    begin, end = float(first["t"].min()), float(last["t"].max())
-    fast = np.hypot(*recording.knots["velocity"].T).max(initial=0.0)
-    stride = STRIDE * r / fast if fast > 0.0 else inf
-    apart = min(0.5 * h, max(stride, (end - begin) / LOOKS))
-    times = np.linspace(begin, end, ceil((end - begin) / apart) + 1)
-    free = free_from(recording, machine.releases.carried)
-    runs, found, look = {}, {}, 0  # of each who is deep: first look of this run, last, worst
-    for some in np.array_split(times, max(1, len(times) // 200)):
-        for t, x in zip(some, recording.at(some)[0], strict=True):
-            look += 1
-            for who, depth in _deep(machine, x, free <= t):
-                since, latest, worst = runs.get(who, (look, look, 0.0))
-                if latest < look - 1:
-                    since, worst = look, 0.0
-                worst = max(worst, depth)
-                runs[who] = since, look, worst
-                name = (
-                    " and ".join(map(str, who))
-                    if isinstance(who[1], int)
-                    else f"{who[0]} in {who[1]}"
-                )
-                lasts = (look - since) * apart / h
-                if depth > INSIDE:
-                    found[who] = f"through: {name} by {depth:.2g} r at {t:.6g} s"
-                elif lasts > 1.25 and not found.get(who, "").startswith("through"):
-                    found[who] = (
-                        f"pressed: {name} by {worst:.2g} r for {lasts:.3g} steps at {t:.6g} s"
-                    )
-    return list(found.values())
-
-
-def _deep(machine, x, free):
-    """Yield who is deep in whom, and how deep in radii, at places x (N, 2)."""
-    r, here = machine.particle.radius, np.flatnonzero(np.isfinite(x[:, 0]))
-    if not len(here):
-        return
-    pairs = here[cKDTree(x[here]).query_pairs((2.0 - DEEP) * r, output_type="ndarray")]
-    for i, j in pairs.tolist():
-        # Of two that are carried none can give way.
-        if free[i] or free[j]:
-            yield (i, j), 2.0 - np.hypot(*(x[i] - x[j])) / r
-    here = here[free[here]]
-    for which, depths in surface_depths(machine, x[here], r, 0.0).items():
-        depth, name = depths / r, which
-        if which != "pulley":
-            name = f"{machine.surfaces[machine.segments.surface[which]]}[{which}]"
-        for k in np.flatnonzero(depth > DEEP):
-            yield (int(here[k]), name), float(depth[k])
-
-
-def _crossings(machine, recording):
-    """Tell whose centre goes through a face, by the cubic between two knots, at nine places."""
-    knots, s = recording.knots, machine.segments
-    whose = np.repeat(np.arange(recording.count), np.diff(recording.offsets))
-    rows = np.flatnonzero((whose[1:] == whose[:-1]) & (np.diff(knots["t"]) > 0.0))
-    h = knots["t"][rows + 1] - knots["t"][rows]
-    a, b = knots["position"][rows], knots["position"][rows + 1]
-    u, v = (h[:, None] * knots["velocity"][rows + k] for k in (0, 1))
-
-    def place(of, share):
-        p = share[..., None]
-        return (
-            a[of] + p * (u[of] + p * (3.0 * (b[of] - a[of]) - 2.0 * u[of] - v[of]
-                                      + p * (2.0 * (a[of] - b[of]) + u[of] + v[of])))
-        )  # fmt: skip
-
-    found, shares = [], np.linspace(0.0, 1.0, 9)
-    for k in range(len(s.length)):
-        left = np.array([-s.tangent[k, 1], s.tangent[k, 0]])
-        off = np.stack(
-            [(place(slice(None), np.full(len(rows), p)) - s.start[k]) @ left for p in shares]
-        )
-        piece, of = np.nonzero((off[1:] > 0.0) != (off[:-1] > 0.0))
-        low, high = shares[piece], shares[piece + 1]
-        side = off[piece, of] > 0.0
-        for _ in range(50):
-            mid = 0.5 * (low + high)
-            same = ((place(of, mid) - s.start[k]) @ left > 0.0) == side
-            low, high = np.where(same, mid, low), np.where(same, high, mid)
-        along = (place(of, low) - s.start[k]) @ s.tangent[k]
-        for n in np.flatnonzero((along > 0.0) & (along < s.length[k])):
-            t = knots["t"][rows[of[n]]] + low[n] * h[of[n]]
-            name = machine.surfaces[s.surface[k]]
-            found.append(f"through: {whose[rows[of[n]]]} through {name}[{k}] at {t:.6g} s")
-    return found
-
-
-def ended(recording):
-    """Return how many ended for each reason."""
-    return {REASONS[k]: int(n) for k, n in enumerate(np.bincount(recording.ended)) if n}

@@ -1,7 +1,5 @@
 """Lone scenes drawn at random, with every option of a scene file; whether they show blows only."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from chutelab.machine import build

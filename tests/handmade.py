@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from chutelab import scene
-from chutelab.machine import Machine, build
-from chutelab.machine.parts import Arcs, Particle, Segments
+from chutelab.machine import Arcs, Machine, Particle, Segments, build
 from chutelab.machine.releases import Releases
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.recorder import Recorder

@@ -8,8 +8,7 @@ from math import cos, inf, sin
 import numpy as np
 
 from chutelab.core.module import Module
-from chutelab.machine import build
-from chutelab.machine.parts import Arcs, Particle
+from chutelab.machine import Arcs, Particle, build
 from chutelab.machine.rows import lay
 from chutelab.scene import from_dict
 
@@ -129,52 +128,37 @@ WHEEL, BELT, LENGTH = 0.5, 2.0, 0.5
 """m, m/s, m: a pulley, its belt, and how far before the pulley's axis a disk is put on it."""
 
 
-def over_the_pulley(radius, friction, turning, speed, **run):
-    """A disk put on a Coulomb belt at a speed; `turning` is m r²/I, 0 for none."""
+def over_the_pulley(radius, friction, spin, speed, **run):
+    """A disk put on a Coulomb belt at a speed."""
     return scene_of(
-        particle={"radius": radius, "spin": turning > 0.0},
+        particle={"radius": radius, "spin": spin},
         incoming={"speed": BELT, "pulley_radius": WHEEL, "friction": friction},
         stream={"at": [-LENGTH, WHEEL + radius], "velocity": [speed, 0.0]},
         run=run,
     )
 
 
-def round_the_wheel(way, radius):
-    """Return the places (N, 2) of a disk that has come so far from above the pulley's axis (m)."""
-    rho = WHEEL + radius
-    round_it = [rho * np.sin(way / rho), rho * np.cos(way / rho)]
-    return np.where(way < 0.0, [way, np.full_like(way, rho)], round_it).T
-
-
 SLIDES = [
     {"speed": 0.5, "belt": 2.0, "friction": 0.3},
-    {"speed": 0.5, "belt": 2.0, "friction": 0.3, "turning": 2.0},
+    {"speed": 0.5, "belt": 2.0, "friction": 0.3, "spin": True},
     {"speed": 1.0, "slope": 0.3, "friction": 0.2},
-    {"speed": 1.0, "slope": 0.3, "friction": 0.2, "turning": 2.0},
-    {"speed": 0.5, "slope": 0.6, "friction": 0.1, "belt": 1.5, "turning": 2.0},
+    {"speed": 1.0, "slope": 0.3, "friction": 0.2, "spin": True},
+    {"speed": 0.5, "slope": 0.6, "friction": 0.1, "belt": 1.5, "spin": True},
     {"speed": 0.0, "slope": 0.3, "friction": 0.5, "belt": -1.0},
 ]
-"""Options of `references.slide`."""
+"""Options of `ramp`."""
 
 
-def ramp(options, **run):
-    """A disk put on a ramp or belt; its place at a way s is `start + s * along`.
-
-    Returns
-    -------
-    Machine, ndarray, ndarray
-        The machine, start and along.
-    """
-    slope, radius = options.get("slope", 0.0), 0.02
-    along, start = np.array([cos(slope), -sin(slope)]), radius * np.array([sin(slope), cos(slope)])
+def ramp(*, speed, friction, belt=0.0, slope=0.0, spin=False, **run):
+    """A disk put on a ramp or belt that falls by an angle (rad)."""
+    along, up = np.array([cos(slope), -sin(slope)]), np.array([sin(slope), cos(slope)])
     surface = face(
-        "ramp", (-20.0 * along).tolist(), (20.0 * along).tolist(), friction=options["friction"],
-        speed=options.get("belt", 0.0), restitution=0.0,
+        "ramp", (-20.0 * along).tolist(), (20.0 * along).tolist(), friction=friction, speed=belt,
+        restitution=0.0,
     )  # fmt: skip
-    machine = scene_of(
-        particle={"radius": radius, "spin": options.get("turning", 0.0) > 0.0},
+    return scene_of(
+        particle={"radius": 0.02, "spin": spin},
         surface=[surface],
-        stream={"at": start.tolist(), "velocity": (options["speed"] * along).tolist()},
-        run={"until": 2.0, **run},
+        stream={"at": (0.02 * up).tolist(), "velocity": (speed * along).tolist()},
+        run=run,
     )
-    return machine, start, along

@@ -1,7 +1,6 @@
 """Answers from outside, to hold engines against: brute force, no code of any engine.
 
 - `first_impacts`: who meets whom and when in a dilute stream; after each event all is predicted.
-- `round_the_pulley`, `slide`: a disk with Coulomb friction over belt and pulley, and along a line.
 - `henderson`, `virial`, `wall_pressure`, `maxwell_boltzmann`: a gas of hard disks.
 - `overlaps`, `inside_surfaces`: how deep disks of a recording are in each other and in surfaces.
 
@@ -16,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import polynomial
-from scipy.integrate import solve_ivp
 from scipy.spatial import cKDTree
 from scipy.stats import kstest
 
@@ -421,142 +419,6 @@ def _contact(one, x):
         return side * one.left, side * one.speed
     n = (x - one.center) / hypot(*(x - one.center))
     return n, one.speed if n @ one.left >= 0.0 else -one.speed
-
-
-# Lasting contacts
-
-
-class Ride(NamedTuple):
-    """A ride over belt and pulley: phases (t, "grip" or "slip"), and how it leaves the pulley."""
-
-    phases: list[tuple[float, str]]
-    t: float
-    angle: float
-    speed: float
-    rim: float
-    state: object
-    """Function of times: (3, T) way from the top (m), speed, r ω (m/s)."""
-
-
-def round_the_pulley(
-    *, belt, ride, gravity=9.81, friction, turning=0.0, way=0.0, speed=None, rim=0.0
-):
-    """Integrate a lone disk over the end of a belt and round its pulley until it leaves.
-
-    With s the way of the centre from the top of the pulley (negative on the belt), φ = max(s, 0)/ρ,
-    w the speed and z = r ω, per mass
-
-        s' = w,  w' = g sin φ + F,  z' = (m r²/I) F,  N = g cos φ - w²/ρ (w²/ρ only for s > 0),
-
-    slipping F = -µ N sign(w + z - belt), gripping F = -g sin φ / (1 + m r²/I) while |F| <= µ N.
-
-    Parameters
-    ----------
-    belt, ride : float
-        v0 (m/s) and ρ = R + r (m).
-    friction, turning : float
-        µ; m r²/I: 0 for a disk that does not turn, 2 for a free one.
-    way, speed, rim : float
-        s, w (the belt's by default) and z at the start.
-    """
-    phases, t, pieces = [], 0.0, []
-    y = np.array([way, belt if speed is None else speed, rim])
-
-    def load(y):
-        phi = max(y[0], 0.0) / ride
-        return gravity * cos(phi) - (y[1] ** 2 / ride if y[0] >= 0.0 else 0.0)
-
-    def pull(y):
-        return gravity * sin(max(y[0], 0.0) / ride)
-
-    def slip(y):
-        return y[1] + y[2] - belt
-
-    def terminal(function):
-        function.terminal, function.direction = True, -1.0
-        return function
-
-    on_pulley = way >= 0.0
-    sign = np.sign(slip(y)) if abs(slip(y)) > 1e-13 * (1.0 + abs(belt)) else 0.0
-    while True:
-        if on_pulley and load(np.array([max(y[0], 0.0), *y[1:]])) <= 0.0:
-            break
-        if sign == 0.0 and pull(y) / (1.0 + turning) > friction * load(y):
-            sign = 1.0
-        held = sign == 0.0
-        phases.append((t, "grip" if held else "slip"))
-
-        def rates(_, y, held=held, sign=sign, on_pulley=on_pulley):
-            phi = y[0] / ride if on_pulley else 0.0
-            normal = gravity * cos(phi) - (y[1] ** 2 / ride if on_pulley else 0.0)
-            down = gravity * sin(phi)
-            force = -down / (1.0 + turning) if held else -friction * normal * sign
-            return [y[1], down + force, turning * force]
-
-        def arrives(_, y):
-            return -y[0]
-
-        def lifts(_, y):
-            return load(y)
-
-        def holds(_, y):
-            return friction * load(y) - pull(y) / (1.0 + turning)
-
-        def slips(_, y, sign=sign):
-            return sign * slip(y)
-
-        events = [terminal(holds if held else slips), terminal(lifts if on_pulley else arrives)]
-        piece = solve_ivp(
-            rates, [t, t + 100.0], y, "DOP853", events=events, dense_output=True,
-            rtol=1e-12, atol=1e-14,
-        )  # fmt: skip
-        if piece.status != 1:
-            raise ValueError("it does not leave the pulley within 100 s")
-        t, y = float(piece.t[-1]), piece.y[:, -1].copy()
-        pieces.append(piece)
-        if len(piece.t_events[1]):
-            if on_pulley:
-                break
-            on_pulley, y[0] = True, 0.0
-        elif held:
-            sign = 1.0  # gravity pulls it forward
-        else:
-            sign = 0.0
-
-    def state(times):
-        times = np.asarray(times, dtype=float)
-        ends = np.array([piece.t[-1] for piece in pieces])
-        which = np.minimum(np.searchsorted(ends, times), len(pieces) - 1)
-        return np.stack([pieces[k].sol(at) for k, at in zip(which, times, strict=True)], axis=1)
-
-    return Ride(phases, t, max(y[0], 0.0) / ride, y[1], y[2], state)
-
-
-def slide(t, *, speed, rim=0.0, belt=0.0, slope=0.0, friction, turning=0.0, gravity=9.81):
-    """Return way (m), speed and r ω (m/s) of a disk, a time t after it is put on a surface.
-
-    Per mass, along the tangent that falls by `slope` (rad): N = g cos β and a pull g sin β. While
-    it slips, F = -µ N sign(u), u = speed + r ω - belt; then, if |F| <= µ N, F = -pull/(1 + m r²/I):
-    it lies, or rolls. m r²/I, `turning`, is 0 for a disk that does not turn, 2 for a free one.
-    """
-    t = np.asarray(t, dtype=float)
-    pull, most = gravity * sin(slope), friction * gravity * cos(slope)
-    slip = speed + rim - belt
-    gripping = -pull / (1.0 + turning)
-    holds = abs(gripping) <= most
-    # From no slip that cannot be held it slips where gravity pulls.
-    force = -most * copysign(1.0, slip if slip != 0.0 else pull)
-    rate = pull + (1.0 + turning) * force
-    stop = -slip / rate if slip * rate < 0.0 else inf
-    if slip == 0.0 and holds:
-        stop = 0.0
-    after = gripping if holds else -force  # it goes on the other way, as gravity pulls
-    one, two = np.minimum(t, stop), np.maximum(t - stop, 0.0)
-    w = speed + (pull + force) * one
-    way = speed * one + 0.5 * (pull + force) * one**2
-    way = way + w * two + 0.5 * (pull + after) * two**2
-    rim = rim + turning * (force * one + after * two)
-    return way, w + (pull + after) * two, rim
 
 
 # A gas of hard disks

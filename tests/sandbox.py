@@ -1,23 +1,19 @@
 """Machines and mixtures drawn at random from all that a scene file can say of round particles."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 
 from chutelab.machine import build
-from chutelab.scene import Scene, SceneError, from_dict
+from chutelab.scene import SceneError, from_dict
 
 MATERIALS = ("steel", "gravel", "coal", "glass", "rubber", "wheat", "mine")
 
 
-def draw(seed: int) -> Scene:
+def draw(seed):
     """Return the scene of a seed; in every other one particles meet."""
     return from_dict(tables(seed), f"sandbox-{seed}")
 
 
-def tables(seed: int) -> dict[str, Any]:
+def tables(seed):
     """Return a scene that can be built, as its file has it; the same seed gives the same scene.
 
     Up to three streams of up to three kinds, into a box, a drum or onto a floor, with whatever
@@ -38,32 +34,32 @@ def tables(seed: int) -> dict[str, Any]:
 class Dice:
     """Values drawn at random."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng):
         self.rng = rng
 
-    def number(self, low: float, high: float) -> float:
+    def number(self, low, high):
         return float(self.rng.uniform(low, high))
 
-    def whole(self, low: int, high: int) -> int:
+    def whole(self, low, high):
         return int(self.rng.integers(low, high + 1))
 
-    def chance(self, share: float) -> bool:
+    def chance(self, share):
         return bool(self.rng.random() < share)
 
-    def one_of(self, *values: Any) -> Any:
+    def one_of(self, *values):
         return values[int(self.rng.integers(len(values)))]
 
 
 class Drawing(Dice):
     """One attempt at a scene."""
 
-    def __init__(self, rng: np.random.Generator, *, meet: bool) -> None:
+    def __init__(self, rng, *, meet):
         super().__init__(rng)
         self.meet = meet
         self.end = self.number(1.0, 1.6)
         self.transfer = self.chance(0.4)
         self.adheres = self.transfer and self.chance(0.5)
-        self.tables: dict[str, Any] = {
+        self.tables = {
             # Without any, what lies on a belt grazes the pulley or not as rounding says.
             "gravity": self.one_of(
                 *[9.81] * 5, 0.05 if self.transfer else 0.0, 0.05, self.number(1.0, 20.0)
@@ -79,10 +75,10 @@ class Drawing(Dice):
             ending = "landed" if "outgoing" in self.tables else "settled"
             self.tables["run"] = {"until": ending, "max_time": self.end}
 
-    def vector(self, reach: float) -> list[float]:
+    def vector(self, reach):
         return self.rng.uniform(-reach, reach, 2).tolist()
 
-    def place(self, reach: float = 0.7) -> list[float]:
+    def place(self, reach=0.7):
         """Draw a place; beyond the pulley where nothing that rides can give way to what it meets.
 
         Adhesion moves riders as if they had no end of mass: between one of them and a wall on the
@@ -91,24 +87,24 @@ class Drawing(Dice):
         x, y = self.vector(reach)
         return [x + (1.5 if self.adheres and self.meet else 0.0), y]
 
-    def some(self, **drawn: Any) -> dict[str, Any]:
+    def some(self, **drawn):
         """Leave out half of the values, so that defaults are drawn as well."""
         return {key: value for key, value in drawn.items() if self.chance(0.5)}
 
-    def values(self) -> dict[str, float]:
+    def values(self):
         return self.some(
             restitution=self.one_of(0.0, self.number(0.0, 0.9), self.number(0.2, 0.7)),
             friction=self.one_of(0.0, self.number(0.0, 1.0), self.number(0.0, 1.0)),
         )
 
-    def _kinds(self) -> None:
+    def _kinds(self):
         count = self.whole(1, 3)
         self.kinds = [f"kind-{n}" for n in range(count)]
         rows = []
         for name in self.kinds:
             size = float(10.0 ** self.number(-2.4, -1.6 if self.meet else -1.5))
             ranged = self.chance(0.3)
-            row: dict[str, Any] = {
+            row = {
                 "radius": [size, size * self.number(1.05, 1.8)] if ranged else size,
                 **self.some(shape=self.one_of("disk", "sphere"), spin=self.chance(0.7)),
             }
@@ -131,11 +127,11 @@ class Drawing(Dice):
             self.tables["material"] = [own | faces]
         self.named = [row["name"] for row in rows if "name" in row]
 
-    def _belts(self) -> None:
+    def _belts(self):
         if not self.transfer:
             return
         speed, wheel = self.number(0.3, 3.0), self.number(0.05, 0.3)
-        belt: dict[str, Any] = {"speed": speed, "pulley_radius": wheel}
+        belt = {"speed": speed, "pulley_radius": wheel}
         belt |= self.some(length=self.number(0.3, 0.8), restitution=self.number(0.0, 0.6))
         belt |= {"incline_deg": self.number(-25.0, 35.0)} if self.chance(0.6) else {}
         if not self.adheres:
@@ -160,7 +156,7 @@ class Drawing(Dice):
         if plates:
             self.tables["plate"] = plates if len(plates) > 1 else plates[0]
 
-    def _hanging(self) -> dict[str, Any]:
+    def _hanging(self):
         x, y = self.place()
         return {
             "name": "flap", "pivot": [x, y], "above": self.number(0.0, 0.2),
@@ -168,7 +164,7 @@ class Drawing(Dice):
             **self.values(),
         }  # fmt: skip
 
-    def _surfaces(self) -> None:
+    def _surfaces(self):
         rows = [] if self.transfer else [self._container()]
         for n in range(self.whole(0, 4)):
             row = {"name": f"s{n}", **self._course(), **self.values()}
@@ -197,7 +193,7 @@ class Drawing(Dice):
                 **self.values(),
             }]  # fmt: skip
 
-    def _container(self) -> dict[str, Any]:
+    def _container(self):
         kind = self.whole(0, 2)
         if kind == 0:
             corners = [[-1.2, 1.2], [-1.2, -1.2], [1.2, -1.2], [1.2, 1.2]]
@@ -207,7 +203,7 @@ class Drawing(Dice):
             return {"name": "drum", "center": [0.0, 0.0], "radius": 1.2, **turning, **self.values()}
         return {"name": "floor", "from": [-3.0, -1.0], "to": [3.0, -1.0], **self.values()}
 
-    def _course(self) -> dict[str, Any]:
+    def _course(self):
         start = np.array(self.place())
         if self.chance(0.4):
             begin, extent = self.number(-180.0, 180.0), self.one_of(-1.0, 1.0)
@@ -226,14 +222,14 @@ class Drawing(Dice):
         ends = [point.tolist() for point in points]
         return {"from": ends[0], "to": ends[1]} if len(ends) == 2 else {"points": ends}
 
-    def _streams(self) -> None:
+    def _streams(self):
         count = self.whole(1, 3)
         most = 60 if self.meet else 10
         counts = self.rng.multinomial(self.whole(max(count, most // 6), most) - count,
                                       [1.0 / count] * count) + 1  # fmt: skip
         rows = []
         for n, every in enumerate(counts.tolist()):
-            row: dict[str, Any] = {"count": every, **self.some(seed=self.whole(0, 99))}
+            row = {"count": every, **self.some(seed=self.whole(0, 99))}
             row |= {"start": self.number(0.0, 0.3)} if self.chance(0.3) else {}
             row |= {"name": f"stream-{n}"} if self.chance(0.3) else {}
             if self.named and self.chance(0.7):
@@ -257,7 +253,7 @@ class Drawing(Dice):
             rows.append(row)
         self.tables["stream"] = rows if count > 1 else rows[0]
 
-    def _on_belt(self, row: dict[str, Any]) -> None:
+    def _on_belt(self, row):
         # Layers of an adhesive bed ride into each other round the pulley, of which `check` warns.
         row["rate"] = self._rate()
         if not self.adheres:
@@ -265,11 +261,11 @@ class Drawing(Dice):
         if not (self.adheres and self.meet):
             row |= self.some(bed_height=self.number(0.0, 0.1))
 
-    def _at_a_point(self, row: dict[str, Any]) -> None:
+    def _at_a_point(self, row):
         row |= {"at": self.place(), "velocity": self.vector(2.0), "rate": self._rate()}
         row |= self.some(bed_height=self.number(0.0, 0.2), speed_spread=self.number(0.0, 0.5))
 
-    def _along_a_line(self, row: dict[str, Any]) -> None:
+    def _along_a_line(self, row):
         start = self.place()
         row |= {"at": start, "to": [start[0] + self.number(0.2, 0.6), start[1]]}
         row["velocity"] = self.vector(1.5)
@@ -279,10 +275,10 @@ class Drawing(Dice):
             # All at once, beside each other: in a row that is long enough for all.
             row["to"] = [start[0] + 0.11 * row["count"], start[1] + self.number(-0.1, 0.1)]
 
-    def _rate(self) -> Any:
+    def _rate(self):
         return self.one_of(self.number(20.0, 200.0), f"{self.number(1.0, 8.0):.3g} t/h")
 
-    def _pairs(self) -> None:
+    def _pairs(self):
         if not self.named or self.chance(0.7):
             return
         surfaces = [

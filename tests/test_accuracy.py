@@ -19,7 +19,6 @@ from chutelab.scene.quantities import THEORY
 from chutelab.studies.accuracy import (
     FLOOR,
     MOST_STEPS,
-    Accuracy,
     Wanted,
     apart,
     each,
@@ -295,10 +294,3 @@ def test_progress_only_goes_forward():
     reach(sc.load("stream-independent", ["stream.count=20"]), 1e-3, shares.append)
     assert shares
     assert all(0.0 <= share <= 1.0 for share in shares)
-
-
-def test_the_answer_is_plain_data():
-    _, found = reach(sc.load("perpendicular"), 1e-3)
-    assert isinstance(found, Accuracy)
-    assert isinstance(found.reached, float)
-    assert type(found.met) is bool

@@ -9,14 +9,11 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
@@ -25,28 +22,22 @@ from PIL import Image, ImageDraw
 from chutelab import scene
 from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
-from chutelab.machine import Machine, build
-from chutelab.machine.parts import Thread
+from chutelab.machine import build
 from chutelab.pictures.animation import Moment, Stage, VideoError, animate, film, moments
 from chutelab.pictures.animation import files as video
-from chutelab.pictures.animation.actors import SIGNS, Writing, stacks
+from chutelab.pictures.animation.actors import SIGNS
 from chutelab.pictures.animation.files import palette, write_gif
 from chutelab.pictures.animation.moments import (
-    contact_normal,
-    going_on,
-    in_flight,
     sentence,
     slowness,
     span,
 )
 from chutelab.pictures.animation.stage import TRAIL, Layout, lay_out
 from chutelab.pictures.plots import Window, style, window_of
-from chutelab.pictures.plots.scenery import energies
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder
 from handmade import (
     BELT_TIME,
-    DISTANCE,
     EPS,
     EXACT,
     MASS,
@@ -164,55 +155,48 @@ def test_film_runs_evenly_and_holds_at_both_impacts(fps: int, delay: int) -> Non
     assert moving == pytest.approx(slow * (end - 0.4), abs=3.0 * 0.01 * delay)
 
 
-def test_film_holds_at_the_hardest_four_impacts_in_their_order() -> None:
-    pushes = [0.1, 1.0, 0.2, 0.8, 0.3, 0.9, 0.04, 0.7]
+@pytest.mark.parametrize(
+    ("pushes", "held"),
+    [
+        ([0.1, 1.0, 0.2, 0.8, 0.3, 0.9, 0.04, 0.7], [0.2, 0.4, 0.6, 0.8]),
+        ([1.0] * 6, [0.1, 0.2, 0.3, 0.4]),  # the first of equals
+    ],
+)
+def test_film_holds_at_the_hardest_four_impacts(pushes: list[float], held: list[float]) -> None:
     impacts = [(Kind.IMPACT, 0.1 * (i + 1), 1.0, push) for i, push in enumerate(pushes)]
     shots = film(recorded((Kind.RELEASE, 0.0, 1.0, 0.0), *impacts), 0.0, 1.0, fps=25, slow=5.0)
-    held = [shot.t for shot in shots[:-1] if shot.delay != 4]
-    assert held == pytest.approx([0.2, 0.4, 0.6, 0.8], abs=1e-15)
     assert {shot.delay for shot in shots[:-1]} == {4, 75}
-    # Of equally hard ones the first.
-    impacts = [(Kind.IMPACT, 0.1 * (i + 1), 1.0, 1.0) for i in range(6)]
-    shots = film(recorded((Kind.RELEASE, 0.0, 1.0, 0.0), *impacts), 0.0, 1.0, fps=25, slow=5.0)
-    held = [shot.t for shot in shots[:-1] if shot.delay != 4]
-    assert held == pytest.approx([0.1, 0.2, 0.3, 0.4], abs=1e-15)
-
-
-@pytest.mark.parametrize("fps", [30, 60, 0, -25, 100])
-def test_rates_a_gif_cannot_have_are_refused(fps: int, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="whole hundredths"):
-        animate(by_hand(), tmp_path / "lesson.gif", fps=fps)
-    assert not list(tmp_path.iterdir())
+    assert [shot.t for shot in shots[:-1] if shot.delay != 4] == pytest.approx(held, abs=1e-15)
 
 
 @pytest.mark.parametrize(
-    "options",
+    ("name", "options", "said"),
     [
-        {"slow": 0.0},
-        {"slow": float("nan")},
-        {"slow": -1.0},
-        {"width": 319},
-        {"height": 100},
-        {"show": ["energy", "spin"]},
-        {"show": "wobble"},
+        *(("lesson.gif", {"fps": fps}, "whole hundredths") for fps in (30, 60, 0, -25, 100)),
+        *(("lesson.gif", {"slow": slow}, "allowed") for slow in (0.0, float("nan"), -1.0)),
+        ("lesson.gif", {"width": 319}, "allowed"),
+        ("lesson.gif", {"height": 100}, "allowed"),
+        ("lesson.gif", {"show": ["energy", "spin"]}, "allowed"),
+        ("lesson.gif", {"show": "wobble"}, "allowed"),
+        ("lesson.mp4", {"width": 801}, "801 x 450 pixels: allowed in a video are even numbers"),
+        *((f"lesson{end}", {}, r"allowed are files that end in \.gif, \.mp4, \.webm")
+          for end in (".avi", "", ".gif.txt")),
     ],
-)
-def test_other_impossible_wishes_are_refused(options: dict[str, Any], tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="allowed"):
-        animate(by_hand(), tmp_path / "lesson.gif", **options)
+)  # fmt: skip
+def test_impossible_wishes_are_refused(
+    name: str, options: dict[str, Any], said: str, tmp_path: Path
+) -> None:
+    if name.endswith(".mp4"):
+        pytest.importorskip("imageio_ffmpeg")
+    with pytest.raises(ValueError, match=said):
+        animate(by_hand(), tmp_path / name, **options)
     assert not list(tmp_path.iterdir())
 
 
-@given(st.floats(1e-3, 1e4))
-def test_slowness_is_round_and_fills_the_time(length: float) -> None:
-    slow = slowness(length)
-    assert float(f"{slow:.1e}") == slow
-    assert moments.RUNNING / 1.51 < slow * length <= moments.RUNNING * (1.0 + 1e-8)
-
-
-def test_loops_take_five_to_ten_seconds(runs: dict[str, Recording]) -> None:
+def test_loops_take_five_to_ten_seconds_at_a_round_slowness(runs: dict[str, Recording]) -> None:
     for name, recording in runs.items():
-        shots, _ = filmed(recording)
+        shots, slow = filmed(recording)
+        assert float(f"{slow:.1e}") == slow, name
         assert 5.0 <= 0.01 * sum(shot.delay for shot in shots) <= 10.2, name
 
 
@@ -301,19 +285,6 @@ def test_words_of_a_weak_impact_give_way_to_what_goes_on(runs: dict[str, Recordi
     assert shots[-1].words == "t = 4.323 s: has settled on the outgoing belt"
 
 
-def test_flight_is_told_from_contact() -> None:
-    recording = by_hand()
-    near = 1e-3
-    before, after = BELT_TIME + np.array([-2e-3, 2e-3])
-    hit = BELT_TIME + t_impact()
-    found = in_flight(recording, np.array([0.1, before, after, hit, hit + 0.01]), near)
-    assert found.tolist() == [False, False, True, True, True]
-    (landing,) = recording.select(Kind.LANDING)
-    assert going_on(recording, landing, flying=False) == "slides on the outgoing belt"
-    assert going_on(recording, landing, flying=True) == "in flight"
-    assert going_on(recording, landing, flying=False, still=True) == "lies on the outgoing belt"
-
-
 @pytest.mark.parametrize(("rode", "said"), [(2.0, False), (2.001, False), (2.1, True)])
 def test_a_stick_right_after_release_is_told_if_the_speed_changed(rode: float, said: bool) -> None:
     release, stick = (Kind.RELEASE, 0.0, 2.0, 0.0), (Kind.STICK, 0.1, rode, 0.0)
@@ -326,97 +297,53 @@ def test_a_stick_right_after_release_is_told_if_the_speed_changed(rode: float, s
         else "rides the incoming belt"
     }
     # One that comes later is news at any speed.
-    recording = recorded(
-        release, (Kind.SLIP, 0.05, 2.0, 0.0), stick, (Kind.SEPARATION, 0.5, 2.0, 0.0)
-    )
+    slip, left = (Kind.SLIP, 0.05, 2.0, 0.0), (Kind.SEPARATION, 0.5, 2.0, 0.0)
+    recording = recorded(release, slip, stick, left)
     shots = film(recording, 0.0, 1.0, fps=25, slow=5.0)
     words = {shot.words for shot in shots if 0.15 < shot.t < 0.45}
     assert words == {f"t = 0.100 s: {sentence(recording, recording.events[2])}"}
 
 
-@pytest.mark.parametrize(
-    "overrides",
-    [["run.engine=pymunk"], ["run.engine=pymunk", "run.align=false"], ["particle.radius=0"]],
-)
-@pytest.mark.parametrize(("name", "angle"), [("inclined-20", 20.0), ("perpendicular", 0.0)])
-def test_contact_normal_is_that_of_the_plate(name: str, angle: float, overrides: list[str]) -> None:
-    recording = simulate(scene.load(name, [*overrides, "plate.restitution=0.4"]))
-    (hit,) = recording.select(Kind.IMPACT, surface="plate")
-    normal = -np.cos(np.radians(angle)), -np.sin(np.radians(angle))
-    assert contact_normal(recording.machine, hit) == pytest.approx(normal, abs=1e-14)
-    said = float(sentence(recording, hit).partition(", ε = ")[2].partition("\n")[0])
-    # A fixed step mixes a step's gravity into the velocities.
-    assert said == pytest.approx(0.4, abs=0.02 if "run.align=false" in overrides else 0.0)
-
-
-def test_contact_normal_points_away_from_a_clipped_end() -> None:
-    # The plate's upper end 5 mm below the flight's height there, less than a radius of 2 cm.
-    recording = simulate(
-        scene.load(
-            "perpendicular",
-            ["particle.radius=0.02", "plate.above=0", "plate.pivot_height=-0.3",
-             "outgoing.drop_from=top", "outgoing.drop=1"],
-        )
-    )  # fmt: skip
-    hit = recording.select(Kind.IMPACT, surface="plate")[0]
-    end = np.array([0.6, -0.3])
-    assert np.hypot(*(hit["position"] - end)) == pytest.approx(0.02, rel=1e-9)
-    expected = (hit["position"] - end) / 0.02
-    assert contact_normal(recording.machine, hit) == pytest.approx(expected, abs=1e-14)
+BOWL = Round("bowl", (0.0, 1.0), 0.5, 180.0, 180.0)
+SLANTED = 0.5**0.5
 
 
 @pytest.mark.parametrize(
-    ("degrees", "away", "speed", "normal"),
+    ("piece", "place", "normal"),
     [
-        # At the lowest point of a bowl of 0.5 m round (0, 1), from inside and from below.
-        (270.0, -0.004, (0.0, -1.0), (0.0, 1.0)),
-        (270.0, 0.004, (0.0, 1.0), (0.0, -1.0)),
-        (225.0, -0.004, (-1.0, -1.0), (0.5**0.5, 0.5**0.5)),
+        (FLOOR, (0.1, 0.004), (0.0, 1.0)),
+        (Line("plate", (0.0, 0.0), (1.0, 1.0)), (0.5 - 3e-3, 0.5 + 3e-3), (-SLANTED, SLANTED)),
+        (FLOOR, (0.6024, 0.0032), (0.6, 0.8)),  # its end
+        (BOWL, (0.0, 0.504), (0.0, 1.0)),
+        (BOWL, (0.0, 0.496), (0.0, -1.0)),
+        (BOWL, (-0.496 * SLANTED, 1.0 - 0.496 * SLANTED), (SLANTED, SLANTED)),
+        (BOWL, (0.5024, 1.0032), (0.6, 0.8)),  # its ends
+        (BOWL, (-0.4976, 1.0032), (0.6, 0.8)),
     ],
 )
-def test_contact_normal_of_an_arc_is_radial(
-    degrees: float, away: float, speed: Any, normal: Any
+def test_restitution_is_told_along_the_normal_at_the_contact(
+    piece: Line | Round, place: tuple[float, float], normal: tuple[float, float]
 ) -> None:
-    machine = machine_of(FLOOR, Round("bowl", (0.0, 1.0), 0.5, 180.0, 180.0))
-    out = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
-    event = struck(machine, (0.0, 1.0) + (0.5 + away) * out, speed)
-    assert contact_normal(machine, event) == pytest.approx(normal, abs=1e-12)
-
-
-def test_contact_normal_points_away_from_the_end_of_an_arc() -> None:
-    machine = machine_of(Round("bowl", (0.0, 1.0), 0.5, 180.0, 180.0))
-    # Its ends are at (-0.5, 1) and (0.5, 1).
-    away = 0.004 * np.array([0.6, 0.8])
-    event = struck(machine, np.array([0.5, 1.0]) + away, (0.0, -1.0))
-    assert contact_normal(machine, event) == pytest.approx([0.6, 0.8], abs=1e-9)
-    event = struck(machine, np.array([-0.5, 1.0]) + away, (0.0, -1.0))
-    assert contact_normal(machine, event) == pytest.approx([0.6, 0.8], abs=1e-9)
-
-
-def struck(machine: Machine, position: Any, velocity: Any) -> Any:
-    """An impact of particle 0 on the last surface."""
-    recorder = Recorder(machine)
-    surface = len(machine.surfaces) - 1
-    recorder.knots([0], [0.0], position, velocity, 0.0)
+    """v·n goes from -2 to 0.4 · 2 m/s, whatever is along the surface."""
+    recorder = Recorder(machine_of(piece))
+    out = np.array(normal)
+    along = 0.7 * np.array([out[1], -out[0]])
+    before, after = along - 2.0 * out, along + 0.8 * out
+    recorder.knots([0], [0.0], place, before, 0.0)
     recorder.events(
-        Kind.IMPACT, [0], [0.0], position, np.zeros(2), velocity_before=velocity, surface=surface
+        Kind.IMPACT, [0], [0.0], place, after, velocity_before=before, surface=0, normal_impulse=1.0
     )
-    return recorder.finish(engine="exact", steps=0).events[0]
-
-
-def test_a_separation_before_the_top_is_told_as_such() -> None:
-    recording = by_hand()
-    (event,) = recording.select(Kind.SEPARATION).copy()
-    angle = np.radians(20.0)
-    event["position"] = 0.104 * np.array([-np.sin(angle), np.cos(angle)])
-    assert "leaves the drive pulley 20.0° before the top" in sentence(recording, event)
+    recording = recorder.finish(engine="exact", steps=0)
+    assert ", ε = 0.4\n" in sentence(recording, recording.events[0])
 
 
 def test_separation_is_told_by_its_angle(runs: dict[str, Recording]) -> None:
     recording = runs["low-speed"]
-    (event,) = recording.select(Kind.SEPARATION)
-    angle = np.degrees(np.arccos(2.0**2 / (9.81 * 0.5063)))
-    assert f"{angle:.1f}° past the top, at 2 m/s" in sentence(recording, event)
+    (event,) = recording.select(Kind.SEPARATION).copy()
+    past = np.degrees(np.arccos(2.0**2 / (9.81 * 0.5063)))
+    assert f"{past:.1f}° past the top, at 2 m/s" in sentence(recording, event)
+    event["position"] *= -1.0, 1.0
+    assert f"leaves the drive pulley {past:.1f}° before the top" in sentence(recording, event)
 
 
 def test_a_ramp_is_left_by_its_name() -> None:
@@ -445,17 +372,6 @@ def test_what_was_struck_before_the_separation_does_not_bound_the_window() -> No
     assert laid_out(recording).window.holds(recording.at([0.6])[0][0]).all()
 
 
-def test_every_kind_of_event_can_be_told(runs: dict[str, Recording]) -> None:
-    told = {
-        Kind(int(event["kind"])): sentence(runs[name], event)
-        for name in runs
-        for event in runs[name].events
-        if event["particle"] == 0
-    }
-    assert told[Kind.SETTLE].startswith("has settled on")
-    assert set(told) >= {Kind.RELEASE, Kind.SEPARATION, Kind.IMPACT, Kind.LANDING, Kind.SETTLE}
-
-
 # The stage
 
 
@@ -478,51 +394,12 @@ def test_actors_stand_where_the_particle_is() -> None:
         flown = passed > BELT_TIME + 1e-9
         assert strobe[flown] == pytest.approx(expected(passed[flown] - BELT_TIME)[0], abs=1e-13)
         assert f"t = {t:.2f} s" == clock(stage, i)
-        # The corner opposite the shaft's middle is the tip of an arrow.
+        # A component is drawn only beside another: here both, and the velocity itself.
         arrows = drawn["arrows"]
-        corners = np.array([path.vertices[3] for path in arrows.get_paths()])
-        scale = stage.view.transData.transform([(0.0, 0.0), (layout.arrow, 0.0)])
-        tips = np.array([(pace[0], 0.0), (0.0, pace[1]), pace])
-        assert corners / np.ptp(scale[:, 0]) == pytest.approx(tips, abs=1e-9)
+        assert np.stack([arrows.U, arrows.V], axis=1) == pytest.approx(
+            np.array([(pace[0], 0.0), (0.0, pace[1]), pace]), abs=1e-9
+        )
         assert np.asarray(arrows.get_offsets()) == pytest.approx(np.tile(known, (3, 1)), abs=1e-14)
-
-
-def test_a_component_is_drawn_only_beside_another() -> None:
-    stage = stage_of(by_hand(), moments_at([0.3, BELT_TIME + 0.2]))
-    lengths = []
-    for i in range(2):
-        arrows = moved(stage, i)["arrows"]
-        lengths.append(np.hypot(arrows.U, arrows.V))
-    assert lengths[0].tolist() == [0.0, 0.0, 2.0]
-    assert (lengths[1] > 1.0).all()
-
-
-def test_everything_that_moves_and_its_arrow_is_in_the_window(runs: dict[str, Recording]) -> None:
-    for name, recording in runs.items():
-        layout = laid_out(recording)
-        shots, _ = filmed(recording)
-        ends = float(recording.track(0)["t"][-1])
-        times = [shot.t for shot in shots if shot.t <= ends]
-        position, velocity = (values[:, 0] for values in recording.at(times))
-        aspect = layout.view[2] * WIDTH / (layout.view[3] * HEIGHT)
-        # What leaves the window for good takes its arrow with it.
-        inside = window_of(recording).fitted(aspect).holds(position)
-        tips = position + layout.arrow * velocity
-        assert layout.window.holds(tips[inside]).all(), name
-        fastest = np.hypot(*(layout.arrow * velocity[inside]).T).max()
-        assert 0.05 < fastest / layout.window.width < 0.11, name
-
-
-def test_dashed_parabola_in_the_background_is_the_formula() -> None:
-    stage = stage_of(by_hand(), moments_at([0.6]))
-    (dashed,) = [one for one in stage.view.lines if one.get_gid() == "analytic"]
-    assert dashed.is_dashed()
-    assert not dashed.get_animated()
-    x, y = np.asarray(dashed.get_xydata()).T
-    down = np.arange(len(x)) <= np.argmax(x)
-    hit = R + DISTANCE - PARTICLE
-    since = np.where(down, x / V, t_impact() + (hit - x) / (EPS * V))
-    assert y == pytest.approx(R + PARTICLE - 0.5 * G * since**2, abs=1e-14)
 
 
 def test_crowd_is_at_the_recorded_positions_and_says_how_many() -> None:
@@ -540,8 +417,7 @@ def test_crowd_is_at_the_recorded_positions_and_says_how_many() -> None:
         drawn = moved(stage, i)
         positions = recording.at([t])[0][0, particles]
         np.testing.assert_array_equal(drawn["crowd"].get_xydata(), positions)
-        # Each trail begins in the picture before and ends at its particle, and NaN comes before
-        # the next one.
+        # Each trail ends at its particle, and NaN comes before the next one.
         trails = np.asarray(drawn["trails"].get_xydata()).reshape(299, min(i, 1) + 2, 2)
         np.testing.assert_array_equal(trails[:, -2], positions)
         assert np.isnan(trails[:, -1]).all()
@@ -589,7 +465,6 @@ def test_bars_add_up_to_the_energies_at_all_times() -> None:
         assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12, abs=0.0)
         assert put_in["start"] == pytest.approx(at_release, rel=1e-12, abs=0.0)
         assert figures(stage, i)["start"] == f"{at_release:.1f}"
-        assert [*figures(stage, i)] == [name for name in SIGNS if name != "residual"]
     assert put_in["belt_work"] == pytest.approx(1e3 * push * V, rel=1e-12, abs=0.0)
     assert is_now["kinetic"] == pytest.approx(
         1e3 * 0.5 * MASS * (push / MASS - EPS * V) ** 2, rel=1e-12, abs=0.0
@@ -604,61 +479,19 @@ def test_bars_add_up_to_the_energies_at_all_times() -> None:
     )
 
 
-@pytest.mark.parametrize("t", [0.2, BELT_TIME + 0.2, BELT_TIME + t_landing()])
-def test_bars_are_painted_one_on_the_other_to_equal_heights(t: float) -> None:
-    stage = stage_of(by_hand(), moments_at([t]))
-    painted = stacked(stage)
-    assert len({sum(rows for _, rows in bar) for bar in painted}) == 1
-    heights = blocks_of(stage, 0)
-    scale = bar_axes(stage).transData.transform([(0.0, 0.0), (0.0, 1.0)])[:, 1]
-    for bar, entries in zip(painted, heights, strict=True):
-        rows = dict(bar)
-        for name, height in entries.items():
-            # Edges are rounded to whole pixels.
-            assert rows.get(name, 0) == pytest.approx(height * np.ptp(scale), abs=1.0), name
-
-
-@pytest.mark.parametrize("planted", [0.003, -0.003])
+@pytest.mark.parametrize("planted", [0.0, 0.003, -0.003])
 def test_bars_add_up_with_the_residual_in_sight(planted: float) -> None:
     stage = stage_of(by_hand(residual=planted), moments_at([BELT_TIME + t_landing()]))
     put_in, is_now = blocks_of(stage, 0)
     assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12, abs=0.0)
-    shown = put_in["residual"] - is_now["residual"]
-    assert shown == pytest.approx(-1e3 * planted, rel=1e-9)
-    assert figures(stage, 0)["residual"] == ("−3.0" if planted > 0 else "3.0")
+    if planted:
+        shown = put_in["residual"] - is_now["residual"]
+        assert shown == pytest.approx(-1e3 * planted, rel=1e-9)
+        assert figures(stage, 0)["residual"] == ("−3.0" if planted > 0 else "3.0")
     left, right = (dict(bar) for bar in stacked(stage))
+    assert sum(left.values()) == sum(right.values())
     assert ("residual" in left) is (planted < 0.0)
     assert ("residual" in right) is (planted > 0.0)
-
-
-@given(st.fixed_dictionaries({name: st.floats(-1e3, 1e3) for name in SIGNS if name != "residual"}))
-def test_stacks_are_positive_and_equal_when_the_books_balance(books: dict[str, Any]) -> None:
-    spent = sum(books[n] for n in ("kinetic", "potential", "restitution_loss", "friction_loss"))
-    books["residual"] = spent - books["start"] - books["belt_work"]
-    put_in, is_now = stacks(books)
-    assert all(value >= 0.0 for side in (put_in, is_now) for value in side.values())
-    assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12, abs=1e-9)
-
-
-def test_books_of_every_run_balance_at_every_moment(runs: dict[str, Recording]) -> None:
-    for name, recording in runs.items():
-        shots, _ = filmed(recording)
-        books = energies(recording, np.array([shot.t for shot in shots]))
-        total = sum(sign * books[entry] for entry, sign in SIGNS.items())
-        assert np.abs(total).max() <= 1e-13 * np.abs(books["start"]).max(), name
-
-
-def test_pulley_turns_and_belt_marks_run_with_the_belt() -> None:
-    stage = stage_of(by_hand(), moments_at([0.60, 0.61]))
-    drawn = moved(stage, 0)
-    holes, marks = (np.asarray(drawn[name].get_xydata()) for name in ("holes", "marks"))
-    angle = V * 0.6 / R
-    assert holes[0] == pytest.approx(0.6 * R * np.array([np.sin(angle), np.cos(angle)]), abs=1e-14)
-    assert np.hypot(*holes.T) == pytest.approx(0.6 * R, rel=1e-12, abs=0.0)
-    assert holes.sum(axis=0) == pytest.approx([0.0, 0.0], abs=1e-14)
-    later = np.asarray(moved(stage, 1)["marks"].get_xydata())
-    shift = np.abs(later[:, None, 0] - marks[None, :, 0] - V * 0.01).min(axis=1)
-    assert np.mean(shift < 1e-12) > 0.9  # all but those that came in at an end
 
 
 def falling(
@@ -669,11 +502,12 @@ def falling(
     return recording_of(machine_of(FLOOR, *pieces, at=at, **more), *rows, ended="settled")
 
 
-def test_pulleys_and_rollers_turn_clockwise_and_marks_run_round_arcs() -> None:
+def test_rollers_turn_clockwise_and_marks_run_with_belts_and_round_arcs() -> None:
     belt = conveyor("second", (-0.3, 0.1), (0.3, 0.2), 0.05, 0.4)
     spoon = Round("spoon", (0.0, 0.5), 0.4, 180.0, 170.0, speed=0.8)
     stage = stage_of(falling(*belt, spoon), moments_at([0.2, 0.25]))
-    seen_angles = []
+    seen_angles, seen_places = [], []
+    forward = np.array([0.6, 0.1]) / np.hypot(0.6, 0.1)
     for index, t in enumerate((0.2, 0.25)):
         drawn = moved(stage, index)
         holes = [one for one, _ in stage.moving if one.get_gid() == "holes second"]
@@ -684,14 +518,17 @@ def test_pulleys_and_rollers_turn_clockwise_and_marks_run_round_arcs() -> None:
             assert three[0] - center == pytest.approx(first, abs=1e-14)
             assert np.hypot(*(three - center).T) == pytest.approx(0.03, rel=1e-12)
         away = np.asarray(drawn["marks"].get_xydata()) - (0.0, 0.5)
+        straight = (away - (-0.3, -0.4)) @ forward
+        above = (away - (-0.3, -0.4)) @ [-forward[1], forward[0]]
+        seen_places.append(straight[np.abs(above - 0.05) < 1e-9])
         on_spoon = away[np.abs(np.hypot(*away.T) - 0.4) < 1e-12]
         # Clockwise from the lowest point.
         seen_angles.append(np.arctan2(-on_spoon[:, 0], -on_spoon[:, 1]))
-    first, later = seen_angles
-    assert len(first) > 1
-    turned = np.abs(later[:, None] - first - 0.8 * 0.05 / 0.4).min(axis=1)
-    # All but one that came in at an end.
-    assert np.count_nonzero(turned < 1e-9) >= len(later) - 1
+    for (first, later), moved_by in ((seen_angles, 0.8 * 0.05 / 0.4), (seen_places, 0.4 * 0.05)):
+        assert len(first) > 1
+        turned = np.abs(later[:, None] - first - moved_by).min(axis=1)
+        # All but one that came in at an end.
+        assert np.count_nonzero(turned < 1e-9) >= len(later) - 1
 
 
 def test_a_gate_is_seen_while_it_is_there() -> None:
@@ -719,48 +556,6 @@ def test_a_gate_is_seen_while_it_is_there() -> None:
         [False, True],
         [False, True],
     ]
-
-
-def test_the_scale_stands_where_no_name_is() -> None:
-    recording = falling()
-    layout = laid_out(recording)
-    shown = Window(-0.6, 0.6, -0.1, 0.6).fitted(layout.window.width / layout.window.height)
-    corner = (shown.left, shown.top)
-    for wall in [
-        Line("ceiling", corner, (shown.left + 0.3, shown.top)),
-        Line("wall", corner, (shown.left + 0.2, shown.top - 0.2)),
-    ]:
-        recording = falling(wall)
-        stage = stage_of(recording, moments_at([0.5]), layout=replace(layout, window=shown))
-        (bar,) = [one for one in stage.view.lines if one.get_gid() == "scale"]
-        (text,) = [one for one in stage.view.texts if one.get_text().endswith(" m")]
-        box = text.get_window_extent()
-        others = [one.get_window_extent() for one in stage.view.texts if one is not text]
-        assert not box.count_overlaps(others)
-        for line in (one for one in stage.view.lines if str(one.get_gid()).startswith("surface")):
-            path = line.get_path().transformed(line.get_transform())
-            assert not path.intersects_bbox(box, filled=False)
-        (x0, x1), middle = bar.get_xdata(), text.get_position()[0]  # type: ignore[misc]
-        assert float(text.get_text().removesuffix(" m")) == pytest.approx(x1 - x0, rel=1e-9)
-        assert middle == pytest.approx(0.5 * (x0 + x1))
-
-
-def test_streams_have_colours_and_names_of_their_own() -> None:
-    spots = [(0.1 * i - 0.4, 0.3) for i in range(6)]
-    names = ("coarse", "fine ones")
-    sizes = np.array([0.02, 0.02, 0.03, 0.01, 0.01, 0.01])
-    recording = falling(at=spots, stream=[0, 0, 0, 1, 1, 1], streams=names, radius=sizes)
-    stage = stage_of(recording, moments_at([0.5]))
-    drawn = moved(stage, 0)
-    assert len(drawn["crowd coarse"].get_offsets()) == 2
-    assert len(np.asarray(drawn["crowd fine ones"].get_xydata())) == 3
-    legend = stage.view.get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()][:3] == ["particle 0", *names]
-    diameter = stage.view.transData.transform([(0, 0), (0.02, 0)])[:, 0]
-    fine = drawn["crowd fine ones"].get_markersize() / 72.0 * stage.figure.dpi
-    assert fine == pytest.approx(np.ptp(diameter), rel=1e-9)
-    assert_readable(stage, 0)
 
 
 def test_a_film_of_many_is_of_all_of_them_to_the_end() -> None:
@@ -791,27 +586,15 @@ def test_a_film_of_many_is_of_all_of_them_to_the_end() -> None:
     assert_readable(stage, 10)
 
 
-def test_strings_end_at_their_particles() -> None:
-    threads = (Thread((0.0, 0.9), 0, 0.4), Thread((0.3, 0.9), 1, 0.5))
-    recording = falling(at=[(0.0, 0.5), (0.3, 0.5)], threads=threads)
-    path = np.asarray(moved(stage_of(recording, moments_at([0.5])), 0)["strings"].get_xydata())
-    first, second, _ = np.split(path, np.flatnonzero(np.isnan(path[:, 0])) + 1)
-    assert first[[0, -2]] == pytest.approx(np.array([(0.0, 0.9), (0.0, 0.5)]))
-    assert second[[0, -2]] == pytest.approx(np.array([(0.3, 0.9), (0.3, 0.5)]))
-
-
 def test_what_is_not_asked_for_is_not_shown() -> None:
     recording, at = by_hand(), moments_at([BELT_TIME + 0.2])
     full = stage_of(recording, at)
     bare = stage_of(recording, at, layout=laid_out(recording, shows=frozenset()))
-    assert set(moved(bare, 0)) == {"marks", "holes", "disk"}
-    assert set(moved(full, 0)) == {"marks", "holes", "disk", "trail", "strobe", "arrows"}
+    assert set(moved(full, 0)) - set(moved(bare, 0)) == {"trail", "strobe", "arrows"}
     assert any(blocks_of(full, 0))
     assert not any(blocks_of(bare, 0))
-    assert len(bare.writings) == 2
-    assert [line for line in full.view.lines if line.get_gid() == "analytic"]
-    assert not [line for line in bare.view.lines if line.get_gid() == "analytic"]
-    assert bare.view.get_position().width > 1.4 * full.view.get_position().width
+    analytic = [{line.get_gid() for line in stage.view.lines} for stage in (full, bare)]
+    assert ["analytic" in one for one in analytic] == [True, False]
 
 
 def test_title_and_question_are_shown_and_cut_at_words() -> None:
@@ -872,42 +655,13 @@ def assert_readable(stage: Stage, index: int) -> None:
 
 
 @pytest.mark.parametrize("name", [*EXACT, "free-fall"])
-@pytest.mark.parametrize("question", ["", "How much of the energy is left when it lands?"])
-def test_no_text_is_cut_off_overlapping_or_small(
-    name: str, question: str, runs: dict[str, Recording]
-) -> None:
+def test_no_text_is_cut_off_overlapping_or_small(name: str, runs: dict[str, Recording]) -> None:
     shots, slow = filmed(runs[name])
-    layout = laid_out(runs[name], question=question)
+    layout = laid_out(runs[name], question="How much of the energy is left when it lands?")
     stage = stage_of(runs[name], shots, slow, layout)
     longest = max(range(len(shots)), key=lambda i: max(map(len, shots[i].words.split("\n"))))
     for index in (0, longest, len(shots) - 1):
         assert_readable(stage, index)
-
-
-def test_a_stream_s_legend_has_room() -> None:
-    text = TEXT + "[stream]\ncount = 10000\nrate = 10000.0\n"
-    recording = simulate(scene.parse(text))
-    stage = stage_of(recording, (Moment(10.25, 4, ""),), slow=1.5)
-    assert_readable(stage, 0)
-
-
-@pytest.mark.parametrize("text", ["t = 0.472 s", "−8e−17 J", "111.8", "strikes “hood”, ε = 0.5"])
-def test_what_changes_is_set_as_matplotlib_would(text: str) -> None:
-    size = 300, 40
-    figure = Figure(figsize=(3.0, 0.4), dpi=100.0)
-    canvas: Any = FigureCanvasAgg(figure)
-    figure.text(0.05, 0.3, text, fontsize=10.5)
-    canvas.draw()
-    picture = Image.new("RGB", size, "white")
-    writing = Writing(10.5, 100.0, 0.05 * size[0], 0.7 * size[1], "ls", [text])
-    writing.paint(ImageDraw.Draw(picture), 0)
-    theirs, ours = (255.0 - np.asarray(shown)[..., 0] for shown in (canvas.buffer_rgba(), picture))
-    assert ours.sum() == pytest.approx(theirs.sum(), rel=0.15)
-    for axis in (0, 1):
-        inked = [np.flatnonzero(ink.any(axis=axis))[[0, -1]] for ink in (ours, theirs)]
-        # Up to 3.10 matplotlib hints with its own FreeType 2.6.1, which sets letters closer.
-        apart = 0.03 if mpl.__version_info__ >= (3, 11) else 0.08
-        assert inked[0] == pytest.approx(inked[1], abs=max(2, apart * np.ptp(inked[1])))
 
 
 # The file
@@ -946,13 +700,13 @@ def blocks(data: bytes) -> list[Block]:
 @pytest.mark.parametrize(("fps", "delay"), [(25, 4), (50, 2)])
 def test_gif_reads_back_frame_by_frame(fps: int, delay: int, tmp_path: Path) -> None:
     recording = by_hand()
-    path = animate(recording, tmp_path / "lesson.gif", slow=4.0, fps=fps, width=640, height=360)
+    path = animate(recording, tmp_path / "lesson.gif", slow=1.5, fps=fps, width=320, height=180)
     assert path == tmp_path / "lesson.gif"
     assert list(tmp_path.iterdir()) == [path]
-    begin, end = span(recording, laid_out(recording, 640, 360).window)
-    shots = film(recording, begin, end, fps=fps, slow=4.0)
+    begin, end = span(recording, laid_out(recording, 320, 180).window)
+    shots = film(recording, begin, end, fps=fps, slow=1.5)
     with Image.open(path) as gif:
-        assert gif.size == (640, 360)
+        assert gif.size == (320, 180)
         assert gif.info["loop"] == 0
         assert gif.n_frames == len(shots)
         for i, shot in enumerate(shots):
@@ -963,41 +717,30 @@ def test_gif_reads_back_frame_by_frame(fps: int, delay: int, tmp_path: Path) -> 
     # Exactly 25 or 50 frames a second, but for the holds.
     assert {frame.delay for frame in frames} == {delay, 130}
     assert all(frame.keeps for frame in frames)
-    assert frames[0][:4] == (0, 0, 640, 360)
-    assert all(frame.width * frame.height < 640 * 360 for frame in frames[1:])
+    assert frames[0][:4] == (0, 0, 320, 180)
+    assert all(frame.width * frame.height < 320 * 180 for frame in frames[1:])
 
 
-def test_gif_frames_are_the_stage_s_in_nearly_its_colours(tmp_path: Path) -> None:
-    recording = by_hand()
-    path = animate(recording, tmp_path / "lesson.gif", slow=2.0, fps=5)
-    shots = film(recording, *span(recording, laid_out(recording).window), fps=5, slow=2.0)
-    stage = stage_of(recording, shots, 2.0)
-    with Image.open(path) as gif:
-        for i in range(len(shots)):
-            gif.seek(i)
-            seen_in_file = np.asarray(gif.convert("RGB")).astype(int)
-            drawn = np.asarray(stage.frame(i)).astype(int)
-            off = np.abs(seen_in_file - drawn).max(axis=2)
-            assert off.mean() < 0.8
-            assert np.quantile(off, 0.999) <= 40
-            assert (seen_in_file[drawn.min(axis=2) == 255] == 255).all()
-
-
-@pytest.mark.parametrize("name", ["perpendicular", "free-fall"])
-def test_what_stands_still_never_changes_its_colour(
-    name: str, runs: dict[str, Recording], tmp_path: Path
+def test_colours_are_nearly_the_stages_and_what_stands_still_keeps_its_own(
+    runs: dict[str, Recording], tmp_path: Path
 ) -> None:
-    path = animate(runs[name], tmp_path / "lesson.gif", fps=4)
-    shots, slow = filmed(runs[name])
-    shots = film(runs[name], shots[0].t, shots[-1].t, fps=4, slow=slow)
-    stage = stage_of(runs[name], shots, slow)
-    drawn = np.array([stage.frame(i) for i in range(len(shots))])
+    recording = runs["free-fall"]
+    path = animate(recording, tmp_path / "lesson.gif", fps=2)
+    shots, slow = filmed(recording)
+    shots = film(recording, shots[0].t, shots[-1].t, fps=2, slow=slow)
+    stage = stage_of(recording, shots, slow)
+    drawn = np.array([stage.frame(i) for i in range(len(shots))]).astype(int)
     with Image.open(path) as gif:
         assert gif.n_frames == len(shots)
         shown = []
         for i in range(len(shots)):
             gif.seek(i)
             shown.append(np.asarray(gif.convert("RGB")))
+    # Nearly the stage's own colours, and white is white.
+    off = np.abs(np.array(shown).astype(int) - drawn).max(axis=3)
+    assert off.mean() < 0.8
+    assert np.quantile(off, 0.999) <= 40
+    assert (np.array(shown)[drawn.min(axis=3) == 255] == 255).all()
     still = (drawn == drawn[0]).all(axis=(0, 3))
     assert 0.8 < still.mean() < 1.0
     assert (np.array(shown)[:, still] == shown[0][still]).all()
@@ -1010,49 +753,14 @@ def test_what_stands_still_never_changes_its_colour(
 
 
 @pytest.mark.parametrize(("name", "delay"), [("perpendicular", 40), ("stream", 50)])
-def test_a_stream_has_fewer_pictures_a_second(name: str, delay: int, tmp_path: Path) -> None:
+def test_a_film_is_small_and_a_streams_has_fewer_pictures_a_second(
+    name: str, delay: int, tmp_path: Path
+) -> None:
     few = scene.load(name, overrides=["stream.count=4"] if name == "stream" else ())
-    with Image.open(animate(simulate(few), tmp_path / "lesson.gif")) as gif:
+    path = animate(simulate(few), tmp_path / "lesson.gif")
+    with Image.open(path) as gif:
         assert gif.info["duration"] == delay
-
-
-# The first has the largest file.
-LONE = [
-    "belt-landing",
-    *(
-        pytest.param(name, marks=pytest.mark.slow)
-        for name in (*EXACT, "inclined-20", "perpendicular-fast")
-        if name != "belt-landing"
-    ),
-]
-
-
-@pytest.mark.parametrize("name", LONE)
-def test_lesson_of_one_particle_is_small(name: str, tmp_path: Path) -> None:
-    path = animate(simulate(scene.load(name)), tmp_path / "lesson.gif")
     assert path.stat().st_size < 200_000
-
-
-def test_palette_is_small_and_shows_the_colours_that_mean_something_as_they_are() -> None:
-    held = palette()
-    assert len(held) == len(set(held)) < 64
-    meant = {"#FFFFFF", "#000000", style.TRACK, style.STREAM, style.ANALYTIC, style.BELT}
-    assert meant | {colour.upper() for colour in style.ENERGY.values()} <= set(held)
-    table = np.array([list(bytes.fromhex(colour[1:])) for colour in held], dtype=np.uint8)
-    np.testing.assert_array_equal(shown_as(table[None]), table[None])
-
-
-def test_palette_shows_greys_as_greys_and_any_colour_as_one_near_by() -> None:
-    greys = np.arange(256, dtype=np.uint8)[None, :, None].repeat(3, axis=2)
-    assert np.ptp(shown_as(greys), axis=2).max() == 0
-    table = np.array([list(bytes.fromhex(colour[1:])) for colour in palette()])
-    any_colour = np.random.default_rng(0).integers(0, 256, (1, 5000, 3), dtype=np.uint8)
-    off, least = (
-        np.sqrt(((any_colour[0] - one.astype(float)) ** 2).sum(axis=-1))
-        for one in (shown_as(any_colour)[0], table[:, None])
-    )
-    # Pillow compares colours by the upper six of eight bits.
-    assert (off - least.min(axis=0)).max() < 8.0
 
 
 def written(pictures: list[NDArray[np.uint8]], delays: list[int]) -> bytes:
@@ -1062,14 +770,8 @@ def written(pictures: list[NDArray[np.uint8]], delays: list[int]) -> bytes:
         return path.read_bytes()
 
 
-def shown_as(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return how a picture (height, width, 3) reads back from a file."""
-    with Image.open(BytesIO(written([picture], [4]))) as gif:
-        return np.asarray(gif.convert("RGB"))
-
-
 @given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.integers(1, 30), st.integers(2, 5))
-@settings(max_examples=50)
+@settings(max_examples=20)
 def test_any_pictures_come_back_from_the_file(seed: int, w: int, h: int, count: int) -> None:
     draw = np.random.default_rng(seed)
     table = np.array([list(bytes.fromhex(colour[1:])) for colour in palette()], np.uint8)
@@ -1098,19 +800,6 @@ def test_only_what_changed_is_in_a_frame_and_what_stays_is_one_frame() -> None:
         (11, 7, 3, 2, 134),
         (11, 7, 3, 2, 4),
     ]
-
-
-def test_tints_are_mixtures() -> None:
-    assert style.tint("#204060", 1.0) == "#204060"
-    assert style.tint("#204060", 0.0, "#808080") == "#808080"
-    assert style.tint("#204060", 0.25, "#60A0E0") == "#5088C0"
-
-
-@pytest.mark.parametrize("suffix", [".avi", "", ".gif.txt"])
-def test_other_files_are_refused(suffix: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"allowed are files that end in \.gif, \.mp4, \.webm"):
-        animate(by_hand(), tmp_path / f"lesson{suffix}")
-    assert not list(tmp_path.iterdir())
 
 
 def test_failure_leaves_the_old_file_and_nothing_else(
@@ -1163,13 +852,6 @@ def test_video_shows_the_stage_at_its_rate(kind: str, tmp_path: Path) -> None:
     decoded = np.frombuffer(done.stdout, np.uint8).reshape(frames, 180, 320, 3).astype(int)
     for shown, index in ((decoded[0], 0), (decoded[-1], len(shots) - 1)):
         assert np.abs(shown - np.asarray(stage.frame(index))).mean() < 4.0
-
-
-def test_video_of_odd_size_is_refused(tmp_path: Path) -> None:
-    pytest.importorskip("imageio_ffmpeg")
-    with pytest.raises(ValueError, match="801 x 450 pixels: allowed in a video are even numbers"):
-        animate(by_hand(), tmp_path / "lesson.mp4", width=801)
-    assert not list(tmp_path.iterdir())
 
 
 def test_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -95,23 +95,6 @@ def test_a_scene_that_is_nowhere_is_answered_with_similar_names(name, says, tmp_
     assert len(said) < 500
 
 
-def test_a_decimal_comma_is_told_how_it_is_written(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text("[incoming]\nspeed = 2,5\n")
-    for name, settings, written in (
-        (path, [], "2.5"),
-        ("slip", ["incoming.speed=1,25 m/s"], "1.25"),
-    ):
-        with pytest.raises(scene.SceneError, match=f"write {written}, with a decimal point"):
-            scene.load(name, settings)
-
-
-def test_a_directory_is_no_scene(tmp_path):
-    assert message(scene.load, tmp_path) == (
-        f"{tmp_path}: a directory; give a scene file, or the name of a shipped scene"
-    )
-
-
 def test_a_file_that_may_not_be_read_is_said_so(tmp_path, monkeypatch):
     file = tmp_path / "locked.toml"
     file.write_text(IN, encoding="utf-8")
@@ -165,16 +148,13 @@ def test_a_key_at_fault_starts_no_quarrel_with_others():
     )
 
 
-def test_a_coulomb_belt_takes_what_an_adhesive_one_refuses():
+def test_what_is_no_conflict_is_taken():
+    scene.parse(IN + '[stream]\ninteract = true\n[run]\nengine = "exact"')
     release = "[stream]\nspeed_spread = 0.1\nvelocity = [1, 0]\n"
     scene.parse(IN + "friction = 0.5\n" + release)
     # and so does the air above an adhesive one
     scene.parse(IN + release + "at = [-0.5, 0.1064]\n")
     scene.parse(IN + "[stream]\nvelocity = [2, 0]\nat = [-0.5, 0.1063]\n")
-
-
-def test_interacting_alone_is_no_conflict():
-    scene.parse(IN + '[stream]\ninteract = true\n[run]\nengine = "exact"')
 
 
 def test_a_long_list_of_faults_and_a_long_value_are_cut_but_not_lost():

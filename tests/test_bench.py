@@ -15,7 +15,7 @@ from PIL import Image
 
 from chutelab.checks import workprecision as bench
 from chutelab.checks.workprecision import MANY_STEPS, METHODS, Stopwatch, Timing, clocked, measure
-from chutelab.cli import benching, main
+from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.pictures.plots.workprecision import LOOKS
@@ -183,33 +183,12 @@ def test_the_picture_shows_every_engine_and_failure(tmp_path):
         assert (seen == [int(look["color"][k : k + 2], 16) for k in (1, 3, 5)]).all(axis=1).any()
 
 
-def test_nothing_in_the_picture_is_cut_or_covered():
-    figure = draw(ROWS, "A scene", ABOUT)
-    figure.canvas.draw()
-    renderer = figure.canvas.get_renderer()
-    (ax,) = figure.axes
-    shown = [*figure.texts, ax._left_title, ax.xaxis.label, ax.yaxis.label, ax.get_legend()]
-    shown += [*ax.get_xticklabels(), *ax.get_yticklabels()]
-    boxes = [one.get_window_extent(renderer) for one in shown]
-    width, height = figure.canvas.get_width_height()
-    for i, box in enumerate(boxes):
-        assert box.x0 >= 0.0 and box.y0 >= 0.0, shown[i]  # noqa: PT018
-        assert box.x1 <= width and box.y1 <= height, shown[i]  # noqa: PT018
-        for other, against in zip(shown[:i], boxes[:i], strict=True):
-            assert not box.overlaps(against), (shown[i], other)
-
-
 def test_a_scene_in_which_all_fails_makes_a_picture():
     (ax,) = draw([Timing("exact", failed="no")], "A scene", ABOUT).axes
     assert not ax.lines
 
 
 # The command.
-
-
-def test_the_command_knows_the_engines():
-    assert benching.METHODS == METHODS == tuple(sorted(LOOKS, key=METHODS.index))
-    assert benching.REPEATS == bench.REPEATS
 
 
 def test_bench_prints_a_table_and_writes_both_files(tmp_path):
@@ -271,18 +250,11 @@ def test_what_bench_cannot_use_is_refused(arguments, allowed, tmp_path, monkeypa
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    "where",
-    [
-        "chutelab.checks.workprecision.measure",
-        "chutelab.pictures.plots.workprecision.workprecision",
-    ],
-)
-def test_an_interrupt_leaves_no_files(where, tmp_path, monkeypatch):
+def test_an_interrupt_leaves_no_files(tmp_path, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(where, interrupt)
+    monkeypatch.setattr("chutelab.pictures.plots.workprecision.workprecision", interrupt)
     out = tmp_path / "out"
     call("perpendicular", "--engine", "exact", "--repeats", 1, "--out", out, code=130)
     assert not list(tmp_path.iterdir())

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, radians, sin
+from math import cos, sin
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from chains import draw, tables
 from chutelab.engines import contact, exact
@@ -160,52 +159,19 @@ def test_contact_engine_on_thousands():
     assert judged(contact.run, range(MANY)) == {}
 
 
+SHOWN = (420, 652, 819, 1472, 1591, 2847)
+"""Seeds on which the exact engine was wrong: a ride that begins at a face that stops it, a ball
+that rolls slowly through the lowest point, two arcs in one place, two that turn back just beyond a
+corner with a piece, and one that flies off where a hollow goes over into a round arc."""
+
 ANSWERS = {"sound", "chaotic", "sensitive"}
 """What `verdict` says of runs that are right as far as they can be compared."""
 
 
 def test_exact_engine_on_chains_and_bowls():
-    found = {seed: verdict(seed) for seed in range(60)}
+    assert judged(in_time, SHOWN) == {}
+    found = {seed: verdict(seed) for seed in range(15)}
     assert {seed: said for seed, said in found.items() if said[0] not in ANSWERS} == {}
-
-
-def test_exact_engine_in_a_bowl_hardly_wider_than_the_disk():
-    """It turns by 40° on a path of 1.4 mm radius at 3 m/s: contact needs steps of 4 µs for that.
-
-    Without friction all is known: it slides down p2 and p3, flies off their end, meets p4 where its
-    centre is R - r from that of the arc, keeps what it has along it, and leaves at its end.
-    """
-    drawn = tables(48)
-    r, g, rows = drawn["particle"]["radius"], drawn["gravity"], drawn["surface"]
-    top, joint, end = (np.array(p) for p in (rows[2]["from"], rows[2]["to"], rows[3]["to"]))
-    down, along = ((b - a) / np.hypot(*(b - a)) for a, b in ((top, joint), (joint, end)))
-    assert abs(down[0] * along[1] - down[1] * along[0]) < 1e-6
-    normal, start = np.array([-down[1], down[0]]), np.array(drawn["stream"]["at"])
-    drop = ((start - top) @ normal - r) / normal[1]
-    held = (2.0 * g * drop) ** 0.5 * -down[1]
-    at = end + r * np.array([-along[1], along[0]])
-    velocity = (held**2 + 2.0 * g * (start[1] - drop - at[1])) ** 0.5 * along
-    center, path = np.array(rows[4]["center"]), rows[4]["radius"] - r
-
-    def fallen(t):
-        return at + velocity * t - [0.0, 0.5 * g * t * t]
-
-    times = np.linspace(0.0, 2e-3, 21)
-    outside = [np.hypot(*(fallen(t) - center)) > path for t in times]
-    first = outside.index(True, outside.index(False))
-    t = brentq(
-        lambda t: np.hypot(*(fallen(t) - center)) - path, times[first - 1], times[first], xtol=1e-16
-    )
-    met, fast = fallen(t), velocity - [0.0, g * t]
-    away = (met - center) / path
-    rim = radians(rows[4]["to_deg"])
-    last = center + path * np.array([cos(rim), sin(rim)])
-    pace = (fast[1] * away[0] - fast[0] * away[1]) ** 2 + 2.0 * g * (met[1] - last[1])
-    track = exact.run(build(draw(48))).track(0)
-    leaves = np.hypot(*(track["position"] - last).T).argmin()
-    np.testing.assert_allclose(track["position"][leaves], last, rtol=0, atol=1e-12)
-    expected = pace**0.5 * np.array([-sin(rim), cos(rim)])
-    np.testing.assert_allclose(track["velocity"][leaves], expected, rtol=0, atol=1e-9)
 
 
 @pytest.mark.slow
@@ -219,7 +185,9 @@ def test_exact_engine_on_thousands():
     assert len(apart) <= MANY / 100, apart
 
 
-@pytest.mark.parametrize("seed", APART)
+@pytest.mark.parametrize(
+    "seed", [pytest.param(n, marks=pytest.mark.slow) if n == 1727 else n for n in APART]
+)
 def test_exact_and_contact_where_contact_was_off(seed):
     assert verdict(seed)[0] in ANSWERS
 

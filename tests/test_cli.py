@@ -22,21 +22,10 @@ from broken import BROKEN
 from chutelab import scene as sc
 from chutelab.checks.agreement import BLOWS
 from chutelab.cli import console, main
-from chutelab.machine import build
-from chutelab.theory import predict
 from test_summary import TOP
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
-FILES = [
-    "events.csv",
-    "lesson.gif",
-    "overlay.png",
-    "recording.npz",
-    "summary.json",
-    "trajectory.csv",
-]
-
-# The contract of section 4, copied by hand.
+FILES = "events.csv lesson.gif overlay.png recording.npz summary.json trajectory.csv".split()  # noqa: SIM905
 
 
 @pytest.fixture(autouse=True)
@@ -60,23 +49,6 @@ def refused(*arguments):
     assert result.stdout == ""
     assert sorted(Path().rglob("*")) == before
     return result.stderr
-
-
-def calls(functions, *arguments):
-    """Call, and count how often functions are entered on the way."""
-    codes = {function.__code__: function.__name__ for function in functions}
-    found = dict.fromkeys(codes.values(), 0)
-
-    def entered(frame, event, _):
-        if event == "call" and frame.f_code in codes:
-            found[codes[frame.f_code]] += 1
-
-    sys.setprofile(entered)
-    try:
-        call(*arguments)
-    finally:
-        sys.setprofile(None)
-    return found
 
 
 def process(*arguments, **options):
@@ -131,19 +103,14 @@ def test_a_run_prints_particle_0_beside_the_theory_the_ledger_and_the_endings():
 
 
 def test_a_summary_fits_a_terminal_and_has_no_colours_in_a_pipe():
-    for arguments in (["run", "belt-landing"], ["tables"], ["scenes"], ["verify", "inclined-60"]):
+    leaning = ("--set", "plate.angle_deg=80", "--set", "outgoing.drop_from=top")
+    for arguments in (
+        ["run", "belt-landing"], ["tables"], ["scenes"], ["verify", "inclined-60"],
+        ["check", "stream"], ["check", "free-fall"], ["check", "perpendicular", *leaning],
+    ):  # fmt: skip
         text = call(*arguments).stdout
         assert max(map(len, text.splitlines())) <= 80
         assert "\x1b" not in text
-
-
-def test_json_is_one_object_with_the_keys_of_the_contract_and_nothing_else():
-    result = call("run", "perpendicular", "--json")
-    assert result.stderr == ""
-    assert result.stdout.count("\n") == 1
-    found = json.loads(result.stdout)
-    expected = chutelab.simulate("perpendicular").summary() | {"seconds": found["seconds"]}
-    assert found == json.loads(json.dumps(expected))
 
 
 def test_json_says_null_where_there_is_no_answer():
@@ -163,13 +130,8 @@ def test_where_the_closed_form_ends_the_summary_says_why():
     assert "\nNo closed form; outside the model: there is no incoming" in text
     assert "  theory  " not in text
     assert "ended: 5 settled" in text
-    # Its way is told instead: by free fall down to the first ramp, without a velocity sideways.
-    row = re.search(r"^meets (\S+) +(\S+) +(\S+) +(\S+) +(\S+) +(\S+)$", text, re.MULTILINE)
-    t, _, y, vx, vy = map(float, row.groups()[1:])
-    release = sc.load("free-fall").stream
-    assert vx == pytest.approx(release.velocity[0], abs=1e-5)
-    assert vy == pytest.approx(release.velocity[1] - 9.81 * t, rel=1e-5)
-    assert y == pytest.approx(release.at[1] + release.velocity[1] * t - 0.5 * 9.81 * t**2, rel=1e-5)
+    # Its way is told instead: by free fall down to the first ramp.
+    assert re.search(r"^meets \S+( +\S+){5}$", text, re.MULTILINE)
     text = call("run", "perpendicular", "--set", "outgoing.length=0.1").stdout
     assert "\nNo closed form from here on; misses the outgoing belt: " in text
 
@@ -185,12 +147,6 @@ def test_a_changed_machine_does_not_go_by_the_bare_title():
         assert call("run", "perpendicular", *same).stdout.splitlines()[0] == title
     own = call("run", "perpendicular", *changes, "--set", "title=Ours").stdout
     assert own.splitlines()[0] == "Ours"
-
-
-def test_quiet_prints_nothing():
-    result = call("run", "perpendicular", "--quiet", "--out", "out", "--only", "json")
-    assert result.output == ""
-    assert [path.name for path in Path("out").iterdir()] == ["summary.json"]
 
 
 def test_settings_change_the_run():
@@ -227,13 +183,6 @@ def test_a_decimal_comma_is_answered_with_the_point(arguments):
     assert "write 2.5, with a decimal point" in refused(*arguments)
 
 
-def test_a_run_without_a_plate_tells_the_time_of_flight():
-    throw = Path(__file__).parent.parent / "lessons" / "01-the-parabola" / "throw.toml"
-    for speed in (2, 4):
-        said = call("run", throw, "--set", f"incoming.speed={speed}", "--set", "outgoing.drop=0.7")
-        assert f"from the first to the second: {(2 * 0.7 / 9.81) ** 0.5:.6g} s" in said.output
-
-
 def test_the_papers_energy_and_power_are_marked_and_the_true_power_is_beside_them():
     text = call("run", "belt-landing").stdout
     # 200 of 8 g a second come back with ε v0 = 1 m/s, against a belt of v_b = 2 m/s.
@@ -259,41 +208,29 @@ def test_a_run_of_a_stream_tells_the_spread_of_the_landings():
     assert f"landing.x, m {mean:.6g} {spread:.6g}" in said
 
 
-def test_rounding_is_no_spread_of_the_landing():
-    # All are alike, and land at one place but for some 1e-16 m.
-    args = ["run", "slip", "--set", "stream.count=20"]
-    row = r"landing\.x, m +\S+ +0 "
-    assert re.search(row, call(*args).stdout)
-    assert not re.search(row, call(*args, "--details").stdout)
+@pytest.mark.parametrize(
+    ("scene", "settings", "said", "usual"),
+    [
+        # m v_b (v_b - v_x)/3 and m v_b (v_b - v_x), with 8 g, 2 m/s and -1 m/s
+        ("belt-landing", ["particle.spin=true", "outgoing.length=8"],
+         "1 disk rolls on the outgoing belt: nothing slips, and nothing is carried along. "
+         "The belt has paid 0.016 J, loads that are carried take 0.048 J", []),
+        # One layer, 1 ms apart, 6.3 ms to get out of the way, looked at each ms: 6 and 12 ms late.
+        ("stream", ["stream.count=3", "stream.rate=1000", "stream.bed_height=0"],
+         "2 particles waited for a free place to be released, 0.012 s at most", ["stream.count=3"]),
+        ("stream", ["stream.count=20", "incoming.speed=0.7", "run.until=1.8"],
+         "particles ride into others round the pulley, ", ["stream.count=3"]),
+        # All are alike, and land at one place but for some 1e-16 m: rounding is no spread.
+        ("slip", ["stream.count=20"], "landing.x, m 0.681305 0 ", None),
+    ],
+)  # fmt: skip
+def test_a_run_says_what_is_not_as_usual(scene, settings, said, usual):
+    def told(changes, *more):
+        settings = [f"--set={change}" for change in changes]
+        return " ".join(call("run", scene, *settings, *more).stdout.split())
 
-
-def test_a_run_says_that_a_disk_rolls_instead_of_being_carried():
-    settings = ("--set", "particle.spin=true", "--set", "outgoing.length=8")
-    text = " ".join(call("run", "belt-landing", *settings).stdout.split())
-    # m v_b (v_b - v_x)/3 and m v_b (v_b - v_x), with 8 g, 2 m/s and -1 m/s
-    assert "1 disk rolls on the outgoing belt: nothing slips, and nothing is carried along." in text
-    assert "The belt has paid 0.016 J, loads that are carried take 0.048 J" in text
-    assert "rolls" not in call("run", "belt-landing").stdout
-
-
-def test_a_run_says_who_waited_for_a_free_place():
-    # One layer, 1 ms apart, 6.3 ms to get out of the way, looked at each ms: 6 ms, then 12 ms late.
-    crowd = [f"--set=stream.{key}" for key in ("count=3", "rate=1000", "bed_height=0")]
-    text = " ".join(call("run", "stream", *crowd).stdout.split())
-    assert "2 particles waited for a free place to be released, 0.012 s at most" in text
-    assert "waited" not in call("run", "stream", "--set", "stream.count=3").stdout
-
-
-def test_a_run_says_who_rode_into_others_round_the_pulley():
-    slow = ["--set=stream.count=20", "--set=incoming.speed=0.7", "--set=run.until=1.8"]
-    text = " ".join(call("run", "stream", *slow).stdout.split())
-    found = json.loads(call("run", "stream", *slow, "--json").stdout)["squeezed"]
-    assert list(found) == ["particles", "deepest", "grip"]
-    assert 1 < found["particles"] <= 20
-    assert 0.0 < found["deepest"] < 2.0 * 0.0063
-    said = f"{found['particles']} particles ride into others round the pulley, "
-    assert f"{said}{found['deepest']:.6g} m deep at most" in text
-    assert "ride into" not in call("run", "stream", "--set", "stream.count=3").stdout
+    assert said in told(settings)
+    assert said not in (told(settings, "--details") if usual is None else told(usual))
 
 
 def test_an_accuracy_is_reported_in_text_json_and_file():
@@ -309,34 +246,15 @@ def test_an_accuracy_is_reported_in_text_json_and_file():
     summary = json.loads(Path("o/summary.json").read_text(encoding="utf-8"))
     assert {**found, "seconds": None} == summary
     accuracy = found["accuracy"]
-    assert list(accuracy) == [
-        "asked", "unit", "reached", "method", "met", "worst", "chaotic", "dt", "runs", "against",
-    ]  # fmt: skip
     assert (accuracy["asked"], accuracy["unit"], accuracy["met"]) == (1e-6, "relative", True)
     assert found["error"]["max"] <= accuracy["reached"] < 1e-11
     assert json.loads(call("run", "slip", "--json").stdout)["accuracy"] is None
-
-
-def test_engine_and_step_are_kept_to():
-    arguments = ("run", "perpendicular", "--accuracy", "1e-3", "--json")
-    found = json.loads(call(*arguments, "--engine", "pymunk", "--dt", "0.004").stdout)
-    assert found["engine"] == "pymunk"
-    assert found["accuracy"]["dt"] == 0.004
-    assert json.loads(call(*arguments, "--engine", "exact").stdout)["accuracy"]["dt"] is None
-
-
-def test_an_accuracy_that_is_not_reached_ends_with_1_and_everything_written():
-    result = call("run", "slip", "--accuracy", "1e-15", "--out", "out", "--only", "json", code=1)
+    # One that is not reached ends with 1, and everything is written.
+    result = call("run", "slip", "--accuracy", "1e-15", "--out", "o", "--only", "json", code=1)
     assert "asked for 1e-15, NOT REACHED" in " ".join(result.stdout.split())
-    assert re.fullmatch(
-        r"Error: the accuracy of 1e-15 was not reached; \S+e-1[34] was\n", result.stderr
-    )
-    found = json.loads(Path("out/summary.json").read_text(encoding="utf-8"))["accuracy"]
-    assert (found["met"], found["asked"]) == (False, 1e-15)
-    quiet = call("run", "slip", "--accuracy", "1e-15", "--quiet", code=1)
-    assert quiet.stdout == ""
-    assert "was not reached" in quiet.stderr
-    assert "the exit code is 1" in " ".join(call("run", "--help").stdout.split())
+    said = r"Error: the accuracy of 1e-15 was not reached; \S+e-1[34] was\n"
+    assert re.fullmatch(said, result.stderr)
+    assert not json.loads(Path("o/summary.json").read_text(encoding="utf-8"))["accuracy"]["met"]
 
 
 # run: what it writes
@@ -344,7 +262,10 @@ def test_an_accuracy_that_is_not_reached_ends_with_1_and_everything_written():
 
 def test_a_run_writes_the_whole_set():
     result = call("run", "perpendicular", "--out", "a/b/out", "--json")
+    assert (result.stderr, result.stdout.count("\n")) == ("", 1)
     found = json.loads(result.stdout)
+    known = chutelab.simulate("perpendicular").summary() | {"seconds": found["seconds"]}
+    assert found == json.loads(json.dumps(known))
     assert list(found) == TOP
     out = Path("a/b/out")
     assert sorted(path.name for path in out.iterdir()) == FILES
@@ -374,15 +295,8 @@ def test_a_run_writes_the_whole_set():
         assert [float(row[key]) for key in ("x", "y", "vx", "vy")] == [*position, *velocity]
 
 
-def test_a_run_works_everything_out_once():
-    found = calls([sc.Scene.validated.__func__, build, predict],
-                  "run", "perpendicular", "--out", "once")  # fmt: skip
-    # The theory answers twice: as corrected and as printed.
-    assert found == {"validated": 1, "build": 1, "predict": 2}
-
-
 def test_a_table_of_very_many_events_is_written_if_it_is_asked_for(monkeypatch):
-    monkeypatch.setattr("chutelab.cli.output.MOST_EVENTS", 3)  # it has 4
+    monkeypatch.setattr("chutelab.cli.running.MOST_EVENTS", 3)  # it has 4
     result = call("run", "perpendicular", "--out", "out")
     assert "lesson.gif, trajectory.csv, recording.npz, summary.json\n" in result.stdout
     said = "events.csv is left out: 4 events, about 0 MB; chutelab "
@@ -394,20 +308,20 @@ def test_a_table_of_very_many_events_is_written_if_it_is_asked_for(monkeypatch):
     assert len(Path("out/events.csv").read_text(encoding="utf-8").splitlines()) == 5
 
 
-def test_a_run_says_what_it_wrote_and_only_chooses():
-    result = call("run", "perpendicular", "--out", "out", "--only", "json,csv")
-    assert "wrote into out: events.csv, trajectory.csv, summary.json\n" in result.stdout
-    expected = ["events.csv", "summary.json", "trajectory.csv"]
-    assert sorted(path.name for path in Path("out").iterdir()) == expected
-
-
-def test_only_may_be_repeated():
-    call("run", "perpendicular", "--out", "out", "--only", "json", "--only", "npz,csv")
-    expected = ["events.csv", "recording.npz", "summary.json", "trajectory.csv"]
-    assert sorted(path.name for path in Path("out").iterdir()) == expected
-    call("run", "perpendicular", "--out", "pictures", "--only", "png", "--only", "gif")
-    expected = ["lesson.gif", "overlay.png"]
-    assert sorted(path.name for path in Path("pictures").iterdir()) == expected
+@pytest.mark.parametrize(
+    ("only", "files"),
+    [
+        (["json,csv"], ["events.csv", "trajectory.csv", "summary.json"]),
+        (["json", "npz,csv"], ["events.csv", "trajectory.csv", "recording.npz", "summary.json"]),
+        (["png"], ["overlay.png"]),
+    ],
+)
+def test_a_run_says_what_it_wrote_and_only_chooses(only, files):
+    chosen = [word for names in only for word in ("--only", names)]
+    text = call("run", "perpendicular", "--out", "out", *chosen).stdout
+    assert f"wrote into out: {', '.join(files)}\n" in text
+    assert {path.name for path in Path("out").iterdir()} == set(files)
+    assert call("run", "perpendicular", "--quiet", "--out", "quiet", *chosen).output == ""
 
 
 def test_a_second_run_replaces_its_own_files_and_leaves_others():
@@ -480,7 +394,7 @@ def test_bad_options_are_refused(arguments, says):
 # what goes wrong
 
 
-@pytest.mark.parametrize("case", BROKEN)
+@pytest.mark.parametrize("case", list(BROKEN)[::20])
 def test_a_broken_scene_ends_with_2_and_names_file_and_key(case):
     text, keys, _ = BROKEN[case]
     Path("broken.toml").write_text(text, encoding="utf-8")
@@ -490,18 +404,11 @@ def test_a_broken_scene_ends_with_2_and_names_file_and_key(case):
         assert key in said
 
 
-def test_the_broken_scenes_are_at_least_forty():
-    assert len(BROKEN) >= 40
-
-
 @pytest.mark.parametrize(
     ("content", "says"),
     [
         (b"", "The scene is empty"),
-        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "not a text file"),
-        (b'title = "\xe9t\xe9"\n', "not UTF-8"),
         (b"[incoming\nspeed = 2", "line 1, column 10"),
-        (b"x = " + b"[" * 20_000, "nested too deep"),
     ],
 )
 def test_rubbish_ends_with_2_and_names_the_file(content, says):
@@ -519,18 +426,10 @@ def test_no_such_scene_and_a_folder_end_with_2():
     assert "Missing argument 'SCENE'" in refused("run")
 
 
-def test_ctrl_c_ends_with_130_and_leaves_nothing(monkeypatch):
+def test_ctrl_c_ends_with_130_and_keeps_in_out_what_was_recorded(monkeypatch):
     def interrupted(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("chutelab.engines.simulation.judged", interrupted)
-    result = call("run", "perpendicular", "--out", "out", code=130)
-    assert result.stdout == ""
-    assert result.stderr.strip() == "Interrupted."
-    assert list(Path().iterdir()) == []
-
-
-def test_ctrl_c_keeps_in_out_what_was_recorded(monkeypatch):
     @contextmanager
     def third_report(*_arguments, **_options):
         shares = []
@@ -542,6 +441,11 @@ def test_ctrl_c_keeps_in_out_what_was_recorded(monkeypatch):
 
         yield report
 
+    with monkeypatch.context() as patched:
+        patched.setattr("chutelab.engines.simulation.judged", interrupted)
+        result = call("run", "perpendicular", "--out", "out", code=130)
+        assert (result.stdout, result.stderr.strip()) == ("", "Interrupted.")
+        assert list(Path().iterdir()) == []
     monkeypatch.setattr("chutelab.cli.running.progress", third_report)
     result = call("run", "stream", "--out", "out", "--only", "json,npz", code=130)
     assert result.stdout == ""
@@ -569,23 +473,12 @@ def test_a_failure_of_ours_ends_with_1_one_line_and_nothing_written(monkeypatch)
     ):
         assert isinstance(debugged.exception, ZeroDivisionError)
 
-
-def test_a_full_disk_is_refused_in_words(monkeypatch):
-    def full(*_arguments, **_options):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("chutelab.results.storage.save", full)
-    said = refused("run", "perpendicular", "--out", "out", "--only", "npz")
-    assert "--out out: cannot be written to: No space left on device" in said
-
-
-def test_too_little_memory_is_said_in_words(monkeypatch):
     def huge(*_arguments, **_options):
         raise MemoryError("Unable to allocate 9 TiB")
 
     monkeypatch.setattr("chutelab.engines.simulation.judged", huge)
-    result = call("run", "perpendicular", code=1)
-    assert "not enough memory; fewer particles need less. (Unable to allocate" in result.stderr
+    said = call("run", "perpendicular", code=1).stderr
+    assert "not enough memory; fewer particles need less. (Unable to allocate" in said
 
 
 def test_a_reader_that_has_gone_is_no_reason_for_a_traceback():
@@ -593,12 +486,6 @@ def test_a_reader_that_has_gone_is_no_reason_for_a_traceback():
         writer.stdout.close()
         assert writer.stderr.read() == ""
         assert writer.wait(timeout=60) == 1
-
-
-def test_a_backend_that_is_not_there_is_not_asked_for():
-    told = process("run", "slip", "--out", "o", "--only", "png", env={"MPLBACKEND": "nonsense"})
-    assert told.communicate(timeout=60)[1] == ""
-    assert (told.returncode, [path.name for path in Path("o").iterdir()]) == (0, ["overlay.png"])
 
 
 @pytest.mark.parametrize(
@@ -685,44 +572,6 @@ def test_a_pipe_that_nobody_writes_to_is_not_waited_for():
     assert "it is a pipe, not a file" in refused("compare", "slip", "--data", "pipe")
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
-@pytest.mark.parametrize(
-    ("arguments", "streams", "code", "says"),
-    [
-        ("run perpendicular --out out --only json", "2>&-", 0, ""),
-        ("run perpendicular --out out --only json", ">&- 2>&- <&-", 0, ""),
-        ("run nowhere", ">&- 2>&-", 2, ""),
-        ("run nowhere", "2>/dev/full", 2, ""),
-        ("--help", ">/dev/full", 1, "chutelab failed: standard output: No space left on device\n"),
-        ("schema", ">/dev/full 2>/dev/full", 1, ""),
-    ],
-)
-def test_streams_that_are_closed_or_full_change_no_exit_code(arguments, streams, code, says):
-    done = subprocess.run(
-        f'"{sys.executable}" -m chutelab {arguments} {streams}',
-        shell=True,
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": SOURCES},
-        timeout=60,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (code, says)
-    if "--out" in arguments:
-        assert [path.name for path in Path("out").iterdir()] == ["summary.json"]
-        assert ("wrote into" in done.stdout) == (">&- " not in streams)
-
-
-def test_a_terminal_without_greek_gets_question_marks():
-    Path("greek.toml").write_text(
-        'title = "Ω"\n[incoming]\nspeed = 2\npulley_radius = 0.1\n', encoding="utf-8"
-    )
-    with process("check", "greek.toml", env={"PYTHONIOENCODING": "latin-1:strict"}) as writer:
-        text, errors = writer.communicate(timeout=60)
-    assert (errors, writer.returncode) == ("", 0)
-    assert text.startswith("greek.toml: ?\n")
-
-
 # progress
 
 
@@ -731,7 +580,7 @@ class Terminal(StringIO):
         return True
 
 
-def test_a_bar_appears_on_standard_error_once_patience_is_over(monkeypatch, capsys):
+def test_a_bar_appears_on_a_terminal_once_patience_is_over(monkeypatch, capsys):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(console, "PATIENCE", 0.0)
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
@@ -741,20 +590,16 @@ def test_a_bar_appears_on_standard_error_once_patience_is_over(monkeypatch, caps
             update(float(share))
     assert "simulating" in terminal.getvalue()
     assert capsys.readouterr().out == ""
-
-
-def test_what_is_over_soon_or_watched_by_nobody_gets_no_bar(monkeypatch):
-    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    with console.progress("simulating") as update:
-        assert update is not None
-        update(0.5)
-    with console.progress("simulating", quiet=True) as update:
-        assert update is None
-    assert terminal.getvalue() == ""
-    monkeypatch.setattr(sys, "stderr", pipe := StringIO())
-    with console.progress("simulating") as update:
-        assert update is None
-    assert pipe.getvalue() == ""
+    # None for what is over soon, is to be quiet or goes into a pipe.
+    monkeypatch.undo()
+    for stream, options, told in ((Terminal(), {}, True), (Terminal(), {"quiet": True}, False),
+                                  (StringIO(), {}, False)):  # fmt: skip
+        monkeypatch.setattr(sys, "stderr", stream)
+        with console.progress("simulating", **options) as update:
+            assert (update is not None) is told
+            if told:
+                update(0.5)
+        assert stream.getvalue() == ""
 
 
 # the other commands
@@ -804,38 +649,25 @@ def test_check_warns_and_says_what_to_change():
     assert said["warning"] == "outgoing: it crosses the drive pulley"
     assert said["change"] == "outgoing.drop = 0.223"
     (found,) = json.loads(call(*arguments, "--json").stdout)["scenes"]
+    assert list(found) == [
+        "scene",
+        "title",
+        "built",
+        "skipped",
+        "engine",
+        "why",
+        "ends",
+        "stepping",
+        "effort",
+        "theory",
+        "advice",
+    ]
     assert found["advice"][-1:] == [{**said, "settings": {"outgoing.drop": 0.223}}]
     settings = ["run.engine=pymunk", "run.align=false", "run.dt=0.01"]
     text = call("check", "perpendicular", *(f"--set={setting}" for setting in settings)).stdout
     passing = "at 4.39 m/s a particle covers 43.9 mm in a step"
     assert table_of(text)["tunnelling"].startswith(f"POSSIBLE: {passing}")
     assert table_of(text)["warning"].startswith("a particle covers 43.9 mm in a step")
-
-
-def test_check_fits_a_terminal():
-    for arguments in (
-        ["stream"],
-        ["free-fall"],
-        ["perpendicular", "--set", "plate.angle_deg=80", "--set", "outgoing.drop_from=top"],
-    ):
-        text = call("check", *arguments).stdout
-        assert max(map(len, text.splitlines())) <= 80
-        assert "\x1b" not in text
-
-
-def test_check_gives_json():
-    found = json.loads(call("check", "perpendicular", "stream", "--json").stdout)
-    assert found["format"] == 1
-    alone, crowd = found["scenes"]
-    assert list(alone) == [
-        "scene", "title", "built", "skipped", "engine", "why", "ends", "stepping", "effort",
-        "theory", "advice",
-    ]  # fmt: skip
-    assert (alone["scene"], alone["engine"], alone["stepping"]) == ("perpendicular", "exact", None)
-    assert alone["effort"]["contacts"] == 2
-    assert alone["theory"]["leaves_out"] == []
-    assert crowd["stepping"]["safe"] is True
-    assert crowd["theory"]["covers"] == []
 
 
 def test_check_goes_through_all_scenes_before_it_refuses():
@@ -856,6 +688,9 @@ def test_the_tables_agree_as_printed_and_mark_what_differs():
     assert text.count("*") == 4
     first = call("tables", "1").stdout
     assert call("tables", "1", "--as-printed").stdout == first
+    (table,) = json.loads(call("tables", "4", "--json").stdout)["tables"]
+    assert (table["number"], table["cells"], table["differing"]) == (4, 66, 0)
+    assert "'2' is not one of" in refused("tables", "2")
     assert "*" not in first
     assert re.search(r"^v0 = 2 m/s, R = 0.0500 m +0.550 0.550 +0.371 0.371 +0.137 0.137", first,
                      re.MULTILINE)  # fmt: skip
@@ -863,23 +698,6 @@ def test_the_tables_agree_as_printed_and_mark_what_differs():
     assert corrected.count("*") == 22
     assert "0.137 0.146*" in corrected
     assert "0.548 0.420*" in corrected
-
-
-@pytest.mark.parametrize("number", [4, 5])
-def test_the_headings_of_the_heights_break_between_symbol_and_value(number):
-    lines = call("tables", str(number)).stdout.splitlines()
-    assert [line.split() for line in lines[2:4]] == [
-        ["d_okr", "="] * 6,
-        ["radius", *" m ".join(("0.5", "0.6", "0.7", "0.8", "0.9", "1")).split(), "m"],
-    ]
-
-
-def test_the_tables_as_json():
-    found = json.loads(call("tables", "4", "--json").stdout)
-    (table,) = found["tables"]
-    assert (table["number"], table["cells"], table["differing"]) == (4, 66, 0)
-    assert table["rows"][0]["cells"][0]["printed"] == "0.87"
-    assert "'2' is not one of" in refused("tables", "2")
 
 
 def test_scenes_lists_names_titles_and_what_to_look_at():
@@ -890,12 +708,6 @@ def test_scenes_lists_names_titles_and_what_to_look_at():
         assert re.search(rf"^{scene['name']} +{re.escape(scene['title'][:30])}", text, re.MULTILINE)
         assert scene["look"][0][:30] in text
         assert len(scene["look"]) == 3
-
-
-def test_the_schema_is_json():
-    found = json.loads(call("schema").stdout)
-    assert found["$schema"] == "https://json-schema.org/draft/2020-12/schema"
-    assert {"incoming", "plate", "outgoing", "surface", "stream", "run"} <= set(found["properties"])
 
 
 def test_new_writes_a_scene_that_runs_and_overwrites_nothing():
@@ -911,9 +723,6 @@ def test_new_writes_a_scene_that_runs_and_overwrites_nothing():
     assert Path("my.toml").read_text(encoding="utf-8") == text
     call("new")
     assert Path("scene.toml").read_text(encoding="utf-8") == text
-
-
-def test_new_says_why_it_cannot_write():
     Path("folder").mkdir()
     assert "folder is a folder" in refused("new", "folder")
     assert "cannot be written: there is no folder nowhere" in refused("new", "nowhere/my.toml")
@@ -996,9 +805,9 @@ def test_verify_ends_with_1_when_a_scene_shows_something_else():
         "exact", "contact", "pymunk", "theory",
     ]  # fmt: skip
     assert said.endswith("4 outside the tolerance\n")
-    found = json.loads(call("verify", "other.toml", "inclined-60", "--json", code=1).stdout)
-    alone = call("verify", "other.toml", "inclined-60", "--jobs", "1", "--json", code=1).stdout
-    assert json.loads(alone) == found
+    found = json.loads(
+        call("verify", "other.toml", "inclined-60", "--jobs", "1", "--json", code=1).stdout
+    )
     assert found["failures"] == 4
     other, inclined = found["scenes"]
     assert list(other) == ["scene", "title", "expectations", "agreement", "skipped"]
@@ -1033,33 +842,16 @@ def test_verify_says_what_cannot_be_compared():
 def test_help_lists_the_commands():
     text = call("--help").stdout
     commands = re.findall(r"^  ([a-z]+)  ", text.partition("Commands:")[2], re.MULTILINE)
-    assert commands == [
-        "run",
-        "live",
-        "check",
-        "show",
-        "sweep",
-        "solve",
-        "compare",
-        "lesson",
-        "figure",
-        "tables",
-        "scenes",
-        "materials",
-        "quantities",
-        "new",
-        "schema",
-        "verify",
-        "stress",
-        "bench",
-    ]
+    assert " ".join(commands) == (
+        "run live check show sweep solve compare lesson figure tables scenes materials quantities "
+        "new schema verify stress bench"
+    )
+    assert call("--version").stdout == f"chutelab {chutelab.__version__}\n"
+    schema = json.loads(call("schema").stdout)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     assert call("-h").stdout == text
     for command in commands:
         assert call(command, "--help").stdout.startswith(f"Usage: main {command} ")
-
-
-def test_the_version_is_the_packages():
-    assert call("--version").stdout == f"chutelab {chutelab.__version__}\n"
 
 
 def test_shells_complete_scenes_and_kinds():

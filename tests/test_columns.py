@@ -21,20 +21,22 @@ from columns import column, faults
 ROOT = Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize("seed", [2, 3, 4, 8, 16, 20, 22, 24])
+@pytest.mark.parametrize("seed", [2, 8, 16, 20])
 def test_a_column_makes_no_energy(seed):
     found = run(build(from_dict(column(seed, 60))))
     assert faults(found) == []
     assert laws.judge(found) == ()
 
 
-@pytest.mark.parametrize(("seed", "count"), [(8, 200), (9, 150)])
+@pytest.mark.parametrize(
+    ("seed", "count"), [(8, 120), pytest.param(9, 150, marks=pytest.mark.slow)]
+)
 def test_what_jams_is_not_pressed_into_each_other(seed, count):
     """By 5 % of the lesser radius, the promise of the engine, at most."""
     found = run(build(from_dict(column(seed, count))))
     i, j = np.triu_indices(count, 1)
     radii, deepest = np.broadcast_to(found.machine.particle.radius, count), 0.0
-    for places in found.at(np.linspace(0.0, found.knots["t"].max(), 200))[0]:
+    for places in found.at(np.linspace(0.0, found.knots["t"].max(), 60))[0]:
         depth = radii[i] + radii[j] - np.hypot(*(places[i] - places[j]).T)
         deepest = max(deepest, np.nanmax(depth / np.minimum(radii[i], radii[j]), initial=0.0))
     assert deepest < 0.05
@@ -88,8 +90,9 @@ def test_where_blows_make_energy_disks_are_too_fast(with_fault):
     assert all("no other lost that" in faults(found)[0] for found in spoilt)
 
 
-@pytest.mark.parametrize("engine", ["contact", "pymunk"])
-@pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize(
+    ("engine", "e"), [("contact", 0.0), ("contact", 0.4), ("contact", 1.0), ("pymunk", 0.4)]
+)
 def test_one_of_two_disks_may_leave_faster_than_both_came(engine, e):
     """Both have the speed V = 1: why in a column a disk may be faster than a free fall.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import acos, atan2, cos, hypot, isnan, nan, pi, radians, sin
+from math import acos, cos, hypot, isnan, nan, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from chutelab import scene, theory
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
 from chutelab.results.comparison import compare, relative_error
+from chutelab.results.ledger import ledger
 from chutelab.scene.quantities import THEORY
 
 M, R, r = 0.008, 0.1, 0.0063
@@ -146,8 +147,9 @@ def test_errors_where_nothing_moves_stay_finite():
     assert relative_error(-3.0, -4.0, 2.0) == 0.25
 
 
-@pytest.mark.parametrize("speed", [2.0, -1.5, 0.0, 5.0])
-@pytest.mark.parametrize("name", ["perpendicular", "inclined-20"])
+@pytest.mark.parametrize(
+    ("name", "speed"), [("perpendicular", 2.0), ("perpendicular", 0.0), ("inclined-20", -1.5)]
+)
 def test_the_belt_of_a_settled_run_pays_what_the_formula_says(name, speed):
     long = ("outgoing.start=-20", "outgoing.length=40")
     recording = run(name, "run.until=settled", f"outgoing.speed={speed}", *long)
@@ -163,8 +165,6 @@ def test_the_belt_of_a_settled_run_pays_what_the_formula_says(name, speed):
 
 def test_a_stream_takes_its_power_steadily():
     """P = ṁ v_b (v_b - v_x), from the ledger of 100 settled particles."""
-    from chutelab.results.ledger import ledger
-
     recording = run(
         "perpendicular", "run.until=settled", "stream.count=100", "stream.rate=50",
         "outgoing.speed=3", "outgoing.length=30",
@@ -182,13 +182,6 @@ def test_a_stream_takes_its_power_steadily():
     assert isnan(compare(recording).simulated["belt_work"])
 
 
-def test_the_angle_at_separation_is_measured_from_the_top():
-    recording = run("low-speed")
-    left = first(recording, Kind.SEPARATION, "incoming")["position"]
-    assert compare(recording).simulated["phi1"] == atan2(left[0], left[1])
-    assert cos(compare(recording).simulated["phi1"]) == pytest.approx(4.0 / (9.81 * 0.5063))
-
-
 def test_a_particle_that_never_stops_slipping_is_not_compared_with_one_that_does():
     endless = ("outgoing.friction=0", "run.until=settled")
     found = compare(simulate(scene.load("perpendicular", endless)))
@@ -199,7 +192,7 @@ def test_a_particle_that_never_stops_slipping_is_not_compared_with_one_that_does
 
 def test_a_rebound_up_along_the_plate_has_one_angle():
     # ε = 0 and no friction: up along the plate, where φ2' is π and rounding could say -π.
-    angles = np.linspace(-59.0, -21.0, 20)
+    angles = np.linspace(-59.0, -21.0, 8)
     for angle in angles:
         compared = compare(
             run("perpendicular", f"plate.angle_deg={angle}", "plate.restitution=0",

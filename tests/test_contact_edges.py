@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from math import cos, exp, pi, radians, sin, sqrt
+from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from chutelab.engines import contact, exact
 from chutelab.engines.contact import run
@@ -71,8 +70,8 @@ def paid(recording, start, end):
     return np.diff(np.sum(books, axis=0))[:, 0] / (end - start)
 
 
-@pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
-@pytest.mark.parametrize("friction", [0.3, 1.0, 1.6, 1.9, 1e6])
+@pytest.mark.parametrize("dt", [1e-3, 5e-4])
+@pytest.mark.parametrize("friction", [0.3, 1.6, 1.9])
 def test_a_belt_slips_under_what_it_cannot_move_and_stalls_where_that_locks(friction, dt):
     """The smooth wall gives N2 sin α = µ N1, the belt N1 = m g + N2 cos α: N1 = m g/(1 - µ cot α).
 
@@ -90,7 +89,7 @@ def test_a_belt_slips_under_what_it_cannot_move_and_stalls_where_that_locks(fric
     assert np.hypot(*recording.track(0)["velocity"][-1]) < 1e-9
 
 
-@pytest.mark.parametrize(("count", "dt"), [(2, 1e-3), (2, 5e-4), (4, 1e-3)])
+@pytest.mark.parametrize(("count", "dt"), [(2, 5e-4), (4, 1e-3)])
 @pytest.mark.parametrize(
     ("friction", "angle"), [(0.3, 30.0), (1.0, 30.0), (0.3, 60.0), (1.0, 60.0)]
 )
@@ -110,9 +109,9 @@ def test_in_a_row_that_is_pushed_into_a_nip_each_pays_for_its_load(count, fricti
     assert judge(recording) == ()
 
 
-@pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
 @pytest.mark.parametrize(
-    ("count", "angle", "wall"), [(2, 30.0, 0.0), (2, 60.0, 0.5), (4, 30.0, 0.0)]
+    ("count", "angle", "wall", "dt"),
+    [(1, 60.0, 0.0, 1e-3), (2, 30.0, 0.0, 5e-4), (2, 60.0, 0.5, 1e-3), (4, 30.0, 0.0, 1e-3)],
 )
 def test_a_row_on_a_belt_that_grips_without_bound_stalls_it(count, angle, wall, dt):
     """What cannot move blocks it, and nothing is paid; before, a blow costs m v² at most.
@@ -125,102 +124,15 @@ def test_a_row_on_a_belt_that_grips_without_bound_stalls_it(count, angle, wall, 
     assert judge(recording) == ()
 
 
-@pytest.mark.parametrize("wall", [0.1, 0.8])
-@pytest.mark.parametrize("friction", [0.5, 1e6])
-@pytest.mark.parametrize("angle", [30.0, 60.0])
+@pytest.mark.parametrize(
+    ("angle", "friction", "wall"), [(30.0, 0.5, 0.8), (60.0, 0.5, 0.1), (30.0, 1e6, 0.1)]
+)
 def test_what_a_nip_costs_is_the_same_at_a_finer_step(angle, friction, wall):
     """A disk that turns rolls on the belt as far as the wall lets it."""
-    costs = [nip(friction, dt, radians(angle), wall, spin=True) for dt in (1e-3, 2.5e-4)]
+    costs = [nip(friction, dt, radians(angle), wall, spin=True) for dt in (1e-3, 5e-4)]
     coarse, fine = (run.by_surface.sum(axis=0) for run in costs)
     np.testing.assert_allclose(coarse, fine, rtol=0.02)
     assert (costs[0].by_surface[:, 1:] >= 0.0).all()
-
-
-@pytest.mark.parametrize("dt", [1e-3, 2.5e-4])
-def test_who_leaves_a_crest_flies(dt):
-    """A disk rolls over a round crest, which grips without a bound, and leaves it once and for all.
-
-    Gripped at the top it keeps v1 = 2/3 v0; 3/4 v^2 - 3/4 v1^2 = g l (1 - cos φ), and it leaves
-    where v^2 = g l cos φ: at cos φ = (3 v1^2/(g l) + 4) / 7. From there its gap grows like t^3.
-    """
-    crest = {"center": (0.0, 0.0), "radius": 0.2, "begin": 0.0, "extent": 2.0 * pi, **GRIP}
-    machine = bent(scene_of(particle={"radius": R, "spin": True}, surface=[FAR],
-                            run={"until": 0.5, "dt": dt}), crest)  # fmt: skip
-    length = 0.2 + R
-    for v0 in np.linspace(0.3, 1.4, 23):
-        recording = run(thrown(machine, [0.0, length], [v0, 0.0]))
-        left = recording.select(Kind.SEPARATION)
-        assert len(left) == 1
-        cosine = (3.0 * (v0 / 1.5) ** 2 / (G * length) + 4.0) / 7.0
-        assert left["position"][0, 1] / length == pytest.approx(cosine, abs=100.0 * dt * dt)
-        events = recording.events
-        assert not len(events[events["t"] > left["t"][0]])
-        last = recording.track(0)
-        last = last[last["t"] > left["t"][0] + dt]
-        assert np.ptp(last["omega"]) == 0.0
-        assert np.ptp(last["velocity"][:, 0]) == 0.0
-
-
-STEPS = np.geomspace(2e-3, 3e-5, 30)
-"""s. An end comes at another place in the step each time: at some of them luck is out."""
-
-
-@pytest.mark.parametrize(("slope", "end"), [(45.0, 275.0), (60.0, 275.0), (60.0, 262.0)])
-def test_off_a_curved_chute_the_error_is_of_second_order_at_every_step(slope, end):
-    """A straight chute leads tangentially into an arc, with friction, and that ends in the air.
-
-    On the arc u = v^2 / (g l) obeys du/dθ = -2 cos θ - a (u - sin θ), a = 2 µ:
-    u = [(a^2 - 2) sin θ - 3 a cos θ] / (1 + a^2) + C exp(-a θ).
-    """
-    ring, mu, way, first, last = 0.4, 0.2, 0.25, radians(270.0 - slope), radians(end)
-    slope, length, a = radians(slope), ring - R, 2.0 * mu
-    pull = G * (sin(slope) - mu * cos(slope))
-    onward, up = np.array([cos(slope), -sin(slope)]), np.array([sin(slope), cos(slope)])
-    joint = ring * np.array([cos(first), sin(first)])
-    usual = {"friction": mu, "restitution": 0.0}
-    chute = face("chute", joint - 0.3 * onward, joint, **usual)
-    arc = {"center": (0.0, 0.0), "radius": ring, "begin": first, "extent": last - first, **usual}
-
-    def particular(angle):
-        return ((a * a - 2.0) * sin(angle) - 3.0 * a * cos(angle)) / (1.0 + a * a)
-
-    def speed(angle):
-        whole = 2.0 * pull * way / (G * length) - particular(first)
-        return sqrt(G * length * (particular(angle) + whole * exp(-a * (angle - first))))
-
-    left = sqrt(2.0 * way / pull) + quad(lambda x: length / speed(x), first, last, epsabs=1e-13)[0]
-    flies = 0.9 - left
-    place = length * np.array([cos(last), sin(last)]) - [0.0, 0.5 * G * flies**2]
-    place += speed(last) * flies * np.array([-sin(last), cos(last)])
-    for dt in STEPS:
-        machine = scene_of(particle={"spin": False}, surface=[chute, FAR],
-                           run={"until": 0.9, "dt": dt})  # fmt: skip
-        recording = run(thrown(bent(machine, arc), joint - way * onward + R * up))
-        assert np.abs(recording.track(0)[-1]["position"] - place).max() < 40.0 * dt * dt, dt
-        # Neither the joint nor the end is struck.
-        assert recording.events["kind"].tolist() == [Kind.RELEASE, Kind.SLIP, Kind.SEPARATION]
-        onto = sqrt(2.0 * way / pull)
-        assert recording.select(Kind.SLIP)["t"] == pytest.approx(onto, abs=10.0 * dt * dt)
-        assert recording.select(Kind.SEPARATION)["t"] == pytest.approx(left, abs=60.0 * dt * dt)
-
-
-def test_where_a_pulley_begins_a_belt_lets_go_alike_at_every_step():
-    """A belt brings a disk to its speed, 2 m/s, which is too fast for the pulley.
-
-    The circle, which the belt hides until it ends, presses nobody on it.
-    """
-    wheel, mu, speed, start = 0.1, 0.4, 2.0, 1.6
-    belt = {"name": "belt", "from": [-1.0, -wheel], "to": [1.0, -wheel], "speed": speed,
-            "pulley_radius": wheel, "friction": mu, "restitution": 0.0}  # fmt: skip
-    slips = (speed - start) / (mu * G)
-    left = slips + (1.0 - 0.5 * (speed + start) * slips) / speed
-    place = [1.0 + speed * (0.9 - left), R - 0.5 * G * (0.9 - left) ** 2]
-    for dt in STEPS:
-        machine = scene_of(particle={"spin": False}, conveyor=[belt], run={"until": 0.9, "dt": dt})
-        recording = run(thrown(machine, (0.0, R), (start, 0.0)))
-        last = recording.track(0)[-1]
-        assert last["velocity"][0] == pytest.approx(speed, abs=1e-12), dt
-        assert np.abs(last["position"] - place).max() < 10.0 * dt * dt, dt
 
 
 @pytest.mark.parametrize("crowded", [False, True])
@@ -249,8 +161,8 @@ def test_who_is_struck_off_a_ramp_has_left_the_ramp(crowded):
 
 
 @pytest.mark.parametrize("crowded", [False, True])
-@pytest.mark.parametrize("aside", [0.1, 0.2, 0.4])
-@pytest.mark.parametrize("share", [1.0, 1.0001, 1.003])
+@pytest.mark.parametrize("aside", [0.1, 0.4])
+@pytest.mark.parametrize("share", [1.0, 1.003])
 def test_a_disk_squeezes_through_the_gap_of_a_ring_and_feels_both_ends(share, aside, crowded):
     """The gap is hardly wider than the disk: next to one end it may not be in the other.
 
@@ -273,7 +185,7 @@ def test_a_disk_squeezes_through_the_gap_of_a_ring_and_feels_both_ends(share, as
 
 
 @pytest.mark.parametrize("engine", [contact, exact])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_corner_is_of_the_first_piece_that_ends_there(engine, seed):
     """Onto the top where two hollow belts meet: it leaves as fast along as the first of them runs.
 

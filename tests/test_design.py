@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-import shlex
 import sys
 from math import cbrt, cos, pi, radians, sin, sqrt, tan
 from pathlib import Path
@@ -82,42 +81,27 @@ def ten():
     into = (V - belt) / ((1.0 + restitution) * cos(a40))
     falls = (V * cos(a40) - into) / sin(a40)
     reach = V * falls / G - 0.5 * falls**2 / G * tan(a40)
-    yield (
-        machine(plate__angle_deg=40.0, plate__restitution=restitution, outgoing__speed=belt),
-        "plate.distance=0.01:0.3",
-        reach - R,
-    )
-    yield (
-        machine(plate__angle_deg=40.0, plate__restitution=restitution, plate__distance=0.05,
-                outgoing__speed=belt),
-        "incoming.pulley_radius=0.01:0.3",
-        reach - 0.05,
-    )  # fmt: skip
+    given = {"plate__angle_deg": 40.0, "plate__restitution": restitution, "outgoing__speed": belt}
+    yield machine(**given), "plate.distance=0.01:0.3", reach - R
+    small = machine(**given, plate__distance=0.05)
+    yield small, "incoming.pulley_radius=0.01:0.3", reach - 0.05
     flight = (R + 0.1) / (V - 0.5 * falls * tan(a40))
-    heavy = machine(plate__angle_deg=40.0, plate__restitution=restitution, plate__distance=0.1,
-                    outgoing__speed=belt)  # fmt: skip
-    yield scene_with_gravity(heavy), "gravity=1:15", falls / flight
+    heavy = machine(**given, plate__distance=0.1)
+    yield scene.from_dict({**scene.to_dict(heavy), "gravity": 5.0}), "gravity=1:15", falls / flight
 
     yield machine(outgoing__speed=-0.7), "incoming.speed=1.2:3", 0.7 / 0.5
 
     # Friction on the plate takes µ (1 + ε) of the blow from what runs along it.
     into, down = at_plate(a50, d1=R + 0.05)
     rubbed = (down - (1.5 + 0.1 * into * cos(a50)) / sin(a50)) / (1.1 * into)
-    yield (
-        machine(plate__distance=0.05, plate__angle_deg=50.0, plate__restitution=0.1,
-                outgoing__speed=1.5),
-        "plate.friction=0:1",
-        rubbed,
-    )  # fmt: skip
+    rough = machine(plate__distance=0.05, plate__angle_deg=50.0, plate__restitution=0.1,
+                    outgoing__speed=1.5)  # fmt: skip
+    yield rough, "plate.friction=0:1", rubbed
 
     # Round the pulley first: cos φ1 = v²/(g R), and v cos φ1 is kept to the belt.
     slow = machine(plate=None, incoming__speed=0.6, outgoing__speed=0.3, outgoing__drop_from="top",
                    outgoing__drop=0.6)  # fmt: skip
     yield slow, "incoming.speed=0.1:0.95", cbrt(G * R * 0.3)
-
-
-def scene_with_gravity(given):
-    return scene.from_dict({**scene.to_dict(given), "gravity": 5.0})
 
 
 TEN = list(ten())
@@ -129,10 +113,6 @@ def test_landing_with_the_belts_speed_agrees_with_the_closed_form(given, vary, e
     assert len(found.answers) == 1
     assert found.answer.values[0] == pytest.approx(expected, rel=1e-10, abs=1e-10)
     assert found.answer.off[0] == pytest.approx(0.0, abs=1e-10)
-
-
-def test_ten_scenes():
-    assert len(TEN) == 10
 
 
 TILT = radians(20.0)
@@ -149,30 +129,24 @@ def energies():
     return (lambda vx: (down * s - vx) / (into * c)), (lambda vx: 0.5 * M * (vx**2 + V**2))
 
 
-def test_all_of_several_roots_are_reported():
+@pytest.mark.parametrize(
+    ("vx", "points", "off"),
+    [
+        (0.1, 21, 1e-10),
+        (0.01, 12, 1e-9),  # both between neighbours of the scan
+        (0.0, 20, 1e-7),  # touches only: known to the square root of a rounding
+    ],
+)
+def test_all_of_several_roots_are_reported(vx, points, off):
     restitution, energy = energies()
-    found = design.solve(inclined(), "plate.restitution=0:1", f"dEk={energy(0.1)!r} J", points=21)
-    expected = sorted([restitution(0.1), restitution(-0.1)])
-    np.testing.assert_allclose(found.points[:, 0], expected, rtol=0.0, atol=1e-10)
+    found = design.solve(
+        inclined(), "plate.restitution=0:1", f"dEk={energy(vx)!r} J", points=points
+    )
+    expected = sorted({restitution(vx), restitution(-vx)})
+    np.testing.assert_allclose(found.points[:, 0], expected, rtol=0.0, atol=off)
     # The picture is of the one next to ε = 0.5.
     assert found.answer.values[0] == min(found.points[:, 0], key=lambda x: abs(x - 0.5))
-    assert "2 solutions" in repr(found)
-
-
-def test_two_roots_between_neighbours_of_the_scan_are_found():
-    restitution, energy = energies()
-    found = design.solve(inclined(), "plate.restitution=0:1", f"dEk={energy(0.01)!r}", points=12)
-    assert len(found.answers) == 2
-    assert abs(np.diff(found.points[:, 0])[0]) < 1.0 / 11.0
-    assert found.points[0, 0] == pytest.approx(restitution(0.01), abs=1e-9)
-
-
-def test_a_root_that_only_touches_is_found():
-    restitution, energy = energies()
-    found = design.solve(inclined(), "plate.restitution=0:1", f"dEk={energy(0.0)!r}", points=20)
-    assert found.points.shape == (1, 1)
-    # The energy is flat there: the root is known to the square root of a rounding.
-    assert found.answer.values[0] == pytest.approx(restitution(0.0), abs=1e-7)
+    assert ("2 solutions" in repr(found)) is (len(expected) == 2)
 
 
 def test_no_root_says_so_and_shows_the_nearest():
@@ -230,30 +204,24 @@ def test_where_nothing_lands_there_is_nothing_to_show():
         _ = found.answer
 
 
-def test_minimum_inside_the_range():
-    restitution, energy = energies()
-    found = design.minimize(inclined(), "plate.restitution=0:1", "dEk", points=15)
-    assert found.answer.place == "inside"
-    assert found.answer.values[0] == pytest.approx(restitution(0.0), abs=1e-7)
-    assert found.answer.found[0] == pytest.approx(energy(0.0), rel=1e-12, abs=0.0)
+def belt_pays(restitution):
+    return M * V * (V - forward(TILT, restitution, d1=R + 0.1))
 
 
-@pytest.mark.parametrize(("goal", "restitution"), [(design.minimize, 0.0), (design.maximize, 1.0)])
-def test_belt_work_is_least_and_most_at_the_ends(goal, restitution):
-    found = goal(inclined(), "plate.restitution=0:1", "belt_work", points=9)
-    vx = forward(TILT, restitution, d1=R + 0.1)
-    assert found.answer.values == (restitution,)
-    assert found.answer.place == "end"
-    assert found.answer.found[0] == pytest.approx(M * V * (V - vx), rel=1e-12, abs=0.0)
-
-
-def test_power_is_the_belt_work_of_a_stream():
-    given = inclined()
-    name = measured(given, "power")
-    assert (name.unit, name.ending) == ("W", "settled")
-    found = design.maximize(given, "plate.restitution=0:1", "power", points=5)
-    vx = forward(TILT, 1.0, d1=R + 0.1)
-    assert found.answer.found[0] == pytest.approx(200.0 * M * V * (V - vx), rel=1e-12, abs=0.0)
+@pytest.mark.parametrize(
+    ("goal", "of", "place", "restitution", "value"),
+    [
+        (design.minimize, "dEk", "inside", energies()[0](0.0), energies()[1](0.0)),
+        (design.minimize, "belt_work", "end", 0.0, belt_pays(0.0)),
+        (design.maximize, "belt_work", "end", 1.0, belt_pays(1.0)),
+        (design.maximize, "power", "end", 1.0, 200.0 * belt_pays(1.0)),
+    ],
+)
+def test_least_and_most_are_inside_or_at_the_ends(goal, of, place, restitution, value):
+    found = goal(inclined(), "plate.restitution=0:1", of, points=9).answer
+    assert found.place == place
+    assert found.values[0] == pytest.approx(restitution, abs=1e-7)
+    assert found.found[0] == pytest.approx(value, rel=1e-12, abs=0.0)
 
 
 def test_what_does_not_depend_on_the_key_has_no_minimum():
@@ -295,21 +263,11 @@ def test_two_targets_and_two_keys():
     again = design.solve(given, KEYS, ["landing.vx=1", "landing.x=0.3"])
     assert again.answer.values == found.answer.values
     assert len(found.answer.sensitivities) == 4
-
-
-@pytest.mark.slow
-def test_minimum_over_two_keys():
-    found = design.minimize(chutelab.load("inclined-20"), KEYS, "belt_work")
-    assert found.answer.values == pytest.approx((60.0, 0.1), abs=1e-6)
-    assert found.answer.place == "end"
-
-
-def test_two_keys_and_an_impossible_target():
-    found = design.solve(inclined(), ["plate.restitution=0:1", "particle.mass=0.01:0.02"],
-                         "landing.vx=9", seed=1)  # fmt: skip
-    assert not found.solved
-    assert found.nearest.values[0] == pytest.approx(0.0, abs=1e-6)
-    assert any("many solutions" in note for note in found.notes)
+    lacking = design.solve(inclined(), ["plate.restitution=0:1", "particle.mass=0.01:0.02"],
+                           "landing.vx=9", seed=1)  # fmt: skip
+    assert not lacking.solved
+    assert lacking.nearest.values[0] == pytest.approx(0.0, abs=1e-6)
+    assert any("many solutions" in note for note in lacking.notes)
 
 
 NAMES = [
@@ -324,7 +282,6 @@ NAMES = [
     [
         ("inclined-20", ("plate.angle_deg", "plate.restitution"), (-10.0, 0.0), (80.0, 1.2)),
         ("perpendicular", ("incoming.speed", "incoming.pulley_radius"), (0.3, 0.05), (4.0, 0.5)),
-        ("slip", ("incoming.friction", "gravity"), (0.1, 1.0), (2.0, 20.0)),
     ],
 )
 def test_variants_run_at_once_give_the_bits_of_single_runs(name, keys, low, high):
@@ -333,7 +290,7 @@ def test_variants_run_at_once_give_the_bits_of_single_runs(name, keys, low, high
     quantities = [measured(given, one) for one in known]
     if given.outgoing is not None:
         quantities += target(given, "landing.vx=outgoing.speed")[1:]
-    draws = np.random.default_rng(5).uniform(low, high, size=(24, 2))
+    draws = np.random.default_rng(5).uniform(low, high, size=(16, 2))
     together = Evaluator(given, keys, quantities)(draws)
     alone = Evaluator(given, keys, quantities)
     singly = [alone(draw[np.newaxis]) for draw in draws]
@@ -425,7 +382,7 @@ def test_without_scipy_it_says_what_to_install(monkeypatch):
 
 def test_files_of_a_solution(tmp_path):
     out = tmp_path / "out"
-    result = CliRunner().invoke(main, [*SOLVE, *VARY, *AIM, "--points", "31", "--out", str(out)])
+    result = CliRunner().invoke(main, [*SOLVE, *VARY, *AIM, "--points", "13", "--out", str(out)])
     assert result.exit_code == 0, result.output
     assert sorted(file.name for file in out.iterdir()) == [
         "overlay.png", "scan.png", "solution.toml", "solve.json",
@@ -455,7 +412,8 @@ def test_no_solution_exits_with_1_and_writes_the_nearest(tmp_path):
 
 
 def test_scan_shows_pieces_target_and_answer():
-    found = design.solve(chutelab.load("inclined-20"), "plate.angle_deg=0:30", "landing.vx=-0.3")
+    found = design.solve(chutelab.load("inclined-20"), "plate.angle_deg=0:30", "landing.vx=-0.3",
+                         points=41)  # fmt: skip
     figure = scan(found)
     gids = [line.get_gid() for line in figure.axes[0].lines]
     assert gids.count("quantity") == 3
@@ -465,22 +423,6 @@ def test_scan_shows_pieces_target_and_answer():
                            "landing.vx=0.2")  # fmt: skip
     with pytest.raises(ValueError, match="several keys"):
         draw_scan(figure.axes[0], several)
-
-
-def test_a_scene_survives_as_text():
-    document = {
-        "title": 'Quotes " and \\ and µ',
-        "particle": {"radius": 0.0, "mass": 1e-05},
-        "surface": [
-            {"name": "floor", "from": [-10.0, 0.0], "to": [10.0, 0.0]},
-            {"name": "hood", "points": [[0.1, 2.0], [0.2, 3.0], [0.3, 2.0]], "speed": -1.0},
-        ],
-        "stream": {"at": [0.0, 1.0], "velocity": [2.0, 0.0], "interact": False},
-    }
-    given = scene.from_dict(document)
-    again = scene.parse(scene.to_toml(given, "A comment\nof two lines"))
-    assert again == given
-    assert scene.to_toml(chutelab.load("perpendicular")).count("expect") == 0
 
 
 # x2 = d1 = R + d_okr for a point that leaves at the top: linear in both.
@@ -577,12 +519,6 @@ def test_kinds_of_outcome_are_told_apart():
     ]  # fmt: skip
 
 
-def test_one_kind_of_outcome_is_a_note():
-    found = design.uncertainty(machine(), "restitution=0.5±0.01", samples=64)
-    assert "All samples touch plate, outgoing." in repr(found)
-    assert "% touch" not in repr(found)
-
-
 def test_samples_that_never_land_are_left_out_and_said():
     given = chutelab.load("inclined-60", ["particle.radius=0.004"])  # misses from 68.9° on
     found = design.uncertainty(given, "plate.angle_deg=69±3", ["landing.vx"], samples=64)
@@ -641,22 +577,13 @@ def test_restitution_dominates_and_the_picture_says_so(tmp_path):
     given = ["restitution=0.5±0.05", "plate.distance=±5mm", "outgoing.drop=±5mm"]
     found = design.uncertainty(machine(), given, samples=128)
     assert found.quantities == ("landing.x", "belt_work")
+    assert "All samples touch plate, outgoing." in repr(found)
     assert all(indices.first[0] > 0.8 for indices in found.indices)
     figure = spread(found)
     figure.write(tmp_path / "spread.png")
     titles = [ax.get_title(loc="left") for ax in figure.axes]
     assert titles.count("against plate.restitution") == 2
     assert (tmp_path / "spread.png").stat().st_size > 10_000
-
-
-def test_the_legend_of_the_shares_covers_no_bar():
-    for given in (["restitution=0.5±0.05"], ["restitution=0.5±0.05", "plate.distance=±5mm"]):
-        figure = spread(design.uncertainty(machine(), given, samples=64))
-        figure.canvas.draw()
-        [ax] = [ax for ax in figure.axes if ax.get_legend() is not None]
-        legend = ax.get_legend().get_window_extent()
-        assert len(ax.patches) == 2 * len(given)
-        assert not any(legend.overlaps(bar.get_window_extent()) for bar in ax.patches)
 
 
 def propagate(folder, given, *options, code=0):
@@ -706,57 +633,7 @@ def test_sweep_refuses_uncertainties_before_it_runs(given, options, said, monkey
     assert said in propagate(tmp_path, given, *options, code=2).stderr
 
 
-def test_frames_need_pandas_or_say_so(linear, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ImportError, match="pip install pandas"):
-        linear.frame()
-
-
 LESSON = Path(__file__).parent.parent / "lessons" / "09-design"
-
-
-def test_the_worksheets_commands_run(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    text = (LESSON / "README.md").read_text(encoding="utf-8")
-    commands = re.findall(r"^chutelab (.*)$", text, re.MULTILINE)
-    assert len(commands) == 9
-    said = []
-    for command in commands:
-        result = CliRunner().invoke(main, shlex.split(command))
-        assert result.exit_code == 0, result.output
-        said.append(result.output)
-    assert "28.939" in said[0]
-    assert "47.8289" in said[1]
-    assert "0.0071011" in said[2]
-    assert "0.016" in said[3]
-    # m v_b (v_b - v_x), with a belt of 1 m/s under the plate of 60°; without slip where v_x = 1 m/s
-    assert "least                  60  -0.0044494" in said[4]
-    assert "least         47.8289" in said[5]
-    assert "share of plate.restitution   70" in said[7]
-
-
-def test_the_worksheets_numbers_hold():
-    text = " ".join((LESSON / "explanation.md").read_text(encoding="utf-8").split())
-    given = chutelab.load("inclined-20")
-    down = design.solve(given, "plate.angle_deg=11:60", "landing.vx=0", points=21).scene
-    # Straight down the belt pays m v_b², at 60° less than a quarter of it.
-    assert design.value(down, "belt_work") == pytest.approx(M * V**2)
-    assert "32.0 mJ" in text
-    energies = [design.value(chutelab.load(f"inclined-{n}"), "dEk") for n in (20, 40, 60)]
-    assert max(energies) == energies[2]
-    assert "the most expensive of the three" in text
-    found = design.uncertainty(
-        chutelab.load("inclined-40"),
-        ["restitution=0.5±0.05", "plate.angle_deg=±0.5", "plate.distance=±2mm",
-         "incoming.speed=±1%"],
-        samples=4096,
-    )  # fmt: skip
-    low, high = found.interval[0]
-    assert 0.5 * (high - low) == pytest.approx(0.024, abs=5e-4)
-    shares = (100.0 * found.indices[0].first).round().astype(int).tolist()
-    assert shares == [70, 18, 11, 1]
-    assert "70 % of its variance" in text
-    assert "18 % that of the angle, 11 % that of the distance and 1 % that of the speed" in text
 
 
 def test_a_search_answers_the_exercise_of_lesson_9():

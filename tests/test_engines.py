@@ -24,7 +24,8 @@ from chutelab.machine import build
 from chutelab.results import REASONS, Kind, balance
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
-from chutelab.scene import from_dict, load, parse
+from chutelab.scene import from_dict, load
+from machines import face
 
 G, R, M = 9.81, 0.0063, 0.008
 
@@ -35,69 +36,37 @@ def ran(engine, machine, progress=None):
     return import_module(f"chutelab.engines.{engine}").run(machine, progress)
 
 
-def simulated(engine, text, *overrides):
-    return ran(engine, build(parse(text, overrides=overrides)))
+def simulated(engine, *surfaces, at, velocity, until, **tables):
+    """Run a lone particle; more tables are named, and keys of `run` and `particle` go into them."""
+    run = {"until": until} | {key: tables.pop(key) for key in ("dt", "max_time") if key in tables}
+    particle = {key: tables.pop(key) for key in ("radius", "spin") if key in tables}
+    stream = {"at": list(at), "velocity": list(velocity)}
+    tables |= {"surface": list(surfaces), "stream": stream, "particle": particle, "run": run}
+    return ran(engine, build(from_dict(tables)))
 
 
 def shipped(engine, name, *overrides):
     return ran(engine, build(load(name, overrides)))
 
 
-def lone(engine, at, velocity, until, *, surface="", spin=False, dt=1e-3, far=0.0):
-    return simulated(
-        engine,
-        f"""
-[particle]
-spin = {str(spin).lower()}
-[stream]
-at = [{at[0] + far}, {at[1] + far}]
-velocity = [{velocity[0]}, {velocity[1]}]
-[run]
-until = {until}
-dt = {dt}
-{surface}
-""",
-    )
+def floor(*, height=0.0, ends=(-20.0, 20.0), **values):
+    usual = {"restitution": 0.0, "friction": 0.0}
+    return face("floor", (ends[0], height), (ends[1], height), **usual | values)
 
 
-def floor(*, restitution=0.0, friction=0.0, speed=0.0, height=0.0, ends=(-20.0, 20.0)):
-    return f"""
-[[surface]]
-name = "floor"
-from = [{ends[0]}, {height}]
-to = [{ends[1]}, {height}]
-restitution = {restitution}
-friction = {friction}
-speed = {speed}
-"""
+FAR = {"name": "far", "points": [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0]]}
 
 
-def released(places, velocities, times, *, surface="", until=0.2, dt=1e-3, spin=False, **pair):
+def released(places, velocities, times, *, surface=FAR, until=0.2, dt=1e-3, spin=False, **pair):
     """Machine of particles that meet, each released where and when told."""
-    told = {"gravity": 0.0, "restitution": 0.7, "friction": 0.4, **pair}
-    far = '[[surface]]\nname = "far"\npoints = [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0]]'
-    machine = build(
-        parse(
-            f"""
-gravity = {told["gravity"]}
-[particle]
-spin = {str(spin).lower()}
-[stream]
-count = {len(times)}
-rate = 1.0
-at = [0.0, 1.0]
-velocity = [1.0, 0.0]
-bed_height = 0.01
-interact = true
-restitution = {told["restitution"]}
-friction = {told["friction"]}
-[run]
-until = {until}
-dt = {dt}
-{surface or far}
-"""
-        )
-    )
+    values = {"restitution": 0.7, "friction": 0.4, **pair}
+    gravity = values.pop("gravity", 0.0)
+    stream = {"count": len(times), "rate": 1.0, "at": [0.0, 1.0], "velocity": [1.0, 0.0],
+              "bed_height": 0.01, "interact": True, **values}  # fmt: skip
+    machine = build(from_dict({
+        "gravity": gravity, "particle": {"spin": spin}, "surface": [surface], "stream": stream,
+        "run": {"until": until, "dt": dt},
+    }))  # fmt: skip
     releases = replace(
         machine.releases,
         t=np.array(times, dtype=float),
@@ -125,10 +94,10 @@ def same(one, other):
 
 
 @both
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(vx=st.floats(-5.0, 5.0), vy=st.floats(-5.0, 5.0), end=st.floats(0.01, 1.0))
 def test_free_flight_is_the_parabola(engine, vx, vy, end):
-    recording = lone(engine, (0.3, 2.0), (vx, vy), end, surface=floor(height=-50.0))
+    recording = simulated(engine, floor(height=-50.0), at=(0.3, 2.0), velocity=(vx, vy), until=end)
     knot = recording.track(0)[-1]
     scale = hypot(0.3, 2.0) + hypot(vx, vy) * end + G * end**2
     x, y = 0.3 + vx * end, 2.0 + vy * end - 0.5 * G * end**2
@@ -141,7 +110,7 @@ def test_free_flight_is_the_parabola(engine, vx, vy, end):
 
 
 @both
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     restitution=st.one_of(st.just(0.0), st.floats(0.05, 1.0)),
     friction=st.floats(0.0, 1.5),
@@ -152,7 +121,9 @@ def test_free_flight_is_the_parabola(engine, vx, vy, end):
 def test_a_bounce_keeps_newtons_and_coulombs_laws(engine, restitution, friction, speed, vx, spin):
     fall = 0.2
     belt = floor(restitution=restitution, friction=friction, speed=speed)
-    recording = lone(engine, (0.0, R + fall), (vx, 0.0), 0.25, surface=belt, spin=spin)
+    recording = simulated(
+        engine, belt, at=(0.0, R + fall), velocity=(vx, 0.0), until=0.25, spin=spin
+    )
     hit = recording.select(Kind.IMPACT)[0]
     approach = sqrt(2.0 * G * fall)
     normal = M * (1.0 + restitution) * approach
@@ -169,66 +140,16 @@ def test_a_bounce_keeps_newtons_and_coulombs_laws(engine, restitution, friction,
 
 
 @both
-@settings(max_examples=40)
-@given(angle=st.floats(-170.0, 170.0), restitution=st.floats(0.1, 1.0), skew=st.floats(-60.0, 60.0))
-def test_a_surface_is_struck_r_in_front_of_it_whatever_its_direction(
-    engine, angle, restitution, skew
-):
-    # Through the origin, struck from 0.1 m away without gravity.
-    t = np.array([cos(radians(angle)), sin(radians(angle))])
-    n = np.array([-t[1], t[0]])
-    course = -(cos(radians(skew)) * n + sin(radians(skew)) * t)
-    start = -0.1 * course
-    recording = simulated(
-        engine,
-        f"""
-gravity = 0.0
-[stream]
-at = [{start[0]}, {start[1]}]
-velocity = [{course[0]}, {course[1]}]
-[run]
-until = 0.15
-[[surface]]
-name = "wall"
-from = [{-t[0]}, {-t[1]}]
-to = [{t[0]}, {t[1]}]
-restitution = {restitution}
-friction = 0.0
-""",
-    )
-    hit = recording.select(Kind.IMPACT)[0]
-    assert hit["position"] @ n == pytest.approx(R, abs=1e-12)
-    assert hit["velocity_after"] @ n == pytest.approx(restitution * cos(radians(skew)), abs=1e-11)
-    assert hit["velocity_after"] @ t == pytest.approx(course @ t, abs=1e-11)
-
-
-@both
 @pytest.mark.parametrize("dt", [1 / 60, 1e-3])
-@pytest.mark.parametrize("speed", [20.0, 2000.0])
-@pytest.mark.parametrize("lean", [0.0, 40.0, -70.0])
+@pytest.mark.parametrize(("speed", "lean"), [(20.0, -70.0), (2000.0, 0.0), (2000.0, 40.0)])
 def test_nothing_is_too_fast_to_be_stopped(engine, dt, speed, lean):
     # r = 2 mm against a plate 1 m away, whose normal leans by an angle; without gravity.
     r, a = 0.002, radians(lean)
+    wall = face("wall", (-sin(a), -cos(a)), (sin(a), cos(a)), restitution=0.5, friction=0.0)
     recording = simulated(
-        engine,
-        f"""
-gravity = 0.0
-[particle]
-radius = {r}
-[stream]
-at = [-1.0, 0.0]
-velocity = [{speed}, 0.0]
-[run]
-until = {1.5 / speed}
-dt = {dt}
-[[surface]]
-name = "wall"
-from = [{-sin(a)}, {-cos(a)}]
-to = [{sin(a)}, {cos(a)}]
-restitution = 0.5
-friction = 0.0
-""",
-    )
+        engine, wall, at=(-1.0, 0.0), velocity=(speed, 0.0), until=1.5 / speed, dt=dt, radius=r,
+        gravity=0.0,
+    )  # fmt: skip
     (hit,) = recording.select(Kind.IMPACT)
     way = 1.0 - r / cos(a)
     assert hit["t"] == pytest.approx(way / speed, rel=1e-12, abs=0.0)
@@ -242,31 +163,15 @@ friction = 0.0
 
 
 @settings(max_examples=40)
-@given(u=st.floats(0.1, 3.0), v=st.floats(-3.0, 0.0), restitution=st.floats(0.0, 1.0))
-def test_equal_disks_head_on(u, v, restitution):
-    reach = 0.1 - 2.0 * R - 0.05 * u
-    if reach < 1e-3:  # they would meet before the second is there
-        return
-    recording = contact.run(pair([(u, 0.0), (v, 0.0)], restitution=restitution, until=1.5))
-    hit, *more = recording.select(Kind.COLLISION)
-    # Without restitution they touch from then on, and may meet again with a rounding error's speed.
-    assert restitution < 1e-10 or not more
-    assert all(again["normal_impulse"] < 1e-15 * M for again in more)
-    assert hit["t"] == pytest.approx(0.05 + reach / (u - v), rel=1e-10)
-    first, second = last(recording, "velocity")[:, 0]
-    assert first == pytest.approx(0.5 * ((u + v) - restitution * (u - v)), abs=1e-10)
-    assert second == pytest.approx(0.5 * ((u + v) + restitution * (u - v)), abs=1e-10)
-    lost = 0.25 * M * (1.0 - restitution**2) * (u - v) ** 2
-    books = ledger(recording)
-    assert books.by_surface["particles"]["restitution_loss"] == pytest.approx(lost, abs=1e-12)
-    assert books.relative_residual < 1e-12
-
-
-@settings(max_examples=40)
-@given(offset=st.floats(-1.8 * R, 1.8 * R), friction=st.floats(0.0, 2.0), spin=st.booleans())
-def test_oblique_disks_keep_momentum_and_turn(offset, friction, spin):
-    velocities, restitution = [(1.0, 0.0), (-1.0, 0.0)], 0.7
-    recording = contact.run(pair(velocities, offset=offset, friction=friction, spin=spin))
+@given(
+    offset=st.floats(-1.8 * R, 1.8 * R),
+    restitution=st.floats(0.05, 1.0),
+    friction=st.floats(0.0, 2.0),
+    spin=st.booleans(),
+)
+def test_two_disks_keep_momentum_and_turn(offset, restitution, friction, spin):
+    given_ = {"restitution": restitution, "friction": friction, "spin": spin, "until": 0.1}
+    recording = contact.run(pair([(1.0, 0.0), (-1.0, 0.0)], offset=offset, **given_))
     # Line of centres at the touch, from the first to the second.
     c = np.array([sqrt(4.0 * R**2 - offset**2), offset]) / (2.0 * R)
     t = np.array([-c[1], c[0]])
@@ -279,7 +184,10 @@ def test_oblique_disks_keep_momentum_and_turn(offset, friction, spin):
     assert last(recording, "velocity") == pytest.approx(np.array([first, second]), abs=1e-9)
     spun = -rub * R / (0.5 * M * R**2) if spin else 0.0
     assert last(recording, "omega") == pytest.approx([spun, spun], abs=1e-6)
-    assert ledger(recording).relative_residual < 1e-12
+    books = ledger(recording)
+    lost = 0.25 * M * (1.0 - restitution**2) * (relative @ c) ** 2
+    assert books.by_surface["particles"]["restitution_loss"] == pytest.approx(lost, abs=1e-12)
+    assert books.relative_residual < 1e-12
 
 
 def test_a_blow_goes_through_a_row_within_one_step():
@@ -296,13 +204,12 @@ def test_a_blow_goes_through_a_row_within_one_step():
     assert ends[[0, 1, 2, 3, 5]] == pytest.approx(np.zeros((5, 2)), abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    "engine",
-    ["contact", "pymunk"],
-)
+@both
 def test_bounces_come_to_rest_in_the_time_of_the_closed_form(engine):
     fall, e = 0.1, 0.5
-    recording = lone(engine, (0.0, R + fall), (0.0, 0.0), '"settled"', surface=floor(restitution=e))
+    recording = simulated(
+        engine, floor(restitution=e), at=(0.0, R + fall), velocity=(0.0, 0.0), until="settled"
+    )
     # Down once, then 2 ε^n times as long for every further bounce; a few steps of rest at the end.
     total = sqrt(2.0 * fall / G) * (1.0 + 2.0 * e / (1.0 - e))
     assert recording.track(0)[-1]["t"] == pytest.approx(total, abs=5e-3)
@@ -324,7 +231,7 @@ def test_bounces_come_to_rest_in_the_time_of_the_closed_form(engine):
 )
 def test_a_belt_pays_for_the_speed_it_gives(engine, spin, speed, work, heat):
     belt = floor(friction=0.3, speed=speed)
-    recording = lone(engine, (0.0, R), (0.0, 0.0), 3.0, surface=belt, spin=spin)
+    recording = simulated(engine, belt, at=(0.0, R), velocity=(0.0, 0.0), until=1.0, spin=spin)
     books = ledger(recording)
     assert books.belt_work == pytest.approx(work, rel=1e-10)
     assert books.friction_loss == pytest.approx(heat, rel=1e-10)
@@ -333,24 +240,11 @@ def test_a_belt_pays_for_the_speed_it_gives(engine, spin, speed, work, heat):
     assert books.relative_residual < 1e-10
 
 
-@pytest.mark.parametrize("spin", [False, True])
-def test_accounts_of_surfaces_and_particles_agree_however_a_slide_is_cut(spin):
-    # Around the end of the slip, µ g t = v, and a third of it for a disk that may turn.
-    mu, v = 0.3, 1.0
-    end = v / (mu * G) / (3.0 if spin else 1.0)
-    belt = floor(friction=mu, speed=v)
-    for until in np.linspace(end - 3e-3, end + 3e-3, 25):
-        recording = lone("contact", (0.0, R), (0.0, 0.0), until, surface=belt, spin=spin)
-        entries = recording.track(0)[-1]["entries"]
-        assert recording.by_surface.sum(axis=0) == pytest.approx(entries, abs=1e-15)
-        # Steps: the last one may end within the slip.
-        paid = mu * M * G * v * min(until, end)
-        assert entries[0] == pytest.approx(paid, abs=0.5 * mu * M * G * v * 1e-3)
-
-
 @pytest.mark.parametrize("until", [0.2, 3.0])
 def test_a_slide_leaves_few_knots_and_is_a_parabola_between_them(until):
-    recording = lone("contact", (0.0, R), (9.0, 0.0), until, surface=floor(friction=0.2))
+    recording = simulated(
+        "contact", floor(friction=0.2), at=(0.0, R), velocity=(9.0, 0.0), until=until
+    )
     assert len(recording.track(0)) < 10
     times = np.linspace(0.0, until, 50)
     position, velocity = recording.at(times)
@@ -369,7 +263,7 @@ def test_off_the_end_of_a_table_it_flies(engine, crowded):
         machine = released(places, velocities, (0.0, 0.0), surface=table, until=1.0, gravity=G)
         recording = ran(engine, machine)
     else:
-        recording = lone(engine, (0.0, R), (1.0, 0.0), 1.0, surface=table)
+        recording = simulated(engine, table, at=(0.0, R), velocity=(1.0, 0.0), until=1.0)
     speed = sqrt(1.0 - 2.0 * 0.1 * G * 0.3)
     end = recording.track(0)[-1]
     fall = end["t"] - (1.0 - speed) / (0.1 * G)
@@ -400,54 +294,16 @@ def test_the_ride_stays_on_its_circle_and_is_braked_by_the_belt(engine, name):
 @both
 def test_a_ride_ends_where_something_is_in_its_way(engine):
     # A wedge at 45° whose tip lies on the belt: n = (-1, 1)/√2, met r in front of its face.
+    scraper = face("scraper", (-0.5, 0.1), (-0.3, 0.3), restitution=0.5, friction=0.0)
     recording = simulated(
-        engine,
-        """
-[incoming]
-speed = 1.0
-pulley_radius = 0.1
-[[surface]]
-name = "scraper"
-from = [-0.5, 0.1]
-to = [-0.3, 0.3]
-restitution = 0.5
-friction = 0.0
-[run]
-until = 0.55
-""",
-    )
+        engine, scraper, at=(-1.0, 0.1 + R), velocity=(1.0, 0.0), until=0.55,
+        incoming={"speed": 1.0, "pulley_radius": 0.1},
+    )  # fmt: skip
     hit = recording.select(Kind.IMPACT, surface="scraper")[0]
     assert hit["t"] == pytest.approx(0.5 + R - R * sqrt(2.0), abs=1e-12)
     # (1 + ε) of the normal velocity, 1/√2, is given back along n.
     after = np.array([1.0, 0.0]) + 1.5 * sqrt(0.5) * np.array([-1.0, 1.0]) / sqrt(2.0)
     assert hit["velocity_after"] == pytest.approx(after, abs=1e-9)
-
-
-@pytest.mark.parametrize("align", ["true", "false"])
-def test_a_ride_along_a_surface_ends_where_it_meets_it(align):
-    # A ceiling 2 r above the belt is touched all the way; a floor goes straight on at the top.
-    recording = simulated(
-        "pymunk",
-        f"""
-[incoming]
-speed = 1.0
-pulley_radius = 0.1
-[[surface]]
-name = "ceiling"
-from = [-0.5, {0.1 + 2.0 * R + 1e-14}]
-to = [-0.3, {0.1 + 2.0 * R + 1e-14}]
-[[surface]]
-name = "floor"
-from = [-0.2, 0.1]
-to = [0.5, 0.1]
-[run]
-until = 1.2
-align = {align}
-""",
-    )
-    away = recording.select(Kind.SEPARATION, surface="incoming")[0]
-    assert away["t"] == pytest.approx(1.0, abs=1e-6)
-    assert recording.seconds < 5.0
 
 
 def in_the_way(place, end):
@@ -483,39 +339,24 @@ def test_what_a_carried_partner_gives_is_booked_when_it_is_given():
     assert np.ptp(track["entries"][:, 0]) > 1e-3
 
 
-def belts(friction=0.6, restitution=0.0, speed=0.7):
-    """Belts that lean at 20° to either side and draw down what lies between them."""
-    return "".join(
-        f"""
-[[surface]]
-name = "{name}"
-from = [{side * 0.37}, 1.0]
-to = [{side * 0.01}, 0.0]
-friction = {friction}
-restitution = {restitution}
-speed = {speed}
-"""
+def belts(places, **values):
+    """Belts that run from the first place to the second, and their mirror image."""
+    return [
+        face(name, *([side * x, y] for x, y in places), friction=0.6, **values)
         for name, side in (("left", -1.0), ("right", 1.0))
-    )
+    ]
 
 
-@pytest.mark.parametrize("restitution", [0.0, 0.3, 0.8])
 @pytest.mark.parametrize(
-    ("until", "spin"),
-    [
-        (3.0, True),
-        (3.0, False),
-        ('"settled"\nmax_time = 3.0', True),
-        ('"settled"\nmax_time = 3.0', False),
-    ],
+    ("until", "spin", "restitution"),
+    [(3.0, True, 0.3), (3.0, False, 0.8), ("settled", False, 0.0)],
 )
 def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restitution):
     # tan 20° < µ: friction holds it against any push. Both belts slip past it: it has not settled.
     recording = simulated(
-        "contact",
-        f"[particle]\nradius = 0.05\nspin = {str(spin).lower()}\n[stream]\nat = [0.0, 1.2]\n"
-        f"velocity = [0.0, 0.0]\n[run]\nuntil = {until}\n{belts(restitution=restitution)}",
-    )
+        "contact", *belts([(0.37, 1.0), (0.01, 0.0)], speed=0.7, restitution=restitution),
+        at=(0.0, 1.2), velocity=(0.0, 0.0), until=until, max_time=3.0, radius=0.05, spin=spin,
+    )  # fmt: skip
     end = recording.track(0)[-1]
     # From the lower end (-0.01, 0) of a face along (0.36, -1), its normal (1, 0.36): r away.
     height = (0.05 * hypot(1.0, 0.36) - 0.01) / 0.36
@@ -529,27 +370,15 @@ def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restit
     assert ledger(recording).relative_residual < 1e-10
 
 
-@pytest.mark.parametrize("speed", [0.1, 2.0])
-@pytest.mark.parametrize("degrees", [0.5, 2.0, 8.0])
+@pytest.mark.parametrize(("speed", "degrees"), [(2.0, 0.5), (0.1, 2.0), (2.0, 8.0)])
 def test_a_narrow_wedge_of_belts_is_no_way_through(speed, degrees):
     # Both faces touch a disk at the origin, and go on below it.
     r, c, s = 0.02, cos(radians(degrees)), sin(radians(degrees))
-    walls = "".join(
-        f"""
-[[surface]]
-name = "{name}"
-from = [{side * (r * c + s)}, {-r * s + c}]
-to = [{side * (r * c - 0.1 * s)}, {-r * s - 0.1 * c}]
-friction = 0.6
-speed = {speed}
-"""
-        for name, side in (("left", -1.0), ("right", 1.0))
-    )
+    places = (r * c + s, c - r * s), (r * c - 0.1 * s, -r * s - 0.1 * c)
     recording = simulated(
-        "contact",
-        f"[particle]\nradius = {r}\n[stream]\nat = [0.0, 0.1]\nvelocity = [0.0, 0.0]\n"
-        f"[run]\nuntil = 1.0\n{walls}",
-    )
+        "contact", *belts(places, speed=speed),
+        at=(0.0, 0.1), velocity=(0.0, 0.0), until=1.0, radius=r,
+    )  # fmt: skip
     end = recording.track(0)[-1]
     assert end["velocity"] == pytest.approx([0.0, 0.0], abs=1e-6)
     # Half a percent of the radius in each face at most.
@@ -559,51 +388,23 @@ speed = {speed}
 
 def test_no_belt_wedges_a_disk_that_it_rolls_out_of_a_corner():
     # The belt under it runs away from the wall: it rests there only as long as it does not grip.
-    corner = """
-[particle]
-radius = 0.05
-[stream]
-at = [0.06, 0.3]
-velocity = [-0.5, 0.0]
-[run]
-until = 1.0
-[[surface]]
-name = "wall"
-from = [0.0, 1.0]
-to = [0.0, -0.1]
-[[surface]]
-name = "belt"
-from = [-0.1, 0.0]
-to = [3.0, 0.0]
-friction = 0.6
-speed = 0.7
-"""
-    end = simulated("contact", corner).track(0)[-1]
+    wall = face("wall", (0.0, 1.0), (0.0, -0.1))
+    belt = face("belt", (-0.1, 0.0), (3.0, 0.0), friction=0.6, speed=0.7)
+    end = simulated(
+        "contact", wall, belt, at=(0.06, 0.3), velocity=(-0.5, 0.0), until=1.0, radius=0.05
+    ).track(0)[-1]
     assert end["velocity"] == pytest.approx([0.7, 0.0], abs=1e-6)
     assert end["position"][1] == pytest.approx(0.05, abs=1e-3 * 0.05)
 
 
 @both
 def test_a_pile_in_a_box_stays_in_it_and_gains_nothing(engine):
-    recording = simulated(
-        engine,
-        """
-[stream]
-count = 30
-rate = 100.0
-at = [0.0, 0.05]
-velocity = [0.3, 0.0]
-bed_height = 0.1
-interact = true
-[run]
-until = 2.0
-[[surface]]
-name = "box"
-points = [[-0.05, 0.2], [-0.05, 0.0], [0.05, 0.0], [0.05, 0.2]]
-friction = 0.5
-restitution = 0.3
-""",
-    )
+    box = {"name": "box", "points": [[-0.05, 0.2], [-0.05, 0.0], [0.05, 0.0], [0.05, 0.2]],
+           "friction": 0.5, "restitution": 0.3}  # fmt: skip
+    stream = {"count": 30, "rate": 100.0, "at": [0.0, 0.05], "velocity": [0.3, 0.0],
+              "bed_height": 0.1, "interact": True}  # fmt: skip
+    recording = ran(engine, build(from_dict({"surface": [box], "stream": stream,
+                                             "run": {"until": 2.0}})))  # fmt: skip
     ends = last(recording)
     assert np.all(np.abs(ends[:, 0]) < 0.05 - 0.9 * R)
     assert np.all(ends[:, 1] > 0.9 * R)
@@ -616,25 +417,15 @@ restitution = 0.3
         assert ledger(recording).relative_residual < 0.05
 
 
-def test_energy_never_rises_where_nothing_is_driven():
-    recording = shipped("contact", "free-fall")
-    for particle in range(recording.count):
-        track = recording.track(particle)
-        energy = np.sum(recording.energies(track), axis=0)
-        # In contact a hop's m (g dt)²/8, twice, is what the halfway velocity may have or not.
-        assert np.diff(energy).max() <= 2.0 * M * (G * 1e-3) ** 2 / 8.0
-        assert energy[-1] < 0.1 * energy[0]
-
-
 # Ends, hosts
 
 
-@pytest.mark.parametrize("until", ['"settled"', "6.0"])
+@pytest.mark.parametrize("until", ["settled", 6.0])
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk", "reference"])
 def test_what_misses_everything_leaves_a_metre_below(engine, until):
     vx, vy, begin, lowest = 0.75, 1.5, 1.0, -0.25
-    step = f'[[surface]]\nname = "step"\npoints = [[-1.0, {lowest}], [0.5, {lowest}]]'
-    recording = lone(engine, (30.0, begin), (vx, vy), until, surface=floor() + step)
+    step = face("step", (-1.0, lowest), (0.5, lowest))
+    recording = simulated(engine, floor(), step, at=(30.0, begin), velocity=(vx, vy), until=until)
     (gone,) = recording.select(Kind.EXIT)
     fall = begin - (lowest - 1.0)
     time = (vy + sqrt(vy**2 + 2.0 * G * fall)) / G
@@ -652,13 +443,13 @@ def test_what_misses_everything_leaves_a_metre_below(engine, until):
     assert books.belt_work == books.restitution_loss == books.friction_loss == 0.0
 
 
-@pytest.mark.parametrize("until", ['"settled"', "6.0"])
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk", "reference"])
-def test_without_gravity_it_leaves_a_metre_outside_the_box_of_all(engine, until):
-    step = '\n[[surface]]\nname = "step"\npoints = [[-1.0, -0.25], [0.5, 0.75]]'
-    without = f"gravity = 0.0\n[stream]\nat = [0.0, 2.0]\nvelocity = [0.5, -0.125]\n{step}"
-    made = build(parse(f"{without}\n[run]\nuntil = {until}"))
-    (gone,) = ran(engine, made).select(Kind.EXIT)
+def test_without_gravity_it_leaves_a_metre_outside_the_box_of_all(engine):
+    step = face("step", (-1.0, -0.25), (0.5, 0.75))
+    recording = simulated(
+        engine, step, at=(0.0, 2.0), velocity=(0.5, -0.125), until=6.0, gravity=0.0
+    )
+    (gone,) = recording.select(Kind.EXIT)
     assert gone["t"] == pytest.approx((0.5 + 1.0) / 0.5, rel=1e-12, abs=0.0)
     assert gone["position"] == pytest.approx([1.5, 2.0 - 0.125 * 3.0], rel=1e-12, abs=0.0)
 
@@ -683,9 +474,8 @@ def test_of_a_crowd_each_leaves_where_it_falls_off(engine):
 
 
 def test_what_hangs_on_a_string_has_not_left():
-    ball = "at = [3.0, 0.0]\nvelocity = [0.0, 0.0]"
-    string = "[[string]]\nfrom = [0.0, 0.0]"
-    recording = simulated("pymunk", f"[stream]\n{ball}\n{string}\n[run]\nuntil = 1.0")
+    string = {"from": [0.0, 0.0]}
+    recording = simulated("pymunk", at=(3.0, 0.0), velocity=(0.0, 0.0), until=1.0, string=[string])
     # From the horizontal it is at its lowest, 3 m below, after K(1/2) √(L/g) = 1.854 √(L/g).
     end = recording.track(0)[-1]
     assert (REASONS[recording.ended[0]], end["t"]) == ("time", 1.0)
@@ -698,29 +488,6 @@ def test_independent_particles_pass_through_each_other(engine):
     assert not len(together.select(Kind.COLLISION))
     alone = shipped(engine, "perpendicular", "run.until=0.9")
     assert together.track(0).tobytes() == alone.track(0).tobytes()
-
-
-@both
-def test_a_machine_far_away_moves_as_one_here(engine):
-    def off_the_edge(far):
-        table = floor(friction=0.3, height=far, ends=(far - 2.0, far + 0.125))
-        return lone(engine, (-0.25, 0.0078125), (1.5, 0.0), 0.5, surface=table, far=far)
-
-    # A power of two, so that it adds without rounding; half a last place of it is 6e-11 m.
-    here, there = off_the_edge(0.0), off_the_edge(2.0**19)
-    times = np.linspace(0.0, 0.5, 100)
-    shifted = there.at(times)[0] - 2.0**19
-    np.testing.assert_allclose(shifted, here.at(times)[0], rtol=0.0, atol=1e-9)
-    assert there.events["kind"].tolist() == here.events["kind"].tolist()
-
-
-@both
-def test_progress_is_rare(engine):
-    shares = []
-    recording = ran(engine, build(load("belt-landing", ["run.until=settled"])), shares.append)
-    assert shares == sorted(shares)
-    assert shares[-1] == 1.0
-    assert len(shares) <= 2 + recording.steps / 64 + recording.seconds / 0.05
 
 
 def test_who_stalls_is_named_and_what_was_recorded_is_kept(monkeypatch):
@@ -762,11 +529,10 @@ def test_an_interrupt_leaves_nothing_behind_for_the_next_run():
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-@both
-def test_ctrl_c_stops_a_long_run_at_once(engine):
+def test_ctrl_c_stops_a_long_run_at_once():
     environment = {**os.environ, "PYTHONPATH": str(Path(chutelab.__file__).parents[1])}
     words = ["run", "stream", "--set", "stream.count=20000", "--set", "stream.rate=1000"]
-    command = [sys.executable, "-m", "chutelab", *words, "--engine", engine, "--json"]
+    command = [sys.executable, "-m", "chutelab", *words, "--engine", "contact", "--json"]
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as running:
@@ -779,7 +545,7 @@ def test_ctrl_c_stops_a_long_run_at_once(engine):
     assert said.strip().endswith("Interrupted.")
 
 
-@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+@both
 def test_a_crowd_on_a_gate_that_is_still_to_open_has_not_settled(engine):
     gate = {"name": "gate", "from": [-0.2, 0.0], "to": [0.2, 0.0], "restitution": 0.0}
     row = {"count": 5, "at": [-0.06, 0.01], "to": [0.06, 0.01], "velocity": [0.0, 0.0]}

@@ -9,11 +9,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from chains import draw, tables
 from chutelab.engines import contact, exact
 from chutelab.engines.exact import detect, obstacles
 from chutelab.machine import build
-from chutelab.results.recorder import StalledError
 from chutelab.scene import from_dict
 from judge import faults
 
@@ -119,38 +117,6 @@ def test_below_a_joint_of_three_pieces_it_goes_straight_on():
     flat = line([-0.6, 0.0], [0.6, 0.0])
     _, alone = ran({"radius": 0.008}, [flat], (-0.5, -0.0081), (2.0, 0.3), until=0.03)
     np.testing.assert_allclose(run.track(0)[-1]["position"], alone.track(0)[-1]["position"])
-
-
-def judged(seeds):
-    """Return the faults of the runs that have some, and what is said where one is refused."""
-    found, refused = {}, {}
-    for seed in seeds:
-        try:
-            run = exact.run(build(draw(seed)))
-        except (exact.CornerError, StalledError) as error:
-            refused[seed] = str(error)
-            continue
-        if said := faults(run, tables(seed)):
-            found[seed] = said
-    return found, refused
-
-
-SHOWN = [420, 652, 819, 1472, 1591, 2847]
-"""A ride that begins at a face that stops it, a ball that rolls slowly through the lowest point,
-two arcs in one place, two that turn back just beyond a corner with a piece, and one that flies off
-where a hollow goes over into a round arc."""
-
-
-def test_random_chains_break_no_law():
-    assert judged([*range(40), *SHOWN]) == ({}, {})
-
-
-@pytest.mark.slow
-def test_thousands_of_random_chains_and_bowls_break_no_law():
-    found, refused = judged(range(3000))
-    assert found == {}
-    assert len(refused) <= 10
-    assert all("particle 0" in said for said in refused.values())
 
 
 def test_the_laws_see_an_engine_that_overlooks_rims_or_sorts_no_joint(monkeypatch):

@@ -1,7 +1,5 @@
 """The paper's figures: printed and corrected equations written out, and the engine beside them."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

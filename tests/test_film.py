@@ -1,7 +1,5 @@
 """Lesson 0: the track is what it says it is, and fits find what the explanation says."""
 
-from __future__ import annotations
-
 from math import pi, sqrt
 
 import numpy as np

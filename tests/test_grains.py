@@ -1,7 +1,5 @@
 """Lessons 10 and 11: grains in a slot and in a heap do what the explanations say."""
 
-from __future__ import annotations
-
 import re
 from math import atan, cos, sin
 

@@ -4,8 +4,6 @@ Read are the sheet in each format, the lesson's page, its card and its live page
 what is written in the film's first part and in the picture of the machine, and its pixels.
 """
 
-from __future__ import annotations
-
 import io
 import re
 from functools import cache
@@ -20,8 +18,8 @@ from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises import find as find_exercise
 from chutelab.classroom.exercises.exercise import draw, shown
 from chutelab.classroom.lessons import find, scene_of, shipped_lessons
-from chutelab.classroom.lessons.building import bundle
-from chutelab.classroom.lessons.printing import printed
+from chutelab.classroom.lessons.pages import bundle
+from chutelab.classroom.lessons.sheets import printed
 from chutelab.classroom.lessons.texts import without_tex, words_for
 from chutelab.engines.simulation import judged
 from chutelab.pictures.animation.files import palette

@@ -1,6 +1,5 @@
 """What gets loaded: text waits for no pictures, a machine for the core alone."""
 
-import ast
 import json
 import os
 import re
@@ -106,32 +105,6 @@ def test_the_package_offers_what_it_promises():
     assert dir(chutelab) == sorted(chutelab.__all__)
     with pytest.raises(AttributeError, match="no attribute 'belt'"):
         chutelab.belt  # noqa: B018
-
-
-def test_the_guide_lists_the_rooms_there_are():
-    package = Path(chutelab.__file__).parent
-    text = (package.parents[1] / "CONTRIBUTING.md").read_text("utf-8")
-    table = text.partition("| room | what lives there |")[2].partition("\n\n")[0]
-    rows = [line.split("|")[1:3] for line in table.splitlines()[2:]]
-    listed = {room.strip(" `"): set(re.findall(r"`(\w+)`", rest)) for room, rest in rows}
-    rooms = {path.name: path for path in package.iterdir() if (path / "__init__.py").is_file()}
-    assert listed.keys() == rooms.keys()
-    for room, modules in listed.items():
-        there = {path.stem for path in rooms[room].iterdir()}
-        assert modules <= there, room
-
-
-PACKAGES = [path.parent for path in Path(chutelab.__file__).parent.rglob("__init__.py")]
-
-
-@pytest.mark.parametrize("package", PACKAGES, ids=lambda path: path.name)
-def test_a_package_says_what_is_in_it(package):
-    """Each module and package stands in the docstring of the folder that it is in."""
-    docstring = ast.get_docstring(ast.parse((package / "__init__.py").read_text("utf-8")))
-    inside = {path.stem for path in package.iterdir() if path.suffix == ".py"}
-    inside |= {path.parent.name for path in package.glob("*/__init__.py")}
-    named = set(re.findall(r"`(\w+)`", docstring))
-    assert not inside - {"__init__", "__main__"} - named
 
 
 def named(text):

@@ -1,12 +1,7 @@
 """The package as a Python user meets it: what functions take, and what they say to a slip."""
 
-from __future__ import annotations
-
 import json
 import signal
-import subprocess
-import sys
-from contextlib import suppress
 from math import radians
 
 import numpy as np
@@ -16,7 +11,6 @@ import chutelab
 from chutelab import design, theory
 from chutelab.checks.preflight import preflight
 from chutelab.machine import build
-from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.results.summary import stopped
 from chutelab.scene import shipped, to_dict
 from chutelab.util.errors import InputError
@@ -124,21 +118,6 @@ def test_what_ends_a_run_has_the_recording_so_far(engine, slip):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_a_run_that_gets_stuck_while_it_is_interrupted_is_interrupted(monkeypatch):
-    def stuck(machine, progress):
-        with suppress(EnoughError):
-            progress(0.5)
-        raise StalledError(0, 0.1, (0.0, 0.0), "stuck", half)
-
-    half = chutelab.simulate("perpendicular")
-    monkeypatch.setattr("chutelab.engines.exact.run", stuck)
-    with pytest.raises(StalledError):
-        chutelab.simulate("perpendicular")
-    with pytest.raises(KeyboardInterrupt) as ended:
-        chutelab.simulate("perpendicular", progress=lambda _: signal.raise_signal(signal.SIGINT))
-    assert ended.value.recording.knots is half.knots
-
-
 def test_degrees_in_place_of_radians_are_told():
     numbers = {"speed": 2.0, "pulley_radius": 0.1, "distance": 0.5}
     with pytest.warns(UserWarning, match=r"angle = 20 is in radians.*np\.radians\(20\)"):
@@ -157,13 +136,3 @@ def test_scenes_and_machines_show_themselves_in_a_line():
         )
         < 150
     )
-
-
-def test_completion_offers_what_is_meant_for_users():
-    code = "import chutelab; chutelab.simulate; chutelab.sweep; print(*dir(chutelab))"
-    offered = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout.split()
-    assert offered == sorted(chutelab.__all__)
-    assert {"Kind", "measure", "scenes", "solve", "sweep"} <= set(offered)
-    assert "perpendicular" in chutelab.scenes()

@@ -1,7 +1,5 @@
 """Laws that no scene may break: random machines of free surfaces, any particle."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import inf
 
@@ -72,7 +70,7 @@ def most(recording):
 
 fuzz = settings(
     deadline=None,
-    max_examples=120,
+    max_examples=80,
     suppress_health_check=list(HealthCheck),
     phases=[Phase.generate],
 )
@@ -145,14 +143,6 @@ def test_in_a_crowd_a_particle_does_what_it_does_alone(soup, count):
     _, alone = run({**crowd, "stream": {**crowd["stream"], "count": 1}, "run": {"until": 1.2}})
     assert together.track(0).tobytes() == alone.track(0).tobytes()
     assert ledger(together).relative_residual <= 1e-12
-
-
-@pytest.mark.slow
-@settings(max_examples=3000, suppress_health_check=list(HealthCheck), phases=[Phase.generate])
-@given(soups())
-def test_the_ledger_closes_on_thousands(soup):
-    _, recording = run(soup)
-    assert abs(ledger(recording).residual) <= most(recording)
 
 
 FASTER = {"s": 0.5, "1/s": 2.0, "m/s": 2.0, "m/s²": 4.0}

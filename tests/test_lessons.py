@@ -1,11 +1,8 @@
 """The lessons: found, validated, started, built."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -48,19 +45,9 @@ def test_a_lesson_is_found_by_number_or_name(wanted):
     assert find(wanted).folder.name == "03-the-bounce"
 
 
-def test_a_lesson_is_found_by_its_folder(tmp_path):
-    start(tmp_path / "my-lesson")
-    lesson = find(tmp_path / "my-lesson")
-    assert (lesson.name, lesson.number, lesson.title) == ("my-lesson", None, "My lesson")
-
-
 @pytest.mark.parametrize(
     ("wanted", "said"),
-    [
-        ("bounce", "did you mean the-bounce?"),
-        ("99", "there are 00-film-a-ball"),
-        ("", "there are"),
-    ],
+    [("bounce", "did you mean the-bounce?"), ("99", "there are 00-film-a-ball"), ("", "there are")],
 )
 def test_what_is_not_there_is_refused_with_advice(wanted, said):
     result = chutelab("lesson", "show", wanted)
@@ -95,17 +82,6 @@ def test_pages_of_lessons_let_one_predict_and_change_what_the_lesson_is_about(nu
         assert key in CONTROLS[number]
         value = value_at(scene, key)
         assert value == "adhesion" or low <= value <= high
-
-
-def test_a_lesson_may_show_all_at_once(tmp_path):
-    plan = start(tmp_path / "mine") / "lesson.toml"
-    text = plan.read_text(encoding="utf-8")
-    plan.write_text(text.replace("predict = true", "predict = false"), encoding="utf-8")
-    lesson = read(tmp_path / "mine")
-    assert not scene_of(lesson, settings=lesson.page.settings).live.predict
-    plan.write_text(text.replace("predict = true ", "# "), encoding="utf-8")
-    lesson = read(tmp_path / "mine")
-    assert scene_of(lesson, settings=lesson.page.settings).live.predict
 
 
 # lesson.toml -------------------------------------------------------------------------------------
@@ -152,11 +128,7 @@ def test_all_faults_of_a_file_are_in_one_message(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (
-            'x3 = "distance',
-            'x9 = "distance',
-            'quantities.x9 = "distance back from',
-        ),
+        ('x3 = "distance', 'x9 = "distance', 'quantities.x9 = "distance back from'),
         ("set = []", 'set = ["plate.tilt=3"]', "picture.set = "),
         ('["plate.restitution"]', '["plate.tilt"]', 'page.live.controls[0] = "plate.tilt": unk'),
         ("[page.live]", "live = 3\n[other]", "page.live = 3: must be a table such as [live] of"),
@@ -193,11 +165,6 @@ def test_a_broken_scene_beside_a_lesson_is_a_fault_of_the_lesson(tmp_path):
         read(folder)
 
 
-def test_a_lesson_cannot_be_changed_after_it_was_read():
-    with pytest.raises(ValueError, match="frozen"):
-        find(3).minutes = 5
-
-
 # build -------------------------------------------------------------------------------------------
 
 
@@ -217,12 +184,6 @@ def small(tmp_path_factory):
 @pytest.fixture
 def copied(small, tmp_path):
     return Path(shutil.copytree(small, tmp_path / "small"))
-
-
-def test_the_same_lesson_gives_the_same_bytes(small, tmp_path):
-    again = build(read(small), tmp_path)
-    assert again.made
-    assert again.path.read_bytes() == (small / "lesson.gif").read_bytes()
 
 
 def test_what_has_not_changed_is_not_built_again(copied):
@@ -250,12 +211,6 @@ def test_a_picture_is_built_again_when_what_it_shows_has_changed(copied, file, o
     assert build(read(copied)).made is made
 
 
-def test_other_versions_build_again(copied, monkeypatch):
-    assert not build(read(copied)).made
-    monkeypatch.setattr("chutelab.classroom.lessons.building.version_of", lambda name: "0.0")
-    assert build(read(copied)).made
-
-
 def test_a_picture_without_a_stamp_or_a_broken_one_is_built_again(copied):
     picture = copied / "lesson.gif"
     whole = picture.read_bytes()
@@ -263,17 +218,6 @@ def test_a_picture_without_a_stamp_or_a_broken_one_is_built_again(copied):
         picture.write_bytes(broken)
         assert build(read(copied)).made
         assert picture.read_bytes() == whole
-
-
-def test_nothing_half_written_is_left(copied, monkeypatch):
-    def fail(self, index):
-        raise RuntimeError("in the middle")
-
-    monkeypatch.setattr("chutelab.pictures.animation.Stage.frame", fail)
-    before = {path.name: path.read_bytes() for path in copied.iterdir()}
-    with pytest.raises(RuntimeError, match="in the middle"):
-        build(read(copied), force=True)
-    assert {path.name: path.read_bytes() for path in copied.iterdir()} == before
 
 
 def test_the_stamp_is_the_comment_of_the_picture(small, tmp_path):
@@ -396,15 +340,6 @@ def test_show_has_question_scenes_quantities_and_worksheet(number):
     assert json.loads(chutelab("lesson", "show", number, "--json").stdout)["number"] == number
 
 
-@pytest.mark.parametrize("command", ["list", "show", "build", "new", "grade", "page"])
-def test_each_command_explains_itself(command):
-    said = chutelab("lesson", command, "--help").stdout
-    assert len(said) > 200
-    if command == "grade":
-        assert "THIS RUNS THE CODE IN NOTEBOOKS" in said
-        assert "container" in said
-
-
 def test_grade_refuses_what_is_no_notebook(tmp_path):
     assert chutelab("lesson", "grade").exit_code == 2
     assert chutelab("lesson", "grade", tmp_path / "missing.ipynb").exit_code == 2
@@ -417,19 +352,6 @@ def test_grade_refuses_what_is_no_notebook(tmp_path):
     assert "JSON" in result.stdout
     assert "nothing to mark" in result.stderr
     assert not (tmp_path / "class.csv").exists()
-
-
-def test_the_template_and_the_lessons_know_the_same_keys():
-    template = Path(start.__code__.co_filename).parent / "template" / "lesson.toml"
-    text = template.read_text(encoding="utf-8").replace("TITLE", '"x"').replace("# slow", "slow")
-    keys = tomllib.loads(text)
-    from chutelab.classroom.lessons import Lesson
-    from chutelab.classroom.lessons.reading import Page, Picture, Teacher
-
-    assert set(keys) == set(Lesson.model_fields)
-    assert set(keys["picture"]) == set(Picture.model_fields)
-    assert set(keys["page"]) == set(Page.model_fields)
-    assert set(keys["teacher"]) == set(Teacher.model_fields)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """``chutelab live``: the file it writes, the browser it opens, and what it refuses."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -69,13 +67,6 @@ def test_a_scene_saved_from_the_page_offers_the_same(tmp_path):
     assert found["scene"]["live"] == {"ranges": found["live"]["ranges"]}
 
 
-def test_quiet_says_nothing_and_a_file_that_is_there_is_replaced(tmp_path):
-    path = tmp_path / "lab.html"
-    path.write_text("mine")
-    assert call("perpendicular", "-q", "-o", path).output == ""
-    assert path.read_text(encoding="utf-8").startswith("<!doctype html>")
-
-
 def shown(tmp_path, **environment):
     """Run it without -o in a process of its own, whose files are in a folder of the test."""
     command = [sys.executable, "-m", "chutelab", "live", "perpendicular"]
@@ -106,27 +97,10 @@ def test_without_a_browser_it_says_so_and_where_the_page_is(tmp_path):
     assert f"no browser could be opened; the page is {page}" in result.stderr
 
 
-def test_german_pages_say_it_in_german(tmp_path):
-    from chutelab.pictures.live import page
-
-    if not (page.files("chutelab.pictures.live") / "assets" / "strings" / "de.json").is_file():
-        pytest.skip("the German catalogue is not there yet")
-    call("perpendicular", "--language", "de", "-o", tmp_path / "lab.html")
-    text = (tmp_path / "lab.html").read_text(encoding="utf-8")
-    assert '<html lang="de">' in text
-    assert data_of(tmp_path / "lab.html")["language"] == "de"
-
-
 def test_what_the_contact_engine_has_not_is_refused_by_its_key(tmp_path):
     result = call("perpendicular", "--set", "particle.radius=0", "-o", tmp_path / "a.html", code=2)
     assert "particle.radius" in result.stderr
     assert not (tmp_path / "a.html").exists()
-
-
-def test_the_old_command_is_gone():
-    result = CliRunner().invoke(main, ["page", "perpendicular"])
-    assert result.exit_code == 2
-    assert "No such command" in result.stderr
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """The page's host of the core does what Python's does, to the last bit."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from chutelab.core import module

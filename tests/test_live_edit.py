@@ -1,11 +1,8 @@
 """What is drawn, typed, kept and shared on the live page, without a screen: in node."""
 
-from __future__ import annotations
-
 import base64
 import csv
 import json
-import re
 from io import StringIO
 
 import numpy as np
@@ -14,7 +11,6 @@ import pytest
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
 from chutelab.scene import from_dict, load, parse, to_toml
-from chutelab.scene.quantities import REGISTRY
 from live.node import ASSETS, needs_node
 from live.node import ask as ask_node
 
@@ -309,48 +305,3 @@ def test_a_table_comes_back_from_its_text_with_all_digits(comma):
     assert back == rows[1:]
     if not comma:
         assert ask({"ask": "stem", "title": "Plate: 40° / 2 m/s"}) == ["Plate-40-2-m-s"]
-
-
-def third(arguments):
-    """The third argument of a call, from the text behind its bracket."""
-    depth, commas, found = 0, 0, ""
-    for letter in arguments:
-        depth += (letter in "([{") - (letter in ")]}")
-        if depth < 0 or (letter == "," and depth == 0 and commas == 2):
-            break
-        if letter == "," and depth == 0:
-            commas += 1
-        elif commas == 2:
-            found += letter
-    return found.strip()
-
-
-def test_both_languages_say_everything_and_nothing_twice():
-    english, german = words("en"), words("de")
-    assert list(english) == sorted(english)
-    assert list(german) == sorted(german)
-    # What quantities are called in English comes with their row of the registry.
-    rows = {f"number-{row.name}" for row in REGISTRY.values() if row.symbol}
-    own = set(german) - set(english)
-    assert set(english) <= set(german)
-    assert own <= rows
-    assert len(own) == 13  # as many as the panel can show
-    for name, text in english.items():
-        blanks = [sorted(re.findall(r"\{\w+\}", one)) for one in (text, german[name])]
-        assert blanks[0] == blanks[1], name
-        assert text.strip()
-        assert german[name].strip()
-    modules = "".join(path.read_text(encoding="utf-8") for path in ASSETS.glob("*.ts"))
-    page = (ASSETS / "page.html").read_text(encoding="utf-8")
-    said = re.findall(r'\bsay\("([\w-]+)"', modules) + re.findall(r'data-\w+="([\w-]+)"', page)
-    faults = {third(rest) for rest in modules.split("new Fault(")[1:]}
-    faults |= {third(rest) for rest in modules.split("yield [")[1:]}
-    faults = {text.strip('"') for text in faults if text.startswith('"')}
-    assert len(said) > 20
-    assert len(faults) > 10
-    assert set(said) - set(english) == set()
-    assert {f"fault-{name}" for name in faults} - set(english) == set()
-    for table in describe(load("perpendicular"))["tables"].values():
-        for key, rule in table.items():
-            if "unit" in rule and key not in ("dt", "max_time", "until", "to_deg"):
-                assert f"key-{key}" in english, key

@@ -1,13 +1,11 @@
 """The live page's modules: types and style where node is; the words that they say."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess
 
 from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.in_page import SAID, data_of
+from chutelab.classroom.exercises.catalogue import SAID, data_of
 from chutelab.pictures.live.page import LANGUAGES
 from chutelab.scene.quantities import REGISTRY
 from live.node import ASSETS, HERE, NODE, needs_node

@@ -1,7 +1,5 @@
 """Panels and tools of the live page under a pointer and under the keyboard alone."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

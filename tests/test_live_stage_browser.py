@@ -1,7 +1,5 @@
 """The picture of the live page: where it lies, what is grabbed in it, what it looks like."""
 
-from __future__ import annotations
-
 import re
 from io import BytesIO
 
@@ -82,8 +80,20 @@ def test_one_finger_on_an_empty_place_moves_neither_view_nor_machine(shown):
     assert page.evaluate("JSON.stringify(chutelab.lab.given)") == given
 
 
-@pytest.mark.parametrize("size", [(1366, 768), (1920, 1080), (390, 844)])
-@pytest.mark.parametrize("name", ["perpendicular", "inclined-40", "cascade", "galton", "spoon"])
+def over(*names):
+    """Each scene at one of three sizes of the window; all of them at all sizes are slow."""
+    sizes = [(1366, 768), (390, 844), (1920, 1080)]
+    return pytest.mark.parametrize(
+        ("name", "size"),
+        [
+            pytest.param(name, size, marks=() if n % 3 == k else pytest.mark.slow)
+            for n, name in enumerate(names)
+            for k, size in enumerate(sizes)
+        ],
+    )
+
+
+@over("perpendicular", "galton", "cascade", "spoon", "inclined-40")
 def test_the_machine_is_fitted_into_what_the_cards_leave_free(shown, name, size):
     page = shown(name, viewport={"width": size[0], "height": size[1]})
     free = page.evaluate("chutelab.stage.view.free")
@@ -170,11 +180,7 @@ LABELS = """() => {
 }"""
 
 
-@pytest.mark.parametrize("size", [(1366, 768), (1920, 1080), (390, 844)])
-@pytest.mark.parametrize(
-    "name",
-    ["perpendicular", "inclined-20", "inclined-60", "inclined-conveyor", "low-speed", "cascade"],
-)
+@over("perpendicular", "inclined-20", "inclined-60", "inclined-conveyor", "low-speed", "cascade")
 def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
     page = shown(name, viewport={"width": size[0], "height": size[1]})
     found, free = page.evaluate(LABELS), page.evaluate("chutelab.stage.view.free")

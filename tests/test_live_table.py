@@ -1,7 +1,5 @@
 """``[live]``: what the page of a scene offers; its keys are the scene's, and no engine sees it."""
 
-from __future__ import annotations
-
 import pytest
 
 from chutelab import scene as sc
@@ -77,12 +75,6 @@ def test_drops_are_measured_from_where_the_page_measures_them():
     found = live_of(scene, page)
     assert found["ranges"] == {"outgoing.drop": [0.65, 1.25]}
     assert found["presets"] == [{"name": "a", "set": {"outgoing.drop": 0.85}}]
-
-
-def test_overrides_reach_it():
-    scene = sc.parse(MACHINE, overrides=["live.predict=true", "live.ranges.gravity=[0, 20]"])
-    assert scene.live.predict
-    assert scene.live.ranges == {"gravity": (0.0, 20.0)}
 
 
 @pytest.mark.parametrize(
@@ -176,9 +168,3 @@ def test_no_engine_looks_at_it_and_recordings_keep_it(tmp_path):
     assert bare.knots.tobytes() == shown.knots.tobytes()
     shown.save(tmp_path / "recording.npz")
     assert Recording.load(tmp_path / "recording.npz").scene.live == live.live
-
-
-def test_one_particle_alone_is_no_page():
-    """Its keys may be those of streams that are not there any more."""
-    rows = "[[stream]]\ncount = 2\n[[stream]]\nname = 'b'\n[live]\ncontrols = ['stream.b.rate']"
-    assert sc.parse(MACHINE + rows).alone().live.controls is None

@@ -16,8 +16,6 @@ ledger. With three reservations, which are the same for every scene:
   balance the weight, one equation too few for the work of the belt.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 from math import inf, log, sqrt

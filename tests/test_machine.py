@@ -1,10 +1,7 @@
 """From a scene to surfaces, releases and the nominal particle, against formulas by hand."""
 
-from __future__ import annotations
-
 import re
-from math import atan2, cos, degrees, hypot, inf, radians, sin, sqrt
-from time import process_time
+from math import atan2, cos, hypot, inf, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -75,12 +72,6 @@ def test_the_belt_hangs_from_the_impact_and_the_plate_stops_short_of_it(
     assert (-ty, tx) == pytest.approx((-cos(angle), -sin(angle)), abs=1e-15)
 
 
-def test_a_belt_measured_from_the_top_needs_no_impact():
-    for plate in ({}, None, {"angle_deg": 80.0}):
-        start, _, _ = segment(built(plate=plate, outgoing={"drop_from": "top"}), "outgoing")
-        assert start[1] == R - DROP
-
-
 def test_a_belt_hangs_from_a_ride_round_the_pulley_too():
     speed, rc = 0.8, R + r
     phi = np.arccos(speed**2 / (G * rc))
@@ -120,18 +111,6 @@ def test_the_other_surfaces_stand_where_the_scene_says():
         found.segments.start[0] = 0.0
 
 
-def test_plates_have_the_lengths_the_scene_says_or_two_metres():
-    assert segment(built(outgoing=None), "plate")[0][1] == pytest.approx(R - 2.0, abs=1e-15)
-    assert segment(built(plate={"below": 0.45}), "plate")[0][1] == pytest.approx(
-        R - 0.45, abs=1e-15
-    )
-    # a pivot under where the belt lets the plate end: nothing below it
-    low, high, _ = segment(
-        built(plate={"pivot_height": -1.0}, outgoing={"drop_from": "top"}), "plate"
-    )
-    assert (low[1], high[1]) == pytest.approx((-1.0, -0.7), abs=1e-15)
-
-
 @pytest.mark.parametrize(
     ("tables", "key", "words"),
     [
@@ -139,10 +118,7 @@ def test_plates_have_the_lengths_the_scene_says_or_two_metres():
         ({"incoming": {"speed": 0.0}}, "outgoing.drop_from", "never meets"),
         # from behind the plate, over its top, and back onto the face
         (
-            {
-                "plate": {"angle_deg": -30.0},
-                "stream": {"at": [0.8, 0.2], "velocity": [-2.0, 0.0]},
-            },
+            {"plate": {"angle_deg": -30.0}, "stream": {"at": [0.8, 0.2], "velocity": [-2.0, 0.0]}},
             "outgoing.drop_from",
             "never meets",
         ),
@@ -175,16 +151,6 @@ def test_the_advice_of_a_refusal_is_enough(speed):
     (length,) = re.findall(r"at least (\S+) m", str(raised.value))
     start, _, _ = segment(built(incoming={"speed": speed}, plate={"below": float(length)}), "plate")
     assert start[1] == pytest.approx(impact(0.0, speed=speed)[1], abs=1.001e-4)
-
-
-def test_a_flight_meets_a_leaning_plate_only_up_to_the_angle_of_the_formula():
-    # a point that leaves at the top, a pivot at y = R: tan α <= v² / (2 g d1)
-    limit = degrees(np.arctan(V**2 / (2.0 * G * (R + GAP))))
-    point = {"radius": 0.0}
-    plate = {"angle_deg": limit * (1.0 - 1e-9), "below": 5.0, "above": 5.0}
-    built(particle=point, plate=plate)
-    with pytest.raises(scene.SceneError, match="never meets"):
-        built(particle=point, plate={**plate, "angle_deg": limit * (1.0 + 1e-9)})
 
 
 def crossed(**tables):
@@ -236,13 +202,6 @@ def test_arcs_that_touch_do_not_cross():
         assert len(crossed(surface=[ring, wider])) == (1 if x else 0)
 
 
-def test_arcs_in_the_drive_pulley_are_warned_of():
-    for angle, said in ((0.0, ()), (180.0, (machine.Caution("bow", machine.DRIVE_PULLEY),))):
-        bow = {"name": "bow", "center": [0.2, 0.0], "radius": 0.12, "from_deg": angle - 60.0,
-               "to_deg": angle + 60.0}  # fmt: skip
-        assert built(surface=[bow]).warnings == said
-
-
 def test_crossing_surfaces_are_warned_of():
     assert built().warnings == ()
     *_, high = built(outgoing={"drop_from": "top", "drop": 0.15}).warnings
@@ -271,31 +230,6 @@ def test_gates_cross_only_what_is_there_while_they_are(bent):
         (({"closes_at": 2.0}, {}), said),
     ]:
         assert built(surface=[flat | times[0], upright | times[1]]).warnings == warnings
-
-
-@pytest.mark.parametrize("abreast", [1, 3])
-def test_pieces_are_held_against_each_other_some_at_a_time(abreast, monkeypatch):
-    """Two lattices, of rings and of ticks, and a line: each two of them cross, told once."""
-    ring = {"name": "ring", "center": [0.0, 5.0], "radius": 0.3, "repeat": [[3, 0.5, 0.0]]}
-    tick = {"name": "tick", "from": [0.1, 5.1], "to": [0.5, 5.4], "repeat": [[4, 0.45, 0.0]]}
-    line = {"name": "line", "from": [-1.0, 5.2], "to": [3.0, 5.2]}
-    far = {"name": "far", "from": [-1.0, 7.0], "to": [3.0, 7.0], "repeat": [[2, 0.0, 0.1]]}
-    monkeypatch.setattr(machine.parts, "ABREAST", abreast)
-    found = falling(surface=[line, tick, far, ring]).warnings
-    assert found == tuple(
-        machine.Caution(one, crosses=other)
-        for one, other in (("tick", "line"), ("ring", "line"), ("ring", "tick"))
-    )
-
-
-def test_thousands_of_pieces_take_a_moment():
-    """Each of 9,800 crosses thousands of others: all pairs at once were gigabytes, and minutes."""
-    rings = {"center": [0.0, 5.0], "radius": 0.5, "repeat": [[70, 0.001, 0.0], [70, 0.0, -0.001]]}
-    built = falling(surface=[{"name": "a", **rings}, {"name": "b", **rings, "radius": 0.45}])
-    assert len(built.arcs.surface) == 9800
-    began = process_time()
-    assert [str(caution) for caution in built.warnings] == ["b: it crosses a"]
-    assert process_time() - began < 20.0
 
 
 @pytest.mark.parametrize(("below", "hit"), [(0.1, -0.4259), (None, None)])
@@ -332,33 +266,6 @@ def test_runs_end_in_time():
     assert built(run={"until": 100.0}).end_time == 30.0
     assert built().until == "landed"
     assert built(outgoing=None).until == "settled"
-
-
-def test_the_nominal_particle_lets_go_where_adhesion_says():
-    position, velocity, _ = nominal(scene.load("low-speed"))
-    rho = 0.5063
-    cosine = 4.0 / (G * rho)
-    sine = sqrt(1.0 - cosine**2)
-    assert position == pytest.approx((rho * sine, rho * cosine), abs=1e-15)
-    assert velocity == pytest.approx((2.0 * cosine, -2.0 * sine), abs=1e-15)
-    position, velocity, _ = nominal(scene.load("perpendicular"))
-    assert (position.tolist(), velocity.tolist()) == ([0.0, R + r], [V, 0.0])
-
-
-def test_the_nominal_particle_slips_before_it_leaves():
-    position, velocity, _ = nominal(scene.load("slip"))
-    assert degrees(np.arctan2(*position)) == pytest.approx(23.157, abs=5e-4)
-    assert hypot(*velocity) == pytest.approx(2.13697, abs=5e-6)
-    # at u = cos φ the pulley presses no more
-    cosine = hypot(*velocity) ** 2 / (G * 0.5063)
-    assert position == pytest.approx((0.5063 * sqrt(1 - cosine**2), 0.5063 * cosine), abs=1e-13)
-
-
-def test_a_rolling_disk_leaves_where_its_energy_says():
-    overrides = ["incoming.friction=1e6", "particle.spin=true", "outgoing.drop_from=top"]
-    position, _, _ = nominal(scene.load("low-speed", overrides))
-    u0 = 4.0 / (G * 0.5063)
-    assert position[1] / 0.5063 == pytest.approx((3.0 * u0 + 4.0) / 7.0, abs=1e-6)
 
 
 def test_a_slow_release_is_drawn_along_the_belt():

@@ -1,42 +1,37 @@
 """Arcs, pegs, conveyors and gates drawn to scale; each surface named once, no name on another."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from chutelab import scene
-from chutelab.machine import Machine, build
-from chutelab.pictures.plots import Window, draw_scene, style, window_of
-from handmade import Line, Round, conveyor, machine_of, recording_of
+from chutelab.pictures.plots import Window, draw_scene, style
+from handmade import Line, Round, conveyor, machine_of
 
 
-def drawn(machine: Machine, window: Window | None = None, **options: bool) -> Axes:
+def drawn(machine, window=None, **options):
     figure = Figure(figsize=(7.0, 5.0))
     FigureCanvasAgg(figure)
     return draw_scene(figure.add_axes((0.0, 0.0, 1.0, 1.0)), machine, window, **options)
 
 
-def lines(ax: Axes, name: str) -> list[np.ndarray]:
+def lines(ax, name):
     return [np.asarray(one.get_xydata()) for one in ax.lines if one.get_gid() == f"surface {name}"]
 
 
-def circles(ax: Axes) -> list[Circle]:
+def circles(ax):
     return [one for one in ax.patches if isinstance(one, Circle)]
 
 
-def said(ax: Axes) -> list[str]:
+def said(ax):
     return [text.get_text() for text in ax.texts]
 
 
-def assert_apart_and_inside(ax: Axes) -> None:
+def assert_apart_and_inside(ax):
     frame = ax.get_window_extent()
     boxes = [text.get_window_extent() for text in ax.texts]
     for i, box in enumerate(boxes):
@@ -47,7 +42,7 @@ def assert_apart_and_inside(ax: Axes) -> None:
         assert not box.count_overlaps(boxes[:i]), ax.texts[i]
 
 
-def test_an_arc_is_drawn_round_its_centre_from_end_to_end() -> None:
+def test_an_arc_is_drawn_round_its_centre_from_end_to_end():
     ax = drawn(machine_of(Round("spoon", (0.3, -0.1), 0.25, begin=170.0, extent=110.0)))
     (points,) = lines(ax, "spoon")
     away = points - (0.3, -0.1)
@@ -61,39 +56,7 @@ def test_an_arc_is_drawn_round_its_centre_from_end_to_end() -> None:
     assert np.hypot(*middles.T).min() > 0.25 * np.cos(np.radians(1.51))
 
 
-@pytest.mark.parametrize("radius", [0.004, 0.3])
-def test_a_circle_is_to_scale_with_its_line(radius: float) -> None:
-    ax = drawn(machine_of(Round("peg", (0.0, 0.0), radius)), Window(-1.0, 1.0, -0.7, 0.7))
-    (peg,) = circles(ax)
-    pixels = (
-        ax.transData.transform([(0.0, 0.0), (1.0, 0.0)])[1, 0] - ax.transData.transform((0, 0))[0]
-    )
-    # Half of the line is outside: 1 pt of a large one, a quarter of the radius of a small one.
-    outside = 0.5 * peg.get_linewidth() * ax.figure.dpi / 72.0 / pixels
-    assert peg.get_radius() + outside == pytest.approx(radius, rel=0.01 if radius < 0.1 else 0.02)
-    assert peg.center == (0.0, 0.0)
-
-
-def test_a_drum_that_holds_what_is_released_is_not_filled() -> None:
-    ax = drawn(machine_of(Round("drum", (0.0, 0.0), 0.5), at=[(0.1, 0.2)]))
-    assert circles(ax)[0].get_facecolor()[3] == 0.0
-    ax = drawn(machine_of(Round("peg", (0.0, 0.0), 0.5), at=[(0.1, 0.6)]))
-    assert circles(ax)[0].get_facecolor()[:3] == to_rgb(style.STEEL_LIGHT)
-
-
-def test_all_of_a_circle_and_of_an_arc_is_in_the_picture() -> None:
-    machine = machine_of(
-        Round("drum", (2.0, 1.0), 0.5), Round("spoon", (0.0, 0.0), 1.0, 170.0, 200.0)
-    )
-    ax = drawn(machine)
-    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    assert left < -1.0
-    assert right > 2.5
-    assert bottom < -1.0
-    assert top > 1.5
-
-
-def test_a_conveyor_is_a_belt_round_two_pulleys_named_once() -> None:
+def test_a_conveyor_is_a_belt_round_two_pulleys_named_once():
     ax = drawn(machine_of(*conveyor("second", (0.0, 0.0), (1.0, 0.3), 0.1, 1.5)))
     top, bottom = lines(ax, "second")
     along = np.array([1.0, 0.3]) / np.hypot(1.0, 0.3)
@@ -112,31 +75,17 @@ def test_a_conveyor_is_a_belt_round_two_pulleys_named_once() -> None:
         ((0.0, 1.0), 2.0, "↑"), ((0.7, -0.7), 2.0, "↘"), ((0.7, 0.7), -2.0, "↙"),
     ],
 )  # fmt: skip
-def test_the_arrow_of_a_belt_shows_where_it_moves_to(
-    end: tuple[float, float], speed: float, arrow: str
-) -> None:
+def test_the_arrow_of_a_belt_shows_where_it_moves_to(end, speed, arrow):
     assert said(drawn(machine_of(Line("belt", (0.0, 0.0), end, speed)))) == [f"belt, 2 m/s {arrow}"]
 
 
-def test_a_hyphen_in_a_name_stays_one() -> None:
-    assert said(drawn(machine_of(Line("left-wall", (0.0, 0.0), (0.0, 1.0))))) == ["left-wall"]
-
-
 @pytest.mark.parametrize(("speed", "arrow"), [(0.5, "↻"), (-0.5, "↺")])
-def test_a_roller_shows_how_it_turns(speed: float, arrow: str) -> None:
+def test_a_roller_shows_how_it_turns(speed, arrow):
     ax = drawn(machine_of(Round("roller", (0.0, 0.0), 0.1, speed=speed)))
     assert said(ax) == [f"roller, 0.5 m/s {arrow}"]
 
 
-def test_a_further_plate_tells_its_angle_and_restitution() -> None:
-    text = (
-        "[[plate]]\nname = 'second'\npivot = [0.0, 1.0]\nangle_deg = 15\nrestitution = 0.25\n"
-        "[stream]\nat = [0.0, 2.0]\nvelocity = [0.0, 0.0]\n"
-    )
-    assert said(drawn(build(scene.parse(text)))) == ["second, 15°\nε = 0.25"]
-
-
-def test_a_surface_of_many_pieces_is_named_once_beside_them() -> None:
+def test_a_surface_of_many_pieces_is_named_once_beside_them():
     pegs = [
         Round("pegs", (0.06 * i - 0.03 * j, -0.05 * j), 0.01) for j in range(8) for i in range(8)
     ]
@@ -149,7 +98,7 @@ def test_a_surface_of_many_pieces_is_named_once_beside_them() -> None:
     assert_apart_and_inside(ax)
 
 
-def test_a_gate_is_dashed_and_faded_and_says_when_it_moves() -> None:
+def test_a_gate_is_dashed_and_faded_and_says_when_it_moves():
     ax = drawn(
         machine_of(
             Line("wall", (-1.0, 0.5), (-0.1, 0.0)),
@@ -171,7 +120,7 @@ def test_a_gate_is_dashed_and_faded_and_says_when_it_moves() -> None:
     }  # fmt: skip
 
 
-def test_the_name_of_a_gate_is_not_where_it_lets_fall() -> None:
+def test_the_name_of_a_gate_is_not_where_it_lets_fall():
     hopper = [Line("hopper", (s * 0.3, 0.4), (s * 0.05, 0.0)) for s in (-1.0, 1.0)]
     gate = Line("gate", (-0.05, 0.0), (0.05, 0.0), vanishes=0.4)
     bin_ = Line("bin", (-0.4, -0.5), (0.4, -0.5))
@@ -187,10 +136,8 @@ PLACES = st.tuples(st.floats(-1.0, 1.0), st.floats(-0.7, 0.7))
 
 @given(st.lists(st.tuples(PLACES, PLACES, st.booleans()), min_size=1, max_size=14))
 @settings(max_examples=25, deadline=None)
-def test_names_never_lie_on_each_other_or_leave_the_picture(
-    drawn_pieces: list[tuple[tuple[float, float], tuple[float, float], bool]],
-) -> None:
-    pieces: list[Line | Round] = []
+def test_names_never_lie_on_each_other_or_leave_the_picture(drawn_pieces):
+    pieces = []
     for i, (a, b, bent) in enumerate(drawn_pieces):
         if bent or np.hypot(b[0] - a[0], b[1] - a[1]) < 1e-3:
             pieces.append(Round(f"surface {i}", a, 0.02 + abs(b[0]), 180.0 * b[1], 200.0))
@@ -199,36 +146,3 @@ def test_names_never_lie_on_each_other_or_leave_the_picture(
     ax = drawn(machine_of(*pieces), Window(-1.0, 1.0, -0.7, 0.7))
     assert_apart_and_inside(ax)
     assert len(set(said(ax))) == len(ax.texts)
-
-
-def test_with_room_all_names_are_there_and_hide_no_line() -> None:
-    pieces: list[Line | Round] = [
-        Line(f"chute {i}", (0.4 * i, 0.0), (0.4 * i + 0.2, -0.3)) for i in range(5)
-    ]
-    pieces += [Round(f"peg {i}", (0.4 * i, -0.6), 0.03) for i in range(5)]
-    ax = drawn(machine_of(*pieces))
-    assert len(ax.texts) == 10
-    for text in ax.texts:
-        box = text.get_window_extent()
-        for line in ax.lines:
-            path = line.get_path().transformed(line.get_transform())
-            assert not path.intersects_bbox(box, filled=False), text
-    assert_apart_and_inside(ax)
-
-
-def test_small_pictures_have_no_names() -> None:
-    ax = drawn(machine_of(Line("floor", (-1.0, 0.0), (1.0, 0.0))), small=True)
-    assert not ax.texts
-    assert len(lines(ax, "floor")) == 1
-
-
-def test_the_window_holds_arcs_near_the_action() -> None:
-    machine = machine_of(
-        Round("spoon", (0.0, 0.5), 0.25, 180.0, 180.0), Round("far", (30.0, 0.0), 1.0)
-    )
-    window = window_of(
-        recording_of(machine, [(0.0, 0.0, 1.0, 0, 0, 0), (0.4, 0.0, 0.2, 0, -4.0, 0)])
-    )
-    assert window.left < -0.25
-    assert window.right > 0.25
-    assert window.right < 5.0

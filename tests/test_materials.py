@@ -121,26 +121,6 @@ def test_what_was_measured_lies_within_the_spread(name, key, found):
     assert max(found) <= high
 
 
-def test_densities_of_solids_span_from_foam_to_osmium():
-    assert LIGHTEST <= 110.0  # balsa
-    assert DENSEST >= 22_500.0  # osmium and iridium, by any handbook
-    assert DENSEST < 29_800.0  # 8 g in a ball of 4 mm radius: no solid
-
-
-def test_a_pair_is_the_same_from_both_sides():
-    steel, rubber = PRESETS["steel"], PRESETS["rubber"]
-    for kind in ("restitution", "friction"):
-        pairs = [
-            ((steel, kind), (steel, f"{kind}_steel")),
-            ((rubber, kind), (rubber, f"{kind}_rubber")),
-            ((steel, f"{kind}_rubber"), (rubber, f"{kind}_steel")),
-        ]
-        for (one, mine), (other, yours) in pairs:
-            assert getattr(one.material, mine) == getattr(other.material, yours)
-            assert one.spread[mine] == other.spread[yours]
-            assert one.sources[mine] == other.sources[yours]
-
-
 def test_the_list_has_every_number_and_is_not_cut():
     text = call().stdout
     # Tables fill their last column with spaces.

@@ -1,7 +1,5 @@
 """Notebooks of lessons: made of worksheet, own cells and exercise; what they call, `Book`."""
 
-from __future__ import annotations
-
 import json
 import re
 from math import atan2, degrees, sqrt
@@ -11,10 +9,9 @@ from click.testing import CliRunner
 from matplotlib.lines import Line2D
 
 from chutelab.classroom.book import Book
+from chutelab.classroom.grading import words_of as written_in
 from chutelab.classroom.lessons import LessonError, read, shipped_lessons
-from chutelab.classroom.lessons.building import build_notebook, start
-from chutelab.classroom.lessons.cells import notebook_of
-from chutelab.classroom.returned import words_of as written_in
+from chutelab.classroom.lessons.building import build_notebook, notebook_of, start
 from chutelab.cli import main
 from chutelab.results.quantities import measure
 from chutelab.util.errors import InputError
@@ -126,14 +123,6 @@ def test_cells_of_its_own_stand_where_they_say(tmp_path):
         build_notebook(read(folder))
 
 
-def test_a_worksheet_without_the_parts_has_no_notebook(tmp_path):
-    folder = start(tmp_path / "my-lesson")
-    (folder / "README.md").write_text("# Mine\n\n## Read\n\nThis.\n", encoding="utf-8")
-    (folder / "exercise.ipynb").unlink()
-    assert build_notebook(read(folder)) is None
-    assert not (folder / "exercise.ipynb").exists()
-
-
 def test_a_book_runs_what_is_said_as_on_the_command_line():
     book = Book("the-parabola")
     runs = book.run("throw.toml", "throw.toml --set incoming.speed=4 --set gravity=1.62")
@@ -162,14 +151,6 @@ def test_a_book_runs_what_is_said_as_on_the_command_line():
     assert "no prediction yet" in str(Book(1).compare({1: None}))
     with pytest.raises(InputError, match="--out: a notebook knows --set"):
         book.run("throw.toml --out here")
-
-
-def test_a_book_tells_the_errors_of_steps():
-    book = Book("trust")
-    runs = book.run("fixed-steps.toml --set run.dt=0.0001", "perpendicular --details")
-    (_, coarse, _), (_, exact, residual) = book.errors(runs).rows
-    assert 1e-5 < float(coarse) < 1e-3
-    assert max(float(exact), float(residual)) < 1e-12
 
 
 def test_the_spread_of_a_stream_is_drawn_with_its_layers():

@@ -1,7 +1,5 @@
 """A whole exercise in the page of its lesson, in a real browser."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -11,7 +9,7 @@ from chutelab.classroom.exercises import lesson
 from chutelab.classroom.exercises.catalogue import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.lessons import find
-from chutelab.classroom.lessons.building import live_page
+from chutelab.classroom.lessons.pages import live_page
 from live.browser import DONE
 
 AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
@@ -51,63 +49,6 @@ def says(page, number, typed):
     return reply.get_attribute("data-verdict"), reply.inner_text()
 
 
-def test_a_whole_exercise_is_done_and_handed_in(page_of):
-    page = page_of(3)
-    assert page.locator("#student").count() == 0
-    assert page.locator("#exercise").inner_text().count("?") == 0
-    begin(page, "Ada Lovelace")
-    task = lesson("the-bounce", "Ada Lovelace")
-    _, cases = draw(EXERCISES["the-bounce"], "Ada Lovelace")
-    assert "Numbers of Ada Lovelace:" in page.locator("#exercise").inner_text()
-    assert f"{task.given.v0:g} m/s" in page.locator(".given").inner_text()
-    wrong = task.check(1, -cases[0].right)
-    assert says(page, 1, f"{-cases[0].right:.4g}") == (
-        "mistake",
-        f"✗ {wrong.heading}. {wrong.text}",
-    )
-    assert says(page, 1, "about 2")[0] == "unread"
-    assert says(page, 1, "  ")[0] == "blank"
-    first = page.locator('[data-question="1"]')
-    for n in range(3):
-        assert first.locator(".working").is_hidden()
-        first.locator(".hint").click()
-        assert task.hint(1).text.split("\n")[0] in first.inner_text(), n
-    first.locator(".working").click()
-    assert task.reveal(1).text.split("\n")[0] in first.inner_text()
-    for n, case in enumerate(cases, 1):
-        typed = f"{case.right:.5g}".replace(".", ",") + f" {case.question.unit}"
-        assert says(page, n, typed) == ("right", says_right(task, n, float(f"{case.right:.5g}")))
-    assert "4 of 4 done" in page.locator("#exercise summary").first.inner_text()
-    page.locator("#explain").fill("Die Platte ist glatt. ½ ε ✓")
-    with page.expect_download() as waiting:
-        page.locator("#result").click()
-    handed = waiting.value
-    assert handed.suggested_filename == "the-bounce-Ada-Lovelace.chutelab.json"
-    result = json.loads(Path(handed.path()).read_text(encoding="utf-8"))
-    answers = result.pop("answers")
-    assert answers == pytest.approx(
-        {str(n): case.right for n, case in enumerate(cases, 1)}, rel=1e-4
-    )
-    assert result == {
-        "chutelab_result": 1, "lesson": "the-bounce", "student": "Ada Lovelace",
-        "tries": {"1": 3, "2": 1, "3": 1, "4": 1}, "hints": {"1": 3}, "revealed": [1],
-        "words": {"explain": "Die Platte ist glatt. ½ ε ✓"}, "language": "en",
-    }  # fmt: skip
-    # It is kept, and open at once.
-    page.reload()
-    page.evaluate(DONE)
-    assert "4 of 4 done" in page.locator("#exercise summary").first.inner_text()
-    assert page.locator("#explain").input_value() == "Die Platte ist glatt. ½ ε ✓"
-    first = page.locator('[data-question="1"]')
-    first.locator("summary").click()
-    assert "3 tries, 3 hints, working shown" in first.inner_text()
-
-
-def says_right(task, number, answer):
-    reply = task.check(number, answer)
-    return f"✓ {reply.heading}. {reply.text}"
-
-
 MEASURED = """async () => {
   const { task } = chutelab.exercise;
   while (!task.measured.size) await new Promise((done) => setTimeout(done, 5));
@@ -115,7 +56,12 @@ MEASURED = """async () => {
 }"""
 
 
-@pytest.mark.parametrize("name", [one.name for one in EXERCISES.values() if one.machine])
+MACHINES = [one.name for one in EXERCISES.values() if one.machine]
+
+
+@pytest.mark.parametrize(
+    "name", [*MACHINES[:2], *(pytest.param(one, marks=pytest.mark.slow) for one in MACHINES[2:])]
+)
 def test_the_machine_of_a_student_says_what_is_right(page_of, name):
     page = page_of(name)
     begin(page, "Ada")

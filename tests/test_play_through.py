@@ -1,7 +1,5 @@
 """Every lesson's page, played through by mouse and by keyboard: it says what Python says."""
 
-from __future__ import annotations
-
 import json
 from collections import deque
 from pathlib import Path
@@ -13,7 +11,7 @@ from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import MARKS
 from chutelab.classroom.grading import grade
 from chutelab.classroom.lessons import find
-from chutelab.classroom.lessons.building import live_page
+from chutelab.classroom.lessons.pages import live_page
 from chutelab.classroom.words import words
 from live.browser import DONE
 

@@ -1,7 +1,5 @@
 """The Pymunk engine against the exact one and against laws written out here."""
 
-from __future__ import annotations
-
 from math import radians, sqrt, tan
 
 import numpy as np
@@ -18,7 +16,6 @@ from chutelab.scene import parse
 
 LONE = ("perpendicular", "perpendicular-fast", "inclined-20", "inclined-40", "inclined-60",
         "low-speed", "belt-landing")  # fmt: skip
-LASTING = {Kind.SLIP, Kind.STICK, Kind.SETTLE}
 
 
 def machine(name, *overrides):
@@ -78,32 +75,6 @@ def test_a_ride_round_the_pulley_converges(case):
     assert order > 1.0 or coarse < 1e-6
 
 
-def test_friction_on_the_belt_leaves_at_the_top_without_a_hit():
-    # Faster than sqrt(g ρ) it leaves at the top: y falls by g t²/2 until the plate.
-    for dt in ("0.001", "0.0005", "0.0001"):
-        got = run(machine("perpendicular", "incoming.friction=0.5", f"run.dt={dt}"))
-        assert not len(got.select(Kind.IMPACT, surface="incoming"))
-        hit = got.select(Kind.IMPACT, surface="plate")[0]
-        t = (0.6 - 0.0063) / 2.0
-        assert hit["position"][1] == pytest.approx(0.1063 - 0.5 * 9.81 * t * t, abs=1e-11)
-
-
-def test_slides_until_it_settles():
-    # v_b - v_x = µ g t on a flat belt.
-    got = run(machine("perpendicular", 'run.until="settled"'))
-    landing, settle = got.select(Kind.LANDING)[0], got.select(Kind.SETTLE)[0]
-    slow = (2.0 - landing["velocity_after"][0]) / (0.5 * 9.81)
-    assert settle["t"] - landing["t"] == pytest.approx(slow, abs=1e-10)
-    assert REASONS[got.ended[0]] == "settled"
-    assert ledger(got).relative_residual < 1e-12
-
-
-def test_nothing_settles_on_the_belt_that_throws_it():
-    got = run(machine("perpendicular", "incoming.friction=0.5", 'run.until="settled"'))
-    assert len(got.select(Kind.SEPARATION, surface="incoming")) == 1
-    assert got.select(Kind.SETTLE)["surface"].tolist() == [got.surface_index("outgoing")]
-
-
 @pytest.mark.parametrize("align", ["true", "false"])
 def test_end_rollers_drive_as_their_faces_do(align):
     # A ball on the rim of a belt meets v (n_y, -n_x): the tangential impulse of a gripping rim is
@@ -134,32 +105,6 @@ speed = 1.5
     assert hit["t"] == pytest.approx(0.2, abs=1e-12 if align == "true" else 1.1e-3)
     assert hit["normal_impulse"] == pytest.approx(2.0 * 3.0, rel=1e-12)
     assert hit["tangential_impulse"] == pytest.approx(2.0 * 1.5, rel=1e-9)
-
-
-@pytest.mark.parametrize("aside", [-0.9, -0.5, -0.1, 0.3, 0.8])
-def test_the_top_end_of_a_wall_is_a_point(aside):
-    text = f"""
-[particle]
-radius = 0.02
-[stream]
-at = [{aside * 0.02}, 1.0]
-velocity = [0.0, 0.0]
-[run]
-until = 1.5
-[[surface]]
-name = "wall"
-from = [0.0, -1.0]
-to = [0.0, 0.0]
-restitution = 0.4
-friction = 0.3
-"""
-    m = build(parse(text))
-    got = run(m)
-    # It falls until its centre is r from the point, and leaves along the new normal.
-    hit = got.select(Kind.IMPACT)[0]
-    y = 0.02 * sqrt(1.0 - aside**2)
-    assert hit["position"] == pytest.approx([aside * 0.02, y], abs=1e-12)
-    assert off(got, exact(m)) < 1e-9
 
 
 def test_an_inclined_ramp_is_slid_down_at_its_acceleration():
@@ -194,7 +139,7 @@ friction = {friction}
 def test_steps_all_alike_converge_in_order_one():
     want = exact(machine("perpendicular"))
     errors = []
-    for dt in (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4):
+    for dt in (4e-3, 2e-3, 1e-3, 5e-4):
         got = run(machine("perpendicular", "run.align=false", f"run.dt={dt}"))
         errors.append(off(got, want))
     assert errors[-1] < 1e-2
@@ -237,18 +182,6 @@ def test_a_machine_far_away_runs_as_one_nearby(align):
         shift, np.tile([2.0**19, -(2.0**18)], (len(shift), 1)), rtol=0, atol=1e-9
     )
     np.testing.assert_allclose(away.events["t"], near.events["t"], rtol=0, atol=1e-9)
-
-
-def test_steps_all_alike_leave_at_the_time_of_their_own_flight():
-    # The last flight is a parabola, y = y0 + v t - g t²/2, down to 1 m below the ramp's lower end.
-    got = fall(0.0, 0.0, align=False)
-    left = got.select(Kind.EXIT)[0]
-    assert left["position"][1] == pytest.approx(-0.75 - 1.0, abs=1e-12)
-    hit = got.track(0)[-2]
-    late = left["t"] - hit["t"]
-    y = hit["position"][1] + hit["velocity"][1] * late - 0.5 * 9.81 * late**2
-    assert y == pytest.approx(-1.75, abs=1e-12)
-    assert (late / 1e-3) % 1.0 == pytest.approx(0.5, abs=0.49)
 
 
 CROWDED = """
@@ -332,39 +265,6 @@ def test_the_bits_do_not_depend_on_where_shapes_lie_in_memory():
         again = run(m)
         for name in ("knots", "events", "by_surface"):
             assert getattr(again, name).tobytes() == getattr(first, name).tobytes()
-
-
-def test_two_disks_share_their_momentum():
-    text = """
-gravity = 0.0
-[particle]
-radius = 0.01
-mass = 0.5
-[stream]
-count = 2
-rate = 5.0
-at = [0.0, 0.0]
-velocity = [1.0, 0.0]
-interact = true
-restitution = 0.6
-friction = 0.0
-[run]
-until = 1.4
-[[surface]]
-name = "wall"
-from = [0.5, -1.0]
-to = [0.5, 1.0]
-restitution = 1.0
-"""
-    got = run(build(parse(text)))
-    hit = got.select(Kind.COLLISION)[0]
-    # Head-on at ±1 m/s: J = m (1 + ε) · 2/2.
-    assert abs(hit["normal_impulse"]) == pytest.approx(0.5 * 1.6, rel=1e-12)
-    books = ledger(got)
-    assert books.by_surface["particles"]["restitution_loss"] == pytest.approx(
-        0.25 * 0.5 * 4.0 * (1.0 - 0.36), rel=1e-6
-    )
-    assert books.relative_residual < 1e-12
 
 
 def test_a_fault_in_the_formulas_does_not_reach_it(monkeypatch):

@@ -1,8 +1,5 @@
 """Tracks between knots, the books at any time, and how a recording is collected."""
 
-from __future__ import annotations
-
-import tracemalloc
 from dataclasses import replace
 from functools import cache
 
@@ -18,8 +15,7 @@ from chutelab import machine, scene
 from chutelab.engines import exact
 from chutelab.engines.simulation import choose
 from chutelab.machine import Particle
-from chutelab.results import ENTRIES, REASONS, Kind
-from chutelab.results import record as tracks
+from chutelab.results import ENTRIES, Kind
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import Recorder
 from chutelab.util.errors import InputError
@@ -188,20 +184,6 @@ def test_an_impact_is_two_knots_at_one_time_and_at_gives_the_state_after():
     assert (recording.at([landing["t"]])[1][0, 0] == landing["velocity_after"]).all()
 
 
-def test_a_ride_round_the_pulley_stays_on_the_arc():
-    recording = shipped("low-speed")
-    rho, v0, start = 0.5 + 0.0063, 2.0, 1.0
-    top = start / v0
-    left = recording.select(Kind.SEPARATION)[0]["t"]
-    times = np.linspace(top, left, 997)
-    position, velocity = recording.at(times)
-    phi = v0 * (times - top) / rho
-    arc = rho * np.stack([np.sin(phi), np.cos(phi)], axis=-1)
-    pace = v0 * np.stack([np.cos(phi), -np.sin(phi)], axis=-1)
-    assert np.abs(position[:, 0] - arc).max() < 1e-9 * rho
-    assert np.abs(velocity[:, 0] - pace).max() < 2e-7 * v0
-
-
 def crowd():
     """Three particles: the second never released, the third later than the first."""
     recorder = recorder_of(3)
@@ -289,42 +271,6 @@ def test_a_slide_heats_quadratically_and_costs_the_belt_linearly(count, belt):
     assert np.abs(now["belt_work"] - work.sum(axis=1)).max() < 1e-15 * size
 
 
-def test_the_belt_lets_a_particle_down_and_nothing_rubs():
-    recording = shipped("low-speed")
-    rho, v0, top = 0.5063, 2.0, 0.5
-    left = recording.select(Kind.SEPARATION)[0]["t"]
-    times = np.linspace(top, left, 500)
-    now = recording.energy_at(times)
-    phi = v0 * (times - top) / rho
-    assert np.abs(now["belt_work"] + M * G * rho * (1.0 - np.cos(phi))).max() < 2e-9 * M * G * rho
-    assert (now["friction_loss"] == 0.0).all()
-    assert (now["restitution_loss"] == 0.0).all()
-
-
-def test_blocks_change_nothing(monkeypatch):
-    recording = shipped("free-fall")
-    times = np.random.default_rng(2).uniform(-0.1, 4.0, 200)
-    whole = (*recording.at(times), *recording.energy_at(times).values())
-    monkeypatch.setattr(tracks, "CELLS", 17)
-    parts = (*recording.at(times), *recording.energy_at(times).values())
-    for one, other in zip(whole, parts, strict=True):
-        assert one.tobytes() == other.tobytes()
-
-
-def test_ten_thousand_particles_take_little_memory():
-    recording = shipped("stream-independent")
-    times = np.linspace(0.0, recording.knots["t"].max(), 200)
-    peaks = []
-    for ask in (recording.at, recording.energy_at):
-        tracemalloc.start()
-        ask(times)
-        peaks.append(tracemalloc.get_traced_memory()[1] / 1e6)
-        tracemalloc.stop()
-    answer = 2 * 200 * 10_000 * 2 * 8 / 1e6
-    assert peaks[0] < answer + 30.0
-    assert peaks[1] < 30.0
-
-
 def test_events_are_found_by_kind_and_surface():
     recording = shipped("free-fall")
     kinds = [Kind.IMPACT, Kind.SETTLE]
@@ -342,29 +288,6 @@ def test_events_are_found_by_kind_and_surface():
     for event in first:
         own = recording.events[recording.events["particle"] == event["particle"]]
         assert event["t"] == own["t"][own["kind"] == Kind.IMPACT].min()
-
-
-def test_the_recorder_keeps_the_order_it_is_given():
-    recorder = recorder_of(3, surfaces=["floor"])
-    recorder.knots([2, 0], [0.0, 1.0], [[2.0, 0.0], [0.0, 0.0]], [1.0, 0.0], 0.5)
-    recorder.book([2, 0], 0, 3.0, [1.0, 2.0], 0.5)
-    recorder.knots([2, 2, 0], [1.0, 1.0, 2.0], [[3.0, 0.0], [4.0, 0.0], [5.0, 0.0]], 0.0, 0.0)
-    recorder.knots([1], [7.0], [[6.0, 0.0]], 0.0, 0.0)
-    for kind, particle, t in ((Kind.IMPACT, 0, 1.0), (Kind.RELEASE, 2, 0.0), (Kind.STICK, 1, 1.0)):
-        recorder.events(kind, [particle], t, [[0.0, 0.0]], [[0.0, 0.0]])
-    recorder.ended[:] = REASONS.index("settled")
-    recording = finish(recorder)
-    assert recording.surfaces == ("floor", "particles")
-    assert recording.offsets.tolist() == [0, 2, 4, 7]
-    assert recording.track(0)["position"][:, 0].tolist() == [0.0, 5.0]
-    assert recording.track(2)["position"][:, 0].tolist() == [2.0, 3.0, 4.0]
-    assert recording.track(2)["entries"].tolist() == [[0, 0, 0], [3, 1, 0.5], [3, 1, 0.5]]
-    assert recording.by_surface.tolist() == [[6.0, 3.0, 1.0], [0.0, 0.0, 0.0]]
-    # a lone knot is its own end, so that every track has an interval
-    assert recording.track(1)["t"].tolist() == [7.0, 7.0]
-    assert recording.at([7.0])[0][0, 1].tolist() == [6.0, 0.0]
-    assert recording.events["t"].tolist() == [0.0, 1.0, 1.0]
-    assert recording.events["kind"].tolist() == [Kind.RELEASE, Kind.IMPACT, Kind.STICK]
 
 
 def test_a_turning_disk_carries_energy_of_rotation():

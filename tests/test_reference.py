@@ -1,7 +1,5 @@
 """The reference: one particle as an ODE, against closed forms written out here, and exact."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections import Counter
@@ -75,29 +73,6 @@ def test_a_slipping_particle_obeys_the_law_of_the_finite_friction():
     assert speed == pytest.approx(sqrt(G * 0.504 * cos(leaves)), rel=1e-12, abs=0.0)
 
 
-def test_a_free_disk_with_all_grip_leaves_at_four_sevenths():
-    """Rolling off: cos φ1 = (3 u0 + 4)/7."""
-    tables = transfer(incoming={"friction": 1e6}, particle={"spin": True})
-    phi, _ = left_at(run(tables))
-    assert phi == pytest.approx(acos((3 * 2.0**2 / (G * 0.504) + 4) / 7), rel=1e-7)
-
-
-@pytest.mark.parametrize(("spin", "lever"), [(False, 1.0), (True, 3.0)])
-def test_a_disk_slides_until_its_slip_is_used_up(spin, lever):
-    """Slip v0 goes at lever µ g; what is left is v0 - µ g t, the heat is what is missing."""
-    mu, v0 = 0.3, 1.0
-    found = run(thrown((0.0, 0.01), (v0, 0.0), 0.5, floor(friction=mu), spin=spin))
-    (held,) = found.select(Kind.STICK)
-    t = v0 / (lever * mu * G)
-    assert held["t"] == pytest.approx(t, rel=1e-13, abs=0.0)
-    assert held["velocity_after"][0] == pytest.approx(v0 - mu * G * t, abs=1e-13)
-    assert held["position"][0] == pytest.approx(v0 * t - 0.5 * mu * G * t * t, rel=1e-13, abs=0.0)
-    # ½ m v0² less ½ m v² less ½ I ω²: ½ (m*) v0², m* = m / lever.
-    books = ledger(found)
-    assert books.friction_loss == pytest.approx(0.5 * 0.008 / lever * v0**2, rel=1e-12, abs=0.0)
-    assert books.relative_residual < 1e-14
-
-
 def test_bounces_end_after_2u_over_g_1_minus_epsilon():
     epsilon, fall = 0.5, 0.4
     tables = thrown((0.0, 0.01 + fall), (0.0, 0.0), "settled", floor(restitution=epsilon))
@@ -106,14 +81,6 @@ def test_bounces_end_after_2u_over_g_1_minus_epsilon():
     expected = down + 2.0 * epsilon * G * down / (G * (1.0 - epsilon))
     assert found.track(0)["t"][-1] == pytest.approx(expected, rel=1e-12, abs=0.0)
     assert REASONS[found.ended[0]] == "settled"
-
-
-def test_a_disk_rolls_over_an_edge_and_falls_off_it():
-    """From rest on the edge of a ledge with all grip: it leaves at cos φ = 4/7, as a full disk."""
-    ledge = floor(points=[[-1.0, 0.0], [0.0, 0.0]], friction=1e6)
-    found = run(thrown((1e-9, 0.01), (0.0, 0.0), 2.0, ledge, spin=True))
-    left = found.select(Kind.SEPARATION)[-1]
-    assert cos(atan2(*left["position"])) == pytest.approx(4.0 / 7.0, rel=1e-7)
 
 
 def test_round_the_end_of_a_belt_the_surface_runs_on_along_the_rim():
@@ -151,20 +118,6 @@ def test_what_it_cannot_follow_is_refused():
 def test_what_it_has_no_equations_for_is_refused(surface, more, what):
     with pytest.raises(reference.UnableError, match=what):
         run({**thrown((0.0, 0.5), (0.0, 0.0), 3.0, surface), **more})
-
-
-def test_one_of_several_kinds_meets_surfaces_as_its_kind_does():
-    # The second of three kinds: ε = 0.7 by its material, on a floor that says nothing.
-    kinds = [
-        {"name": name, "radius": radius, "material": name}
-        for name, radius in (("glass", 0.02), ("rubber", 0.01), ("coal", 0.03))
-    ]
-    bare = {"name": "floor", "points": [[-9.0, 0.0], [9.0, 0.0]]}
-    tables = thrown((0.0, 0.5), (0.0, 0.0), 0.35, bare) | {"particle": kinds}
-    tables["stream"]["particle"] = "rubber"
-    (hit,) = run(tables).select(Kind.IMPACT)
-    assert hit["t"] == pytest.approx(sqrt(2.0 * 0.49 / G), rel=1e-12)
-    assert hit["velocity_after"][1] == pytest.approx(0.7 * sqrt(2.0 * G * 0.49), rel=1e-12)
 
 
 def test_without_scipy_it_says_what_to_install():

@@ -1,13 +1,10 @@
 """The references against closed forms, and against the exact engine where that has an answer."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from math import cos, exp, hypot, pi, sin, sqrt
+from math import pi, sqrt
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from chutelab import scene
 from chutelab.engines import exact
@@ -15,14 +12,7 @@ from chutelab.machine import build
 from chutelab.results import Kind
 from drawn import draw, only_blows
 from machines import (
-    BELT,
-    LENGTH,
-    SLIDES,
-    WHEEL,
     box,
-    over_the_pulley,
-    ramp,
-    round_the_wheel,
     scene_of,
     thrown,
 )
@@ -32,12 +22,7 @@ from references import (
     henderson,
     inside_surfaces,
     likeness,
-    maxwell_boltzmann,
     overlaps,
-    pair_overlaps,
-    round_the_pulley,
-    slide,
-    surface_depths,
     virial,
     wall_pressure,
 )
@@ -54,7 +39,7 @@ def own_impacts(recording, particle):
 
 
 @pytest.mark.parametrize(
-    ("count", "least"), [(40, 10), pytest.param(150, 50, marks=pytest.mark.slow)]
+    ("count", "least"), [(20, 5), pytest.param(150, 50, marks=pytest.mark.slow)]
 )
 def test_lone_disks_meet_what_they_meet_in_the_exact_engine(count, least):
     compared = 0
@@ -118,7 +103,7 @@ def test_a_pair_meets_when_and_as_fast_as_written_here():
     assert (found[0][0].partner, found[1][0].partner) == (1, 0)
 
 
-@pytest.mark.parametrize("end", [1.5, pytest.param(8.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("end", [0.75, pytest.param(8.0, marks=pytest.mark.slow)])
 def test_a_gas_presses_on_its_walls_as_the_virial_theorem_says(end):
     # d/dt Σ m x·v = 2 K + Σ σ J (pairs) - (walls) ½ a J, with x from the middle and a = side - 2 r.
     count, side, r = 64, 1.0, 0.02
@@ -141,57 +126,6 @@ def test_a_gas_presses_on_its_walls_as_the_virial_theorem_says(end):
     assert pressure == pytest.approx(walls.sum() / (4.0 * side * end), rel=1e-15, abs=0.0)
 
 
-# Lasting contacts
-
-
-@pytest.mark.parametrize("friction", [0.15, 0.5, 2.0])
-@pytest.mark.parametrize("turning", [0.0, 2.0])
-def test_round_the_pulley_as_the_exact_engine_and_the_slip_law_say(friction, turning):
-    r = 0.004
-    ride = WHEEL + r
-    found = round_the_pulley(
-        belt=BELT, ride=ride, friction=friction, turning=turning, way=-LENGTH, speed=0.8
-    )
-    u0 = BELT**2 / (G * ride)
-    if turning == 0.0 and friction > 0.15:
-        # It has the belt's speed before it comes to the pulley.
-        # u' = 2 (sin φ - µ (cos φ - u)); u = A cos φ - B sin φ + C exp(2 µ φ), from the onset on.
-        onset = brentq(lambda f: sin(f) - friction * (cos(f) - u0), 0.0, 1.5, xtol=1e-15)
-        a, b = (
-            (4.0 * friction**2 - 2.0) / (1.0 + 4.0 * friction**2),
-            6.0 * friction / (1.0 + 4.0 * friction**2),
-        )
-        c = (u0 - a * cos(onset) + b * sin(onset)) * exp(-2.0 * friction * onset)
-        leaves = brentq(
-            lambda f: a * cos(f) - b * sin(f) + c * exp(2.0 * friction * f) - cos(f),
-            onset + 1e-6, 1.5, xtol=1e-15,
-        )  # fmt: skip
-        assert [what for _, what in found.phases] == ["slip", "grip", "grip", "slip"]
-        assert found.angle == pytest.approx(leaves, abs=1e-9)
-    recording = exact.run(over_the_pulley(r, friction, turning, 0.8, until=3.0))
-    left = recording.select(Kind.SEPARATION)[0]
-    assert found.t == pytest.approx(left["t"], rel=1e-9)
-    assert found.angle == pytest.approx(np.arctan2(*left["position"]), abs=1e-9)
-    assert found.speed == pytest.approx(hypot(*left["velocity_after"]), rel=1e-9)
-    assert found.rim == pytest.approx(r * left["omega_after"], abs=1e-9)
-    times = np.linspace(0.0, found.t, 200)
-    place = round_the_wheel(found.state(times)[0], r)
-    np.testing.assert_allclose(recording.at(times)[0][:-1, 0], place[:-1], rtol=0, atol=1e-8)
-
-
-@pytest.mark.parametrize("options", SLIDES)
-def test_slide_as_the_exact_engine_says(options):
-    machine, start, along = ramp(options)
-    recording = exact.run(machine)
-    times = np.linspace(0.0, 1.99, 50)
-    way, speed, _ = slide(times, **options)
-    place, velocity = recording.at(times)
-    np.testing.assert_allclose(place[:, 0], start + way[:, None] * along, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(velocity[:, 0], speed[:, None] * along, rtol=0, atol=1e-12)
-    r = machine.particle.radius
-    assert r * recording.track(0)[-1]["omega"] == pytest.approx(slide(2.0, **options)[2], abs=1e-12)
-
-
 # Gas
 
 
@@ -201,12 +135,6 @@ def test_henderson_has_the_virial_coefficients_of_hard_disks():
     assert (henderson(h) - henderson(-h)) / (2.0 * h) == pytest.approx(2.0, rel=1e-5)
     third = (henderson(h) - 2.0 + henderson(-h)) / (2.0 * h**2)
     assert third == pytest.approx(16.0 / 3.0 - 4.0 * sqrt(3.0) / pi, rel=1e-3)
-
-
-def test_maxwell_boltzmann_tells_normal_components_from_others():
-    rng = np.random.default_rng(3)
-    assert maxwell_boltzmann(rng.normal(0.0, 2.5, (2000, 2))) > 0.01
-    assert maxwell_boltzmann(rng.uniform(-1.0, 1.0, (2000, 2))) < 1e-6
 
 
 # Overlaps
@@ -230,29 +158,3 @@ def test_overlaps_are_those_of_what_touches_in_radii():
     assert depth.percentile_99 == pytest.approx(0.1, rel=1e-12, abs=0.0)
     depth = inside_surfaces(recording, built, [0.0])
     assert (depth.worst, depth.count) == (pytest.approx(0.1, rel=1e-12, abs=0.0), 1)
-
-
-def test_overlaps_of_two_sizes_count_in_radii_of_the_smaller():
-    """1 and 4 mm, 4.8 mm apart: 0.2 mm deep, and 0.2 of the smaller."""
-    deep = pair_overlaps(np.array([[0.0, 0.0], [0.0048, 0.0], [0.02, 0.0]]), [0.001, 0.004, 0.004])
-    assert deep == pytest.approx([0.2], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("place", "deep"),
-    [
-        ((0.0, -0.485), -0.005),  # inside, at the lowest point
-        ((0.0, -0.505), 0.005),  # outside, beyond it
-        ((0.0, 0.5), -0.697106781186548),  # above: sqrt(1/2) m from both ends
-        ((0.5, 0.003), 0.007),  # above the right end
-        ((-0.5, -0.003), 0.009991),  # beside the left one, rather: 9 um from the arc
-    ],
-)
-def test_disks_are_as_deep_in_an_arc_as_its_nearest_point_is_near(place, deep):
-    """A half circle of 0.5 m below the origin, that comes at 1 s and goes at 2 s."""
-    bowl = {"name": "bowl", "center": [0.0, 0.0], "radius": 0.5, "from_deg": 180.0,
-            "to_deg": 360.0, "closes_at": 1.0}  # fmt: skip
-    built = scene_of(surface=[bowl])
-    (found,) = surface_depths(built, np.array([place]), 0.01, 1.5).values()
-    assert found == pytest.approx([deep], abs=1e-9)
-    assert surface_depths(built, np.array([place]), 0.01, 0.5) == {}

@@ -1,8 +1,5 @@
 """The stream: when, where and how fast each particle starts."""
 
-from __future__ import annotations
-
-import tracemalloc
 from time import process_time
 
 import numpy as np
@@ -28,13 +25,6 @@ def drawn(*, incoming=None, particle=None, **stream):
     return build(scene.from_dict(tables, "mine.toml")).releases
 
 
-def same(one, other):
-    return all(
-        a.tobytes() == b.tobytes()
-        for a, b in zip(vars(one).values(), vars(other).values(), strict=True)
-    )
-
-
 @given(count=st.integers(1, 400), rate=st.floats(1e-3, 1e6), seed=st.integers(0, 2**63 - 1))
 def test_particle_i_starts_at_i_over_the_rate_on_the_belt(count, rate, seed):
     found = drawn(count=count, rate=rate, seed=seed, bed_height=0.05)
@@ -51,36 +41,10 @@ def test_particle_i_starts_at_i_over_the_rate_on_the_belt(count, rate, seed):
         found.t[0] = 1.0
 
 
-def test_heights_and_speeds_are_spread_uniformly():
-    changes = {"count": 20_000, "bed_height": 0.05, "speed_spread": 0.5, "velocity": [3.0, 4.0]}
-    found = drawn(**changes, at=[0.0, 1.0])
-    height = (found.position[1:, 1] - 1.0) / 0.05
-    along = (found.velocity[1:] @ [0.6, 0.8] - 5.0) / 0.5
-    across = found.velocity @ [-0.8, 0.6]
-    # five standard errors of a uniform distribution's mean and variance
-    five = 5.0 / np.sqrt(20_000)
-    assert height.mean() == pytest.approx(0.5, abs=five * np.sqrt(1 / 12))
-    assert height.var() == pytest.approx(1 / 12, abs=five * np.sqrt(1 / 180))
-    assert along.mean() == pytest.approx(0.0, abs=five * np.sqrt(1 / 3))
-    assert along.var() == pytest.approx(1 / 3, abs=five * np.sqrt(4 / 45))
-    assert np.abs(along).max() <= 1.0 + 1e-14
-    assert np.abs(across).max() < 1e-14
-    assert found.velocity[0].tolist() == [3.0, 4.0]
-    assert not found.carried.any()
-
-
 def test_a_particle_let_go_from_rest_has_its_spread_forwards():
     found = drawn(count=50, at=[0.0, 1.0], velocity=[0.0, 0.0], speed_spread=0.3)
     assert (found.velocity[:, 1] == 0.0).all()
     assert 0.0 < np.abs(found.velocity[1:, 0]).max() <= 0.3
-
-
-def test_the_seed_decides():
-    changes = {"count": 100, "bed_height": 0.1, "rate": 100.0}
-    for interact in (False, True):
-        one = drawn(**changes, interact=interact, seed=3)
-        assert same(one, drawn(**changes, interact=interact, seed=3))
-        assert not same(one, drawn(**changes, interact=interact, seed=4))
 
 
 @pytest.mark.parametrize(
@@ -97,46 +61,6 @@ def test_only_what_starts_on_an_adhesive_belt_is_carried(changes, carried):
     found = drawn(**changes)
     assert found.carried.tolist() == [carried]
     assert found.position.tolist() == [list(changes.get("at", [-1.0, RC]))]
-
-
-def gaps(found, fall, floor):
-    """Distances of every particle, at its release, from all released before it."""
-    for i in range(1, len(found.t)):
-        age = found.t[i] - found.t[:i, None]
-        there = found.position[:i] + found.velocity[:i] * age - [0.0, fall] * age**2
-        there[:, 1] = np.maximum(there[:, 1], floor)
-        yield np.hypot(*(there - found.position[i]).T).min()
-
-
-@settings(max_examples=25)
-@given(seed=st.integers(0, 1000), rate=st.floats(50.0, 1000.0), bed=st.floats(0.1, 0.2))
-@pytest.mark.parametrize("kind", ["carried", "slipping", "dropped"])
-def test_interacting_particles_never_start_inside_each_other(kind, seed, rate, bed):
-    stream = {"count": 100, "rate": rate, "bed_height": bed, "seed": seed, "interact": True}
-    small = {"radius": 0.004}
-    fall, floor = 0.5 * G, -np.inf
-    if kind == "carried":
-        found, fall = drawn(**stream, particle=small), 0.0
-    elif kind == "slipping":
-        # 5 mm apart, and 3 mm fallen where there is so much room above the belt
-        slow = {"velocity": [0.2, 0.0], "rate": 40.0, "bed_height": 0.014}
-        belt = {"friction": 0.5}
-        found, floor = drawn(**{**stream, **slow}, incoming=belt, particle=small), 0.104
-    else:
-        found = drawn(**stream, at=[0.0, 3.0], velocity=[1.5, 0.4], particle=small)
-    assert min(gaps(found, fall, floor)) >= 0.008 * (1.0 - 1e-12)
-    assert found.position[0, 1] == found.position[:, 1].min()
-    assert np.ptp(found.position[:, 1]) <= bed
-
-
-def test_in_a_bed_with_no_room_everybody_is_due_all_the_same():
-    # one every millimetre of belt, in a single layer, 13 mm across: they wait, see test_summary
-    found = drawn(count=20, rate=2000.0, interact=True)
-    assert found.t.tolist() == [i / 2000.0 for i in range(20)]
-    assert found.position.tolist() == [[-1.0, RC]] * 20
-    # in two layers' height at most a few find a place, and nobody is put outside the bed
-    found = drawn(count=20, rate=2000.0, interact=True, bed_height=0.025)
-    assert np.ptp(found.position[:, 1]) <= 0.025
 
 
 def bed_of_numpy(seeds, count, rate, height, speed, spread, radii, fall, floor):
@@ -159,7 +83,7 @@ def bed_of_numpy(seeds, count, rate, height, speed, spread, radii, fall, floor):
     return y, u, size
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     seed=st.sampled_from([0, 2**32 - 1, 2**32, 2**63 - 1]) | st.integers(0, 2**63 - 1),
     second=st.booleans(), carried=st.booleans(), count=st.integers(2, 100),
@@ -247,30 +171,6 @@ def test_what_is_poured_into_what_was_poured_lies_beside_it():
     radius = machine.particle.radius
     free = np.hypot(*apart.T) - radius[:, None] - radius + np.eye(300)
     assert free.min() >= -1e-15
-
-
-@pytest.mark.parametrize(
-    "stream",
-    [
-        {"count": 10, "fill": [[0.0, 0.0], [15.0, 15.0]]},
-        {"count": 2000, "at": [0.0, 0.5], "velocity": [1.0, 0.0], "rate": 1e5, "bed_height": 0.1},
-    ],
-    ids=["box", "bed"],
-)
-def test_places_are_found_at_once(stream):
-    """It took 37 s and 3.5 GB, and 14 s: the bounds are of processor time and of memory."""
-    line = {"name": "line", "from": [0.0, -0.1], "to": [15.0, -0.1]}
-    stream = {**stream, "interact": True}
-    made = scene.from_dict({"particle": {"radius": 0.001}, "surface": [line], "stream": stream})
-    began = process_time()
-    build(made)
-    assert process_time() - began < 3.0
-    if "fill" in stream:
-        tracemalloc.start()
-        build(made)
-        _, peak = tracemalloc.get_traced_memory()
-        tracemalloc.stop()
-        assert peak < 1e8
 
 
 def test_a_box_is_not_looked_through_for_ever():

@@ -1,7 +1,5 @@
 """Result files of a lesson's live page: marked like notebooks, and none of them stops a class."""
 
-from __future__ import annotations
-
 import json
 import math
 import os
@@ -11,8 +9,7 @@ from click.testing import CliRunner
 from markdown_it import MarkdownIt
 
 from chutelab.classroom.exercises import EXERCISES, lesson
-from chutelab.classroom.grading import Grade, grade
-from chutelab.classroom.returned import LARGEST_RESULT
+from chutelab.classroom.grading import LARGEST_RESULT, Grade, grade
 from chutelab.cli import main
 
 
@@ -213,11 +210,3 @@ def test_a_folder_stands_for_all_in_it_but_hidden_copies(returned, tmp_path):
     marking = ["lesson", "grade", str(tmp_path / "class"), "--json"]
     found = json.loads(CliRunner().invoke(main, marking).output)["grades"]
     assert [one["student"] for one in found] == ["Ada", "Ben"]
-
-
-def test_a_report_writes_over_no_file_that_was_returned(returned):
-    path = returned("x.json", result())
-    before = path.read_bytes()
-    refused = CliRunner().invoke(main, ["lesson", "grade", str(path), "--report", str(path)])
-    assert (refused.exit_code, path.read_bytes()) == (2, before)
-    assert "one of the files that were returned" in refused.stderr

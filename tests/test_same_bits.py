@@ -1,7 +1,5 @@
 """The same command leaves the same files to the last bit, whoever runs it, where and when."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -79,7 +77,7 @@ KERNELS = {"OPENBLAS_CORETYPE": "Prescott"}
 """Of linear algebra: those of the oldest processor, not the ones that suit this one best."""
 
 
-def written(folder: Path, commands: list[str], environment: dict[str, str]) -> dict[str, bytes]:
+def written(folder, commands, environment):
     """Run commands in a new folder; return what is in its files by their paths in it."""
     folder.mkdir(parents=True)
     arguments = [HERE / "in_a_row.py", json.dumps([line.split() for line in commands])]

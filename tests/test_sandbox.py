@@ -1,7 +1,5 @@
 """Random machines of all parts and mixtures of all kinds: laws that every run of them must keep."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, pi
 
@@ -176,7 +174,7 @@ def in_the_ledger(recording):
             yield "streams: energy from others where none meet"
 
 
-def faults(recording: Recording) -> list[str]:
+def faults(recording):
     """Return what a run did that none may do."""
     found = [*in_surfaces(recording), *in_the_ledger(recording)]
     return found + list(in_others(recording)) if recording.machine.interact else found

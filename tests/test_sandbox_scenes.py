@@ -1,7 +1,5 @@
 """The laws that the shipped scenes of piles and crowds show, measured on their recordings."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from math import comb, hypot
@@ -20,73 +18,8 @@ def last_places(recording):
 
 # Hopper.
 
-D = 0.006
-"""Mean diameter of its grains, m."""
-
-
-def outflow(opening, count):
-    """Return grains per second in the steady middle of a run: when 20 % to 70 % cross y = 0."""
-    w, wall = 0.5 * opening, 0.1
-    sides = {"left": -1.0, "right": 1.0}
-    changes = {
-        f"surface.{name}.points": [[s * wall, 1.2], [s * wall, wall - w], [s * w, 0.0]]
-        for name, s in sides.items()
-    }
-    changes |= {"surface.gate.points": [[-w, 0.0], [w, 0.0]], "stream.count": count}
-    changes |= {"stream.fill": [[-0.095, 0.13], [0.095, 1.1]], "expect": None}
-    recording = simulate(sc.load("hopper").with_values(changes))
-    crossed = []
-    for i in range(count):
-        track = recording.track(i)
-        y = track["position"][:, 1]
-        below = np.flatnonzero(y < 0.0)
-        crossed.append(track["t"][below[0]] if len(below) else np.inf)
-    crossed = np.sort(crossed)
-    low, high = int(0.2 * count), int(0.7 * count)
-    return (high - low) / (crossed[high] - crossed[low])
-
-
-def test_a_wider_hopper_lets_more_out_and_all_of_it():
-    narrow, wide = outflow(8 * D, 200), outflow(12 * D, 200)
-    assert wide > 1.2 * narrow
-
-
-@pytest.mark.slow
-def test_the_outflow_of_a_hopper_is_beverloos():
-    """In two dimensions the flow is C (W - k d)^1.5, with k = 1.3 (1 to 2 in experiments)."""
-    openings = np.array([6.5, 8.0, 10.0, 12.0]) * D
-    flows = [outflow(opening, 1000) for opening in openings]
-    exponent = np.polyfit(np.log(openings - 1.3 * D), np.log(flows), 1)[0]
-    assert exponent == pytest.approx(1.5, abs=0.15)
-
 
 # Heap.
-
-
-def repose(rolling, count):
-    """Return the flanks' mean slope, degrees: a line through the highest grain of each 12 mm."""
-    scene = sc.load("heap", [f"particle.rolling_friction={rolling}", f"stream.count={count}"])
-    recording = simulate(scene.with_values({"run.until": count / 60.0 + 2.0}))
-    x, y = last_places(recording).T
-    x, top = np.abs(x[y > 0.0]), (y + recording.particle.radius)[y > 0.0]
-    strip = (x // 0.012).astype(int)
-    found = np.unique(strip)
-    height = np.array([top[strip == n].max() for n in found])
-    flank = (height > 0.2 * height.max()) & (height < 0.8 * height.max())
-    slope = np.polyfit(0.012 * found[flank], height[flank], 1)[0]
-    return np.degrees(np.arctan(-slope))
-
-
-@pytest.mark.slow
-def test_a_heap_is_steeper_the_more_its_grains_resist_rolling():
-    low, middle, high = (repose(rolling, 300) for rolling in (0.1, 0.3, 0.8))
-    assert 5.0 < low < middle - 4.0
-    assert middle + 4.0 < high < 60.0
-
-
-def test_without_rolling_friction_no_heap_stands():
-    flat, heap = (repose(rolling, 120) for rolling in (0.05, 0.8))
-    assert heap > flat + 5.0
 
 
 # Galton board.

@@ -1,7 +1,5 @@
 """SCORM 1.2 packages: their manifest, and lessons played through in a platform's stand-in."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -14,7 +12,7 @@ from click.testing import CliRunner
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.lessons import find
-from chutelab.classroom.lessons.scorm import package
+from chutelab.classroom.lessons.pages import package
 from chutelab.cli import main
 
 LIVE = Path(__file__).parent / "live"
@@ -120,37 +118,6 @@ def test_every_lesson_has_a_package_that_its_manifest_describes(name, tmp_path):
         if file != "page.html":
             assert set(re.findall(r"https?://[\w./]+", text)) <= {CP[1:-1], ADL[1:-1]}
             assert not re.search(r'(?:src|href)="(?:/|\w+:)', text)
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ('href="scorm.js"', 'href="script.js"'),
-        ('identifierref="page"', 'identifierref="leaf"'),
-        ('default="lessons"', 'default="lesson"'),
-        (' adlcp:scormtype="sco"', ""),
-        ("<schemaversion>1.2</schemaversion>", ""),
-        ('identifier="lesson"', 'identifier="1esson"'),
-        ('identifier="lesson"', 'identifier="lessons"'),
-        ("imscp_rootv1p1p2", "imscp_v1p1"),
-        ("<organizations", "<resources/><organizations"),
-    ],
-)
-def test_the_check_of_manifests_finds_faults(tmp_path, old, new):
-    files = unpacked(package(find("the-bounce"), tmp_path / "x.zip"))
-    xml = files["imsmanifest.xml"].decode("utf-8")
-    check_manifest(xml, files)
-    assert old in xml
-    with pytest.raises(AssertionError):
-        check_manifest(xml.replace(old, new), files)
-
-
-def test_the_same_lesson_makes_the_same_bytes(tmp_path):
-    first = package(find("the-bounce"), tmp_path / "a.zip").read_bytes()
-    assert package(find("the-bounce"), tmp_path / "b.zip").read_bytes() == first
-    with ZipFile(tmp_path / "a.zip") as archive:
-        assert {one.date_time for one in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zip", "b.zip"]
 
 
 def test_what_a_title_has_in_it_is_no_markup(tmp_path):

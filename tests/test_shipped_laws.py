@@ -1,7 +1,5 @@
 """What the shipped chutes, the cradle and the dominoes do, by laws written out here."""
 
-from __future__ import annotations
-
 from functools import cache
 from math import asin, atan2, cos, exp, pi, radians, sin, sqrt
 

@@ -1,14 +1,9 @@
 """From a scene to a recording: which engine runs, and the same numbers every time."""
 
-from __future__ import annotations
-
-from importlib import import_module
-
 import numpy as np
 import pytest
 
 from chutelab import machine, scene
-from chutelab.engines import exact
 from chutelab.engines.simulation import ENGINES, choose, simulate
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.ledger import ledger
@@ -46,11 +41,6 @@ def test_auto_takes_exact_unless_particles_interact(name):
     built = machine.build(loaded(name))
     assert choose(built) == choose(built, "auto") == AUTO.get(name, "exact")
     assert [choose(built, engine) for engine in ENGINES[1:]] == ["exact", "contact", "pymunk"]
-
-
-def test_one_particle_has_nobody_to_interact_with():
-    recording = simulate(loaded("perpendicular", "stream.interact=true"))
-    assert recording.engine == "exact"
 
 
 def test_the_scene_chooses_and_the_caller_overrides():
@@ -102,25 +92,6 @@ def test_the_same_scene_and_seed_give_the_same_bits(name, overrides, engine):
     assert len(one.events) > 0
 
 
-def test_another_seed_gives_another_run():
-    one, other = (
-        simulate(loaded("stream-independent", "stream.count=20", f"stream.seed={seed}"))
-        for seed in (1, 2)
-    )
-    assert one.knots.tobytes() != other.knots.tobytes()
-
-
-@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
-def test_simulating_is_building_and_running(engine):
-    run = exact.run if engine == "exact" else import_module(f"chutelab.engines.{engine}").run
-    asked = loaded("perpendicular")
-    recording = simulate(asked, engine=engine)
-    assert same(recording, run(machine.build(asked)))
-    assert 0.0 < recording.seconds < 60.0
-    assert scene.from_dict({**scene.to_dict(asked)}) == asked
-    assert [REASONS[n] for n in recording.ended] == ["landed"]
-
-
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
 def test_progress_goes_from_0_to_1(engine):
     shares = []
@@ -134,12 +105,9 @@ def test_progress_goes_from_0_to_1(engine):
 
 STOPPABLE = (
     # scene, engine, what is changed, looks until the end
-    ("stream", "contact", (), 7),
+    ("stream", "contact", ("stream.count=60",), 4),
     ("stream", "pymunk", ("stream.count=20", "run.until=0.7"), 9),
-    ("stream-independent", "exact", ("stream.count=6000",), 4),
     ("stream-independent", "exact", ("stream.count=6000", "run.until=settled"), 6),
-    ("stream-independent", "contact", ("stream.count=300",), 8),
-    ("stream-independent", "pymunk", ("stream.count=5", "run.until=settled"), 9),
     ("belt-landing", "exact", (), 3),
     ("belt-landing", "contact", (), 5),
     ("belt-landing", "pymunk", (), 9),
@@ -191,13 +159,6 @@ def test_a_run_that_is_stopped_keeps_what_was_recorded(name, engine, changes, lo
     assert waits(again) is None
 
 
-def test_who_has_not_been_reached_is_not_said_to_have_waited():
-    """The engine for particles that do not meet takes one block after the other."""
-    recording = simulate(loaded("stream-independent"), engine="exact", progress=after(2))
-    assert stopped(recording).unreleased > 5000
-    assert waits(recording) is None
-
-
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
 def test_a_time_limit_ends_a_run(engine):
     found = stopped(simulate(loaded("belt-landing"), engine=engine, max_seconds=1e-9))
@@ -205,28 +166,7 @@ def test_a_time_limit_ends_a_run(engine):
     assert stopped(simulate(loaded("perpendicular"), engine=engine, max_seconds=1e3)) is None
 
 
-def test_a_run_that_is_over_is_not_stopped_by_the_last_look():
-    for engine in ("exact", "contact", "pymunk"):
-        looks = []
-        whole = simulate(loaded("perpendicular"), engine=engine, progress=looks.append)
-        assert looks[-1] == 1.0
-        assert same(
-            whole, simulate(loaded("perpendicular"), engine=engine, progress=after(len(looks)))
-        )
-
-
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_time_limit_is_a_number_above_0(seconds):
     with pytest.raises(ValueError, match=r"max_seconds = .*: a finite number above 0 s"):
         simulate(loaded("perpendicular"), max_seconds=seconds)
-
-
-def test_a_name_a_path_and_tables_are_run_as_the_scene_is(tmp_path):
-    loaded = scene.load("perpendicular")
-    path = tmp_path / "mine.toml"
-    path.write_text(scene.to_toml(loaded))
-    whole = simulate(loaded)
-    for given in ("perpendicular", path, str(path), scene.to_dict(loaded)):
-        assert (simulate(given).knots == whole.knots).all()
-    with pytest.raises(scene.SceneError, match="no shipped scene"):
-        simulate("perpendicularly speaking")

@@ -1,7 +1,5 @@
 """The picture of a velocity that splits along a plate and into it."""
 
-from __future__ import annotations
-
 from math import cos, hypot, radians, sin, sqrt
 
 import numpy as np
@@ -54,8 +52,3 @@ def test_symbols_are_written_and_no_number():
             "$v_2$", "$v_t$", "$v_n$", "$v_2'$", "$v_t' = v_t$", r"$v_n' = \varepsilon v_n$",
             r"$\varphi_2$", *more,
         }  # fmt: skip
-
-
-def test_where_nothing_is_struck_it_says_so():
-    with pytest.raises(ValueError, match=r'surface = "plate": the scene has ramp, floor'):
-        split_velocity(chutelab.simulate(chutelab.load("free-fall")))

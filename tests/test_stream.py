@@ -1,9 +1,5 @@
 """A stream as a whole, against sums written here."""
 
-from __future__ import annotations
-
-from itertools import permutations
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -12,7 +8,7 @@ from chutelab import simulate
 from chutelab.cli import main
 from chutelab.machine import build
 from chutelab.results import REASONS, Kind
-from chutelab.results.arrival import LOOKS, Places, arrivals, fates
+from chutelab.results.arrival import LOOKS, arrivals, fates
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import each, measure
 from chutelab.results.recorder import Recorder
@@ -24,7 +20,7 @@ from chutelab.studies.sweep import sweep
 G = 9.81
 
 
-def test_envelope_of_parabolas() -> None:
+def test_envelope_of_parabolas():
     """Of parabolas from many heights: where 2, 50 and 98 % of them cross each cut."""
     thrown = {"count": 300, "rate": 1e6, "at": [0.0, 1.0], "velocity": [2.0, 0.0]}
     scene = from_dict({
@@ -50,16 +46,6 @@ def test_envelope_of_parabolas() -> None:
         np.testing.assert_allclose(offset, expected, atol=5e-5)
         cuts += 1
     assert cuts > 10
-
-
-@pytest.mark.parametrize("changes", [{"count": 19}, {"fill": [[0.0, 0.0], [0.5, 0.5]]}])
-def test_no_envelope(changes: dict[str, object]) -> None:
-    """Of few particles, and of those that are released all at once, there is none."""
-    stream = {"count": 40, **changes} | (
-        {} if "fill" in changes else {"at": [0.0, 1.0], "velocity": [1.0, 0.0]}
-    )
-    floor = {"name": "floor", "from": [-1.0, -2.0], "to": [4.0, -2.0]}
-    assert envelopes(simulate(from_dict({"stream": stream, "surface": [floor]}))) == {}
 
 
 # who has arrived ----------------------------------------------------------------------------------
@@ -124,31 +110,6 @@ def test_a_particle_arrives_on_what_lies_on_the_belt_and_on_nothing_else():
     assert np.isnan(found["t"][4])
     landed = each(recording, "landing.t")
     assert np.flatnonzero(np.isfinite(landed)).tolist() == [0, 3]
-
-
-def test_what_leans_on_several_lies_there_if_one_of_them_does():
-    """1 lies on the belt; 0 leans on it and, in later pairs, on two that hang in the air."""
-    angles = np.radians([270.0, 60.0, 0.0])
-    around = 2.0 * R * np.stack([np.cos(angles), np.sin(angles)], axis=1) + [0.0, 3.0 * R]
-    rows = [line(x, y, 0.0, 1.0) for x, y in [(0.0, 3.0 * R), *around.tolist()]]
-    for order in permutations(range(4)):
-        recording = by_hand([rows[n] for n in order], landings=[(0.0, order.index(1))])
-        there = Places(recording)
-        lies = there.lying(0.5, *there.at(0.5), "outgoing")
-        assert lies.all(), order
-
-
-def test_what_has_bounced_off_carries_nobody():
-    """0 lands and flies up again; 1 hits it in the air, and comes when it lands."""
-    bounces = [(0.0, 0.0, 1.0, 0.0, -1.0), (1.0, 0.0, R, 0.0, -1.0), (1.0, 0.0, R, 0.0, 1.0),
-               (2.0, 0.0, 1.0, 0.0, 1.0), (3.0, 9.0, 2.0, 0.0, 0.0)]  # fmt: skip
-    meets = [
-        (0.0, 0.0, 3.0, 0.0, -1.0),
-        (2.0, 0.0, 1.0 + 2.0 * R, 0.0, -1.0),
-        (3.0, 1.0, R, 0.0, 0.0),
-    ]
-    recording = by_hand([bounces, meets], collisions=[(2.0, 0, 1)], landings=[(1.0, 0), (3.0, 1)])
-    assert arrivals(recording)["t"].tolist() == [1.0, 3.0]
 
 
 def connected(recording, t):

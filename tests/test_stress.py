@@ -67,13 +67,6 @@ def test_the_scene_is_changed_and_run_as_told():
     assert all(one["holds"] and one["figure"] <= one["bound"] for one in told["laws"])
 
 
-def test_a_crowd_on_the_contact_engine_keeps_its_laws():
-    """Two of these disks meet three times within an ulp of one instant, on the belt."""
-    shown = call("stream", "--set", "stream.count=40").stdout
-    assert "\nengine contact, steps of 0.001 s\n" in shown
-    assert shown.endswith("\nall 15 laws kept\n")
-
-
 def test_a_broken_law_is_told_and_is_exit_code_1(monkeypatch):
     monkeypatch.setitem(LAWS, "ledger closes", lambda e: Verdict(inf, 1e-12, "of it all"))
     shown = call("perpendicular", code=1).stdout
@@ -115,22 +108,6 @@ def test_bad_input_is_exit_code_2(arguments, said):
     outcome = call(*arguments, code=2)
     assert outcome.stdout == ""
     assert said in outcome.stderr
-
-
-def test_a_stuck_run_is_told_and_not_judged(monkeypatch):
-    monkeypatch.setattr("chutelab.engines.simulation.judged", stuck)
-    outcome = call("perpendicular", code=1)
-    assert outcome.stdout == ""
-    assert "particle 0 is stuck at t = 0.75 s" in outcome.stderr
-    assert "--partial" not in outcome.stderr
-
-
-def test_ctrl_c_ends_it(monkeypatch):
-    def interrupts(*_arguments, **_options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("chutelab.engines.simulation.judged", interrupts)
-    assert call("perpendicular", code=130).stdout == ""
 
 
 # A run that gets stuck; a run that is interrupted
@@ -179,10 +156,6 @@ def test_a_stuck_run_writes_what_there_is_if_asked(monkeypatch, tmp_path):
     saved = chutelab.Recording.load(tmp_path / "out" / "recording.npz")
     hop = follow(build(scene.from_dict(HOP)), None, None)
     assert saved.knots.tobytes() == hop.knots.tobytes()
-
-
-def test_partial_needs_out(monkeypatch, tmp_path):
-    assert "--out" in run_stuck(monkeypatch, tmp_path, "--partial", code=2)
 
 
 def started(folder, *arguments, **environment):
@@ -251,21 +224,10 @@ def test_ctrl_c_during_a_run_leaves_what_was_recorded(tmp_path, in_the_middle):
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["stopped"]
 
 
-@pytest.mark.parametrize("name", ["overlay.png", ".chutelab-*/lesson.gif"])
-def test_ctrl_c_during_writing_leaves_nothing(tmp_path, name):
-    def when():
-        return bool(list(tmp_path.glob(f".chutelab-*/{name}")))
-
-    code, said = interrupted(tmp_path, "free-fall", "--out", "out", when=when)
-    assert code == 130
-    assert "Traceback" not in said
-    assert listed(tmp_path) == []
-
-
 @pytest.mark.parametrize(
-    ("sent", "code", "told"), [("SIGINT", 130, "Interrupted."), ("SIGTERM", 143, "Terminated.")]
+    ("module", "sent", "code", "told"),
+    [("click", "SIGINT", 130, "Interrupted."), ("rich", "SIGTERM", 143, "Terminated.")],
 )
-@pytest.mark.parametrize("module", ["click", "rich"])
 def test_a_signal_during_the_imports_is_no_traceback(tmp_path, module, sent, code, told):
     """The first is imported before there is a command, the second inside one."""
     (tmp_path / f"{module}.py").write_text(f"import signal; signal.raise_signal(signal.{sent})")
@@ -274,23 +236,6 @@ def test_a_signal_during_the_imports_is_no_traceback(tmp_path, module, sent, cod
         out, said = process.communicate(timeout=60.0)
     assert (process.returncode, out) == (code, "")
     assert said == ("" if module == "click" else f"\n{told}\n")
-
-
-def test_a_signal_that_python_would_pass_over_is_raised_again(capsys):
-    class Thing:
-        def __del__(self):
-            signal.raise_signal(signal.SIGTERM)
-            time.sleep(0.0)
-
-    def wait():
-        del things[0]
-        time.sleep(5.0)
-
-    things = [Thing()]
-    with raised(), pytest.raises(KeyboardInterrupt) as told:
-        wait()
-    assert told.value.signum == signal.SIGTERM
-    assert capsys.readouterr().err == ""
 
 
 def test_a_signal_waits_until_all_files_are_in_their_place(tmp_path, monkeypatch):

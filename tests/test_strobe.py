@@ -1,13 +1,8 @@
-from __future__ import annotations
-
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.text import Annotation
 from PIL import Image
 
 from chutelab import scene
@@ -16,11 +11,11 @@ from chutelab.pictures.plots import strobe
 from handmade import BELT_TIME, EXACT, by_hand, expected, seen
 
 
-def times_of(figure: Figure) -> list[Annotation]:
-    return [text for text in figure.axes[0].texts if text.get_gid() == "time"]  # type: ignore[misc]
+def times_of(figure):
+    return [text for text in figure.axes[0].texts if text.get_gid() == "time"]
 
 
-def test_times_stand_beside_the_dots_they_belong_to() -> None:
+def test_times_stand_beside_the_dots_they_belong_to():
     figure = strobe(by_hand())
     (dots,) = [line for line in figure.axes[0].lines if line.get_gid() == "strobe"]
     labels = times_of(figure)
@@ -43,7 +38,7 @@ def test_times_stand_beside_the_dots_they_belong_to() -> None:
 
 
 @pytest.mark.parametrize("name", [*EXACT, "free-fall"])
-def test_no_text_is_cut_off_overlapping_or_small(name: str) -> None:
+def test_no_text_is_cut_off_overlapping_or_small(name):
     figure = strobe(simulate(scene.load(name)))
     FigureCanvasAgg(figure).draw()
     texts = seen(figure)
@@ -66,7 +61,7 @@ def test_no_text_is_cut_off_overlapping_or_small(name: str) -> None:
             assert not path.intersects_bbox(label.get_window_extent(), filled=False), label
 
 
-def test_still_is_sharp_enough_for_print(tmp_path: Path) -> None:
+def test_still_is_sharp_enough_for_print(tmp_path):
     strobe(by_hand(), path=tmp_path / "strobe.png")
     with Image.open(tmp_path / "strobe.png") as image:
         assert image.size == (2700, 1680)

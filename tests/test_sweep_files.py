@@ -1,7 +1,5 @@
 """Files of sweeps: every bit of the rows, whole or not at all."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 
@@ -11,15 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chutelab.scene import load
-from chutelab.studies.sweep import (
-    COLUMNS,
-    REASON,
-    TEXTS,
-    crew,
-    planned,
-    sweep,
-    sweep_to,
-)
+from chutelab.studies.sweep import COLUMNS, REASON, TEXTS, crew, planned, sweep, sweep_to
 from chutelab.studies.sweep.result import columns_of, text_of
 from chutelab.util.errors import InputError
 
@@ -63,10 +53,7 @@ def test_parquet_has_them_too():
 @given(st.lists(st.floats(), min_size=1, max_size=4), st.text(st.characters(codec="utf-8")))
 def test_text_gives_rows_back(numbers, words):
     reason = " ".join(words.split())
-    columns = {
-        "x": np.array(numbers),
-        REASON: np.array([reason] * len(numbers), dtype=object),
-    }
+    columns = {"x": np.array(numbers), REASON: np.array([reason] * len(numbers), dtype=object)}
     found = columns_of(tuple(columns), text_of(columns))
     assert found[REASON].tolist() == [reason] * len(numbers)
     assert np.array_equal(found["x"], columns["x"], equal_nan=True)

@@ -1,9 +1,5 @@
 """The file of finished rows: it goes on after any interruption, and believes nothing unchecked."""
 
-from __future__ import annotations
-
-import hashlib
-import json
 import os
 import re
 import signal
@@ -13,10 +9,8 @@ from pathlib import Path
 from time import monotonic, sleep
 
 import pytest
-from click.testing import CliRunner
 
 import chutelab
-from chutelab.cli import main
 from chutelab.scene import load
 from chutelab.studies.sweep import crew, planned, sweep_to
 from chutelab.studies.sweep.batch import alone
@@ -52,8 +46,9 @@ def stop_at(share):
     return update
 
 
-@pytest.mark.parametrize("share", [0.0, 0.01, 0.1, 0.3, 0.5, 0.77, 0.98, 1.0])
-@pytest.mark.parametrize("form", ["csv", "parquet"])
+@pytest.mark.parametrize(
+    ("share", "form"), [(0.01, "csv"), (0.5, "csv"), (0.98, "csv"), (1.0, "csv"), (0.77, "parquet")]
+)
 def test_a_sweep_goes_on_and_writes_the_same_bytes(interrupted, share, form):
     plan, whole, kept = interrupted
     out = Path(f"rows.{form}")
@@ -111,26 +106,11 @@ def test_rows_of_another_sweep_are_refused(interrupted):
             sweep_to(plan, "rows.csv", team, resume=True)
 
 
-def test_there_may_be_nothing_to_go_on_with(interrupted):
-    plan, whole, _ = interrupted
-    with crew() as team:
-        sweep_to(plan, "rows.csv", team, resume=True)
-    assert Path("rows.csv").read_bytes() == whole
-
-
 # what is not as it was written -------------------------------------------------------------------
 
 
 def edited(lines):
     lines[4] = lines[4].replace(b"1", b"2", 1)
-
-
-def rounded(lines):
-    lines[4] = re.sub(rb"(\.\d{6})\d+", rb"\1", lines[4], count=1)
-
-
-def spaced(lines):
-    lines[4] = lines[4].replace(b", ", b",", 1)
 
 
 def rehashed(lines):
@@ -149,41 +129,15 @@ def swapped(lines):
     lines[4], lines[5] = lines[5], lines[4]
 
 
-def shifted(lines):
-    """Give each block the number of the next."""
-    for n in range(4, len(lines)):
-        begin, *rest = json.loads(lines[n])
-        lines[n] = json.dumps([begin + 1, *rest]).encode() + b"\n"
-
-
-def blank(lines):
-    lines.insert(4, b"\n")
-
-
 def deep(lines):
     lines[4] = b"[" * 100_000 + b"\n"
-
-
-def zeros(lines):
-    lines[4] = bytes(4096) + b"\n"
 
 
 def binary(lines):
     lines[4] = b"\xff\xfe" + lines[4]
 
 
-def huge(lines):
-    lines[4] = b"[" + b"9" * 5000 + b', "", ""]\n'
-
-
-def text_only(lines):
-    lines[4] = b'"begin, text"\n'
-
-
-HARM = [
-    edited, rounded, spaced, rehashed, doubled, removed, swapped, shifted, blank, deep, zeros,
-    binary, huge, text_only,
-]  # fmt: skip
+HARM = [edited, rehashed, doubled, removed, swapped, deep, binary]
 
 
 @pytest.mark.parametrize("harm", HARM)
@@ -219,67 +173,6 @@ def test_a_first_line_that_was_changed_is_refused(interrupted):
         with crew() as team, pytest.raises(InputError, match=r"line 1: not|no rows of a sweep"):
             sweep_to(plan, "rows.csv", team, resume=True)
         assert part.read_bytes() == changed
-
-
-def without_a_row(begin, text):
-    return begin, ""
-
-
-def with_a_row_more(begin, text):
-    return begin, text + text
-
-
-def without_a_column(begin, text):
-    return begin, text.partition(",")[2]
-
-
-def of_another_block(begin, text):
-    return begin + 1, text
-
-
-def of_no_block(begin, text):
-    return begin + 1000, text
-
-
-def with_words(begin, text):
-    first, *cells = text.split(",")
-    return begin, ",".join([first, "fast", *cells[1:]])
-
-
-@pytest.mark.parametrize(
-    "forge",
-    [without_a_row, with_a_row_more, without_a_column, of_another_block, of_no_block, with_words],
-)
-def test_blocks_with_true_hashes_must_be_of_the_plan(interrupted, forge):
-    plan, _, kept = interrupted
-    head, *blocks = kept.splitlines(keepends=True)
-    chain = hashlib.sha256(head[: head.index(b', "process"')])
-    lines = [head]
-    for number, block in enumerate(blocks):
-        begin, text, hashed = json.loads(block)
-        if number == 3:
-            begin, text = forge(begin, text)
-        body = json.dumps([begin, text])[:-1]
-        chain.update(body.encode())
-        # The formula is that of the file: blocks before are as they were.
-        assert number >= 3 or chain.hexdigest() == hashed
-        lines.append(f'{body}, "{chain.hexdigest()}"]\n'.encode())
-    part_of(Path("rows.csv")).write_bytes(b"".join(lines))
-    with crew() as team, pytest.raises(InputError, match="line 5"):
-        sweep_to(plan, "rows.csv", team, resume=True)
-
-
-def test_the_command_says_which_line_and_ends_with_2():
-    arguments = ["sweep", "perpendicular", "--vary", "plate.angle_deg=0:20:5", "--engine", "pymunk"]
-    plan = planned(load("perpendicular"), ["plate.angle_deg=0:20:5"], engine="pymunk")
-    with crew() as team, pytest.raises(KeyboardInterrupt):
-        sweep_to(plan, "rows.csv", team, progress=stop_at(0.8))
-    part = part_of(Path("rows.csv"))
-    head, first, second, *rest = part.read_bytes().splitlines(keepends=True)
-    part.write_bytes(b"".join([head, second, first, *rest]))
-    found = CliRunner().invoke(main, [*arguments, "--out", "rows.csv", "--resume"])
-    assert found.exit_code == 2
-    assert "rows.csv.part, line 2: not as it was written" in found.stderr
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no FIFO")
@@ -319,15 +212,6 @@ def test_a_sweep_that_runs_is_told_from_one_that_was_interrupted(interrupted):
     assert not part_of(Path("rows.csv")).exists()
 
 
-def test_who_goes_on_is_named_in_the_file(interrupted):
-    plan, _, kept = interrupted
-    part = part_of(Path("rows.csv"))
-    part.write_bytes(re.sub(rb'"process": +\d+', b'"process": %10d' % 1, kept, count=1))
-    with crew() as team, pytest.raises(KeyboardInterrupt):
-        sweep_to(plan, "rows.csv", team, resume=True, progress=stop_at(0.9))
-    assert json.loads(part.read_bytes().splitlines()[0])["process"] == os.getpid()
-
-
 def test_rows_are_on_the_disk_before_anything_relies_on_them(interrupted, monkeypatch):
     plan, _, _ = interrupted
     synced = []
@@ -351,7 +235,7 @@ def test_rows_are_on_the_disk_before_anything_relies_on_them(interrupted, monkey
     assert len(synced) < plan.count
 
 
-@pytest.mark.parametrize("room", [0, 500, 5000, 12_000])
+@pytest.mark.parametrize("room", [0, 12_000])
 def test_a_full_disk_loses_nothing(interrupted, room):
     resource = pytest.importorskip("resource")
     plan, whole, kept = interrupted
@@ -374,8 +258,7 @@ def test_a_full_disk_loses_nothing(interrupted, room):
 
 
 @pytest.mark.parametrize(
-    "signum",
-    [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM, signal.SIGKILL],
+    "signum", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM, signal.SIGKILL]
 )
 def test_a_signal_keeps_the_finished_rows_and_leaves_no_process(signum):
     sources = str(Path(chutelab.__file__).parent.parent)

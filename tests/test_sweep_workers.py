@@ -1,7 +1,5 @@
 """Who does the work of a sweep: nothing depends on it, nor on whether they all stay alive."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

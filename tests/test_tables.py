@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -10,7 +8,7 @@ RADII = (0.05, 0.0625, 0.08, 0.1, 0.125, 0.1575, 0.2, 0.25, 0.315, 0.4, 0.5)
 G = 9.81
 
 
-def paper_height(speed: float, radius: float, distance: float) -> float:
+def paper_height(speed, radius, distance):
     """Equations (2), (4), (5) and (16) with d2 = 0.5 m, as the paper writes them."""
     phi = math.acos(min(1.0, speed**2 / (G * radius)))
     t2 = (radius + distance - radius * math.sin(phi)) / (speed * math.cos(phi))
@@ -18,14 +16,12 @@ def paper_height(speed: float, radius: float, distance: float) -> float:
     return radius * (1 - math.cos(phi)) + y2 + 0.5
 
 
-def half_unit(printed: str) -> float:
+def half_unit(printed):
     return 0.5 * 10.0 ** -len(printed.partition(".")[2])
 
 
 @pytest.mark.parametrize(("number", "rows", "cells"), [(1, 22, 88), (4, 11, 66), (5, 11, 66)])
-def test_every_printed_digit_comes_out_of_the_printed_equations(
-    number: int, rows: int, cells: int
-) -> None:
+def test_every_printed_digit_comes_out_of_the_printed_equations(number, rows, cells):
     found = table(number)
     assert (len(found.rows), found.cells, found.differing) == (rows, cells, 0)
     for row in found.rows:
@@ -35,7 +31,7 @@ def test_every_printed_digit_comes_out_of_the_printed_equations(
 
 
 @pytest.mark.parametrize(("number", "speed"), [(4, 2.0), (5, 4.0)])
-def test_heights_are_equation_16(number: int, speed: float) -> None:
+def test_heights_are_equation_16(number, speed):
     for row, radius in zip(table(number).rows, RADII, strict=True):
         for cell, distance in zip(row.cells, (0.5, 0.6, 0.7, 0.8, 0.9, 1.0), strict=True):
             assert cell.computed == pytest.approx(
@@ -43,7 +39,7 @@ def test_heights_are_equation_16(number: int, speed: float) -> None:
             )
 
 
-def test_only_x3_of_table_1_depends_on_equation_9() -> None:
+def test_only_x3_of_table_1_depends_on_equation_9():
     found = table(1, rebound="corrected")
     assert found.differing == 22
     assert all([cell.differs for cell in row.cells] == [False, False, True, False]
@@ -53,7 +49,7 @@ def test_only_x3_of_table_1_depends_on_equation_9() -> None:
     assert [table(number, rebound="corrected").differing for number in (4, 5)] == [0, 0]
 
 
-def test_ties_agree_and_are_rounded_as_the_paper_does() -> None:
+def test_ties_agree_and_are_rounded_as_the_paper_does():
     cells = {row.label: row.cells[0] for row in table(1).rows}
     for radius, exact, printed in [("0.0625", 0.5625, "0.563"), ("0.1575", 0.6575, "0.658")]:
         cell = cells[f"v0 = 2 m/s, R = {radius} m"]
@@ -61,7 +57,7 @@ def test_ties_agree_and_are_rounded_as_the_paper_does() -> None:
         assert (cell.printed, cell.rounded, cell.differs) == (printed, printed, False)
 
 
-def test_table_3_is_refuted_not_fitted() -> None:
+def test_table_3_is_refuted_not_fitted():
     found = table(3)
     assert (found.cells, found.differing) == (4, 4)
     # A 0.26 kg point from a flat belt, 0.5 m to the plate: E = m/2 (v0² + (g 0.5/v0)²), in mJ
@@ -78,7 +74,7 @@ def test_table_3_is_refuted_not_fitted() -> None:
     assert math.sqrt(2 * 17.67536 / 0.26) == pytest.approx(11.66, abs=0.005)
 
 
-def test_there_are_no_other_tables() -> None:
+def test_there_are_no_other_tables():
     assert TABLES == (1, 3, 4, 5)
     for number in (0, 2, 6):
         with pytest.raises(ValueError, match="tables 1, 3, 4 and 5"):

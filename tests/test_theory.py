@@ -1,18 +1,15 @@
-from __future__ import annotations
-
 import math
 from decimal import Decimal, localcontext
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from chutelab.scene import from_dict
-from chutelab.theory import STAGES, Reason, Transfer, predict, transfer
+from chutelab.theory import STAGES, Reason, predict, transfer
 
 G = 9.81
 SPEED = st.floats(0.3, 6.0)
@@ -23,28 +20,26 @@ ANGLE = st.integers(-60_000, 60_000).map(lambda thousandths: thousandths / 1000.
 SHARE = st.floats(0.0, 1.0)
 
 
-def disk_or_point_leaves(
-    speed: float, radius: float, friction: float, *, spin: bool
-) -> tuple[float, float, float]:
+def disk_or_point_leaves(speed, radius, friction, *, spin):
     """φ1, v1 and r ω1 from an ODE in φ for u = v²/(gR) and r ω: stick or roll, slip, leave."""
     start = speed**2 / (G * radius)
     gain, share = (4.0 / 3.0, 3.0) if spin else (0.0, 1.0)
 
-    def rolling(phi: float) -> float:
+    def rolling(phi):
         return start + gain * (1.0 - math.cos(phi))
 
-    def excess(phi: float) -> float:
+    def excess(phi):
         return math.sin(phi) - share * friction * (math.cos(phi) - rolling(phi))
 
-    def slope(phi: float, state: Any) -> list[float]:
+    def slope(phi, state):
         press = math.cos(phi) - state[0]
         turning = -2.0 * friction * press * math.sqrt(G * radius / state[0]) if spin else 0.0
         return [2.0 * math.sin(phi) - 2.0 * friction * press, turning]
 
-    def leaves(phi: float, state: Any) -> float:
+    def leaves(phi, state):
         return math.cos(phi) - state[0]
 
-    leaves.terminal = True  # type: ignore[attr-defined]
+    leaves.terminal = True
     onset = brentq(excess, 0.0, math.pi / 2, xtol=1e-15)
     u = rolling(onset)
     rim = speed - math.sqrt(G * radius * u) if spin else 0.0
@@ -56,15 +51,13 @@ def disk_or_point_leaves(
     return run.t_events[0][0], math.sqrt(G * radius * state[0]), state[1]
 
 
-def leave(**changes: Any) -> Transfer:
+def leave(**changes):
     return transfer(**({"speed": 2.0, "pulley_radius": 0.5, "distance": 0.5} | changes))
 
 
 class TestSeparation:
     @given(SPEED, PULLEY, RADIUS)
-    def test_adhesion_lets_go_where_weight_no_longer_holds_it(
-        self, speed: float, pulley: float, r: float
-    ) -> None:
+    def test_adhesion_lets_go_where_weight_no_longer_holds_it(self, speed, pulley, r):
         found = transfer(speed=speed, pulley_radius=pulley, particle_radius=r, distance=1.0)
         ratio = speed**2 / (G * (pulley + r))
         assert found.v1 == speed
@@ -74,9 +67,7 @@ class TestSeparation:
     @pytest.mark.parametrize("spin", [False, True])
     @pytest.mark.parametrize("friction", [0.01, 0.3, 0.5, 1.0, 4.0, 30.0])
     @pytest.mark.parametrize(("speed", "pulley"), [(2.0, 0.5), (0.3, 0.6), (1.0, 0.11)])
-    def test_finite_friction_against_an_ode(
-        self, speed: float, pulley: float, friction: float, spin: bool
-    ) -> None:
+    def test_finite_friction_against_an_ode(self, speed, pulley, friction, spin):
         r = 0.004
         found = leave(
             speed=speed, pulley_radius=pulley, particle_radius=r, friction=friction, spin=spin
@@ -86,59 +77,20 @@ class TestSeparation:
         assert found.v1 == pytest.approx(v, rel=1e-12, abs=0.0)
         assert found.omega1 * r == pytest.approx(rim, abs=2e-12)
 
-    def test_half_a_metre_pulley_at_friction_one_half(self) -> None:
-        found = leave(particle_radius=0.004, friction=[0.5, np.inf])
-        assert np.degrees(found.phi1) == pytest.approx([22.913, 36.0], abs=6e-4)
-        assert found.v1 == pytest.approx([2.1340, 2.0], abs=5e-5)
-
-    @given(SPEED, PULLEY, st.booleans())
-    def test_ice_leaves_by_energy_alone(self, speed: float, pulley: float, spin: bool) -> None:
+    @given(st.floats(0.05, 0.999), PULLEY, st.booleans())
+    def test_ice_leaves_by_energy_alone(self, share, pulley, spin):
+        speed = math.sqrt(share * G * (pulley + 0.01))
         ratio = speed**2 / (G * (pulley + 0.01))
-        assume(ratio < 1.0 - 1e-6)
         found = leave(
             speed=speed, pulley_radius=pulley, particle_radius=0.01, friction=0.0, spin=spin
         )
         assert math.cos(found.phi1) == pytest.approx((2.0 + ratio) / 3.0, rel=4e-16, abs=0.0)
         assert found.omega1 == 0.0
 
-    def test_endless_grip_is_adhesion_for_a_point_and_rolling_for_a_disk(self) -> None:
-        ratio = 4.0 / (G * 0.504)
-        for spin, cosine in [(False, ratio), (True, (3.0 * ratio + 4.0) / 7.0)]:
-            for friction in (1e9, 1e15, 1e300):
-                found = leave(particle_radius=0.004, friction=friction, spin=spin)
-                assert math.cos(found.phi1) == pytest.approx(cosine, rel=2 / friction + 1e-15)
-                if spin:
-                    assert found.v1 + 0.004 * found.omega1 == pytest.approx(
-                        2.0, abs=10 / friction + 1e-15
-                    )
-
-    @given(SPEED, PULLEY, st.floats(0.0, 1e3), st.booleans())
-    def test_slip_only_ever_makes_it_leave_earlier_and_faster(
-        self, speed: float, pulley: float, friction: float, spin: bool
-    ) -> None:
-        shared: dict[str, Any] = {"speed": speed, "pulley_radius": pulley, "particle_radius": 0.01}
-        slipping = leave(friction=[friction, np.inf], spin=spin, **shared)
-        assert slipping.phi1[0] <= slipping.phi1[1]
-        assert slipping.v1[0] >= slipping.v1[1] == speed
-        assert (
-            slipping.v1[0] ** 2
-            <= speed**2
-            + 2 * G * (pulley + 0.01) * (1 - math.cos(slipping.phi1[0])) * (1 + 1e-14)
-            + 1e-15
-        )  # energy: friction takes, the slower belt gives nothing
-
 
 class TestPaperEquations:
     @given(SPEED, PULLEY, DISTANCE, SHARE, st.floats(0.05, 2.0), st.booleans())
-    def test_perpendicular_plate(
-        self,
-        v: float,
-        R: float,  # noqa: N803
-        d_okr: float,
-        eps: float,
-        d2: float,
-        printed: bool,
-    ) -> None:
+    def test_perpendicular_plate(self, v, R, d_okr, eps, d2, printed):  # noqa: N803
         ratio = v**2 / (G * R)
         assume(abs(1.0 - ratio) > 1e-3)
         phi = math.acos(min(1.0, ratio))
@@ -170,45 +122,13 @@ class TestPaperEquations:
             loose = 1e-13 * (1 + b / (G * t3)) if name in ("t3", "x3") else 1e-13
             assert getattr(found, name) == pytest.approx(value, rel=loose, abs=1e-15), name
 
-    def test_the_misprint_makes_the_headline_trend(self) -> None:
-        radii = [0.05, 0.0625, 0.08, 0.1, 0.125, 0.1575, 0.2, 0.25, 0.315, 0.4]
-        for speed, energy in [(2.0, 0.020), (4.0, 0.080)]:
-            right = transfer(speed=speed, pulley_radius=radii, distance=0.5)
-            wrong = transfer(speed=speed, pulley_radius=radii, distance=0.5, rebound="as-printed")
-            assert right.dEk == pytest.approx(np.full(10, energy), rel=1e-14, abs=0.0)
-            assert (np.diff(wrong.dEk) < 0.0).all()
-
-    def test_x3_of_the_first_row(self) -> None:
-        for speed, right, wrong in [(2.0, 0.1464, 0.1369), (4.0, 0.420, 0.548)]:
-            both = [
-                transfer(speed=speed, pulley_radius=0.05, distance=0.5, rebound=form).x3
-                for form in ("corrected", "as-printed")
-            ]
-            assert both == pytest.approx([right, wrong], abs=5e-4 if speed == 4 else 5e-5)
-
-    @given(SPEED, PULLEY, DISTANCE)
-    def test_both_forms_agree_without_damping(self, v: float, pulley: float, d: float) -> None:
-        right, wrong = (
-            transfer(speed=v, pulley_radius=pulley, distance=d, restitution=1.0, rebound=form)
-            for form in ("corrected", "as-printed")
-        )
-        assert right.v2r == pytest.approx(float(right.v2), rel=1e-15, abs=0.0)
-        assert wrong.x3 == pytest.approx(float(right.x3), rel=1e-14, abs=0.0)
-
 
 class TestInclinedPlate:
-    def test_section_3_2(self) -> None:
-        angles = np.radians([20.0, 40.0, 60.0])
-        found = transfer(speed=2.0, pulley_radius=0.05, distance=0.05, angle=angles)
-        assert -found.v3x == pytest.approx([-0.40, 0.65, 1.71], abs=5e-3)
-        slow = transfer(speed=1.0, pulley_radius=0.05, distance=0.05, angle=angles[0])
-        assert -slow.v3x == pytest.approx(0.29, abs=5e-3)
-
     @given(SPEED, PULLEY, RADIUS, DISTANCE, ANGLE, SHARE, SHARE, st.booleans())
     def test_the_rebound_obeys_newton_and_coulomb_in_the_world_frame(
-        self, v: float, pulley: float, r: float, d: float, degrees: float, eps: float, mu: float,
-        spin: bool,
-    ) -> None:  # fmt: skip
+        self, v, pulley, r, d, degrees, eps, mu,
+        spin,
+    ):  # fmt: skip
         spin = spin and r > 0.0
         alpha = math.radians(degrees)
         found = transfer(
@@ -247,17 +167,8 @@ class TestInclinedPlate:
         fall = after[1] * found.t3 - 0.5 * G * found.t3**2
         assert fall == exact(-0.5, rel=1e-12 + noise / abs(after[1] - G * found.t3))
 
-    @given(st.floats(1.0, 6.0), st.floats(0.03, 0.1), DISTANCE, st.sampled_from([-1e-9, 1e-9]))
-    def test_matching_angle_of_a_point(self, v: float, R: float, d: float, off: float) -> None:  # noqa: N803
-        alpha = math.atan(v**2 / (2 * G * (R + d))) + off
-        assume(abs(alpha) < 1.5)
-        found = transfer(speed=v, pulley_radius=R, distance=d, angle=alpha)
-        assert (Reason.of(found.reason) is Reason.NO_IMPACT) == (off > 0.0)
-
     @given(SPEED, PULLEY, RADIUS, DISTANCE, ANGLE)
-    def test_flight_time_to_fifteen_digits(
-        self, v: float, pulley: float, r: float, d: float, degrees: float
-    ) -> None:
+    def test_flight_time_to_fifteen_digits(self, v, pulley, r, d, degrees):
         alpha = math.radians(degrees)
         assume(abs(1.0 - v**2 / (G * (pulley + r))) > 1e-2)
         found = transfer(
@@ -277,53 +188,10 @@ class TestInclinedPlate:
             whole = float((R + D) * c + R * abs(s)) / float(gap) + float(V / closing)
             assert abs(Decimal(float(found.t2)) / t2 - 1) < 1e-15 * (2 + grazing**2 + whole)
 
-    def test_leaning_away_meets_the_unbounded_plate_again(self) -> None:
-        arguments: dict[str, Any] = {"speed": 2.0, "pulley_radius": 0.1, "distance": 0.5}
-        bounded, unbounded = (
-            transfer(angle=math.radians(-30), unbounded_plate=flag, drop=2.0, **arguments)
-            for flag in (False, True)
-        )
-        assert Reason.of(unbounded.reason) is Reason.SECOND
-        assert bounded.reason == ""
-        again = 2 * bounded.v2r * np.sin(bounded.phi2r) / (G * math.sin(math.radians(30)))
-        assert again < bounded.t3
-        assert all(np.isnan(getattr(unbounded, name)) for name in STAGES["landing"])
-        assert unbounded.v2r == bounded.v2r
-
-    def test_a_rolling_disk_on_a_rough_plate(self) -> None:
-        r = 0.01
-        found = transfer(
-            speed=1.0, pulley_radius=0.5, distance=0.5, particle_radius=r, spin=True, friction=0.5,
-            plate_friction=[0.001, 10.0],
-        )  # fmt: skip
-        rim = r * found.omega1
-        assert (rim < -0.1).all()  # turns forward, clockwise
-        down = found.v2r * np.cos(found.phi2r)
-        limit = 0.001 * 1.5 * found.v2x[0]
-        assert down[0] == pytest.approx(found.v2y[0] - limit, rel=1e-14, abs=0.0)
-        # Gripped: a third of the slip v2y - r ω1 goes from the centre, two thirds to the rim.
-        slip = found.v2y[1] - rim[1]
-        assert down[1] == pytest.approx(found.v2y[1] - slip / 3.0, rel=1e-14, abs=0.0)
-        assert r * found.omega2[1] == pytest.approx(down[1], rel=1e-14, abs=0.0)
-
-    @pytest.mark.parametrize("share", [0.999, 1.001])
-    def test_the_unbounded_plate_objects_exactly_from_its_line_on(self, share: float) -> None:
-        arguments: dict[str, Any] = {"speed": 2.0, "pulley_radius": 0.1, "distance": 0.5}
-        alpha = math.radians(-30)
-        free = transfer(angle=alpha, unbounded_plate=False, **arguments)
-        away, down = free.v2r * np.sin(free.phi2r), free.v2r * np.cos(free.phi2r)
-        again = 2 * away / (G * 0.5)
-        sinking = away * math.sin(alpha) + down * math.cos(alpha)
-        drop = sinking * again + 0.5 * G * again**2
-        found = transfer(angle=alpha, drop=share * drop, **arguments)
-        assert (found.reason == "") == (share < 1.0)
-
 
 class TestOutgoingBelt:
     @given(SPEED, st.floats(-3.0, 3.0), st.booleans(), SHARE, st.floats(0.0, 1.0))
-    def test_belt_work_is_kinetic_gain_plus_heat(
-        self, v: float, belt: float, spin: bool, eps: float, mu: float
-    ) -> None:
+    def test_belt_work_is_kinetic_gain_plus_heat(self, v, belt, spin, eps, mu):
         m, r = 0.3, 0.01
         found = transfer(
             speed=v, pulley_radius=0.3, distance=0.4, angle=0.2, restitution=eps, belt_speed=belt,
@@ -343,27 +211,6 @@ class TestOutgoingBelt:
         assert found.belt_work == pytest.approx(m * belt * (end - vx), abs=1e-14 * turned_over)
         assert found.belt_work - found.slip_heat == pytest.approx(gain, abs=1e-14 * turned_over)
         assert found.slip_heat >= 0.0
-
-    def test_a_disk_at_rest_is_left_at_a_third_of_the_belts_speed(self) -> None:
-        # ε = 0 on a perpendicular plate without friction stops it dead
-        found = transfer(
-            speed=2.0, pulley_radius=0.1, distance=0.5, restitution=0.0, particle_radius=0.01,
-            spin=True, belt_speed=3.0, mass=1.0,
-        )  # fmt: skip
-        assert found.v3x == 0.0
-        assert found.belt_work == pytest.approx(3.0 * 3.0 / 3.0, rel=1e-15, abs=0.0)
-        assert found.slip_heat == pytest.approx(9.0 / 6.0, rel=1e-15, abs=0.0)
-
-    def test_equation_14_loses_the_sign_that_the_belt_pays_for(self) -> None:
-        back, forth = (
-            transfer(speed=2.0, pulley_radius=0.05, distance=0.05, angle=math.radians(a), mass=1.0)
-            for a in (20.0, 40.0)
-        )
-        for found in (back, forth):
-            assert found.dEk == pytest.approx(0.5 * (found.v3x**2 + 4.0), rel=1e-15, abs=0.0)
-            assert found.belt_work == pytest.approx(2.0 * (2.0 + found.v3x), rel=1e-15, abs=0.0)
-        assert back.dEk < forth.dEk
-        assert back.belt_work > forth.belt_work
 
 
 class TestDomain:
@@ -393,7 +240,7 @@ class TestDomain:
             ({"interval": 0.0}, "landing"),
         ],
     )
-    def test_outside_the_model(self, changes: dict[str, Any], lost: str) -> None:
+    def test_outside_the_model(self, changes, lost):
         found = leave(**changes)
         assert Reason.of(found.reason) is Reason.OUTSIDE
         order = list(STAGES)
@@ -401,7 +248,7 @@ class TestDomain:
             kept = order.index(stage) < order.index(lost)
             assert all(np.isfinite(getattr(found, name)) == kept for name in names)
 
-    def test_misses_and_early_contact(self) -> None:
+    def test_misses_and_early_contact(self):
         steep = leave(pulley_radius=0.1, angle=math.radians(60))
         assert Reason.of(steep.reason) is Reason.NO_IMPACT
         parting = leave(speed=0.5, distance=3.0, angle=math.radians(30))
@@ -410,7 +257,7 @@ class TestDomain:
         assert Reason.of(close.reason) is Reason.EARLY
         assert np.isnan(close.phi1)
 
-    def test_without_gravity(self) -> None:
+    def test_without_gravity(self):
         straight = leave(gravity=0.0, angle=[0.0, 0.3, -0.3])
         assert (straight.phi1 == 0.0).all()
         assert straight.y2 == pytest.approx([0.0, 0.0, 0.0], abs=0.0)
@@ -419,7 +266,7 @@ class TestDomain:
         ]  # fmt: skip
         assert straight.t3[1] == pytest.approx(0.5 / straight.v3y[1], rel=1e-15, abs=0.0)
 
-    def test_one_bad_entry_does_not_spoil_the_others(self) -> None:
+    def test_one_bad_entry_does_not_spoil_the_others(self):
         many = leave(speed=[[2.0], [-2.0]], distance=[0.5, 0.6, 0.7])
         assert many.x2.shape == many.reason.shape == (2, 3)
         assert (many.reason[0] == "").all()
@@ -427,17 +274,9 @@ class TestDomain:
         for index, distance in enumerate([0.5, 0.6, 0.7]):
             assert many.x3[0, index] == leave(distance=distance).x3
 
-    def test_arrays_are_read_only_and_forms_are_known(self) -> None:
-        found = leave()
-        with pytest.raises(ValueError, match="read-only"):
-            found.x2[...] = 0.0
-        with pytest.raises(ValueError, match="as-printed"):
-            leave(rebound="printed")
-        assert np.isnan(found.P)
 
-
-def scene(**tables: Any) -> Any:
-    base: dict[str, Any] = {
+def scene(**tables):
+    base = {
         "particle": {"radius": 0.004},
         "incoming": {"speed": 2.0, "pulley_radius": 0.1},
         "plate": {"distance": 0.5},
@@ -448,12 +287,12 @@ def scene(**tables: Any) -> Any:
     return from_dict({name: table for name, table in base.items() if table is not None}, "test")
 
 
-def wall(x0: float, y0: float, x1: float, y1: float) -> list[dict[str, Any]]:
+def wall(x0, y0, x1, y1):
     return [{"name": "wall", "from": [x0, y0], "to": [x1, y1]}]
 
 
 class TestPredict:
-    def test_is_transfer_where_nothing_is_in_the_way(self) -> None:
+    def test_is_transfer_where_nothing_is_in_the_way(self):
         found = predict(scene(outgoing={"speed": 1.5}, stream={"rate": 50.0}))
         same = transfer(
             speed=2.0, pulley_radius=0.1, distance=0.5, particle_radius=0.004, belt_speed=1.5,
@@ -464,20 +303,6 @@ class TestPredict:
             for name in names:
                 assert getattr(found, name) == getattr(same, name)
                 assert getattr(found, name).shape == ()
-
-    @given(st.floats(0.4, 1.9), ANGLE)
-    def test_drop_from_the_top_is_d3(self, drop: float, degrees: float) -> None:
-        found = predict(
-            scene(
-                incoming={"speed": 1.0, "pulley_radius": 0.3},
-                plate={"distance": 0.1, "angle_deg": degrees},
-                outgoing={"drop": drop, "drop_from": "top"},
-            )
-        )
-        assume(found.reason == "")
-        assert found.d3 == pytest.approx(drop, rel=1e-15, abs=0.0)
-        fall = drop - 0.304 * (1 - math.cos(found.phi1)) - found.y2
-        assert found.y3 == pytest.approx(float(fall), abs=1e-15)
 
     @pytest.mark.parametrize(
         ("tables", "reason"),
@@ -524,7 +349,7 @@ class TestPredict:
               "surface": wall(0.0, -0.3, 0.4, -0.3)}, "second contact: pulley"),
         ],
     )  # fmt: skip
-    def test_reasons(self, tables: dict[str, Any], reason: str) -> None:
+    def test_reasons(self, tables, reason):
         found = predict(scene(**tables))
         assert str(found.reason).startswith(reason)
         assert np.isnan(found.t3)
@@ -535,58 +360,14 @@ class TestPredict:
         elif judged in (Reason.SECOND, Reason.MISSES):
             assert np.isfinite(found.v2r)
 
-    @pytest.mark.parametrize(("r", "margin"), [(0.0, 0.05), (0.004, 0.05), (0.02, 0.06)])
-    def test_the_default_plate_stops_short_of_the_belt(self, r: float, margin: float) -> None:
-        fall = 0.5 * G * ((0.5 - r) / 2.0) ** 2  # of the centre, up to the perpendicular plate
-        for off, reason in [(1e-6, ""), (-1e-6, "no impact"), (-0.03, "no impact")]:
-            drop = fall - r + margin + off
-            found = predict(
-                scene(
-                    incoming={"pulley_radius": 0.1},
-                    plate={"distance": 0.4},
-                    particle={"radius": r},
-                    outgoing={"drop": drop, "drop_from": "top"},
-                )
-            )
-            clips = r > 0.0 and off == -1e-6
-            assert str(found.reason).startswith("early contact: plate" if clips else reason)
-
-    def test_the_time_of_a_second_contact(self) -> None:
-        leaning = predict(scene(plate={"angle_deg": -30.0, "restitution": 0.1}))
-        away = leaning.v2r * np.sin(leaning.phi2r)
-        assert leaning.reason == f"second contact: plate: {4 * away / G:.4g} s after the rebound"
-        hard = predict(scene(incoming={"speed": 5.0}, plate={"distance": 0.05, "restitution": 1.0}))
-        x, y, v = 0.146, 0.104 - hard.y2, hard.v2y  # |p| = Rc from here, with velocity (-5, -v)
-        quartic = [
-            G**2 / 4,
-            G * v,
-            25.0 + v**2 - G * y,
-            -10.0 * x - 2 * y * v,
-            x**2 + y**2 - 0.104**2,
-        ]
-        roots = np.roots(quartic)
-        time = min(roots[(roots.imag == 0.0) & (roots.real > 0.0)].real)
-        assert hard.reason == f"second contact: pulley: {time:.4g} s after the rebound"
-
-    def test_a_release_on_the_moving_belt_is_as_good_as_the_default(self) -> None:
-        own = predict(scene(stream={"at": [-0.25, 0.104], "velocity": [2.0, 0.0]}))
-        assert own.x3 == predict(scene()).x3
-
-    def test_printed_form_answers_up_to_the_plate_if_that_leans(self) -> None:
-        found = predict(scene(plate={"angle_deg": 10.0}), rebound="as-printed")
-        assert Reason.of(found.reason) is Reason.OUTSIDE
-        assert np.isfinite(found.v2)
-        assert np.isnan(found.v2r)
-
     @settings(max_examples=150)
     @given(
         SPEED, PULLEY, st.one_of(st.just(0.0), st.floats(0.002, 0.02)), st.floats(0.03, 1.0),
         ANGLE, SHARE, st.one_of(st.none(), st.floats(0.3, 1.5)), st.floats(-1.0, 0.5),
     )  # fmt: skip
     def test_sampled_tracks_touch_nothing_unless_told(
-        self, v: float, R: float, r: float, d: float, degrees: float, eps: float,  # noqa: N803
-        top: float | None, start: float,
-    ) -> None:  # fmt: skip
+        self, v, R, r, d, degrees, eps, top, start,  # noqa: N803
+    ):  # fmt: skip
         out = {"drop": 0.5} if top is None else {"drop": top, "drop_from": "top"}
         tables = scene(
             particle={"radius": r}, incoming={"speed": v, "pulley_radius": R},
@@ -627,28 +408,3 @@ class TestPredict:
             assert gaps[name].min() < r + speed * t3 / 1500
         else:
             assert not start <= track[-1, 0] <= start + 6.0
-
-
-def test_the_slipping_disks_spin_against_a_plain_quadrature() -> None:
-    # Nearly singular: a slow belt, hardly any friction. r ω1 = -2µ ∫ w sqrt(gR/u) dφ and rolling.
-    speed, radius, mu, r = 0.05, 0.5, 0.01, 0.01
-    found = transfer(
-        speed=speed, pulley_radius=radius - r, particle_radius=r, distance=1.0, friction=mu,
-        spin=True,
-    )  # fmt: skip
-    start = speed**2 / (G * radius)
-    onset = brentq(
-        lambda x: math.sin(x) - 3 * mu * ((7 * math.cos(x) - 4) / 3 - start), 0, 1, xtol=1e-16
-    )
-    p, q = (4 * mu**2 - 2) / (1 + 4 * mu**2), -6 * mu / (1 + 4 * mu**2)
-    u0 = start + 4 / 3 * (1 - math.cos(onset))
-    constant = (u0 - p * math.cos(onset) - q * math.sin(onset)) * math.exp(-2 * mu * onset)
-
-    def slope(phi: float) -> float:
-        u = p * math.cos(phi) + q * math.sin(phi) + constant * math.exp(2 * mu * phi)
-        return -2 * mu * (math.cos(phi) - u) * math.sqrt(G * radius / u)
-
-    marks = [onset + (found.phi1 - onset) * 0.5**k for k in range(12, 0, -1)]
-    integral = quad(slope, onset, found.phi1, points=marks, epsabs=1e-14, epsrel=1e-13, limit=500)
-    rolled = speed - math.sqrt(G * radius * u0)
-    assert r * found.omega1 == pytest.approx(rolled + integral[0], rel=1e-12, abs=0.0)

@@ -1,7 +1,5 @@
 """Sine, cosine and their inverses, against the C library's in extended precision."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import isnan, nan, pi
 

@@ -1,7 +1,5 @@
 """Libraries that are too old are told from those that do, and pyproject.toml says which."""
 
-from __future__ import annotations
-
 import os
 import runpy
 import subprocess
@@ -18,7 +16,7 @@ ROOT = Path(__file__).parent.parent
 OWN = ("pydantic>=2.9", "numpy>=1.26", "never-installed>=1", 'scipy>=1.12; extra == "design"')
 
 
-def installed(folder: Path, name: str, version: str, *needs: str) -> None:
+def installed(folder, name, version, *needs):
     """Make a folder look as if a package was installed in it."""
     about = folder / f"{name}-{version}.dist-info" / "METADATA"
     about.parent.mkdir()

@@ -1,7 +1,5 @@
 """`chutelab.live`: the page in a notebook, and what it tells of the scene."""
 
-from __future__ import annotations
-
 import json
 import sys
 

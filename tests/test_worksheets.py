@@ -1,7 +1,5 @@
 """Nothing in a worksheet that does not hold: its commands run, its numbers are right."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
@@ -25,7 +23,6 @@ from chutelab.results import Kind
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.scene import load
-from chutelab.theory import transfer
 
 G = 9.81
 BALL = 0.0063  # radius of the particle where a scene does not say, m
@@ -486,7 +483,6 @@ STATED = {
         "at 60° forward at {1.71} m/s": plate(60, 0.0)[1],
         "| adhesion | {36.36}°": angle(2.0, RC),
         "does not turn | {23.16}°": degrees(slipping(0.5, U0)[0]),
-        "23.16° | {2.137} m/s": sqrt(G * RC * cos(slipping(0.5, U0)[0])),
         "free disk | {22.27}°": ease(0.5),
         "22.27° | {2.144} m/s": sqrt(G * RC * cos(radians(ease(0.5)))),
         "µ = 0 | {20.75}°": degrees(acos((2.0 + U0) / 3.0)),
@@ -512,8 +508,6 @@ STATED = {
         "| 0.1 m | 40° | 2 m/s | +0.65 m/s | +{0.46} m/s": plate(40, 0.02, 0.1)[1],
         "| 0.5 m | 20° | 2 m/s | +{1.13} m/s": plate(20, 0.0, 0.5)[1],
         "| 0.5 m | 20° | 2 m/s | +1.13 m/s | +{0.95} m/s": plate(20, 0.02, 0.5)[1],
-        "back up to {17.9}° only": leaving_at(0.0, 0.02, v=1.0),
-        "the point up to {14.2}°": leaving_at(0.0, 0.0, v=1.0),
         "plate at {0.269} to": reaches(0.02)[0],
         "0.269 to {0.286} m": reaches(0.02)[1],
         "({0.241} to": reaches(0.0)[0],
@@ -523,7 +517,6 @@ STATED = {
         "to fall {12.8} m to the plate": (2.0 * 34.84660 / 0.26 - 16.0) / (2.0 * G),
         "another {23.0} m": (93.56914 - 34.84660) / (0.26 * G),
         "lands with {77.2} mJ": 500.0 * 0.008 * (1.0 + DOWN**2),
-        "rides on with {16} mJ": 500.0 * 0.008 * 4.0,
         "a change of {-61.2} mJ": 500.0 * 0.008 * (4.0 - 1.0 - DOWN**2),
         "-61.2 mJ; {73.2} mJ": 500.0 * 0.008 * DOWN**2,
         "from {16} mJ at ε = 0": rise(0.0),
@@ -532,23 +525,19 @@ STATED = {
         "3.94, {4.41} and": sqrt(1.0 + (G * 0.3) ** 2 + 2.0 * G * 0.5),
         "and {4.84} m/s": sqrt(1.0 + (G * 0.3) ** 2 + 2.0 * G * 0.7),
         "x2 = {0.711} m in Table 1": 1.0 - 0.5 * sin(acos(4.0 / (G * 0.5))),
-        "`perpendicular` {0.81} % of the weight": 100.0 * GRAIN[0],
         "would land {0.6} mm farther": GRAIN[1],
-        "leave at {22.27}°": ease(0.5),
         "22.27° or {22.13}°": ease(0.4),
         "it would be after {15} s": 2.0 / (2.0 / 3.0 * 0.02 * G),
         "2/3 c g, {0.13} m/s²": 2.0 / 3.0 * 0.02 * G,
         "5 cm up leaves at {42.9}°": angle(2.0, RC + 0.05),
         "one body, at {24.9}°": angle(2.0 * (RC + 0.05) / 0.5, RC + 0.05),
         "leave at {34.3}°": angle(2.0 * RC / 0.5, RC),
-        "instead of {36.4}°": angle(2.0, RC),
         "steel ball ({7.64} g/cm³": 8.0 / (4.0 / 3.0 * pi * (100.0 * BALL) ** 3),
         "8 g has r = {9} mm": 1e3 * (0.006 / pi / 2650.0) ** (1.0 / 3.0),
         "there drag is {1.6} %": 100.0 * STONE[0],
         "it lands {1.2} mm": STONE[1],
         "in diameter has {46} %": 100.0 * SAND[0],
         "46 % and {43} mm": SAND[1],
-        "pays {48} or": belt(2.0)[0],
         "48 or {16} mJ": belt(2.0)[0] / 3.0,
         "1/8 g dt², {1.2} µm": 1e6 * G * 1e-6 / 8.0,
         "√(0.008 r / g), {2.3} ms at r": 1e3 * sqrt(0.008 * BALL / G),
@@ -559,22 +548,8 @@ STATED = {
 has to be, from formulas written here."""
 
 GIVEN = {
-    0: {
-        "1.05",
-        "0.7",
-        "0.8",
-        "9.81",
-        "0.8003",
-        "0.0002",
-        "9.815",
-        "0.008",
-        "0.45",
-        "0.796",
-        "9.83",
-        "2.7",
-        "0.75",
-        "10.0",
-    },
+    0: {"1.05", "0.7", "0.8", "9.81", "0.8003", "0.0002", "9.815", "0.008",
+        "0.45", "0.796", "9.83", "2.7", "0.75", "10.0"},
     1: {"0.2", "0.4", "0.8", "1.62", "9.81"},
     2: {"0.5", "1.5", "2.3"},
     3: {"0.5", "0.05", "0.1", "0.2"},
@@ -582,22 +557,11 @@ GIVEN = {
     5: {"0.1", "0.3", "0.8"},
     6: {"0.5", "6.3"},
     7: {"0.5", "3.6", "3.3"},
-    8: {
-        "0.2",
-        "0.16",
-        "0.1",
-        "0.05",
-        "0.02",
-        "1.2",
-        "9.7e-4",
-        "4.9e-4",
-        "6.5e-4",
-        "7.8e-4",
-        "2.4e-4",
-    },
+    8: {"0.2", "0.16", "0.1", "0.05", "0.02", "1.2",
+        "9.7e-4", "4.9e-4", "6.5e-4", "7.8e-4", "2.4e-4"},
     9: {"0.1", "0.5", "0.05", "0.3"},
     11: {"0.1", "0.2", "0.3", "0.5", "0.8"},
-}
+}  # fmt: skip
 """Further numbers with decimals: what the scenes set, and what other tests look at."""
 
 
@@ -620,41 +584,6 @@ def test_no_number_of_a_worksheet_goes_unlooked_at(number):
     found = set(re.findall(r"\d+\.\d+(?:e-\d+)?", prose))
     looked_at = {text for said in STATED[number] for text in re.findall(r"\{-?(.*)\}", said)}
     assert found - looked_at - GIVEN.get(number, set()) == set()
-
-
-def numbers_in(text):
-    """Numbers with decimals, and whole ones of two digits or more, as they are written."""
-    text = re.sub(r"`[^`]*`", "", text)
-    return set(re.findall(r"(?<![\w.])\d+\.\d+|(?<![\w.])\d{2,}(?![\w.])", text))
-
-
-# Of the answers' numbers, those that the questions give: a row of the paper's table, the plates'
-# angles, the textbook's and its belt's µ, rates to choose from, steps, the end of a range, a width.
-TOLD = {
-    3: {"0.137"}, 4: {"20", "40", "60"}, 6: {"0.5", "36.4"}, 7: {"10", "50"},
-    8: {"0.1", "0.2"}, 9: {"60"}, 10: {"48"},
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("number", NUMBERS)
-def test_no_number_of_the_key_is_on_the_students_sheet(number):
-    student = without_tex(sheet(find(number), "student"))
-    explanation = " ".join(without_tex(sheet(find(number), "explanation")).split())
-    stated = {
-        text
-        for said in STATED[number]
-        if re.sub("[{}]", "", said) in explanation
-        for text in re.findall(r"\{-?(.*)\}", said)
-    }
-    assert stated
-    asked = numbers_in(student)
-    assert stated & asked <= TOLD.get(number, set())
-    _, cases = draw(find_exercise(number), "your name")
-    assert {shown(abs(case.right)) for case in cases} & asked <= TOLD.get(number, set())
-    teacher = find(number).teacher
-    if teacher is not None:
-        assert numbers_in(" ".join(teacher.predictions)) & asked <= TOLD.get(number, set())
-    assert re.findall(r"!\[[^\]]*\]\((.*)\)", student) == ["machine.png"]
 
 
 @pytest.mark.parametrize("number", NUMBERS[:9])
@@ -734,17 +663,6 @@ def test_nothing_tells_of_the_misprint_before_the_explanation_of_lesson_3():
         assert not re.search("misprint|wrong|fault|not what the paper", text), text
 
 
-def test_table_1_differs_in_x3_only_as_worksheet_3_says():
-    printed = {0.05: (0.550, 0.371, 0.137), 0.1: (0.600, 0.441, 0.127), 0.2: (0.7, 0.601, 0.112)}
-    for radius, (x2, y2, x3) in printed.items():
-        scene = load(find(3).folder / "table-1.toml", [f"incoming.pulley_radius={radius}"])
-        found = compare(simulate(scene)).simulated
-        assert found["x2"] == pytest.approx(x2, abs=0.5001e-3)
-        assert found["y2"] == pytest.approx(y2, abs=0.5001e-3)
-        assert found["y3"] == pytest.approx(0.5, abs=1e-12)
-        assert found["x3"] > x3 + 0.009
-
-
 def test_the_plate_of_lesson_4_is_missed_from_66_degrees_on():
     def strikes(angle, radius=BALL):
         settings = [f"plate.angle_deg={angle}", f"particle.radius={radius}"]
@@ -761,30 +679,6 @@ def test_the_plate_of_lesson_4_is_missed_from_66_degrees_on():
     )
 
 
-def test_equation_14_rises_with_epsilon_all_the_way_in_either_form():
-    for printed in (False, True):
-        energies = [rise(0.05 * n, printed) for n in range(21)]
-        assert all(np.diff(energies) > 0.0)
-        form = "as-printed" if printed else "corrected"
-        found = transfer(
-            speed=2.0, pulley_radius=0.1, distance=0.5, restitution=0.05 * np.arange(21),
-            rebound=form,
-        )  # fmt: skip
-        assert 1e3 * found.dEk == pytest.approx(energies, rel=1e-12, abs=0.0)
-
-
-def test_the_papers_ball_of_lesson_4_goes_forward_in_the_engine_too():
-    def after(radius, angle):
-        settings = [f"particle.radius={radius}", f"plate.angle_deg={angle}", "incoming.speed=1"]
-        recording = simulate(load("inclined-20", settings), engine="exact")
-        return recording.select(Kind.IMPACT, surface="plate")["velocity_after"][0, 0]
-
-    assert after(0.0, 20.0) == pytest.approx(plate(20, 0.0, v=1.0)[1], rel=1e-12, abs=0.0)
-    assert after(0.02, 20.0) == pytest.approx(plate(20, 0.02, v=1.0)[1], rel=1e-12, abs=0.0)
-    assert after(0.02, 17.8) < 0.0 < after(0.02, 17.9)
-    assert after(0.0, 14.2) < 0.0 < after(0.0, 14.3)
-
-
 def test_belts_pay_less_the_faster_particles_land_as_lessons_4_and_9_say():
     def paid(angle, speed):
         settings = [f"outgoing.speed={speed}", "outgoing.length=20", "run.until=settled"]
@@ -795,15 +689,6 @@ def test_belts_pay_less_the_faster_particles_land_as_lessons_4_and_9_say():
     for speed in (1.0, 2.0):
         for angle in (20, 40, 60):
             assert paid(angle, speed) == pytest.approx(belt(speed, plate(angle)[1]), rel=1e-10)
-
-
-def test_the_slip_of_lesson_5_lasts_as_long_as_it_says():
-    for mu in (0.1, 0.3):
-        recording = simulate(load(find(5).folder / "landing.toml", [f"outgoing.friction={mu}"]))
-        lasted = recording.events["t"][-1] - recording.select(Kind.LANDING)["t"][0]
-        assert lasted == pytest.approx((3.0 / mu - DOWN) / G, rel=1e-12, abs=0.0)
-    rough = simulate(load(find(5).folder / "landing.toml", ["outgoing.friction=0.8"]))
-    assert rough.events["t"][-1] == rough.select(Kind.LANDING)["t"][0]
 
 
 def test_the_spread_of_lesson_7_is_as_it_says():
@@ -845,6 +730,7 @@ def test_impacts_of_lesson_8_are_late_by_a_step_or_a_part_of_one_as_it_says():
     assert said in worksheet(8)
 
 
+@pytest.mark.slow
 def test_errors_and_orders_of_lesson_8_are_as_it_says():
     (e1, r1), (e2, r2), (e3, r3) = (fixed(dt) for dt in (2e-4, 1e-4, 5e-5))
     assert f"{e1:.1e}, {e2:.1e}, {e3:.1e}".replace("e-0", "e-") in worksheet(8)

@@ -19,7 +19,7 @@ from email.parser import Parser
 from pathlib import Path
 from zipfile import ZipFile
 
-from chutelab.classroom.lessons.wheel import write_wheel
+from chutelab.classroom.lessons.pages import write_wheel
 
 ROOT = Path(__file__).resolve().parent.parent
 WRITTEN = re.compile(r"[^/]+\.dist-info/")

@@ -4,7 +4,7 @@
 `mutants`        what is wrong with an input: bytes, numbers, texts and keys, drawn at random
 `inputs`         cases of each kind: files made from mutants, and the command that is given them
 `worker`         runs cases in a process of its own, and tells what became of each
-`test_inputs`    scenes, arguments, tracks, recordings, unfinished sweeps and notebooks
+`test_inputs`    scenes, machines, arguments and tracks
 `test_ends`      signals, a full disk, closed descriptors and odd environments
 ===============  ==================================================================================
 

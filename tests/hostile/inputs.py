@@ -4,21 +4,11 @@ A kind is a function of a random generator; it writes into the current folder an
 Good files to begin with are made once, by `begin`, in the folder beside that one.
 """
 
-from __future__ import annotations
-
 import copy
-import io
-import json
-import random
 import tomllib
-import zipfile
-from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import click
-import numpy as np
 import tomli_w
 
 import chutelab
@@ -26,9 +16,7 @@ from broken_sandbox import BASES
 from chutelab import scene
 from chutelab.cli import main
 from chutelab.scene import Scene
-from chutelab.studies.sweep import planned
-from chutelab.studies.sweep.sweeping import Crew, sweep_to
-from hostile.mutants import NUMBERS, TEXTS, changed, extreme, garbled, value
+from hostile.mutants import NUMBERS, TEXTS, changed, extreme, garbled
 
 GOOD = Path("../good")
 SCENES = sorted(scene.shipped())
@@ -74,10 +62,10 @@ LISTS = ("material", "pair", "conveyor", "surface", "string", "expect")
 """Tables of which there are several."""
 
 
-def _rules() -> dict[str, Any]:
+def _rules():
     """Return the schema's rule of each key, by table and name."""
     schema = Scene.model_json_schema()
-    found: dict[str, Any] = {}
+    found = {}
     for table, rule in schema["properties"].items():
         parts = [rule, *rule.get("anyOf", ()), *([rule["items"]] if "items" in rule else [])]
         names = [part["$ref"].rpartition("/")[2] for part in parts if "$ref" in part]
@@ -94,37 +82,14 @@ RULES = _rules()
 QUANTITIES = ("landing.x", "landing.vx.mean", "impact.t", "d3", "belt_work", "reason", "nothing")
 
 
-def begin() -> None:
-    """Write a good recording, an unfinished sweep and a good notebook into `GOOD`."""
+def begin():
+    """Write a good recording and a good track into `GOOD`."""
     GOOD.mkdir()
     chutelab.simulate(chutelab.load("perpendicular")).save(GOOD / "recording.npz")
     (GOOD / "film.txt").write_text(TRACK, encoding="utf-8")
 
-    class EnoughError(Exception):
-        pass
 
-    def watch(share: float) -> None:
-        if share > 0.2:
-            raise EnoughError
-
-    plan = planned(chutelab.load("perpendicular"), [SWEEP[3]], engine="pymunk")
-    out = GOOD / "rows.csv"
-    with suppress(EnoughError):
-        sweep_to(plan, out, Crew(), progress=watch)
-    (GOOD / "rows.csv.part").rename(GOOD / "part")
-    sweep_to(plan, out, Crew())
-    cells = [
-        "from chutelab.classroom.exercises import lesson",
-        'task = lesson("the-bounce", student="Ann")',
-    ]
-    found = {
-        "cells": [{"cell_type": "code", "source": cell} for cell in cells],
-        "metadata": {}, "nbformat": 4, "nbformat_minor": 2,
-    }  # fmt: skip
-    (GOOD / "exercise.ipynb").write_text(json.dumps(found), encoding="utf-8")
-
-
-def scenes(rng: random.Random) -> list[str]:
+def scenes(rng):
     """A shipped scene with mistakes in its text or in its values."""
     text = scene.shipped()[rng.choice(SCENES)].read_bytes()
     if rng.random() < 0.25:
@@ -133,7 +98,7 @@ def scenes(rng: random.Random) -> list[str]:
     return _mutant(rng, tomllib.loads(text.decode()))
 
 
-def machines(rng: random.Random) -> list[str]:
+def machines(rng):
     """A scene of all parts, or of parts of several machines, with mistakes in its values.
 
     Half of them get a table from another machine: names then lead nowhere, or to another thing.
@@ -153,7 +118,7 @@ def machines(rng: random.Random) -> list[str]:
     return _mutant(rng, tables)
 
 
-def keys(rng: random.Random) -> list[str]:
+def keys(rng):
     """A scene in which one to three keys of all that there are have extreme values."""
     drawn = rng.choices(sorted(RULES), k=rng.choice((1, 1, 2, 3)))
     bases = [
@@ -176,21 +141,21 @@ def keys(rng: random.Random) -> list[str]:
     return _written(rng, tables)
 
 
-def _few(tables: Any) -> None:
+def _few(tables):
     # Work that takes long is no hang.
     streams = tables.get("stream", [])
     for stream in streams if isinstance(streams, list) else [streams]:
         stream["count"] = min(stream.get("count", 1), 200)
 
 
-def _mutant(rng: random.Random, tables: Any) -> list[str]:
+def _mutant(rng, tables):
     _few(tables)
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         tables = changed(rng, tables)
     return _written(rng, tables)
 
 
-def _written(rng: random.Random, tables: Any) -> list[str]:
+def _written(rng, tables):
     try:
         text = tomli_w.dumps(tables).encode("utf-8", "surrogatepass")
     except (TypeError, AttributeError, ValueError):  # the whole is no table any more
@@ -199,7 +164,7 @@ def _written(rng: random.Random, tables: Any) -> list[str]:
     return _tried(rng)
 
 
-def _tried(rng: random.Random) -> list[str]:
+def _tried(rng):
     """Return the words of a command on the mutant."""
     run = ["run", "mutant.toml", "--max-seconds", "0.3"]
     return rng.choice(
@@ -209,10 +174,10 @@ def _tried(rng: random.Random) -> list[str]:
     )  # fmt: skip
 
 
-def arguments(rng: random.Random) -> list[str]:
+def arguments(rng):
     """Words that a command knows, most with values that may be, one or two with others."""
     words = rng.choice(COMMANDS).split()
-    command: Any = main
+    command = main
     for word in words:
         command = command.commands[word]
     for parameter in command.params:
@@ -235,7 +200,7 @@ def arguments(rng: random.Random) -> list[str]:
     return [word.replace("\x00", "") for word in words]
 
 
-def _word(rng: random.Random) -> str:
+def _word(rng):
     key, number = rng.choice(KEYS), rng.choice((*NUMBERS, 2, 3, 20, 1e-3))
     return str(
         rng.choice(
@@ -249,7 +214,7 @@ def _word(rng: random.Random) -> str:
     )  # fmt: skip
 
 
-def tracks(rng: random.Random) -> list[str]:
+def tracks(rng):
     """A table of points with mistakes in it."""
     Path("film.txt").write_bytes(
         garbled(rng, TRACK.encode(rng.choice(("utf-8", "utf-16", "latin-1"))))
@@ -265,90 +230,10 @@ def tracks(rng: random.Random) -> list[str]:
     return [*words, *rng.choice(extra)]
 
 
-def recordings(rng: random.Random) -> list[str]:
-    """A recording whose file is damaged, or whose arrays or header hold something else."""
-    data = (GOOD / "recording.npz").read_bytes()
-    if rng.random() < 0.5:
-        Path("mutant.npz").write_bytes(garbled(rng, data))
-    else:
-        with np.load(io.BytesIO(data)) as found:
-            arrays = dict(found)
-        name = rng.choice(list(arrays))
-        arrays[name] = _array(rng, name, arrays[name])
-        with zipfile.ZipFile("mutant.npz", "w") as archive:
-            for key, array in arrays.items():
-                with archive.open(f"{key}.npy", "w") as file:
-                    np.lib.format.write_array(file, np.asanyarray(array), allow_pickle=True)
-    show = ["show", "mutant.npz"]
-    return rng.choice((show, [*show, "--json"], [*show, "--out", "out", "--only", "csv,json,png"]))
-
-
-def _array(rng: random.Random, name: str, good: Any) -> Any:
-    if name == "about":
-        return np.array(json.dumps(changed(rng, json.loads(str(good)))))
-    other = np.array(good)
-    way = rng.randrange(6)
-    if way == 0:
-        return other[: rng.randrange(len(other) + 1)] if other.ndim else other
-    if way == 1:
-        objects = np.array(value(rng), dtype=object)
-        return rng.choice(
-            (np.zeros(0), np.zeros((2, 2)), objects, np.array("x"), np.zeros(3, "U4"))
-        )
-    fields = other.dtype.names
-    column = other[rng.choice(fields)] if fields else other
-    if not column.size:
-        return other
-    flat = column.reshape(-1)
-    with np.errstate(all="ignore"):
-        some = (
-            rng.choice(NUMBERS[6:])
-            if flat.dtype.kind == "f"
-            else rng.choice((-1, 0, 1, 2, 100, 127))
-        )
-        flat[rng.randrange(len(flat))] = some
-    if not np.shares_memory(flat, other):
-        column[...] = flat.reshape(column.shape)
-    return other
-
-
-def parts(rng: random.Random) -> list[str]:
-    """A damaged file of an unfinished sweep; to go on must be refused, or end in the same rows."""
-    lines = (GOOD / "part").read_bytes().splitlines(keepends=True)
-    way, at = rng.randrange(5), rng.randrange(len(lines))
-    if way == 0:
-        data = garbled(rng, b"".join(lines))
-    else:
-        other = rng.randrange(len(lines))
-        kept = {
-            1: lines[:at] + lines[at + 1 :],
-            2: lines[: at + 1] + lines[at:],
-            3: lines[: at + 1],
-        }
-        lines[at], lines[other] = lines[other], lines[at]
-        data = b"".join(kept.get(way, lines))
-    Path("rows.csv.part").write_bytes(data)
-    return [*SWEEP, "--out", "rows.csv", "--resume", "--json"]
-
-
-def notebooks(rng: random.Random) -> list[str]:
-    """A returned notebook that is damaged, or holds other things than cells."""
-    data = (GOOD / "exercise.ipynb").read_bytes()
-    if rng.random() < 0.5:
-        data = garbled(rng, data)
-    else:
-        data = json.dumps(changed(rng, json.loads(data))).encode("utf-8", "surrogatepass")
-    Path("mutant.ipynb").write_bytes(data)
-    return ["lesson", "grade", "mutant.ipynb", "--out", "marks.csv", "--time-limit", "5"]
-
-
-KINDS: dict[str, Callable[[random.Random], list[str]]] = {
+KINDS = {
     "scenes": scenes,
     "machines": machines,
     "keys": keys,
     "arguments": arguments,
     "tracks": tracks,
-    "recordings": recordings,
-    "parts": parts,
-    "notebooks": notebooks,
 }

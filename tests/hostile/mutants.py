@@ -1,10 +1,6 @@
 """What is wrong with an input, drawn at random."""
 
-from __future__ import annotations
-
-import random
 from math import inf, nan, nextafter
-from typing import Any
 
 NUMBERS = (
     0, -1, 1, 2**31, -(2**63), 10**400, 0.0, -0.0, 1e-320, 1e-9, 0.5, 1.5, 1e9, 1e308, -1e308,
@@ -28,7 +24,7 @@ TOKENS = (
 )  # fmt: skip
 
 
-def value(rng: random.Random) -> Any:
+def value(rng):
     """Return something that stands where another value belongs."""
     plain = (True, False, rng.choice(NUMBERS), rng.choice(NUMBERS), rng.choice(TEXTS))
     return rng.choice(
@@ -37,7 +33,7 @@ def value(rng: random.Random) -> Any:
     )  # fmt: skip
 
 
-def extreme(rng: random.Random, rule: Any) -> Any:
+def extreme(rng, rule):
     """Return a value at or beyond an end of what a JSON schema's rule allows, or a wrong one."""
     if "anyOf" in rule:
         rule = rng.choice(rule["anyOf"])
@@ -62,7 +58,7 @@ def extreme(rng: random.Random, rule: Any) -> Any:
     return value(rng)
 
 
-def garbled(rng: random.Random, data: bytes) -> bytes:
+def garbled(rng, data):
     """Return bytes with some of them changed, lost, doubled, moved, or something put in between."""
     for _ in range(rng.choice((1, 1, 1, 2, 4, 16))):
         at, end = sorted(rng.randrange(len(data) + 1) for _ in range(2))
@@ -83,7 +79,7 @@ def garbled(rng: random.Random, data: bytes) -> bytes:
     return data
 
 
-def changed(rng: random.Random, tables: Any) -> Any:
+def changed(rng, tables):
     """Return nested tables and lists with one thing replaced, removed, doubled or renamed."""
     if isinstance(tables, int | float) and rng.random() < 0.6:
         return tables * rng.choice((-1, 0, 2, 10, 1000, 0.5, 1e-3, 1.0 + 1e-15))

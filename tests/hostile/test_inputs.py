@@ -1,6 +1,4 @@
-"""Scenes, machines, arguments, tracks and other files with mistakes, see `hostile.inputs`."""
-
-from __future__ import annotations
+"""Scenes, machines, arguments and tracks with mistakes, see `hostile.inputs`."""
 
 import json
 import os
@@ -25,19 +23,16 @@ SHARES = {
     "keys": 0.3,
     "arguments": 0.2,
     "tracks": 0.15,
-    "recordings": 0.15,
-    "parts": 0.08,
-    "notebooks": 0.02,
 }
 ASKED = int(os.environ.get("CHUTELAB_HOSTILE", "2000"))
 """Cases of a slow run, of which each kind has its share."""
 
 
-def results(kind: str, seed: int, count: int, folder: Path) -> list[dict]:
+def results(kind, seed, count, folder):
     """Run cases; a case in which the process ended is begun anew after it, and counts as wrong."""
     paths = [str(Path(chutelab.__file__).parents[1]), str(TESTS)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    found: list[dict] = []
+    found = []
     first = 0
     while first < count:
         home = folder / f"{kind}-{seed}-{first}"
@@ -65,7 +60,7 @@ def results(kind: str, seed: int, count: int, folder: Path) -> list[dict]:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_some(kind, tmp_path):
-    check(kind, seed=0, count=max(3, round(150 * SHARES[kind])), folder=tmp_path)
+    check(kind, seed=0, count=max(3, round(60 * SHARES[kind])), folder=tmp_path)
 
 
 @pytest.mark.slow

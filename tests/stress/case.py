@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from chutelab.checks.stress import Evidence, Verdict
-from chutelab.results import Recording
-from chutelab.scene import Scene, from_dict
+from chutelab.scene import from_dict
 from chutelab.util.arrays import Floats
 
 Tables = Mapping[str, Any]
@@ -53,37 +52,6 @@ class Twin:
 
 
 @dataclass(frozen=True)
-class Ladder:
-    """Runs at steps halved again and again; the error has to fall with them.
-
-    Attributes
-    ----------
-    steps : tuple of float
-        s, falling.
-    quantity : callable
-        What is observed of a recording.
-    floor : float
-        Error (of the quantity's own unit) that rounding explains: below it halving changes nothing.
-    claimed : float
-        Order of the method.
-    """
-
-    steps: tuple[float, ...]
-    quantity: Callable[[Recording], float]
-    floor: float
-    claimed: float = 1.0
-
-    @property
-    def order(self) -> float:
-        """The least order that may be found: the claimed one, less what chance may do to it.
-
-        What happens at the end of a step happens up to a step late, at a coarse step perhaps a
-        quarter as late as it might: that is two of the halvings.
-        """
-        return self.claimed - 2.0 / (len(self.steps) - 1)
-
-
-@dataclass(frozen=True)
 class Case:
     """A scene, its engines and steps, and what is asked of it besides the laws for all.
 
@@ -113,7 +81,7 @@ class Case:
         Left, right, bottom and top (m) that no centre may leave.
     at_rest : bool
         Whether everything must lie still, not sunk in, at the end.
-    twin, ladder
+    twin
         See there.
     slow : tuple of str
         Engines on which it takes too long for the default run, at its finest step.
@@ -134,21 +102,20 @@ class Case:
     inside: tuple[float, float, float, float] | None = None
     at_rest: bool = False
     twin: Twin | None = None
-    ladder: Ladder | None = None
     slow: tuple[str, ...] = ()
     patience: float = PATIENCE
 
-    def but(self, **changes: Any) -> Case:
+    def but(self, **changes):
         """Return the case with some attributes changed."""
         return replace(self, **changes)
 
 
-def by_name(engine: str) -> str:
+def by_name(engine):
     """Return what run.engine calls one of `ENGINES`."""
     return "pymunk" if engine == "fixed" else engine
 
 
-def scene_of(tables: Tables, name: str, engine: str, dt: float | None) -> Scene:
+def scene_of(tables, name, engine, dt):
     """Validate a scene for an engine and a step; one kind of particles has 4 mm if not told."""
     run = {**tables.get("run", {})}
     run["engine"] = by_name(engine)
@@ -162,9 +129,9 @@ def scene_of(tables: Tables, name: str, engine: str, dt: float | None) -> Scene:
     return from_dict({"title": name, **tables, "particle": particle, "run": run}, name)
 
 
-def merged(*tables: Tables) -> dict[str, Any]:
+def merged(*tables):
     """Lay tables over each other, key by key; lists and numbers of the later ones win."""
-    out: dict[str, Any] = {}
+    out = {}
     for layer in tables:
         for key, value in layer.items():
             old = out.get(key)
@@ -172,13 +139,7 @@ def merged(*tables: Tables) -> dict[str, Any]:
     return out
 
 
-def surface(
-    name: str,
-    *points: tuple[float, float],
-    restitution: float = 0.5,
-    friction: float = 0.3,
-    speed: float = 0.0,
-) -> dict[str, Any]:
+def surface(name, *points, restitution=0.5, friction=0.3, speed=0.0):
     """Return the table of a free surface."""
     return {
         "name": name,
@@ -189,14 +150,12 @@ def surface(
     }
 
 
-def thrown(
-    at: tuple[float, float], velocity: tuple[float, float], **stream: Any
-) -> dict[str, dict[str, Any]]:
+def thrown(at, velocity, **stream):
     """Return the table of a stream released at a point."""
     return {"stream": {"at": list(at), "velocity": list(velocity), **stream}}
 
 
-TRANSFER: Tables = {
+TRANSFER = {
     "incoming": {"speed": 2.0, "pulley_radius": 0.1},
     "plate": {"distance": 0.5, "restitution": 0.5},
     "outgoing": {"drop": 0.5, "drop_from": "top"},

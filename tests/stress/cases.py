@@ -1,20 +1,13 @@
 """All cases.
 
-Defined here are the cases that run twice (the machine far away, or in a mirror), those at ever
-smaller steps, and machines drawn at random: a particle thrown into surfaces that cross, fold, move
-and grip.
+Defined here are the cases that run twice (the machine far away, or in a mirror), and machines drawn
+at random: a particle thrown into surfaces that cross, fold, move and grip.
 """
-
-from __future__ import annotations
-
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from chutelab.results import Kind, Recording
 from stress import extremes, geometry
-from stress.case import LONE, TRANSFER, Case, Ladder, Twin, merged, surface, thrown
+from stress.case import LONE, Case, Twin, merged, surface, thrown
 
 FAR = 1e6
 """m that machines are moved by; a double's ulp there is 1.2e-10 m."""
@@ -23,17 +16,17 @@ FAR_BOUND = 1e-9
 """m: eight ulps at `FAR`."""
 
 
-def moved(tables: dict[str, Any], dx: float, dy: float) -> dict[str, Any]:
+def moved(tables, dx, dy):
     """Return a scene of free surfaces with everything moved by (dx, dy) m."""
     return _mapped(tables, lambda x, y: [x + dx, y + dy], 1.0)
 
 
-def mirrored(tables: dict[str, Any]) -> dict[str, Any]:
+def mirrored(tables):
     """Return a scene of free surfaces with x and -x exchanged."""
     return _mapped(tables, lambda x, y: [-x, y], -1.0)
 
 
-def _mapped(tables: dict[str, Any], to: Any, turn: float) -> dict[str, Any]:
+def _mapped(tables, to, turn):
     stream = tables["stream"]
     vx, vy = stream["velocity"]
     surfaces = [{**s, "points": [to(*p) for p in s["points"]]} for s in tables["surface"]]
@@ -43,7 +36,7 @@ def _mapped(tables: dict[str, Any], to: Any, turn: float) -> dict[str, Any]:
     )
 
 
-def _machines() -> dict[str, dict[str, Any]]:
+def _machines():
     """Machines within 4 m left of and below the origin, at places that doubles hold exactly.
 
     So they can be moved by `FAR` in either direction without moving their parts against each other.
@@ -70,7 +63,7 @@ def _machines() -> dict[str, dict[str, Any]]:
     }
 
 
-def _twins() -> list[Case]:
+def _twins():
     out = []
     for name, tables in _machines().items():
         for axis, shift in (("x", (FAR, 0.0)), ("y", (0.0, FAR)), ("xy", (-FAR + 4.0, FAR))):
@@ -88,84 +81,11 @@ def _twins() -> list[Case]:
     return out
 
 
-def _shifted_back(shift: tuple[float, float]) -> Any:
+def _shifted_back(shift):
     return lambda p: p - np.array(shift)
 
 
-COARSE = tuple(1.0 / 60.0 / 2**n for n in range(6))
-"""s; from a frame of a game to half a millisecond, for steps that end at contacts."""
-
-LONGEST = (
-    *(("fixed", name) for name in ("pulley", "slide", "roll", "belt", "transfer")),
-    ("pymunk", "roll"), ("pymunk", "belt"),
-)  # fmt: skip
-"""Ladders that are left out of the default run."""
-
-FINE = tuple(2e-3 / 2**n for n in range(5))
-"""s; for what touches. Where steps are all alike the first is left out: at 2 ms what falls on the
-belt goes farther than its radius in a step."""
-
-
-def _left_at(recording: Recording) -> float:
-    """Angle at which the pulley is left, rad."""
-    left = recording.select(Kind.SEPARATION)
-    return float(np.arctan2(*left["position"][0])) if len(left) else np.nan
-
-
-def _landed_at(recording: Recording) -> float:
-    landing = recording.select(Kind.LANDING)
-    return float(landing["position"][0, 0]) if len(landing) else np.nan
-
-
-def _end_at(recording: Recording) -> float:
-    return float(recording.track(0)["position"][-1, 0])
-
-
-def _ladders() -> list[Case]:
-    belt = {"speed": 2.0, "pulley_radius": 0.5, "friction": 0.5, "length": 0.1}
-    grip = {"incoming": belt, "run": {"until": 0.6}}
-    floor = surface("floor", (-1.0, 0.0), (9.0, 0.0), friction=0.3)
-    slides = {"surface": [floor], **thrown((0.0, 0.004), (1.0, 0.0)), "run": {"until": 0.5}}
-    rolls = merged(slides, {"particle": {"spin": True}})
-    hops = {"surface": [floor], **thrown((0.0, 0.1), (1.0, 0.0)), "run": {"until": 0.4}}
-    whole = merged(TRANSFER, {"incoming": {"length": 0.1}, "plate": {"angle_deg": 20.0}})
-    carried = merged(whole, {"run": {"until": 0.8}})
-    # Chipmunk's arithmetic leaves some 1e-10 m where it resolves a contact.
-    floor_of = 1e-9
-    out = []
-    for name, tables, quantity in (
-        ("pulley", grip, _left_at),
-        ("slide", slides, _end_at),
-        ("roll", rolls, _end_at),
-        ("bounce", hops, _end_at),
-        ("belt", carried, _end_at),
-        ("transfer", whole, _landed_at),
-    ):
-        for engine in ("contact", "pymunk", "fixed"):
-            # Impacts alone are exact at any step; what touches is stepped no coarser than this.
-            blows = engine != "fixed" and name in {"bounce", "transfer"}
-            claimed = 2.0 if engine == "contact" else 1.0
-            fine = FINE[1:] if engine == "fixed" else FINE
-            ladder = Ladder(COARSE if blows else fine, quantity, floor_of, claimed)
-            out.append(
-                Case(
-                    f"order-{name}",
-                    "steps halved until rounding takes over",
-                    tables,
-                    (engine,),
-                    ladder=ladder,
-                    slow=(engine,) if (engine, name) in LONGEST else (),
-                )
-            )
-    return out
-
-
-def symmetric_cases() -> tuple[Case, ...]:
-    """Return the cases."""
-    return (*_twins(), *_ladders())
-
-
-QUICK, MANY = 8, 500
+QUICK, MANY = 4, 500
 """Machines in the default run, and in all."""
 
 RESOLVED = 1e-3
@@ -175,7 +95,7 @@ SHORTEST = 0.05
 """m; shortest segment drawn."""
 
 
-def machine(seed: int) -> dict[str, Any]:
+def machine(seed):
     """Return the scene of a seed."""
     rng = np.random.default_rng(seed)
     surfaces = [found for n in range(rng.integers(1, 6)) if (found := _surface(rng, f"s{n}"))]
@@ -192,7 +112,7 @@ def machine(seed: int) -> dict[str, Any]:
     }
 
 
-def _surface(rng: np.random.Generator, name: str) -> dict[str, Any] | None:
+def _surface(rng, name):
     points = [(_place(rng), _place(rng))]
     for _ in range(rng.integers(1, 4)):
         following = (_place(rng), _place(rng))
@@ -206,16 +126,16 @@ def _surface(rng: np.random.Generator, name: str) -> dict[str, Any] | None:
     return surface(name, *points, **materials) if len(points) > 1 else None
 
 
-def _place(rng: np.random.Generator) -> float:
+def _place(rng):
     """Draw a coordinate within 1 m; half of them from a grid, so that things fall together."""
     return float(rng.integers(-8, 9)) / 8.0 if rng.integers(2) else float(rng.uniform(-1.0, 1.0))
 
 
-def _one_of(rng: np.random.Generator, values: Sequence[float]) -> float:
+def _one_of(rng, values):
     return values[int(rng.integers(len(values)))]
 
 
-def drawn_cases() -> tuple[Case, ...]:
+def drawn_cases():
     """Return the cases."""
     out = []
     for seed in range(MANY):
@@ -236,12 +156,12 @@ def drawn_cases() -> tuple[Case, ...]:
     return tuple(out)
 
 
-def all_cases() -> tuple[Case, ...]:
+def all_cases():
     """Return the cases."""
     return (
         *extremes.CASES,
         *geometry.CASES,
         *extremes.lasting_cases(),
-        *symmetric_cases(),
+        *_twins(),
         *drawn_cases(),
     )

@@ -1,15 +1,10 @@
-"""What single cases ask for besides the laws: endings, boxes, rest, twins, convergence."""
-
-from __future__ import annotations
-
-from collections.abc import Sequence
+"""What single cases ask for besides the laws: endings, boxes, rest, twins."""
 
 import numpy as np
 
-from chutelab.checks.stress import EPS, Evidence, Verdict
+from chutelab.checks.stress import EPS, Verdict
 from chutelab.checks.stress.barriers import closest
 from chutelab.results import REASONS
-from stress.case import Case, Ladder, Twin
 
 UNSEEN = ("nobody leaves", "nobody sinks", "lies still")
 """Demands that are lost, as some laws are, once a disk is on the wrong side of something."""
@@ -30,7 +25,7 @@ AMPLIFIED = 10.0
 radius of what it met, for flights of a few times that radius."""
 
 
-def ended(e: Evidence, reasons: Sequence[str]) -> Verdict:
+def ended(e, reasons):
     """Particles end as they must; the figure counts the others."""
     wrong = [i for i, k in enumerate(e.recording.ended) if REASONS[k] not in reasons]
     detail = "particles"
@@ -39,7 +34,7 @@ def ended(e: Evidence, reasons: Sequence[str]) -> Verdict:
     return Verdict(len(wrong), 0.0, detail)
 
 
-def inside(e: Evidence, box: tuple[float, float, float, float]) -> Verdict:
+def inside(e, box):
     """Nobody leaves a box (left, right, bottom, top, m); the figure counts those who do."""
     left, right, bottom, top = box
     t = e.recording.knots["t"]
@@ -49,7 +44,7 @@ def inside(e: Evidence, box: tuple[float, float, float, float]) -> Verdict:
     return Verdict(len(gone), 0.0, f"particles: {gone[0]}" if len(gone) else "particles")
 
 
-def sunk(e: Evidence) -> Verdict:
+def sunk(e):
     """At rest nobody lies deeper in anything than `SUNK`; the figure is a share of the radius."""
     r = e.machine.particle.radius
     _, last = e.recording.ends()
@@ -66,7 +61,7 @@ def sunk(e: Evidence) -> Verdict:
     return Verdict(deepest / r, SUNK, of)
 
 
-def still(e: Evidence) -> Verdict:
+def still(e):
     """At the end nobody moves; the figure is the largest speed, m/s."""
     _, last = e.recording.ends()
     speed = np.hypot(*last["velocity"].T) + e.machine.particle.radius * np.abs(last["omega"])
@@ -74,7 +69,7 @@ def still(e: Evidence) -> Verdict:
     return Verdict(float(speed[i]), STILL, f"m/s, particle {i}")
 
 
-def symmetric(e: Evidence, other: Evidence, twin: Twin) -> Verdict:
+def symmetric(e, other, twin):
     """Judge whether a run and its twin's, moved back, are one; the figure is the distance, m."""
     one, two = e.recording, other.recording
     worst, where = 0.0, "m"
@@ -102,25 +97,9 @@ def symmetric(e: Evidence, other: Evidence, twin: Twin) -> Verdict:
     return Verdict(worst, bound, where)
 
 
-def order(ladder: Ladder, errors: Sequence[float]) -> float:
-    """Return the order at which errors fall with the step until rounding takes over, as fitted.
-
-    An error depends on where a step happens to fall, so what is fitted is the largest error at this
-    step or any finer one. The first at the floor is the last one counted; a method that is at the
-    floor from the first step on has nothing to converge: infinity. NaN if a run did not get there.
-    """
-    if not np.isfinite(errors).all():
-        return np.nan
-    worst = np.maximum(np.maximum.accumulate(np.array(errors)[::-1])[::-1], ladder.floor)
-    if worst[0] == ladder.floor:
-        return np.inf
-    count = np.count_nonzero(worst > ladder.floor) + 1
-    return float(np.polyfit(np.log2(ladder.steps[:count]), np.log2(worst[:count]), 1)[0])
-
-
-def demands(case: Case, e: Evidence) -> dict[str, Verdict]:
+def demands(case, e):
     """Judge a run by all that its case asks for and that needs no second run."""
-    out: dict[str, Verdict] = {}
+    out = {}
     if case.ends:
         out["ends as it must"] = ended(e, case.ends)
     if case.inside is not None:

@@ -4,13 +4,11 @@ Speed, size, mass, materials, belts and gravity at their limits; many bounces, l
 releases, piles and coarse steps.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np
 
-from chutelab.checks.stress import A_CONTACT, EPS, ROUNDINGS, Evidence, Verdict
+from chutelab.checks.stress import A_CONTACT, EPS, ROUNDINGS, Verdict
 from chutelab.scene import load, to_dict
 from stress.case import CROWD, TRANSFER, Case, Twin, merged, surface, thrown
 
@@ -21,7 +19,7 @@ THIN = 0.002
 """m; thickness of the plate at which particles are shot."""
 
 
-def place_error(e: Evidence, x: float, y: float) -> Verdict:
+def place_error(e, x, y):
     """Distance of particle 0 from where a formula has it at the end, m."""
     found = e.recording.track(0)["position"][-1]
     apart = float(np.hypot(*(found - [x, y])))
@@ -31,7 +29,7 @@ def place_error(e: Evidence, x: float, y: float) -> Verdict:
 SHOT_UNTIL, SHOT_SPEED, SHOT_RADIUS = 0.01, 200.0, 0.004
 
 
-def _shot(e: Evidence) -> Verdict:
+def _shot(e):
     # Straight on to the face at x = 1, back at half the speed, falling all the time.
     face = 1.0 - SHOT_RADIUS
     back = 0.5 * SHOT_SPEED * (SHOT_UNTIL - face / SHOT_SPEED)
@@ -43,22 +41,17 @@ _PLATE = surface(
     friction=0.0,
 )  # fmt: skip
 
-_SHOT = {
-    "surface": [_PLATE],
-    **thrown((0.0, 0.3), (SHOT_SPEED, 0.0)),
-    "run": {"until": SHOT_UNTIL},
-}
+_SHOT = {"surface": [_PLATE], **thrown((0.0, 0.3), (SHOT_SPEED, 0.0)), "run": {"until": SHOT_UNTIL}}
 
 _FLOOR = surface("floor", (-50.0, 0.0), (50.0, 0.0))
 
 
-def _fast() -> list[Case]:
+def _fast():
     group = "200 m/s against a 2 mm plate"
     machine = merged(TRANSFER, {"incoming": {"speed": 200.0}, "outgoing": {"speed": 2.0}})
     stream = {"count": 20, "rate": 1000.0, "bed_height": 0.05, "interact": True}
     volley = merged(
-        _SHOT,
-        {"particle": {"radius": 0.002}, "stream": stream, "run": {"until": 0.05}},
+        _SHOT, {"particle": {"radius": 0.002}, "stream": stream, "run": {"until": 0.05}}
     )
     return [
         Case("plate-200", group, _SHOT, steps=(1e-3, 1 / 60, 1 / 30), formula=_shot),
@@ -69,12 +62,12 @@ def _fast() -> list[Case]:
     ]
 
 
-def _inclined() -> dict[str, object]:
+def _inclined():
     plate = surface("target", (0.8, -0.5), (1.2, 0.8), restitution=1.0)
     return merged(_SHOT, {"surface": [plate], "particle": {"spin": True}})
 
 
-def _radii() -> list[Case]:
+def _radii():
     group = "radius"
     out = []
     for r in (1e-6, 1e-5, 1e-4, 1e-3, 0.03):
@@ -104,7 +97,7 @@ def _radii() -> list[Case]:
     ]
 
 
-def _masses() -> list[Case]:
+def _masses():
     group = "mass"
     out = []
     for mass in (1e-9, 1.0, 1e6):
@@ -115,7 +108,7 @@ def _masses() -> list[Case]:
     return out
 
 
-def swarm(count: int, **particle: object) -> dict[str, object]:
+def swarm(count, **particle):
     """Return a stream that meets itself far from everything, without gravity."""
     return {
         "gravity": 0.0,
@@ -128,7 +121,7 @@ def swarm(count: int, **particle: object) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _materials() -> list[Case]:
+def _materials():
     out = []
     for restitution in (0.0, 0.999, 1.0):
         drop = {
@@ -168,14 +161,14 @@ def _materials() -> list[Case]:
     return out
 
 
-def _belts() -> list[Case]:
+def _belts():
     group = "belt speed"
     out = []
     for speed in (0.0, -2.0, 100.0):
         belt = {"start": -500.0, "length": 20000.0, "speed": speed}
         machine = merged(TRANSFER, {"outgoing": belt, "run": {"until": "settled"}})
 
-        def carried(e: Evidence, speed: float = speed) -> Verdict:
+        def carried(e, speed=speed):
             # It settles where it no longer slips: at the speed of the belt.
             found = float(e.recording.track(0)["velocity"][-1, 0])
             bound = e.rounding + (ALIGNED * max(1.0, abs(speed)) if e.dt is not None else 0.0)
@@ -197,7 +190,7 @@ def _belts() -> list[Case]:
     ]
 
 
-def _weightless() -> list[Case]:
+def _weightless():
     group = "g = 0"
     machine = merged(TRANSFER, {"gravity": 0.0, "run": {"until": 3.0}})
     return [
@@ -217,7 +210,7 @@ LONG = 1e6
 COARSE = 1.0 / 30.0
 
 
-def _bounces() -> list[Case]:
+def _bounces():
     group = "ten thousand bounces"
     restitution, drop = 0.998, 0.01
     floor = surface("floor", (-50.0, 0.0), (50.0, 0.0), restitution=restitution, friction=0.0)
@@ -227,7 +220,7 @@ def _bounces() -> list[Case]:
         "run": {"until": "settled", "max_time": 100.0},
     }
 
-    def at_rest(e: Evidence) -> Verdict | None:
+    def at_rest(e):
         # Flights shrink by ε: after the fall they last 2 u (1 + ε + ε² ...)/g, u the rebound.
         if e.dt is not None:
             return None
@@ -248,7 +241,7 @@ def _bounces() -> list[Case]:
     ]
 
 
-def _flights() -> list[Case]:
+def _flights():
     group = "10^6 s of flight without gravity"
     free = {
         "gravity": 0.0,
@@ -262,13 +255,13 @@ def _flights() -> list[Case]:
     post = surface("post", (6e5, 3e5), (6e5, -3e5))
     room = merged(free, {"surface": [post]})
 
-    def straight(e: Evidence) -> Verdict:
+    def straight(e):
         return place_error(e, 0.125 + 0.5 * LONG, 0.25 - 0.25 * LONG)
 
     wall = surface("wall", (4e5, -1e6), (4e5, 1e6), restitution=0.5, friction=0.0)
     walled = merged(free, {"surface": [wall]})
 
-    def returned(e: Evidence) -> Verdict:
+    def returned(e):
         there = (4e5 - 0.004 - 0.125) / 0.5
         x = 4e5 - 0.004 - 0.25 * (LONG - there)
         return place_error(e, x, 0.25 - 0.25 * LONG)
@@ -279,7 +272,7 @@ def _flights() -> list[Case]:
     ]
 
 
-def _late() -> list[Case]:
+def _late():
     group = "time far from zero"
     late = merged(TRANSFER, {"stream": {"count": 2, "rate": 1e-6}})
     # Knots are at times as coarse as an ulp of 1e6 s, passed at up to 4 m/s, some at either end.
@@ -292,13 +285,13 @@ def _late() -> list[Case]:
     ]
 
 
-def box(width: float, height: float, **materials: float) -> dict[str, object]:
+def box(width, height, **materials):
     """Return an open box with its floor on y = 0, as one polyline."""
     half = 0.5 * width
     return surface("box", (-half, height), (-half, 0.0), (half, 0.0), (half, height), **materials)
 
 
-def _pile(count: int, width: float, radius: float, lasts: float) -> dict[str, object]:
+def _pile(count, width, radius, lasts):
     """Return a box into which particles are thrown, five box widths a second, and left alone.
 
     Those that come back from the far wall have fallen below where the next are released.
@@ -315,7 +308,7 @@ def _pile(count: int, width: float, radius: float, lasts: float) -> dict[str, ob
     }  # fmt: skip
 
 
-def _piles() -> list[Case]:
+def _piles():
     group = "a pile left alone"
     small = Case(
         "pile-60",
@@ -338,7 +331,7 @@ def _piles() -> list[Case]:
     return [small, large]
 
 
-def _coarse() -> list[Case]:
+def _coarse():
     group = "dt 1/30"
     names = ("perpendicular", "inclined-40", "low-speed", "belt-landing", "slip", "free-fall")
     shipped = {name: to_dict(load(name)) for name in names}
@@ -359,6 +352,6 @@ def _coarse() -> list[Case]:
     ]  # fmt: skip
 
 
-def lasting_cases() -> tuple[Case, ...]:
+def lasting_cases():
     """Return the cases; the shipped scenes among them are read now."""
     return (*_bounces(), *_flights(), *_late(), *_piles(), *_coarse())

@@ -1,12 +1,10 @@
 """Cases that lie on a border: grazing, critical speed, ends, corners, contact from the start."""
 
-from __future__ import annotations
-
 from math import atan2, degrees, sqrt
 
 import numpy as np
 
-from chutelab.checks.stress import EPS, ROUNDINGS, Evidence, Verdict
+from chutelab.checks.stress import EPS, ROUNDINGS, Verdict
 from chutelab.results import Kind
 from stress.case import CROWD, LONE, TRANSFER, Case, merged, surface, thrown
 from stress.extremes import place_error
@@ -14,7 +12,7 @@ from stress.extremes import place_error
 G = 9.81
 
 
-def _grazing() -> list[Case]:
+def _grazing():
     group = "grazing plates"
     out = []
     for name, tilt in (("nearing", 1e-12), ("parting", -1e-12), ("parallel", 0.0)):
@@ -47,14 +45,14 @@ def _grazing() -> list[Case]:
     return out
 
 
-def _critical() -> list[Case]:
+def _critical():
     group = "v²/(g R) within 1e-15 of 1"
     critical = sqrt(G * 0.104)
     out = []
     for ulps in (-4, -1, 0, 1, 4):
         speed = critical * (1.0 + ulps * EPS)
 
-        def separation(e: Evidence, speed: float = speed) -> Verdict:
+        def separation(e, speed=speed):
             # cos φ1 = v²/(g Rc); what rounds the cosine by δ moves φ1 by up to the root of 2 δ.
             left = e.recording.select(Kind.SEPARATION)
             cosine = min(1.0, speed**2 / (G * 0.104))
@@ -70,7 +68,7 @@ def _critical() -> list[Case]:
     return out
 
 
-def _ends() -> list[Case]:
+def _ends():
     group = "a plate's very end"
     out = []
     r = 0.004
@@ -96,7 +94,7 @@ def _ends() -> list[Case]:
         "run": {"until": 0.5},
     }
 
-    def upright(e: Evidence) -> Verdict:
+    def upright(e):
         # One rebound, straight up; the place after t = 0.5 s.
         fall = sqrt(2.0 * (0.5 - r) / G)
         rest = 0.5 - fall
@@ -112,7 +110,7 @@ def _ends() -> list[Case]:
     ]
 
 
-def _contact() -> list[Case]:
+def _contact():
     group = "released in contact or overlapping"
     floor = surface("floor", (-2.0, 0.0), (2.0, 0.0))
     wall = surface("wall", (2.0, 0.0), (2.0, 1.0))
@@ -150,7 +148,7 @@ def _contact() -> list[Case]:
     ]
 
 
-def _corners() -> list[Case]:
+def _corners():
     group = "two impacts at one instant"
     floor = surface("floor", (0.0, 0.0), (1.0, 0.0), friction=0.0)
     wall = surface("wall", (1.0, 0.0), (1.0, 1.0), friction=0.0)
@@ -161,7 +159,7 @@ def _corners() -> list[Case]:
         "run": {"until": 1.0},
     }
 
-    def back(e: Evidence) -> Verdict:
+    def back(e):
         # Both components turn round at one time, at half their size.
         t = (0.5 - 0.004) / 1.0
         return place_error(e, 0.996 - 0.5 * (1.0 - t), 0.004 + 0.5 * (1.0 - t))

@@ -162,14 +162,6 @@ def crowd(**changes):
     return evidence(PAIR, "contact", 1e-3, **changes)
 
 
-def test_a_crowd_keeps_the_laws_and_meets():
-    whole = crowd()
-    assert whole.recording.contacts == 1
-    found = {name: law(whole) for name, law in laws.LAWS.items()}
-    assert {"momentum", "angular momentum", "no overlap"} <= {n for n, v in found.items() if v}
-    assert [name for name, verdict in found.items() if verdict and not verdict.holds] == []
-
-
 @pytest.mark.parametrize("law", [laws.momentum, laws.spin, laws.energy])
 def test_one_faster_particle_breaks_the_laws_of_a_crowd(law):
     def push(knots):
@@ -291,23 +283,6 @@ def test_what_rides_on_a_belt_that_will_throw_it_has_not_settled():
     carried = evidence(merged(TRANSFER, {"run": {"until": "settled"}}))
     assert carried.machine.segments.speed[-1] != 0.0
     assert barriers.settled_to_stay(carried).holds
-
-
-def test_momentum_on_a_frictionless_floor_holds_along_it_only():
-    slides = merged(
-        PAIR, {"surface": [{**FLOOR, "friction": 0.0, "points": [[-9.0, -0.5], [9.0, -0.5]]}]}
-    )
-
-    def pushed(direction):
-        return lambda knots: np.add.at(knots["velocity"], -1, direction)
-
-    verdicts = [
-        laws.momentum(evidence(slides, "contact", 1e-3, knots=pushed(direction)))
-        for direction in ([0.0, 0.0], [0.0, 0.1], [0.1, 0.0])
-    ]
-    assert [verdict.holds for verdict in verdicts] == [True, True, False]
-    rough = merged(slides, {"surface": [{**slides["surface"][0], "friction": 0.1}]})
-    assert laws.momentum(evidence(rough, "contact", 1e-3)) is None
 
 
 def test_fast_disks_in_steps_all_alike_are_promised_no_surface():

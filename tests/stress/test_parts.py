@@ -25,18 +25,6 @@ def knot_at_blow(e):
     return int(np.argmax(e.recording.knots["t"] == hit["t"]))
 
 
-@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
-@pytest.mark.parametrize("tables", [INSIDE, OUTSIDE])
-def test_a_disk_that_strikes_an_arc_keeps_the_laws(engine, tables):
-    e = evidence(tables, engine, None if engine == "exact" else 1e-3)
-    assert len(e.recording.select(Kind.IMPACT))
-    found = {name: law(e) for name, law in laws.LAWS.items()}
-    assert {"no one through", "no one inside", "rebound of the pair"} <= {
-        name for name, one in found.items() if one
-    }
-    assert [name for name, one in found.items() if one and not one.holds] == []
-
-
 @pytest.mark.parametrize(("tables", "side"), [(INSIDE, 1.0), (OUTSIDE, -1.0)])
 def test_a_hair_deeper_in_an_arc_is_too_deep(tables, side):
     """Moved by 10 nm along the radius, outward on the inside and inward on the outside."""
@@ -70,18 +58,6 @@ def test_an_arc_is_passed_between_its_ends_only(degrees, through):
     bad = barriers.no_one_through(evidence(still, knots=out))
     assert bad.figure == through
     assert not through or "particle 0 through bowl" in bad.detail
-
-
-def test_a_circle_has_no_ends_to_pass_at():
-    """Where the angle of a whole circle begins, at 180°, it is as closed as elsewhere."""
-
-    def out(knots):
-        knots["position"] = [-2.0 * RIM, 0.0]
-        knots["position"][-1] = [0.5 * RIM, 0.0]
-        knots["velocity"] = (knots["position"][-1] - knots["position"][0]) / 0.15
-
-    still = merged(OUTSIDE, {"gravity": 0.0})
-    assert barriers.no_one_through(evidence(still, knots=out)).figure == 1
 
 
 def test_the_end_of_an_arc_is_a_point():
@@ -155,16 +131,6 @@ TWO = {
 
 def two(**changes):
     return evidence(TWO, "contact", 1e-3, **changes)
-
-
-def test_two_sizes_meet_at_the_sum_of_their_radii():
-    whole = two()
-    (hit,) = whole.recording.select(Kind.COLLISION)
-    (places,), _ = whole.recording.at([hit["t"]])
-    assert hypot(*(places[1] - places[0])) == pytest.approx(0.025, abs=1e-12)
-    found = {name: law(whole) for name, law in laws.LAWS.items()}
-    assert {"momentum", "angular momentum", "no overlap"} <= {n for n, v in found.items() if v}
-    assert [name for name, one in found.items() if one and not one.holds] == []
 
 
 def test_two_sizes_overlap_by_what_lacks_to_the_sum_of_their_radii():

@@ -4,7 +4,6 @@
 - `exercises`: exercises that answer back, with each student's own numbers.
 - `book`: what a lesson's notebook calls: its machine, its runs.
 - `words`: what a learner is told, in each language (`strings`, a file a language).
-- `grading`: marks from what students returned, which `returned` reads.
-- `class_report`: what a class did, lesson by lesson.
+- `grading`: marks from what students returned, and what a class did.
 - `kernel`: their cells, run in a process of their own, with limits.
 """

@@ -1,30 +1,201 @@
-"""Marks from what students return. It runs notebooks' code: use a container for strangers.
+"""Marks from what students return, and what a class did. It runs notebooks' code.
 
-A notebook runs in a kernel of its own (`kernel`), with limits. What it prints is not looked at: the
-kernel hands over the numbers that were checked. A result file of a lesson's live page (`returned`)
-has those numbers in it, and nothing of it runs. They are judged again here, against right ones
-that are computed here. Each file is marked by itself, whatever becomes of the others;
-`write_csv` writes the marks of a class, a row as soon as there is one.
+Use a container for the notebooks of strangers. A notebook runs in a kernel of its own (`kernel`),
+with limits. What it prints is not looked at: the kernel hands over the numbers that were checked. A
+result file of a lesson's live page has those numbers in it, and nothing of it runs. Both are read
+without trust, and judged again here, against right ones that are computed here. Each file is marked
+by itself, whatever becomes of the others; `write_csv` writes the marks of a class, a row as soon as
+there is one, and `report` what the class did, lesson by lesson.
 """
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+import re
+import stat
+import textwrap
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
-from math import isfinite
 from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import LONGEST_NAME, OPENED, UNNAMED
 from chutelab.classroom.exercises.exercise import draw, plain
 from chutelab.classroom.exercises.judging import is_rounded, judge
 from chutelab.classroom.kernel import ForgedError, run
-from chutelab.classroom.returned import ReturnedError, code_of, is_result, result_of, words_of
-from chutelab.util.errors import MissingLibraryError, printable, printable_lines
+from chutelab.classroom.lessons.reading import OWN_WORDS
+from chutelab.classroom.words import LANGUAGES, words
+from chutelab.util.errors import InputError, MissingLibraryError, cut, printable, printable_lines
 from chutelab.util.files import csv_lines
 from chutelab.util.versions import too_old
+
+LARGEST: Final = 25 << 20
+"""Bytes; a notebook with its pictures is a tenth of it. As JSON it takes up to 30 times that."""
+
+LARGEST_RESULT: Final = 256 << 10
+"""Bytes; a result file has four numbers and what its student wrote."""
+
+RESULT: Final = ".json"
+"""End of a result file's name. The page calls it ``the-bounce-Ada.chutelab.json``, and browsers and
+learning platforms put more before the end."""
+
+
+class ReturnedError(InputError):
+    """A file that cannot be marked; its text says why."""
+
+
+def _content(path: Path, kind: str, most: int) -> Any:
+    """Return what a file of JSON has in it."""
+    try:
+        # Asked before it is opened, which alone would set off some devices; and not waited for, if
+        # it has become a pipe since then.
+        regular = stat.S_ISREG(path.stat().st_mode)
+        data = b""
+        if regular:
+            flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+            with os.fdopen(os.open(path, flags), "rb") as file:
+                # A size that is told may be wrong.
+                regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
+                data = file.read(most + 1) if regular else b""
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else ""
+        raise ReturnedError(f"cannot be read: {reason or error}") from None
+    if not regular:
+        raise ReturnedError(f"not a {kind}: not a regular file")
+    if len(data) > most:
+        size = f"{most >> 20} MB" if most >> 20 else f"{most >> 10} kB"
+        raise ReturnedError(f"too large for a {kind}, which has at most {size}")
+    try:
+        return json.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        raise ReturnedError(f"not a {kind}: not UTF-8 text") from None
+    except (ValueError, RecursionError):
+        raise ReturnedError(f"not a {kind}: not JSON") from None
+
+
+def code_of(path: Path) -> list[str | None]:
+    """Return the code cells of a notebook of version 4, None for one whose source is no text.
+
+    The JSON is read here and not by nbformat: that refuses a notebook with a cell that has lost its
+    metadata or its source, and what was checked in the other cells counts.
+
+    Raises
+    ------
+    ReturnedError
+        If it cannot be read.
+    """
+    found = _content(path, "notebook", LARGEST)
+    try:
+        cells = found["cells"]
+        sources = [one.get("source", "") for one in cells if one.get("cell_type") == "code"]
+    except (AttributeError, LookupError, TypeError):
+        raise ReturnedError("not a notebook: it has no cells") from None
+    return list(map(_text, sources))
+
+
+def words_of(path: Path) -> dict[str, str]:
+    """Return what was written into a notebook's cell for words, as "explain"; {} without any.
+
+    Raises
+    ------
+    ReturnedError
+        If the notebook cannot be read.
+    """
+    found = _content(path, "notebook", LARGEST)
+    written = {}
+    for cell in found["cells"]:
+        if cell.get("cell_type") == "markdown" and cell.get("id") == OWN_WORDS:
+            said = _text(cell.get("source", "")) or ""
+            for language in LANGUAGES:
+                said = said.replace(words(language).say("notebook-words"), "")
+            if said.strip():
+                written["explain"] = said.strip()[:LONGEST_TEXT]
+    return written
+
+
+def _text(source: Any) -> str | None:
+    """Return the source of a cell: a text, or a list of lines."""
+    lines = source if isinstance(source, list) else [source]
+    return "".join(lines) if all(isinstance(line, str) for line in lines) else None
+
+
+MOST_QUESTIONS: Final = 20
+LONGEST_TEXT: Final = 10_000
+"""Characters of one text that a student wrote."""
+
+Name = Annotated[
+    str, StringConstraints(strip_whitespace=True, min_length=1, max_length=LONGEST_NAME)
+]
+# JSON has texts for keys.
+QuestionNumber = Annotated[int, Field(strict=False)]
+Answer = Annotated[float, Field(allow_inf_nan=False)]
+Key = Annotated[str, StringConstraints(max_length=40)]
+Words = Annotated[str, StringConstraints(max_length=LONGEST_TEXT)]
+
+
+class Work(BaseModel):
+    """What a student did in one lesson: numbers and words, no verdicts.
+
+    A result file has it, with more that is for the page alone, and the kernel tells it.
+    """
+
+    model_config = ConfigDict(strict=True)
+
+    chutelab_result: Literal[1] = 1
+    lesson: Key
+    student: Name
+    answers: Annotated[dict[QuestionNumber, Answer], Field(max_length=MOST_QUESTIONS)] = {}
+    revealed: Annotated[list[int], Field(max_length=MOST_QUESTIONS)] = []
+    words: Annotated[dict[Key, Words], Field(max_length=MOST_QUESTIONS)] = {}
+
+
+def _work(found: object) -> Work:
+    """Return what a student did; a `ValueError` says what no chutelab writes so."""
+    try:
+        work = Work.model_validate(found)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        why = first["msg"][:1].lower() + first["msg"][1:]
+        raise ValueError(": ".join([*map(str, first["loc"]), why])) from None
+    if work.lesson not in EXERCISES:
+        raise ValueError(f"no lesson {work.lesson!r} has an exercise")
+    count = len(EXERCISES[work.lesson].questions)
+    if not {*work.answers, *work.revealed} <= set(range(1, count + 1)):
+        raise ValueError(f"the lesson has questions 1 to {count} only")
+    return work
+
+
+def result_of(path: Path) -> Work:
+    """Return what is in a result file.
+
+    Raises
+    ------
+    ReturnedError
+        If it cannot be read, or has anything in it that no page writes.
+    """
+    found = _content(path, "result file", LARGEST_RESULT)
+    match found:
+        case {"chutelab_result": int(version)} if version > 1:
+            raise ReturnedError("a result file of a newer chutelab: upgrade to read it")
+        case {"chutelab_result": _}:
+            pass
+        case _:
+            raise ReturnedError('not a result file: it has no "chutelab_result"')
+    try:
+        return _work(found)
+    except ValueError as error:
+        raise ReturnedError(cut(f"not a result file: {error}", 200)) from None
+
+
+def is_result(path: Path) -> bool:
+    """Tell a result file from a notebook, by its name."""
+    return path.suffix.casefold() == RESULT
 
 
 @dataclass(frozen=True)
@@ -85,7 +256,7 @@ def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
     for file in files:
         try:
             result = is_result(Path(file))
-            row = _of_result(file) if result else _of_notebook(file, time_limit)
+            row = _marked(file, result_of(Path(file))) if result else _of_notebook(file, time_limit)
         except ReturnedError as error:
             row = Grade(file, reason=str(error))
         except ForgedError as error:
@@ -171,17 +342,6 @@ def write_csv(grades: Iterable[Grade], path: str | Path) -> Path:
     return part.replace(path)
 
 
-@dataclass
-class _Work:
-    """What a student did in one lesson, as the kernel or a result file reports it."""
-
-    lesson: str
-    student: str
-    answers: dict[int, float] = field(default_factory=dict)
-    revealed: set[int] = field(default_factory=set)
-    words: dict[str, str] = field(default_factory=dict)
-
-
 def _of_notebook(file: str, time_limit: float) -> Grade:
     ran = run(code_of(Path(file)), time_limit)
     works = _works(ran.tasks)
@@ -195,20 +355,7 @@ def _of_notebook(file: str, time_limit: float) -> Grade:
     return _marked(file, work, [ran.trouble, *also])
 
 
-def _of_result(file: str) -> Grade:
-    result = result_of(Path(file))
-    if result.lesson not in EXERCISES:
-        raise ReturnedError(f"not a result file: no lesson {result.lesson!r} has an exercise")
-    numbers = {str(n): n for n in range(1, len(EXERCISES[result.lesson].questions) + 1)}
-    if not {*result.answers, *map(str, result.revealed)} <= {*numbers}:
-        raise ReturnedError(f"not a result file: the lesson has questions 1 to {len(numbers)} only")
-    answers = {numbers[key]: answer for key, answer in result.answers.items()}
-    words = {key: text.strip() for key, text in result.words.items() if text.strip()}
-    work = _Work(result.lesson, result.student, answers, set(result.revealed), words)
-    return _marked(file, work, [])
-
-
-def _marked(file: str, work: _Work, reasons: list[str]) -> Grade:
+def _marked(file: str, work: Work, reasons: Sequence[str] = ()) -> Grade:
     # The right answers come from here, whatever was made of them in the kernel or the page.
     _, cases = draw(EXERCISES[work.lesson], work.student)
     replies = [judge(cases[n - 1], answer) for n, answer in sorted(work.answers.items())]
@@ -221,15 +368,15 @@ def _marked(file: str, work: _Work, reasons: list[str]) -> Grade:
         lesson=work.lesson,
         marks=tuple(int(case.number in right) for case in cases),
         out_of=len(cases),
-        revealed=tuple(sorted(work.revealed)),
+        revealed=tuple(sorted({*work.revealed})),
         reason="; ".join(filter(None, reasons)),
         answers=work.answers,
         mistakes={reply.question: reply.mistake for reply in replies if reply.mistake},
-        words=work.words,
+        words={key: text.strip() for key, text in work.words.items() if text.strip()},
     )
 
 
-def _works(reports: object) -> list[_Work]:
+def _works(reports: object) -> list[Work]:
     """Return what was worked on, each lesson and student once, in the order they were opened.
 
     Raises
@@ -239,24 +386,78 @@ def _works(reports: object) -> list[_Work]:
     """
     if not isinstance(reports, list) or len(reports) > (OPENED.maxlen or 0):
         raise ForgedError("its report is not a list of tasks, or too long a one")
-    works: dict[tuple[str, str], _Work] = {}
-    for report in reports:
-        match report:
-            case {
-                "lesson": str(name),
-                "student": str(student),
-                "answers": dict(answers),
-                "revealed": list(revealed),
-            } if name in EXERCISES and 0 < len(student) <= LONGEST_NAME:
-                work = works.setdefault((name, plain(student)), _Work(name, student))
-            case _:
-                raise ForgedError("its report is of no lesson, or of no student")
-        numbers = {str(n): n for n in range(1, len(EXERCISES[name].questions) + 1)}
-        # Answers come as floats and numbers of questions as integers; true is no 1.
-        if not all(key in numbers and type(x) is float for key, x in answers.items()):
-            raise ForgedError("its report has answers to no question, or that are no numbers")
-        if not all(type(n) is int and n in numbers.values() for n in revealed):
-            raise ForgedError("its report has workings of no question")
-        work.answers |= {numbers[key]: x for key, x in answers.items() if isfinite(x)}
-        work.revealed |= set(revealed)
+    works: dict[tuple[str, str], Work] = {}
+    for one in reports:
+        try:
+            work = _work(one)
+        except ValueError as error:
+            raise ForgedError(f"its report is none of chutelab's: {error}") from None
+        first = works.setdefault((work.lesson, plain(work.student)), work)
+        first.answers |= work.answers
+        first.revealed += work.revealed
     return list(works.values())
+
+
+_MARKUP: Final = re.compile(r"[\\`*_\[\]<>|&~]")
+
+
+def report(grades: Iterable[Grade]) -> str:
+    """Return the report of a class as Markdown.
+
+    Files with one name on them all count: two students may have it, or one returned twice, and
+    nothing here can tell. Nothing that a student wrote is markup in it.
+    """
+    rows = list(grades)
+    lines = ["# Class report", ""]
+    for name in EXERCISES:
+        if of_lesson := [row for row in rows if row.marks and row.lesson == name]:
+            lines += _lesson(name, of_lesson)
+    if rest := [row for row in rows if not row.marks]:
+        lines += ["## Not counted", "", "| file | why |", "|---|---|"]
+        lines += [f"| {_literal(row.file)} | {_literal(row.reason)} |" for row in rest]
+        lines += [""]
+    return "\n".join(lines)
+
+
+def _lesson(name: str, rows: list[Grade]) -> Iterator[str]:
+    exercise = EXERCISES[name]
+    files: dict[str, list[Grade]] = {}
+    for row in rows:
+        files.setdefault(plain(row.student), []).append(row)
+    shared = {name: found for name, found in files.items() if len(found) > 1}
+    handed = "1 student" if len(files) == 1 else f"{len(files)} students"
+    handed += f", {len(rows)} files" if shared else ""
+    yield from (f"## Lesson {exercise.number}: {exercise.title}", "", handed, "")
+    for found in shared.values():
+        several = ", ".join(_literal(row.file) for row in found)
+        yield from (
+            f"{_literal(found[0].student)}: several files have this name, and all count: {several}",
+            "",
+        )
+    yield "| question | right | not right | no answer | working shown |"
+    yield "|---|--:|--:|--:|--:|"
+    for number, asked in enumerate(exercise.questions, 1):
+        right = sum(row.marks[number - 1] for row in rows)
+        tried = sum(number in row.answers for row in rows)
+        shown = sum(number in row.revealed for row in rows)
+        counts = f"{right} | {tried - right} | {len(rows) - tried} | {shown}"
+        yield f"| {number} {_literal(asked.title)} | {counts} |"
+    counted = Counter((n, mistake) for row in rows for n, mistake in row.mistakes.items())
+    if counted:
+        yield from ("", "| question | mistake | how many |", "|---|---|--:|")
+        for (number, mistake), many in sorted(counted.items(), key=lambda one: (-one[1], one[0])):
+            yield f"| {number} | {_literal(mistake)} | {many} |"
+    yield ""
+    for row in rows:
+        which = f", {_literal(row.file)}" if plain(row.student) in shared else ""
+        for key, text in row.words.items():
+            yield from (f"**{_literal(row.student)}** ({_literal(key)}{which}):", "")
+            for line in text.splitlines():
+                # An indented line is shown as it is.
+                yield from textwrap.wrap(line, 90, initial_indent="    ", subsequent_indent="    ")
+            yield ""
+
+
+def _literal(text: str) -> str:
+    """Return a text for a cell of Markdown that shows just that."""
+    return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))

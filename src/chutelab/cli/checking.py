@@ -1,35 +1,38 @@
-"""``check``, ``verify`` and ``stress``: is a scene, an answer, a run to be trusted."""
+"""``check``, ``verify``, ``stress`` and ``bench``: is a scene, an answer, a run to be trusted."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
 from chutelab.cli.console import progress, say, tell
-from chutelab.cli.parameters import (
+from chutelab.cli.options import (
+    Count,
+    Engine,
+    Folder,
+    Number,
+    SceneName,
+    Seconds,
+    Texts,
+    command,
     complete_scene,
-    dt_option,
-    engine_option,
-    jobs_option,
-    json_option,
+    destination,
     loaded_as_told,
-    max_seconds_option,
-    scene_argument,
-    set_option,
 )
 
+if TYPE_CHECKING:
+    from chutelab.checks.workprecision import Timing
+    from chutelab.util.tables import Sheet
 
-@click.command(short_help="Look at a scene before it runs, or say all that is wrong.")
-@click.argument(
-    "scenes", metavar="SCENE...", nargs=-1, required=True, shell_complete=complete_scene
-)
-@set_option
-@json_option()
-def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) -> None:
+
+@command("Look at a scene before it runs, or say all that is wrong.")
+def check(scenes: Annotated[Texts, complete_scene], *, set_: Texts, json_: bool) -> None:
     """Look at each SCENE before it runs, or say all that is wrong with it.
 
     Says what will be built and what is skipped, which engine runs and why, what a run will cost in
@@ -47,28 +50,33 @@ def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) ->
     found: dict[str, Preflight] = {}
     for name in scenes:
         try:
-            found[name] = preflight(load(name, overrides))
+            found[name] = preflight(load(name, set_))
         except SceneError as error:
             refused = True
             say(f"Error: {error}", err=True)
     looks = [{"scene": name, **plain(look)} for name, look in found.items()]
     titled = (replace(look, title=f"{name}: {look.title}") for name, look in found.items())
-    tell({"scenes": looks}, *titled, as_json=as_json)
+    tell({"scenes": looks}, *titled, as_json=json_)
     if refused:
         click.get_current_context().exit(2)
 
 
-@click.command(short_help="Check what scenes promise; compare independent answers.")
-@click.argument("scenes", metavar="[SCENE]...", nargs=-1, shell_complete=complete_scene)
-@max_seconds_option(300.0, "Leave out an answer that takes longer than S seconds.")
-@jobs_option(0, "Spread the scenes over N processes")
-@json_option()
-def verify(scenes: tuple[str, ...], max_seconds: float, jobs: int, as_json: bool) -> None:
+@command("Check what scenes promise; compare independent answers.")
+def verify(
+    scenes: Annotated[Texts, complete_scene] = (),
+    *,
+    max_seconds: Seconds = 300.0,
+    jobs: Annotated[int, Count(min=0)] = 0,
+    json_: bool,
+) -> None:
     """Check what each SCENE is expected to show (default: all shipped ones).
 
     Every [[expect]] of a scene is looked at on each engine that can run it, and in the theory.
     Then theory, exact, contact, pymunk and, where SciPy is installed, its DOP853 are compared on
     its particle 0, taken alone. Exit code 1 if an error is larger than its tolerance.
+
+    --max-seconds S  Leave out an answer that takes longer than S seconds. [default]
+    --jobs N  Spread the scenes over N processes; 0, the default, is one for each processor.
     """
     from chutelab.checks import agreement
     from chutelab.scene import load, shipped
@@ -109,7 +117,7 @@ def verify(scenes: tuple[str, ...], max_seconds: float, jobs: int, as_json: bool
         {"failures": failures, "shares": shares, "scenes": answers},
         *chain.from_iterable(both),
         common,
-        as_json=as_json,
+        as_json=json_,
         wrote="Errors and tolerances are relative where they have no unit.\n"
         + (f"{failures} outside the tolerance" if failures else "all within the tolerance"),
     )
@@ -117,15 +125,8 @@ def verify(scenes: tuple[str, ...], max_seconds: float, jobs: int, as_json: bool
         click.get_current_context().exit(1)
 
 
-@click.command(short_help="Run a scene and judge it by laws that every run must keep.")
-@scene_argument
-@engine_option
-@dt_option
-@set_option
-@json_option()
-def stress(
-    scene: str, engine: str | None, dt: float | None, overrides: tuple[str, ...], as_json: bool
-) -> None:
+@command("Run a scene and judge it by laws that every run must keep.")
+def stress(scene: SceneName, *, engine: Engine, dt: float | None, set_: Texts, json_: bool) -> None:
     """Run SCENE and judge the run by laws that it must keep, whatever the scene.
 
     No particle passes a surface, sinks into one or bounces off nothing; energy rises only by a
@@ -139,7 +140,7 @@ def stress(
     from chutelab.results.recorder import StalledError
     from chutelab.util.tables import Sheet, plain
 
-    loaded = loaded_as_told(scene, overrides, engine, dt)
+    loaded = loaded_as_told(scene, set_, engine, dt)
     need_judged(loaded)
     try:
         with progress("simulating") as update:
@@ -165,6 +166,106 @@ def stress(
         verdict = f"{broken} of {len(found)} laws broken"
     elif unpromised:
         verdict = f"{len(found) - unpromised} laws kept, {unpromised} not promised"
-    tell({**about, "broken": broken, "laws": laws}, table, as_json=as_json, wrote=verdict)
+    tell({**about, "broken": broken, "laws": laws}, table, as_json=json_, wrote=verdict)
     if broken:
         click.get_current_context().exit(1)
+
+
+@command("Measure run time against error of a scene, and draw the diagram.")
+def bench(
+    scene: SceneName,
+    *,
+    engine: tuple[Literal["exact", "contact", "pymunk", "fixed"], ...],
+    dt: Annotated[tuple[float, ...], Number(1e-7, 0.1)],
+    repeats: Annotated[int, Count(1, 1000)] = 9,
+    max_seconds: Seconds = 60.0,
+    set_: Texts,
+    out: Folder,
+    json_: bool,
+) -> None:
+    """Measure how long each engine takes on SCENE with each step, and how wrong it is.
+
+    SCENE is a scene file or the name of a shipped one. Its run.engine, run.dt and run.align are
+    ignored.
+
+    Errors are relative, the largest of all answers of a run, against one that the engine had no
+    part in, as with `run --accuracy`: the closed form where it speaks of the whole run, else an
+    engine that shares no formula with the first. Of particles that meet, only totals are compared.
+    A step may be right by luck, where it happens to end at a contact: look at several. Of many
+    particles there are fewer steps, and fixed is left out unless it is asked for. Long steps come
+    first; what there is no time for is listed.
+
+    The first run is reported separately from the median of the repeats (what is over in less than
+    20 ms runs several times in a row); imports are never timed.
+
+    How to read the diagram: a point is one run with one step, further left is more accurate,
+    further down is faster, and both axes count powers of ten. A line is an engine: where it lies
+    lower, take that engine for the accuracy you need.
+
+    --engine  Only this engine; fixed is pymunk with run.align = false. May be repeated.
+    --dt S  A step of the engines that step, in place of the usual ones. May be repeated.
+    --repeats N  Timed runs after the first, at most; fewer of what takes long. [default]
+    --max-seconds S  Leave out what is not measured after S seconds, repeats aside: short steps of
+        crowds. [default]
+    --out DIR  Write work-precision.tsv and work-precision.png into this folder.
+    """
+    from chutelab.checks.workprecision import Timing, measure
+    from chutelab.util.files import tsv_text
+    from chutelab.util.versions import environment, measured_on
+
+    loaded = loaded_as_told(scene, set_)
+    about = environment()
+    files = ["work-precision.tsv", "work-precision.png"]
+    with destination(out, files) as into:
+        with progress("measuring") as update:
+            timings = measure(
+                loaded, engine, dt, repeats=repeats, max_seconds=max_seconds, progress=update
+            )
+        if into is not None:
+            from chutelab.pictures.plots.workprecision import workprecision
+
+            text = tsv_text(timings, Timing, {"scene": loaded.title, **about})
+            (into / files[0]).write_text(text, encoding="utf-8")
+            workprecision(timings, loaded.title, about).write(into / files[1])
+    told = {"scene": loaded.title, "environment": about, "records": timings}
+    table = _table(loaded.title, timings, measured_on(about))
+    wrote = f"wrote into {out}: {', '.join(files)}" if out else ""
+    tell(told, table, as_json=json_, wrote=wrote)
+
+
+def _table(title: str, timings: Sequence[Timing], measured: str) -> Sheet:
+    """Return the table of a scene, why runs failed, how errors are known, and what it ran on."""
+    from chutelab.util.tables import Sheet
+
+    rows = [
+        (
+            "" if before is not None and before.method == one.method else one.method,
+            "" if one.value is None else f"{one.value:.0e}",
+            duration(one.first),
+            duration(one.median),
+            "" if one.median is None else str(one.repeats),
+            "failed" if one.error is None else f"{one.error:.1e}",
+            one.quantity,
+        )
+        for one, before in zip(timings, [None, *timings], strict=False)
+    ]
+    heads = ("engine", "dt", "first", "median", "runs", "error", "of")
+    notes = [
+        f"{one.method} failed{'' if one.value is None else f' at dt {one.value:.0e}'}: {one.failed}"
+        for one in timings
+        if one.failed
+    ]
+    for how in dict.fromkeys(one.how for one in timings if one.how):
+        methods = dict.fromkeys(one.method for one in timings if one.how == how)
+        notes.append(f"error of {', '.join(methods)}: {how}")
+    return Sheet(title, heads, tuple(rows), tail=1, notes=(*notes, measured))
+
+
+def duration(seconds: float | None) -> str:
+    """Return a time in three digits, with its unit; "" for none."""
+    if seconds is None:
+        return ""
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("µs", 1e6)):
+        if seconds * factor >= 1.0:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds * 1e9:.0f} ns"

@@ -5,16 +5,24 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
 from chutelab.cli.console import progress
-from chutelab.cli.output import check_file
-from chutelab.cli.parameters import FileName, Number, file_option, json_option, out_option
-from chutelab.cli.program import InOrder, RefusedError
+from chutelab.cli.options import (
+    FileName,
+    Folder,
+    FolderName,
+    Number,
+    Texts,
+    beginning,
+    check_file,
+    command,
+)
+from chutelab.cli.program import InOrder, RefusedError, main
 from chutelab.util.files import whole, write_lines, writing
 
 if TYPE_CHECKING:
@@ -22,35 +30,20 @@ if TYPE_CHECKING:
     from chutelab.classroom.lessons import Lesson
 
 
-def complete_lesson(
-    _ctx: click.Context, _parameter: click.Parameter, incomplete: str
-) -> list[CompletionItem]:
+def complete_lesson(begun: str) -> list[CompletionItem]:
     """Offer the names of shipped lessons that begin so, with or without their number."""
     from chutelab.classroom.lessons.reading import shipped_lessons
 
-    return [
-        CompletionItem(name, help=lesson.title)
-        for lesson in shipped_lessons()
-        for name in (lesson.name, lesson.folder.name)
-        if name.startswith(incomplete)
-    ]
+    found = shipped_lessons()
+    titles = {name: one.title for one in found for name in (one.name, one.folder.name)}
+    return beginning(titles, begun)
 
 
-lessons_argument = click.argument(
-    "wanted", metavar="[LESSON]...", nargs=-1, type=FileName(), shell_complete=complete_lesson
-)
+LessonName = Annotated[str, FileName(), complete_lesson]
+LessonNames = Annotated[Texts, FileName(), complete_lesson]
 
 
-language_option = click.option(
-    "--language",
-    metavar="LANGUAGE",
-    default="en",
-    show_default=True,
-    help="Of the texts: en, or de where they are translated; the rest is in English.",
-)
-
-
-@click.group(
+@main.group(
     cls=InOrder,
     short_help="Lessons: list, show, build, start, grade, bundle, package.",
     epilog="Begin with: chutelab lesson list, then: chutelab lesson show 1",
@@ -63,9 +56,8 @@ def lesson() -> None:
     """
 
 
-@lesson.command("list", short_help="List the lessons.")
-@json_option()
-def list_lessons(as_json: bool) -> None:
+@command("List the lessons.", lesson)
+def list_(*, json_: bool) -> None:
     """List the lessons: number, name, for whom, how long, and the question of each."""
     from chutelab.classroom.lessons.reading import shipped_lessons
     from chutelab.util.tables import Sheet
@@ -77,63 +69,49 @@ def list_lessons(as_json: bool) -> None:
     ]
     heads = ("", "lesson", "level", "minutes", "what it is about")
     table = Sheet("", heads, tuple(rows), texts=5)
-    console.tell({"lessons": [_plain(one) for one in found]}, table, as_json=as_json)
+    console.tell({"lessons": [_plain(one) for one in found]}, table, as_json=json_)
 
 
-@lesson.command(short_help="Show one lesson, or print its sheets.")
-@click.argument(
-    "wanted", metavar="[LESSON]", required=False, type=FileName(), shell_complete=complete_lesson
-)
-@click.option(
-    "--sheet",
-    type=click.Choice(["student", "teacher", "explanation"]),
-    help="One sheet to hand out: the student's (nothing of the answer on it), the teacher's (key,"
-    " mistakes, goals), or the explanation.",
-)
-@file_option(
-    "-o",
-    "--out",
-    text="Write the sheet into this file: its ending, .md, .html or .pdf, says what it is to be. Or"
-    " into a folder.",
-)
-@click.option(
-    "--format",
-    "kind",
-    type=click.Choice(["md", "html", "pdf"]),
-    help="Markdown, a web page in one file, or A4 to print (which needs the extra chutelab[pdf]);"
-    " default: as the file's name says, in a folder pdf.",
-)
-@click.option("--all", "every", is_flag=True, help="The sheet of every shipped lesson.")
-@language_option
-@json_option()
+@command("Show one lesson, or print its sheets.", lesson)
 def show(
-    wanted: str | None,
-    sheet: str | None,
+    lesson: LessonName | None = None,
+    *,
+    sheet: Literal["student", "teacher", "explanation"] | None,
     out: Path | None,
-    kind: str | None,
-    every: bool,
-    language: str,
-    as_json: bool,
+    format_: Literal["md", "html", "pdf"] | None,
+    all_: bool,
+    language: str = "en",
+    json_: bool,
 ) -> None:
     """Show one lesson: its question, scenes and quantities, its files, and the worksheet.
 
     With --sheet it is one sheet; without -o it is printed, as Markdown in plain characters.
 
-    \b
     chutelab lesson show 3
     chutelab lesson show 3 --sheet student -o sheet.pdf
     chutelab lesson show --all --sheet teacher -o sheets/
     chutelab lesson show 3 --language de
     chutelab lesson show ./my-lesson
-    """  # noqa: D301 - click wants the backspace
-    if (wanted is None) is not every:
+
+    --sheet  One sheet to hand out: the student's (nothing of the answer on it), the teacher's
+        (key, mistakes, goals), or the explanation.
+    -o, --out FILE  Write the sheet into this file: its ending, .md, .html or .pdf, says what it is
+        to be. Or into a folder.
+    --format  Markdown, a web page in one file, or A4 to print (which needs the extra
+        chutelab[pdf]); default: as the file's name says, in a folder pdf.
+    --all  The sheet of every shipped lesson.
+    --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
+        [default]
+    --json  Print one JSON object instead of text.
+    """
+    if (lesson is None) is not all_:
         raise RefusedError("name one LESSON, as in: chutelab lesson show 3; or give --all")
-    if sheet is not None or out is not None or kind is not None or every:
-        if as_json:
+    if sheet is not None or out is not None or format_ is not None or all_:
+        if json_:
             raise RefusedError("--sheet is a text, and --json is not: give one of them")
         if sheet is None:
             raise RefusedError("say which one: --sheet student, teacher or explanation")
-        _hand_out(_lessons((wanted,) if wanted else (), language), sheet, out, kind)
+        _hand_out(_lessons((lesson,) if lesson else (), language), sheet, out, format_)
         return
     from rich.markdown import Markdown
     from rich.text import Text
@@ -144,8 +122,8 @@ def show(
     from chutelab.classroom.words import words
     from chutelab.util.tables import Sheet
 
-    found, say = find(wanted or "", language), words(language).say
-    if as_json:
+    found, say = find(lesson or "", language), words(language).say
+    if json_:
         console.show_json({"format": 1, **_plain(found)})
         return
     number = "" if found.number is None else f"{found.number}  "
@@ -170,7 +148,7 @@ def show(
 
 def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | None) -> None:
     """Print one sheet of each lesson, or write it into a file or a folder."""
-    from chutelab.classroom.lessons.printing import FORMATS, printed
+    from chutelab.classroom.lessons.sheets import FORMATS, printed
     from chutelab.classroom.lessons.texts import without_tex
 
     if out is None:
@@ -196,15 +174,8 @@ def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | N
             console.say(f"wrote {path}")
 
 
-@lesson.command(short_help="Make film and notebook of each lesson that changed.")
-@lessons_argument
-@out_option(
-    "Write each picture into a folder NN-name in here, not into the lesson's own: for an"
-    " installed chutelab, whose folders cannot be written to."
-)
-@click.option("--force", is_flag=True, help="Make them anew, changed or not.")
-@click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
-def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -> None:
+@command("Make film and notebook of each lesson that changed.", lesson)
+def build(lessons: LessonNames = (), *, out: Folder, force: bool, quiet: bool) -> None:
     """Make lesson.gif and exercise.ipynb of each LESSON (default: all shipped), where they changed.
 
     The notebook is made of README.md (Predict, Run, Compare), notebook.py and the exercise. Where
@@ -213,13 +184,17 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
     A picture is up to date if it was made from the same scene and settings with the same versions
     of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
     the same bytes.
+
+    --out DIR  Write each picture into a folder NN-name in here, not into the lesson's own: for an
+        installed chutelab, whose folders cannot be written to.
+    --force  Make them anew, changed or not.
     """
     from chutelab.classroom.lessons import find
     from chutelab.classroom.lessons.building import build as build_lesson
     from chutelab.classroom.lessons.building import build_notebook, check_inside
     from chutelab.classroom.words import LANGUAGES
 
-    for one in _lessons(wanted):
+    for one in _lessons(lessons):
         with (
             writing(instead="another folder: --out DIR"),
             progress(one.name, quiet=quiet) as update,
@@ -236,30 +211,22 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
                 console.say(f"{built.path}: {done}, {built.size / 1000:.0f} kB")
 
 
-@lesson.command(short_help="Start a lesson of your own.")
-@click.argument("name", type=FileName(path_type=Path))
-@click.option(
-    "--from",
-    "model",
-    type=FileName(),
-    metavar="LESSON",
-    shell_complete=complete_lesson,
-    help="Begin with a copy of this lesson: worksheet, exercise, scenes and all.",
-)
-def new(name: Path, model: str | None) -> None:
+@command("Start a lesson of your own.", lesson)
+def new(name: Path, *, from_: LessonName | None) -> None:
     """Start a lesson of your own: a folder NAME with lesson.toml, worksheet, explanation and scene.
 
     It can be shown and built at once; change it from there. With --from it is a copy of a shipped
     lesson, to adapt one, or to work through it. Nothing is ever overwritten.
 
-    \b
     chutelab lesson new my-lesson
     chutelab lesson new our-bounce --from 3
-    """  # noqa: D301 - click wants the backspace
+
+    --from LESSON  Begin with a copy of this lesson: worksheet, exercise, scenes and all.
+    """
     from chutelab.classroom.lessons import find
     from chutelab.classroom.lessons.building import start
 
-    copied = None if model is None else find(model)
+    copied = None if from_ is None else find(from_)
     with writing(instead="another place"):
         made = start(name, copied)
     # A name with a folder in front is taken for a folder, even if a shipped lesson has it.
@@ -267,13 +234,15 @@ def new(name: Path, model: str | None) -> None:
     console.say(f"wrote {made}; edit it, and make its picture with: chutelab lesson build {said}")
 
 
-@lesson.command(short_help="Bundle the lessons as web pages that need no server.")
-@lessons_argument
-@out_option("The folder, or FILE.html; files that are there are replaced.", "-o", required=True)
-@language_option
-@click.option("--wheel/--no-wheel", default=True, help="With what students install, or without.")
-@click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
-def page(wanted: tuple[str, ...], out: Path, language: str, wheel: bool, quiet: bool) -> None:
+@command("Bundle the lessons as web pages that need no server.", lesson)
+def page(
+    lessons: LessonNames = (),
+    *,
+    out: Annotated[Path, FolderName()],
+    language: str = "en",
+    wheel: bool = True,
+    quiet: bool,
+) -> None:
     """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
 
     index.html, and for each lesson its worksheet, animation, files, and a live page, which offers
@@ -284,40 +253,39 @@ def page(wanted: tuple[str, ...], out: Path, language: str, wheel: bool, quiet: 
 
     With one LESSON and a FOLDER that ends in .html, only that lesson's live page is written, into a
     file of that name.
+
+    -o, --out DIR  The folder, or FILE.html; files that are there are replaced. [required]
+    --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
+        [default]
+    --wheel / --no-wheel  With what students install, or without.
     """
-    from chutelab.classroom.lessons.building import bundle, live_page
+    from chutelab.classroom.lessons.pages import bundle, live_page
 
     if out.suffix == ".html":
-        lessons = _lessons(wanted, language)
-        if len(lessons) != 1:
+        chosen = _lessons(lessons, language)
+        if len(chosen) != 1:
             raise click.UsageError("a single page is of one lesson: name it, or a folder")
         with writing(instead="another file"):
-            size = live_page(lessons[0], out)
+            size = live_page(chosen[0], out)
         if not quiet:
             console.say(f"wrote {out}, {size / 1e3:.0f} kB")
         return
     with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
-        made = bundle(_lessons(wanted, language), out, update, wheel=wheel)
+        made = bundle(_lessons(lessons, language), out, update, wheel=wheel)
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
 
 
-@lesson.command(short_help="Package lessons for a learning platform (SCORM 1.2).")
-@lessons_argument
-@click.option("--all", "everything", is_flag=True, help="All lessons that are shipped.")
-@click.option(
-    "--out",
-    "-o",
-    metavar="DIR|FILE.zip",
-    type=FileName(path_type=Path),
-    default=Path(),
-    help="The folder for the packages, NN-name.scorm.zip each, by default this one; or, for one"
-    " lesson, the zip file itself. Files that are there are replaced.",
-)
-@language_option
-@click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
-def scorm(wanted: tuple[str, ...], everything: bool, out: Path, language: str, quiet: bool) -> None:
+@command("Package lessons for a learning platform (SCORM 1.2).", lesson)
+def scorm(
+    lessons: LessonNames = (),
+    *,
+    all_: bool,
+    out: Path = Path(),
+    language: str = "en",
+    quiet: bool,
+) -> None:
     """Make a SCORM 1.2 package of each LESSON: its live page with its exercise, for a course.
 
     The platform tells the page each student's name, from which the numbers are drawn, and keeps the
@@ -325,7 +293,6 @@ def scorm(wanted: tuple[str, ...], everything: bool, out: Path, language: str, q
     right, or its working was shown), each answer, the time, and where to go on next time. The page
     asks for nothing from the network; students install nothing.
 
-    \b
     Moodle  "Add an activity", "SCORM package", and the zip into "Package file".
             Appearance: "New window" gives it room. Grade: "Highest grade", maximum 100.
             Attempts: "Force new attempt" stays "No", so that students go on where they
@@ -338,27 +305,32 @@ def scorm(wanted: tuple[str, ...], everything: bool, out: Path, language: str, q
     students then hand in the result file for `chutelab lesson grade`. A score from a browser can be
     forged, as on every platform: use it to see where a class stands, not as an exam.
 
-    \b
     chutelab lesson scorm 3
     chutelab lesson scorm 1 2 3 --language de -o packages/
     chutelab lesson scorm --all -o packages/
-    """  # noqa: D301 - click wants the backspace
-    from chutelab.classroom.lessons.scorm import package
 
-    if everything == bool(wanted):
+    --all  All lessons that are shipped.
+    -o, --out DIR|FILE.zip  The folder for the packages, NN-name.scorm.zip each, by default this
+        one; or, for one lesson, the zip file itself. Files that are there are replaced.
+    --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
+        [default]
+    """
+    from chutelab.classroom.lessons.pages import package
+
+    if all_ == bool(lessons):
         raise RefusedError("give lessons, such as: chutelab lesson scorm 3; or --all")
-    lessons = _lessons(wanted, language)
+    chosen = _lessons(lessons, language)
     is_file = out.suffix.lower() == ".zip"
-    if is_file and len(lessons) > 1:
-        raise RefusedError(f"--out {out}: {len(lessons)} lessons go into a folder, not one zip")
+    if is_file and len(chosen) > 1:
+        raise RefusedError(f"--out {out}: {len(chosen)} lessons go into a folder, not one zip")
     with writing(instead="another place"), progress("packaging", quiet=quiet) as update:
         if not is_file:
             out.mkdir(parents=True, exist_ok=True)
-        for i, one in enumerate(lessons, 1):
+        for i, one in enumerate(chosen, 1):
             target = out if is_file else out / f"{one.folder.name}.scorm.zip"
             made = package(one, target)
             if update is not None:
-                update(i / len(lessons))
+                update(i / len(chosen))
             if not quiet:
                 console.say(f"wrote {made}, {made.stat().st_size / 1000:.0f} kB")
 
@@ -382,43 +354,15 @@ def _plain(lesson: Lesson) -> dict[str, object]:
     }
 
 
-@lesson.command(short_help="Mark what students returned: notebooks, result files.")
-@click.argument(
-    "files",
-    metavar="FILES...",
-    nargs=-1,
-    required=True,
-    # One that cannot be read has its row.
-    type=FileName(exists=True, readable=False, path_type=Path),
-)
-@click.option(
-    "--out",
-    metavar="FILE",
-    type=FileName(dir_okay=False, path_type=Path),
-    help="Write the marks into this CSV file, a row for each file returned. Until the last is"
-    " marked, the rows are in FILE.part.",
-)
-@file_option(
-    "--report",
-    text="Write what the class did into this Markdown file: by lesson how many were right, which"
-    " mistakes were made how often, and what students wrote.",
-)
-@click.option(
-    "--time-limit",
-    metavar="S",
-    default=60.0,
-    show_default=True,
-    type=Number(1.0, 3600.0),
-    help="Seconds that a notebook may run.",
-)
-@json_option()
-@click.option("--quiet", "-q", is_flag=True, help="Print no table, and show no progress bar.")
+@command("Mark what students returned: notebooks, result files.", lesson)
 def grade(
-    files: tuple[Path, ...],
-    out: Path | None,
+    # One that cannot be read has its row.
+    files: Annotated[tuple[Path, ...], FileName(exists=True, readable=False, path_type=Path)],
+    *,
+    out: Annotated[Path | None, FileName(dir_okay=False, path_type=Path)],
     report: Path | None,
-    time_limit: float,
-    as_json: bool,
+    time_limit: Annotated[float, Number(1.0, 3600.0)] = 60.0,
+    json_: bool,
     quiet: bool,
 ) -> None:
     """Mark each question of the exercises that students returned.
@@ -440,12 +384,18 @@ def grade(
 
     Ctrl-C, or a crash, keeps the marks so far, in FILE.part.
 
-    \b
     chutelab lesson grade returned/ --out class.csv --report class.md
     chutelab lesson grade anna.ipynb the-bounce-Ben.chutelab.json --time-limit 30
-    """  # noqa: D301 - click wants the backspace
-    from chutelab.classroom.class_report import report as class_report
+
+    --out FILE  Write the marks into this CSV file, a row for each file returned. Until the last is
+        marked, the rows are in FILE.part.
+    --report FILE  Write what the class did into this Markdown file: by lesson how many were right,
+        which mistakes were made how often, and what students wrote.
+    --time-limit S  Seconds that a notebook may run. [default]
+    -q, --quiet  Print no table, and show no progress bar.
+    """
     from chutelab.classroom.grading import grade as grade_returned
+    from chutelab.classroom.grading import report as class_report
     from chutelab.classroom.grading import write_csv
     from chutelab.util.tables import Sheet
 
@@ -499,7 +449,7 @@ def grade(
             else:
                 write_csv(rows(update), out)
     finally:
-        if done and as_json:
+        if done and json_:
             console.show_json({"format": 1, "grades": done})
         elif done and not quiet:
             console.show(Sheet("", HEADS, tuple(map(_cells, done)), texts=5))
@@ -510,7 +460,7 @@ def grade(
         with writing(f"--report {report}"):
             write_lines(report, [class_report(done)], errors="replace")
     for target in filter(None, (out, report)):
-        if not as_json:
+        if not json_:
             console.say(f"wrote {target}")
 
 

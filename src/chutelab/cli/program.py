@@ -28,6 +28,13 @@ class RefusedError(click.ClickException):
     exit_code = 2
 
 
+ORDER = [
+    "run", "live", "check", "show", "sweep", "solve", "compare", "lesson", "figure", "tables",
+    "scenes", "materials", "quantities", "new", "schema", "verify", "stress", "bench",
+]  # fmt: skip
+"""The commands as help lists them."""
+
+
 class InOrder(click.Group):
     """A group of commands, listed in the order they were added."""
 
@@ -36,8 +43,12 @@ class InOrder(click.Group):
         return list(self.commands)
 
 
-class Program(InOrder):
+class Program(click.Group):
     """The commands of ``chutelab``, which never show a traceback."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands in the order of help."""
+        return ORDER
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run the program, and exit; what goes wrong becomes a message and an exit code.

@@ -2,73 +2,227 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
+from click.shell_completion import CompletionItem
 
-from chutelab.cli.console import progress, say
-from chutelab.cli.output import KINDS, Output, check_file, destination, output_options
-from chutelab.cli.parameters import (
-    FileName,
-    Number,
-    dt_option,
-    engine_option,
-    file_option,
+from chutelab.cli.console import progress, say, show_json
+from chutelab.cli.console import show as show_parts
+from chutelab.cli.options import (
+    Engine,
+    Folder,
+    SceneName,
+    Seconds,
+    Texts,
+    check_file,
+    command,
+    destination,
     loaded_as_told,
-    scene_argument,
-    set_option,
+    write_json,
 )
 from chutelab.cli.program import RefusedError
 from chutelab.util.errors import InputError
 from chutelab.util.files import writing
+from chutelab.util.tables import wrapped
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from chutelab.results import Recording
     from chutelab.studies.accuracy import Accuracy, Wanted
 
+KINDS = {
+    "png": ("overlay.png",),
+    "gif": ("lesson.gif",),
+    "csv": ("events.csv", "trajectory.csv"),
+    "npz": ("recording.npz",),
+    "json": ("summary.json",),
+    "mp4": ("lesson.mp4",),
+    "webm": ("lesson.webm",),
+    "strobe": ("strobe.png",),
+}
+"""What ``--only`` takes, and the files it stands for."""
 
-def _accuracy(text: str) -> Wanted:
-    from chutelab.studies.accuracy import parse
+FILMS = ("gif", "mp4", "webm")
+"""Those that are the lesson picture; ``--format`` chooses one."""
 
-    try:
-        return parse(text)
-    except InputError as error:
-        raise click.BadParameter(str(error)) from error
+USUAL = ("png", "gif", "csv", "npz", "json")
+"""Those that are written unless ``--only`` chooses."""
+
+MOST_EVENTS, EVENT = 100_000, 240
+"""Rows and bytes a row, about: of more events.csv is left out unless ``--only`` asks for it."""
 
 
-@click.command(short_help="Simulate a scene and print a summary; write its files.")
-@scene_argument
-@engine_option
-@dt_option
-@click.option(
-    "--accuracy",
-    metavar="A",
-    type=_accuracy,
-    help="Choose engine and step so that errors are at most this: relative, such as 1e-6, or a"
-    " length, such as 1mm; say what was reached.",
-)
-@click.option(
-    "--max-seconds",
-    metavar="S",
-    type=Number(min=0.0, min_open=True),
-    help="End the simulation after S seconds with what is recorded; the summary says so.",
-)
-@set_option
-@output_options
-@click.option(
-    "--partial",
-    is_flag=True,
-    help="With --out: if the run gets stuck, write what was recorded until then.",
-)
+def complete_kinds(incomplete: str) -> list[CompletionItem]:
+    """Offer `KINDS` after the last comma."""
+    before, comma, begun = incomplete.rpartition(",")
+    return [CompletionItem(f"{before}{comma}{kind}") for kind in KINDS if kind.startswith(begun)]
+
+
+@dataclass(kw_only=True)
+class Output:
+    """What ``run`` and ``show`` leave of a recording.
+
+    Refused are ``--only`` and ``--format`` where nothing is written, ``--format`` where there is no
+    film, and a film that cannot be written here.
+
+    --out DIR  Write pictures, tables and the recording into this folder.
+    --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe; without, the first
+        5, but no events.csv of more than 100,000 events. May be repeated.
+    --format  With --out: the lesson picture as this instead of a GIF; mp4 and webm need the extra
+        chutelab[video].
+    --details  For experts: engine and steps, errors and residuals down to rounding, in the summary
+        and in overlay.png; of a crowd particle 0, too.
+    -q, --quiet  Print no summary and no progress bar.
+    """
+
+    out: Folder
+    only: Annotated[Texts, complete_kinds]
+    format_: Literal["gif", "mp4", "webm"] | None
+    details: bool
+    json_: bool
+    quiet: bool
+    kinds: tuple[str, ...] = field(init=False)  # which of `KINDS`
+
+    def __post_init__(self) -> None:
+        chosen = {kind.strip().lower() for value in self.only for kind in value.split(",")}
+        if chosen - KINDS.keys():
+            said = f"{','.join(self.only)!r}: choose from {','.join(KINDS)}"
+            raise click.BadParameter(said, param_hint="'--only'")
+        if self.out is None and (self.only or self.format_):
+            option = "--only chooses among" if self.only else "--format is for one of"
+            raise click.UsageError(f"{option} the files of --out DIR: give --out too.")
+        kinds = tuple(kind for kind in KINDS if kind in (chosen or USUAL))
+        if self.format_ is not None:
+            others = set(kinds) - set(FILMS)
+            if len(others) == len(kinds):
+                raise click.UsageError(
+                    f"--format {self.format_} is for the lesson picture, which --only"
+                    f" {','.join(kinds)} leaves out: add gif to --only."
+                )
+            kinds = tuple(kind for kind in KINDS if kind == self.format_ or kind in others)
+        self.kinds = kinds
+        for kind in {"mp4", "webm"}.intersection(kinds):
+            from chutelab.pictures.animation import need_video
+
+            need_video(kind)
+
+    @property
+    def files(self) -> list[str]:
+        """Names of the files."""
+        return [name for kind in self.kinds for name in KINDS[kind]]
+
+    def leaves_out(self, recording: Recording) -> bool:
+        """Tell whether there are so many events that events.csv is not written unasked."""
+        return "csv" in self.kinds and not self.only and len(recording.events) > MOST_EVENTS
+
+    def write(self, recording: Recording, folder: Path, accuracy: Accuracy | None = None) -> None:
+        """Write the files into an existing folder."""
+        for kind in self.kinds:
+            path = folder / KINDS[kind][0]
+            with progress(f"writing {' and '.join(KINDS[kind])}", quiet=self.quiet):
+                if kind in FILMS:
+                    from chutelab.pictures.animation import animate
+
+                    animate(recording, path)
+                elif kind in ("png", "strobe"):
+                    from chutelab.pictures import plots
+
+                    if kind == "png":
+                        plots.overlay(recording, path=path, details=self.details)
+                    else:
+                        plots.strobe(recording, path=path)
+                elif kind == "csv":
+                    tables = ("events", "trajectory")[self.leaves_out(recording) :]
+                    recording.to_csv(folder, only=tables)
+                elif kind == "npz":
+                    recording.save(path)
+                else:
+                    # Only what is printed tells how long it took: the same run, the same file.
+                    write_json({**_summary(recording, accuracy), "seconds": None}, path)
+
+    def tell(self, recording: Recording, accuracy: Accuracy | None = None) -> None:
+        """Print the summary, what was written, and what was left out."""
+        left_out = self.leaves_out(recording)
+        if self.json_:
+            show_json(_summary(recording, accuracy))
+        elif not self.quiet:
+            show_parts(*_report(recording, accuracy, details=self.details))
+            if self.out is not None:
+                files = [name for name in self.files if name != "events.csv" or not left_out]
+                say(f"wrote into {self.out}: {', '.join(files)}")
+        if recording.laws and (self.json_ or self.quiet):
+            say("\n".join(map(str, recording.laws)), err=True)
+        if self.out is not None and left_out and not self.quiet:
+            many, kept = len(recording.events), self.out / "recording.npz"
+            say(
+                f"events.csv is left out: {many:,} events, about {many * EVENT / 1e6:.0f} MB;"
+                f" chutelab show {kept} --out {self.out} --only csv writes it",
+                err=self.json_,
+            )
+        if self.out is not None and "csv" in self.kinds and not self.quiet:
+            from chutelab.results import storage
+
+            if (few := storage.instants(recording)) < storage.SAMPLES:
+                say(
+                    f"trajectory.csv has {few} instants, not {storage.SAMPLES}: with more it would"
+                    f" have over {storage.MOST_ROWS:,} rows",
+                    err=self.json_,
+                )
+
+    def end(self, recording: Recording) -> None:
+        """End the command with exit code 1 if the run broke a law."""
+        if recording.laws:
+            click.get_current_context().exit(1)
+
+
+def _report(
+    recording: Recording, accuracy: Accuracy | None, *, details: bool
+) -> list[RenderableType]:
+    """Return what a run leaves to read: particle 0 beside the theory, the ledger, the accuracy.
+
+    With `details` also the engine and its steps, and errors down to rounding.
+    """
+    from rich.text import Text
+
+    from chutelab.results.summary import facts, sheets
+    from chutelab.studies.accuracy import written
+
+    head = Text(recording.title, style="bold")
+    head.append(f"\n{facts(recording, details=details)}", style="not bold")
+    parts: list[RenderableType] = [head, *sheets(recording, details=details)]
+    if accuracy is not None:
+        what = "relative error" if accuracy.unit == "relative" else "error of places"
+        said = "cannot be told"
+        if accuracy.reached is not None:
+            said = f"about {written(accuracy.reached, accuracy.unit)} ({accuracy.worst})"
+        met = "reached" if accuracy.met else "NOT REACHED"
+        found = wrapped(f"{what} {said}; asked for {written(accuracy.asked, accuracy.unit)}, {met}")
+        how = wrapped(f"how it is known: {accuracy.method}")
+        parts += [Text("\nAccuracy", style="bold"), Text("\n".join([*found, *how]))]
+    return parts
+
+
+def _summary(recording: Recording, accuracy: Accuracy | None) -> dict[str, Any]:
+    from chutelab.results.summary import summary
+
+    return summary(recording, None if accuracy is None else vars(accuracy))
+
+
+@command("Simulate a scene and print a summary; write its files.")
 def run(
-    scene: str,
-    engine: str | None,
+    scene: SceneName,
+    *,
+    engine: Engine,
     dt: float | None,
-    accuracy: Wanted | None,
-    max_seconds: float | None,
-    overrides: tuple[str, ...],
+    accuracy: str | None,
+    max_seconds: Seconds | None,
+    set_: Texts,
     output: Output,
     partial: bool,
 ) -> None:
@@ -86,11 +240,24 @@ def run(
     A run that --max-seconds ends counts as a run: its summary and files are of what was recorded,
     particles that had not ended have "stopped" as their end, and the exit code is 0. Ctrl-C ends a
     run the same way: with --out its files are written, and the exit code is 130.
+
+    --accuracy A  Choose engine and step so that errors are at most this: relative, such as 1e-6, or
+        a length, such as 1mm; say what was reached.
+    --max-seconds S  End the simulation after S seconds with what is recorded; the summary says so.
+    --partial  With --out: if the run gets stuck, write what was recorded until then.
     """
     from chutelab.engines.simulation import judged
     from chutelab.results import Recording
     from chutelab.results.recorder import StalledError
 
+    wanted: Wanted | None = None
+    if accuracy is not None:
+        from chutelab.studies.accuracy import parse, reach, written
+
+        try:
+            wanted = parse(accuracy)
+        except InputError as error:
+            raise click.BadParameter(str(error), param_hint="'--accuracy'") from error
     if partial and output.out is None:
         raise click.UsageError("--partial keeps files of --out DIR: give --out too.")
     if max_seconds is not None and accuracy is not None:
@@ -98,7 +265,7 @@ def run(
     if max_seconds is not None and not isfinite(max_seconds):
         raise click.UsageError(f"--max-seconds {max_seconds}: a finite number above 0 s.")
     began = perf_counter()
-    loaded = loaded_as_told(scene, overrides, engine, dt)
+    loaded = loaded_as_told(scene, set_, engine, dt)
     if max_seconds is not None:
         # It counts from the reading of the scene on.
         max_seconds = max(max_seconds - (perf_counter() - began), 1e-9)
@@ -107,12 +274,10 @@ def run(
     with destination(output.out, output.files) as folder:
         try:
             with progress("simulating", quiet=output.quiet, left=True) as update:
-                if accuracy is None:
+                if wanted is None:
                     recording = judged(loaded, progress=update, max_seconds=max_seconds)
                 else:
-                    from chutelab.studies.accuracy import reach
-
-                    recording, reached = reach(loaded, accuracy, update)
+                    recording, reached = reach(loaded, wanted, update)
         except StalledError as stalled:
             kept = (
                 "" if partial else "; add --out DIR --partial to keep what was recorded until then"
@@ -132,21 +297,17 @@ def run(
         raise interrupted
     output.tell(recording, reached)
     if reached is not None and not reached.met:
-        from chutelab.studies.accuracy import written
-
         best = "how much was, cannot be told"
         if reached.reached is not None:
             best = f"{written(reached.reached, reached.unit)} was"
-        stuck = f"the accuracy of {accuracy} was not reached; {best}"
+        stuck = f"the accuracy of {wanted} was not reached; {best}"
     if stuck:
         raise click.ClickException(stuck)
     output.end(recording)
 
 
-@click.command(short_help="Print the summary of a recording.npz; make its files again.")
-@click.argument("recording", type=FileName(path_type=Path))
-@output_options
-def show(recording: Path, output: Output) -> None:
+@command("Print the summary of a recording.npz; make its files again.")
+def show(recording: Path, *, output: Output) -> None:
     """Print the summary of RECORDING, a recording.npz; with --out make its files again."""
     from chutelab.results import Recording
     from chutelab.results.storage import RecordingError
@@ -169,27 +330,13 @@ def show(recording: Path, output: Output) -> None:
     output.end(loaded)
 
 
-@click.command(short_help="Open a scene as a page that answers when you drag it.")
-@scene_argument
-@set_option
-@file_option(
-    "-o", "--out", "--output", "output",
-    text="The file to write, such as lab.html; default: one in a temporary folder, which is then"
-    " opened in the browser.",
-)  # fmt: skip
-@click.option(
-    "--language",
-    type=click.Choice(["en", "de"]),
-    default="en",
-    show_default=True,
-    help="Of all that the page says; texts of the scene stay as they are.",
-)
-@click.option("--quiet", "-q", is_flag=True, help="Print nothing.")
+@command("Open a scene as a page that answers when you drag it.")
 def live(
-    scene: str,
-    overrides: tuple[str, ...],
-    output: Path | None,
-    language: str,
+    scene: SceneName,
+    *,
+    set_: Texts,
+    out: Path | None,
+    language: Literal["en", "de"] = "en",
     quiet: bool,
 ) -> None:
     """Show SCENE as a live page: drag the plate, and path, numbers and ledger follow.
@@ -203,24 +350,28 @@ def live(
     until the learner has set a mark; controls, panels, ranges and presets say what can be changed
     and what is shown.
 
-    \b
     chutelab live inclined-40
     chutelab live inclined-40 --language de -o lab.html
     chutelab live perpendicular --set live.predict=true -o predict.html
-    """  # noqa: D301 - click wants the backspace
+
+    -o, --out, --output FILE  The file to write, such as lab.html; default: one in a temporary
+        folder, which is then opened in the browser.
+    --language  Of all that the page says; texts of the scene stay as they are. [default]
+    -q, --quiet  Print nothing.
+    """
     import webbrowser
     from tempfile import mkdtemp
 
     from chutelab.pictures.live.page import write
 
-    check_file("-o", output)
-    loaded = loaded_as_told(scene, overrides)
+    check_file("-o", out)
+    loaded = loaded_as_told(scene, set_)
     name = f"{Path(scene).name.removesuffix('.toml')}.html"
-    path = Path(mkdtemp(prefix="chutelab-")) / name if output is None else output
+    path = Path(mkdtemp(prefix="chutelab-")) / name if out is None else out
     with writing(str(path)):
         size = write(loaded, path, language=language)
-    if output is None and not webbrowser.open(path.absolute().as_uri()):
+    if out is None and not webbrowser.open(path.absolute().as_uri()):
         raise click.ClickException(f"no browser could be opened; the page is {path}")
     if not quiet:
-        done = "opened" if output is None else "wrote"
+        done = "opened" if out is None else "wrote"
         say(f"{done} {path}, {size / 1000:.0f} kB")

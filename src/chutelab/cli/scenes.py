@@ -9,27 +9,23 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
-from chutelab.cli.output import check_file, destination
-from chutelab.cli.parameters import FileName, json_option, out_option
+from chutelab.cli.options import FileName, Folder, beginning, check_file, command, destination
 from chutelab.cli.program import RefusedError
 from chutelab.util.files import whole, writing
 
 if TYPE_CHECKING:
     from chutelab.scene.materials import Preset
-    from chutelab.util.tables import Sheet
 
 STANDARD_OUTPUT = Path("-")
 
 
-@click.command()
-@json_option()
-def scenes(as_json: bool) -> None:
+@command()
+def scenes(*, json_: bool) -> None:
     """List the shipped scenes; `run` takes their names."""
     from chutelab.scene import about
     from chutelab.util.tables import Sheet
@@ -37,26 +33,18 @@ def scenes(as_json: bool) -> None:
     listed = [{**asdict(scene), "path": str(scene.path)} for scene in about()]
     rows = [(s.name, f"{s.title}\n{s.look[0] if s.look else ''}") for s in about()]
     table = Sheet("", ("scene", "what it shows"), tuple(rows), texts=2)
-    console.tell({"scenes": listed}, table, as_json=as_json)
+    console.tell({"scenes": listed}, table, as_json=json_)
 
 
-def complete_material(
-    _ctx: click.Context, _parameter: click.Parameter, incomplete: str
-) -> list[CompletionItem]:
+def complete_material(begun: str) -> list[CompletionItem]:
     """Offer the materials that begin so."""
     from chutelab.scene.materials import PRESETS
 
-    return [
-        CompletionItem(name, help=preset.about)
-        for name, preset in PRESETS.items()
-        if name.startswith(incomplete)
-    ]
+    return beginning({name: preset.about for name, preset in PRESETS.items()}, begun)
 
 
-@click.command(short_help="List the materials of particles: density, bounce, friction.")
-@click.argument("material", required=False, metavar="[MATERIAL]", shell_complete=complete_material)
-@json_option()
-def materials(material: str | None, as_json: bool) -> None:
+@command("List the materials of particles: density, bounce, friction.")
+def materials(material: Annotated[str | None, complete_material] = None, *, json_: bool) -> None:
     """List the materials that a scene may name, or show MATERIAL alone, to copy and change.
 
     The density is that of the solid, without the voids of a heap. A coefficient of restitution (how
@@ -66,12 +54,12 @@ def materials(material: str | None, as_json: bool) -> None:
     Behind each number is how far it usually spreads, and its source. Where a result depends on
     one, run both ends of its spread, and measure your own material.
 
-    \b
     chutelab materials
     chutelab materials coal
-    """  # noqa: D301 - click wants the backspace
-    from chutelab.scene.materials import PRESETS
+    """
+    from chutelab.scene.materials import PRESETS, VALUES
     from chutelab.util.errors import InputError, did_you_mean
+    from chutelab.util.tables import Sheet
 
     if material is not None and material not in PRESETS:
         known = f"there are {', '.join(PRESETS)}"
@@ -79,6 +67,7 @@ def materials(material: str | None, as_json: bool) -> None:
     shown = list(PRESETS.values()) if material is None else [PRESETS[material]]
     texts = dict.fromkeys(text for one in shown for row in one.sources.values() for text in row)
     numbers = {text: number for number, text in enumerate(texts, 1)}
+    notes = tuple(f"[{number}] {text}" for text, number in numbers.items())
     told = [
         {
             "about": one.about,
@@ -88,111 +77,71 @@ def materials(material: str | None, as_json: bool) -> None:
         }
         for one in shown
     ]
-    console.tell(
-        {"materials": told, "sources": list(numbers)},
-        *(_of_all(shown, numbers) if material is None else [_alone(shown[0], numbers)]),
-        as_json=as_json,
-        wrote="" if material is None else _to_copy(shown[0]),
-    )
 
+    def said(one: Preset, key: str) -> tuple[str, str]:
+        digits = "g" if key == "density" else ".2f"
+        low, high = one.spread[key]
+        return f"{getattr(one.material, key):{digits}}", f"{low:{digits}}-{high:{digits}}"
 
-def _of_all(presets: list[Preset], numbers: dict[str, int]) -> list[Sheet]:
-    """Return tables of densities, restitutions and frictions, with the sources below the last."""
-    from chutelab.util.tables import Sheet
+    def cited(one: Preset, *keys: str) -> str:
+        cited = {numbers[text] for key in keys for text in one.sources[key]}
+        return " ".join(map(str, sorted(cited)))
 
-    def pairs(title: str, kind: str, notes: tuple[str, ...] = ()) -> Sheet:
-        keys = (kind, f"{kind}_steel", f"{kind}_rubber")
-        rows = tuple(
-            (
-                one.material.name,
-                *("  ".join(_number(one, key)) for key in keys),
-                _cited(one, keys, numbers),
-            )
-            for one in presets
-        )
+    if material is None:
+        rows = [
+            (one.material.name, one.about, *said(one, "density"), cited(one, "density"))
+            for one in shown
+        ]
+        heads: tuple[str, ...] = ("", "", "kg/m³", "spread", "source")
+        tables = [Sheet("Materials, and their density", heads, tuple(rows), texts=2, tail=1)]
         heads = ("", "with itself", "with steel", "with rubber", "source")
-        return Sheet(title, heads, rows, tail=1, notes=notes)
-
-    densities = tuple(
-        (
-            one.material.name,
-            one.about,
-            *_number(one, "density"),
-            _cited(one, ("density",), numbers),
-        )
-        for one in presets
-    )
-    heads = ("", "", "kg/m³", "spread", "source")
-    return [
-        Sheet("Materials, and their density", heads, densities, texts=2, tail=1),
-        pairs("Coefficient of restitution ε", "restitution"),
-        pairs("Coefficient of friction µ", "friction", _listed(numbers)),
-    ]
-
-
-def _alone(one: Preset, numbers: dict[str, int]) -> Sheet:
-    """Return a table of one material, a row for each of its keys."""
-    from chutelab.scene.materials import VALUES
-    from chutelab.util.tables import Sheet
-
-    return Sheet(
-        f"{one.material.name}: {one.about}",
-        ("", "value", "usual spread", "source"),
-        tuple(
-            (
-                f"{key}, kg/m³" if key == "density" else key,
-                *_number(one, key),
-                _cited(one, (key,), numbers),
-            )
+        for kind, symbol in (("restitution", "ε"), ("friction", "µ")):
+            keys = (kind, f"{kind}_steel", f"{kind}_rubber")
+            cells = (["  ".join(said(one, key)) for key in keys] for one in shown)
+            pairs = [
+                (one.material.name, *found, cited(one, *keys))
+                for one, found in zip(shown, cells, strict=True)
+            ]
+            last = notes if kind == "friction" else ()
+            title = f"Coefficient of {kind} {symbol}"
+            tables.append(Sheet(title, heads, tuple(pairs), tail=1, notes=last))
+        to_copy = ""
+    else:
+        (one,) = shown
+        values = [
+            (f"{key}, kg/m³" if key == "density" else key, *said(one, key), cited(one, key))
             for key in VALUES
-        ),
-        tail=1,
-        notes=_listed(numbers),
+        ]
+        heads = ("", "value", "usual spread", "source")
+        tables = [Sheet(f"{material}: {one.about}", heads, tuple(values), tail=1, notes=notes)]
+        to_copy = TO_COPY.format(name=material) + "\n".join(
+            f"{key} = {getattr(one.material, key)!r}" for key in VALUES
+        )
+    console.tell(
+        {"materials": told, "sources": list(numbers)}, *tables, as_json=json_, wrote=to_copy
     )
 
 
-def _to_copy(one: Preset) -> str:
-    """Return how a material gets into a scene, as it is and changed."""
-    from chutelab.scene.materials import VALUES
+TO_COPY = """
+In a scene:
 
-    name = one.material.name
-    lines = [
-        "",
-        "In a scene:",
-        "",
-        "[particle]",
-        f'material = "{name}"',
-        "",
-        f'Or with what you measured, as material = "my-{name}":',
-        "",
-        "[[material]]",
-        f'name = "my-{name}"',
-        *(f"{key} = {getattr(one.material, key)!r}" for key in VALUES),
-    ]
-    return "\n".join(lines)
+[particle]
+material = "{name}"
+
+Or with what you measured, as material = "my-{name}":
+
+[[material]]
+name = "my-{name}"
+"""
 
 
-def _number(one: Preset, key: str) -> tuple[str, str]:
-    """Return a number and its spread, as cells."""
-    digits = "g" if key == "density" else ".2f"
-    low, high = one.spread[key]
-    return f"{getattr(one.material, key):{digits}}", f"{low:{digits}}-{high:{digits}}"
+@command("Print the JSON Schema of scene files, for editors.")
+def schema(*, run: bool) -> None:
+    """Print the JSON Schema of scene files, for editors that complete them.
 
-
-def _cited(one: Preset, keys: tuple[str, ...], numbers: dict[str, int]) -> str:
-    cited = {numbers[text] for key in keys for text in one.sources[key]}
-    return " ".join(map(str, sorted(cited)))
-
-
-def _listed(numbers: dict[str, int]) -> tuple[str, ...]:
-    return tuple(f"[{number}] {text}" for text, number in numbers.items())
-
-
-@click.command(short_help="Print the JSON Schema of scene files, for editors.")
-@click.option("--run", "of_run", is_flag=True, help="Print that of `chutelab run --json` instead.")
-def schema(of_run: bool) -> None:
-    """Print the JSON Schema of scene files, for editors that complete them."""
-    if of_run:
+    --run  Print that of `chutelab run --json` instead.
+    """
+    if run:
         from chutelab.results.summary import schema as described
     else:
         from chutelab.scene import schema as described
@@ -200,9 +149,8 @@ def schema(of_run: bool) -> None:
     console.say(json.dumps(described(), indent=2))
 
 
-@click.command(short_help="List the quantities of a run: names, units, meanings.")
-@json_option("Print one JSON object instead of a table.")
-def quantities(as_json: bool) -> None:
+@command("List the quantities of a run: names, units, meanings.")
+def quantities(*, json_: bool) -> None:
     """List the quantities of a run, for [[expect]], solve and sweep, and from Python measure.
 
     SURFACE is the name of any surface. Of several particles, particles[0].landing.x is that of the
@@ -216,14 +164,19 @@ def quantities(as_json: bool) -> None:
     told = [{key: getattr(row, key) for key in keys} for row in REGISTRY.values()]
     rows = tuple((row.name, row.unit, row.meaning) for row in REGISTRY.values())
     listed = Sheet("Quantities of a run", ("", "", ""), rows, texts=3)
-    console.tell({"quantities": told}, listed, as_json=as_json)
+    console.tell({"quantities": told}, listed, as_json=json_)
 
 
-@click.command(short_help="Write a complete, commented scene to start from.")
-@click.argument("path", default="scene.toml", type=FileName(path_type=Path, allow_dash=True))
-@click.option("--force", is_flag=True, help="Overwrite a file that is there.")
-def new(path: Path, force: bool) -> None:
-    """Write a complete, commented scene to start from (scene.toml, or PATH; - prints it)."""
+@command("Write a complete, commented scene to start from.")
+def new(
+    path: Annotated[Path, FileName(path_type=Path, allow_dash=True)] = Path("scene.toml"),
+    *,
+    force: bool,
+) -> None:
+    """Write a complete, commented scene to start from (scene.toml, or PATH; - prints it).
+
+    --force  Overwrite a file that is there.
+    """
     from chutelab.scene import template
 
     if path == STANDARD_OUTPUT:
@@ -237,52 +190,42 @@ def new(path: Path, force: bool) -> None:
     console.say(f"wrote {path}; run it with: chutelab run {path}")
 
 
-NUMBERS = (1, 3, 4, 5)
-
-
-@click.command(short_help="Compute the paper's tables anew, beside what is printed.")
-@click.argument(
-    "number", required=False, metavar="[NUMBER]", type=click.Choice([str(n) for n in NUMBERS])
-)
-@click.option(
-    "--as-printed",
-    "rebound",
-    flag_value="as-printed",
-    default=True,
-    help="Compute with Eq. (9) as the paper prints it (the default here).",
-)
-@click.option(
-    "--corrected", "rebound", flag_value="corrected", help="Compute with Eq. (9) corrected."
-)
-@json_option()
-def tables(number: str | None, rebound: Literal["as-printed", "corrected"], as_json: bool) -> None:
+@command("Compute the paper's tables anew, beside what is printed.")
+def tables(
+    number: Literal["1", "3", "4", "5"] | None = None,
+    *,
+    as_printed: bool = True,
+    json_: bool,
+) -> None:
     """Compute Table 1, 3, 4 or 5 of the paper anew (all of them without NUMBER).
 
     Each cell holds the printed number, then the computed one, marked with * where it differs in a
     printed digit.
+
+    --as-printed / --corrected  Compute with Eq. (9) as the paper prints it (the default here), or
+        corrected.
     """
     from chutelab.theory import table
 
-    found = [table(n, rebound) for n in ([int(number)] if number else NUMBERS)]
+    rebound: Literal["as-printed", "corrected"] = "as-printed" if as_printed else "corrected"
+    found = [table(int(n), rebound) for n in ([number] if number else "1345")]
     told = [{**asdict(t), "cells": t.cells, "differing": t.differing} for t in found]
-    console.tell({"tables": told}, *found, as_json=as_json)
+    console.tell({"tables": told}, *found, as_json=json_)
 
 
-@click.command(short_help="Draw the paper's figures again, as printed and corrected.")
-@click.argument("number", type=int, metavar="NUMBER")
-@out_option("Write the picture, its numbers and its scenes into this folder.")
-@json_option()
-def figure(number: int, out: Path | None, as_json: bool) -> None:
+@command("Draw the paper's figures again, as printed and corrected.")
+def figure(number: int, *, out: Folder, json_: bool) -> None:
     """Compute Figure 6, 7, 8, 9, 11, 12 or 13 of the paper anew.
 
     Side by side: what follows from Eq. (9) as the paper prints it, and what follows from it
     corrected; and in words what the misprint does to the figure's conclusion. What the paper's text
     does not give is said, not guessed.
 
-    \b
     chutelab figure 6
     chutelab figure 6 --out out
-    """  # noqa: D301 - click wants the backspace
+
+    --out DIR  Write the picture, its numbers and its scenes into this folder.
+    """
     from chutelab.scene import to_toml
     from chutelab.theory.figures import figure as compute
 
@@ -304,4 +247,4 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
             f" -v3y: {found.sweep}"
         )
     told = {key: getattr(found, key) for key in ("title", "meaning", "missing", "columns")}
-    console.tell({"figure": found.number, **told}, found, as_json=as_json, wrote=wrote)
+    console.tell({"figure": found.number, **told}, found, as_json=json_, wrote=wrote)

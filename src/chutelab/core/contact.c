@@ -6,6 +6,8 @@
 #define CHORD 1.01
 /* Sine of half the angle that a step may turn a disk in a hollow by, at most. */
 #define STEEPEST 0.9
+/* Of the radius: hops of what lies stay below it, else the step is shorter than asked for. */
+#define HOP 1e-3
 
 /* Whether a disk touches the same place of two surfaces: pieces on each other, or the point that they share. */
 static int same_place(const Disk *d, int k, int other) {
@@ -152,19 +154,34 @@ static void pool(Contact *list, int count, int later) {
     }
 }
 
-/* Kinetic energy by which a disk of a crowd that moves on in a hollow is short halfway through this
-   step's impulses, J: in between its velocity turns, and is larger than the mean. */
-static double lacks(const Contact *c, const double *u, const double *v) {
+/* Mass of the disks of contacts that were solved together. */
+static double mass_of(const Contact *list, int count) {
+    double mass = 0;
+    W.stamp++;
+    for (int n = 0; n < count; n++)
+        for (int k = 0; k <= list[n].two; k++) {
+            Disk *d = W.disks + (k ? list[n].j : list[n].i);
+            mass += d->mark == W.stamp ? 0 : d->mass;
+            d->mark = W.stamp;
+        }
+    return mass;
+}
+
+/* Kinetic energy of which a disk of a crowd in a hollow, and the `mass` that it carries along, are short halfway
+   through this step's impulses, J: velocities turn, so that the mean of those before and after is smaller than
+   they are. What gravity changes is a hop, of which halfway nothing is left. */
+static double lacks(const Contact *c, double mass, const double *u, const double *v) {
     const Disk *d = W.disks + c->i;
     double f = W.before, x = d->ux + f * (d->vx - d->ux), y = d->uy + f * (d->vy - d->uy);
-    double most = CHORD * c->turns * (0.5 * W.length_before + (c->leaves ? 1 : 0.5) * W.length);
-    double change = v[0] - u[0];
-    if (!(c->impulse[0] > 0 && change > 0) || x * x + y * y < 0.5 * (d->ux * d->ux + d->uy * d->uy)) return 0;
-    return 0.5 * f * (1 - f) * MIN(c->impulse[0], d->mass * change) * MIN(change, most);
+    double weight = MAX(-(W.gx * c->nx + W.gy * c->ny), 0), change = v[0] - u[0];
+    double turns = change - weight * (0.5 * W.length_before + (c->leaves ? 1 : 0.5) * W.length);
+    if (!(turns > 0) || x * x + y * y < 0.01 * (d->ux * d->ux + d->uy * d->uy)) return 0;
+    return 0.5 * f * (1 - f) * MIN(c->impulse[0], mass * change) * turns;
 }
 
 /* Work out the ledger entries of contacts that were solved together. */
 void account(Contact *list, int count) {
+    double mass = 0;
     for (int n = 0; n < count; n++) {
         Contact *c = list + n;
         double u[3], v[3], given[3];
@@ -175,7 +192,8 @@ void account(Contact *list, int count) {
         share_out(c, u, v, W.before, c->later, given);
         c->given[1] = given[0];
         if (c->turns == 0) continue;
-        double more = lacks(c, u, v);
+        if (mass == 0) mass = mass_of(list, count);
+        double more = lacks(c, mass, u, v);
         c->later[1] += more;
         W.disks[c->i].lacks += more;
     }
@@ -209,6 +227,15 @@ double pressed_inside(const Disk *d, int surface) {
     return most;
 }
 
+/* Longest step in which what lies hops by no more than HOP radii, s: gravity presses it and, in a crowd, the
+   way inside an arc. */
+double hop_time(const Disk *d) {
+    double inside = 0;
+    for (int n = 0; n < d->held_count && W.interact && d->mode == FREE; n++)
+        inside = MAX(inside, pressed_inside(d, d->held[n]));
+    return W.g + inside > 0 ? sqrt(8 * HOP * d->radius / (W.g + inside)) : INFINITY;
+}
+
 /* Time in which a disk that slides inside an arc is turned by TURN, INFINITY on what is not hollow. */
 double turning_time(const Disk *d, const Surface *s) {
     double bends = -bending(s, d->x, d->y, d->radius) * sqrt(d->vx * d->vx + d->vy * d->vy);
@@ -221,13 +248,15 @@ double press_on(const Disk *d, const Surface *s, double nx, double ny) {
     return -(W.gx * nx + W.gy * ny) - along * along * bending(s, d->x, d->y, d->radius);
 }
 
-/* Sine of the angle to the surface of the chord on which a disk goes on in a hollow for a time h. */
-double chord(const Contact *c, double h) {
+/* Sine of the angle to the surface of the chord on which a disk goes on in a hollow for a time h, to where
+   its gap is 0, or of its overlap so much (m) is parted. */
+double chord(const Contact *c, double parted, double h) {
     const Disk *d = W.disks + c->i;
     const Surface *s = W.surfaces + (-1 - c->j);
     double bends = -bending(s, d->x, d->y, d->radius), way = sqrt(square(d->vx) + square(d->vy)) * h;
     if (!(bends > 0 && way > 0)) return 0;
     double away = square(d->x - s->x) + square(d->y - s->y), to = MAX(away, square(1 / bends));
+    if (parted > 0) to = square(sqrt(to) - parted);
     return (away - to + way * way) / (2 * way * sqrt(away));
 }
 

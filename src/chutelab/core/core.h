@@ -158,9 +158,10 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
                double *given);
 void account(Contact *list, int count);
 double pressed_inside(const Disk *d, int surface);
+double hop_time(const Disk *d);
 double turning_time(const Disk *d, const Surface *s);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
-double chord(const Contact *c, double h);
+double chord(const Contact *c, double parted, double h);
 double follow(Contact *c, double past, double out);
 
 /* impacts.c */

@@ -207,18 +207,23 @@ static void give(Contact *c, double normal) {
 }
 
 /* Let a disk lie on a surface from t on. The step of a disk by itself ends here; in a crowd half of
-   what gravity will take from it within the step it gets now, and hops to the end. */
+   what gravity will take from it within the step it gets now, and hops to the end. In a hollow it is turned
+   besides: without work where its velocity along the normal of the middle is reversed. */
 static void support(int i, int k, double t) {
     Disk *d = W.disks + i;
     Contact c;
     describe(&c, i, -1 - k);
     hold(d, k);
-    double press = press_on(d, W.surfaces + k, c.nx, c.ny), left = W.step_end - t, u[3];
+    double press = press_on(d, W.surfaces + k, c.nx, c.ny), u[3];
     if (press <= 0 || !W.interact) return;
-    double cosine = follow(&c, 0, chord(&c, left));
+    if (bending(W.surfaces + k, d->x, d->y, d->radius) < 0) W.step_end = MIN(W.step_end, t + hop_time(d));
+    double left = W.step_end - t, weight = -(W.gx * c.nx + W.gy * c.ny);
+    double cosine = follow(&c, 0, chord(&c, 0, left)), normal = 0.5 * press * d->mass * left;
     relative(&c, 0, u);
     c.drift = 0.5 * left * c.pull;
-    give(&c, 0.5 * press * d->mass * left / cosine);
+    if (c.turns > 0) normal = d->mass * (0.5 * left * weight / cosine - 2 * u[0]);
+    if (normal <= 0) return;
+    give(&c, normal);
     /* Friction that need not slow it can hold it from now on. */
     if (fabs(u[1]) <= 1e-12 * W.g * W.dt && fabs(c.impulse[1]) < c.friction * c.impulse[0]) {
         d->slips = 0;

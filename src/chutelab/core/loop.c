@@ -6,8 +6,6 @@ World W;
 
 /* s on Earth; within it everything of a settled crowd is calm. */
 #define SETTLED 0.1
-/* Of the radius: a hop under gravity stays below it, else the step is shorter than asked for. */
-#define HOP 1e-3
 /* After two steps that were cut short impulses may grow by so much; noise grows, too. */
 #define MOST_AGAIN 2.0
 /* rad; between knots round the pulley. A cubic through them is off by rho angle^4 / 384, 9e-10 rho. */
@@ -312,8 +310,7 @@ static int begin_step(void) {
     int woke;
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
     double next = set_gates(W.t), h = W.dt, stride = 0;
-    if (W.g > 0)
-        for (int i = W.low; i < W.high; i++) h = MIN(h, sqrt(8 * HOP * W.disks[i].radius / W.g));
+    for (int i = W.low; i < W.high; i++) h = MIN(h, hop_time(W.disks + i));
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     W.step = h;
     W.soft = 2 * W.g * h;

@@ -155,7 +155,7 @@ static int add(int i, int j, double least, double bound, double h) {
     } else if (gone) c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     else if (pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
     if (j < 0 && W.interact && !gone && !c->leaves) {
-        follow(c, lasted ? W.length_before : 0, chord(c, h));
+        follow(c, lasted ? W.length_before : 0, chord(c, aim - MIN(c->gap, 0), h));
         if (c->turns > 0) c->need = closes(c, aim, h);
     }
     W.contact_count++;

@@ -1,6 +1,7 @@
 """A scene resolved to world-frame arrays: what the engines take, and all they take.
 
-- `parts`: `Machine`, its particle, segments and pulley.
+- `parts`: `Machine`, its particle and its pulley.
+- `shapes`: straight and bent pieces of surfaces: nearest point, gap, ends, box, path to draw.
 - `releases`: where, when and how fast each particle starts.
 - `rows`: a scene as one row of numbers, of which the core lays the surfaces.
 - `builder`: `build`, from a validated scene to a machine.
@@ -9,17 +10,16 @@
 from chutelab.machine.builder import build
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
-    Arcs,
     Caution,
     Machine,
     Particle,
     Pulley,
-    Segments,
     Thread,
     moved,
     origin,
 )
 from chutelab.machine.releases import RefusedError
+from chutelab.machine.shapes import Arcs, Pieces, Segments
 
 __all__ = [
     "DRIVE_PULLEY",
@@ -27,6 +27,7 @@ __all__ = [
     "Caution",
     "Machine",
     "Particle",
+    "Pieces",
     "Pulley",
     "RefusedError",
     "Segments",

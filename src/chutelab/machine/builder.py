@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core.module import borrow, constants, give_back
-from chutelab.machine.parts import Arcs, Caution, Machine, Particle, Pulley, Segments, Thread
+from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Thread
 from chutelab.machine.releases import RefusedError, Releases, draw
 from chutelab.machine.rows import lay
+from chutelab.machine.shapes import Arcs, Segments
 from chutelab.scene import Fault, Plate, Scene
 from chutelab.scene.units import polygon_moment
 from chutelab.scene.variants import Family

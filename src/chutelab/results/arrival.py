@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.machine import Arcs, Machine, Segments
+from chutelab.machine import Machine, Pieces
 from chutelab.results.record import EVENT, PARTICLES, REASONS, Kind, Record, hermite, kept
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -93,8 +93,7 @@ def fates(recording: Record) -> NDArray[Any]:
 
 def moving(machine: Machine) -> set[str]:
     """Return the names of the belts: the outgoing one, and all surfaces that move."""
-    pieces = (machine.segments, machine.arcs)
-    owners = {owner for p in pieces for owner in p.surface[p.speed != 0.0].tolist()}
+    owners = {owner for p in machine.parts for owner in p.surface[p.speed != 0.0].tolist()}
     return {machine.surfaces[owner] for owner in owners | {machine.landing} - {-1}}
 
 
@@ -200,10 +199,6 @@ def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
     return found
 
 
-def _is_there(pieces: Segments | Arcs, k: int, t: Any) -> Any:
-    return (pieces.appears[k] <= t) & (t < pieces.vanishes[k])
-
-
 class Places:
     """Where particles are at an instant, and what of them lies on a surface then."""
 
@@ -211,6 +206,7 @@ class Places:
         self.recording = recording
         self.radius = np.broadcast_to(recording.particle.radius, recording.count)
         knots, corners = recording.knots, recording.machine.corners
+        self._pieces: dict[int, list[Pieces]] = {}
         self._point = POINT * float(np.ptp(corners, axis=0).max()) if corners.size else 0.0
         self._t0 = float(knots["t"].min(initial=0.0))
         self._span = 2.0 * (float(knots["t"].max(initial=0.0)) - self._t0) + 1.0
@@ -263,17 +259,10 @@ class Places:
         """Tell which particles touch a surface itself at t (s, one or (n,)), (n,)."""
         machine, owner = self.recording.machine, self.recording.surface_index(surface)
         gap = np.full(len(particles), np.inf)
-        flat, bent, wheel = machine.segments, machine.arcs, machine.pulley
-        for k in np.flatnonzero(flat.surface == owner).tolist():
-            away = places - flat.start[k]
-            along = np.clip(away @ flat.tangent[k], 0.0, flat.length[k])
-            far = np.hypot(*(away - along[:, None] * flat.tangent[k]).T)
-            gap = np.where(_is_there(flat, k, t), np.minimum(gap, far), gap)
-        for k in np.flatnonzero(bent.surface == owner).tolist():
-            far = np.hypot(*(places.T - bent.nearest(k, places)))
-            gap = np.where(_is_there(bent, k, t), np.minimum(gap, far), gap)
-        if wheel is not None and wheel.surface == owner:
-            gap = np.minimum(gap, np.abs(np.hypot(*places.T) - wheel.radius))
+        if owner not in self._pieces:
+            self._pieces[owner] = [one for one in machine.pieces if one.surface == owner]
+        for piece in self._pieces[owner]:
+            gap = np.where(piece.there(t), np.minimum(gap, piece.gap(places)), gap)
         radius = self.radius[particles]
         return np.asarray(gap <= np.where(radius > 0.0, radius * (1.0 + TOUCH), self._point))
 

@@ -20,9 +20,6 @@ GRAINS: Final = 3.0
 CELLS: Final = 64
 """Cells along each side of a box whose parts are looked for."""
 
-CHORDS: Final = 32
-"""Straight pieces that stand for an arc in such a box."""
-
 
 def places(scene: Scene, machine: Machine) -> Iterator[Advice]:
     """Yield what may surprise about a machine and where its particles start."""
@@ -58,11 +55,10 @@ def _narrow(scene: Scene, machine: Machine) -> Iterator[Advice]:
         name = plate.name or "plate"
         (end,) = lines.start[lines.surface == machine.surfaces.index(name)]
         for k in np.flatnonzero(np.isin(lines.surface, belts)):
-            away, tangent = end - lines.start[k], lines.tangent[k]
-            foot = float(np.clip(away @ tangent, 0.0, lines.length[k]))
-            gap = float(np.hypot(*(away - foot * tangent)))
+            belt = lines.of(k)
+            gap = float(belt.gap(end))
             # Surfaces that cross are another warning.
-            if not 0.0 < gap < GRAINS * largest or away[1] <= foot * tangent[1]:
+            if not 0.0 < gap < GRAINS * largest or belt.away(end)[1] <= 0.0:
                 continue
             path = f"plate[{number}].below" if len(scene.plates) > 1 else "plate.below"
             settings = {path: _shorter(machine, plate, name, GRAINS * largest - gap)}
@@ -90,7 +86,7 @@ def _shorter(machine: Machine, plate: Plate, name: str, room: float) -> float:
 def _beyond_walls(scene: Scene, machine: Machine) -> Iterator[Advice]:
     """Warn of a `fill` that walls cut into parts: what starts in the smaller ones is outside."""
     starts = machine.releases
-    walls, owner = _pieces(machine)
+    walls, owner = _walls(machine)
     for number, stream in enumerate(scene.streams):
         if stream.fill is None:
             continue
@@ -117,19 +113,16 @@ def _beyond_walls(scene: Scene, machine: Machine) -> Iterator[Advice]:
         )
 
 
-def _pieces(machine: Machine) -> tuple[Floats, Ints]:
+def _walls(machine: Machine) -> tuple[Floats, Ints]:
     """Return what is there at t = 0 as straight pieces: ends (P, 2, 2), m, and surfaces (P,)."""
-    lines, arcs = machine.segments, machine.arcs
-    there = (lines.appears <= 0.0) & (lines.vanishes > 0.0)
-    ends = [np.stack([lines.start, lines.end], axis=1)[there]]
-    owner = [lines.surface[there]]
-    share = np.linspace(0.0, 1.0, CHORDS + 1)[:, None]
-    # (CHORDS + 1, A, 2)
-    points = np.stack([arcs.point(arcs.begin + s * arcs.extent) for s in share])
-    for n in np.flatnonzero((arcs.appears <= 0.0) & (arcs.vanishes > 0.0)):
-        ends.append(np.stack([points[:-1, n], points[1:, n]], axis=1))
-        owner.append(np.full(CHORDS, arcs.surface[n]))
-    return np.concatenate(ends), np.concatenate(owner)
+    found = [(np.empty((0, 2, 2)), np.empty(0, dtype=np.int64))]
+    for part in machine.parts:
+        for piece in map(part.of, np.flatnonzero(part.there(0.0))):
+            path = piece.path()
+            ends = np.stack([path[:-1], path[1:]], axis=1)
+            found.append((ends, np.full(len(ends), piece.surface)))
+    walls, owner = zip(*found, strict=True)
+    return np.concatenate(walls), np.concatenate(owner)
 
 
 Side = tuple[tuple[int, int], tuple[int, int]]

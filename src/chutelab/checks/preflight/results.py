@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.machine import Machine
-from chutelab.machine.parts import Pieces
+from chutelab.machine import Machine, Pieces
 from chutelab.results import Recording
 from chutelab.results.summary import air_drag
 from chutelab.scene import Scene
@@ -166,30 +165,18 @@ MANY = 12
 
 def built(machine: Machine) -> Iterator[Part]:
     """Yield the parts of a machine, world frame."""
-    segments, arcs = machine.segments, machine.arcs
-    ends = segments.end
     for index, surface in enumerate(machine.surfaces):
-        lines = (segments.surface == index).nonzero()[0].tolist()
-        bends = (arcs.surface == index).nonzero()[0].tolist()
-        if len(lines) + len(bends) > MANY:
-            corners = [segments.start[lines], ends[lines], arcs.center[bends]]
-            points = np.round(np.concatenate(corners), 12) + 0.0
+        mine = [part.of(part.surface == index) for part in machine.parts]
+        count = sum(len(part.surface) for part in mine)
+        if count > MANY:
+            points = np.round(np.concatenate([part.corners for part in mine]), 12) + 0.0
             (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
             box = f"from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m"
-            yield Part(surface, f"{len(lines) + len(bends)} pieces, {box}")
+            yield Part(surface, f"{count} pieces, {box}")
             continue
-        for k in lines:
-            # Rounding leaves 1e-17 where 0 is meant.
-            (x0, y0), (x1, y1) = np.round([segments.start[k], ends[k]], 12) + 0.0
-            where = f"from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m"
-            yield Part(surface, where + _moves(segments, k))
-        for k in bends:
-            x, y = np.round(arcs.center[k], 12) + 0.0
-            where = f"radius {arcs.radius[k]:.6g} m, about ({x:.6g}, {y:.6g}) m"
-            if not arcs.whole[k]:
-                first, last = np.degrees([arcs.begin[k], arcs.begin[k] + arcs.extent[k]])
-                where += f", {first:.6g}° to {last:.6g}°"
-            yield Part(surface, where + _moves(arcs, k))
+        for part in mine:
+            for piece in map(part.of, range(len(part.surface))):
+                yield Part(surface, piece.where() + _moves(piece))
         if machine.pulley is not None and machine.pulley.surface == index:
             yield Part("pulley", f"radius {machine.pulley.radius:.6g} m, axis at (0, 0)")
     for thread in machine.threads:
@@ -200,13 +187,13 @@ def built(machine: Machine) -> Iterator[Part]:
     yield from _releases(machine)
 
 
-def _moves(parts: Pieces, k: int) -> str:
+def _moves(piece: Pieces) -> str:
     """Say how fast a piece of a surface moves, and when it is there."""
-    said = f", moving at {parts.speed[k]:.6g} m/s" if parts.speed[k] else ""
-    if np.isfinite(parts.appears[k]):
-        said += f", from t = {parts.appears[k]:.6g} s"
-    if np.isfinite(parts.vanishes[k]):
-        said += f", until t = {parts.vanishes[k]:.6g} s"
+    said = f", moving at {piece.speed:.6g} m/s" if piece.speed else ""
+    if np.isfinite(piece.appears):
+        said += f", from t = {piece.appears:.6g} s"
+    if np.isfinite(piece.vanishes):
+        said += f", until t = {piece.vanishes:.6g} s"
     return said
 
 

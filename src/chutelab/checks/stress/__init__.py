@@ -2,13 +2,13 @@
 
 ===============  ==================================================================================
 `evidence`       what a law looks at, and how it answers
-`surfaces`       where surfaces are
 `barriers`       laws on where no particle may be
 `blows`          laws on what a blow may do: restitution and friction of the pair
 `laws`           laws on energy, ledger, momentum and the record; all by name, `judge`
 ===============  ==================================================================================
 
-What every run is judged by is `results.laws`, which also finds what is inside a surface.
+Where surfaces are is said by `machine.shapes`, which no engine uses to find a contact. What every
+run is judged by is `results.laws`, which also finds what is inside a surface.
 
 The scenes that are hard on an engine, and what each asks for besides, are in ``tests/stress``.
 """

@@ -49,7 +49,7 @@ def _first(e: Evidence, said: str, found: NDArray[Any]) -> str:
     if not len(found):
         return "none"
     one = found[0]
-    return said.format(one["particle"], e.pieces[one["piece"]].name, one["t"])
+    return said.format(one["particle"], e.machine.names[one["piece"]], one["t"])
 
 
 def overlap(e: Evidence) -> Verdict | None:
@@ -190,12 +190,12 @@ def released_free(e: Evidence) -> Verdict | None:
     if not (e.crowd or len(e.machine.surfaces)) or not len(releases):
         return None
     found = []
-    for piece in e.pieces:
+    for piece, name in zip(e.pieces, e.machine.names, strict=True):
         there = releases[piece.there(releases["t"])]
         if len(there):
             gap = piece.gap(there["position"], e.radii[there["particle"]])
             at = int(np.argmin(gap))
-            found.append((-gap[at], f"particle {there['particle'][at]} in {piece.name}"))
+            found.append((-gap[at], f"particle {there['particle'][at]} in {name}"))
     for event in _some(e, Kind.RELEASE) if e.crowd else ():
         (place,), _ = e.recording.at([event["t"]])
         apart = np.nan_to_num(np.hypot(*(place - event["position"]).T), nan=inf)
@@ -221,9 +221,9 @@ def settled_to_stay(e: Evidence) -> Verdict | None:
     last = e.recording.knots[e.recording.offsets[settled + 1] - 1]
     near = e.rounding + ON_ARCS * e.radius + e.late
     thrown: dict[int, str] = {}
-    for piece in e.pieces:
+    for piece, name in zip(e.pieces, e.machine.names, strict=True):
         if piece.speed != 0.0 and piece.surface != m.landing:
             on = piece.gap(last["position"], e.radii[settled]) < near
             for i in settled[on & piece.there(last["t"])].tolist():
-                thrown.setdefault(i, f"particles: {i} on {piece.name}")
+                thrown.setdefault(i, f"particles: {i} on {name}")
     return Verdict(len(thrown), 0.0, next(iter(thrown.values()), "particles"))

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.checks.stress.surfaces import Bow, Piece, pieces
 from chutelab.core.module import number
-from chutelab.machine import Machine
+from chutelab.machine import Machine, Pieces
 from chutelab.results import Recording
 from chutelab.results.laws import Findings, alike, examine, inner_radius
 from chutelab.util.arrays import Floats
@@ -68,10 +67,10 @@ class Evidence:
         """Whether all is left to Chipmunk, in steps that are all alike."""
         return alike(self.recording)
 
-    @cached_property
-    def pieces(self) -> list[Piece]:
+    @property
+    def pieces(self) -> tuple[Pieces, ...]:
         """All pieces of its surfaces."""
-        return pieces(self.machine)
+        return self.machine.pieces
 
     @cached_property
     def radii(self) -> Floats:
@@ -100,11 +99,6 @@ class Evidence:
     def energies(self) -> tuple[Floats, Floats]:
         """Kinetic and potential energy at each knot, (K,), J."""
         return self.recording.energies(self.recording.knots, self.recording.owner)
-
-    @property
-    def bows(self) -> list[Bow]:
-        """Its bent pieces, the drive pulley among them."""
-        return [piece for piece in self.pieces if isinstance(piece, Bow)]
 
     @cached_property
     def found(self) -> Findings:

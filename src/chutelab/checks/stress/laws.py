@@ -136,7 +136,7 @@ def momentum(e: Evidence) -> Verdict | None:
     sizes m |v|.
     """
     m = e.machine
-    if not e.crowd or e.bows:
+    if not e.crowd or m.pulley is not None or len(m.arcs.surface):
         return None
     along = np.eye(2)
     if len(m.segments.length):

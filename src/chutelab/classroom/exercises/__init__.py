@@ -6,10 +6,10 @@
 ? Question 1: not a number. That is text (“quickly”). Give a number, without quotes.
 
 - `catalogue`: `lesson` hands out a `Task`, with `question`, `check`, `hint`, `reveal` and
-  `progress`; all exercises by name.
+  `progress`; all exercises by name; `data_of` an exercise as data for a live page, which judges as
+  this package does.
 - `exercise`: what an exercise is made of: parameters, drawn from a name, questions, known mistakes.
 - `judging`: a number read and judged: right, a known mistake, or how far off; replies.
-- `in_page`: an exercise as data for a live page, which judges as this package does.
 - ``the-parabola.toml`` and so on: the exercises themselves, a file a lesson: what is drawn,
   questions, and each answer and mistake as a formula.
 

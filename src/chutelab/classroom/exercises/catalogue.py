@@ -1,22 +1,32 @@
-"""`lesson` hands out a `Task`: the exercise of one lesson for one student, and its answers."""
+"""Exercises handed out: `lesson` gives a `Task`, `data_of` an exercise as data for a live page.
+
+No page may evaluate text, so Python's own parser turns each formula into a tree that a small
+evaluator (``pictures/live/assets/formula.ts``) walks. There is no answer in the data: the page
+draws a student's numbers from the name and computes right and wrong answers from them, as `Task`
+does. The way to the answer stands there as a template: it says no more than the formulas that the
+page has to know, and has no numbers.
+"""
 
 from __future__ import annotations
 
+import ast
 import difflib
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from chutelab.classroom.exercises import judging
 from chutelab.classroom.exercises.exercise import (
+    GENERAL,
     ROUNDED,
     TOLERANCE,
     Case,
     Exercise,
     Numbers,
+    Question,
     Values,
     draw,
     plain,
@@ -169,34 +179,33 @@ class Task:
         text = words(self.language).say("python-unknown", count=len(self._standings))
         return Reply(0, Verdict.UNKNOWN, text, language=self.language)
 
-    def _rows(self) -> list[tuple[str, str, str]]:
-        said = words(self.language)
-        return [
+    def _told(self) -> tuple[str, list[tuple[str, str, str]], str]:
+        """Return the title, the rows of numbers, and the story."""
+        exercise, said = _exercise(self), words(self.language)
+        rows = [
             (one.symbol, with_unit(self.given[one.name], one.unit, said), one.meaning)
-            for one in _exercise(self).parameters
+            for one in exercise.parameters
         ]
-
-    def _head(self) -> str:
-        exercise = _exercise(self)
-        say = words(self.language).say
-        return say("lesson-title", number=exercise.number, title=exercise.title)
+        story = _case(self, 1).numbers.text(exercise.story)
+        if not exercise.whole:
+            story = f"{story}\n{said.say('untranslated')}"
+        return said.say("lesson-title", number=exercise.number, title=exercise.title), rows, story
 
     def __repr__(self) -> str:
-        rows = self._rows()
+        title, rows, story = self._told()
+        say = words(self.language).say
         left, middle = (max(len(row[i]) for row in rows) for i in (0, 1))
         lines = [f"  {s:<{left}} = {value:<{middle}}  {meaning}" for s, value, meaning in rows]
-        say = words(self.language).say
-        head = f"{self._head()}\n{say('numbers-of', student=self.student)}"
+        head = f"{title}\n{say('numbers-of', student=self.student)}"
         questions = [f"  {one.number} {one.title}" for one in self._standings]
-        story = judging.filled(_story(self))
-        return "\n".join([head, *lines, story, say("questions"), *questions])
+        return "\n".join([head, *lines, judging.filled(story), say("questions"), *questions])
 
     def _repr_html_(self) -> str:
-        head = words(self.language).say(
-            "numbers-of-title", title=self._head(), student=self.student
-        )
-        rows = [(f"{s} = {value}", meaning) for s, value, meaning in self._rows()]
-        return f"{judging.box(head, _story(self))}{judging.table(rows)}"
+        title, rows, story = self._told()
+        say = words(self.language).say
+        head = say("numbers-of-title", title=title, student=self.student)
+        cells = [(f"{s} = {value}", meaning) for s, value, meaning in rows]
+        return f"{judging.box(head, story)}{judging.table(cells)}"
 
 
 def _exercise(task: Task) -> Exercise:
@@ -204,39 +213,30 @@ def _exercise(task: Task) -> Exercise:
     return told(task.lesson, task.language)
 
 
-def _case(task: Task, number: int) -> Case:
-    """Return a question with a student's numbers, and all that follows from them."""
-    return _case_of(_exercise(task), task.given, number)
-
-
-def _case_of(exercise: Exercise, given: Values, number: int) -> Case:
-    drawn = {name: given[name] for name in given}
-    numbers = Numbers(drawn, exercise.formulas, language=exercise.language)
+def _case(task: Task, number: int, given: Values | None = None) -> Case:
+    """Return a question with a student's numbers, or those given, and what follows from them."""
+    exercise, drawn = _exercise(task), given or task.given
+    numbers = Numbers(
+        {name: drawn[name] for name in drawn}, exercise.formulas, language=exercise.language
+    )
     return Case(number, exercise.questions[number - 1], numbers)
 
 
 def _of_others(task: Task, number: int) -> Iterator[tuple[str, float]]:
     """Yield the right answers for the other names of this process's tasks, and for no name."""
-    exercise = EXERCISES[task.lesson]
-    given = {plain(UNNAMED): (UNNAMED, _of_nobody(exercise.name))}
+    given = {plain(UNNAMED): (UNNAMED, _unnamed(task.lesson))}
     for one in list(OPENED):  # another thread may be opening one
         if one.lesson == task.lesson:
             given.setdefault(plain(one.student), (one.student, one.given))
     given.pop(plain(task.student), None)
     for name, values in given.values():
-        yield name, _case_of(exercise, values, number).right
+        yield name, _case(task, number, values).right
 
 
 @cache
-def _of_nobody(name: str) -> Values:
-    """Return the parameters that belong to no name."""
+def _unnamed(name: str) -> Values:
+    """Return the parameters of an exercise for `UNNAMED`."""
     return draw(EXERCISES[name], UNNAMED)[0]
-
-
-def _story(task: Task) -> str:
-    exercise = _exercise(task)
-    story = _case(task, 1).numbers.text(exercise.story)
-    return story if exercise.whole else f"{story}\n{words(task.language).say('untranslated')}"
 
 
 def _asked(case: Case) -> Passage:
@@ -342,3 +342,128 @@ def lesson(name: str | int, student: object = "", language: str = "en") -> Task:
         said = f"a name has at most {LONGEST_NAME} characters; this one has {len(name_given)}"
         raise ExerciseError(said, "student", name_given)
     return Task(told(find(name).name, words(language).language), name_given)
+
+
+SAID: Final = (
+    "answer", "besides", "decimal", "heading", "hint", "hints", "large", "mistake", "numbers",
+    "off", "pair", "pure", "question", "reply", "right", "small", "source", "tries",
+    "untranslated", "verdict", "working",
+)  # fmt: skip
+"""How keys of the catalogue begin that pages need: with nothing of cells, sheets and packages."""
+
+OPERATORS: Final[dict[type[ast.AST], str]] = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**",
+    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
+}  # fmt: skip
+
+
+@cache
+def tree(formula: str) -> Any:
+    """Return a formula as nested lists, each an operation's name and what it is done to.
+
+    Numbers and truth values stand for themselves, and a text is a name.
+
+    Raises
+    ------
+    ValueError
+        If there is something in it that pages do not know.
+
+    Examples
+    --------
+    >>> tree("0.5 * m * v0**2 > -1")
+    ['compare', ['*', ['*', 0.5, 'm'], ['**', 'v0', 2]], '>', ['-', 1]]
+    >>> tree("transfer(**throw, rebound='as-printed').v3x")
+    ['.', ['call', 'transfer', [], [['throw'], ['rebound', ['text', 'as-printed']]]], 'v3x']
+    """
+    return _of(ast.parse(formula.strip(), mode="eval").body)
+
+
+def _of(node: ast.expr) -> Any:
+    match node:
+        case ast.Constant(bool() | int() | float() as value):
+            return value
+        case ast.Constant(str(text)):
+            return ["text", text]
+        case ast.Name(name):
+            return name
+        case ast.UnaryOp(ast.USub(), operand):
+            return ["-", _of(operand)]
+        case ast.BinOp(left, operator, right) if type(operator) in OPERATORS:
+            return [OPERATORS[type(operator)], _of(left), _of(right)]
+        case ast.Compare(left, operators, others) if {*map(type, operators)} <= {*OPERATORS}:
+            parts = zip(operators, others, strict=True)
+            rest = [part for one, other in parts for part in (OPERATORS[type(one)], _of(other))]
+            return ["compare", _of(left), *rest]
+        case ast.Attribute(value, name):
+            return [".", _of(value), name]
+        case ast.Subscript(value, index):
+            return ["item", _of(value), _of(index)]
+        case ast.List(items):
+            return ["list", *map(_of, items)]
+        case ast.Lambda(ast.arguments() as taken, body):
+            return ["lambda", [one.arg for one in taken.args], _of(body)]
+        case ast.Call(function, arguments, keywords):
+            # A table that is laid open has no name.
+            named = [[one.arg, _of(one.value)] if one.arg else [_of(one.value)] for one in keywords]
+            return ["call", _of(function), [*map(_of, arguments)], named]
+    raise ValueError(f"pages do not know {ast.unparse(node)!r}")
+
+
+def data_of(exercise: Exercise, explain: str = "") -> dict[str, Any]:
+    """Return an exercise as plain data for JSON, in its language.
+
+    Parameters
+    ----------
+    exercise
+        In the language of the page.
+    explain
+        What students are to explain in their own words; "" for nothing.
+    """
+    said = words(exercise.language)
+    return {
+        "name": exercise.name,
+        "number": exercise.number,
+        "title": exercise.title,
+        "language": exercise.language,
+        "whole": exercise.whole,
+        "story": _line(exercise.story),
+        "explain": explain,
+        "unnamed": UNNAMED,
+        "parameters": [
+            [one.name, one.symbol, said.unit(one.unit), one.meaning, list(one.values)]
+            for one in exercise.parameters
+        ],
+        "formulas": {name: tree(formula) for name, formula in exercise.formulas.items()},
+        "tell": list(exercise.tell),
+        "fits": [tree(condition) for condition in exercise.fits],
+        "machine": {key: tree(formula) for key, formula in exercise.machine.items()},
+        "questions": [_question(asked, exercise.language) for asked in exercise.questions],
+        "words": {
+            key: text for key, text in said.catalogue.items() if key.partition("-")[0] in SAID
+        },
+    }
+
+
+def _question(asked: Question, language: str) -> dict[str, Any]:
+    own = {mistake.name for mistake in asked.mistakes}
+    known = [key for key, *_ in GENERAL] + ["mistake-ten"]
+    if asked.unit == "degrees":
+        known.append("mistake-radians")
+    return {
+        "title": asked.title,
+        "text": _line(asked.text),
+        "unit": words(language).unit(asked.unit),
+        "answer": tree(asked.answer),
+        "measured": tree(asked.measured) if asked.measured else None,
+        "mistakes": [
+            [one.called or one.name, tree(one.formula), _line(one.says)] for one in asked.mistakes
+        ],
+        "general": [key for key in known if words().say(key) not in own],
+        "hints": [_line(hint) for hint in asked.hints],
+        "working": [_line(line) for line in asked.working.splitlines()],
+        "source": asked.source,
+    }
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())

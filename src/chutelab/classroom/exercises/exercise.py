@@ -273,60 +273,51 @@ class Trace:
     number: float
 
 
+GENERAL: Final = (
+    ("mistake-sign", "reply-sign", -1.0),
+    ("mistake-half-missing", "reply-half-missing", 2.0),
+    ("mistake-half-too-many", "reply-half-too-many", 0.5),
+)
+"""Mistakes that any question knows, besides powers of ten: keys of name and reply, and what each
+makes of a right answer of 1."""
+
+OF_ANGLES: Final = (
+    ("mistake-radians", "reply-radians", radians(1.0)),
+    ("mistake-radians", "reply-degrees", degrees(1.0)),
+)
+"""Those of answers in degrees."""
+
+BESIDES: Final = (
+    ("mistake-sign", "besides-sign", -1.0),
+    ("mistake-ten", "besides-large", 1e3),
+    ("mistake-ten", "besides-small", 1e-3),
+)
+"""What is common on top of a question's own mistake."""
+
 MOST_TENS: Final = 6
 """Powers of ten, either way: from micro to mega."""
 
 _RAISED: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def _trace(language: str, name: str, says: str, number: float) -> Trace:
-    """Return a mistake by the key of its name."""
-    return Trace(words().say(name), words(language).say(name), says, number)
+@cache
+def _general(language: str, *, angle: bool) -> tuple[Trace, ...]:
+    """Return the mistakes that any question knows, and those of angles, in a language."""
+    said = words(language)
 
+    def trace(name: str, says: str, number: float) -> Trace:
+        return Trace(words().say(name), said.say(name), says, number)
 
-def _powers_of_ten(language: str) -> Iterator[Trace]:
-    say = words(language).say
+    found = [trace(name, said.say(says), factor) for name, says, factor in GENERAL]
     for power in range(1, MOST_TENS + 1):
-        times = f"{10**power:,}".replace(",", " ")
+        raised, times = str(power).translate(_RAISED), f"{10**power:,}".replace(",", " ")
         for way, factor in (("large", 10.0**power), ("small", 10.0**-power)):
-            raised = str(power).translate(_RAISED)
-            says = say("reply-ten", power=raised, times=times, way=say(way))
-            yield _trace(language, "mistake-ten", says, factor)
-            also = f"{says} {say('reply-ten-sign')}"
-            yield _trace(language, "mistake-ten", also, -factor)
-
-
-@cache
-def general(language: str) -> tuple[Trace, ...]:
-    """Return the general mistakes, with what each makes of a right answer of 1."""
-    say, one = words(language).say, partial(_trace, language)
-    return (
-        one("mistake-sign", say("reply-sign"), -1.0),
-        one("mistake-half-missing", say("reply-half-missing"), 2.0),
-        one("mistake-half-too-many", say("reply-half-too-many"), 0.5),
-        *_powers_of_ten(language),
-    )
-
-
-@cache
-def of_angles(language: str) -> tuple[Trace, ...]:
-    """Return those of answers in degrees besides."""
-    say, one = words(language).say, partial(_trace, language)
-    return (
-        one("mistake-radians", say("reply-radians"), radians(1.0)),
-        one("mistake-radians", say("reply-degrees"), degrees(1.0)),
-    )
-
-
-@cache
-def besides(language: str) -> tuple[Trace, ...]:
-    """Return what is common on top of a question's own mistake, with its factor."""
-    say, one = words(language).say, partial(_trace, language)
-    return (
-        one("mistake-sign", say("besides-sign"), -1.0),
-        one("mistake-ten", say("besides-large"), 1e3),
-        one("mistake-ten", say("besides-small"), 1e-3),
-    )
+            says = said.say("reply-ten", power=raised, times=times, way=said.say(way))
+            found.append(trace("mistake-ten", says, factor))
+            found.append(trace("mistake-ten", f"{says} {said.say('reply-ten-sign')}", -factor))
+    if angle:
+        found += [trace(name, said.say(says), factor) for name, says, factor in OF_ANGLES]
+    return tuple(found)
 
 
 LEAST: Final = 1e-9
@@ -355,24 +346,21 @@ class Case:
             for one in self.question.mistakes
         ]
         replaced = {trace.name for trace in own}
-        more = general(language)
-        if self.question.unit == "degrees":
-            more += of_angles(language)
+        more = _general(language, angle=self.question.unit == "degrees")
         kept = [trace for trace in more if trace.name not in replaced]
         return (*own, *(replace(trace, number=self.right * trace.number) for trace in kept))
 
     @property
     def pairs(self) -> Iterator[Trace]:
-        """A mistake of the question's own, and one of `besides` on top of it."""
+        """A mistake of the question's own, and one of `BESIDES` on top of it."""
         own = {known.name for known in self.question.mistakes}
-        say, language = words(self.numbers.language).say, self.numbers.language
+        english, say = words().say, words(self.numbers.language).say
         for first in self.mistakes[: len(own)]:
-            for more in besides(language):
-                if more.name not in own:
-                    name = words().say("pair", first=first.name, second=more.name)
-                    called = say("pair", first=first.called, second=more.called)
-                    says = f"{first.says} {more.says}"
-                    yield Trace(name, called, says, more.number * first.number)
+            for key, says, factor in BESIDES:
+                if english(key) not in own:
+                    name = english("pair", first=first.name, second=english(key))
+                    called = say("pair", first=first.called, second=say(key))
+                    yield Trace(name, called, f"{first.says} {say(says)}", factor * first.number)
 
     @cached_property
     def feels_gravity(self) -> bool:

@@ -1,45 +1,53 @@
-"""What is made of lessons: films and notebooks, new lessons, and all of them as web pages.
+"""What is made of a lesson: its film and its notebook, and new lessons.
 
 ``lesson.gif`` is made anew only if what it is made from has changed; the stamp that tells is kept
 in a comment of the GIF itself. A new lesson comes from the template or is a copy of another: it
-validates and builds at once. The web pages need no server and no network; every link is relative.
+validates and builds at once.
+
+``exercise.ipynb`` has the parts of the worksheet; a translated worksheet makes one in its language.
+A block of commands becomes a cell that runs the same (`classroom.book`); paragraphs that begin with
+``*In a terminal`` are left out. ``notebook.py``, in the percent format, has what only the notebook
+has: a cell ``# %% Run`` follows what stands under "Run", a cell ``# %% Run 2`` takes the place of
+its second block, and ``# %% [markdown] Run`` is text; a line ``# needs: notebook,fit`` names the
+extras of the package that it takes. The same files make the same bytes.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 import shutil
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+import textwrap
+from collections.abc import Callable
 from dataclasses import dataclass
-from errno import ELOOP, ENOTDIR
-from html import escape
-from importlib.util import find_spec
+from errno import ELOOP
+from functools import partial
 from io import BytesIO
 from math import prod
 from pathlib import Path
-from string import Template
-from typing import Final
-from urllib.parse import quote
+from typing import Any, Final
 
 from PIL.GifImagePlugin import GifImageFile
 
 from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import told
-from chutelab.classroom.exercises.in_page import data_of
-from chutelab.classroom.lessons.cells import name_of, notebook_of
-from chutelab.classroom.lessons.printing import printed
-from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
-from chutelab.classroom.lessons.texts import INDEX, html_of, own_words, words_for
-from chutelab.classroom.lessons.wheel import write_wheel
-from chutelab.classroom.words import Words, words
+from chutelab.classroom.exercises.catalogue import UNNAMED
+from chutelab.classroom.lessons.reading import (
+    OWN_WORDS,
+    PARTS,
+    Lesson,
+    LessonError,
+    read,
+    scene_of,
+    shipped_lessons,
+    split,
+    unusable,
+)
+from chutelab.classroom.words import words
 from chutelab.engines.simulation import judged
 from chutelab.scene import Fault, to_dict
-from chutelab.util.files import aside, refuse_other, together, whole
-from chutelab.util.versions import own_version, version_of
+from chutelab.util.files import aside, refuse_other, whole
+from chutelab.util.versions import version_of
 
 _HERE: Final = Path(__file__).parent
 PICTURE: Final = "lesson.gif"
@@ -237,239 +245,170 @@ def files_of(lesson: Lesson) -> list[Path]:
     return sorted(path for path in found if path.is_file() and not path.name.startswith("."))
 
 
-LIVE: Final = "page.html"
-EXPLANATION: Final = "explanation.html"
-STILL: Final = "still.png"
-END: Final = "end.png"
-"""The first picture of the film, and the last one: the answer is in it."""
-
-_NOT_GIVEN: Final = re.compile(r"lesson(\..+)?\.toml")
-"""The key for the teacher is in it."""
-
-_SHARED: Final = ("style.css", "picture.js")
-
-
-def bundle(
-    lessons: Sequence[Lesson],
-    folder: str | Path,
-    progress: Callable[[float], None] | None = None,
-    *,
-    wheel: bool = True,
-) -> list[Path]:
-    """Write web pages into a folder: an index of the lessons, and a folder with a page for each.
-
-    Everything is made aside first; files that are there already are replaced, others stay.
-
-    Parameters
-    ----------
-    lessons
-        In the order of the index.
-    folder
-        Made if need be.
-    progress
-        Called with the share that is done, 0 to 1.
-    wheel
-        Put the wheel of this chutelab in, and how to install from it.
-
-    Returns
-    -------
-    list of Path
-        The files written.
-
-    Raises
-    ------
-    InputError
-        If a lesson's scene cannot be run, or shown as a live page.
-    MissingLibraryError
-        If chutelab is not installed, so that there is no wheel.
-    OSError
-        If it cannot be written.
-    """
-    folder = Path(folder)
-    _check_places(lessons, folder)
-    for name in (INDEX, *_SHARED):
-        refuse_other(folder / name)
-    for lesson in lessons:
-        if (there := folder / lesson.folder.name).exists() and not there.is_dir():
-            raise NotADirectoryError(ENOTDIR, "it is a file, not a folder", str(there))
-    with together(folder) as made:
-        cards = ""
-        for i, lesson in enumerate(lessons):
-            before = _link(lessons[i - 1], "prev", "← {}") if i > 0 else ""
-            after = _link(lessons[i + 1], "next", "{} →") if i + 1 < len(lessons) else ""
-            folders = [one.folder.name for one in lessons]
-            cards += _lesson(lesson, made, folders, before, after, wheel=wheel)
-            if progress is not None:
-                progress((i + 1) / len(lessons))
-        said = words(lessons[0].language if lessons else "en")
-        key = "page-count-one" if len(lessons) == 1 else "page-count"
-        values = {"cards": cards, "count": said.say(key, count=len(lessons))}
-        values["install"] = (
-            _page("install.html", said, wheel=write_wheel(made).name) if wheel else ""
-        )
-        (made / INDEX).write_text(_page("index.html", said, **values), encoding="utf-8")
-        for name in _SHARED:
-            shutil.copyfile(_HERE / "assets" / name, made / name)
-        files = [path.relative_to(made) for path in made.rglob("*") if path.is_file()]
-    return [folder / file for file in sorted(files)]
-
-
-def _check_places(lessons: Sequence[Lesson], folder: Path) -> None:
-    """Refuse, before anything is made, what would be written over another's or out of a folder."""
-    names = [INDEX, *_SHARED]
-    for lesson in lessons:
-        name = lesson.folder.name
-        if not name or name in names:
-            text = "another lesson, or a file of the pages, has the same name; rename the folder"
-            raise unusable(lesson.folder, text)
-        names.append(name)
-        check_inside(folder / name)
-
-
 def check_inside(folder: Path) -> None:
     """Refuse to write into a folder that is a link: an `OSError`."""
     if folder.is_symlink():
         raise OSError(ELOOP, "it is a symbolic link, which may lead anywhere", str(folder))
 
 
-def _address(*names: str) -> str:
-    """Return a relative address, in which no name is markup, a scheme, or the start of a query."""
-    return "/".join(quote(os.fsencode(name)) for name in names)
+OWN: Final = "notebook.py"
 
 
-def _lesson(
-    lesson: Lesson, made: Path, folders: Sequence[str], before: str, after: str, *, wheel: bool
-) -> str:
-    """Make the folder of one of the lessons, with links to its neighbours; return its card."""
-    folder = made / lesson.folder.name
-    folder.mkdir()
-    for file in files_of(lesson):
-        if not _NOT_GIVEN.fullmatch(file.name):
-            shutil.copyfile(file, folder / file.name)
-    if not is_current(lesson):
-        build(lesson, folder, force=True)
-    with GifImageFile(folder / PICTURE) as film:
-        for name, index in ((STILL, 0), (END, film.n_frames - 1)):
-            film.seek(index)
-            shown = film.convert("RGB").quantize(255)
-            shown.info.pop("transparency", None)
-            shown.save(folder / name, optimize=True)
-        width, height = film.size
-    said = words(lesson.language)
-    say = said.say
-    worksheet, explanation = lesson.text("README"), lesson.text("explanation")
-    # What there is to play with, and to take along.
-    doors = []
-    if lesson.page is not None:
-        home = (say("page-back", title=lesson.title), INDEX)
-        live_page(lesson, folder / LIVE, home=home)
-        doors.append(f'<li><a class="main" href="{LIVE}">{say("page-try")}</a></li>')
-    kind = "pdf" if find_spec("typst") else "html"
-    with suppress(LessonError):  # a worksheet of other parts is on the page alone
-        (folder / f"worksheet.{kind}").write_bytes(printed(lesson, "student", kind))
-        doors.append(f'<li><a href="worksheet.{kind}">{say("page-print")}</a></li>')
-    names = (name_of(language) for language in (lesson.language, "en"))
-    if book := next((name for name in names if (folder / name).is_file()), ""):
-        door = f'<li><a href="{book}" download>{say("page-notebook")}</a></li>'
-        doors.append(door)
-        if wheel:
-            doors.append(f'<li><a href="../{INDEX}#get">{say("page-get-door")}</a></li>')
-    for name in lesson.scenes:
-        if (folder / name).is_file():
-            scene_door = escape(say("page-scene", name=name))
-            doors.append(f'<li><a href="{_address(name)}" download>{scene_door}</a></li>')
-    note = f"<p><em>{say('untranslated')}</em></p>\n" if lesson.untranslated else ""
-    facts = {
-        "folder": _address(lesson.folder.name),
-        "title": heading(lesson),
-        "question": escape(lesson.question),
-        "about": say("show-about", level=say(f"level-{lesson.level}"), minutes=lesson.minutes),
-        "width": str(width),
-        "height": str(height),
-    }
-    page = _page(
-        "lesson.html",
-        said,
-        **facts,
-        alt=escape(words_for(MACHINE, worksheet) or lesson.title),
-        worksheet=note + html_of(worksheet, folders),
-        doors="\n".join(doors),
-        before=before,
-        after=after,
-    )
-    (folder / INDEX).write_text(page, encoding="utf-8")
-    page = _page(
-        "explanation.html",
-        said,
-        **facts,
-        alt=escape(words_for(PICTURE, explanation) or lesson.title),
-        explanation=html_of(explanation, folders),
-        back=escape(say("page-back", title=lesson.title)),
-    )
-    (folder / EXPLANATION).write_text(page, encoding="utf-8")
-    return _page("card.html", said, **facts)
+def name_of(language: str) -> str:
+    """Return the name of a notebook's file."""
+    return "exercise.ipynb" if language == "en" else f"exercise.{language}.ipynb"
 
 
-def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = None) -> int:
-    """Write the live page of a lesson with its exercise, in its language; return the size in bytes.
+def notebook_of(lesson: Lesson) -> str:
+    """Return the text of a lesson's notebook, JSON; "" if its worksheet has not all of `PARTS`.
 
-    In a frame it tells the page around it, by ``postMessage``, ``{chutelab: "ready", lesson}``. A
-    page that answers ``{chutelab: "begin", student, suspend_data}``, "" for the first time, says
-    who this is and keeps what becomes of it: after each change it is told ``{chutelab: "progress",
-    lesson, student, done, total, score, status, suspend_data, result}``, with a score of 100 for
-    all, the status "incomplete" or "completed", at most 4000 characters of data to go on from, and
-    the result as `chutelab.classroom.grading` takes it.
-
-    Parameters
-    ----------
-    lesson
-        One with a table ``[page]``.
-    path
-        A file; one that is there is replaced.
-    home
-        Text and address of a link back.
+    The worksheet is that in the lesson's language; so is the notebook.
 
     Raises
     ------
     LessonError
-        If the lesson says of no page what it is to offer.
-    InputError
-        If its scene cannot be shown as a live page.
-    OSError
-        If the page cannot be written.
+        If a cell of ``notebook.py`` belongs to no part.
     """
-    from chutelab.pictures.live.page import write
+    say = words(lesson.language).say
+    heading, *pieces = re.split(r"^## (.*)\n+", lesson.text("README"), flags=re.MULTILINE)
+    parts = dict(zip(pieces[::2], pieces[1::2], strict=True))
+    heads = [say(key) for key in PARTS]
+    if not parts.keys() >= {*heads}:
+        return ""
+    predict, run, compare = (parts[head] for head in heads)
+    own = _own(lesson)
+    left = dict.fromkeys(own)
+    cells: list[dict[str, Any]] = []
 
-    if lesson.page is None:
-        text = "is missing: what the lesson's page offers; an empty table offers everything"
-        raise LessonError(str(lesson.folder), [Fault("page", None, text)])
-    scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
-    exercise = None
-    if lesson.name in EXERCISES:
-        asked = own_words(lesson.text("README"))
-        exercise = data_of(told(lesson.name, lesson.language), explain=asked or lesson.question)
-    return write(scene, path, language=lesson.language, home=home, exercise=exercise)
+    def add(kind: str, name: str, source: str, place: str = "") -> None:
+        cell: dict[str, Any] = {"cell_type": kind, "id": name, "metadata": {}}
+        if kind == "code":
+            cell |= {"execution_count": None, "outputs": []}
+        cells.append(cell | {"source": source.splitlines(keepends=True)})
+        left.pop(place, None)
+
+    text, code = partial(add, "markdown"), partial(add, "code")
+
+    def add_own(place: str) -> None:
+        for n, (kind, source) in enumerate(own.get(place, ()), start=1):
+            add(kind, f"{place}-own-{n}".lower().replace(" ", "-"), source, place)
+
+    def prose(part: str) -> str:
+        """Return paragraphs on a line each, without those that are for a terminal."""
+        paragraphs = re.split(r"\n{2,}", part.strip())
+        terminal = f"*{say('notebook-terminal')}"
+        return "\n\n".join(_unbroken(one) for one in paragraphs if not one.startswith(terminal))
+
+    exercise = EXERCISES.get(lesson.name)
+    title, _, opening = heading.partition("\n")
+    # The notebook draws the machine itself: it may be all that a student has.
+    opening = prose(re.sub(r"^!\[.*\n+", "", opening, flags=re.MULTILINE))
+    order = say("notebook-order-exercise" if exercise is not None else "notebook-order")
+    needs = re.search(r"^# needs: *(.*)$", _source(lesson), re.MULTILINE)
+    extras = say("notebook-needs", extras=needs[1] if needs else "notebook")
+    text("title", f"{title}\n\n{opening}\n\n{order}\n\n{extras}")
+    shipped = any(one.folder == lesson.folder for one in shipped_lessons())
+    book = f"book = Book({json.dumps(lesson.name if shipped else '.')})\nbook.machine()"
+    code("machine", f"from chutelab.classroom.book import Book\n\n{book}")
+    if exercise is not None:
+        text("name-text", f"## {say('notebook-name-head')}\n\n{say('notebook-name')}")
+        language = "" if lesson.language == "en" else f', language="{lesson.language}"'
+        task = f'task = lesson("{exercise.name}", student=student{language})\ntask'
+        given = f'from chutelab.classroom.exercises import lesson\n\nstudent = "{UNNAMED}"\n'
+        code("name", given + task)
+    text("predict-text", f"## {heads[0]}\n\n{prose(predict)}\n\n{say('notebook-predict')}")
+    asked = re.findall(r"^(\d+)\. ", predict, flags=re.MULTILINE)
+    lines = "".join(f"    {number}: None,\n" for number in asked)
+    code("predict", f"predictions = {{\n{lines}}}")
+    add_own("Predict")
+
+    # The texts under "Run", and a cell for each block of commands.
+    before, *pieces = re.split(r"^```sh\n(.*?)^```$", run, flags=re.MULTILINE | re.DOTALL)
+    head = f"## {heads[1]}\n\n"
+    for n, (block, after) in enumerate(zip(pieces[::2], pieces[1::2], strict=True), start=1):
+        name, place = "run" if n == 1 else f"run-{n}", f"Run {n}"
+        if said := f"{head}{prose(before)}".strip():
+            text(f"{name}-text", said)
+        for i, (kind, source) in enumerate(own.get(place) or [("code", _commands(block))]):
+            add(kind, name if i == 0 else f"run-{n}-own-{i}", source, place)
+        if place not in own and " --out " in block:
+            code(f"{name}-picture", "import chutelab\n\nchutelab.overlay(runs[0])")
+        head, before = "", after
+    if rest := prose(before):
+        text("run-end", rest)
+    add_own("Run")
+
+    compared = prose(compare)
+    fill = f"\n\n{say('notebook-fill')}" if "|---" in compared else ""
+    text("compare-text", f"## {heads[2]}\n\n{compared}{fill}")
+    code("compare", "book.compare(predictions)")
+    add_own("Compare")
+    text("explain-text", f"## {say('notebook-explain-head')}\n\n{say('notebook-explain')}")
+    text(OWN_WORDS, say("notebook-words"))
+    if exercise is not None:
+        questions = say("notebook-questions", first=exercise.parameters[0].name)
+        text("questions-text", f"## {say('notebook-questions-head')}\n\n{questions}")
+        add_own("Questions")
+        for n in range(1, len(exercise.questions) + 1):
+            code(f"question-{n}", f"task.question({n})")
+            code(f"answer-{n}", f"answer_{n} = None\ntask.check({n}, answer_{n})")
+    if lesson.page is not None:
+        (_, said), *_ = own.get("Try it live", [("markdown", "")])
+        text("live-text", f"## {say('notebook-live')}\n\n{said}".strip(), "Try it live")
+        code("live", "book.live()")
+    if exercise is not None:
+        text("progress-text", f"## {say('notebook-progress')}")
+        code("progress", "task.progress()")
+    if left:
+        raise unusable(lesson.folder / OWN, f"there is no place for a cell # %% {next(iter(left))}")
+    kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
+    about = {"kernelspec": kernel, "language_info": {"name": "python"}}
+    made = {"cells": cells, "metadata": about, "nbformat": 4, "nbformat_minor": 5}
+    return json.dumps(made, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
 
 
-def heading(lesson: Lesson) -> str:
-    """Return number and title of a lesson, as HTML."""
-    return escape(lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}")
+def _source(lesson: Lesson, name: str = OWN) -> str:
+    path = lesson.folder / name
+    return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 
-def _link(lesson: Lesson, relation: str, form: str) -> str:
-    text = form.format(heading(lesson))
-    return f'<a rel="{relation}" href="../{_address(lesson.folder.name, INDEX)}">{text}</a>'
+def _own(lesson: Lesson) -> dict[str, list[tuple[str, str]]]:
+    """Return the kinds and sources of the cells in ``notebook.py`` by their places.
+
+    In another language the texts, in their order, are those of ``notebook.LANGUAGE.py``.
+    """
+    found = _cells_in(_source(lesson))
+    told = _cells_in(_source(lesson, f"notebook.{lesson.language}.py"))
+    for place, cells in told.items():
+        texts = iter(cells)
+        found[place] = [
+            next(texts, cell) if cell[0] == "markdown" else cell for cell in found.get(place, ())
+        ]
+    return found
 
 
-def _page(name: str, said: Words, **values: str) -> str:
-    """Fill in a page: ``$page_all`` is what the catalogue has for "page-all"."""
-    page = Template((_HERE / "assets" / name).read_text(encoding="utf-8"))
-    version = own_version()
-    values |= {
-        name: escape(said.say(name.replace("_", "-")))
-        for name in page.get_identifiers()
-        if name.startswith("page_")
-    }
-    made_with = escape(said.say("page-made-with", version=version))
-    known = {"language": said.language, "version": escape(version), "made_with": made_with}
-    return page.substitute(values, **known)
+def _cells_in(source: str) -> dict[str, list[tuple[str, str]]]:
+    found: dict[str, list[tuple[str, str]]] = {}
+    pieces = re.split(r"^# %% *(\[markdown\])? *(.*)\n", source, flags=re.MULTILINE)
+    for markdown, place, source in zip(pieces[1::3], pieces[2::3], pieces[3::3], strict=True):
+        kind = "markdown" if markdown else "code"
+        if markdown:
+            source = re.sub(r"^# ?", "", source, flags=re.MULTILINE)
+        found.setdefault(place.strip(), []).append((kind, source.strip("\n")))
+    return found
+
+
+def _commands(block: str) -> str:
+    """Return the cell that runs the scenes of ``chutelab run`` in a block; other commands are left.
+
+    What is left needs a cell in `OWN`.
+    """
+    found = re.findall(r"^chutelab run (.*?)$", block, flags=re.MULTILINE)
+    runs = [re.sub(r" --(out|only) \S+", "", line) for line in found]
+    lines = "".join(f"    {json.dumps(run, ensure_ascii=False)},\n" for run in runs)
+    return f"runs = book.run(\n{lines})\nruns"
+
+
+def _unbroken(paragraph: str) -> str:
+    """Return a paragraph without its line breaks; lists and tables keep theirs."""
+    return re.sub(r"\n(?!\s*(?:[-*] |\||\d+\. )|#)\s*", " ", textwrap.dedent(paragraph))

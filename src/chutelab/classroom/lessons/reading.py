@@ -188,6 +188,12 @@ def shipped_lessons(language: str = "en") -> list[Lesson]:
 
 PLAN: Final = "lesson.toml"
 
+PARTS: Final = ("part-predict", "part-run", "part-compare")
+"""The parts of a worksheet, and of a notebook, by the keys of their headings."""
+
+OWN_WORDS: Final = "explanation"
+"""Id of the cell of a notebook in which a student writes in words."""
+
 LARGEST: Final = 1 << 20
 """Bytes of it, and characters of a worksheet or an explanation."""
 

@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from PIL import ImageDraw, ImageFont
 
-from chutelab.machine import Machine
+from chutelab.machine import Arcs, Machine, Pieces
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.bodies import (
     LEAST,
@@ -29,7 +29,7 @@ from chutelab.pictures.plots.bodies import (
     stream_handles,
     strings,
 )
-from chutelab.pictures.plots.machinery import Piece, draw_piece, pieces, points_of
+from chutelab.pictures.plots.machinery import draw_piece, pieces, points_of
 from chutelab.pictures.plots.scenery import (
     FINE,
     nominal,
@@ -212,9 +212,9 @@ def strung(ax: Axes, recording: Recording, times: Floats) -> list[Moving]:
 def gates(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
     """Return the pieces that are not always there: each is seen while it is."""
 
-    def shown(piece: Piece) -> Moving:
+    def shown(piece: Pieces) -> Moving:
         drawn = draw_piece(ax, machine, piece, animated=True)
-        there = (times >= piece.appears) & (times < piece.vanishes)
+        there = piece.there(times)
         return drawn, lambda index: drawn.set_visible(bool(there[index]))
 
     return [shown(piece) for piece in pieces(machine) if piece.gate]
@@ -222,40 +222,36 @@ def gates(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
 
 def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
     """Return marks that run with belts, and holes that turn with pulleys and rollers at v/R."""
-    segments, arcs, pulley = machine.segments, machine.arcs, machine.pulley
     spacing = float(np.ptp(ax.get_xlim())) / MARKS
+    driven = [piece for piece in pieces(machine) if piece.speed != 0.0]
+    belts = [piece for piece in driven if not piece.whole]
 
     def marks(index: int) -> Floats:
-        found = [np.empty((0, 2))]
-        for i in np.flatnonzero(segments.speed):
-            shift = (segments.speed[i] * times[index]) % spacing
-            along = np.arange(shift, segments.length[i], spacing)
-            found.append(segments.start[i] + along[:, None] * segments.tangent[i])
-        for i in np.flatnonzero((arcs.speed != 0.0) & ~arcs.whole):
-            # Clockwise from its last end.
-            shift = (arcs.speed[i] * times[index]) % spacing
-            along = np.arange(shift, arcs.radius[i] * arcs.extent[i], spacing)
-            angle = arcs.begin[i] + arcs.extent[i] - along / arcs.radius[i]
-            around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-            found.append(arcs.center[i] + arcs.radius[i] * around)
-        return np.concatenate(found)
+        placed = [np.empty((0, 2))]
+        for piece in belts:
+            shift = float((piece.speed * times[index]) % spacing)
+            placed.append(piece.at(np.arange(shift, float(piece.way), spacing)))
+        return np.concatenate(placed)
 
     dots: dict[str, Any] = {"ls": "none", "marker": "o", "mew": 0.0}
     moving = [line(ax, "marks", marks, color="white", ms=3.2, **dots)]
 
-    def turning(gid: str, center: Floats, radius: float, speed: float) -> Moving:
-        turned = speed * times / radius
+    def turning(gid: str, wheel: Arcs) -> Moving:
+        turned = wheel.speed * times / wheel.radius
         # Clockwise from the top.
         angles = turned[:, None] + 2.0 * np.pi / HOLES * np.arange(HOLES)
-        holes = center + 0.6 * radius * np.stack([np.sin(angles), np.cos(angles)], axis=-1)
-        size = min(points_of(ax, 0.3 * radius), SMALLEST)
+        out = np.stack([np.sin(angles), np.cos(angles)], axis=-1)
+        holes = wheel.center + 0.6 * wheel.radius * out
+        size = min(points_of(ax, 0.3 * float(wheel.radius)), SMALLEST)
         return line(ax, gid, lambda index: holes[index], color=style.STEEL, ms=size, **dots)
 
-    if pulley is not None:
-        moving.insert(0, turning("holes", np.zeros(2), pulley.radius, pulley.speed))
-    for i in np.flatnonzero((arcs.speed != 0.0) & arcs.whole):
-        gid = f"holes {machine.surfaces[arcs.surface[i]]}"
-        moving.append(turning(gid, arcs.center[i], float(arcs.radius[i]), float(arcs.speed[i])))
+    if machine.pulley is not None and isinstance(wheel := machine.pieces[-1], Arcs):
+        moving.insert(0, turning("holes", wheel))
+    moving += [
+        turning(f"holes {machine.surfaces[piece.surface]}", piece)
+        for piece in driven
+        if piece.whole and isinstance(piece, Arcs)
+    ]
     return moving
 
 

@@ -33,37 +33,15 @@ def contact_normal(machine: Machine, event: Any) -> Floats:
 
     It comes from where the particle is: a fixed step's velocities have gravity in them, too.
     """
-    position, segments, arcs = event["position"], machine.segments, machine.arcs
-    mine = segments.surface == event["surface"]
-    start, tangent = segments.start[mine], segments.tangent[mine]
-    along = np.einsum("sd,sd->s", position - start, tangent)
-    foot = start + np.clip(along, 0.0, segments.length[mine])[:, None] * tangent
-    across = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
-    beyond = (along < 0.0) | (along > segments.length[mine])
-    if len(arcs.surface):
-        bent = arcs.surface == event["surface"]
-        radial = position - arcs.center[bent]
-        radial /= np.hypot(*radial.T)[:, None]
-        past = np.mod(np.arctan2(radial[:, 1], radial[:, 0]) - arcs.begin[bent], 2.0 * np.pi)
-        off = past > arcs.extent[bent]
-        ends = np.stack([end[bent] for end in arcs.ends])
-        nearer = np.hypot(*np.moveaxis(ends - position, 2, 0)).argmin(axis=0)
-        rim = arcs.center[bent] + arcs.radius[bent][:, None] * radial
-        rim[off] = ends[nearer, np.arange(len(nearer))][off]
-        foot, across = np.concatenate([foot, rim]), np.concatenate([across, radial])
-        beyond = np.concatenate([beyond, off])
-    away = position - foot
-    gap = np.hypot(*away.T)
-    pulley, name = machine.pulley, machine.surfaces[event["surface"]]
-    if pulley is not None and name == "incoming":
-        out = np.hypot(*position)
-        if abs(out - pulley.radius) < gap.min():
-            return np.asarray(position / out)
-    nearest = int(np.argmin(gap))
+    position = event["position"]
+    mine = [piece for piece in machine.pieces if piece.surface == event["surface"]]
+    nearest = min(mine, key=lambda piece: float(piece.gap(position)))
     radius = np.broadcast_to(machine.particle.radius, machine.count)[event["particle"]]
-    if beyond[nearest] and gap[nearest] > 0.5 * radius > 0.0:
-        return np.asarray(away[nearest] / gap[nearest])
-    normal = across[nearest]
+    away, normal = nearest.away(position), nearest.normal(position)
+    gap = float(np.hypot(*away))
+    # At an end it is the way from there.
+    if gap > 0.5 * radius > 0.0 and abs(away[0] * normal[1] - away[1] * normal[0]) > 1e-9 * gap:
+        return np.asarray(away / gap)
     return np.asarray(normal if normal @ event["velocity_before"] < 0.0 else -normal)
 
 
@@ -302,7 +280,7 @@ def _gates(machine: Machine, times: Floats, slow: float) -> list[str]:
     """Return the caption at each time: for a while which gate opened or closed last."""
     news = {
         (t, f"t = {t:.3f} s: {surface_words(machine.surfaces[surface])} {what}")
-        for parts in (machine.segments, machine.arcs)
+        for parts in machine.parts
         for clock, what in ((parts.appears, "closes"), (parts.vanishes, "opens"))
         for t, surface in zip(clock.tolist(), parts.surface.tolist(), strict=True)
         if isfinite(t)

@@ -43,7 +43,7 @@ def html(
     home : tuple of str, optional
         Text and address of a link back, for a page that is one of several.
     exercise : mapping, optional
-        What `chutelab.classroom.exercises.in_page.data_of` makes of an exercise.
+        What `chutelab.classroom.exercises.catalogue.data_of` makes of an exercise.
 
     Raises
     ------

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from math import ceil, degrees, inf, pi, radians
+from collections.abc import Iterator, Sequence
+from math import degrees, inf, pi
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
 
-from chutelab.machine import Machine
+from chutelab.machine import Arcs, Machine, Pieces, Segments
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import Window, around
 from chutelab.util.arrays import Floats
@@ -26,101 +25,34 @@ HALO = [withStroke(linewidth=3.0, foreground="white")]
 TWO_LINES = 32.0
 """pt; height of two lines of small text."""
 
-FINE = radians(3.0)
-"""Between two points of an arc as it is drawn: off by 3e-4 of its radius at most."""
-
 GATE: dict[str, Any] = {"ls": (0, (2.2, 1.1))}
 """How a piece that is not always there is drawn, in half its colour."""
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A straight piece of a surface, an arc or a whole circle, as it is drawn.
-
-    Attributes
-    ----------
-    surface : int
-        Index into `Machine.surfaces`.
-    index : int
-        Its own, among the segments or among the arcs.
-    points : ndarray, (P, 2)
-        m; along an arc clockwise.
-    center, radius : ndarray (2,), float
-        m; of an arc. NaN of a straight piece.
-    whole : bool
-        A circle all round.
-    speed : float
-        m/s, along the points.
-    appears, vanishes : float
-        s; from when to when it is there.
-    """
-
-    surface: int
-    index: int
-    points: Floats
-    center: Floats
-    radius: float
-    whole: bool
-    speed: float
-    appears: float
-    vanishes: float
-
-    @property
-    def gate(self) -> bool:
-        """Whether it is not always there."""
-        return self.appears > -inf or self.vanishes < inf
+def pieces(machine: Machine) -> tuple[Pieces, ...]:
+    """Return all pieces of a machine's surfaces but the drive pulley."""
+    return machine.pieces if machine.pulley is None else machine.pieces[:-1]
 
 
-def pieces(machine: Machine) -> list[Piece]:
-    """Return all pieces of a machine's surfaces but the drive pulley: segments, then arcs."""
-    segments, arcs = machine.segments, machine.arcs
-    ends = np.stack([segments.start, segments.end], axis=1)
-    nowhere = np.full(2, np.nan)
-    found = [
-        Piece(int(s), i, ends[i], nowhere, np.nan, whole=False, speed=v, appears=a, vanishes=b)
-        for i, (s, v, a, b) in enumerate(
-            zip(
-                segments.surface,
-                segments.speed.tolist(),
-                segments.appears.tolist(),
-                segments.vanishes.tolist(),
-                strict=True,
-            )
-        )
-    ]
-    for i, s in enumerate(arcs.surface.tolist()):
-        center, radius, extent = arcs.center[i], float(arcs.radius[i]), float(arcs.extent[i])
-        shares = np.linspace(1.0, 0.0, 1 + ceil(extent / FINE))
-        angles = arcs.begin[i] + extent * shares
-        points = center + radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        found.append(
-            Piece(
-                s, i, points, center, radius, bool(arcs.whole[i]), float(arcs.speed[i]),
-                float(arcs.appears[i]), float(arcs.vanishes[i]),
-            )
-        )  # fmt: skip
-    return found
-
-
-def colour_of(machine: Machine, piece: Piece) -> str:
+def colour_of(machine: Machine, piece: Pieces) -> str:
     """Return the colour of a piece: of a belt, or of what stands still."""
     belt = machine.surfaces[piece.surface] in ("incoming", "outgoing") or piece.speed != 0.0
     return style.BELT if belt else style.INK
 
 
-def draw_piece(ax: Axes, machine: Machine, piece: Piece, **look: Any) -> Circle | Line2D:
+def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle | Line2D:
     """Draw a piece to scale, filled if it is a circle that nothing is released in."""
     color = look.pop("color", colour_of(machine, piece))
     gid = f"surface {machine.surfaces[piece.surface]}"
-    if not piece.whole:
-        (line,) = ax.plot(*piece.points.T, color=color, lw=2.6, zorder=2.0)
+    if not (piece.whole and isinstance(piece, Arcs)):
+        (line,) = ax.plot(*piece.path().T, color=color, lw=2.6, zorder=2.0)
         line.set(solid_capstyle="butt", gid=gid, **look)
         return line
     out = np.hypot(*(machine.releases.position - piece.center).T) >= piece.radius
     # The line of a small one must not make it larger than it is.
-    width = min(2.0, points_of(ax, 0.5 * piece.radius))
-    inner = piece.radius if width == 2.0 else 0.75 * piece.radius
-    circle = Circle((float(piece.center[0]), float(piece.center[1])), inner)
+    radius = float(piece.radius)
+    width = min(2.0, points_of(ax, 0.5 * radius))
+    circle = Circle(tuple(piece.center.tolist()), radius if width == 2.0 else 0.75 * radius)
     circle.set(facecolor=style.STEEL_LIGHT if out.all() else "none", edgecolor=color)
     circle.set(linewidth=width, zorder=1.0, gid=gid, **look)
     ax.add_patch(circle)
@@ -164,7 +96,8 @@ def draw_scene(
         if piece.gate:
             look |= {**GATE, "color": style.tint(colour_of(machine, piece), 0.5)}
         draw_piece(ax, machine, piece, **look)
-        if piece.whole and piece.speed != 0.0 and points_of(ax, piece.radius) > AXIS:
+        driven = piece.whole and piece.speed != 0.0
+        if driven and isinstance(piece, Arcs) and points_of(ax, float(piece.radius)) > AXIS:
             ax.plot(*piece.center, "+", color=style.STEEL, ms=AXIS, zorder=1.5)
     if machine.threads:
         anchors = np.array([thread.anchor for thread in machine.threads])
@@ -205,24 +138,24 @@ class _Names:
         With its limits set.
     machine : Machine
         What is drawn.
-    found : list of Piece
+    found : sequence of Pieces
         Its pieces.
     shown : Window
         What of the world is in the picture.
     """
 
-    def __init__(self, ax: Axes, machine: Machine, found: list[Piece], shown: Window) -> None:
+    def __init__(self, ax: Axes, machine: Machine, found: Sequence[Pieces], shown: Window) -> None:
         self.ax, self.machine, self.shown = ax, machine, shown
         self.frame = ax.get_window_extent().padded(-3.0)
-        self.parts: dict[int, list[tuple[Piece, Floats]]] = {}
+        self.parts: dict[int, list[tuple[Pieces, Floats]]] = {}
         for piece in found:
             part = self._part(piece)
             if part is not None:
-                self.parts.setdefault(piece.surface, []).append((piece, part))
+                self.parts.setdefault(int(piece.surface), []).append((piece, part))
         self.found = found
         self.plates = {"plate", *(plate.name for plate in machine.scene.plates)}
         self.lines = [
-            (Path(ax.transData.transform(piece.points)), piece.whole)
+            (Path(ax.transData.transform(piece.path())), bool(piece.whole))
             for parts in self.parts.values()
             for piece, _ in parts
         ]
@@ -230,7 +163,7 @@ class _Names:
         fall = np.array([[0.0, 0.0], [0.0, -FALL * shown.height]])
         for piece in found:
             if piece.gate:
-                below = piece.points[len(piece.points) // 2 - 1 :][:2].mean(axis=0) + fall
+                below = piece.at(0.5 * piece.way) + fall
                 self.lines.append((Path(ax.transData.transform(below)), False))
         if machine.pulley is not None:
             rim = Path.circle((0.0, 0.0), machine.pulley.radius)
@@ -261,13 +194,14 @@ class _Names:
             self._put(label, best[1])
             self.taken.append(best[2].padded(1.0))
 
-    def _part(self, piece: Piece) -> Floats | None:
+    def _part(self, piece: Pieces) -> Floats | None:
         """Return the points of a piece that are shown."""
-        if np.isnan(piece.radius):
-            ends = self.shown.clip(*piece.points)
+        points = piece.path()
+        if len(points) == 2:
+            ends = self.shown.clip(*points)
             return None if ends is None else np.array(ends)
-        inside = self.shown.holds(piece.points)
-        return piece.points[inside] if inside.any() else None
+        inside = self.shown.holds(points)
+        return points[inside] if inside.any() else None
 
     def _hides(self, box: Bbox) -> int:
         """Return how many lines, circles and releases a name would stand on."""
@@ -292,18 +226,17 @@ class _Names:
         offset = (offset[0] + right * points, offset[1] + up * points)
         return (where, offset, across, along), box.translated(right, up)
 
-    def _said(self, surface: int, piece: Piece) -> str:
+    def _said(self, surface: int, piece: Pieces) -> str:
         """Return what is written at a surface, of which a piece is shown."""
-        name, machine = self.machine.surfaces[surface], self.machine
-        speed = piece.speed
+        name, speed = self.machine.surfaces[surface], float(piece.speed)
         if name in self.plates:
-            x, y = machine.segments.tangent[piece.index]
+            x, y = piece.inward[0]
             angle = float(np.degrees(np.arctan2(-x, y))) + 0.0  # no -0
-            values = np.unique(np.atleast_2d(machine.segments.restitution)[:, piece.index])
+            values = np.unique(piece.restitution)
             leans = f"{angle:.3g}°".replace("-", "−")
             return f"{name}, {leans}\nε = {' / '.join(f'{one:.3g}' for one in values)}"
-        if np.isnan(piece.radius):
-            moves = _motion(speed, piece.points[1] - piece.points[0])
+        if isinstance(piece, Segments):
+            moves = _motion(speed, piece.tangent)
         else:
             moves = f"{abs(speed):.3g} m/s {'↻' if speed > 0.0 else '↺'}"
         if name == "incoming":
@@ -317,13 +250,13 @@ class _Names:
         when = [f"{what} at {t:.4g} s" for t, what in sorted(times)]
         return ", ".join([name, *([moves] if speed else []), *when])
 
-    def _spots(self, parts: list[tuple[Piece, Floats]]) -> Iterator[Spot]:
+    def _spots(self, parts: list[tuple[Pieces, Floats]]) -> Iterator[Spot]:
         """Yield where the name of a surface may stand, the best first."""
         piece, part = parts[0]
         name = self.machine.surfaces[piece.surface]
         low, high = sorted((part[0], part[-1]), key=lambda point: (point[1], point[0]))
         if name in self.plates:
-            x, y = self.machine.segments.tangent[piece.index]
+            x, y = piece.inward[0]
             angle = degrees(np.arctan2(-x, y))
             # Two lines need room above where they begin.
             room = TWO_LINES * self.ax.figure.dpi / 72.0
@@ -354,25 +287,24 @@ class _Names:
                 yield _spot(np.array(where), farther * GAP, np.array(away))
 
 
-def _beside(piece: Piece, part: Floats, share: float) -> Iterator[tuple[Floats, Floats]]:
+def _beside(piece: Pieces, part: Floats, share: float) -> Iterator[tuple[Floats, Floats]]:
     """Yield a point at a share of a piece's way, and the directions in which its name may stand.
 
     First to the side where no particle is expected: below.
     """
-    if np.isnan(piece.radius):
+    if len(part) == 2:
         low, high = sorted(part, key=lambda point: (point[1], point[0]))
-        where, along = low + share * (high - low), (high - low) / np.hypot(*(high - low))
-        down = np.array([along[1], -along[0]])
-        down *= -1.0 if down[1] > 0.0 or (down[1] == 0.0 and down[0] < 0.0) else 1.0
-        if share == 0.5:
-            where = 0.5 * (low + high)
+        where = 0.5 * (low + high) if share == 0.5 else low + share * (high - low)
+        down = piece.normal(where)
+        down = -down if down[1] > 0.0 or (down[1] == 0.0 and down[0] < 0.0) else down
     else:
-        where = part[round(share * (len(part) - 1))]
+        index = round(share * (len(part) - 1))
         if piece.whole:
-            # The lowest point of a circle first.
-            turn = 2.0 * pi * (share - 0.5)
-            where = piece.center - piece.radius * np.array([np.sin(turn), np.cos(turn)])
-        down = (where - piece.center) / piece.radius
+            # The lowest point of all of it is at its middle.
+            part = piece.path()[:-1]
+            index = (int(part[:, 1].argmin()) + round((share - 0.5) * len(part))) % len(part)
+        where = part[index]
+        down = piece.normal(where)
     yield where, down
     if not piece.whole:
         yield where, -down

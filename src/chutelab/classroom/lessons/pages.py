@@ -1,0 +1,383 @@
+"""Lessons as web pages that need no server and no network, and as packages for learning platforms.
+
+All links are relative. A package follows SCORM 1.2 (Content Aggregation Model, Run-Time
+Environment): a zip of the manifest; ``index.html``, which is launched; ``scorm.js``, which speaks
+with the platform; and the live page, in a frame, which speaks with ``scorm.js`` by messages.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from base64 import urlsafe_b64encode
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from errno import ENOTDIR
+from hashlib import sha256
+from html import escape
+from importlib.metadata import PackageNotFoundError, distribution
+from importlib.util import find_spec
+from pathlib import Path
+from string import Template
+from typing import Final
+from urllib.parse import quote
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+from PIL.GifImagePlugin import GifImageFile
+
+from chutelab.classroom.exercises import EXERCISES
+from chutelab.classroom.exercises.catalogue import data_of, told
+from chutelab.classroom.lessons.building import (
+    MACHINE,
+    PICTURE,
+    build,
+    check_inside,
+    files_of,
+    is_current,
+    name_of,
+)
+from chutelab.classroom.lessons.reading import Lesson, LessonError, scene_of, unusable
+from chutelab.classroom.lessons.sheets import printed
+from chutelab.classroom.lessons.texts import ASSETS, INDEX, asset, html_of, own_words, words_for
+from chutelab.classroom.words import Words, words
+from chutelab.scene import Fault
+from chutelab.util.errors import MissingLibraryError, printable
+from chutelab.util.files import refuse_other, together, whole
+from chutelab.util.versions import own_version
+
+LIVE: Final = "page.html"
+EXPLANATION: Final = "explanation.html"
+STILL: Final = "still.png"
+END: Final = "end.png"
+"""The first picture of the film, and the last one: the answer is in it."""
+
+_NOT_GIVEN: Final = re.compile(r"lesson(\..+)?\.toml")
+"""The key for the teacher is in it."""
+
+_SHARED: Final = ("style.css", "picture.js")
+
+
+def bundle(
+    lessons: Sequence[Lesson],
+    folder: str | Path,
+    progress: Callable[[float], None] | None = None,
+    *,
+    wheel: bool = True,
+) -> list[Path]:
+    """Write web pages into a folder: an index of the lessons, and a folder with a page for each.
+
+    Everything is made aside first; files that are there already are replaced, others stay.
+
+    Parameters
+    ----------
+    lessons
+        In the order of the index.
+    folder
+        Made if need be.
+    progress
+        Called with the share that is done, 0 to 1.
+    wheel
+        Put the wheel of this chutelab in, and how to install from it.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    InputError
+        If a lesson's scene cannot be run, or shown as a live page.
+    MissingLibraryError
+        If chutelab is not installed, so that there is no wheel.
+    OSError
+        If it cannot be written.
+    """
+    folder = Path(folder)
+    _check_places(lessons, folder)
+    for name in (INDEX, *_SHARED):
+        refuse_other(folder / name)
+    for lesson in lessons:
+        if (there := folder / lesson.folder.name).exists() and not there.is_dir():
+            raise NotADirectoryError(ENOTDIR, "it is a file, not a folder", str(there))
+    with together(folder) as made:
+        cards = ""
+        for i, lesson in enumerate(lessons):
+            before = _link(lessons[i - 1], "prev", "← {}") if i > 0 else ""
+            after = _link(lessons[i + 1], "next", "{} →") if i + 1 < len(lessons) else ""
+            folders = [one.folder.name for one in lessons]
+            cards += _lesson(lesson, made, folders, before, after, wheel=wheel)
+            if progress is not None:
+                progress((i + 1) / len(lessons))
+        said = words(lessons[0].language if lessons else "en")
+        key = "page-count-one" if len(lessons) == 1 else "page-count"
+        values = {"cards": cards, "count": said.say(key, count=len(lessons))}
+        values["install"] = (
+            _page("install.html", said, wheel=write_wheel(made).name) if wheel else ""
+        )
+        (made / INDEX).write_text(_page("index.html", said, **values), encoding="utf-8")
+        for name in _SHARED:
+            shutil.copyfile(ASSETS / name, made / name)
+        files = [path.relative_to(made) for path in made.rglob("*") if path.is_file()]
+    return [folder / file for file in sorted(files)]
+
+
+def _check_places(lessons: Sequence[Lesson], folder: Path) -> None:
+    """Refuse, before anything is made, what would be written over another's or out of a folder."""
+    names = [INDEX, *_SHARED]
+    for lesson in lessons:
+        name = lesson.folder.name
+        if not name or name in names:
+            text = "another lesson, or a file of the pages, has the same name; rename the folder"
+            raise unusable(lesson.folder, text)
+        names.append(name)
+        check_inside(folder / name)
+
+
+def _address(*names: str) -> str:
+    """Return a relative address, in which no name is markup, a scheme, or the start of a query."""
+    return "/".join(quote(os.fsencode(name)) for name in names)
+
+
+def _lesson(
+    lesson: Lesson, made: Path, folders: Sequence[str], before: str, after: str, *, wheel: bool
+) -> str:
+    """Make the folder of one of the lessons, with links to its neighbours; return its card."""
+    folder = made / lesson.folder.name
+    folder.mkdir()
+    for file in files_of(lesson):
+        if not _NOT_GIVEN.fullmatch(file.name):
+            shutil.copyfile(file, folder / file.name)
+    if not is_current(lesson):
+        build(lesson, folder, force=True)
+    with GifImageFile(folder / PICTURE) as film:
+        for name, index in ((STILL, 0), (END, film.n_frames - 1)):
+            film.seek(index)
+            shown = film.convert("RGB").quantize(255)
+            shown.info.pop("transparency", None)
+            shown.save(folder / name, optimize=True)
+        width, height = film.size
+    said = words(lesson.language)
+    say = said.say
+    worksheet, explanation = lesson.text("README"), lesson.text("explanation")
+    # What there is to play with, and to take along.
+    doors = []
+    if lesson.page is not None:
+        home = (say("page-back", title=lesson.title), INDEX)
+        live_page(lesson, folder / LIVE, home=home)
+        doors.append(f'<li><a class="main" href="{LIVE}">{say("page-try")}</a></li>')
+    kind = "pdf" if find_spec("typst") else "html"
+    with suppress(LessonError):  # a worksheet of other parts is on the page alone
+        (folder / f"worksheet.{kind}").write_bytes(printed(lesson, "student", kind))
+        doors.append(f'<li><a href="worksheet.{kind}">{say("page-print")}</a></li>')
+    names = (name_of(language) for language in (lesson.language, "en"))
+    if book := next((name for name in names if (folder / name).is_file()), ""):
+        door = f'<li><a href="{book}" download>{say("page-notebook")}</a></li>'
+        doors.append(door)
+        if wheel:
+            doors.append(f'<li><a href="../{INDEX}#get">{say("page-get-door")}</a></li>')
+    for name in lesson.scenes:
+        if (folder / name).is_file():
+            scene_door = escape(say("page-scene", name=name))
+            doors.append(f'<li><a href="{_address(name)}" download>{scene_door}</a></li>')
+    note = f"<p><em>{say('untranslated')}</em></p>\n" if lesson.untranslated else ""
+    facts = {
+        "folder": _address(lesson.folder.name),
+        "title": heading(lesson),
+        "question": escape(lesson.question),
+        "about": say("show-about", level=say(f"level-{lesson.level}"), minutes=lesson.minutes),
+        "width": str(width),
+        "height": str(height),
+    }
+    page = _page(
+        "lesson.html",
+        said,
+        **facts,
+        alt=escape(words_for(MACHINE, worksheet) or lesson.title),
+        worksheet=note + html_of(worksheet, folders),
+        doors="\n".join(doors),
+        before=before,
+        after=after,
+    )
+    (folder / INDEX).write_text(page, encoding="utf-8")
+    page = _page(
+        "explanation.html",
+        said,
+        **facts,
+        alt=escape(words_for(PICTURE, explanation) or lesson.title),
+        explanation=html_of(explanation, folders),
+        back=escape(say("page-back", title=lesson.title)),
+    )
+    (folder / EXPLANATION).write_text(page, encoding="utf-8")
+    return _page("card.html", said, **facts)
+
+
+def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = None) -> int:
+    """Write the live page of a lesson with its exercise, in its language; return the size in bytes.
+
+    In a frame it tells the page around it, by ``postMessage``, ``{chutelab: "ready", lesson}``. A
+    page that answers ``{chutelab: "begin", student, suspend_data}``, "" for the first time, says
+    who this is and keeps what becomes of it: after each change it is told ``{chutelab: "progress",
+    lesson, student, done, total, score, status, suspend_data, result}``, with a score of 100 for
+    all, the status "incomplete" or "completed", at most 4000 characters of data to go on from, and
+    the result as `chutelab.classroom.grading` takes it.
+
+    Parameters
+    ----------
+    lesson
+        One with a table ``[page]``.
+    path
+        A file; one that is there is replaced.
+    home
+        Text and address of a link back.
+
+    Raises
+    ------
+    LessonError
+        If the lesson says of no page what it is to offer.
+    InputError
+        If its scene cannot be shown as a live page.
+    OSError
+        If the page cannot be written.
+    """
+    from chutelab.pictures.live.page import write
+
+    if lesson.page is None:
+        text = "is missing: what the lesson's page offers; an empty table offers everything"
+        raise LessonError(str(lesson.folder), [Fault("page", None, text)])
+    scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
+    exercise = None
+    if lesson.name in EXERCISES:
+        asked = own_words(lesson.text("README"))
+        exercise = data_of(told(lesson.name, lesson.language), explain=asked or lesson.question)
+    return write(scene, path, language=lesson.language, home=home, exercise=exercise)
+
+
+def heading(lesson: Lesson) -> str:
+    """Return number and title of a lesson, as HTML."""
+    return escape(lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}")
+
+
+def _link(lesson: Lesson, relation: str, form: str) -> str:
+    text = form.format(heading(lesson))
+    return f'<a rel="{relation}" href="../{_address(lesson.folder.name, INDEX)}">{text}</a>'
+
+
+def _page(name: str, said: Words, **values: str) -> str:
+    """Fill in a page: ``$page_all`` is what the catalogue has for "page-all"."""
+    page = Template(asset(name))
+    version = own_version()
+    values |= {
+        name: escape(said.say(name.replace("_", "-")))
+        for name in page.get_identifiers()
+        if name.startswith("page_")
+    }
+    made_with = escape(said.say("page-made-with", version=version))
+    known = {"language": said.language, "version": escape(version), "made_with": made_with}
+    return page.substitute(values, **known)
+
+
+_PACKED: Final = ("imsmanifest.xml", "index.html", "scorm.js")
+"""What a package has besides the live page."""
+
+
+def package(lesson: Lesson, path: str | Path) -> Path:
+    """Write the SCORM 1.2 package of a lesson, in its language: a zip file, whole or not at all.
+
+    Raises
+    ------
+    LessonError
+        If the lesson has no live page with an exercise, which is what is in the package.
+    OSError
+        If it cannot be written.
+    """
+    if lesson.page is None or lesson.name not in EXERCISES:
+        text = "a package is a live page with an exercise, and it has none"
+        raise unusable(lesson.folder, text)
+    values = {
+        # An XML name begins with a letter and has no spaces.
+        "identifier": "chutelab-" + re.sub(r"[^A-Za-z0-9_.-]", "-", lesson.name),
+        "title": printable(heading(lesson)),
+        "language": lesson.language,
+        "page": LIVE,
+        "alone": escape(words(lesson.language).say("scorm-alone")),
+    }
+    contents = {}
+    for name in _PACKED:
+        text = asset(f"scorm/{name}")
+        said = text if name.endswith(".js") else Template(text).substitute(values)
+        contents[name] = said.encode("utf-8")
+    with whole(path) as made:
+        live_page(lesson, page := made.with_name(LIVE))
+        _zip(made, {**contents, LIVE: page.read_bytes()})
+    return Path(path)
+
+
+def _zip(path: Path, contents: Mapping[str, bytes]) -> None:
+    """Write a zip file; the same contents make the same bytes."""
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        for name, data in contents.items():
+            entry = ZipInfo(name)  # of 1980
+            entry.create_system = 3  # Unix, wherever it is made
+            entry.external_attr = 0o644 << 16
+            entry.compress_type = ZIP_DEFLATED
+            archive.writestr(entry, data)
+
+
+_SOURCES: Final = (".c", ".h", ".pyc", ".ts")
+"""Endings of files that a wheel does without."""
+
+_FORM: Final = b"""\
+Wheel-Version: 1.0
+Generator: chutelab
+Root-Is-Purelib: true
+Tag: py3-none-any
+"""
+
+
+def write_wheel(folder: Path) -> Path:
+    """Write the wheel of this chutelab into a folder, which is made, for those who get the pages.
+
+    It is made of chutelab's own files, in a checkout with the scenes and lessons beside ``src``,
+    and of what the installer keeps: no network, no tools for building. The form is that of the
+    binary distribution format, PEP 427. The same chutelab gives the same bytes.
+
+    Raises
+    ------
+    MissingLibraryError
+        If chutelab is not installed, so that nothing says what it needs.
+    OSError
+        If it cannot be written.
+    """
+    try:
+        installed = distribution("chutelab")
+    except PackageNotFoundError as error:
+        text = "the wheel for students is made of an installed chutelab; install it, or --no-wheel"
+        raise MissingLibraryError(text) from error
+    package = Path(__file__).parents[2]
+    places = {"chutelab": package}
+    if not (package / "data").is_dir():
+        beside = package.parents[1]
+        places |= {f"chutelab/data/{one}": beside / one for one in ("scenes", "lessons")}
+    contents = {}
+    for place, home in places.items():
+        for path in home.rglob("*"):
+            name = path.relative_to(home)
+            hidden = any(part.startswith(".") for part in name.parts)
+            if path.is_file() and path.suffix not in _SOURCES and not hidden:
+                contents[f"{place}/{name.as_posix()}"] = path.read_bytes()
+    contents = dict(sorted(contents.items()))
+    about = f"chutelab-{installed.version}.dist-info"
+    for file in ("METADATA", "entry_points.txt", "licenses/LICENSE"):
+        contents[f"{about}/{file}"] = (installed.read_text(file) or "").encode("utf-8")
+    contents[f"{about}/WHEEL"] = _FORM
+    record = ""
+    for file, data in contents.items():
+        digest = urlsafe_b64encode(sha256(data).digest()).rstrip(b"=").decode("ascii")
+        record += f"{file},sha256={digest},{len(data)}\n"
+    contents[f"{about}/RECORD"] = f"{record}{about}/RECORD,,\n".encode()
+    folder.mkdir(parents=True, exist_ok=True)
+    made = folder / f"chutelab-{installed.version}-py3-none-any.whl"
+    _zip(made, contents)
+    return made

@@ -1,0 +1,278 @@
+"""Options of commands, said once: type and default in the signature, the rest in the docstring.
+
+::
+
+    @command("Find the angle, speed, distance ... that does what you want.")
+    def solve(scene: SceneName, *, vary: tuple[str, ...], points: int = 181, quiet: bool) -> None:
+        '''Change SCENE until a quantity has the value wanted.
+
+        --vary KEY=FROM:TO  A key of the scene and the range to search. [required]
+        --points N  How many values to look at first. [default]
+        '''
+
+Parameters before the star are arguments. A tuple may be given several times, a `bool` is a flag, a
+`Literal` a choice; ``Annotated`` adds how a value is read, or how a shell completes it. What is not
+in the docstring is one of `SHARED`. A parameter that is a dataclass stands for all its fields.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import is_dataclass
+from errno import EINVAL, ELOOP, ENAMETOOLONG
+from functools import wraps
+from inspect import Parameter, cleandoc, signature
+from pathlib import Path
+from types import UnionType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+import click
+from click.shell_completion import CompletionItem
+
+from chutelab.cli.program import RefusedError, main
+from chutelab.util.errors import cut, printable
+from chutelab.util.files import check, refuse_other, together, writing
+from chutelab.util.tables import plain
+
+if TYPE_CHECKING:
+    from chutelab.scene import Scene
+
+SHARED = """
+--set KEY=VALUE  Change a key of the scene, such as plate.angle_deg=20 or particle.radius=4mm. May
+    be repeated.
+--engine  Same as --set run.engine=...
+--dt S  Same as --set run.dt=S.
+--json  Print one JSON object instead of tables.
+-q, --quiet  Print nothing, and show no progress bar.
+"""
+"""Options of several commands."""
+
+_ENTRY = re.compile(r"^(-.*?)  +(.*(?:\n    .*)*)\n?", re.MULTILINE)
+
+
+def command(
+    short: str | None = None, group: click.Group = main, *, cls: type[click.Command] = click.Command
+) -> Callable[[Callable[..., None]], click.Command]:
+    """Make a command of a group of a function, whose docstring becomes its help.
+
+    Paragraphs that begin with ``chutelab``, or have indented lines, keep their lines.
+    """
+
+    def made(function: Callable[..., None]) -> click.Command:
+        parts: dict[str, Any] = {}
+        parameters = list(_parameters(function, parts))
+
+        @wraps(function)
+        def told(**values: Any) -> None:
+            for name, kind in parts.items():
+                values[name] = kind(**{one: values.pop(one) for one in signature(kind).parameters})
+            function(**values)
+
+        text = _ENTRY.sub("", cleandoc(function.__doc__ or ""))
+        text = re.sub(r"\n\n+(?=chutelab |.*\n +\S)", "\n\n\b\n", text)
+        name = function.__name__.rstrip("_")
+        new = cls(name, None, told, parameters, help=text, short_help=short)
+        group.add_command(new)
+        return new
+
+    return made
+
+
+def _parameters(taker: Callable[..., Any], parts: dict[str, Any]) -> Iterator[click.Parameter]:
+    """Yield what a function or a dataclass takes; note in `parts` the dataclasses among it."""
+    entries = _ENTRY.findall(SHARED) + _ENTRY.findall(cleandoc(taker.__doc__ or ""))
+    told = {re.findall("--([a-z0-9-]+)", form)[0]: (form, text) for form, text in entries}
+    hints = get_type_hints(taker, include_extras=True)
+    for name, parameter in signature(taker).parameters.items():
+        kind, extras, several = hints[name], list[Any](), False
+        if is_dataclass(kind):
+            parts[name] = kind
+            yield from _parameters(kind, parts)  # type: ignore[arg-type]
+            continue
+        while (form := get_origin(kind)) in (Annotated, tuple, Union, UnionType):
+            several = several or form is tuple
+            kind, *others = get_args(kind)
+            extras += others if form is Annotated else []
+        usual: Any = FileName(path_type=Path) if kind is Path else kind
+        if get_origin(kind) is Literal:
+            usual = click.Choice(get_args(kind))
+        read = next((one for one in extras if isinstance(one, click.ParamType)), usual)
+        needed = parameter.default is Parameter.empty
+        offer = next((one for one in extras if one is not read), None)
+        settings: dict[str, Any] = {
+            "type": read,
+            "shell_complete": offer and (lambda _ctx, _parameter, begun, offer=offer: offer(begun)),
+        }
+        if not (needed or several):
+            settings["default"] = parameter.default
+        if parameter.kind is not Parameter.KEYWORD_ONLY:
+            form = name.upper().removesuffix("S") if several else name.upper()
+            form = (form if needed else f"[{form}]") + "..." * several
+            nargs = -1 if several else 1
+            yield click.Argument([name], metavar=form, nargs=nargs, required=needed, **settings)
+            continue
+        long = name.rstrip("_").replace("_", "-")
+        form, text = told.get(long, (f"--{long}", ""))  # `python -OO` has no docstrings
+        words = form.replace(" / ", "/").replace(", ", " ").split()
+        if kind is bool:
+            settings |= {"type": None, "is_flag": True}
+        yield click.Option(
+            [name, *(word for word in words if word[0] == "-")],
+            metavar=words[-1] if words[-1][0] != "-" else None,
+            multiple=several,
+            help=re.sub(r" \[(default|required)\]$", "", " ".join(text.split())),
+            show_default=text.endswith("[default]"),
+            required=text.endswith("[required]"),
+            **settings,
+        )
+
+
+def complete_scene(begun: str) -> list[CompletionItem]:
+    """Offer the shipped scenes that begin so, and files."""
+    from chutelab.scene import about
+
+    titles = {scene.name: scene.title for scene in about()}
+    return [*beginning(titles, begun), CompletionItem(begun, type="file")]
+
+
+def beginning(told: Mapping[str, str], begun: str) -> list[CompletionItem]:
+    """Offer the names that begin so, with what is told of each."""
+    return [CompletionItem(n, help=text) for n, text in told.items() if n.startswith(begun)]
+
+
+class Number(click.FloatRange):
+    """A number in a range, called so in what click says of anything else."""
+
+    name = "number"
+
+
+class Count(click.IntRange):
+    """A whole number in a range, called so in what click says of anything else."""
+
+    name = "whole number"
+
+
+DEEPEST = 200
+"""Folders inside each other in a name; each made needs a call inside the one before."""
+
+
+class FileName(click.Path):
+    """The name of a file or folder, refused where the system can have none that is called so."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the name as `click.Path` does."""
+        said = cut(printable(str(value)), 60)
+        try:
+            os.lstat(value)
+        except ValueError:
+            self.fail(f"'{said}': no file can have this name.", param, ctx)
+        except OSError as error:
+            if error.errno in (EINVAL, ELOOP, ENAMETOOLONG):
+                self.fail(f"'{said}': {error.strerror}.", param, ctx)
+        if len(Path(value).parts) > DEEPEST:
+            self.fail(f"'{said}': more than {DEEPEST} folders deep.", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class FolderName(FileName):
+    """The name of a folder, which is made where there is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the name as a path."""
+        if value == "":
+            self.fail("the name of a folder is empty", param, ctx)
+        return Path(super().convert(value, param, ctx))
+
+
+PICTURES = (".png", ".svg", ".pdf")
+"""What pictures may be written as, by suffix."""
+
+Texts = tuple[str, ...]
+SceneName = Annotated[str, complete_scene]
+Engine = Literal["auto", "exact", "contact", "pymunk"] | None
+Seconds = Annotated[float, Number(min=0.0, min_open=True)]
+Folder = Annotated[Path | None, FolderName()]
+
+
+def loaded_as_told(
+    name: str, overrides: Sequence[str], engine: str | None = None, dt: float | None = None
+) -> Scene:
+    """Load a scene with what ``--set``, ``--engine`` and ``--dt`` change; its title says so."""
+    from chutelab.scene import load
+    from chutelab.scene.overrides import Override
+
+    settings: list[str | Override] = list(overrides)
+    if engine is not None:
+        settings.append(Override("run.engine", engine, f"--engine {engine}"))
+    if dt is not None:
+        settings.append(Override("run.dt", dt, f"--dt {dt:.12g}"))
+    return retitled(load(name, settings), overrides)
+
+
+def retitled(scene: Scene, changes: Sequence[str]) -> Scene:
+    """Return a scene whose title says what was changed of its machine, each ``KEY=VALUE``.
+
+    Titles name numbers, such as "2 m/s": a picture of another machine must not go by them alone.
+    """
+    if any(change.partition("=")[0].strip() == "title" for change in changes):
+        return scene
+    stripped = [change.strip() for change in changes]
+    told = [change for change in stripped if not change.startswith(("run.", "live."))]
+    if not told:
+        return scene
+    title = f"{scene.title}; with {', '.join(told)}"
+    return scene.model_copy(update={"title": title if len(title) <= 200 else f"{title[:198]} …"})
+
+
+@contextmanager
+def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path | None]:
+    """Give an empty folder to write to; at the end its files move to `folder`, which is made.
+
+    To be entered before a long run: refused at once is what cannot be written to, is no folder, or
+    has folders in it that are called like the files, `names`. None stays None.
+    """
+    if folder is None:
+        yield None
+        return
+    try:
+        for name in names:
+            refuse_other(folder / name)
+        with together(folder) as unfinished:
+            yield unfinished
+    except OSError as error:
+        named = Path(error.filename or folder)
+        if named not in (folder, *folder.parents) and folder not in named.parents:
+            raise
+        reason = error.strerror or str(error)
+        raise RefusedError(f"--out {folder}: cannot be written to: {reason}") from error
+
+
+def check_file(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> None:
+    """Refuse, before anything runs, the file of an option if it cannot be written.
+
+    So if it does not end in one of `suffixes`, if there are some.
+    """
+    if path is None:
+        return
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise RefusedError(f"{option} {path}: give a name that ends in {' or '.join(suffixes)}")
+    with writing(f"{option} {path}".strip()):
+        check(path)
+
+
+def write_json(value: Any, path: Path) -> None:
+    """Write one JSON object into a file, see `chutelab.util.tables.plain`."""
+    path.write_text(json.dumps(plain(value), indent=1, allow_nan=False) + "\n", encoding="utf-8")

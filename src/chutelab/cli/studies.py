@@ -1,0 +1,418 @@
+"""``sweep``, ``solve`` and ``compare``: many variants of a scene, the right one, a measured one."""
+
+from __future__ import annotations
+
+import csv
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import click
+from click.shell_completion import CompletionItem
+
+from chutelab.cli import console
+from chutelab.cli.console import progress, tell
+from chutelab.cli.options import (
+    PICTURES,
+    Count,
+    Engine,
+    FileName,
+    Folder,
+    SceneName,
+    Texts,
+    beginning,
+    check_file,
+    command,
+    destination,
+    loaded_as_told,
+    retitled,
+    write_json,
+)
+from chutelab.cli.program import RefusedError
+from chutelab.util.files import write_lines, writing
+
+if TYPE_CHECKING:
+    from chutelab.scene import Scene
+    from chutelab.studies.design.uncertainty import Uncertainty
+
+
+def complete_column(begun: str) -> list[CompletionItem]:
+    """Offer the columns of a sweep that begin so."""
+    from chutelab.scene.quantities import COLUMNS
+
+    return beginning({name: row.meaning for name, row in COLUMNS.items()}, begun)
+
+
+class _Listing(click.Command):
+    """A command whose help ends with the columns of a sweep."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the columns; the registry is loaded for this help only."""
+        from chutelab.scene.quantities import COLUMNS
+        from chutelab.scene.units import with_unit
+
+        with formatter.section("Columns"):
+            formatter.write_dl(
+                [(n, with_unit(row.meaning, row.unit)) for n, row in COLUMNS.items()]
+            )
+
+
+@command("Simulate many variants of a scene; a row for each.", cls=_Listing)
+def sweep(
+    scene: SceneName,
+    *,
+    vary: Texts,
+    uncertainty: Texts,
+    sample: int | None,
+    design: Literal["lhs", "sobol"] = "lhs",
+    seed: int = 0,
+    engine: Engine,
+    set_: Texts,
+    out: Path | None,
+    resume: bool,
+    plot: Path | None,
+    of: Annotated[str, complete_column] = "landing.vx.mean",
+    jobs: Annotated[int, Count(min=0)] = 1,
+    scheduler: str | None,
+    json_: bool,
+    quiet: bool,
+) -> None:
+    """Simulate all variants of SCENE and say what happened in each.
+
+    A variant that is impossible, or misses the outgoing belt, is a row with its reason. Rows that
+    are finished are kept beside --out FILE until all are: --resume goes on after an interruption,
+    and writes the same file as a sweep that was not interrupted. Rows that were changed meanwhile
+    are refused, and so is a file that another sweep is writing.
+
+    Columns are the varied keys, then those below, in SI units, then touches (the surfaces that
+    particles meet, in order, up to the landing; bounces in a row on one count once) and reason
+    (why there are no numbers, or not all). Maps are hatched where no particle meets the plate.
+
+    With --uncertainty, statistics are also told by what is touched: a stream that misses the plate
+    in half of all cases has two kinds of outcome, and their mean may be near to neither.
+
+    What the ledger has is counted up to run.until, which is the landing unless said: a slip that
+    goes on after it is not in it. With --set run.until=settled it is, as it always is in belt_work
+    and slip_heat, of chutelab solve and with --uncertainty.
+
+    --vary KEY=FROM:TO:COUNT  A key of the scene and its values, such as plate.angle_deg=0:60:61 or
+        incoming.speed=2,4. May be repeated: all combinations are simulated.
+    --uncertainty KEY=VALUE±SPREAD  Instead of --vary: what is not exactly known, such as
+        plate.restitution=0.5±0.05, where 0.05 is the standard deviation (with :uniform at the end
+        the half-width). Says how uncertain that makes landing and belt work, for each kind of
+        outcome, and which key matters most.
+    --sample N  Draw N samples from ranges, --vary KEY=FROM:TO, instead of a grid.
+    --design  How samples are drawn: a Latin hypercube, or Sobol points.
+    --seed  Seed of the samples. [default]
+    --out FILE  Write all rows into this file, .csv or .parquet.
+    --resume  Go on with an interrupted sweep that was to write this file.
+    --plot FILE  Draw one or two varied keys into this file: lines, or a heat map.
+    --of COLUMN  What to draw. [default]
+    --jobs N  Spread the work over N processes; 0 is one for each processor.
+    --scheduler ADDRESS  Spread it over a Dask cluster instead.
+    --json  Print one JSON object with all columns.
+    -q, --quiet  Print no summary and no progress bar.
+    """
+    from chutelab.studies.sweep import (
+        COLUMNS,
+        LostWorkersError,
+        crew,
+        no_column,
+        planned,
+        sweep_to,
+        swept_by,
+    )
+
+    wrote = "\n".join(f"wrote {path}" for path in (out, plot) if path is not None)
+    if bool(vary) == bool(uncertainty):
+        raise click.UsageError("Give either --vary, what to vary, or --uncertainty.")
+    if scheduler is not None and jobs != 1:
+        raise click.UsageError("--jobs and --scheduler: give one of them.")
+    if resume and out is None:
+        raise click.UsageError("--resume goes on with the file of --out: give --out too.")
+    if uncertainty:
+        if resume or scheduler is not None or jobs != 1:
+            raise click.UsageError("--resume, --jobs and --scheduler go with --vary only.")
+        from chutelab.studies.design.uncertainty import as_dict
+
+        loaded = loaded_as_told(scene, set_, engine)
+        spread = _propagated(loaded, uncertainty, sample, seed, out, plot, quiet)
+        tell(as_dict(spread), spread, as_json=json_, quiet=quiet, wrote=wrote)
+        return
+    loaded = loaded_as_told(scene, set_)
+    if of not in COLUMNS:
+        raise RefusedError(f"--of {no_column(of)}")
+    check_file("--plot", plot, PICTURES)
+    check_file("--out", out)
+    try:
+        plan = planned(loaded, vary, sample=sample, design=design, seed=seed, engine=engine)
+        varied = sum(len(set(one.values)) > 1 for one in plan.varies)
+        if plot is not None and varied > 2:
+            raise RefusedError(f"--plot draws one or two varied keys, not {varied}")
+        what = f"{plan.count:,} variants"
+        with (
+            _unlogged() if scheduler else nullcontext(),
+            crew(jobs, scheduler) as team,
+            progress(what, quiet=quiet, left=True) as update,
+        ):
+            if out is None:
+                found = swept_by(plan, team, progress=update)
+            else:
+                found = sweep_to(plan, out, team, resume=resume, progress=update)
+    except LostWorkersError as error:
+        raise click.ClickException(". ".join(filter(None, (str(error), _kept(out))))) from error
+    except KeyboardInterrupt:
+        if said := _kept(out):
+            console.say(f"\n{said}", err=True)
+        raise
+    if plot is not None:
+        from chutelab.pictures.plots.design import sweep_figure
+
+        with writing(f"--plot {plot}"):
+            sweep_figure(found, of).write(plot)
+    told = {"scene": found.title, "variants": len(found), "columns": found.columns}
+    tell(told, found, as_json=json_, quiet=quiet, wrote=wrote)
+
+
+def _propagated(
+    scene: Scene,
+    given: Sequence[str],
+    samples: int | None,
+    seed: int,
+    out: Path | None,
+    plot: Path | None,
+    quiet: bool,
+) -> Uncertainty:
+    """Propagate uncertain inputs; write all samples as CSV, and a picture, where asked for."""
+    from chutelab.studies import design
+    from chutelab.studies.design.uncertainty import SAMPLES
+
+    check_file("--out", out, (".csv",))
+    check_file("--plot", plot, PICTURES)
+    count = SAMPLES if samples is None else samples
+    with progress("propagating", quiet=quiet) as meter:
+        found = design.uncertainty(scene, given, samples=count, seed=seed, progress=meter)
+    with writing():
+        if out is not None:
+            write_lines(out, [found.csv()])
+        if plot is not None:
+            from chutelab.pictures.plots.design import spread
+
+            spread(found).write(plot)
+    return found
+
+
+@contextmanager
+def _unlogged() -> Iterator[None]:
+    """Keep Dask from logging tracebacks of what is said in one message here."""
+    before = logging.root.manager.disable
+    logging.disable()
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
+def _kept(out: Path | None) -> str:
+    """Say where the finished rows are, if there are some."""
+    from chutelab.studies.sweep.part import part_of
+
+    if out is None or not part_of(out).exists():
+        return ""
+    return f"{part_of(out)} has the finished rows; --resume goes on."
+
+
+SOLVED = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json")
+"""What ``--out`` may write: scan.png with one key, nearest.toml if there is no solution."""
+
+
+@command("Find the angle, speed, distance ... that does what you want.")
+def solve(
+    scene: SceneName,
+    *,
+    vary: Texts,
+    target: Texts,
+    minimize: str | None,
+    maximize: str | None,
+    points: int = 181,
+    seed: int = 0,
+    set_: Texts,
+    out: Folder,
+    json_: bool,
+    quiet: bool,
+) -> None:
+    r"""Change SCENE until a quantity has the value wanted, or is as small or as large as it can be.
+
+    chutelab solve inclined-20 --vary plate.angle_deg=0:80 --target landing.vx=1
+    chutelab solve inclined-20 --vary plate.angle_deg=0:80 --minimize belt_work
+    chutelab solve inclined-20 --vary plate.angle_deg=20:60 \
+        --vary plate.restitution=0.1:0.9 --target landing.vx=1 --target landing.x=0.3
+
+    Quantities are those of `chutelab quantities`, such as landing.x, x3, belt_work or
+    ledger.by_surface.plate.restitution_loss. Of several particles say whose: particles[0].landing.x
+    is the first one's, landing.x.mean and arrival.vx.spread are the stream's. Belt work falls
+    steadily as particles land faster, and is negative above the belt's speed; what is least at that
+    speed is slip_heat.
+
+    With one key all solutions in its range are found, and jumps are not taken for solutions. The
+    exit code is 1 if there is no solution; the nearest thing to one is shown then. It needs pip
+    install "chutelab[design]".
+
+    --vary KEY=FROM:TO  A key of the scene and the range to search, such as plate.angle_deg=0:80.
+        May be repeated. [required]
+    --target QUANTITY=VALUE  What should be: VALUE is a number, with or without unit, a key of the
+        scene or another quantity. May be repeated with as many --vary.
+    --minimize QUANTITY  Make this as small as possible.
+    --maximize QUANTITY  Make this as large as possible.
+    --points N  With one --vary: how many values to look at first. [default]
+    --seed N  With several: of the random draws of the search. [default]
+    --out DIR  Write the overlay at the answer, the scene there, a picture of the search and its
+        numbers into this folder.
+    -q, --quiet  Print no answer and no progress bar.
+    """
+    from rich.text import Text
+
+    from chutelab.engines.simulation import simulate
+    from chutelab.scene import to_toml
+    from chutelab.studies import design
+    from chutelab.studies.design.answers import as_dict
+
+    if len([goal for goal in (target, minimize, maximize) if goal]) != 1:
+        raise click.UsageError("Give one of --target, --minimize and --maximize.")
+    loaded = loaded_as_told(scene, set_)
+    written = []
+    with destination(out, SOLVED) as place:
+        with progress("searching", quiet=quiet) as meter:
+            search = partial(design.solve, target=target)
+            if minimize:
+                search = partial(design.minimize, quantity=minimize)
+            if maximize:
+                search = partial(design.maximize, quantity=maximize)
+            found = search(loaded, vary, points=points, seed=seed, progress=meter)
+        if place is not None:
+            from chutelab.pictures.plots import overlay
+            from chutelab.pictures.plots.design import scan
+
+            with progress("drawing", quiet=quiet):
+                write_json(as_dict(found), place / "solve.json")
+                if found.scan is not None:
+                    scan(found).write(place / "scan.png")
+                if found.solved or found.nearest:
+                    values = zip(found.ranges, found.answer.values, strict=True)
+                    told = [f"{one.key}={value:.4g}" for one, value in values]
+                    at = retitled(found.scene, told)
+                    outcome = "solution" if found.solved else "no solution, the nearest to one"
+                    name = "solution.toml" if found.solved else "nearest.toml"
+                    text = to_toml(at, f"{found.asked}: {outcome}.")
+                    (place / name).write_text(text, encoding="utf-8")
+                    overlay(simulate(at), path=place / "overlay.png")
+            written = sorted(file.name for file in place.iterdir())
+    title = Text(found.base.title, style="bold")
+    wrote = f"\nwrote into {out}: {', '.join(written)}" if out else ""
+    tell(as_dict(found), title, *found.sheets(), as_json=json_, quiet=quiet, wrote=wrote)
+    if not found.solved:
+        click.get_current_context().exit(1)
+
+
+COMPARED = ("compare.png", "points.csv", "fit.json")
+
+
+@command("Compare measured points with a scene; fit the scene to them.")
+def compare(
+    scene: SceneName,
+    *,
+    data: Annotated[str, FileName()],
+    track: str | None,
+    columns: str = "",
+    fps: float | None,
+    scale: float | None,
+    origin: str = "0,0",
+    flip_y: bool,
+    t0: float = 0.0,
+    fit: Texts,
+    robust: bool,
+    set_: Texts,
+    out: Folder,
+    json_: bool,
+) -> None:
+    r"""Lay the points of a film over SCENE, and say how far off they are.
+
+    FILE is a table with a line that names its columns t, x and y, such as the video-analysis
+    program Tracker exports: tabs, semicolons or commas between cells, decimal points or commas,
+    other columns and empty cells do no harm. Of other files --columns says which are t, x and y;
+    a file of three columns of numbers needs no names. --fps is for files without times: with
+    --columns X,Y every line is a frame, with --columns FRAME,X,Y the first counts them. In the
+    world, x = M (x_file - X), and y likewise, with
+    --flip-y downward; the clock is t_file - S.
+
+    chutelab compare perpendicular --data perpendicular-track
+    chutelab compare perpendicular --data perpendicular-track \
+        --fit plate.restitution,incoming.speed --out out
+    chutelab compare my.toml --data film.txt --scale 0.0021 --origin 312,95 --flip-y --fit t0
+    chutelab compare my.toml --data ball.csv --columns "frame,ball x,ball y" --fps 240
+
+    The shipped track perpendicular-track is not a film: it was made from a simulation with
+    restitution 0.62 and 1.9 m/s, seen at 120 frames a second with an error of 1 mm in each
+    coordinate. So it is known what a fit to it should find.
+
+    --fit takes any number of the scene, which starts at the scene's value and stays within what the
+    scene allows, and t0 (which is searched for everywhere), scale, origin.x and origin.y. What the
+    points cannot determine is refused by name. The uncertainties are standard deviations, s²
+    (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
+    hold if errors are independent and the model is right. Needs pip install "chutelab[fit]".
+
+    --data FILE  A table with columns t, x, y, such as Tracker exports, or a shipped track.
+        [required]
+    --track NAME  Which track, of a file that holds several.
+    --columns T,X,Y  Which columns are t, x and y: names or numbers, such as 1,4,5; default: t,x,y.
+    --fps F  Frames per second, for a file without times: each line is a frame.
+    --scale M  Metres per unit of the file; by default what its header says, else 1.
+    --origin X,Y  The origin of the scene, such as the pulley's axis, in the units of the file.
+    --flip-y  y is counted downward in the file, as pixels are.
+    --t0 S  Time in the file at which the particle is released: t = 0 of the simulation.
+    --fit KEYS  Fit these, such as plate.restitution,incoming.speed. May be repeated.
+    --robust  With --fit: give points far off less weight.
+    --out DIR  Write compare.png, points.csv and, with --fit, fit.json into this folder.
+    """
+    from rich.console import RenderableType
+    from rich.text import Text
+
+    from chutelab.studies import measured
+    from chutelab.studies.measured.result import advice, as_dict, points_csv
+    from chutelab.util.tables import wrapped
+
+    keys = tuple(key.strip() for value in fit for key in value.split(","))
+    if robust and not keys:
+        raise click.UsageError("--robust is for fits: name what to fit with --fit.")
+    try:
+        x, y = map(float, origin.split(","))
+    except ValueError:
+        said = f"{origin!r}: two numbers X,Y, such as 320,95.5"
+        raise click.BadParameter(said, param_hint="'--origin'") from None
+    loaded = loaded_as_told(scene, set_)
+    film = measured.read(
+        data, scale=scale, origin=(x, y), flip_y=flip_y, t0=t0, track=track,
+        columns=next(csv.reader([columns], skipinitialspace=True), ()), fps=fps,
+    )  # fmt: skip
+    with destination(out, COMPARED) as place:
+        with progress("fitting" if keys else "comparing"):
+            fitted = measured.fit(loaded, film, keys, robust=robust) if keys else None
+            found = measured.residuals(loaded, film) if fitted is None else fitted.after
+        if place is not None:
+            from chutelab.pictures.plots.measured import measured as draw
+
+            with progress("drawing"):
+                draw(found, fitted).write(place / "compare.png")
+                (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
+                if fitted is not None:
+                    write_json(as_dict(found, fitted), place / "fit.json")
+    head = Text(found.recording.title, style="bold").append(f"\n{film.said()}", style="not bold")
+    parts: list[RenderableType] = [head, found] if fitted is None else [head, fitted, found]
+    if fitted is None and (advised := advice(found)):
+        parts.append(Text("\n" + "\n".join(wrapped(f"note: {advised}"))))
+    names = [name for name in COMPARED if fitted is not None or name != "fit.json"]
+    wrote = f"wrote into {out}: {', '.join(names)}" if out else ""
+    tell(as_dict(found, fitted), *parts, as_json=json_, wrote=wrote)

@@ -1,0 +1,409 @@
+"""What a piece of a surface is, straight or bent: the one place that says what its shape means.
+
+Nearest point, gap, normal, ends, box, and the path to draw it: for what draws machines, says where
+their parts are, and checks runs. An engine must not use it to find a contact, nor may the core to
+judge a run (`barriers.c`): each has detection of its own, so that none of them, nor a check made
+of this, repeats another's mistake.
+
+Arrays are of S pieces, (S,), and vectors (S, 2), in a family (N, S) and (N, S, 2); `Pieces.of`
+picks some of them, or one. Places (..., 2) are broadcast against the pieces: many places (c, 2)
+against one piece, or each against its own.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from functools import cached_property
+from math import ceil, pi, radians
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.trig import sin_cos
+
+FINE = radians(3.0)
+"""Between two points of a path to draw: it is off by 3e-4 of the radius of curvature at most."""
+
+VECTORS = {"start", "tangent", "center"}
+"""Fields with two components, the last axis."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Pieces(ABC):
+    """What S pieces of surfaces have, whatever their shape: read-only arrays.
+
+    Attributes
+    ----------
+    speed : ndarray, (..., S)
+        Speed of the surface, along the tangent of a segment, clockwise round an arc, m/s.
+    restitution, friction : ndarray, (..., S)
+        Of the pair with a particle; (K, S) where there are several kinds of particles.
+    surface : ndarray, (S,)
+        Index of the surface a piece belongs to, into `Machine.surfaces`.
+    appears, vanishes : ndarray, (S,)
+        From when to when it is there, s; -inf and inf if always.
+    """
+
+    speed: Floats
+    restitution: Floats
+    friction: Floats
+    surface: Ints
+    appears: Floats
+    vanishes: Floats
+
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            if isinstance(array, np.ndarray):
+                array.flags.writeable = False
+
+    def of(self, which: Any) -> Self:
+        """Return some of the pieces, or one, of numbers instead of arrays, by their numbers."""
+        own: dict[str, Any] = {}
+        for field in fields(self):
+            array, rest = getattr(self, field.name), (slice(None),) * (field.name in VECTORS)
+            own[field.name] = array[(..., which, *rest)][()]
+        return type(self)(**own)
+
+    @property
+    def gate(self) -> Bools:
+        """Which are not always there."""
+        return np.isfinite(self.appears) | np.isfinite(self.vanishes)
+
+    def there(self, t: Any, late: float = 0.0) -> Bools:
+        """Tell whether it is there at times (s), or was until no longer than `late` (s) ago."""
+        return np.asarray((self.appears <= t) & (t < self.vanishes + late))
+
+    @property
+    @abstractmethod
+    def way(self) -> Floats:
+        """How long each is, m."""
+
+    @property
+    @abstractmethod
+    def whole(self) -> Bools:
+        """Which go all round, without ends."""
+
+    @property
+    @abstractmethod
+    def ends(self) -> tuple[Floats, Floats]:
+        """First and last point, (..., S, 2) each, m; one and the same of what is `whole`."""
+
+    @property
+    @abstractmethod
+    def inward(self) -> tuple[Floats, Floats]:
+        """Unit vectors along each from its first and from its last point, (..., S, 2) each."""
+
+    @property
+    @abstractmethod
+    def boxes(self) -> tuple[Floats, Floats]:
+        """Lower left and upper right corner of a box that holds each, (..., S, 2), m."""
+
+    @property
+    @abstractmethod
+    def corners(self) -> Floats:
+        """Points of each that its narrowest box goes through, (..., C, 2), m."""
+
+    @abstractmethod
+    def away(self, places: Floats) -> Floats:
+        """Return the way to places from the nearest points, (..., 2), m."""
+
+    @abstractmethod
+    def normal(self, places: Floats) -> Floats:
+        """Return unit normals of the faces beside places, (..., 2), to the left of a segment."""
+
+    @abstractmethod
+    def at(self, way: ArrayLike) -> Floats:
+        """Return the points of one piece so far (m) along it, where a positive speed leads."""
+
+    @abstractmethod
+    def path(self) -> Floats:
+        """Return the points (P, 2) through which to draw one piece, m, as `at` has them."""
+
+    @abstractmethod
+    def where(self) -> str:
+        """Say where one piece is."""
+
+    def nearest(self, places: Floats) -> Floats:
+        """Return the nearest points to places, (..., 2), m."""
+        return np.asarray(places - self.away(places))
+
+    def gap(self, places: Floats, radius: ArrayLike = 0.0) -> Floats:
+        """Return the gaps (...) to disks round places, m; negative where they overlap."""
+        return np.asarray(np.hypot(*np.moveaxis(self.away(places), -1, 0)) - radius)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Segments(Pieces):
+    """Straight two-sided surfaces, world frame, SI units.
+
+    Attributes
+    ----------
+    start, tangent : ndarray, (..., S, 2)
+        First end, and unit vector towards the second.
+    length : ndarray, (..., S)
+        m.
+    """
+
+    start: Floats
+    tangent: Floats
+    length: Floats
+
+    @property
+    def end(self) -> Floats:
+        """Second end, (..., S, 2), m."""
+        return np.asarray(self.start + self.length[..., None] * self.tangent)
+
+    @property
+    def way(self) -> Floats:
+        return self.length
+
+    @property
+    def whole(self) -> Bools:
+        return np.zeros(self.length.shape, dtype=bool)
+
+    @property
+    def ends(self) -> tuple[Floats, Floats]:
+        return self.start, self.end
+
+    @property
+    def inward(self) -> tuple[Floats, Floats]:
+        return self.tangent, -self.tangent
+
+    @property
+    def boxes(self) -> tuple[Floats, Floats]:
+        return np.minimum(self.start, self.end), np.maximum(self.start, self.end)
+
+    @property
+    def corners(self) -> Floats:
+        return np.concatenate(self.ends, axis=-2)
+
+    def away(self, places: Floats) -> Floats:
+        from_start = places - self.start
+        along = (from_start * self.tangent).sum(axis=-1).clip(0.0, self.length)
+        return np.asarray(from_start - along[..., None] * self.tangent)
+
+    def normal(self, places: Floats) -> Floats:
+        left = np.stack([-self.tangent[..., 1], self.tangent[..., 0]], axis=-1)
+        return np.broadcast_to(left, np.broadcast_shapes(left.shape, places.shape))
+
+    def at(self, way: ArrayLike) -> Floats:
+        return np.asarray(self.start + np.asarray(way)[..., None] * self.tangent)
+
+    def path(self) -> Floats:
+        return np.stack(self.ends)
+
+    def where(self) -> str:
+        # Rounding leaves 1e-17 where 0 is meant.
+        (x0, y0), (x1, y1) = np.round(self.ends, 12) + 0.0
+        return f"from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Arcs(Pieces):
+    """Two-sided surfaces bent round a centre, and whole circles, world frame, SI units.
+
+    Attributes
+    ----------
+    center : ndarray, (..., S, 2)
+        m.
+    radius : ndarray, (..., S)
+        m; a particle may be inside or outside.
+    begin, extent : ndarray, (..., S)
+        Angle of the first end from the x axis, counterclockwise, and how far the arc reaches
+        from there, counterclockwise, rad; 2π for a whole circle, which has no ends.
+    """
+
+    center: Floats
+    radius: Floats
+    begin: Floats
+    extent: Floats
+
+    @property
+    def way(self) -> Floats:
+        return np.asarray(self.radius * self.extent)
+
+    @property
+    def whole(self) -> Bools:
+        return np.asarray(self.extent >= 2.0 * pi)
+
+    def point(self, angle: ArrayLike) -> Floats:
+        """Return the points of the arcs at angles (..., S) from the x axis, (..., S, 2), m."""
+        sine, cosine = sin_cos(np.asarray(angle))
+        direction = np.stack([cosine, sine], axis=-1)
+        return np.asarray(self.center + self.radius[..., None] * direction)
+
+    @cached_property
+    def ends(self) -> tuple[Floats, Floats]:
+        return self.point(self.begin), self.point(self.begin + self.extent)
+
+    @property
+    def inward(self) -> tuple[Floats, Floats]:
+        first, last = self.begin, self.begin + self.extent
+        return (
+            np.stack([-np.sin(first), np.cos(first)], axis=-1),
+            np.stack([np.sin(last), -np.cos(last)], axis=-1),
+        )
+
+    @property
+    def boxes(self) -> tuple[Floats, Floats]:
+        # Of the whole circle: it is needed of thousands, and only to tell what may be near.
+        reach = self.radius[..., None]
+        return self.center - reach, self.center + reach
+
+    @property
+    def corners(self) -> Floats:
+        quarters = 0.5 * pi * np.arange(4)[:, None]
+        reach = np.mod(quarters - self.begin[..., None, :], 2.0 * pi)
+        # Where a quarter is not on the arc, its first end instead.
+        inside = reach <= self.extent[..., None, :]
+        angle = np.where(inside, self.begin[..., None, :] + reach, self.begin[..., None, :])
+        points = [self.point(quarter) for quarter in np.moveaxis(angle, -2, 0)]
+        return np.concatenate([*points, *self.ends], axis=-2)
+
+    def _turned(self, out: Floats) -> Floats:
+        """Return how far ways from the centres are turned from the first ends, 0 to 2π, rad."""
+        return np.asarray(np.mod(np.arctan2(out[..., 1], out[..., 0]) - self.begin, 2.0 * pi))
+
+    def away(self, places: Floats) -> Floats:
+        out = places - self.center
+        far = np.hypot(out[..., 0], out[..., 1]) - self.radius
+        away = far[..., None] * self.normal(places)
+        beyond = ~self.whole & (self._turned(out) > self.extent)
+        if beyond.any():
+            first, last = (places - end for end in self.ends)
+            nearer = np.hypot(*np.moveaxis(first, -1, 0)) <= np.hypot(*np.moveaxis(last, -1, 0))
+            ends = np.where(nearer[..., None], first, last)
+            away = np.where(beyond[..., None], ends, away)
+        return np.asarray(away)
+
+    def normal(self, places: Floats) -> Floats:
+        x, y = np.moveaxis(places - self.center, -1, 0)
+        # All of it is as far from its centre: any will do.
+        x = np.where(np.hypot(x, y) > 0.0, x, 1.0)
+        return np.asarray(np.stack([x, y], axis=-1) / np.hypot(x, y)[..., None])
+
+    def holds(self, place: Floats, near: float) -> Bools:
+        """Tell whether points of the circles (..., 2) are on the arcs, not `near` (m) an end."""
+        way = self.radius * self._turned(place - self.center)
+        return np.asarray(self.whole | ((way > near) & (way < self.way - near)))
+
+    def at(self, way: ArrayLike) -> Floats:
+        # Clockwise from the last end.
+        return self.point(self.begin + self.extent - np.asarray(way) / self.radius)
+
+    def path(self) -> Floats:
+        return self.at(np.linspace(0.0, self.way, 1 + ceil(self.extent / FINE)))
+
+    def where(self) -> str:
+        x, y = np.round(self.center, 12) + 0.0
+        said = f"radius {self.radius:.6g} m, about ({x:.6g}, {y:.6g}) m"
+        if self.whole:
+            return said
+        first, last = np.degrees([self.begin, self.begin + self.extent])
+        return f"{said}, {first:.6g}° to {last:.6g}°"
+
+
+TOUCHES = 1e-9
+"""Share of the machine's size by which an arc and another piece must cross; joints only touch."""
+
+
+def crossings(names: int, segments: Segments, arcs: Arcs) -> list[tuple[int, int]]:
+    """Return the numbers of every two of so many surfaces that cross, the lower one first.
+
+    Those that only touch, as at a shared end, do not; nor do gates cross what is never there while
+    they are.
+    """
+    rows = np.concatenate(segments.ends, axis=1)
+    found: dict[tuple[int, int], None] = {}
+    known = np.eye(names, dtype=bool)  # surfaces that need not be held against each other
+
+    def note(pairs: Ints) -> None:
+        found.update(dict.fromkeys(map(tuple, pairs.tolist())))
+        known[pairs[:, 0], pairs[:, 1]] = known[pairs[:, 1], pairs[:, 0]] = True
+
+    for one, other in _beside(segments, segments, known):
+        one, other = one[one < other], other[one < other]
+        crossed = _parts(rows[one], rows[other]) & _parts(rows[other], rows[one])
+        note(segments.surface[np.stack([one, other], axis=1)[crossed]])
+    if len(arcs.surface):
+        near = TOUCHES * np.abs(np.concatenate([segments.end, arcs.corners])).max()
+        for pieces in (segments, arcs):
+            for one, other in _beside(pieces, arcs, known):
+                with_it = arcs.of(other)
+                crossed = (
+                    _chords(segments, one, with_it, near)
+                    if pieces is segments
+                    else _lenses(arcs.of(one), with_it, near)
+                )
+                pairs = np.stack([pieces.surface[one[crossed]], arcs.surface[other[crossed]]])
+                note(np.sort(pairs, axis=0).T)
+    return list(found)
+
+
+ABREAST = 256
+"""Pieces that are held against all others together, so that their pairs fit into memory."""
+
+
+def _beside(
+    one: Segments | Arcs, other: Segments | Arcs, known: Bools
+) -> Iterator[tuple[Ints, Ints]]:
+    """Yield pairs of pieces, by numbers, whose boxes touch while both are there.
+
+    Pieces of surfaces that are known to cross, (surfaces, surfaces), are left out.
+    """
+    (low, high), (low2, high2) = one.boxes, other.boxes
+    for first in range(0, len(one.surface), ABREAST):
+        some = slice(first, first + ABREAST)
+        met = ~known[one.surface[some, None], other.surface]
+        begin = np.maximum(one.appears[some, None], other.appears)
+        met &= begin < np.minimum(one.vanishes[some, None], other.vanishes)
+        for axis in (0, 1):
+            met &= low[some, axis, None] <= high2[:, axis]
+            met &= high[some, axis, None] >= low2[:, axis]
+        index, which = met.nonzero()
+        yield first + index, which
+
+
+def _chords(segments: Segments, which: Ints, arcs: Arcs, near: float) -> Bools:
+    """Tell which segments, by their numbers (n,), cross n arcs by more than `near` (m)."""
+    start, tangent = segments.start[which], segments.tangent[which]
+    away = arcs.center - start
+    foot = (away * tangent).sum(axis=-1)
+    off = np.abs(tangent[..., 0] * away[..., 1] - tangent[..., 1] * away[..., 0])
+    half = np.sqrt(np.maximum(arcs.radius**2 - off**2, 0.0))
+    crossed = np.zeros(off.shape, dtype=bool)
+    for s in (foot - half, foot + half):
+        on = (s > near) & (s < segments.length[which] - near)
+        crossed |= on & arcs.holds(start + s[..., None] * tangent, near)
+    return np.asarray(crossed & (off < arcs.radius - near))
+
+
+def _lenses(first: Arcs, second: Arcs, near: float) -> Bools:
+    """Tell of which pairs (n,) the left one of both crossings is on both arcs, by `near` (m)."""
+    distance = np.hypot(*(second.center - first.center).T)
+    crossed = (distance < first.radius + second.radius - near) & (
+        distance > np.abs(first.radius - second.radius) + near
+    )
+    some = crossed.nonzero()[0]
+    first, second, distance = first.of(some), second.of(some), distance[some]
+    towards = (second.center - first.center) / distance[:, None]
+    aside = np.stack([-towards[:, 1], towards[:, 0]], axis=-1)
+    # The other way round it is the other crossing.
+    a, b = first.radius, second.radius
+    foot = 0.5 * (distance + (a - b) * (a + b) / distance)
+    half = np.sqrt(np.maximum(a**2 - foot**2, 0.0))
+    place = first.center + foot[:, None] * towards + half[:, None] * aside
+    crossed[some] = second.holds(place, near) & first.holds(place, near)
+    return np.asarray(crossed)
+
+
+def _parts(line: Floats, ends: Floats) -> Bools:
+    """Tell of pairs (n, 4) whether two ends lie strictly on two sides of a line."""
+    (x0, y0, x1, y1), (u0, v0, u1, v1) = line.T, ends.T
+    first = (x1 - x0) * (v0 - y0) - (y1 - y0) * (u0 - x0)
+    second = (x1 - x0) * (v1 - y0) - (y1 - y0) * (u1 - x0)
+    return np.asarray(first * second < 0.0)

@@ -24,6 +24,7 @@ from chutelab.scene.overrides import (
     parts_of,
     resolved,
     rule_at,
+    unit_of,
 )
 from chutelab.scene.schema import TABLES, SceneTables
 from chutelab.scene.tables import Live
@@ -70,8 +71,7 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
             # The location of a union's error ends with the name of the member that refused.
             while (rule := rule_at(parts)) is None:
                 parts = parts[:-1]
-            last_key = max(depth for depth, part in enumerate(parts) if isinstance(part, str))
-            unit = (rule_at(parts[: last_key + 1]) or {}).get("x-unit")
+            unit = unit_of(parts)
             allowed = _listed(_phrases(rule)) + (f", in {unit}" if unit else "")
             text = str(cause) if cause else allowed if missing else f"must be {allowed}"
         value = MISSING if missing else at_path(document, parts)
@@ -98,12 +98,10 @@ def _phrases(rule: Mapping[str, Any]) -> list[str]:
         return [phrase for choice in rule["anyOf"] for phrase in _phrases(choice)]
     if "x-words" in rule:
         return [str(rule["x-words"])]
-    if "$ref" in rule:
+    if "$ref" in rule or rule.get("type") == "object":
         return ["a table of keys and values"]
     if "enum" in rule or "const" in rule:
         return [f'"{choice}"' for choice in rule.get("enum", [rule.get("const")])]
-    if rule["type"] == "object":
-        return ["a table of keys and values"]
     if rule["type"] != "array":
         least = rule.get("not", {}).get("exclusiveMaximum")
         if least is not None:

@@ -104,8 +104,8 @@ def read_size(text: str) -> tuple[float, str]:
 def read_any(text: str) -> tuple[float, str]:
     """Read a size as `read_size` does, or one whose unit has no prefixes; NaN if it is neither.
 
-    >>> read_any("4 mm"), read_any("3 1/s"), read_any("x")
-    ((0.004, 'm'), (3.0, '1/s'), (nan, ''))
+    >>> read_any("4 mm"), read_any("3 kg/m³"), read_any("x")
+    ((0.004, 'm'), (3.0, 'kg/m³'), (nan, ''))
     """
     try:
         return read_size(text)

@@ -51,7 +51,7 @@ SLICE = 0.05
 """s of wall time between two looks at Ctrl-C and reports of progress."""
 
 MOST_STEPS = 512
-"""Steps between two looks, at most: what follows may take a thousand times as long as what was."""
+"""Steps between two looks, at most: later ones may take a thousand times as long."""
 
 
 def run(machine: Machine, progress: Progress | None = None) -> Record:
@@ -229,14 +229,14 @@ class Job:
         return world.stalled, world.now, (float(disk["x"]), float(disk["y"]))
 
     def stop(self) -> Status:
-        """Have the run be over at the end of the step that it is in."""
+        """End the run after the step that it is in."""
         while (status := self.proceed(0)) in FULL:
             pass
         if status is Status.PAUSED:
             world = self.module.world
             self.stopped_from = world.low
             world.end_time = world.t
-            # Without contacts between them disks run one after the other: no further one does.
+            # Disks that do not meet run one after the other: no further one is released.
             disks = self.module.array("disks", dtype("Disk"), self.machine.count)
             disks["release"][world.high :] = inf
             while status not in (Status.DONE, Status.STALLED):
@@ -279,7 +279,7 @@ class Job:
         """Return what was recorded."""
         recorder = Recorder(machine)
         world, module = self.module.world, self.module
-        # Chunks are let go as they are handed over: all of them are most of the memory.
+        # Each chunk is freed when it is handed over: together they are most of the memory.
         self.knots.reverse()
         self.events.reverse()
         while self.knots:

@@ -276,7 +276,7 @@ def worst(recording: Record) -> Floats:
         return np.array([nan if found is None else found])
     if scene.incoming is None or scene.plate is None:
         return np.full(count, nan)
-    # It has to be released on the belt, as fast as the belt is.
+    # The equations need a release on the belt, at its speed.
     belt, start = scene.incoming, recording.offsets[:-1]
     release = recording.knots[np.where(recording.released, start, 0)]
     (x, y), (vx, vy) = release["position"].T, release["velocity"].T
@@ -315,7 +315,7 @@ def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
         at, one = place == n, never(len(holds))
         one[own["particle"][at]] = own[at]
         found.append(one)
-    # A carried particle leaves the belt with a blow that throws it off, too.
+    # An impact that throws a carried particle off the belt is no separation of the theory.
     holds = holds & ~(found[0]["t"] >= found[1]["t"])
     for one, (event, surface) in zip(found, NEEDED.items(), strict=True):
         holds = holds & (one["kind"] == Kind[event.upper()])

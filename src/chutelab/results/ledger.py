@@ -17,10 +17,10 @@ from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
 
 ROUNDING = 1e-12
-"""Share of the energy turned over up to which an entry is told as 0, but in detail."""
+"""Share of the energy turned over up to which an entry is shown as 0, unless in detail."""
 
 UNSEEN = 5e-6
-"""Share of the energy turned over that reads 0.000 %: a heap at rest still trembles by less."""
+"""Share of the energy turned over that is shown as 0.000 %; a heap at rest trembles with less."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -18,7 +18,7 @@ from chutelab.util.arrays import Floats, Ints
 
 
 class StalledError(RuntimeError):
-    """A loop reached its bound: a particle goes on without getting on.
+    """A loop reached its bound: a particle makes no progress.
 
     It says which one, when (s) and where its centre is (m); the reason is a half-sentence: what
     happened too often, and what to do about it. The recording is of what went before: tracks that
@@ -181,7 +181,7 @@ class Recorder:
         sizes.cumsum(out=offsets[1:])
         lonely = (sizes == 1).nonzero()[0]
         if len(lonely):
-            # A track needs an interval: a lone knot is its own end.
+            # A track needs two knots: a single one is doubled.
             if self._angular:
                 angle = np.insert(angle, offsets[lonely], angle[offsets[lonely]])
             knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])

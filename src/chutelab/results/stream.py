@@ -27,16 +27,16 @@ QUANTILES = (0.02, 0.5, 0.98)
 """Shares of the paths that an envelope leaves on its right: its two edges, and the middle."""
 
 FEWEST = 20
-"""Particles of a stream from which on its paths have an envelope."""
+"""Least number of particles whose paths have an envelope."""
 
 MOST_PATHS = 400
 """Paths of a stream that its envelope is made of, at most; of more, evenly chosen ones."""
 
 JUMP = 5.0
-"""Distances between two places by which its lines may go on from one to the next."""
+"""Largest jump of an edge from one place to the next, in distances between places."""
 
 AHEAD = 1.0 / 60.0
-"""Share of the way that the direction of a cut looks ahead, and back."""
+"""Share of the way, ahead and back, over which the direction of a cut is taken."""
 
 INSTANTS = 400
 """Instants of the way at which paths are looked at."""
@@ -116,8 +116,8 @@ def _envelope(recording: Record, own: Ints, end: Floats, places: int) -> Envelop
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
     offset = np.full((len(QUANTILES), places), np.nan)
     for s in range(places):
-        # A path passes where it goes from behind the cut to before it; of several times that one
-        # counts that is nearest to the way's.
+        # A path crosses where it goes from behind the cut to ahead of it; of several crossings
+        # the one counts that is nearest in time to the way's.
         along = paths @ tangent[s]
         along -= middle[s] @ tangent[s]
         passes = (along[:-1] <= 0.0) & (along[1:] > 0.0)
@@ -266,7 +266,7 @@ def _per_mass(recording: Record, paid: Floats, own: Bools) -> tuple[float, float
 
 
 FLOW = 8
-"""Particles that must have arrived for a word about how fast they came."""
+"""Least number of arrivals that tell a flow."""
 
 
 @dataclass(frozen=True, repr=False)

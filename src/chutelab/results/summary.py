@@ -65,7 +65,7 @@ def stopped(recording: Record) -> Stopped | None:
     under_way = halted & recording.released
     t = float(recording.knots["t"].max(initial=0.0))
     if not recording.machine.interact:
-        # Each by itself: some are ahead of others.
+        # Each particle is simulated by itself: some are further on than others.
         last = recording.knots["t"][recording.offsets[1:][under_way] - 1]
         due = recording.machine.releases.t[halted & ~recording.released]
         t = min(float(last.min(initial=t)), float(due.min(initial=t)))

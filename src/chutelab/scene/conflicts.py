@@ -1,8 +1,8 @@
-"""What no single key can answer for: conflicts between keys, and between tables.
+"""Rules that concern several keys or tables: conflicts between them.
 
-Every rule is written so that it speaks only when a comparison is *true*. A `Look` answers NaN for
-a key that is itself at fault, and nothing is true of NaN: so the rules can be asked about a
-half-broken scene, and all faults of a file come out in one message.
+Every rule speaks only when a comparison is *true*. A `Look` answers NaN for a key that is itself at
+fault, and no comparison with NaN is true: so the rules work on a half-broken scene, and all faults
+of a file come out in one message.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The tables of a scene file together, and what follows from one for another."""
+"""All tables of a scene file, and the defaults that depend on other tables."""
 
 from __future__ import annotations
 

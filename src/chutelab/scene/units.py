@@ -38,7 +38,7 @@ class Table(BaseModel):
 
 
 class Resolved(Table):
-    """A table with keys whose values mean others, and which its file keeps as they were given."""
+    """A table some of whose values are resolved, such as a rate in t/h; its file keeps the text."""
 
     _typed: dict[str, object] = PrivateAttr(default_factory=dict)
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.machine import Machine, Pieces
-from chutelab.results.record import EVENT, PARTICLES, REASONS, Kind, Record, hermite, kept
+from chutelab.results.record import EVENT, PARTICLES, Kind, Record, hermite, kept
 from chutelab.util.arrays import Bools, Floats, Ints
 
 TOUCH = 0.01
@@ -62,7 +62,7 @@ def fates(recording: Record) -> NDArray[Any]:
     left, right, bottom, top = (
         np.broadcast_to(side, count)[particles] for side in machine.exit_box
     )
-    (x, y), out = last["position"].T, recording.ended[particles] == REASONS.index("exit")
+    (x, y), out = last["position"].T, recording.ended_by("exit")[particles]
     gone = out | (x < left) | (x > right) | (y < bottom) | (y > top)
     said[particles[gone]] = _ways_out(recording, particles[gone], last["position"][gone])
     stays, places = particles[~gone], last["position"][~gone]
@@ -86,7 +86,7 @@ def fates(recording: Record) -> NDArray[Any]:
         rides[recording.select(Kind.SEPARATION, surface="incoming")["particle"]] = False
         home[rides[stays]] = order.index("incoming")
     if machine.landing >= 0:
-        home[recording.ended[stays] == REASONS.index("landed")] = order.index("outgoing")
+        home[recording.ended_by("landed")[stays]] = order.index("outgoing")
     said[stays] = [f"on {order[n]}" if n >= 0 else "in the air" for n in home.tolist()]
     return said
 
@@ -204,7 +204,7 @@ class Places:
 
     def __init__(self, recording: Record) -> None:
         self.recording = recording
-        self.radius = np.broadcast_to(recording.particle.radius, recording.count)
+        self.radius = recording.radius
         knots, corners = recording.knots, recording.machine.corners
         self._pieces: dict[int, list[Pieces]] = {}
         self._point = POINT * float(np.ptp(corners, axis=0).max()) if corners.size else 0.0

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.results.arrival import never
-from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
+from chutelab.results.record import ENTRIES, Kind, Record, kept
 from chutelab.scene import Scene
 from chutelab.scene.quantities import NEEDED, THEORY, Quantity
 from chutelab.scene.units import with_unit
@@ -77,7 +77,7 @@ def until_no_slip(recording: Record, landed: Floats) -> dict[str, Floats]:
     found = np.full((2, recording.count), nan)
     if (recording.count == 1 or recording.family) and "outgoing" in recording.surfaces:
         events = recording.events
-        there = np.isfinite(landed) & (recording.ended == REASONS.index("settled"))
+        there = np.isfinite(landed) & recording.ended_by("settled")
         away = events["surface"] != recording.surface_index("outgoing")
         away &= events["t"] > landed[events["particle"]]
         there[events["particle"][away]] = False

@@ -82,7 +82,7 @@ def _until_no_slip(recording: Record, what: str) -> Floats:
     """Return what the outgoing belt pays until a lone particle does not slip, (N,)."""
     if recording.count > 1 and not recording.family:
         return np.full(recording.count, nan)
-    settled = recording.ended == REASONS.index("settled")
+    settled = recording.ended_by("settled")
     entry = "friction_loss" if what == "slip_heat" else "belt_work"
     work = np.where(settled, paid(recording, "outgoing", entry), nan)
     return np.asarray(work * (recording.machine.scenes.rate if what == "power" else 1.0))
@@ -110,7 +110,7 @@ def measured(recording: Record, name: str) -> Floats:
             # Of a family they are counted together.
             return np.full(many, nan if recording.family else float(recording.contacts))
         case ["ended", reason] if reason in REASONS:
-            return count(recording.ended == REASONS.index(reason))
+            return count(recording.ended_by(reason))
         case ["misses"]:
             return count(np.isnan(each(recording, "arrival.t")))
         case ["error", "max"]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from chutelab.results.arrival import CARRIED, Places, arrivals, fates
 from chutelab.results.quantities import each, measure
-from chutelab.results.record import ENTRIES, REASONS, Record
+from chutelab.results.record import ENTRIES, Record
 from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.units import with_unit
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -194,13 +194,13 @@ def works(recording: Record) -> Floats:
     if belt is None or belt.speed is None or not len(there):
         return found
     speed: float = belt.speed
-    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    mass = recording.mass
     alone = not machine.interact and np.all(recording.particle.inertia == 0.0)
     if alone and machine.until != "settled":
         found[there] = mass[there] * speed * (speed - came["velocity_before"][there, 0])
         return found
     last = recording.knots[recording.offsets[there + 1] - 1]
-    settled = recording.ended[there] == REASONS.index("settled")
+    settled = recording.ended_by("settled")[there]
     if machine.until != "landed":
         fate = fates(recording)[there]
         slip = np.abs(last["velocity"][:, 0] - speed)
@@ -246,7 +246,7 @@ def _per_mass(recording: Record, paid: Floats, own: Bools) -> tuple[float, float
     came = arrivals(recording)["t"]
     order = np.argsort(came, kind="stable")
     order = order[(own & np.isfinite(paid))[order]]
-    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    mass = recording.mass
     if not len(order):
         return nan, nan
     mean = float(paid[order].sum() / mass[order].sum())
@@ -397,7 +397,7 @@ def flows(recording: Record) -> tuple[float | None, float | None]:
     span = float(t[order[last]] - t[order[first]])
     if not span > 0.0:
         return None, None
-    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    mass = recording.mass
     middle = order[first + 1 : last + 1]
     slices = np.array([scene.slices(number) for number in range(len(scene.streams))])
     slices = slices[recording.machine.releases.stream[middle]]

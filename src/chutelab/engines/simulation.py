@@ -10,14 +10,14 @@ from time import perf_counter
 import numpy as np
 
 from chutelab.machine import Machine, build
-from chutelab.results import Recording
+from chutelab.results import Recording, record
 from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.scene import AnyScene, Fault, Overrides, Scene, SceneError, load
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import LawWarning
 from chutelab.util.signals import ctrl_c_waits
 
-ENGINES = ("auto", "exact", "contact", "pymunk")
+ENGINES = ("auto", *record.ENGINES)
 
 
 def choose(machine: Machine, engine: str | None = None) -> str:
@@ -163,7 +163,7 @@ def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> 
     If none does, the first run stands, with its laws.
     """
     said = []
-    recording, order = broken, ("exact", "contact", "pymunk")
+    recording, order = broken, record.ENGINES
     for name in order[order.index(broken.engine) + 1 :]:
         said.append(
             f"{recording.engine} did not keep the laws of every run ({recording.laws[0].told})"
@@ -195,10 +195,6 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"
             raise _refused(scene, "run.engine", "exact", allowed)
-        points = np.count_nonzero(np.equal(machine.particle.radius, 0.0))
-        if 0 < points < np.size(machine.particle.radius):
-            allowed = "more than 0, or 0 of all kinds: no engine has points beside disks"
-            raise _refused(scene, "particle.radius", 0.0, allowed)
         from chutelab.engines.exact import CornerError, run
 
         try:
@@ -207,7 +203,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
             if "exact" in (engine, scene.run.engine):
                 raise _refused(scene, "run.engine", "exact", str(error)) from error
             name = "contact"
-    if np.count_nonzero(np.equal(machine.particle.radius, 0.0)):
+    if np.any(np.equal(machine.particle.radius, 0.0)):
         raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
     if name == "contact":
         from chutelab.engines.contact import run as stepped

@@ -33,6 +33,9 @@ ENTRIES = quantities.ENTRIES
 REASONS = quantities.ENDINGS
 """Why a particle's track ends; `Recording.ended` holds indices into this tuple."""
 
+ENGINES = ("exact", "contact", "pymunk")
+"""Engines that make a `Recording`, in the order in which they are tried."""
+
 PARTICLES = "particles"
 """Name under which the losses of particle-particle contacts are booked."""
 

@@ -20,7 +20,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from chutelab.machine import build
-from chutelab.results.record import ENTRIES, EVENT, KNOT, REASONS, Kind, Record
+from chutelab.results.record import ENGINES, ENTRIES, EVENT, KNOT, REASONS, Kind, Record
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
@@ -49,9 +49,6 @@ SMALL = 1 << 20
 MOST_UNPACKED = 150
 """How many times as large as packed a larger array may be: runs in which next to nothing happens
 come to 60, and a file that is made to fill the memory to 1000."""
-
-ENGINES = ("exact", "contact", "pymunk")
-"""Engines that can have made a recording."""
 
 FAR = 1e100
 """Bound on every number: energies and distances computed from it stay finite."""

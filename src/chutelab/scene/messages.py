@@ -7,7 +7,6 @@ everything that is changed there.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from typing import Any, Final
@@ -28,13 +27,10 @@ from chutelab.scene.overrides import (
 )
 from chutelab.scene.schema import TABLES, SceneTables
 from chutelab.scene.tables import Live
-from chutelab.util.errors import MISSING, Fault, InputError
+from chutelab.util.errors import MISSING, Fault, InputError, nearest
 
 Location = tuple[str | int, ...]
 """Path of keys and indices, as Pydantic gives it."""
-
-_NEAR: Final = 0.55
-"""Likeness of a misspelt key and the one that was meant: pivot is taken for pivot_height."""
 
 LISTS: Final = ("material", "pair", "conveyor", "surface", "string", "expect")
 """Tables that are always lists; of those in `EITHER` there may be one or several."""
@@ -131,11 +127,6 @@ def _bound(value: float) -> str:
 def _listed(choices: Iterable[str]) -> str:
     *first, last = choices
     return f"{', '.join(first)} or {last}" if first else last
-
-
-def nearest(key: str, known: Iterable[str]) -> list[str]:
-    """Return the known key that is most like one, in a list; none if none is like it."""
-    return difflib.get_close_matches(key, list(known), n=1, cutoff=_NEAR)
 
 
 def unknown(parts: Sequence[str | int]) -> str:

@@ -138,7 +138,7 @@ def judged(
         except EnoughError:
             counts = [stream.count for stream in scene.streams]
             most = counts.index(max(counts))
-            key = f"stream[{most}].count" if len(counts) > 1 else "stream.count"
+            key = f"{scene.head('stream', most)}.count"
             allowed = "fewer, or more seconds: those allowed were over before all had a place to"
             raise _refused(scene, key, counts[most], f"{allowed} start") from None
         try:
@@ -184,11 +184,9 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
     if name in ("exact", "contact"):
         for n, outline in enumerate(machine.outlines):
             if outline is not None:
-                several = f"[{n}]" * (len(machine.outlines) > 1)
-                raise _refused(
-                    scene, f"particle{several}.shape", scene.particles[n].shape,
-                    f'a disk or sphere with run.engine = "{name}"; the pymunk engine has it',
-                )  # fmt: skip
+                key, shape = f"{scene.head('particle', n)}.shape", scene.particles[n].shape
+                allowed = f'a disk or sphere with run.engine = "{name}"; the pymunk engine has it'
+                raise _refused(scene, key, shape, allowed)
         if machine.threads:
             raise _refused(scene, "string", len(machine.threads), "none, or the pymunk engine")
     if name == "exact":

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chutelab.engines import contact, exact
-from chutelab.engines.exact.contacts import CornerError
+from chutelab.engines.exact import CornerError
 from chutelab.results import Kind
 from chutelab.results.ledger import ledger
 from machines import bent, face, of_sizes, scene_of, thrown

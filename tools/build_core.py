@@ -19,7 +19,7 @@ CORE = Path(__file__).parents[1] / "src" / "chutelab" / "core"
 
 EXPORTS = (
     "run", "prepare", "world", "build", "plan", "draw", "drawing", "sine", "cosine", "angle_of",
-    "angle_of_cosine", "__heap_base",
+    "angle_of_cosine", "exact", "follow_all", "__heap_base",
 )  # fmt: skip
 """What a host can call."""
 

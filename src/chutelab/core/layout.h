@@ -9,6 +9,7 @@
 #define LAYOUT_H
 
 #define MAX_HELD 4 /* surfaces that one disk can lie on at a time; a fifth is met as an impact */
+#define MOST_IDLE 400 /* rounds in a row that take no time: with more of them a particle is stuck */
 #define MAX_NEARBY 12 /* surfaces that are listed for a disk; where there are more, it asks all */
 
 /* What a disk is doing. Free disks move on parabolas; riders and sleepers on a prescribed path. */
@@ -323,6 +324,58 @@ typedef struct {
     int segment_room, arc_room;   /* [in] of all members */
     int segment_count, arc_count; /* [out] of each */
 } Plan;
+
+/* A particle that meets no other, for the exact engine. */
+typedef struct {
+    double release, stop;       /* [in] s; when it starts, and how long after that its run is over */
+    double position[2], velocity[2]; /* [in] at its release */
+    double radius, mass;        /* [in] a radius of 0 is a mass point */
+    double inertia;             /* [in] kg m2; 0: it does not turn */
+    double rolling;             /* [in] rolling friction: its arm over the radius */
+    double gravity, pace;       /* [in] m/s2; what bounds on speeds are multiplied by */
+    double exit_box[4];         /* [in] m; left, right, bottom, top */
+    int kind;                   /* [in] row of the table of pairs */
+    int carried;                /* [in] it rides the incoming belt by adhesion */
+    int reason;                 /* [out] why its track ended: enum Ending */
+    int pad;
+} Lone;
+
+/* Why a track of the exact engine ended, as in `recording.REASONS`. */
+enum Ending { TIME_IS_OVER, HAS_LANDED, HAS_SETTLED, HAS_LEFT };
+
+/* Why the exact engine came back. PAUSED: the budget of rounds is used up. FULL_...: make room and go
+   on. NO_PROGRESS, DRIVEN, TOO_LONG: a particle is stuck, its track is over; go on with the others.
+   HELD: a spinning disk is held between surfaces of which one moves. */
+enum Course { FINISHED, PAUSING, NO_KNOTS, NO_EVENTS, NO_ROOM, NO_PROGRESS, DRIVEN, TOO_LONG, HELD };
+
+typedef struct { double radius, speed, incline; int surface, pad; } Wheel; /* [in] the drive pulley */
+
+typedef struct {
+    /* arrays, laid out by the host; of a family each particle is a member */
+    Segment *segments;      /* [in] (members, segment_count) */
+    Arc *arcs;              /* [in] (members, arc_count) */
+    Wheel *wheels;          /* [in] (members) or none */
+    Pair *materials;        /* [in] (kinds or members, segments + arcs + pulley) */
+    Lone *lones;            /* [in] (lone_count) in the order of releases */
+    double *books;          /* (1 or lone_count, surface_count, 3) entries of each surface, J */
+    Knot *knots;            /* [out] */
+    Event *events;          /* [out] */
+    double *room;           /* (room_size) for the obstacles that surfaces are */
+    int segment_count, arc_count, wheel_count, lone_count, surface_count;
+    int knot_room, event_room, room_size;
+    int family, apart;      /* [in] each particle has surfaces, and books, of its own */
+    int until, landing;     /* [in] enum Until; surface that a particle lands on, or -1 */
+    int most, window;       /* [in] rounds of a particle; rounds after which it is asked whether it gets on */
+    double tick;            /* [in] s over its pace; mean time between events below which it does not */
+    double far;             /* [in] m; how far off the coordinates were rounded */
+    int laid, begun;        /* number after the member whose obstacles are laid; whether `lone` is */
+    /* [out] */
+    int knot_count, event_count, contacts, rounds; /* rounds: of the particle that took most */
+    int lone;               /* the particle that is under way; all before it have ended */
+    int other[2];           /* surfaces that hold it */
+    double t, x, y;         /* where it is stuck, s and m */
+    double passed;          /* s; that its latest rounds took */
+} Exact;
 
 /* Where and how a particle starts. */
 typedef struct { double t, position[2], velocity[2], radius; } Start;                     /* [out] */

@@ -29,7 +29,7 @@ PAGE = 65536
 LARGE = 64 * 2**20
 """Bytes beyond which a used memory is let go rather than kept for the next run."""
 
-SUBJECTS = ("World", "Plan", "Drawing", "Laws")
+SUBJECTS = ("World", "Plan", "Drawing", "Laws", "Exact")
 """Structs of layout.h of which the core has one each."""
 
 TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}

@@ -25,7 +25,7 @@ from chutelab.core.module import (
     number,
 )
 from chutelab.machine import Machine, moved, origin
-from chutelab.results.record import EVENT, KNOT, REASONS, Record
+from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 
@@ -283,22 +283,9 @@ class Job:
         self.knots.reverse()
         self.events.reverse()
         while self.knots:
-            rows = self.knots.pop()
-            owner = rows["disk"].astype(np.int64)
-            recorder.add(owner, rows.view("<f8").reshape(-1, 10)[:, :9].copy().view(KNOT)[:, 0])
+            recorder.take_knots(self.knots.pop())
         while self.events:
-            rows = self.events.pop()
-            events = np.empty(len(rows), EVENT)
-            for name, source in (("t", "t"), ("particle", "disk"), ("other", "other"),
-                                 ("kind", "kind"), ("surface", "surface"),
-                                 ("normal_impulse", "normal"),
-                                 ("tangential_impulse", "tangent")):  # fmt: skip
-                events[name] = rows[source]
-            events["position"][:, 0], events["position"][:, 1] = rows["x"], rows["y"]
-            for when in ("before", "after"):
-                events[f"velocity_{when}"] = rows[when][:, :2]
-                events[f"omega_{when}"] = rows[when][:, 2]
-            recorder.tell(events)
+            recorder.take_events(self.events.pop())
         disks = module.array("disks", dtype("Disk"), machine.count)
         reasons, late = disks["reason"].copy(), np.arange(machine.count) >= self.stopped_from
         reasons[late & (reasons == REASONS.index("time"))] = REASONS.index("stopped")

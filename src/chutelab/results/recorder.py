@@ -104,6 +104,26 @@ class Recorder:
         if self._angular:
             self._angles.append(np.broadcast_to(np.asarray(angle, dtype=float), len(knots)).copy())
 
+    def take_knots(self, rows: NDArray[Any]) -> None:
+        """Add knots as the core writes them, dtype ``Knot``: a particle's in the order of time."""
+        numbers = rows.view("<f8").reshape(len(rows), -1)
+        own = numbers[:, : KNOT.itemsize // 8].copy().view(KNOT)[:, 0]
+        self.add(rows["disk"].astype(np.int64), own)
+
+    def take_events(self, rows: NDArray[Any]) -> None:
+        """Add events as the core writes them, dtype ``Event``."""
+        events = np.empty(len(rows), EVENT)
+        for name, source in (
+            ("t", "t"), ("particle", "disk"), ("other", "other"), ("kind", "kind"),
+            ("surface", "surface"), ("normal_impulse", "normal"), ("tangential_impulse", "tangent"),
+        ):  # fmt: skip
+            events[name] = rows[source]
+        events["position"][:, 0], events["position"][:, 1] = rows["x"], rows["y"]
+        for when in ("before", "after"):
+            events[f"velocity_{when}"] = rows[when][:, :2]
+            events[f"omega_{when}"] = rows[when][:, 2]
+        self._events.append(events)
+
     def book(
         self,
         particle: ArrayLike,
@@ -144,11 +164,7 @@ class Recorder:
         chunk["omega_before"] = omega if omega_before is None else omega_before
         chunk["surface"], chunk["other"] = surface, other
         chunk["normal_impulse"], chunk["tangential_impulse"] = normal_impulse, tangential_impulse
-        self.tell(chunk)
-
-    def tell(self, events: NDArray[Any]) -> None:
-        """Add finished events."""
-        self._events.append(events)
+        self._events.append(chunk)
 
     def finish(
         self,

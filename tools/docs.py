@@ -21,7 +21,7 @@ from pathlib import Path
 from pkgutil import walk_packages
 from types import ModuleType
 
-from chutelab.scene.loading import about
+from chutelab.scene import about
 from pydantic import BaseModel
 from sphinx.cmd.build import build_main
 from sphinx.pycode import ModuleAnalyzer

@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from chutelab.scene.loading import about
+from chutelab.scene import about
 
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.plots.figure import draw_view

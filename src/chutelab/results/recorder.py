@@ -61,7 +61,7 @@ class Recorder:
     """
 
     def __init__(self, machine: Machine, *, apart: bool = False) -> None:
-        self.machine, self.apart = machine, apart
+        self.machine = machine
         count, owners = machine.count, len(machine.surfaces) + 1  # and the particles
         self.entries = np.zeros((count, 3))
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))

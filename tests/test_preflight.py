@@ -206,6 +206,14 @@ max_time = 1000
 """
 
 
+@pytest.fixture
+def even_looks(monkeypatch):
+    """Have the exact engine look at its progress after each event."""
+    monkeypatch.setattr("chutelab.engines.exact.engine.SLICE", 0.0)
+    monkeypatch.setattr("chutelab.engines.exact.engine.FIRST", 1)
+
+
+@pytest.mark.usefixtures("even_looks")
 @pytest.mark.parametrize(
     ("restitution", "until"),
     [(0.9, '"settled"'), (0.98, '"settled"'), (0.98, 40.0), (0.999, 40.0), (1.0, 40.0)],
@@ -221,6 +229,7 @@ def test_the_bounces_to_come_follow_from_those_that_were(restitution, until, mon
     assert found.contacts == pytest.approx(whole.contacts, rel=0.1)
 
 
+@pytest.mark.usefixtures("even_looks")
 @pytest.mark.parametrize(
     ("name", "changes"),
     [

@@ -22,11 +22,10 @@ from chutelab.classroom.book import Book
 from chutelab.classroom.exercises import lesson
 from chutelab.cli import main
 from chutelab.cli.studies import uncertain
-from chutelab.pictures.plots.design import draw_scan, scan, spread
-from chutelab.studies.design import roots, sensitivity
-from chutelab.studies.design.evaluation import Evaluator, Outcomes, suits
-from chutelab.studies.design.quantities import measured, target
-from chutelab.studies.design.uncertainty import as_dict, spreads
+from chutelab.pictures.plots.studies import draw_scan, scan, spread
+from chutelab.studies.design import roots
+from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, suits, target
+from chutelab.studies.design.uncertainty import as_dict, indices, sampled, spreads
 from chutelab.util.errors import InputError
 
 G, V, R, D, DROP, M = 9.81, 2.0, 0.1, 0.5, 0.5, 0.008
@@ -469,8 +468,8 @@ def test_sobol_indices_of_ishigamis_function():
     # Ishigami and Homma (1990): V1 = ½ (1 + b π⁴/5)², V2 = a²/8, V13 = 8 b² π⁸/225.
     v1, v2, v13 = 0.5 * (1.0 + b * pi**4 / 5.0) ** 2, a**2 / 8.0, 8.0 * b**2 * pi**8 / 225.0
     variance = v1 + v2 + v13
-    points = pi * (2.0 * sensitivity.sampled(3, 4096, seed=0) - 1.0)
-    found = sensitivity.indices(f(points), seed=0)
+    points = pi * (2.0 * sampled(3, 4096, seed=0) - 1.0)
+    found = indices(f(points), seed=0)
     np.testing.assert_allclose(found.first, np.array([v1, v2, 0.0]) / variance, rtol=0, atol=0.01)
     np.testing.assert_allclose(
         found.total, np.array([v1 + v13, v2, v13]) / variance, rtol=0, atol=0.01

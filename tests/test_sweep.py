@@ -558,7 +558,7 @@ def test_a_crowds_ways_are_told_from_a_fiftieth_on(edge, told):
 
 
 def test_a_map_is_hatched_where_the_plate_is_missed():
-    from chutelab.pictures.plots.design import sweep_figure
+    from chutelab.pictures.plots.studies import sweep_figure
 
     swept = sweep(parse(PASSED), ["incoming.speed=1.9:2.1:11", "plate.restitution=0:1:10"])
     figure = sweep_figure(swept, "landing.vx.mean")

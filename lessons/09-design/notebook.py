@@ -15,7 +15,7 @@ least = design.minimize(scene, {"plate.angle_deg": (11, 60)}, "belt_work")
 least
 
 # %% Run 1
-from chutelab.pictures.plots.design import scan, spread
+from chutelab.pictures.plots.studies import scan, spread
 
 scan(least)
 

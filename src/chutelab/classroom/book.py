@@ -106,8 +106,7 @@ class Book:
 
     def machine(self) -> Picture:
         """Draw the lesson's machine before anything happens."""
-        from chutelab.pictures.plots.bodies import draw_bodies
-        from chutelab.pictures.plots.machinery import draw_scene
+        from chutelab.pictures.plots.machinery import draw_bodies, draw_scene
         from chutelab.pictures.plots.scenery import action, window_of
         from chutelab.pictures.plots.style import Picture, dress
 
@@ -182,7 +181,7 @@ class Book:
 
     def landings(self, runs: Runs) -> Picture:
         """Draw where the particles of some runs land, mean, spread, lowest and highest layer."""
-        from chutelab.pictures.plots.crowd import draw_arrivals
+        from chutelab.pictures.plots.panels import draw_arrivals
         from chutelab.pictures.plots.style import Picture
 
         figure = Picture((9.0, 2.2 * len(runs) + 0.8))

@@ -222,7 +222,7 @@ def bench(
                 loaded, engine, dt, repeats=repeats, max_seconds=max_seconds, progress=update
             )
         if into is not None:
-            from chutelab.pictures.plots.workprecision import workprecision
+            from chutelab.pictures.plots.studies import workprecision
 
             text = tsv_text(timings, Timing, {"scene": loaded.title, **about})
             (into / files[0]).write_text(text, encoding="utf-8")

@@ -262,7 +262,7 @@ def sweep(
             console.say(f"\n{said}", err=True)
         raise
     if plot is not None:
-        from chutelab.pictures.plots.design import sweep_figure
+        from chutelab.pictures.plots.studies import sweep_figure
 
         with writing(f"--plot {plot}"):
             sweep_figure(found, of).write(plot)
@@ -294,7 +294,7 @@ def _propagated(
         if out is not None:
             write_lines(out, [found.csv()])
         if plot is not None:
-            from chutelab.pictures.plots.design import spread
+            from chutelab.pictures.plots.studies import spread
 
             spread(found).write(plot)
     return found
@@ -391,7 +391,7 @@ def solve(
             )
         if place is not None:
             from chutelab.pictures.plots import overlay
-            from chutelab.pictures.plots.design import scan
+            from chutelab.pictures.plots.studies import scan
 
             with progress("drawing", quiet=quiet):
                 write_json(as_dict(found), place / "solve.json")
@@ -499,7 +499,7 @@ def compare(
             fitted = measured.fit(loaded, film, keys, robust=robust) if keys else None
             found = measured.residuals(loaded, film) if fitted is None else fitted.after
         if place is not None:
-            from chutelab.pictures.plots.measured import measured as draw
+            from chutelab.pictures.plots.studies import measured as draw
 
             with progress("drawing"):
                 draw(found, fitted).write(place / "compare.png")

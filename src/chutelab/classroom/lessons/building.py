@@ -105,7 +105,7 @@ def build(
     made = force or comment_of(path) != wanted or not machine.is_file()
     if made:
         from chutelab.pictures.animation import animate, still
-        from chutelab.pictures.plots.split import split_velocity
+        from chutelab.pictures.plots.figure import split_velocity
 
         with aside(path.parent, path):
             refuse_other(path)

@@ -17,11 +17,17 @@ from numpy.typing import ArrayLike
 from chutelab.scene import AnyScene, Scene, load
 from chutelab.scene.variants import Varied, refuse_texts
 from chutelab.studies.design.answers import Answer, Goal, Solution
-from chutelab.studies.design.evaluation import Evaluator, Span, ranges
-from chutelab.studies.design.quantities import Quantity, measured, scipy
-from chutelab.studies.design.quantities import target as wish
+from chutelab.studies.design.evaluation import (
+    Evaluator,
+    Quantity,
+    Span,
+    measured,
+    ranges,
+    scipy,
+    sensitivities,
+)
+from chutelab.studies.design.evaluation import target as wish
 from chutelab.studies.design.roots import CLOSE, Scan, level, minima, roots, scan
-from chutelab.studies.design.sensitivity import sensitivities
 from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
 

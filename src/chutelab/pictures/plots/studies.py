@@ -159,7 +159,7 @@ def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
     bars: dict[str, Any] = {"bins": 40, "edgecolor": "white", "linewidth": 0.3, "zorder": 3.0}
     ax.hist(
         list(parts.values()), color=KINDS[: len(parts)], stacked=True,
-        label=[shorten(name, 34, placeholder=" …") for name in parts], **bars,
+        label=[style.plain(shorten(name, 34, placeholder=" …")) for name in parts], **bars,
     )  # fmt: skip
     if len(parts) > 1:
         ax.legend(loc="best", fontsize=style.SMALL)

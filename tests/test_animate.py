@@ -25,15 +25,14 @@ from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
 from chutelab.machine.parts import Thread
 from chutelab.pictures.animation import Moment, Stage, VideoError, animate, film, moments
-from chutelab.pictures.animation import files as video
+from chutelab.pictures.animation import stage as video
 from chutelab.pictures.animation.actors import SIGNS
-from chutelab.pictures.animation.files import palette, write_gif
 from chutelab.pictures.animation.moments import (
     sentence,
     slowness,
     span,
 )
-from chutelab.pictures.animation.stage import TRAIL, Layout, lay_out
+from chutelab.pictures.animation.stage import TRAIL, Layout, lay_out, palette, write_gif
 from chutelab.pictures.plots import Window, style, window_of
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder

@@ -18,8 +18,8 @@ from chutelab.checks.workprecision import MANY_STEPS, METHODS, Stopwatch, Timing
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.pictures.plots.workprecision import LOOKS
-from chutelab.pictures.plots.workprecision import workprecision as draw
+from chutelab.pictures.plots.studies import LOOKS
+from chutelab.pictures.plots.studies import workprecision as draw
 from chutelab.scene import load
 from chutelab.util.files import tsv_text
 from chutelab.util.versions import environment
@@ -237,7 +237,7 @@ def test_an_interrupt_leaves_no_files(tmp_path, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("chutelab.pictures.plots.workprecision.workprecision", interrupt)
+    monkeypatch.setattr("chutelab.pictures.plots.studies.workprecision", interrupt)
     out = tmp_path / "out"
     call("perpendicular", "--engine", "exact", "--repeats", 1, "--out", out, code=130)
     assert not list(tmp_path.iterdir())

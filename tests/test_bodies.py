@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from chutelab.machine import Machine
 from chutelab.machine.parts import Thread
 from chutelab.pictures.plots import Window, draw_scene, draw_tracks, overlay, style
-from chutelab.pictures.plots.bodies import (
+from chutelab.pictures.plots.machinery import (
     draw_bodies,
     placed,
     stream_colours,

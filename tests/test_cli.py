@@ -12,6 +12,7 @@ from importlib import import_module
 from io import StringIO
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -843,6 +844,22 @@ def test_help_lists_the_commands():
     assert call("-h").stdout == text
     for command in commands:
         assert call(command, "--help").stdout.startswith(f"Usage: main {command} ")
+
+
+def test_options_and_docstrings_name_the_same():
+    """What a docstring tells of an option is of one that is there, and each option is told."""
+
+    def commands(group):
+        for one in group.commands.values():
+            yield from commands(one) if isinstance(one, click.Group) else [one]
+
+    for command in commands(main):
+        options = [one for one in command.params if isinstance(one, click.Option)]
+        names = {name for one in options for name in (*one.opts, *one.secondary_opts)}
+        assert all(one.help for one in options)
+        told = re.findall(r"^    (-[^\n]*?)  ", command.callback.__doc__, re.MULTILINE)
+        assert {name for form in told for name in re.findall(r"--?[a-z][\w-]*", form)} <= names
+        assert not re.search(r"^-.*?  ", command.help, re.MULTILINE)
 
 
 def test_shells_complete_scenes_and_kinds():

@@ -1,16 +1,11 @@
 """Tall columns and silos: no solve and no blow makes energy, however contacts wedge."""
 
-import shutil
-import subprocess
-import sys
 from math import sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
-import wasmtime
 
-from chutelab.core import module
 from chutelab.engines.contact import run
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
@@ -53,30 +48,6 @@ def test_what_jams_is_not_pressed_into_each_other(seed, count):
 @pytest.mark.parametrize("seed", range(20))
 def test_twenty_columns_and_silos_make_no_energy(seed):
     check(seed, 1000 + 379 * seed % 1001)
-
-
-@pytest.fixture
-def with_fault(tmp_path, monkeypatch):
-    """Return a function: from then on the core runs with a text in one of its files replaced."""
-    pytest.importorskip("ziglang")
-
-    def plant(name, text, fault):
-        core = tmp_path / "src" / "chutelab" / "core"
-        for path in (ROOT / "src").glob("chutelab/core/*.[ch]"):
-            core.mkdir(parents=True, exist_ok=True)
-            shutil.copy(path, core)
-        (tmp_path / "tools").mkdir()
-        tool = shutil.copy(ROOT / "tools" / "build_core.py", tmp_path / "tools")
-        source = (core / name).read_text()
-        assert source.count(text) == 1
-        (core / name).write_text(source.replace(text, fault))
-        subprocess.run([sys.executable, tool], check=True, timeout=120)
-        engine = module._compiled()[0]
-        built = wasmtime.Module(engine, (core / "core.wasm").read_bytes())
-        monkeypatch.setattr(module, "_compiled", lambda: (engine, built))
-        monkeypatch.setattr(module, "_idle", [])
-
-    return plant
 
 
 @pytest.mark.slow

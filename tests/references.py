@@ -1,6 +1,6 @@
 """Answers from outside, to hold engines against: brute force, no code of any engine.
 
-- `first_impacts`: who meets whom and when in a dilute stream; after each event all is predicted.
+- `first_impacts`: who meets whom and when in a box; after each event all is predicted anew.
 - `henderson`, `virial`, `wall_pressure`, `maxwell_boltzmann`: a gas of hard disks.
 - `overlaps`, `inside_surfaces`: how deep disks of a recording are in each other and in surfaces.
 
@@ -10,11 +10,11 @@ contact of normal n is (n_y, -n_x). Everything is in SI units.
 
 from __future__ import annotations
 
-from math import acos, copysign, cos, hypot, inf, sin, sqrt
+from itertools import zip_longest
+from math import hypot, inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import polynomial
 from scipy.spatial import cKDTree
 from scipy.stats import kstest
 
@@ -31,80 +31,33 @@ class Impact(NamedTuple):
     approach: float
 
 
-class Impacts(NamedTuple):
-    """What `first_impacts` finds: each particle's impacts, and until when it is followed (s)."""
-
-    of: list[list[Impact]]
-    followed: np.ndarray
-
-
-class _Round(NamedTuple):
-    """A circle that a centre can meet: the end of a segment, or the pulley."""
-
-    center: np.ndarray
-    reach: float
-    left: np.ndarray  # of the belt that ends there; 0 for the pulley
-    speed: float
-    restitution: float
-    friction: float
-    surface: int
-    segment: int  # whose end it is, -1 for the pulley
-    outward: np.ndarray
-
-
-class _Face(NamedTuple):
-    start: np.ndarray
-    tangent: np.ndarray
-    length: float
-    left: np.ndarray
-    speed: float
-    restitution: float
-    friction: float
-    surface: int
-
-
 SAME = 1e-12
-"""m; ends of segments this close together are one joint."""
-
-REAL = 1e-7
-"""Imaginary share of a root below which it may be real: of a double root half the digits are lost.
-Newton's rounds afterwards decide."""
+"""m; what is this near to a face touches it."""
 
 
 def first_impacts(machine, t_end):
-    """Follow the disks of a dilute stream from event to event.
+    """Follow disks in a convex box from event to event, and return the impacts of each.
 
-    After each event all times of the two that had it are predicted anew: with every other disk (a
-    quadratic, as both fall alike), every face (a quadratic), every end and the pulley (a quartic).
-    Blows are Newton's and Coulomb's. Disks carried by adhesion appear where they leave the pulley.
-
-    A disk is followed until it comes to rest on a surface (its rebound would last less than two
-    steps `machine.dt`). Then it is taken away: what would meet it later flies on.
+    After each event all times of the two that had it are predicted anew: with every other disk,
+    which falls alike, and with every face. Each is the root of a quadratic at which a gap closes.
+    Blows are Newton's and Coulomb's.
 
     Parameters
     ----------
     machine : Machine
-        Of disks (r > 0), released by adhesion or in free flight; no surface is in the way of those
-        that are carried.
+        Of equal disks (r > 0) that start at 0 s; its faces are the sides of a box, and do not move.
     t_end : float
-        s.
-
-    Raises
-    ------
-    ValueError
-        If a free disk gets in the way of a carried one, or one is released inside another.
+        s; before any of them comes to rest.
     """
-    p, r, g = machine.particle, machine.particle.radius, machine.gravity
-    faces, rounds = _solids(machine, r)
-    solids = [*faces, *rounds]
+    p, r, s, g = machine.particle, machine.particle.radius, machine.segments, machine.gravity
     turning = 2.0 if p.inertia > 0.0 else 0.0  # m r²/I
     fall = np.array([0.0, -g])
-    entry, place, course, rides = _entries(machine)
-    count = len(entry)
-    x, v, spin = np.zeros((count, 2)), np.zeros((count, 2)), np.zeros(count)
-    since, here = np.full(count, inf), np.zeros(count, dtype=bool)
-    pair, solid = np.full((count, count), inf), np.full((count, len(solids)), inf)
-    found, followed = [[] for _ in range(count)], np.full(count, float(t_end))
+    x, v = machine.releases.position.copy(), machine.releases.velocity.copy()
+    count = len(x)
+    spin, since, found = np.zeros(count), np.zeros(count), [[] for _ in range(count)]
+    left = np.stack([-s.tangent[:, 1], s.tangent[:, 0]], axis=1)
+    inward = np.sign(((x[0] - s.start) * left).sum(axis=1))[:, None] * left
+    pair, face = np.full((count, count), inf), np.full((count, len(left)), inf)
 
     def move(i, t):
         h = t - since[i]
@@ -112,137 +65,100 @@ def first_impacts(machine, t_end):
         v[i] += h * fall
         since[i] = t
 
-    def predict(i, touched, order):
-        """Find the next times of particle i; it touches a solid, left in that order of time."""
-        for k, one in enumerate(solids):
-            left = order if k in touched else 0
-            meet = _meet_face if k < len(faces) else _meet_round
-            solid[i, k] = since[i] + meet(one, x[i], v[i], fall, r, left)
-        pair[i], pair[:, i] = inf, inf
-        others = np.flatnonzero(here & (np.arange(count) != i))
-        if machine.interact and len(others):
-            h = (since[i] - since[others])[:, None]
-            d = x[i] - (x[others] + h * v[others] + 0.5 * h * h * fall)
-            u = v[i] - (v[others] + h * fall)
-            a, b = (u * u).sum(1), (d * u).sum(1)
-            c = (np.hypot(*d.T) - 2.0 * r) * (np.hypot(*d.T) + 2.0 * r)
-            square = b * b - a * c
-            meets = (b < 0.0) & (square > 0.0)
-            root = np.sqrt(np.where(meets, square, 1.0))
-            t = np.where(meets, np.maximum(c, 0.0) / (root - b), inf)
-            pair[i, others] = pair[others, i] = since[i] + t
+    def predict(i):
+        gap = ((x[i] - s.start) * inward).sum(axis=1) - r
+        face[i] = since[i] + closes(np.where(gap <= SAME, 0.0, gap), inward @ v[i], inward @ fall)
+        others = np.flatnonzero(np.arange(count) != i)
+        h = (since[i] - since[others])[:, None]
+        d = x[i] - (x[others] + h * v[others] + 0.5 * h * h * fall)
+        u = v[i] - (v[others] + h * fall)
+        # |d + u t| = 2 r, over 2 |d|: what is left of the square is a quadratic's.
+        c = 0.5 * (np.hypot(*d.T) - 2.0 * r) * (np.hypot(*d.T) + 2.0 * r)
+        met = closes(np.maximum(c, 0.0), (d * u).sum(axis=1), (u * u).sum(axis=1))
+        pair[i, others] = pair[others, i] = since[i] + met
 
-    def leave(i, t):
-        here[i] = False
-        followed[i] = t
-        pair[i], pair[:, i], solid[i] = inf, inf, inf
+    def blow(along, normal, slip, friction, share):
+        """Return the impulse along a tangent that stops the slip, or what friction allows."""
+        return np.clip(-share * slip / (1.0 + turning), -friction * normal, friction * normal)
 
-    waiting = sorted(range(count), key=lambda i: -entry[i])
+    for i in range(count):
+        predict(i)
     while True:
         i, j = divmod(int(pair.argmin()), count)
-        k, surface = divmod(int(solid.argmin()), len(solids))
-        release = entry[waiting[-1]] if waiting else inf
-        t = min(pair[i, j], solid[k, surface], release)
+        k, side = divmod(int(face.argmin()), len(left))
+        t = min(pair[i, j], face[k, side])
         if t >= t_end:
-            return Impacts(found, followed)
-        if t == release:
-            i = waiting.pop()
-            x[i], v[i], since[i], here[i] = place[i], course[i], t, True
-            others = np.flatnonzero(here & (np.arange(count) != i))
-            away = x[others] + (t - since[others])[:, None] * v[others]
-            away += 0.5 * (t - since[others])[:, None] ** 2 * fall - x[i]
-            if machine.interact and (np.hypot(*away.T) < 2.0 * r * (1.0 - SAME)).any():
-                raise ValueError(f"particle {i} is released inside another")
-            predict(i, *_touched(faces, rounds, x[i], v[i], r, rides[i]))
-        elif pair[i, j] <= solid[k, surface]:
+            return found
+        if pair[i, j] <= face[k, side]:
             move(i, t)
             move(j, t)
             n = (x[i] - x[j]) / hypot(*(x[i] - x[j]))
-            along = np.array([n[1], -n[0]])
-            approach = -(v[i] - v[j]) @ n
+            along, approach = np.array([n[1], -n[0]]), -(v[i] - v[j]) @ n
             slip = (v[i] - v[j]) @ along + r * (spin[i] + spin[j])
             # Per mass; each takes half of what changes.
             normal = 0.5 * (1.0 + machine.pair_restitution[0, 0]) * approach
-            most = machine.pair_friction[0, 0] * normal
-            rub = np.clip(-0.5 * slip / (1.0 + turning), -most, most)
+            rub = blow(along, normal, slip, machine.pair_friction[0, 0], 0.5)
             v[i] += normal * n + rub * along
             v[j] -= normal * n + rub * along
             spin[[i, j]] += turning * rub / r
             found[i].append(Impact(t, j, approach))
             found[j].append(Impact(t, i, approach))
-            predict(i, (), 0)
-            predict(j, (), 0)
+            predict(j)
         else:
-            i, one = k, solids[surface]
+            i, n = k, inward[side]
             move(i, t)
-            n, belt = _contact(one, x[i])
-            along = np.array([n[1], -n[0]])
-            approach, pace = -v[i] @ n, v[i] @ along
-            normal = (1.0 + one.restitution) * approach
-            slip = pace + r * spin[i] - belt
-            # µ may be infinite, and the blow nothing.
-            most = one.friction * normal if normal > 0.0 else 0.0
-            rub = np.clip(-slip / (1.0 + turning), -most, most)
-            v[i] = one.restitution * approach * n + (pace + rub) * along
+            along, approach = np.array([n[1], -n[0]]), -v[i] @ n
+            normal = (1.0 + s.restitution[side]) * approach
+            rub = blow(along, normal, v[i] @ along + r * spin[i], s.friction[side], 1.0)
+            v[i] += normal * n + rub * along
             spin[i] += turning * rub / r
-            found[i].append(Impact(t, machine.surfaces[one.surface], approach))
-            rebound, load = one.restitution * approach, g * n[1]
-            if isinstance(one, _Round):
-                load -= (v[i] @ along) ** 2 / one.reach
-            if rebound < load * machine.dt:
-                leave(i, t)
-            else:
-                predict(i, (surface,), 1 if rebound > 0.0 else 2)
-        _look_out(machine, t, x, v, since, here, entry, fall)
+            found[i].append(Impact(t, machine.surfaces[s.surface[side]], approach))
+        predict(i)
+
+
+def closes(gap, rate, pull):
+    """Return when gap + rate t + pull t²/2, of gaps >= 0, comes to 0 while it falls; inf if never.
+
+    What touches comes back where it is pulled back.
+    """
+    square = rate * rate - 2.0 * pull * gap
+    root = np.sqrt(np.maximum(square, 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = np.where(pull < 0.0, -2.0 * rate / pull, inf)
+        later = np.where(root - rate > 0.0, 2.0 * gap / (root - rate), inf)
+    touching = (gap == 0.0) & (rate >= 0.0)
+    return np.where(square <= 0.0, inf, np.where(touching, away, later))
 
 
 class Likeness(NamedTuple):
     """A recording beside `first_impacts`: how many impacts were alike, what was not."""
 
     alike: int
-    time: float
-    """Largest difference of times, s."""
+    off: float
+    """Largest difference of times, in the way that the gap closes meanwhile, m."""
     approach: float
     """Largest difference of approach speeds, m/s; of impacts with surfaces."""
     unlike: list[tuple[int, Impact | None, Impact | None]]
     """Particle, what was expected, what came: the first difference of each particle."""
-    unknown: int
-    """Particles that met one that the reference did not follow any more."""
 
 
 def likeness(found, recording, most=3, tolerance=1e-10):
     """Lay the first impacts of each particle beside a recording's.
 
-    An impact is alike if its partner is the same and its time within `tolerance`, s. A particle
-    counts up to where the reference stops following it, or it meets one that is followed no more.
+    An impact is alike if its partner is the same and its time within `tolerance`, s.
     """
-    own = _impacts_of(recording)
-    known, places = found.followed.copy(), [0] * len(own)
-    alike, times, approaches, unlike, unknown = 0, [0.0], [0.0], [], 0
-    # All of them: what a particle does after its first ones, others may feel.
-    for t, i in sorted((one.t, i) for i, each in enumerate(own) for one in each):
-        if t > known[i] + tolerance:
-            continue
-        k = places[i]
-        places[i] += 1
-        one, expected = own[i][k], found.of[i][k] if k < len(found.of[i]) else None
-        if isinstance(one.partner, int) and t > known[one.partner] + tolerance:
-            known[i] = t
-            unknown += k < most
-        elif expected is None or expected.partner != one.partner or abs(expected.t - t) > tolerance:
-            known[i] = t
-            if k < most:
+    alike, offs, approaches, unlike = 0, [0.0], [0.0], []
+    for i, pairs in enumerate(zip(found, _impacts_of(recording), strict=True)):
+        for expected, one in zip_longest(*(each[:most] for each in pairs)):
+            both = expected is not None and one is not None and expected.partner == one.partner
+            if not both or abs(expected.t - one.t) > tolerance:
                 unlike.append((i, expected, one))
-        elif k < most:
+                break
             alike += 1
-            times.append(abs(expected.t - t))
+            offs.append(abs(expected.t - one.t) * expected.approach)
             if isinstance(one.partner, str):
                 approaches.append(abs(expected.approach - one.approach))
-    for i, expected in enumerate(found.of):
-        # What was expected and never came.
-        if places[i] < min(most, len(expected)) and expected[places[i]].t < known[i] - tolerance:
-            unlike.append((i, expected[places[i]], None))
-    return Likeness(alike, max(times), max(approaches), unlike, unknown)
+    return Likeness(alike, max(offs), max(approaches), unlike)
 
 
 def _impacts_of(recording):
@@ -267,158 +183,6 @@ def normal_of(recording, blow):
     if n == 0.0:
         return change
     return (n * change + rub * np.array([-change[1], change[0]])) / (n * n + rub * rub)
-
-
-def _solids(machine, r):
-    s, wheel = machine.segments, machine.pulley
-    faces, rounds = [], []
-    lefts = np.stack([-s.tangent[:, 1], s.tangent[:, 0]], axis=1)
-    ends = (s.start, s.start + s.length[:, None] * s.tangent)
-    for k in range(len(s.length)):
-        material = float(s.restitution[k]), float(s.friction[k]), int(s.surface[k])
-        speed = float(s.speed[k])
-        faces.append(_Face(s.start[k], s.tangent[k], s.length[k], lefts[k], speed, *material))
-        for end, sign in zip(ends, (-1.0, 1.0), strict=True):
-            if wheel is not None and k == 0 and sign > 0.0:
-                continue  # inside the pulley
-            # At a joint of one surface the rim joins both faces: their left normals' sum.
-            near = [
-                m for m in range(len(s.length)) if s.surface[m] == s.surface[k]
-                and any(hypot(*(other[m] - end[k])) <= SAME for other in ends)
-            ]  # fmt: skip
-            left = lefts[near].sum(axis=0)
-            outward = sign * s.tangent[k]
-            rounds.append(_Round(end[k], r, left, speed, *material, k, outward))
-    if wheel is not None:
-        material = wheel.restitution, wheel.friction, wheel.surface
-        nothing = np.zeros(2)
-        reach = wheel.radius + r
-        rounds.append(_Round(nothing, reach, nothing, wheel.speed, *material, -1, nothing))
-    return faces, rounds
-
-
-def _entries(machine):
-    """Return when and where each disk is free, how fast, and whether it was carried until then."""
-    start, g = machine.releases, machine.gravity
-    t, place, course = start.t.copy(), start.position.copy(), start.velocity.copy()
-    for i in np.flatnonzero(start.carried):
-        (along, rho), speed = start.position[i], start.velocity[i, 0]
-        angle = acos(min(1.0, speed**2 / (g * rho))) if g > 0.0 else 0.0
-        t[i] += (rho * angle - along) / speed
-        place[i] = rho * sin(angle), rho * cos(angle)
-        course[i] = speed * cos(angle), -speed * sin(angle)
-    return t, place, course, start.carried
-
-
-def _look_out(machine, t, x, v, since, here, entry, fall):
-    """Raise if a free disk is where a carried one is now."""
-    start, r = machine.releases, machine.particle.radius
-    on = np.flatnonzero(start.carried & (start.t <= t) & (entry > t))
-    free = np.flatnonzero(here)
-    if not machine.interact or not len(on) or not len(free):
-        return
-    way = start.position[on, 0] + start.velocity[on, 0] * (t - start.t[on])
-    rho = start.position[on, 1]
-    angle = np.maximum(way, 0.0) / rho
-    held = np.stack([np.minimum(way, 0.0) + rho * np.sin(angle), rho * np.cos(angle)], axis=1)
-    h = (t - since[free])[:, None]
-    loose = x[free] + h * v[free] + 0.5 * h * h * fall
-    if (np.hypot(*(held[:, None] - loose).transpose(2, 0, 1)) < 2.0 * r * (1.0 - SAME)).any():
-        raise ValueError(f"a free disk is in the way of a carried one at {t} s")
-
-
-def _touched(faces, rounds, x, v, r, carried):
-    """Return the solids that a disk touches at its release, and the order in which it leaves them.
-
-    Off the pulley the gap begins with t² at its top and with t³ beyond: g v sin φ t³ + g² t⁴/4.
-    """
-    touched = [
-        k for k, one in enumerate(faces) if abs(abs((x - one.start) @ one.left) - r) <= SAME
-        and -SAME <= (x - one.start) @ one.tangent <= one.length + SAME
-    ]  # fmt: skip
-    touched += [
-        len(faces) + k
-        for k, one in enumerate(rounds)
-        if abs(hypot(*(x - one.center)) - one.reach) <= SAME
-    ]
-    return touched, (3 if carried and v[1] < 0.0 else 2)
-
-
-def _first(coefficients, order, gap, rate, inside):
-    """Return the first root of a gap that closes there, polished on the gap itself; inf if none."""
-    roots = polynomial.polyroots(np.trim_zeros(coefficients[order:], "b"))
-    near = roots[np.abs(roots.imag) <= REAL * (1.0 + np.abs(roots.real))].real
-    for t in np.sort(near[near > 0.0]):
-        for _ in range(4):
-            if rate(t) < 0.0 and t > 0.0:
-                t -= gap(t) / rate(t)
-        if t > 0.0 and rate(t) < 0.0 and abs(gap(t)) <= 1e-11 and inside(t):
-            return t
-    return inf
-
-
-def _meet_face(face, x, v, a, r, order):
-    height, rate, pull = ((vector @ face.left) for vector in (x - face.start, v, a))
-    best = inf
-    for side in (1.0, -1.0):
-        c = [side * height - r, side * rate, 0.5 * side * pull]
-        # Never twice at once: the face that it touches is left, or slid along.
-        touching = order if order and abs(c[0]) <= SAME else 0
-        c[:touching] = [0.0] * touching
-
-        def gap(t, c=c):
-            return c[0] + t * (c[1] + t * c[2])
-
-        def rate_(t, c=c):
-            return c[1] + 2.0 * t * c[2]
-
-        def beside(t):
-            foot = (x + t * v + 0.5 * t * t * a - face.start) @ face.tangent
-            return 0.0 <= foot <= face.length
-
-        if len(np.trim_zeros(c[touching:], "b")) > 1:
-            best = min(best, _first(np.array(c), touching, gap, rate_, beside))
-    return best
-
-
-def _meet_round(one, x, v, a, r, order):
-    d = x - one.center
-    distance = hypot(*d)
-    c = np.array(
-        [
-            (distance - one.reach) * (distance + one.reach),
-            2.0 * d @ v, v @ v + d @ a, v @ a, 0.25 * a @ a,
-        ]
-    )  # fmt: skip
-    c[:order] = 0.0
-    if len(np.trim_zeros(c[order:], "b")) < 2:
-        return inf
-
-    def gap(t):
-        if order:
-            # What is left is too small to be told from the distance.
-            return polynomial.polyval(t, c) / (2.0 * one.reach)
-        return hypot(*(d + t * v + 0.5 * t * t * a)) - one.reach
-
-    def rate(t):
-        if order:
-            return polynomial.polyval(t, polynomial.polyder(c)) / (2.0 * one.reach)
-        there = d + t * v + 0.5 * t * t * a
-        return there @ (v + t * a) / hypot(*there)
-
-    def beyond(t):
-        return one.segment < 0 or (d + t * v + 0.5 * t * t * a) @ one.outward > 0.0
-
-    return _first(c, order, gap, rate, beyond)
-
-
-def _contact(one, x):
-    """Return normal and speed of the surface along the tangent; round an end v s, see there."""
-    if isinstance(one, _Face):
-        side = copysign(1.0, (x - one.start) @ one.left)
-        return side * one.left, side * one.speed
-    n = (x - one.center) / hypot(*(x - one.center))
-    return n, one.speed if n @ one.left >= 0.0 else -one.speed
 
 
 # A gas of hard disks

@@ -289,7 +289,7 @@ def test_what_places_the_belt_is_shared_by_the_engines_and_told_by_the_theory(mo
     def sunk(*given):
         laid = honest(*given)
         for end in ("start", "end"):
-            laid.segments[end][2, 1] -= lower
+            laid.parts["segments"][end][2, 1] -= lower
         return laid
 
     monkeypatch.setattr(builder, "lay", sunk)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -111,6 +112,38 @@ def test_a_box_is_drawn_turned_counterclockwise() -> None:
 
 
 # Streams
+
+
+def seen_by(colour: str, matrix: np.ndarray) -> np.ndarray:
+    """Return a colour's L*, a* and b* (CIE 1976, D65) as a dichromat sees it."""
+    rgb = np.array(to_rgb(colour))
+    linear = np.where(rgb > 0.04045, ((rgb + 0.055) / 1.055) ** 2.4, rgb / 12.92)
+    linear = np.clip(matrix @ linear, 0.0, 1.0)
+    xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    white = np.array([0.9505, 1.0, 1.089])
+    f = xyz @ linear / white
+    f = np.where(f > (6 / 29) ** 3, np.cbrt(f), f / (3 * (6 / 29) ** 2) + 4 / 29)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+# Machado, Oliveira and Fernandes (2009), severity 1, for linear RGB.
+EYES = {
+    "normal": np.eye(3),
+    "protanopia": np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+                            [-0.003882, -0.048116, 1.051998]]),
+    "deuteranopia": np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+                              [-0.011820, 0.042940, 0.968881]]),
+    "tritanopia": np.array([[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
+                            [0.004733, 0.691367, 0.303900]]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_streams_and_particle_0_can_be_told_apart_by_all_eyes(eyes: str) -> None:
+    colours = [seen_by(colour, EYES[eyes]) for colour in (*stream_colours(5), style.STRIKE)]
+    for one, other in combinations(colours, 2):
+        # 2.3 is a just noticeable difference.
+        assert np.hypot.reduce(one - other) > 12.0
 
 
 def test_ten_streams_have_ten_colours() -> None:

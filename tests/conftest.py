@@ -1,11 +1,20 @@
 from __future__ import annotations
 
 import gc
+import shutil
 import signal
+import subprocess
+import sys
+from pathlib import Path
 
+import pytest
+import wasmtime
 from hypothesis import settings
 
+from chutelab.core import module
 from live.browser import browser, opened, shown  # noqa: F401
+
+ROOT = Path(__file__).parents[1]
 
 # What runs in the background of a shell ignores Ctrl-C, and so would the commands that tests start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -24,3 +33,27 @@ def pytest_collection_finish(session):
 
 # Cells of notebooks, not modules.
 collect_ignore_glob = ["solutions/*"]
+
+
+@pytest.fixture
+def with_fault(tmp_path, monkeypatch):
+    """Return a function: from then on the core runs with a text in one of its files replaced."""
+    pytest.importorskip("ziglang")
+
+    def plant(name, text, fault):
+        core = tmp_path / "src" / "chutelab" / "core"
+        for path in (ROOT / "src").glob("chutelab/core/*.[ch]"):
+            core.mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, core)
+        (tmp_path / "tools").mkdir()
+        tool = shutil.copy(ROOT / "tools" / "build_core.py", tmp_path / "tools")
+        source = (core / name).read_text()
+        assert source.count(text) == 1
+        (core / name).write_text(source.replace(text, fault))
+        subprocess.run([sys.executable, tool], check=True, timeout=120)
+        engine = module._compiled()[0]
+        built = wasmtime.Module(engine, (core / "core.wasm").read_bytes())
+        monkeypatch.setattr(module, "_compiled", lambda: (engine, built))
+        monkeypatch.setattr(module, "_idle", [])
+
+    return plant

@@ -11,13 +11,13 @@ from scipy.integrate import quad
 
 from chutelab import machine, scene, theory
 from chutelab.checks.agreement import agreement, order, verify
+from chutelab.core.module import dtype
 from chutelab.engines import exact, reference
 from chutelab.engines.contact import Job
-from chutelab.engines.exact import contacts
+from chutelab.engines.exact import engine
 from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.simulation import simulate
 from chutelab.machine import builder
-from chutelab.mechanics import ballistics, contact
 from chutelab.results import REASONS, Kind
 from chutelab.results.comparison import compare
 from chutelab.scene.quantities import THEORY
@@ -136,8 +136,8 @@ def test_where_all_contacts_are_blows_the_engines_agree_to_what_each_promises():
 
 def test_where_contacts_last_a_stepped_engine_converges():
     rows = rows_of("slip", "incoming.length=0.1")
-    for engine, least in (("contact", 1.5), ("pymunk", 0.5)):
-        row = rows[f"{engine}, exact"]
+    for name, least in (("contact", 1.5), ("pymunk", 0.5)):
+        row = rows[f"{name}, exact"]
         assert (row.least, row.tolerance, row.holds) == (True, least, True)
         assert row.difference > 1.5
 
@@ -193,36 +193,20 @@ WRONG = 1e-6
 """Relative error of the planted formula."""
 
 
-def restitution_on_the_slip(approach, slip, restitution, friction, share):
-    """The printed Eq. (9) in an engine: the wrong component is damped."""
-    normal, _ = contact.impulses(approach, slip, 1.0, friction, share)
-    return normal, -(1.0 - np.asarray(restitution)) * np.asarray(slip)
+def heavier(module, machine, *given, honest=engine.fill):
+    honest(module, machine, *given)
+    module.array("lones", dtype("Lone"), machine.count, of="Exact")["gravity"] *= 1.0 + WRONG
 
 
-def late_descent(gap, rate, acceleration):
-    return ballistics.descent(gap, rate, acceleration) * (1.0 + WRONG)
+def livelier(module, machine, *given, honest=engine.fill):
+    honest(module, machine, *given)
+    pieces = len(machine.segments.length) + len(machine.arcs.surface) + (machine.pulley is not None)
+    module.array("materials", dtype("Pair"), pieces, of="Exact")["restitution"] *= 1.0 + WRONG
 
 
-def lively_blow(s, who, contact, before, approach, rebound, landing, blow=contacts._blow):
-    return blow(s, who, contact, before, approach, rebound * (1.0 + WRONG), landing)
-
-
-PLANTED = [
-    ("chutelab.engines.exact.contacts._blow", lively_blow),
-    ("chutelab.engines.exact.contacts.impulses", restitution_on_the_slip),
-    ("chutelab.engines.exact.detect.descent", late_descent),
-]
-
-
-@pytest.mark.parametrize(
-    ("where", "wrong", "until"),
-    [*((*fault, "landed") for fault in PLANTED), (*PLANTED[2], "settled")],
-)
-def test_a_wrong_formula_is_caught_from_outside(where, wrong, until, monkeypatch):
+def caught(until):
+    """Tell that what the exact engine does differs from all else, and from nothing else."""
     drawn = scene.load("perpendicular", [f"run.until={until}"])
-    assert verify(drawn).failures == 0
-    assert reach(drawn, 1e-9)[1].met
-    monkeypatch.setattr(where, wrong)
     failed = [row.pair for row in verify(drawn).agreements if not row.holds]
     assert "exact, theory" in failed
     assert {f"{name}, exact" for name in ("dop853", "contact", "pymunk")} <= set(failed)
@@ -233,6 +217,34 @@ def test_a_wrong_formula_is_caught_from_outside(where, wrong, until, monkeypatch
     assert not found.met
     assert found.reached is None or found.reached > 0.1 * WRONG
     assert found.against == ("theory" if until == "landed" else "dop853")
+
+
+@pytest.mark.parametrize("until", ["landed", "settled"])
+@pytest.mark.parametrize("wrong", [heavier, livelier])
+def test_a_wrong_number_is_caught_from_outside(wrong, until, monkeypatch):
+    drawn = scene.load("perpendicular", [f"run.until={until}"])
+    assert verify(drawn).failures == 0
+    assert reach(drawn, 1e-9)[1].met
+    monkeypatch.setattr(engine, "fill", wrong)
+    caught(until)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("file", "text", "wrong"),
+    [
+        ("exact_meet.c", "span / -acceleration : (gap + gap) / span;",
+         "span / -acceleration : (1.0 + 1e-6) * (gap + gap) / span;"),
+        ("exact.c", "double rebound = c.restitution * approach;",
+         "double rebound = (1.0 + 1e-6) * c.restitution * approach;"),
+        # The printed Eq. (9) in an engine: the wrong component is damped.
+        ("exact.c", "push = limited(-A.share * slip, grip);",
+         "push = -(1.0 - c->restitution) * slip;"),
+    ],
+)  # fmt: skip
+def test_a_wrong_formula_is_caught_from_outside(file, text, wrong, with_fault):
+    with_fault(file, text, wrong)
+    caught("landed")
 
 
 def heavier_core(job, *given, honest=Job.settings):
@@ -253,7 +265,7 @@ def heavier_ode(run, *given, honest=reference._Run.__init__):
 @pytest.mark.parametrize(
     ("name", "where", "wrong"),
     [
-        ("exact", "chutelab.engines.exact.detect.descent", late_descent),
+        ("exact", "chutelab.engines.exact.engine.fill", heavier),
         ("contact", "chutelab.engines.contact.Job.settings", heavier_core),
         ("pymunk", "chutelab.engines.pymunk.lone.Lone.__init__", heavier_flight),
         ("dop853", "chutelab.engines.reference._Run.__init__", heavier_ode),

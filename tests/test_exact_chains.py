@@ -10,7 +10,6 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from chutelab.engines import contact, exact
-from chutelab.engines.exact import detect, obstacles
 from chutelab.machine import build
 from chutelab.scene import from_dict
 from judge import faults
@@ -119,14 +118,18 @@ def test_below_a_joint_of_three_pieces_it_goes_straight_on():
     np.testing.assert_allclose(run.track(0)[-1]["position"], alone.track(0)[-1]["position"])
 
 
-def test_the_laws_see_an_engine_that_overlooks_rims_or_sorts_no_joint(monkeypatch):
-    """A planted fault of each of the two kinds that were there."""
-    monkeypatch.setattr(detect, "_entry", lambda motion, *_: np.inf)
+@pytest.mark.slow
+def test_the_laws_see_an_engine_that_overlooks_rims(with_fault):
+    with_fault("exact_meet.c", "MIN(t, enter(m, k, until)) : t;", "t : t;")
     drawn, run = ran({"radius": 0.1}, [PIPE], (-0.9, 0.5), until=2.0)
     assert any(said.startswith("through p0") for said in faults(run, drawn))
-    monkeypatch.undo()
-    by_bend = obstacles._by_bend
-    monkeypatch.setattr(obstacles, "_by_bend", lambda rays: by_bend(rays)[::-1])
+
+
+@pytest.mark.slow
+def test_the_laws_see_an_engine_that_sorts_no_joint(with_fault):
+    with_fault(
+        "exact_pieces.c", "some[k].bend < some[k - 1].bend", "some[k].bend > some[k - 1].bend"
+    )
     drawn, run = ran({"radius": 0.008}, JOINTS["end"], (-0.5, 0.0081), (2.0, 0.0))
     assert any(said.startswith("in p1") for said in faults(run, drawn))
 

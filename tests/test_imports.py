@@ -125,3 +125,19 @@ def test_what_docstrings_and_texts_name_is_there():
     texts = [*(root / "src").rglob("*.py"), *(root / "docs").glob("*.md"), *root.glob("*.md")]
     for name in sorted(set().union(*(named(path.read_text("utf-8")) for path in texts))):
         resolved(name)
+
+
+OWN = {"core.h": "contact", "exact.h": "exact", "laws.h": "laws", "plan.h": "machine"} | {
+    "releases.h": "machine"
+}
+"""Headers of the core, by what they belong to."""
+
+SHARED = {"layout.h", "memory.h", "trig.h"}
+"""Structs, where arrays lie, sine and cosine: no mechanics."""
+
+
+def test_engines_judge_and_builder_in_the_core_share_no_formula():
+    for path in (Path(SOURCES) / "chutelab" / "core").glob("*.[ch]"):
+        headers = set(re.findall(r'#include "(\w+\.h)"', path.read_text())) - SHARED
+        assert headers <= OWN.keys()
+        assert len({OWN[name] for name in headers | ({path.name} & OWN.keys())}) <= 1

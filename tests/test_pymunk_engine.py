@@ -215,21 +215,6 @@ def test_the_bits_do_not_depend_on_where_shapes_lie_in_memory():
             assert getattr(again, name).tobytes() == getattr(first, name).tobytes()
 
 
-def test_a_fault_in_the_formulas_does_not_reach_it(monkeypatch):
-    m = machine("perpendicular")
-    before, right = run(m), exact(m)
-    assert off(before, right) < 1e-11
-    true = chutelab.mechanics.contact.impulses
-
-    def wrong(approach, slip, restitution, friction, share):
-        return true(1.01 * approach, slip, restitution, friction, share)
-
-    monkeypatch.setattr("chutelab.mechanics.contact.impulses", wrong)
-    monkeypatch.setattr("chutelab.engines.exact.contacts.impulses", wrong)
-    assert off(exact(m), right) > 1e-6
-    np.testing.assert_array_equal(final(run(m)), final(before))
-
-
 def test_refuses_points():
     m = machine("perpendicular", "particle.radius=0")
     with pytest.raises(ValueError, match="radius"):

@@ -15,7 +15,6 @@ The rooms of the house; each imports only those below it:
 - `engines`: exact, contact, pymunk, and `simulate`, which chooses;
 - `results`: recordings, ledger, comparison, summary;
 - `theory` and `machine`: the paper in closed form; a scene resolved to arrays for the engines;
-- `mechanics`: flight, impact, ride;
 - `scene`: scene files;
 - `core`: what runs in Python and in the page alike, in C: builds machines, runs contact,
   judges runs;

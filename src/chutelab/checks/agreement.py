@@ -29,7 +29,7 @@ from chutelab.util.tables import Sheet
 
 ANSWERS: Final = {
     "theory": ("closed form, NumPy", "nothing, not even the machine"),
-    "exact": ("the next event, solved", "mechanics, which place the belt too"),
+    "exact": ("the next event, solved", "exact.c and its files"),
     "contact": ("impacts, contact dynamics; C", "the machine's arrays"),
     "pymunk": ("Chipmunk's solver, stepped", "the machine's arrays"),
     "dop853": ("SciPy's ODE solver, events", "the machine's arrays"),

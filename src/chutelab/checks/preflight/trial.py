@@ -10,7 +10,7 @@ from time import process_time
 import numpy as np
 
 from chutelab.checks.preflight.results import Effort, Stepping
-from chutelab.engines.exact.engine import ROUNDS
+from chutelab.engines.exact import ROUNDS
 from chutelab.engines.simulation import follow
 from chutelab.machine import Machine, build
 from chutelab.results import EVENT, KNOT, REASONS, Recording

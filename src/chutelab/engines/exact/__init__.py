@@ -1,18 +1,9 @@
 """The event-driven engine: particles move on exact arcs, the next event is solved, not stepped.
 
-One round resolves the next event of all particles of a block at once. There is no contact between
-particles.
-
-- `obstacles`: faces and circles to meet, and how they join: what goes on where one ends.
-- `layout`: a machine's surfaces as these.
-- `detect`: the next contact: of flight and slide, and of a ride round a circle.
-- `particle_state`: the state of a block of particles, and what it leaves behind.
-- `contacts`: what a contact does: blows, rest, grip and slip.
-- `motion`: flight, slide, carriage and ride up to the next event.
-- `engine`: the rounds, block by block; which machines of a family can run together.
+It is in C, in `chutelab.core` (exact.c and its files), and shares nothing with the contact
+engine's; `engine` has `run`, from a machine to a recording. There is no contact between particles.
 """
 
-from chutelab.engines.exact.contacts import CornerError
-from chutelab.engines.exact.engine import kinds, run
+from chutelab.engines.exact.engine import ROUNDS, CornerError, run
 
-__all__ = ["CornerError", "kinds", "run"]
+__all__ = ["ROUNDS", "CornerError", "run"]

@@ -1,123 +1,43 @@
-"""Rounds of the event-driven engine, block by block.
-
-Machines of a family can run together, `kinds`, if their surfaces join in the same way.
-"""
+"""`run`: a machine whose particles meet no other in, a recording out; the core does the rest."""
 
 from __future__ import annotations
 
-from itertools import combinations
+from contextlib import suppress
+from math import prod
 from time import perf_counter
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from chutelab.engines.exact.layout import (
-    JOINT,
-    Bends,
-    ahead_of,
-    beginnings,
-    corners_of,
-    curvatures_of,
-    obstacles,
-    resting,
-    size_of,
-    touch_of,
-)
-from chutelab.engines.exact.motion import carry, fly, ride, slide
-from chutelab.engines.exact.obstacles import COLLINEAR, FOLDED, along, dot
-from chutelab.engines.exact.particle_state import Mode, State
+from chutelab.core.module import REAL, Module, borrow, constants, dtype, give_back, number
 from chutelab.machine import Machine, moved, origin
-from chutelab.results.record import REASONS, Kind, Record
+from chutelab.results.record import EVENT, KNOT, REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
-from chutelab.util.arrays import Bools, Ints, Progress
-
-
-def kinds(machine: Machine) -> list[Ints]:
-    """Group members of a family that share every trait taken from the first one.
-
-    Traits are how pieces join, and whether there are points, points that may lie in a surface,
-    gravity, and a belt at rest.
-
-    Parameters
-    ----------
-    machine : Machine
-        A family, see `Machine`.
-
-    Returns
-    -------
-    list of ndarray
-        Numbers of members that are alike; each member is in one of them.
-    """
-    bends = Bends.of(machine)
-    ends, ahead = corners_of(machine, bends), ahead_of(machine, bends)
-    size, radius = size_of(ends, bends, machine.releases.position), machine.particle.radius
-    reach = JOINT * size
-    curvature = curvatures_of(machine, bends)
-    traits = [np.greater(radius, 0.0), radius <= touch_of(size), np.greater(machine.gravity, 0.0)]
-    if machine.pulley is not None:
-        traits.append(np.equal(machine.pulley.speed, 0.0))
-    traits += [*np.atleast_2d(machine.arcs.whole).T]
-    for arc, on in enumerate(resting(ends, bends, reach)):
-        away = (ends - bends.center[:, arc, None]) / bends.shape[0, arc]
-        flush = on & (np.abs(dot(away, ahead)) <= COLLINEAR)
-        traits += [*on, *flush, *(flush & (dot(along(away), ahead) > 0.0))]
-    traits += beginnings(machine, bends, ends, reach).values()
-    # Most ends are never near each other.
-    beyond = ends.min(axis=-1)[:, :, None] > ends.max(axis=-1)[:, None] + reach.max()
-    beyond |= beyond.transpose(0, 2, 1)
-    joins: dict[frozenset[int], Bools] = {}
-    ordered: dict[frozenset[int], Bools] = {}
-    for a, b in np.argwhere(np.triu(~beyond.any(axis=0), 1)).tolist():
-        near: Bools = np.all(np.abs(ends[:, a] - ends[:, b]) <= reach, axis=0)
-        joins[frozenset((a, b))] = near
-        outward, onward = ahead[:, a], ahead[:, b]
-        cross = outward[0] * onward[1] - outward[1] * onward[0]
-        folded = near & (np.abs(outward - onward).max(axis=0) <= FOLDED)
-        traits += [near, folded, near & (np.abs(cross) <= COLLINEAR)]
-        tighter = curvature[a] > curvature[b]
-        ordered[frozenset((a, b))] = np.where(folded, tighter, near & (cross > COLLINEAR))
-    # Where three meet, their order round the place matters.
-    for one, other in combinations(joins, 2):
-        if len(one ^ other) == 2:
-            traits += [ordered[one], ordered[other]]
-    # Where a joins b and b joins c, but a does not join c, the order of the ends matters too.
-    none = np.zeros(machine.count, dtype=bool)
-    chained = none.copy()
-    for one, other in combinations(joins, 2):
-        if len(one ^ other) == 2:
-            chained |= joins[one] & joins[other] & ~joins.get(one ^ other, none)
-    apart = np.where(chained, 1 + np.arange(machine.count), 0)
-    table = np.stack([np.broadcast_to(trait, machine.count) for trait in (*traits, apart)])
-    order = np.lexsort(table)
-    return np.split(order, 1 + np.flatnonzero(np.diff(table[:, order]).any(axis=0)))
-
-
-MOVE = {Mode.FLIGHT: fly, Mode.CARRIED: carry, Mode.FACE: slide, Mode.ARC: ride}
-"""What takes particles to their next event."""
-
-CELLS = 2**15
-"""Particles times obstacles in one block: some thirty arrays of that size stay near the cache."""
-
-FEWEST, MOST = 64, 4096
-"""Particles in a block: bounds."""
+from chutelab.util.arrays import Progress
 
 ROUNDS = 500_000
-"""Most rounds of a block. A particle at ε = 0.999 comes to rest within some 20,000, at 0.9999
-within 200,000; one that rattles at 7 ms a period for the default max_time needs 10,000."""
+"""Most events of a particle. One at ε = 0.999 comes to rest within some 20,000, at 0.9999 within
+200,000; one that rattles at 7 ms a period for the default max_time needs 10,000."""
 
 WINDOW = 10_000
-"""Progress check interval, in rounds."""
+"""Events after which it is asked whether a particle gets on."""
 
 TICK = 1e-12
-"""s over `Machine.pace`; mean time between events below which a particle makes no progress: the
-last bounces before rest, at 1e-9 m/s, are 200 times as far apart."""
+"""s over `Machine.pace`; mean time between events below which it does not: the last bounces before
+rest, at 1e-9 m/s, are 200 times as far apart."""
+
+SLICE = 20_000
+"""Events between two looks at Ctrl-C and reports of progress: some 20 ms."""
+
+COURSE = constants("Course")
 
 
-def run(
-    machine: Machine,
-    progress: Progress | None = None,
-    *,
-    apart: bool = False,
-) -> Record:
+class CornerError(RuntimeError):
+    """A spinning disk held between moving surfaces: beyond the exact engine."""
+
+
+def run(machine: Machine, progress: Progress | None = None, *, apart: bool = False) -> Record:
     """Run a machine whose particles do not interact.
 
     Parameters
@@ -125,10 +45,9 @@ def run(
     machine : Machine
         From `chutelab.machine.build`.
     progress : callable, optional
-        Called with the share of particles that have ended, after every round; may end the run.
+        Called with the share of particles that have ended, now and then; may end the run.
     apart : bool
-        Keep the books of the particles apart: `Recording.by_surface` is (N, S, 3) then. For a
-        family of machines, alike in what `chutelab.engines.exact.kinds` tells apart.
+        Keep the books of the particles apart: `Record.by_surface` is (N, S, 3) then.
 
     Returns
     -------
@@ -142,7 +61,8 @@ def run(
     CornerError
         If a spinning disk is held between surfaces of which one moves.
     StalledError
-        If a particle has event after event without progress; with what was recorded until then.
+        If a particle has event after event without progress; its track ends there, and the
+        recording has those of all others.
     """
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
@@ -150,76 +70,153 @@ def run(
     if 0 < np.count_nonzero(points) < points.size and machine.segments.start.ndim == 2:
         raise ValueError("the exact engine has no points beside disks")
     begin = perf_counter()
-    recorder = Recorder(machine, apart=apart)
-    rounds, stalled, enough = 0, None, False
     place = origin(machine)
     near = moved(machine, -place[0], -place[1])
-    surfaces = obstacles(near, max(map(abs, place)))
-    # What particles do does not depend on how many run together.
-    size = max(FEWEST, min(MOST, CELLS // max(1, len(surfaces.surface))))
-    # Roots that do not exist come out as inf or NaN, and are looked for as such.
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for first in range(0, machine.count, size):
-            s = State(near, surfaces, first, min(first + size, machine.count))
-            try:
-                _to_the_end(s, progress)
-            except StalledError as error:
-                stalled = error
-            except EnoughError:
-                s.finish(s.mode.nonzero()[0], "stopped")
-                recorder.ended[first + size :] = REASONS.index("stopped")
-                enough = True
-            rounds = max(rounds, s.rounds)
-            s.close(recorder)
-            if enough or stalled is not None:
-                break
+    module, recorder = borrow(), Recorder(machine, apart=apart)
+    try:
+        fill(module, near, max(map(abs, place)), apart)
+        stalled = follow(module, recorder, progress)
+        collect(module, recorder)
+        rounds: int = module.structs["Exact"].rounds
+    finally:
+        give_back(module)
     recording = recorder.finish(
         engine="exact", steps=rounds, seconds=perf_counter() - begin, origin=place
     )
     if stalled is not None:
-        (x, y), (dx, dy) = stalled.position, place
-        raise StalledError(stalled.particle, stalled.t, (x + dx, y + dy), stalled.reason, recording)
+        particle, t, (x, y), reason = stalled
+        raise StalledError(particle, t, (x + place[0], y + place[1]), reason, recording)
     return recording
 
 
-def _to_the_end(s: State, progress: Progress | None) -> None:
-    """Run a block of particles until all have ended."""
-    _release(s)
-    then = s.age.copy()
-    while parties := s.parties():
-        if s.rounds >= ROUNDS:
-            reason = f"{ROUNDS} events, and no end of them; lower run.max_time"
-            raise s.stalled(int(s.mode.argmax()), reason)
-        if s.rounds and s.rounds % WINDOW == 0:
-            passed = s.age - then
-            stuck = ((s.mode != Mode.DONE) & (passed < WINDOW * TICK / s.pace)).nonzero()[0]
-            if len(stuck):
-                reason = (
-                    f"{WINDOW} events took {passed[stuck[0]]:.2g} s: it is driven to and fro in a"
-                    " narrow place; move the surfaces there apart, or lower their restitution"
+def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
+    """Hand a machine over to the core, whose coordinates were rounded `far` off (m)."""
+    count, segments, arcs = machine.count, machine.segments, machine.arcs
+    family, wheel = segments.length.ndim == 2, machine.pulley
+    members = count if family else 1
+    s, a, w = segments.length.shape[-1], len(arcs.surface), int(wheel is not None)
+    columns, owners = s + a + w, len(machine.surfaces) + 1
+    kinds = members if family else len(machine.rolling)
+    exact: Any = module.structs["Exact"]
+    for name, value in (
+        ("segment_count", s), ("arc_count", a), ("wheel_count", w), ("lone_count", count),
+        ("surface_count", owners), ("kind_count", kinds), ("family", family), ("apart", apart),
+        ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
+        ("landing", machine.landing), ("far", far), ("most", ROUNDS), ("window", WINDOW),
+        ("tick", TICK),
+    ):  # fmt: skip
+        setattr(exact, name, value)
+    module.work("lay_out_exact")
+
+    def rows(name: str, kind: str, *shape: int) -> NDArray[Any]:
+        found = module.array(name, dtype(kind), prod(shape), of="Exact")
+        return found.reshape(shape)
+
+    materials = rows("materials", "Pair", kinds, columns)
+    for name, kind, part, first, many in (
+        ("segments", "Segment", segments, 0, s), ("arcs", "Arc", arcs, s, a),
+    ):  # fmt: skip
+        if not many:
+            continue
+        own = rows(name, kind, members, many)
+        for field in own.dtype.names or ():
+            if field != "end":
+                own[field] = getattr(part, field)
+        for field in ("restitution", "friction"):
+            materials[field][:, first : first + many] = getattr(part, field)
+    if wheel is not None:
+        own = rows("wheels", "Wheel", members)
+        for field in ("radius", "speed", "incline", "surface"):
+            own[field] = getattr(wheel, field)
+        materials["restitution"][:, -1] = wheel.restitution
+        materials["friction"][:, -1] = wheel.friction
+    lones, releases = rows("lones", "Lone", count), machine.releases
+    lones["release"], lones["stop"] = releases.t, machine.end_time - releases.t
+    lones["position"], lones["velocity"] = releases.position, releases.velocity
+    for field in ("radius", "mass", "inertia"):
+        lones[field] = getattr(machine.particle, field)
+    lones["gravity"], lones["pace"] = machine.gravity, machine.pace
+    several = len(machine.rolling) > 1
+    lones["rolling"] = machine.rolling[releases.kind] if several else machine.rolling[0]
+    lones["kind"], lones["carried"] = releases.kind, releases.carried
+    lones["exit_box"] = releases.exit_box
+
+
+def follow(
+    module: Module, recorder: Recorder, progress: Progress | None
+) -> tuple[int, float, tuple[float, float], str] | None:
+    """Run to the end; return which particle first made no progress, when, where, and why."""
+    stalled, course = None, COURSE["PAUSING"]
+    with suppress(EnoughError):
+        while course != COURSE["FINISHED"]:
+            course = module.run("follow_all", SLICE, COURSE["NO_MEMORY"])
+            drain(module, recorder)
+            exact: Any = module.structs["Exact"]
+            if course == COURSE["HELD"]:
+                a, b = (recorder.machine.surfaces[surface] for surface in exact.other)
+                raise CornerError(
+                    f"particle {exact.lone}, a spinning disk, is held between {a!r} and {b!r}, of"
+                    " which one moves; the exact engine cannot follow that: run it with"
+                    ' engine = "contact"'
                 )
-                raise s.stalled(int(stuck[0]), reason)
-            then = s.age.copy()
-        s.rounds += 1
-        for mode, index in parties:
-            MOVE[mode](s, index)
-        if progress is not None:
-            ended = s.first + len(s.mode) - int(np.count_nonzero(s.mode))
-            progress(ended / s.machine.count)
+            if (why := stuck(course, exact.passed)) and stalled is None:
+                stalled = exact.lone, exact.t, (exact.x, exact.y), why
+            if progress is not None:
+                progress(exact.lone / exact.lone_count)
+        return stalled
+    recorder.ended[module.structs["Exact"].lone :] = REASONS.index("stopped")
+    return stalled
 
 
-def _release(s: State) -> None:
-    """Start every particle whose time comes before the end of the run."""
-    index = (s.stop > 0.0).nonzero()[0]
-    if len(index) < len(s.stop):
-        s.finish((s.stop <= 0.0).nonzero()[0], "time")
-    s.knots(index)
-    s.event(int(Kind.RELEASE), index)
-    if (
-        s.machine.until == "settled"
-        and s.machine.pulley
-        and np.ravel(s.machine.pulley.speed)[0] == 0.0
-    ):
-        rests = index[s.mode[index] == Mode.CARRIED]
-        s.event(int(Kind.SETTLE), rests, s.machine.pulley.surface)
-        s.finish(rests, "settled")
+def stuck(course: int, passed: float) -> str:
+    """Return why a particle makes no progress, whose latest events took some time (s), or ""."""
+    return {
+        COURSE["NO_PROGRESS"]: f"{number('MOST_IDLE')} events in a row took no time; look for"
+        " surfaces that nearly touch where it is, and join their ends or move them apart",
+        COURSE[
+            "DRIVEN"
+        ]: f"{WINDOW} events took {passed:.2g} s: it is driven to and fro in a narrow"
+        " place; move the surfaces there apart, or lower their restitution",
+        COURSE["TOO_LONG"]: f"{ROUNDS} events, and no end of them; lower run.max_time",
+    }.get(course, "")
+
+
+def drain(module: Module, recorder: Recorder) -> None:
+    """Take what was written, so that there is room for more."""
+    exact: Any = module.structs["Exact"]
+    if exact.knot_count:
+        rows = module.array("knots", dtype("Knot"), exact.knot_count, of="Exact")
+        owner = rows["disk"].astype(np.int64)
+        recorder.add(owner, rows.view(REAL).reshape(-1, 10)[:, :9].copy().view(KNOT)[:, 0])
+        exact.knot_count = 0
+    if exact.event_count:
+        rows = module.array("events", dtype("Event"), exact.event_count, of="Exact")
+        recorder.tell(told(rows))
+        exact.event_count = 0
+
+
+def told(rows: NDArray[Any]) -> NDArray[Any]:
+    """Return events of the core as those of a recording."""
+    events = np.empty(len(rows), EVENT)
+    for name, source in (
+        ("t", "t"), ("particle", "disk"), ("other", "other"), ("kind", "kind"),
+        ("surface", "surface"), ("normal_impulse", "normal"), ("tangential_impulse", "tangent"),
+    ):  # fmt: skip
+        events[name] = rows[source]
+    events["position"][:, 0], events["position"][:, 1] = rows["x"], rows["y"]
+    for when in ("before", "after"):
+        events[f"velocity_{when}"] = rows[when][:, :2]
+        events[f"omega_{when}"] = rows[when][:, 2]
+    return events
+
+
+def collect(module: Module, recorder: Recorder) -> None:
+    """Take reasons and books."""
+    exact: Any = module.structs["Exact"]
+    lones = module.array("lones", dtype("Lone"), exact.lone_count, of="Exact")
+    ended = recorder.ended != REASONS.index("stopped")
+    recorder.ended[ended] = lones["reason"][ended]
+    recorder.by_surface[:] = module.array(
+        "books", REAL, recorder.by_surface.size, of="Exact"
+    ).reshape(recorder.by_surface.shape)
+    recorder.contacts = exact.contacts

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chutelab.engines.exact import CornerError, kinds, run
+from chutelab.engines.exact import CornerError, run
 from chutelab.engines.simulation import judged
 from chutelab.machine import RefusedError, build
 from chutelab.results import Recording
@@ -148,7 +148,7 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
     while len(which) and not groups:
         try:
             machine = build(scenes(which))
-            groups = [which[alike] for alike in kinds(machine)]
+            groups = [which]
         except RefusedError as refused:
             faults |= {int(which[n]): str(fault) for n, fault in refused.members.items()}
             which = np.delete(which, list(refused.members))

@@ -1,0 +1,899 @@
+/* The exact engine: particles that meet no other, from event to event, one after the other.
+
+   A blow follows Newton restitution with Coulomb friction; flight, sliding on a face and being carried
+   have constant acceleration. A ride by adhesion is in closed form, one by friction goes step by step
+   along the arc. */
+
+#include "exact.h"
+#include "memory.h"
+
+/* Contacts in a row that take no time after which a particle has come to rest in its corner. An elastic
+   particle leaves a wedge of angle beta after pi/beta of them. */
+#define COLLAPSE (MOST_IDLE / 2)
+/* Share of its age that an event of a particle must take to count as progress. */
+#define ROUNDING (4.0 * ULP)
+/* Share of the speeds involved below which a slip is rounding. */
+#define NO_SLIP 1e-13
+/* Share of the weight that a surface may seem to pull with, by rounding, where it holds nothing. */
+#define WEIGHTLESS 1e-9
+/* m/s times `Lone.pace`, as the two that follow; an approach this slow is a touch, not a blow. */
+#define NEGLIGIBLE 1e-12
+/* A rebound this slow is summed with all that would follow it: u_n (1 + e)/(1 - e) of normal impulse in
+   the time 2 u_n/(g_n (1 - e)). At e = 0.999 some 20,000 bounces come before. At e = 1 such a rebound,
+   1e-19 m high, is taken for rest. */
+#define REST 1e-9
+/* A particle this slow that goes to and fro between two obstacles is coming to rest there. */
+#define CRAWL (1000.0 * REST)
+/* Sine of the angle at which two surfaces must meet to hold a particle between them. */
+#define OPPOSED 1e-9
+/* Turns in which friction and rolling friction take their shares of a blow: each changes what the other
+   has to stop by 5/7 at most. */
+#define SHARES 100
+/* Effective mass over m at the rim of a free disk, with I = m r2/2: an impulse moves the contact point 3 times as much as it would a
+   particle that does not turn. */
+#define DISK_SHARE (1.0 / 3.0)
+/* Way, in `touch`, after which a point has been away from what it touches. */
+#define CLEAR 16.0
+/* Knots and events that a round may write. */
+#define ROUND_KNOTS 400
+#define ROUND_EVENTS 32
+
+Exact E;
+Particle A;
+
+static int course; /* what a round came to */
+
+EXPORT Exact *exact(void) { return &E; }
+
+/* What is recorded. */
+
+static void write_knot(void) {
+    const double *b = A.entries;
+    double spin = A.turns ? A.z / A.given->radius : 0.0;
+    E.knots[E.knot_count++] = (Knot){ A.given->release + A.age, A.x, A.y, A.vx, A.vy, spin,
+                                      { b[0], b[1], b[2] }, E.lone, 0 };
+}
+
+static void write_event(int kind, int surface) {
+    double spin = A.turns ? A.z / A.given->radius : 0.0;
+    E.events[E.event_count++] = (Event){ A.given->release + A.age, A.x, A.y, { A.vx, A.vy, spin },
+                                         { A.vx, A.vy, spin }, 0.0, 0.0, E.lone, NONE, kind, surface };
+}
+
+static void book(int surface, double work, double restitution, double friction) {
+    double *row = E.books + 3 * (surface + (E.apart ? E.lone * E.surface_count : 0));
+    double entries[] = { work, restitution, friction };
+    for (int k = 0; k < 3; k++) A.entries[k] += entries[k], row[k] += entries[k];
+}
+
+static void end_track(int reason) {
+    A.way = OVER;
+    E.lones[E.lone].reason = reason;
+}
+
+static void part_from(int surface) { write_event(SEPARATION, surface); }
+
+/* Let the particle go, away from the obstacle it touched, or all those of a joint. */
+static void let_go(int left, int side, int order, int joint) {
+    A.way = FLIES;
+    A.on = NONE, A.side = 0, A.slip = 1.0;
+    A.left = left, A.left_side = side, A.order = order, A.joint = joint;
+}
+
+/* What a contact is like. */
+
+static int epoch_now(void) { return epoch_at(A.age); }
+
+/* Age at which the next gate opens or shuts, or the run is over. */
+static double next_change(void) {
+    int epoch = epoch_now();
+    double stop = A.given->stop;
+    return epoch < O.change_count ? MIN(stop, O.changes[epoch] - A.given->release) : stop;
+}
+
+static double vanishes(int obstacle) { return O.all[obstacle].went - A.given->release; }
+
+static void normal_at(const Obstacle *o, int side, double *nx, double *ny) {
+    if (o->met == FACE) {
+        *nx = side * o->nx, *ny = side * o->ny;
+        return;
+    }
+    double x = A.x - o->x, y = A.y - o->y, distance = copysign(length_of(x, y), o->rho);
+    *nx = x / distance, *ny = y / distance;
+}
+
+/* Which half of a circle a normal is on: 1, or -1 away from the crown; the inside of an arc is -1. Round
+   the end of a segment of speed v the surface moves with v or -v along (n_y, -n_x), which is v along the
+   segment on both its faces. */
+static int rim_side(const Obstacle *o, double nx, double ny) {
+    int half = nx * o->crown[0] + ny * o->crown[1] >= 0.0 ? 1 : -1;
+    return o->rho < 0.0 ? -half : half;
+}
+
+/* What a contact with an obstacle is like where the particle is now. The side of a circle may be left
+   open, 0: it is that where it is. */
+static Touch touch_of(int obstacle, int side) {
+    const Obstacle *o = O.all + obstacle;
+    int columns = E.segment_count + E.arc_count + (E.wheel_count > 0);
+    const Pair *pair = E.materials + (E.family ? E.lone : A.given->kind) * columns + o->source;
+    Touch c;
+    normal_at(o, side, &c.nx, &c.ny);
+    c.tx = c.ny, c.ty = -c.nx;
+    if (!side) side = rim_side(o, c.nx, c.ny);
+    c.belt = side * o->speed, c.friction = pair->friction, c.restitution = pair->restitution;
+    c.surface = o->surface, c.obstacle = obstacle;
+    return c;
+}
+
+static Touch touch_now(void) { return touch_of(A.on, A.side); }
+
+static double along(const Touch *c) { return A.vx * c->tx + A.vy * c->ty; }
+static double weight_on(const Touch *c) { return A.given->gravity * c->ny; }
+static double weight_along(const Touch *c) { return A.given->gravity * c->nx; }
+
+static void go_along(const Touch *c, double pace) { A.vx = pace * c->tx, A.vy = pace * c->ty; }
+
+/* Slip of the contact point against the surface at a pace, m/s; exactly 0 below rounding. */
+static double slip_of(const Touch *c, double pace) {
+    double slip = pace + A.z - c->belt;
+    return fabs(slip) <= NO_SLIP * (fabs(pace) + fabs(c->belt) + fabs(A.z)) ? 0.0 : slip;
+}
+
+/* Take a slip that is used up to exactly zero: off the spin, else off the pace that is returned. */
+static double stop_slip(double belt, double pace) {
+    if (!A.turns) return belt;
+    A.z = belt - pace;
+    return pace;
+}
+
+/* r times the angular velocity of a surface, m/s. */
+static double surface_spin(int obstacle) {
+    const Obstacle *o = O.all + obstacle;
+    return A.given->radius * (o->met == WHEEL ? -o->speed / o->bend : o->turning);
+}
+
+/* Most that friction can give; infinite where it is, also without a normal force. */
+static double grip_limit(double friction, double normal) {
+    return isinf(friction) ? INFINITY : friction * normal;
+}
+
+static double limited(double value, double most) { return MIN(MAX(value, -most), most); }
+
+/* Put the particle exactly at contact distance, so that rounding cannot add up. */
+static void snap(int obstacle, int side) {
+    const Obstacle *o = O.all + obstacle;
+    if (o->met == FACE) {
+        double nx = side * o->nx, ny = side * o->ny;
+        double off = (A.x - o->x) * nx + (A.y - o->y) * ny - A.given->radius;
+        A.x -= off * nx, A.y -= off * ny;
+    } else {
+        double x = A.x - o->x, y = A.y - o->y, ratio = fabs(o->rho) / length_of(x, y);
+        A.x = o->x + ratio * x, A.y = o->y + ratio * y;
+    }
+}
+
+/* Normal force per mass that would keep the particle on an obstacle, m/s2. */
+static double load_on(const Touch *c) {
+    const Obstacle *o = O.all + c->obstacle;
+    return weight_on(c) - (o->met == FACE ? 0.0 : square(along(c)) / o->rho);
+}
+
+/* Whether an obstacle bears the particle: by a positive load, or one that is about to be. Where a path
+   round a circle gets steeper towards the weight, the hops of a particle shrink towards the point of zero
+   load, and by rounding its load there is never above 0. */
+static int is_pressed(const Touch *c) {
+    const Obstacle *o = O.all + c->obstacle;
+    double load = load_on(c);
+    if (load > 0.0) return 1;
+    return o->met != FACE && load >= -WEIGHTLESS * A.given->gravity
+        && along(c) * weight_along(c) / o->rho < 0.0;
+}
+
+/* What a contact does. */
+
+/* Change the spin by the tangential impulse per mass that goes with a normal one; rolling friction has
+   its share in that. Returns the tangential impulse per mass, and by how much the slip changes (m/s), and
+   work and heat of rolling friction (J). */
+static double rub(const Touch *c, double slip, double normal, double *change, double *work, double *heat) {
+    double grip = grip_limit(c->friction, normal), push = limited(-A.share * slip, grip);
+    *work = *heat = 0.0;
+    if (!(A.given->rolling > 0.0 && A.turns)) {
+        A.z += A.lever * push;
+        *change = push / A.share;
+        return push;
+    }
+    /* Friction stops the slip as far as mu J_n allows, rolling friction the spin as far as kappa J_n does. */
+    double turn = surface_spin(c->obstacle), spin = A.z - turn, most = A.given->rolling * normal, couple = 0.0;
+    for (int n = 0; n < SHARES && most > 0.0; n++) {
+        couple = limited(-spin / A.lever - push, most);
+        double next = limited(-A.share * (slip + A.lever * couple), grip);
+        if (next == push) break;
+        push = next;
+    }
+    double gain = A.lever * (push + couple);
+    A.z += gain;
+    *change = push + gain;
+    *work = A.given->mass * couple * turn;
+    *heat = -0.5 * A.given->mass * couple * (2.0 * spin + gain);
+    return push;
+}
+
+/* A blow: change the velocities, book the energies, write event and knot. */
+static void blow(const Touch *c, double approach, double rebound, int lands) {
+    double vx = A.vx, vy = A.vy, spin = A.turns ? A.z / A.given->radius : 0.0, mass = A.given->mass;
+    double pace = along(c), slip = slip_of(c, pace), change, work, heat;
+    double normal = (1.0 + c->restitution) * approach;
+    double push = rub(c, slip, normal, &change, &work, &heat);
+    /* The normal speed is set, not added to: e |v_n| to the last bit. */
+    A.vx = rebound * c->nx + (pace + push) * c->tx;
+    A.vy = rebound * c->ny + (pace + push) * c->ty;
+    book(c->surface, mass * push * c->belt + work,
+         0.5 * mass * (approach - rebound) * (approach + rebound),
+         -0.5 * mass * push * (slip + (slip + change)) + heat);
+    write_knot();
+    if (!(approach > NEGLIGIBLE * A.given->pace || push != 0.0 || lands)) return;
+    E.contacts++;
+    write_event(lands ? LANDING : IMPACT, c->surface);
+    Event *e = E.events + E.event_count - 1;
+    e->before[0] = vx, e->before[1] = vy, e->before[2] = spin;
+    e->normal = mass * normal, e->tangent = mass * push;
+}
+
+/* Choose between turning and not where rolling friction acts. `tends` is what makes the contact point
+   slip, m/s2, `share` how much of it friction must take up to hold it; returns whether it can rest. */
+static int settle_roll(const Touch *c, double slip, double load, double grip, double *tends, double *share) {
+    double most = A.given->rolling * load, pull = *tends;
+    double spin = A.z - surface_spin(A.on);
+    int turns = fabs(spin) > NO_SLIP * (fabs(A.z) + fabs(c->belt)), still = slip == 0.0;
+    if (!turns) A.z -= spin;
+    /* Without slip the pull must turn it, with slip friction does. */
+    int holds = still ? fabs(pull) <= most && fabs(pull) <= grip : grip <= most;
+    /* It starts to turn as the force at the rim has it; sliding wins where friction gives way. */
+    int slides = still && grip <= most;
+    A.roll = turns ? sign_of(spin) : holds || slides ? 0.0 : -sign_of(still ? pull : slip);
+    if (A.roll == 0.0) {
+        *share = 1.0;
+        return 1;
+    }
+    *tends = pull - A.lever * A.roll * most;
+    return 0;
+}
+
+/* Choose between gripping and slipping, and end tracks that have settled. Without slip, friction must
+   hold against gravity: share |g_t| <= mu N. Where it cannot, slip starts the way gravity pulls. */
+static void settle(void) {
+    Touch c = touch_now();
+    double pace = along(&c), slip = slip_of(&c, pace);
+    int arc = A.way == ON_ARC;
+    if (isinf(c.friction) && slip != 0.0) {
+        /* Friction without bound stops a slip without a normal impulse. */
+        blow(&c, 0.0, 0.0, 0);
+        pace = along(&c), slip = slip_of(&c, pace);
+    }
+    int still = slip == 0.0;
+    if (still) pace = stop_slip(c.belt, pace);
+    go_along(&c, pace);
+    double pull = weight_along(&c), load = load_on(&c), grip = grip_limit(c.friction, load);
+    double tends = pull, share = A.share;
+    int rests = !A.turns || pull == 0.0;
+    if (A.turns && A.given->rolling > 0.0) rests = settle_roll(&c, slip, load, grip, &tends, &share);
+    int grips = still && share * fabs(tends) <= grip, begins = grips && A.slip != 0.0;
+    A.slip = grips ? 0.0 : still ? sign_of(tends) : sign_of(slip);
+    if (begins) write_event(STICK, c.surface);
+    if (E.until != UNTIL_SETTLED) return;
+    /* Rolling down a slope is not lying on it. */
+    int steady = grips && rests && !(arc && pace != 0.0);
+    if (!steady || !(c.belt == 0.0 || c.surface == E.landing) || !isinf(vanishes(A.on))) return;
+    write_event(SETTLE, c.surface);
+    end_track(HAS_SETTLED);
+}
+
+/* Make a spin that is used up exactly that of the surface, then see what goes on. */
+static void end_roll(void) {
+    Touch c = touch_now();
+    A.z = surface_spin(A.on);
+    if (A.slip == 0.0) go_along(&c, c.belt - A.z);
+    settle();
+}
+
+/* Make a slip that is used up exactly zero, then see whether friction holds. */
+static void end_slip(void) {
+    Touch c = touch_now();
+    double pace = stop_slip(c.belt, along(&c));
+    if (!A.turns) go_along(&c, pace);
+    settle();
+}
+
+/* What acts on a face, per mass: friction along the tangent and, over r, the couple of rolling friction;
+   returns the acceleration along the tangent. */
+static double face_force(const Touch *c, double *force, double *couple) {
+    double pull = weight_along(c), load = weight_on(c), tends = pull, share = A.share;
+    int rolls = A.turns && A.given->rolling > 0.0, held = rolls && A.roll == 0.0, grips = A.slip == 0.0;
+    *couple = rolls ? -A.roll * A.given->rolling * load : 0.0;
+    if (rolls) tends += A.lever * *couple;
+    if (held) share = 1.0;
+    *force = grips ? -share * tends : -A.slip * c->friction * load;
+    if (held) *couple = -*force;
+    return pull + *force;
+}
+
+/* Find where a ride round a circle, or round its other half, ends. */
+static void look_round(void) {
+    const Obstacle *o = O.all + A.on;
+    double nx, ny;
+    normal_at(o, A.side, &nx, &ny);
+    if (!A.side) A.side = rim_side(o, nx, ny);
+    A.angle = angle_of(nx, ny);
+    find_bounds(A.on, A.side, A.angle, epoch_now(), A.bounds);
+}
+
+/* What the particle is on, or came from at the beginning of the stretch. */
+static int touched_before(int *side) {
+    *side = A.on == NONE ? A.left_side : A.side;
+    return A.on == NONE ? A.left : A.on;
+}
+
+/* Sum the bounces after a rebound slower than REST, geometric in time and impulse. */
+static void last_bounces(int obstacle, int side, double u) {
+    if (!(u > 0.0) || obstacle >= O.faces) return;
+    Touch c = touch_of(obstacle, side);
+    double weight = weight_on(&c), pull = weight_along(&c), mass = A.given->mass, change, work, heat;
+    /* Without loss the series never ends; its motion is below what is resolved, so it is dropped. */
+    double lost = c.restitution < 1.0 ? 1.0 - c.restitution : INFINITY;
+    double time = MIN(2.0 * u / (weight * lost), A.given->stop - A.age);
+    int face, before = touched_before(&face);
+    /* Straight from another obstacle: it is in the way. */
+    if (before != NONE && before != obstacle) time = 0.0;
+    double pace = along(&c), way = time * (pace + 0.5 * pull * time);
+    A.age += time;
+    A.x += way * c.tx, A.y += way * c.ty;
+    pace += pull * time;
+    double slip = slip_of(&c, pace);
+    double push = rub(&c, slip, MAX(weight * time - u, 0.0), &change, &work, &heat);
+    go_along(&c, pace + push);
+    book(c.surface, mass * push * c.belt + work, 0.5 * mass * u * u,
+         -0.5 * mass * push * (2.0 * slip + change) + heat);
+    write_knot();
+}
+
+/* Begin sliding, gripping or riding on an obstacle. */
+static void rest_on(int obstacle, int side, double rebound) {
+    last_bounces(obstacle, side, rebound);
+    A.way = obstacle < O.faces ? ON_FACE : ON_ARC;
+    A.on = obstacle, A.side = side;
+    A.left = NONE, A.left_side = 0, A.order = 0;
+    if (A.way == ON_ARC) look_round();
+    settle();
+}
+
+/* Friction of a surface that slides under a resting particle, else 0. */
+static double grip_of(const Touch *c) {
+    return c->belt == 0.0 || isinf(c->friction) ? 0.0 : c->friction;
+}
+
+static double cross(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
+
+/* The two normal forces per mass that hold a particle in a corner; returns whether it is locked there. */
+static int corner_loads(const Touch *a, const Touch *b, double *loads) {
+    const Touch *both[] = { a, b };
+    double g = A.given->gravity, x[2], y[2];
+    int drawn[2], locked = 0;
+    for (int n = 0; n < 2; n++) {
+        double grip = sign_of(both[n]->belt) * grip_of(both[n]);
+        x[n] = both[n]->nx + grip * both[n]->tx, y[n] = both[n]->ny + grip * both[n]->ty;
+    }
+    double determinant = cross(x[0], y[0], x[1], y[1]);
+    loads[0] = g * -x[1] / determinant, loads[1] = g * x[0] / determinant;
+    for (int n = 0; n < 2; n++)
+        if (!isfinite(loads[n])) loads[n] = -1.0;
+    int pulled = loads[0] < -WEIGHTLESS * g || loads[1] < -WEIGHTLESS * g;
+    for (int n = 0; n < 2; n++) {
+        const Touch *c = both[n], *against = both[1 - n];
+        drawn[n] = sign_of(c->belt) * (c->tx * against->nx + c->ty * against->ny) < 0.0;
+        locked |= drawn[n] && (isinf(c->friction) || (pulled && c->friction > 0.0));
+    }
+    return locked;
+}
+
+/* Bring the particle to rest in the corner of two obstacles, each given with its side.
+
+   A moving surface under it goes on doing work, all of it heat. Where a surface is at rest its friction is
+   taken as zero: it dissipates nothing, and the balance of the two normal forces needs none. Where friction
+   pulls the particle in harder than any load can hold it (self-locking, as with adhesion) a real drive would
+   stall: the particle stays, and nothing more is booked. Where gravity pulls out of the corner it falls,
+   from rest, or rests on the other obstacle alone. */
+static void hold(int on, int side, int other, int other_side) {
+    Touch a = touch_of(on, side), b = touch_of(other, other_side);
+    const Touch *both[] = { &a, &b };
+    int moving = a.belt != 0.0 || b.belt != 0.0;
+    double g = A.given->gravity, mass = A.given->mass, loads[2];
+    if (moving && A.turns) {
+        E.other[0] = a.surface, E.other[1] = b.surface;
+        course = HELD;
+        end_track(TIME_IS_OVER);
+        return;
+    }
+    double turning = A.turns ? A.z * A.z / A.lever : 0.0;
+    double kinetic = 0.5 * mass * (A.vx * A.vx + A.vy * A.vy + turning);
+    A.vx = A.vy = A.z = 0.0;
+    book(b.surface, 0.0, kinetic, 0.0);
+    write_knot();
+    int locked = corner_loads(&a, &b, loads);
+    int stays = locked || (loads[0] >= -WEIGHTLESS * g && loads[1] >= -WEIGHTLESS * g);
+    if (!stays) {
+        int onto = loads[0] < 0.0 && weight_on(&b) > 0.0;
+        if (onto) rest_on(other, other_side, 0.0);
+        else let_go(other, other_side, 2, NONE);
+        return;
+    }
+    /* A gate lets it out of the corner when it opens, and that is at the end of the wait. */
+    double gone[] = { vanishes(on), vanishes(other) }, first = MIN(gone[0], gone[1]);
+    int opens = first < A.given->stop;
+    if (!moving && E.until == UNTIL_SETTLED && isinf(first)) {
+        write_event(SETTLE, a.surface);
+        end_track(HAS_SETTLED);
+        return;
+    }
+    double until = opens ? first : A.given->stop, time = until - A.age;
+    for (int n = 0; n < 2; n++) {
+        const Touch *c = both[n];
+        double heat = locked ? 0.0 : mass * grip_of(c) * fabs(c->belt) * MAX(loads[n], 0.0) * time;
+        book(c->surface, heat, 0.0, heat);
+    }
+    A.age = until;
+    write_knot();
+    if (!opens) {
+        end_track(TIME_IS_OVER);
+        return;
+    }
+    let_go(NONE, 0, 0, NONE);
+    for (int n = 0; n < 2; n++)
+        if (gone[n] <= until && gone[1 - n] > until && weight_on(both[1 - n]) > 0.0)
+            rest_on(n ? on : other, n ? side : other_side, 0.0);
+}
+
+/* Stop the particle if it goes to and fro between two obstacles without progress; tell whether. */
+static int stop_jammed(int obstacle, int side) {
+    int face, before = touched_before(&face);
+    int slow = length_of(A.vx, A.vy) <= CRAWL * A.given->pace;
+    int between = before != NONE && before != obstacle && A.way != OVER;
+    A.crawls = slow ? A.crawls + between : 0;
+    if (!between || !(A.idle > COLLAPSE || A.crawls > COLLAPSE)) return 0;
+    /* Faces that lie on each other make no corner. */
+    Touch one = touch_of(before, face), two = touch_of(obstacle, side);
+    if (!(fabs(cross(one.nx, one.ny, two.nx, two.ny)) > OPPOSED)) return 0;
+    hold(before, face, obstacle, side);
+    return 1;
+}
+
+/* Go on sliding after a blow from another obstacle, or stay in the corner of the two. A touch ends the
+   approach along what it slides on: where the two are not at right angles it takes but a part of it, and
+   the next touch would follow at once. */
+static void slide_past(int obstacle, int side, double rebound, int soft) {
+    Touch c = touch_now(), against = touch_of(obstacle, side);
+    A.left = obstacle, A.left_side = side;
+    A.order = rebound > 0.0 ? 1 : 2;
+    if (soft && along(&c) * (c.tx * against.nx + c.ty * against.ny) < 0.0) go_along(&c, 0.0);
+    settle();
+    if (A.way != ON_FACE) return;
+    c = touch_now();
+    double force, couple, pull = face_force(&c, &force, &couple);
+    double towards = pull * c.tx * against.nx + pull * c.ty * against.ny;
+    double size = length_of(pull * c.tx, pull * c.ty);
+    if (rebound <= REST * A.given->pace && towards < -OPPOSED * size) hold(A.on, A.side, obstacle, side);
+}
+
+/* Resolve a contact with an obstacle that has just been reached. */
+static void strike(int obstacle, int side) {
+    if (A.way == RIDES_BELT) part_from(0);
+    snap(obstacle, side);
+    Touch c = touch_of(obstacle, side);
+    double approach = MAX(-(A.vx * c.nx + A.vy * c.ny), 0.0);
+    int soft = approach <= NEGLIGIBLE * A.given->pace;
+    if (soft) c.restitution = 0.0;
+    double rebound = c.restitution * approach;
+    int lands = c.surface == E.landing && !A.landed;
+    blow(&c, approach, rebound, lands);
+    if (lands) {
+        A.landed = 1;
+        if (E.until == UNTIL_LANDED) {
+            end_track(HAS_LANDED);
+            return;
+        }
+    }
+    int face, before = touched_before(&face);
+    if (A.point && before != obstacle) A.past = before, A.past_side = face;
+    if (stop_jammed(obstacle, side)) return;
+    if (A.way >= ON_FACE) {
+        /* A blow from elsewhere may leave it on what it slides or rides on. */
+        Touch under = touch_now();
+        if (fabs(A.vx * under.nx + A.vy * under.ny) <= NEGLIGIBLE * A.given->pace && is_pressed(&under)) {
+            slide_past(obstacle, side, rebound, soft);
+            return;
+        }
+    }
+    if (rebound <= REST * A.given->pace && is_pressed(&c)) {
+        rest_on(obstacle, side, rebound);
+        return;
+    }
+    if (A.on != NONE) part_from(O.all[A.on].surface);
+    let_go(obstacle, side, rebound > 0.0 ? 1 : 2, NONE);
+}
+
+/* Go on from the end of a face or an arc on what follows, or fly if nothing holds there. */
+static void go_on(int obstacle, int side, int joint) {
+    int ends = obstacle == NONE, left = A.on, face = A.side;
+    if (ends) obstacle = left, side = face;
+    Touch c = touch_of(obstacle, side);
+    const Obstacle *o = O.all + obstacle, *from = O.all + left;
+    if (ends || !is_pressed(&c)) {
+        part_from(from->surface);
+        /* From a tangential joint it flies off what follows; from an end it leaves what ends. */
+        int flush = ends || o->met != END;
+        let_go(flush ? obstacle : left, flush ? side : face, 2, joint);
+        return;
+    }
+    /* Another surface is come on to without a blow: what it did on the one before ends there. */
+    int onto = o->surface != from->surface;
+    if (onto) {
+        A.slip = 1.0;
+        if (o->surface == E.landing && !A.landed) {
+            A.landed = 1;
+            write_event(LANDING, o->surface);
+            if (E.until == UNTIL_LANDED) {
+                end_track(HAS_LANDED);
+                return;
+            }
+            onto = 0;
+        }
+    }
+    rest_on(obstacle, side, 0.0);
+    if (onto && A.slip != 0.0) write_event(SLIP, o->surface);
+}
+
+/* How it moves between events. */
+
+/* Count events in a row that take no time. */
+static void count_idle(double dt) {
+    A.idle = dt > ROUNDING * A.age ? 0 : A.idle + 1;
+    if (A.idle > MOST_IDLE) course = NO_PROGRESS;
+}
+
+static Motion motion_of(double ax, double ay) {
+    return (Motion){ A.x, A.y, A.vx, A.vy, ax, ay, A.left, A.left_side, A.order, NONE, NONE, 0, 0 };
+}
+
+/* Carry the state over a stretch. */
+static void move(const Motion *m, double dt) {
+    double half = 0.5 * dt;
+    A.age += dt;
+    A.x = m->x + dt * (m->vx + half * m->ax), A.y = m->y + dt * (m->vy + half * m->ay);
+    A.vx = m->vx + dt * m->ax, A.vy = m->vy + dt * m->ay;
+    if (!A.point) return;
+    double x = m->x + half * (m->vx + 0.5 * half * m->ax), y = m->y + half * (m->vy + 0.5 * half * m->ay);
+    if (MAX(fabs(A.x - x), fabs(A.y - y)) > CLEAR * O.touch) A.past_x = x, A.past_y = y;
+}
+
+/* Time until a gap closes, at once if it is closed; infinite if that was in the past or never is. */
+static double when(double gap, double rate, double acceleration) {
+    double time = descent(MAX(gap, 0.0), rate, acceleration);
+    return time >= 0.0 ? time : INFINITY;
+}
+
+static void stop_now(void) {
+    A.age = A.given->stop;
+    end_track(TIME_IS_OVER);
+}
+
+/* Let the particle go from what vanishes under it now. */
+static void drop(void) {
+    part_from(O.all[A.on].surface);
+    let_go(NONE, 0, 0, NONE);
+}
+
+static void fly(void) {
+    const double *box = A.given->exit_box;
+    Motion m = motion_of(0.0, -A.given->gravity);
+    m.joint = A.joint;
+    double leaves = MIN(MIN(when(A.x - box[0], A.vx, 0.0), when(box[2] - A.x, -A.vx, 0.0)),
+                        MIN(when(A.y - box[1], A.vy, m.ay), when(box[3] - A.y, -A.vy, -m.ay)));
+    double stops = A.given->stop - A.age, dt = MIN(leaves, stops);
+    int obstacle, side, hits = first_contact(&m, &dt, &obstacle, &side);
+    count_idle(dt);
+    move(&m, dt);
+    write_knot();
+    if (hits) strike(obstacle, side);
+    else if (leaves <= stops) {
+        write_event(EXIT, NONE);
+        end_track(HAS_LEFT);
+    } else
+        stop_now();
+}
+
+static void put_round(double rho, double phi, double pace, double x, double y) {
+    double up, across;
+    sin_cos(phi, &up, &across);
+    A.x = x + rho * up, A.y = y + rho * across;
+    A.vx = pace * across, A.vy = -pace * up;
+}
+
+/* Carry the particle by adhesion round the pulley, from an angle until cos phi1 = v2/(g rho). */
+static void carry_round(double start, double pace) {
+    const Obstacle *pulley = O.all + O.pulley;
+    Bound found[2];
+    double up, across, g = A.given->gravity, stop = next_change(), left = stop - A.age, end = start;
+    int struck = 0, cut = 0;
+    sin_cos(start, &up, &across);
+    double rho = A.x * up + A.y * across;
+    A.x = rho * up, A.y = rho * across;
+    double level = MIN(pace * pace / (g * rho), 1.0);
+    if (level < across) {
+        Obstacle own = *pulley;
+        end = angle_of_cosine(level);
+        /* A ride on a bed is further out than one on the pulley itself. */
+        O.all[O.pulley].rho = rho;
+        find_bounds(O.pulley, 1, start, epoch_now(), found);
+        O.all[O.pulley] = own;
+        struck = !found[1].handover && found[1].angle < end;
+        if (struck) end = found[1].angle;
+        cut = (end - start) * rho / pace > left;
+        if (cut) end = start + left * pace / rho;
+        double begin = A.age, above = rho * across, way = end - start, parts = ceil(way / STEP_ANGLE);
+        for (int n = 1; n <= parts; n++) {
+            double turn = way * (n / parts);
+            put_round(rho, start + turn, pace, 0.0, 0.0);
+            A.age = begin + rho * turn / pace;
+            /* The belt lifts the particle, or lets it down: F v = -m g v sin phi, from the last knot on. */
+            double height = rho * cosine(start + turn);
+            book(pulley->surface, -A.given->mass * g * (above - height), 0.0, 0.0);
+            above = height;
+            write_knot();
+        }
+        if (O.change_count && cut) A.age = stop;
+    }
+    /* Where a gate opens or shuts the ride goes on, with another look at what is in the way. */
+    if (A.age >= A.given->stop) end_track(TIME_IS_OVER);
+    else if (O.change_count && cut) return;
+    else if (struck) strike(found[1].obstacle, found[1].side);
+    else {
+        part_from(0);
+        let_go(O.pulley, 0, end > start ? 3 : 2, NONE);
+    }
+}
+
+/* Move the particle, which the belt carries, on to the pulley, or to what is in the way. */
+static void carry(void) {
+    double up, across, incline = E.wheels[E.family ? E.lone : 0].incline;
+    sin_cos(incline, &up, &across);
+    /* One that was on the pulley when a gate opened or shut. */
+    if (O.change_count && A.x * across + A.y * up > O.touch) {
+        carry_round(angle_of(A.x, A.y), length_of(A.vx, A.vy));
+        return;
+    }
+    Motion m = motion_of(0.0, 0.0);
+    m.carried = 1;
+    double pace = A.vx * across + A.vy * up, ends = -(A.x * across + A.y * up) / pace;
+    double stops = A.given->stop - A.age, height = A.y;
+    if (!(pace > 0.0)) ends = INFINITY;
+    double dt = MIN(ends, stops);
+    int obstacle, side, hits = first_contact(&m, &dt, &obstacle, &side);
+    count_idle(dt);
+    move(&m, dt);
+    if (incline != 0.0) book(O.all[0].surface, A.given->mass * A.given->gravity * (A.y - height), 0.0, 0.0);
+    write_knot();
+    if (hits) strike(obstacle, side);
+    else if (stops < ends) stop_now();
+    else carry_round(incline == 0.0 ? 0.0 : angle_of(-up, across), pace);
+}
+
+/* Move the particle on by one knot of a ride, or to the next event, and resolve it. */
+static void ride(void) {
+    int circle = A.on;
+    const Obstacle *o = O.all + circle;
+    Touch c = touch_now();
+    double rho = o->rho, mass = A.given->mass, phi = angle_of(c.nx, c.ny), stop = next_change();
+    double turn = surface_spin(circle), center_x = A.x - rho * c.nx, center_y = A.y - rho * c.ny;
+    int rolls = A.turns && A.given->rolling > 0.0;
+    if (!is_pressed(&c)) {
+        count_idle(0.0);
+        part_from(c.surface);
+        let_go(circle, 0, 2, NONE);
+        return;
+    }
+    /* The angle goes on where a turn is complete. */
+    phi += TURN * rint((A.angle - phi) / TURN);
+    Circle state = { phi, along(&c), A.z, rho, A.given->gravity, c.friction, c.belt, A.slip, A.share,
+                     A.bounds[0].angle, A.bounds[1].angle, rolls ? A.given->rolling : 0.0, A.roll, turn };
+    Ridden end, knots[MOST_KNOTS];
+    int count = advance_ride(&state, stop - A.age, &end, knots);
+    double age = A.age, before[3];
+    count_idle(end.dt);
+    for (int k = 0; k < 3; k++) before[k] = A.entries[k];
+    for (int n = 0; n <= count; n++) {
+        const Ridden *r = n < count ? knots + n : &end;
+        double work = mass * (r->work * c.belt + (rolls ? r->twist * turn : 0.0)), heat = mass * r->heat;
+        A.age = age + r->dt;
+        put_round(rho, r->phi, r->w, center_x, center_y);
+        A.z = r->z;
+        if (n == count) book(c.surface, work, 0.0, heat);
+        else A.entries[0] = before[0] + work, A.entries[2] = before[2] + heat;
+        write_knot();
+        for (int k = 0; k < 3 && n < count; k++) A.entries[k] = before[k];
+    }
+    A.angle = end.phi;
+    const Bound *there = A.bounds + (end.outcome == HIGH);
+    double tends = sine(end.phi);
+    switch (end.outcome) {
+    case NOTHING:
+        if (A.age >= A.given->stop) end_track(TIME_IS_OVER);
+        else if (O.change_count && A.age >= stop) {
+            A.age = stop;
+            if (is_there(circle, epoch_now())) look_round();
+            else drop();
+        }
+        break;
+    case LIFT:
+        part_from(c.surface);
+        let_go(circle, 0, 3, NONE);
+        break;
+    case ROLL: A.roll = -sign_of(sine(end.phi)); break;
+    case HALT: end_roll(); break;
+    case ONSET:
+        if (rolls) {
+            double load = A.given->gravity * cosine(end.phi) - end.w * end.w / rho;
+            tends = A.given->gravity * tends - A.lever * A.roll * A.given->rolling * load;
+        }
+        A.slip = sign_of(tends);
+        write_event(SLIP, c.surface);
+        break;
+    case GRIP: end_slip(); break;
+    default:
+        if (there->handover) go_on(there->obstacle, there->side, there->joint);
+        else strike(there->obstacle, there->side);
+    }
+}
+
+/* Go on at the end of a face: onto the next segment, round the end, or into flight. */
+static void leave_face(void) {
+    const Obstacle *o = O.all + A.on;
+    double foot = (A.x - o->x) * o->tx + (A.y - o->y) * o->ty;
+    int tip = 2 * A.on + (foot > 0.5 * o->length), face = A.side < 0;
+    Onward to = O.onward[2 * (epoch_now() * O.tip_count + tip) + face];
+    go_on(to.obstacle, to.side, O.tips[tip].sets[face]);
+}
+
+/* Move the particle on a face on to its next event and resolve it. */
+static void slide(void) {
+    Touch c = touch_now();
+    const Obstacle *o = O.all + A.on;
+    double force, couple, pull = face_force(&c, &force, &couple), mass = A.given->mass;
+    int rolls = A.turns && A.given->rolling > 0.0;
+    Motion m = motion_of(pull * c.tx, pull * c.ty);
+    m.on = A.on, m.on_side = A.side;
+    /* The slip is linear in time, while there is one. */
+    double slip = along(&c) + A.z - c.belt, twist = A.lever * (force + couple);
+    double rate = (m.ax * c.tx + m.ay * c.ty) + twist, spin = A.z;
+    double grips = A.slip * rate < 0.0 ? MAX(-slip / rate, 0.0) : INFINITY;
+    double halts = rolls && A.roll * twist < 0.0 ? MAX(-spin / twist, 0.0) : INFINITY;
+    double foot = (A.x - o->x) * o->tx + (A.y - o->y) * o->ty;
+    double pace = A.vx * o->tx + A.vy * o->ty, push = m.ax * o->tx + m.ay * o->ty;
+    double ends = MIN(when(foot, pace, push), when(o->length - foot, -pace, -push));
+    /* What it lies on may vanish; that counts as a stop. */
+    double stop = MIN(A.given->stop, vanishes(A.on)), stops = MAX(stop - A.age, 0.0);
+    double soonest = MIN(MIN(grips, halts), MIN(ends, stops)), dt = soonest;
+    int obstacle, side, hits = first_contact(&m, &dt, &obstacle, &side);
+    count_idle(dt);
+    double mean = A.slip == 0.0 ? 0.0 : slip + 0.5 * rate * dt, heat = -mass * force * mean * dt;
+    if (rolls) heat -= mass * couple * (spin + 0.5 * twist * dt) * dt;
+    book(c.surface, mass * force * c.belt * dt, 0.0, heat);
+    move(&m, dt);
+    snap(A.on, A.side);
+    A.z += twist * dt;
+    /* What was left at the beginning is some way off now. */
+    if (dt > 0.0) A.left = NONE;
+    write_knot();
+    if (hits) strike(obstacle, side);
+    else if (rolls && halts <= soonest) end_roll();
+    else if (stops < grips && stops < ends) {
+        if (stop < A.given->stop) {
+            A.age = MAX(A.age, stop);
+            drop();
+        } else
+            stop_now();
+    } else if (ends < grips) leave_face();
+    else end_slip();
+}
+
+/* Start a particle; one whose time comes after the end of the run is over at once. */
+static void begin(void) {
+    const Lone *p = E.lones + E.lone;
+    double inertia = p->inertia, arm = p->mass * p->radius * p->radius;
+    A = (Particle){ .given = p, .x = p->position[0], .y = p->position[1], .vx = p->velocity[0],
+                    .vy = p->velocity[1], .share = 1.0, .way = p->carried ? RIDES_BELT : FLIES, .on = NONE,
+                    .slip = 1.0, .left = NONE, .joint = NONE, .past = NONE };
+    A.turns = inertia > 0.0;
+    if (A.turns) A.share = inertia / (inertia + arm);
+    /* That of a disk is not to depend on the rounding of its I. */
+    if (fabs(A.share - DISK_SHARE) < 1e-15) A.share = DISK_SHARE;
+    A.lever = 1.0 / A.share - 1.0;
+    fit_obstacles();
+    A.point = p->radius <= O.touch;
+    A.past_x = A.x, A.past_y = A.y;
+    if (!(p->stop > 0.0)) {
+        end_track(TIME_IS_OVER);
+        return;
+    }
+    write_knot();
+    write_event(RELEASE, NONE);
+    if (E.until == UNTIL_SETTLED && p->carried && E.wheels[E.family ? E.lone : 0].speed == 0.0) {
+        write_event(SETTLE, O.all[O.pulley].surface);
+        end_track(HAS_SETTLED);
+    }
+}
+
+/* Take the particle to its next event. */
+static void proceed(void) {
+    if (A.way == OVER) return;
+    if (A.rounds >= E.most) course = TOO_LONG;
+    else if (A.rounds && A.rounds % E.window == 0) {
+        E.passed = A.age - A.then;
+        if (E.passed < E.window * E.tick / A.given->pace) course = DRIVEN;
+        A.then = A.age;
+    }
+    if (course != FINISHED) return;
+    A.rounds++;
+    switch (A.way) {
+    case FLIES: fly(); break;
+    case RIDES_BELT: carry(); break;
+    case ON_FACE: slide(); break;
+    default: ride();
+    }
+}
+
+/* Lay out what the host fills in, and what is written. */
+EXPORT int lay_out_exact(void) {
+    double members = E.family ? E.lone_count : 1, many = MIN(20.0 * E.lone_count, 1e5);
+    RESERVE(E.segments, members * E.segment_count);
+    RESERVE(E.arcs, members * E.arc_count);
+    RESERVE(E.wheels, members * E.wheel_count);
+    RESERVE(E.materials, (double)E.kind_count * (E.segment_count + E.arc_count + E.wheel_count));
+    RESERVE(E.lones, E.lone_count);
+    RESERVE(E.books, 3.0 * E.surface_count * (E.apart ? E.lone_count : 1));
+    E.room_size = 100 * (E.segment_count + E.arc_count) + 200;
+    E.knot_room = (int)many + 500;
+    E.event_room = (int)many + 100;
+    RESERVE(E.room, E.room_size);
+    RESERVE(E.knots, E.knot_room);
+    RESERVE(E.events, E.event_room);
+    return has_room();
+}
+
+/* Run all particles, for at most so many rounds; returns why it came back, see `enum Course`. */
+EXPORT int follow_all(int rounds) {
+    for (; E.lone < E.lone_count; E.lone++, E.begun = 0) {
+        int member = E.family ? E.lone : 0;
+        if (E.laid != member + 1) {
+            while (!lay_obstacles(member)) {
+                E.room_size *= 2;
+                if (!RESERVE(E.room, E.room_size)) return NO_MEMORY;
+            }
+            E.laid = member + 1;
+        }
+        do {
+            if (E.knot_room - E.knot_count < ROUND_KNOTS) return FILLED;
+            if (E.event_room - E.event_count < ROUND_EVENTS) return FILLED;
+            if (!rounds--) return PAUSING;
+            course = FINISHED;
+            if (E.begun) proceed();
+            else begin();
+            E.begun = 1;
+            if (course != FINISHED) {
+                E.t = A.given->release + A.age, E.x = A.x, E.y = A.y;
+                end_track(TIME_IS_OVER);
+                return course;
+            }
+        } while (A.way != OVER);
+        E.rounds = MAX(E.rounds, A.rounds);
+    }
+    return FINISHED;
+}

@@ -1,0 +1,403 @@
+/* What a particle meets next, and when: solved, not stepped.
+
+   A gap is a polynomial in time, positive while two things are apart. Only the crossing from positive
+   to negative is a contact; the other one is a departure. In flight, or sliding straight, a particle
+   may meet a face or a circle (an end, an arc from outside or inside, the pulley). A ride round a
+   circle is stopped by something else at an angle in closed form. */
+
+#include "exact.h"
+
+/* Share of a speed or an acceleration along a surface below which it has no part towards it. */
+#define PARALLEL 1e-14
+/* Share of the speed towards a circle below which a Newton step would not improve the contact. */
+#define GLANCING 1e-3
+/* Least order with which a circle is left for good, unless the pull turns a path back. */
+#define FROM_CURVE 2
+/* Bound on the refinements of a root: Newton's method takes about 8, a double root by halving this. */
+#define REFINEMENTS 120
+/* rad; an obstacle this close to the present angle is met now: by rounding it may be passed. */
+#define NOW 2e-11
+/* In `touch`; circles whose centres and radii differ by no more are in one place. */
+#define ALIKE 4.0
+
+/* When gap + rate t + acceleration t^2/2 crosses zero downwards; NaN or infinite if never, and
+   negative where that was in the past.
+
+   A parabola crosses any level downwards at most once, with derivative -S, where
+   S^2 = rate^2 - 2 acceleration gap. Of the two forms of that root the one without cancellation is
+   taken: 2 gap / (S - rate) while closing, -(rate + S) / acceleration while opening. */
+double descent(double gap, double rate, double acceleration) {
+    double span = fabs(rate) + sqrt(rate * rate - (acceleration + acceleration) * gap);
+    /* Neither gap nor rate: it closes at once if it is pulled. */
+    if (span == 0.0 && gap == 0.0 && acceleration < 0.0) return 0.0;
+    return rate > 0.0 ? span / -acceleration : (gap + gap) / span;
+}
+
+/* A polynomial by Horner's rule, constant term first. */
+double polynomial(const double *c, int count, double t) {
+    double value = 0.0;
+    while (count--) value = value * t + c[count];
+    return value;
+}
+
+/* Where a polynomial, monotonic between low and high, changes sign, or `high`: Newton's method inside a
+   shrinking bracket, halving where it would leave it. */
+static double crossing(const double *c, int count, double low, double high) {
+    double at_low = polynomial(c, count, low), at_high = polynomial(c, count, high), slope[4];
+    double sign = at_high < at_low ? 1.0 : -1.0;
+    if (!(sign * at_high < 0.0 && sign * at_low > 0.0)) return sign * at_low <= 0.0 ? low : high;
+    for (int n = 1; n < count; n++) slope[n - 1] = c[n] * n;
+    double t = 0.5 * (low + high);
+    for (int n = 0; n < REFINEMENTS; n++) {
+        double value = sign * polynomial(c, count, t);
+        double rate = sign * polynomial(slope, count - 1, t);
+        if (value >= 0.0) low = t;
+        else high = t;
+        double newton = t - value / rate, old = t;
+        t = newton > low && newton < high ? newton : value == 0.0 ? t : 0.5 * (low + high);
+        if (fabs(t - old) <= 0.5 * ULP * fabs(old)) break;
+    }
+    return t;
+}
+
+/* Find each t, 0 < t <= until, where a polynomial of degree up to 4 becomes negative, in their order;
+   infinite where there is none. The stationary points of each derivative split the time axis into
+   pieces on which the next one down is monotonic, so no root is missed or mistaken for another.
+   Touching zero without crossing is not a contact. */
+static void descents(const double *c, double until, double *found) {
+    static const double BERNSTEIN[5][5] = { { 1.0 }, { 1.0, 0.25 }, { 1.0, 0.5, 1.0 / 6.0 },
+        { 1.0, 0.75, 0.5, 0.25 }, { 1.0, 1.0, 1.0, 1.0, 1.0 } };
+    double scaled[5], power = 1.0, derivatives[4][5], knots[6] = { 0.0, until };
+    int below = 0, count = 2;
+    for (int n = 0; n < 5; n++, power *= until) scaled[n] = c[n] * power, derivatives[0][n] = c[n];
+    for (int n = 0; n < 4; n++) found[n] = INFINITY;
+    /* A polynomial lies above the smallest of its Bernstein coefficients. */
+    for (int j = 0; j < 5; j++) {
+        double sum = 0.0;
+        for (int i = 0; i <= j; i++) sum += BERNSTEIN[j][i] * scaled[i];
+        below |= sum < 0.0;
+    }
+    if (!below) return;
+    for (int k = 1; k < 4; k++)
+        for (int n = 1; n < 6 - k; n++) derivatives[k][n - 1] = derivatives[k - 1][n] * n;
+    for (int k = 3; k > 0; k--) {
+        double next[6] = { 0.0 };
+        for (int n = 1; n < count; n++) next[n] = crossing(derivatives[k], 5 - k, knots[n - 1], knots[n]);
+        next[count++] = until;
+        for (int n = 0; n < count; n++) knots[n] = next[n];
+    }
+    /* At 0 it may be 0 and go either way. */
+    int before = c[0] < 0.0;
+    for (int n = 0; n < 4; n++) {
+        int after = polynomial(c, 5, knots[n + 1]) < 0.0;
+        if (after && !before) found[n] = crossing(c, 5, knots[n], knots[n + 1]);
+        before = after;
+    }
+}
+
+static double first_descent(const double *c, double until) {
+    double found[4], first = INFINITY;
+    descents(c, until, found);
+    for (int n = 0; n < 4; n++) first = MIN(first, found[n]);
+    return first;
+}
+
+/* Whether a direction from the centre of a circle is one of its arc. */
+int spans(const Obstacle *o, double x, double y) {
+    if (!(o->extent < TURN)) return 1;
+    return modulo(angle_of(y, x) - o->begin + FOOT, TURN) <= o->extent + 2.0 * FOOT;
+}
+
+/* Whether a circle is met from a direction, as far as gates are concerned. A gate that appears in a disk
+   does not act on it until the disk is clear of it; so neither does its end, where the disk comes to it
+   along the gate, which goes on into the disk there. */
+int is_reached(int circle, double x, double y, int epoch) {
+    if (!O.change_count) return 1;
+    if (!is_there(circle, epoch)) return 0;
+    int clear = O.all[circle].tips == NONE;
+    for (int n = O.all[circle].tips; n != NONE && !clear; n = O.tips[n].next) {
+        const Tip *tip = O.tips + n;
+        clear = tip->out[0] * x + tip->out[1] * y >= -O.touch && is_there(face_of(n / 2, 1), epoch);
+    }
+    return clear;
+}
+
+static int counts(int circle, double x, double y, double t) {
+    return spans(O.all + circle, x, y) && is_reached(circle, x, y, epoch_at(A.age + t));
+}
+
+static double speed_of(const Motion *m) { return length_of(m->vx, m->vy); }
+static double after_x(const Motion *m, double t) { return m->x + t * (m->vx + 0.5 * t * m->ax); }
+static double after_y(const Motion *m, double t) { return m->y + t * (m->vy + 0.5 * t * m->ay); }
+
+typedef struct { double low[2], high[2]; } Box;
+
+/* Lowest and highest coordinates of a path. */
+static Box box_of(const Motion *m, double until) {
+    double p[] = { m->x, m->y }, v[] = { m->vx, m->vy }, a[] = { m->ax, m->ay };
+    double end[] = { after_x(m, until), after_y(m, until) };
+    Box box;
+    for (int k = 0; k < 2; k++) {
+        box.low[k] = MIN(p[k], end[k]), box.high[k] = MAX(p[k], end[k]);
+        double turn = -v[k] / a[k];
+        if (!(turn > 0.0 && turn < until)) continue;
+        double top = p[k] + turn * (v[k] + (0.5 * turn) * a[k]);
+        box.low[k] = MIN(box.low[k], top), box.high[k] = MAX(box.high[k], top);
+    }
+    return box;
+}
+
+static int is_near(const Box *box, const Obstacle *o) {
+    return box->low[0] < o->high[0] && box->high[0] > o->low[0] && box->low[1] < o->high[1]
+        && box->high[1] > o->low[1];
+}
+
+/* Whether a particle on the incoming belt cannot meet something at any height. */
+static int is_under_belt(int k) {
+    return k == 0 || k == O.pulley || k == O.tips[0].circle || k == O.tips[1].circle;
+}
+
+/* When a face of a segment is met from a side, at most `until`; else infinite. */
+static double meet_face(const Motion *m, int k, int side, double until) {
+    const Obstacle *o = O.all + k;
+    double dx = m->x - o->x, dy = m->y - o->y;
+    double height = dx * o->nx + dy * o->ny, foot = dx * o->tx + dy * o->ty;
+    double pace = m->vx * o->tx + m->vy * o->ty, push = m->ax * o->tx + m->ay * o->ty;
+    double gap = side * height - A.given->radius, rate = side * (m->vx * o->nx + m->vy * o->ny);
+    double fall = side * (m->ax * o->nx + m->ay * o->ny);
+    int shared = is_shared(m->joint, k, side < 0), leaving = m->left == k || shared;
+    int same = (m->left == k && m->left_side == side) || shared;
+    int touching = fabs(gap) <= O.touch || same, grazing = 0;
+    if (touching) {
+        gap = 0.0;
+        grazing = fabs(rate) <= PARALLEL * speed_of(m);
+        if (grazing && !same) rate = 0.0;
+        if (grazing && fabs(fall) <= PARALLEL * length_of(m->ax, m->ay)) fall = 0.0;
+    }
+    double time = descent(gap, rate, fall);
+    if (!(time >= 0.0 && time <= until) || (leaving && !(same && m->order <= 1)) || m->on == k)
+        return INFINITY;
+    if (A.point && touching && !same && time == 0.0) {
+        double then = (A.past_x - o->x) * o->nx + (A.past_y - o->y) * o->ny;
+        if (side * (A.past == k ? A.past_side : then) < 0.0) return INFINITY;
+    }
+    /* How far along the segment the contact is. */
+    double over = FOOT * o->length;
+    foot += time * (pace + (0.5 * time) * push);
+    if (!(foot >= -over && foot <= over + o->length)) return INFINITY;
+    /* Grazing the end on the way out is not lying on the face. */
+    if (grazing && ((foot <= over && pace < 0.0) || (foot >= o->length - over && pace > 0.0)))
+        return INFINITY;
+    return O.change_count && !is_there(k, epoch_at(A.age + time)) ? INFINITY : time;
+}
+
+/* Improve the time of a contact by a Newton step on the distance itself. Its rounding does not grow with
+   the flight, as the polynomial's does; but of a contact that is being left the polynomial, divided by
+   t, is better on ways below rho. */
+static double polish(const Motion *m, const Obstacle *o, double t, int apart) {
+    if (!isfinite(t)) return t;
+    double x = m->x - o->x + t * (m->vx + 0.5 * t * m->ax), vx = m->vx + t * m->ax;
+    double y = m->y - o->y + t * (m->vy + 0.5 * t * m->ay), vy = m->vy + t * m->ay;
+    double distance = length_of(x, y), sense = sign_of(o->rho), rho = fabs(o->rho);
+    double rate = sense * (x * vx + y * vy) / distance;
+    if (!(rate < -GLANCING * length_of(vx, vy)) || !(apart || -rate * t > rho)) return t;
+    return MAX(t - sense * (distance - rho) / rate, 0.0);
+}
+
+/* When a path comes in past the end of an arc along its face, before `until`; else infinite.
+
+   Before that the arc is not beside the particle, and the gap to its circle may have any sign. Where
+   the gap is zero at the instant at which the arc comes to be beside it, there is no crossing from
+   positive to negative: it is a contact if the gap falls from there. */
+static double enter(const Motion *m, int k, double until) {
+    const Obstacle *o = O.all + k;
+    double first = INFINITY, dx = m->x - o->x, dy = m->y - o->y;
+    for (int end = 1; end >= 0; end--) {
+        double turn = end ? 1.0 : -1.0, up, across;
+        sin_cos(end ? o->begin : o->begin + o->extent, &up, &across);
+        double ax = turn * up, ay = -turn * across;
+        double ahead = has_edge(m->joint, k, end) ? 0.0 : ax * dx + ay * dy;
+        double time = descent(ahead, ax * m->vx + ay * m->vy, ax * m->ax + ay * m->ay);
+        if (!(time > 0.0 && time < until)) continue;
+        double x = dx + time * (m->vx + 0.5 * time * m->ax), vx = m->vx + time * m->ax;
+        double y = dy + time * (m->vy + 0.5 * time * m->ay), vy = m->vy + time * m->ay;
+        if (!(fabs(across * x + up * y - fabs(o->rho)) <= O.touch)) continue;
+        if (!is_reached(k, x, y, epoch_at(A.age + time))) continue;
+        /* The gap, which is zero then, over the time since: so its own zero is divided out. */
+        double sense = sign_of(o->rho), gap[] = { sense * 2.0 * (x * vx + y * vy),
+            sense * (vx * vx + vy * vy + (x * m->ax + y * m->ay)),
+            sense * (vx * m->ax + vy * m->ay), sense * 0.25 * (m->ax * m->ax + m->ay * m->ay), 0.0 };
+        first = MIN(first, time + (gap[0] < 0.0 ? 0.0 : first_descent(gap, until - time)));
+    }
+    return first;
+}
+
+static int is_alike(int k, int left) {
+    const Obstacle *a = O.all + k, *b = O.all + left;
+    double near = ALIKE * O.touch;
+    return left >= O.first_arc && left < O.first_arc + 2 * O.arcs && fabs(a->x - b->x) <= near
+        && fabs(a->y - b->y) <= near && fabs(a->rho - b->rho) <= near;
+}
+
+/* When a circle is met, before or at `until`; else infinite. */
+static double meet_circle(const Motion *m, int k, double until) {
+    const Obstacle *o = O.all + k;
+    double dx = m->x - o->x, dy = m->y - o->y, rho = fabs(o->rho), sense = sign_of(o->rho);
+    double distance = length_of(dx, dy), sum = dx * m->vx + dy * m->vy;
+    if (!(rho >= 0.0)) return INFINITY;
+    /* |d + v t + a t^2/2|^2 - rho^2, as a polynomial of t; rho^2 less that from inside. */
+    double gap[] = { (distance - rho) * (distance + rho), 2.0 * sum,
+        m->vx * m->vx + m->vy * m->vy + (dx * m->ax + dy * m->ay), m->vx * m->ax + m->vy * m->ay,
+        0.25 * (m->ax * m->ax + m->ay * m->ay) };
+    for (int n = 0; n < 5; n++) gap[n] *= sense;
+    /* Arcs that lie on each other are left together. */
+    int leaving = m->left == k || (O.arcs > 1 && is_alike(k, m->left)) || is_shared(m->joint, k, 0);
+    leaving |= A.point && is_back(k, m->left);
+    int touching = fabs(distance - rho) <= O.touch;
+    /* The direction from the centre is as uncertain as the places are, over rho. */
+    double uncertain = 2.0 * (PARALLEL * rho + O.touch) * speed_of(m);
+    if (touching && fabs(gap[1]) <= uncertain && !leaving) gap[1] = 0.0;
+    int closing = touching && gap[1] < 0.0;
+    /* A point behind a circle does not meet it, however near it is. */
+    if (A.point && closing)
+        closing = sense * (length_of(A.past_x - o->x, A.past_y - o->y) - rho) >= -O.touch;
+    int order = leaving ? m->order : touching && !closing ? 1 : 0, falls = 0, rises = 0;
+    if (closing && !leaving && counts(k, dx, dy, 0.0)) return 0.0;
+    for (int n = 0; n < order; n++) {
+        for (int c = 0; c < 4; c++) gap[c] = gap[c + 1];
+        gap[4] = 0.0;
+    }
+    for (int n = 0; n < 5; n++) falls |= gap[n] < 0.0, rises |= gap[n] > 0.0;
+    double t = INFINITY;
+    /* Else it is past it for good, or never approaching it: no contact to find. */
+    if ((gap[0] >= 0.0 || rises) && falls) {
+        double found[4];
+        descents(gap, until, found);
+        for (int n = 3; n >= 0; n--) {
+            double s = found[n];
+            if (!isfinite(s) || !counts(k, after_x(m, s) - o->x, after_y(m, s) - o->y, s)) continue;
+            t = s;
+        }
+        t = polish(m, o, t, order == 0);
+    }
+    return o->extent < TURN ? MIN(t, enter(m, k, until)) : t;
+}
+
+/* Whether a particle cannot meet a circle, from where it is or comes from. */
+static int is_hidden(const Motion *m, int k) {
+    int left = m->left;
+    if (m->on != NONE && is_beside(k, m->on, m->on_side < 0)) return 1;
+    if (left == NONE) return 0;
+    const Obstacle *o = O.all + left;
+    if (left >= O.faces)
+        /* Left tangentially with the speed not falling, all terms of the gap to a circle grow. */
+        return left == k && m->order >= FROM_CURVE && m->vx * m->ax + m->vy * m->ay >= 0.0
+            && !(O.arcs && o->rho < 0.0);
+    /* A face that is left with the pull away from it hides its own two ends, as does one slid on. */
+    return (O.tips[2 * left].circle == k || O.tips[2 * left + 1].circle == k)
+        && m->left_side * (m->ax * o->nx + m->ay * o->ny) >= 0.0;
+}
+
+/* Find what a particle meets first, and whether it does so at or before `until` (s from now, finite),
+   which then becomes the time of that. The side is that of a face, 0 for a circle.
+
+   Finds faces within a segment's length, ends of segments (for a disk), arcs and the pulley. Misses, by
+   design, a point against the end of a segment, and anything the particle overlaps already. */
+int first_contact(const Motion *m, double *until, int *obstacle, int *side) {
+    Box box = box_of(m, *until);
+    double first = INFINITY, soonest = INFINITY;
+    int circle = NONE;
+    for (int k = 0; k < O.faces; k++) {
+        if (!is_near(&box, O.all + k) || (m->carried && is_under_belt(k))) continue;
+        for (int face = 1; face >= -1; face -= 2) {
+            double time = meet_face(m, k, face, *until);
+            if (time < first) first = time, *obstacle = k, *side = face;
+        }
+    }
+    int hits = first <= *until;
+    if (hits) *until = first, box = box_of(m, first);
+    for (int k = O.faces; k < O.count; k++) {
+        if (!is_near(&box, O.all + k) || (m->carried && is_under_belt(k)) || is_hidden(m, k)) continue;
+        double time = meet_circle(m, k, *until);
+        if (time < soonest) soonest = time, circle = k;
+    }
+    /* Before a face that is met then, and at the latest at the end. */
+    if (circle == NONE || !(soonest < *until || (!hits && soonest == *until))) return hits;
+    *until = soonest, *obstacle = circle, *side = 0;
+    return 1;
+}
+
+/* Take in one more obstacle of a ride, whose gap falls with phi at the rate `closing` at an angle. */
+static void narrow(Bound *found, double phi, double angle, double closing, Bound what) {
+    for (int way = 0; way < 2; way++) {
+        double sign = way ? 1.0 : -1.0;
+        double ahead = MAX(modulo(sign * (angle - phi) + NOW, TURN) - NOW, 0.0);
+        double place = phi + sign * ahead;
+        if (!(sign * closing > 0.0) || !(sign * (place - found[way].angle) < 0.0)) continue;
+        found[way] = what, found[way].angle = place;
+    }
+}
+
+/* Find what stops a ride round a circle backwards and forwards, now at phi, on the half that `side`
+   tells; only of what is there in an epoch. */
+void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
+    const Obstacle *c = O.all + circle;
+    double facing = sign_of(c->rho), rho = c->rho;
+    for (int way = 0; way < 2; way++)
+        found[way] = (Bound){ way ? INFINITY : -INFINITY, NONE, 0, 0, NONE };
+    for (int k = 0; k < O.faces; k++)
+        for (int n = 0; n < 2; n++) {
+            const Obstacle *o = O.all + k;
+            int face = n ? -1 : 1;
+            /* The gap to a face is rho (cos(phi - tilt) - level). */
+            double height = (o->x - c->x) * o->nx + (o->y - c->y) * o->ny;
+            double level = (face * height + A.given->radius) / rho;
+            /* A ride that only touches goes on. */
+            if (!(fabs(level) < 1.0) || is_beside(circle, k, n) || !is_there(k, epoch)) continue;
+            double tilt = angle_of(face * o->nx, face * o->ny), half = angle_of_cosine(level);
+            for (int sign = -1; sign <= 1; sign += 2) {
+                double angle = tilt + sign * half, up, across;
+                sin_cos(angle, &up, &across);
+                double foot = (c->x + rho * up - o->x) * o->tx + (c->y + rho * across - o->y) * o->ty;
+                if (foot >= 0.0 && foot <= o->length)
+                    narrow(found, phi, angle, facing * sine(angle - tilt), (Bound){ 0.0, k, face, 0, NONE });
+            }
+        }
+    for (int h = c->handovers; h != NONE; h = O.handovers[h].next) {
+        const Handover *over = O.handovers + h;
+        const Tip *tip = O.tips + over->tip;
+        int face = over->face ? -1 : 1, number = face_of(over->tip / 2, face);
+        if (!is_there(number, epoch)) continue;
+        double tilt = angle_of(tip->out[0], tip->out[1]);
+        double angle = (face > 0) == (over->tip % 2 > 0) ? tilt - 0.5 * PI : tilt + 0.5 * PI;
+        double closing = facing * sine(angle - tilt);
+        int joint = tip->sets[over->face];
+        Onward onward = O.onward[2 * (epoch * O.tip_count + over->tip) + over->face];
+        if (over->onto) narrow(found, phi, angle, closing, (Bound){ 0.0, number, face, 1, joint });
+        else narrow(found, phi, angle, -closing, (Bound){ 0.0, onward.obstacle, onward.side, 1, joint });
+    }
+    if ((c->crown[0] != 0.0 || c->crown[1] != 0.0) && c->speed != 0.0) {
+        double tilt = angle_of(c->crown[0], c->crown[1]);
+        for (int sign = -1; sign <= 1; sign += 2) {
+            double angle = tilt + sign * 0.5 * PI;
+            narrow(found, phi, angle, side * sine(angle - tilt), (Bound){ 0.0, circle, -side, 1, NONE });
+        }
+    }
+    for (int k = O.faces; k < O.count; k++) {
+        const Obstacle *o = O.all + k;
+        /* The gap to a circle grows with -cos(phi - tilt). */
+        double x = o->x - c->x, y = o->y - c->y, distance = length_of(x, y);
+        if (k == circle || !(distance > O.touch) || is_beside(circle, k, 0)) continue;
+        double level = (rho * rho + distance * distance - o->rho * o->rho) / (2.0 * rho * distance);
+        if (!(fabs(level) < 1.0)) continue;
+        double half = angle_of_cosine(level), tilt = angle_of(x, y);
+        for (int sign = -1; sign <= 1; sign += 2) {
+            double angle = tilt + sign * half, up, across;
+            sin_cos(angle, &up, &across);
+            double away_x = rho * up - x, away_y = rho * across - y;
+            if (!spans(o, away_x, away_y) || !is_reached(k, away_x, away_y, epoch)) continue;
+            narrow(found, phi, angle, -sign_of(o->rho) * facing * sine(angle - tilt),
+                   (Bound){ 0.0, k, 0, 0, NONE });
+        }
+    }
+}

@@ -1,0 +1,706 @@
+/* The machine as the exact engine sees it: faces and circles to meet, and how pieces join.
+
+   The pieces that share a place, sorted by the angles at which they leave it, divide its surroundings
+   into sectors. A disk is in one of them and can touch only the two faces that bound that. Where the
+   angle between these is pi they are *flush*, and a ride on one goes on on the other; where it is
+   more, round the place; where it is less, the ride is stopped before. */
+
+#include <stdlib.h>
+#include "exact.h"
+
+/* In `touch`; circles whose centres and radii differ by no more are in one place. */
+#define ALIKE 4.0
+/* Share of a curvature by which two pieces that leave a place in one direction differ at least. */
+#define CIRCULAR 1e-9
+/* Width, in `touch`, by which the boxes of faces are larger than they need be. */
+#define BOX_TOUCHES 64.0
+/* In place of an end: a piece that goes on through a place, first along it, then back. */
+#define THROUGH 2
+
+Obstacles O;
+
+/* A segment, or a part of one, with its ends. */
+typedef struct { double x, y, ex, ey, length; const Segment *of; int source; } Part;
+
+/* A piece seen from a place where it ends, or which it passes. */
+typedef struct { double angle, bend; int piece, end, place; } Ray;
+
+static double *arena, *arena_end;
+static int arena_full;
+
+/* Set doubles apart; where there is no room for them, ask for more. */
+static void *reserve(int count, int size) {
+    double *found = arena;
+    long doubles = ((long)count * size + 7) / 8;
+    if (doubles > arena_end - arena) {
+        arena_full = 1;
+        return 0;
+    }
+    arena += doubles;
+    return found;
+}
+
+static Part *parts;
+static int part_count;
+static const Arc **bends; /* those with ends first */
+static int *bend_source;
+static double *xs;        /* of the ends, for sorting */
+static int *order;        /* ends by x */
+static int *at_spot;      /* first end at each spot, or -1 ... */
+static int *next_there;   /* ... and the next of each */
+static Ray *rays, *ring, *flat;
+
+static double extent_of(const Arc *a) { return MIN(a->extent, TURN); }
+
+static int by_x(const void *one, const void *other) {
+    int a = *(const int *)one, b = *(const int *)other;
+    return xs[a] < xs[b] ? -1 : xs[a] > xs[b] ? 1 : a - b;
+}
+
+static int compared(double a, double b) { return a < b ? -1 : a > b; }
+static int ascending(const void *a, const void *b) {
+    return compared(*(const double *)a, *(const double *)b);
+}
+static int by_angle(const void *one, const void *other) {
+    const Ray *a = one, *b = other;
+    int by = compared(a->angle, b->angle);
+    return by ? by : a->piece != b->piece ? a->piece - b->piece : a->end - b->end;
+}
+
+/* Where ends are, and the directions out of their pieces and to the left of these. */
+static void find_tips(void) {
+    for (int s = 0; s < part_count; s++) {
+        const Part *p = parts + s;
+        const double *t = p->of->tangent;
+        for (int e = 0; e < 2; e++) {
+            Tip *tip = O.tips + 2 * s + e;
+            tip->x = e ? p->ex : p->x, tip->y = e ? p->ey : p->y;
+            tip->out[0] = e ? t[0] : -t[0], tip->out[1] = e ? t[1] : -t[1];
+            tip->left[0] = -t[1], tip->left[1] = t[0];
+        }
+    }
+    for (int b = 0; b < O.bent; b++) {
+        const Arc *a = bends[b];
+        for (int e = 0; e < 2; e++) {
+            Tip *tip = O.tips + 2 * (part_count + b) + e;
+            double up, across;
+            sin_cos(e ? a->begin : a->begin + extent_of(a), &up, &across);
+            tip->x = a->center[0] + a->radius * across, tip->y = a->center[1] + a->radius * up;
+            tip->left[0] = across, tip->left[1] = up;
+            tip->out[0] = e ? up : -up, tip->out[1] = e ? -across : across;
+        }
+    }
+    for (int n = 0; n < O.tip_count; n++) {
+        O.tips[n].rests = O.tips[n].circle = NONE;
+        O.tips[n].sets[0] = O.tips[n].sets[1] = NONE;
+    }
+}
+
+static void sort_tips(void) {
+    for (int n = 0; n < O.tip_count; n++) xs[n] = O.tips[n].x, order[n] = n;
+    qsort(order, O.tip_count, sizeof *order, by_x);
+}
+
+/* Number of ends whose x is below some value. */
+static int before(double x) {
+    int low = 0, high = O.tip_count;
+    while (low < high) {
+        int middle = (low + high) / 2;
+        if (xs[order[middle]] < x) low = middle + 1;
+        else high = middle;
+    }
+    return low;
+}
+
+/* The largest coordinate of the surfaces. */
+static double size_of_surfaces(void) {
+    double size = 0.0;
+    for (int n = 0; n < O.tip_count; n++)
+        size = MAX(size, MAX(fabs(O.tips[n].x), fabs(O.tips[n].y)));
+    for (int b = 0; b < O.arcs; b++)
+        for (int k = 0; k < 2; k++)
+            size = MAX(size, fabs(bends[b]->center[k]) + bends[b]->radius);
+    return size;
+}
+
+static double size_for(const Lone *p) {
+    return MAX(O.size, MAX(fabs(p->position[0]), fabs(p->position[1])));
+}
+
+/* Where along a part an end lies inside it and is tangent to it, m; else 0. What the incoming belt
+   carries comes to nothing that begins on it. */
+static double begins_on(const Part *p, int s, int n, double near) {
+    const Tip *tip = O.tips + n;
+    const double *t = p->of->tangent;
+    if (n / 2 == s || (E.wheel_count && s == 0)) return 0.0;
+    double dx = tip->x - p->x, dy = tip->y - p->y;
+    double foot = dx * t[0] + dy * t[1];
+    return fabs(t[0] * dy - t[1] * dx) <= near && foot > near && foot < p->length - near
+            && fabs(t[0] * tip->out[1] - t[1] * tip->out[0]) <= COLLINEAR
+        ? foot : 0.0;
+}
+
+/* List where other pieces begin on a part, if `feet` is given; return how many do. */
+static int begin_on(int s, double near, double *feet) {
+    const Part *p = parts + s;
+    int count = 0;
+    for (int n = before(MIN(p->x, p->ex) - near); n < O.tip_count; n++) {
+        if (xs[order[n]] > MAX(p->x, p->ex) + near) break;
+        double foot = begins_on(p, s, order[n], near);
+        if (foot && feet) feet[count] = foot;
+        count += foot != 0.0;
+    }
+    return count;
+}
+
+static Part part_of(const Part *whole, double low, double high) {
+    const double *t = whole->of->tangent;
+    Part p = *whole;
+    p.x += low * t[0], p.y += low * t[1];
+    p.length = high - low;
+    p.ex = p.x + p.length * t[0], p.ey = p.y + p.length * t[1];
+    return p;
+}
+
+/* Cut parts where other pieces begin on them: there three join. Returns whether some were. */
+static int cut_parts(double near) {
+    int found = 0, count = 0;
+    for (int s = 0; s < part_count; s++) found += begin_on(s, near, 0);
+    if (!found) return 0;
+    double *feet = reserve(found + 1, sizeof *feet);
+    Part *cut = reserve(part_count + found, sizeof *cut);
+    if (arena_full) return 0;
+    for (int s = 0; s < part_count; s++) {
+        int many = begin_on(s, near, feet);
+        double low = 0.0;
+        if (!many) cut[count++] = parts[s];
+        else {
+            qsort(feet, many, sizeof *feet, ascending);
+            feet[many] = parts[s].length;
+            for (int n = 0; n <= many; low = feet[n++])
+                if (feet[n] - low > near) cut[count++] = part_of(parts + s, low, feet[n]);
+        }
+    }
+    parts = cut, part_count = count;
+    return 1;
+}
+
+/* Make room for the ends of all pieces and find them, sorted by place. */
+static int list_tips(void) {
+    O.tip_count = 2 * (part_count + O.bent);
+    O.tips = reserve(O.tip_count, sizeof *O.tips);
+    xs = reserve(O.tip_count, sizeof *xs);
+    order = reserve(O.tip_count, sizeof *order);
+    if (arena_full) return 0;
+    find_tips();
+    sort_tips();
+    O.size = size_of_surfaces();
+    return 1;
+}
+
+/* Number the places where pieces begin and end; within the tolerance it is one place. */
+static void number_spots(double tolerance) {
+    for (int n = 0, first = 0; n < O.tip_count; n++) {
+        Tip *tip = O.tips + order[n];
+        tip->spot = order[n];
+        while (tip->x - xs[order[first]] > tolerance) first++;
+        for (int m = first; m < n; m++)
+            if (fabs(tip->y - O.tips[order[m]].y) <= tolerance) {
+                tip->spot = O.tips[order[m]].spot;
+                break;
+            }
+    }
+}
+
+static double came_of(int piece) {
+    return piece < part_count ? parts[piece].of->appears : bends[piece - part_count]->appears;
+}
+static double went_of(int piece) {
+    return piece < part_count ? parts[piece].of->vanishes : bends[piece - part_count]->vanishes;
+}
+static int stays(int piece) { return isinf(came_of(piece)) && isinf(went_of(piece)); }
+
+/* Of parts that lie on each other keep the first, as it counts when two are met at once. A gate that
+   shuts again is there twice, at different times. */
+static void drop_doubles(void) {
+    int kept = 0;
+    for (int s = 0; s < part_count; s++) {
+        const Tip *a = O.tips + 2 * s;
+        int doubled = 0;
+        for (int k = 0; k < kept && !doubled; k++) {
+            const Tip *b = O.tips + 2 * k;
+            int same = (a[0].spot == b[0].spot && a[1].spot == b[1].spot)
+                || (a[0].spot == b[1].spot && a[1].spot == b[0].spot);
+            doubled = same && came_of(s) == came_of(k) && went_of(s) == went_of(k);
+        }
+        if (doubled) continue;
+        parts[kept] = parts[s];
+        O.tips[2 * kept] = a[0], O.tips[2 * kept + 1] = a[1];
+        kept++;
+    }
+    for (int n = 2 * part_count; kept < part_count && n < O.tip_count; n++)
+        O.tips[n - 2 * (part_count - kept)] = O.tips[n];
+    O.tip_count -= 2 * (part_count - kept);
+    part_count = kept;
+}
+
+/* List when gates open or shut, each time once. */
+static int list_changes(void) {
+    int pieces = part_count + O.arcs, count = 0;
+    O.changes = reserve(2 * pieces, sizeof *O.changes);
+    if (arena_full) return 0;
+    for (int p = 0; p < pieces; p++) {
+        if (isfinite(came_of(p))) O.changes[count++] = came_of(p);
+        if (isfinite(went_of(p))) O.changes[count++] = went_of(p);
+    }
+    qsort(O.changes, count, sizeof *O.changes, ascending);
+    O.change_count = 0;
+    for (int n = 0; n < count; n++)
+        if (!n || O.changes[n] > O.changes[O.change_count - 1]) O.changes[O.change_count++] = O.changes[n];
+    return 1;
+}
+
+/* Find which ends lie on an arc, but not where that ends: they cannot be met, nor can that of the belt
+   on the pulley. */
+static void find_rests(double near) {
+    sort_tips();
+    for (int b = 0; b < O.arcs; b++) {
+        const Arc *a = bends[b];
+        if (O.change_count && !stays(part_count + b)) continue;
+        for (int k = before(a->center[0] - a->radius - 2.0 * near); k < O.tip_count; k++) {
+            Tip *tip = O.tips + order[k];
+            if (tip->x > a->center[0] + a->radius + near) break;
+            double x = tip->x - a->center[0], y = tip->y - a->center[1];
+            if (!(fabs(length_of(x, y) - a->radius) <= near)) continue;
+            double extent = extent_of(a), edge = extent < TURN ? near / a->radius : 0.0;
+            double turn = modulo(angle_of(y, x) - a->begin, TURN);
+            if (turn >= edge && turn <= extent - edge) tip->rests = MAX(tip->rests, b);
+        }
+    }
+    if (E.wheel_count) O.tips[1].rests = O.arcs;
+}
+
+static double turning_of(int piece) {
+    const Arc *a = bends[piece - part_count];
+    return -a->speed / a->radius;
+}
+
+static void place_of_piece(Obstacle *o, int piece) {
+    if (piece < part_count) {
+        const Segment *s = parts[piece].of;
+        o->speed = s->speed, o->surface = s->surface, o->source = parts[piece].source;
+    } else {
+        const Arc *a = bends[piece - part_count];
+        o->speed = a->speed, o->surface = a->surface, o->source = bend_source[piece - part_count];
+    }
+    o->came = came_of(piece), o->went = went_of(piece);
+}
+
+/* Make a circle round each place where pieces of disks end, and list the ends at it; a point meets it
+   with probability zero. What stays comes first. */
+static int make_ends(int disks) {
+    int count = 0;
+    for (int n = O.tip_count - 1; n >= 0; n--) {
+        int spot = O.tips[n].spot;
+        next_there[n] = at_spot[spot], at_spot[spot] = n;
+    }
+    for (int late = 0; late < 2; late++)
+        for (int n = 0; disks && n < O.tip_count; n++) {
+            if (O.tips[n].rests != NONE || O.tips[n].circle != NONE || stays(n / 2) == late) continue;
+            Obstacle *o = O.all + O.faces + count;
+            o->met = END, o->x = O.tips[n].x, o->y = O.tips[n].y;
+            place_of_piece(o, n / 2);
+            for (int k = at_spot[O.tips[n].spot]; k != NONE; k = next_there[k])
+                if (O.tips[k].rests == NONE)
+                    O.tips[k].circle = O.faces + count, O.tips[k].next = o->tips, o->tips = k;
+            /* The ends come the other way round: the turning of the first one counts. */
+            for (int k = o->tips; k != NONE; k = O.tips[k].next)
+                o->turning = k / 2 < O.faces ? 0.0 : turning_of(k / 2);
+            count++;
+        }
+    return count;
+}
+
+static int list_obstacles(int disks) {
+    int most = part_count + O.tip_count + 2 * O.arcs + 1;
+    O.all = reserve(most, sizeof *O.all);
+    if (arena_full) return 0;
+    for (int k = 0; k < most; k++)
+        O.all[k] = (Obstacle){ .extent = TURN, .tips = NONE, .members = NONE, .handovers = NONE };
+    O.faces = part_count;
+    for (int s = 0; s < part_count; s++) {
+        Obstacle *o = O.all + s;
+        const double *t = parts[s].of->tangent;
+        o->met = FACE, o->x = parts[s].x, o->y = parts[s].y, o->length = parts[s].length;
+        o->tx = t[0], o->ty = t[1], o->nx = -t[1], o->ny = t[0];
+        place_of_piece(o, s);
+    }
+    O.first_arc = O.faces + make_ends(disks);
+    for (int k = 0; k < 2 * O.arcs; k++) {
+        Obstacle *o = O.all + O.first_arc + k;
+        int piece = O.faces + k % O.arcs;
+        const Arc *a = bends[k % O.arcs];
+        o->met = k < O.arcs ? OUTSIDE : INSIDE;
+        o->x = a->center[0], o->y = a->center[1], o->bend = a->radius;
+        o->begin = a->begin, o->extent = extent_of(a);
+        place_of_piece(o, piece);
+        o->turning = turning_of(piece);
+    }
+    O.count = O.first_arc + 2 * O.arcs;
+    O.pulley = NONE;
+    return 1;
+}
+
+static void list_pulley(const Wheel *wheel) {
+    Obstacle *o = O.all + O.count;
+    O.pulley = O.count++;
+    o->met = WHEEL;
+    o->bend = wheel->radius, o->speed = wheel->speed, o->surface = wheel->surface;
+    o->came = -INFINITY, o->went = INFINITY;
+    o->source = E.segment_count + E.arc_count;
+}
+
+int face_of(int piece, int face) {
+    if (piece < O.faces) return piece;
+    if (piece == O.faces + O.arcs) return face > 0 ? O.pulley : NONE;
+    return O.first_arc + piece - O.faces + (face > 0 ? 0 : O.arcs);
+}
+
+static double angle_at(double x, double y) { return modulo(angle_of(y, x), TURN); }
+
+/* List the pieces at a place as they go out of it. */
+static int list_rays(int first) {
+    int count = 0;
+    for (int n = first; n != NONE; n = next_there[n]) {
+        const Tip *tip = O.tips + n;
+        double bend = n / 2 < O.faces ? 0.0 : 1.0 / bends[n / 2 - O.faces]->radius;
+        rays[count] = (Ray){ angle_at(-tip->out[0], -tip->out[1]), n % 2 ? bend : -bend, n / 2, n % 2, count };
+        count++;
+    }
+    for (int n = first; n != NONE; n = next_there[n]) {
+        const Tip *tip = O.tips + n;
+        int through = O.faces + tip->rests, known = tip->rests == NONE;
+        for (int k = 0; k < count; k++) known |= rays[k].piece == through;
+        if (known) continue;
+        /* By rounding the place is not quite on top of the pulley, but the belt is flush. */
+        int wheel = tip->rests == O.arcs;
+        const Arc *a = wheel ? 0 : bends[tip->rests];
+        double x = wheel ? tip->left[0] : tip->x - a->center[0];
+        double y = wheel ? tip->left[1] : tip->y - a->center[1];
+        double bend = 1.0 / (wheel ? O.all[O.pulley].bend : a->radius);
+        rays[count] = (Ray){ angle_at(y, -x), -bend, through, THROUGH, count };
+        count++;
+        rays[count] = (Ray){ angle_at(-y, x), bend, through, THROUGH + 1, count };
+        count++;
+    }
+    return count;
+}
+
+/* Face of the piece on the left of the way out; the right one has the other sign. */
+static int left_of(const Ray *r) { return r->end == 0 || r->end == THROUGH ? 1 : -1; }
+static int tip_of(const Ray *r) { return 2 * r->piece + r->end; }
+
+/* Sort rays of one angle counterclockwise; of those that lie on each other keep the first. */
+static int sort_by_bend(Ray *some, int count) {
+    int kept = 0;
+    for (int n = 0; n < count; n++) {
+        Ray ray = some[n];
+        int alike = 0;
+        for (int k = 0; k < kept; k++)
+            alike |= fabs(ray.bend - some[k].bend) <= CIRCULAR * fabs(some[k].bend);
+        if (!alike) some[kept++] = ray;
+    }
+    for (int n = 1; n < kept; n++)
+        for (int k = n; k > 0 && some[k].bend < some[k - 1].bend; k--) {
+            Ray ray = some[k];
+            some[k] = some[k - 1], some[k - 1] = ray;
+        }
+    return kept;
+}
+
+/* Sort the rays of a place that are there in an epoch, all in epoch -1, into `flat`; return how many.
+   `turns` becomes 1 if all go one way. What lies on another piece is left out. */
+static int sort_rays(int count, int epoch, int *turns) {
+    int some = 0, kept = 0, last = 0;
+    for (int n = 0; n < count; n++)
+        if (epoch < 0 || is_there(face_of(rays[n].piece, 1), epoch)) ring[some++] = rays[n];
+    qsort(ring, some, sizeof *ring, by_angle);
+    for (int n = 1; n < some; n++)
+        if (!(ring[n].angle - ring[last].angle <= COLLINEAR)) last = n;
+    *turns = last == 0;
+    if (last && ring[0].angle + TURN - ring[last].angle <= COLLINEAR) {
+        /* What is just below a whole turn goes the way of what is just above 0. */
+        int first = 1;
+        while (first < last && ring[first].angle - ring[0].angle <= COLLINEAR) first++;
+        *turns = first == last;
+        for (int n = 0; n < first; n++) flat[kept++] = ring[n];
+        for (int n = last; n < some; n++) flat[kept++] = ring[n];
+        kept = sort_by_bend(flat, kept);
+        for (int n = first; n < last; n++) ring[n - first] = ring[n];
+        some = last - first;
+    }
+    for (int n = 0; n < some;) {
+        int begin = kept, first = n;
+        while (n < some && ring[n].angle - ring[first].angle <= COLLINEAR) flat[kept++] = ring[n++];
+        kept = begin + sort_by_bend(flat + begin, kept - begin);
+    }
+    return kept;
+}
+
+/* Angle from a ray to the next one counterclockwise. */
+static double angle_after(int n, int count, int turns) {
+    if (count == 1 || (turns && n == count - 1)) return TURN;
+    double angle = modulo(flat[(n + 1) % count].angle - flat[n].angle, TURN);
+    return TURN - angle <= COLLINEAR ? 0.0 : angle;
+}
+
+static void go_onward(Onward *to, const Ray *r, int face, const Ray *other, int onto) {
+    if (r->end < THROUGH)
+        to[2 * tip_of(r) + (face < 0)] = (Onward){ face_of(other->piece, onto), onto };
+}
+
+/* Find what faces go over into at their ends: another face if that is flush, else the circle round the
+   end, whose side is left open, 0. */
+static void find_onward(int epoch) {
+    Onward *to = O.onward + epoch * 2 * O.tip_count;
+    for (int n = 0; n < 2 * O.tip_count; n++) to[n] = (Onward){ O.tips[n / 2].circle, 0 };
+    for (int n = 0; n < O.tip_count; n++) {
+        if (at_spot[O.tips[n].spot] != n) continue;
+        int turns, count = sort_rays(list_rays(n), epoch, &turns);
+        for (int k = 0; k < count; k++) {
+            if (!(fabs(angle_after(k, count, turns) - PI) <= COLLINEAR)) continue;
+            const Ray *right = flat + k, *left = flat + (k + 1) % count;
+            go_onward(to, right, left_of(right), left, -left_of(left));
+            go_onward(to, left, -left_of(left), right, left_of(right));
+        }
+    }
+}
+
+/* Find the middles of the halves of ends that join left faces: at an end the piece's left normal, at a
+   joint the sum of both. */
+static void find_crowns(void) {
+    for (int n = 0; n < O.tip_count; n++) {
+        if (at_spot[O.tips[n].spot] != n) continue;
+        int first = n, other = NONE, turns, count = sort_rays(list_rays(n), -1, &turns);
+        while (first != NONE && O.tips[first].circle == NONE) first = next_there[first];
+        if (first == NONE) continue;
+        for (int k = 0; k < count; k++) {
+            const Ray *one = flat + k, *two = flat + (k + 1) % count;
+            if (one == two || angle_after(k, count, turns) < PI - COLLINEAR) continue;
+            if (one->end >= THROUGH || two->end >= THROUGH) continue;
+            if (tip_of(one) == first) other = tip_of(two);
+            else if (tip_of(two) == first) other = tip_of(one);
+        }
+        const Tip *tip = O.tips + first, *next = other == NONE ? 0 : O.tips + other;
+        double sign = next && other % 2 != first % 2 ? 1.0 : -1.0;
+        for (int k = 0; k < 2; k++)
+            O.all[tip->circle].crown[k] = tip->left[k] + (next ? sign * next->left[k] : 0.0);
+    }
+}
+
+static void join(int set, int obstacle, int faces, int edge) {
+    for (int m = O.sets[set]; m != NONE; m = O.members[m].next)
+        if (O.members[m].obstacle == obstacle) {
+            O.members[m].faces |= faces, O.members[m].edges |= edge;
+            return;
+        }
+    Obstacle *o = O.all + obstacle;
+    O.members[O.member_count] = (Member){ set, obstacle, faces, edge, O.sets[set], o->members };
+    O.sets[set] = o->members = O.member_count++;
+}
+
+/* Find what a disk touches at once where faces end: faces that share a place and the normal there, and
+   the circle round it. */
+static void find_sets(void) {
+    double(*normals)[2] = (double(*)[2])flat;
+    for (int n = 0; n < O.tip_count; n++) {
+        if (at_spot[O.tips[n].spot] != n) continue;
+        int first = O.set_count, count = list_rays(n);
+        for (int k = 0; k < 2 * count; k++) {
+            const Ray *r = rays + k / 2;
+            int face = k % 2 ? -1 : 1, set = first, end = r->end < THROUGH;
+            double x, y;
+            if (r->end > THROUGH) continue;
+            if (end) x = O.tips[tip_of(r)].left[0], y = O.tips[tip_of(r)].left[1];
+            else sin_cos(r->angle, &x, &y), x = -x;
+            x *= face, y *= face;
+            while (set < O.set_count
+                   && !(fabs(normals[set - first][0] - x) <= COLLINEAR
+                        && fabs(normals[set - first][1] - y) <= COLLINEAR))
+                set++;
+            if (set == O.set_count) {
+                normals[set - first][0] = x, normals[set - first][1] = y;
+                O.sets[O.set_count++] = NONE;
+            }
+            int own = face_of(r->piece, face);
+            if (own != NONE)
+                join(set, own, own < O.faces ? 1 + k % 2 : 3, end && own >= O.faces ? 1 + r->end : 0);
+            if (!end) continue;
+            Tip *tip = O.tips + tip_of(r);
+            tip->sets[k % 2] = set;
+            if (tip->circle != NONE) join(set, tip->circle, 3, 0);
+        }
+    }
+}
+
+static void hand_over(int obstacle, int tip, int face, int onto) {
+    Obstacle *o = O.all + obstacle;
+    O.handovers[O.handover_count] = (Handover){ tip, face, onto, o->handovers };
+    o->handovers = O.handover_count++;
+}
+
+/* Find where rides round circles go over into other pieces; the last one found stands first. */
+static void find_handovers(void) {
+    for (int n = O.tip_count - 1; n >= 0; n--)
+        for (int k = 0; k < 2; k++) {
+            int face = n % 2 ? 1 - k : k, next = O.onward[2 * n + face].obstacle;
+            if (n / 2 >= O.faces) hand_over(face_of(n / 2, face ? -1 : 1), n, face, 0);
+            if (O.tips[n].rests != NONE && next != NONE) hand_over(next, n, face, 1);
+            if (O.tips[n].circle != NONE) hand_over(O.tips[n].circle, n, face, 1);
+        }
+}
+
+static int find_joints(void) {
+    int tips = O.tip_count, epochs = O.change_count + 1;
+    O.onward = reserve(2 * tips * epochs, sizeof *O.onward);
+    O.members = reserve(16 * tips, sizeof *O.members);
+    O.sets = reserve(6 * tips, sizeof *O.sets);
+    O.handovers = reserve(6 * tips, sizeof *O.handovers);
+    if (arena_full) return 0;
+    O.set_count = O.member_count = O.handover_count = 0;
+    for (int epoch = 0; epoch < epochs; epoch++) find_onward(epoch);
+    find_crowns();
+    find_sets();
+    find_handovers();
+    return 1;
+}
+
+/* Lay the obstacles of a member of a family, or of the one machine; 0 if there is no room for them. */
+int lay_obstacles(int member) {
+    const Segment *segments = E.segments + member * E.segment_count;
+    const Arc *arcs = E.arcs + member * E.arc_count;
+    arena = E.room, arena_end = E.room + E.room_size, arena_full = 0;
+    parts = reserve(E.segment_count, sizeof *parts);
+    bends = reserve(E.arc_count, sizeof *bends);
+    bend_source = reserve(E.arc_count, sizeof *bend_source);
+    if (arena_full) return 0;
+    part_count = E.segment_count, O.arcs = E.arc_count, O.bent = 0;
+    for (int s = 0; s < part_count; s++) {
+        const Segment *g = segments + s;
+        const double *t = g->tangent;
+        parts[s] = (Part){ g->start[0], g->start[1], g->start[0] + g->length * t[0],
+                           g->start[1] + g->length * t[1], g->length, g, s };
+    }
+    for (int whole = 0, b = 0; whole < 2; whole++)
+        for (int k = 0; k < E.arc_count; k++)
+            if ((arcs[k].extent >= TURN) == whole) {
+                bends[b] = arcs + k, bend_source[b++] = E.segment_count + k;
+                O.bent += !whole;
+            }
+    double near;
+    do {
+        if (!list_tips()) return 0;
+        near = JOINT * size_for(E.lones + member);
+    } while (cut_parts(near));
+    if (arena_full) return 0;
+    int spots = O.tip_count;
+    number_spots(near);
+    at_spot = reserve(spots, sizeof *at_spot);
+    next_there = reserve(spots, sizeof *next_there);
+    rays = reserve(3 * spots, sizeof *rays);
+    ring = reserve(3 * spots, sizeof *ring);
+    flat = reserve(6 * spots, sizeof *flat);
+    if (arena_full) return 0;
+    for (int n = 0; n < spots; n++) at_spot[n] = NONE;
+    drop_doubles();
+    if (!list_changes()) return 0;
+    find_rests(near);
+    if (!list_obstacles(E.lones[member].radius > 0.0)) return 0;
+    if (E.wheel_count) list_pulley(E.wheels + member);
+    return find_joints();
+}
+
+/* Make the obstacles those of the particle under way, by its radius, and by where it is released. */
+void fit_obstacles(void) {
+    double r = A.given->radius, touch = ULP * (TOUCH_ULPS * size_for(A.given) + E.far);
+    O.touch = touch;
+    for (int k = 0; k < O.count; k++) {
+        Obstacle *o = O.all + k;
+        double reach = r + BOX_TOUCHES * touch, x = o->x, y = o->y;
+        if (o->met == FACE) x += o->length * o->tx, y += o->length * o->ty;
+        else if (o->met == INSIDE) {
+            double room = o->bend - r;
+            o->rho = room > touch ? -room : NAN;
+        } else
+            o->rho = o->bend + r;
+        /* A circle's box is smaller, met from outside: what only touches it does not meet it. */
+        if (o->met != FACE) reach = isnan(o->rho) ? -INFINITY : fabs(o->rho - touch);
+        o->low[0] = MIN(o->x, x) - reach, o->low[1] = MIN(o->y, y) - reach;
+        o->high[0] = MAX(o->x, x) + reach, o->high[1] = MAX(o->y, y) + reach;
+    }
+}
+
+/* How many of the changes have been by an age of the particle. */
+int epoch_at(double t) {
+    int count = 0;
+    while (count < O.change_count && O.changes[count] - A.given->release <= t) count++;
+    return count;
+}
+
+static int is_open(const Obstacle *o, int piece, double since) {
+    return piece < 0 ? o->came <= since && o->went > since : came_of(piece) <= since && went_of(piece) > since;
+}
+
+/* Whether an obstacle is there; an end that pieces share is while any of them is. */
+int is_there(int obstacle, int epoch) {
+    if (!O.change_count) return 1;
+    const Obstacle *o = O.all + obstacle;
+    double since = epoch ? O.changes[epoch - 1] : -INFINITY;
+    int there = is_open(o, NONE, since);
+    for (int n = o->tips; n != NONE && !there; n = O.tips[n].next) there = is_open(o, n / 2, since);
+    return there;
+}
+
+static const Member *member_of(int set, int obstacle) {
+    for (int m = set == NONE ? NONE : O.sets[set]; m != NONE; m = O.members[m].next)
+        if (O.members[m].obstacle == obstacle) return O.members + m;
+    return 0;
+}
+
+/* Whether an obstacle, or a face of a segment (0 left, 1 right), is in a set. */
+int is_shared(int set, int obstacle, int face) {
+    const Member *m = member_of(set, obstacle);
+    return m && (m->faces & (1 << face)) != 0;
+}
+
+/* Whether an end (0, 1) of an arc is where the faces of a set end. */
+int has_edge(int set, int obstacle, int edge) {
+    const Member *m = member_of(set, obstacle);
+    return m && (m->edges & (1 << edge)) != 0;
+}
+
+/* The other face of an arc, or -1. */
+static int back_of(int circle) {
+    if (circle < O.first_arc || circle >= O.first_arc + 2 * O.arcs) return NONE;
+    return circle < O.first_arc + O.arcs ? circle + O.arcs : circle - O.arcs;
+}
+
+int is_back(int circle, int other) { return other != NONE && back_of(circle) == other; }
+
+/* Whether something touches a circle without being met, as both share a place: they are tangent to each
+   other there, and have no other point in common. To a point both faces of a piece are in one place. */
+int is_beside(int circle, int obstacle, int face) {
+    int point = O.arcs && A.given->radius <= O.touch;
+    for (int k = 0; k < 1 + point; k++) {
+        int c = k ? back_of(circle) : circle;
+        for (int m = c == NONE ? NONE : O.all[c].members; m != NONE; m = O.members[m].alike) {
+            int set = O.members[m].set;
+            if (is_shared(set, obstacle, face)) return 1;
+            if (!point) continue;
+            if (is_shared(set, obstacle, 1 - face)) return 1;
+            int back = back_of(obstacle);
+            if (back != NONE && is_shared(set, back, face)) return 1;
+        }
+    }
+    return 0;
+}

@@ -1,0 +1,173 @@
+/* A ride round a pulley, an arc or a surface's end, in closed steps.
+
+   The centre of the particle moves on a circle of radius rho. The angle phi is that of the normal,
+   which points at the particle, from the top, clockwise; inside a circle rho is negative. With w the
+   speed along (n_y, -n_x), z = r omega, N the normal and F the tangential force per mass,
+
+       phi' = w/rho,   w' = g sin phi + F,   z' = (m r2/I) F,   N = g cos phi - w2/rho,
+
+   and F = stick g sin phi + load N: gripping without turning is stick = -1, rolling -I/(I + m r2), -1/3
+   of a disk; slipping is load = -sigma mu, with sigma the sign of the slip u = w + z - belt. Rolling
+   friction adds a couple q m r, at most kappa N, that opposes the spin against the surface's own,
+   z' = (m r2/I) (F + q), and holds it where it can. Everything is expanded in a Taylor series in time,
+   which holds for any mixture of turning back, spinning and slipping. A step is as long as its last
+   terms are rounding; knots within it come from the series. */
+
+#include "exact.h"
+
+#define ORDER 20
+/* Share of the angle (rad), of the speeds and of the load that the last terms of a step may be. */
+#define LEFT_OUT 1e-16
+/* Share of the radius by which the cubic Hermite curve between two knots may leave the way: 1e-9, less
+   what is missed by looking at three times of a step. */
+#define CURVE 0.9e-9
+/* Bisections of a step for the time of an event, past the last bit. */
+#define HALVINGS 64
+
+typedef double Series[ORDER + 1];
+
+static Series phi, w, z, work, heat, twist, normal, force, couple;
+
+/* Series that turn negative at an event, and what they tell. */
+#define GAUGES 9
+static Series gauges[GAUGES];
+static const int TELLS[GAUGES] = { LIFT, ONSET, ONSET, GRIP, LOW, HIGH, HALT, ROLL, ROLL };
+
+static double at_time(const double *c, double t) { return polynomial(c, ORDER + 1, t); }
+
+static int is_held(const Circle *c) { return c->rolling > 0.0 && c->roll == 0.0; }
+
+/* The Taylor coefficients in time; those of the work are of F, of the heat of -F u and that of the
+   couple, of the twist of q. */
+static void expand(const Circle *c) {
+    Series sine_of, cosine_of, slip, spin;
+    int gripping = c->slip == 0.0, rolls = c->rolling > 0.0, held = is_held(c);
+    double lever = 1.0 / c->share - 1.0;
+    double stick = !gripping ? 0.0 : held ? -1.0 : -c->share;
+    double load = !gripping ? -c->slip * c->friction : rolls ? c->share * lever * c->roll * c->rolling : 0.0;
+    sin_cos(c->phi, sine_of, cosine_of);
+    phi[0] = c->phi, w[0] = c->w, z[0] = c->z;
+    work[0] = heat[0] = twist[0] = 0.0;
+    slip[0] = gripping ? 0.0 : c->w + c->z - c->belt;
+    spin[0] = held ? 0.0 : c->z - c->turn;
+    for (int n = 0; n <= ORDER; n++) {
+        double sum = 0.0, up = 0.0, across = 0.0, rubbed = 0.0;
+        for (int i = 0; i <= n; i++) sum += w[i] * w[n - i];
+        normal[n] = c->gravity * cosine_of[n] - sum / c->rho;
+        force[n] = stick * c->gravity * sine_of[n] + load * normal[n];
+        couple[n] = !rolls ? 0.0 : held ? -force[n] : -c->roll * c->rolling * normal[n];
+        if (n == ORDER) break;
+        w[n + 1] = (c->gravity * sine_of[n] + force[n]) / (n + 1);
+        z[n + 1] = lever * (force[n] + couple[n]) / (n + 1);
+        phi[n + 1] = w[n] / c->rho / (n + 1);
+        for (int i = 0; i <= n; i++) {
+            double rate = (i + 1) * phi[i + 1];
+            up += rate * cosine_of[n - i], across += rate * sine_of[n - i];
+            rubbed += force[i] * slip[n - i] + couple[i] * spin[n - i];
+        }
+        sine_of[n + 1] = up / (n + 1), cosine_of[n + 1] = -across / (n + 1);
+        work[n + 1] = force[n] / (n + 1);
+        heat[n + 1] = -rubbed / (n + 1);
+        twist[n + 1] = couple[n] / (n + 1);
+        slip[n + 1] = gripping ? 0.0 : w[n + 1] + z[n + 1];
+        spin[n + 1] = z[n + 1];
+    }
+}
+
+/* Find the series that turn negative at events; those of what cannot happen are 0, or 1. */
+static void find_gauges(const Circle *c) {
+    int held = is_held(c) && c->slip == 0.0, grips = c->slip == 0.0 && isfinite(c->friction);
+    for (int n = 0; n <= ORDER; n++) {
+        double first = n ? 0.0 : 1.0, grip = c->friction * normal[n], most = c->rolling * normal[n];
+        gauges[0][n] = normal[n];
+        gauges[1][n] = grips ? grip - force[n] : 0.0;
+        gauges[2][n] = grips ? grip + force[n] : 0.0;
+        gauges[3][n] = c->slip * (w[n] + z[n] - first * c->belt);
+        /* Round a circle that does not end it may go however often. */
+        gauges[4][n] = isfinite(c->low) ? phi[n] - first * c->low : first;
+        gauges[5][n] = isfinite(c->high) ? first * c->high - phi[n] : first;
+        gauges[6][n] = c->roll * (z[n] - first * c->turn);
+        /* What slips with less friction than that stays held. */
+        gauges[7][n] = held ? most - couple[n] : 0.0;
+        gauges[8][n] = held ? most + couple[n] : 0.0;
+    }
+}
+
+/* How long a step is, s, and by how many knots, evenly in time, it is recorded.
+
+   The cubic between two knots, h apart, is off by h^4/384 times the fourth derivative of the place
+   rho exp(i phi): rho |phi1^4 - 3 phi2^2 - 4 phi1 phi3 + i (phi4 - 6 phi1^2 phi2)|. */
+static double step_of(const Circle *c, double longest, int *parts) {
+    double pace = fabs(c->w) + fabs(c->z) + fabs(c->belt) + sqrt(c->gravity * fabs(c->rho));
+    double load = c->gravity + c->w * c->w / fabs(c->rho), dt = longest, bend = 0.0;
+    for (int n = ORDER - 1; n <= ORDER; n++) {
+        double share = fabs(phi[n]);
+        if (pace > 0.0) share = MAX(share, MAX(fabs(w[n]), fabs(z[n])) / pace);
+        if (load > 0.0) share = MAX(share, fabs(normal[n]) / load);
+        dt = MIN(dt, pow(LEFT_OUT / share, 1.0 / n));
+    }
+    /* What rests does so for ever. */
+    double finite = isfinite(dt) ? dt : 0.0, rates[4][ORDER];
+    for (int k = 0; k < 4; k++)
+        for (int n = 1; n <= ORDER - k; n++) rates[k][n - 1] = (k ? rates[k - 1][n] : phi[n]) * n;
+    for (int n = 0; n < 3; n++) {
+        double of[4], t = 0.5 * n * finite;
+        for (int k = 0; k < 4; k++) of[k] = polynomial(rates[k], ORDER - k, t);
+        double one = of[0] * of[0];
+        bend = MAX(bend, length_of(one * one - 3.0 * of[1] * of[1] - 4.0 * of[0] * of[2],
+                                   of[3] - 6.0 * one * of[1]));
+    }
+    double count = MAX(ceil(finite * sqrt(sqrt(bend / (384.0 * CURVE)))), 1.0);
+    *parts = (int)MIN(count, MOST_KNOTS);
+    return dt * MIN(MOST_KNOTS / count, 1.0);
+}
+
+/* When a series that is not negative at `low` and is at `high` becomes so. */
+static double first_negative(const double *c, double low, double high) {
+    for (int n = 0; n < HALVINGS; n++) {
+        double middle = 0.5 * (low + high);
+        if (at_time(c, middle) >= 0.0) low = middle;
+        else high = middle;
+    }
+    return high;
+}
+
+static Ridden state_at(double t) {
+    return (Ridden){ t, at_time(phi, t), at_time(w, t), at_time(z, t), at_time(work, t), at_time(heat, t),
+                     at_time(twist, t), NOTHING };
+}
+
+/* Move on by one step, or to the first event within it; return how many knots there are before its
+   end. N must be positive. */
+int advance_ride(const Circle *c, double longest, Ridden *end, Ridden *knots) {
+    int parts, outcome = NOTHING, count = 0;
+    expand(c);
+    find_gauges(c);
+    double dt = step_of(c, longest, &parts);
+    /* Where it turns beyond an end of the circle, it would be back at the end of the whole step. */
+    Series back;
+    for (int n = 0; n <= ORDER; n++) back[n] = sign_of(c->w) * w[n];
+    if (at_time(back, dt) < 0.0) {
+        double turn = first_negative(back, 0.0, dt);
+        if (at_time(gauges[4], turn) < 0.0 || at_time(gauges[5], turn) < 0.0) dt = turn;
+    }
+    double whole = dt, low = 0.0;
+    for (int n = 1; n <= parts && outcome == NOTHING; n++) {
+        double high = whole * MIN(n / (double)parts, 1.0), first = INFINITY;
+        for (int k = 0; k < GAUGES; k++) {
+            if (!(at_time(gauges[k], high) < 0.0)) continue;
+            double at = first_negative(gauges[k], low, high);
+            if (at < first) first = dt = at, outcome = TELLS[k];
+        }
+        low = high;
+    }
+    for (int n = 1; n < parts; n++) {
+        double t = whole * (n / (double)parts);
+        if (t < dt) knots[count++] = state_at(t);
+    }
+    *end = state_at(dt);
+    end->outcome = outcome;
+    if (outcome == LOW) end->phi = c->low;
+    if (outcome == HIGH) end->phi = c->high;
+    return count;
+}

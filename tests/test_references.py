@@ -6,7 +6,6 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from chutelab import scene
 from chutelab.engines import exact
 from chutelab.machine import build
 from chutelab.results import Kind
@@ -17,18 +16,13 @@ from machines import (
     thrown,
 )
 from references import (
-    Impact,
     first_impacts,
     henderson,
     inside_surfaces,
-    likeness,
     overlaps,
     virial,
     wall_pressure,
 )
-
-G = 9.81
-
 
 # First impacts
 
@@ -63,24 +57,6 @@ def test_lone_disks_meet_what_they_meet_in_the_exact_engine(count, least):
         np.testing.assert_allclose([i.t for i in found.of[0]], met["t"], rtol=1e-12, atol=1e-13)
         compared += len(met)
     assert compared > least, compared
-
-
-def test_likeness_counts_what_is_alike_and_names_what_is_not():
-    built = build(scene.load("stream-independent", ["stream.count=40", "plate.friction=0.3"]))
-    recording = exact.run(built)
-    found = first_impacts(built, 3.0)
-    both = likeness(found, recording)
-    # Each strikes the plate and lands, and there the run ends.
-    assert (both.alike, both.unlike, both.unknown) == (80, [], 0)
-    assert both.time < 1e-12
-    assert both.approach < 1e-12
-    late = found.of[3][1]._replace(t=found.of[3][1].t + 1e-9)
-    found.of[3][1] = late
-    found.of[5].insert(1, Impact(found.of[5][0].t + 0.01, "plate", 1.0))
-    (mine, its), (missed, _) = (one[1:] for one in likeness(found, recording).unlike)
-    assert mine == late
-    assert its.t == pytest.approx(late.t - 1e-9, abs=1e-12)
-    assert missed.partner == "plate"
 
 
 def test_a_pair_meets_when_and_as_fast_as_written_here():

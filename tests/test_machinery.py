@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
-from chutelab.pictures.plots import Window, draw_scene, style
-from handmade import Line, Round, conveyor, machine_of
+from chutelab.pictures.plots import Window, draw_scene
+from handmade import Line, Round, machine_of
 
 
 def drawn(machine, window=None, **options):
@@ -21,10 +20,6 @@ def drawn(machine, window=None, **options):
 
 def lines(ax, name):
     return [np.asarray(one.get_xydata()) for one in ax.lines if one.get_gid() == f"surface {name}"]
-
-
-def circles(ax):
-    return [one for one in ax.patches if isinstance(one, Circle)]
 
 
 def said(ax):
@@ -42,32 +37,6 @@ def assert_apart_and_inside(ax):
         assert not box.count_overlaps(boxes[:i]), ax.texts[i]
 
 
-def test_an_arc_is_drawn_round_its_centre_from_end_to_end():
-    ax = drawn(machine_of(Round("spoon", (0.3, -0.1), 0.25, begin=170.0, extent=110.0)))
-    (points,) = lines(ax, "spoon")
-    away = points - (0.3, -0.1)
-    assert np.hypot(*away.T) == pytest.approx(0.25, rel=1e-12)
-    ends = 0.25 * np.array([[np.cos(a), np.sin(a)] for a in np.radians([170.0, 280.0])])
-    assert sorted(map(tuple, away[[0, -1]])) == [
-        pytest.approx(end) for end in sorted(map(tuple, ends))
-    ]
-    # The chords between its points leave it by R (1 - cos 1.5°) at most.
-    middles = 0.5 * (away[1:] + away[:-1])
-    assert np.hypot(*middles.T).min() > 0.25 * np.cos(np.radians(1.51))
-
-
-def test_a_conveyor_is_a_belt_round_two_pulleys_named_once():
-    ax = drawn(machine_of(*conveyor("second", (0.0, 0.0), (1.0, 0.3), 0.1, 1.5)))
-    top, bottom = lines(ax, "second")
-    along = np.array([1.0, 0.3]) / np.hypot(1.0, 0.3)
-    up = 0.1 * np.array([-along[1], along[0]])
-    assert top == pytest.approx(np.array([(0.0, 0.0), (1.0, 0.3)]) + up)
-    assert bottom == pytest.approx(np.array([(1.0, 0.3), (0.0, 0.0)]) - up)
-    assert [one.center for one in circles(ax)] == [(0.0, 0.0), (1.0, 0.3)]
-    assert {to_rgb(one.get_edgecolor()[:3]) for one in circles(ax)} == {to_rgb(style.BELT)}
-    assert said(ax) == ["second, 1.5 m/s →"]
-
-
 @pytest.mark.parametrize(
     ("end", "speed", "arrow"),
     [
@@ -83,19 +52,6 @@ def test_the_arrow_of_a_belt_shows_where_it_moves_to(end, speed, arrow):
 def test_a_roller_shows_how_it_turns(speed, arrow):
     ax = drawn(machine_of(Round("roller", (0.0, 0.0), 0.1, speed=speed)))
     assert said(ax) == [f"roller, 0.5 m/s {arrow}"]
-
-
-def test_a_surface_of_many_pieces_is_named_once_beside_them():
-    pegs = [
-        Round("pegs", (0.06 * i - 0.03 * j, -0.05 * j), 0.01) for j in range(8) for i in range(8)
-    ]
-    ax = drawn(machine_of(*pegs))
-    (label,) = ax.texts
-    box = label.get_window_extent()
-    for peg in circles(ax):
-        x, y = ax.transData.transform(peg.center)
-        assert not (box.x0 <= x <= box.x1 and box.y0 <= y <= box.y1)
-    assert_apart_and_inside(ax)
 
 
 def test_a_gate_is_dashed_and_faded_and_says_when_it_moves():

@@ -25,7 +25,6 @@ from chutelab.util.errors import InputError
 from handmade import (
     BELT_TIME,
     DISTANCE,
-    DROP,
     EPS,
     EXACT,
     MASS,
@@ -61,21 +60,6 @@ def runs():
 
 
 # The analytic parabola
-
-
-def test_dashed_line_is_the_formula():
-    recording = by_hand()
-    parts, _ = plots.analytic_of(recording, recording.prediction)
-    ax = plots.draw_analytic(axes(), parts)
-    drawn = line(ax, "analytic")
-    since = np.where(
-        np.arange(len(drawn)) < 120,
-        drawn[:, 0] / V,
-        t_impact() + (R + DISTANCE - PARTICLE - drawn[:, 0]) / (EPS * V),
-    )
-    assert len(drawn) == 239
-    assert drawn[:, 1] == pytest.approx(expected(since)[0][:, 1], abs=1e-14)
-    assert ax.lines[0].is_dashed()
 
 
 # Tracks
@@ -152,18 +136,6 @@ def test_ledger_stack_reaches_the_line_and_both_are_the_energies():
 
 
 # The scene
-
-
-def test_window_is_cropped_to_the_action_but_holds_it():
-    recording = by_hand()
-    window = plots.window_of(recording)
-    path = expected(np.linspace(0.0, t_landing(), 100))[0]
-    for x, y in [*path, (-R, -R), (R, R), (R + DISTANCE, R + 0.3)]:
-        assert window.left < x < window.right
-        assert window.bottom < y < window.top
-    assert window.left > -0.6  # of 1 m of belt
-    assert window.width < 1.3
-    assert window.height < 1.8
 
 
 BOUNCY = """
@@ -246,21 +218,6 @@ def test_a_view_is_what_pictures_show(tmp_path, place):
     layout = animation.stage.lay_out(recording, width=800, height=450)
     assert layout.window == Window(x0, x1, y0, y1).fitted(0.675 * 800 / (0.71 * 450))
     assert animate(recording, tmp_path / "some.gif", fps=5).stat().st_size > 1000
-
-
-def test_scene_is_drawn_to_scale_where_the_machine_has_it():
-    machine = build(scene.parse(TEXT))
-    ax = plots.draw_scene(axes(7.0, 3.0), machine)
-    plate = line(ax, "surface plate")
-    assert (plate[:, 0] == R + DISTANCE).all()
-    assert plate[1, 1] == pytest.approx(R + 0.3, abs=1e-15)
-    belt_y = expected(np.array([t_impact()]))[0][0, 1] - DROP - PARTICLE
-    assert line(ax, "surface outgoing")[:, 1] == pytest.approx(belt_y, abs=1e-14)
-    (pulley,) = ax.patches
-    assert pulley.get_radius() == R
-    ax.figure.canvas.draw()
-    (x0, y0), (x1, y1) = ax.transData.transform([(0.0, 0.0), (1.0, 1.0)])
-    assert x1 - x0 == pytest.approx(y1 - y0, rel=1e-9)
 
 
 def test_a_plate_leaning_back_reads_its_angle():

@@ -50,8 +50,8 @@ def sunk(e):
     _, last = e.recording.ends()
     position = last["position"]
     deepest, of = 0.0, "r"
-    for piece in e.pieces:
-        name, gap = piece.name, piece.gap(position, r)
+    for piece, name in zip(e.pieces, e.machine.names, strict=True):
+        gap = piece.gap(position, r)
         i = int(np.argmin(gap))
         if -gap[i] > deepest:
             deepest, of = -float(gap[i]), f"r, particle {i} in {name}"

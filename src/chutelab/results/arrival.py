@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.machine import Machine, Pieces
+from chutelab.machine import Machine, Pieces, Segments
 from chutelab.results.record import EVENT, PARTICLES, REASONS, Kind, Record, hermite, kept
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -59,9 +59,7 @@ def fates(recording: Record) -> NDArray[Any]:
     if not len(particles):
         return said
     last = recording.ends()[1]
-    left, right, bottom, top = (
-        np.broadcast_to(side, count)[particles] for side in machine.exit_box
-    )
+    left, bottom, right, top = machine.releases.exit_box[particles].T
     (x, y), out = last["position"].T, recording.ended[particles] == REASONS.index("exit")
     gone = out | (x < left) | (x > right) | (y < bottom) | (y > top)
     said[particles[gone]] = _ways_out(recording, particles[gone], last["position"][gone])
@@ -117,14 +115,12 @@ def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
         elsewhere = (when[gone] > came) & ~np.isin(met[gone], (own, others))
         carried = (came > since) & ~elsewhere
         since = np.where(carried, came, since)
-        pieces = [
-            part[machine.segments.surface == own]
-            for part in (machine.segments.start, machine.segments.end)
-        ]
-        bent = machine.arcs.surface == own
-        pieces += [machine.arcs.center[bent]]
+        points: list[Floats] = []
+        for part in machine.parts:
+            mine = part.of(part.surface == own)
+            points += mine.ends if isinstance(mine, Segments) else [0.5 * np.add(*mine.boxes)]
         (first, low), (second, _) = (
-            edge(np.concatenate(pieces), axis=0) for edge in (np.min, np.max)
+            edge(np.concatenate(points), axis=0) for edge in (np.min, np.max)
         )
         for n in np.flatnonzero(carried).tolist():
             track = recording.track(int(gone[n]))

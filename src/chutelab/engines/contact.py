@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, Status, borrow, constants, dtype, give_back
 from chutelab.machine import Machine, Pieces, moved, origin
-from chutelab.results.record import EVENT, KNOT, REASONS, Record
+from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 
@@ -26,7 +26,7 @@ SLICE = 0.05
 """s of wall time between two looks at Ctrl-C and reports of progress."""
 
 MOST_STEPS = 512
-"""Steps between two looks, at most: what follows may take a thousand times as long as what was."""
+"""Steps between two looks, at most: later ones may take a thousand times as long."""
 
 
 def run(machine: Machine, progress: Progress | None = None) -> Record:
@@ -170,14 +170,14 @@ class Job:
         return world.stalled, world.now, (float(disk["x"]), float(disk["y"]))
 
     def stop(self) -> Status:
-        """Have the run be over at the end of the step that it is in."""
+        """End the run after the step that it is in."""
         while (status := self.proceed(0)) is Status.FULL:
             pass
         if status is Status.PAUSED:
             world = self.module.world
             self.stopped_from = world.low
             world.end_time = world.t
-            # Without contacts between them disks run one after the other: no further one does.
+            # Disks that do not meet run one after the other: no further one is released.
             disks = self.module.array("disks", dtype("Disk"), self.machine.count)
             disks["release"][world.high :] = inf
             while status not in (Status.DONE, Status.STALLED):
@@ -209,26 +209,13 @@ class Job:
         """Return what was recorded."""
         recorder = Recorder(machine)
         world, module = self.module.world, self.module
-        # Chunks are let go as they are handed over: all of them are most of the memory.
+        # Each chunk is freed when it is handed over: together they are most of the memory.
         self.knots.reverse()
         self.events.reverse()
         while self.knots:
-            rows = self.knots.pop()
-            owner = rows["disk"].astype(np.int64)
-            recorder.add(owner, rows.view("<f8").reshape(-1, 10)[:, :9].copy().view(KNOT)[:, 0])
+            recorder.take_knots(self.knots.pop())
         while self.events:
-            rows = self.events.pop()
-            events = np.empty(len(rows), EVENT)
-            for name, source in (("t", "t"), ("particle", "disk"), ("other", "other"),
-                                 ("kind", "kind"), ("surface", "surface"),
-                                 ("normal_impulse", "normal"),
-                                 ("tangential_impulse", "tangent")):  # fmt: skip
-                events[name] = rows[source]
-            events["position"][:, 0], events["position"][:, 1] = rows["x"], rows["y"]
-            for when in ("before", "after"):
-                events[f"velocity_{when}"] = rows[when][:, :2]
-                events[f"omega_{when}"] = rows[when][:, 2]
-            recorder.tell(events)
+            recorder.take_events(self.events.pop())
         disks = module.array("disks", dtype("Disk"), machine.count)
         reasons, late = disks["reason"].copy(), np.arange(machine.count) >= self.stopped_from
         reasons[late & (reasons == REASONS.index("time"))] = REASONS.index("stopped")

@@ -25,10 +25,11 @@ from chutelab.scene.overrides import (
     parts_of,
     resolved,
     rule_at,
+    unit_of,
 )
 from chutelab.scene.schema import DEFAULTS, plain_number
 from chutelab.scene.tables import Particle, Stream
-from chutelab.scene.units import SIZE, Table, read_size, sphere_mass
+from chutelab.scene.units import Table, read_any, sphere_mass
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.errors import MISSING, InputError, about_comma
 
@@ -120,12 +121,7 @@ def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, .
     """
     values, units = [], set()
     for part in parts:
-        try:
-            value, unit = read_size(part)
-        except ValueError:
-            # A unit without prefixes, such as kg, is as good if it is the key's.
-            match = SIZE.fullmatch(part.strip())
-            value, unit = (float(match[1]), match[2]) if match else (nan, "")
+        value, unit = read_any(part)
         if not isfinite(value):
             found = part.strip() or "nothing"
             raise InputError(f"{found} is not a number; it {form}{about_comma(found)}", typed)
@@ -182,7 +178,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
     kinds = {kind.get("type") for kind in about.get("anyOf", [about])}
     if not (indexed or kinds & {"number", "integer"}) or parts[0] in NO_MACHINE:
         raise InputError(f"{path} is no number, and only numbers can be varied", vary.typed)
-    unit = str(about.get("x-unit") or "")
+    unit = unit_of(parts)
     if vary.unit not in ("", unit) and (vary.unit, unit) != ("%", ""):
         own = f"is in {unit}" if unit else "is a pure number"
         raise InputError(f"{path} {own}, not in {vary.unit}; plain numbers will do", vary.typed)

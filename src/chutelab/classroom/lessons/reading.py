@@ -5,7 +5,6 @@ A folder is validated with its scenes, and all that is wrong is said at once.
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 import tomllib
@@ -20,7 +19,7 @@ from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene.overrides import Override, at_path, joined
 from chutelab.scene.quantities import lookup, suggestion
 from chutelab.scene.units import Number, Table, Text, Whole
-from chutelab.util.errors import did_you_mean
+from chutelab.util.errors import did_you_mean, nearest
 
 MOST: Final = 20
 """Most entries of a list: a lesson that needs more is two lessons."""
@@ -406,7 +405,7 @@ def _faults(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
         path = detail["loc"][: 2 if table else 1]
         keys, missing = (table or Lesson).model_fields, detail["type"] == "missing"
         if detail["type"] == "extra_forbidden":
-            near = difflib.get_close_matches(str(path[-1]), keys, n=1, cutoff=0.55)
+            near = nearest(str(path[-1]), keys)
             known = f"known are {', '.join(keys)}"
             meant = f"did you mean {joined((*path[:-1], *near))}?" if near else known
             text = f"unknown key; {meant}"

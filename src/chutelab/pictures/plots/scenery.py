@@ -186,7 +186,7 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
         [[0.0], np.cumsum(sum(recording.energies(first[order], indices[order])))]
     )
     released = np.searchsorted(first["t"][order], times, side="right")
-    masses = np.broadcast_to(recording.particle.mass, recording.count)[indices][order]
+    masses = recording.mass[indices][order]
     weight = np.concatenate([[0.0], np.cumsum(masses)])[released] * recording.gravity
     heights = recording.knots["position"][:, 1]
     stays = recording.ended != REASONS.index("exit")
@@ -227,7 +227,7 @@ def bodily(recording: Recording) -> bool:
 
 def stays(recording: Recording) -> Bools:
     """Tell which particles are still to be seen after their end, (N,): those of many that lie."""
-    return np.asarray((recording.ended == REASONS.index("settled")) & (recording.count > MANY))
+    return np.asarray(recording.ended_by("settled") & (recording.count > MANY))
 
 
 def places(recording: Recording, particles: Sequence[int] | Ints, times: Floats) -> Floats:

@@ -209,7 +209,12 @@ def film(
     crowd = crowd or one_of_many(recording)
     if crowd:
         own = own[:0]
-    held = _held(own)
+    # The hardest impacts that are worth a hold, in order, one for each time.
+    impulse = np.abs(own["normal_impulse"])
+    struck = np.flatnonzero(np.isin(own["kind"], STRUCK))
+    struck = struck[impulse[struck] >= WORTH * impulse[struck].max(initial=0.0)]
+    struck = struck[np.unique(own["t"][struck], return_index=True)[1]]
+    held = struck[np.sort(np.argsort(-impulse[struck], kind="stable")[:HOLDS])]
     stops = own["t"][held]
     fixed = stops if ask is None else np.append(stops, ask)
     times = np.linspace(begin, end, max(2, round((end - begin) / step) + 1))
@@ -265,16 +270,6 @@ def slowness(length: float) -> float:
     power = floor(log10(exact))
     mantissa = exact / 10.0**power
     return float(f"{max(m for m in (1, 1.5, 2, 3, 4, 5, 6, 8) if m <= mantissa)}e{power}")
-
-
-def _held(own: NDArray[Any]) -> Ints:
-    """Return the indices of the hardest impacts worth a hold, in order, one for each time."""
-    impulse = np.abs(own["normal_impulse"])
-    struck = np.flatnonzero(np.isin(own["kind"], STRUCK))
-    struck = struck[impulse[struck] >= WORTH * impulse[struck].max(initial=0.0)]
-    struck = struck[np.unique(own["t"][struck], return_index=True)[1]]
-    hardest = np.argsort(-impulse[struck], kind="stable")[:HOLDS]
-    return np.asarray(struck[np.sort(hardest)])
 
 
 def _gates(machine: Machine, times: Floats, slow: float) -> list[str]:

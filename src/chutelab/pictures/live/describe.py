@@ -42,7 +42,23 @@ def describe(scene: Scene) -> dict[str, Any]:
         If the page cannot show it: mass points, boxes, polygons, strings, or too many particles; or
         if the scene contradicts itself where it is laid out.
     """
-    _need_disks(scene)
+    allowed = "a page that answers shows disks and spheres"
+    faults = []
+    for n, kind in enumerate(scene.particles):
+        table = scene.head("particle", n)
+        if kind.outline:
+            faults.append(Fault(f"{table}.shape", kind.shape, allowed))
+        elif kind.radius == 0.0:
+            faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
+    if scene.count > MOST:
+        counts = [stream.count for stream in scene.streams]
+        table = scene.head("stream", counts.index(max(counts)))
+        text = f"a page has room for {MOST} particles, and these are {scene.count}"
+        faults.append(Fault(f"{table}.count", max(counts), text))
+    if scene.string:
+        faults.append(Fault("string", None, f"{allowed}, without strings"))
+    if faults:
+        raise SceneError(scene.source, faults)
     tables = to_dict(scene)
     machine, out = build(scene), scene.outgoing
     if out is not None and out.drop_from == "impact":
@@ -68,26 +84,6 @@ def describe(scene: Scene) -> dict[str, Any]:
         for name, preset in PRESETS.items()
     }
     return {"scene": tables, "tables": _rules(), "presets": materials}
-
-
-def _need_disks(scene: Scene) -> None:
-    allowed = "a page that answers shows disks and spheres"
-    faults = []
-    for n, kind in enumerate(scene.particles):
-        table = scene.head("particle", n)
-        if kind.outline:
-            faults.append(Fault(f"{table}.shape", kind.shape, allowed))
-        elif kind.radius == 0.0:
-            faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
-    if scene.count > MOST:
-        counts = [stream.count for stream in scene.streams]
-        table = scene.head("stream", counts.index(max(counts)))
-        text = f"a page has room for {MOST} particles, and these are {scene.count}"
-        faults.append(Fault(f"{table}.count", max(counts), text))
-    if scene.string:
-        faults.append(Fault("string", None, f"{allowed}, without strings"))
-    if faults:
-        raise SceneError(scene.source, faults)
 
 
 def _rules() -> dict[str, dict[str, dict[str, Any]]]:

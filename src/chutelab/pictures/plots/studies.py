@@ -90,12 +90,7 @@ def draw_scan(ax: Axes, solution: Solution) -> Axes:
     for jump in solution.jumps:
         ends = [factor * jump.before, factor * jump.after]
         ax.plot([jump.at] * 2, ends, color=style.STRIKE, lw=1.2, ls=":", zorder=2.0)
-    _mark(ax, solution, factor)
-    return ax
-
-
-def _mark(ax: Axes, solution: Solution, factor: float) -> None:
-    """Mark the answers, and write the key's value beside each."""
+    # The answers, with the key's value beside each.
     shown = solution.answers or ((solution.nearest,) if solution.nearest else ())
     words = {"solve": "solution", "minimize": "least", "maximize": "most"}[solution.goal]
     for i, answer in enumerate(shown):
@@ -116,6 +111,7 @@ def _mark(ax: Axes, solution: Solution, factor: float) -> None:
                 fontsize=style.NORMAL, horizontalalignment="right" if left else "left", zorder=7.0,
                 bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
             )  # fmt: skip
+    return ax
 
 
 def spread(found: Uncertainty) -> Picture:

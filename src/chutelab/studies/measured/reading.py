@@ -248,7 +248,8 @@ def _header(source: Path, lines: Sequence[str], keys: Sequence[str]) -> tuple[in
     if len(best[1]) > 1:
         missing = ", ".join(sorted({*keys} - best[1]))
         raise refused(source, f"line {best[0] + 1}", f"no column {missing}; {asked} are needed")
-    first = _first(lines)
+    told = (line.strip() for line in lines)
+    first = next((line for line in told if line and not line.startswith("#")), "")
     for separator in SEPARATORS:
         cells = cells_of(first, separator)
         if len(cells) == len(keys) and _numeric(cells):
@@ -257,12 +258,6 @@ def _header(source: Path, lines: Sequence[str], keys: Sequence[str]) -> tuple[in
     raise refused(
         source, "line 1" if first else "", text if first else f"empty; {text}", first or None
     )
-
-
-def _first(lines: Sequence[str]) -> str:
-    """Return the first line that says anything, "" for none."""
-    told = (line.strip() for line in lines)
-    return next((line for line in told if line and not line.startswith("#")), "")
 
 
 def _numeric(cells: Sequence[str]) -> bool:

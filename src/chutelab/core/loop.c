@@ -310,8 +310,10 @@ static int begin_step(void) {
     int woke;
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
     double next = set_gates(W.t), h = W.dt, stride = 0;
-    for (int i = W.low; i < W.high; i++) h = MIN(h, hop_time(W.disks + i));
-    if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
+    for (int i = W.low; i < W.high && W.g > 0; i++) h = MIN(h, hop_time(W.disks + i, W.g));
+    W.usual = h;
+    for (int i = W.low; i < W.high && W.interact; i++) h = MIN(h, hop_time(W.disks + i, pressed(W.disks + i)));
+    if (!W.interact && W.disks[W.low].mode == FREE) W.usual = h = hollow_step(W.disks + W.low, h);
     W.step = h;
     W.soft = 2 * W.g * h;
     W.skip = SKIP / h;

@@ -228,13 +228,6 @@ double pressed_inside(const Disk *d, int surface) {
     return most;
 }
 
-/* How hard gravity and the insides of arcs press a disk of a crowd on what it lies on, m/s2, at most. */
-double pressed(const Disk *d) {
-    double inside = 0;
-    for (int n = 0; n < d->held_count && d->mode == FREE; n++) inside = MAX(inside, pressed_inside(d, d->held[n]));
-    return W.g + inside;
-}
-
 /* Time in which a disk that slides inside an arc is turned by FLAT, INFINITY on what is not hollow. */
 double turning_time(const Disk *d, const Surface *s) {
     double bends = -bending(s, d->x, d->y, d->radius) * sqrt(d->vx * d->vx + d->vy * d->vy);

@@ -164,7 +164,6 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
                double *given);
 void account(Contact *list, int count);
 double pressed_inside(const Disk *d, int surface);
-double pressed(const Disk *d);
 double turning_time(const Disk *d, const Surface *s);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
 double chord(const Contact *c, double parted, double h);

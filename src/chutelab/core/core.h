@@ -4,12 +4,16 @@
 #define CORE_H
 #include <math.h>
 #include "layout.h"
+#include "memory.h"
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 #define ALARM (-1000000) /* partner of a release or of a ride's end; no surface has that number */
 
 extern World W;
+
+/* What was too small, so that `run` makes more room. */
+enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_NEAR, FULL_CONTACTS };
 
 /* Contacts are looked for where a gap is below this share of the radius: what lasts stays a
    thousandth of it apart at most, and nothing crosses the rest within a step unseen. */
@@ -199,5 +203,8 @@ void end_in_contact(int i, int reason);
 /* sleep.c */
 void wake(int i, double t);
 void fall_asleep(void);
+
+/* prepare.c */
+int make_room(int full);
 
 #endif

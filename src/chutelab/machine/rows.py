@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
-from math import inf, nan
+from math import inf, nan, prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, dtype
+from chutelab.machine.shapes import KINDS
 from chutelab.scene import Scene
 from chutelab.scene.variants import Family
 from chutelab.util.arrays import Numbers
@@ -26,9 +27,6 @@ WORDS = {"adhesion": inf, "impact": 0.0, "top": 1.0}
 
 WORD = 2**32
 """Seeds are handed over as two numbers below it."""
-
-ROOM = 64
-"""Segments and arcs of all members for which there is room at first."""
 
 
 @cache
@@ -77,6 +75,8 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
         add("ConveyorKeys", conveyor)
     for surface in scene.surface:
         add("SurfaceKeys", surface, corners=len(surface.points or ()))
+    for string in scene.string:
+        add("StringKeys", string)
     return [*found, *chain(*(point for one in scene.surface for point in one.points or ()))]
 
 
@@ -86,16 +86,13 @@ class Laid:
 
     Attributes
     ----------
-    segments : ndarray, (S,) or (N, S)
-        Rows as `Segment` in layout.h.
-    arcs : ndarray, (A,) or (N, A)
-        As `Arc`.
+    parts : dict of ndarray, (S,) or (N, S)
+        For each of `KINDS` rows as that in layout.h, by the part of a machine.
     nominal : ndarray, () or (N,)
         As `Nominal`.
     """
 
-    segments: NDArray[Any]
-    arcs: NDArray[Any]
+    parts: dict[str, NDArray[Any]]
     nominal: NDArray[Any]
 
 
@@ -103,35 +100,27 @@ def lay(module: Module, scenes: Scene | Family, friction: Numbers) -> Laid:
     """Have the core lay the surfaces of a scene, or of all scenes of a family."""
     scene, numbers = scenes.scene, row(scenes, friction)
     shape = (len(scenes),) if isinstance(scenes, Family) else ()
-    every = shape[0] if shape else 1
-    segments, arcs = ROOM // every, ROOM // every
-    while True:
-        module.place(
-            ("rows", REAL, every * len(numbers)), ("nominal", dtype("Nominal"), every),
-            ("segments", dtype("Segment"), every * segments),
-            ("arcs", dtype("Arc"), every * arcs), of="Plan",
-        )  # fmt: skip
-        plan = module.structs["Plan"]
-        rows = module.array("rows", REAL, every * len(numbers), of="Plan").reshape(every, -1)
-        varies = [n for n, number in enumerate(numbers) if isinstance(number, np.ndarray)]
-        rows[:] = [nan if n in varies else number for n, number in enumerate(numbers)]
-        for column in varies:
-            rows[:, column] = numbers[column]
-        plan.members, plan.width = rows.shape
-        plan.particles, plan.streams = len(scene.particles), len(scene.streams)
-        plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
-        plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
-        plan.surfaces = len(scene.surface)
-        plan.segment_room, plan.arc_room = every * segments, every * arcs
-        if module.call("build"):
-            break
-        segments, arcs = plan.segment_count, plan.arc_count
-    found = (
-        module.array(name, dtype(struct), every * count, of="Plan").copy().reshape((*shape, *more))
-        for name, struct, count, more in (
-            ("segments", "Segment", plan.segment_count, (plan.segment_count,)),
-            ("arcs", "Arc", plan.arc_count, (plan.arc_count,)),
-            ("nominal", "Nominal", 1, ()),
-        )
-    )
-    return Laid(*found)
+    plan, every = module.structs["Plan"], shape[0] if shape else 1
+    plan.members, plan.width = every, len(numbers)
+    plan.particles, plan.streams = len(scene.particles), len(scene.streams)
+    plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
+    plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
+    plan.surfaces, plan.strings = len(scene.surface), len(scene.string)
+    module.work("lay_out_plan")
+    rows = module.array("rows", REAL, every * len(numbers), of="Plan").reshape(every, -1)
+    varies = [n for n, number in enumerate(numbers) if isinstance(number, np.ndarray)]
+    rows[:] = [nan if n in varies else number for n, number in enumerate(numbers)]
+    for column in varies:
+        rows[:, column] = numbers[column]
+    module.work("build")
+    plan = module.structs["Plan"]
+
+    def found(name: str, kind: str, *count: int) -> NDArray[Any]:
+        rows = module.array(name, dtype(kind), every * prod(count), of="Plan")
+        return rows.copy().reshape((*shape, *count))
+
+    parts = {
+        f"{kind.lower()}s": found(f"{kind.lower()}s", kind, getattr(plan, f"{kind.lower()}_count"))
+        for kind in KINDS
+    }
+    return Laid(parts, found("nominal", "Nominal"))

@@ -8,7 +8,6 @@ what comes of it; `chutelab stress` has more laws, which take longer.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -29,10 +28,7 @@ LAWS = (FINITE, THROUGH, INSIDE, ENERGY, LOSSES, LEDGER, STEP)
 UNITS = {FINITE: "", THROUGH: "", INSIDE: "m", STEP: "m"}
 """Units of what is found; of the others J."""
 
-HITS = 64
-"""Places inside or beyond surfaces for which there is room at first."""
-
-INTEGER, REAL = np.dtype("<i4"), np.dtype("<f8")
+INTEGER = np.dtype("<i4")
 
 _NUMBERS = np.dtype(
     {"names": ["t", "rest"], "formats": ["f8", ("f8", 10)],
@@ -126,21 +122,10 @@ def judge(recording: Record) -> tuple[Broken, ...]:
 def examine(recording: Record) -> Findings:
     """Have the core look at a run, of one knot or more."""
     module, hit, breach = core.borrow(), core.dtype("Hit"), core.dtype("Breach")
-    crowd = recording.machine.interact and recording.engine == "contact"
     try:
         _lay_out(module, recording)
-        module.place(
-            ("breaches", breach, core.number("BREACHES")),
-            ("order", INTEGER, len(recording.knots) if crowd else 1),
-            ("places", REAL, 2 * recording.count if crowd else 1), of="Laws",
-        )  # fmt: skip
-        room = HITS
-        while room:
-            module.place(("hits", hit, room), of="Laws")
-            figures: Any = module.structs["Laws"]
-            figures.hit_room = room
-            module.call("judge")
-            room = figures.hit_count if figures.hit_count > room else 0
+        module.work("judge")
+        figures: Any = module.structs["Laws"]
         figures = type(figures).from_buffer_copy(figures)
         breaches = module.array("breaches", breach, figures.breach_count, of="Laws")
         hits = module.array("hits", hit, figures.hit_count, of="Laws")
@@ -157,16 +142,13 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     bodies["inertia"], bodies["gravity"] = machine.particle.inertia, machine.gravity
     rows = barriers(machine)
     books = recording.by_surface.reshape(-1)
-    module.put(
-        "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
-        barriers=rows.reshape(-1), books=books,
-    )  # fmt: skip
     events = recording.events.view(_NUMBERS)
     unreal = sum(int(np.count_nonzero(~np.isfinite(events[name]))) for name in ("t", "rest"))
     exact = recording.engine == "exact"
     laws: Any = module.structs["Laws"]
     for name, value in (
         ("particle_count", count), ("piece_count", rows.shape[-1]),
+        ("knot_count", len(recording.knots)),
         ("row", recording.knots.dtype.itemsize // 8), ("book_rows", len(books) // 3),
         ("surface_count", len(recording.surfaces)), ("engine", _ENGINES.index(recording.engine)),
         ("interact", machine.interact), ("alike", alike(recording)), ("family", rows.ndim > 1),
@@ -175,6 +157,11 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("gained", recording.gained), ("largest", np.max(machine.particle.radius)),
     ):  # fmt: skip
         setattr(laws, name, value)
+    module.work("lay_out_laws")
+    module.fill(
+        "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
+        barriers=rows.reshape(-1), books=books,
+    )  # fmt: skip
 
 
 _ENGINES = ("exact", "contact", "pymunk")
@@ -211,27 +198,17 @@ def barriers(machine: Machine) -> NDArray[Any]:
 
     Straight ones, bent ones, and the drive pulley last; (P,), of a family (N, P).
     """
-    lines, arcs, wheel = machine.segments, machine.arcs, machine.pulley
-    straight = lines.length.shape[-1]
-    bent = straight + arcs.radius.shape[-1]
-    ahead = () if lines.length.ndim == 1 else (machine.count,)
-    rows = np.zeros((*ahead, bent + (wheel is not None)), core.dtype("Barrier"))
-    for part, own in ((lines, rows[..., :straight]), (arcs, rows[..., straight:bent])):
-        if own.shape[-1]:
-            own["speed"], own["surface"] = part.speed, part.surface
-            own["appears"], own["vanishes"] = part.appears, part.vanishes
-            place = lines.start if part is lines else arcs.center
-            own["x"], own["y"] = place[..., 0], place[..., 1]
-    own = rows[..., :straight]
-    own["length"] = lines.length
-    own["tx"], own["ty"] = lines.tangent[..., 0], lines.tangent[..., 1]
-    if bent > straight:
-        own = rows[..., straight:bent]
-        own["radius"], own["begin"], own["extent"] = arcs.radius, arcs.begin, arcs.extent
-    if wheel is not None:
-        own = rows[..., -1]
-        own["radius"], own["speed"], own["surface"] = wheel.radius, wheel.speed, wheel.surface
-        own["extent"], own["appears"], own["vanishes"] = inf, -inf, inf
+    ahead = () if machine.segments.length.ndim == 1 else (machine.count,)
+    rims = [] if machine.pulley is None else [machine.pulley.rim]
+    parts = [part for part in (*machine.parts, *rims) if part.surface.size]
+    rows = np.zeros((*ahead, sum(part.surface.size for part in parts)), core.dtype("Barrier"))
+    first = 0
+    for part in parts:
+        own = rows[..., first : (first := first + part.surface.size)]
+        own["speed"], own["surface"] = part.speed, part.surface
+        own["appears"], own["vanishes"] = part.appears, part.vanishes
+        for name, values in part.told().items():
+            own[name] = values
     return rows
 
 

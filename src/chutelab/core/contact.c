@@ -9,8 +9,6 @@
 /* rad; what comes off the inside of an arc by less, however short steps are, stays on it: bounces that go on without an
    end are left out at last. */
 #define FLAT 0.01
-/* Of the radius: hops of what lies stay below it, else the step is shorter than asked for. */
-#define HOP 1e-3
 
 /* Whether a disk touches the same place of two surfaces: pieces on each other, or the point that they share. */
 static int same_place(const Disk *d, int k, int other) {
@@ -228,15 +226,6 @@ double pressed_inside(const Disk *d, int surface) {
         most = MAX(most, (d->vx * d->vx + d->vy * d->vy) / (s->radius - d->radius));
     }
     return most;
-}
-
-/* Longest step in which what lies hops by no more than HOP radii, s: gravity presses it and, in a crowd, the
-   way inside an arc. */
-double hop_time(const Disk *d) {
-    double inside = 0;
-    for (int n = 0; n < d->held_count && W.interact && d->mode == FREE; n++)
-        inside = MAX(inside, pressed_inside(d, d->held[n]));
-    return W.g + inside > 0 ? sqrt(8 * HOP * d->radius / (W.g + inside)) : INFINITY;
 }
 
 /* Time in which a disk that slides inside an arc is turned by FLAT, INFINITY on what is not hollow. */

@@ -54,6 +54,8 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_NEAR, FULL_CONTACTS };
 #define ROUGH 4.0
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
 #define STALL 20000
+/* Of the radius: hops of what lies stay below it, else the step is shorter than asked for. */
+#define HOP 1e-3
 /* rad; steps of a disk by itself turn it by no more inside an arc. */
 #define TURN 0.2
 /* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
@@ -96,6 +98,10 @@ int is_held(const Disk *d, int k);
 /* Whether a disk that is on a piece at the beginning of a step is on no hollow at its end. */
 static inline int is_flat(const Surface *s) {
     return s->shape == SEGMENT && mate_of(s, 0) < 0 && mate_of(s, 1) < 0;
+}
+/* Longest step in which what is pressed on something, by so much (m/s2), hops by no more than HOP radii, s. */
+static inline double hop_time(const Disk *d, double press) {
+    return press > 0 ? sqrt(8 * HOP * d->radius / press) : INFINITY;
 }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
@@ -162,7 +168,6 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
                double *given);
 void account(Contact *list, int count);
 double pressed_inside(const Disk *d, int surface);
-double hop_time(const Disk *d);
 double turning_time(const Disk *d, const Surface *s);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
 double chord(const Contact *c, double parted, double h);

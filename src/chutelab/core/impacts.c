@@ -216,7 +216,7 @@ static void support(int i, int k, double t) {
     hold(d, k);
     double press = press_on(d, W.surfaces + k, c.nx, c.ny), u[3];
     if (press <= 0 || !W.interact) return;
-    if (bending(W.surfaces + k, d->x, d->y, d->radius) < 0) W.step_end = MIN(W.step_end, t + hop_time(d));
+    if (bending(W.surfaces + k, d->x, d->y, d->radius) < 0) W.step_end = MIN(W.step_end, t + hop_time(d, press));
     double left = W.step_end - t, weight = -(W.gx * c.nx + W.gy * c.ny);
     double cosine = follow(&c, 0, chord(&c, 0, left)), normal = 0.5 * press * d->mass * left;
     relative(&c, 0, u);

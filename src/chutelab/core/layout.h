@@ -238,6 +238,7 @@ typedef struct {
     int phase, cell_count, heap_count, moved_count, wide_count;
     int stamp, shocks, jams; /* numbers of the latest query, shock and jam, for marks */
     double t, now, step, step_end, cell;
+    double usual;        /* s; the step if nothing slid in a hollow: so long a part of an overlap takes */
     double length, length_before; /* s; of this step and of the one before */
     double again;        /* what lasts needs so many times the impulses of the step before */
     double before;       /* share of this step's impulses that belongs to the one before */

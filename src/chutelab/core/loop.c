@@ -304,17 +304,30 @@ static double ledge_in(const Disk *d, double h) {
     return MAX(2 * way * way / d->radius, TOUCHING * d->radius);
 }
 
+static void set_step(double h) {
+    W.step = h;
+    W.soft = 2 * W.g * h;
+    W.skip = SKIP / h;
+}
+
+/* Longest step in which what touches the insides of arcs in a crowd does not hop too far, s. */
+static double in_hollows(void) {
+    double most = INFINITY;
+    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++)
+        if (c->turns > 0) most = MIN(most, hop_time(W.disks + c->i, W.g + c->turns));
+    return most;
+}
+
 /* Begin a step: where prescribed paths lead, who may meet, what lasts. A status other than DONE says
    what was too small, and nothing has happened yet. */
 static int begin_step(void) {
     int woke;
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
     double next = set_gates(W.t), h = W.dt, stride = 0;
-    for (int i = W.low; i < W.high; i++) h = MIN(h, hop_time(W.disks + i));
+    for (int i = W.low; i < W.high && W.g > 0; i++) h = MIN(h, hop_time(W.disks + i, W.g));
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
-    W.step = h;
-    W.soft = 2 * W.g * h;
-    W.skip = SKIP / h;
+    W.usual = h;
+    set_step(h);
     if (!W.interact) W.ledge = ledge_in(W.disks + W.low, h);
     /* Steps end where a surface comes or goes, and at the end of the run; none is a short rest: two
        shorter ones share what is left. At the very end a step is solved for what lasts, and not gone
@@ -330,9 +343,9 @@ static int begin_step(void) {
     h = W.step_end - W.t;
     /* Impulses stand for half of the step before and half of this one. */
     double span = W.length_before + W.length;
-    W.again = span > 0 ? MIN((W.length + h) / span, MOST_AGAIN) : 1;
     W.length_before = W.length;
     do {
+        W.again = span > 0 ? MIN((W.length + h) / span, MOST_AGAIN) : 1;
         for (int i = W.low; i < W.high; i++) {
             Disk *d = W.disks + i;
             if (d->mode == ASLEEP) look_ahead(i);
@@ -354,6 +367,13 @@ static int begin_step(void) {
             /* It does not fly: what it touches is solved for a step of usual length. */
             stride = 0;
             W.step_end = MIN(W.t + W.step, W.step_end);
+            h = W.step_end - W.t;
+            woke = 1;
+        }
+        double most = in_hollows();
+        if (h > (1 + 1e-9) * most) {
+            set_step(most);
+            W.step_end = W.t + most;
             h = W.step_end - W.t;
             woke = 1;
         }

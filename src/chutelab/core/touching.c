@@ -109,7 +109,7 @@ static int add(int i, int j, double least, double bound, double h) {
     double aim = MIN(c->gap, 0);
     if (c->gap < -SLOP * least) {
         /* A shorter step parts less, with the same speed: else it would give so much more energy. */
-        double share = MIN(h / W.step, 1), part = share * MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
+        double share = MIN(h / W.usual, 1), part = share * MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
         aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
         if (W.interact) {
             c->most = (c->gap + share * MOST_PARTED * least - later) / h;

@@ -32,7 +32,6 @@ from chutelab.results import Recording
 from chutelab.results.comparison import prediction as predicted
 from chutelab.results.quantities import each
 from chutelab.scene import Scene
-from chutelab.scene.conflicts import beside
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
 from chutelab.util.arrays import Floats
@@ -67,6 +66,10 @@ class Arc:
         return np.array(self.position) + t * (velocity + 0.5 * pull * t), velocity + pull * t
 
 
+ON_BELT = 1e-9
+"""m; how near to the belt's height a release counts as lying on the belt."""
+
+
 def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
     """Return the flights of particle 0 that are known in closed form, in order.
 
@@ -82,7 +85,9 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
         its, v, (sine, cosine) = scene.stream, belt.speed, sin_cos(belt.incline_deg * RADIANS)
         rides = its.fill is None and its.to is None
         if its.at is not None:
-            rides &= beside(*its.at, riding, belt.length, belt.incline_deg)
+            x, y = its.at
+            along, above = x * cosine + y * sine, y * cosine - x * sine
+            rides &= -belt.length <= along <= 0.0 and abs(above - riding) <= ON_BELT
         carried = rides and its.velocity in (None, (v * cosine, v * sine)) and v > 0
         met = scene.surface or scene.crowded or scene.plates or scene.conveyor
         # Where on the belt it starts matters to one that slips.

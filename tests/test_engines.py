@@ -495,8 +495,8 @@ def test_who_stalls_is_named_and_what_was_recorded_is_kept(monkeypatch):
     statuses = iter([None, None, host.Status.STALLED])
     really = host.Module.run
 
-    def run(module, _steps):
-        status = really(module, 64)
+    def run(module, name, _steps, lacking):
+        status = really(module, name, 64, lacking)
         module.world.stalled = 1
         return next(statuses) or status
 

@@ -222,10 +222,10 @@ def _fault(scenes: Scene | Family, refusal: Any, member: int) -> Fault:
     )
     if why == reasons["SPREAD_ADHERES"]:
         spread = np.ravel(scenes.value(stream, "speed_spread"))
-        allowed = f"{advice} Coulomb coefficient, or speed_spread = 0"
+        allowed = f"{advice} coefficient, or speed_spread = 0"
         return Fault(f"stream{several}.speed_spread", spread[member % len(spread)].item(), allowed)
     if why == reasons["VELOCITY_ADHERES"]:
-        allowed = f"{advice} Coulomb coefficient, or leave the velocity out"
+        allowed = f"{advice} coefficient, or leave the velocity out"
         return Fault(f"stream{several}.velocity", list(stream.velocity or ()), allowed)
     if why == reasons["BOX_FULL"]:
         fewer = f", or stream{several}.count = {particle} at most" if particle else ""

@@ -54,7 +54,7 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_NEAR, FULL_CONTACTS };
 #define ROUGH 4.0
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
 #define STALL 20000
-/* rad; within it the inside of an arc counts as flat: steps of a disk by itself turn it by no more. */
+/* rad; steps of a disk by itself turn it by no more inside an arc. */
 #define TURN 0.2
 /* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
 #define SHOCKS 4

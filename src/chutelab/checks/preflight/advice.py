@@ -74,7 +74,7 @@ def _densities(scene: Scene) -> Iterator[Advice]:
         density = kind.mass / (4.0 / 3.0 * pi * kind.radius**3)
         if LIGHTEST <= density <= DENSEST:
             continue
-        path = f"particle[{n}]" if len(scene.particles) > 1 else "particle"
+        path = scene.head("particle", n)
         steel = (kind.mass / (4.0 / 3.0 * pi * PRESETS["steel"].material.density)) ** (1.0 / 3.0)
         yield Advice(
             f"{path}: a sphere of {kind.radius:.4g} m radius and {kind.mass:.4g} kg would have a"

@@ -60,7 +60,7 @@ def _narrow(scene: Scene, machine: Machine) -> Iterator[Advice]:
             # Surfaces that cross are another warning.
             if not 0.0 < gap < GRAINS * largest or belt.away(end)[1] <= 0.0:
                 continue
-            path = f"plate[{number}].below" if len(scene.plates) > 1 else "plate.below"
+            path = f"{scene.head('plate', number)}.below"
             settings = {path: _shorter(machine, plate, name, GRAINS * largest - gap)}
             try:
                 build(scene.with_values({**settings, "expect": None}))
@@ -104,7 +104,7 @@ def _beyond_walls(scene: Scene, machine: Machine) -> Iterator[Advice]:
             for (a, b), wall in blocked
             if parts[a] != parts[b] and (held[a] or held[b])
         }
-        path = f"stream[{number}].fill" if len(scene.streams) > 1 else "stream.fill"
+        path = f"{scene.head('stream', number)}.fill"
         yield Advice(
             f"{path} reaches through {' and '.join(sorted(names))}: {outside} of {len(mine)}"
             " particles start beyond",

@@ -281,7 +281,7 @@ def _bounces(recording: Recording, rounds: int) -> list[float]:
     Twice: with bounces that follow each other as much faster, or less, than the last ones told as
     their scatter allows.
     """
-    under_way = recording.released & (recording.ended == REASONS.index("stopped"))
+    under_way = recording.released & recording.ended_by("stopped")
     particles = np.flatnonzero(under_way)
     begun = recording.count - int(np.count_nonzero(~recording.released & ~under_way))
     if begun > 2 * len(particles):

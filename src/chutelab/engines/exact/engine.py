@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, borrow, constants, dtype, give_back, number
 from chutelab.machine import Machine, moved, origin
-from chutelab.results.record import EVENT, KNOT, REASONS, Record
+from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 
@@ -185,29 +185,11 @@ def drain(module: Module, recorder: Recorder) -> None:
     """Take what was written, so that there is room for more."""
     exact: Any = module.structs["Exact"]
     if exact.knot_count:
-        rows = module.array("knots", dtype("Knot"), exact.knot_count, of="Exact")
-        owner = rows["disk"].astype(np.int64)
-        recorder.add(owner, rows.view(REAL).reshape(-1, 10)[:, :9].copy().view(KNOT)[:, 0])
+        recorder.take_knots(module.array("knots", dtype("Knot"), exact.knot_count, of="Exact"))
         exact.knot_count = 0
     if exact.event_count:
-        rows = module.array("events", dtype("Event"), exact.event_count, of="Exact")
-        recorder.tell(told(rows))
+        recorder.take_events(module.array("events", dtype("Event"), exact.event_count, of="Exact"))
         exact.event_count = 0
-
-
-def told(rows: NDArray[Any]) -> NDArray[Any]:
-    """Return events of the core as those of a recording."""
-    events = np.empty(len(rows), EVENT)
-    for name, source in (
-        ("t", "t"), ("particle", "disk"), ("other", "other"), ("kind", "kind"),
-        ("surface", "surface"), ("normal_impulse", "normal"), ("tangential_impulse", "tangent"),
-    ):  # fmt: skip
-        events[name] = rows[source]
-    events["position"][:, 0], events["position"][:, 1] = rows["x"], rows["y"]
-    for when in ("before", "after"):
-        events[f"velocity_{when}"] = rows[when][:, :2]
-        events[f"omega_{when}"] = rows[when][:, 2]
-    return events
 
 
 def collect(module: Module, recorder: Recorder) -> None:

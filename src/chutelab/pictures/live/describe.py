@@ -11,9 +11,6 @@ from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
 
-SAFE: Final = 2**53
-"""JavaScript's numbers have all digits of whole numbers up to here."""
-
 MOST: Final = 100_000
 """Particles that a page has room for: it keeps their tracks, and draws them in each frame."""
 
@@ -63,7 +60,8 @@ def describe(scene: Scene) -> dict[str, Any]:
     for key in EITHER:
         rows = tables.get(key, ())
         for row in (rows,) if isinstance(rows, dict) else rows:
-            if row.get("seed", 0) > SAFE:
+            # JavaScript's numbers have all digits of whole numbers up to here.
+            if row.get("seed", 0) > 2**53:
                 row["seed"] = str(row["seed"])
     materials = {
         name: {key: getattr(preset.material, key) for key in VALUES}
@@ -74,17 +72,16 @@ def describe(scene: Scene) -> dict[str, Any]:
 
 def _need_disks(scene: Scene) -> None:
     allowed = "a page that answers shows disks and spheres"
-    several = len(scene.particles) > 1
     faults = []
     for n, kind in enumerate(scene.particles):
-        table = f"particle[{n}]" if several else "particle"
+        table = scene.head("particle", n)
         if kind.outline:
             faults.append(Fault(f"{table}.shape", kind.shape, allowed))
         elif kind.radius == 0.0:
             faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
     if scene.count > MOST:
         counts = [stream.count for stream in scene.streams]
-        table = f"stream[{counts.index(max(counts))}]" if len(counts) > 1 else "stream"
+        table = scene.head("stream", counts.index(max(counts)))
         text = f"a page has room for {MOST} particles, and these are {scene.count}"
         faults.append(Fault(f"{table}.count", max(counts), text))
     if scene.string:

@@ -476,10 +476,6 @@ def ride_of(scenes: Scene | Family) -> dict[str, Any]:
     }
 
 
-ON_BELT = 1e-9
-"""m; how near to the riding height a release counts as lying on the belt."""
-
-
 def not_carried(scene: Scene) -> str:
     """Return why particle 0 is not released on the incoming belt, at its speed; "" if it is."""
     stream, belt = scene.stream, scene.incoming
@@ -487,12 +483,11 @@ def not_carried(scene: Scene) -> str:
     if stream.fill is not None or stream.to is not None:
         return "the stream is not released at a point of the incoming belt"
     sin, cos = sin_cos(belt.incline_deg * RADIANS)
-    if stream.at is not None:
-        x, y = stream.at
-        along, above = x * cos + y * sin, y * cos - x * sin
-        off = above - (belt.pulley_radius + scene.particle.radius)
-        if abs(off) > ON_BELT or not -belt.length <= along <= 0.0:
-            return "the release point stream.at is not on the incoming belt"
+    x, y = stream.at or (0.0, 0.0)
+    off = y * cos - x * sin - belt.pulley_radius - scene.particle.radius
+    near = abs(off) <= 1e-9 and -belt.length <= x * cos + y * sin <= 0.0  # m
+    if stream.at is not None and not near:
+        return "the release point stream.at is not on the incoming belt"
     if stream.velocity not in (None, (belt.speed * cos, belt.speed * sin)):
         return "the release velocity stream.velocity is not the incoming belt's"
     return ""

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from broken import BIG, BROKEN, HOOD, IN, OUT, PLATE
 from chutelab import scene
+from chutelab.machine import build
 
 
 def message(call, *arguments):
@@ -23,7 +24,7 @@ def test_a_broken_file_is_refused_with_file_key_and_what_is_allowed(case, tmp_pa
     text, keys, allowed = BROKEN[case]
     file = tmp_path / "broken.toml"
     file.write_text(text, encoding="utf-8")
-    said = message(scene.load, file)
+    said = message(lambda text: build(scene.load(text)), file)
     assert said.startswith(f"{file}: ")
     for key in keys:
         assert key in said

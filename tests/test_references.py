@@ -13,13 +13,18 @@ from machines import (
     thrown,
 )
 from references import (
+    Impact,
     first_impacts,
     henderson,
     inside_surfaces,
+    likeness,
     overlaps,
     virial,
     wall_pressure,
 )
+
+G = 9.81
+
 
 # First impacts
 

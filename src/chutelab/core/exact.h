@@ -1,7 +1,7 @@
 /* What the files of the exact engine share: the obstacles, the particle under way, a line a function.
 
    Nothing of this is the contact engine's, and nothing of that is used here: each is a check of the
-   other, so they share layout.h and trig.h alone. */
+   other, so they share layout.h, memory.h and trig.h alone. */
 
 #ifndef EXACT_H
 #define EXACT_H

@@ -404,9 +404,10 @@ typedef struct {                                                                
    have to be. */
 typedef struct { double dx, dy, reach; int particle, next; } Near;
 
-/* Why releases of a scene cannot be drawn: a box has room for so many of this radius only, or one would
-   start inside a surface, at this distance from it instead of `reach` (m). */
-enum Refused { ACCEPTED, BOX_FULL, RELEASE_INSIDE };
+/* Why releases of a scene cannot be drawn: a box has room for so many of this radius only; one would
+   start inside a surface, at this distance from it instead of `reach` (m); or a belt that grips by
+   adhesion lets none be faster than others, or start with another velocity than its own. */
+enum Refused { ACCEPTED, BOX_FULL, RELEASE_INSIDE, SPREAD_ADHERES, VELOCITY_ADHERES };
 
 typedef struct {                                                                         /* [out] */
     double distance, reach;

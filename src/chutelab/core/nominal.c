@@ -2,9 +2,6 @@
 
 #include "plan.h"
 
-/* Share of a speed across the belt that is rounding. */
-#define ALONG 1e-12
-
 /* When gap + rate t + acceleration t^2/2 crosses zero downwards; NaN or an infinity if never.
 
    A parabola crosses any level downwards at most once, with the slope -S, S^2 = rate^2 - 2

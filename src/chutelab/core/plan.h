@@ -11,6 +11,8 @@
 
 /* m; how near to the belt's height R + r a release counts as lying on the belt. */
 #define ON_BELT 1e-9
+/* Share of a speed on the belt that is rounding. */
+#define ALONG 1e-12
 
 extern Plan P;
 

@@ -100,6 +100,12 @@ static void begin_stream(void) {
     carried = rides && tables.incoming->adheres != 0.0;
     belt_x = 1.0, belt_y = 0.0;
     if (rides) up_belt(tables.incoming, &belt_x, &belt_y);
+    if (carried) {
+        double speed = tables.incoming->speed, near = ALONG * fabs(speed);
+        int other = fabs(velocity[0] - speed * belt_x) > near || fabs(velocity[1] - speed * belt_y) > near;
+        int why = stream->speed_spread > 0.0 ? SPREAD_ADHERES : other ? VELOCITY_ADHERES : ACCEPTED;
+        D.refusals[D.member] = (Refusal){ .why = why, .stream = D.stream };
+    }
     for (int i = 0; i < count; i++) {
         double t = stream->at_once != 0.0 ? 0.0 : i / stream->rate;
         starts[i] = (Start){ .t = t + stream->start, .velocity = { velocity[0], velocity[1] },
@@ -279,6 +285,7 @@ static int draw_stream(void) {
     starts = D.starts + (long)D.member * D.count + D.first;
     if (!D.is_begun) begin_stream();
     D.is_begun = 1;
+    if (D.refusals[D.member].why) return 1;
     int is_bed = !is_fill() && !is_line() && meets_others() && stream->bed_height > 0.0;
     if (is_fill() ? !pour() : is_bed && !spread_apart()) return 0;
     if (!is_fill()) place_stream();

@@ -175,7 +175,8 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
     Raises
     ------
     RefusedError
-        If a box has not room for all, or a particle would start inside a surface.
+        If a box has not room for all, a particle would start inside a surface, or a belt that grips
+        by adhesion does not allow its speed.
     """
     scene, family = scenes.scene, isinstance(scenes, Family)
     counts = [stream.count for stream in scene.streams]
@@ -193,7 +194,7 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
     refused = array("refusals", dtype("Refusal"), 1)
     if np.count_nonzero(refused["why"]):
         which = refused["why"].nonzero()[0].tolist()
-        raise RefusedError(scene.source, {n: _fault(scene, refused[n]) for n in which})
+        raise RefusedError(scene.source, {n: _fault(scenes, refused[n], n) for n in which})
     starts = array("starts", dtype("Start"), drawing.count)
     carried = array("carried", INTEGER, streams).astype(bool)
     releases = Releases(
@@ -210,12 +211,23 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
     return releases, None if alike else radius
 
 
-def _fault(scene: Scene, refusal: Any) -> Fault:
+def _fault(scenes: Scene | Family, refusal: Any, member: int) -> Fault:
     """Return in words why the releases of a scene, or of one of a family, cannot be drawn."""
+    scene, why, reasons = scenes.scene, refusal["why"], constants("Refused")
     which, particle = refusal["stream"].item(), refusal["particle"].item()
     several = f"[{which}]" * (len(scene.streams) > 1)
     stream, reach = scene.streams[which], refusal["reach"].item()
-    if refusal["why"] == constants("Refused")["BOX_FULL"]:
+    advice = (
+        'incoming.friction = "adhesion" releases every particle at incoming.speed; give a Coulomb'
+    )
+    if why == reasons["SPREAD_ADHERES"]:
+        spread = np.ravel(scenes.value(stream, "speed_spread"))
+        allowed = f"{advice} coefficient, or speed_spread = 0"
+        return Fault(f"stream{several}.speed_spread", spread[member % len(spread)].item(), allowed)
+    if why == reasons["VELOCITY_ADHERES"]:
+        allowed = f"{advice} coefficient, or leave the velocity out"
+        return Fault(f"stream{several}.velocity", list(stream.velocity or ()), allowed)
+    if why == reasons["BOX_FULL"]:
         fewer = f", or stream{several}.count = {particle} at most" if particle else ""
         allowed = (
             f"a larger box{fewer}: {particle or 'none'} of radius {reach:.4g} m have room in it,"

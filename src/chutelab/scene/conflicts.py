@@ -25,14 +25,11 @@ from chutelab.scene.units import (
     write_size,
 )
 from chutelab.util.errors import MISSING, Fault, did_you_mean
-from chutelab.util.trig import RADIANS, sin_cos
+from chutelab.util.trig import RADIANS
 
 THEORY: Final = "theory"
 UNPROMISED: Final = "none"
 """What an expectation may have for its value and for a tolerance."""
-
-ON_BELT: Final = 1e-9
-"""How near to the belt's height R + r a release counts as lying on the belt, m."""
 
 
 class ConflictError(ValueError):
@@ -385,38 +382,6 @@ def _release(look: Look, stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
         for key, what in (("at", "release point [x, y], m"), ("velocity", "[vx, vy], m/s")):
             if not given(key) and not fills and stream.sound(key):
                 yield stream.missing(key, f"{what}; required without [incoming]")
-        return
-    belt = look.row("incoming")
-    on_belt = not given("at") and not fills
-    if given("at") and stream.sound("at") and not given("to"):
-        x, y = stream["at"]
-        height = belt["pulley_radius"] + _mean(radius)
-        on_belt = beside(x, y, height, belt["length"], belt["incline_deg"])
-    if belt["friction"] != "adhesion" or not on_belt:
-        return
-    advice = 'incoming.friction = "adhesion" releases every particle at incoming.speed'
-    if stream["speed_spread"] > 0.0:
-        text = f"{advice}; give a Coulomb coefficient, or speed_spread = 0"
-        yield stream.fault("speed_spread", text)
-    if given("velocity") and stream.sound("velocity"):
-        speed, (sine, cosine) = belt["speed"], sin_cos(belt["incline_deg"] * RADIANS)
-        wanted = speed * cosine, speed * sine
-        off = (abs(v - w) for v, w in zip(stream["velocity"], wanted, strict=True))
-        if any(each > 1e-12 * abs(speed) for each in off):
-            text = f"{advice}; give a Coulomb coefficient, or leave the velocity out"
-            yield stream.fault("velocity", text)
-
-
-def beside(x: float, y: float, height: float, length: float, incline_deg: float) -> bool:
-    """Tell whether a point (m) lies on the incoming belt, at a height above the pulley's axis.
-
-    The height is the pulley's radius and the particle's, m; the belt rises by the angle to where it
-    is tangential to the pulley.
-    """
-    sine, cosine = sin_cos(incline_deg * RADIANS)
-    along = x * cosine + y * sine
-    above = y * cosine - x * sine
-    return -length <= along <= 0.0 and abs(above - height) <= ON_BELT
 
 
 def _plate(plate: Row, earlier: Sequence[Row]) -> Iterator[Fault]:

@@ -478,16 +478,16 @@ def ride_of(scenes: Scene | Family) -> dict[str, Any]:
 
 def not_carried(scene: Scene) -> str:
     """Return why particle 0 is not released on the incoming belt, at its speed; "" if it is."""
-    from chutelab.scene.conflicts import beside
-
     stream, belt = scene.stream, scene.incoming
     assert belt is not None
     if stream.fill is not None or stream.to is not None:
         return "the stream is not released at a point of the incoming belt"
-    height = belt.pulley_radius + scene.particle.radius
-    if stream.at is not None and not beside(*stream.at, height, belt.length, belt.incline_deg):
-        return "the release point stream.at is not on the incoming belt"
     sin, cos = sin_cos(belt.incline_deg * RADIANS)
+    x, y = stream.at or (0.0, 0.0)
+    off = y * cos - x * sin - belt.pulley_radius - scene.particle.radius
+    near = abs(off) <= 1e-9 and -belt.length <= x * cos + y * sin <= 0.0  # m
+    if stream.at is not None and not near:
+        return "the release point stream.at is not on the incoming belt"
     if stream.velocity not in (None, (belt.speed * cos, belt.speed * sin)):
         return "the release velocity stream.velocity is not the incoming belt's"
     return ""

@@ -1,7 +1,7 @@
 // What no scene may say: values that do not have the form of their key, keys that contradict each
 // other, names that lead nowhere. The rules are Python's, of `chutelab.scene`.
 import { fits, type Form } from "./forms.ts";
-import { RADIANS, sinCos } from "./trig.ts";
+import { RADIANS } from "./trig.ts";
 import type { Given, Lab, Point, Scene, Rule, Surface } from "./scene.ts";
 
 /** What a `Fault` says: key, value, id of a text, and its words. */
@@ -16,9 +16,6 @@ const RESERVED = ["incoming", "plate", "outgoing", "particles"];
 
 /** Least width and height of a view, m. */
 const LEAST_VIEW = 1e-6;
-
-/** How near to the belt's height a release counts as lying on the belt, m. */
-const ON_BELT = 1e-9;
 
 /** Tables that are for other programs. */
 const FOREIGN = ["expect", "live"];
@@ -273,23 +270,6 @@ function* layoutConflicts(one: Surface, key: string): Generator<Wrong> {
   }
 }
 
-/**
- * Tells whether a stream is released on the incoming belt.
- * @param number of the stream
- */
-function onBelt(scene: Scene, number: number) {
-  const stream = scene.streams[number];
-  const belt = scene.incoming;
-  if (belt === null || stream.fill !== undefined || stream.to !== undefined) return false;
-  if (stream.at === undefined) return true;
-  const riding = belt.pulley_radius + scene.particles[scene.kinds[number]].radius;
-  const [x, y] = stream.at;
-  const [sine, cosine] = sinCos(belt.incline_deg * RADIANS);
-  const along = x * cosine + y * sine;
-  const above = y * cosine - x * sine;
-  return -belt.length <= along && along <= 0.0 && Math.abs(above - riding) <= ON_BELT;
-}
-
 /** @param n of the stream */
 function* releaseConflicts(scene: Scene, given: Given, n: number): Generator<Wrong> {
   const { incoming } = scene;
@@ -319,19 +299,5 @@ function* releaseConflicts(scene: Scene, given: Given, n: number): Generator<Wro
     if (stream.fill !== undefined) return;
     if (stream.at === undefined) yield [path("at"), undefined, "missing"];
     if (stream.velocity === undefined) yield [path("velocity"), undefined, "missing"];
-    return;
-  }
-  if (incoming.friction !== "adhesion" || !onBelt(scene, n)) return;
-  if (stream.speed_spread > 0.0) {
-    yield [path("speed_spread"), stream.speed_spread, "adhesion-speed"];
-  }
-  if (stream.velocity !== undefined) {
-    const [sine, cosine] = sinCos(incoming.incline_deg * RADIANS);
-    const [vx, vy] = stream.velocity;
-    const near = 1e-12 * Math.abs(incoming.speed);
-    const off = Math.abs(vx - incoming.speed * cosine) > near;
-    if (off || Math.abs(vy - incoming.speed * sine) > near) {
-      yield [path("velocity"), stream.velocity, "adhesion-speed"];
-    }
   }
 }

@@ -53,12 +53,15 @@ export function draw(scene: Scene, names: string[]): { releases: Release[], radi
 /** Returns why the releases of a scene cannot be drawn. */
 function faultOf(scene: Scene, refusal: Refusal, names: string[]) {
   const { why, stream, particle, surface, distance, reach } = refusal;
-  const { at, fill } = scene.streams[stream];
-  const several = scene.streams.length > 1 ? `[${stream}]` : "";
-  if (why === memory().layout.enums.Refused.BOX_FULL) {
-    return new Fault(`stream${several}.fill`, fill, "box-full", { count: particle, radius: reach });
+  const { at, fill, speed_spread: spread, velocity } = scene.streams[stream];
+  const { BOX_FULL, SPREAD_ADHERES, VELOCITY_ADHERES } = memory().layout.enums.Refused;
+  const table = scene.streams.length > 1 ? `stream[${stream}]` : "stream";
+  if (why === SPREAD_ADHERES) return new Fault(`${table}.speed_spread`, spread, "adhesion-speed");
+  if (why === VELOCITY_ADHERES) return new Fault(`${table}.velocity`, velocity, "adhesion-speed");
+  if (why === BOX_FULL) {
+    return new Fault(`${table}.fill`, fill, "box-full", { count: particle, radius: reach });
   }
-  return new Fault(`stream${several}.at`, at, "release-inside", {
+  return new Fault(`${table}.at`, at, "release-inside", {
     surface: names[surface], particle, distance, reach,
   });
 }

@@ -9,7 +9,7 @@ import pytest
 
 from chutelab import scene as sc
 from chutelab.checks.preflight import preflight, trial
-from chutelab.checks.preflight.places import places
+from chutelab.checks.preflight.advice import places
 from chutelab.engines import pymunk
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build

@@ -133,9 +133,6 @@ def stepping(machine: Machine, engine: str, tried: Trial) -> Stepping:
     )
 
 
-TOGETHER = 400.0
-"""Particles that cost the exact engine as much again as a round costs by itself."""
-
 FEWEST = 0.1
 """Share of a run below which a trial says no more than how long it takes at least."""
 
@@ -152,9 +149,6 @@ CROWDED = 2.0
 
 REST = 2e-10
 """s; time between the last bounces before rest, about, in the exact engine."""
-
-LOOK = 64
-"""Particles whose bounces are followed up, at most."""
 
 
 def peak() -> int:
@@ -188,7 +182,7 @@ def _effort(machine: Machine, tried: Trial) -> Effort:
     together = _together(recording)
     took = float(tried.marks[-1, 0])
     if recording.engine == "exact":
-        guesses = [took * grown for grown in _bounces(recording, len(tried.marks))]
+        guesses = [took * grown for grown in _bounces(recording)]
         share = took / max(guesses)
     elif some == count:
         guesses, share = _paces(tried, recording, _shares(tried, recording), together)
@@ -275,27 +269,25 @@ def _shares(tried: Trial, recording: Recording) -> Floats:
     return shares * (end / over) if by_time else shares
 
 
-def _bounces(recording: Recording, rounds: int) -> list[float]:
-    """Return how many times as long as a trial's `rounds` a run of the exact engine takes.
+def _bounces(recording: Recording) -> list[float]:
+    """Return how many times as long as a trial a run of the exact engine takes.
 
-    Twice: with bounces that follow each other as much faster, or less, than the last ones told as
-    their scatter allows.
+    Its particles run one after the other. Twice: with bounces that follow each other as much
+    faster, or less, than the last ones told as their scatter allows.
     """
-    under_way = recording.released & (recording.ended == REASONS.index("stopped"))
-    particles = np.flatnonzero(under_way)
-    begun = recording.count - int(np.count_nonzero(~recording.released & ~under_way))
-    if begun > 2 * len(particles):
-        # Most have ended: blocks are alike.
-        return [recording.count / begun, recording.count / (begun - len(particles))]
-    some = particles[:: max(1, len(particles) // LOOK)]
-    ends = np.broadcast_to(recording.machine.end_time, recording.count)
-    left = np.array([_left(recording.track(i)["t"], float(ends[i])) for i in some]).reshape(-1, 2)
-    # Rounds to come of each; the block goes on as long as one of them does.
-    left = np.minimum(left * recording.steps, max(0, ROUNDS - recording.steps))
-    together = TOGETHER + 0.5 * (begun + len(particles))
-    more = TOGETHER * left.max(axis=0, initial=0.0) + len(particles) * left.mean(axis=0)
-    grown = (1.0 + more / (rounds * together)) * recording.count / begun
-    return [float(grown.min()), float(grown.max())]
+    under_way = np.flatnonzero(recording.released & (recording.ended == REASONS.index("stopped")))
+    one = int(under_way[0] if len(under_way) else np.count_nonzero(recording.released) - 1)
+    begun, track = one + 1, recording.track(one)
+    if begun > 2:
+        # Most have ended: they are alike.
+        return [recording.count / begun, recording.count / (begun - 1)]
+    if not len(track):
+        return [recording.count / begun, inf]
+    # Bounces to come of the one under way, as a share of all so far.
+    end = float(np.broadcast_to(recording.machine.end_time, recording.count)[one])
+    share, most = len(track) / len(recording.knots), ROUNDS / len(track)
+    left = (min(more, most) * share for more in _left(track["t"], end))
+    return [(1.0 + more) * recording.count / begun for more in left]
 
 
 def _left(times: Floats, end: float) -> tuple[float, float]:

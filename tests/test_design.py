@@ -16,10 +16,12 @@ from PIL import Image
 from scipy.stats import norm
 
 import chutelab
-from chutelab import design, scene
+import typed as design
+from chutelab import scene
 from chutelab.classroom.book import Book
 from chutelab.classroom.exercises import lesson
 from chutelab.cli import main
+from chutelab.cli.studies import uncertain
 from chutelab.pictures.plots.studies import draw_scan, scan, spread
 from chutelab.studies.design import roots
 from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, suits, target
@@ -288,7 +290,7 @@ def test_variants_run_at_once_give_the_bits_of_single_runs(name, keys, low, high
     known = [one for one in NAMES if _has(given, one)]
     quantities = [measured(given, one) for one in known]
     if given.outgoing is not None:
-        quantities += target(given, "landing.vx=outgoing.speed")[1:]
+        quantities += target(given, "landing.vx", "outgoing.speed")[1:]
     draws = np.random.default_rng(5).uniform(low, high, size=(16, 2))
     together = Evaluator(given, keys, quantities)(draws)
     alone = Evaluator(given, keys, quantities)
@@ -319,10 +321,10 @@ def test_streams_and_released_particles_run_one_by_one():
 def test_units_and_sides_of_a_target():
     given = machine()
     run = chutelab.simulate(given)
-    assert target(given, "landing.x = 300 mm")[1].of(run) == pytest.approx(0.3)
-    assert target(given, "landing.x=0.3")[1].unit == "m"
-    assert target(given, "landing.vx=incoming.speed")[1].of(run) == V
-    assert target(given, "landing.vx=impact.vx")[1].key == "impact.vx"
+    assert target(given, "landing.x", "300 mm")[1].of(run) == pytest.approx(0.3)
+    assert target(given, "landing.x", 0.3)[1].unit == "m"
+    assert target(given, "landing.vx", "incoming.speed")[1].of(run) == V
+    assert target(given, "landing.vx", "impact.vx")[1].key == "impact.vx"
 
 
 SOLVE = ("solve", "inclined-20")
@@ -538,7 +540,7 @@ def test_a_sample_that_lacks_one_quantity_is_told_as_lacking_that_one():
 
 def test_uniform_and_relative_spreads():
     given = ["incoming.speed=2±10%", "plate.distance=0.5+/-20mm:uniform"]
-    speed, distance = spreads(machine(), given)
+    speed, distance = spreads(machine(), uncertain(given))
     assert speed.spread == pytest.approx(0.2)
     assert (distance.law, distance.spread) == ("uniform", pytest.approx(0.02))
     np.testing.assert_allclose(distance.values(np.array([0.0, 0.5, 1.0])), [0.48, 0.5, 0.52])

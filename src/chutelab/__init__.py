@@ -35,86 +35,54 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from chutelab import theory
-    from chutelab.classroom import exercises
-    from chutelab.engines.simulation import simulate
-    from chutelab.pictures.animation import animate
-    from chutelab.pictures.live import live
-    from chutelab.pictures.plots import overlay
-    from chutelab.results import Kind, Recording
-    from chutelab.results.comparison import compare
-    from chutelab.results.quantities import measure
-    from chutelab.scene import Scene, SceneError, load
-    from chutelab.scene import shipped as scenes
-    from chutelab.studies import design, measured
-    from chutelab.studies.design import solve
-    from chutelab.studies.sweep import sweep
-    from chutelab.theory import figures
-    from chutelab.util.errors import LawWarning
+    from chutelab import theory as theory
+    from chutelab.classroom import exercises as exercises
+    from chutelab.engines.simulation import simulate as simulate
+    from chutelab.pictures.animation import animate as animate
+    from chutelab.pictures.live import live as live
+    from chutelab.pictures.plots import overlay as overlay
+    from chutelab.results import Kind as Kind
+    from chutelab.results import Recording as Recording
+    from chutelab.results.comparison import compare as compare
+    from chutelab.results.quantities import measure as measure
+    from chutelab.scene import Scene as Scene
+    from chutelab.scene import SceneError as SceneError
+    from chutelab.scene import load as load
+    from chutelab.scene import shipped
+    from chutelab.studies import design as design
+    from chutelab.studies import measured as measured
+    from chutelab.studies.design import solve as solve
+    from chutelab.studies.sweep import sweep as sweep
+    from chutelab.theory import figures as figures
+    from chutelab.util.errors import LawWarning as LawWarning
 
+    scenes = shipped
     __version__: str
     """Of the package that is installed."""
 
-__all__ = [
-    "Kind",
-    "LawWarning",
-    "Recording",
-    "Scene",
-    "SceneError",
-    "__version__",
-    "animate",
-    "compare",
-    "design",
-    "exercises",
-    "figures",
-    "live",
-    "load",
-    "measure",
-    "measured",
-    "overlay",
-    "scenes",
-    "simulate",
-    "solve",
-    "sweep",
-    "theory",
-]
-
-_PACKAGES = {
-    "design": "chutelab.studies.design",
-    "exercises": "chutelab.classroom.exercises",
-    "figures": "chutelab.theory.figures",
-    "measured": "chutelab.studies.measured",
-    "theory": "chutelab.theory",
-}
-
 _HOME = {
-    "Kind": "chutelab.results",
-    "LawWarning": "chutelab.util.errors",
-    "Recording": "chutelab.results",
-    "Scene": "chutelab.scene",
-    "SceneError": "chutelab.scene",
-    "animate": "chutelab.pictures.animation",
-    "compare": "chutelab.results.comparison",
-    "live": "chutelab.pictures.live",
-    "load": "chutelab.scene",
-    "measure": "chutelab.results.quantities",
-    "overlay": "chutelab.pictures.plots",
-    "simulate": "chutelab.engines.simulation",
-    "solve": "chutelab.studies.design",
-    "sweep": "chutelab.studies.sweep",
-}
+    "Kind": "results:Kind", "LawWarning": "util.errors:LawWarning",
+    "Recording": "results:Recording", "Scene": "scene:Scene", "SceneError": "scene:SceneError",
+    "animate": "pictures.animation:animate", "compare": "results.comparison:compare",
+    "design": "studies.design", "exercises": "classroom.exercises", "figures": "theory.figures",
+    "live": "pictures.live:live", "load": "scene:load", "measure": "results.quantities:measure",
+    "measured": "studies.measured", "overlay": "pictures.plots:overlay", "scenes": "scene:shipped",
+    "simulate": "engines.simulation:simulate", "solve": "studies.design:solve",
+    "sweep": "studies.sweep:sweep", "theory": "theory",
+}  # fmt: skip
+"""Where each name is: a module, or what is in one."""
+
+__all__ = [*_HOME, "__version__"]
 
 
 def __getattr__(name: str) -> Any:
     value: Any
     if name == "__version__":
         value = import_module("chutelab.util.versions").own_version()
-    elif name in _PACKAGES:
-        value = import_module(_PACKAGES[name])
-    elif name == "scenes":
-        value = import_module("chutelab.scene").shipped
     elif name in _HOME:
-        value = getattr(import_module(_HOME[name]), name)
+        module, _, attribute = _HOME[name].partition(":")
+        value = import_module(f"chutelab.{module}")
+        value = getattr(value, attribute) if attribute else value
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

@@ -234,7 +234,7 @@ def bench(
 
 
 def _table(title: str, timings: Sequence[Timing], measured: str) -> Sheet:
-    """Return the table of a scene, why runs failed, how errors are known, and what it ran on."""
+    """Return the table of a scene, with notes: failures, how errors are known, the machine."""
     from chutelab.util.tables import Sheet
 
     rows = [

@@ -199,7 +199,7 @@ class _Run:
         if not thing.flat:
             away = self.base - thing.place
             return np.asarray(away / hypot(*away))
-        # Of a point on a line there is no telling: the face that it struck last.
+        # A point on a line is on neither side: take the face that it struck last.
         side = thing.distance(self.base) >= 0.0 if self.r > 0.0 else self.sides.get(index, True)
         return thing.left if side else -thing.left
 
@@ -459,7 +459,7 @@ class _Run:
         return left
 
     def exits(self) -> Iterator[tuple[str, int, Guard]]:
-        left, right, bottom, top = self.machine.exit_box
+        left, bottom, right, top = self.machine.releases.exit_box[0]
         low, high = np.array([left, bottom]) - self.base, np.array([right, top]) - self.base
         yield "exit", -1, lambda y: np.minimum(y[X].T - low, high - y[X].T).min(axis=1)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from time import perf_counter
@@ -11,14 +10,14 @@ from time import perf_counter
 import numpy as np
 
 from chutelab.machine import Machine, build
-from chutelab.results import Recording
+from chutelab.results import Recording, record
 from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.scene import AnyScene, Fault, Overrides, Scene, SceneError, load
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import LawWarning
 from chutelab.util.signals import ctrl_c_waits
 
-ENGINES = ("auto", "exact", "contact", "pymunk")
+ENGINES = ("auto", *record.ENGINES)
 
 
 def choose(machine: Machine, engine: str | None = None) -> str:
@@ -134,7 +133,14 @@ def judged(
                 cut.append(error)
                 raise EnoughError from None
 
-        machine = _built(scene, look)
+        try:
+            machine = build(scene, look)
+        except EnoughError:
+            counts = [stream.count for stream in scene.streams]
+            most = counts.index(max(counts))
+            key = f"{scene.head('stream', most)}.count"
+            allowed = "fewer, or more seconds: those allowed were over before all had a place to"
+            raise _refused(scene, key, counts[most], f"{allowed} start") from None
         try:
             recording = follow(machine, engine, watched)
         except StalledError as stalled:
@@ -151,24 +157,13 @@ def judged(
     return recording
 
 
-def _built(scene: Scene, look: Callable[[], None]) -> Machine:
-    try:
-        return build(scene, look)
-    except EnoughError:
-        counts = [stream.count for stream in scene.streams]
-        most = counts.index(max(counts))
-        several = f"[{most}]" * (len(counts) > 1)
-        allowed = "fewer, or more seconds: those allowed were over before all had a place to start"
-        raise _refused(scene, f"stream{several}.count", counts[most], allowed) from None
-
-
 def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> Recording:
     """Run a machine with the engines after the one that broke a law, until one keeps all.
 
     If none does, the first run stands, with its laws.
     """
     said = []
-    recording, order = broken, ("exact", "contact", "pymunk")
+    recording, order = broken, record.ENGINES
     for name in order[order.index(broken.engine) + 1 :]:
         said.append(
             f"{recording.engine} did not keep the laws of every run ({recording.laws[0].told})"
@@ -189,21 +184,15 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
     if name in ("exact", "contact"):
         for n, outline in enumerate(machine.outlines):
             if outline is not None:
-                several = f"[{n}]" * (len(machine.outlines) > 1)
-                raise _refused(
-                    scene, f"particle{several}.shape", scene.particles[n].shape,
-                    f'a disk or sphere with run.engine = "{name}"; the pymunk engine has it',
-                )  # fmt: skip
+                key, shape = f"{scene.head('particle', n)}.shape", scene.particles[n].shape
+                allowed = f'a disk or sphere with run.engine = "{name}"; the pymunk engine has it'
+                raise _refused(scene, key, shape, allowed)
         if machine.threads:
             raise _refused(scene, "string", len(machine.threads), "none, or the pymunk engine")
     if name == "exact":
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"
             raise _refused(scene, "run.engine", "exact", allowed)
-        points = np.count_nonzero(np.equal(machine.particle.radius, 0.0))
-        if 0 < points < np.size(machine.particle.radius):
-            allowed = "more than 0, or 0 of all kinds: no engine has points beside disks"
-            raise _refused(scene, "particle.radius", 0.0, allowed)
         from chutelab.engines.exact import CornerError, run
 
         try:
@@ -212,7 +201,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
             if "exact" in (engine, scene.run.engine):
                 raise _refused(scene, "run.engine", "exact", str(error)) from error
             name = "contact"
-    if np.count_nonzero(np.equal(machine.particle.radius, 0.0)):
+    if np.any(np.equal(machine.particle.radius, 0.0)):
         raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
     if name == "contact":
         from chutelab.engines.contact import run as stepped

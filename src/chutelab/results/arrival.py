@@ -1,4 +1,4 @@
-"""Where particles come to, and where they go.
+"""Where particles arrive, and where they end.
 
 A particle *arrives* on a surface when it first touches it, or touches what lies on it. What lies on
 a surface at an instant is found from the places of all particles: those that touch it, those that
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.machine import Machine, Pieces, Segments
-from chutelab.results.record import EVENT, PARTICLES, REASONS, Kind, Record, hermite, kept
+from chutelab.results.record import EVENT, PARTICLES, Kind, Record, hermite, kept
 from chutelab.util.arrays import Bools, Floats, Ints
 
 TOUCH = 0.01
@@ -30,10 +30,10 @@ CARRIED = 1e-3
 """m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
 
 LOOKS = 100
-"""Instants at which particles on a surface are looked for, beside recorded blows."""
+"""Evenly spaced instants, besides impacts, at which particles that lie on a surface are found."""
 
 HALVINGS = 24
-"""Of the time between two such instants, until the one is known at which a contact began."""
+"""Bisections between two such instants, to find when a contact began."""
 
 
 def fates(recording: Record) -> NDArray[Any]:
@@ -59,10 +59,8 @@ def fates(recording: Record) -> NDArray[Any]:
     if not len(particles):
         return said
     last = recording.ends()[1]
-    left, right, bottom, top = (
-        np.broadcast_to(side, count)[particles] for side in machine.exit_box
-    )
-    (x, y), out = last["position"].T, recording.ended[particles] == REASONS.index("exit")
+    left, bottom, right, top = machine.releases.exit_box[particles].T
+    (x, y), out = last["position"].T, recording.ended_by("exit")[particles]
     gone = out | (x < left) | (x > right) | (y < bottom) | (y > top)
     said[particles[gone]] = _ways_out(recording, particles[gone], last["position"][gone])
     stays, places = particles[~gone], last["position"][~gone]
@@ -86,7 +84,7 @@ def fates(recording: Record) -> NDArray[Any]:
         rides[recording.select(Kind.SEPARATION, surface="incoming")["particle"]] = False
         home[rides[stays]] = order.index("incoming")
     if machine.landing >= 0:
-        home[recording.ended[stays] == REASONS.index("landed")] = order.index("outgoing")
+        home[recording.ended_by("landed")[stays]] = order.index("outgoing")
     said[stays] = [f"on {order[n]}" if n >= 0 else "in the air" for n in home.tolist()]
     return said
 
@@ -106,7 +104,7 @@ def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
     high = np.where((y > top) & (machine.gravity == 0.0), "flew above", "fell below")
     said = np.where(x < left, "fell left", np.where(x > right, "fell right", high)).astype(object)
     touch = recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
-    # Of several rows the last one holds, and rows are in the order of time.
+    # Rows are in the order of time: the last one of a particle stays.
     met, when = np.full(recording.count, -1), np.full(recording.count, -np.inf)
     met[touch["particle"]], when[touch["particle"]] = touch["surface"], touch["t"]
     others = recording.surface_index(PARTICLES)
@@ -151,7 +149,7 @@ def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
     found = never(recording.count)
     if surface not in recording.surfaces:
         return found
-    # All that happens on it: what passes on to it from a tangential chute gives no blow.
+    # All events on it: a particle that slides on to it from a tangential chute has no impact.
     direct = recording.select(surface=surface)
     if not recording.machine.interact:
         own = recording.first(direct)
@@ -159,7 +157,7 @@ def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
         return found
     there = Places(recording)
     met = np.concatenate([direct, recording.select(Kind.COLLISION)])
-    # None arrives before the first that touches the surface itself, which is told however soft.
+    # Nothing arrives before the first touch of the surface itself, which is always recorded.
     begin = float(direct["t"].min(initial=np.inf))
     met = met[met["t"] >= begin]
     met = met[np.argsort(met["t"], kind="stable")]
@@ -173,7 +171,7 @@ def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
         if come.all():
             break
         now = int(np.searchsorted(times, look, side="right"))
-        # Two that have come say nothing new.
+        # Blows between two that have arrived change nothing.
         between = np.arange(last, now)
         between = between[~(come[one[between]] & come[two[between]] & (two[between] >= 0))]
         some = (between, times[between], one[between], two[between])
@@ -183,13 +181,13 @@ def arrivals(recording: Record, surface: str = "outgoing") -> NDArray[Any]:
                     found[i], come[i] = met[row], True
             elif come[i] != come[j]:
                 new, old = (j, i) if come[i] else (i, j)
-                # Whatever lies there has come before.
+                # Only particles that have arrived can lie there.
                 particles, places = there.at(t, np.flatnonzero(come))
                 if there.carries(old, t, particles, places, surface):
                     found[new] = met[row] if new == i else there.state(new, t, old)
                     come[new] = True
         last = now
-        # What came to lie there so softly that no blow was recorded.
+        # Particles that came to lie there without a recorded impact.
         particles, places = there.at(look)
         lies = there.lying(look, particles, places, surface)
         for i in particles[lies & np.isnan(found["t"][particles])].tolist():
@@ -202,7 +200,7 @@ class Places:
 
     def __init__(self, recording: Record) -> None:
         self.recording = recording
-        self.radius = np.broadcast_to(recording.particle.radius, recording.count)
+        self.radius = recording.radius
         knots, corners = recording.knots, recording.machine.corners
         self._pieces: dict[int, list[Pieces]] = {}
         self._point = POINT * float(np.ptp(corners, axis=0).max()) if corners.size else 0.0
@@ -310,7 +308,7 @@ class Places:
             room = radius + radius[k] + TOUCH * np.minimum(radius, radius[k])
             next_to = (np.hypot(*(places - places[k]).T) <= room) & ~seen
             seen |= next_to
-            # The lowest, which is next to be looked at, is the nearest to what carries it.
+            # The lowest is looked at first: it is the nearest to the surface.
             near = np.flatnonzero(next_to)
             todo += near[np.argsort(-places[near, 1])].tolist()
         return False

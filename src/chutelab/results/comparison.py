@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.results.arrival import never
-from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
+from chutelab.results.record import ENTRIES, Kind, Record, kept
 from chutelab.scene import Scene
 from chutelab.scene.quantities import NEEDED, THEORY, Quantity
 from chutelab.scene.units import with_unit
@@ -77,7 +77,7 @@ def until_no_slip(recording: Record, landed: Floats) -> dict[str, Floats]:
     found = np.full((2, recording.count), nan)
     if (recording.count == 1 or recording.family) and "outgoing" in recording.surfaces:
         events = recording.events
-        there = np.isfinite(landed) & (recording.ended == REASONS.index("settled"))
+        there = np.isfinite(landed) & recording.ended_by("settled")
         away = events["surface"] != recording.surface_index("outgoing")
         away &= events["t"] > landed[events["particle"]]
         there[events["particle"][away]] = False
@@ -276,7 +276,7 @@ def worst(recording: Record) -> Floats:
         return np.array([nan if found is None else found])
     if scene.incoming is None or scene.plate is None:
         return np.full(count, nan)
-    # It has to be released on the belt, as fast as the belt is.
+    # The equations need a release on the belt, at its speed.
     belt, start = scene.incoming, recording.offsets[:-1]
     release = recording.knots[np.where(recording.released, start, 0)]
     (x, y), (vx, vy) = release["position"].T, release["velocity"].T
@@ -315,7 +315,7 @@ def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
         at, one = place == n, never(len(holds))
         one[own["particle"][at]] = own[at]
         found.append(one)
-    # A carried particle leaves the belt with a blow that throws it off, too.
+    # An impact that throws a carried particle off the belt is no separation of the theory.
     holds = holds & ~(found[0]["t"] >= found[1]["t"])
     for one, (event, surface) in zip(found, NEEDED.items(), strict=True):
         holds = holds & (one["kind"] == Kind[event.upper()])

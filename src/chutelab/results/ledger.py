@@ -17,10 +17,10 @@ from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
 
 ROUNDING = 1e-12
-"""Share of the energy turned over up to which an entry is told as 0, but in detail."""
+"""Share of the energy turned over up to which an entry is shown as 0, unless in detail."""
 
 UNSEEN = 5e-6
-"""Share of the energy turned over that reads 0.000 %: a heap at rest still trembles by less."""
+"""Share of the energy turned over that is shown as 0.000 %; a heap at rest trembles with less."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -67,7 +67,7 @@ class Ledger(Shown):
         return abs(self.residual) / self.turned_over if self.turned_over > 0.0 else 0.0
 
     def sheet(self, *, details: bool = False) -> Sheet:
-        """Return the entries of each surface that has any, their sum, and how the books close.
+        """Return the entries of each surface that has any, their sum, and what is left over.
 
         With `details` the residual is told down to rounding.
         """
@@ -90,8 +90,8 @@ class Ledger(Shown):
         )
         rows = [(name, [*entries.values()]) for name, entries in self.by_surface.items()]
         rows += [
-            (f"of {name}", [books[entry] for entry in ENTRIES])
-            for name, books in self.by_stream.items()
+            (f"of {name}", [share[entry] for entry in ENTRIES])
+            for name, share in self.by_stream.items()
         ]
         return Sheet(
             "Energy ledger, J",
@@ -102,7 +102,7 @@ class Ledger(Shown):
         )
 
 
-def books(recording: Record) -> dict[str, Floats]:
+def ledger_of_each(recording: Record) -> dict[str, Floats]:
     """Return the ledger of each released particle, (n,), J; its three `ENTRIES` together, (n, 3).
 
     The other names are those of the registry, without "ledger.".
@@ -118,8 +118,8 @@ def books(recording: Record) -> dict[str, Floats]:
 
 @kept
 def ledger(recording: Record) -> Ledger:
-    """Close the books of a recording."""
-    found, names = books(recording), recording.machine.streams
+    """Return the energy ledger of a recording."""
+    found, names = ledger_of_each(recording), recording.machine.streams
     stream = recording.machine.releases.stream[recording.released]
     by_stream: dict[str, dict[str, Any]] = {}
     for n, name in enumerate(names if len(names) > 1 else ()):
@@ -138,7 +138,7 @@ def ledger(recording: Record) -> Ledger:
 
 
 def _closed(found: dict[str, Floats]) -> dict[str, Any]:
-    """Sum the `books` of some particles."""
+    """Sum what `ledger_of_each` has of some particles."""
     kinetic, potential = (
         (float(found[f"{energy}.start"].sum()), float(found[f"{energy}.end"].sum()))
         for energy in ("kinetic", "potential")

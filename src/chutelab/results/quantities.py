@@ -15,7 +15,7 @@ import numpy as np
 
 from chutelab.results.arrival import arrivals
 from chutelab.results.comparison import column, first, paid, symbols, worst
-from chutelab.results.ledger import books, ledger
+from chutelab.results.ledger import ledger, ledger_of_each
 from chutelab.results.record import ENTRIES, REASONS, Record
 from chutelab.scene.quantities import FIRST, lookup, suggestion, whose
 from chutelab.util.arrays import Bools, Floats
@@ -47,7 +47,7 @@ def each(recording: Record, name: str) -> Floats:
             begin, end = recording.ends()
             return _at_end(recording, end["t"] - begin["t"])
         case ["ledger", *rest]:
-            found, entry = books(recording), ".".join(rest)
+            found, entry = ledger_of_each(recording), ".".join(rest)
             entries, fall = found["entries"], found["potential.end"] - found["potential.start"]
             found |= dict(zip(ENTRIES, entries.T, strict=True))
             found["turned_over"] = (
@@ -82,7 +82,7 @@ def _until_no_slip(recording: Record, what: str) -> Floats:
     """Return what the outgoing belt pays until a lone particle does not slip, (N,)."""
     if recording.count > 1 and not recording.family:
         return np.full(recording.count, nan)
-    settled = recording.ended == REASONS.index("settled")
+    settled = recording.ended_by("settled")
     entry = "friction_loss" if what == "slip_heat" else "belt_work"
     work = np.where(settled, paid(recording, "outgoing", entry), nan)
     return np.asarray(work * (recording.machine.scenes.rate if what == "power" else 1.0))
@@ -110,7 +110,7 @@ def measured(recording: Record, name: str) -> Floats:
             # Of a family they are counted together.
             return np.full(many, nan if recording.family else float(recording.contacts))
         case ["ended", reason] if reason in REASONS:
-            return count(recording.ended == REASONS.index(reason))
+            return count(recording.ended_by(reason))
         case ["misses"]:
             return count(np.isnan(each(recording, "arrival.t")))
         case ["error", "max"]:

@@ -33,6 +33,9 @@ ENTRIES = quantities.ENTRIES
 REASONS = quantities.ENDINGS
 """Why a particle's track ends; `Recording.ended` holds indices into this tuple."""
 
+ENGINES = ("exact", "contact", "pymunk")
+"""Engines that make a `Recording`, in the order in which they are tried."""
+
 PARTICLES = "particles"
 """Name under which the losses of particle-particle contacts are booked."""
 
@@ -287,6 +290,16 @@ class Record(Shown):
         """m/s²."""
         return self.machine.gravity
 
+    @property
+    def radius(self) -> Floats:
+        """Of each particle, (N,), m."""
+        return np.broadcast_to(self.particle.radius, self.count)
+
+    @property
+    def mass(self) -> Floats:
+        """Of each particle, (N,), kg."""
+        return np.broadcast_to(self.particle.mass, self.count)
+
     @cached_property
     def surfaces(self) -> tuple[str, ...]:
         """Names that `events["surface"]` indexes; the last is always ``"particles"``."""
@@ -311,6 +324,10 @@ class Record(Shown):
     def released(self) -> Bools:
         """Which particles were released, (N,)."""
         return self.offsets[1:] > self.offsets[:-1]
+
+    def ended_by(self, reason: str) -> Bools:
+        """Return which tracks ended for one of `REASONS`, (N,)."""
+        return np.asarray(self.ended == REASONS.index(reason))
 
     def sheet(self, *, details: bool = False) -> Sheet:
         """Return what it holds, in a few lines; with `details` also how it was computed."""

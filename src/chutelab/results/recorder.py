@@ -18,7 +18,7 @@ from chutelab.util.arrays import Floats, Ints
 
 
 class StalledError(RuntimeError):
-    """A loop reached its bound: a particle goes on without getting on.
+    """A loop reached its bound: a particle makes no progress.
 
     It says which one, when (s) and where its centre is (m); the reason is a half-sentence: what
     happened too often, and what to do about it. The recording is of what went before: tracks that
@@ -47,7 +47,7 @@ class StalledError(RuntimeError):
 
 
 class EnoughError(Exception):
-    """Raised by who watches a run's progress: the run is to end here.
+    """Raised by what watches a run's progress: the run is to end here.
 
     An engine closes the tracks that are under way with reason ``"stopped"``, which is also that of
     particles not yet released, and returns the recording.
@@ -57,11 +57,11 @@ class EnoughError(Exception):
 class Recorder:
     """Grows by chunks; `finish` turns it into a frozen `Record` of the machine's run.
 
-    With `apart` the books of each particle are kept apart: `by_surface` is (N, S, 3) then.
+    With `apart`, `by_surface` is kept for each particle, (N, S, 3).
     """
 
     def __init__(self, machine: Machine, *, apart: bool = False) -> None:
-        self.machine, self.apart = machine, apart
+        self.machine = machine
         count, owners = machine.count, len(machine.surfaces) + 1  # and the particles
         self.entries = np.zeros((count, 3))
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
@@ -104,6 +104,26 @@ class Recorder:
         if self._angular:
             self._angles.append(np.broadcast_to(np.asarray(angle, dtype=float), len(knots)).copy())
 
+    def take_knots(self, rows: NDArray[Any]) -> None:
+        """Add knots as the core writes them, dtype ``Knot``: a particle's in the order of time."""
+        numbers = rows.view("<f8").reshape(len(rows), -1)
+        own = numbers[:, : KNOT.itemsize // 8].copy().view(KNOT)[:, 0]
+        self.add(rows["disk"].astype(np.int64), own)
+
+    def take_events(self, rows: NDArray[Any]) -> None:
+        """Add events as the core writes them, dtype ``Event``."""
+        events = np.empty(len(rows), EVENT)
+        for name, source in (
+            ("t", "t"), ("particle", "disk"), ("other", "other"), ("kind", "kind"),
+            ("surface", "surface"), ("normal_impulse", "normal"), ("tangential_impulse", "tangent"),
+        ):  # fmt: skip
+            events[name] = rows[source]
+        events["position"][:, 0], events["position"][:, 1] = rows["x"], rows["y"]
+        for when in ("before", "after"):
+            events[f"velocity_{when}"] = rows[when][:, :2]
+            events[f"omega_{when}"] = rows[when][:, 2]
+        self._events.append(events)
+
     def book(
         self,
         particle: ArrayLike,
@@ -144,11 +164,7 @@ class Recorder:
         chunk["omega_before"] = omega if omega_before is None else omega_before
         chunk["surface"], chunk["other"] = surface, other
         chunk["normal_impulse"], chunk["tangential_impulse"] = normal_impulse, tangential_impulse
-        self.tell(chunk)
-
-    def tell(self, events: NDArray[Any]) -> None:
-        """Add finished events."""
-        self._events.append(events)
+        self._events.append(chunk)
 
     def finish(
         self,
@@ -170,7 +186,7 @@ class Recorder:
             knots = knots.take(order)
             angle = angle.take(order) if self._angular else angle
         if self.machine.interact:
-            # Of several blows at one instant the states between them are seen by nobody.
+            # Of several blows at one instant the states between them are dropped.
             owners = np.sort(owners)
             same = (np.diff(knots["t"]) == 0.0) & (np.diff(owners) == 0)
             kept = ~np.concatenate([[False], same[:-1] & same[1:], [False]])[: len(knots)]
@@ -181,7 +197,7 @@ class Recorder:
         sizes.cumsum(out=offsets[1:])
         lonely = (sizes == 1).nonzero()[0]
         if len(lonely):
-            # A track needs an interval: a lone knot is its own end.
+            # A track needs two knots: a single one is doubled.
             if self._angular:
                 angle = np.insert(angle, offsets[lonely], angle[offsets[lonely]])
             knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])

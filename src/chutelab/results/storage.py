@@ -20,7 +20,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from chutelab.machine import build
-from chutelab.results.record import ENTRIES, EVENT, KNOT, REASONS, Kind, Record
+from chutelab.results.record import ENGINES, ENTRIES, EVENT, KNOT, REASONS, Kind, Record
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
@@ -44,14 +44,11 @@ HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 """Readers of an array's shape and type, by the version of its format."""
 
 SMALL = 1 << 20
-"""Bytes of an array that may be packed however well."""
+"""Bytes up to which an array may be packed to any share of its size."""
 
 MOST_UNPACKED = 150
 """How many times as large as packed a larger array may be: runs in which next to nothing happens
 come to 60, and a file that is made to fill the memory to 1000."""
-
-ENGINES = ("exact", "contact", "pymunk")
-"""Engines that can have made a recording."""
 
 FAR = 1e100
 """Bound on every number: energies and distances computed from it stay finite."""
@@ -106,7 +103,7 @@ def load(path: str | Path) -> Record:
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
     except OSError as error:
-        # In a damaged file an address may lead to before its beginning.
+        # In a damaged file an offset may point before its beginning.
         unread = f"cannot be read: {error.strerror or error}"
         said = f"{kind} (recording.npz)" if error.errno == EINVAL else unread
         raise RecordingError(f"{path}: {said}") from None
@@ -132,7 +129,7 @@ def _regular(path: Path) -> Path:
 
 
 def _array(archive: zipfile.ZipFile, name: str, room: int = 0) -> NDArray[Any]:
-    """Return one array of an archive; it may have `room` bytes, however well it is packed."""
+    """Return one array of an archive; up to `room` bytes it may be packed to any share of them."""
     info = archive.getinfo(f"{name}.npy")
     # Other methods can make a million bytes of one.
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):

@@ -17,8 +17,7 @@ import numpy as np
 
 from chutelab.results.arrival import CARRIED, Places, arrivals, fates
 from chutelab.results.quantities import each, measure
-from chutelab.results.record import ENTRIES, REASONS, Record
-from chutelab.scene import Scene
+from chutelab.results.record import ENTRIES, Record
 from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.units import with_unit
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -28,16 +27,16 @@ QUANTILES = (0.02, 0.5, 0.98)
 """Shares of the paths that an envelope leaves on its right: its two edges, and the middle."""
 
 FEWEST = 20
-"""Particles of a stream from which on its paths have an envelope."""
+"""Least number of particles whose paths have an envelope."""
 
 MOST_PATHS = 400
 """Paths of a stream that its envelope is made of, at most; of more, evenly chosen ones."""
 
 JUMP = 5.0
-"""Distances between two places by which its lines may go on from one to the next."""
+"""Largest jump of an edge from one place to the next, in distances between places."""
 
 AHEAD = 1.0 / 60.0
-"""Share of the way that the direction of a cut looks ahead, and back."""
+"""Share of the way, ahead and back, over which the direction of a cut is taken."""
 
 INSTANTS = 400
 """Instants of the way at which paths are looked at."""
@@ -117,8 +116,8 @@ def _envelope(recording: Record, own: Ints, end: Floats, places: int) -> Envelop
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
     offset = np.full((len(QUANTILES), places), np.nan)
     for s in range(places):
-        # A path passes where it goes from behind the cut to before it; of several times that one
-        # counts that is nearest to the way's.
+        # A path crosses where it goes from behind the cut to ahead of it; of several crossings
+        # the one counts that is nearest in time to the way's.
         along = paths @ tangent[s]
         along -= middle[s] @ tangent[s]
         passes = (along[:-1] <= 0.0) & (along[1:] > 0.0)
@@ -191,24 +190,24 @@ def works(recording: Record) -> Floats:
     found = np.full(recording.count, nan)
     belt = scene.outgoing
     came = arrivals(recording)
-    who = np.flatnonzero(np.isfinite(came["t"]) & recording.released)
-    if belt is None or belt.speed is None or not len(who):
+    there = np.flatnonzero(np.isfinite(came["t"]) & recording.released)
+    if belt is None or belt.speed is None or not len(there):
         return found
     speed: float = belt.speed
-    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    mass = recording.mass
     alone = not machine.interact and np.all(recording.particle.inertia == 0.0)
     if alone and machine.until != "settled":
-        found[who] = mass[who] * speed * (speed - came["velocity_before"][who, 0])
+        found[there] = mass[there] * speed * (speed - came["velocity_before"][there, 0])
         return found
-    last = recording.knots[recording.offsets[who + 1] - 1]
-    settled = recording.ended[who] == REASONS.index("settled")
+    last = recording.knots[recording.offsets[there + 1] - 1]
+    settled = recording.ended_by("settled")[there]
     if machine.until != "landed":
-        there = fates(recording)[who]
+        fate = fates(recording)[there]
         slip = np.abs(last["velocity"][:, 0] - speed)
-        rides = (there == "on outgoing") & (slip <= CARRIED)
-        settled |= rides | np.char.startswith(there.astype(str), "off outgoing")
-    who, last = who[settled], last[settled]
-    found[who] = last["entries"][:, BELT_WORK] - Places(recording).belt_work(who, came["t"][who])
+        rides = (fate == "on outgoing") & (slip <= CARRIED)
+        settled |= rides | np.char.startswith(fate.astype(str), "off outgoing")
+    there, booked = there[settled], last["entries"][settled, BELT_WORK]
+    found[there] = booked - Places(recording).belt_work(there, came["t"][there])
     return found
 
 
@@ -247,7 +246,7 @@ def _per_mass(recording: Record, paid: Floats, own: Bools) -> tuple[float, float
     came = arrivals(recording)["t"]
     order = np.argsort(came, kind="stable")
     order = order[(own & np.isfinite(paid))[order]]
-    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    mass = recording.mass
     if not len(order):
         return nan, nan
     mean = float(paid[order].sum() / mass[order].sum())
@@ -267,7 +266,7 @@ def _per_mass(recording: Record, paid: Floats, own: Bools) -> tuple[float, float
 
 
 FLOW = 8
-"""Particles that must have arrived for a word about how fast they came."""
+"""Least number of arrivals that tell a flow."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -339,12 +338,13 @@ class Crowd(Shown):
             f"{name}: 96 % of the paths are within {1e3 * size:.3g} mm half-way"
             for name, size in self.thick.items()
         ]
-        heads = ("", "mean", "spread", "2 %", "50 %", "98 %") if rows else ()
+        heads = ("", *COLUMNS.values()) if rows else ()
         written = tuple(f"{note[0].upper()}{note[1:]}." for note in notes)
         return Sheet("All particles", heads, tuple(rows), notes=written)
 
 
-COLUMNS = ("mean", "spread", "q02", "q50", "q98")
+COLUMNS = {"mean": "mean", "spread": "spread", "q02": "2 %", "q50": "50 %", "q98": "98 %"}
+"""Statistics of a crowd, and the heads of their columns."""
 
 
 def told_fates(counts: dict[str, int]) -> str:
@@ -386,7 +386,8 @@ def flows(recording: Record) -> tuple[float | None, float | None]:
 
     Either is None where too few arrive to tell, the second one without ``stream.width`` as well.
     """
-    if recording.scene.outgoing is None:
+    scene = recording.scene
+    if scene.outgoing is None:
         return None, None
     t = each(recording, "arrival.t")
     order = np.argsort(t, kind="stable")[: int(np.isfinite(t).sum())]
@@ -396,16 +397,11 @@ def flows(recording: Record) -> tuple[float | None, float | None]:
     span = float(t[order[last]] - t[order[first]])
     if not span > 0.0:
         return None, None
-    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    mass = recording.mass
     middle = order[first + 1 : last + 1]
-    slices = _slices(recording.scene)[recording.machine.releases.stream[middle]]
-    brought = mass[middle]
-    whole = 3.6 * float((brought * slices).sum()) / span
-    return 3.6 * float(
-        brought.sum()
-    ) / span, None if recording.scene.stream.width is None else whole
-
-
-def _slices(scene: Scene) -> Floats:
-    """Return how many slices each stream is wide."""
-    return np.array([scene.slices(number) for number in range(len(scene.streams))])
+    slices = np.array([scene.slices(number) for number in range(len(scene.streams))])
+    slices = slices[recording.machine.releases.stream[middle]]
+    flow, whole = (
+        3.6 * float(brought.sum()) / span for brought in (mass[middle], mass[middle] * slices)
+    )
+    return flow, None if scene.stream.width is None else whole

@@ -59,13 +59,13 @@ class Stopped:
 
 def stopped(recording: Record) -> Stopped | None:
     """Return where a run was stopped; None if it was not."""
-    halted = recording.ended == REASONS.index("stopped")
+    halted = recording.ended_by("stopped")
     if not halted.any():
         return None
     under_way = halted & recording.released
     t = float(recording.knots["t"].max(initial=0.0))
     if not recording.machine.interact:
-        # Each by itself: some are ahead of others.
+        # Each particle is simulated by itself: some are further on than others.
         last = recording.knots["t"][recording.offsets[1:][under_way] - 1]
         due = recording.machine.releases.t[halted & ~recording.released]
         t = min(float(last.min(initial=t)), float(due.min(initial=t)))
@@ -143,12 +143,12 @@ def plugged(recording: Record) -> Plug | None:
     machine = recording.machine
     if not machine.interact or stopped(recording) is not None:
         return None
-    through = recording.ended == REASONS.index("exit")
+    through = recording.ended_by("exit")
     if recording.scene.outgoing is not None:
         through |= np.isfinite(arrivals(recording)["t"])
     still = np.zeros(recording.count, dtype=bool)
     still[recording.released] = np.hypot(*recording.ends()[1]["velocity"].T) < STILL
-    still |= recording.ended == REASONS.index("settled")
+    still |= recording.ended_by("settled")
     lying, gone = int(np.count_nonzero(still & ~through)), int(np.count_nonzero(through))
     if not lying or not (gone or recording.scene.outgoing is not None):
         return None
@@ -167,10 +167,7 @@ def air_drag(recording: Record) -> Drag | None:
     particle = int(np.searchsorted(recording.offsets, fastest, side="right")) - 1
     if len(met) and met.max() > speed:
         speed, particle = float(met.max()), int(recording.events["particle"][np.argmax(met)])
-    radius, mass = (
-        float(np.broadcast_to(part, recording.count)[particle])
-        for part in (recording.particle.radius, recording.particle.mass)
-    )
+    radius, mass = float(recording.radius[particle]), float(recording.mass[particle])
     return drag(recording.scene, prediction(recording), speed, radius, mass)
 
 
@@ -178,7 +175,7 @@ def squeezed(recording: Record) -> Squeeze | None:
     """Return what rode into others by adhesion, see `machine.releases.squeeze`; or None."""
     released = recording.select(Kind.RELEASE)
     released = released[recording.machine.releases.carried[released["particle"]]]
-    radius = np.broadcast_to(recording.particle.radius, recording.count)[released["particle"]]
+    radius = recording.radius[released["particle"]]
     return squeeze(recording.scene, released["t"], released["position"], radius)
 
 
@@ -219,7 +216,7 @@ def rolling(recording: Record) -> Rolling | None:
     if not astray.any():
         return None
     paid = ledger(recording).by_surface["outgoing"]["belt_work"]
-    masses = np.broadcast_to(recording.particle.mass, recording.count)[settled["particle"]]
+    masses = recording.mass[settled["particle"]]
     due = belt.speed * float((masses * missing)[astray].sum())
     return Rolling(int(astray.sum()), paid, paid + due)
 
@@ -289,8 +286,8 @@ def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
     ends = {"landed": "the landing", "settled": "all have settled"}.get(
         str(until), f"t = {until} s"
     )
-    books = ledger(recording).sheet(details=details)
-    parts.append(replace(books, title=f"Energy ledger until {ends}, J"))
+    balance = ledger(recording).sheet(details=details)
+    parts.append(replace(balance, title=f"Energy ledger until {ends}, J"))
     notes = [str(note) for read, _ in NOTES.values() if (note := read(recording)) is not None]
     if (layered := layers(recording)) is not None:
         notes.insert(

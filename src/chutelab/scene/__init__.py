@@ -27,7 +27,7 @@ import tomli_w
 from pydantic import ValidationError
 
 from chutelab.scene.conflicts import ConflictError, Look, conflicts
-from chutelab.scene.messages import faults_of, live_faults, nearest
+from chutelab.scene.messages import faults_of, live_faults
 from chutelab.scene.overrides import Override, apply, joined, schema, sized
 from chutelab.scene.schema import DEFAULTS, SceneTables, plain_number, to_dict
 from chutelab.scene.tables import (
@@ -42,7 +42,16 @@ from chutelab.scene.tables import (
     Surface,
 )
 from chutelab.scene.units import RESERVED_NAMES, flat
-from chutelab.util.errors import MISSING, Fault, InputError, cut, did_you_mean, printable, shown
+from chutelab.util.errors import (
+    MISSING,
+    Fault,
+    InputError,
+    cut,
+    did_you_mean,
+    nearest,
+    printable,
+    shown,
+)
 from chutelab.util.files import first_bytes
 from chutelab.util.versions import need_all
 

@@ -1,8 +1,8 @@
-"""What no single key can answer for: conflicts between keys, and between tables.
+"""Rules that concern several keys or tables: conflicts between them.
 
-Every rule is written so that it speaks only when a comparison is *true*. A `Look` answers NaN for
-a key that is itself at fault, and nothing is true of NaN: so the rules can be asked about a
-half-broken scene, and all faults of a file come out in one message.
+Every rule speaks only when a comparison is *true*. A `Look` answers NaN for a key that is itself at
+fault, and no comparison with NaN is true: so the rules work on a half-broken scene, and all faults
+of a file come out in one message.
 """
 
 from __future__ import annotations
@@ -89,9 +89,9 @@ class Row:
 
     def __getitem__(self, key: str) -> Any:
         """Return the value of a key, or its default; NaN if it is at fault or its table absent."""
-        path = self.path(key)
-        self._look.asked.add(path)
-        if not self._look.sound(path):
+        path, look = f"{self.head}.{key}", self._look
+        look.asked.add(path)
+        if look.faulty and not look.sound(path):
             return math.nan
         value = self.content.get(key)
         if value is not None:
@@ -123,21 +123,22 @@ class Look:
     ) -> None:
         self.document = document
         self.defaults = defaults
-        self._faulty = faulty
+        self.faulty = faulty
         self.asked: set[str] = set()
+        self._rows: dict[str, list[Row]] = {}
 
     def sound(self, path: str) -> bool:
         """Whether neither the key, nor its table, nor anything inside it is at fault."""
-        return not self._faulty or not any(
+        return not self.faulty or not any(
             f == path
             or f.startswith((path + ".", path + "["))
             or path.startswith((f + ".", f + "["))
-            for f in self._faulty
+            for f in self.faulty
         )
 
     def has(self, table: str) -> bool:
         """Whether the table is there, sound or not; one that is only misspelt is at fault."""
-        return self.document.get(table) not in (None, (), []) or table in self._faulty
+        return self.document.get(table) not in (None, (), []) or table in self.faulty
 
     def row(self, table: str) -> Row:
         """Return a table, or the first of several."""
@@ -145,10 +146,12 @@ class Look:
 
     def rows(self, table: str, least: int = 0) -> list[Row]:
         """Return all of a table of which there may be several; at least so many."""
-        found = self.document.get(table)
-        one = isinstance(found, dict) and table in EITHER
-        count = len(found) if isinstance(found, LIST) else int(one)
-        return [Row(self, table, number) for number in range(max(count, least))]
+        if table not in self._rows:
+            found = self.document.get(table)
+            one = isinstance(found, dict) and table in EITHER
+            count = len(found) if isinstance(found, LIST) else int(one)
+            self._rows[table] = [Row(self, table, number) for number in range(count)]
+        return self._rows[table] or [Row(self, table, number) for number in range(least)]
 
     @property
     def damps(self) -> bool:

@@ -7,7 +7,6 @@ everything that is changed there.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from typing import Any, Final
@@ -24,16 +23,14 @@ from chutelab.scene.overrides import (
     parts_of,
     resolved,
     rule_at,
+    unit_of,
 )
 from chutelab.scene.schema import TABLES, SceneTables
 from chutelab.scene.tables import Live
-from chutelab.util.errors import MISSING, Fault, InputError
+from chutelab.util.errors import MISSING, Fault, InputError, nearest
 
 Location = tuple[str | int, ...]
 """Path of keys and indices, as Pydantic gives it."""
-
-_NEAR: Final = 0.55
-"""Likeness of a misspelt key and the one that was meant: pivot is taken for pivot_height."""
 
 LISTS: Final = ("material", "pair", "conveyor", "surface", "string", "expect")
 """Tables that are always lists; of those in `EITHER` there may be one or several."""
@@ -70,8 +67,7 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
             # The location of a union's error ends with the name of the member that refused.
             while (rule := rule_at(parts)) is None:
                 parts = parts[:-1]
-            last_key = max(depth for depth, part in enumerate(parts) if isinstance(part, str))
-            unit = (rule_at(parts[: last_key + 1]) or {}).get("x-unit")
+            unit = unit_of(parts)
             allowed = _listed(_phrases(rule)) + (f", in {unit}" if unit else "")
             text = str(cause) if cause else allowed if missing else f"must be {allowed}"
         value = MISSING if missing else at_path(document, parts)
@@ -98,12 +94,10 @@ def _phrases(rule: Mapping[str, Any]) -> list[str]:
         return [phrase for choice in rule["anyOf"] for phrase in _phrases(choice)]
     if "x-words" in rule:
         return [str(rule["x-words"])]
-    if "$ref" in rule:
+    if "$ref" in rule or rule.get("type") == "object":
         return ["a table of keys and values"]
     if "enum" in rule or "const" in rule:
         return [f'"{choice}"' for choice in rule.get("enum", [rule.get("const")])]
-    if rule["type"] == "object":
-        return ["a table of keys and values"]
     if rule["type"] != "array":
         least = rule.get("not", {}).get("exclusiveMaximum")
         if least is not None:
@@ -133,11 +127,6 @@ def _bound(value: float) -> str:
 def _listed(choices: Iterable[str]) -> str:
     *first, last = choices
     return f"{', '.join(first)} or {last}" if first else last
-
-
-def nearest(key: str, known: Iterable[str]) -> list[str]:
-    """Return the known key that is most like one, in a list; none if none is like it."""
-    return difflib.get_close_matches(key, list(known), n=1, cutoff=_NEAR)
 
 
 def unknown(parts: Sequence[str | int]) -> str:

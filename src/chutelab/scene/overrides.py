@@ -146,6 +146,12 @@ def _below(rule: Mapping[str, Any], part: str | int) -> Any:
     return first[part] if part < len(first) else rule.get("items")
 
 
+def unit_of(parts: Sequence[str | int]) -> str:
+    """Return the unit of a key, or of the key that an entry of a list belongs to; "" for none."""
+    named = max(depth for depth, part in enumerate(parts) if isinstance(part, str))
+    return str((rule_at(parts[: named + 1]) or {}).get("x-unit", ""))
+
+
 def limits_of(
     rule: Mapping[str, Any], types: Sequence[str] = ("number",)
 ) -> tuple[float, float] | None:
@@ -225,12 +231,8 @@ def sized(value: Any, path: Sequence[str | int] = ()) -> Any:
         case list():
             return [sized(item, (*path, index)) for index, item in enumerate(value)]
         case str() if path and value[:1] in "+-.0123456789":
-            key = list(path)
-            while isinstance(key[-1], int):
-                key.pop()
-            rule = rule_at(path)
-            if rule is not None and limits_of(rule) is not None:
-                size = size_in(value, str((rule_at(key) or {}).get("x-unit") or ""))
+            if limits_of(rule_at(path) or {}) is not None:
+                size = size_in(value, unit_of(path))
                 return value if size is None else size
     return value
 

@@ -63,7 +63,7 @@ class Quantity(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """What it is an example of: errors of lengths are measured by a length, and so on."""
+        """Its kind, which chooses what its errors are measured by: lengths by a length."""
         return KINDS[self.unit]
 
 
@@ -279,7 +279,7 @@ def _row(name: str, surfaces: Collection[str]) -> Quantity | None:
 
 
 def whose(row: Quantity, count: int) -> str:
-    """Say how a name has to go on where there are several particles; "" if it says whose it is.
+    """Say how a name has to tell which of several particles it means; "" if it does.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The tables of a scene file together, and what follows from one for another."""
+"""All tables of a scene file, and the defaults that depend on other tables."""
 
 from __future__ import annotations
 
@@ -266,6 +266,15 @@ class SceneTables(Table):
             return None
         own = {material.name: material for material in self.material}
         return own.get(particle.material) or PRESETS[particle.material].material
+
+    def head(self, table: str, number: int) -> str:
+        """Return the path of a particle, plate or stream: with its number if there are several.
+
+        >>> from chutelab.scene import load
+        >>> load("perpendicular").head("stream", 0), load("mixture").head("particle", 1)
+        ('stream', 'particle[1]')
+        """
+        return f"{table}[{number}]" if len(getattr(self, EITHER[table])) > 1 else table
 
     @property
     def free(self) -> tuple[Plate | Conveyor | Surface, ...]:

@@ -205,10 +205,7 @@ class Conveyor(Table):
     """A further belt between two pulleys: forward on top, and back below."""
 
     name: Name = described(..., "Unique name, for events and the ledger")
-    from_: Point = Field(
-        ..., alias="from", description="Axis [x, y] of the first pulley (m).",
-        json_schema_extra={"x-unit": "m"},
-    )  # fmt: skip
+    from_: Point = described(..., "Axis [x, y] of the first pulley", "m", alias="from")
     to: Point = described(..., "Axis [x, y] of the second pulley", "m")
     pulley_radius: Length = described(0.1, "Radius of both pulleys, with the belt", "m")
     speed: Coordinate = described(
@@ -237,9 +234,7 @@ class Surface(Table):
     )
 
     name: Name = described(..., "Unique name, for events and the ledger")
-    from_: Point | None = Field(
-        None, alias="from", description="First end [x, y] (m).", json_schema_extra={"x-unit": "m"}
-    )
+    from_: Point | None = described(None, "First end [x, y]", "m", alias="from")
     to: Point | None = described(None, "Second end [x, y]", "m")
     points: Polyline = described(None, "Instead of from and to: a polyline [[x, y], ...]", "m")
     center: Point | None = described(None, "Of an arc: its centre [x, y]", "m")
@@ -286,9 +281,7 @@ class Surface(Table):
 class String(Table):
     """A string without mass from a point to a particle's centre, for the pymunk engine."""
 
-    from_: Point = Field(
-        ..., alias="from", description="Fixed end [x, y] (m).", json_schema_extra={"x-unit": "m"}
-    )
+    from_: Point = described(..., "Fixed end [x, y]", "m", alias="from")
     particle: Whole = described(0, "Number of the particle, over all streams, from 0", ge=0)
     length: Length | None = described(
         None, "Length; default: the distance at the particle's release", "m"
@@ -389,10 +382,7 @@ class Run(Table):
 class View(Table):
     """What pictures, film and page show, instead of what they choose. No engine looks at it."""
 
-    from_: Point = Field(
-        ..., alias="from", description="Lower left corner [x, y] (m).",
-        json_schema_extra={"x-unit": "m"},
-    )  # fmt: skip
+    from_: Point = described(..., "Lower left corner [x, y]", "m", alias="from")
     to: Point = described(..., "Upper right corner [x, y]", "m")
 
 
@@ -467,7 +457,7 @@ class Expect(Table):
         None, 'The same for the pymunk engine, or "none"; default: tolerance'
     )
     source: Text = described(
-        ..., "Who says so: an equation or a table of the paper, a closed form", max_length=200
+        ..., "Where it is from: an equation or a table of the paper, a closed form", max_length=200
     )
 
     def allowed(self, engine: str) -> tuple[float, str] | None:

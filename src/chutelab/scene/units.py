@@ -27,7 +27,7 @@ from chutelab.util.errors import about_comma
 
 
 class Table(BaseModel):
-    """What all tables share: frozen, and strangers refused."""
+    """What all tables share: frozen, and unknown keys refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -38,7 +38,7 @@ class Table(BaseModel):
 
 
 class Resolved(Table):
-    """A table with keys whose values mean others, and which its file keeps as they were given."""
+    """A table some of whose values are resolved, such as a rate in t/h; its file keeps the text."""
 
     _typed: dict[str, object] = PrivateAttr(default_factory=dict)
 
@@ -101,18 +101,26 @@ def read_size(text: str) -> tuple[float, str]:
     return number, unit
 
 
+def read_any(text: str) -> tuple[float, str]:
+    """Read a size as `read_size` does, or one whose unit has no prefixes; NaN if it is neither.
+
+    >>> read_any("4 mm"), read_any("3 kg/m³"), read_any("x")
+    ((0.004, 'm'), (3.0, 'kg/m³'), (nan, ''))
+    """
+    try:
+        return read_size(text)
+    except ValueError:
+        match = SIZE.fullmatch(text.strip())
+        return (float(match[1]), match[2] or "") if match else (nan, "")
+
+
 def size_in(text: str, unit: str) -> float | None:
     """Return a size in the SI unit that it has to have; None if it has none, or another.
 
     >>> size_in("4 mm", "m"), size_in("20°", "degrees"), size_in("4 s", "m"), size_in("4", "m")
     (0.004, 20.0, None, None)
     """
-    try:
-        number, found = read_size(text)
-    except ValueError:
-        # A unit without prefixes, such as 1/s, is as good if it is the one.
-        match = SIZE.fullmatch(text.strip())
-        return float(match[1]) if match and match[2] == unit else None
+    number, found = read_any(text)
     return number if found == (unit or "%") else None
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from chutelab.engines import reference
 from chutelab.engines.simulation import judged
 from chutelab.machine import build
-from chutelab.results import ENTRIES, REASONS, Kind, Recording
+from chutelab.results import ENTRIES, Kind, Recording
 from chutelab.results.comparison import compare, first, prediction, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
@@ -124,7 +124,7 @@ def each(recording: Recording) -> Iterator[Answer]:
     segments = recording.machine.segments
     still = segments.surface[segments.speed == 0.0]
     settled = recording.select(Kind.SETTLE)
-    told = recording.ended == REASONS.index("time")
+    told = recording.ended_by("time")
     told[settled["particle"][np.isin(settled["surface"], still)]] = True
     told &= recording.released
     places = np.full((recording.count, 2), np.nan)

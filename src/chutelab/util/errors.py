@@ -24,6 +24,15 @@ def did_you_mean(
     return f"did you mean {' or '.join(near)}?" if near else otherwise
 
 
+def nearest(key: str, known: Iterable[str]) -> list[str]:
+    """Return the known key that is most like one, in a list; none if none is like it.
+
+    >>> nearest("pivot", ["pivot_height", "above"])
+    ['pivot_height']
+    """
+    return difflib.get_close_matches(key, list(known), n=1, cutoff=0.55)
+
+
 _VALUE_WIDTH: Final = 48
 """Longest value shown in a message, characters: one line of a terminal holds key and value."""
 

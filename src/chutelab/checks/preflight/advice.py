@@ -73,7 +73,7 @@ def _densities(scene: Scene) -> Iterator[Advice]:
         density = kind.mass / (4.0 / 3.0 * pi * kind.radius**3)
         if LIGHTEST <= density <= DENSEST:
             continue
-        path = f"particle[{n}]" if len(scene.particles) > 1 else "particle"
+        path = scene.head("particle", n)
         steel = (kind.mass / (4.0 / 3.0 * pi * PRESETS["steel"].material.density)) ** (1.0 / 3.0)
         yield Advice(
             f"{path}: a sphere of {kind.radius:.4g} m radius and {kind.mass:.4g} kg would have a"
@@ -131,7 +131,7 @@ def _narrow(scene: Scene, machine: Machine) -> Iterator[Advice]:
             # Surfaces that cross are another warning.
             if not 0.0 < gap < GRAINS * largest or belt.away(end)[1] <= 0.0:
                 continue
-            path = f"plate[{number}].below" if len(scene.plates) > 1 else "plate.below"
+            path = f"{scene.head('plate', number)}.below"
             settings = {path: _shorter(machine, plate, name, GRAINS * largest - gap)}
             try:
                 build(scene.with_values({**settings, "expect": None}))
@@ -175,7 +175,7 @@ def _beyond_walls(scene: Scene, machine: Machine) -> Iterator[Advice]:
             for (a, b), wall in blocked
             if parts[a] != parts[b] and (held[a] or held[b])
         }
-        path = f"stream[{number}].fill" if len(scene.streams) > 1 else "stream.fill"
+        path = f"{scene.head('stream', number)}.fill"
         yield Advice(
             f"{path} reaches through {' and '.join(sorted(names))}: {outside} of {len(mine)}"
             " particles start beyond",

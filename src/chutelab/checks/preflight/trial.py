@@ -275,7 +275,7 @@ def _bounces(recording: Recording) -> list[float]:
     Its particles run one after the other. Twice: with bounces that follow each other as much
     faster, or less, than the last ones told as their scatter allows.
     """
-    under_way = np.flatnonzero(recording.released & (recording.ended == REASONS.index("stopped")))
+    under_way = np.flatnonzero(recording.released & recording.ended_by("stopped"))
     one = int(under_way[0] if len(under_way) else np.count_nonzero(recording.released) - 1)
     begun, track = one + 1, recording.track(one)
     if begun > 2:

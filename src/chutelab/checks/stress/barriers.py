@@ -18,7 +18,7 @@ from chutelab.checks.stress.evidence import (
     Verdict,
     worst,
 )
-from chutelab.results import REASONS, Kind
+from chutelab.results import Kind
 from chutelab.util.arrays import Floats, Ints
 
 AT_SURFACES = (Kind.IMPACT, Kind.LANDING, Kind.STICK, Kind.SLIP, Kind.SETTLE)
@@ -224,7 +224,7 @@ def settled_to_stay(e: Evidence) -> Verdict | None:
     That is any surface that moves, but for the outgoing belt.
     """
     m = e.machine
-    settled = np.flatnonzero(e.recording.ended == REASONS.index("settled"))
+    settled = np.flatnonzero(e.recording.ended_by("settled"))
     settled = settled[np.diff(e.recording.offsets)[settled] > 0]
     if not len(settled):
         return None

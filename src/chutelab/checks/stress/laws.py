@@ -195,9 +195,8 @@ def spin(e: Evidence) -> Verdict | None:
 def need_judged(scene: Scene) -> None:
     """Raise a `SceneError` unless the laws are about a scene: about disks, without strings."""
     allowed = "not judged: the laws are about disks without strings"
-    several = len(scene.particles) > 1
     faults = [
-        Fault(f"particle[{i}].shape" if several else "particle.shape", kind.shape, allowed)
+        Fault(f"{scene.head('particle', i)}.shape", kind.shape, allowed)
         for i, kind in enumerate(scene.particles)
         if kind.shape not in {"disk", "sphere"}
     ]

@@ -240,7 +240,7 @@ def span(recording: Recording, shown: Window) -> tuple[float, float]:
     track = recording.track(0)
     first, last = float(track["t"][0]), float(track["t"][-1])
     times = np.linspace(first, max(action(recording)[0], first), 400)
-    radius = float(np.broadcast_to(recording.particle.radius, recording.count)[0])
+    radius = float(recording.radius[0])
     inset = max(EDGE, radius / max(shown.width, shown.height))
     all_of_it = shown.padded(*[-inset] * 4)
     inside = all_of_it.holds(nominal(recording, times)[0])

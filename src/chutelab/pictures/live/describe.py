@@ -72,17 +72,16 @@ def describe(scene: Scene) -> dict[str, Any]:
 
 def _need_disks(scene: Scene) -> None:
     allowed = "a page that answers shows disks and spheres"
-    several = len(scene.particles) > 1
     faults = []
     for n, kind in enumerate(scene.particles):
-        table = f"particle[{n}]" if several else "particle"
+        table = scene.head("particle", n)
         if kind.outline:
             faults.append(Fault(f"{table}.shape", kind.shape, allowed))
         elif kind.radius == 0.0:
             faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
     if scene.count > MOST:
         counts = [stream.count for stream in scene.streams]
-        table = f"stream[{counts.index(max(counts))}]" if len(counts) > 1 else "stream"
+        table = scene.head("stream", counts.index(max(counts)))
         text = f"a page has room for {MOST} particles, and these are {scene.count}"
         faults.append(Fault(f"{table}.count", max(counts), text))
     if scene.string:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine.parts import EXIT_MARGIN
+from chutelab.core.module import number as layout_number
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.quantities import each
 from chutelab.results.stream import FEWEST
@@ -186,7 +186,7 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
         [[0.0], np.cumsum(sum(recording.energies(first[order], indices[order])))]
     )
     released = np.searchsorted(first["t"][order], times, side="right")
-    masses = np.broadcast_to(recording.particle.mass, recording.count)[indices][order]
+    masses = recording.mass[indices][order]
     weight = np.concatenate([[0.0], np.cumsum(masses)])[released] * recording.gravity
     heights = recording.knots["position"][:, 1]
     stays = recording.ended != REASONS.index("exit")
@@ -227,7 +227,7 @@ def bodily(recording: Recording) -> bool:
 
 def stays(recording: Recording) -> Bools:
     """Tell which particles are still to be seen after their end, (N,): those of many that lie."""
-    return np.asarray((recording.ended == REASONS.index("settled")) & (recording.count > MANY))
+    return np.asarray(recording.ended_by("settled") & (recording.count > MANY))
 
 
 def places(recording: Recording, particles: Sequence[int] | Ints, times: Floats) -> Floats:
@@ -400,7 +400,7 @@ def _crowd(recording: Recording, begin: int) -> Floats:
     released = events["position"][~carried & (events["kind"] == Kind.RELEASE)]
     struck = events["position"][np.isin(events["kind"], STRUCK)]
     strays = 0.02 if recording.count > MANY else 0.0
-    bottom = np.min(recording.machine.exit_box[2]) + EXIT_MARGIN
+    bottom = recording.machine.releases.exit_box[:, 1].min() + layout_number("EXIT_MARGIN")
     corners = [
         np.quantile(places, [share, 1.0 - share], axis=0)
         for places, share in ((released, 0.0), (struck, strays))

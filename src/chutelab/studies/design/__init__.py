@@ -3,7 +3,7 @@
 >>> import chutelab
 >>> from chutelab import design
 >>> scene = chutelab.load("inclined-20")
->>> found = design.solve(scene, "plate.angle_deg=0:60", "landing.vx=1")
+>>> found = design.solve(scene, {"plate.angle_deg": (0, 60)}, {"landing.vx": 1.0})
 >>> round(found.answer.values[0], 3)
 47.829
 

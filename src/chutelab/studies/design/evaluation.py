@@ -1,7 +1,7 @@
 """The question: what can be aimed at, what can be varied; and the one place where variants are run.
 
 >>> from chutelab.scene import load
->>> left, right = target(load("perpendicular"), "landing.vx = outgoing.speed")
+>>> left, right = target(load("perpendicular"), "landing.vx", "outgoing.speed")
 >>> left.unit, right.name
 ('m/s', 'outgoing.speed')
 
@@ -11,12 +11,12 @@ quantity depends on each key: its slope, and what one per cent of the key does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import groupby, product
 from math import nan
-from typing import Any, Final, Literal, NamedTuple, TypeVar
+from typing import Any, Final, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,23 +39,31 @@ from chutelab.util.versions import library
 T = TypeVar("T")
 
 
+class Typed(Protocol):
+    """What an option takes once; messages call it `typed`."""
+
+    @property
+    def typed(self) -> str:
+        """The option and its value, as on the command line."""
+        ...
+
+
+G = TypeVar("G", bound=Typed)
+
+
 def each_once(
-    option: str, given: Sequence[Any], read: Callable[[Any], T], ask: str, most: int
+    option: str, given: Sequence[G], read: Callable[[G], T], ask: str, most: int
 ) -> tuple[T, ...]:
     """Read what an option takes, given 1 to `most` times; each result has another `key`."""
-
-    def typed(one: Any) -> str:
-        return one.typed if isinstance(one, Vary) else f"{option} {one}"
-
     if not given:
         raise InputError(ask, option)
     if len(given) > most:
-        raise InputError(f"at most {most} keys are allowed", typed(given[most]))
+        raise InputError(f"at most {most} keys are allowed", given[most].typed)
     found: dict[str, T] = {}
-    for text in given:
-        one: Any = read(text)
+    for asked in given:
+        one: Any = read(asked)
         if one.key in found:
-            raise InputError(f"{one.key} is given already", typed(text))
+            raise InputError(f"{one.key} is given already", asked.typed)
         found[one.key] = one
     return tuple(found.values())
 
@@ -152,29 +160,25 @@ def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
     return Quantity(name, row.unit, name, ending=row.ending)
 
 
-def target(scene: Scene, text: str) -> tuple[Quantity, Quantity]:
-    """Read ``QUANTITY=VALUE``: a quantity, and the number, key or quantity that it is to equal.
+def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quantity]:
+    """Return a quantity, and the number, key of the scene or quantity that it is to equal.
 
     Raises
     ------
     InputError
-        If it is not of that form, one of them is unknown, or their units differ.
+        If one of them is unknown, or their units differ.
     """
-    typed = f"--target {text}"
-    name, equals, given = (part.strip() for part in text.partition("="))
-    if not (name and equals and given):
-        raise InputError(
-            "must be QUANTITY=VALUE, such as landing.x=1.2 or landing.vx=outgoing.speed", typed
-        )
+    typed = f"--target {name}={value}"
     left = measured(scene, name, typed)
     try:
-        number, unit = read_size(given)
+        number, unit = read_size(value) if isinstance(value, str) else (value, "")
         right = Quantity(f"{number:.12g} {unit}".strip(), unit, source="number", number=number)
     except ValueError as error:
-        if given[0].isdigit() or given[0] in "+-.":
-            allowed = f"{given} is no number of a quantity {_in(left.unit)}; {error}"
+        text = str(value)
+        if text[0].isdigit() or text[0] in "+-.":
+            allowed = f"{text} is no number of a quantity {_in(left.unit)}; {error}"
             raise InputError(allowed, typed) from None
-        right = _named(scene, given, typed)
+        right = _named(scene, text, typed)
     if right.source == "number" and right.unit == "":
         right = replace(right, name=f"{right.name} {left.unit}".strip(), unit=left.unit)
     if right.unit != left.unit:
@@ -204,9 +208,7 @@ def _in(unit: str) -> str:
     return f"in {unit}" if unit else "a pure number"
 
 
-FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=0:80"
-
-ASK = f"say what may vary; it {FORM}"
+ASK: Final = "say what may vary, and between which ends, such as plate.angle_deg from 0 to 80"
 
 MOST: Final = 8
 """Keys that may vary at once: beyond, a search over the whole range takes too long to be one."""
@@ -264,9 +266,6 @@ def ranges(scene: Scene, vary: Varied) -> tuple[Span, ...]:
         start = float(value) if isinstance(value, (int, float)) else None
         return Span(about.path, about.unit, low, high, start)
 
-    for text in [vary] if isinstance(vary, str) else vary:
-        if not isinstance(vary, Mapping) and isinstance(text, str) and text.count(":") != 1:
-            raise InputError(FORM, f"--vary {text}")
     return each_once("--vary", varied(vary, Range), read, ASK, MOST)
 
 

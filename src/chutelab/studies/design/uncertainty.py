@@ -1,17 +1,16 @@
 """`uncertainty`: how uncertain inputs make a landing point and a belt's work uncertain.
 
-Inputs are written ``KEY=MEAN±SPREAD`` and checked against the scene before anything runs. Shares of
-a variance (Sobol indices) are estimated from three sets of points.
+Inputs are checked against the scene before anything runs. Shares of a variance (Sobol indices) are
+estimated from three sets of points.
 """
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 from chutelab.scene import AnyScene, Scene, SceneError, load
 from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
 from chutelab.scene.units import read_size, with_unit
-from chutelab.scene.variants import Vary, quantity, reason
+from chutelab.scene.variants import Vary, quantity, reason, refuse_texts
 from chutelab.studies.design.evaluation import INSIDE, Evaluator, each_once, measured, scipy
 from chutelab.studies.sweep import TOUCHES
 from chutelab.studies.sweep.rows import RARE
@@ -102,12 +101,7 @@ def _estimates(sets: Floats) -> tuple[Floats, Floats]:
     return first, total
 
 
-FORM: Final = (
-    "must be KEY=MEAN±SPREAD, such as restitution=0.5±0.05 or incoming.speed=2+-1% (or ±SPREAD"
-    " alone, around the scene's value); :uniform at the end makes SPREAD a half-width"
-)
-
-ASK = f"say what is uncertain; it {FORM}"
+ASK: Final = "say what is uncertain, and by how much, such as a restitution of 0.5 by 0.05"
 
 LAWS: Final = ("normal", "uniform")
 
@@ -117,9 +111,21 @@ HOMES: Final = ("plate", "incoming", "outgoing", "particle", "stream")
 MOST: Final = 12
 """Uncertain inputs at once."""
 
-_GIVEN: Final = re.compile(
-    r"(?P<key>[^=]+)=(?P<mean>[^:]*?)(?:±|\+/-|\+-)(?P<spread>[^:]*?)(?::(?P<law>.*))?"
-)
+
+class Given(NamedTuple):
+    """A number of the scene that is not known exactly, as `uncertainty` takes it."""
+
+    key: str  # its table may be left out
+    mean: float | str | None  # a text may have a unit; None is the scene's own value
+    spread: float | str  # likewise, or in per cent of the mean
+    law: str = "normal"  # or uniform: `spread` is the half-width
+
+    @property
+    def typed(self) -> str:
+        """As on the command line."""
+        mean = "" if self.mean is None else self.mean
+        law = "" if self.law == "normal" else f":{self.law}"
+        return f"--uncertainty {self.key}={mean}±{self.spread}{law}"
 
 
 @dataclass(frozen=True)
@@ -168,18 +174,14 @@ class Spread:
         return np.asarray(np.clip(found, self.low, self.high))
 
 
-def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
-    """Read what ``--uncertainty`` takes, several times; each is tried on the scene."""
+def spreads(scene: Scene, asked: Sequence[Given]) -> tuple[Spread, ...]:
+    """Return how inputs are distributed; each is tried on the scene."""
 
-    def read(text: str) -> Spread:
-        typed = f"--uncertainty {text}"
-        match = _GIVEN.fullmatch(text)
-        if match is None:
-            raise InputError(FORM, typed)
-        key, middle, width, law = (part.strip() for part in match.groups(default=""))
-        if law not in ("", *LAWS):
+    def read(given: Given) -> Spread:
+        key, typed = given.key, given.typed
+        if given.law not in LAWS:
             known = " and ".join(LAWS)
-            raise InputError(f"{law} is no distribution here; there are {known}", typed)
+            raise InputError(f"{given.law} is no distribution here; there are {known}", typed)
         homes = [
             home
             for home in HOMES
@@ -189,38 +191,40 @@ def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
             key = f"{homes[0]}.{key}"
         about = quantity(scene, Vary(key, (0.0,), typed))
 
-        def number(text: str, unit: str) -> float:
+        def number(value: float | str, unit: str) -> float:
+            if not isinstance(value, str):
+                return float(value)
             try:
-                value, found = read_size(text)
+                size, found = read_size(value)
             except ValueError as error:
-                raise InputError(f"{text or 'nothing'}: {error}; it {FORM}", typed) from None
+                raise InputError(f"{value or 'nothing'}: {error}", typed) from None
             if found not in ("", unit):
                 allowed = f"it is in {unit}" if unit else "it is a pure number"
-                raise InputError(f"wrong unit in {text}: {allowed}", typed)
-            return value
+                raise InputError(f"wrong unit in {value}: {allowed}", typed)
+            return size
 
-        own = value_at(scene, about.path)
-        if middle:
-            mean = number(middle, about.unit)
+        own, width = value_at(scene, about.path), given.spread
+        if given.mean is not None:
+            mean = number(given.mean, about.unit)
         elif isinstance(own, (int, float)):
             mean = float(own)
         else:
             raise InputError(f"{about.path} has no value in this scene: give the mean, too", typed)
-        if width.endswith("%"):
+        if isinstance(width, str) and width.endswith("%"):
             spread = abs(mean) * number(width.removesuffix("%"), "") / 100.0
         else:
             spread = number(width, about.unit)
         if not spread > 0.0:
-            raise InputError(f"the spread {width} must be more than 0; it {FORM}", typed)
+            raise InputError(f"the spread {width} must be more than 0", typed)
         low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
         for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
             try:
                 scene.with_values({about.path: value})
             except SceneError as error:
                 raise InputError(reason(error), typed) from None
-        return Spread(about.path, about.unit, mean, spread, law or "normal", low, high)
+        return Spread(about.path, about.unit, mean, spread, given.law, low, high)
 
-    return each_once("--uncertainty", texts, read, ASK, MOST)
+    return each_once("--uncertainty", asked, read, ASK, MOST)
 
 
 QUANTITIES: Final = ("landing.x", "belt_work")
@@ -424,7 +428,7 @@ def _lines(found: Statistics) -> list[tuple[str, ...]]:
 
 def uncertainty(
     scene: AnyScene,
-    given: str | Sequence[str],
+    given: Sequence[Given] | Mapping[str, Sequence[Any]],
     quantities: Sequence[str] | None = None,
     *,
     samples: int = SAMPLES,
@@ -437,9 +441,10 @@ def uncertainty(
     ----------
     scene : Scene, str, path or mapping
         What `chutelab.load` takes.
-    given : str or sequence of str
-        ``KEY=MEAN±SPREAD``, or ``KEY=±SPREAD`` around the scene's own value. SPREAD is a standard
-        deviation, or in per cent of the mean; with ``:uniform`` at the end a half-width.
+    given : mapping, or sequence of Given
+        ``{KEY: (MEAN, SPREAD)}``: numbers, or texts with a unit; MEAN may be None, the scene's own
+        value, and SPREAD in per cent of it. SPREAD is a standard deviation, or with "uniform" as a
+        third entry a half-width.
     quantities : sequence of str
         What is looked at, see `chutelab.scene.quantities`; default: `QUANTITIES`, or
         `OF_A_STREAM`.
@@ -460,14 +465,17 @@ def uncertainty(
     Examples
     --------
     >>> found = uncertainty(
-    ...     "perpendicular", ["restitution=0.5±0.05", "plate.distance=±1%"], ["landing.x"],
-    ...     samples=64,
+    ...     "perpendicular", {"restitution": (0.5, 0.05), "plate.distance": (None, "1%")},
+    ...     ["landing.x"], samples=64,
     ... )
     >>> bool(found.indices[0].first[0] > found.indices[0].first[1])
     True
     """
     scene = load(scene)
-    inputs = spreads(scene, [given] if isinstance(given, str) else list(given))
+    refuse_texts(given, "--uncertainty", '{"plate.restitution": (0.5, 0.05)}')
+    if isinstance(given, Mapping):
+        given = [Given(key, *entries) for key, entries in given.items()]
+    inputs = spreads(scene, given)
     if quantities is None:
         quantities = QUANTITIES if scene.count == 1 else OF_A_STREAM
     names = list(dict.fromkeys(quantities))

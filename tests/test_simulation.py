@@ -108,7 +108,7 @@ STOPPABLE = (
     ("stream", "contact", ("stream.count=60",), 4),
     ("stream", "pymunk", ("stream.count=20", "run.until=0.7"), 9),
     ("stream-independent", "exact", ("stream.count=6000", "run.until=settled"), 6),
-    ("belt-landing", "exact", (), 3),
+    ("belt-landing", "exact", (), 1),
     ("belt-landing", "contact", (), 5),
     ("belt-landing", "pymunk", (), 9),
     ("perpendicular", "pymunk", ("run.align=false",), 6),

@@ -27,8 +27,11 @@ TICK = 1e-12
 """s over `Machine.pace`; mean time between events below which it does not: the last bounces before
 rest, at 1e-9 m/s, are 200 times as far apart."""
 
-SLICE = 20_000
-"""Events between two looks at Ctrl-C and reports of progress: some 20 ms."""
+SLICE = 0.02
+"""s of wall time between two looks at Ctrl-C and reports of progress."""
+
+FIRST = 16
+"""Events up to the first look: most lone runs have fewer."""
 
 COURSE = constants("Course")
 
@@ -146,10 +149,12 @@ def follow(
     module: Module, recorder: Recorder, progress: Progress | None
 ) -> tuple[int, float, tuple[float, float], str] | None:
     """Run to the end; return which particle first made no progress, when, where, and why."""
-    stalled, course = None, COURSE["PAUSING"]
+    stalled, course, events = None, COURSE["PAUSING"], FIRST
     with suppress(EnoughError):
         while course != COURSE["FINISHED"]:
-            course = module.run("follow_all", SLICE, COURSE["NO_MEMORY"])
+            began = perf_counter()
+            course = module.run("follow_all", events, COURSE["NO_MEMORY"])
+            events = 2 * events if perf_counter() - began < SLICE else max(FIRST, events // 2)
             drain(module, recorder)
             exact: Any = module.structs["Exact"]
             if course == COURSE["HELD"]:

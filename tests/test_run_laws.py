@@ -292,7 +292,7 @@ def by_looking(e):
         place = np.stack([hermite(knots, left, shares, axis)[0] for axis in (0, 1)], axis=-1)
         for piece in e.pieces:
             gap = piece.gap(place, e.radii[e.recording.owner[left]])
-            if (gap[piece.there(knots["t"][left])] < -e.allowed).any():
+            if (gap[piece.there(knots["t"][left])] < -e.bounds.allowed).any():
                 return True
     return False
 
@@ -312,8 +312,8 @@ def test_what_is_proven_clear_is_clear(seed):
 
     for run in (whole, spoilt(whole, knots=shake)):
         e = Evidence(run)
-        assert bool(len(e.hits)) >= by_looking(e)
-        assert run is not whole or not len(e.hits)
+        assert bool(len(e.found.hits)) >= by_looking(e)
+        assert run is not whole or not len(e.found.hits)
 
 
 def in_steps(tables):

@@ -88,12 +88,13 @@ def symmetric(e, other, twin):
             worst = float(apart[at])
             where = f"m, particle {i} at t = {mine['t'][0] + ages[at]:.6g} s"
         # One that lasts longer than the other has done something else, unless it is rounding.
-        lasted = abs(np.ptp(mine["t"]) - np.ptp(its["t"])) * e.speed
+        lasted = abs(np.ptp(mine["t"]) - np.ptp(its["t"])) * e.bounds.speed
         if lasted > worst:
             worst, where = lasted, f"m, the way of what particle {i} lasts longer"
     bound = twin.bound
     if bound is None:
-        bound = EPS * max(e.length, other.length) * AMPLIFIED ** min(e.recording.contacts + 1, 6)
+        length = max(e.bounds.length, other.bounds.length)
+        bound = EPS * length * AMPLIFIED ** min(e.recording.contacts + 1, 6)
     return Verdict(worst, bound, where)
 
 

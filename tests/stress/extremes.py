@@ -23,7 +23,9 @@ def place_error(e, x, y):
     """Distance of particle 0 from where a formula has it at the end, m."""
     found = e.recording.track(0)["position"][-1]
     apart = float(np.hypot(*(found - [x, y])))
-    return Verdict(apart, e.rounding + (ALIGNED * e.length if e.dt is not None else 0.0), "m")
+    bounds = e.bounds
+    late = ALIGNED * bounds.length if e.dt is not None else 0.0
+    return Verdict(apart, bounds.rounding + late, "m")
 
 
 SHOT_UNTIL, SHOT_SPEED, SHOT_RADIUS = 0.01, 200.0, 0.004
@@ -171,8 +173,8 @@ def _belts():
         def carried(e, speed=speed):
             # It settles where it no longer slips: at the speed of the belt.
             found = float(e.recording.track(0)["velocity"][-1, 0])
-            bound = e.rounding + (ALIGNED * max(1.0, abs(speed)) if e.dt is not None else 0.0)
-            return Verdict(abs(found - speed), bound, "m/s")
+            late = ALIGNED * max(1.0, abs(speed)) if e.dt is not None else 0.0
+            return Verdict(abs(found - speed), e.bounds.rounding + late, "m/s")
 
         for spin in (False, True):
             tables = merged(machine, {"particle": {"spin": spin}})

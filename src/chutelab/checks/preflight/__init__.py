@@ -2,7 +2,6 @@
 
 - `results`: `Preflight` and its parts: what will be built, what the closed form answers.
 - `trial`: a run that is cut off after 1 s; contacts, run time and memory, estimated from it.
-- `places`: what may surprise about where things lie: loops, walls through a `fill`, narrow gaps.
 - `advice`: `preflight`, all of it, and the warnings, each with the key and the value that would do.
 """
 

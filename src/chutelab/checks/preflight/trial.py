@@ -270,21 +270,24 @@ def _shares(tried: Trial, recording: Recording) -> Floats:
 
 
 def _bounces(recording: Recording) -> list[float]:
-    """Return how many times as long as a trial of it a run of the exact engine takes.
+    """Return how many times as long as a trial a run of the exact engine takes.
 
-    Twice: with bounces of the particle that was under way which follow each other as much faster,
-    or less, than the last ones told as their scatter allows. Those to come are as those before.
+    Its particles run one after the other. Twice: with bounces that follow each other as much
+    faster, or less, than the last ones told as their scatter allows.
     """
-    knots, ended = np.diff(recording.offsets), ~recording.ended_by("stopped")
-    end = np.broadcast_to(recording.machine.end_time, recording.count)
-    left = np.zeros(2)
-    for i in np.flatnonzero(recording.released & ~ended).tolist():
-        most = knots[ended].max(initial=0) or max(0, ROUNDS - knots[i])
-        more = np.array(_left(recording.track(i)["t"], float(end[i])), dtype=np.float64)
-        left = np.minimum(knots[i] * more, most)
-    begun = np.count_nonzero(recording.released | ended)
-    grown = (1.0 + left / knots.sum()) * recording.count / begun
-    return [float(grown.min()), float(grown.max())]
+    under_way = np.flatnonzero(recording.released & recording.ended_by("stopped"))
+    one = int(under_way[0] if len(under_way) else np.count_nonzero(recording.released) - 1)
+    begun, track = one + 1, recording.track(one)
+    if begun > 2:
+        # Most have ended: they are alike.
+        return [recording.count / begun, recording.count / (begun - 1)]
+    if not len(track):
+        return [recording.count / begun, inf]
+    # Bounces to come of the one under way, as a share of all so far.
+    end = float(np.broadcast_to(recording.machine.end_time, recording.count)[one])
+    share, most = len(track) / len(recording.knots), ROUNDS / len(track)
+    left = (min(more, most) * share for more in _left(track["t"], end))
+    return [(1.0 + more) * recording.count / begun for more in left]
 
 
 def _left(times: Floats, end: float) -> tuple[float, float]:

@@ -2,8 +2,7 @@
 
 ===============  ==================================================================================
 `evidence`       what a law looks at, and how it answers
-`barriers`       laws on where no particle may be
-`blows`          laws on what a blow may do: restitution and friction of the pair
+`barriers`       laws on where no particle may be, and on what a blow may do
 `laws`           laws on energy, ledger, momentum and the record; all by name, `judge`
 ===============  ==================================================================================
 

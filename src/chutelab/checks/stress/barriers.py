@@ -1,4 +1,4 @@
-"""Laws on places: no particle is beyond a surface, in one or in another particle."""
+"""Laws on places, none beyond a surface or in another particle, and on what a blow may do."""
 
 from __future__ import annotations
 
@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.checks.stress.evidence import ON_ARCS, PRESSED, Evidence, Verdict, worst
+from chutelab.checks.stress.evidence import (
+    EPS,
+    ON_ARCS,
+    PRESSED,
+    ROUNDINGS,
+    Evidence,
+    Verdict,
+    worst,
+)
 from chutelab.results import Kind
 from chutelab.util.arrays import Floats, Ints
 
@@ -27,7 +35,7 @@ def no_one_through(e: Evidence) -> Verdict | None:
     """No centre passes a surface between its ends; the figure counts the passages."""
     if not e.pieces or not len(e.recording.knots):
         return None
-    found = e.hits[e.hits["passes"] == 1]
+    found = e.found.hits[e.found.hits["passes"] == 1]
     return Verdict(len(found), 0.0, _first(e, "particle {} through {} at t = {:.6g} s", found))
 
 
@@ -38,10 +46,10 @@ def depth(e: Evidence) -> Verdict | None:
     """
     if not e.pieces or not len(e.recording.knots):
         return None
-    found = e.hits[np.argsort(-e.hits["depth"], kind="stable")]
+    found = e.found.hits[np.argsort(-e.found.hits["depth"], kind="stable")]
     deepest = float(found["depth"].max(initial=0.0))
     return Verdict(
-        deepest, e.allowed, f"m, {_first(e, 'particle {} in {} at t = {:.6g} s', found)}"
+        deepest, e.bounds.allowed, f"m, {_first(e, 'particle {} in {} at t = {:.6g} s', found)}"
     )
 
 
@@ -63,7 +71,7 @@ def overlap(e: Evidence) -> Verdict | None:
         deep, i, j = closest(position[there], e.radii[there])
         if deep > 0.0:
             found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))
-    return worst(found, e.rounding + 2.0 * e.late, "m")
+    return worst(found, e.bounds.rounding + 2.0 * e.bounds.late, "m")
 
 
 def pressed(e: Evidence) -> Verdict | None:
@@ -81,7 +89,8 @@ def pressed(e: Evidence) -> Verdict | None:
         deep = (e.radii[i] + e.radii[j] - apart) / np.minimum(e.radii[i], e.radii[j])
         at = int(np.argmax(deep))
         found.append((deep[at], f"particles {i[at]} and {j[at]} at t = {now:.6g} s"))
-    return worst(found, PRESSED if e.engine == "contact" else 2.0 * e.late / e.radii.min(), "r")
+    bound = PRESSED if e.engine == "contact" else 2.0 * e.bounds.late / e.radii.min()
+    return worst(found, bound, "r")
 
 
 def no_one_through_another(e: Evidence) -> Verdict | None:
@@ -181,7 +190,8 @@ def on_something(e: Evidence) -> Verdict | None:
         found.append((far, f"particles {i} and {j} at t = {hit['t']:.6g} s"))
     if not found:
         return None
-    return worst(found, e.rounding + e.arcs + (2.0 if e.crowd else 1.0) * e.late, "m")
+    b = e.bounds
+    return worst(found, b.rounding + b.arcs + (2.0 if e.crowd else 1.0) * b.late, "m")
 
 
 def released_free(e: Evidence) -> Verdict | None:
@@ -205,7 +215,7 @@ def released_free(e: Evidence) -> Verdict | None:
         where = f"particle {event['particle']} in {other} at t = {event['t']:.6g} s"
         found.append((deep[other], where))
     # One that is released just behind another, in touch, may be seen a rounding too near.
-    return worst(found, e.rounding, "m")
+    return worst(found, e.bounds.rounding, "m")
 
 
 def settled_to_stay(e: Evidence) -> Verdict | None:
@@ -219,7 +229,7 @@ def settled_to_stay(e: Evidence) -> Verdict | None:
     if not len(settled):
         return None
     last = e.recording.knots[e.recording.offsets[settled + 1] - 1]
-    near = e.rounding + ON_ARCS * e.radius + e.late
+    near = e.bounds.rounding + ON_ARCS * e.radius + e.bounds.late
     thrown: dict[int, str] = {}
     for piece, name in zip(e.pieces, e.machine.names, strict=True):
         if piece.speed != 0.0 and piece.surface != m.landing:
@@ -227,3 +237,96 @@ def settled_to_stay(e: Evidence) -> Verdict | None:
             for i in settled[on & piece.there(last["t"])].tolist():
                 thrown.setdefault(i, f"particles: {i} on {name}")
     return Verdict(len(thrown), 0.0, next(iter(thrown.values()), "particles"))
+
+
+LEAST = 1e-12
+"""Friction that two particles of the pymunk engine have where the scene says 0: Chipmunk's pair is
+a product, and a factor 0 would take it from all pairs."""
+
+
+def cone(e: Evidence) -> Verdict | None:
+    """No blow pulls, or grips by more than the pair's friction times what it pushes.
+
+    The figure is the excess as a share of the largest momentum m v.
+    """
+    events = e.recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
+    if not len(events):
+        return None
+    kinds = e.machine.releases.kind
+    friction = e.machine.pair_friction[kinds[events["particle"]], kinds[events["other"]]]
+    if e.engine == "pymunk":
+        friction = np.maximum(friction, LEAST)
+    alone = np.flatnonzero(events["other"] < 0)
+    struck, _, _ = _struck(e, events[alone])
+    friction[alone] = _of_pieces(e, events[alone], struck, "friction")
+    rough = np.isinf(friction)
+    normal, along = events["normal_impulse"], np.abs(events["tangential_impulse"])
+    excess = np.where(rough, 0.0, along - np.where(rough, 0.0, friction) * normal)
+    momentum = e.masses.max() * e.bounds.speed
+    return _verdict(events, np.maximum(excess, -normal) / momentum, "of m v")
+
+
+def rebound(e: Evidence) -> Verdict | None:
+    """Judge whether speeds after blows are the restitution times the speeds before.
+
+    This is about one blow at a time, so not about crowds and corners. A stepped engine may let a
+    particle stay that would leave slower than gravity brings it back in a step, and the pymunk
+    engine knows speeds to what gravity does to them in one. A mass point has no contact normal to
+    be measured by. The figure is how far off it is, as a share of the largest speed.
+    """
+    events = e.recording.select(Kind.IMPACT, Kind.LANDING)
+    if e.alike or e.crowd or not e.radii.all():
+        return None
+    struck, away, touched = _struck(e, events)
+    events, struck, away = (of[touched == 1] for of in (events, struck, away))
+    if not len(events):
+        return None
+    normal = away / np.hypot(*away.T)[:, None]
+    before = (events["velocity_before"] * normal).sum(axis=1)
+    after = (events["velocity_after"] * normal).sum(axis=1)
+    due = -before * _of_pieces(e, events, struck, "restitution")
+    rounding, pull = ROUNDINGS * EPS, e.machine.gravity * (e.dt or 0.0) / e.bounds.speed
+    stays = (np.abs(after) <= rounding * e.bounds.speed) & (due <= pull * e.bounds.speed)
+    off = np.where(stays, 0.0, np.abs(after - due)) / e.bounds.speed
+    return _verdict(events, off, "of v", pull if e.engine == "pymunk" else 0.0)
+
+
+def _verdict(events: NDArray[Any], off: Floats, unit: str, more: float = 0.0) -> Verdict:
+    off = np.nan_to_num(off, nan=inf)
+    hit = events[int(np.argmax(off))]
+    where = f"particle {hit['particle']} at t = {hit['t']:.6g} s"
+    return worst([(float(off.max()), where)], ROUNDINGS * EPS + more, unit)
+
+
+def _struck(e: Evidence, events: NDArray[Any]) -> tuple[Ints, Floats, Ints]:
+    """Find what was struck at blows on surfaces (c,).
+
+    Returns
+    -------
+    struck : ndarray of int, (c,)
+        Number of the nearest piece of the surface that is named.
+    away : ndarray, (c, 2)
+        Way from there to the centre, m.
+    touched : ndarray of int, (c,)
+        How many pieces, of any surface, were as near as one that is touched.
+    """
+    best, touched = np.full(len(events), inf), np.zeros(len(events), dtype=int)
+    struck, away = np.zeros(len(events), dtype=int), np.zeros((len(events), 2))
+    near = e.bounds.rounding + e.bounds.arcs + e.bounds.late
+    for number, piece in enumerate(e.pieces):
+        out = piece.away(events["position"])
+        off = np.abs(np.hypot(*out.T) - e.radii[events["particle"]])
+        off[~piece.there(events["t"], e.dt or 0.0)] = inf
+        touched += off <= near
+        nearer = (events["surface"] == piece.surface) & (off < best)
+        best[nearer], struck[nearer], away[nearer] = off[nearer], number, out[nearer]
+    return struck, away, touched
+
+
+def _of_pieces(e: Evidence, events: NDArray[Any], struck: Ints, name: str) -> Floats:
+    """Return what pieces have with the particles that strike them, (c,)."""
+    count = len(e.machine.pair_friction)
+    # A row for each piece, a column for each kind of particles.
+    values = np.array([np.broadcast_to(getattr(piece, name), count) for piece in e.pieces])
+    kinds = e.machine.releases.kind[events["particle"]]
+    return np.asarray(values.reshape(-1, count)[struck, kinds])

@@ -9,7 +9,6 @@ from operator import itemgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.core.module import number
 from chutelab.machine import Machine, Pieces
@@ -106,54 +105,9 @@ class Evidence:
         return examine(self.recording)
 
     @property
-    def hits(self) -> NDArray[Any]:
-        """Where particles are deeper in surfaces than `allowed`, or pass them: rows of `Hit`."""
-        return self.found.hits
-
-    @property
-    def speed(self) -> float:
-        """Largest speed of anything that moves, belts included, m/s."""
-        return float(self.found.figures.speed)
-
-    @property
-    def length(self) -> float:
-        """Largest length in play, m: coordinates, radii, and the way made while the clock ran."""
-        return float(self.found.figures.length)
-
-    @property
-    def rounding(self) -> float:
-        """What rounding may do to a length, m."""
-        return float(self.found.figures.rounding)
-
-    @property
-    def arcs(self) -> float:
-        """How far a curve between two knots may leave the way along an arc or round an end, m."""
-        return float(self.found.figures.arcs)
-
-    @property
-    def late(self) -> float:
-        """How far beyond a surface a step may take a disk, m; 0 for the exact engine."""
-        return float(self.found.figures.late)
-
-    @property
-    def allowed(self) -> float:
-        """How deep a disk may be in a surface, m: by rounding, the curve between knots, a step."""
-        return float(self.found.figures.allowed)
-
-    @property
-    def energy(self) -> float:
-        """Energy in play, J: what each had at most and was booked; of a crowd the turnover."""
-        return float(self.found.figures.energy)
-
-    @property
-    def energy_bound(self) -> float:
-        """What numbers may do to the energy, as a share of the energy in play."""
-        return float(self.found.figures.energy_bound)
-
-    @property
-    def parted(self) -> float:
-        """Energy that parting overlaps may give, J: no more than lifts all by their depth."""
-        return float(self.found.figures.parted)
+    def bounds(self) -> Any:
+        """Numbers in play and what they bound, under the names of the core's `Laws` (layout.h)."""
+        return self.found.figures
 
 
 @dataclass(frozen=True)

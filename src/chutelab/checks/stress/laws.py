@@ -16,16 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.checks.stress.barriers import (
+    cone,
     depth,
     no_one_through,
     no_one_through_another,
     on_something,
     overlap,
     pressed,
+    rebound,
     released_free,
     settled_to_stay,
 )
-from chutelab.checks.stress.blows import cone, rebound
 from chutelab.checks.stress.evidence import A_CONTACT, EPS, ROUNDINGS, Evidence, Verdict, worst
 from chutelab.machine import Segments
 from chutelab.results.ledger import ledger
@@ -77,7 +78,7 @@ def energy(e: Evidence) -> Verdict | None:
 
     The figure is the largest rise above any earlier value, as a share of the energy in play.
     """
-    if not e.energy:
+    if not e.bounds.energy:
         return None
     if e.crowd:
         return _energy_of_crowd(e)
@@ -90,8 +91,9 @@ def energy(e: Evidence) -> Verdict | None:
             rise = own - np.minimum.accumulate(own)
             at = int(np.argmax(rise))
             t = knots["t"][offsets[i] + at]
-            rises.append((rise[at] / e.energy, f"particle {i} at t = {t:.6g} s"))
-    return worst(rises, e.energy_bound + e.parted / e.energy, f"of {e.energy:.3g} J")
+            rises.append((rise[at] / e.bounds.energy, f"particle {i} at t = {t:.6g} s"))
+    b = e.bounds
+    return worst(rises, b.energy_bound + b.parted / b.energy, f"of {b.energy:.3g} J")
 
 
 def _energy_of_crowd(e: Evidence) -> Verdict:
@@ -117,16 +119,17 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
     gain = books["kinetic"] + books["potential"] - start - books["belt_work"]
     rise = gain - np.minimum.accumulate(gain)
     at = int(np.argmax(rise))
-    where = f"of {e.energy:.3g} J, at t = {times[at]:.6g} s"
-    return Verdict(float(rise[at]) / e.energy, e.energy_bound + e.parted / e.energy, where)
+    b = e.bounds
+    where = f"of {b.energy:.3g} J, at t = {times[at]:.6g} s"
+    return Verdict(float(rise[at]) / b.energy, b.energy_bound + b.parted / b.energy, where)
 
 
 def residual(e: Evidence) -> Verdict | None:
     """Ledgers close; the figure is a share of the energy in play."""
-    if not e.energy:
+    if not e.bounds.energy:
         return None
-    figure = abs(ledger(e.recording).residual) / e.energy
-    return Verdict(figure, e.energy_bound, f"of {e.energy:.3g} J")
+    figure = abs(ledger(e.recording).residual) / e.bounds.energy
+    return Verdict(figure, e.bounds.energy_bound, f"of {e.bounds.energy:.3g} J")
 
 
 def momentum(e: Evidence) -> Verdict | None:

@@ -1,17 +1,10 @@
-"""Random tall columns and silos of disks: where contacts wedge, and friction carries on walls.
-
-- `column`: the scene of a seed.
-- `too_fast`: where disks got more energy than a free fall gives, and no other one lost it.
-- `faults`: what a run of one does that none may do, in words.
-"""
+"""Random tall columns and silos of disks: where contacts wedge, and friction carries on walls."""
 
 from __future__ import annotations
 
 from math import sqrt, tan
 
 import numpy as np
-
-from chutelab.results.ledger import ledger
 
 G = 9.81
 
@@ -78,49 +71,3 @@ def column(seed, count):
         "surface": surfaces,
         "run": {"until": count / rate + 60.0 * tick, "dt": min(1e-3, sqrt(8e-3) * tick)},
     }  # fmt: skip
-
-
-def too_fast(recording, least=0.0):
-    """Return knots (k,) at which disks got more energy than is possible without drives.
-
-    A kilogram has at most what the highest release gives, v0²/2 + g y0, unless other disks give it
-    more: one of two equal ones of speed V that meet may leave with 2 V / sqrt(3 - restitution), see
-    docs/physics.md. That happens in a blow, and all that a blow moves have, together, no more
-    kinetic energy than before, but for `least`, J. A state in contact has half of a step's fall
-    more, or less.
-    """
-    machine, knots, owner = recording.machine, recording.knots, recording.owner
-    t, speed = knots["t"], np.hypot(*knots["velocity"].T)
-    kinetic, potential = recording.energies(knots, owner)
-    mass = np.broadcast_to(machine.particle.mass, recording.count)[owner]
-    specific = (kinetic + potential) / mass
-    most = specific[recording.offsets[:-1][recording.released]].max()
-    same = owner[1:] == owner[:-1]
-    blown = np.flatnonzero(same & (t[1:] == t[:-1]))
-    _, instant = np.unique(t[blown], return_inverse=True)
-    given = np.full(len(t) - 1, np.inf)
-    given[blown] = np.bincount(instant, kinetic[blown + 1] - kinetic[blown])[instant]
-    got = specific[1:] > np.maximum(specific[:-1], most) + G * machine.dt * speed[1:]
-    return np.flatnonzero(same & got & ~(given <= least)) + 1
-
-
-def faults(recording):
-    """Return in words what a run did that none may do."""
-    machine, knots, books = recording.machine, recording.knots, ledger(recording)
-    found = []
-    if not machine.segments.speed.any():
-        for k in too_fast(recording, 1e-9 * books.turned_over)[:1]:
-            speed, at = np.hypot(*knots["velocity"][k]), knots["t"][k]
-            found.append(f"a disk got {speed:.4g} m/s at {at:.6g} s, and no other lost that")
-    losses = ("restitution_loss", "friction_loss")
-    for name, entries in [("total", vars(books)), *books.by_surface.items()]:
-        found += [
-            f"{name}, {key}: {entries[key]:.3g} of {books.turned_over:.3g} J"
-            for key in losses
-            if not entries[key] >= -1e-9 * books.turned_over
-        ]
-    if not recording.gained <= 1e-12 * books.turned_over:
-        found.append(f"solves gained {recording.gained:.3g} of {books.turned_over:.3g} J")
-    if not books.relative_residual <= 1e-9:
-        found.append(f"the ledger misses {books.relative_residual:.1e}")
-    return found

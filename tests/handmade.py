@@ -16,6 +16,7 @@ from chutelab.machine import Arcs, Machine, Particle, Segments, build
 from chutelab.machine.releases import Releases
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.recorder import Recorder
+from machines import boxed
 
 G, V, R, PARTICLE, EPS, DISTANCE, DROP, MASS, MU = 9.81, 2.0, 0.1, 0.0063, 0.5, 0.5, 0.5, 0.008, 0.5
 BELT_TIME = 0.5
@@ -161,7 +162,7 @@ def machine_of(
                   for key in ("start", "end"))  # fmt: skip
     length = np.hypot(*(end - start).T)
     count, which = len(at), np.array(stream or [0] * len(at))
-    return replace(
+    found = replace(
         base,
         surfaces=names,
         segments=Segments(
@@ -176,12 +177,13 @@ def machine_of(
         ),
         releases=Releases(
             np.zeros(count), np.array(at, float), np.zeros((count, 2)), np.zeros(count, bool),
-            which, which.copy(),
+            which, which.copy(), np.zeros((count, 4)),
         ),
         particle=Particle(radius, 0.008, 0.0),
         outlines=more.pop("outlines", (None,) * (1 + max(which))),
         **more,
     )  # fmt: skip
+    return boxed(found)
 
 
 def recording_of(machine: Machine, *tracks: Any, ended: str = "time") -> Recording:

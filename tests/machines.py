@@ -74,7 +74,27 @@ def thrown(machine, position, velocity=(0.0, 0.0), t=0.0):
         stream=np.zeros(count, dtype=np.int64),
         kind=np.zeros(count, dtype=np.int64),
     )
-    return replace(machine, releases=releases, interact=count > 1)
+    return boxed(replace(machine, releases=releases, interact=count > 1))
+
+
+def boxed(machine):
+    """Return the machine with the boxes of its particles round all that it has now, and 1 m."""
+    arcs, place = machine.arcs, machine.releases.position
+    corners = [machine.segments.start, machine.segments.end]
+    for share in np.linspace(0.0, 1.0, 361):
+        angle = arcs.begin + share * arcs.extent
+        way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        corners.append(arcs.center + arcs.radius[:, None] * way)
+    wheel = machine.pulley.radius if machine.pulley else None
+    corners += [np.array([[-wheel, -wheel], [wheel, wheel]])] if wheel else []
+    corners += [place] if machine.interact else []
+    corners = np.concatenate(corners)
+    low = np.minimum(corners.min(axis=0, initial=inf), place) - 1.0
+    high = np.maximum(corners.max(axis=0, initial=-inf), place) + 1.0
+    if machine.gravity:
+        low[:, 0], high[:] = -inf, inf
+    box = np.concatenate([low, high], axis=1)
+    return replace(machine, releases=replace(machine.releases, exit_box=box))
 
 
 def bent(machine, *arcs):
@@ -88,7 +108,7 @@ def bent(machine, *arcs):
     names = tuple(dict.fromkeys([*machine.surfaces, *(row.pop("name") for row in rows)]))
     owner = [names.index(arc.get("name", f"arc {n}")) for n, arc in enumerate(arcs)]
     columns = {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}
-    return replace(machine, surfaces=names, arcs=Arcs(**columns, surface=np.array(owner)))
+    return boxed(replace(machine, surfaces=names, arcs=Arcs(**columns, surface=np.array(owner))))
 
 
 def gated(machine, piece, appears=-inf, vanishes=inf):

@@ -23,16 +23,16 @@ from chutelab import scene
 from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
+from chutelab.machine.parts import Thread
 from chutelab.pictures.animation import Moment, Stage, VideoError, animate, film, moments
-from chutelab.pictures.animation import files as video
+from chutelab.pictures.animation import stage as video
 from chutelab.pictures.animation.actors import SIGNS
-from chutelab.pictures.animation.files import palette, write_gif
 from chutelab.pictures.animation.moments import (
     sentence,
     slowness,
     span,
 )
-from chutelab.pictures.animation.stage import TRAIL, Layout, lay_out
+from chutelab.pictures.animation.stage import TRAIL, Layout, lay_out, palette, write_gif
 from chutelab.pictures.plots import Window, style, window_of
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder
@@ -584,6 +584,15 @@ def test_a_film_of_many_is_of_all_of_them_to_the_end() -> None:
     assert drawn["crowd"].get_markersize() / 72.0 * stage.figure.dpi == pytest.approx(x1 - x0)
     assert not set(drawn) & {"strobe", "arrows", "trails"}
     assert_readable(stage, 10)
+
+
+def test_strings_end_at_their_particles() -> None:
+    threads = (Thread((0.0, 0.9), 0, 0.4), Thread((0.3, 0.9), 1, 0.5))
+    recording = falling(at=[(0.0, 0.5), (0.3, 0.5)], threads=threads)
+    path = np.asarray(moved(stage_of(recording, moments_at([0.5])), 0)["strings"].get_xydata())
+    first, second, _ = np.split(path, np.flatnonzero(np.isnan(path[:, 0])) + 1)
+    assert first[[0, -2]] == pytest.approx(np.array([(0.0, 0.9), (0.0, 0.5)]))
+    assert second[[0, -2]] == pytest.approx(np.array([(0.3, 0.9), (0.3, 0.5)]))
 
 
 def test_what_is_not_asked_for_is_not_shown() -> None:

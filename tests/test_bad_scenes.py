@@ -223,23 +223,10 @@ VALUES = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3),
     max_leaves=6,
 )
-KNOWN = {
-    "": {"title", "gravity", *GOOD, "surface", "expect", "live"},
-    "particle": {"radius", "mass", "spin"},
-    "incoming": {"speed", "pulley_radius", "length", "friction", "restitution"},
-    "plate": {
-        *("distance", "angle_deg", "pivot_height", "above", "below"),
-        "restitution",
-        "friction",
-    },
-    "outgoing": {*("speed", "drop", "drop_from", "start", "length"), "restitution", "friction"},
-    "stream": {
-        *("count", "rate", "bed_height", "speed_spread", "seed", "at", "velocity", "interact"),
-        *("restitution", "friction"),
-    },
-    "run": {"engine", "until", "max_time", "dt", "align"},
-    "live": {"predict", "controls", "panels", "ranges", "presets"},
-}
+RULES = scene.Scene.model_json_schema()
+TABLES = ("particle", "incoming", "plate", "outgoing", "stream", "run", "live")
+KNOWN = {table: set(RULES["$defs"][table.capitalize()]["properties"]) for table in TABLES}
+KNOWN[""] = set(RULES["properties"])
 
 
 def with_key(table, key, value):

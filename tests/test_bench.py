@@ -14,12 +14,12 @@ from click.testing import CliRunner
 from PIL import Image
 
 from chutelab.checks import workprecision as bench
-from chutelab.checks.workprecision import MANY_STEPS, METHODS, Stopwatch, Timing, clocked, measure
+from chutelab.checks.workprecision import MANY_STEPS, METHODS, Stopwatch, Timing, measure
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.pictures.plots.workprecision import LOOKS
-from chutelab.pictures.plots.workprecision import workprecision as draw
+from chutelab.pictures.plots.studies import LOOKS
+from chutelab.pictures.plots.studies import workprecision as draw
 from chutelab.scene import load
 from chutelab.util.files import tsv_text
 from chutelab.util.versions import environment
@@ -43,13 +43,6 @@ def half_seconds(monkeypatch):
 
 
 @pytest.mark.usefixtures("half_seconds")
-def test_what_is_over_at_once_is_measured_several_times_in_a_row():
-    calls = []
-    assert clocked(lambda: calls.append(1) or "last", 4) == (0.125, "last")
-    assert len(calls) == 4
-
-
-@pytest.mark.usefixtures("half_seconds")
 def test_repeats_end_when_patience_does():
     calls = []
     watch = Stopwatch(lambda: calls.append(1), first=7.0, patience=6.0)
@@ -61,16 +54,6 @@ def test_repeats_end_when_patience_does():
         watch.repeat()
     assert watch.times == [0.5, 0.5, 0.5]
     assert len(calls) == 3
-
-
-def test_short_repeats_last_20_ms_together(monkeypatch):
-    numbers = []
-    monkeypatch.setattr(bench, "clocked", lambda run, n: (numbers.append(n) or 0.004, run()))
-    watch = Stopwatch(lambda: None, first=0.5, patience=2.0)
-    for _ in range(3):
-        watch.repeat()
-    # By what the one before took: 0.5 s, then 4 ms, and 4 ms again.
-    assert numbers == [1, 5, 5]
 
 
 # Errors.
@@ -254,7 +237,7 @@ def test_an_interrupt_leaves_no_files(tmp_path, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("chutelab.pictures.plots.workprecision.workprecision", interrupt)
+    monkeypatch.setattr("chutelab.pictures.plots.studies.workprecision", interrupt)
     out = tmp_path / "out"
     call("perpendicular", "--engine", "exact", "--repeats", 1, "--out", out, code=130)
     assert not list(tmp_path.iterdir())

@@ -16,13 +16,13 @@ from matplotlib.figure import Figure
 from chutelab.machine import Machine
 from chutelab.machine.parts import Thread
 from chutelab.pictures.plots import Window, draw_scene, draw_tracks, overlay, style
-from chutelab.pictures.plots.bodies import (
+from chutelab.pictures.plots.machinery import (
     draw_bodies,
     placed,
     stream_colours,
     strings,
 )
-from chutelab.pictures.plots.scenery import energies, places, window_of
+from chutelab.pictures.plots.scenery import energies, places
 from chutelab.results import Recording
 from handmade import Line, machine_of, recording_of
 
@@ -108,15 +108,6 @@ def test_a_box_is_drawn_turned_counterclockwise() -> None:
 
 
 # To scale
-
-
-def test_large_particles_are_seen_whole() -> None:
-    machine = machine_of(FLOOR, at=[(0.0, 0.4), (0.6, 0.4)], radius=0.3)
-    machine = replace(machine, threads=(Thread((0.0, 0.5), 0, 0.1),))
-    window = window_of(recording_of(machine, still((0.0, 0.4)), still((0.6, 0.4))))
-    assert window.left < -0.3
-    assert window.right > 0.9
-    assert window.top > 0.7
 
 
 # Streams

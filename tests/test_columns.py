@@ -10,17 +10,23 @@ from chutelab.engines.contact import run
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import Kind, laws
+from chutelab.results.ledger import ledger
 from chutelab.scene import from_dict
-from columns import column, faults
+from columns import column
 
 ROOT = Path(__file__).parents[1]
 
 
+def check(seed, count):
+    """No law is broken, and what solves gained, which no law allows for, is rounding."""
+    found = run(build(from_dict(column(seed, count))))
+    assert laws.judge(found) == ()
+    assert found.gained <= 1e-12 * ledger(found).turned_over
+
+
 @pytest.mark.parametrize("seed", [2, 8, 16, 20])
 def test_a_column_makes_no_energy(seed):
-    found = run(build(from_dict(column(seed, 60))))
-    assert faults(found) == []
-    assert laws.judge(found) == ()
+    check(seed, 60)
 
 
 @pytest.mark.parametrize(
@@ -41,7 +47,7 @@ def test_what_jams_is_not_pressed_into_each_other(seed, count):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_twenty_columns_and_silos_make_no_energy(seed):
-    assert faults(run(build(from_dict(column(seed, 1000 + 379 * seed % 1001))))) == []
+    check(seed, 1000 + 379 * seed % 1001)
 
 
 @pytest.mark.slow
@@ -49,16 +55,17 @@ def test_without_the_line_searches_columns_make_energy_and_a_law_tells(with_faul
     """The planted fault: impulses of the step before are taken as they are, and none are eased."""
     with_fault("solver.c", "if (!(all > 0)) return;", "if (list) return;")
     spoilt = [run(build(from_dict(column(seed, 60)))) for seed in (8, 16, 20, 22, 24)]
-    assert all(any("solves gained" in fault for fault in faults(found)) for found in spoilt)
+    assert all(found.gained > 1e-9 * ledger(found).turned_over for found in spoilt)
     assert all(laws.ENERGY in {broken.law for broken in laws.judge(found)} for found in spoilt)
 
 
 @pytest.mark.slow
-def test_where_blows_make_energy_disks_are_too_fast(with_fault):
+def test_where_blows_make_energy_a_law_tells(with_fault):
     """The planted fault: two disks part 1.2 times as fast as they met."""
     with_fault("impacts.c", "-c.rest * u[0]", "-(c.two ? 1.2 : c.rest) * u[0]")
     spoilt = [run(build(from_dict(column(seed, 60)))) for seed in (5, 9, 13, 16)]
-    assert all("no other lost that" in faults(found)[0] for found in spoilt)
+    told = [{broken.law for broken in laws.judge(found)} for found in spoilt]
+    assert all(laws.LOSSES in one or laws.ENERGY in one for one in told)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from chutelab import scene, theory
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
 from chutelab.results.comparison import compare, relative_error
-from chutelab.results.ledger import ledger
 from chutelab.scene.quantities import THEORY
 
 M, R, r = 0.008, 0.1, 0.0063
@@ -161,25 +160,6 @@ def test_the_belt_of_a_settled_run_pays_what_the_formula_says(name, speed):
     assert compared.simulated["slip_heat"] == pytest.approx(heat, abs=1e-14 * size)
     assert {"belt_work", "slip_heat"} <= set(compared.errors)
     assert compared.max < 1e-14
-
-
-def test_a_stream_takes_its_power_steadily():
-    """P = ṁ v_b (v_b - v_x), from the ledger of 100 settled particles."""
-    recording = run(
-        "perpendicular", "run.until=settled", "stream.count=100", "stream.rate=50",
-        "outgoing.speed=3", "outgoing.length=30",
-    )  # fmt: skip
-    vx = recording.select(Kind.LANDING)["velocity_before"][:, 0]
-    power = M * 50.0 * 3.0 * (3.0 - vx.mean())
-    work = ledger(recording).by_surface["outgoing"]["belt_work"]
-    assert work / (100 / 50.0) == pytest.approx(power, rel=1e-13, abs=0.0)
-    # and the theory's dEk over the time per particle, Eq. (15)
-    predicted = recording.prediction
-    assert float(predicted.P) == pytest.approx(
-        0.5 * M * (vx[0] ** 2 + 9.0) * 50.0, rel=1e-13, abs=0.0
-    )
-    # the books of many are no particle's own
-    assert isnan(compare(recording).simulated["belt_work"])
 
 
 def test_a_particle_that_never_stops_slipping_is_not_compared_with_one_that_does():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi, radians, sin
+from math import cos, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -209,3 +209,32 @@ def test_a_corner_is_of_the_first_piece_that_ends_there(engine, seed):
     roof = [arc | {"speed": 0.5 + n} for n, arc in enumerate(arcs)]
     hit = engine.run(bent(machine, *roof)).select(Kind.IMPACT)[0]
     assert abs(hit["velocity_after"][0]) == pytest.approx(0.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("engine", [exact, contact])
+@pytest.mark.parametrize("ways", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
+@pytest.mark.parametrize("frictions", [(0.1, 0.2), (0.3, 0.1)])
+@pytest.mark.parametrize("begins", [-1.0, 0.2])
+def test_of_two_faces_on_each_other_the_first_in_the_file_acts(engine, ways, frictions, begins):
+    """A slide down a slope of angle β: v² grows by 2 g (sin β - µ cos β) s, with the µ of one face.
+
+    That is the first, from where it begins; before, it is the second.
+    """
+    beta, v0, start, end = 0.3, 1.0, -0.1, 0.3
+    along, normal = np.array([cos(beta), -sin(beta)]), np.array([sin(beta), cos(beta)])
+    surface = [
+        face(name, *[along * s for s in span[::way]], friction=mu, restitution=0.0)
+        for name, span, way, mu in zip(
+            ("one", "two"), ((begins, end), (-0.7, end)), ways, frictions, strict=True
+        )
+    ]
+    machine = scene_of(particle={"spin": False}, surface=surface, run={"until": 0.5, "dt": 2e-4})
+    recording = engine.run(thrown(machine, start * along + 0.01 * normal, v0 * along))
+    pulls = G * (sin(beta) - np.array(frictions) * cos(beta))
+    on_one = end - max(begins, start)
+    speed = sqrt(v0**2 + 2.0 * pulls @ [on_one, end - start - on_one])
+    left = recording.select(Kind.SEPARATION)["velocity_before"][0]
+    # A step has the friction of one of them: all of it rubs as the other would, at most.
+    off = 1e-12 if engine is exact else G * abs(np.diff(frictions)[0]) * machine.dt
+    np.testing.assert_allclose(left, speed * along, rtol=0, atol=off)
+    assert recording.by_surface[1].any() == (begins > start)

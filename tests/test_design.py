@@ -16,15 +16,16 @@ from PIL import Image
 from scipy.stats import norm
 
 import chutelab
-from chutelab import design, scene
+import typed as design
+from chutelab import scene
 from chutelab.classroom.book import Book
 from chutelab.classroom.exercises import lesson
 from chutelab.cli import main
-from chutelab.pictures.plots.design import draw_scan, scan, spread
-from chutelab.studies.design import roots, sensitivity
-from chutelab.studies.design.evaluation import Evaluator, Outcomes, suits
-from chutelab.studies.design.quantities import measured, target
-from chutelab.studies.design.uncertainty import as_dict, spreads
+from chutelab.cli.studies import uncertain
+from chutelab.pictures.plots.studies import draw_scan, scan, spread
+from chutelab.studies.design import roots
+from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, suits, target
+from chutelab.studies.design.uncertainty import as_dict, indices, sampled, spreads
 from chutelab.util.errors import InputError
 
 G, V, R, D, DROP, M = 9.81, 2.0, 0.1, 0.5, 0.5, 0.008
@@ -289,7 +290,7 @@ def test_variants_run_at_once_give_the_bits_of_single_runs(name, keys, low, high
     known = [one for one in NAMES if _has(given, one)]
     quantities = [measured(given, one) for one in known]
     if given.outgoing is not None:
-        quantities += target(given, "landing.vx=outgoing.speed")[1:]
+        quantities += target(given, "landing.vx", "outgoing.speed")[1:]
     draws = np.random.default_rng(5).uniform(low, high, size=(16, 2))
     together = Evaluator(given, keys, quantities)(draws)
     alone = Evaluator(given, keys, quantities)
@@ -320,10 +321,10 @@ def test_streams_and_released_particles_run_one_by_one():
 def test_units_and_sides_of_a_target():
     given = machine()
     run = chutelab.simulate(given)
-    assert target(given, "landing.x = 300 mm")[1].of(run) == pytest.approx(0.3)
-    assert target(given, "landing.x=0.3")[1].unit == "m"
-    assert target(given, "landing.vx=incoming.speed")[1].of(run) == V
-    assert target(given, "landing.vx=impact.vx")[1].key == "impact.vx"
+    assert target(given, "landing.x", "300 mm")[1].of(run) == pytest.approx(0.3)
+    assert target(given, "landing.x", 0.3)[1].unit == "m"
+    assert target(given, "landing.vx", "incoming.speed")[1].of(run) == V
+    assert target(given, "landing.vx", "impact.vx")[1].key == "impact.vx"
 
 
 SOLVE = ("solve", "inclined-20")
@@ -467,8 +468,8 @@ def test_sobol_indices_of_ishigamis_function():
     # Ishigami and Homma (1990): V1 = ½ (1 + b π⁴/5)², V2 = a²/8, V13 = 8 b² π⁸/225.
     v1, v2, v13 = 0.5 * (1.0 + b * pi**4 / 5.0) ** 2, a**2 / 8.0, 8.0 * b**2 * pi**8 / 225.0
     variance = v1 + v2 + v13
-    points = pi * (2.0 * sensitivity.sampled(3, 4096, seed=0) - 1.0)
-    found = sensitivity.indices(f(points), seed=0)
+    points = pi * (2.0 * sampled(3, 4096, seed=0) - 1.0)
+    found = indices(f(points), seed=0)
     np.testing.assert_allclose(found.first, np.array([v1, v2, 0.0]) / variance, rtol=0, atol=0.01)
     np.testing.assert_allclose(
         found.total, np.array([v1 + v13, v2, v13]) / variance, rtol=0, atol=0.01
@@ -539,7 +540,7 @@ def test_a_sample_that_lacks_one_quantity_is_told_as_lacking_that_one():
 
 def test_uniform_and_relative_spreads():
     given = ["incoming.speed=2±10%", "plate.distance=0.5+/-20mm:uniform"]
-    speed, distance = spreads(machine(), given)
+    speed, distance = spreads(machine(), uncertain(given))
     assert speed.spread == pytest.approx(0.2)
     assert (distance.law, distance.spread) == ("uniform", pytest.approx(0.02))
     np.testing.assert_allclose(distance.values(np.array([0.0, 0.5, 1.0])), [0.48, 0.5, 0.52])

@@ -9,16 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hypothesis import assume, given
-from hypothesis import strategies as st
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 
 from chutelab.cli.program import main
 from chutelab.engines.simulation import simulate
 from chutelab.results.summary import summary
 from chutelab.scene import from_dict
 from chutelab.theory import drag, predict
-from chutelab.theory.drag import drag_coefficient, fly
+from chutelab.theory.drag import drag_coefficient
 
 G = 9.81
 AIR, VISCOSITY = 1.2, 1.8e-5
@@ -85,44 +83,6 @@ def test_the_shifts_against_scipy(r: float, degrees: float) -> None:
     assert told.impact_shift == pytest.approx(impact, rel=1e-5)
     assert told.landing_shift == pytest.approx(landing, rel=1e-5)
     assert told.arrives
-
-
-def test_the_shift_of_a_heavy_particle_is_that_of_small_drag_theory() -> None:
-    # To first order drag works along the path without it: m δ'' = -c |v| v, straight down a fall.
-    r, m = 0.02, 400.0
-    one = scene(particle={"radius": r, "mass": m}, plate={"restitution": 0.0})
-    found = predict(one)
-    told = drag(one, found, 0.0)
-    assert told is not None
-    c = 0.5 * AIR * 0.44 * math.pi * r * r / m
-    t2 = float(found.t2)
-
-    def accelerations(t: float) -> tuple[float, float]:
-        v = math.hypot(2.0, G * t)
-        return -c * v * 2.0, c * v * G * t
-
-    late = quad(lambda t: (t2 - t) * accelerations(t)[0], 0.0, t2, epsabs=0.0, epsrel=1e-12)[0]
-    up = quad(lambda t: (t2 - t) * accelerations(t)[1], 0.0, t2, epsabs=0.0, epsrel=1e-12)[0]
-    # It comes to the plate later by -late/2 s, and falls on meanwhile.
-    assert told.impact_shift == pytest.approx(up + late / 2.0 * G * t2, rel=1e-5)
-    assert told.landing_shift == pytest.approx(0.0, abs=1e-12)
-
-
-@given(st.floats(0.2, 30.0), st.floats(0.05, 2.0))
-def test_a_fall_with_a_constant_coefficient(terminal: float, height: float) -> None:
-    # v = vt tanh(g t/vt), y = vt²/g ln cosh(g t/vt), so v² = vt² (1 - exp(-2 g y/vt²)).
-    def rate(vx: float, vy: float) -> tuple[float, float]:
-        v = math.hypot(vx, vy)
-        return -G * v * vx / terminal**2, -G * v * vy / terminal**2 - G
-
-    speed = terminal * math.sqrt(-math.expm1(-2.0 * G * height / terminal**2))
-    time = terminal / G * math.atanh(speed / terminal) if speed < terminal else math.inf
-    free = math.sqrt(2.0 * height / G)
-    assume(time < 2.9 * free)
-    down = fly((0.0, 0.0, 0.0, 0.0), rate, lambda state: state[1] + height, free)
-    assert down is not None
-    assert down[1] == pytest.approx(-height, rel=1e-12)
-    assert down[3] == pytest.approx(-speed, rel=1e-5)
 
 
 def test_the_coefficient_of_a_sphere() -> None:

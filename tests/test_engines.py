@@ -397,26 +397,6 @@ def test_no_belt_wedges_a_disk_that_it_rolls_out_of_a_corner():
     assert end["position"][1] == pytest.approx(0.05, abs=1e-3 * 0.05)
 
 
-@both
-def test_a_pile_in_a_box_stays_in_it_and_gains_nothing(engine):
-    box = {"name": "box", "points": [[-0.05, 0.2], [-0.05, 0.0], [0.05, 0.0], [0.05, 0.2]],
-           "friction": 0.5, "restitution": 0.3}  # fmt: skip
-    stream = {"count": 30, "rate": 100.0, "at": [0.0, 0.05], "velocity": [0.3, 0.0],
-              "bed_height": 0.1, "interact": True}  # fmt: skip
-    recording = ran(engine, build(from_dict({"surface": [box], "stream": stream,
-                                             "run": {"until": 2.0}})))  # fmt: skip
-    ends = last(recording)
-    assert np.all(np.abs(ends[:, 0]) < 0.05 - 0.9 * R)
-    assert np.all(ends[:, 1] > 0.9 * R)
-    gaps = np.linalg.norm(ends[:, None] - ends, axis=2)[np.triu_indices(30, 1)]
-    assert gaps.min() > 1.9 * R
-    assert np.abs(last(recording, "velocity")).max() < 1e-2
-    if engine == "contact":
-        assert ledger(recording).relative_residual < 1e-11
-    else:  # what Chipmunk presses apart is energy from nowhere: a few percent
-        assert ledger(recording).relative_residual < 0.05
-
-
 # Ends, hosts
 
 
@@ -471,15 +451,6 @@ def test_of_a_crowd_each_leaves_where_it_falls_off(engine):
     assert out["t"] == pytest.approx(np.full(2, sqrt(2.0 * 2.0 / G)), abs=1e-3)
     books = ledger(recording)
     assert books.potential[1] == pytest.approx(M * G * (-2.0 + R), rel=1e-9)
-
-
-def test_what_hangs_on_a_string_has_not_left():
-    string = {"from": [0.0, 0.0]}
-    recording = simulated("pymunk", at=(3.0, 0.0), velocity=(0.0, 0.0), until=1.0, string=[string])
-    # From the horizontal it is at its lowest, 3 m below, after K(1/2) √(L/g) = 1.854 √(L/g).
-    end = recording.track(0)[-1]
-    assert (REASONS[recording.ended[0]], end["t"]) == ("time", 1.0)
-    assert end["position"][1] < -2.9
 
 
 @both

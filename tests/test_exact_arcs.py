@@ -135,68 +135,6 @@ def test_it_leaves_the_outside_where_its_weight_no_longer_holds_it(speed):
     assert run.surfaces[left["surface"]] == ("arc 0" if cosine < 1.0 else "ramp")
 
 
-@pytest.mark.parametrize("radius", [0.02, 0.0])
-@pytest.mark.parametrize("seed", range(4))
-def test_down_a_chute_of_ramps_and_bends_nothing_is_lost_but_by_friction(seed, radius):
-    """A ramp, a bend to the left, one to the right, a ramp: v dv/ds = g sin - µ N, N with v²/ρ."""
-    draw = np.random.default_rng(seed)
-    slope, turn, back = draw.uniform(0.5, 1.0), draw.uniform(0.3, 0.9), draw.uniform(0.2, 0.5)
-    mu, big, small = draw.uniform(0.0, 0.15), draw.uniform(0.3, 0.6), draw.uniform(2.0, 3.0)
-    down = np.array([cos(slope), -sin(slope)])
-    up = np.array([sin(slope), cos(slope)])
-    # The ramp ends at the origin; the first bend is round a point on its left.
-    one = big * up
-    flat = slope - turn
-    joint = one - big * np.array([sin(flat), cos(flat)])
-    two = joint - small * np.array([sin(flat), cos(flat)])
-    steep = flat + back
-    last = two + small * np.array([sin(steep), cos(steep)])
-    further = np.array([cos(steep), -sin(steep)])
-    ramps = [
-        face("down", (-2.0 * down).tolist(), [0.0, 0.0], friction=mu),
-        face("on", last.tolist(), (last + 3.0 * further).tolist(), friction=mu),
-    ]
-    first = {
-        "center": one,
-        "radius": big,
-        "begin": 1.5 * pi - slope,
-        "extent": turn,
-        "friction": mu,
-    }
-    second = {
-        "center": two,
-        "radius": small,
-        "begin": 0.5 * pi - steep,
-        "extent": back,
-        "friction": mu,
-    }
-    way = 0.3
-    # A point must not start below the ramp, not even by rounding.
-    place = -way * down + max(radius, 1e-13) * up
-    built = at(place, (0.0, 0.0), *ramps, radius=radius, until=5.0)
-    run = exact.run(bent(built, first, second))
-
-    # v² along the pieces, by its differential equation over the angle or the way.
-    def bend(v2, rho, start, end):
-        """φ from the top of the normal; ρ < 0 inside; φ' = w/ρ."""
-
-        def rate(phi, y):
-            return [2.0 * rho * (G * sin(phi) - mu * (G * cos(phi) - y[0] / rho))]
-
-        return solve_ivp(rate, (start, end), [v2], method="DOP853", rtol=1e-13, atol=1e-14).y[0, -1]
-
-    v2 = 2.0 * (G * sin(slope) - mu * G * cos(slope)) * way
-    v2 = bend(v2, -(big - radius), slope, flat)
-    v2 = bend(v2, small + radius, flat, steep)
-    assert v2 < G * cos(steep) * small
-    touched = [run.surfaces[n] for n in run.select(Kind.SEPARATION)["surface"]]
-    assert touched == ["on"]
-    end = run.select(Kind.SEPARATION)[0]
-    v2 += 2.0 * (G * sin(steep) - mu * G * cos(steep)) * 3.0
-    assert hypot(*end["velocity_before"]) ** 2 == pytest.approx(v2, rel=1e-10)
-    assert ledger(run).relative_residual < 1e-13
-
-
 def test_round_a_loop_it_comes_off_where_the_normal_force_is_gone():
     """In at the bottom at v² < 5 g L: off where v² = -g L cos φ, v² = v0² - 2 g L (1 - cos φ)."""
     floor = face("floor", [-2.0, 0.0], [0.0, 0.0], friction=0.0)

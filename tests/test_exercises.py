@@ -309,31 +309,6 @@ def test_what_is_no_known_mistake_is_told_how_far_off_it_is():
         assert text in reply.text, (ratio, reply)
 
 
-# Questions whose answers have no g in their formula, by lesson; all others have.
-WITHOUT_GRAVITY = {
-    "film-a-ball": {1, 2, 3},
-    "the-bounce": {1, 4},
-    "turning-the-plate": {1, 2, 3},
-    "landing": {1, 2, 4},
-    "a-stream": {1, 2, 4},
-    "trust": {1, 2, 3, 4},
-    "design": {1, 2, 3, 4},
-    "the-hopper": {1, 2, 4},
-    "the-heap": {1, 2, 3},
-}
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_another_g_is_suspected_where_there_is_one(name):
-    task = lesson(name, "gravity")
-    for number, right in enumerate(solution(name, task.given), start=1):
-        # On one side there may be a known mistake.
-        replies = [task.check(number, factor * right) for factor in (1.03, 0.97)]
-        reply = next(one for one in replies if one.verdict is Verdict.OFF)
-        assert "Were numbers rounded on the way" in reply.text
-        assert ("g not 9.81" in reply.text) == (number not in WITHOUT_GRAVITY.get(name, ()))
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_two_mistakes_at_once_are_both_named(name):
     found = {-1.0: 0, 1e3: 0, 1e-3: 0}

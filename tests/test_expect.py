@@ -169,14 +169,6 @@ def test_each_row_of_the_registry_is_read_alone_in_a_crowd_and_in_a_family():
         assert measured(family, name) == kind, name
 
 
-def test_stored_energies_have_a_start_and_an_end():
-    _, recording = shipped("perpendicular")
-    assert measure(recording, "ledger.kinetic.start") == 0.5 * 0.008 * 2.0**2
-    last = recording.track(0)[-1]
-    end = 0.008 * G * last["position"][1]
-    assert measure(recording, "ledger.potential.end") == pytest.approx(end, rel=1e-15, abs=0.0)
-
-
 # Tolerances.
 
 
@@ -269,23 +261,14 @@ def test_the_theory_is_asked_for_its_own_symbols_only():
 @pytest.mark.parametrize(
     ("more", "engines", "skipped"),
     [
-        (
-            "[particle]\nradius = 0\n",
-            ["exact"],
-            dict.fromkeys(("contact", "pymunk"), "it has no mass points"),
-        ),
-        (
-            "[stream]\ncount = 3\ninteract = true\nrate = 20\n",
-            ["contact", "pymunk"],
-            {"exact": "particles meet each other"},
-        ),
-        (
-            f"[stream]\ncount = {MOST_ALONE + 1}\n",
-            ["exact", "contact"],
-            {"pymunk": f"{MOST_ALONE + 1} particles that do not meet would take it minutes"},
-        ),
+        ("[particle]\nradius = 0\n", ["exact"],
+         dict.fromkeys(("contact", "pymunk"), "it has no mass points")),
+        ("[stream]\ncount = 3\ninteract = true\nrate = 20\n", ["contact", "pymunk"],
+         {"exact": "particles meet each other"}),
+        (f"[stream]\ncount = {MOST_ALONE + 1}\n", ["exact", "contact"],
+         {"pymunk": f"{MOST_ALONE + 1} particles that do not meet would take it minutes"}),
     ],
-)
+)  # fmt: skip
 def test_engines_that_are_not_for_a_scene_are_left_out(more, engines, skipped):
     found = verify(expecting("landing.count", 1, 1, machine=PERPENDICULAR + more))
     assert [row.engine for row in found.findings] == engines
@@ -328,15 +311,6 @@ def test_a_wrong_expectation_of_a_shipped_scene_is_noticed():
         *("exact", "contact", "pymunk", "theory")
     ]
     assert found.failures == 4
-
-
-def test_expectations_travel_with_the_recording_and_change_nothing():
-    scene, recording = shipped("perpendicular")
-    assert recording.scene.expect == scene.expect
-    tables = sc.to_dict(scene)
-    del tables["expect"]
-    bare = simulate(sc.from_dict(tables, scene.source))
-    assert np.array_equal(bare.knots, recording.knots)
 
 
 def test_a_quantity_may_be_of_one_stream():

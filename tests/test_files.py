@@ -4,13 +4,10 @@ import csv
 import io
 import re
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chutelab.studies.sweep.result import columns_of, text_of
-from chutelab.studies.sweep.rows import REASON
 from chutelab.util.files import csv_lines, harmless, unquoted
 
 STARTS = tuple("=+-@＝＋－＠")
@@ -56,11 +53,3 @@ def test_whatever_separates_the_cells_none_begins_as_a_formula_and_all_come_back
         assert cell == text
     else:
         assert not any(part.lstrip(' "').startswith(STARTS) for part in re.split("[;\t\r\n]", line))
-
-
-def test_reasons_of_a_sweep_come_back_from_its_file_of_finished_rows():
-    reasons = ["=1+1", "a;-b", "'=", "one\u2028line,\nanother", ""]
-    columns = {"x": np.array([-0.0, 0.5, -0.1, np.nan, 1e22]), REASON: np.array(reasons, object)}
-    found = columns_of(("x", REASON), text_of(columns))
-    assert found[REASON].tolist() == reasons
-    assert found["x"].tobytes() == columns["x"].tobytes()

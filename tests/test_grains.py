@@ -12,7 +12,7 @@ from chutelab.classroom.lessons.texts import without_tex
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
-from chutelab.scene import from_dict, to_dict
+from chutelab.scene import from_dict
 
 SEEDS = range(10)
 
@@ -47,15 +47,6 @@ def flow(recording):
 @pytest.fixture(scope="module")
 def emptied():
     return bin_of(0.036)
-
-
-def test_the_scene_as_it_is_has_the_slot_that_the_worksheet_says(emptied):
-    scene = scene_of(find(10), "slot.toml")
-    written = {one["name"]: one for one in to_dict(scene)["surface"]}
-    slot = written["slider"]["points"][0][0] - written["left"]["points"][-1][0]
-    assert slot == pytest.approx(0.036)
-    caught = scene_of(find(10), "hourglass.toml")
-    assert [one.name for one in caught.surface] == [*(one.name for one in scene.surface), "tray"]
 
 
 def test_the_summary_says_when_the_quarters_had_fallen_out(emptied):

@@ -22,9 +22,8 @@ from chutelab.classroom.lessons.pages import bundle
 from chutelab.classroom.lessons.sheets import printed
 from chutelab.classroom.lessons.texts import without_tex, words_for
 from chutelab.engines.simulation import judged
-from chutelab.pictures.animation.files import palette
 from chutelab.pictures.animation.moments import ASK, asked, film, slowness, span
-from chutelab.pictures.animation.stage import lay_out
+from chutelab.pictures.animation.stage import lay_out, palette
 from chutelab.pictures.plots import style
 from chutelab.results.quantities import measure
 

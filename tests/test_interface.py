@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import chutelab
+import typed
 from chutelab import design, theory
 from chutelab.checks.preflight import preflight
 from chutelab.machine import build
@@ -58,12 +59,12 @@ def test_a_scene_is_changed_as_it_is_run():
 
 
 def test_mappings_ask_the_same_as_texts():
-    said = chutelab.solve("inclined-20", "plate.angle_deg=0:60", "landing.vx=outgoing.speed")
+    said = typed.solve("inclined-20", "plate.angle_deg=0:60", "landing.vx=outgoing.speed")
     given = chutelab.solve(
         "inclined-20", {"plate.angle_deg": (0, 60)}, {"landing.vx": "outgoing.speed"}
     )
     assert str(said) == str(given)
-    texts = chutelab.sweep("perpendicular", ["plate.distance=40cm,500mm", "gravity=5:9:3"])
+    texts = typed.sweep("perpendicular", ["plate.distance=40cm,500mm", "gravity=5:9:3"])
     numbers = {"plate.distance": ["40 cm", 0.5 * 1.0], "gravity": [5, 7, 9]}
     with pytest.raises(InputError, match="give all numbers in one kind of unit"):
         chutelab.sweep("perpendicular", numbers)
@@ -74,6 +75,14 @@ def test_mappings_ask_the_same_as_texts():
     )
     with pytest.raises(InputError, match="must be a list of numbers"):
         chutelab.sweep("perpendicular", {"gravity": 5})
+    for ask in (
+        lambda: chutelab.sweep("perpendicular", ["gravity=5:9:3"]),
+        lambda: chutelab.solve("inclined-20", "plate.angle_deg=0:60", {"landing.vx": 1}),
+        lambda: chutelab.solve("inclined-20", {"plate.angle_deg": (0, 60)}, "landing.vx=1"),
+        lambda: design.uncertainty("perpendicular", ["restitution=0.5±0.05"]),
+    ):
+        with pytest.raises(InputError, match="is for the command line; in Python"):
+            ask()
 
 
 def test_a_recording_answers_by_itself():

@@ -1,4 +1,4 @@
-"""What turns keys into machines, in Python and in JavaScript: every number to the last bit."""
+"""What the page does itself, beside the core: keys, refusals, transfers, predictions."""
 
 import json
 
@@ -8,13 +8,12 @@ import pytest
 import sandbox
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
-from chutelab.scene import SceneError, from_dict, load, parse, shipped
+from chutelab.scene import SceneError, from_dict, load, parse
 from chutelab.scene.overrides import Override
 from chutelab.theory import Reason, predict, transfer
 from chutelab.theory.prediction import unbounded
 from chutelab.theory.results import STAGES
-from live.machines import as_page_has_it, plain
-from live.node import ask, needs_node
+from live.node import ask, needs_node, plain
 
 pytestmark = needs_node
 
@@ -38,32 +37,6 @@ def differences(mine, other, path=""):
             yield from differences(*pair, f"{path}[{n}]")
     elif mine != other:
         yield f"{path}: {mine} in Python, {other} in JavaScript"
-
-
-def compare(documents, names):
-    for document, name, found in zip(documents, names, in_node(documents), strict=True):
-        scene = from_dict(document)
-        assert "machine" in found, (name, found)
-        wrong = list(differences(plain(as_page_has_it(build(scene))), found["machine"]))
-        assert not wrong, (name, len(wrong), wrong[:5])
-        assert parse(found["toml"]) == scene, name
-
-
-@pytest.mark.parametrize("count", DRAWS)
-def test_machines_drawn_at_random_are_the_same_to_the_last_bit(count):
-    compare([sandbox.tables(seed) for seed in range(count)], range(count))
-
-
-def test_shipped_scenes_are_the_same_to_the_last_bit():
-    documents, names = [], []
-    for name in shipped():
-        try:
-            documents.append(describe(load(name))["scene"])
-        except SceneError:
-            continue
-        names.append(name)
-    assert len(names) > 10
-    compare(documents, names)
 
 
 WALL = {"name": "wall", "from": [0.0, 0.0], "to": [1.0, 0.0]}

@@ -52,21 +52,6 @@ def test_what_the_page_offers_can_be_set_and_is_no_change_of_the_machine(tmp_pat
     assert "; with" not in found["scene"]["title"]
 
 
-def test_a_scene_saved_from_the_page_offers_the_same(tmp_path):
-    """Keys by index, and drops from where the page measures them: from the top of the pulley."""
-    name, path = tmp_path / "own.toml", tmp_path / "lab.html"
-    name.write_text(
-        "[incoming]\nspeed = 2\npulley_radius = 0.1\n[plate]\ndistance = 0.5\n"
-        "[outgoing]\ndrop = 0.5\n[live]\nranges = { outgoing.drop = [0.4, 1] }\n"
-    )
-    call(name, "-o", path)
-    found = data_of(path)
-    # A throw at 2 m/s from the height R + r falls so far to the impact at x = R + d - r.
-    fall = 0.5 * 9.81 * ((0.1 + 0.5 - 0.0063) / 2.0) ** 2
-    assert found["live"]["ranges"]["outgoing.drop"] == pytest.approx([0.4 + fall, 1.0 + fall])
-    assert found["scene"]["live"] == {"ranges": found["live"]["ranges"]}
-
-
 def shown(tmp_path, **environment):
     """Run it without -o in a process of its own, whose files are in a folder of the test."""
     command = [sys.executable, "-m", "chutelab", "live", "perpendicular"]
@@ -95,12 +80,6 @@ def test_without_a_browser_it_says_so_and_where_the_page_is(tmp_path):
     assert result.returncode == 1
     (page,) = tmp_path.glob("*/perpendicular.html")
     assert f"no browser could be opened; the page is {page}" in result.stderr
-
-
-def test_what_the_contact_engine_has_not_is_refused_by_its_key(tmp_path):
-    result = call("perpendicular", "--set", "particle.radius=0", "-o", tmp_path / "a.html", code=2)
-    assert "particle.radius" in result.stderr
-    assert not (tmp_path / "a.html").exists()
 
 
 @pytest.mark.parametrize(

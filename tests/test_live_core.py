@@ -1,40 +1,52 @@
-"""The page's host of the core does what Python's does, to the last bit."""
+"""Scenes become rows and runs in the page's host of the core as in Python's, to the last bit."""
 
 import numpy as np
+import pytest
 
+import sandbox
 from chutelab.core import module
 from chutelab.engines import contact as engine
 from chutelab.machine import build
-from chutelab.scene import load
-from live.machines import as_page_has_it, plain
-from live.node import ask, needs_node
+from chutelab.pictures.live.describe import describe
+from chutelab.scene import from_dict, load, parse
+from live.node import ask, needs_node, page_scene
 
 pytestmark = needs_node
 
 SCENES = [
-    "perpendicular", "inclined-40", "stream", "slip", "spoon", "cascade", "two-sizes",
-    ("hopper", "stream.count=150"), ("stream", "stream.interact=true", "stream.count=60"),
-    "inclined-conveyor",
+    ("perpendicular",), ("inclined-40",), ("stream", "stream.count=60"), ("slip",), ("spoon",),
+    ("cascade",), ("two-sizes",), ("hopper", "stream.count=150"), ("inclined-conveyor",),
+    ("belt-landing",), ("free-fall",), ("low-speed",), ("mixture", "stream.fines.count=30"),
+    ("slip", "particle.shape=sphere", "particle.spin=true"),
+    *(("stream", "stream.count=20", f"stream.seed={seed}") for seed in (2**32, 2**53 - 1)),
 ]  # fmt: skip
 
 
-def test_the_pages_host_runs_every_kind_of_scene_as_python_does():
-    machines = []
-    for row in SCENES:
-        name, *overrides = (row,) if isinstance(row, str) else row
-        machines.append(build(load(name, overrides)))
-    answers = ask("core.mjs", plain([as_page_has_it(machine) for machine in machines]))
-    for row, machine, answer in zip(SCENES, machines, answers, strict=True):
-        job = engine.Job(module.Module(), machine)
+def same_runs(scenes):
+    told = [page_scene(scene) for scene in scenes]
+    lab = describe(load("perpendicular"))
+    answers = ask("core.mjs", {"lab": lab, "scenes": [given for given, _ in told]})
+    for (given, scene), answer in zip(told, answers, strict=True):
+        assert parse(answer["toml"]) == scene, given
+        job = engine.Job(module.Module(), build(scene))
         assert job.run(None) is None
         assert answer["state"] == "done"
         knots = np.concatenate(job.knots)
         ours = knots.view("<f8").reshape(-1, 10)[:, :9]
         its = np.array(answer["knots"]).reshape(-1, 10)
-        assert np.array_equal(its[:, :9], ours), row
-        assert np.array_equal(its[:, 9], knots["disk"]), row
+        assert np.array_equal(its[:, :9], ours), given
+        assert np.array_equal(its[:, 9], knots["disk"]), given
         events = np.concatenate(job.events)
-        assert [event["t"] for event in answer["events"]] == events["t"].tolist(), row
-        assert [event["kind"] for event in answer["events"]] == events["kind"].tolist(), row
+        assert [event["t"] for event in answer["events"]] == events["t"].tolist(), given
+        assert [event["kind"] for event in answer["events"]] == events["kind"].tolist(), given
         books = job.module.array("books", engine.REAL, 3 * (job.owners + 1)).reshape(-1, 3)
-        assert np.array_equal(np.array(answer["books"]), books), row
+        assert np.array_equal(np.array(answer["books"]), books), given
+
+
+def test_the_pages_host_runs_every_kind_of_scene_as_python_does():
+    same_runs([load(name, overrides) for name, *overrides in SCENES])
+
+
+@pytest.mark.parametrize("count", [24, pytest.param(200, marks=pytest.mark.slow)])
+def test_it_runs_scenes_with_any_keys_as_python_does(count):
+    same_runs([from_dict(sandbox.tables(seed)) for seed in range(count)])

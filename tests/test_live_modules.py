@@ -53,18 +53,6 @@ def test_every_word_that_is_said_is_in_the_catalogue():
         assert set(said) <= set(text), module.name
 
 
-def test_every_word_in_the_catalogue_is_said():
-    """Whole, as "undo", or by what comes after its family: `fault-${text}`."""
-    said = "\n".join(path.read_text(encoding="utf-8") for path in ASSETS.glob("*.*"))
-    words = json.loads((ASSETS / "strings" / "en.json").read_text(encoding="utf-8"))
-    families = set(re.findall(r"`(\w+)-\$", said))
-    for word in words:
-        family, _, own = word.partition("-")
-        if f'"{word}"' not in said:
-            assert family in families, word
-            assert re.search(rf"\b{own.rpartition('.')[2]}\b", said), word
-
-
 def test_every_word_of_an_exercise_is_in_its_catalogue():
     told = data_of(EXERCISES["the-bounce"])["words"]
     assert {key.partition("-")[0] for key in told} == set(SAID)

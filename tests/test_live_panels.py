@@ -9,16 +9,15 @@ import chutelab
 import sandbox
 from chutelab.engines.contact import run
 from chutelab.machine import build
+from chutelab.pictures.live.describe import describe
 from chutelab.results import Kind
 from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
 from chutelab.results.stream import envelopes
-from chutelab.scene import load
+from chutelab.scene import from_dict, load
 from chutelab.scene.quantities import THEORY
-from crowds import crowd
-from live.machines import as_page_has_it, plain
 from live.node import ask as ask_node
-from live.node import needs_node
+from live.node import needs_node, page_scene, plain
 
 THROW = Path(__file__).parents[1] / "lessons" / "01-the-parabola" / "throw.toml"
 pytestmark = needs_node
@@ -32,13 +31,14 @@ SCENES = [
 
 
 def ask(**questions):
-    return ask_node("panels.mjs", plain(questions))
+    return ask_node("panels.mjs", plain({"lab": describe(load("perpendicular")), **questions}))
 
 
 @pytest.fixture(scope="module")
 def runs():
-    scenes = [load(name, overrides) for name, *overrides in SCENES]
-    answers = ask(machines=[as_page_has_it(build(scene)) for scene in scenes])["runs"]
+    told = [page_scene(load(name, overrides)) for name, *overrides in SCENES]
+    given, scenes = zip(*told, strict=True)
+    answers = ask(scenes=given)["runs"]
     names = [name for name, *_ in SCENES]
     return dict(zip(names, zip(scenes, answers, strict=True), strict=True))
 
@@ -132,16 +132,15 @@ def test_arrivals_and_envelopes_are_pythons(runs, name):
 
 def test_arrivals_in_crowds_drawn_at_random_are_pythons():
     """Those that touch only what lies there, softly or hard, among them."""
-    drawn = [machine for _, machine in (crowd(seed, count=30) for seed in range(16))]
-    drawn = [
-        build(load("stream", ["stream.count=60"])),
-        *(machine for machine in drawn if machine.landing >= 0),
-    ]
-    assert len(drawn) > 2
-    answers = ask(crowds=[as_page_has_it(machine) for machine in drawn])["arrivals"]
+    beds = [f"stream.bed_height={0.02 * seed}" for seed in range(6)]
+    drawn = [load("stream", ["stream.count=30", f"stream.seed={n}", b]) for n, b in enumerate(beds)]
+    drawn += [from_dict(sandbox.tables(seed)) for seed in range(1, 40, 2)]
+    told = [page_scene(scene) for scene in drawn if build(scene).landing >= 0]
+    assert len(told) > 4
+    answers = ask(crowds=[given for given, _ in told])["arrivals"]
     indirect = 0
-    for n, (machine, its) in enumerate(zip(drawn, answers, strict=True)):
-        ours = run(machine)
+    for n, ((_, scene), its) in enumerate(zip(told, answers, strict=True)):
+        ours = run(build(scene))
         assert same_arrivals(ours, its), n
         own = ours.first(ours.select(Kind.LANDING, Kind.IMPACT, surface="outgoing"))
         indirect += np.isfinite(arrivals(ours)["t"]).sum() - len(own)
@@ -153,10 +152,9 @@ LAWS = ("law-finite", "law-inside", "law-through", "law-energy", "law-losses", "
 
 @pytest.mark.parametrize("name", ["perpendicular", "stream"])
 def test_each_law_is_broken_by_what_breaks_it_and_by_nothing_else(name):
-    machine = as_page_has_it(build(load(name, ["stream.count=20"] if name == "stream" else ())))
-    sound, *broken = ask(faulty=[{"machine": machine, "fault": law} for law in ("none", *LAWS)])[
-        "faulty"
-    ]
+    given, _ = page_scene(load(name, ["stream.count=20"] if name == "stream" else ()))
+    asked = [{"scene": given, "fault": law} for law in ("none", *LAWS)]
+    sound, *broken = ask(faulty=asked)["faulty"]
     assert sound["laws"] == []
     for law, told in zip(LAWS, broken, strict=True):
         first = next(one for one in told["laws"] if one["law"] == law)
@@ -167,8 +165,7 @@ def test_each_law_is_broken_by_what_breaks_it_and_by_nothing_else(name):
 
 def test_sound_runs_keep_the_laws(runs):
     assert [name for name, (_, answer) in runs.items() if answer["laws"]] == []
-    drawn = [build(sandbox.draw(seed)) for seed in range(12)]
-    told = ask(sound=[as_page_has_it(machine) for machine in drawn])["laws"]
+    told = ask(sound=[sandbox.tables(seed) for seed in range(12)])["laws"]
     assert [seed for seed, law in enumerate(told) if law] == []
 
 

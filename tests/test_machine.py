@@ -240,22 +240,47 @@ def test_a_flight_off_the_finite_plate_is_told_with_its_place(below, hit):
     assert hits == ([pytest.approx(hit, abs=5e-5)] if hit else [])
 
 
+def exit_box(found, particle=0):
+    """Return left, bottom, right and top of a particle's box."""
+    return found.releases.exit_box[particle].tolist()
+
+
 def test_the_scene_ends_a_metre_below_or_without_gravity_around_it():
     found = built()
-    assert found.exit_box == (-inf, inf, segment(found, "outgoing")[0][1] - 1.0, inf)
-    left, right, bottom, top = built(gravity=0.0).exit_box
+    assert exit_box(found) == [-inf, segment(found, "outgoing")[0][1] - 1.0, inf, inf]
+    left, bottom, right, top = exit_box(built(gravity=0.0))
     # without gravity the impact is at Rc and the belt 0.5 m + r lower
     assert (left, right, top) == pytest.approx((-3.0, 5.0, 1.4), abs=1e-15)
     assert bottom == pytest.approx(R - DROP - 1.0, abs=1e-15)
-    bare = built(gravity=0.0, plate=None, outgoing=None).exit_box
+    bare = exit_box(built(gravity=0.0, plate=None, outgoing=None))
     # it is released on the belt, its centre r above
-    assert bare == pytest.approx((-2.0, R + 1.0, -R - 1.0, R + 0.0063 + 1.0), abs=1e-15)
+    assert bare == pytest.approx((-2.0, -R - 1.0, R + 1.0, R + 0.0063 + 1.0), abs=1e-15)
     low = built(stream={"at": [0.5, -9.0], "velocity": [0.0, 5.0]}, plate=None, outgoing=None)
-    assert low.exit_box == (-inf, inf, -10.0, inf)
-    alone = machine.build(
-        scene.from_dict({"stream": {"at": [2.0, 3.0], "velocity": [0.0, 0.0]}, "gravity": 0.0})
-    )
-    assert alone.exit_box == (1.0, 3.0, 2.0, 4.0)
+    assert exit_box(low) == [-inf, -10.0, inf, inf]
+
+
+def test_all_that_a_scene_has_is_in_the_box_where_it_ends():
+    def box(**tables):
+        tables = {"stream": {"at": [2.0, 3.0], "velocity": [0.0, 0.0]}, "gravity": 0.0, **tables}
+        return machine.build(scene.from_dict(tables))
+
+    assert exit_box(box()) == [1.0, 2.0, 3.0, 4.0]
+    # An arc from 30 to 300 degrees of radius 2 round (2, 3): it has its top, its left and its
+    # bottom at 90, 180 and 270 degrees; rightmost is its first end, x = 2 + 2 cos 30° = 2 + √3.
+    arc = {"name": "a", "center": [2.0, 3.0], "radius": 2.0, "from_deg": 30.0, "to_deg": 300.0}
+    expected = [0.0 - 1.0, 1.0 - 1.0, 2.0 + 3.0**0.5 + 1.0, 5.0 + 1.0]
+    assert exit_box(box(surface=[arc])) == pytest.approx(expected, abs=1e-14)
+    # A string reaches as far all round as its length, 3-4-5 if it has to span that.
+    for length, reach in ((7.0, 7.0), (None, 5.0)):
+        string = {"from": [5.0, 7.0]} | ({"length": length} if length else {})
+        expected = [4.0 - reach, 6.0 - reach, 6.0 + reach, 8.0 + reach]
+        assert exit_box(box(string=[string])) == pytest.approx(expected, abs=1e-14)
+    # Of two that meet, one's box holds the other's release too, but not of two that do not.
+    streams = [{"at": [x, 0.0], "velocity": [0.0, 0.0]} for x in (0.0, 4.0)]
+    apart = box(stream=streams)
+    assert [exit_box(apart, n)[0] for n in (0, 1)] == [-1.0, 3.0]
+    crowd = box(stream=[{**stream, "interact": True} for stream in streams])
+    assert [exit_box(crowd, n)[0] for n in (0, 1)] == [-1.0, -1.0]
 
 
 def test_runs_end_in_time():

@@ -1,6 +1,6 @@
 """The Pymunk engine against the exact one and against laws written out here."""
 
-from math import radians, sqrt, tan
+from math import cos, radians, sin, sqrt, tan
 
 import numpy as np
 import pymunk
@@ -12,7 +12,8 @@ from chutelab.engines.pymunk import run
 from chutelab.machine import build
 from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
-from chutelab.scene import parse
+from chutelab.scene import from_dict
+from machines import face
 
 LONE = ("perpendicular", "perpendicular-fast", "inclined-20", "inclined-40", "inclined-60",
         "low-speed", "belt-landing")  # fmt: skip
@@ -75,65 +76,42 @@ def test_a_ride_round_the_pulley_converges(case):
     assert order > 1.0 or coarse < 1e-6
 
 
-@pytest.mark.parametrize("align", ["true", "false"])
+def dropped(at, velocity, *surfaces, **tables):
+    particle = {"radius": 0.01} | tables.pop("particle", {})
+    stream = {"at": list(at), "velocity": list(velocity)}
+    given = {"particle": particle, "stream": stream, "surface": list(surfaces), **tables}
+    return build(from_dict(given))
+
+
+@pytest.mark.parametrize("align", [True, False])
 def test_end_rollers_drive_as_their_faces_do(align):
     # A ball on the rim of a belt meets v (n_y, -n_x): the tangential impulse of a gripping rim is
     # J_t = -m (v·t - speed), t = (n_y, -n_x), for the normal n of the contact.
     n = np.array([-0.6, 0.8])
-    x = np.array([0.0, 0.0]) + 0.1 * n
-    v = -3.0 * n
-    text = f"""
-gravity = 0.0
-[particle]
-radius = 0.1
-mass = 2.0
-[stream]
-at = [{x[0] - 0.2 * v[0]}, {x[1] - 0.2 * v[1]}]
-velocity = [{v[0]}, {v[1]}]
-[run]
-until = 0.3
-align = {align}
-[[surface]]
-name = "belt"
-from = [0.0, 0.0]
-to = [1.0, 0.0]
-friction = 100.0
-restitution = 0.0
-speed = 1.5
-"""
-    hit = run(build(parse(text))).select(Kind.IMPACT)[0]
-    assert hit["t"] == pytest.approx(0.2, abs=1e-12 if align == "true" else 1.1e-3)
+    belt = face("belt", (0.0, 0.0), (1.0, 0.0), friction=100.0, restitution=0.0, speed=1.5)
+    m = dropped(
+        (0.1 + 0.2 * 3.0) * n, -3.0 * n, belt, gravity=0.0, particle={"radius": 0.1, "mass": 2.0},
+        run={"until": 0.3, "align": align},
+    )  # fmt: skip
+    hit = run(m).select(Kind.IMPACT)[0]
+    assert hit["t"] == pytest.approx(0.2, abs=1e-12 if align else 1.1e-3)
     assert hit["normal_impulse"] == pytest.approx(2.0 * 3.0, rel=1e-12)
     assert hit["tangential_impulse"] == pytest.approx(2.0 * 1.5, rel=1e-9)
 
 
-def test_an_inclined_ramp_is_slid_down_at_its_acceleration():
+@pytest.mark.parametrize("friction", [0.2, 0.9])
+def test_an_inclined_ramp_is_slid_down_at_its_acceleration(friction):
     # a = g (sin β - µ cos β), at rest where µ > tan β.
-    for friction in (0.2, 0.9):
-        beta = radians(30.0)
-        text = f"""
-[particle]
-radius = 0.01
-[stream]
-at = [{float(-0.01 * np.sin(beta))}, {float(0.01 * np.cos(beta))}]
-velocity = [0.0, 0.0]
-[run]
-until = 0.5
-dt = 0.004
-[[surface]]
-name = "ramp"
-from = [5.0, {5.0 * tan(beta)}]
-to = [-5.0, {-5.0 * tan(beta)}]
-restitution = 0.0
-friction = {friction}
-"""
-        got = run(build(parse(text)))
-        a = max(9.81 * (np.sin(beta) - friction * np.cos(beta)), 0.0)
-        gone = np.hypot(*(got.knots["position"][-1] - got.knots["position"][0]))
-        assert gone == pytest.approx(0.5 * a * 0.25, abs=1e-11)
-        assert ledger(got).friction_loss == pytest.approx(
-            0.008 * friction * 9.81 * np.cos(beta) * gone if a else 0.0, abs=1e-9
-        )
+    beta = radians(30.0)
+    ends = (5.0, 5.0 * tan(beta)), (-5.0, -5.0 * tan(beta))
+    ramp = face("ramp", *ends, restitution=0.0, friction=friction)
+    above = 0.01 * np.array([-sin(beta), cos(beta)])
+    got = run(dropped(above, (0.0, 0.0), ramp, run={"until": 0.5, "dt": 0.004}))
+    a = max(9.81 * (sin(beta) - friction * cos(beta)), 0.0)
+    gone = np.hypot(*(got.knots["position"][-1] - got.knots["position"][0]))
+    assert gone == pytest.approx(0.5 * a * 0.25, abs=1e-11)
+    heat = 0.008 * friction * 9.81 * cos(beta) * gone if a else 0.0
+    assert ledger(got).friction_loss == pytest.approx(heat, abs=1e-9)
 
 
 def test_steps_all_alike_converge_in_order_one():
@@ -146,29 +124,10 @@ def test_steps_all_alike_converge_in_order_one():
     assert errors[-1] < 0.25 * errors[0]
 
 
-FALL = """
-[particle]
-radius = 0.01
-[stream]
-at = [{x}, {y}]
-velocity = [1.0, 0.0]
-[run]
-align = {align}
-[[surface]]
-name = "ramp"
-points = [[{x}, {low}], [{far}, {lower}]]
-restitution = 0.5
-friction = 0.2
-"""
-
-
 def fall(x, y, align):
     """Two bounces on a ramp and off its end, somewhere in the world."""
-    return run(
-        build(parse(FALL.format(
-            x=x, y=y, low=y - 0.5, far=x + 1.0, lower=y - 0.75, align=str(align).lower()
-        )))
-    )  # fmt: skip
+    ramp = face("ramp", (x, y - 0.5), (x + 1.0, y - 0.75), restitution=0.5, friction=0.2)
+    return run(dropped((x, y), (1.0, 0.0), ramp, run={"align": align}))
 
 
 @pytest.mark.parametrize("align", [True, False])
@@ -184,24 +143,13 @@ def test_a_machine_far_away_runs_as_one_nearby(align):
     np.testing.assert_allclose(away.events["t"], near.events["t"], rtol=0, atol=1e-9)
 
 
-CROWDED = """
-[particle]
-radius = 0.004
-[incoming]
-speed = 0.5
-pulley_radius = 0.1
-[stream]
-count = 12
-rate = 200.0
-interact = true
-[run]
-until = 1.0
-"""
-
-
 def test_who_finds_its_place_taken_waits_until_it_is_free():
     # The belt takes 2 r / v to carry one out of the next one's way; steps are 1 ms.
-    got = run(build(parse(CROWDED)))
+    crowded = {
+        "particle": {"radius": 0.004}, "incoming": {"speed": 0.5, "pulley_radius": 0.1},
+        "stream": {"count": 12, "rate": 200.0, "interact": True}, "run": {"until": 1.0},
+    }  # fmt: skip
+    got = run(build(from_dict(crowded)))
     t = got.select(Kind.RELEASE)["t"]
     assert len(t) == 12
     assert np.diff(t).min() >= 0.008 / 0.5 - 1e-12

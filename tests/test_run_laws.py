@@ -26,6 +26,7 @@ from chutelab.engines import simulation
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
 from chutelab.results import laws
+from chutelab.results.ledger import ledger
 from chutelab.results.record import hermite
 from chutelab.results.recorder import StalledError
 from chutelab.scene import SceneError
@@ -124,6 +125,16 @@ def test_a_crowd_that_makes_energy_is_seen(engine):
     assert laws.LEDGER in names(spoilt(whole, knots=fast))
     both = names(spoilt(spoilt(whole, knots=booked), knots=fast))
     assert laws.LOSSES in both
+
+
+@pytest.mark.parametrize(("share", "seen"), [(0.5, []), (2.0, [laws.LEDGER])])
+def test_a_crowd_may_misbook_a_billionth_of_what_it_turns_over(share, seen):
+    whole = recorded(CROWD, "contact")
+
+    def misbook(knots):
+        knots["entries"][-1, 2] += share * 1e-9 * ledger(whole).turned_over
+
+    assert names(spoilt(whole, knots=misbook)) == seen
 
 
 @pytest.mark.parametrize(("share", "seen"), [(0.9, False), (1.1, True)])

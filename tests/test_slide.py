@@ -156,13 +156,6 @@ def test_outside(changes):
     assert np.isnan([found.angle, found.speed, found.omega, found.time, found.load]).all()
 
 
-def test_arrays_broadcast_and_one_bad_entry_spoils_no_other():
-    many = slide(radius=[[1.0], [-1.0]], start=-3.0, end=[-2.0, -1.0], friction=0.2)
-    assert many.speed.shape == (2, 2)
-    assert np.isnan(many.speed[1]).all()
-    assert many.time[0, 1] == slide(radius=1.0, start=-3.0, end=-1.0, friction=0.2).time
-
-
 def test_the_power_of_a_belt_is_what_its_load_gains_and_its_slip_heats():
     # A second's load of 120 t/h, from -0.5 to 3 m/s and 4 m up; slip heat ½ m (v_b - v_x)².
     mass, fed, belt, rise = 120.0e3 / 3600.0, -0.5, 3.0, 4.0

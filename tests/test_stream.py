@@ -15,7 +15,7 @@ from chutelab.results.recorder import Recorder
 from chutelab.results.stream import envelopes, steady
 from chutelab.results.summary import summary
 from chutelab.scene import SceneError, from_dict, load
-from chutelab.studies.sweep import sweep
+from typed import sweep
 
 G = 9.81
 

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from chutelab.cli import main
+from chutelab.cli.studies import varied
 from chutelab.engines.exact import CornerError, run
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
@@ -21,10 +22,8 @@ from chutelab.scene.variants import (
     Family,
     Vary,
     accepted,
-    parse_range,
     quantity,
 )
-from chutelab.scene.variants import parse as parse_vary
 from chutelab.studies.sweep import (
     COLUMNS,
     MOST_VARIANTS,
@@ -32,12 +31,11 @@ from chutelab.studies.sweep import (
     TEXTS,
     TOUCHES,
     batch,
-    planned,
-    sweep,
 )
 from chutelab.studies.sweep.batch import alone
 from chutelab.studies.sweep.rows import joined
 from chutelab.util.errors import InputError
+from typed import planned, sweep
 
 PAID, HEAT = (f"ledger.by_surface.outgoing.{name}" for name in ("belt_work", "friction_loss"))
 
@@ -344,7 +342,7 @@ def test_a_family_has_the_numbers_that_each_of_its_scenes_has(line):
                 "plate": {"distance": 0.3},
             }
         )
-    columns = {vary.key: np.array(vary.values) for vary in map(parse_vary, varies)}
+    columns = {vary.key: np.array(vary.values) for vary in varied(varies, ranges=False)}
     each = [scene.with_values({key: own[n] for key, own in columns.items()}) for n in range(2)]
     family = Family(each[0], columns)
     assert len(family) == 2
@@ -419,15 +417,18 @@ def test_options_that_cannot_be_are_refused_before_anything_runs(options, allowe
 
 
 def test_units_are_read():
-    assert parse_vary("particle.mass=8g,1kg").values == (0.008, 1.0)
-    assert parse_vary("plate.distance=50cm,1m").values == (0.5, 1.0)
-    assert parse_vary("plate.restitution=0:50%:3").values == (0.0, 0.25, 0.5)
-    assert parse_range("particle.mass=1kg:2kg").values == (1.0, 2.0)
+    def read(text, ranges=False):
+        return varied([text], ranges=ranges)[0]
+
+    assert read("particle.mass=8g,1kg").values == (0.008, 1.0)
+    assert read("plate.distance=50cm,1m").values == (0.5, 1.0)
+    assert read("plate.restitution=0:50%:3").values == (0.0, 0.25, 0.5)
+    assert read("particle.mass=1kg:2kg", ranges=True).values == (1.0, 2.0)
     scene = load("perpendicular")
     for text in ("plate.angle_deg=0:60°:3", "particle.mass=1kg,2kg", "incoming.speed=20cm/s,1m/s"):
-        quantity(scene, parse_vary(text))
+        quantity(scene, read(text))
     with pytest.raises(InputError, match="in kg, not in m"):
-        quantity(scene, parse_vary("particle.mass=1mm"))
+        quantity(scene, read("particle.mass=1mm"))
 
 
 # grids and samples -------------------------------------------------------------------------------
@@ -474,9 +475,9 @@ def test_whole_numbers_are_drawn_as_such_with_both_ends():
 
 def test_samples_need_ranges_and_grids_need_counts():
     scene = load("perpendicular")
-    with pytest.raises(InputError, match="samples are drawn between two ends"):
+    with pytest.raises(InputError, match="between two ends"):
         planned(scene, ["plate.angle_deg=1,2,3"], sample=4)
-    with pytest.raises(InputError, match="from ranges"):
+    with pytest.raises(InputError, match="between two ends, not from lists"):
         planned(scene, [Vary("plate.angle_deg", (1.0, 2.0))], sample=4)
     with pytest.raises(InputError, match="lhs, sobol"):
         planned(scene, ["plate.angle_deg=1:2"], sample=4, design="grid")
@@ -557,7 +558,7 @@ def test_a_crowds_ways_are_told_from_a_fiftieth_on(edge, told):
 
 
 def test_a_map_is_hatched_where_the_plate_is_missed():
-    from chutelab.pictures.plots.design import sweep_figure
+    from chutelab.pictures.plots.studies import sweep_figure
 
     swept = sweep(parse(PASSED), ["incoming.speed=1.9:2.1:11", "plate.restitution=0:1:10"])
     figure = sweep_figure(swept, "landing.vx.mean")

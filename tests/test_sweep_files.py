@@ -19,7 +19,7 @@ def _elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-SMALL = ["plate.angle_deg=-20:40:7", "incoming.speed=1,2"]
+SMALL = {"plate.angle_deg": range(-20, 41, 10), "incoming.speed": [1, 2]}
 
 
 def test_a_file_has_every_bit_of_the_rows():

@@ -12,11 +12,12 @@ import pytest
 
 import chutelab
 from chutelab.scene import load
-from chutelab.studies.sweep import crew, planned, sweep_to
+from chutelab.studies.sweep import crew, sweep_to
 from chutelab.studies.sweep.batch import alone
 from chutelab.studies.sweep.part import part_of
 from chutelab.studies.sweep.rows import joined
 from chutelab.util.errors import InputError
+from typed import planned
 
 
 @pytest.fixture(autouse=True)

@@ -18,8 +18,9 @@ from click.testing import CliRunner
 import chutelab
 from chutelab.cli import main
 from chutelab.scene import load
-from chutelab.studies.sweep import LostWorkersError, crew, planned, sweep, sweep_to
+from chutelab.studies.sweep import LostWorkersError, crew, sweep_to
 from chutelab.studies.sweep.part import part_of
+from typed import planned, sweep
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from chutelab.theory import TABLES, table
+from chutelab.theory import table
 
 RADII = (0.05, 0.0625, 0.08, 0.1, 0.125, 0.1575, 0.2, 0.25, 0.315, 0.4, 0.5)
 G = 9.81
@@ -72,10 +72,3 @@ def test_table_3_is_refuted_not_fitted():
     assert f"fall {(93.56914 - 34.84660) / (0.26 * G):.1f} m from the plate" in text
     assert "fall 23.0 m" in text
     assert math.sqrt(2 * 17.67536 / 0.26) == pytest.approx(11.66, abs=0.005)
-
-
-def test_there_are_no_other_tables():
-    assert TABLES == (1, 3, 4, 5)
-    for number in (0, 2, 6):
-        with pytest.raises(ValueError, match="tables 1, 3, 4 and 5"):
-            table(number)

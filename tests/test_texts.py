@@ -13,12 +13,10 @@ from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.pictures import plots
 from chutelab.pictures.animation import animate
-from chutelab.pictures.plots.design import scan, spread, sweep_figure
-from chutelab.pictures.plots.measured import measured
+from chutelab.pictures.plots.studies import measured, scan, spread, sweep_figure
 from chutelab.scene import SceneError, from_dict, parse, to_dict, to_toml
-from chutelab.studies.design import solve, uncertainty
 from chutelab.studies.measured import read, residuals
-from chutelab.studies.sweep import sweep
+from typed import solve, sweep, uncertainty
 
 NAME = "$x_{1$\x1b\N{RIGHT-TO-LEFT OVERRIDE}</b>漢"
 TITLE = f"Cost \\$5 or $\\frac{{\n\t\x9b2J {NAME} <script>alert(1)</script> & $y$ 🎈"

@@ -12,15 +12,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from chutelab.engines.simulation import simulate
 from chutelab.util.files import tsv_text
 from chutelab.util.versions import environment
 from work_precision import main
-from workprecision import METHODS, Record, Size, cases, claims, from_tsv, measure, whole_process
-from workprecision.cases import Reference, overlaps, typical, worst
+from workprecision import METHODS, Record, Size, cases, claims, from_tsv, whole_process
+from workprecision.cases import Reference, worst
 from workprecision.claims import order
 from workprecision.measure import COMMANDS
-from workprecision.methods import Method
 
 G, R, RADIUS, V, EPS, MU, DROP = 9.81, 0.1, 0.004, 2.0, 0.5, 0.3, 1.0
 KNOWN = cases()
@@ -91,24 +89,6 @@ def test_an_error_is_the_worst_of_quantities_and_particles():
     assert worst(answer, reference) == (pytest.approx(0.001, rel=1e-9), "t2")
 
 
-def test_overlaps_are_those_of_all_pairs():
-    rng = np.random.default_rng(5)
-    frames = rng.uniform(0.0, 0.1, (3, 60, 2))
-    frames[1, ::2] = np.nan
-    expected = []
-    for frame in frames:
-        for i in range(60):
-            for j in range(i):
-                distance = np.hypot(*(frame[i] - frame[j]))
-                if distance < 2.0 * RADIUS:
-                    expected.append(2.0 - distance / RADIUS)
-    found = overlaps(frames, RADIUS)
-    assert len(expected) > 20
-    assert np.sort(found) == pytest.approx(np.sort(expected), rel=1e-12, abs=0.0)
-    assert typical(np.linspace(0.0, 1.0, 101)) == pytest.approx(0.99, rel=1e-12, abs=0.0)
-    assert typical(np.empty(0)) == 0.0
-
-
 # Methods.
 
 
@@ -138,18 +118,6 @@ def test_plain_pymunk_is_of_first_order():
     assert all(1e-4 < row.error < 3e-2 for row in rows)
     # The error of the flight alone: y comes out ½ g dt t too low.
     assert rows[1].error > 0.5 * G * 1e-3 * 0.298 / (R + 0.5179)
-
-
-def test_a_method_that_breaks_costs_nobody_else_his_row(monkeypatch):
-    def run(self, case, scene, value):
-        if self.name == "aligned":
-            raise ZeroDivisionError("no\n  luck")
-        return simulate(scene)
-
-    monkeypatch.setattr(Method, "run", run)
-    rows = measure(["transfer"], ["aligned", "exact"], quick=True)
-    assert rows[0].failed == "ZeroDivisionError: no luck"
-    assert rows[-1].error < 1e-12
 
 
 # Clocks and memory.

@@ -14,12 +14,14 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 CORE = Path(__file__).parents[1] / "src" / "chutelab" / "core"
 
 EXPORTS = (
-    "run", "prepare", "world", "build", "plan", "draw", "drawing", "sine", "cosine", "angle_of",
-    "angle_of_cosine", "exact", "follow_all", "__heap_base",
+    "room", "world", "lay_out_world", "prepare", "run", "plan", "lay_out_plan", "build", "drawing",
+    "draw", "exact", "lay_out_exact", "follow_all", "laws", "lay_out_laws", "judge", "sine",
+    "cosine", "angle_of", "angle_of_cosine",
 )  # fmt: skip
 """What a host can call."""
 
@@ -68,13 +70,29 @@ def layout(text: str) -> dict[str, object]:
     return {"structs": structs, "enums": enums, "constants": constants}
 
 
+def checks(described: Any) -> str:
+    """Return C that does not compile where the compiler lays a struct out otherwise."""
+    lines = ["#include <stddef.h>", '#include "layout.h"']
+    for struct, its in described["structs"].items():
+        lines.append(f'_Static_assert(sizeof({struct}) == {its["size"]}, "{struct}");')
+        for name, (offset, _, _) in its["fields"].items():
+            same = f"offsetof({struct}, {name}) == {offset}"
+            lines.append(f'_Static_assert({same}, "{struct}.{name}");')
+    return "\n".join(lines) + "\n"
+
+
 def build(folder: Path) -> None:
     """Write core.wasm and layout.json into a folder."""
-    sources = sorted(map(str, CORE.glob("*.c")))
-    output = str(folder / "core.wasm")
-    command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "-o", output, *sources, "-lm"]
-    subprocess.run(command, check=True, cwd=CORE)
     described = layout((CORE / "layout.h").read_text(encoding="utf-8"))
+    sources = sorted(map(str, CORE.glob("*.c")))
+    with tempfile.TemporaryDirectory() as place:
+        check = Path(place) / "layout.c"
+        check.write_text(checks(described), encoding="utf-8")
+        command = [
+            sys.executable, "-m", "ziglang", "cc", *FLAGS, "-I", str(CORE),
+            "-o", str(folder / "core.wasm"), *sources, str(check), "-lm",
+        ]  # fmt: skip
+        subprocess.run(command, check=True, cwd=CORE)
     text = json.dumps(described) + "\n"
     (folder / "layout.json").write_text(text, encoding="utf-8")
 

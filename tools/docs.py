@@ -21,7 +21,6 @@ from pathlib import Path
 from pkgutil import walk_packages
 from types import ModuleType
 
-from chutelab.scene import about
 from pydantic import BaseModel
 from sphinx.cmd.build import build_main
 from sphinx.pycode import ModuleAnalyzer
@@ -30,7 +29,7 @@ import chutelab
 from chutelab.classroom.lessons import Lesson, shipped_lessons
 from chutelab.classroom.lessons.pages import LIVE, live_page
 from chutelab.pictures.live.page import write
-from chutelab.scene import SceneError, load
+from chutelab.scene import SceneError, about, load
 from chutelab.scene.quantities import REGISTRY, STATISTICS
 
 ROOT = Path(__file__).resolve().parent.parent

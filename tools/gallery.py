@@ -11,14 +11,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from chutelab.scene import about
-
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.plots.figure import draw_view
 from chutelab.pictures.plots.panels import analytic_of
 from chutelab.pictures.plots.scenery import as_crowd, bodily
 from chutelab.pictures.plots.style import Picture
-from chutelab.scene import load
+from chutelab.scene import about, load
 
 SIZE = (6.4, 4.2)
 """Width and height of a picture, inches."""

@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 
 from chutelab.pictures import PURPLE, VERMILION
 from chutelab.pictures.plots import style
+from chutelab.pictures.plots.studies import LOOKS as ENGINES
+from chutelab.pictures.plots.studies import decades
 from chutelab.pictures.plots.style import Picture
-from chutelab.pictures.plots.workprecision import LOOKS as ENGINES
-from chutelab.pictures.plots.workprecision import decades
 from workprecision import METHODS, Record, Size, cases
 from workprecision.claims import exponent, points, work_slope
 

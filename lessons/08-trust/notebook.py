@@ -14,7 +14,7 @@ book.errors(better)
 
 # %% Run 3
 from chutelab.checks.workprecision import measure
-from chutelab.pictures.plots.workprecision import workprecision
+from chutelab.pictures.plots.studies import workprecision
 
 scene = book.scene("perpendicular")
 workprecision(measure(scene, repeats=1, max_seconds=2), scene.title, {})

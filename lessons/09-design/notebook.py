@@ -4,36 +4,36 @@
 from chutelab import design
 
 scene = book.scene("inclined-20")
-down = design.solve(scene, "plate.angle_deg=11:60", "landing.vx=0")
+down = design.solve(scene, {"plate.angle_deg": (11, 60)}, {"landing.vx": 0})
 down
 
 # %% Run 1
-design.solve(scene, "plate.angle_deg=11:60", "landing.vx=1")
+design.solve(scene, {"plate.angle_deg": (11, 60)}, {"landing.vx": 1})
 
 # %% Run 1
-least = design.minimize(scene, "plate.angle_deg=11:60", "belt_work")
+least = design.minimize(scene, {"plate.angle_deg": (11, 60)}, "belt_work")
 least
 
 # %% Run 1
-from chutelab.pictures.plots.design import scan, spread
+from chutelab.pictures.plots.studies import scan, spread
 
 scan(least)
 
 # %% Run 1
-design.minimize(scene, "plate.angle_deg=11:60", "dEk")
+design.minimize(scene, {"plate.angle_deg": (11, 60)}, "dEk")
 
 # %% Run 2
 slower = book.scene("inclined-20", "outgoing.speed=1")
-design.minimize(slower, "plate.angle_deg=11:60", "belt_work")
+design.minimize(slower, {"plate.angle_deg": (11, 60)}, "belt_work")
 
 # %% Run 2
-design.minimize(slower, "plate.angle_deg=11:60", "slip_heat")
+design.minimize(slower, {"plate.angle_deg": (11, 60)}, "slip_heat")
 
 # %% Run 3
 both = design.solve(
     scene,
-    ["plate.angle_deg=20:60", "plate.restitution=0.1:0.9"],
-    ["landing.vx=1", "landing.x=0.3"],
+    {"plate.angle_deg": (20, 60), "plate.restitution": (0.1, 0.9)},
+    {"landing.vx": 1, "landing.x": 0.3},
     seed=1,
 )
 both
@@ -41,7 +41,12 @@ both
 # %% Run 4
 sure = design.uncertainty(
     book.scene("inclined-40"),
-    ["restitution=0.5±0.05", "plate.angle_deg=±0.5", "plate.distance=±2mm", "incoming.speed=±1%"],
+    {
+        "restitution": (0.5, 0.05),
+        "plate.angle_deg": (None, 0.5),
+        "plate.distance": (None, "2 mm"),
+        "incoming.speed": (None, "1%"),
+    },
     samples=256,
 )
 sure
@@ -56,7 +61,7 @@ from chutelab.pictures.plots.figure import paper_figure
 paper_figure(figures.figure(6))
 
 # %% [markdown] Questions
-# The machine with your numbers, for searches of your own, such as `design.solve(machine, "plate.angle_deg=5:60", "landing.vx=0")`:
+# The machine with your numbers, for searches of your own, such as `design.solve(machine, {"plate.angle_deg": (5, 60)}, {"landing.vx": 0})`:
 
 # %% Questions
 given = task.given

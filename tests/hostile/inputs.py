@@ -34,13 +34,11 @@ COMMANDS = (
 )  # fmt: skip
 USUAL = {
     "scene": "perpendicular", "scenes": "inclined-60", "material": "coal", "number": "8",
-    "recording": "../good/recording.npz",
-    "names": "the-bounce", "name": "2", "path": "new.toml", "settings": "plate.angle_deg=10",
-    "sets": "plate.restitution=0.3", "vary": "plate.restitution=0:1:3",
-    "varies": "plate.angle_deg=0:20:3",
+    "recording": "../good/recording.npz", "lesson": "the-bounce", "from_": "2",
+    "name": "mine", "path": "new.toml", "set_": "plate.angle_deg=10",
+    "vary": "plate.restitution=0:1:3", "uncertainty": "plate.restitution=0.5±0.1",
     "data": "../good/film.txt", "fit": "plate.restitution", "out": "out", "plot": "out.png",
-    "only": "csv,json",
-    "target": "landing.vx=-1", "targets": "landing.vx=-1", "of": "landing.x.mean",
+    "only": "csv,json", "target": "landing.vx=-1", "of": "landing.x.mean",
     "engine": "exact",
     "dt": "1e-3",
     "accuracy": "1e-3", "jobs": "1", "sample": "4", "seed": "3", "points": "9",

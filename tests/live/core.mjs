@@ -1,13 +1,14 @@
-// Runs machines in node by the page's own host of the core: a JSON list on stdin, one on stdout of
-// {state, knots (rows of ten numbers), events, books}.
+// Runs scenes in node by the page's own host of the core: {lab, scenes} on stdin, on stdout a list
+// of {state, knots (rows of ten numbers), events, books, toml}.
 import { readFileSync } from "node:fs";
 
-import { core } from "./run.mjs";
+import { core, load, machineOf } from "./run.mjs";
 
-// JSON has no infinity.
-const revive = (_, value) => (["Infinity", "-Infinity"].includes(value) ? Number(value) : value);
-const answers = JSON.parse(readFileSync(0, "utf8"), revive).map((machine) => {
-  core.begin(machine);
+const { toToml } = await load("keys.js");
+
+const { lab, scenes } = JSON.parse(readFileSync(0, "utf8"));
+const answers = scenes.map((given) => {
+  core.begin(machineOf(given, lab));
   const knots = [], events = [];
   let state = "running";
   while (state === "running") {
@@ -16,6 +17,6 @@ const answers = JSON.parse(readFileSync(0, "utf8"), revive).map((machine) => {
     knots.push(...taken.knots);
     events.push(...taken.events);
   }
-  return { state, knots, events, books: core.books() };
+  return { state, knots, events, books: core.books(), toml: toToml(given) };
 });
 process.stdout.write(JSON.stringify(answers));

@@ -6,12 +6,15 @@ import json
 import shutil
 import subprocess
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 
 import chutelab.pictures.live
+from chutelab.pictures.live.describe import describe
+from chutelab.scene import from_dict
 
 HERE = Path(__file__).parent
 ASSETS = Path(chutelab.pictures.live.__file__).parent / "assets"
@@ -43,3 +46,18 @@ def ask(script, question):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
+
+
+def page_scene(scene):
+    """Return a scene as a page begins with it, and the same for Python."""
+    given = describe(scene)["scene"]
+    return given, from_dict(given)
+
+
+def plain(value):
+    """Return a tree with the numbers that JSON has not as JavaScript writes them."""
+    if isinstance(value, float) and not isfinite(value):
+        return {"inf": "Infinity", "-inf": "-Infinity", "nan": "NaN"}[str(value)]
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    return {key: plain(entry) for key, entry in value.items()} if isinstance(value, dict) else value

@@ -2,7 +2,7 @@
 // answers on stdout.
 import { readFileSync } from "node:fs";
 
-import { core, load, recordingOf } from "./run.mjs";
+import { core, load, machineOf, recordingOf } from "./run.mjs";
 
 const { groundedLedger, stacks } = await load("energy.js");
 const { Arrivals } = await load("arrival.js");
@@ -40,10 +40,10 @@ const FAULTS = {
   "law-ledger": ({ set, last }) => set(last, VX, (vx) => 1.1 * vx + 0.1),
 };
 
-function faultyOf({ machine, fault }) {
-  const recording = recordingOf(machine);
+function faultyOf({ scene, fault }) {
+  const recording = recordingOf(built(scene));
   const event = recording.events.find(({ kind }) => kind === 4), { disk } = event;
-  const track = recording.tracks[disk], radius = machine.radius[disk];
+  const track = recording.tracks[disk], radius = recording.machine.radius[disk];
   const set = (knot, column, value) => {
     const at = knot * 10 + column;
     track.rows[at] = typeof value === "function" ? value(track.rows[at]) : value;
@@ -54,7 +54,8 @@ function faultyOf({ machine, fault }) {
   return { laws: lawsOf(recording), disk, at: event.t };
 }
 
-function runOf(machine) {
+function runOf(scene) {
+  const machine = built(scene);
   const recording = recordingOf(machine), { begin, end } = recording;
   const history = new RunHistory(recording, "plate"), { stages, landings, arrivals } = history;
   const times = Array.from({ length: 400 }, (_, n) => begin + ((end - begin) * n) / 399);
@@ -89,10 +90,11 @@ function watchOf(acts) {
 
 const revive = (_, value) => (["Infinity", "-Infinity"].includes(value) ? Number(value) : value);
 const asked = JSON.parse(readFileSync(0, "utf8"), revive);
+const built = (scene) => machineOf(scene, asked.lab);
 process.stdout.write(JSON.stringify({
-  runs: asked.machines?.map(runOf),
-  arrivals: asked.crowds?.map((machine) => new Arrivals(recordingOf(machine)).found),
-  laws: asked.sound?.map((machine) => lawsOf(recordingOf(machine))),
+  runs: asked.scenes?.map(runOf),
+  arrivals: asked.crowds?.map((scene) => new Arrivals(recordingOf(built(scene))).found),
+  laws: asked.sound?.map((scene) => lawsOf(recordingOf(built(scene)))),
   faulty: asked.faulty?.map(faultyOf),
   histograms: asked.values?.map((values) => histogram(values)),
   means: asked.values?.map(runningMean),

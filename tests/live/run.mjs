@@ -8,12 +8,17 @@ export const load = (name) => import(new URL(name, modules));
 const { startCore } = await load("core.js");
 const { startPlan } = await load("plan.js");
 const { Recording } = await load("recording.js");
+const { build } = await load("machine.js");
+const { resolve } = await load("scene.js");
 
 const home = new URL("../../src/chutelab/core/", import.meta.url);
 const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
 const module = await WebAssembly.compile(readFileSync(new URL("core.wasm", home)));
 export const core = await startCore(module, layout);
 await startPlan(module, layout);
+
+/** The machine of a scene, by its keys. */
+export const machineOf = (given, lab) => build(resolve(given, lab));
 
 /** The recording of a run, up to so many events, or whole. */
 export function recordingOf(machine, many = Infinity) {

@@ -230,7 +230,10 @@ def _bounces():
         bound = EPS * (ROUNDINGS + A_CONTACT * e.recording.contacts) * expected
         return Verdict(abs(found - expected), bound, f"s of {expected:.4g} s")
 
-    once = Case("bounces-10000", group, tables, steps=(COARSE,), formula=at_rest, ends=("settled",))
+    once = Case(
+        "bounces-10000", group, tables, steps=(COARSE,), formula=at_rest, ends=("settled",),
+        slow=("exact", "pymunk"),
+    )  # fmt: skip
     for_ever = merged(
         tables,
         {"surface": [{**floor, "restitution": 1.0}], "run": {"until": 900.0, "max_time": 900.0}},

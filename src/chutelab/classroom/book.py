@@ -73,7 +73,7 @@ class Runs(Shown):
 
 
 def _value(recording: Recording, name: str) -> float:
-    """Return a quantity: of what was not simulated, such as work until no slip, the theory's.
+    """Return a quantity: the theory's if it was not simulated, such as work until no slip.
 
     NaN where the scene has none, or one for each of several particles.
     """
@@ -106,8 +106,7 @@ class Book:
 
     def machine(self) -> Picture:
         """Draw the lesson's machine before anything happens."""
-        from chutelab.pictures.plots.bodies import draw_bodies
-        from chutelab.pictures.plots.machinery import draw_scene
+        from chutelab.pictures.plots.machinery import draw_bodies, draw_scene
         from chutelab.pictures.plots.scenery import action, window_of
         from chutelab.pictures.plots.style import Picture, dress
 
@@ -116,7 +115,7 @@ class Book:
         figure = Picture((9.0, 5.0))
         axes = dress(figure.add_subplot(), "x, m", "y, m", self._lesson.title)
         draw_scene(axes, recording.machine, window_of(recording))
-        # Where it separates is an answer, so it is drawn on its way there.
+        # The place of separation is an answer, so it is drawn halfway there.
         released = float(recording.track(0)["t"][0])
         draw_bodies(axes, recording, 0.5 * (released + action(recording)[0]))
         return figure
@@ -176,13 +175,13 @@ class Book:
         if not self._runs:
             return Sheet("", (), (), notes=(head,))
         sheet = Runs(self._lesson, self._runs).sheet()
-        # Many runs are easier to read below each other.
+        # A row for each run: many columns are hard to read.
         rows = tuple(zip(*[sheet.columns, *sheet.rows], strict=True))
         return Sheet("What came out", rows[0], rows[1:], notes=(head,))
 
     def landings(self, runs: Runs) -> Picture:
         """Draw where the particles of some runs land, mean, spread, lowest and highest layer."""
-        from chutelab.pictures.plots.crowd import draw_arrivals
+        from chutelab.pictures.plots.panels import draw_arrivals
         from chutelab.pictures.plots.style import Picture
 
         figure = Picture((9.0, 2.2 * len(runs) + 0.8))
@@ -193,13 +192,13 @@ class Book:
         return figure
 
     def live(self) -> Any:
-        """Return what the lesson's page has to play with, as a widget."""
+        """Return the lesson's live page as a widget."""
         from chutelab.pictures.live import live
 
         page = self._lesson.page
         if page is None:
             raise InputError(f"lesson {self._lesson.name} has no page: [page] is not in its plan")
-        # By now the student has predicted.
+        # The student has predicted already.
         shown = [*page.settings, Override("live.predict", False)]
         return live(scene_of(self._lesson, page.scene, shown))
 

@@ -36,10 +36,10 @@ from chutelab.util.files import csv_lines
 from chutelab.util.versions import too_old
 
 LARGEST: Final = 25 << 20
-"""Bytes; a notebook with its pictures is a tenth of it. As JSON it takes up to 30 times that."""
+"""Most bytes of a notebook; one with pictures has a tenth. Parsed, it takes up to 30 times that."""
 
 LARGEST_RESULT: Final = 256 << 10
-"""Bytes; a result file has four numbers and what its student wrote."""
+"""Most bytes of a result file; it has four numbers and what the student wrote."""
 
 RESULT: Final = ".json"
 """End of a result file's name. The page calls it ``the-bounce-Ada.chutelab.json``, and browsers and
@@ -47,20 +47,20 @@ learning platforms put more before the end."""
 
 
 class ReturnedError(InputError):
-    """A file that cannot be marked; its text says why."""
+    """A file that cannot be marked; the message says why."""
 
 
 def _content(path: Path, kind: str, most: int) -> Any:
-    """Return what a file of JSON has in it."""
+    """Return the content of a JSON file."""
     try:
-        # Asked before it is opened, which alone would set off some devices; and not waited for, if
-        # it has become a pipe since then.
+        # Checked before it is opened, since opening triggers some devices, and after, without
+        # waiting: it may have become a pipe.
         regular = stat.S_ISREG(path.stat().st_mode)
         data = b""
         if regular:
             flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
             with os.fdopen(os.open(path, flags), "rb") as file:
-                # A size that is told may be wrong.
+                # Not by the reported size, which may be wrong.
                 regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
                 data = file.read(most + 1) if regular else b""
     except (OSError, ValueError) as error:
@@ -156,7 +156,7 @@ class Work(BaseModel):
 
 
 def _work(found: object) -> Work:
-    """Return what a student did; a `ValueError` says what no chutelab writes so."""
+    """Return what a student did; a `ValueError` says what chutelab would not have written."""
     try:
         work = Work.model_validate(found)
     except ValidationError as error:
@@ -177,7 +177,7 @@ def result_of(path: Path) -> Work:
     Raises
     ------
     ReturnedError
-        If it cannot be read, or has anything in it that no page writes.
+        If it cannot be read, or has content that no page writes.
     """
     found = _content(path, "result file", LARGEST_RESULT)
     match found:
@@ -200,7 +200,7 @@ def is_result(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class Grade:
-    """The row of one file; what it does not have is empty."""
+    """The row of one file; missing values are empty."""
 
     file: str  # as it was given
     student: str = ""
@@ -356,7 +356,7 @@ def _of_notebook(file: str, time_limit: float) -> Grade:
 
 
 def _marked(file: str, work: Work, reasons: Sequence[str] = ()) -> Grade:
-    # The right answers come from here, whatever was made of them in the kernel or the page.
+    # The right answers are computed here: those of the kernel or the page may be forged.
     _, cases = draw(EXERCISES[work.lesson], work.student)
     replies = [judge(cases[n - 1], answer) for n, answer in sorted(work.answers.items())]
     right = {reply.question for reply in replies if reply.right}
@@ -391,7 +391,7 @@ def _works(reports: object) -> list[Work]:
         try:
             work = _work(one)
         except ValueError as error:
-            raise ForgedError(f"its report is none of chutelab's: {error}") from None
+            raise ForgedError(f"its report is not from chutelab: {error}") from None
         first = works.setdefault((work.lesson, plain(work.student)), work)
         first.answers |= work.answers
         first.revealed += work.revealed
@@ -459,5 +459,5 @@ def _lesson(name: str, rows: list[Grade]) -> Iterator[str]:
 
 
 def _literal(text: str) -> str:
-    """Return a text for a cell of Markdown that shows just that."""
+    """Return a text in which nothing is Markdown."""
     return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))

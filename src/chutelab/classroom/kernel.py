@@ -243,7 +243,7 @@ def _end(watcher: subprocess.Popen[bytes], folder: str) -> int:
 
 
 def _sweep(folder: str) -> None:
-    """Do what is left to do without a watcher; a folder in the environment tells whose it is."""
+    """Clean up without a watcher; its processes have the folder in their environment."""
     import psutil
 
     for process in psutil.process_iter():

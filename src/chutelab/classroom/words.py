@@ -1,4 +1,4 @@
-"""What a learner is told, in each language: a catalogue of templates, ``strings/LANGUAGE.json``.
+"""Texts for learners in each language: a catalogue of templates, ``strings/LANGUAGE.json``.
 
 A translation is a file. Templates have ``{names}`` for what is filled in; a live page reads the
 same files, in which keys that begin with ``python-`` speak of cells and ``task``, which it has not.
@@ -22,7 +22,7 @@ LANGUAGES: Final = tuple(sorted((path.stem for path in STRINGS.glob("*.json")), 
 
 
 class LanguageError(InputError):
-    """A language that there is no catalogue for."""
+    """A language without a catalogue."""
 
 
 class Words:

@@ -222,7 +222,7 @@ def bench(
                 loaded, engine, dt, repeats=repeats, max_seconds=max_seconds, progress=update
             )
         if into is not None:
-            from chutelab.pictures.plots.workprecision import workprecision
+            from chutelab.pictures.plots.studies import workprecision
 
             text = tsv_text(timings, Timing, {"scene": loaded.title, **about})
             (into / files[0]).write_text(text, encoding="utf-8")
@@ -234,7 +234,7 @@ def bench(
 
 
 def _table(title: str, timings: Sequence[Timing], measured: str) -> Sheet:
-    """Return the table of a scene, why runs failed, how errors are known, and what it ran on."""
+    """Return the table of a scene, with notes: failures, how errors are known, the machine."""
     from chutelab.util.tables import Sheet
 
     rows = [

@@ -1,6 +1,6 @@
 """What commands print: text and JSON on standard output, a progress bar on standard error.
 
-The bar is for people who wait longer than a second.
+The bar appears after a second.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class _Output(io.TextIOWrapper):
-    """Standard output, whose errors say which file they mean: it has no name."""
+    """Standard output; its errors say "standard output", since it has no file name."""
 
     def write(self, text: str, /) -> int:
         with self._named():
@@ -57,7 +57,7 @@ class _Errors(io.TextIOWrapper):
 
 
 def open_streams() -> None:
-    """Make the standard streams such that the rest need not ask what they are.
+    """Make the standard streams safe to write to, whatever they are.
 
     One that is closed becomes the null device: else the next file that is opened gets its number,
     and what others print. A title in Greek does not fail in a terminal that has no Greek.
@@ -81,7 +81,7 @@ def open_streams() -> None:
 
 
 def say(text: str, *, err: bool = False, end: str = "\n") -> None:
-    """Print a text in which a terminal finds nothing to obey, whatever titles and names are in it.
+    """Print a text; control characters in titles and names are escaped.
 
     All text goes through here, or through `show`.
     """
@@ -89,7 +89,7 @@ def say(text: str, *, err: bool = False, end: str = "\n") -> None:
 
 
 class _Shown:
-    """What rich prints of something, in which a terminal finds nothing to obey but colours."""
+    """What rich prints of something, with control characters escaped, colours aside."""
 
     def __init__(self, part: RenderableType) -> None:
         self.part = part
@@ -108,9 +108,9 @@ def show(*parts: RenderableType) -> None:
     console = Console(highlight=False)
     with console.capture() as capture:
         for part in parts:
-            # What was made printable is longer than it was, and not to be cut for it.
+            # Escaped characters take more room: lines are not cut for that.
             console.print(_Shown(part), crop=False)
-    # Through click: it flushes, and knows what to do when the reader has gone.
+    # click flushes, and handles a closed pipe.
     click.echo(capture.get().removeprefix("\n"), nl=False)
 
 
@@ -138,7 +138,7 @@ def tell(
 
 
 PATIENCE = 1.0
-"""s without a bar: what is over sooner needs none, and should not wait for its import."""
+"""s before a bar appears: shorter work needs none, nor the time its import takes."""
 
 
 @contextmanager
@@ -173,7 +173,7 @@ def progress(
             console=Console(stderr=True),
             transient=True,
         )
-        # Without a total it pulses.
+        # Without a total the bar pulses.
         bar.add_task(printable(what), total=None)
         bar.start()
         bars.append(bar)

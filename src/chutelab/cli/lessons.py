@@ -39,6 +39,8 @@ def complete_lesson(begun: str) -> list[CompletionItem]:
     return beginning(titles, begun)
 
 
+HEADS = ("file", "student", "lesson", "marks (*: working shown)", "remarks")
+
 LessonName = Annotated[str, FileName(), complete_lesson]
 LessonNames = Annotated[Texts, FileName(), complete_lesson]
 
@@ -58,7 +60,7 @@ def lesson() -> None:
 
 @command("List the lessons.", lesson)
 def list_(*, json_: bool) -> None:
-    """List the lessons: number, name, for whom, how long, and the question of each."""
+    """List the lessons: number, name, level, duration, and the question of each."""
     from chutelab.classroom.lessons.reading import shipped_lessons
     from chutelab.util.tables import Sheet
 
@@ -100,8 +102,6 @@ def show(
     --format  Markdown, a web page in one file, or A4 to print (which needs the extra
         chutelab[pdf]); default: as the file's name says, in a folder pdf.
     --all  The sheet of every shipped lesson.
-    --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
-        [default]
     --json  Print one JSON object instead of text.
     """
     if (lesson is None) is not all_:
@@ -229,7 +229,7 @@ def new(name: Path, *, from_: LessonName | None) -> None:
     copied = None if from_ is None else find(from_)
     with writing(instead="another place"):
         made = start(name, copied)
-    # A name with a folder in front is taken for a folder, even if a shipped lesson has it.
+    # With a folder in front it means the folder, even if a shipped lesson has this name.
     said = made if len(made.parts) > 1 else f"./{made}"
     console.say(f"wrote {made}; edit it, and make its picture with: chutelab lesson build {said}")
 
@@ -255,8 +255,6 @@ def page(
     file of that name.
 
     -o, --out DIR  The folder, or FILE.html; files that are there are replaced. [required]
-    --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
-        [default]
     --wheel / --no-wheel  With what students install, or without.
     """
     from chutelab.classroom.lessons.pages import bundle, live_page
@@ -312,8 +310,6 @@ def scorm(
     --all  All lessons that are shipped.
     -o, --out DIR|FILE.zip  The folder for the packages, NN-name.scorm.zip each, by default this
         one; or, for one lesson, the zip file itself. Files that are there are replaced.
-    --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
-        [default]
     """
     from chutelab.classroom.lessons.pages import package
 
@@ -356,7 +352,7 @@ def _plain(lesson: Lesson) -> dict[str, object]:
 
 @command("Mark what students returned: notebooks, result files.", lesson)
 def grade(
-    # One that cannot be read has its row.
+    # A file that cannot be read gets a row of its own.
     files: Annotated[tuple[Path, ...], FileName(exists=True, readable=False, path_type=Path)],
     *,
     out: Annotated[Path | None, FileName(dir_okay=False, path_type=Path)],
@@ -430,7 +426,12 @@ def grade(
             )
     done: list[Grade] = []
 
-    def rows(update: Callable[[float], None] | None) -> Iterator[Grade]:
+    def marks(one: Grade) -> str:
+        given = enumerate(one.marks, 1)
+        shown = " ".join(f"{mark}*" if n in one.revealed else str(mark) for n, mark in given)
+        return f"{one.total} of {one.out_of} ({shown})" if one.marks else "-"
+
+    def marked(update: Callable[[float], None] | None) -> Iterator[Grade]:
         for row in grade_returned(returned, time_limit=time_limit):
             done.append(row)
             yield row
@@ -445,30 +446,21 @@ def grade(
     try:
         with progress("marking", quiet=quiet) as update, writing(f"--out {out}"):
             if out is None:
-                deque(rows(update), maxlen=0)
+                deque(marked(update), maxlen=0)
             else:
-                write_csv(rows(update), out)
+                write_csv(marked(update), out)
     finally:
         if done and json_:
             console.show_json({"format": 1, "grades": done})
         elif done and not quiet:
-            console.show(Sheet("", HEADS, tuple(map(_cells, done)), texts=5))
+            rows = [(one.file, one.student, one.lesson, marks(one), one.reason) for one in done]
+            console.show(Sheet("", HEADS, tuple(rows), texts=5))
         if out is not None and part.exists():
-            marked = f"{len(done)} of {len(returned)} files"
-            console.say(f"the marks of {marked} are in {part}", err=True)
+            count = f"{len(done)} of {len(returned)} files"
+            console.say(f"the marks of {count} are in {part}", err=True)
     if report is not None:
         with writing(f"--report {report}"):
             write_lines(report, [class_report(done)], errors="replace")
     for target in filter(None, (out, report)):
         if not json_:
             console.say(f"wrote {target}")
-
-
-HEADS = ("file", "student", "lesson", "marks (*: working shown)", "remarks")
-
-
-def _cells(one: Grade) -> tuple[str, ...]:
-    """Return the cells of a row in the table, see `HEADS`."""
-    shown = (f"{mark}*" if n in one.revealed else str(mark) for n, mark in enumerate(one.marks, 1))
-    marks = f"{one.total} of {one.out_of} ({' '.join(shown)})"
-    return (one.file, one.student, one.lesson, marks if one.marks else "-", one.reason)

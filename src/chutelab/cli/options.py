@@ -56,6 +56,8 @@ SHARED = """
 --engine  Same as --set run.engine=...
 --dt S  Same as --set run.dt=S.
 --json  Print one JSON object instead of tables.
+--language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
+    [default]
 -q, --quiet  Print nothing, and show no progress bar.
 """
 """Options of several commands."""
@@ -102,10 +104,11 @@ def _parameters(taker: Callable[..., Any], parts: dict[str, Any]) -> Iterator[cl
             parts[name] = kind
             yield from _parameters(kind, parts)  # type: ignore[arg-type]
             continue
-        while (form := get_origin(kind)) in (Annotated, tuple, Union, UnionType):
-            several = several or form is tuple
+        # `X | None`, `tuple[X, ...]` and `Annotated[X, ...]` take an X.
+        while (outer := get_origin(kind)) in (Annotated, tuple, Union, UnionType):
+            several = several or outer is tuple
             kind, *others = get_args(kind)
-            extras += others if form is Annotated else []
+            extras += others if outer is Annotated else []
         usual: Any = FileName(path_type=Path) if kind is Path else kind
         if get_origin(kind) is Literal:
             usual = click.Choice(get_args(kind))
@@ -154,23 +157,23 @@ def beginning(told: Mapping[str, str], begun: str) -> list[CompletionItem]:
 
 
 class Number(click.FloatRange):
-    """A number in a range, called so in what click says of anything else."""
+    """A number in a range; click's messages call it "number"."""
 
     name = "number"
 
 
 class Count(click.IntRange):
-    """A whole number in a range, called so in what click says of anything else."""
+    """A whole number in a range; click's messages call it "whole number"."""
 
     name = "whole number"
 
 
 DEEPEST = 200
-"""Folders inside each other in a name; each made needs a call inside the one before."""
+"""Most folders inside each other in a name: making them is recursive."""
 
 
 class FileName(click.Path):
-    """The name of a file or folder, refused where the system can have none that is called so."""
+    """The name of a file or folder; refused if the system allows no such name."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the name as `click.Path` does."""
@@ -188,7 +191,7 @@ class FileName(click.Path):
 
 
 class FolderName(FileName):
-    """The name of a folder, which is made where there is none."""
+    """The name of a folder; it is made if there is none."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the name as a path."""
@@ -198,7 +201,7 @@ class FolderName(FileName):
 
 
 PICTURES = (".png", ".svg", ".pdf")
-"""What pictures may be written as, by suffix."""
+"""Suffixes of pictures."""
 
 Texts = tuple[str, ...]
 SceneName = Annotated[str, complete_scene]
@@ -210,7 +213,7 @@ Folder = Annotated[Path | None, FolderName()]
 def loaded_as_told(
     name: str, overrides: Sequence[str], engine: str | None = None, dt: float | None = None
 ) -> Scene:
-    """Load a scene with what ``--set``, ``--engine`` and ``--dt`` change; its title says so."""
+    """Load a scene changed by ``--set``, ``--engine`` and ``--dt``; the title names the changes."""
     from chutelab.scene import load
     from chutelab.scene.overrides import Override
 
@@ -225,7 +228,7 @@ def loaded_as_told(
 def retitled(scene: Scene, changes: Sequence[str]) -> Scene:
     """Return a scene whose title says what was changed of its machine, each ``KEY=VALUE``.
 
-    Titles name numbers, such as "2 m/s": a picture of another machine must not go by them alone.
+    A title such as "2 m/s" would be wrong for a changed machine.
     """
     if any(change.partition("=")[0].strip() == "title" for change in changes):
         return scene
@@ -239,10 +242,10 @@ def retitled(scene: Scene, changes: Sequence[str]) -> Scene:
 
 @contextmanager
 def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path | None]:
-    """Give an empty folder to write to; at the end its files move to `folder`, which is made.
+    """Give an empty folder to write to; at the end its files move to `folder`, made if need be.
 
-    To be entered before a long run: refused at once is what cannot be written to, is no folder, or
-    has folders in it that are called like the files, `names`. None stays None.
+    Enter it before a long run: a `folder` that cannot be written to, is no folder, or has folders
+    called like the files, `names`, is refused at once. None stays None.
     """
     if folder is None:
         yield None
@@ -263,7 +266,7 @@ def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path
 def check_file(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> None:
     """Refuse, before anything runs, the file of an option if it cannot be written.
 
-    So if it does not end in one of `suffixes`, if there are some.
+    With `suffixes` it must end in one of them.
     """
     if path is None:
         return

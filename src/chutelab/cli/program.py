@@ -23,7 +23,7 @@ from chutelab.util.signals import INTERRUPTED, exit_code, raised
 
 
 class RefusedError(click.ClickException):
-    """What the user gave cannot be used."""
+    """Invalid input; exit code 2."""
 
     exit_code = 2
 
@@ -78,7 +78,7 @@ class Program(click.Group):
 def _noted(
     broken: list[str], show: Any, message: Warning | str, category: type[Warning], *where: Any
 ) -> None:
-    """Say which law a run broke, on standard error, and note it; show other warnings as ever."""
+    """Print a broken law on standard error and note it; show other warnings as usual."""
     if issubclass(category, LawWarning):
         say(str(message), err=True)
         broken.append(str(message))
@@ -87,7 +87,7 @@ def _noted(
 
 
 EXPECTED = (click.ClickException, InputError, MissingLibraryError)
-"""Invalid input: told the same with ``--debug``."""
+"""Errors that ``--debug`` shows without a traceback, too."""
 
 
 def _told(error: BaseException) -> int:
@@ -143,5 +143,5 @@ def _version(ctx: click.Context, _parameter: click.Parameter, asked: bool) -> No
 @click.pass_obj
 def main(asked: dict[str, bool], debug: bool) -> None:
     """Simulate a belt, a damping plate and a second belt, and account for every joule."""
-    # It is read where errors are caught, in `Program.main`.
+    # `Program.main` reads it when it catches an error.
     asked["debug"] = debug

@@ -49,13 +49,13 @@ KINDS = {
 """What ``--only`` takes, and the files it stands for."""
 
 FILMS = ("gif", "mp4", "webm")
-"""Those that are the lesson picture; ``--format`` chooses one."""
+"""Kinds of the lesson picture; ``--format`` chooses one."""
 
 USUAL = ("png", "gif", "csv", "npz", "json")
-"""Those that are written unless ``--only`` chooses."""
+"""Kinds that are written without ``--only``."""
 
 MOST_EVENTS, EVENT = 100_000, 240
-"""Rows and bytes a row, about: of more events.csv is left out unless ``--only`` asks for it."""
+"""Rows, and bytes of each, about: a longer events.csv is written only if ``--only`` asks for it."""
 
 
 def complete_kinds(incomplete: str) -> list[CompletionItem]:
@@ -143,7 +143,7 @@ class Output:
                 elif kind == "npz":
                     recording.save(path)
                 else:
-                    # Only what is printed tells how long it took: the same run, the same file.
+                    # No computing time in the file, so that the same run gives the same file.
                     write_json({**_summary(recording, accuracy), "seconds": None}, path)
 
     def tell(self, recording: Recording, accuracy: Accuracy | None = None) -> None:
@@ -267,7 +267,7 @@ def run(
     began = perf_counter()
     loaded = loaded_as_told(scene, set_, engine, dt)
     if max_seconds is not None:
-        # It counts from the reading of the scene on.
+        # The time limit includes reading the scene.
         max_seconds = max(max_seconds - (perf_counter() - began), 1e-9)
     reached: Accuracy | None = None
     stuck, interrupted = "", None

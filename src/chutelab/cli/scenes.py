@@ -1,4 +1,4 @@
-"""What one needs to write a scene, and the paper: seven commands.
+"""What you need to write a scene, and the paper: seven commands.
 
 ``scenes``, ``materials``, ``quantities``, ``schema`` and ``new``; ``tables`` and ``figure``, the
 paper's tables and figures as printed beside computed.

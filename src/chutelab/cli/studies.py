@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import logging
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial
@@ -32,11 +33,13 @@ from chutelab.cli.options import (
     write_json,
 )
 from chutelab.cli.program import RefusedError
+from chutelab.util.errors import InputError
 from chutelab.util.files import write_lines, writing
 
 if TYPE_CHECKING:
     from chutelab.scene import Scene
-    from chutelab.studies.design.uncertainty import Uncertainty
+    from chutelab.scene.variants import Vary
+    from chutelab.studies.design.uncertainty import Given, Uncertainty
 
 
 def complete_column(begun: str) -> list[CompletionItem]:
@@ -44,6 +47,95 @@ def complete_column(begun: str) -> list[CompletionItem]:
     from chutelab.scene.quantities import COLUMNS
 
     return beginning({name: row.meaning for name, row in COLUMNS.items()}, begun)
+
+
+def varied(texts: Sequence[str], *, ranges: bool) -> list[Vary]:
+    """Read what ``--vary`` takes: KEY=FROM:TO:COUNT or KEY=a,b,c; with `ranges` KEY=FROM:TO.
+
+    Numbers may have units, such as 0.5mm. Raises an `InputError`.
+    """
+    from chutelab.scene.variants import Range, Vary, numbers
+
+    form = "must be KEY=FROM:TO, such as plate.angle_deg=-20:70"
+    if not ranges:
+        form = "must be KEY=FROM:TO:COUNT, such as plate.angle_deg=-20:70:46, or KEY=a,b,c"
+    found: list[Vary] = []
+    for text in texts:
+        typed = f"--vary {text}"
+        key, given = _halves(text, typed, form)
+        parts = given.split(":")
+        if ranges:
+            if len(parts) != 2:
+                raise InputError(f"a range is between two ends: it {form}", typed)
+            values, unit = numbers(typed, parts, form)
+            found.append(Range(key, values, typed, unit))
+            continue
+        if len(parts) == 1:
+            parts = given.split(",")
+            if len(parts) > MOST_VALUES:
+                raise InputError(f"{len(parts)} values, at most {MOST_VALUES} are allowed", typed)
+            values, unit = numbers(typed, parts, form)
+        elif len(parts) == 3:
+            (first, last), unit = numbers(typed, parts[:2], form)
+            values = _spaced(first, last, parts[2].strip(), typed)
+        else:
+            raise InputError(form, typed)
+        found.append(Vary(key, values, typed, unit))
+    return found
+
+
+MOST_VALUES = 10_000
+"""Most values of one key; more would be a typing error."""
+
+
+def _spaced(first: float, last: float, written: str, typed: str) -> tuple[float, ...]:
+    """Return COUNT numbers from one to another."""
+    count = int(written) if written.isdecimal() else 0
+    if not 1 <= count <= MOST_VALUES:
+        found = f"COUNT = {written or 'nothing'}"
+        raise InputError(f"{found}; it must be a whole number from 1 to {MOST_VALUES}", typed)
+    if count == 1:
+        return (first,)
+    if first == last:
+        raise InputError(f"the range is empty: from {first:g} to {last:g}", typed)
+    # Rounded: 0.3 is 0.3, not 0.30000000000000004, and what rounding leaves of a 0 is a 0.
+    nothing = 1e-13 * max(abs(first), abs(last))
+    inside = (first + (last - first) * i / (count - 1) for i in range(1, count - 1))
+    rounded = (0.0 if abs(value) < nothing else float(f"{value:.12g}") for value in inside)
+    return (first, *rounded, last)
+
+
+def targets(texts: Sequence[str]) -> list[tuple[str, str]]:
+    """Read what ``--target`` takes, QUANTITY=VALUE; raises an `InputError`."""
+    form = "must be QUANTITY=VALUE, such as landing.x=1.2 or landing.vx=outgoing.speed"
+    return [_halves(text, f"--target {text}", form) for text in texts]
+
+
+def uncertain(texts: Sequence[str]) -> list[Given]:
+    """Read what ``--uncertainty`` takes, KEY=MEAN±SPREAD:LAW; raises an `InputError`."""
+    from chutelab.studies.design.uncertainty import Given
+
+    found = []
+    for text in texts:
+        match = re.fullmatch(r"([^=]+)=([^:]*?)(?:±|\+/-|\+-)([^:]*?)(?::(.*))?", text)
+        if match is None:
+            raise InputError(
+                "must be KEY=MEAN±SPREAD, such as restitution=0.5±0.05 or incoming.speed=2+-1% (or"
+                " ±SPREAD alone, around the scene's value); :uniform at the end makes SPREAD a"
+                " half-width",
+                f"--uncertainty {text}",
+            )
+        key, mean, spread, law = (part.strip() for part in match.groups(default=""))
+        found.append(Given(key, mean or None, spread, law or "normal"))
+    return found
+
+
+def _halves(text: str, typed: str, form: str) -> tuple[str, str]:
+    """Return what is left and right of the first equals sign."""
+    left, _, right = (part.strip() for part in text.partition("="))
+    if not (left and right):
+        raise InputError(form, typed)
+    return left, right
 
 
 class _Listing(click.Command):
@@ -145,13 +237,14 @@ def sweep(
     loaded = loaded_as_told(scene, set_)
     if of not in COLUMNS:
         raise RefusedError(f"--of {no_column(of)}")
+    variations = varied(vary, ranges=sample is not None)
     check_file("--plot", plot, PICTURES)
     check_file("--out", out)
     try:
-        plan = planned(loaded, vary, sample=sample, design=design, seed=seed, engine=engine)
-        varied = sum(len(set(one.values)) > 1 for one in plan.varies)
-        if plot is not None and varied > 2:
-            raise RefusedError(f"--plot draws one or two varied keys, not {varied}")
+        plan = planned(loaded, variations, sample=sample, design=design, seed=seed, engine=engine)
+        several = sum(len(set(one.values)) > 1 for one in plan.varies)
+        if plot is not None and several > 2:
+            raise RefusedError(f"--plot draws one or two varied keys, not {several}")
         what = f"{plan.count:,} variants"
         with (
             _unlogged() if scheduler else nullcontext(),
@@ -169,7 +262,7 @@ def sweep(
             console.say(f"\n{said}", err=True)
         raise
     if plot is not None:
-        from chutelab.pictures.plots.design import sweep_figure
+        from chutelab.pictures.plots.studies import sweep_figure
 
         with writing(f"--plot {plot}"):
             sweep_figure(found, of).write(plot)
@@ -194,12 +287,14 @@ def _propagated(
     check_file("--plot", plot, PICTURES)
     count = SAMPLES if samples is None else samples
     with progress("propagating", quiet=quiet) as meter:
-        found = design.uncertainty(scene, given, samples=count, seed=seed, progress=meter)
+        found = design.uncertainty(
+            scene, uncertain(given), samples=count, seed=seed, progress=meter
+        )
     with writing():
         if out is not None:
             write_lines(out, [found.csv()])
         if plot is not None:
-            from chutelab.pictures.plots.design import spread
+            from chutelab.pictures.plots.studies import spread
 
             spread(found).write(plot)
     return found
@@ -207,7 +302,7 @@ def _propagated(
 
 @contextmanager
 def _unlogged() -> Iterator[None]:
-    """Keep Dask from logging tracebacks of what is said in one message here."""
+    """Keep Dask from logging tracebacks: one message here says what failed."""
     before = logging.root.manager.disable
     logging.disable()
     try:
@@ -286,15 +381,17 @@ def solve(
     written = []
     with destination(out, SOLVED) as place:
         with progress("searching", quiet=quiet) as meter:
-            search = partial(design.solve, target=target)
+            search = partial(design.solve, target=targets(target))
             if minimize:
                 search = partial(design.minimize, quantity=minimize)
             if maximize:
                 search = partial(design.maximize, quantity=maximize)
-            found = search(loaded, vary, points=points, seed=seed, progress=meter)
+            found = search(
+                loaded, varied(vary, ranges=True), points=points, seed=seed, progress=meter
+            )
         if place is not None:
             from chutelab.pictures.plots import overlay
-            from chutelab.pictures.plots.design import scan
+            from chutelab.pictures.plots.studies import scan
 
             with progress("drawing", quiet=quiet):
                 write_json(as_dict(found), place / "solve.json")
@@ -402,7 +499,7 @@ def compare(
             fitted = measured.fit(loaded, film, keys, robust=robust) if keys else None
             found = measured.residuals(loaded, film) if fitted is None else fitted.after
         if place is not None:
-            from chutelab.pictures.plots.measured import measured as draw
+            from chutelab.pictures.plots.studies import measured as draw
 
             with progress("drawing"):
                 draw(found, fitted).write(place / "compare.png")

@@ -6,6 +6,9 @@
 #define CHORD 1.01
 /* Sine of half the angle that a step may turn a disk in a hollow by, at most. */
 #define STEEPEST 0.9
+/* rad; what comes off the inside of an arc by less, however short steps are, stays on it: bounces that go on without an
+   end are left out at last. */
+#define FLAT 0.01
 /* Of the radius: hops of what lies stay below it, else the step is shorter than asked for. */
 #define HOP 1e-3
 
@@ -236,10 +239,10 @@ double hop_time(const Disk *d) {
     return W.g + inside > 0 ? sqrt(8 * HOP * d->radius / (W.g + inside)) : INFINITY;
 }
 
-/* Time in which a disk that slides inside an arc is turned by TURN, INFINITY on what is not hollow. */
+/* Time in which a disk that slides inside an arc is turned by FLAT, INFINITY on what is not hollow. */
 double turning_time(const Disk *d, const Surface *s) {
     double bends = -bending(s, d->x, d->y, d->radius) * sqrt(d->vx * d->vx + d->vy * d->vy);
-    return bends > 0 ? TURN / bends : INFINITY;
+    return bends > 0 ? FLAT / bends : INFINITY;
 }
 
 /* How hard gravity and the curved way press a disk on a surface, m/s2. */
@@ -249,15 +252,29 @@ double press_on(const Disk *d, const Surface *s, double nx, double ny) {
 }
 
 /* Sine of the angle to the surface of the chord on which a disk goes on in a hollow for a time h, to where
-   its gap is 0, or of its overlap so much (m) is parted. */
+   its gap is 0, or of its overlap so much (m) is parted; past an end of a hollow that it comes to or from, by
+   Newton's steps. */
 double chord(const Contact *c, double parted, double h) {
     const Disk *d = W.disks + c->i;
     const Surface *s = W.surfaces + (-1 - c->j);
-    double bends = -bending(s, d->x, d->y, d->radius), way = sqrt(square(d->vx) + square(d->vy)) * h;
-    if (!(bends > 0 && way > 0)) return 0;
-    double away = square(d->x - s->x) + square(d->y - s->y), to = MAX(away, square(1 / bends));
-    if (parted > 0) to = square(sqrt(to) - parted);
-    return (away - to + way * way) / (2 * way * sqrt(away));
+    double bends = -bending(s, d->x, d->y, d->radius), way = sqrt(square(d->vx) + square(d->vy)) * h, out = 0;
+    if (!(way > 0) || (bends <= 0 && !(pressed_inside(d, -1 - c->j) > 0))) return 0;
+    if (bends > 0) {
+        double away = square(d->x - s->x) + square(d->y - s->y), to = MAX(away, square(1 / bends));
+        if (parted > 0) to = square(sqrt(to) - parted);
+        return (away - to + way * way) / (2 * way * sqrt(away));
+    }
+    double forth = d->vx * c->ny - d->vy * c->nx > 0 ? way : -way, nx, ny;
+    for (int n = 0; n < 4; n++) {
+        double cosine = sqrt(1 - out * out);
+        double x = d->x + cosine * forth * c->ny + out * way * c->nx;
+        double y = d->y - cosine * forth * c->nx + out * way * c->ny;
+        double gap = gap_to(face_at(s, x, y), x, y, d->radius, &nx, &ny);
+        double slope = way * (nx * c->nx + ny * c->ny) - out / cosine * forth * (nx * c->ny - ny * c->nx);
+        if (slope < 0.5 * way) break;
+        out = MIN(MAX(out + (MIN(c->gap, 0) + parted - gap) / slope, -STEEPEST), STEEPEST);
+    }
+    return out;
 }
 
 /* Turn the normal of a contact in a crowd to where a hollow leads the disk; return the cosine of that turn.
@@ -271,8 +288,9 @@ double chord(const Contact *c, double parted, double h) {
 double follow(Contact *c, double past, double out) {
     const Disk *d = W.disks + c->i;
     double x = d->vx - 0.5 * W.gx * past, y = d->vy - 0.5 * W.gy * past, speed = sqrt(x * x + y * y);
+    double fast = square(d->vx) + square(d->vy), inside = pressed_inside(d, -1 - c->j);
     double bends = MAX(-bending(W.surfaces + (-1 - c->j), d->x, d->y, d->radius), 0);
-    c->turns = MAX(bends * speed * speed, pressed_inside(d, -1 - c->j));
+    c->turns = MAX(bends, fast > 0 ? inside / fast : 0) * speed * speed;
     if (!(c->turns > 0)) return 1;
     double most = MIN(CHORD * 0.5 * c->turns * W.step / speed, STEEPEST);
     double in = MIN(MAX(-(x * c->nx + y * c->ny) / speed, -most), most);

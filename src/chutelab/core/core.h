@@ -4,12 +4,16 @@
 #define CORE_H
 #include <math.h>
 #include "layout.h"
+#include "memory.h"
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 #define ALARM (-1000000) /* partner of a release or of a ride's end; no surface has that number */
 
 extern World W;
+
+/* What was too small, so that `run` makes more room. */
+enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_NEAR, FULL_CONTACTS };
 
 /* Contacts are looked for where a gap is below this share of the radius: what lasts stays a
    thousandth of it apart at most, and nothing crosses the rest within a step unseen. */
@@ -50,7 +54,7 @@ extern World W;
 #define ROUGH 4.0
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
 #define STALL 20000
-/* rad; within it the inside of an arc counts as flat: steps of a disk by itself turn it by no more. */
+/* rad; steps of a disk by itself turn it by no more inside an arc. */
 #define TURN 0.2
 /* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
 #define SHOCKS 4
@@ -194,5 +198,8 @@ void end_in_contact(int i, int reason);
 /* sleep.c */
 void wake(int i, double t);
 void fall_asleep(void);
+
+/* prepare.c */
+int make_room(int full);
 
 #endif

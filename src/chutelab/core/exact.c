@@ -5,8 +5,7 @@
    along the arc. */
 
 #include "exact.h"
-
-#define EXPORT __attribute__((visibility("default")))
+#include "memory.h"
 
 /* Contacts in a row that take no time after which a particle has come to rest in its corner. An elastic
    particle leaves a wedge of angle beta after pi/beta of them. */
@@ -596,8 +595,8 @@ static void fly(void) {
     const double *box = A.given->exit_box;
     Motion m = motion_of(0.0, -A.given->gravity);
     m.joint = A.joint;
-    double leaves = MIN(MIN(when(A.x - box[0], A.vx, 0.0), when(box[1] - A.x, -A.vx, 0.0)),
-                        MIN(when(A.y - box[2], A.vy, m.ay), when(box[3] - A.y, -A.vy, -m.ay)));
+    double leaves = MIN(MIN(when(A.x - box[0], A.vx, 0.0), when(box[2] - A.x, -A.vx, 0.0)),
+                        MIN(when(A.y - box[1], A.vy, m.ay), when(box[3] - A.y, -A.vy, -m.ay)));
     double stops = A.given->stop - A.age, dt = MIN(leaves, stops);
     int obstacle, side, hits = first_contact(&m, &dt, &obstacle, &side);
     count_idle(dt);
@@ -851,17 +850,38 @@ static void proceed(void) {
     }
 }
 
+/* Lay out what the host fills in, and what is written. */
+EXPORT int lay_out_exact(void) {
+    double members = E.family ? E.lone_count : 1, many = MIN(20.0 * E.lone_count, 1e5);
+    RESERVE(E.segments, members * E.segment_count);
+    RESERVE(E.arcs, members * E.arc_count);
+    RESERVE(E.wheels, members * E.wheel_count);
+    RESERVE(E.materials, (double)E.kind_count * (E.segment_count + E.arc_count + E.wheel_count));
+    RESERVE(E.lones, E.lone_count);
+    RESERVE(E.books, 3.0 * E.surface_count * (E.apart ? E.lone_count : 1));
+    E.room_size = 100 * (E.segment_count + E.arc_count) + 200;
+    E.knot_room = (int)many + 500;
+    E.event_room = (int)many + 100;
+    RESERVE(E.room, E.room_size);
+    RESERVE(E.knots, E.knot_room);
+    RESERVE(E.events, E.event_room);
+    return has_room();
+}
+
 /* Run all particles, for at most so many rounds; returns why it came back, see `enum Course`. */
 EXPORT int follow_all(int rounds) {
     for (; E.lone < E.lone_count; E.lone++, E.begun = 0) {
         int member = E.family ? E.lone : 0;
         if (E.laid != member + 1) {
-            if (!lay_obstacles(member)) return NO_ROOM;
+            while (!lay_obstacles(member)) {
+                E.room_size *= 2;
+                if (!RESERVE(E.room, E.room_size)) return NO_MEMORY;
+            }
             E.laid = member + 1;
         }
         do {
-            if (E.knot_room - E.knot_count < ROUND_KNOTS) return NO_KNOTS;
-            if (E.event_room - E.event_count < ROUND_EVENTS) return NO_EVENTS;
+            if (E.knot_room - E.knot_count < ROUND_KNOTS) return FILLED;
+            if (E.event_room - E.event_count < ROUND_EVENTS) return FILLED;
             if (!rounds--) return PAUSING;
             course = FINISHED;
             if (E.begun) proceed();

@@ -199,19 +199,21 @@ static double meet_ends(const Surface *s, const Disk *d, double span, double *ap
 
 /* When a disk meets a circle from inside. Where it goes inwards at first, from outside through the
    opening of an arc or from a place that touches, that is after it was nearest to the centre; if it is
-   not inside even there, never. */
+   not inside even there, never. What has sunk in so that it overlaps even there meets it where it is as
+   deep again. */
 static double meet_inside(const Surface *s, const Disk *d, double span, double *approach) {
-    double x = d->x - s->x, y = d->y - s->y, vx = d->vx, vy = d->vy, t = 0;
-    double in = x * vx + y * vy;
+    double x = d->x - s->x, y = d->y - s->y, vx = d->vx, vy = d->vy, t = 0, reach = s->radius - d->radius;
+    double in = x * vx + y * vy, away = x * x + y * y;
     if (in < 0) {
         t = MIN(-in / (vx * vx + vy * vy), span);
         x += (vx + 0.5 * W.gx * t) * t;
         y += (vy + 0.5 * W.gy * t) * t;
         vx += W.gx * t;
         vy += W.gy * t;
+        if (x * x + y * y > reach * reach && away < square(s->radius)) reach = sqrt(away);
     }
     if (x * x + y * y >= s->radius * s->radius) return INFINITY;
-    return t + meet_round(x, y, vx, vy, s->radius - d->radius, -1, span - t, approach);
+    return t + meet_round(x, y, vx, vy, reach, -1, span - t, approach);
 }
 
 /* Time from d->t until a disk meets a surface, INFINITY if not within the span. */

@@ -532,7 +532,7 @@ void lie_down(int i) {
         if (s->there != THERE || is_spared(s, d) || face_at(s, d->x, d->y) != s || is_held(d, k)) continue;
         if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
         double press = press_on(d, s, nx, ny);
-        if (press <= 0 || fabs(d->vx * nx + d->vy * ny) > press * W.dt) continue;
+        if (press <= 0 || fabs(d->vx * nx + d->vy * ny) > press * MIN(W.dt, turning_time(d, s))) continue;
         d->on = s->owner;
         d->slips = 1;
         support(i, k, d->t);

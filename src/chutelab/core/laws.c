@@ -10,6 +10,8 @@
 
 Laws L;
 
+/* Places inside or beyond surfaces for which there is room at first. */
+#define HITS 64
 /* Times at which the energy of all particles together is summed, and instants at which overlaps are. */
 #define INSTANTS 24
 /* Share of the radius that Chipmunk and the contact engine leave alone. */
@@ -482,15 +484,29 @@ static void judge_steps(void) {
     tell_group(LAW_STEP, &bad, way, radius);
 }
 
-/* Judge a run: tell the laws that it breaks, each once, losses twice at most, in their order. */
-__attribute__((export_name("judge"))) void judge(void) {
+/* Lay out what the host fills in, and what is told. */
+EXPORT int lay_out_laws(void) {
+    int crowd = L.interact && L.engine == ENGINE_CONTACT;
+    RESERVE(L.knots, (double)L.knot_count * L.row);
+    RESERVE(L.offsets, L.particle_count + 1);
+    RESERVE(L.bodies, L.particle_count);
+    RESERVE(L.barriers, (double)L.piece_count * (L.family ? L.particle_count : 1));
+    RESERVE(L.books, 3.0 * L.book_rows);
+    RESERVE(L.breaches, BREACHES);
+    RESERVE(L.order, crowd ? L.knot_count : 1);
+    RESERVE(L.places, crowd ? 2.0 * L.particle_count : 1);
+    return has_room();
+}
+
+/* Judge a run, if there is room for all hits. */
+static void judge_all(void) {
     L.breach_count = L.hit_count = 0;
     memset(&All, 0, sizeof All);
     shape_barriers();
     if (!weigh()) return; /* The other laws say nothing about what is no number. */
     find_bounds();
     find_hits();
-    if (L.hit_count > L.hit_room) return; /* It is asked again, with more room. */
+    if (L.hit_count > L.hit_room) return;
     double bound = L.energy_bound * L.energy;
     tell_hits(1);
     tell_hits(0);
@@ -498,4 +514,15 @@ __attribute__((export_name("judge"))) void judge(void) {
     judge_steps();
 }
 
-__attribute__((export_name("laws"))) Laws *laws(void) { return &L; }
+/* Judge a run: tell the laws that it breaks, each once, losses twice at most, in their order. */
+EXPORT int judge(void) {
+    for (int room = HITS; room; room = L.hit_count > room ? L.hit_count : 0) {
+        RESERVE(L.hits, room);
+        if (!has_room()) return 0;
+        L.hit_room = room;
+        judge_all();
+    }
+    return 1;
+}
+
+EXPORT Laws *laws(void) { return &L; }

@@ -4,6 +4,7 @@
 #define LAWS_H
 #include <math.h>
 #include "layout.h"
+#include "memory.h"
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))

@@ -1,9 +1,10 @@
 /* What the core shares with its host: every array, every number, in SI units.
 
-   The host lays the arrays out in the memory of the module, writes their places into `World`, fills
-   in what is marked [in], and reads what is marked [out]. `tools/build_core.py` reads this file and
-   writes `layout.json`, from which hosts take sizes, offsets and names: so a field is declared once.
-   Only `double`, `int`, arrays of these and pointers stand here. */
+   The host fills in the counts marked [in] of a subject, has the core lay its arrays out (`lay_out_...`),
+   fills in what of them is marked [in], calls what does the work, and reads what is marked [out].
+   `tools/build_core.py` reads this file and writes `layout.json`, from which hosts take sizes, offsets
+   and names: so a field is declared once. Only `double`, `int`, arrays of these and pointers stand
+   here. */
 
 #ifndef LAYOUT_H
 #define LAYOUT_H
@@ -29,8 +30,15 @@ enum There { ABSENT, THERE, LEAVING };
 /* When a run ends: `run.until`. */
 enum Until { UNTIL_LANDED, UNTIL_SETTLED, UNTIL_TIME };
 
-/* Why `run` came back. PAUSED: the budget of steps is used up. FULL_...: make room and go on. */
-enum Status { DONE, PAUSED, FULL_KNOTS, FULL_EVENTS, FULL_NEAR, FULL_CONTACTS, STALLED };
+/* Why `run` came back. PAUSED: the budget of steps is used up. FULL: take knots and events, and go on.
+   LACKING: the core gets no more memory. */
+enum Status { DONE, PAUSED, FULL, STALLED, LACKING };
+
+/* The memory of arrays. Zeros in it, and in all other subjects, free all arrays. */
+typedef struct {
+    double end;             /* where the next array begins; 0: at the beginning */
+    int lacks;              /* whether there was too little */
+} Room;
 
 typedef struct {
     double x, y, vx, vy, spin;  /* [in] at time t: centre, velocity, angular velocity */
@@ -175,11 +183,11 @@ typedef struct {                                                                
 typedef struct { int disk, next, ix, iy; } Cell; /* one disk in one cell of the grid */
 
 typedef struct {
-    /* arrays, laid out by the host */
     Disk *disks;
-    Track *tracks;
-    Surface *surfaces;   /* with room for twice the arcs */
+    Surface *surfaces;   /* with room for twice as many: narrow arcs become two */
     Pair *pairs;         /* (kinds, kinds + materials) */
+    /* arrays that `prepare` lays out */
+    Track *tracks;
     double *books;       /* (owners + 1, 3), J; the last row is the disks' among themselves */
     Knot *knots;
     Event *events;
@@ -199,8 +207,10 @@ typedef struct {
     int *circles;        /* ... and within, behind them, the circles */
     int *spared;         /* (disks, gates) 1: what shut on this disk, and does not touch it yet */
     /* sizes */
-    int disk_count, surface_count, kind_count, material_count, owner_count;
+    int disk_count, surface_count, kind_count, owner_count; /* [in] */
+    int material_count;
     int knot_room, event_room, contact_room, near_room, cell_room;
+    int full;            /* what `run` makes room for as it goes on: see `Full` */
     int bucket_count;    /* a power of two */
     int gate_count, end_count, circle_count;
     /* the run */
@@ -286,6 +296,9 @@ typedef struct {
     double repeat[6];       /* up to two of count, dx, dy */
 } SurfaceKeys;
 
+/* A string from a point to a particle; without a length as long as it has to be at the release. */
+typedef struct { double from[2], length, particle; } StringKeys;
+
 /* Pieces of surfaces. Speeds are along the tangent, and clockwise round an arc. */
 typedef struct {                                                                         /* [out] */
     double start[2], end[2], tangent[2], length, speed;
@@ -317,11 +330,10 @@ typedef struct {                                                                
 typedef struct {
     double *rows;           /* [in] (members, width) */
     int members, width;     /* [in] */
-    int particles, streams, incoming, plates, outgoing, conveyors, surfaces; /* [in] counts */
+    int particles, streams, incoming, plates, outgoing, conveyors, surfaces, strings; /* [in] counts */
     Segment *segments;      /* [out] (members, segment_count) */
     Arc *arcs;
     Nominal *nominal;       /* [out] (members) */
-    int segment_room, arc_room;   /* [in] of all members */
     int segment_count, arc_count; /* [out] of each */
 } Plan;
 
@@ -333,7 +345,7 @@ typedef struct {
     double inertia;             /* [in] kg m2; 0: it does not turn */
     double rolling;             /* [in] rolling friction: its arm over the radius */
     double gravity, pace;       /* [in] m/s2; what bounds on speeds are multiplied by */
-    double exit_box[4];         /* [in] m; left, right, bottom, top */
+    double exit_box[4];         /* [in] m; as of `Start` */
     int kind;                   /* [in] row of the table of pairs */
     int carried;                /* [in] it rides the incoming belt by adhesion */
     int reason;                 /* [out] why its track ended: enum Ending */
@@ -343,15 +355,15 @@ typedef struct {
 /* Why a track of the exact engine ended, as in `recording.REASONS`. */
 enum Ending { TIME_IS_OVER, HAS_LANDED, HAS_SETTLED, HAS_LEFT };
 
-/* Why the exact engine came back. PAUSED: the budget of rounds is used up. FULL_...: make room and go
-   on. NO_PROGRESS, DRIVEN, TOO_LONG: a particle is stuck, its track is over; go on with the others.
+/* Why the exact engine came back. PAUSING: the budget of rounds is used up. FILLED: take knots and events,
+   and go on. NO_MEMORY: the core gets no more of it. NO_PROGRESS, DRIVEN, TOO_LONG: a particle is stuck, its track is over; go on with the others.
    HELD: a spinning disk is held between surfaces of which one moves. */
-enum Course { FINISHED, PAUSING, NO_KNOTS, NO_EVENTS, NO_ROOM, NO_PROGRESS, DRIVEN, TOO_LONG, HELD };
+enum Course { FINISHED, PAUSING, FILLED, NO_MEMORY, NO_PROGRESS, DRIVEN, TOO_LONG, HELD };
 
 typedef struct { double radius, speed, incline; int surface, pad; } Wheel; /* [in] the drive pulley */
 
 typedef struct {
-    /* arrays, laid out by the host; of a family each particle is a member */
+    /* arrays; of a family each particle is a member */
     Segment *segments;      /* [in] (members, segment_count) */
     Arc *arcs;              /* [in] (members, arc_count) */
     Wheel *wheels;          /* [in] (members) or none */
@@ -361,7 +373,7 @@ typedef struct {
     Knot *knots;            /* [out] */
     Event *events;          /* [out] */
     double *room;           /* (room_size) for the obstacles that surfaces are */
-    int segment_count, arc_count, wheel_count, lone_count, surface_count;
+    int segment_count, arc_count, wheel_count, lone_count, surface_count, kind_count; /* [in] */
     int knot_room, event_room, room_size;
     int family, apart;      /* [in] each particle has surfaces, and books, of its own */
     int until, landing;     /* [in] enum Until; surface that a particle lands on, or -1 */
@@ -377,8 +389,15 @@ typedef struct {
     double passed;          /* s; that its latest rounds took */
 } Exact;
 
-/* Where and how a particle starts. */
-typedef struct { double t, position[2], velocity[2], radius; } Start;                     /* [out] */
+/* m below the lowest surface and release, or outside the box of all without gravity, where a track
+   ends. */
+#define EXIT_MARGIN 1.0
+
+/* Where and how a particle starts, and where its track ends if nothing holds it. */
+typedef struct {                                                                         /* [out] */
+    double t, position[2], velocity[2], radius;
+    double exit_box[4];     /* m; left, bottom, right, top */
+} Start;
 
 /* An earlier particle as one that is drawn sees it: how far it has come (m), and how far apart they
    have to be. */
@@ -406,8 +425,8 @@ typedef struct {
     int *links;             /* (count) */
     int *heads;             /* (head_room) lists of a grid */
     int *listed;            /* (pieces) */
-    int count;              /* [in] particles of each member */
-    int head_room;          /* [in] a power of two */
+    int count;              /* [out] particles of each member */
+    int head_room;          /* a power of two */
     int looks;              /* [in] particles and places that a call looks at before it comes back */
     /* how far it has come */
     int left;               /* of the looks of this call */
@@ -483,20 +502,19 @@ typedef struct {                                                                
 } Breach;
 
 typedef struct {
-    /* arrays, laid out by the host */
     double *knots;          /* [in] rows of t, x, y, vx, vy, spin, three entries of the ledger */
     int *offsets;           /* [in] (particles + 1) first knot of each, and behind the last */
     Body *bodies;           /* [in] (particles) */
     Barrier *barriers;      /* [in] (pieces), of a family (particles, pieces) */
     double *books;          /* [in] (book_rows, 3) entries of each surface, J */
     Breach *breaches;       /* (BREACHES) */
-    Hit *hits;              /* (hit_room) in the order of particles and knots */
+    Hit *hits;              /* in the order of particles and knots */
     int *order;             /* (knots) in crowds of the contact engine */
     double *places;         /* (particles, 2) there, too */
     /* sizes */
-    int particle_count, piece_count, row; /* [in] row: doubles from knot to knot */
+    int particle_count, piece_count, knot_count, row; /* [in] row: doubles from knot to knot */
     int book_rows, surface_count; /* [in] with the particles' own, which is the last */
-    int hit_room;           /* [in] */
+    int hit_room;
     /* the run */
     int engine;             /* [in] */
     int interact;           /* [in] particles meet each other */

@@ -508,8 +508,8 @@ static int begin_alone(void) {
     return 1;
 }
 
-/* Run on for at most so many steps; see `Status`. */
-__attribute__((visibility("default"))) int run(int steps) {
+/* Run on for at most so many steps: a `Status`, or what is `Full`. */
+static int run_on(int steps) {
     int status;
     for (;;) {
         int count = W.high - W.low;
@@ -552,4 +552,18 @@ __attribute__((visibility("default"))) int run(int steps) {
 }
 
 /* Where `World` is. */
-__attribute__((visibility("default"))) World *world(void) { return &W; }
+/* Run on for at most so many steps; see `Status`. What the host has taken by the next call makes room for
+   knots and events, if they were many: else there is more of it then. */
+EXPORT int run(int steps) {
+    int status = W.full;
+    for (W.full = 0; !status || make_room(status);) {
+        status = run_on(steps);
+        if (status == FULL_KNOTS && W.knot_count <= W.knot_room / 2) W.full = status;
+        if (status == FULL_EVENTS && W.event_count <= W.event_room / 2) W.full = status;
+        if (status == FULL_KNOTS || status == FULL_EVENTS) return FULL;
+        if (status < FULL_KNOTS) return status;
+    }
+    return LACKING;
+}
+
+EXPORT World *world(void) { return &W; }

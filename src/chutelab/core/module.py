@@ -23,13 +23,10 @@ from numpy.typing import NDArray
 
 from chutelab.util.files import whole
 
-PAGE = 65536
-"""Bytes of a page of WebAssembly's memory."""
-
 LARGE = 64 * 2**20
 """Bytes beyond which a used memory is let go rather than kept for the next run."""
 
-SUBJECTS = ("World", "Plan", "Drawing", "Laws", "Exact")
+SUBJECTS = ("Room", "World", "Plan", "Drawing", "Laws", "Exact")
 """Structs of layout.h of which the core has one each."""
 
 TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}
@@ -90,19 +87,17 @@ class Status(IntEnum):
 
     DONE = 0
     PAUSED = 1
-    FULL_KNOTS = 2
-    FULL_EVENTS = 3
-    FULL_NEAR = 4
-    FULL_CONTACTS = 5
-    STALLED = 6
+    FULL = 2
+    STALLED = 3
+    LACKING = 4
 
 
 class Module:
     """One instance of the module, with a memory of its own.
 
     Each subject of the core has one struct of numbers and of pointers to arrays, which a function
-    named like it gives; `world` is that of the contact engine. Arrays are placed one after the
-    other behind the module's own data; `forget` frees them all.
+    named like it gives; `world` is that of the contact engine. The core lays out its arrays itself;
+    `forget` frees them all.
     """
 
     def __init__(self) -> None:
@@ -116,8 +111,7 @@ class Module:
         self._functions: dict[str, Any] = {}
         self.call("_initialize")
         self._memory: Any = self._exports["memory"]
-        base: Any = self._exports["__heap_base"]
-        self._base: int = base.value(self._store)
+        self._bytes = np.empty(0, np.uint8)
         self._begins = {name: self.call(name.lower()) for name in SUBJECTS}
         self._look()
         self.forget()
@@ -130,13 +124,27 @@ class Module:
 
     def forget(self) -> None:
         """Free all arrays and reset all structs."""
-        self._end = self._base
         for struct in self.structs.values():
             ctypes.memset(ctypes.addressof(struct), 0, ctypes.sizeof(struct))
+
+    def work(self, name: str) -> None:
+        """Call a function that may take more memory; it makes all views of arrays invalid.
+
+        Raises
+        ------
+        MemoryError
+            If there is no more to be had.
+        """
+        done = self.call(name)
+        self._look()
+        if not done:
+            raise MemoryError(f"the core has {self.size / 2**30:.1f} GiB, and gets no more")
 
     def _look(self) -> None:
         """Look at the memory anew; it moves when it grows, and with it every array."""
         size = self._memory.data_len(self._store)
+        if size == self.size:
+            return
         address = ctypes.addressof(self._memory.data_ptr(self._store).contents)
         self._bytes = np.ctypeslib.as_array((ctypes.c_uint8 * size).from_address(address))
         self.structs: dict[str, Any] = {
@@ -150,51 +158,24 @@ class Module:
         """Bytes of its memory."""
         return len(self._bytes)
 
-    def place(self, *arrays: tuple[str, np.dtype[Any], int], of: str = "World") -> None:
-        """Make room for arrays of zeros, to which the fields of a struct point from now on."""
-        first = self._end
-        self._reserve(of, [(name, kind.itemsize * count) for name, kind, count in arrays])
-        self._bytes[first : self._end] = 0
-
-    def put(self, of: str, **arrays: NDArray[Any]) -> None:
-        """Copy arrays, flat and contiguous, to which the fields of a struct point from now on."""
-        begins = self._reserve(of, [(name, array.nbytes) for name, array in arrays.items()])
-        whole = self._bytes.data
-        for begin, array in zip(begins, arrays.values(), strict=True):
-            whole[begin : begin + array.nbytes] = array.view(np.uint8).data
-
-    def _reserve(self, of: str, sizes: list[tuple[str, int]]) -> list[int]:
-        """Set bytes apart, to which fields of a struct point; return where each begins."""
-        begins = []
-        for _, size in sizes:
-            begins.append((self._end + 15) // 16 * 16)
-            self._end = begins[-1] + max(1, size)
-        if self._end > self.size:
-            try:
-                self._memory.grow(self._store, -(-(self._end - self.size) // PAGE))
-            except wasmtime.WasmtimeError as error:
-                raise MemoryError(
-                    f"{self._end / 2**30:.1f} GiB are more than the core can have"
-                ) from error
-            self._look()
-        struct = self.structs[of]
-        for (name, _), begin in zip(sizes, begins, strict=True):
-            setattr(struct, name, begin)
-        return begins
-
     def array(self, name: str, kind: np.dtype[Any], count: int, of: str = "World") -> NDArray[Any]:
-        """Return a view of the array that a struct's field points to; `place` makes it invalid."""
+        """Return a view of the array that a field points to, good until `work` or `run`."""
         begin: int = getattr(self.structs[of], name)
         rows: NDArray[Any] = self._bytes[begin : begin + kind.itemsize * count].view(kind)
         return rows
 
-    def prepare(self) -> None:
-        """Have the core work out what follows from the arrays as they are filled in."""
-        self.call("prepare")
+    def fill(self, of: str, **arrays: NDArray[Any]) -> None:
+        """Copy arrays, flat and contiguous, to where the fields of a struct point."""
+        for name, array in arrays.items():
+            self.array(name, np.dtype(np.uint8), array.nbytes, of)[:] = array.view(np.uint8)
 
-    def run(self, steps: int) -> Status:
-        """Run on for at most so many steps."""
-        return Status(self.call("run", steps))
+    def run(self, name: str, steps: int, lacking: int) -> int:
+        """Call a function for so many steps at most, as `work`; `lacking` tells of no memory."""
+        status: int = self.call(name, steps)
+        self._look()
+        if status == lacking:
+            raise MemoryError(f"the core has {self.size / 2**30:.1f} GiB, and gets no more")
+        return status
 
 
 @cache

@@ -16,7 +16,14 @@
 
 Plan P;
 
-__attribute__((visibility("default"))) Plan *plan(void) { return &P; }
+EXPORT Plan *plan(void) { return &P; }
+
+/* Lay out the rows of numbers, which the host fills in. */
+EXPORT int lay_out_plan(void) {
+    RESERVE(P.rows, (double)P.members * P.width);
+    RESERVE(P.nominal, P.members);
+    return has_room();
+}
 
 /* The tables of a member, found by their counts. */
 Tables tables_of(int member) {
@@ -32,6 +39,7 @@ Tables tables_of(int member) {
     NEXT(outgoing, OutgoingKeys, P.outgoing);
     NEXT(conveyors, ConveyorKeys, P.conveyors);
     NEXT(surfaces, SurfaceKeys, P.surfaces);
+    NEXT(strings, StringKeys, P.strings);
 #undef NEXT
     t.points = row;
     t.particle = t.particles + (int)t.streams->kind;
@@ -43,25 +51,29 @@ Tables tables_of(int member) {
     return t;
 }
 
-/* Where the pieces of this member are written, and how many there are. */
+/* Where the pieces of this member are written, or NULL while they are counted; how many there are. */
 static Segment *segments;
 static Arc *arcs;
-static int segment_count, arc_count, segment_room, arc_room;
+static int segment_count, arc_count;
 
-/* Lay a straight piece of a surface. What has no room is only counted. */
+/* Lay a straight piece of a surface. */
 static void lay_segment(int surface, double x, double y, double x1, double y1, double speed,
                         const double *gate) {
-    if (segment_count++ >= segment_room) return;
+    if (!segments) {
+        segment_count++;
+        return;
+    }
     double dx = x1 - x, dy = y1 - y, length = length_of(dx, dy);
-    segments[segment_count - 1] = (Segment){
+    segments[segment_count++] = (Segment){
         { x, y }, { x1, y1 }, { dx / length, dy / length }, length, speed, gate[0], gate[1], surface,
     };
 }
 
 static void lay_arc(int surface, double x, double y, double radius, double begin, double extent,
                     double speed, const double *gate) {
-    if (arc_count++ >= arc_room) return;
-    arcs[arc_count - 1] = (Arc){ { x, y }, radius, begin, extent, speed, gate[0], gate[1], surface };
+    Arc arc = { { x, y }, radius, begin, extent, speed, gate[0], gate[1], surface };
+    if (arcs) arcs[arc_count] = arc;
+    arc_count++;
 }
 
 static const double ALWAYS[] = { -INFINITY, INFINITY };
@@ -174,23 +186,30 @@ static void lay_all(const Tables *t, Nominal *found) {
     }
 }
 
-/* Build the machine of each member: 1 if there was room for all pieces. Where there was none, only
-   `segment_count` and `arc_count` are right. */
-__attribute__((visibility("default"))) int build(void) {
-    segment_room = P.segment_room / P.members;
-    arc_room = P.arc_room / P.members;
-    for (int member = 0; member < P.members; member++) {
-        Tables t = tables_of(member);
-        Nominal found = { .along = NAN, .below = NAN };
-        fly_nominal(&t, &found);
+/* Lay all surfaces of a member, or count them if there is no place yet. */
+static void build_member(int member) {
+    Tables t = tables_of(member);
+    Nominal found = { .along = NAN, .below = NAN };
+    fly_nominal(&t, &found);
+    segment_count = arc_count = 0;
+    lay_all(&t, &found);
+    P.nominal[member] = found;
+}
+
+/* Build the machine of each member, which have as many pieces each; and lay out what is drawn into. */
+EXPORT int build(void) {
+    segments = 0;
+    arcs = 0;
+    build_member(0);
+    P.segment_count = segment_count;
+    P.arc_count = arc_count;
+    RESERVE(P.segments, (double)P.members * segment_count);
+    RESERVE(P.arcs, (double)P.members * arc_count);
+    for (int member = 0; member < P.members && has_room(); member++) {
         segments = P.segments + (long)member * P.segment_count;
         arcs = P.arcs + (long)member * P.arc_count;
-        segment_count = arc_count = 0;
-        lay_all(&t, &found);
-        P.nominal[member] = found;
-        P.segment_count = segment_count;
-        P.arc_count = arc_count;
-        if (segment_count > segment_room || arc_count > arc_room) return 0;
+        build_member(member);
     }
-    return 1;
+    lay_out_drawing();
+    return has_room();
 }

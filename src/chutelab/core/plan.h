@@ -3,6 +3,7 @@
 #ifndef PLAN_H
 #define PLAN_H
 #include "layout.h"
+#include "memory.h"
 #include "trig.h"
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
@@ -23,6 +24,7 @@ typedef struct {
     const OutgoingKeys *outgoing; /* or NULL */
     const ConveyorKeys *conveyors;
     const SurfaceKeys *surfaces;
+    const StringKeys *strings;
     const double *points;
 } Tables;
 
@@ -35,6 +37,9 @@ int is_on_belt(const Tables *t, int stream);
 void release_point(const Tables *t, int stream, double *place);
 void release_velocity(const Tables *t, int stream, double *velocity);
 void fly_nominal(const Tables *t, Nominal *out);
+
+/* releases.c */
+void lay_out_drawing(void);
 
 /* ride.c */
 int ride_to_pulley(double *w, double *z, double gap, double length, double gravity, double friction,

@@ -1,5 +1,6 @@
 /* From what a host says of a machine to what the core works with. */
 
+#include <string.h>
 #include "core.h"
 
 #define PI 3.14159265358979323846
@@ -182,8 +183,76 @@ static void share_end(int k, int n, double near, double r) {
     end[1] = W.surfaces[first / 2].end[2 * (first % 2) + 1];
 }
 
-/* The host has laid out the arrays and filled in what is marked [in]: fill in what follows. */
-__attribute__((visibility("default"))) void prepare(void) {
+/* Lay out what the host fills in. */
+EXPORT int lay_out_world(void) {
+    W.material_count = W.surface_count;
+    RESERVE(W.disks, W.disk_count);
+    RESERVE(W.surfaces, 2.0 * W.surface_count);
+    RESERVE(W.pairs, (double)W.kind_count * (W.kind_count + W.material_count));
+    return has_room();
+}
+
+static void make_near_room(int room) {
+    W.near_room = room;
+    RESERVE(W.near, 2.0 * room);
+}
+
+/* Of contacts those of the step before are kept. */
+static void make_contact_room(int room) {
+    const Contact *old = W.earlier;
+    W.contact_room = room;
+    RESERVE(W.contacts, room);
+    RESERVE(W.earlier, room);
+    RESERVE(W.links, 2.0 * room);
+    if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
+}
+
+static void make_knot_room(int room) {
+    W.knot_room = room;
+    RESERVE(W.knots, room);
+}
+
+static void make_event_room(int room) {
+    W.event_room = room;
+    RESERVE(W.events, room);
+}
+
+/* Make twice the room for what is full. Knots and events that were there have been taken. */
+int make_room(int full) {
+    if (full == FULL_NEAR) make_near_room(2 * W.near_room);
+    if (full == FULL_CONTACTS) make_contact_room(2 * W.contact_room);
+    if (full == FULL_KNOTS) make_knot_room(2 * W.knot_room);
+    if (full == FULL_EVENTS) make_event_room(2 * W.event_room);
+    return has_room();
+}
+
+/* Lay out all that the core works with, but for `spared`. */
+static int lay_out_work(void) {
+    int n = W.disk_count, crowd = W.interact, room = 2 * W.surface_count, rides = 0;
+    for (int i = 0; i < n; i++) rides |= W.disks[i].rides;
+    for (W.bucket_count = 1; crowd && W.bucket_count <= 4 * n + 16;) W.bucket_count *= 2;
+    W.cell_room = crowd ? 12 * n + 64 : 1;
+    RESERVE(W.tracks, n);
+    RESERVE(W.books, 3.0 * (W.owner_count + 1));
+    RESERVE(W.cells, W.cell_room);
+    RESERVE(W.heads, W.bucket_count);
+    RESERVE(W.heap, n);
+    RESERVE(W.queue, n + 1);
+    RESERVE(W.moved, n);
+    RESERVE(W.found, 2.0 * n);
+    RESERVE(W.nearby, (double)MAX_NEARBY * n);
+    RESERVE(W.everything, room);
+    RESERVE(W.ends, 2.0 * room);
+    make_knot_room((rides ? 100 : 30) * n + 200);
+    make_event_room(40 * n + 1200);
+    make_contact_room(8 * n + 16);
+    make_near_room(crowd ? 16 * n + 16 : 1);
+    return has_room();
+}
+
+/* The host has filled in what is marked [in]: fill in what follows. */
+EXPORT int prepare(void) {
+    if (!lay_out_work()) return 0;
     double least = INFINITY, most = 0, s = sin(W.ride_incline), c = cos(W.ride_incline);
     int alone = !W.interact;
     for (int i = 0; i < W.disk_count; i++) {
@@ -203,6 +272,8 @@ __attribute__((visibility("default"))) void prepare(void) {
         piece->gate = piece->opens > -INFINITY || piece->closes < INFINITY ? W.gate_count++ : -1;
         W.everything[k] = k;
     }
+    RESERVE(W.spared, (double)W.disk_count * W.gate_count);
+    if (!has_room()) return 0;
     sort_ends();
     for (int k = 0; k < 2 * W.surface_count; k++)
         if (W.surfaces[k / 2].shape != CIRCLE) share_end(k / 2, k % 2, TOUCHING * least, least);
@@ -223,4 +294,5 @@ __attribute__((visibility("default"))) void prepare(void) {
     W.pace = W.g > 0 ? sqrt(W.g / EARTH) : 1;
     W.smooth_v = 1e-4 * W.pace;
     W.accurate = (alone ? 1e-15 : 3e-4) * W.pace;
+    return 1;
 }

@@ -3,8 +3,6 @@
 #include <string.h>
 #include "releases.h"
 
-#define EXPORT __attribute__((visibility("default")))
-
 /* Draws of a height that may overlap an earlier particle before it has to wait for its place. */
 #define TRIES 1000
 /* Distance of neighbours in a packed box, in radii of the largest. */
@@ -32,6 +30,28 @@ static double belt_x, belt_y; /* the way the belt runs, for what is released on 
 static Place handful[HANDFUL];
 
 EXPORT Drawing *drawing(void) { return &D; }
+
+/* Lay out what is drawn into. */
+void lay_out_drawing(void) {
+    Tables t = tables_of(0);
+    double corners = 0.0, beds = 0.0;
+    D.count = 0;
+    for (int n = 0; n < P.streams; n++) {
+        D.count += (int)t.streams[n].count;
+        if (t.scene->crowded != 0.0) beds = MAX(beds, t.streams[n].bed_height);
+    }
+    for (int n = 0; n < P.particles; n++) corners += t.particles[n].corners;
+    int near = beds > 0.0 ? D.count : 1, links = P.streams > 1 ? D.count : 1;
+    for (D.head_room = 1; D.head_room <= 2 * MAX(near, links);) D.head_room *= 2;
+    RESERVE(D.starts, (double)P.members * D.count);
+    RESERVE(D.refusals, P.members);
+    RESERVE(D.carried, (double)P.members * P.streams);
+    RESERVE(D.corners, 2.0 * corners);
+    RESERVE(D.near, near);
+    RESERVE(D.links, links);
+    RESERVE(D.heads, D.head_room);
+    RESERVE(D.listed, P.segment_count + P.arc_count + 1 + 2 * P.conveyors);
+}
 
 static int is_line(void) { return !isnan(stream->to[0]); }
 static int is_fill(void) { return !isnan(stream->fill[0]); }
@@ -82,8 +102,8 @@ static void begin_stream(void) {
     if (rides) up_belt(tables.incoming, &belt_x, &belt_y);
     for (int i = 0; i < count; i++) {
         double t = stream->at_once != 0.0 ? 0.0 : i / stream->rate;
-        starts[i] = (Start){ t + stream->start, { 0.0, 0.0 }, { velocity[0], velocity[1] },
-                             particle->radius };
+        starts[i] = (Start){ .t = t + stream->start, .velocity = { velocity[0], velocity[1] },
+                             .radius = particle->radius };
     }
     D.next = 1;
     D.near_count = 0;
@@ -275,6 +295,7 @@ EXPORT int draw(void) {
         enter_room(&tables);
         for (; D.stream <= P.streams && !D.refusals[D.member].why; D.stream++, D.is_begun = 0)
             if (!(D.stream < P.streams ? draw_stream() : clear_releases())) return PAUSED;
+        box_in(&tables);
     }
     return DONE;
 }

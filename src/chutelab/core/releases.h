@@ -19,4 +19,7 @@ void enter_room(const Tables *t);
 int take_what_is_in_surfaces(Place *places, int count, double radius);
 int clear_releases(void);
 
+/* exits.c */
+void box_in(const Tables *t);
+
 #endif

@@ -13,17 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import (
-    INTEGER,
-    REAL,
-    Module,
-    Status,
-    borrow,
-    constants,
-    dtype,
-    give_back,
-    number,
-)
+from chutelab.core.module import REAL, Module, Status, borrow, constants, dtype, give_back
 from chutelab.machine import Machine, moved, origin
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
@@ -31,21 +21,6 @@ from chutelab.util.arrays import Progress
 
 GREATEST = 1e300
 """Friction without a bound, as a number that can be multiplied by zero."""
-
-GROWING = {
-    "knot": (("knots", dtype("Knot"), 1),),
-    "event": (("events", dtype("Event"), 1),),
-    "contact": (
-        ("contacts", dtype("Contact"), 1), ("earlier", dtype("Contact"), 1), ("links", INTEGER, 2)
-    ),
-    "near": (("near", INTEGER, 2),),
-}  # fmt: skip
-"""Arrays that may become full: name, type, rows for each knot, event, contact or pair near."""
-
-FULL = {
-    Status.FULL_KNOTS: "knot", Status.FULL_EVENTS: "event",
-    Status.FULL_CONTACTS: "contact", Status.FULL_NEAR: "near",
-}  # fmt: skip
 
 SLICE = 0.05
 """s of wall time between two looks at Ctrl-C and reports of progress."""
@@ -120,7 +95,7 @@ def pieces(machine: Machine) -> NDArray[Any]:
 
 
 class Job:
-    """One run: fills the module's memory, drains what it writes, makes room where it is full."""
+    """One run: fills the module's memory, and drains what it writes."""
 
     def __init__(self, module: Module, machine: Machine) -> None:
         self.module, self.machine = module, machine
@@ -128,46 +103,20 @@ class Job:
         self.events: list[NDArray[Any]] = []
         # First disk of the part in which the run was stopped: from it on disks have not ended.
         self.stopped_from = machine.count
-        n = machine.count
         self.pieces = pieces(machine)
         self.kinds, self.materials = len(machine.rolling), len(self.pieces)
-        # An arc may become two.
-        room = self.materials + len(machine.arcs.surface)
-        comes = np.isfinite(self.pieces["opens"]) | np.isfinite(self.pieces["closes"])
-        gates = 2 * int(np.count_nonzero(comes))
         self.owners = len(machine.surfaces)
-        buckets = 1 << (4 * n + 16).bit_length() if machine.interact else 1
-        cells = 12 * n + 64 if machine.interact else 1
-        module.place(
-            ("disks", dtype("Disk"), n), ("tracks", dtype("Track"), n),
-            ("surfaces", dtype("Surface"), room),
-            ("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials)),
-            ("books", REAL, 3 * (self.owners + 1)), ("cells", dtype("Cell"), cells),
-            ("heads", INTEGER, buckets), ("heap", INTEGER, n), ("queue", INTEGER, n + 1),
-            ("moved", INTEGER, n), ("found", INTEGER, 2 * n),
-            ("nearby", INTEGER, number("MAX_NEARBY") * n), ("everything", INTEGER, room),
-            ("ends", INTEGER, 2 * room), ("spared", INTEGER, gates * n),
-        )  # fmt: skip
-        self.make_room("knot", (100 if machine.releases.carried.any() else 30) * n + 200)
-        self.make_room("event", 40 * n + 1200)
-        self.make_room("contact", 8 * n + 16)
-        self.make_room("near", 16 * n + 16 if machine.interact else 1)
-        self.settings(buckets, cells)
+        self.settings()
+        module.work("lay_out_world")
         self.fill()
-        module.prepare()
+        module.work("prepare")
 
-    def make_room(self, what: str, room: int) -> None:
-        """Make room for so many, in the arrays of `GROWING`."""
-        self.module.place(*((name, kind, rows * room) for name, kind, rows in GROWING[what]))
-        setattr(self.module.world, f"{what}_room", room)
-
-    def settings(self, buckets: int, cells: int) -> None:
+    def settings(self) -> None:
         """Fill in the numbers of the world."""
         machine, world, wheel = self.machine, self.module.world, self.machine.pulley
         for name, value in (
             ("disk_count", machine.count), ("surface_count", len(self.pieces)),
-            ("kind_count", self.kinds), ("material_count", self.materials),
-            ("owner_count", self.owners), ("bucket_count", buckets), ("cell_room", cells),
+            ("kind_count", self.kinds), ("owner_count", self.owners),
             ("interact", machine.interact),
             ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
             ("landing", machine.landing), ("ride_owner", 0),
@@ -189,9 +138,7 @@ class Job:
         disks["inertia"] = particle.inertia
         disks["kind"] = releases.kind
         disks["rides"] = releases.carried
-        left, right, bottom, top = machine.exit_box
-        for n, side in enumerate((left, bottom, right, top)):
-            disks["exit_box"][:, n] = side
+        disks["exit_box"] = releases.exit_box
         module.array("surfaces", dtype("Surface"), len(self.pieces))[:] = self.pieces
         pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials))
         pairs = pairs.reshape(self.kinds, -1)
@@ -230,7 +177,7 @@ class Job:
 
     def stop(self) -> Status:
         """End the run after the step that it is in."""
-        while (status := self.proceed(0)) in FULL:
+        while (status := self.proceed(0)) is Status.FULL:
             pass
         if status is Status.PAUSED:
             world = self.module.world
@@ -244,24 +191,13 @@ class Job:
         return status
 
     def proceed(self, steps: int) -> Status:
-        """Run on for at most so many steps, take what was written, make room where it is full."""
+        """Run on for at most so many steps, and take what was written."""
         module = self.module
-        status, counts = module.run(steps), {}
+        status = Status(module.run("run", steps, Status.LACKING))
         for what, kept in (("knot", self.knots), ("event", self.events)):
-            counts[what] = count = getattr(module.world, f"{what}_count")
-            if count:
+            if count := getattr(module.world, f"{what}_count"):
                 kept.append(module.array(f"{what}s", dtype(what.title()), count).copy())
                 setattr(module.world, f"{what}_count", 0)
-        if status in FULL:
-            what = FULL[status]
-            room = getattr(module.world, f"{what}_room")
-            # Taking many knots or events has made room.
-            if counts.get(what, 0) <= room // 2:
-                # Of what was there, only contacts of the step before are needed.
-                count = module.world.earlier_count if what == "contact" else 0
-                earlier = module.array("earlier", dtype("Contact"), count).copy()
-                self.make_room(what, 2 * room)
-                module.array("earlier", dtype("Contact"), count)[:] = earlier
         return status
 
     def share(self) -> float:

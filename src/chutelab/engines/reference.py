@@ -459,7 +459,7 @@ class _Run:
         return left
 
     def exits(self) -> Iterator[tuple[str, int, Guard]]:
-        left, right, bottom, top = self.machine.exit_box
+        left, bottom, right, top = self.machine.releases.exit_box[0]
         low, high = np.array([left, bottom]) - self.base, np.array([right, top]) - self.base
         yield "exit", -1, lambda y: np.minimum(y[X].T - low, high - y[X].T).min(axis=1)
 

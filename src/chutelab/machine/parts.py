@@ -18,7 +18,7 @@ from chutelab.machine.releases import Releases
 from chutelab.machine.shapes import Arcs, Pieces, Segments, crossings
 from chutelab.scene import Scene
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import Floats, Numbers
+from chutelab.util.arrays import Floats
 
 DRIVE_PULLEY = "the drive pulley"
 
@@ -45,11 +45,6 @@ class Caution:
 
     def __str__(self) -> str:
         return f"{self.surface}: {self.text}"
-
-
-EXIT_MARGIN = 1.0
-"""m below the lowest surface and release, or outside the box of all without gravity, where a track
-ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,33 +228,6 @@ class Machine:
             said += [Caution(self.surfaces[owner], DRIVE_PULLEY) for owner in owners]
         return (*self.plate_warnings, *said)
 
-    @cached_property
-    def exit_box(self) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-        """Left, right, bottom and top (m) beyond which a particle has left the scene.
-
-        With gravity only the bottom is finite: what flies up comes back. What is released below
-        all surfaces, or hangs on a string, has not left: the box holds releases, too. Where
-        particles do not meet it holds each one's own alone, so that a particle does the same alone
-        and with others: then, and in a family, these are arrays (N,) if there are several. In a
-        family all have gravity or none.
-        """
-        wheel = self.pulley.radius if self.pulley is not None else -inf
-        corners, place = self.corners, self.releases.position
-        for thread in self.threads:
-            circle = np.add.outer([-thread.length, thread.length], thread.anchor)
-            corners = np.concatenate([corners, circle], axis=-2)
-        low, high = corners.min(axis=-2, initial=inf), corners.max(axis=-2, initial=-inf)
-        if corners.ndim == 2 and (self.interact or len(place) == 1):
-            low, high = np.minimum(low, place.min(axis=0)), np.maximum(high, place.max(axis=0))
-        else:
-            low, high = np.minimum(low, place), np.maximum(high, place)
-        bottom = np.minimum(low[..., 1], -wheel) - EXIT_MARGIN
-        if np.count_nonzero(self.gravity) == np.size(self.gravity):
-            return -inf, inf, bottom, inf
-        left = np.minimum(low[..., 0], -wheel) - EXIT_MARGIN
-        right, top = (np.maximum(high[..., axis], wheel) + EXIT_MARGIN for axis in (0, 1))
-        return left, right, bottom, top
-
 
 REMOTE = 8.0
 """Distance from the world's origin, in machine sizes, beyond which a local origin is used."""
@@ -294,7 +262,11 @@ def moved(machine: Machine, x: float, y: float) -> Machine:
         machine,
         segments=replace(segments, start=segments.start + by),
         arcs=replace(machine.arcs, center=machine.arcs.center + by),
-        releases=replace(releases, position=releases.position + by),
+        releases=replace(
+            releases,
+            position=releases.position + by,
+            exit_box=releases.exit_box + np.tile(by, 2),
+        ),
         threads=tuple(
             replace(thread, anchor=(thread.anchor[0] + x, thread.anchor[1] + y))
             for thread in machine.threads

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.core.module import INTEGER, REAL, Module, Status, constants, dtype
+from chutelab.core.module import INTEGER, Module, Status, constants, dtype
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.scene.variants import Family
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers, Watch
@@ -40,6 +40,11 @@ class Releases:
         Whose it is: particles of the first stream come first, then those of the next.
     kind : ndarray of int, (N,)
         Its row in the machine's tables of pairs; of a family each has a row of its own.
+    exit_box : ndarray, (N, 4)
+        Left, bottom, right and top beyond which it has left the scene, m. With gravity only the
+        bottom is finite: what flies up comes back. What is released below all surfaces, or hangs on
+        a string, has not left: the box holds releases, too. Where particles do not meet it holds
+        each one's own alone, so that a particle does the same alone and with others.
     """
 
     t: Floats
@@ -48,6 +53,7 @@ class Releases:
     carried: Bools
     stream: Ints
     kind: Ints
+    exit_box: Floats
 
     def __post_init__(self) -> None:
         for array in vars(self).values():
@@ -172,34 +178,24 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
         If a box has not room for all, or a particle would start inside a surface.
     """
     scene, family = scenes.scene, isinstance(scenes, Family)
-    plan, counts = module.structs["Plan"], [stream.count for stream in scene.streams]
+    counts = [stream.count for stream in scene.streams]
     corners = np.array([corner for kind in scene.particles for corner in kind.outline])
-    members, streams, count = plan.members, len(counts), sum(counts)
-    pieces = plan.segment_count + plan.arc_count + 1 + 2 * plan.conveyors
-    beds = scene.crowded and any(stream.bed_height > 0.0 for stream in scene.streams)
-    near, links = count if beds else 1, count if streams > 1 else 1
-    heads = 1 << (2 * max(near, links)).bit_length()
-    shapes: dict[str, tuple[Any, int]] = {
-        "starts": (dtype("Start"), members * count), "refusals": (dtype("Refusal"), members),
-        "carried": (INTEGER, members * streams), "corners": (REAL, corners.size),
-        "near": (dtype("Near"), near), "links": (INTEGER, links), "heads": (INTEGER, heads),
-        "listed": (INTEGER, pieces),
-    }  # fmt: skip
-    module.place(*((name, *shape) for name, shape in shapes.items()), of="Drawing")
-
-    def array(name: str) -> Any:
-        return module.array(name, *shapes[name], of="Drawing")
-
-    array("corners")[:] = corners.ravel()
+    members, streams = module.structs["Plan"].members, len(counts)
     drawing = module.structs["Drawing"]
-    drawing.count, drawing.head_room, drawing.looks = count, heads, LOOKS
+    drawing.looks = LOOKS
+    module.fill("Drawing", corners=corners.reshape(-1))
     while Status(module.call("draw")) is Status.PAUSED:
         watch()
-    refused = array("refusals")
+
+    def array(name: str, kind: np.dtype[Any], each: int) -> Any:
+        return module.array(name, kind, members * each, of="Drawing")
+
+    refused = array("refusals", dtype("Refusal"), 1)
     if np.count_nonzero(refused["why"]):
         which = refused["why"].nonzero()[0].tolist()
         raise RefusedError(scene.source, {n: _fault(scene, refused[n]) for n in which})
-    starts, carried = array("starts"), array("carried").astype(bool)
+    starts = array("starts", dtype("Start"), drawing.count)
+    carried = array("carried", INTEGER, streams).astype(bool)
     releases = Releases(
         t=starts["t"].copy(),
         position=starts["position"].copy(),
@@ -207,6 +203,7 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
         carried=carried if family else carried.repeat(counts),
         stream=np.arange(streams).repeat(members * np.array(counts)),
         kind=np.arange(members) if family else np.array(scene.kinds).repeat(counts),
+        exit_box=starts["exit_box"].copy(),
     )
     radius = starts["radius"].copy()
     alike = family or bool((radius == radius[0]).all())

@@ -27,9 +27,6 @@ WORDS = {"adhesion": inf, "impact": 0.0, "top": 1.0}
 WORD = 2**32
 """Seeds are handed over as two numbers below it."""
 
-ROOM = 64
-"""Segments and arcs of all members for which there is room at first."""
-
 
 @cache
 def _keys(struct: str) -> list[tuple[str, int]]:
@@ -77,6 +74,8 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
         add("ConveyorKeys", conveyor)
     for surface in scene.surface:
         add("SurfaceKeys", surface, corners=len(surface.points or ()))
+    for string in scene.string:
+        add("StringKeys", string)
     return [*found, *chain(*(point for one in scene.surface for point in one.points or ()))]
 
 
@@ -103,29 +102,20 @@ def lay(module: Module, scenes: Scene | Family, friction: Numbers) -> Laid:
     """Have the core lay the surfaces of a scene, or of all scenes of a family."""
     scene, numbers = scenes.scene, row(scenes, friction)
     shape = (len(scenes),) if isinstance(scenes, Family) else ()
-    every = shape[0] if shape else 1
-    segments, arcs = ROOM // every, ROOM // every
-    while True:
-        module.place(
-            ("rows", REAL, every * len(numbers)), ("nominal", dtype("Nominal"), every),
-            ("segments", dtype("Segment"), every * segments),
-            ("arcs", dtype("Arc"), every * arcs), of="Plan",
-        )  # fmt: skip
-        plan = module.structs["Plan"]
-        rows = module.array("rows", REAL, every * len(numbers), of="Plan").reshape(every, -1)
-        varies = [n for n, number in enumerate(numbers) if isinstance(number, np.ndarray)]
-        rows[:] = [nan if n in varies else number for n, number in enumerate(numbers)]
-        for column in varies:
-            rows[:, column] = numbers[column]
-        plan.members, plan.width = rows.shape
-        plan.particles, plan.streams = len(scene.particles), len(scene.streams)
-        plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
-        plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
-        plan.surfaces = len(scene.surface)
-        plan.segment_room, plan.arc_room = every * segments, every * arcs
-        if module.call("build"):
-            break
-        segments, arcs = plan.segment_count, plan.arc_count
+    plan, every = module.structs["Plan"], shape[0] if shape else 1
+    plan.members, plan.width = every, len(numbers)
+    plan.particles, plan.streams = len(scene.particles), len(scene.streams)
+    plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
+    plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
+    plan.surfaces, plan.strings = len(scene.surface), len(scene.string)
+    module.work("lay_out_plan")
+    rows = module.array("rows", REAL, every * len(numbers), of="Plan").reshape(every, -1)
+    varies = [n for n, number in enumerate(numbers) if isinstance(number, np.ndarray)]
+    rows[:] = [nan if n in varies else number for n, number in enumerate(numbers)]
+    for column in varies:
+        rows[:, column] = numbers[column]
+    module.work("build")
+    plan = module.structs["Plan"]
     found = (
         module.array(name, dtype(struct), every * count, of="Plan").copy().reshape((*shape, *more))
         for name, struct, count, more in (

@@ -59,9 +59,7 @@ def fates(recording: Record) -> NDArray[Any]:
     if not len(particles):
         return said
     last = recording.ends()[1]
-    left, right, bottom, top = (
-        np.broadcast_to(side, count)[particles] for side in machine.exit_box
-    )
+    left, bottom, right, top = machine.releases.exit_box[particles].T
     (x, y), out = last["position"].T, recording.ended_by("exit")[particles]
     gone = out | (x < left) | (x > right) | (y < bottom) | (y > top)
     said[particles[gone]] = _ways_out(recording, particles[gone], last["position"][gone])

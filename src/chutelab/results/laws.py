@@ -29,10 +29,7 @@ LAWS = (FINITE, THROUGH, INSIDE, ENERGY, LOSSES, LEDGER, STEP)
 UNITS = {FINITE: "", THROUGH: "", INSIDE: "m", STEP: "m"}
 """Units of what is found; of the others J."""
 
-HITS = 64
-"""Places inside or beyond surfaces for which there is room at first."""
-
-INTEGER, REAL = np.dtype("<i4"), np.dtype("<f8")
+INTEGER = np.dtype("<i4")
 
 _NUMBERS = np.dtype(
     {"names": ["t", "rest"], "formats": ["f8", ("f8", 10)],
@@ -126,21 +123,10 @@ def judge(recording: Record) -> tuple[Broken, ...]:
 def examine(recording: Record) -> Findings:
     """Have the core look at a run, of one knot or more."""
     module, hit, breach = core.borrow(), core.dtype("Hit"), core.dtype("Breach")
-    crowd = recording.machine.interact and recording.engine == "contact"
     try:
         _lay_out(module, recording)
-        module.place(
-            ("breaches", breach, core.number("BREACHES")),
-            ("order", INTEGER, len(recording.knots) if crowd else 1),
-            ("places", REAL, 2 * recording.count if crowd else 1), of="Laws",
-        )  # fmt: skip
-        room = HITS
-        while room:
-            module.place(("hits", hit, room), of="Laws")
-            figures: Any = module.structs["Laws"]
-            figures.hit_room = room
-            module.call("judge")
-            room = figures.hit_count if figures.hit_count > room else 0
+        module.work("judge")
+        figures: Any = module.structs["Laws"]
         figures = type(figures).from_buffer_copy(figures)
         breaches = module.array("breaches", breach, figures.breach_count, of="Laws")
         hits = module.array("hits", hit, figures.hit_count, of="Laws")
@@ -157,16 +143,13 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     bodies["inertia"], bodies["gravity"] = machine.particle.inertia, machine.gravity
     rows = barriers(machine)
     books = recording.by_surface.reshape(-1)
-    module.put(
-        "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
-        barriers=rows.reshape(-1), books=books,
-    )  # fmt: skip
     events = recording.events.view(_NUMBERS)
     unreal = sum(int(np.count_nonzero(~np.isfinite(events[name]))) for name in ("t", "rest"))
     exact = recording.engine == "exact"
     laws: Any = module.structs["Laws"]
     for name, value in (
         ("particle_count", count), ("piece_count", rows.shape[-1]),
+        ("knot_count", len(recording.knots)),
         ("row", recording.knots.dtype.itemsize // 8), ("book_rows", len(books) // 3),
         ("surface_count", len(recording.surfaces)), ("engine", _ENGINES.index(recording.engine)),
         ("interact", machine.interact), ("alike", alike(recording)), ("family", rows.ndim > 1),
@@ -175,6 +158,11 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("gained", recording.gained), ("largest", np.max(machine.particle.radius)),
     ):  # fmt: skip
         setattr(laws, name, value)
+    module.work("lay_out_laws")
+    module.fill(
+        "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
+        barriers=rows.reshape(-1), books=books,
+    )  # fmt: skip
 
 
 _ENGINES = ("exact", "contact", "pymunk")

@@ -1,4 +1,4 @@
-"""One scene, varied: what ``--vary`` takes, and what the keys are.
+"""One scene, varied: which keys, and the values they take.
 
 Scenes that differ in plain numbers only are a `Family`: one of them, and a column for each key.
 """
@@ -33,12 +33,9 @@ from chutelab.scene.units import Table, read_any, sphere_mass
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.errors import MISSING, InputError, about_comma
 
-MOST_VALUES: Final = 10_000
-"""Values of one key; more would be a slip of the keyboard."""
+RANGE: Final = "must have two ends, such as -20 and 70"
 
-FORM: Final = "must be KEY=FROM:TO:COUNT, such as plate.angle_deg=-20:70:46, or KEY=a,b,c"
-
-RANGE_FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=-20:70"
+NUMBERS: Final = "must be a list of numbers, or of texts such as 4 mm"
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ class Vary:
             raise InputError("only finite numbers are allowed", self.typed)
 
 
-Varied = str | Sequence["Vary | str"] | Mapping[str, Sequence[float | str]]
+Varied = Sequence[Vary] | Mapping[str, Sequence[float | str]]
 """Keys that vary and their values, see `varied`."""
 
 
@@ -82,85 +79,46 @@ class Range(Vary):
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.values) != 2:
-            raise InputError(RANGE_FORM, self.typed)
+            raise InputError(RANGE, self.typed)
         low, high = self.values
         if low >= high:
             raise InputError(f"the range is empty: from {low:g} to {high:g}", self.typed)
 
 
+def refuse_texts(given: Any, option: str, example: str) -> None:
+    """Refuse what is written as on the command line; say what it is in Python."""
+    texts = [given] if isinstance(given, str) else () if isinstance(given, Mapping) else given
+    if any(isinstance(one, str) for one in texts):
+        raise InputError(f"KEY=... is for the command line; in Python it is {example}", option)
+
+
 def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
     """Return what is varied as a list of one kind, `Vary` or `Range`.
 
-    Values by key, numbers or texts with a unit; texts as ``--vary`` takes them; or such a list.
+    It is given as such a list, or as values by key: numbers, or texts with a unit.
     """
-    if isinstance(varies, str):
-        varies = [varies]
-    if isinstance(varies, Mapping):
-        form = "must be a list of numbers, or of texts such as 4 mm"
-        found = []
-        for key, values in varies.items():
-            typed = f"--vary {key}=..."
-            if isinstance(values, str) or not hasattr(values, "__len__"):
-                raise InputError(form, typed)
-            numbers, unit = _numbers(typed, [str(value) for value in plain(values)], form)
-            # + 0.0: there is one zero.
-            found.append(kind(key, tuple(number + 0.0 for number in numbers), typed, unit))
-        return found
-    read = parse_range if kind is Range else parse
-    return [read(vary) if isinstance(vary, str) else vary for vary in varies]
+    refuse_texts(varies, "--vary", '{"plate.angle_deg": [0, 30, 60]}')
+    if not isinstance(varies, Mapping):
+        return list(varies)
+    found = []
+    for key, values in varies.items():
+        typed = f"--vary {key}=..."
+        if isinstance(values, str) or not hasattr(values, "__len__"):
+            raise InputError(NUMBERS, typed)
+        read, unit = numbers(typed, [str(value) for value in plain(values)], NUMBERS)
+        # + 0.0: there is one zero.
+        found.append(kind(key, tuple(number + 0.0 for number in read), typed, unit))
+    return found
 
 
-def parse(text: str) -> Vary:
-    """Read what ``--vary`` takes, or raise an `InputError`; numbers may have units (0.5mm)."""
-    typed, key, given = _parted_key(text, FORM)
-    if ":" not in given:
-        parts = given.split(",")
-        if len(parts) > MOST_VALUES:
-            raise InputError(f"{len(parts)} values, at most {MOST_VALUES} are allowed", typed)
-        values, unit = _numbers(typed, parts, FORM)
-        return Vary(key, values, typed, unit)
-    parts = given.split(":")
-    if len(parts) != 3:
-        raise InputError(FORM, typed)
-    (first, last), unit = _numbers(typed, parts[:2], FORM)
-    try:
-        count = int(parts[2])
-    except ValueError:
-        count = 0
-    if not 1 <= count <= MOST_VALUES:
-        found = f"COUNT = {parts[2].strip() or 'nothing'}"
-        raise InputError(f"{found}; it must be a whole number from 1 to {MOST_VALUES}", typed)
-    if count == 1:
-        return Vary(key, (first,), typed, unit)
-    if first == last:
-        raise InputError(f"the range is empty: from {first:g} to {last:g}", typed)
-    # Rounded: 0.3 is 0.3, not 0.30000000000000004, and what rounding leaves of a 0 is a 0.
-    nothing = 1e-13 * max(abs(first), abs(last))
-    inside = (first + (last - first) * i / (count - 1) for i in range(1, count - 1))
-    rounded = (0.0 if abs(value) < nothing else float(f"{value:.12g}") for value in inside)
-    return Vary(key, (first, *rounded, last), typed, unit)
+def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
+    """Return numbers, with or without unit, in the SI unit, and which that is; "" if none is there.
 
-
-def parse_range(text: str) -> Range:
-    """Read what ``--vary`` takes where samples are drawn, ``KEY=FROM:TO``; raises as `parse`."""
-    typed, key, given = _parted_key(text, RANGE_FORM)
-    parts = given.split(":")
-    if len(parts) != 2:
-        raise InputError(f"samples are drawn between two ends: it {RANGE_FORM}", typed)
-    values, unit = _numbers(typed, parts, RANGE_FORM)
-    return Range(key, values, typed, unit)
-
-
-def _parted_key(text: str, form: str) -> tuple[str, str, str]:
-    typed = f"--vary {text}"
-    key, equals, given = (part.strip() for part in text.partition("="))
-    if not (key and equals and given):
-        raise InputError(form, typed)
-    return typed, key, given
-
-
-def _numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
-    """Return numbers in the SI unit, and which that is; "" if none was written."""
+    Raises
+    ------
+    InputError
+        If one is none; it says `form`, what is allowed.
+    """
     values, units = [], set()
     for part in parts:
         value, unit = read_any(part)

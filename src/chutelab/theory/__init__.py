@@ -4,11 +4,9 @@ V. Molnár et al., "Energy calculation model of an outgoing conveyor with applic
 chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016.
 
 - `results`: `Transfer` and `Reason`: the answer, or why there is none.
-- `separation`: how the pulley is left, on the level or an incline: adhesion, slip at finite
-  friction, bodies that roll.
 - `transfer`: Eqs. (2)-(16) and their generalisations, vectorised; plain numbers in.
-- `slide`: sliding and rolling along a round chute.
-- `obstacles`: first contacts of a disk with finite surfaces.
+- `slide`: sliding and rolling on a round surface: along a chute, and round the pulley to where it
+  is left, by adhesion, at finite friction, or by bodies that roll.
 - `prediction`: `predict`, particle 0 of a scene, or the reason why the closed form does not hold
   for it; `unbounded`, the same without looking at the finite machine.
 - `drag`: what air drag, left out everywhere else, would do.

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot, inf, isnan, nan, pi
+from math import inf, isnan, nan, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chutelab.theory.prediction import Course
 from chutelab.theory.results import Transfer
-from chutelab.theory.transfer import rebound
+from chutelab.theory.transfer import rebounded
 
 if TYPE_CHECKING:
     from chutelab.scene import Scene
@@ -32,12 +32,8 @@ STEPS = 64
 MOST_STEPS = 20_000
 """Dust, which air stops within microns, would take more: no answer."""
 
-State = tuple[float, float, float, float]
-"""x, y (m) and vx, vy (m/s)."""
-
-
-TOLD = 1e-6
-"""m; a shift of less is not told, and one that is NaN."""
+State = tuple[complex, complex]
+"""Place, x + i y (m), and velocity (m/s) likewise."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,7 @@ class Drag:
         said = f"air drag, left out, would be {share} at {self.speed:.3g} m/s"
         if not self.arrives:
             said += ", and air would keep particle 0 from getting there"
-        elif abs(self.landing_shift) >= TOLD:
+        elif abs(self.landing_shift) >= 1e-6:  # m; not NaN either
             way = "forward" if self.landing_shift >= 0.0 else "back"
             far = f"{1000.0 * abs(self.landing_shift):.2g} mm farther {way}"
             said += f", and particle 0 would land {far}"
@@ -134,7 +130,7 @@ def drag(
     slowed = slowing(speed, radius, mass) * speed
     impact, landing = nan, nan
     if np.isfinite(found.t2) and own.radius > 0.0:
-        impact, landing = _shifts(Course(scene, found))
+        impact, landing = shifts(Course(scene, found))
     return Drag(
         speed=speed,
         reynolds=reynolds,
@@ -148,62 +144,74 @@ def drag(
     )
 
 
-def _shifts(course: Course) -> tuple[float, float]:
+def shifts(course: Course) -> tuple[float, float]:
     """Return `Drag.impact_shift` and `Drag.landing_shift`."""
-    found, own = course.found, course.own
-    restitution, friction = course.scene.met(course.kind, "plate")
+    found, own, leaves = course.found, course.own, course.separation
+    restitution, friction = course.scene.met(course.scene.kinds[0], "plate")
+    normal, up, pivot, place, speed, impact = (
+        complex(*vector)
+        for vector in (
+            course.normal, course.up, course.pivot, leaves.position, leaves.velocity, course.impact,
+        )
+    )  # fmt: skip
 
-    def rate(vx: float, vy: float) -> tuple[float, float]:
-        slow = slowing(hypot(vx, vy), own.radius, own.mass)
-        return -slow * vx, -slow * vy - course.scene.gravity
+    def rate(v: complex) -> complex:
+        return -slowing(abs(v), own.radius, own.mass) * v - 1j * course.scene.gravity
 
-    start = course.separation
-    (nx, ny), (ux, uy) = course.normal, course.up
-    px, py = course.pivot
+    def along(vector: complex, direction: complex) -> float:
+        return (vector * direction.conjugate()).real
 
-    def before_plate(state: State) -> float:
-        return float((state[0] - px) * nx + (state[1] - py) * ny - own.radius)
-
-    met = fly((*start.position, *start.velocity), rate, before_plate, float(found.t2))
+    t2, t3 = float(found.t2), float(found.t3)
+    met = fly((place, speed), rate, lambda z: along(z - pivot, normal) - own.radius, t2)
     if met is None:
         return nan, nan
-    x, y, vx, vy = met
-    shift = float(y - course.impact[1])
-    if not np.isfinite(found.t3):
+    z, v = met
+    shift = (z - impact).imag
+    if not np.isfinite(t3):
         return shift, nan
-    away, down, _ = rebound(
-        normal=np.array(-vx * nx - vy * ny), tangential=np.array(-vx * ux - vy * uy),
-        rim=np.array(own.radius * float(found.omega1)), restitution=np.array(restitution),
-        friction=np.array(friction), spin=np.array(own.spin), inertia=np.array(own.moment or 0.5),
+    away, down, _ = (
+        float(part)
+        for part in rebounded(
+            normal=np.array(-along(v, normal)), tangential=np.array(-along(v, up)),
+            rim=own.radius * found.omega1, restitution=np.array(restitution),
+            friction=np.array(friction), spin=np.array(own.spin),
+            inertia=np.array(own.moment or 0.5),
+        )
     )  # fmt: skip
-    level = float(course.impact[1] - found.y3)
-    after = (x, y, float(away * nx - down * ux), float(away * ny - down * uy))
-    landed = fly(after, rate, lambda state: state[1] - level, float(found.t3))
-    if landed is None:
-        return shift, nan
-    return shift, float(landed[0] - (course.impact[0] - found.x3))
+    lands = impact - complex(found.x3, found.y3)
+    after = z, away * normal - down * up
+    landed = fly(after, rate, lambda z: (z - lands).imag, t3)
+    return shift, nan if landed is None else (landed[0] - lands).real
 
 
 def fly(
-    start: State,
-    rate: Callable[[float, float], tuple[float, float]],
-    gap: Callable[[State], float],
-    about: float,
+    start: State, rate: Callable[[complex], complex], gap: Callable[[complex], float], about: float
 ) -> State | None:
     """Fly until a gap closes; None if it does not in three times the time that it takes about, s.
 
-    `rate` gives the acceleration (m/s²) from the velocity. Classical Runge-Kutta; the last step is
-    cut where the gap, taken for linear and then by secants, is 0.
+    `rate` gives the acceleration (m/s²) from the velocity, `gap` a distance (m) from the place.
+    Classical Runge-Kutta; the last step is cut where the gap, taken for linear and then by secants,
+    is 0.
     """
-    vx, vy = start[2:]
-    relief = -rate(vx, vy)[0] / vx if vx else 0.0
+
+    def step(state: State, h: float) -> State:
+        """Return the state a step of h (s) later."""
+        z, v = state
+        a = rate(v)
+        b = rate(v + 0.5 * h * a)
+        c = rate(v + 0.5 * h * b)
+        d = rate(v + h * c)
+        return z + h * (v + h / 6.0 * (a + b + c)), v + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+
+    vx = start[1].real
+    relief = -rate(start[1]).real / vx if vx else 0.0
     h = min(about / STEPS, 0.25 / relief) if relief > 0.0 else about / STEPS
     if not h > 0.0 or 3.0 * about / h > MOST_STEPS:
         return start if about == 0.0 else None
-    state, before = start, gap(start)
+    state, before = start, gap(start[0])
     for _ in range(int(3.0 * about / h) + 1):
-        ahead = _step(state, rate, h)
-        after = gap(ahead)
+        ahead = step(state, h)
+        after = gap(ahead[0])
         if after <= 0.0:
             break
         state, before = ahead, after
@@ -213,23 +221,8 @@ def fly(
     for _ in range(8):
         cut = high - after * (high - low) / (after - before)
         low, before, high = high, after, cut
-        ahead = _step(state, rate, cut)
-        after = gap(ahead)
+        ahead = step(state, cut)
+        after = gap(ahead[0])
         if abs(after) <= 1e-15 or after == before:
             break
     return ahead
-
-
-def _step(state: State, rate: Callable[[float, float], tuple[float, float]], h: float) -> State:
-    """Return the state a step of h (s) later."""
-    x, y, vx, vy = state
-    a = rate(vx, vy)
-    b = rate(vx + 0.5 * h * a[0], vy + 0.5 * h * a[1])
-    c = rate(vx + 0.5 * h * b[0], vy + 0.5 * h * b[1])
-    d = rate(vx + h * c[0], vy + h * c[1])
-    return (
-        x + h * (vx + h / 6.0 * (a[0] + b[0] + c[0])),
-        y + h * (vy + h / 6.0 * (a[1] + b[1] + c[1])),
-        vx + h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]),
-        vy + h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]),
-    )

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.scene import Scene, from_dict
-from chutelab.theory.paper import BALL_MASS, DISTANCES, FALL, PLATE_AHEAD, RADII, at_radii
+from chutelab.theory.paper import BALL_MASS, DISTANCES, FALL, PLATE_AHEAD, RADII, WORDS, at_radii
 from chutelab.theory.transfer import Rebound, transfer
 from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError
@@ -162,8 +162,26 @@ def figure(number: int) -> PaperFigure:
     if number not in NUMBERS:
         raise FigureError(f"the paper has no figure {number} of results; there are {there}")
     if number in CASES:
-        return _trajectories(number)
-    return _energies(number) if number in (6, 7) else _velocities(number)
+        return trajectories(number)
+    return against_the_radius(number)
+
+
+def worded(
+    number: int,
+    words: dict[str, Any],
+    values: dict[str, Any],
+    panels: tuple[Panel, ...],
+    columns: dict[str, NDArray[Any]],
+    rows: list[int],
+    scenes: dict[str, Scene],
+    sweep: str = "",
+) -> PaperFigure:
+    """Return a figure whose words take computed values in their braces."""
+    title = words["title"].format(**values)
+    meaning, missing = (
+        tuple(text.format(**values) for text in words[kind]) for kind in ("meaning", "missing")
+    )
+    return PaperFigure(number, title, panels, meaning, missing, columns, rows, scenes, sweep)
 
 
 def _scene(title: str, mass: float, speed: float, radius: float, plate: dict[str, float]) -> Scene:
@@ -195,27 +213,55 @@ NEAR, FAR = float(DISTANCES[0]), float(DISTANCES[-1])
 
 SPEEDS: Final = {6: 2.0, 7: 4.0, 8: 2.0, 9: 4.0}
 
+ROLES: Final = ("first", "second", "third", "fourth")
+
 SWEEP: Final = "chutelab sweep figure-{}.toml --vary incoming.pulley_radius=0.05:0.5:91"
 """The same radii with the engine."""
 
 
-def _against_the_radius(
-    number: int,
-    title: str,
-    y_label: str,
-    curves: dict[Rebound, dict[str, Floats]],
-    columns: dict[str, Floats],
-    meaning: tuple[str, ...],
-    missing: tuple[str, ...],
-) -> PaperFigure:
-    """Return a figure of one panel a form, each with its curves by label."""
-    roles, speed = ("first", "second", "third", "fourth"), SPEEDS[number]
+def against_the_radius(number: int) -> PaperFigure:
+    """Figures 6 and 7: energy of Eq. (14); 8 and 9: velocities of the three phases."""
+    speed = SPEEDS[number]
+    critical = speed**2 / GRAVITY
+    values = {"speed": speed, "near": GRID[0], "far": GRID[-1], "critical": critical, "d_okr": NEAR}
+    found = {form: at_radii(GRID, speed, NEAR, form) for form in FORMS}
+    printed, right = found.values()
+    columns: dict[str, NDArray[Any]] = {"R, m": GRID}
+    curves: dict[Rebound, dict[str, Floats]] = {form: {} for form in FORMS}
+    if number in (6, 7):
+        words, y_label = WORDS["figures"]["energies"], "energy ΔE_k of Eq. (14), mJ"
+        for form in FORMS:
+            for d in (NEAR, FAR):
+                energy = 1000.0 * at_radii(GRID, speed, d, form).dEk
+                curves[form][f"d_okr = {d:g} m"] = energy
+                columns[f"ΔE_k, mJ, {form}, d_okr = {d:g} m"] = energy
+        (first, *_, last), level = (1000.0 * one.dEk for one in found.values())
+        values |= {"first": first, "last": last, "share": 100.0 * (1.0 - last / first)}
+        values |= {"level": level[0], "right_last": level[-1]}
+    else:
+        words, y_label = WORDS["figures"]["velocities"], "speed, m/s"
+        columns |= {"v1, m/s": right.v1, "v2, m/s": right.v2}
+        for form, one in found.items():
+            for name, speeds in (("v2'", one.v2r), ("v3", one.v3), ("v3x", one.v3x)):
+                columns[f"{name}, m/s, {form}"] = speeds
+            curves[form] = {
+                "v1, leaving the pulley": one.v1,
+                "v2, at the plate": one.v2,
+                "v2', after it": one.v2r,
+                "v3, at the belt": one.v3,
+            }
+        values |= {"first": printed.v2r[0], "last": printed.v2r[-1]}
+        values |= {"right_first": right.v2r[0], "right_last": right.v2r[-1]}
+        values |= {"back_first": printed.v3x[0], "back_last": printed.v3x[-1]}
+        values |= {"right_back": right.v3x[0], "right_back_last": right.v3x[-1]}
+        values["how"] = "too slow" if printed.v2r[0] < right.v2r[0] else "too fast"
+    values["rest"] = words["slow" if critical < GRID[-1] else "fast"].format(**values)
     panels = tuple(
         Panel(
             SAID[form], "pulley radius R, m", y_label,
             tuple(
                 Line(label, GRID, y, role, np.column_stack([GRID, y])[SHOWN])
-                for role, (label, y) in zip(roles, curves[form].items(), strict=False)
+                for role, (label, y) in zip(ROLES, curves[form].items(), strict=False)
             ),
         )
         for form in FORMS
@@ -224,105 +270,8 @@ def _against_the_radius(
         f"Figure {number} of the paper: v0 = {speed:g} m/s, first radius",
         MASS, speed, float(GRID[0]), {"distance": NEAR},
     )  # fmt: skip
-    return PaperFigure(
-        number, title, panels, meaning, missing, {"R, m": GRID, **columns}, SHOWN,
-        {f"figure-{number}": scene}, SWEEP.format(number),
-    )  # fmt: skip
-
-
-def _energies(number: int) -> PaperFigure:
-    """Figures 6 and 7: energy of Eq. (14)."""
-    speed = SPEEDS[number]
-    curves: dict[Rebound, dict[str, Floats]] = {
-        form: {f"d_okr = {d:g} m": 1000.0 * at_radii(GRID, speed, d, form).dEk for d in (NEAR, FAR)}
-        for form in FORMS
-    }
-    printed, right = (curves[form][f"d_okr = {NEAR:g} m"] for form in FORMS)
-    critical = speed**2 / GRAVITY
-    meaning = (
-        f"As printed the energy falls from {printed[0]:.1f} mJ at R = {GRID[0]:g} m to"
-        f" {printed[-1]:.1f} mJ at {GRID[-1]:g} m, {100.0 * (1.0 - printed[-1] / printed[0]):.0f} %"
-        " less: the paper concludes that a larger pulley saves energy. With Eq. (9) corrected the"
-        " particle comes down with v3x = ε v1 cos φ1, whatever the radius:"
-        f" {right[0]:.1f} mJ for every pulley that the belt leaves at the top."
-    )
-    if critical < GRID[-1]:
-        meaning += (
-            f" Only beyond R = v0²/g = {critical:.3f} m, where the particle rides round the pulley"
-            f" first, the energy falls, to {right[-1]:.1f} mJ at {GRID[-1]:g} m. The trend below"
-            " that is the misprint."
-        )
-    else:
-        meaning += " At this speed that is all of them: the whole trend is the misprint."
-    return _against_the_radius(
-        number,
-        f"energy of a particle after the impact on the outgoing belt, v0 = {speed:g} m/s",
-        "energy ΔE_k of Eq. (14), mJ",
-        curves,
-        {
-            f"ΔE_k, mJ, {form}, {label}": energy
-            for form in FORMS
-            for label, energy in curves[form].items()
-        },
-        (meaning,),
-        (
-            "which distance d_okr the curve is for (the paper varies it from 0.5 to 1 m): both ends"
-            " are drawn.",
-            "which of 7.95 g and 8 g the particle has: 8 g here. The range of the axis: the radii"
-            " of Table 1.",
-            "v_dop of the outgoing belt: v0, as both belts have the same speed in Sect. 2.",
-        ),
-    )
-
-
-def _velocities(number: int) -> PaperFigure:
-    """Figures 8 and 9: velocities of the three phases."""
-    speed = SPEEDS[number]
-    found = {form: at_radii(GRID, speed, NEAR, form) for form in FORMS}
-    printed, right = found.values()
-    columns = {"v1, m/s": right.v1, "v2, m/s": right.v2}
-    curves: dict[Rebound, dict[str, Floats]] = {}
-    for form, one in found.items():
-        columns |= {
-            f"v2', m/s, {form}": one.v2r,
-            f"v3, m/s, {form}": one.v3,
-            f"v3x, m/s, {form}": one.v3x,
-        }
-        curves[form] = {
-            "v1, leaving the pulley": one.v1,
-            "v2, at the plate": one.v2,
-            "v2', after it": one.v2r,
-            "v3, at the belt": one.v3,
-        }
-    where = "too slow" if printed.v2r[0] < right.v2r[0] else "too fast"
-    critical = speed**2 / GRAVITY
-    until = (
-        f"up to R = {critical:.3f} m and {right.v3x[-1]:.3f} m/s at the end."
-        if critical < GRID[-1]
-        else "throughout."
-    )
-    return _against_the_radius(
-        number,
-        f"velocities of the particle in the three phases, v1 = {speed:g} m/s",
-        "speed, m/s",
-        curves,
-        columns,
-        (
-            "v1 and v2 come before the plate, where the misprint has no part. After it, the printed"
-            f" equation makes the particle {where} at R = {GRID[0]:g} m:"
-            f" v2' = {printed.v2r[0]:.3f} m/s instead of {right.v2r[0]:.3f} m/s; at"
-            f" R = {GRID[-1]:g} m it is {printed.v2r[-1]:.3f} instead of {right.v2r[-1]:.3f} m/s.",
-            "That v2' grows with the radius holds either way, because the fall to the plate is"
-            " longer. That v3x falls with it, from which the paper reads a saving of energy, does"
-            f" not: printed {printed.v3x[0]:.3f} to {printed.v3x[-1]:.3f} m/s, corrected"
-            f" {right.v3x[0]:.3f} m/s {until}",
-        ),
-        (
-            "which velocities are drawn, and against what: here v1, v2, v2' and v3, the speeds that"
-            " the text compares, against the radius R.",
-            f"the distance d_okr: {NEAR:g} m here, as in Table 1.",
-        ),
-    )
+    scenes = {f"figure-{number}": scene}
+    return worded(number, words, values, panels, columns, SHOWN, scenes, SWEEP.format(number))
 
 
 # Figures 11 to 13: trajectories with an upright plate and with inclined ones.
@@ -409,7 +358,8 @@ def path(case: Case, form: Rebound) -> NDArray[Any]:
 Paths = dict[tuple[Case, Rebound], NDArray[Any]]
 
 
-def _trajectories(number: int) -> PaperFigure:
+def trajectories(number: int) -> PaperFigure:
+    """Figures 11 to 13."""
     cases = CASES[number]
     paths: Paths = {(case, form): path(case, form) for case in cases for form in FORMS}
     points = np.concatenate([point for flights in paths.values() for point in flights])
@@ -428,7 +378,7 @@ def _trajectories(number: int) -> PaperFigure:
     # The first and the last point of each flight to the belt.
     rows = [2 * POINTS * n + row for n in range(len(paths)) for row in (POINTS, 2 * POINTS - 1)]
     panels = tuple(
-        Panel(f"{case}, {SAID[form]}", "x, m", "y, m", _lines(case, found), to_scale=True)
+        Panel(f"{case}, {SAID[form]}", "x, m", "y, m", lines_of(case, found), to_scale=True)
         for (case, form), found in paths.items()
     )
     scenes = {
@@ -446,16 +396,13 @@ def _trajectories(number: int) -> PaperFigure:
         )
         for case in cases
     }
-    title, meaning, missing = {11: _upright, 12: _inclined, 13: _steep}[number](paths)
-    missing += (
-        "how far below the incoming support the outgoing one lies: the particle falls d2 = 0.5 m"
-        " after the plate here, as in Sect. 2.",
-        "friction and how the contacts were modelled: none here; the particle is a point, ε = 0.5.",
-    )
-    return PaperFigure(number, title, panels, meaning, missing, columns, rows, scenes)
+    words = WORDS["figures"][str(number)]
+    words = {**words, "missing": words["missing"] + WORDS["figures"]["simulated"]["missing"]}
+    return worded(number, words, told(number, paths), panels, columns, rows, scenes)
 
 
-def _lines(case: Case, flights: NDArray[Any]) -> tuple[Line, ...]:
+def lines_of(case: Case, flights: NDArray[Any]) -> tuple[Line, ...]:
+    """Return what is drawn of a case: plate, belts and the two flights."""
     alpha, top = np.radians(case.angle), case.radius
     along = np.array([ABOVE, -case.below])
     first, second = flights["position"]
@@ -470,70 +417,36 @@ def _lines(case: Case, flights: NDArray[Any]) -> tuple[Line, ...]:
     )
 
 
-Words = tuple[str, tuple[str, ...], tuple[str, ...]]
-"""Title, meaning and what is missing of one of these figures, see `PaperFigure`."""
+def told(number: int, paths: Paths) -> dict[str, Any]:
+    """Return the values that the words of a figure take."""
 
+    def forward(flights: NDArray[Any]) -> float:
+        return float(flights["velocity"][1, -1, 0])
 
-def _upright(paths: Paths) -> Words:
-    parts = []
-    for case in CASES[11]:
-        printed, right = (case.ahead - paths[case, form]["position"][1, -1, 0] for form in FORMS)
-        parts.append(
-            f"at {case.speed:g} m/s it comes down {right:.3f} m back from the plate, as printed"
-            f" {printed:.3f} m"
-        )
-    meaning = (
-        "The figure is the simulation's, which knows no Eq. (9): its paths are the corrected ones,"
-        f" {'; '.join(parts)}.",
-        "What the paper reads off it, that a faster particle meets the plate higher up and at a"
-        " larger angle φ2, comes before the plate and stands.",
-    )
-    return "trajectories with an upright plate", meaning, ()
-
-
-def _forward(flights: NDArray[Any]) -> float:
-    """Return the velocity forward with which the particle lands, m/s."""
-    return float(flights["velocity"][1, -1, 0])
-
-
-def _inclined(paths: Paths) -> Words:
-    parts = [
-        f"{case}: {_forward(paths[case, 'corrected']):+.2f} m/s (as printed"
-        f" {_forward(paths[case, 'as-printed']):+.2f})"
-        for case in CASES[12]
-    ]
-    faster = _forward(path(replace(CASES[12][0], speed=2.0), "corrected"))
-    meaning = (
-        f"Forward velocity at the belt: {', '.join(parts)}. The misprint changes how fast the"
-        " particle leaves the plate, not whether it goes forward: the direction is Eq. (8)'s, which"
-        " is right.",
-        "The paper's own sentences disagree about 20°: in one the particle goes on forward in both"
-        " pictures, in another it bounces backward at 1 m/s. With d1 = 0.1 m it goes forward at"
-        f" 1 m/s, and backward at 2 m/s ({faster:+.2f} m/s).",
-    )
-    missing = (
-        "where the plate's pivot is: at the height of the incoming support, 0.1 m ahead, which the"
-        " text gives for angles up to 20° and 1 m/s, and which is taken for 40° too."
-    )
-    return "trajectories with plates inclined by 20° and 40°", meaning, (missing,)
-
-
-def _steep(paths: Paths) -> Words:
+    if number == 11:
+        parts = []
+        for case in CASES[11]:
+            printed, right = (case.ahead - paths[case, f]["position"][1, -1, 0] for f in FORMS)
+            parts.append(
+                f"at {case.speed:g} m/s it comes down {right:.3f} m back from the plate, as"
+                f" printed {printed:.3f} m"
+            )
+        return {"landings": "; ".join(parts)}
+    if number == 12:
+        parts = [
+            f"{case}: {forward(paths[case, 'corrected']):+.2f} m/s (as printed"
+            f" {forward(paths[case, 'as-printed']):+.2f})"
+            for case in CASES[12]
+        ]
+        faster = path(replace(CASES[12][0], speed=2.0), "corrected")
+        return {"forward": ", ".join(parts), "faster": forward(faster)}
     (case,) = CASES[13]
-    printed, right = (paths[case, form] for form in FORMS)
-    before = np.hypot(*right["velocity"][0, -1])
-    after, printed_after = (np.hypot(*one["velocity"][1, 0]) for one in (right, printed))
-    meaning = (
-        f"At 60° the particle almost grazes the plate, keeps {after:.2f} of {before:.2f} m/s and"
-        f" comes down with {_forward(right):+.2f} m/s forward, close to the belt's own"
-        f" {case.speed:g} m/s: the paper's recommendation of a steep plate stands.",
-        f"As printed, Eq. (9) would leave it {printed_after:.2f} m/s and"
-        f" {_forward(printed):+.2f} m/s forward, because it damps what runs along the"
-        " plate: the misprint speaks against the very plate that the paper recommends. The"
-        " simulation, which knows no Eq. (9), does not.",
-    )
-    missing = (
-        "the speed, of which the caption has the symbol only: 2 m/s here, as in the text before.",
-        "where the plate's pivot is: 0.1 m ahead here, as in Fig. 12.",
-    )
-    return "trajectory with a plate inclined by 60°", meaning, missing
+    as_printed, corrected = (paths[case, form] for form in FORMS)
+    return {
+        "speed": case.speed,
+        "before": np.hypot(*corrected["velocity"][0, -1]),
+        "after": np.hypot(*corrected["velocity"][1, 0]),
+        "printed_after": np.hypot(*as_printed["velocity"][1, 0]),
+        "right": forward(corrected),
+        "printed": forward(as_printed),
+    }

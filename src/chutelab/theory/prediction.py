@@ -1,29 +1,30 @@
 """`predict`: the theory's answer for a scene, or the reason why it has none.
 
 The finite machine is laid over the numbers of `transfer`: what is touched before the plate, whether
-the plate is there, what is touched between rebound and landing, whether the belt is there.
+the plate is there, what is touched between rebound and landing, whether the belt is there. Surfaces
+are segments and arcs without thickness, touched from either side at the disk's radius.
+
+The gap to each side of a face or an arc, and to each end, is a function of time (on the ride, of
+the angle) that is followed between its turning points: the disk collides at the first instant at
+which a gap falls to zero, touching included. A gap that is zero from the beginning falls if the
+disk approaches or is pressed, and not if it leaves or goes along. Zero is what rounding makes of
+the numbers, so a graze to within rounding is one.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.theory.obstacles import (
-    Bend,
-    Flight,
-    Line,
-    Obstacles,
-    corner_times,
-    first_in_flight,
-    first_on_pulley,
-    ring_times,
-)
 from chutelab.theory.results import Reason, Transfer, cut, unanswered
+from chutelab.theory.slide import HALVINGS
 from chutelab.theory.transfer import Rebound, transfer
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.trig import RADIANS, hypot, sin_cos
 
 if TYPE_CHECKING:
@@ -31,17 +32,239 @@ if TYPE_CHECKING:
     from chutelab.scene import AnyScene, Scene
     from chutelab.scene.variants import Family
 
-LEAST_CLEARANCE = 0.05
-"""m of the default plate's lower end above the outgoing belt, for particles below 17 mm."""
+Line = tuple[str, ArrayLike, ArrayLike]
+"""A straight surface: its name and both ends, m."""
 
-RADII_CLEARANCE = 3.0
-"""The same in particle radii, for larger ones."""
+Bend = tuple[str, ArrayLike, float, float, float]
+"""A round one: its name, centre and radius, m; the angle of its first end from the x axis,
+counter-clockwise, and how far it reaches from there, rad. 2π is a whole circle, without ends."""
 
-REACH_WITHOUT_BELT = 2.0
-"""m of the default plate below its pivot where there is no outgoing belt."""
+WHOLE = 2.0 * np.pi
 
-REACH_HANGING = 0.5
-"""m of a further plate below its pivot by default."""
+ROUNDING = 2.0**-48
+"""Share of the numbers that a gap is worked out from by which it may be off: 16 units of the last
+place."""
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Straight and round surfaces, and all their ends.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the S straight ones, then of the others.
+    start, tangent, normal, length : ndarray, (S, 2) and (S,)
+        First ends of the straight ones (m), unit vectors along them and to their left, lengths.
+    center, size, begin, extent : ndarray, (C, 2) and (C,)
+        What is round, as `Bend` has it; an end of a surface is a circle of no size.
+    owner : ndarray of int, (C,)
+        To which of the names each of these belongs.
+    """
+
+    names: tuple[str, ...]
+    start: Floats
+    tangent: Floats
+    normal: Floats
+    length: Floats
+    center: Floats
+    size: Floats
+    begin: Floats
+    extent: Floats
+    owner: Ints
+
+    @classmethod
+    def of(cls, lines: Sequence[Line], bends: Sequence[Bend] = ()) -> Obstacles:
+        """Collect surfaces."""
+        ends = np.array([line[1:] for line in lines], dtype=np.float64).reshape(-1, 2, 2)
+        way = ends[:, 1] - ends[:, 0]
+        length = np.hypot(*way.T)
+        tangent = way / length[:, None]
+        # Of two that are met at once the first of faces, points, rings and tips counts.
+        points = [(x, y, 0.0, 0.0, WHOLE, i) for k in (0, 1) for i, (x, y) in enumerate(ends[:, k])]
+        rings, tips = [], []
+        for i, (_, center, size, begin, extent) in enumerate(bends, start=len(lines)):
+            x, y = np.asarray(center)
+            rings.append((x, y, size, begin, extent, i))
+            for angle in (begin, begin + extent) if extent < WHOLE else ():
+                tip = x + size * np.cos(angle), y + size * np.sin(angle)
+                tips.append((*tip, 0.0, 0.0, WHOLE, i))
+        table = np.array([*points, *rings, *tips], dtype=np.float64).reshape(-1, 6)
+        size, begin, extent, owner = table[:, 2:].T
+        return cls(
+            (*(line[0] for line in lines), *(bend[0] for bend in bends)),
+            ends[:, 0], tangent, np.stack([-tangent[:, 1], tangent[:, 0]], axis=1), length,
+            table[:, :2], size, begin, extent, owner.astype(np.int64),
+        )  # fmt: skip
+
+    @property
+    def corners(self) -> Floats:
+        """Corners of boxes round all that is round, ends too, (2C, 2), m."""
+        return np.concatenate([self.center - self.size[:, None], self.center + self.size[:, None]])
+
+    def on_face(self, points: Floats) -> Bools:
+        """Tell whether the feet of points (S, 2) are on the straight surfaces."""
+        foot = np.sum((points - self.start) * self.tangent, axis=1)
+        return np.asarray((foot >= 0.0) & (foot <= self.length))
+
+    def on_arc(self, points: Floats) -> Bools:
+        """Tell whether the directions from the centres to points (C, 2) are on the arcs."""
+        away = points - self.center
+        turned = np.arctan2(away[:, 1], away[:, 0]) - self.begin
+        return np.asarray(np.mod(turned, WHOLE) <= self.extent)
+
+    def overlapped(self, point: Floats, radius: float) -> int:
+        """Return the first that is closer to `point` than `radius`, -1 if none."""
+        height = np.abs(np.sum((point - self.start) * self.normal, axis=1))
+        faces = np.flatnonzero((height < radius) & self.on_face(point))
+        gap = np.abs(np.hypot(*(point - self.center).T) - self.size)
+        rings = self.owner[(gap < radius) & self.on_arc(point)]
+        return min([*faces.tolist(), *rings.tolist()], default=-1)
+
+    def earliest(self, faces: Floats, rings: Floats) -> tuple[float, int]:
+        """Return the least of two rows of numbers, (S,) and (C,), and its surface; (inf, -1)."""
+        both = np.append(faces, rings)
+        if not np.isfinite(both).any():
+            return np.inf, -1
+        index = int(np.argmin(both))
+        owner = index if index < len(faces) else int(self.owner[index - len(faces)])
+        return float(both[index]), owner
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """A parabola from t = 0: position and velocity (2,), m and m/s, gravity m/s² downward."""
+
+    position: Floats
+    velocity: Floats
+    gravity: float
+
+    def at(self, t: Floats) -> Floats:
+        """Return the positions (..., 2) at times (...)."""
+        place = self.position + np.multiply.outer(t, self.velocity)
+        place[..., 1] -= 0.5 * self.gravity * t**2
+        return place
+
+    def horizon(self, targets: Obstacles, radius: float) -> float:
+        """Return a time after which a disk has passed all targets."""
+        if self.gravity > 0.0:
+            rise = self.position[1] - (float(targets.corners[:, 1].min()) - radius)
+            speed = self.velocity[1]
+            square = speed**2 + 2.0 * self.gravity * rise
+            if square <= 0.0:
+                return 0.0
+            return max(float((speed + np.sqrt(square)) / self.gravity), 0.0)
+        apart = targets.corners - self.position
+        reach, pace = float(np.hypot(*apart.T).max()), float(np.hypot(*self.velocity))
+        return (reach + 2.0 * radius) / pace if pace > 0.0 else 0.0
+
+
+def ring_times(
+    flight: Flight, center: Floats, size: float, radius: float, horizon: float, side: float = 1.0
+) -> Iterator[float]:
+    """Yield when a disk comes to a circle of a size (m) from outside, or inside (-1.0), in order.
+
+    The distance, squared, is a quartic. Between the roots of its derivative it is monotone, so no
+    approach is overlooked, and none found that is not there.
+    """
+    drop, v = np.array([0.0, -0.5 * flight.gravity]), flight.velocity
+    apart, far = flight.position - center, size + side * radius
+    powers = (drop @ drop, 2.0 * v @ drop, v @ v + 2.0 * apart @ drop, 2.0 * apart @ v)
+    quartic = np.array([*powers, apart @ apart - far**2])
+    # Complex roots only add breakpoints, which do no harm.
+    turns = np.roots(np.polyder(quartic)).real
+    marks = np.sort(np.concatenate([[0.0, horizon], turns[(turns > 0.0) & (turns < horizon)]]))
+    reach = np.abs(flight.position).sum() + np.abs(center).sum() + size + radius
+    off = ROUNDING * (np.polyval(np.abs(quartic), marks) + far * reach)
+    gap = side * quartic
+    values = np.polyval(gap, marks)
+    values[np.abs(values) <= off] = 0.0
+    for index in np.flatnonzero((values[:-1] >= 0.0) & (values[1:] <= 0.0)):
+        low, high = marks[index : index + 2]
+        if values[index] == 0.0:
+            # Where the gap is zero first, the fall begins there, if it is one.
+            if values[index + 1] < 0.0:
+                yield float(low)
+            continue
+        for _ in range(HALVINGS if values[index + 1] < 0.0 else 0):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if np.polyval(gap, middle) < 0.0 else (middle, high)
+        yield float(high)
+
+
+def first_in_flight(
+    flight: Flight, obstacles: Obstacles, radius: float, horizon: float
+) -> tuple[float, int]:
+    """Return when and with what the disk first collides up to `horizon`; (inf, -1)."""
+    start, normal = obstacles.start, obstacles.normal
+    center, size = obstacles.center, obstacles.size
+    height = np.sum((flight.position - start) * normal, axis=1)
+    speed = normal @ flight.velocity
+    bend = -0.5 * flight.gravity * normal[:, 1]
+    faces, rings = np.full(len(start), np.inf), np.full(len(size), np.inf)
+    off = ROUNDING * (np.abs(flight.position).sum() + np.abs(start).sum(axis=1) + radius)
+    for side in (1.0, -1.0):
+        # Where c + b t + a t² falls to 0, without cancellation; NaN if nowhere.
+        c, b, a = side * height - radius, side * speed, side * bend
+        c[np.abs(c) <= off] = 0.0
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            square = b**2 - 4.0 * a * c
+            root = np.sqrt(np.where(np.abs(square) <= 4.0 * np.abs(a) * off, 0.0, square))
+            t = np.where(b > 0.0, -(b + root) / (2.0 * a), 2.0 * c / (root - b))
+        t[(c == 0.0) & (b == 0.0) & (a < 0.0)] = 0.0
+        met = (t >= 0.0) & (t <= horizon)
+        met &= obstacles.on_face(flight.at(np.where(met, t, 0.0)))
+        faces = np.minimum(faces, np.where(met, t, np.inf))
+    # Circles that the box of the flight comes near.
+    turn = flight.velocity[1] / flight.gravity if flight.gravity > 0.0 else 0.0
+    places = flight.at(np.array([0.0, horizon, np.clip(turn, 0.0, horizon)]))
+    room = 1.001 * (size + radius)[:, None]
+    near = (center >= places.min(axis=0) - room) & (center <= places.max(axis=0) + room)
+    for index in np.flatnonzero(near.all(axis=1)) if horizon > 0.0 else ():
+        for side in (1.0, -1.0):
+            if size[index] + side * radius <= 0.0:
+                continue
+            for time in ring_times(flight, center[index], size[index], radius, horizon, side):
+                if obstacles.on_arc(flight.at(np.array(time)))[index]:
+                    rings[index] = min(rings[index], time)
+                    break
+    return obstacles.earliest(faces, rings)
+
+
+def first_on_pulley(
+    ride_radius: float, begin: float, last: float, obstacles: Obstacles, radius: float
+) -> tuple[float, int]:
+    """Return angle and obstacle of the first collision of the ride; (inf, -1) if none.
+
+    The centre's path has radius Rc (m) round the origin and goes from the angle `begin` from the
+    top to `last` (rad); the angle returned is counted from `begin`.
+    """
+
+    def turned(lean: Floats, cosine: Floats, on_it: Callable[[Floats], Bools]) -> Floats:
+        """Return how far from `begin` it is to the first of the angles lean ± acos; inf if none."""
+        # A cosine may be beyond 1 by rounding.
+        over = np.abs(cosine) - 1.0
+        spread = np.arccos(np.where(np.abs(over) <= ROUNDING, np.sign(cosine), cosine))
+        first = np.full(len(lean), np.inf)
+        for angle in (lean - spread, lean + spread):
+            way = np.mod(angle - begin, WHOLE)
+            way = np.where(way >= WHOLE - ROUNDING, 0.0, way)
+            there = on_it(ride_radius * np.stack([np.sin(angle), np.cos(angle)], axis=1))
+            first = np.where(there & (way <= last - begin), np.minimum(first, way), first)
+        return first
+
+    normal, center, size = obstacles.normal, obstacles.center, obstacles.size
+    level = np.sum(obstacles.start * normal, axis=1)
+    far = np.hypot(*center.T)
+    faces, rings = np.full(len(level), np.inf), np.full(len(size), np.inf)
+    with np.errstate(all="ignore"):
+        for side in (radius, -radius):
+            lean, cosine = np.arctan2(*normal.T), (level + side) / ride_radius
+            faces = np.minimum(faces, turned(lean, cosine, obstacles.on_face))
+            reach = np.where(size + side > 0.0, size + side, np.nan)
+            cosine = (ride_radius**2 + far**2 - reach**2) / (2.0 * ride_radius * far)
+            rings = np.minimum(rings, turned(np.arctan2(*center.T), cosine, obstacles.on_arc))
+    return obstacles.earliest(faces, rings)
 
 
 class Course:
@@ -56,22 +279,18 @@ class Course:
         assert scene.plate is not None
         self.scene, self.found = scene, found
         self.belt, plate, out = scene.incoming, scene.plate, scene.outgoing
-        self.kind = scene.kinds[0]
-        self.own = scene.particles[self.kind]
-        self.radius = self.own.radius
+        self.own, self.radius = scene.particle, scene.particle.radius
         self.ride_radius = self.belt.pulley_radius + self.radius
         self.angle = plate.angle_deg * RADIANS
         # Up along the plate, and out of its struck face.
         sin, cos = sin_cos(self.angle)
-        self.up = np.array([-sin, cos])
-        self.normal = np.array([-cos, -sin])
-        ahead = self.belt.pulley_radius + plate.distance
-        self.pivot = np.array([ahead, plate.pivot_height], dtype=np.float64)
+        self.up, self.normal = np.array([-sin, cos]), np.array([-cos, -sin])
+        pivot = self.belt.pulley_radius + plate.distance, plate.pivot_height
+        self.pivot = np.array(pivot, dtype=np.float64)
         self.incline = self.belt.incline_deg * RADIANS
         # Up along the incoming belt, and out of its upper side.
         sin, cos = sin_cos(self.incline)
-        self.along = np.array([cos, sin])
-        self.above = np.array([-sin, cos])
+        self.along, self.above = np.array([cos, sin]), np.array([-sin, cos])
 
         sin, cos = sin_cos(float(found.phi1))
         left = self.ride_radius * np.array([sin, cos])
@@ -89,9 +308,10 @@ class Course:
             self.belt_height = float(self.impact[1] - out.drop - self.radius)
         below = plate.below
         if below is None:
-            below = REACH_WITHOUT_BELT
+            below = 2.0
             if self.belt_height is not None:
-                lowest = self.belt_height + max(LEAST_CLEARANCE, RADII_CLEARANCE * self.radius)
+                # Room for a particle, and 5 cm at least.
+                lowest = self.belt_height + max(0.05, 3.0 * self.radius)
                 below = max((self.pivot[1] - lowest) / sin_cos(self.angle)[1], 0.0)
         # From the pivot upwards along the plate.
         self.plate_reach = -below, plate.above
@@ -104,20 +324,14 @@ class Course:
             self.lines.append(("outgoing", (out.start, y), (out.start + out.length, y)))
         lines, self.bends = free_surfaces(scene)
         self.lines += lines
-        self.gates = {
-            free.name for free in scene.surface if (free.opens_at, free.closes_at) != (None, None)
-        }
-
-    @property
-    def belt_line(self) -> Line:
-        """The straight part of the incoming belt."""
         end = self.belt.pulley_radius * self.above
-        return "incoming", end - self.belt.length * self.along, end
+        self.belt_line: Line = "incoming", end - self.belt.length * self.along, end
 
     def meets(self, claim: Reason, name: str, how: str) -> str:
         """Return the reason for which the equations end at a surface."""
-        if name in self.gates:
-            return Reason.OUTSIDE.because(f"{name}: it is a gate, and in the way while it is shut")
+        for free in self.scene.surface:
+            if free.name == name and (free.opens_at, free.closes_at) != (None, None):
+                claim, how = Reason.OUTSIDE, "it is a gate, and in the way while it is shut"
         return claim.because(f"{name}: {how}")
 
 
@@ -129,7 +343,7 @@ def free_surfaces(scene: Scene) -> tuple[list[Line], list[Bend]]:
         if plate.pivot is not None:
             sin, cos = sin_cos(plate.angle_deg * RADIANS)
             up = np.array([-sin, cos])
-            below = REACH_HANGING if plate.below is None else plate.below
+            below = 0.5 if plate.below is None else plate.below
             pivot = np.array(plate.pivot)
             lines.append((str(plate.name), pivot - below * up, pivot + plate.above * up))
     for belt in scene.conveyor:
@@ -152,10 +366,6 @@ def free_surfaces(scene: Scene) -> tuple[list[Line], list[Bend]]:
                 place = shift + np.array(free.center)
                 bends.append((free.name, place, free.radius, min(first, last), abs(last - first)))
     return lines, bends
-
-
-ON_BELT = 1e-12
-"""m; a release this close to the riding height differs from it by the rounding of a sum only."""
 
 
 def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
@@ -187,7 +397,7 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     from chutelab.scene import load
 
     scene = load(scene)
-    fault = _outside(scene)
+    fault = outside(scene)
     if fault:
         return cut(unanswered(), "separation", Reason.OUTSIDE.because(fault))
     found = unbounded(scene, rebound)
@@ -197,14 +407,7 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     if scene.outgoing is not None and course.belt_height is None:
         # Nothing places the belt, nor the plate's lower end: there is no machine to look at.
         return cut(found, "separation", str(found.reason))
-    low, high = course.plate_reach
-    if high <= low:
-        return cut(found, "impact", Reason.OUTSIDE.because("the plate has no length"))
-    trouble = _on_the_ride(course) or _before_the_plate(course)
-    if trouble is None and scene.outgoing is None and np.isfinite(found.v2r):
-        trouble = "landing", Reason.OUTSIDE.because("there is no outgoing conveyor")
-    if trouble is None and Reason.of(found.reason) in (None, Reason.MISSES):
-        trouble = _after_the_rebound(course)
+    trouble = hindrance(course)
     return found if trouble is None else cut(found, *trouble)
 
 
@@ -219,35 +422,19 @@ def unbounded(scenes: Scene | Family, rebound: Rebound = "corrected") -> Transfe
     belt, plate, out = scene.incoming, scene.plate, scene.outgoing
     assert belt is not None
     assert plate is not None
-    kind, stream = scene.kinds[0], scene.stream
-    own = scene.particles[kind]
-    restitution, plate_friction = scenes.met(kind, "plate")
-    _, friction = scenes.met(kind, "incoming")
-    pulley_radius, radius = value(belt, "pulley_radius"), value(own, "radius")
-    incline = value(belt, "incline_deg") * RADIANS
-    ride_length = value(belt, "length")
-    if stream.at is not None:
-        sin, cos = sin_cos(incline)
-        ride_length = -(stream.at[0] * cos + stream.at[1] * sin)
+    restitution, plate_friction = scenes.met(scene.kinds[0], "plate")
+    ride = ride_of(scenes)
 
     def found(drop: ArrayLike, belt_speed: ArrayLike) -> Transfer:
         return transfer(
-            speed=value(belt, "speed"),
-            pulley_radius=pulley_radius,
+            **ride,
             distance=value(plate, "distance"),
             angle=value(plate, "angle_deg") * RADIANS,
             pivot_height=value(plate, "pivot_height"),
             restitution=restitution,
             drop=drop,
             belt_speed=belt_speed,
-            particle_radius=radius,
-            mass=value(own, "mass"),
-            gravity=value(scene, "gravity"),
-            friction=np.inf if isinstance(friction, str) else friction,
-            spin=own.spin,
-            inertia=0.4 if own.shape == "sphere" else 0.5,
-            incline=incline,
-            ride_length=ride_length,
+            mass=value(scene.particle, "mass"),
             plate_friction=plate_friction,
             interval=1.0 / scenes.rate,
             rebound=rebound,
@@ -261,63 +448,93 @@ def unbounded(scenes: Scene | Family, rebound: Rebound = "corrected") -> Transfe
         return found(drop, belt_speed)
     impact = found(0.0, belt_speed)
     # Eq. (16) solved for d2; `predict` refuses a belt above the impact
-    sunk = (pulley_radius + radius) * (1.0 - sin_cos(impact.phi1)[1]) + impact.y2
+    ride_radius = ride["pulley_radius"] + ride["particle_radius"]
+    sunk = ride_radius * (1.0 - sin_cos(impact.phi1)[1]) + impact.y2
     return found(np.maximum(drop - sunk, 0.0), belt_speed)
 
 
-def _outside(scene: Scene) -> str:
+def ride_of(scenes: Scene | Family) -> dict[str, Any]:
+    """Return what `transfer` takes, as numbers, of particle 0's ride on the incoming conveyor."""
+    value, scene = scenes.value, scenes.scene
+    belt, own, at = scene.incoming, scene.particle, scene.stream.at
+    assert belt is not None
+    incline, ride_length = value(belt, "incline_deg") * RADIANS, value(belt, "length")
+    if at is not None:
+        sin, cos = sin_cos(incline)
+        ride_length = -(at[0] * cos + at[1] * sin)
+    friction = scenes.met(scene.kinds[0], "incoming")[1]
+    return {
+        "speed": value(belt, "speed"),
+        "pulley_radius": value(belt, "pulley_radius"),
+        "particle_radius": value(own, "radius"),
+        "gravity": value(scene, "gravity"),
+        "friction": np.inf if isinstance(friction, str) else friction,
+        "spin": own.spin,
+        "inertia": 0.4 if own.shape == "sphere" else 0.5,
+        "incline": incline,
+        "ride_length": ride_length,
+    }
+
+
+def not_carried(scene: Scene) -> str:
+    """Return why particle 0 is not released on the incoming belt, at its speed; "" if it is."""
+    from chutelab.scene.conflicts import beside
+
+    stream, belt = scene.stream, scene.incoming
+    assert belt is not None
+    if stream.fill is not None or stream.to is not None:
+        return "the stream is not released at a point of the incoming belt"
+    height = belt.pulley_radius + scene.particle.radius
+    if stream.at is not None and not beside(*stream.at, height, belt.length, belt.incline_deg):
+        return "the release point stream.at is not on the incoming belt"
+    sin, cos = sin_cos(belt.incline_deg * RADIANS)
+    if stream.velocity not in (None, (belt.speed * cos, belt.speed * sin)):
+        return "the release velocity stream.velocity is not the incoming belt's"
+    return ""
+
+
+def outside(scene: Scene) -> str:
     """Return what makes the scene another problem than the paper's, "" if nothing does."""
+    own = scene.particle
     if scene.incoming is None:
         return "there is no incoming conveyor"
     if scene.plate is None:
         return "there is no damping plate"
-    own, stream, belt = scene.particles[scene.kinds[0]], scene.stream, scene.incoming
     if own.outline:
         return "it is about disks and spheres"
     if own.spin and own.rolling_friction > 0.0:
         return "rolling friction"
     if any(string.particle == 0 for string in scene.string):
         return "the particle hangs on a string"
-    if stream.fill is not None or stream.to is not None:
-        return "the stream is not released at a point of the incoming belt"
-    sin, cos = sin_cos(belt.incline_deg * RADIANS)
-    if stream.at is not None:
-        x, y = stream.at
-        above = y * cos - x * sin - belt.pulley_radius - own.radius
-        if abs(above) > ON_BELT or not -belt.length <= x * cos + y * sin <= 0.0:
-            return "the release point stream.at is not on the incoming belt"
-    if stream.velocity is not None and stream.velocity != (belt.speed * cos, belt.speed * sin):
-        return "the release velocity stream.velocity is not the incoming belt's"
-    if scene.crowded:
-        return "particles interact"
-    return ""
+    return not_carried(scene) or ("particles interact" if scene.crowded else "")
 
 
-Trouble = tuple[str, str] | None
-"""The first stage that is not reached as the equations assume, and the reason; None if all are."""
+def hindrance(course: Course) -> tuple[str, str] | None:
+    """Return the first stage that is not reached as the equations assume, and why; None if all are.
 
+    What is in the way is looked for along the ride, the flight to the plate, and the fall from it.
+    """
+    found, radius, out = course.found, course.radius, course.scene.outgoing
+    low, high = course.plate_reach
+    if high <= low:
+        return "impact", Reason.OUTSIDE.because("the plate has no length")
 
-def _on_the_ride(course: Course) -> Trouble:
+    # The ride on the belt and round the pulley.
     obstacles = Obstacles.of(course.lines, course.bends)
-    at, radius, begin = course.scene.stream.at, course.radius, -course.incline
-    way = course.belt.length if at is None else -float(np.array(at) @ course.along)
+    way = float(ride_of(course.scene)["ride_length"])
     start = course.ride_radius * course.above - way * course.along
     index = obstacles.overlapped(start, radius)
     if index < 0:
-        straight = Flight(start, course.along, 0.0)
-        index = first_in_flight(straight, obstacles, radius, way)[1]
+        index = first_in_flight(Flight(start, course.along, 0.0), obstacles, radius, way)[1]
     if index < 0:
-        last = float(course.found.phi1)
-        index = first_on_pulley(course.ride_radius, begin, last, obstacles, radius)[1]
-    if index < 0:
-        return None
-    what = "it is in the way of the ride"
-    return "separation", course.meets(Reason.EARLY, obstacles.names[index], what)
+        last = float(found.phi1)
+        index = first_on_pulley(course.ride_radius, -course.incline, last, obstacles, radius)[1]
+    if index >= 0:
+        what = "it is in the way of the ride"
+        return "separation", course.meets(Reason.EARLY, obstacles.names[index], what)
 
-
-def _before_the_plate(course: Course) -> Trouble:
-    found, radius, flight = course.found, course.radius, course.separation
-    low, high = course.plate_reach
+    # The flight to the plate.
+    flight = course.separation
     foot = float((course.impact - course.pivot) @ course.up)
     hit = low <= foot <= high  # false for NaN: the line is not met
     plate = Obstacles.of(course.lines[:1])
@@ -325,10 +542,11 @@ def _before_the_plate(course: Course) -> Trouble:
     horizon = float(found.t2) if hit else flight.horizon(plate, radius)
     # Thrown up slowly, it may come down on the pulley again. Faster, it would only seem to at once,
     # by rounding: it starts on the circle.
-    centre, rides, again = np.zeros(2), course.ride_radius, np.inf
-    slow = found.v1 * found.v1 * sin_cos(found.phi1)[1] < flight.gravity * rides
+    again = np.inf
+    slow = found.v1 * found.v1 * sin_cos(found.phi1)[1] < flight.gravity * course.ride_radius
     if found.phi1 < 0.0 and slow:
-        again = next(ring_times(flight, centre, rides, 0.0, horizon), np.inf)
+        falls = ring_times(flight, np.zeros(2), course.ride_radius, 0.0, horizon)
+        again = next(falls, np.inf)
     hops = again < horizon
     index = first_in_flight(flight, obstacles, radius, min(horizon, again))[1]
     # What is in the way of a flight that misses the plate anyway does not matter.
@@ -339,58 +557,44 @@ def _before_the_plate(course: Course) -> Trouble:
         return "impact", course.meets(Reason.EARLY, name, how)
     if hops:
         return "impact", Reason.EARLY.because("pulley: the flight comes down on it again")
-    if hit:
-        return None
     if np.isnan(foot):
         return "impact", str(found.reason)
-    where = f"{foot - high:.4g} m above" if foot > high else f"{low - foot:.4g} m below"
-    what = f"the plate's line is met {where} the end of the plate"
-    return "impact", Reason.NO_IMPACT.because(what)
+    if not hit:
+        where = f"{foot - high:.4g} m above" if foot > high else f"{low - foot:.4g} m below"
+        what = f"the plate's line is met {where} the end of the plate"
+        return "impact", Reason.NO_IMPACT.because(what)
+    if out is None and np.isfinite(found.v2r):
+        return "landing", Reason.OUTSIDE.because("there is no outgoing conveyor")
+    if Reason.of(found.reason) not in (None, Reason.MISSES):
+        return None
 
-
-def _after_the_rebound(course: Course) -> Trouble:
-    found, radius, out = course.found, course.radius, course.scene.outgoing
+    # The fall to the outgoing belt.
     height = course.belt_height
     assert out is not None
     assert height is not None
     if course.impact[1] - radius < height:
         return "landing", Reason.MISSES.because("the plate is met below the belt")
-    lands = bool(np.isfinite(found.t3))
-    flight, top = course.rebounded, course.belt.pulley_radius
-    around = Obstacles.of([("pulley", (-top, -top), (top, top)), *course.lines], course.bends)
-    horizon = float(found.t3) if lands else flight.horizon(around, radius)
-    solid = Obstacles.of([course.belt_line, *course.lines[2:]], course.bends)
-    time, index = first_in_flight(flight, solid, radius, horizon)
-    time, name = min(
-        (time, solid.names[index]),
-        (_plate_again(course, horizon), "plate"),
-        (corner_times(flight, np.zeros((1, 2)), course.ride_radius, horizon)[0], "pulley"),
-    )
+    lands, flight = bool(np.isfinite(found.t3)), course.rebounded
+    pulley: Bend = ("pulley", (0.0, 0.0), course.belt.pulley_radius, 0.0, WHOLE)
     # The outgoing belt is not among them: no part of it, ends included, is met above its level.
-    if np.isfinite(time):
-        what = f"{time:.4g} s after the rebound"
+    bends = [*course.bends, pulley]
+    around = Obstacles.of(course.lines, bends)
+    horizon = float(found.t3) if lands else flight.horizon(around, radius)
+    again, pressing = np.inf, -flight.gravity * sin_cos(course.angle)[0]
+    if pressing > 0.0:
+        # Gravity takes it back to a plate that leans away: to its face, where it is now, or an end.
+        bends += [("plate", end, 0.0, 0.0, WHOLE) for end in course.lines[0][1:]]
+        back = 2.0 * float(flight.velocity @ course.normal) / pressing
+        foot = float((flight.at(np.array(back)) - course.pivot) @ course.up)
+        again = back if back < horizon and low <= foot <= high else np.inf
+    obstacles = Obstacles.of([course.belt_line, *course.lines[2:]], bends)
+    time, index = first_in_flight(flight, obstacles, radius, horizon)
+    if min(time, again) < np.inf:
+        name = obstacles.names[index] if time <= again else "plate"
+        what = f"{min(time, again):.4g} s after the rebound"
         return "landing", course.meets(Reason.SECOND, name, what)
     x = float(course.impact[0] - found.x3)
     if lands and not out.start <= x <= out.start + out.length:
         what = f"it comes down at x = {x:.4g} m, off the belt"
         return "landing", Reason.MISSES.because(what)
     return None
-
-
-def _plate_again(course: Course, horizon: float) -> float:
-    """Return when the plate is touched again, inf if not before `horizon`."""
-    flight = course.rebounded
-    pressing = -flight.gravity * sin_cos(course.angle)[0]
-    if pressing <= 0.0:
-        return np.inf
-    low, high = course.plate_reach
-    face = np.inf
-    away = flight.velocity @ course.normal
-    if 2.0 * away < pressing * horizon:
-        again = 2.0 * away / pressing
-        foot = float((flight.at(np.array(again)) - course.pivot) @ course.up)
-        face = float(again) if low <= foot <= high else np.inf
-    clipped = corner_times(
-        flight, Obstacles.of(course.lines[:1]).segments.points, course.radius, horizon
-    )
-    return float(min(face, clipped.min()))

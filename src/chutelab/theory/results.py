@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.util.arrays import Floats
+from chutelab.util.arrays import Bools, Floats
 
 
 class Reason(StrEnum):
@@ -157,3 +157,27 @@ def cut(found: Transfer, stage: str, reason: str) -> Transfer:
     order = list(STAGES)
     lost = [name for later in order[order.index(stage) :] for name in STAGES[later]]
     return replace(found, reason=np.array(reason), **dict.fromkeys(lost, np.array(np.nan)))
+
+
+class Answers:
+    """Results of N motions, stage by stage, and the reason where they end."""
+
+    def __init__(self, count: int) -> None:
+        self.values: dict[str, Floats] = {}
+        self.reason = np.full(count, "", dtype=object)
+        self.fine = np.full(count, True)
+
+    def fail(self, where: Bools, reason: str) -> None:
+        """State a reason where there is none yet."""
+        if where.any():
+            self.reason[where & self.fine] = reason
+            self.fine &= ~where
+
+    def require(self, rules: dict[str, Bools]) -> None:
+        """Object to parameters that break a rule; NaN never holds."""
+        for rule, holds in rules.items():
+            self.fail(~holds, Reason.OUTSIDE.because(f"{rule} is required"))
+
+    def keep(self, **values: Floats) -> None:
+        """Store results of a stage where nothing has gone wrong up to now."""
+        self.values |= {name: np.where(self.fine, v, np.nan) for name, v in values.items()}

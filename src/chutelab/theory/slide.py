@@ -1,8 +1,12 @@
-"""Sliding and rolling along a round chute: speed, time and where it ends, in closed form.
+"""Sliding and rolling on a round surface in closed form: a chute, and the top of a pulley.
 
 With u = v² / (g ρ), ρ the radius of the centre's path, and θ the angle from the x axis round the
-arc's centre, the chute presses with m g n, n = u - sin θ from inside and sin θ - u from outside.
-Friction makes that a linear equation for u over the angle.
+arc's centre, the surface presses with m g n, n = u - sin θ from inside and sin θ - u from outside.
+Friction makes that a linear equation for n over the angle.
+
+`slide` follows a motion along a chute at rest. `separation` follows the ride round the drive
+pulley, with φ the angle from its top: a belt that rises at β meets it at φ = -β; the particle may
+slip back at first, then holds or rolls, then slips forward, and leaves where n = 0.
 """
 
 from __future__ import annotations
@@ -12,28 +16,151 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.theory.results import Arrays, Reason
-from chutelab.util.arrays import Bools, Floats
+from chutelab.theory.results import Answers, Arrays, Reason
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers
+from chutelab.util.trig import arc_cos, sin_cos
 
 HALVINGS = 64
 """Bisections of an angle: they exhaust a double's digits."""
 
 LEAST = 1e-18
-"""rad; a shorter motion is what bisection leaves of one that stands at once."""
+"""rad; a shorter motion is rounding: the body does not move."""
 
 LARGEST = 700.0
-"""Largest exponent: what grows so far has left the chute, or come to rest, long before."""
+"""Largest exponent; by then the body has left the surface, or come to rest."""
 
 _x = np.arange(-64, 65) / 16.0
 _share = 1.0 / (1.0 + np.exp(-np.pi * np.sinh(_x)))
 _NODES = tuple(
-    (float(share), float(rest), float(weight))
-    for share, rest, weight in zip(
-        _share, _share[::-1], np.pi / 16.0 * np.cosh(_x) * _share * _share[::-1], strict=True
-    )
+    zip(_share, _share[::-1], np.pi / 16.0 * np.cosh(_x) * _share * _share[::-1], strict=True)
 )
 """Double exponential quadrature of the time: shares of a piece from its two ends, and weights. It
 takes 1/√u where u is 0 at an end; the last nodes are 1e-37 from there."""
+
+
+class Leg:
+    """Motion under one law from an angle on: where it ends, and how; arrays (N,).
+
+    Angles x >= 0 are counted from `start` in the direction of motion. With σ = 1 counter-clockwise
+    and -1 clockwise, s = 1 inside and -1 outside, b = 2 µ s,
+
+        n = A sin θ + B cos θ + C exp(-b x), A = -3 s/(1 + b²), B = σ b A.
+
+    A body that rolls, k = I/(m r²), has b = 0 and 1 + 2/(1 + k) for the 3, as long as friction
+    bears its share of the weight: k/(1 + k) |cos θ| <= µ n. Endless k is a body that is carried at
+    constant speed.
+
+    Parameters
+    ----------
+    start, u, load : ndarray
+        θ (rad), u and n at the beginning.
+    way : ndarray
+        Largest x, rad.
+    sense, side, friction : ndarray
+        σ, s and µ; -µ where the surface moves on faster than the body that slides on it.
+    rolls : ndarray of bool
+        Whether it rolls, or is carried.
+    inertia : ndarray
+        k of one that does.
+    limit : ndarray
+        u with which one that is sped up by the surface is as fast as that.
+
+    Attributes
+    ----------
+    end, u, gained, load : ndarray
+        x, u, its growth and n at the end.
+    why : ndarray of str
+        "stops", "lifts off", "slips" or "holds" (it is as fast as the surface); "" at `way`.
+    """
+
+    def __init__(
+        self,
+        start: Floats,
+        u: Floats,
+        load: Floats,
+        way: Floats,
+        *,
+        sense: Floats,
+        side: Floats,
+        friction: Floats,
+        rolls: Bools,
+        inertia: Floats,
+        limit: Numbers = np.inf,
+    ) -> None:
+        self.start, self.sense, self.side = start, sense, side
+        gives = np.where(rolls, 1.0 / (1.0 + inertia), 1.0)
+        self.b = np.where(rolls, 0.0, 2.0 * friction * side)
+        self.A = -side * (1.0 + 2.0 * gives) / (1.0 + self.b**2)
+        self.B = sense * self.b * self.A
+        place = np.zeros_like(u)
+
+        def lost(x: Floats) -> tuple[Bools, ...]:
+            there, pressed = self.ahead(place, u, load, x)
+            across = np.cos(start + sense * x)
+            grip = friction * pressed < (1.0 - gives) * np.abs(across)
+            fast = (there >= limit) & (-sense * across > friction * pressed)
+            return there <= 0.0, pressed < 0.0, rolls & grip, fast
+
+        # u exp(b x), n exp(b x) and what is left of the grip of a body that rolls rise or fall all
+        # the way from one of these angles to the next.
+        least = np.arctan2(friction * (1.0 + 2.0 * gives), 1.0 - gives)
+        turns = [place + 0.5 * np.pi, np.arctan2(sense, friction * side), least, -least]
+        first = np.mod(sense * (np.stack(turns) - start), np.pi)
+        self.marks = np.concatenate([place[None], first, first + np.pi, way[None]])
+        self.marks = np.sort(np.minimum(self.marks, way), axis=0)
+        # The first of the pieces in whose course something is lost, then where.
+        gone = np.array([(mark > 0.0) & np.any(lost(mark), axis=0) for mark in self.marks[1:]])
+        index = np.argmax(gone, axis=0)[None]
+        low, high = (np.take_along_axis(part, index, axis=0)[0]
+                     for part in (self.marks[:-1], self.marks[1:]))  # fmt: skip
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            beyond = np.any(lost(middle), axis=0)
+            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        at_once = lost(place)[2]
+        self.end = np.where(at_once, 0.0, np.where(gone.any(axis=0), high, way))
+        stops, lifts, slips, fast = lost(self.end)
+        stops &= ~at_once
+        causes = ["stops", "lifts off", "slips", "holds"]
+        self.why = np.select([stops, lifts, slips, fast], causes, "")
+        self.u, self.load = self.ahead(place, u, load, self.end)
+        self.u = np.where(stops, 0.0, self.u)
+        self.gained = self.ahead(place, place, load, self.end)[0]
+        # At the onset of slip friction tells the load better than a difference does.
+        bears = (1.0 - gives) * np.abs(np.cos(start + sense * self.end))
+        self.load = np.where(slips & ~at_once, bears / friction, self.load)
+        self._states = np.stack(self.ahead(place, u, load, self.marks))
+
+    def ahead(self, x: Floats, u: Floats, load: Floats, step: Floats) -> tuple[Floats, Floats]:
+        """Return u and n a step on from x, where they are known; small differences are exact."""
+        theta, half = self.start + self.sense * x, 0.5 * self.sense * step
+        sine = 2.0 * np.sin(half) * np.cos(theta + half)
+        cosine = -2.0 * np.sin(half) * np.sin(theta + half)
+        rest = load - self.A * np.sin(theta) - self.B * np.cos(theta)
+        grown = np.expm1(np.minimum(-self.b * step, LARGEST))
+        change = self.A * sine + self.B * cosine + rest * grown
+        return u + (sine + self.side * change), load + change
+
+    def integrals(self) -> tuple[Floats, Floats]:
+        """Return ∫ dx/√u and ∫ n/√u dx up to the end."""
+        marks = np.minimum(self.marks, self.end)
+        there = np.stack([self.u, self.load])
+        states = np.where(self.marks < self.end, self._states, there[:, None])
+        length = np.diff(marks, axis=0)
+        pieces = np.flatnonzero((length > LEAST).any(axis=1))
+        length = length[pieces]
+        time, pressed = np.zeros((2, *self.end.shape))
+        for share, rest, weight in _NODES:
+            # From the nearer end of the piece.
+            near = pieces + (share > 0.5)
+            step = length * (-rest if share > 0.5 else share)
+            u, load = states[:, near]
+            u, load = self.ahead(marks[near], u, load, step)
+            moves = (length > LEAST) & (u > 0.0)
+            each = np.where(moves, weight * length / np.sqrt(u), 0.0)
+            time += each.sum(axis=0)
+            pressed += (load * each).sum(axis=0)
+        return time, pressed
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,138 +258,182 @@ def slide(
     shape = whole[0].shape
     within, turns, *flat = (part.ravel() for part in whole)
     radius, start, end, speed, friction, r, inertia, gravity = flat
-    reason = np.full(len(start), "", dtype=object)
-    for what, holds in (
-        ("0 <= particle_radius < inf", (r >= 0.0) & (r < np.inf)),
-        ("0 < radius < inf", (radius > 0.0) & (radius < np.inf)),
-        ("particle_radius < radius inside", ~within | (r < radius)),
-        ("particle_radius > 0 with spin", ~turns | (r > 0.0)),
-        ("|end - start| <= 2π", np.abs(end - start) <= 2.0 * np.pi),
-        ("0 <= speed < inf", (speed >= 0.0) & (speed < np.inf)),
-        ("0 <= friction < inf", (friction >= 0.0) & (friction < np.inf)),
-        ("0 < inertia <= 1", (inertia > 0.0) & (inertia <= 1.0)),
-        ("0 < gravity < inf", (gravity > 0.0) & (gravity < np.inf)),
-    ):
-        fault = Reason.OUTSIDE.because(f"{what} is required")
-        reason[~holds & (reason == "")] = fault
+    found = Answers(len(start))
+    found.require(
+        {
+            "0 <= particle_radius < inf": (r >= 0.0) & (r < np.inf),
+            "0 < radius < inf": (radius > 0.0) & (radius < np.inf),
+            "particle_radius < radius inside": ~within | (r < radius),
+            "particle_radius > 0 with spin": ~turns | (r > 0.0),
+            "|end - start| <= 2π": np.abs(end - start) <= 2.0 * np.pi,
+            "0 <= speed < inf": (speed >= 0.0) & (speed < np.inf),
+            "0 <= friction < inf": (friction >= 0.0) & (friction < np.inf),
+            "0 < inertia <= 1": (inertia > 0.0) & (inertia <= 1.0),
+            "0 < gravity < inf": (gravity > 0.0) & (gravity < np.inf),
+        }
+    )
     side = np.where(within, 1.0, -1.0)
     sense = np.where(end < start, -1.0, 1.0)
     rho = radius - side * r
     with np.errstate(all="ignore"):
         u = speed**2 / (gravity * rho)
-        loose = side * (u - np.sin(start)) < 0.0
-        reason[loose & (reason == "")] = Reason.OUTSIDE.because("it is off the chute at the start")
-        fine = reason == ""
+        load = side * (u - np.sin(start))
+        found.fail(load < 0.0, Reason.OUTSIDE.because("it is off the chute at the start"))
+        fine = found.fine
         way = np.where(fine, np.abs(end - start), np.nan)
-        leg = _Leg(start, u, way, sense, side, friction, turns, inertia)
-        x, u, pace = leg.end, leg.u_end, np.sqrt(gravity * rho)
-        time, spun = leg.time * rho / pace, np.where(turns, np.sqrt(u), 0.0)
+        about = {"sense": sense, "side": side, "friction": friction, "inertia": inertia}
+        leg = Leg(start, u, load, way, rolls=turns, **about)
+        x, u, load, why, pace = leg.end, leg.u, leg.load, leg.why, np.sqrt(gravity * rho)
+        time = leg.integrals()[0]
+        spun = np.where(turns, np.sqrt(u), 0.0)
         angle = start + sense * x
-        why = leg.why
         onward = turns & ~within & (why == "slips") & (sense * np.cos(angle) < 0.0)
         if onward.any():
-            parts = (angle, u, way - x, sense, side, friction, np.zeros_like(turns), inertia)
-            leg = _Leg(*(part[onward] for part in parts))
+            about = {name: values[onward] for name, values in about.items()}
+            parts = (part[onward] for part in (angle, u, load, way - x))
+            leg = Leg(*parts, rolls=np.zeros(onward.sum(), dtype=bool), **about)
             angle[onward] += sense[onward] * leg.end
-            u[onward], why[onward] = leg.u_end, leg.why
-            time[onward] += leg.time * rho[onward] / pace[onward]
-            spun[onward] += (friction / inertia)[onward] * leg.pressed
-        speed = np.sqrt(u) * pace
+            u[onward], load[onward], why[onward] = leg.u, leg.load, leg.why
+            lasts, pressed = leg.integrals()
+            time[onward] += lasts
+            spun[onward] += about["friction"] / about["inertia"] * pressed
         # Adding 0 turns -0 into 0.
         omega = np.where(turns, -side * sense * spun * pace / r, 0.0) + 0.0
-        load = side * (u - np.sin(angle))
-    reached = fine & (why == "")
-    angle = np.where(reached, end, np.where(fine, angle, np.nan))
-    reason = np.where(fine, why, reason)
-    found = (np.where(fine, part, np.nan) for part in (angle, speed, omega, time, load))
-    return Slide(*(part.reshape(shape) for part in (*found, reason.astype(np.str_))))
+        time *= rho / pace
+    found.keep(
+        angle=np.where(why == "", end, angle),
+        speed=np.sqrt(u) * pace,
+        omega=omega,
+        time=time,
+        load=load,
+    )
+    reason = np.where(fine, why, found.reason).astype(np.str_).reshape(shape)
+    return Slide(reason=reason, **{k: v.reshape(shape) for k, v in found.values.items()})
 
 
-class _Leg:
-    """Motion under one law from an angle on, over `way` at most: where it ends, and the time.
+MOST_FRICTION = 1e100
+"""Its square does not overflow, and slip at it cannot be told from slip at infinite friction."""
 
-    Angles x >= 0 are counted from the start along the way. `time` is ∫ dx/√u, `pressed` is
-    ∫ n/√u dx, both up to `end`.
+FAULTS = (
+    "",
+    "it does not get up the incoming belt",
+    "it does not get over the pulley",
+    "it slips back on the pulley, which has no closed form for a body that turns",
+)
+"""Why there is no separation, by `Separation.fault`; all on belts that rise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """State of the centre where the pulley is left, arrays of one shape.
+
+    φ1 is the angle from the top of the pulley, rad, its cosine and sine are each to full relative
+    precision; v1 is the speed, m/s, and `rim` is r ω, m/s, ω counter-clockwise: the velocity of the
+    lowest point relative to the centre. Thrown up from a rising belt, it may come down on the
+    pulley again after the time `again`, s, inf if not. `fault` is an index into `FAULTS`, and
+    where it is not 0 all else is NaN.
     """
 
-    def __init__(
-        self,
-        start: Floats,
-        u: Floats,
-        way: Floats,
-        sense: Floats,
-        side: Floats,
-        friction: Floats,
-        rolls: Bools,
-        inertia: Floats,
-    ) -> None:
-        self.start, self.sense, self.side = start, sense, side
-        # u = P sin θ + Q cos θ + C exp(-a θ), with a = 0 for one that rolls
-        share = inertia / (1.0 + inertia)
-        self.a = np.where(rolls, 0.0, 2.0 * friction * side * sense)
-        square = 1.0 + self.a**2
-        self.p = np.where(rolls, -2.0 / (1.0 + inertia), (self.a**2 - 2.0) / square)
-        self.q = -3.0 * self.a / square
-        place = np.zeros_like(u)
+    phi1: Floats
+    cos: Floats
+    sin: Floats
+    v1: Floats
+    rim: Floats
+    again: Floats
+    fault: Ints
 
-        def lost(x: Floats, u: Floats) -> tuple[Bools, Bools, Bools]:
-            angle = start + sense * x
-            load = side * (u - np.sin(angle))
-            return u <= 0.0, load < 0.0, rolls & (friction * load < share * np.abs(np.cos(angle)))
 
-        # u exp(a θ), n exp(a θ) and what is left of the grip of a body that rolls rise or fall all
-        # the way from one of these angles to the next.
-        least = np.arctan(friction * (3.0 + inertia) / (share * (1.0 + inertia)))
-        turns = [place + 0.5 * np.pi, np.arctan2(sense, friction * side), least, -least]
-        first = np.mod(sense * (np.stack(turns) - start), np.pi)
-        marks = np.concatenate([place[None], first, first + np.pi, way[None]])
-        marks = np.sort(np.minimum(marks, way), axis=0)
+def separation(
+    *,
+    speed: Floats,
+    ride_radius: Floats,
+    gravity: Floats,
+    friction: Floats,
+    spin: Bools,
+    inertia: ArrayLike = 0.5,
+    incline: ArrayLike = 0.0,
+    ride_length: ArrayLike = 0.0,
+) -> Separation:
+    """Separate from the pulley after a ride that starts on the belt, with its speed and no spin.
 
-        def over(x: Floats) -> Bools:
-            return np.asarray(np.logical_or.reduce(lost(x, self.u(place, u, x))))
+    All are (N,), or numbers where there is a default: v0 (m/s), Rc (m), g (m/s²), µ of belt and
+    pulley, whether it turns, and I/(m r²) then; the angle β at which the belt rises (rad), and the
+    way on it before it meets the pulley (m), which matters where it slides or rolls on an incline.
+    Infinite µ is adhesion: carried at v0, not turning, Eq. (2).
 
-        # The first of the pieces in whose course something is lost, then where.
-        gone = np.array([(mark > 0.0) & over(mark) for mark in marks[1:]])
-        index = np.argmax(gone, axis=0)
-        low, high = (
-            np.take_along_axis(part, index[None], axis=0)[0] for part in (marks[:-1], marks[1:])
-        )
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            beyond = over(middle)
-            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-        at_once = lost(place, u)[2]
-        self.end = np.where(at_once, 0.0, np.where(gone.any(axis=0), high, way))
-        self.u_end = np.where(at_once, u, self.u(place, u, self.end))
-        stops, lifts, slips = lost(self.end, self.u_end)
-        stops &= ~at_once
-        self.u_end = np.where(stops, 0.0, self.u_end)
-        self.why = np.select([stops, lifts, slips], ["stops", "lifts off", "slips"], "")
-        self.time, self.pressed = self._integrals(np.minimum(marks, self.end), u)
+    Adhesion is a closed form; slip is one over the angle, of which onset and end are bisected to
+    the last bit or two. The spin of a slipping disk is a quadrature, to about 1e-14.
+    """
+    count, endless = len(speed), np.isinf(friction)
+    k, beta, way = (
+        np.broadcast_to(np.asarray(part, dtype=np.float64), (count,))
+        for part in (inertia, incline, ride_length)
+    )
+    friction, turns = np.where(endless, 0.0, friction), spin & ~endless
+    (sin, cos), rises, begin = sin_cos(beta), beta > 0.0, 0.0 - beta
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        unit = gravity * ride_radius  # v² at u = 1
+        # On the belt. Held, friction bears this share of the weight; the rest accelerates.
+        share = np.where(turns, k / (1.0 + k), 1.0)
+        slides = ~endless & (np.abs(sin) * share > friction * cos)
+        pull = np.where(slides, sin - np.sign(sin) * friction * cos, (1.0 - share) * sin)
+        square = speed**2 - 2.0 * gravity * pull * way
+        arrives = square > 0.0
+        v = np.where(pull == 0.0, speed, np.sqrt(np.where(arrives, square, np.nan)))
+        # Rolling, the rim makes up for the speed; sliding, friction turns it at its own rate.
+        rate = np.where(slides, np.sign(sin) * friction * cos / k, pull)
+        rim = np.where(turns, rate * 2.0 * gravity * way / (speed + v), 0.0)
+        belt, u = speed**2 / unit, v**2 / unit
+        # A flight that begins where the belt ends may come down on the pulley.
+        lifts = u >= cos
+        up = gravity * (v * sin + np.sqrt(np.maximum(cos * (unit - v**2 * cos), 0.0)))
+        hops = lifts & rises & (v**2 * cos < unit)
+        again = np.where(hops, 2.0 * (v**2 - unit * cos) / up, np.inf)
+    # On the pulley the load is less: it may slip at once, forward or back.
+    forward = ~lifts & ~rises & slides
+    back = ~lifts & rises & (slides | (~endless & (sin * share > friction * (cos - u))))
+    fault = np.where(arrives, np.where(turns & back, 3, 0), 1)
+    phi1 = np.where(lifts, begin, arc_cos(np.where(lifts, 1.0, u)))  # Eq. (2), held by adhesion
+    rides = ~lifts & ~endless & (fault == 0)
+    angle, load = begin.copy(), cos - u
 
-    def u(self, begin: Floats, u: Floats, step: Floats) -> Floats:
-        """Return u a step from `begin`, where it is `u`; small differences are exact."""
-        theta, half = self.start + self.sense * begin, 0.5 * self.sense * step
-        rest = u - self.p * np.sin(theta) - self.q * np.cos(theta)
-        swing = self.p * np.cos(theta + half) - self.q * np.sin(theta + half)
-        grown = np.expm1(np.minimum(-2.0 * self.a * half, LARGEST))
-        return np.asarray(u + 2.0 * np.sin(half) * swing + rest * grown)
+    def leg(which: Bools, grip: Floats, inertia: Floats, limit: Numbers, *, rolls: bool) -> Leg:
+        """Take some of them on over the pulley, clockwise on its back, at most to φ = π/2."""
+        on = np.full((3, int(which.sum())), -1.0)
+        part = Leg(
+            0.5 * np.pi - angle[which], u[which], load[which], 0.5 * np.pi - angle[which],
+            sense=on[0], side=on[1], friction=grip, inertia=inertia, limit=limit,
+            rolls=np.full(len(grip), rolls),
+        )  # fmt: skip
+        angle[which] += part.end
+        u[which], load[which] = part.u, part.load
+        return part
 
-    def _integrals(self, marks: Floats, u: Floats) -> tuple[Floats, Floats]:
-        """Integrate 1/√u and n/√u, piece by piece between the marks (M, N)."""
-        speeds = self.u(np.zeros_like(u), u, marks)
-        speeds = np.where(marks < self.end, speeds, self.u_end)
-        low, high, length = marks[:-1], marks[1:], np.diff(marks, axis=0)
-        time, pressed = np.zeros((2, *u.shape))
-        for share, rest, weight in _NODES:
-            # From the nearer end of the piece.
-            near, at, step = low, speeds[:-1], length * share
-            if share > 0.5:
-                near, at, step = high, speeds[1:], -length * rest
-            there = self.u(near, at, step)
-            moves = (length > LEAST) & (there > 0.0)
-            each = np.where(moves, weight * length / np.sqrt(there), 0.0)
-            load = self.side * (there - np.sin(self.start + self.sense * (near + step)))
-            time += each.sum(axis=0)
-            pressed += (load * each).sum(axis=0)
-        return time, pressed
+    with np.errstate(all="ignore"):
+        friction = np.minimum(friction, MOST_FRICTION)
+        if (dragged := rides & back).any():
+            part = leg(dragged, -friction[dragged], k[dragged], belt[dragged], rolls=False)
+            fault[dragged] = np.where(part.why == "stops", 2, 0)
+            u[dragged] = np.where(part.why == "holds", belt[dragged], u[dragged])
+            forward[dragged] = part.why == "lifts off"
+        if (held := rides & ~forward & (fault == 0)).any():
+            ahead = u[held] - belt[held]
+            carried = np.where(turns[held], k[held], np.inf)
+            part = leg(held, friction[held], carried, np.inf, rolls=True)
+            fault[held] = np.where(part.why == "stops", 2, 0)
+            rolled = -(ahead + part.gained) / (np.sqrt(u[held]) + np.sqrt(belt[held]))
+            rim[held] = np.where(turns[held], rolled * np.sqrt(unit[held]), 0.0)
+        if (slips := rides & (fault == 0)).any():
+            part = leg(slips, friction[slips], k[slips], np.inf, rolls=False)
+            if turns[slips].any():
+                spun = friction[slips] / k[slips] * part.integrals()[1] * np.sqrt(unit[slips])
+                rim[slips] -= np.where(turns[slips], spun, 0.0)
+        sound = fault == 0
+        phi1 = np.where(sound, np.where(rides, angle, phi1), np.nan)
+        sin, cos = sin_cos(phi1)
+        v = np.where(sound, np.where(rides, np.sqrt(unit * cos), v), np.nan)
+    # Level and without slip the cosine is known better than the angle.
+    level = ~rides & (beta == 0.0)
+    cos = np.where(level, np.minimum(belt, 1.0), cos)
+    sin = np.where(level, np.sqrt((1.0 - cos) * (1.0 + cos)), sin)
+    return Separation(phi1, cos, sin, v, np.where(sound, rim, np.nan), again, fault)

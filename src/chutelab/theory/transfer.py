@@ -1,7 +1,7 @@
 """The paper's equations (2) to (16) in closed form, vectorised, with their generalisations.
 
 Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside the right one.
-`transfer` is what others call, `stages` has the equations; `belt_power` speaks of a steady stream.
+`belt_power` is of a steady stream.
 """
 
 from __future__ import annotations
@@ -12,39 +12,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.theory.results import STAGES, Reason, Transfer
-from chutelab.theory.separation import FAULTS, separation
+from chutelab.theory.results import STAGES, Answers, Reason, Transfer
+from chutelab.theory.slide import FAULTS, separation
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.trig import atan2, hypot, sin_cos
 
 Rebound = Literal["corrected", "as-printed"]
 
 
-class Answers:
-    """Results of N transfers as they come in, and why they stop coming."""
-
-    def __init__(self, count: int) -> None:
-        self.values: dict[str, Floats] = {}
-        self.reason = np.full(count, "", dtype=object)
-        self.fine = np.full(count, True)
-
-    def fail(self, where: Bools, reason: str) -> None:
-        """State a reason where there is none yet."""
-        if not where.any():
-            return
-        self.reason[where & self.fine] = reason
-        self.fine &= ~where
-
-    def require(self, what: str, holds: Bools) -> None:
-        """Object to parameters; NaN never holds."""
-        if not holds.all():
-            self.fail(~holds, Reason.OUTSIDE.because(f"{what} is required"))
-
-    def keep(self, **values: Floats) -> None:
-        """Store results of a stage where nothing has gone wrong up to now."""
-        self.values |= {name: np.where(self.fine, v, np.nan) for name, v in values.items()}
-
-
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")
 def transfer(
     *,
     speed: ArrayLike,
@@ -110,7 +86,7 @@ def transfer(
         Which Eq. (9). The printed one is defined for α = 0 without plate friction only.
     unbounded_plate : bool
         False: do not object when ride or rebound meet the plate's line elsewhere, as a rebound must
-        for α < 0; for callers who know where the plate ends.
+        for α < 0; for callers that know where the plate ends.
 
     Returns
     -------
@@ -141,48 +117,168 @@ def transfer(
     """
     if rebound not in ("corrected", "as-printed"):
         raise ValueError(f'rebound must be "corrected" or "as-printed", not {rebound!r}')
-    numbers = {
-        "speed": speed,
-        "pulley_radius": pulley_radius,
-        "distance": distance,
-        "angle": angle,
-        "pivot_height": pulley_radius if pivot_height is None else pivot_height,
-        "restitution": restitution,
-        "drop": drop,
-        "belt_speed": speed if belt_speed is None else belt_speed,
-        "particle_radius": particle_radius,
-        "mass": mass,
-        "gravity": gravity,
-        "friction": friction,
-        "inertia": inertia,
-        "incline": incline,
-        "ride_length": ride_length,
-        "plate_friction": plate_friction,
-        "interval": np.nan if interval is None else interval,
-    }
-    arrays = [np.asarray(value, dtype=np.float64) for value in numbers.values()]
-    turning, *whole = np.broadcast_arrays(np.asarray(spin, dtype=np.bool_), *arrays)
-    flat = dict(zip(numbers, (array.ravel() for array in whole), strict=True))
-    for name in ("angle", "incline"):
-        if len(beyond := flat[name][np.abs(flat[name]) > np.pi / 2]):
+    timed, as_printed = interval is not None, rebound == "as-printed"
+    numbers = (
+        speed, pulley_radius, distance, angle, restitution, drop, particle_radius, mass, gravity,
+        friction, inertia, incline, ride_length, plate_friction,
+        pulley_radius if pivot_height is None else pivot_height,
+        speed if belt_speed is None else belt_speed, np.nan if interval is None else interval,
+    )  # fmt: skip
+    arrays = [np.asarray(value, dtype=np.float64) for value in numbers]
+    whole = np.broadcast_arrays(np.asarray(spin, dtype=np.bool_), *arrays)
+    spin, *flat = (part.ravel() for part in whole)
+    (
+        speed, pulley_radius, distance, angle, restitution, drop, particle_radius, mass, gravity,
+        friction, inertia, incline, ride_length, plate_friction, pivot_height, belt_speed, interval,
+    ) = flat  # fmt: skip
+    for name, values in (("angle", angle), ("incline", incline)):
+        if len(beyond := values[np.abs(values) > np.pi / 2]):
             warnings.warn(
                 f"{name} = {beyond[0]:g} is in radians, and beyond ±π/2; of degrees take"
                 f" np.radians({beyond[0]:g})",
-                stacklevel=2,
+                stacklevel=3,
             )
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        found = stages(
-            **flat,
-            spin=turning.ravel(),
-            timed=interval is not None,
-            as_printed=rebound == "as-printed",
-            unbounded_plate=unbounded_plate,
+    found = Answers(len(speed))
+
+    def turning(rim: Floats) -> Floats:
+        # Adding 0 turns -0 into 0.
+        return np.where(spin, rim / particle_radius, 0.0) + 0.0
+
+    # Ride the belt and the pulley.
+    found.require(
+        {
+            "0 < speed < inf": (speed > 0.0) & (speed < np.inf),
+            "0 < pulley_radius < inf": (pulley_radius > 0.0) & (pulley_radius < np.inf),
+            "0 <= particle_radius < inf": (particle_radius >= 0.0) & (particle_radius < np.inf),
+            "particle_radius > 0 with spin": ~spin | (particle_radius > 0.0),
+            "0 <= gravity < inf": (gravity >= 0.0) & (gravity < np.inf),
+            "friction >= 0": friction >= 0.0,
+            "0 < inertia <= 1": (inertia > 0.0) & (inertia <= 1.0),
+            "|incline| < π/2": np.abs(incline) < 0.5 * np.pi,
+            "0 <= ride_length < inf": (ride_length >= 0.0) & (ride_length < np.inf),
+        }
+    )
+    ride_radius = pulley_radius + particle_radius
+    left = separation(
+        speed=speed, ride_radius=ride_radius, gravity=gravity, friction=friction, spin=spin,
+        inertia=inertia, incline=incline, ride_length=ride_length,
+    )  # fmt: skip
+    if left.fault.any():
+        for fault in range(1, len(FAULTS)):
+            found.fail(left.fault == fault, Reason.OUTSIDE.because(FAULTS[fault]))
+    found.keep(phi1=left.phi1, v1=left.v1, omega1=turning(left.rim))
+
+    # Fly to the plate: the gap between disk and plate's line is a quadratic in time.
+    found.require(
+        {
+            "|angle| < π/2": np.abs(angle) < 0.5 * np.pi,
+            "finite distance and pivot_height": np.isfinite(distance + pivot_height),
+        }
+    )
+    sin, cos = sin_cos(angle)
+    to_pivot = (pulley_radius + distance) * cos + pivot_height * sin - particle_radius
+    # The gap on the pulley is least where the centre's radius is square to the plate.
+    closest = np.clip(0.5 * np.pi - angle, -incline, left.phi1)
+    behind = to_pivot < ride_radius * sin_cos(closest + angle)[0]
+    behind &= found.fine
+    if unbounded_plate:
+        found.fail(behind, Reason.EARLY.because("plate: its line is reached during the ride"))
+        for name in STAGES["separation"]:
+            found.values[name] = np.where(behind, np.nan, found.values[name])
+    else:
+        found.fail(behind, Reason.NO_IMPACT.because("the ride passes the plate's line"))
+    gap = to_pivot - ride_radius * (left.sin * cos + left.cos * sin)
+    closing = left.v1 * (left.cos * cos - left.sin * sin)
+    discriminant = closing**2 - 2.0 * gravity * sin * gap
+    normal = np.sqrt(discriminant)
+    t2 = 2.0 * gap / (closing + normal)  # Eq. (5)
+    # Thrown up steeply, it meets a plate that leans away when it comes down again.
+    parts = (closing <= 0.0) & (sin >= 0.0)
+    comes_down = np.isfinite(left.again) & ~(~parts & (t2 <= left.again))
+    found.fail(comes_down, Reason.EARLY.because("pulley: the flight comes down on it again"))
+    found.fail(parts, Reason.NO_IMPACT.because("the velocity points off the plate"))
+    found.fail(
+        discriminant <= 0.0,
+        Reason.NO_IMPACT.because("the flight turns away before it reaches the plate's line"),
+    )
+    x2 = left.v1 * t2 * left.cos  # Eq. (3)
+    y2 = 0.5 * gravity * t2**2 + left.v1 * t2 * left.sin  # Eq. (4)
+    v2x = left.v1 * left.cos
+    v2y = left.v1 * left.sin + gravity * t2
+    tangential = v2x * sin + v2y * cos
+    v2, phi2 = hypot(v2x, v2y), atan2(normal, tangential)  # Eqs. (6), (7)
+    found.keep(t2=t2, x2=x2, y2=y2, v2x=v2x, v2y=v2y, v2=v2, phi2=phi2)
+
+    # Leave the plate: normal and tangential (down the plate) velocity, and the rim's.
+    found.require(
+        {
+            "0 <= restitution <= 1": (restitution >= 0.0) & (restitution <= 1.0),
+            "plate_friction >= 0": plate_friction >= 0.0,
+        }
+    )
+    if as_printed:
+        upright = (plate_friction == 0.0) & (angle == 0.0)
+        found.require({"plate_friction = 0 and angle = 0 for Eq. (9) as printed": upright})
+        v2r = hypot(normal, restitution * tangential)  # Eq. (9) as printed
+        phi2r = atan2(restitution * normal, tangential)  # Eq. (8)
+        away, down = (v2r * part for part in sin_cos(phi2r))
+        rim = left.rim
+    else:
+        away, down, rim = rebounded(
+            normal=normal, tangential=tangential, rim=left.rim, restitution=restitution,
+            friction=plate_friction, spin=spin, inertia=inertia,
+        )  # fmt: skip
+        v2r = hypot(away, down)  # Eq. (9) corrected
+        phi2r = atan2(away, down)  # Eq. (8)
+    found.keep(phi2r=phi2r, v2r=v2r, omega2=turning(rim))
+
+    # Fall on the outgoing belt, and be taken along by it.
+    found.require(
+        {
+            "0 <= drop < inf": (drop >= 0.0) & (drop < np.inf),
+            "finite belt_speed": np.isfinite(belt_speed),
+            "0 < mass < inf": (mass > 0.0) & (mass < np.inf),
+            "interval > 0": (interval > 0.0) | (not timed),
+        }
+    )
+    v3x = away * cos - down * sin
+    sinking = away * sin + down * cos
+    v3y = np.sqrt(sinking**2 + 2.0 * gravity * drop)
+    # Eq. (12), the root that does not cancel for either sign of b
+    t3 = np.where(sinking >= 0.0, 2.0 * drop / (sinking + v3y), (v3y - sinking) / gravity)
+    t3 = np.where((drop == 0.0) & (sinking >= 0.0), 0.0, t3)
+    found.fail(~np.isfinite(t3), Reason.MISSES.because("without gravity it never comes down to it"))
+    if unbounded_plate:
+        pressing = -gravity * sin
+        found.fail(
+            (pressing > 0.0) & (2.0 * away < pressing * t3),
+            Reason.SECOND.because("plate: its line is met again before the landing"),
         )
-    answers = {name: values.reshape(turning.shape) for name, values in found.values.items()}
-    return Transfer(reason=found.reason.astype(np.str_).reshape(turning.shape), **answers)
+    dEk = 0.5 * mass * (v3x**2 + belt_speed**2)  # noqa: N806 - Eq. (14)
+    slip = belt_speed + v3x - rim
+    carried = np.where(
+        spin, mass / ((1.0 + inertia) / inertia), mass
+    )  # effective mass at the contact point
+    lost_height = left.sin**2 / (1.0 + left.cos)  # 1 - cos φ1
+    found.keep(
+        t3=t3,
+        x3=v3x * t3,  # Eq. (10)
+        y3=drop,  # Eq. (11), solved for t3
+        v3x=v3x,
+        v3y=v3y,
+        v3=hypot(v3x, v3y),  # Eq. (13)
+        d3=ride_radius * lost_height + found.values["y2"] + drop,  # Eq. (16)
+        dEk=dEk,
+        P=dEk / interval,  # Eq. (15)
+        belt_work=carried * belt_speed * slip,
+        slip_heat=0.5 * carried * slip**2,
+    )
+    shape = whole[0].shape
+    answers = {name: values.reshape(shape) for name, values in found.values.items()}
+    return Transfer(reason=found.reason.astype(np.str_).reshape(shape), **answers)
 
 
-def rebound(
+def rebounded(
     *,
     normal: Floats,
     tangential: Floats,
@@ -237,155 +333,3 @@ def belt_power(
     flow, v_b, v_x = (np.asarray(part) for part in (rate_t_h, belt_speed, feed_speed))
     height = np.multiply(gravity, lift)
     return np.asarray(flow / 3.6 * (v_b * (v_b - v_x) + height), dtype=np.float64)
-
-
-def stages(
-    *,
-    speed: Floats,
-    pulley_radius: Floats,
-    distance: Floats,
-    angle: Floats,
-    pivot_height: Floats,
-    restitution: Floats,
-    drop: Floats,
-    belt_speed: Floats,
-    particle_radius: Floats,
-    mass: Floats,
-    gravity: Floats,
-    friction: Floats,
-    inertia: Floats,
-    incline: Floats,
-    ride_length: Floats,
-    plate_friction: Floats,
-    interval: Floats,
-    spin: Bools,
-    timed: bool,
-    as_printed: bool,
-    unbounded_plate: bool,
-) -> Answers:
-    """Go through the stages of N transfers; the parameters are those of `transfer`, each (N,)."""
-    found = Answers(len(speed))
-
-    def turning(rim: Floats) -> Floats:
-        # Adding 0 turns -0 into 0.
-        return np.where(spin, rim / particle_radius, 0.0) + 0.0
-
-    # Ride the belt and the pulley.
-    found.require("0 < speed < inf", (speed > 0.0) & (speed < np.inf))
-    found.require("0 < pulley_radius < inf", (pulley_radius > 0.0) & (pulley_radius < np.inf))
-    found.require(
-        "0 <= particle_radius < inf", (particle_radius >= 0.0) & (particle_radius < np.inf)
-    )
-    found.require("particle_radius > 0 with spin", ~spin | (particle_radius > 0.0))
-    found.require("0 <= gravity < inf", (gravity >= 0.0) & (gravity < np.inf))
-    found.require("friction >= 0", friction >= 0.0)
-    found.require("0 < inertia <= 1", (inertia > 0.0) & (inertia <= 1.0))
-    found.require("|incline| < π/2", np.abs(incline) < 0.5 * np.pi)
-    found.require("0 <= ride_length < inf", (ride_length >= 0.0) & (ride_length < np.inf))
-    ride_radius = pulley_radius + particle_radius
-    left = separation(
-        speed=speed, ride_radius=ride_radius, gravity=gravity, friction=friction, spin=spin,
-        inertia=inertia, incline=incline, ride_length=ride_length,
-    )  # fmt: skip
-    if left.fault.any():
-        for fault in range(1, len(FAULTS)):
-            found.fail(left.fault == fault, Reason.OUTSIDE.because(FAULTS[fault]))
-    found.keep(phi1=left.phi1, v1=left.v1, omega1=turning(left.rim))
-
-    # Fly to the plate: the gap between disk and plate's line is a quadratic in time.
-    found.require("|angle| < π/2", np.abs(angle) < 0.5 * np.pi)
-    found.require("finite distance and pivot_height", np.isfinite(distance + pivot_height))
-    sin, cos = sin_cos(angle)
-    to_pivot = (pulley_radius + distance) * cos + pivot_height * sin - particle_radius
-    # The gap on the pulley is least where the centre's radius is square to the plate.
-    closest = np.clip(0.5 * np.pi - angle, -incline, left.phi1)
-    behind = to_pivot < ride_radius * sin_cos(closest + angle)[0]
-    behind &= found.fine
-    if unbounded_plate:
-        found.fail(behind, Reason.EARLY.because("plate: its line is reached during the ride"))
-        for name in STAGES["separation"]:
-            found.values[name] = np.where(behind, np.nan, found.values[name])
-    else:
-        found.fail(behind, Reason.NO_IMPACT.because("the ride passes the plate's line"))
-    gap = to_pivot - ride_radius * (left.sin * cos + left.cos * sin)
-    closing = left.v1 * (left.cos * cos - left.sin * sin)
-    discriminant = closing**2 - 2.0 * gravity * sin * gap
-    normal = np.sqrt(discriminant)
-    t2 = 2.0 * gap / (closing + normal)  # Eq. (5)
-    # Thrown up steeply, it meets a plate that leans away when it comes down again.
-    parts = (closing <= 0.0) & (sin >= 0.0)
-    comes_down = np.isfinite(left.again) & ~(~parts & (t2 <= left.again))
-    found.fail(comes_down, Reason.EARLY.because("pulley: the flight comes down on it again"))
-    found.fail(parts, Reason.NO_IMPACT.because("the velocity points off the plate"))
-    found.fail(
-        discriminant <= 0.0,
-        Reason.NO_IMPACT.because("the flight turns away before it reaches the plate's line"),
-    )
-    x2 = left.v1 * t2 * left.cos  # Eq. (3)
-    y2 = 0.5 * gravity * t2**2 + left.v1 * t2 * left.sin  # Eq. (4)
-    v2x = left.v1 * left.cos
-    v2y = left.v1 * left.sin + gravity * t2
-    tangential = v2x * sin + v2y * cos
-    v2, phi2 = hypot(v2x, v2y), atan2(normal, tangential)  # Eqs. (6), (7)
-    found.keep(t2=t2, x2=x2, y2=y2, v2x=v2x, v2y=v2y, v2=v2, phi2=phi2)
-
-    # Leave the plate: normal and tangential (down the plate) velocity, and the rim's.
-    found.require("0 <= restitution <= 1", (restitution >= 0.0) & (restitution <= 1.0))
-    found.require("plate_friction >= 0", plate_friction >= 0.0)
-    if as_printed:
-        found.require(
-            "plate_friction = 0 and angle = 0 for Eq. (9) as printed",
-            (plate_friction == 0.0) & (angle == 0.0),
-        )
-        v2r = hypot(normal, restitution * tangential)  # Eq. (9) as printed
-        phi2r = atan2(restitution * normal, tangential)  # Eq. (8)
-        away, down = (v2r * part for part in sin_cos(phi2r))
-        rim = left.rim
-    else:
-        away, down, rim = rebound(
-            normal=normal, tangential=tangential, rim=left.rim, restitution=restitution,
-            friction=plate_friction, spin=spin, inertia=inertia,
-        )  # fmt: skip
-        v2r = hypot(away, down)  # Eq. (9) corrected
-        phi2r = atan2(away, down)  # Eq. (8)
-    found.keep(phi2r=phi2r, v2r=v2r, omega2=turning(rim))
-
-    # Fall on the outgoing belt, and be taken along by it.
-    found.require("0 <= drop < inf", (drop >= 0.0) & (drop < np.inf))
-    found.require("finite belt_speed", np.isfinite(belt_speed))
-    found.require("0 < mass < inf", (mass > 0.0) & (mass < np.inf))
-    if timed:
-        found.require("interval > 0", interval > 0.0)
-    v3x = away * cos - down * sin
-    sinking = away * sin + down * cos
-    v3y = np.sqrt(sinking**2 + 2.0 * gravity * drop)
-    # Eq. (12), the root that does not cancel for either sign of b
-    t3 = np.where(sinking >= 0.0, 2.0 * drop / (sinking + v3y), (v3y - sinking) / gravity)
-    t3 = np.where((drop == 0.0) & (sinking >= 0.0), 0.0, t3)
-    found.fail(~np.isfinite(t3), Reason.MISSES.because("without gravity it never comes down to it"))
-    if unbounded_plate:
-        pressing = -gravity * sin
-        found.fail(
-            (pressing > 0.0) & (2.0 * away < pressing * t3),
-            Reason.SECOND.because("plate: its line is met again before the landing"),
-        )
-    dEk = 0.5 * mass * (v3x**2 + belt_speed**2)  # noqa: N806 - Eq. (14)
-    slip = belt_speed + v3x - rim
-    carried = np.where(
-        spin, mass / ((1.0 + inertia) / inertia), mass
-    )  # effective mass at the contact point
-    lost_height = left.sin**2 / (1.0 + left.cos)  # 1 - cos φ1
-    found.keep(
-        t3=t3,
-        x3=v3x * t3,  # Eq. (10)
-        y3=drop,  # Eq. (11), solved for t3
-        v3x=v3x,
-        v3y=v3y,
-        v3=hypot(v3x, v3y),  # Eq. (13)
-        d3=ride_radius * lost_height + found.values["y2"] + drop,  # Eq. (16)
-        dEk=dEk,
-        P=dEk / interval,  # Eq. (15)
-        belt_work=carried * belt_speed * slip,
-        slip_heat=0.5 * carried * slip**2,
-    )
-    return found

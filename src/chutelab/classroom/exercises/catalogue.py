@@ -46,7 +46,7 @@ from chutelab.classroom.words import words
 from chutelab.util.errors import InputError
 
 OPENED: Final[deque[Task]] = deque(maxlen=64)
-"""The tasks of this process, the last one last: where grading looks for what was answered."""
+"""The tasks of this process in the order they were opened; grading reads the answers here."""
 
 UNNAMED: Final = "your name"
 """What stands in a notebook in place of the student's name."""
@@ -106,7 +106,7 @@ class Task:
         return self._unknown if found is None else _asked(_case(self, found.number))
 
     def check(self, number: object = None, answer: object = None) -> Reply:
-        """Say what becomes of an answer.
+        """Judge an answer.
 
         Parameters
         ----------
@@ -349,7 +349,7 @@ SAID: Final = (
     "off", "pair", "pure", "question", "reply", "right", "small", "source", "tries",
     "untranslated", "verdict", "working",
 )  # fmt: skip
-"""How keys of the catalogue begin that pages need: with nothing of cells, sheets and packages."""
+"""First parts of the keys that pages need of the catalogue: none of cells, sheets, packages."""
 
 OPERATORS: Final[dict[type[ast.AST], str]] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**",
@@ -359,7 +359,7 @@ OPERATORS: Final[dict[type[ast.AST], str]] = {
 
 @cache
 def tree(formula: str) -> Any:
-    """Return a formula as nested lists, each an operation's name and what it is done to.
+    """Return a formula as nested lists: the name of an operation, then its operands.
 
     Numbers and truth values stand for themselves, and a text is a name.
 
@@ -403,7 +403,7 @@ def _of(node: ast.expr) -> Any:
         case ast.Lambda(ast.arguments() as taken, body):
             return ["lambda", [one.arg for one in taken.args], _of(body)]
         case ast.Call(function, arguments, keywords):
-            # A table that is laid open has no name.
+            # An unpacked table (**table) has no name.
             named = [[one.arg, _of(one.value)] if one.arg else [_of(one.value)] for one in keywords]
             return ["call", _of(function), [*map(_of, arguments)], named]
     raise ValueError(f"pages do not know {ast.unparse(node)!r}")

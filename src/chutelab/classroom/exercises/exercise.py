@@ -56,7 +56,7 @@ class Values:
         vars(self).update({name: float(number) for name, number in numbers.items()})
 
     def __getattr__(self, name: str) -> float:
-        # Python asks here for what is not among the numbers.
+        # Python calls this for names that are not among the numbers.
         raise AttributeError(f"no number {name!r} here; there are {', '.join(self)}")
 
     def __setattr__(self, name: str, value: object = None) -> None:
@@ -102,7 +102,7 @@ FUNCTIONS: Final[dict[str, Any]] = {
     **{one.__name__: one for one in (abs, dict, round)},
     **{name: getattr(math, name) for name in _OF_MATH},
 }
-"""What formulas know besides the exercise's own names, g and `chutelab.theory.transfer`."""
+"""Names in formulas, besides the exercise's own, g and `chutelab.theory.transfer`."""
 
 
 @cache
@@ -162,7 +162,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Mistake:
-    """A way to go wrong that is recognised by the number it leads to.
+    """A mistake that is recognised by the number it leads to.
 
     What the student is told is a template: what seems to have happened, never the right number.
     """
@@ -265,7 +265,7 @@ def _choices(values: list[float] | dict[str, float]) -> list[float]:
 
 @dataclass(frozen=True)
 class Trace:
-    """A wrong number, the mistake it tells of, and what to say about it."""
+    """A wrong number, the mistake that leads to it, and the reply."""
 
     name: str  # in English
     called: str  # in the learner's language
@@ -285,14 +285,14 @@ OF_ANGLES: Final = (
     ("mistake-radians", "reply-radians", radians(1.0)),
     ("mistake-radians", "reply-degrees", degrees(1.0)),
 )
-"""Those of answers in degrees."""
+"""Mistakes with answers in degrees."""
 
 BESIDES: Final = (
     ("mistake-sign", "besides-sign", -1.0),
     ("mistake-ten", "besides-large", 1e3),
     ("mistake-ten", "besides-small", 1e-3),
 )
-"""What is common on top of a question's own mistake."""
+"""Common second mistakes, on top of one of the question's own."""
 
 MOST_TENS: Final = 6
 """Powers of ten, either way: from micro to mega."""
@@ -321,7 +321,7 @@ def _general(language: str, *, angle: bool) -> tuple[Trace, ...]:
 
 
 LEAST: Final = 1e-9
-"""An answer smaller than that in its unit has no digits to judge."""
+"""Smallest right answer, in its unit: below it there are no digits to judge."""
 
 
 @dataclass(frozen=True)
@@ -364,7 +364,7 @@ class Case:
 
     @cached_property
     def feels_gravity(self) -> bool:
-        """Whether the right answer is another one where g is."""
+        """Whether the right answer depends on g."""
         given = {name: self.numbers[name] for name in self.numbers.drawn}
         other = Numbers(given, self.numbers.formulas, 1.001 * GRAVITY)
         return not isclose(float(other.of(self.question.answer)), self.right, rel_tol=1e-9)
@@ -380,7 +380,7 @@ class Case:
 
 
 def plain(student: str) -> str:
-    """Return a name without what people do not mean to differ in: case, spaces, Unicode forms.
+    """Return a name in lower case, with single spaces and in one Unicode form.
 
     >>> plain("  Ada  LOVELACE ")
     'ada lovelace'
@@ -406,7 +406,7 @@ def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] |
 
 
 MOST_DRAWS: Final = 1000
-"""A lesson whose draws fit less often than that is badly made."""
+"""Most draws for a student; if none fits, the lesson is badly made."""
 
 
 def draw(exercise: Exercise, student: str) -> tuple[Values, tuple[Case, ...]]:
@@ -415,7 +415,7 @@ def draw(exercise: Exercise, student: str) -> tuple[Values, tuple[Case, ...]]:
     Raises
     ------
     RuntimeError
-        If none of many draws fits: the exercise is wrongly made.
+        If none of `MOST_DRAWS` draws fits: the exercise is badly made.
     """
     for number in range(MOST_DRAWS):
         cases = attempt(exercise, student, number)

@@ -1,4 +1,4 @@
-"""From what a student hands over to a reply: right, a known mistake, or how far off.
+"""Judge what a student enters: right, a known mistake, or how far off.
 
 Replies read well in a terminal and, as HTML without colours of background and text, in light and
 dark notebooks.
@@ -27,7 +27,7 @@ WIDTH: Final = 88
 
 
 class Verdict(StrEnum):
-    """What became of an answer."""
+    """The result of judging an answer."""
 
     RIGHT = "right"
     MISTAKE = "known mistake"
@@ -49,7 +49,7 @@ MARKS: Final = {
 
 
 def in_words(verdict: Verdict, language: str) -> str:
-    """Return a verdict as a learner is told it."""
+    """Return a verdict in the learner's language."""
     return words(language).say(f"verdict-{verdict.name.lower()}")
 
 
@@ -75,14 +75,14 @@ def table(rows: Sequence[tuple[str, ...]]) -> str:
 
 @dataclass(frozen=True, repr=False)
 class Reply:
-    """The answer to an answer.
+    """The reply to an answer.
 
     Attributes
     ----------
     question
         Its number; 0 if there is no such one.
     verdict, text
-        What became of the answer, and what to tell the student.
+        The result of judging the answer, and what to tell the student.
     mistake, called
         The known mistake that it looks like, or empty: its name in English, and in `language`.
     """
@@ -172,7 +172,7 @@ BAR, HEIGHT, GAP = 150, 12, 4
 """Pixels: length and height of a part of the progress bar, and what is between two."""
 
 FAINT: Final = 0.35
-"""Opacity of the parts that nothing was done about."""
+"""Opacity of the parts that were not attempted."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -288,11 +288,11 @@ def _of_text(text: str, say: Callable[..., str]) -> str | None:
 
 
 CLOSE: Final = 0.05
-"""Relative difference up to which rounding, or another g, is the likely reason."""
+"""Up to this relative difference, rounding or another value of g is the likely reason."""
 
 
 def is_close(answer: float, number: float) -> bool:
-    """Tell whether an answer stands for a number: whether it is within the tolerance."""
+    """Tell whether an answer is a number within the tolerance."""
     return abs(answer - number) <= TOLERANCE * abs(number)
 
 
@@ -334,7 +334,7 @@ def judge(case: Case, answer: float, others: Iterable[tuple[str, float]] = ()) -
         if is_rounded(answer, number):
             known, called = (one.say("mistake-others") for one in (words(), said))
             return reply(Verdict.MISTAKE, said.say("reply-others", name=name), known, called)
-    # What is close has hardly two mistakes in it, and what two pairs lead to tells of neither.
+    # Two mistakes rarely give a close answer; if several pairs give this number, none is named.
     near = abs(answer / case.right - 1.0) <= CLOSE
     pairs = [trace for trace in case.pairs if is_close(answer, trace.number)]
     if len(pairs) == 1 and not near:
@@ -348,7 +348,7 @@ def with_unit(number: float, unit: str, said: Words) -> str:
 
 
 FAR: Final = 10.0
-"""Ratio from which on a percentage says less than a factor."""
+"""From this ratio on, "more than 10 times" is said, not a percentage."""
 
 
 def _distance(case: Case, answer: float, said: Words) -> str:

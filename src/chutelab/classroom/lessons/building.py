@@ -56,10 +56,10 @@ SPLIT: Final = "split.png"
 """The film, the machine before anything has happened, and the velocity at the plate."""
 
 MOST_PIXELS: Final = 3840 * 2160
-"""Of a picture, as `Picture` in `reading` has it."""
+"""Most pixels of a picture, as in `reading.Picture`."""
 
 LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
-"""What decides on the bytes of a picture, besides its inputs."""
+"""Packages whose versions determine the bytes of a picture, besides its inputs."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def build(
     force: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Built:
-    """Make film and machine picture of a lesson, unless they are there, made from the same.
+    """Make film and machine picture of a lesson, unless they are up to date.
 
     The same lesson and versions give the same bytes.
 
@@ -87,7 +87,7 @@ def build(
     folder
         Where to write it (made if need be); default: the lesson's own folder.
     force
-        Make it even so.
+        Make them even if they are.
     progress
         Called with the share of the simulation that is done, 0 to 1.
 
@@ -105,7 +105,7 @@ def build(
     made = force or comment_of(path) != wanted or not machine.is_file()
     if made:
         from chutelab.pictures.animation import animate, still
-        from chutelab.pictures.plots.split import split_velocity
+        from chutelab.pictures.plots.figure import split_velocity
 
         with aside(path.parent, path):
             refuse_other(path)
@@ -146,12 +146,12 @@ def build_notebook(lesson: Lesson, folder: Path | None = None) -> Built | None:
 
 
 def _in_english(lesson: Lesson) -> Lesson:
-    """Return a lesson as its film has it, which speaks English whatever the lesson speaks."""
+    """Return a lesson in English, the language of its film."""
     return lesson if lesson.language == "en" else read(lesson.folder)
 
 
 def is_current(lesson: Lesson) -> bool:
-    """Tell whether a lesson's picture shows what the lesson says, with whatever versions made."""
+    """Tell whether a lesson's picture was made from its present inputs, with any versions."""
     found, wanted = comment_of(lesson.folder / PICTURE), stamp_of(lesson)
     return found.split("; ")[:2] == wanted.split("; ")[:2]
 
@@ -166,7 +166,7 @@ def stamp_of(lesson: Lesson) -> str:
     scene = to_dict(scene_of(lesson, lesson.picture.scene, lesson.picture.set))
     for table in ("expect", "live"):  # neither shows in its picture
         scene.pop(table, None)
-    # Without defaults: they belong to the version.
+    # Without defaults, which the version determines.
     settings = lesson.picture.model_dump(exclude_unset=True, exclude={"scene", "set"})
     inputs = {"scene": scene, "picture": settings, "question": lesson.question, "predict": True}
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=True)
@@ -185,7 +185,7 @@ def comment_of(picture: Path) -> str:
         return ""
     if prod(size) > MOST_PIXELS:
         return ""
-    # Every GIF ends with a semicolon.
+    # A whole GIF ends with a semicolon.
     return str(comment.decode("ascii", "replace")) if gif.endswith(b";") else ""
 
 
@@ -294,14 +294,19 @@ def notebook_of(lesson: Lesson) -> str:
             add(kind, f"{place}-own-{n}".lower().replace(" ", "-"), source, place)
 
     def prose(part: str) -> str:
-        """Return paragraphs on a line each, without those that are for a terminal."""
-        paragraphs = re.split(r"\n{2,}", part.strip())
+        """Return paragraphs on a line each, without those that are for a terminal.
+
+        Lists and tables keep their line breaks.
+        """
         terminal = f"*{say('notebook-terminal')}"
-        return "\n\n".join(_unbroken(one) for one in paragraphs if not one.startswith(terminal))
+        paragraphs = re.split(r"\n{2,}", part.strip())
+        kept = [textwrap.dedent(one) for one in paragraphs if not one.startswith(terminal)]
+        broken = r"\n(?!\s*(?:[-*] |\||\d+\. )|#)\s*"
+        return "\n\n".join(re.sub(broken, " ", one) for one in kept)
 
     exercise = EXERCISES.get(lesson.name)
     title, _, opening = heading.partition("\n")
-    # The notebook draws the machine itself: it may be all that a student has.
+    # The notebook draws the machine itself: a student may have no other file.
     opening = prose(re.sub(r"^!\[.*\n+", "", opening, flags=re.MULTILINE))
     order = say("notebook-order-exercise" if exercise is not None else "notebook-order")
     needs = re.search(r"^# needs: *(.*)$", _source(lesson), re.MULTILINE)
@@ -407,8 +412,3 @@ def _commands(block: str) -> str:
     runs = [re.sub(r" --(out|only) \S+", "", line) for line in found]
     lines = "".join(f"    {json.dumps(run, ensure_ascii=False)},\n" for run in runs)
     return f"runs = book.run(\n{lines})\nruns"
-
-
-def _unbroken(paragraph: str) -> str:
-    """Return a paragraph without its line breaks; lists and tables keep theirs."""
-    return re.sub(r"\n(?!\s*(?:[-*] |\||\d+\. )|#)\s*", " ", textwrap.dedent(paragraph))

@@ -53,7 +53,7 @@ END: Final = "end.png"
 """The first picture of the film, and the last one: the answer is in it."""
 
 _NOT_GIVEN: Final = re.compile(r"lesson(\..+)?\.toml")
-"""The key for the teacher is in it."""
+"""Not given to students: the teacher's key is in it."""
 
 _SHARED: Final = ("style.css", "picture.js")
 
@@ -124,7 +124,7 @@ def bundle(
 
 
 def _check_places(lessons: Sequence[Lesson], folder: Path) -> None:
-    """Refuse, before anything is made, what would be written over another's or out of a folder."""
+    """Refuse, before anything is made, lessons with one name and links out of the folder."""
     names = [INDEX, *_SHARED]
     for lesson in lessons:
         name = lesson.folder.name
@@ -136,7 +136,7 @@ def _check_places(lessons: Sequence[Lesson], folder: Path) -> None:
 
 
 def _address(*names: str) -> str:
-    """Return a relative address, in which no name is markup, a scheme, or the start of a query."""
+    """Return a relative address with quoted names: no markup, scheme or query."""
     return "/".join(quote(os.fsencode(name)) for name in names)
 
 
@@ -161,7 +161,7 @@ def _lesson(
     said = words(lesson.language)
     say = said.say
     worksheet, explanation = lesson.text("README"), lesson.text("explanation")
-    # What there is to play with, and to take along.
+    # Links to the live page, the sheet, the notebook and the scenes.
     doors = []
     if lesson.page is not None:
         home = (say("page-back", title=lesson.title), INDEX)
@@ -217,8 +217,8 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
     """Write the live page of a lesson with its exercise, in its language; return the size in bytes.
 
     In a frame it tells the page around it, by ``postMessage``, ``{chutelab: "ready", lesson}``. A
-    page that answers ``{chutelab: "begin", student, suspend_data}``, "" for the first time, says
-    who this is and keeps what becomes of it: after each change it is told ``{chutelab: "progress",
+    page that answers ``{chutelab: "begin", student, suspend_data}``, "" for the first time, names
+    the student and keeps the state: after each change it is told ``{chutelab: "progress",
     lesson, student, done, total, score, status, suspend_data, result}``, with a score of 100 for
     all, the status "incomplete" or "completed", at most 4000 characters of data to go on from, and
     the result as `chutelab.classroom.grading` takes it.
@@ -337,7 +337,7 @@ Tag: py3-none-any
 
 
 def write_wheel(folder: Path) -> Path:
-    """Write the wheel of this chutelab into a folder, which is made, for those who get the pages.
+    """Write the wheel of this chutelab into a folder, made if need be, for users of the pages.
 
     It is made of chutelab's own files, in a checkout with the scenes and lessons beside ``src``,
     and of what the installer keeps: no network, no tools for building. The form is that of the

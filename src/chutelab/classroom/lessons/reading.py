@@ -22,10 +22,10 @@ from chutelab.scene.units import Number, Table, Text, Whole
 from chutelab.util.errors import did_you_mean, nearest
 
 MOST: Final = 20
-"""Entries of a list at most: a lesson that needs more is two lessons."""
+"""Most entries of a list: a lesson that needs more is two lessons."""
 
 LONGEST: Final = 200
-"""Characters of a text at most: it has to go on one slide."""
+"""Most characters of a text: it must fit on a slide."""
 
 Said = Annotated[Text, Field(min_length=1, max_length=LONGEST)]
 Names = Annotated[tuple[Said, ...], Field(max_length=MOST)]
@@ -98,7 +98,7 @@ class Teacher(Table):
         (), "Answers to the predictions, in their order", f"a list of at most {MOST} texts"
     )
     basic: Words = key("", "What to leave out for a short version", "a text")
-    stretch: Words = key("", "What to add for those who are done", "a text")
+    stretch: Words = key("", "What to add for students who are done", "a text")
     curriculum: Words = key("", "Where it sits in a curriculum", "a text")
 
 
@@ -249,7 +249,7 @@ def read(folder: str | Path, language: str = "en") -> Lesson:
         lesson = Lesson.model_validate(document)
     except ValidationError as error:
         faults += _faults(error, document)
-        # What is sound is judged all the same, so that all faults are said at once.
+        # The sound keys are still checked, so that all faults are listed at once.
         faulty = {detail["loc"][0] for detail in error.errors()}
         sound = {name: value for name, value in document.items() if name not in faulty}
         needed = {"title": "-", "level": "start", "question": "-", "scenes": ["-"]}
@@ -351,7 +351,7 @@ def beside(lesson: Lesson, name: str) -> Path | None:
 
 
 def _misfits(lesson: Lesson) -> Iterator[Fault]:
-    """Yield what no key can be judged for alone: scenes that load, names that are in them."""
+    """Yield faults of several keys: scenes that do not load, names that are not in them."""
     scenes: dict[str, Scene] = {}
     for i, name in enumerate(lesson.scenes):
         here = f"scenes[{i}]"
@@ -397,7 +397,7 @@ def unit_in(lesson: Lesson, quantity: str) -> str:
 
 
 def _faults(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
-    """Say every error of a validation in words, one fault a key."""
+    """Return the errors of a validation in words, one fault a key."""
     faults: dict[tuple[str | int, ...], Fault] = {}
     for detail in error.errors(include_url=False):
         table = TABLES.get(str(detail["loc"][0])) if len(detail["loc"]) > 1 else None

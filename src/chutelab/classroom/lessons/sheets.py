@@ -47,7 +47,7 @@ def sheet(lesson: Lesson, which: str) -> str:
         case "student":
             text = lesson.text("README")
             heads = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
-            # A worksheet that is not translated has the English ones.
+            # A worksheet that is not translated has the English headings.
             for language in dict.fromkeys((lesson.language, "en")):
                 parts = [words(language).say(key) for key in PARTS]
                 if not (missing := [name for name in parts if name not in heads]):
@@ -66,59 +66,58 @@ def sheet(lesson: Lesson, which: str) -> str:
             if lesson.number is not None:
                 title = say("sheet-title", number=lesson.number, title=title)
             head = f"# {say('sheet-teacher', title=title)}"
-            made = "\n\n".join([head, *_for_the_teacher(lesson)]) + "\n"
+            made = f"{head}\n\n{_for_the_teacher(lesson)}\n"
     if lesson.untranslated:
         title, _, rest = made.partition("\n")
         made = f"{title}\n\n*{say('untranslated')}*\n{rest}"
     return made
 
 
-def _for_the_teacher(lesson: Lesson) -> Iterator[str]:
+def _for_the_teacher(lesson: Lesson) -> str:
+    """Return the sections of the teacher's sheet; those without a text are left out."""
     said = words(lesson.language)
-    say = said.say
-    level = say("sheet-level", level=say(f"level-{lesson.level}"), minutes=lesson.minutes)
-    yield f"{lesson.question}\n\n{level}"
-    teacher = lesson.teacher or Teacher()
-    if teacher.goals:
-        yield f"## {say('sheet-goals')}\n\n" + "\n".join(f"- {goal}" for goal in teacher.goals)
-    if teacher.say:
-        yield f"## {say('sheet-say')}\n\n{teacher.say}"
-    if teacher.predictions:
-        key = "\n".join(f"{n}. {answer}" for n, answer in enumerate(teacher.predictions, 1))
-        yield f"## {say('sheet-predictions')}\n\n{key}"
-    yield from _of_exercise(lesson, said)
+    say, teacher = said.say, lesson.teacher or Teacher()
     lengths = (("sheet-basic", teacher.basic), ("sheet-stretch", teacher.stretch))
-    if lines := [f"- {say(key)}: {text}" for key, text in lengths if text]:
-        yield f"## {say('sheet-lengths')}\n\n" + "\n".join(lines)
-    if teacher.curriculum:
-        yield f"## {say('sheet-curriculum')}\n\n{teacher.curriculum}"
+    sections = {
+        "sheet-goals": "\n".join(f"- {goal}" for goal in teacher.goals),
+        "sheet-say": teacher.say,
+        "sheet-predictions": "\n".join(
+            f"{n}. {answer}" for n, answer in enumerate(teacher.predictions, 1)
+        ),
+        **_of_exercise(lesson, said),
+        "sheet-lengths": "\n".join(f"- {say(key)}: {text}" for key, text in lengths if text),
+        "sheet-curriculum": teacher.curriculum,
+    }
+    level = say("sheet-level", level=say(f"level-{lesson.level}"), minutes=lesson.minutes)
+    parts = (f"## {say(key)}\n\n{text}" for key, text in sections.items() if text)
+    return "\n\n".join([f"{lesson.question}\n\n{level}", *parts])
 
 
-def _of_exercise(lesson: Lesson, said: Words) -> Iterator[str]:
-    """Yield the key to the exercise, and the mistakes that its replies name."""
+def _of_exercise(lesson: Lesson, said: Words) -> dict[str, str]:
+    """Return the key to the exercise, and the mistakes that its replies name, as sections."""
     if lesson.name not in EXERCISES:
-        return
+        return {}
     exercise, say = told(lesson.name, lesson.language), said.say
     given, cases = draw(exercise, UNNAMED)
-    lines = []
+    lines, rows = [], [f"| {say('sheet-columns')} |", "|---|---|---|"]
     for case in cases:
-        asked = case.question
-        way = "; ".join(case.numbers.text(line) for line in asked.working.strip().splitlines())
+        asked, text = case.question, case.numbers.text
+        way = "; ".join(map(text, asked.working.strip().splitlines()))
         answer = say("answer", answer=with_unit(case.right, asked.unit, said))
         lines.append(f"{case.number}. *{asked.title}*: {way}. {answer}.")
+        rows += [
+            f"| {case.number} | {known.called or known.name} | {text(known.says)} |"
+            for known in asked.mistakes
+        ]
     numbers = "; ".join(
         f"{one.symbol} = {with_unit(given[one.name], one.unit, said)}"
         for one in exercise.parameters
     )
     shipped = say("sheet-shipped", name=UNNAMED, numbers=numbers)
-    yield f"## {say('sheet-key')}\n\n{shipped}\n\n" + "\n".join(lines)
-    rows = [
-        f"| {case.number} | {known.called or known.name} | {case.numbers.text(known.says)} |"
-        for case in cases
-        for known in case.question.mistakes
-    ]
-    head = f"| {say('sheet-columns')} |\n|---|---|---|\n"
-    yield f"## {say('sheet-mistakes')}\n\n{say('sheet-besides')}\n\n{head}" + "\n".join(rows)
+    return {
+        "sheet-key": "\n".join([f"{shipped}\n", *lines]),
+        "sheet-mistakes": "\n".join([f"{say('sheet-besides')}\n", *rows]),
+    }
 
 
 FORMATS: Final = ("md", "html", "pdf")
@@ -180,7 +179,7 @@ def _pictures(lesson: Lesson, tree: SyntaxTreeNode) -> Iterator[tuple[SyntaxTree
 
 
 def _page(lesson: Lesson, tree: SyntaxTreeNode, asked: list[SyntaxTreeNode]) -> str:
-    """Return a page that is whole: pictures are in it."""
+    """Return a page in one file, pictures included."""
     for node in asked:
         node.attrs["class"] = "answer"
     for node, path in _pictures(lesson, tree):
@@ -212,7 +211,7 @@ def _pdf(lesson: Lesson, tree: SyntaxTreeNode, asked: list[SyntaxTreeNode], kind
                 node.attrs["src"] = ""  # its words stand for it
         for node, path in found.items():
             with Image.open(path) as picture:
-                # Of a film its end, when all has happened.
+                # Of a film its last picture.
                 picture.seek(getattr(picture, "n_frames", 1) - 1)
                 picture.convert("RGB").save(folder / f"{path.stem}.png")
             node.attrs["src"] = f"{path.stem}.png"
@@ -222,12 +221,12 @@ def _pdf(lesson: Lesson, tree: SyntaxTreeNode, asked: list[SyntaxTreeNode], kind
         body = _blocks(tree.children, asked)
         source = folder / "sheet.typ"
         source.write_text(f"{look}\n#show: sheet.with({options})\n{body}", encoding="utf-8")
-        # The fonts are Typst's own, and no time is in the file: it is the same everywhere.
+        # With Typst's own fonts and no date, the file is the same everywhere.
         return typst.compile(source, format="pdf", ignore_system_fonts=True)
 
 
 def _text(text: str) -> str:
-    """Return a text as Typst writes one, in which nothing is markup."""
+    """Return a text as a Typst string, without markup."""
     kept = "".join(sign for sign in text if sign.isprintable() or sign == "\n")
     escaped = kept.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     return f'"{escaped}"'
@@ -263,7 +262,7 @@ def _blocks(nodes: Iterable[SyntaxTreeNode], asked: list[SyntaxTreeNode]) -> str
 
 
 def _table(table: SyntaxTreeNode) -> str:
-    """Return a table; columns with cells to be filled in share what room there is."""
+    """Return a table; columns with cells to be filled in share the free width."""
     rows = [
         [_inline(cell) for cell in row.children] for part in table.children for row in part.children
     ]
@@ -271,7 +270,7 @@ def _table(table: SyntaxTreeNode) -> str:
     columns = ", ".join("1fr" if one else "auto" for one in blank)
     head, *body = ("".join(f"[{cell or '#blank'}]" for cell in row) for row in rows)
     made = f"#table(columns: ({columns},), table.header{head}){''.join(body)}"
-    # It is filled in by hand, so it stays on one page.
+    # A table that is filled in by hand stays on one page.
     return f"#block(breakable: false)[{made}]" if any(blank) else made
 
 

@@ -144,7 +144,7 @@ def _typeset(part: Part) -> str:
     inside = ", ".join(typeset(argument) or "zws" for argument in part.arguments)
     match part.name:
         case "":
-            # All but letters and digits means something there, unless it is escaped.
+            # In Typst all but letters and digits is markup unless escaped.
             known = {" ": "", "-": "−"}
             said = known.get(part.text, part.text if part.text[0].isalnum() else f"\\{part.text}")
         case "group":
@@ -189,11 +189,11 @@ def parser() -> MarkdownIt:
     from mdit_py_plugins.dollarmath import dollarmath_plugin
 
     made = MarkdownIt("commonmark", {"html": False}).enable("table")
-    return made.use(dollarmath_plugin, allow_space=False, renderer=_mathematics)
-
-
-def _mathematics(tex: str, options: dict[str, bool]) -> str:
-    return mathml(tex, display=options["display_mode"])
+    return made.use(
+        dollarmath_plugin,
+        allow_space=False,
+        renderer=lambda tex, options: mathml(tex, display=options["display_mode"]),
+    )
 
 
 _NAMED: Final = r"(?:<mi>[a-z]{2,}</mi>|<(msu[bp])><mi>[a-z]{2,}</mi>.*?</\1>)"
@@ -232,12 +232,12 @@ def html_of(markdown: str, folders: Collection[str] | None = None) -> str:
             if other and folders is not None and other[1] not in folders:
                 del link.attrs["href"]
     made = str(read.renderer.render(worksheet.to_tokens(), read.options, {}))
-    # What is too wide for a phone scrolls by itself, and with the keyboard.
+    # Wide tables and code scroll by themselves, with the keyboard, too.
     return re.sub("<(pre|table)>", r'<\1 tabindex="0">', made)
 
 
 def _elsewhere(part: SyntaxTreeNode) -> bool:
-    """Tell whether a paragraph is a picture that the page shows elsewhere, or is not to show."""
+    """Tell whether a paragraph is a picture that the page shows elsewhere or leaves out."""
     inside = [one for line in part.children for one in line.children]
     if part.type != "paragraph" or [one.type for one in inside] != ["image"]:
         return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from math import prod
 from time import perf_counter
 from typing import Any
 
@@ -96,34 +97,40 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
     s, a, w = segments.length.shape[-1], len(arcs.surface), int(wheel is not None)
     columns, owners = s + a + w, len(machine.surfaces) + 1
     kinds = members if family else len(machine.rolling)
-    books = owners * (count if apart else 1)
-    shapes: dict[str, tuple[Any, int]] = {
-        "segments": (dtype("Segment"), members * s), "arcs": (dtype("Arc"), members * a),
-        "wheels": (dtype("Wheel"), members * w), "lones": (dtype("Lone"), count),
-        "materials": (dtype("Pair"), kinds * columns), "books": (REAL, 3 * books),
-    }  # fmt: skip
-    module.place(*((name, *shape) for name, shape in shapes.items()), of="Exact")
+    exact: Any = module.structs["Exact"]
+    for name, value in (
+        ("segment_count", s), ("arc_count", a), ("wheel_count", w), ("lone_count", count),
+        ("surface_count", owners), ("kind_count", kinds), ("family", family), ("apart", apart),
+        ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
+        ("landing", machine.landing), ("far", far), ("most", ROUNDS), ("window", WINDOW),
+        ("tick", TICK),
+    ):  # fmt: skip
+        setattr(exact, name, value)
+    module.work("lay_out_exact")
 
-    def rows(name: str, *shape: int) -> NDArray[Any]:
-        return module.array(name, *shapes[name], of="Exact").reshape(shape)
+    def rows(name: str, kind: str, *shape: int) -> NDArray[Any]:
+        found = module.array(name, dtype(kind), prod(shape), of="Exact")
+        return found.reshape(shape)
 
-    materials = rows("materials", kinds, columns)
-    for name, part, first, many in (("segments", segments, 0, s), ("arcs", arcs, s, a)):
+    materials = rows("materials", "Pair", kinds, columns)
+    for name, kind, part, first, many in (
+        ("segments", "Segment", segments, 0, s), ("arcs", "Arc", arcs, s, a),
+    ):  # fmt: skip
         if not many:
             continue
-        own = rows(name, members, many)
+        own = rows(name, kind, members, many)
         for field in own.dtype.names or ():
             if field != "end":
                 own[field] = getattr(part, field)
         for field in ("restitution", "friction"):
             materials[field][:, first : first + many] = getattr(part, field)
     if wheel is not None:
-        own = rows("wheels", members)
+        own = rows("wheels", "Wheel", members)
         for field in ("radius", "speed", "incline", "surface"):
             own[field] = getattr(wheel, field)
         materials["restitution"][:, -1] = wheel.restitution
         materials["friction"][:, -1] = wheel.friction
-    lones, releases = rows("lones", count), machine.releases
+    lones, releases = rows("lones", "Lone", count), machine.releases
     lones["release"], lones["stop"] = releases.t, machine.end_time - releases.t
     lones["position"], lones["velocity"] = releases.position, releases.velocity
     for field in ("radius", "mass", "inertia"):
@@ -132,27 +139,7 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
     several = len(machine.rolling) > 1
     lones["rolling"] = machine.rolling[releases.kind] if several else machine.rolling[0]
     lones["kind"], lones["carried"] = releases.kind, releases.carried
-    for n, side in enumerate(machine.exit_box):
-        lones["exit_box"][:, n] = side
-    exact: Any = module.structs["Exact"]
-    for name, value in (
-        ("segment_count", s), ("arc_count", a), ("wheel_count", w), ("lone_count", count),
-        ("surface_count", owners), ("family", family), ("apart", apart),
-        ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
-        ("landing", machine.landing), ("far", far), ("most", ROUNDS), ("window", WINDOW),
-        ("tick", TICK),
-    ):  # fmt: skip
-        setattr(exact, name, value)
-    make_room(module, "room", 100 * (s + a) + 200)
-    make_room(module, "knot", min(20 * count, 100_000) + 500)
-    make_room(module, "event", min(20 * count, 100_000) + 100)
-
-
-def make_room(module: Module, what: str, room: int) -> None:
-    """Make room for so many knots or events, or for obstacles."""
-    name, kind = ("room", REAL) if what == "room" else (f"{what}s", dtype(what.title()))
-    module.place((name, kind, room), of="Exact")
-    setattr(module.structs["Exact"], "room_size" if what == "room" else f"{what}_room", room)
+    lones["exit_box"] = releases.exit_box
 
 
 def follow(
@@ -162,19 +149,17 @@ def follow(
     stalled, course = None, COURSE["PAUSING"]
     with suppress(EnoughError):
         while course != COURSE["FINISHED"]:
-            course = module.call("follow_all", SLICE)
+            course = module.run("follow_all", SLICE, COURSE["NO_MEMORY"])
             drain(module, recorder)
             exact: Any = module.structs["Exact"]
-            if course == COURSE["NO_ROOM"]:
-                make_room(module, "room", 2 * exact.room_size)
-            elif course == COURSE["HELD"]:
+            if course == COURSE["HELD"]:
                 a, b = (recorder.machine.surfaces[surface] for surface in exact.other)
                 raise CornerError(
                     f"particle {exact.lone}, a spinning disk, is held between {a!r} and {b!r}, of"
                     " which one moves; the exact engine cannot follow that: run it with"
                     ' engine = "contact"'
                 )
-            elif (why := stuck(course, exact.passed)) and stalled is None:
+            if (why := stuck(course, exact.passed)) and stalled is None:
                 stalled = exact.lone, exact.t, (exact.x, exact.y), why
             if progress is not None:
                 progress(exact.lone / exact.lone_count)

@@ -29,7 +29,6 @@ from chutelab.engines.pymunk.world import (
     Tracks,
     World,
     bisected,
-    exit_box,
 )
 from chutelab.machine import Machine
 from chutelab.results.record import REASONS, Kind
@@ -288,7 +287,7 @@ class Lone:
         self.on, self.slipping = -1, None
         path = Flight(self.x, self.v, self.pull)
         span, reason = self.machine.end_time - self.t, "time"
-        if (out := path.leaves(exit_box(self.machine, self.particle))) < span:
+        if (out := path.leaves(self.machine.releases.exit_box[self.particle])) < span:
             span, reason = out, "exit"
         if self.changes - self.t < span:
             span, reason = self.changes - self.t, ""

@@ -28,7 +28,7 @@ import pymunk
 from pymunk import Vec2d, batch
 
 from chutelab.engines.pymunk.shapes import Shapes
-from chutelab.engines.pymunk.world import Bend, Carriage, Flight, Tracks, World, exit_box
+from chutelab.engines.pymunk.world import Bend, Carriage, Flight, Tracks, World
 from chutelab.machine import Machine
 from chutelab.results.record import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder
@@ -515,13 +515,13 @@ class Shared:
 
     def _endings(self, t: float, entries: Floats) -> None:
         """End particles that left, landed or settled."""
-        until, (left, right, bottom, top) = self.machine.until, self.machine.exit_box
+        until, (left, bottom, right, top) = self.machine.until, self.machine.releases.exit_box.T
         x, y = self.state[1, :2, : self.count]
         out = (y < bottom) | (y > top) | (x < left) | (x > right)
         for i in np.flatnonzero(out & self.free).tolist():
             begin = Vec2d(*self.state[0, :2, i].tolist())
             v = Vec2d(*self.state[0, 2:4, i].tolist())
-            late = Flight(begin, v, self.pull).leaves(exit_box(self.machine, i))
+            late = Flight(begin, v, self.pull).leaves(self.machine.releases.exit_box[i])
             if late < self.h and (entries[:, i] == self.entries[:, i]).all():
                 # It flew, and left within the step.
                 after = v + late * self.pull

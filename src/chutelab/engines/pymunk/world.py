@@ -236,9 +236,9 @@ class Flight(NamedTuple):
         """The largest acceleration (m/s²) in any direction."""
         return self.g.length
 
-    def leaves(self, box: tuple[float, float, float, float]) -> float:
-        """Return the time (s) after which it leaves the exit box, inf if never."""
-        left, right, bottom, top = box
+    def leaves(self, box: Floats) -> float:
+        """Return the time (s) after which it leaves the exit box, see `Releases`, inf if never."""
+        left, bottom, right, top = box.tolist()
         (x, y), (vx, vy), g = self.x, self.v, self.g.y
         return min(
             falls(x - left, vx, 0.0), falls(right - x, -vx, 0.0),
@@ -250,11 +250,6 @@ def own(values: ArrayLike, particle: int) -> float:
     """Return a particle's own of a property that all share or each has."""
     values = np.asarray(values)
     return float(values[particle] if values.ndim else values)
-
-
-def exit_box(machine: Machine, particle: int) -> tuple[float, float, float, float]:
-    """Return a particle's own of `Machine.exit_box`, m."""
-    return tuple(own(side, particle) for side in machine.exit_box)  # type: ignore[return-value]
 
 
 def falls(gap: float, rate: float, pull: float) -> float:

@@ -20,16 +20,18 @@ from PIL import ImageDraw, ImageFont
 
 from chutelab.machine import Arcs, Machine, Pieces
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.bodies import (
+from chutelab.pictures.plots.machinery import (
     LEAST,
     WHITE,
     Bodies,
+    draw_piece,
     motion,
+    pieces,
+    points_of,
     stream_colours,
     stream_handles,
     strings,
 )
-from chutelab.pictures.plots.machinery import draw_piece, pieces, points_of
 from chutelab.pictures.plots.scenery import (
     FINE,
     nominal,
@@ -40,7 +42,7 @@ from chutelab.pictures.plots.scenery import (
     track_times,
 )
 from chutelab.results import Recording
-from chutelab.util.arrays import Floats, Ints
+from chutelab.util.arrays import Bools, Floats, Ints
 
 Moving = tuple[Artist, Callable[[int], object]]
 """What moves, and the function that sets it to the moment of an index."""
@@ -65,6 +67,11 @@ def line(ax: Axes, gid: str, points: Callable[[int], Floats], **look: Any) -> Mo
     """Return a line, or dots, through points (P, 2), m, that depend on the index."""
     (drawn,) = ax.plot([], [], gid=gid, animated=True, **look)
     return drawn, lambda index: drawn.set_data(*points(index).T)
+
+
+def seen(artist: Artist, there: Bools) -> Moving:
+    """Return what is seen at the moments of `there`, (T,)."""
+    return artist, lambda index: artist.set_visible(bool(there[index]))
 
 
 def bodies(
@@ -214,8 +221,7 @@ def gates(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
 
     def shown(piece: Pieces) -> Moving:
         drawn = draw_piece(ax, machine, piece, animated=True)
-        there = piece.there(times)
-        return drawn, lambda index: drawn.set_visible(bool(there[index]))
+        return seen(drawn, piece.there(times))
 
     return [shown(piece) for piece in pieces(machine) if piece.gate]
 

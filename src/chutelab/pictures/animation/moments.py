@@ -34,8 +34,8 @@ def contact_normal(machine: Machine, event: Any) -> Floats:
     It comes from where the particle is: a fixed step's velocities have gravity in them, too.
     """
     position = event["position"]
-    mine = [piece for piece in machine.pieces if piece.surface == event["surface"]]
-    nearest = min(mine, key=lambda piece: float(piece.gap(position)))
+    own = [piece for piece in machine.pieces if piece.surface == event["surface"]]
+    nearest = min(own, key=lambda piece: float(piece.gap(position)))
     radius = np.broadcast_to(machine.particle.radius, machine.count)[event["particle"]]
     away, normal = nearest.away(position), nearest.normal(position)
     gap = float(np.hypot(*away))
@@ -125,7 +125,7 @@ RUNNING = 4.2
 """s; the longest the motion of a film takes on the screen by default, holds not counted."""
 
 LIVES = 3.0
-"""A stream is filmed for at most this many times what particle 0 takes."""
+"""Longest film of a stream, in multiples of the time that particle 0 takes."""
 
 HOLDS, WORTH = 4, 0.05
 """The film stops at the hardest impacts only: at most so many, or it would be a slide show, and at
@@ -138,7 +138,8 @@ ASKED, ASK = 300, "Predict: what comes next?"
 """Hundredths of a second that a film waits for a prediction, and what it says meanwhile."""
 
 EDGE = 0.012
-"""Share of the window's larger side that particle 0 is inside it as the film begins: all of it."""
+"""Least distance of particle 0 from the window's edges as the film begins, in shares of its larger
+side."""
 
 TOLD = 1.2
 """s on the screen, holds not counted, for which the caption tells what happened."""
@@ -203,13 +204,13 @@ def film(
         raise ValueError(f"slow = {slow!r}: allowed is a positive number")
     step = 0.01 * delay / slow
     events = recording.events
-    mine = events[(events["particle"] == 0) | (events["other"] == 0)]
-    mine = mine[(mine["t"] >= begin) & (mine["t"] <= end)]
+    own = events[(events["particle"] == 0) | (events["other"] == 0)]
+    own = own[(own["t"] >= begin) & (own["t"] <= end)]
     crowd = crowd or one_of_many(recording)
     if crowd:
-        mine = mine[:0]
-    held = _held(mine)
-    stops = mine["t"][held]
+        own = own[:0]
+    held = _held(own)
+    stops = own["t"][held]
     fixed = stops if ask is None else np.append(stops, ask)
     times = np.linspace(begin, end, max(2, round((end - begin) / step) + 1))
     if len(fixed):
@@ -223,7 +224,7 @@ def film(
         gates = _gates(recording.machine, times, slow)
         words = [told or said for told, said in zip(gates, _counts(recording, times), strict=True)]
     else:
-        words = _words(recording, mine, held, times, slow)
+        words = _words(recording, own, held, times, slow)
     if ask is not None:
         at = int(np.searchsorted(times, ask))
         delays[at], words[at] = ASKED, ASK
@@ -266,12 +267,12 @@ def slowness(length: float) -> float:
     return float(f"{max(m for m in (1, 1.5, 2, 3, 4, 5, 6, 8) if m <= mantissa)}e{power}")
 
 
-def _held(mine: NDArray[Any]) -> Ints:
+def _held(own: NDArray[Any]) -> Ints:
     """Return the indices of the hardest impacts worth a hold, in order, one for each time."""
-    impulse = np.abs(mine["normal_impulse"])
-    struck = np.flatnonzero(np.isin(mine["kind"], STRUCK))
+    impulse = np.abs(own["normal_impulse"])
+    struck = np.flatnonzero(np.isin(own["kind"], STRUCK))
     struck = struck[impulse[struck] >= WORTH * impulse[struck].max(initial=0.0)]
-    struck = struck[np.unique(mine["t"][struck], return_index=True)[1]]
+    struck = struck[np.unique(own["t"][struck], return_index=True)[1]]
     hardest = np.argsort(-impulse[struck], kind="stable")[:HOLDS]
     return np.asarray(struck[np.sort(hardest)])
 
@@ -312,7 +313,7 @@ def _counts(recording: Recording, times: Floats) -> list[str]:
 
 def _words(
     recording: Recording,
-    mine: NDArray[Any],
+    own: NDArray[Any],
     held: Ints,
     times: Floats,
     slow: float,
@@ -321,17 +322,17 @@ def _words(
 
     What is told: the impacts that the film holds at, and events that are no impacts.
     """
-    struck = np.isin(mine["kind"], STRUCK)
-    told = ~struck & (mine["kind"] != Kind.RELEASE)
-    if list(mine["kind"][:2]) == [Kind.RELEASE, Kind.STICK]:
+    struck = np.isin(own["kind"], STRUCK)
+    told = ~struck & (own["kind"] != Kind.RELEASE)
+    if list(own["kind"][:2]) == [Kind.RELEASE, Kind.STICK]:
         # Released at the belt's speed, it never slipped.
-        released, rode = mine["velocity_after"][:2]
+        released, rode = own["velocity_after"][:2]
         told[1] = not np.allclose(rode, released, rtol=1e-3, atol=1e-6)
     told[held] = True
     stories = np.flatnonzero(told)
-    lines = [f"t = {mine['t'][i]:.3f} s: {sentence(recording, mine[i])}" for i in stories]
+    lines = [f"t = {own['t'][i]:.3f} s: {sentence(recording, own[i])}" for i in stories]
     # Particle 0 comes on the incoming belt if that is the first thing it leaves.
-    first = mine[struck | (mine["kind"] == Kind.SEPARATION)][:1]
+    first = own[struck | (own["kind"] == Kind.SEPARATION)][:1]
     incoming = recording.surface_index("incoming")
     carried = any((first["kind"] == Kind.SEPARATION) & (first["surface"] == incoming))
     gone = float(recording.track(0)["t"][-1])
@@ -340,9 +341,9 @@ def _words(
     still = ~np.any(nominal(recording, times)[1], axis=1)
     captions = []
     for t, flies, lies in zip(times, flying.tolist(), still.tolist(), strict=True):
-        story = int(np.searchsorted(mine["t"][stories], t, side="right")) - 1
+        story = int(np.searchsorted(own["t"][stories], t, side="right")) - 1
         if story >= 0:
-            last = mine[stories[story]]
+            last = own[stories[story]]
             # An impact is no news any more once the particle slides.
             news = slow * (t - last["t"]) <= TOLD and (flies or last["kind"] not in STRUCK)
             if news or last["kind"] in LASTING:
@@ -351,12 +352,12 @@ def _words(
         elif carried:
             captions.append("rides the incoming belt")
             continue
-        latest = int(np.searchsorted(mine["t"], t, side="right")) - 1
+        latest = int(np.searchsorted(own["t"], t, side="right")) - 1
         known = latest >= 0 and t <= gone
-        said = going_on(recording, mine[latest], flying=flies, still=lies) if known else ""
+        said = going_on(recording, own[latest], flying=flies, still=lies) if known else ""
         captions.append(said)
     for i in held:
         # What else happens in the same instant has to wait for the next picture.
-        at = int(np.searchsorted(times, mine["t"][i]))
+        at = int(np.searchsorted(times, own["t"][i]))
         captions[at] = lines[int(np.searchsorted(stories, i))]
     return captions

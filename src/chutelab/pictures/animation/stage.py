@@ -1,8 +1,17 @@
-"""The picture of the film: where everything is, a background drawn once, and what moves on it."""
+"""The film: a background drawn once, what moves on it, and all of it as a file.
+
+`animate` writes a GIF, or a video for those who project from other programs. Pillow writes the GIF:
+one fixed palette for all frames, so that no colour can flicker, and of each frame only the pixels
+that changed. Videos, mp4 or webm, go through imageio and its ffmpeg.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from itertools import combinations
+from pathlib import Path
 from textwrap import shorten
 from typing import Any, cast
 
@@ -13,8 +22,8 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from PIL import Image, ImageDraw
 
+from chutelab.pictures import PURPLE
 from chutelab.pictures.animation.actors import (
-    Moving,
     Writing,
     arrows,
     bars,
@@ -22,11 +31,12 @@ from chutelab.pictures.animation.actors import (
     crowd,
     drives,
     gates,
+    seen,
     strobe,
     strung,
     trail,
 )
-from chutelab.pictures.animation.moments import Moment, span
+from chutelab.pictures.animation.moments import Moment, asked, film, slowness, span
 from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_scene, style, window_of
 from chutelab.pictures.plots.scenery import (
     FINE,
@@ -41,31 +51,14 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
-from chutelab.util.arrays import Bools
+from chutelab.util.errors import MissingLibraryError
+from chutelab.util.files import whole
 
 SHOWS = ("parabola", "trails", "strobe", "velocity", "energy")
 """What a picture can show besides the machine and the particles."""
 
-NOMINAL = frozenset(("strobe", "velocity"))
-"""What of it is of particle 0."""
-
-INCHES = (8.0, 4.5)
-"""Width and height of the picture at least: text keeps its share of it at any pixel size."""
-
-LEAST = (320, 180)
-"""Pixels below which text cannot be read."""
-
-LONGEST = 0.10
-"""Share of the picture's width that the arrow of the highest speed is long."""
-
 TRAIL = 0.07
 """Share of the window's width that the trail of the fastest particle is long."""
-
-NAME = 0.21
-"""Share of the window's width for the incoming belt's name, which stands left of the pulley."""
-
-LETTER_ROOM = 0.015
-"""Share of the window's width between its edges and what moves."""
 
 
 @dataclass(frozen=True)
@@ -107,13 +100,16 @@ class Layout:
 
     @property
     def arrow(self) -> float:
-        """Length of the arrow of the velocity for 1 m/s, m; 0: there is none."""
-        return self.reach(LONGEST, "velocity")
+        """Length of the arrow of the velocity for 1 m/s, m; 0: there is none.
+
+        That of the highest speed is a tenth of the picture's width.
+        """
+        return self.reach(0.1, "velocity")
 
     @property
     def dpi(self) -> float:
-        """Pixels to the inch."""
-        return min(self.width / INCHES[0], self.height / INCHES[1])
+        """Pixels to the inch: text keeps its share of 8 by 4.5 inches, or more."""
+        return min(self.width / 8.0, self.height / 4.5)
 
 
 def lay_out(
@@ -134,13 +130,13 @@ def lay_out(
     ValueError
         If the picture is too small, or `shows` has an unknown name.
     """
-    if width < LEAST[0] or height < LEAST[1]:
-        raise ValueError(f"{width} x {height} pixels: allowed are at least {LEAST[0]} x {LEAST[1]}")
+    if width < 320 or height < 180:  # text could not be read
+        raise ValueError(f"{width} x {height} pixels: allowed are at least 320 x 180")
     wanted, shows = shows, frozenset(SHOWS) if shows is None else shows
     if unknown := sorted(shows - set(SHOWS)):
         raise ValueError(f"show = {unknown[0]!r}: allowed are {', '.join(SHOWS)}")
     if one_of_many(recording) or (wanted is None and as_crowd(recording)):
-        shows -= NOMINAL
+        shows -= {"strobe", "velocity"}  # of particle 0
     view = (0.015, 0.135, 0.675 if "energy" in shows else 0.97, 0.65 if question else 0.71)
     aspect = view[2] * width / (view[3] * height)
     pulley = recording.machine.pulley
@@ -157,10 +153,11 @@ def lay_out(
     tight = Layout(width, height, said, question, shows, view, window, fastest)
     corners = [(window.left, window.bottom), (window.right, window.top)]
     if pulley is not None:
-        corners.append((-pulley.radius - NAME * window.width, 0.0))
+        # The incoming belt's name stands left of it.
+        corners.append((-pulley.radius - 0.21 * window.width, 0.0))
     if recording.scene.view is not None:
         return tight
-    room = LETTER_ROOM * window.width
+    room = 0.015 * window.width
     tips = position + tight.arrow * velocity
     grown = around(np.concatenate([corners, tips - room, tips + room]))
     return replace(tight, window=grown.fitted(aspect))
@@ -210,7 +207,9 @@ class Stage:
             spine.set_color(style.STEEL_LIGHT)
         _draw_scale(view)
         parts = analytic_of(recording)[0] if "parabola" in shows else ()
+        drawn = len(view.lines)
         draw_analytic(view, parts)
+        parabola = view.lines[drawn:]
         position, velocity = nominal(recording, times)
         reach = layout.reach(TRAIL, "trails")
         others, named = crowd(view, recording, times, reach)
@@ -220,9 +219,10 @@ class Stage:
             *strung(view, recording, times),
             *others,
         ]
-        if ask is not None:
+        for dashed in [] if ask is None else parabola:
             # Below all that moves.
-            self.moving = [*_after(view, "analytic", times > ask), *self.moving]
+            dashed.set_animated(True)
+            self.moving.insert(0, seen(dashed, times > ask))
         # What the legend names, in its order.
         dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0}
         handles = [Line2D([], [], **dot, color=style.STRIKE, label="particle 0"), *named]
@@ -297,26 +297,10 @@ class Stage:
         ]
 
 
-def _after(ax: Axes, gid: str, there: Bools) -> list[Moving]:
-    """Take the lines of a name off the background: each is seen at the moments of `there`, (T,)."""
-    found = [line for line in ax.lines if line.get_gid() == gid]
-    for line in found:
-        line.set_animated(True)
-
-    def moving(line: Line2D) -> Moving:
-        return line, lambda index: line.set_visible(bool(there[index]))
-
-    return list(map(moving, found))
-
-
-ALWAYS = 5
-"""Entries of a legend that are there in any case."""
-
-
 def _add_legend(ax: Axes, handles: list[Line2D], *, components: bool) -> None:
     """Name what is drawn above the scene, and last the components of the velocity.
 
-    What does not fit beside the rest is left out, the last first.
+    What does not fit beside the first five is left out, the last first.
     """
     while True:
         legend = ax.legend(
@@ -332,7 +316,7 @@ def _add_legend(ax: Axes, handles: list[Line2D], *, components: bool) -> None:
             columnspacing=0.8,
             handletextpad=0.3,
         )
-        if len(handles) <= ALWAYS or legend.get_window_extent().x1 <= ax.get_window_extent().x1:
+        if len(handles) <= 5 or legend.get_window_extent().x1 <= ax.get_window_extent().x1:
             break
         handles, components = handles[:-1], False
     for place, (name, colour) in enumerate(style.VELOCITY.items() if components else ()):
@@ -380,15 +364,228 @@ def _draw_scale(ax: Axes) -> None:
     said = ax.text(0.0, 0.0, f"{length:g} m", ha="center", va="bottom")
     said.set(fontsize=style.SMALL, color=style.MUTED)
     edge = 0.015 * (right - left)
-    corners: list[tuple[int, int, float, float]] = []
-    for y in (top - 0.08 * (top - bottom), bottom + 0.03 * (top - bottom)):
-        for x in (left + edge, right - edge - length):
-            said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
-            ends = ax.transData.transform([(x, y), (x + length, y)])
-            box = Bbox.union([said.get_window_extent(), Bbox(ends)])
-            crossed = sum(line.intersects_bbox(box, filled=False) for line in lines)
-            hides = int(100 * box.count_overlaps(taken) + crossed)
-            corners.append((hides, len(corners), x, y))
-    _, _, x, y = min(corners)
-    bar.set_data([x, x + length], [y, y])
-    said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
+
+    def hides(place: tuple[float, float]) -> int:
+        """Put it there, and return what it would hide: a name counts more than lines."""
+        x, y = place
+        bar.set_data([x, x + length], [y, y])
+        said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
+        ends = ax.transData.transform([(x, y), (x + length, y)])
+        box = Bbox.union([said.get_window_extent(), Bbox(ends)])
+        crossed = sum(line.intersects_bbox(box, filled=False) for line in lines)
+        return int(100 * box.count_overlaps(taken) + crossed)
+
+    rows = top - 0.08 * (top - bottom), bottom + 0.03 * (top - bottom)
+    hides(min(((x, y) for y in rows for x in (left + edge, right - edge - length)), key=hides))
+
+
+def palette() -> tuple[str, ...]:
+    """Return the colours of every GIF: few, since few make a small file.
+
+    White, the greys and the colours with a meaning, unmixed, and the mixtures at which anti-aliased
+    edges between them are read as smooth. Every other colour is shown as the nearest of these.
+    """
+    hues = [style.TRACK, style.ANALYTIC, style.BELT, style.STRIKE, style.STREAM, PURPLE]
+    edges = [style.tint(hue, share) for share in (0.5, 0.75, 0.25) for hue in hues]
+    meeting = [style.tint(one, 0.5, other) for one, other in combinations(hues, 2)]
+    dark = [style.tint(hue, 0.6, "#000000") for hue in hues]
+    greys = [
+        "#FFFFFF",
+        "#000000",
+        style.MUTED,
+        style.STEEL,
+        style.STEEL_LIGHT,
+        style.ENERGY["start"],
+    ]
+    # Where a grey edge would otherwise be shown in a dull colour.
+    greys += ["#303030", "#686868", "#787878", "#D4D4D4"]
+    return tuple(dict.fromkeys([*greys, *hues, *edges, *meeting, *dark]))
+
+
+def write_gif(
+    path: Path, pictures: Iterable[Image.Image], delays: Iterable[int], comment: str = ""
+) -> None:
+    """Write RGB pictures of one size as a GIF that loops for ever.
+
+    Each stays for its delay in hundredths of a second; equal ones in a row become one frame. Pillow
+    keeps a byte for each of their pixels until all are drawn. The comment is kept, not shown.
+    """
+    table = b"".join(bytes.fromhex(colour[1:]) for colour in palette())
+    reference = Image.new("P", (1, 1))
+    reference.putpalette(table)
+    few = (one.quantize(palette=reference, dither=Image.Dither.NONE) for one in pictures)
+    next(few).save(
+        path,
+        format="GIF",
+        save_all=True,
+        append_images=few,
+        duration=[10 * delay for delay in delays],
+        loop=0,
+        # The table ends with a colour that no pixel has: there the last frame stays to be seen.
+        palette=table + bytes(3),
+        transparency=len(table) // 3,
+        disposal=1,
+        optimize=True,
+        comment=comment,
+    )
+
+
+VIDEOS = {
+    "mp4": ("libx264", "-crf 20 -preset medium -movflags +faststart"),
+    "webm": ("libvpx-vp9", "-crf 28 -b:v 0 -deadline realtime -cpu-used 7 -row-mt 1"),
+}
+"""Codec of each kind of video and its options, by the suffix of the file.
+
+Lines and letters stay sharp; the file begins to play before it is all there.
+"""
+
+
+class VideoError(MissingLibraryError):
+    """A video cannot be written, and what to do about it."""
+
+
+def need_video(kind: str) -> None:
+    """Raise a `VideoError` if the extra that writes this kind of film is not installed."""
+    if find_spec("imageio_ffmpeg") is None:
+        raise VideoError(
+            f'a film as {kind} needs what is not installed: pip install "chutelab[video]"'
+        )
+
+
+def write_video(
+    path: Path, kind: str, fps: int, pictures: Iterable[Image.Image], delays: Iterable[int]
+) -> None:
+    """Write pictures, each for a delay in hundredths of a second, as a video of one of `VIDEOS`.
+
+    Raises
+    ------
+    VideoError
+        If the extra is not installed.
+    """
+    need_video(kind)
+    from imageio.v2 import get_writer
+
+    codec, parameters = VIDEOS[kind]
+    # The same pictures make the same bytes: the encoders' work depends on how many threads share
+    # it, and ffmpeg gives a webm a random number unless told.
+    parameters += " -threads 4 -flags:v +bitexact -fflags +bitexact"
+    options: dict[str, Any] = {
+        "fps": fps, "codec": codec, "quality": None, "pixelformat": "yuv420p",
+        "macro_block_size": 2, "output_params": parameters.split(), "ffmpeg_log_level": "error",
+    }  # fmt: skip
+    with cast(Any, get_writer(path, format="FFMPEG", mode="I", **options)) as video:
+        for picture, delay in zip(pictures, delays, strict=True):
+            for _ in range(max(1, round(delay / (100 // fps)))):
+                video.append_data(np.asarray(picture))
+
+
+FORMATS = ("gif", *VIDEOS)
+"""Files that `animate` writes, by their suffix."""
+
+
+def animate(
+    recording: Recording,
+    path: str | Path,
+    *,
+    fps: int | None = None,
+    width: int = 800,
+    height: int = 450,
+    slow: float | None = None,
+    title: str | None = None,
+    question: str = "",
+    show: Collection[str] | None = None,
+    predict: bool = False,
+    comment: str = "",
+) -> Path:
+    """Write the lesson picture of a recording, a GIF that loops for ever, or a video.
+
+    Parameters
+    ----------
+    recording : Recording
+        From either engine, with at least one knot of particle 0.
+    path : path
+        Where to; written whole or not at all. Its suffix says what: .gif, .mp4 or .webm, the last
+        two with the extra ``chutelab[video]``.
+    fps : int, optional
+        Pictures a second: 25 or 50, or another divisor of 100 below. By default 25; of a stream 20,
+        since much of each picture changes.
+    width, height : int
+        Pixels; even numbers for a video.
+    slow : float, optional
+        Seconds on the screen for one second of the recording; by default a round number that
+        makes the motion take three to five seconds, holds not counted.
+    title : str, optional
+        By default the recording's.
+    question : str, optional
+        A line under the title.
+    show : collection of str, optional
+        Which of `SHOWS` to show: "parabola" (the analytic one, dashed), "trails", "strobe" (dots
+        at round times), "velocity" (of particle 0, an arrow with its components) and "energy"
+        (the ledger as bars; without it the scene is wider). By default all, but of a crowd
+        neither strobe dots nor velocity, and no impact of particle 0 is told.
+    predict : bool, optional
+        Let viewers predict: the film begins without the analytic parabola, and waits as
+        the particle comes to the top of the drive pulley, or as it begins.
+    comment : str, optional
+        A text that a GIF keeps, not shown.
+
+    Returns
+    -------
+    Path
+        Of the file.
+
+    Raises
+    ------
+    ValueError
+        If the suffix, `fps`, `slow`, `show` or the size is not possible.
+    VideoError
+        If a video is asked for and the extra is not installed.
+    OSError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    kind = path.suffix.removeprefix(".").lower()
+    if kind not in FORMATS:
+        allowed = ", ".join(f".{name}" for name in FORMATS)
+        raise ValueError(f"{path.name}: allowed are files that end in {allowed}")
+    if kind in VIDEOS and (width % 2 or height % 2):
+        raise ValueError(f"{width} x {height} pixels: allowed in a video are even numbers")
+    fps = (25 if recording.count == 1 else 20) if fps is None else fps
+    shows = None if show is None else frozenset([show] if isinstance(show, str) else show)
+    layout = lay_out(
+        recording, width=width, height=height, title=title, question=question, shows=shows
+    )
+    begin, end = span(recording, layout.window)
+    pace = slowness(end - begin) if slow is None else slow
+    ask = asked(recording, begin) if predict else None
+    crowd = as_crowd(recording) and "velocity" not in layout.shows
+    moments = film(recording, begin, end, fps=fps, slow=pace, ask=ask, crowd=crowd)
+    stage = Stage(recording, layout, moments, slow=pace, ask=ask)
+    pictures = map(stage.frame, range(len(moments)))
+    delays = [moment.delay for moment in moments]
+    with whole(path) as unfinished:
+        if kind == "gif":
+            write_gif(unfinished, pictures, delays, comment)
+        else:
+            write_video(unfinished, kind, fps, pictures, delays)
+    return path
+
+
+def still(recording: Recording, path: str | Path, *, width: int = 800, height: int = 450) -> Path:
+    """Write the machine as the film begins, without a path, as a PNG: the scene of the film alone.
+
+    Parameters, result and errors are as of `animate`; width and height are the film's, of which the
+    picture has twice as many pixels: it is for print.
+    """
+    shows = frozenset(("velocity", "energy"))
+    wide, high = 2 * width, 2 * height
+    layout = lay_out(recording, width=wide, height=high, question="?", shows=shows)
+    begin = span(recording, layout.window)[0]
+    stage = Stage(recording, layout, (Moment(begin, 0, ""),), slow=1.0, ask=begin)
+    left, bottom, across, up = layout.view
+    top = 1.0 - bottom - up
+    corners = (left * wide, top * high, (left + across) * wide, (top + up) * high)
+    with whole(Path(path)) as unfinished:
+        picture = stage.frame(0).crop(corners).quantize(64, dither=Image.Dither.NONE)
+        picture.save(unfinished, format="PNG", optimize=True)
+    return Path(path)

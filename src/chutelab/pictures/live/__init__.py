@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from chutelab.scene import AnyScene, Overrides, load
+from chutelab.scene import AnyScene, Overrides, load, to_toml
 from chutelab.util.errors import MissingLibraryError
 
 if TYPE_CHECKING:
@@ -64,13 +64,17 @@ def live(
     >>> chutelab.live("perpendicular", ["plate.angle_deg=20"])  # doctest: +SKIP
     """
     try:
-        from chutelab.pictures.live.widget import shown
+        from chutelab.pictures.live.widget import LivePage
     except ModuleNotFoundError as error:
         if error.name not in ("anywidget", "traitlets"):
             raise
         text = 'live pages in a notebook need anywidget: python -m pip install "chutelab[notebook]"'
         raise MissingLibraryError(text) from error
-    return shown(load(scene, overrides), height=height, language=language)
+    from chutelab.pictures.live.page import html
+
+    scene = load(scene, overrides)
+    page = html(scene, language=language)
+    return LivePage(html=page, height=height, title=scene.title, scene=to_toml(scene))
 
 
 __all__ = ["live"]

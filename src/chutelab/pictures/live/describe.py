@@ -11,9 +11,6 @@ from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
 
-SAFE: Final = 2**53
-"""JavaScript's numbers have all digits of whole numbers up to here."""
-
 MOST: Final = 100_000
 """Particles that a page has room for: it keeps their tracks, and draws them in each frame."""
 
@@ -63,7 +60,8 @@ def describe(scene: Scene) -> dict[str, Any]:
     for key in EITHER:
         rows = tables.get(key, ())
         for row in (rows,) if isinstance(rows, dict) else rows:
-            if row.get("seed", 0) > SAFE:
+            # JavaScript's numbers have all digits of whole numbers up to here.
+            if row.get("seed", 0) > 2**53:
                 row["seed"] = str(row["seed"])
     materials = {
         name: {key: getattr(preset.material, key) for key in VALUES}

@@ -24,6 +24,8 @@ from chutelab.util.versions import own_version
 
 LANGUAGES = ("en", "de")
 
+COLOURS = ("track", "analytic", "belt", "strike", "stream")
+
 
 def html(
     scene: Scene,
@@ -50,7 +52,14 @@ def html(
     SceneError
         If there is something in the scene that the contact engine has not, by its key.
     """
-    css = f":root {{\n{_palette()}}}\n{_file('assets/page.css')}"
+    # The colours of every picture; page.css has those for the dark.
+    colours = {
+        **{name: getattr(style, name.upper()) for name in COLOURS},
+        **{f"velocity-{name}": colour for name, colour in style.VELOCITY.items()},
+        **{f"energy-{name}": colour for name, colour in style.ENERGY.items()},
+    }
+    palette = "".join(f"  --{k.replace('_', '-')}: {v};\n" for k, v in colours.items())
+    css = f":root {{\n{palette}}}\n{_file('assets/page.css')}"
     core = files("chutelab.core")
     facts = describe(scene)
     live = live_of(scene, facts["scene"])
@@ -117,17 +126,3 @@ def _file(name: str) -> str:
 def _hash(text: str) -> str:
     """Return what a Content-Security-Policy calls an inline text it allows."""
     return f"sha256-{b64encode(sha256(text.encode('utf-8')).digest()).decode('ascii')}"
-
-
-def _palette() -> str:
-    """Return the colours of every picture as CSS variables; page.css has those for the dark."""
-    colours = {
-        "track": style.TRACK,
-        "analytic": style.ANALYTIC,
-        "belt": style.BELT,
-        "strike": style.STRIKE,
-        "stream": style.STREAM,
-        **{f"velocity-{name}": colour for name, colour in style.VELOCITY.items()},
-        **{f"energy-{name}": colour for name, colour in style.ENERGY.items()},
-    }
-    return "".join(f"  --{name.replace('_', '-')}: {value};\n" for name, value in colours.items())

@@ -5,9 +5,6 @@ from __future__ import annotations
 import anywidget
 import traitlets
 
-from chutelab.pictures.live.page import html
-from chutelab.scene import Scene, to_toml
-
 SHOWN = """
 export default {
   render({ model, el }) {
@@ -62,13 +59,3 @@ class LivePage(anywidget.AnyWidget):
     height = traitlets.Int(min=1).tag(sync=True)
     title = traitlets.Unicode().tag(sync=True)
     scene = traitlets.Unicode().tag(sync=True)
-
-
-def shown(scene: Scene, *, height: int, language: str) -> LivePage:
-    """Return the live page of a scene as a widget."""
-    return LivePage(
-        html=html(scene, language=language),
-        height=height,
-        title=scene.title,
-        scene=to_toml(scene),
-    )

@@ -3,43 +3,34 @@
 ===============  ==================================================================================
 `style`          colours, text sizes, units; a figure that shows itself
 `scenery`        what of a recording is worth drawing: particles, times, part of the world
-`machinery`      the machine to scale, with names
-`bodies`         particles to scale, turned as they are, strings
-`panels`         tracks, parabola, residual, velocity, energy ledger
-`crowd`          envelope, arrivals, flow, belt power, losses by surface
-`figure`         the overlay; the paper's figures
-`strobe`         a still for print: where the particle is at round times
-`split`          the velocity at an impact, along the surface and into it
-`design`         searches, uncertainty, sweeps
-`measured`       measured points over the model
-`workprecision`  run time against error
+`machinery`      machine and particles to scale, with names
+`panels`         tracks, parabola, velocity, ledger; envelope, arrivals, flow, power, losses
+`figure`         the overlay, a still for print, the velocity at an impact, the paper's figures
+`studies`        searches, uncertainty, sweeps, measured points, run time against error
 ===============  ==================================================================================
 
 Figures are drawn by Agg through `Figure` objects: no pyplot, no global state.
 """
 
-from chutelab.pictures.plots.crowd import (
-    draw_arrivals,
-    draw_envelope,
-    draw_flow,
-    draw_losses,
-    draw_power,
-)
-from chutelab.pictures.plots.figure import overlay
+from chutelab.pictures.plots.figure import overlay, strobe
 from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.panels import (
     Arc,
     analytic_of,
     arcs,
     draw_analytic,
+    draw_arrivals,
+    draw_envelope,
+    draw_flow,
     draw_ledger,
+    draw_losses,
+    draw_power,
     draw_residual,
     draw_tracks,
     draw_velocity,
     flight,
 )
 from chutelab.pictures.plots.scenery import Window, window_of
-from chutelab.pictures.plots.strobe import strobe
 
 __all__ = [
     "Arc",

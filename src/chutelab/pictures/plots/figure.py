@@ -1,33 +1,35 @@
-"""Whole figures: `overlay`, a recording on its analytic parabola, and the paper's figures.
+"""Whole figures: `overlay`, `strobe`, the velocity at an impact, and the paper's figures.
 
-The paper's figures are computed anew: as printed on the left, corrected on the right.
+`overlay` draws a recording on its analytic parabola, `strobe` a still for print: the scene with
+particle 0 at round times, like a stroboscopic photograph. The paper's figures are computed anew, as
+printed on the left, corrected on the right.
 """
 
 from __future__ import annotations
 
+from math import floor, log10
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
+from matplotlib.transforms import Bbox
 
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.bodies import draw_bodies, stream_handles
-from chutelab.pictures.plots.crowd import (
-    draw_arrivals,
-    draw_envelope,
-    draw_flow,
-    draw_losses,
-    draw_power,
-)
-from chutelab.pictures.plots.machinery import HALO, draw_scene
+from chutelab.pictures.plots.machinery import HALO, draw_bodies, draw_scene, stream_handles
 from chutelab.pictures.plots.panels import (
     Arc,
     analytic_of,
     draw_analytic,
+    draw_arrivals,
+    draw_envelope,
+    draw_flow,
     draw_ledger,
+    draw_losses,
+    draw_power,
     draw_residual,
     draw_tracks,
     draw_velocity,
@@ -36,15 +38,19 @@ from chutelab.pictures.plots.scenery import (
     as_crowd,
     bodily,
     drawn_tracks,
+    nominal,
     one_of_many,
     places,
+    strobe_step,
+    strobe_times,
     window_of,
 )
 from chutelab.pictures.plots.style import Picture
-from chutelab.results import Recording
+from chutelab.results import Kind, Recording
 from chutelab.results.comparison import prediction as predicted
 from chutelab.theory import Transfer
 from chutelab.theory.figures import Panel, PaperFigure
+from chutelab.util.arrays import Floats
 
 SIZE = (13.0, 7.6)
 """Width and height of the figure, inches."""
@@ -191,24 +197,20 @@ def fullest(recording: Recording) -> float:
     return float(times[np.flatnonzero(2 * there >= there.max())[-1]])
 
 
-MOMENTS = 4
-"""Moments at which all particles are shown beneath the scene."""
-
-GRIDS = ((1, 4), (2, 2), (4, 1))
-"""Rows and columns in which they may stand."""
-
-
 def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, crowd: bool) -> None:
-    """Draw the scene small, without names, with all particles, at even times from first to last."""
+    """Draw the scene small, without names, with all particles, at four even times."""
     window, clock = window_of(recording), recording.knots["t"]
     room = place.get_position(figure)
     size = np.array([room.height * SIZE[1], room.width * SIZE[0]])
-    grid = max(GRIDS, key=lambda grid: float((size / grid / (window.height, window.width)).min()))
+    # Rows and columns in which they are largest.
+    grid = max(
+        ((1, 4), (2, 2), (4, 1)),
+        key=lambda grid: float((size / grid / (window.height, window.width)).min()),
+    )
     cells = place.subgridspec(*grid, wspace=0.08, hspace=0.2)
-    times = np.linspace(clock.min(), clock.max(), MOMENTS)
-    for row, column in np.ndindex(*grid):
-        t = times[row * grid[1] + column]
-        ax = figure.add_subplot(cells[row, column])
+    times = np.linspace(clock.min(), clock.max(), 4)
+    for t, cell in zip(times, np.ndindex(*grid), strict=True):
+        ax = figure.add_subplot(cells[cell])
         draw_scene(ax, recording.machine, window, small=True)
         draw_bodies(ax, recording, t, crowd=crowd)
         ax.set(xticks=[], yticks=[])
@@ -224,12 +226,15 @@ def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, c
 WIDE = 185
 """Characters of a line of text below the panels."""
 
-COLOURS = {
-    "first": style.TRACK, "second": style.STRIKE, "third": style.BELT, "fourth": style.ANALYTIC,
-    "plate": style.INK, "belt": style.BELT,
-}  # fmt: skip
-DASHES = {"second": (0, (5, 2)), "third": (0, (2, 1.4)), "fourth": (0, (6, 1.5, 1.2, 1.5))}
-"""So that lines are told apart without colour, too."""
+ROLES: dict[str, tuple[str, Any]] = {
+    "first": (style.TRACK, "-"),
+    "second": (style.STRIKE, (0, (5, 2))),
+    "third": (style.BELT, (0, (2, 1.4))),
+    "fourth": (style.ANALYTIC, (0, (6, 1.5, 1.2, 1.5))),
+    "plate": (style.INK, "-"),
+    "belt": (style.BELT, "-"),
+}
+"""Colour and dashes of lines, which so are told apart without colour, too."""
 
 MARGIN = 0.06
 """Of the range of what is drawn, on each side."""
@@ -281,10 +286,11 @@ def draw_panel(ax: Axes, panel: Panel) -> Axes:
     """Draw one panel."""
     style.dress(ax, panel.x_label, panel.y_label, panel.title)
     for line in panel.lines:
-        color, solid = COLOURS[line.role], line.role in ("plate", "belt")
-        (drawn,) = ax.plot(line.x, line.y, color=color, label=line.label, gid=line.role)
-        drawn.set(linewidth=3.0 if solid else 1.8, zorder=3.0 if solid else 4.0)
-        drawn.set_linestyle(DASHES.get(line.role, "-"))
+        (color, dashes), solid = ROLES[line.role], line.role in ("plate", "belt")
+        ax.plot(
+            line.x, line.y, color=color, ls=dashes, lw=3.0 if solid else 1.8, label=line.label,
+            zorder=3.0 if solid else 4.0, gid=line.role,
+        )  # fmt: skip
         if line.marks is not None:
             ax.plot(*line.marks.T, "o", color=color, ms=4.5, mfc="white", zorder=5.0)
     if panel.to_scale:
@@ -292,3 +298,188 @@ def draw_panel(ax: Axes, panel: Panel) -> Axes:
     else:
         ax.legend(loc="best", fontsize=style.SMALL, framealpha=0.85, edgecolor="none")
     return ax
+
+
+AWAY = 9.0
+"""pt from the middle of a dot to the text beside it."""
+
+SIDES = ((0, 0.8), (1, 0), (-1, 0), (0.7, 0.6), (-0.7, 0.6), (0.7, -0.6), (-0.7, -0.6), (0, -0.8))
+"""Directions from a dot in which its text may stand, the best first."""
+
+
+def strobe(
+    recording: Recording, prediction: Transfer | None = None, *, path: str | Path | None = None
+) -> Figure:
+    """Draw particle 0 at round times, with the times, over its analytic parabola.
+
+    Parameters
+    ----------
+    recording : Recording
+        From either engine.
+    prediction : Transfer, optional
+        By default `chutelab.theory.predict` of the recording's scene.
+    path : path, optional
+        Also write the figure there, whole or not at all; the suffix says the format.
+
+    Returns
+    -------
+    Figure
+        9 by 5.6 inches at 300 dots to the inch.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    figure = Picture((9.0, 5.6), dpi=300)
+    ax = figure.add_axes((0.095, 0.09, 0.885, 0.77))
+    draw_view(ax, recording, analytic_of(recording, prediction)[0])
+    draw_times(ax, recording)
+    figure.headline(0.095, 0.955, recording.title, 70)
+    figure.write(path)
+    return figure
+
+
+def draw_times(ax: Axes, recording: Recording) -> Axes:
+    """Write the time beside each strobe dot, on the first of `SIDES` where it hides nothing.
+
+    Its own dot must be the nearest of all to its middle, or it would be read as another's. Where no
+    side is free there is no time.
+    """
+    times = strobe_times(recording)
+    dots, _ = nominal(recording, times)
+    digits = max(0, -floor(log10(strobe_step(recording)) + 1e-9))
+    # All in pixels from here on: dots, texts and lines that are drawn already.
+    pixels = ax.transData.transform(dots)
+    half, gap = np.array([0.4 * AWAY, 1.5]) * ax.figure.dpi / 72.0
+    taken = [text.get_window_extent() for text in ax.texts]
+    taken += [Bbox([dot - half, dot + half]) for dot in pixels]
+    lines = [line for line in ax.lines if line.get_linestyle() != "None"]
+    paths = [line.get_path().transformed(line.get_transform()) for line in lines]
+    tracks = [path for collection in ax.collections for path in collection.get_paths()]
+    paths += [path.transformed(ax.transData) for path in tracks]
+    filled = [patch.get_path().transformed(patch.get_transform()) for patch in ax.patches]
+    inside = ax.get_window_extent().padded(-half)
+
+    def free(box: Bbox, own: int) -> bool:
+        return bool(
+            inside.contains(box.x0, box.y0)
+            and inside.contains(box.x1, box.y1)
+            and np.hypot(*(pixels - np.mean(box.corners(), axis=0)).T).argmin() == own
+            and not box.count_overlaps(taken)
+            and not any(path.intersects_bbox(box, filled=False) for path in paths)
+            and not any(path.intersects_bbox(box, filled=True) for path in filled)
+        )
+
+    for own, (t, dot) in enumerate(zip(times, dots, strict=True)):
+        said = f"{t + 0.0:.{digits}f}".replace("-", "−")
+        label = ax.annotate(said, dot, xytext=(0.0, 0.0), textcoords="offset points", gid="time")
+        label.set(fontsize=style.SMALL, color=style.TRACK, path_effects=HALO, zorder=8.0)
+        for x, y in SIDES:
+            label.xyann = (AWAY * x, AWAY * y)
+            label.set_horizontalalignment("left" if x > 0.0 else "right" if x < 0.0 else "center")
+            label.set_verticalalignment("bottom" if y > 0.0 else "top" if y < 0.0 else "center")
+            box = label.get_window_extent().padded(gap)
+            if free(box, own):
+                taken.append(box)
+                break
+        else:
+            label.remove()
+    note = ax.text(1.0, 1.01, "beside the dots: time, s", ha="right", va="bottom")
+    note.set(transform=ax.transAxes, fontsize=style.SMALL, color=style.TRACK)
+    return ax
+
+
+ALONG, INTO = style.TRACK, style.STRIKE
+"""Colours of the component along the surface, and of the one into it."""
+
+LETTERS = 14.0
+"""pt; of symbols."""
+
+
+def split_velocity(
+    recording: Recording, path: str | Path | None = None, *, surface: str = "plate"
+) -> Picture:
+    """Draw the velocities before and after the first impact on a surface, and how they split.
+
+    They are to scale, with the theory's symbols and no number: v_2 before and v_2' after, v_t along
+    the surface, v_n into it, φ_2 between surface and v_2, α between surface and the vertical.
+
+    Raises
+    ------
+    ValueError
+        If no particle hits that surface.
+    OSError
+        If the file cannot be written.
+    """
+    impacts = recording.select(Kind.IMPACT, surface=surface)
+    if not len(impacts):
+        raise ValueError(f"no particle hits a surface {surface!r}")
+    before, after = impacts[0]["velocity_before"], impacts[0]["velocity_after"]
+    segments = recording.machine.segments
+    tangent = segments.tangent[segments.surface == impacts[0]["surface"]][0]
+    tangent = tangent if tangent @ before > 0.0 else -tangent
+    normal = np.array([-tangent[1], tangent[0]])
+    normal = normal if normal @ before < 0.0 else -normal
+    speed, here = float(np.hypot(*before)), np.zeros(2)
+    figure = Picture((7.2, 3.9))
+    left, right = (figure.add_axes((place, 0.02, 0.48, 0.96)) for place in (0.01, 0.51))
+    for ax in (left, right):
+        ax.set_aspect("equal")
+        ax.set_axis_off()
+        ends = np.outer([-1.2 * speed, 1.2 * speed], tangent)
+        ax.plot(*ends.T, color=style.INK, lw=4.0, solid_capstyle="butt", gid="surface")
+    into = normal * (normal @ before)
+    _arrow(left, -before, here, style.INK, "$v_2$", -before / speed, 0.0)
+    _arrow(left, -before, -into, ALONG, "$v_t$", normal)
+    _arrow(left, -into, here, INTO, "$v_n$", tangent)
+    _angle(left, here, -tangent, -before, 0.6 * speed, r"$\varphi_2$")
+    back = normal * (normal @ after)
+    _arrow(right, here, after, style.INK, "$v_2'$", after / np.hypot(*after), 1.0)
+    _arrow(right, back, after, ALONG, "$v_t' = v_t$", normal)
+    _arrow(right, here, back, INTO, r"$v_n' = \varepsilon v_n$", (normal - tangent) / 2.0**0.5, 1.0)
+    foot = min(ends.tolist(), key=lambda end: end[1])
+    leaning, up = -np.array(foot), np.array([0.0, 1.0])
+    if abs(leaning[0]) > 1e-9 * speed:
+        line = np.stack([foot, foot + 0.9 * speed * up])
+        right.plot(*line.T, color=style.MUTED, lw=1.0, ls="--")
+        _angle(right, np.array(foot), up, leaning, 0.6 * speed, r"$\alpha$")
+    for ax in (left, right):
+        ax.set(xlim=(-1.25 * speed, 1.25 * speed), ylim=(-1.25 * speed, 1.25 * speed))
+    figure.write(path)
+    return figure
+
+
+def _pair(place: Floats) -> tuple[float, float]:
+    return float(place[0]), float(place[1])
+
+
+def _arrow(
+    ax: Axes, tail: Floats, tip: Floats, color: str, said: str, aside: Floats, at: float = 0.5
+) -> None:
+    """Draw an arrow, and its symbol on the side to which `aside` points, at a share of its way."""
+    look = {"arrowstyle": "-|>", "color": color, "lw": 2.2, "shrinkA": 0.0, "shrinkB": 0.0}
+    ax.annotate("", _pair(tip), _pair(tail), arrowprops={**look, "mutation_scale": 14.0})
+    across, up = (0 if abs(part) < 0.3 else int(np.sign(part)) for part in aside)
+    ax.annotate(
+        said,
+        _pair(tail + at * (tip - tail)),
+        _pair((8.0 if across else 13.0) * aside),
+        textcoords="offset points",
+        color=color,
+        fontsize=LETTERS,
+        ha=("center", "left", "right")[across],
+        va=("center", "bottom", "top")[up if across else 0],
+    )
+
+
+def _angle(ax: Axes, at: Floats, one: Floats, other: Floats, radius: float, said: str) -> None:
+    """Draw the arc of the angle between two directions, with its symbol inside."""
+    first, second = (float(np.arctan2(*direction[::-1])) for direction in (one, other))
+    turn = (second - first + np.pi) % (2.0 * np.pi) - np.pi
+    angles = first + turn * np.linspace(0.0, 1.0, 40)
+    arc = at + radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    ax.plot(*arc.T, color=style.MUTED, lw=1.2)
+    middle = first + 0.5 * turn
+    x, y = at + 0.72 * radius * np.array([np.cos(middle), np.sin(middle)])
+    ax.text(x, y, said, color=style.MUTED, fontsize=LETTERS, ha="center", va="center")

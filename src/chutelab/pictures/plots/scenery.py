@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from math import floor, isnan, log10
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine.parts import EXIT_MARGIN
+from chutelab.core.module import number as layout_number
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.quantities import each
 from chutelab.results.stream import FEWEST
@@ -19,9 +19,6 @@ from chutelab.util.errors import InputError
 
 STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
 """Kinds of event in which something is hit."""
-
-STROBES = 10
-"""Strobe dots aimed at from separation to the last impact."""
 
 
 def subset(recording: Recording, particles: Sequence[int] | Ints) -> Recording:
@@ -97,7 +94,7 @@ def strobe_step(recording: Recording) -> float:
     begin, end = action(recording)
     struck = struck_by_nominal(recording)["t"]
     last = float(struck[-1]) if len(struck) and struck[-1] > begin else end
-    return round_step(max(last - begin, 1e-3), STROBES)
+    return round_step(max(last - begin, 1e-3), 10)
 
 
 def strobe_times(recording: Recording) -> Floats:
@@ -108,9 +105,6 @@ def strobe_times(recording: Recording) -> Floats:
 
 FINE = 2e-4
 """Share of what is seen by which a line that is drawn may miss the curve."""
-
-MOST_CHORDS = 500
-"""Straight parts in which a piece of a track is drawn at most."""
 
 
 def track_times(
@@ -130,7 +124,7 @@ def track_times(
     Parameters
     ----------
     recording : Recording
-        Whose track.
+        The run.
     begin, end : float, optional
         s; by default all of the track.
     particle : int
@@ -149,7 +143,7 @@ def track_times(
         np.hypot(*(6.0 * way - 2.0 * first - 4.0 * last).T),
     )
     parts = np.ceil(np.sqrt(bent / 8.0 / max(fine, 1e-300)))
-    parts = np.clip(parts, 1, MOST_CHORDS).astype(np.int64)
+    parts = np.clip(parts, 1, 500).astype(np.int64)
     number = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
     even = np.repeat(t[:-1], parts) + number * np.repeat(h / parts, parts)
     jumps = np.nextafter(t[1:][h == 0.0], -np.inf)
@@ -217,9 +211,9 @@ def as_crowd(recording: Recording) -> bool:
 
 
 def one_of_many(recording: Recording) -> bool:
-    """Tell whether what all particles do matters, not the way of particle 0.
+    """Tell whether pictures show what all particles do, not the way of particle 0.
 
-    So it is where there are many, and no conveyor brings one after the other.
+    They do if there are many, and no conveyor brings one after the other.
     """
     return recording.count > MANY and recording.machine.pulley is None
 
@@ -247,8 +241,7 @@ def places(recording: Recording, particles: Sequence[int] | Ints, times: Floats)
 
 
 STREAM_TRACKS, FEW_TRACKS = 60, 12
-"""Tracks that are drawn of a stream, and of many particles that nothing brings one after the other;
-more would be one blot."""
+"""Most tracks that are drawn: of a stream, and of many particles that are there at once."""
 
 
 def drawn_tracks(recording: Recording) -> Ints:
@@ -258,8 +251,8 @@ def drawn_tracks(recording: Recording) -> Ints:
 
 
 NEARBY, FAR = 0.35, 1.0
-"""Shares of the action's size: around it within the first the ends of belts are shown, within the
-second those of what stands still, and what happens later."""
+"""Margins around the action, in shares of its size: within the first, ends of belts are shown;
+within the second, ends of surfaces at rest, and what happens later."""
 
 
 @dataclass(frozen=True)
@@ -284,12 +277,8 @@ class Window:
     def padded(self, left: float, right: float, bottom: float, top: float) -> Window:
         """Return a window larger by shares of its own larger side."""
         size = max(self.width, self.height)
-        return Window(
-            self.left - left * size,
-            self.right + right * size,
-            self.bottom - bottom * size,
-            self.top + top * size,
-        )
+        shifts = np.array([-left, right, -bottom, top]) * size
+        return Window(*(np.array(astuple(self)) + shifts).tolist())
 
     def fitted(self, aspect: float) -> Window:
         """Return the smallest window of that width / height which holds this one, centred."""
@@ -300,12 +289,8 @@ class Window:
 
     def joined(self, other: Window) -> Window:
         """Return the smallest window that holds both."""
-        return Window(
-            min(self.left, other.left),
-            max(self.right, other.right),
-            min(self.bottom, other.bottom),
-            max(self.top, other.top),
-        )
+        least, most = np.sort([astuple(self), astuple(other)], axis=0).tolist()
+        return Window(least[0], most[1], least[2], most[3])
 
     def holds(self, points: Floats) -> Bools:
         """Tell which points, (..., 2), lie inside."""
@@ -386,10 +371,10 @@ def _path(recording: Recording) -> tuple[Floats, Floats, Floats]:
     What falls has left the scene, and touched nothing since.
     """
     begin, end = action(recording)
-    mine = recording.events[recording.events["particle"] == 0]
-    gone = mine["kind"] == Kind.EXIT
-    mine = mine[~gone & (mine["t"] > begin)]
-    rests = float(mine["t"][-1]) if gone.any() and len(mine) else end
+    events = recording.events[recording.events["particle"] == 0]
+    gone = events["kind"] == Kind.EXIT
+    events = events[~gone & (events["t"] > begin)]
+    rests = float(events["t"][-1]) if gone.any() and len(events) else end
     struck = struck_by_nominal(recording)
     # What it struck before, on the way to the end of a ramp, is not where it goes.
     struck = struck[struck["t"] > begin]
@@ -414,7 +399,7 @@ def _crowd(recording: Recording, begin: int) -> Floats:
     released = events["position"][~carried & (events["kind"] == Kind.RELEASE)]
     struck = events["position"][np.isin(events["kind"], STRUCK)]
     strays = 0.02 if recording.count > MANY else 0.0
-    bottom = np.min(recording.machine.exit_box[2]) + EXIT_MARGIN
+    bottom = recording.machine.releases.exit_box[:, 1].min() + layout_number("EXIT_MARGIN")
     corners = [
         np.quantile(places, [share, 1.0 - share], axis=0)
         for places, share in ((released, 0.0), (struck, strays))

@@ -188,20 +188,17 @@ def scientific(value: float, unit: str) -> str:
     return f"{value:.0e} {unit}".replace("-", "−").replace("e−0", "e−") if value else f"0 {unit}"
 
 
-DPI = 120
-"""Dots to the inch in files, unless a picture is for print."""
-
 UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """By format, what keeps the time at which a picture is written out of its file."""
 
-ON_SCREEN = 80
-"""Dots to the inch in a notebook; files have what the figure was made with."""
-
 
 class Picture(Figure):
-    """A matplotlib figure of a size in inches with its canvas, made without pyplot."""
+    """A matplotlib figure of a size in inches with its canvas, made without pyplot.
 
-    def __init__(self, size: tuple[float, float], dpi: float = DPI) -> None:
+    Files have 120 dots to the inch, unless it is for print.
+    """
+
+    def __init__(self, size: tuple[float, float], dpi: float = 120) -> None:
         super().__init__(figsize=size, dpi=dpi)
         FigureCanvasAgg(self)
 
@@ -229,5 +226,5 @@ class Picture(Figure):
 
     def _repr_png_(self) -> bytes:
         buffer = BytesIO()
-        self.savefig(buffer, format="png", dpi=ON_SCREEN)
+        self.savefig(buffer, format="png", dpi=80)  # of a notebook; files have the figure's own
         return buffer.getvalue()

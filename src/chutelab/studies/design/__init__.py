@@ -3,16 +3,14 @@
 >>> import chutelab
 >>> from chutelab import design
 >>> scene = chutelab.load("inclined-20")
->>> found = design.solve(scene, "plate.angle_deg=0:60", "landing.vx=1")
+>>> found = design.solve(scene, {"plate.angle_deg": (0, 60)}, {"landing.vx": 1.0})
 >>> round(found.answer.values[0], 3)
 47.829
 
-- `quantities`: what can be aimed at.
-- `evaluation`: what can be varied, and the one place where variants are run.
+- `evaluation`: what can be aimed at and varied, the one place where variants are run, and slopes.
 - `roots`: one key: smooth pieces, all roots, all minima.
 - `solving`: `solve`, `minimize` and `maximize`; several keys.
 - `answers`: a `Solution`, in numbers and in words.
-- `sensitivity`: slopes, what one per cent does, shares of a variance.
 - `uncertainty`: how uncertain inputs spread, and which of them matters: an `Uncertainty`.
 """
 

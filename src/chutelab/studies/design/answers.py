@@ -17,9 +17,8 @@ from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
 from chutelab.scene import Scene
 from chutelab.scene.units import symbol, with_unit, write_size
-from chutelab.studies.design.evaluation import NO_RUN, Span
+from chutelab.studies.design.evaluation import NO_RUN, Sensitivity, Span
 from chutelab.studies.design.roots import Change, Scan
-from chutelab.studies.design.sensitivity import Sensitivity
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, frame, plain
 

@@ -1,39 +1,214 @@
-"""Many variants of a scene at once: the one place where a design runs them.
+"""The question: what can be aimed at, what can be varied; and the one place where variants are run.
 
-Ranges, ``KEY=FROM:TO``, are checked against the scene before anything runs. Beside its numbers each
-variant has a *course*: which surfaces particle 0 touches up to its landing. Within one course the
-numbers are smooth functions of the keys; where it changes, they may jump.
+>>> from chutelab.scene import load
+>>> left, right = target(load("perpendicular"), "landing.vx", "outgoing.speed")
+>>> left.unit, right.name
+('m/s', 'outgoing.speed')
+
+Also here: the course of a particle, which surfaces it touches up to its landing, and how much a
+quantity depends on each key: its slope, and what one per cent of the key does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from itertools import groupby, product
+from math import nan
+from typing import Any, Final, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.engines.simulation import judged, simulate
-from chutelab.results import Recording
+from chutelab.results import REASONS, Kind, Recording
+from chutelab.results.quantities import measured as read
 from chutelab.results.recorder import StalledError
-from chutelab.scene import AnyScene, Scene, SceneError, load
+from chutelab.scene import MISSING, AnyScene, Scene, SceneError, load
 from chutelab.scene.overrides import value_at
+from chutelab.scene.quantities import Ending, lookup, suggestion, whose
+from chutelab.scene.units import read_size
 from chutelab.scene.variants import Range, Varied, Vary, is_plain, quantity, reason, varied
-from chutelab.studies.design.quantities import (
-    Quantity,
-    courses_of,
-    each_once,
-    measured,
-)
 from chutelab.studies.sweep.batch import Block, one_line, together
 from chutelab.studies.sweep.rows import touches
 from chutelab.util.arrays import Floats, Ints, Progress
 from chutelab.util.errors import InputError
+from chutelab.util.versions import library
 
-FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=0:80"
+T = TypeVar("T")
 
-ASK = f"say what may vary; it {FORM}"
+
+class Typed(Protocol):
+    """What an option takes once; messages call it `typed`."""
+
+    @property
+    def typed(self) -> str:
+        """The option and its value, as on the command line."""
+        ...
+
+
+G = TypeVar("G", bound=Typed)
+
+
+def each_once(
+    option: str, given: Sequence[G], read: Callable[[G], T], ask: str, most: int
+) -> tuple[T, ...]:
+    """Read what an option takes, given 1 to `most` times; each result has another `key`."""
+    if not given:
+        raise InputError(ask, option)
+    if len(given) > most:
+        raise InputError(f"at most {most} keys are allowed", given[most].typed)
+    found: dict[str, T] = {}
+    for asked in given:
+        one: Any = read(asked)
+        if one.key in found:
+            raise InputError(f"{one.key} is given already", asked.typed)
+        found[one.key] = one
+    return tuple(found.values())
+
+
+def scipy(name: str) -> Any:
+    """Return a module of SciPy, such as ``optimize``; without SciPy say what to install."""
+    return library(f"scipy.{name}", "SciPy is needed", "design")
+
+
+MANY_TOUCHES: Final = 6
+"""Touches of one surface in a row from which on they are not counted: a particle that bounces to
+rest does so a thousand times, and extra bounces do not change the sequence of contacts."""
+
+LONGEST: Final = 6
+"""Surfaces that are named; longer sequences are cut off there."""
+
+
+def courses_of(recording: Recording) -> list[str]:
+    """Return the surfaces that each particle touches up to its landing.
+
+    Such as ``plate, outgoing``, or ``plate, never lands (exit)``.
+    """
+    touched: list[list[int]] = [[] for _ in range(recording.count)]
+    landed = [False] * recording.count
+    events = recording.select(Kind.IMPACT, Kind.LANDING)
+    columns = (events[name].tolist() for name in ("particle", "surface", "kind"))
+    for particle, surface, kind in zip(*columns, strict=True):
+        if not landed[particle]:
+            touched[particle].append(surface)
+            landed[particle] = kind == Kind.LANDING
+
+    @cache
+    def course(surfaces: tuple[int, ...], end: str) -> str:
+        names = []
+        for surface, group in groupby(surfaces):
+            times = len(list(group))
+            often = {1: "", 2: " twice"}.get(times, f" {times} times")
+            often = often if times < MANY_TOUCHES else " many times"
+            names.append(f"{recording.surfaces[surface]}{often}")
+        if len(names) > LONGEST:
+            names[LONGEST - 1 :] = ["and so on"]
+        return ", ".join([*names, end] if end else names)
+
+    ends = [
+        "" if down else f"never lands ({REASONS[reason]})"
+        for down, reason in zip(landed, recording.ended.tolist(), strict=True)
+    ]
+    return [course(tuple(one), end) for one, end in zip(touched, ends, strict=True)]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of a run, the value of a key of the scene, or a plain number."""
+
+    name: str
+    """As it was asked for."""
+
+    unit: str
+
+    key: str = ""
+    """Of a run: its name, see `chutelab.scene.quantities`. Of the scene: the full path."""
+
+    source: Literal["run", "scene", "number"] = "run"
+    ending: Ending = "any"
+    number: float = 0.0
+
+    def of(self, recording: Recording) -> Any:
+        """Return its value, of each scene of a family (N,); NaN where it did not happen."""
+        value: Any = self.number
+        if self.source == "scene":
+            family = recording.family if is_plain(self.key) else None
+            value = family.at(self.key) if family else value_at(recording.scene, self.key)
+            return nan if value is None or value is MISSING or isinstance(value, str) else value
+        if self.source == "run":
+            value = read(recording, self.key)
+            value = value if recording.family else value[0]
+        return value
+
+
+def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
+    """Return the quantity of a scene that has this name; messages call it `typed`.
+
+    Raises
+    ------
+    InputError
+        If the scene has no such quantity.
+    """
+    row = lookup(name, scene.surfaces, [str(stream.name) for stream in scene.streams])
+    if row is None:
+        allowed = f"no such quantity here; {suggestion(name, scene.surfaces)}"
+        raise InputError(allowed, typed or name)
+    if which := whose(row, scene.count):
+        raise InputError(which, typed or name)
+    return Quantity(name, row.unit, name, ending=row.ending)
+
+
+def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quantity]:
+    """Return a quantity, and the number, key of the scene or quantity that it is to equal.
+
+    Raises
+    ------
+    InputError
+        If one of them is unknown, or their units differ.
+    """
+    typed = f"--target {name}={value}"
+    left = measured(scene, name, typed)
+    try:
+        number, unit = read_size(value) if isinstance(value, str) else (value, "")
+        right = Quantity(f"{number:.12g} {unit}".strip(), unit, source="number", number=number)
+    except ValueError as error:
+        text = str(value)
+        if text[0].isdigit() or text[0] in "+-.":
+            allowed = f"{text} is no number of a quantity {_in(left.unit)}; {error}"
+            raise InputError(allowed, typed) from None
+        right = _named(scene, text, typed)
+    if right.source == "number" and right.unit == "":
+        right = replace(right, name=f"{right.name} {left.unit}".strip(), unit=left.unit)
+    if right.unit != left.unit:
+        raise InputError(
+            f"{left.name} is {_in(left.unit)}, and {right.name} is {_in(right.unit)}", typed
+        )
+    if right == left:
+        raise InputError("both sides are the same", typed)
+    return left, right
+
+
+def _named(scene: Scene, text: str, typed: str) -> Quantity:
+    """Return the quantity or the key of a scene that a text names."""
+    if lookup(text, scene.surfaces) is not None:
+        return measured(scene, text, typed)
+    try:
+        found = quantity(scene, Vary(text, (0.0,), typed))
+    except InputError as error:
+        allowed = f"{text} is neither a number, nor a quantity, nor a key of the scene"
+        raise InputError(f"{allowed}: {error.allowed}", typed) from None
+    if not isinstance(value_at(scene, found.path), (int, float)):
+        raise InputError(f"{found.path} has no number as its value in this scene", typed)
+    return Quantity(found.path, found.unit, found.path, "scene")
+
+
+def _in(unit: str) -> str:
+    return f"in {unit}" if unit else "a pure number"
+
+
+ASK: Final = "say what may vary, and between which ends, such as plate.angle_deg from 0 to 80"
 
 MOST: Final = 8
 """Keys that may vary at once: beyond, a search over the whole range takes too long to be one."""
@@ -91,9 +266,6 @@ def ranges(scene: Scene, vary: Varied) -> tuple[Span, ...]:
         start = float(value) if isinstance(value, (int, float)) else None
         return Span(about.path, about.unit, low, high, start)
 
-    for text in [vary] if isinstance(vary, str) else vary:
-        if not isinstance(vary, Mapping) and isinstance(text, str) and text.count(":") != 1:
-            raise InputError(FORM, f"--vary {text}")
     return each_once("--vary", varied(vary, Range), read, ASK, MOST)
 
 
@@ -108,7 +280,7 @@ def suits(scene: Scene, keys: Sequence[str], quantities: Sequence[Quantity]) -> 
     )
 
 
-MANY: Final = 8
+FEWEST: Final = 8
 """Variants from which on it pays to run them at once."""
 
 BLOCK: Final = 4096
@@ -152,14 +324,6 @@ class Evaluator:
     def __call__(self, points: ArrayLike) -> Outcomes:
         """Run the variants at points, shape (N, K), K values of the keys each."""
         table = np.asarray(points, dtype=np.float64)
-        if len(table) > BLOCK:
-            parts = list(map(self, np.split(table, range(BLOCK, len(table), BLOCK))))
-            return Outcomes(
-                np.concatenate([part.values for part in parts]),
-                [course for part in parts for course in part.courses],
-                [fault for part in parts for fault in part.faults],
-                [kind for part in parts for kind in part.touches],
-            )
         values = np.full((len(table), len(self.quantities)), np.nan)
         courses, faults, kinds = np.full((3, len(table)), "", dtype=object)
         # The run that ends as the scene says comes last: what both runs know is read off that.
@@ -174,17 +338,17 @@ class Evaluator:
             kinds[rows] = touches(recording, len(rows))
 
         left = set(range(len(table)))
-        if len(table) >= MANY and suits(self.scene, self.keys, self.quantities):
+        if len(table) >= FEWEST and suits(self.scene, self.keys, self.quantities):
             left = set()
-            for ending in endings:
-                base = self.scene.with_values(_until(ending))
-                runs, refused, alone = together(Block(base, tuple(self.keys), table))
+            for start, ending in product(range(0, len(table), BLOCK), endings):
+                base, part = self.scene.with_values(_until(ending)), table[start : start + BLOCK]
+                runs, refused, alone = together(Block(base, tuple(self.keys), part))
                 for recording, rows in runs:
-                    read(ending, recording, rows)
+                    read(ending, recording, start + rows)
                 for row, fault in refused.items():
-                    faults[row] = one_line(fault)
-                left.update(alone)
-                self._ran(len(table) / len(endings))
+                    faults[start + row] = one_line(fault)
+                left.update(start + row for row in alone)
+                self._ran(len(part) / len(endings))
         for row in sorted(left):
             given = dict(zip(self.keys, table[row].tolist(), strict=True))
             try:
@@ -214,7 +378,7 @@ def _until(ending: str) -> dict[str, str]:
 def value(scene: AnyScene, name: str) -> float:
     """Run a scene and return one of its quantities; NaN if it did not happen.
 
-    Names are those of `chutelab.studies.design.quantities`.
+    Names are those of `chutelab.scene.quantities`.
 
     Raises
     ------
@@ -231,3 +395,101 @@ def value(scene: AnyScene, name: str) -> float:
     scene = load(scene)
     wanted = measured(scene, name)
     return float(wanted.of(simulate(scene.with_values(_until(wanted.ending)))))
+
+
+STEPS: Final = (1e-3, 1e-4, 1e-5, 1e-6)
+"""Of a range: over the largest, differences lose fewest digits to rounding, over the smallest they
+see least of what bends the function."""
+
+PERCENT: Final = 0.01
+
+ROUNDING: Final = 1e-15
+"""Relative error of a quantity: what a difference over a step must stay clear of."""
+
+STEADY: Final = 0.01
+"""By how much a one-sided slope may change when its step is halved."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What a key does to a quantity at a point.
+
+    Attributes
+    ----------
+    key, unit : str
+        What is changed, and its unit.
+    quantity, quantity_unit : str
+        What changes.
+    derivative : float
+        In quantity_unit per unit; NaN where the course changes within a millionth of the range.
+    step : float
+        One per cent of the key's value; of its range, if its value is 0.
+    lower, upper : float
+        The quantity with the key one `step` less and more; NaN where it has none.
+    courses : tuple of str
+        The way of particle 0 there.
+    """
+
+    key: str
+    unit: str
+    quantity: str
+    quantity_unit: str
+    derivative: float
+    step: float
+    lower: float
+    upper: float
+    courses: tuple[str, str]
+
+
+def sensitivities(
+    evaluate: Evaluator, ranges: Sequence[Span], at: Floats, columns: Sequence[int]
+) -> tuple[Sensitivity, ...]:
+    """Return what each key does to some of the evaluator's quantities at a point, (K,)."""
+    found = []
+    for one, unit in zip(ranges, np.eye(len(at)), strict=True):
+        derivative = _derivatives(evaluate, at, unit * one.width)
+        step = PERCENT * (float(unit @ np.abs(at)) or one.width)
+        sides = evaluate([at - step * unit, at + step * unit])
+        for column in columns:
+            quantity = evaluate.quantities[column]
+            lower, upper = (float(value) for value in sides.values[:, column])
+            found.append(
+                Sensitivity(
+                    one.key, one.unit, quantity.name, quantity.unit, float(derivative[column]),
+                    step, lower, upper, (sides.courses[0], sides.courses[1]),
+                )
+            )  # fmt: skip
+    return tuple(found)
+
+
+def _derivatives(evaluate: Evaluator, at: Floats, along: Floats) -> Floats:
+    """Return the derivatives of all quantities by one key; one-sided where the course ends.
+
+    Differences over a step and half of it are extrapolated; of all steps the one counts at which
+    the two agree best, since next to a jump the function may bend within any step. `along` is the
+    range of the key in its own direction, (K,).
+    """
+    (here,), (course,), *_ = evaluate(at[np.newaxis])
+    steps = np.multiply.outer(STEPS, (1.0, 0.5))
+    shares = np.multiply.outer((1.0, -1.0), steps)
+    found = evaluate(at + shares.reshape(-1, 1) * along)
+    # Both sides, all steps, whole and half: (2, S, 2), and for values the M quantities.
+    values = found.values.reshape(*shares.shape, -1)
+    usable = (np.array(found.courses) == course).reshape(shares.shape).all(axis=2)
+    steps = steps[..., np.newaxis] * along.sum()
+    both = usable.all(axis=0)
+    if both.any():
+        far, half = np.moveaxis((values[0] - values[1])[both] / (2.0 * steps[both]), 1, 0)
+        apart = np.abs(half - far) + ROUNDING * np.abs(here) / steps[both, 0]
+        best = np.argmin(np.where(np.isfinite(apart), apart, np.inf), axis=0)
+        chosen: Floats = np.take_along_axis((4.0 * half - far) / 3.0, best[np.newaxis], axis=0)[0]
+        return chosen
+    for side, sign in enumerate((1.0, -1.0)):
+        if usable[side].any():
+            smallest = np.flatnonzero(usable[side])[-1]
+            far, half = (values[side, smallest] - here) / (sign * steps[smallest])
+            # A slope that depends on the step is none: at a grazing blow it is infinite.
+            steady = np.abs(half - far) <= STEADY * np.abs(half)
+            slope: Floats = np.where(steady, 2.0 * half - far, np.nan)
+            return slope
+    return np.full(len(here), np.nan)

@@ -17,8 +17,7 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from chutelab.studies.design.evaluation import NO_RUN, Evaluator
-from chutelab.studies.design.quantities import scipy
+from chutelab.studies.design.evaluation import NO_RUN, Evaluator, scipy
 from chutelab.util.arrays import Floats
 
 Function = Callable[[float], float]

@@ -15,13 +15,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.scene import AnyScene, Scene, load
-from chutelab.scene.variants import Varied
+from chutelab.scene.variants import Varied, refuse_texts
 from chutelab.studies.design.answers import Answer, Goal, Solution
-from chutelab.studies.design.evaluation import Evaluator, Span, ranges
-from chutelab.studies.design.quantities import Quantity, measured, scipy
-from chutelab.studies.design.quantities import target as wish
+from chutelab.studies.design.evaluation import (
+    Evaluator,
+    Quantity,
+    Span,
+    measured,
+    ranges,
+    scipy,
+    sensitivities,
+)
+from chutelab.studies.design.evaluation import target as wish
 from chutelab.studies.design.roots import CLOSE, Scan, level, minima, roots, scan
-from chutelab.studies.design.sensitivity import sensitivities
 from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
 
@@ -95,7 +101,7 @@ MORE: Final = 400
 def solve(
     scene: AnyScene,
     vary: Varied,
-    target: str | Sequence[str] | Mapping[str, object],
+    target: Mapping[str, float | str] | Sequence[tuple[str, float | str]],
     *,
     points: int = POINTS,
     seed: int = 0,
@@ -107,12 +113,11 @@ def solve(
     ----------
     scene : Scene, str, path or mapping
         What `chutelab.load` takes.
-    vary : mapping, str or sequence of str
-        The keys and the ranges that are searched: ``{KEY: (FROM, TO)}``, or ``KEY=FROM:TO``.
-    target : mapping, str or sequence of str
-        ``{QUANTITY: VALUE}`` or ``QUANTITY=VALUE``: a quantity of the run, and the number, key of
-        the scene or quantity that it is to equal. With several keys there may be several targets,
-        up to one a key.
+    vary : mapping, or sequence of Range
+        The keys and the ranges that are searched: ``{KEY: (FROM, TO)}``.
+    target : mapping, or sequence of pairs
+        ``{QUANTITY: VALUE}``: a quantity of the run, and the number, key of the scene or quantity
+        that it is to equal. With several keys there may be several targets, up to one a key.
     points : int
         With one key: how many values are looked at first. Two solutions between neighbours are
         found only if the quantity bends visibly between them.
@@ -142,23 +147,20 @@ def solve(
     47.828951
     """
     scene = load(scene)
-    if isinstance(target, Mapping):
-        target = [f"{name}={value}" for name, value in target.items()]
-    texts = [target] if isinstance(target, str) else list(target)
-    if not texts:
+    refuse_texts(target, "--target", '{"landing.vx": 1.0}')
+    pairs = list(target.items()) if isinstance(target, Mapping) else list(target)
+    if not pairs:
         raise InputError("name at least one, such as landing.vx=outgoing.speed", "--target")
-    wishes = [wish(scene, text) for text in texts]
+    wishes = [wish(scene, name, value) for name, value in pairs]
+    last = "--target {}={}".format(*pairs[-1])
     if len({left.key for left, _ in wishes}) < len(wishes):
-        raise InputError("this quantity has a target already", f"--target {texts[-1]}")
+        raise InputError("this quantity has a target already", last)
     what = ", ".join(f"{left.name} = {right.name}" for left, right in wishes)
     sides = [side for wanted in wishes for side in wanted]
     search = _Search("solve", what, sides, scene, vary, points, seed, progress)
     keys = len(search.ranges)
     if len(wishes) > keys:
-        raise InputError(
-            f"{len(wishes)} targets need as many keys to vary, {keys} given",
-            f"--target {texts[-1]}",
-        )
+        raise InputError(f"{len(wishes)} targets need as many keys to vary, {keys} given", last)
     return search.roots() if keys == 1 else search.system(len(wishes))
 
 

@@ -10,8 +10,8 @@
   off the simulation (`Residuals`).
 - `reading`: the files that the video-analysis program Tracker exports, as tracks; the shipped one
   was made from a simulation with noise, so that its answer is known.
-- `parameters`: what can be fitted: any number of the scene, and the placement.
-- `fitting`: least squares, with uncertainties; needs ``pip install "chutelab[fit]"``.
+- `fitting`: what can be fitted, and least squares, with uncertainties; needs
+  ``pip install "chutelab[fit]"``.
 - `result`: what a fit found, what makes it less certain than it looks, and its files.
 """
 

@@ -1,20 +1,26 @@
-"""Least squares: the parameters with which the simulation follows the measured points best."""
+"""Least squares: the parameters with which the simulation follows the measured points best.
+
+What can be fitted: the numbers of a scene, and how the measured points lie in the world. Units and
+bounds are those of the scene's own validation, read from its JSON Schema.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.results import Recording
-from chutelab.scene import AnyScene, Fault, Scene, SceneError, load
+from chutelab.scene import MISSING, AnyScene, Fault, Scene, SceneError, load, shown, to_dict
+from chutelab.scene.overrides import at_path, joined, limits_of, names_of, resolved, rule_at
 from chutelab.studies.measured import result
-from chutelab.studies.measured.parameters import Parameter, changed, resolve
-from chutelab.studies.measured.result import Fit
+from chutelab.studies.measured.result import Fit, Parameter
 from chutelab.studies.measured.track import (
+    LARGEST,
     LEAST,
     MeasuredError,
     Residuals,
@@ -26,7 +32,106 @@ from chutelab.studies.measured.track import (
     run,
 )
 from chutelab.util.arrays import Bools, Floats
+from chutelab.util.errors import did_you_mean
 from chutelab.util.versions import library
+
+SMALLEST: Final = 1e-6
+"""Of its start: the least value at which a number that must be positive is searched. A fit of what
+the points do not tell is driven to a bound by rounding, and next to 0 a length has no direction."""
+
+
+def placements(track: Track) -> dict[str, Parameter]:
+    """Return what can be fitted of a track's `Placement`."""
+    place, anything = track.placement, (-LARGEST, LARGEST)
+    found = (
+        Parameter("t0", "s", place.t0, *anything),
+        Parameter("scale", "m per unit", place.scale, SMALLEST * place.scale, LARGEST),
+        Parameter("origin.x", "file units", place.origin[0], *anything),
+        Parameter("origin.y", "file units", place.origin[1], *anything),
+    )
+    return {one.key: one for one in found}
+
+
+def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter, ...]:
+    """Return the parameters that keys name.
+
+    Raises
+    ------
+    MeasuredError
+        With all keys that are unknown, no number, without a value to start from, or given twice.
+    """
+    document, placed = to_dict(scene, defaults=True), placements(track)
+    faults: list[Fault] = []
+    found: list[Parameter] = []
+    if not keys:
+        faults.append(Fault("fit", None, "name at least one key, such as plate.restitution"))
+    for key in keys:
+        known = placed.get(key) or _of_scene(document, key, placed)
+        if isinstance(known, str):
+            faults.append(Fault(f"fit {key}", None, known))
+        elif any(resolved(document, key) == resolved(document, one.key) for one in found):
+            faults.append(Fault(f"fit {key}", None, "given twice"))
+        else:
+            found.append(known)
+    if faults:
+        raise MeasuredError(scene.source, faults)
+    return tuple(found)
+
+
+def changed(
+    scene: Scene, track: Track, parameters: Sequence[Parameter], values: Sequence[float]
+) -> tuple[Scene, Track]:
+    """Return scene and track with the values of some parameters changed.
+
+    Raises
+    ------
+    SceneError
+        If the scene refuses a value, or two that do not go together.
+    """
+    given = {one.key: float(value) for one, value in zip(parameters, values, strict=True)}
+    place = {key: given.pop(key, one.start) for key, one in placements(track).items()}
+    origin = place["origin.x"], place["origin.y"]
+    moved = track.placed(t0=place["t0"], scale=place["scale"], origin=origin)
+    return scene.with_values(given) if given else scene, moved
+
+
+def _of_scene(document: Mapping[str, Any], key: str, others: Iterable[str]) -> Parameter | str:
+    """Return the parameter of a key of the scene, or why there is none, with other known keys."""
+    rule = None
+    with suppress(ValueError):
+        parts = resolved(document, key)
+        rule = rule_at(parts)
+    if rule is None:
+        known = [*numbers(document), *others]
+        last = key.rpartition(".")[2]
+        near = [name for name in known if name.rpartition(".")[2] == last]
+        advice = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
+        return f"unknown key; {did_you_mean(key, known, advice, most=3)}"
+    head = str(parts[0])
+    if document.get(head) in (None, ()):
+        return f"the scene has no [{head}]"
+    value: Any = at_path(document, parts)
+    path, limits = joined(parts), limits_of(rule)
+    if value is None or value is MISSING:
+        if limits is None:
+            return "not a number"
+        return f"has no value in this scene; give one to start from, --set {path}=..."
+    if limits is None or isinstance(value, (str, bool)):
+        return f"{shown(value)} is not a number that can vary continuously"
+    low, high = limits
+    low = max(low, SMALLEST * value) if low > 0.0 else low
+    return Parameter(key, rule.get("x-unit", ""), float(value), low, high)
+
+
+def numbers(document: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the keys of a scene's tables whose values are numbers that can be fitted."""
+    tables = {"": document}
+    tables |= {f"{head}.": table for head, table in document.items() if isinstance(table, dict)}
+    for head, names in names_of(document).items():
+        tables |= {f"{head}.{n}.": row for n, row in zip(names, document[head], strict=True)}
+    for head, table in tables.items():
+        yield from (f"{head}{key}" for key, value in table.items() if isinstance(value, float))
+
 
 STEP = 1e-6
 """Of a parameter's size. Tracks of the exact engine are smooth to rounding, so a difference over
@@ -144,7 +249,7 @@ SEARCHED = 41
 """Values tried of each parameter, over twice its size, when a fit is caught in a wrong minimum."""
 
 KEPT = 0.9
-"""Share of the points that a better minimum must keep: it must not do by losing them."""
+"""Least share of the points that a better minimum keeps: with fewer points every sum is smaller."""
 
 TUNING = 2.0
 """Standard deviations from which on a robust fit begins to believe a point less."""
@@ -247,7 +352,7 @@ def _descended(problem: Problem, values: Floats, *, robust: bool) -> _Minimum | 
         )
         values = np.asarray(solved.x)
         left = problem.residuals(values)
-        # Neither 0, for points without noise, nor so large that it could not be told from none.
+        # Clamp; 1.0 means off.
         deviation = result.MAD * float(np.median(np.abs(left)))
         previous, threshold = threshold, min(max(TUNING * deviation, 1e-9), 0.99)
         # From the third turn on points only leave: one at the very end could come and go forever.

@@ -12,7 +12,6 @@ import numpy as np
 
 from chutelab.scene import Scene
 from chutelab.scene.units import write_size
-from chutelab.studies.measured.parameters import Parameter
 from chutelab.studies.measured.track import MeasuredError, Residuals, best_t0, over
 from chutelab.util.arrays import Floats
 from chutelab.util.files import csv_lines
@@ -73,7 +72,7 @@ def notes(fit: Fit, bent: Floats, *, settled: bool) -> Iterator[str]:
     relatively; `settled`, whether the fit ended with the same points within the simulated time.
     """
     if doubt := advice(fit.after):
-        # Then nothing else that could be said means anything.
+        # The other notes would mean nothing then.
         yield doubt
         return
     for key, parameter, value, error in zip(
@@ -124,6 +123,34 @@ def _neighbours(left: Floats) -> float:
     """Return the correlation of residuals (n, 2) with those of the next points."""
     total = float((left**2).sum())
     return float((left[1:] * left[:-1]).sum()) / total if total > 1e-20 else 0.0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that a fit may change.
+
+    Attributes
+    ----------
+    key, unit : str
+        What it is called: a full path in the scene as it was given, or a key of `placements`; ""
+        for the unit of a pure number.
+    start : float
+        Its value in the scene or the placement.
+    low, high : float
+        The least and the largest value that are searched: those that are allowed, but not below
+        `SMALLEST` of the start where 0 is not.
+    """
+
+    key: str
+    unit: str
+    start: float
+    low: float
+    high: float
+
+    @property
+    def size(self) -> float:
+        """By how much it may be expected to change: its own size, but not next to nothing."""
+        return max(abs(self.start), 0.1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

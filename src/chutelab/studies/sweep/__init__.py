@@ -2,7 +2,8 @@
 
 >>> import chutelab
 >>> from chutelab.studies.sweep import sweep
->>> swept = sweep(chutelab.load("perpendicular"), ["incoming.speed=2,4", "plate.restitution=0,1"])
+>>> varied = {"incoming.speed": [2.0, 4.0], "plate.restitution": [0.0, 1.0]}
+>>> swept = sweep(chutelab.load("perpendicular"), varied)
 >>> len(swept), swept.columns["landing.vx.mean"].round(3).tolist()
 (4, [0.0, -2.0, 0.0, -4.0])
 

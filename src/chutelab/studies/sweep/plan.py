@@ -133,7 +133,7 @@ def planned(
     varying = tuple(varied(varies, kind))
     for vary in varying:
         if not isinstance(vary, kind):
-            raise InputError("samples are drawn from ranges, not from lists", vary.typed)
+            raise InputError("samples are drawn between two ends, not from lists", vary.typed)
     if not varying:
         raise InputError("at least one key is to be varied, such as plate.angle_deg", "--vary")
     if len(varying) > MOST_KEYS:

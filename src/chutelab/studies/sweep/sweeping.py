@@ -300,9 +300,9 @@ def sweep(
     ----------
     scene : Scene, str, path or mapping
         What `chutelab.load` takes.
-    varies : mapping, or sequence of Vary or str
-        Values by key, or ``KEY=FROM:TO:COUNT`` or ``KEY=a,b,c`` each; a grid of all combinations,
-        whose last key runs fastest. With `sample`, ``KEY=FROM:TO``, or two ends by key.
+    varies : mapping, or sequence of Vary
+        Values by key; a grid of all combinations, whose last key runs fastest. With `sample`, the
+        two ends of a range by key.
     sample : int, optional
         Draw so many samples from the ranges instead; needs SciPy.
     design, seed : {"lhs", "sobol"}, int

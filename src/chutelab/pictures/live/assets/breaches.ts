@@ -12,9 +12,6 @@ export type Run = { machine: Machine, knots: Float64Array, offsets: number[], bo
 export type Breach = { law: number, particle: number, surface: number, t: number, x: number,
   y: number };
 
-/** Places inside or beyond surfaces for which there is room at first. */
-const HITS = 64;
-
 /** What the laws ask of a recording of a run that is over. */
 function runOf({ machine, tracks, events, books, gained, contacts, steps }: Recording): Run {
   const offsets = [0];
@@ -32,15 +29,16 @@ function runOf({ machine, tracks, events, books, gained, contacts, steps }: Reco
  * stays as it is. */
 function judge(core: Core, { machine, knots, offsets, books, ...run }: Run): Breach[] {
   const { gravity, interact, dt, pulley, radius, mass, inertia } = machine;
-  const { end, layout: { constants, enums } } = core;
+  const { enums } = core.layout, end = core.get("end", "Room");
   const pieces = barriersOf(machine), count = radius.length;
   core.reset("Laws");
-  for (const [name, kind, many] of [
-    ["knots", "double", knots.length], ["offsets", "int", offsets.length],
-    ["bodies", "Body", count], ["barriers", "Barrier", pieces.length],
-    ["books", "double", books.length], ["breaches", "Breach", constants.BREACHES],
-    ["order", "int", interact ? offsets[count] : 1], ["places", "double", 2 * count],
-  ] as const) core.place(name, kind, many, "Laws");
+  core.setAll("Laws", {
+    particle_count: count, piece_count: pieces.length, knot_count: offsets[count], row: KNOT_ROW,
+    book_rows: books.length / 3, surface_count: machine.surfaces.length + 1,
+    engine: enums.Engine.ENGINE_CONTACT, interact: Number(interact), pulley: Number(!!pulley),
+    dt, largest: radius.reduce((most, own) => Math.max(most, own), 0), ...run,
+  });
+  core.work("lay_out_laws");
   core.doubles.set(knots, core.get("knots", "Laws") >> 3);
   core.doubles.set(books, core.get("books", "Laws") >> 3);
   core.ints.set(offsets, core.get("offsets", "Laws") >> 2);
@@ -49,21 +47,8 @@ function judge(core: Core, { machine, knots, offsets, books, ...run }: Run): Bre
     core.fill("bodies", "Body", i, body, "Laws");
   });
   pieces.forEach((row, k) => core.fill("barriers", "Barrier", k, row, "Laws"));
-  const numbers = {
-    particle_count: count, piece_count: pieces.length, row: KNOT_ROW,
-    book_rows: books.length / 3, surface_count: machine.surfaces.length + 1,
-    engine: enums.Engine.ENGINE_CONTACT, interact: Number(interact), pulley: Number(!!pulley),
-    dt, largest: radius.reduce((most, own) => Math.max(most, own), 0), ...run,
-  };
-  for (const [name, value] of Object.entries(numbers)) core.set(name, value, "Laws");
-  for (let room = HITS; room;) {
-    core.place("hits", "Hit", room, "Laws");
-    core.set("hit_room", room, "Laws");
-    core.exports.judge();
-    const found = core.get("hit_count", "Laws");
-    room = found > room ? found : 0;
-  }
-  core.end = end;
+  core.work("judge");
+  core.set("end", end, "Room");
   return core.rows("breaches", "Breach", core.get("breach_count", "Laws"), "Laws") as Breach[];
 }
 

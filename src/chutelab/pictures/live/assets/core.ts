@@ -10,23 +10,11 @@ export type Event = { t: number, x: number, y: number, before: number[], after: 
   normal: number, tangent: number, disk: number, other: number, kind: number,
   surface: number };
 
-const PAGE = 65536;
-
 // Friction without a bound, as a number that can be multiplied by zero.
 const GREATEST = 1e300;
 
 /** Doubles of a knot: t, x, y, vx, vy, spin, three entries of the ledger; and its disk. */
 const KNOT_ROW = 10;
-
-/** Arrays that may become full, and the structs of their rows. */
-const GROWING = {
-  knot: [["knots", "Knot"]],
-  event: [["events", "Event"]],
-  contact: [["contacts", "Contact"], ["earlier", "Contact"], ["links", "int2"]],
-  near: [["near", "int2"]],
-};
-
-const SIZES: Record<string, number> = { double: 8, int: 4, int2: 8 };
 
 /** Compile what a page carries: the core, compressed by zlib. */
 async function compiled(wasm: ArrayBuffer) {
@@ -38,13 +26,12 @@ async function startCore(module: WebAssembly.Module, layout: Layout) {
   return new Core(await WebAssembly.instantiate(module, {}), layout);
 }
 
-/** Structs of which the core has one each, and arrays that their fields point to. */
+/** Structs of which the core has one each, and arrays that their fields point to, which it lays
+ * out. */
 class Memory {
   exports: any;
-  base;
   /** Where the structs of the core's subjects are, by their names. */
   subjects: Record<string, number>;
-  end;
   bytes = new Uint8Array();
   doubles = new Float64Array();
   ints = new Int32Array();
@@ -52,17 +39,24 @@ class Memory {
   constructor(instance: WebAssembly.Instance, readonly layout: Layout) {
     this.exports = instance.exports;
     this.exports._initialize();
-    this.base = this.exports.__heap_base.value;
-    const { world, plan, drawing, laws } = this.exports;
-    this.subjects = { World: world(), Plan: plan(), Drawing: drawing(), Laws: laws() };
-    this.end = this.base;
+    const { room, world, plan, drawing, laws } = this.exports;
+    this.subjects = {
+      Room: room(), World: world(), Plan: plan(), Drawing: drawing(), Laws: laws(),
+    };
     this.look();
   }
 
   /** Free all arrays, and reset all structs. */
   forget() {
-    this.end = this.base;
     Object.keys(this.subjects).forEach((name) => this.reset(name));
+  }
+
+  /** Call a function that may take more memory; the views of it are made anew. */
+  work(name: string, ...numbers: number[]): number {
+    const found = this.exports[name](...numbers);
+    this.look();
+    if (!found) throw new RangeError("The core gets no more memory.");
+    return found;
   }
 
   /** Set all fields of a struct to 0. */
@@ -73,6 +67,7 @@ class Memory {
   /** Look at the memory anew; it moves when it grows. */
   look() {
     const { buffer } = this.exports.memory;
+    if (buffer === this.bytes.buffer) return;
     this.bytes = new Uint8Array(buffer);
     this.doubles = new Float64Array(buffer);
     this.ints = new Int32Array(buffer);
@@ -91,17 +86,9 @@ class Memory {
     else this.ints[at >> 2] = value;
   }
 
-  /** Make room for an array of zeros, to which a field points from now on. */
-  place(name: string, kind: string, count: number, of = "World") {
-    const size = SIZES[kind] ?? this.layout.structs[kind].size;
-    const begin = Math.ceil(this.end / 16) * 16;
-    this.end = begin + size * Math.max(1, count);
-    if (this.end > this.bytes.length) {
-      this.exports.memory.grow(Math.ceil((this.end - this.bytes.length) / PAGE));
-      this.look();
-    }
-    this.bytes.fill(0, begin, this.end);
-    this.set(name, begin, of);
+  /** Set several fields of a struct. */
+  setAll(of: string, values: Record<string, number>) {
+    for (const [name, value] of Object.entries(values)) this.set(name, value, of);
   }
 
   /** The rows of an array, field by field. */
@@ -123,11 +110,6 @@ class Memory {
 class Core extends Memory {
   machine: Machine | null = null;
 
-  makeRoom(what: keyof typeof GROWING, room: number) {
-    for (const [name, kind] of GROWING[what]) this.place(name, kind, room);
-    this.set(`${what}_room`, room);
-  }
-
   /** Fill in fields of one row of an array. */
   fill(name: string, struct: string, row: number, values: Record<string, number | number[]>,
     of = "World") {
@@ -145,44 +127,17 @@ class Core extends Memory {
   begin(machine: Machine) {
     this.machine = machine;
     this.forget();
-    const { interact, releases, rolling } = machine;
-    const n = releases.length;
+    const { releases, rolling, pulley } = machine, kinds = rolling.length;
     const rows = surfaceRows(machine, this.layout.enums.Shape);
-    const kinds = rolling.length;
-    const room = rows.length + machine.arcs.length;
-    const gates = rows.filter(({ opens, closes }) => isFinite(opens) || isFinite(closes)).length;
-    const buckets = interact ? 1 << (32 - Math.clz32(4 * n + 16)) : 1;
-    const cells = interact ? 12 * n + 64 : 1;
-    this.place("disks", "Disk", n);
-    this.place("tracks", "Track", n);
-    this.place("surfaces", "Surface", room);
-    this.place("pairs", "Pair", kinds * (kinds + rows.length));
-    this.place("books", "double", 3 * (machine.surfaces.length + 1));
-    this.place("cells", "Cell", cells);
-    this.place("heads", "int", buckets);
-    this.place("heap", "int", n);
-    this.place("queue", "int", n + 1);
-    this.place("moved", "int", n);
-    this.place("found", "int", 2 * n);
-    this.place("nearby", "int", this.layout.constants.MAX_NEARBY * n);
-    this.place("everything", "int", room);
-    this.place("ends", "int", 2 * room);
-    this.place("spared", "int", 2 * n * gates);
-    this.makeRoom("knot", (releases.some(({ carried }) => carried) ? 100 : 30) * n + 200);
-    this.makeRoom("event", 40 * n + 1200);
-    this.makeRoom("contact", 8 * n + 16);
-    this.makeRoom("near", interact ? 16 * n + 16 : 1);
-    const numbers = {
-      disk_count: n, surface_count: rows.length, kind_count: kinds, material_count: rows.length,
-      owner_count: machine.surfaces.length, bucket_count: buckets, cell_room: cells,
-      interact: Number(interact),
+    this.setAll("World", {
+      disk_count: releases.length, surface_count: rows.length, kind_count: kinds,
+      owner_count: machine.surfaces.length, interact: Number(machine.interact),
       until: this.layout.enums.Until[`UNTIL_${machine.until.toUpperCase()}`],
-      landing: machine.landing, ride_owner: 0,
-      pulley: machine.pulley ? machine.segments.length : -1,
-      ride_incline: machine.pulley ? machine.pulley.incline : 0,
-      g: machine.gravity, dt: machine.dt, end_time: machine.endTime,
-    };
-    for (const [name, value] of Object.entries(numbers)) this.set(name, value);
+      landing: machine.landing, ride_owner: 0, pulley: pulley ? machine.segments.length : -1,
+      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity, dt: machine.dt,
+      end_time: machine.endTime,
+    });
+    this.work("lay_out_world");
     rows.forEach(({ restitution, friction, ...row }, k) => {
       this.fill("surfaces", "Surface", k, row);
       for (let kind = 0; kind < kinds; kind += 1) {
@@ -196,15 +151,14 @@ class Core extends Memory {
       }
     }
     releases.forEach((one, i) => {
-      const [left, right, bottom, top] = machine.exitBoxes[i];
       this.fill("disks", "Disk", i, {
         x: one.x, y: one.y, vx: one.vx, vy: one.vy, spin: machine.spins?.[i] ?? 0, release: one.t,
         radius: machine.radius[i], mass: machine.mass[i], inertia: machine.inertia[i],
         kind: one.kind, rides: Number(one.carried), goes_on: Number(machine.goesOn?.[i] ?? false),
-        exit_box: [left, bottom, right, top],
+        exit_box: one.exitBox,
       });
     });
-    this.exports.prepare();
+    this.work("prepare");
   }
 
   pair(kind: number, column: number, restitution: number, friction: number, rolling: number) {
@@ -213,30 +167,13 @@ class Core extends Memory {
     this.fill("pairs", "Pair", kind * columns + column, row);
   }
 
-  /** Run on for at most so many steps, make room where it is full. What has been written is in
-   * `take`; it has to be taken before the next call. */
+  /** Run on for at most so many steps. What has been written is in `take`; it has to be taken
+   * before the next call. */
   proceed(steps: number): "running" | "done" | "stalled" {
-    const { Status } = this.layout.enums;
-    const status = this.exports.run(steps);
-    // Growing inside the core would move the memory too.
+    const { Status } = this.layout.enums, status = this.exports.run(steps);
     this.look();
-    if (status === Status.DONE) return "done";
-    if (status === Status.STALLED) return "stalled";
-    if (status === Status.FULL_NEAR) this.makeRoom("near", 2 * this.get("near_room"));
-    if (status === Status.FULL_CONTACTS) {
-      // Of what was there, only contacts of the step before are needed.
-      const size = this.get("earlier_count") * this.layout.structs.Contact.size;
-      const earlier = this.bytes.slice(this.get("earlier"), this.get("earlier") + size);
-      this.makeRoom("contact", 2 * this.get("contact_room"));
-      this.bytes.set(earlier, this.get("earlier"));
-    }
-    for (const what of ["knot", "event"] as const) {
-      const full = status === Status[`FULL_${what.toUpperCase()}S`];
-      const room = this.get(`${what}_room`);
-      // Taking many of them has made room.
-      if (full && this.get(`${what}_count`) <= room / 2) this.grow = { what, room: 2 * room };
-    }
-    return "running";
+    if (status === Status.LACKING) throw new RangeError("The core gets no more memory.");
+    return status === Status.DONE ? "done" : status === Status.STALLED ? "stalled" : "running";
   }
 
   /** Take the knots, `KNOT_ROW` doubles each, and the events that have been written. */
@@ -251,8 +188,6 @@ class Core extends Memory {
     const events: Event[] = this.rows("events", "Event", this.get("event_count"));
     this.set("knot_count", 0);
     this.set("event_count", 0);
-    if (this.grow) this.makeRoom(this.grow.what as "knot", this.grow.room);
-    this.grow = null;
     return { knots, events };
   }
 
@@ -291,8 +226,6 @@ class Core extends Memory {
     }
     return new Float64Array(rows);
   }
-
-  grow: { what: string, room: number } | null = null;
 
   /** Why each track ended, see enum Reason; only once the run is done. */
   reasons() {

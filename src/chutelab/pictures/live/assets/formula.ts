@@ -1,4 +1,4 @@
-// Formulas of exercises: trees that Python's parser made of them (`exercises/in_page.py`), and what
+// Formulas of exercises: trees that Python's parser made of them (`exercises/catalogue.py`), and what
 // they know besides an exercise's own names.
 
 import { fixedText } from "./decimal.ts";

@@ -3,7 +3,7 @@
 import { lay } from "./plan.ts";
 import { draw, type Release } from "./releases.ts";
 import { met, type Scene } from "./scene.ts";
-import { RADIANS, modulo, sinCos } from "./trig.ts";
+import { RADIANS } from "./trig.ts";
 
 export interface Segment {
   x: number; // first end, m
@@ -51,7 +51,6 @@ export interface Machine {
   endTime: number; // s
   dt: number; // s
   interact: boolean;
-  exitBoxes: [number, number, number, number][]; // left, right, bottom, top, m, of each
   segments: Segment[];
   arcs: Arc[];
   pulley: Pulley | null;
@@ -64,9 +63,6 @@ export interface Machine {
   pairFriction: number[][];
   rolling: number[]; // by kind
 }
-
-/** m below the lowest surface, or outside the box of all without gravity, where a track ends. */
-export const EXIT_MARGIN = 1.0;
 
 /**
  * Builds the machine of a scene.
@@ -103,7 +99,6 @@ export function build(scene: Scene): Machine {
     endTime: typeof run.until === "string" ? bound : Math.min(bound, run.until),
     dt: run.dt,
     interact: scene.crowded,
-    exitBoxes: exitBoxes(scene, segments, arcs, releases),
     segments,
     arcs,
     pulley: belt === null ? null : {
@@ -145,42 +140,4 @@ function heft(scene: Scene, releases: Release[], radius: number[]) {
     inertia.push(moment * one.mass * (one.radius * one.radius) * (cube * square));
   }
   return { mass, inertia };
-}
-
-/**
- * Returns left, right, bottom and top beyond which each particle has left the scene.
- * With gravity only the bottom is finite: what flies up comes back. Where particles do not meet the
- * box of each holds its own release, else those of all.
- */
-function exitBoxes(
-  scene: Scene, segments: Segment[], arcs: Arc[], releases: Release[],
-): [number, number, number, number][] {
-  const wheel = scene.incoming === null ? -Infinity : scene.incoming.pulley_radius;
-  let [left, right, bottom, top] = [-wheel, wheel, -wheel, wheel];
-  const hold = (x: number, y: number) => {
-    left = Math.min(left, x);
-    right = Math.max(right, x);
-    bottom = Math.min(bottom, y);
-    top = Math.max(top, y);
-  };
-  for (const { x, y, tx, ty, length } of segments) {
-    hold(x, y);
-    hold(x + length * tx, y + length * ty);
-  }
-  for (const { x, y, radius, begin, extent } of arcs) {
-    const angles = [begin, begin + extent];
-    for (let n = 0; n < 4; n++) {
-      const reach = modulo(0.5 * Math.PI * n - begin, 2.0 * Math.PI);
-      if (reach <= extent) angles.push(begin + reach);
-    }
-    for (const angle of angles) {
-      const [sine, cosine] = sinCos(angle);
-      hold(x + radius * cosine, y + radius * sine);
-    }
-  }
-  if (scene.crowded) releases.forEach(({ x, y }) => hold(x, y));
-  return releases.map(({ x, y }) => scene.gravity
-    ? [-Infinity, Infinity, Math.min(bottom, y) - EXIT_MARGIN, Infinity]
-    : [Math.min(left, x) - EXIT_MARGIN, Math.max(right, x) + EXIT_MARGIN,
-      Math.min(bottom, y) - EXIT_MARGIN, Math.max(top, y) + EXIT_MARGIN]);
 }

@@ -13,9 +13,6 @@ type Arc = { center: Point, radius: number, begin: number, extent: number, speed
 /** Numbers of what keys may say in words; `drop_from` as in layout.h. */
 const WORDS: Record<string, number> = { adhesion: Infinity, impact: 0.0, top: 1.0 };
 
-/** Segments and arcs for which there is room at first. */
-const ROOM = 64;
-
 /** The core of this thread. */
 let core: Memory;
 
@@ -74,31 +71,23 @@ function rowOf(scene: Scene): number[] {
  */
 export function lay(scene: Scene): { segments: Segment[], arcs: Arc[] } {
   const row = rowOf(scene);
-  let [segments, arcs] = [ROOM, ROOM];
-  for (let done = false; !done;) {
-    core.forget();
-    for (const [name, kind, count] of [
-      ["rows", "double", row.length], ["nominal", "Nominal", 1], ["segments", "Segment", segments],
-      ["arcs", "Arc", arcs],
-    ] as const) core.place(name, kind, count, "Plan");
-    core.doubles.set(row, core.get("rows", "Plan") >> 3);
-    for (const [name, count] of Object.entries({
-      members: 1, width: row.length, particles: scene.particles.length,
-      streams: scene.streams.length, incoming: Number(scene.incoming !== null),
-      plates: scene.plates.length, outgoing: Number(scene.outgoing !== null),
-      conveyors: scene.conveyor.length, surfaces: scene.surface.length, segment_room: segments,
-      arc_room: arcs,
-    })) core.set(name, count, "Plan");
-    done = core.exports.build() === 1;
-    [segments, arcs] = [core.get("segment_count", "Plan"), core.get("arc_count", "Plan")];
-  }
+  core.forget();
+  core.setAll("Plan", {
+    members: 1, width: row.length, particles: scene.particles.length,
+    streams: scene.streams.length, incoming: Number(scene.incoming !== null),
+    plates: scene.plates.length, outgoing: Number(scene.outgoing !== null),
+    conveyors: scene.conveyor.length, surfaces: scene.surface.length,
+  });
+  core.work("lay_out_plan");
+  core.doubles.set(row, core.get("rows", "Plan") >> 3);
+  core.work("build");
   const [{ contradiction }] = core.rows("nominal", "Nominal", 1, "Plan");
   if (contradiction === core.layout.enums.Contradiction.NO_LENGTH) {
     const plate = scene.plates.find(({ pivot }) => pivot === undefined);
     throw new Fault("plate.above", plate?.above, "no-length");
   }
   return {
-    segments: core.rows("segments", "Segment", segments, "Plan"),
-    arcs: core.rows("arcs", "Arc", arcs, "Plan"),
+    segments: core.rows("segments", "Segment", core.get("segment_count", "Plan"), "Plan"),
+    arcs: core.rows("arcs", "Arc", core.get("arc_count", "Plan"), "Plan"),
   };
 }

@@ -348,7 +348,6 @@ class Recording {
     });
     return {
       ...machine, releases, spins, goesOn: renamed.map((its) => its.goesOn),
-      exitBoxes: renamed.map(({ index }) => machine.exitBoxes[index]),
       radius: some(machine.radius), mass: some(machine.mass), inertia: some(machine.inertia),
       segments: machine.segments.map(gate), arcs: machine.arcs.map(gate),
       endTime: Math.max(0, machine.endTime - t),

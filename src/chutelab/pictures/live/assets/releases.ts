@@ -9,6 +9,7 @@ export interface Release {
   y: number;
   vx: number; // m/s
   vy: number;
+  exitBox: number[]; // left, bottom, right, top beyond which it has left the scene, m
   carried: boolean; // rides the incoming belt by adhesion
   stream: number;
   kind: number;
@@ -28,18 +29,7 @@ const LOOKS = 2 ** 31 - 1;
  */
 export function draw(scene: Scene, names: string[]): { releases: Release[], radius: number[] } {
   const core = memory(), { Refused, Status } = core.layout.enums, { streams, kinds } = scene;
-  const count = streams.reduce((all, stream) => all + stream.count, 0);
-  const heads = 1 << (32 - Math.clz32(2 * count));
-  const pieces = core.get("segment_count", "Plan") + core.get("arc_count", "Plan") + 1
-    + 2 * scene.conveyor.length;
-  for (const [name, kind, many] of [
-    ["starts", "Start", count], ["refusals", "Refusal", 1], ["carried", "int", streams.length],
-    ["near", "Near", count], ["links", "int", count], ["heads", "int", heads],
-    ["listed", "int", pieces],
-  ] as const) core.place(name, kind, many, "Drawing");
-  for (const [name, value] of Object.entries({ count, head_room: heads, looks: LOOKS })) {
-    core.set(name, value, "Drawing");
-  }
+  core.set("looks", LOOKS, "Drawing");
   while (core.exports.draw() === Status.PAUSED);
   const [refusal]: Refusal[] = core.rows("refusals", "Refusal", 1, "Drawing");
   if (refusal.why !== Refused.ACCEPTED) throw faultOf(scene, refusal, names);
@@ -52,7 +42,7 @@ export function draw(scene: Scene, names: string[]): { releases: Release[], radi
     for (let i = 0; i < one.count; i += 1, at += core.layout.structs.Start.size >> 3) {
       releases.push({
         t: doubles[at], x: doubles[at + 1], y: doubles[at + 2], vx: doubles[at + 3],
-        vy: doubles[at + 4], ...common,
+        vy: doubles[at + 4], exitBox: [...doubles.subarray(at + 6, at + 10)], ...common,
       });
       radius.push(doubles[at + 5]);
     }

@@ -1,5 +1,5 @@
 // Where a body leaves the pulley of a level belt that grips with finite friction, as Python's
-// `theory/separation.py`; without its spin, which takes a quadrature.
+// `theory/slide.py`; without its spin, which takes a quadrature.
 
 /** Newton rounds; fewer than 20 are ever used. */
 const MOST_ROUNDS = 100;

@@ -1,6 +1,7 @@
 // Between the world, m with y up, and the picture, pixels with y down.
 
-import { EXIT_MARGIN, type Machine, type Segment } from "./machine.ts";
+import type { Machine, Segment } from "./machine.ts";
+import { memory } from "./plan.ts";
 
 type Box = { left: number, bottom: number, right: number, top: number };
 
@@ -98,11 +99,12 @@ function boxOf(
   }
   if (machine.pulley) widen(0, 0, machine.pulley.radius);
   let [west, east, south, north] = [Infinity, -Infinity, Infinity, -Infinity];
-  for (const [left, right, bottom, top] of machine.exitBoxes) {
-    west = Math.min(west, left + EXIT_MARGIN);
-    east = Math.max(east, right - EXIT_MARGIN);
-    south = Math.min(south, bottom + EXIT_MARGIN);
-    north = Math.max(north, top - EXIT_MARGIN);
+  const { EXIT_MARGIN: margin } = memory().layout.constants;
+  for (const { exitBox: [left, bottom, right, top] } of machine.releases) {
+    west = Math.min(west, left + margin);
+    east = Math.max(east, right - margin);
+    south = Math.min(south, bottom + margin);
+    north = Math.max(north, top - margin);
   }
   // Without a surface nothing is left.
   const all = !machine.segments.length && !machine.arcs.length;

@@ -1,4 +1,4 @@
-"""Pictures of many runs: a search over one key, the spread of uncertain inputs, sweeps.
+"""Pictures of many runs: searches, uncertainty, sweeps, measured points, run time against error.
 
 A sweep is drawn as lines over one varied key, a heat map over two, dots for samples.
 """
@@ -6,24 +6,44 @@ A sweep is drawn as lines over one varied key, a heat map over two, dots for sam
 from __future__ import annotations
 
 from collections import Counter
-from textwrap import fill, shorten
+from collections.abc import Mapping, Sequence
+from math import ceil, floor, log10
+from textwrap import fill, shorten, wrap
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
 from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
+from chutelab.checks.workprecision import METHODS, Timing
+from chutelab.pictures import BLUE, GREEN, ORANGE, SKY
 from chutelab.pictures.plots import style
+from chutelab.pictures.plots.machinery import draw_scene
+from chutelab.pictures.plots.panels import analytic_of, draw_analytic
+from chutelab.pictures.plots.scenery import (
+    FAR,
+    FINE,
+    around,
+    path_of,
+    struck_by_nominal,
+    window_of,
+)
 from chutelab.pictures.plots.style import Picture
-from chutelab.scene.units import symbol, with_unit
+from chutelab.results import Kind, Recording
+from chutelab.scene.units import symbol, with_unit, write_size
 from chutelab.studies.design import Solution, Uncertainty
+from chutelab.studies.measured import Fit, Residuals
+from chutelab.studies.measured.result import plus_minus
+from chutelab.studies.measured.track import counted
 from chutelab.studies.sweep import COLUMNS, REASON, Sweep, no_column
 from chutelab.studies.sweep.rows import RARE
 from chutelab.util.arrays import Bools, Floats
+from chutelab.util.versions import PACKAGES
 
-SIZE = (9.0, 5.6)
 BARS = (style.TRACK, style.STREAM)
 KINDS = (style.STREAM, style.ANALYTIC, style.BELT, style.STRIKE, style.STEEL)
 """Colours of the kinds of outcome; the last one also of all that follow."""
@@ -40,7 +60,7 @@ def scan(solution: Solution) -> Picture:
     ValueError
         If several keys were varied.
     """
-    figure = Picture(SIZE)
+    figure = Picture((9.0, 5.6))
     ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
     draw_scan(ax, solution)
     _titles(figure, solution.base.title, solution.asked)
@@ -199,9 +219,6 @@ def _titles(figure: Picture, title: str, text: str, wide: int = 95) -> None:
     figure.remark(0.02, 1.0 - 0.47 / height, fill(text, wide))
 
 
-SWEEP_SIZE = (8.6, 5.4)
-"""Width and height of the figure, inches."""
-
 MOST_LINES, DOTS = 8, 60
 """Values of a second key up to which each has a line (more make a heat map), and values up to which
 a line shows where they are."""
@@ -221,7 +238,7 @@ def sweep_figure(swept: Sweep, column: str) -> Picture:
     """
     if column not in COLUMNS:
         raise ValueError(no_column(column))
-    figure = Picture(SWEEP_SIZE)
+    figure = Picture((8.6, 5.4))
     draw_sweep(figure.add_subplot(), swept, column)
     figure.subplots_adjust(left=0.115, right=0.97, top=0.86, bottom=0.18)
     figure.headline(0.03, 0.955, swept.title)
@@ -294,11 +311,11 @@ def _draw_lines(ax: Axes, x: Floats, others: Floats, z: Floats) -> None:
     values = np.unique(others)
     shades = mpl.colormaps[COLORS](np.linspace(0.0, LIGHTEST, len(values)))
     for value, shade in zip(values.tolist(), shades, strict=True):
-        mine = np.flatnonzero(others == value)
-        mine = mine[np.argsort(x[mine], kind="stable")]
+        chosen = np.flatnonzero(others == value)
+        chosen = chosen[np.argsort(x[chosen], kind="stable")]
         ax.plot(
-            x[mine], z[mine], color=shade if len(values) > 1 else style.TRACK, linewidth=1.8,
-            marker="o" if len(mine) <= DOTS else "", markersize=4.0, label=f"{value:g}",
+            x[chosen], z[chosen], color=shade if len(values) > 1 else style.TRACK, linewidth=1.8,
+            marker="o" if len(chosen) <= DOTS else "", markersize=4.0, label=f"{value:g}",
         )  # fmt: skip
 
 
@@ -337,3 +354,220 @@ def _edges(middles: Floats) -> Floats:
         return np.array([middles[0] - 0.5, middles[0] + 0.5])
     first, last = 2.0 * middles[0] - between[0], 2.0 * middles[-1] - between[-1]
     return np.concatenate([[first], between, [last]])
+
+
+PARAMETERS = 6
+"""Fitted parameters that are written into the figure."""
+
+POINTS: dict[str, Any] = {"ls": "none", "marker": "+", "ms": 7.0, "mew": 1.3}
+"""How measured points are drawn."""
+
+
+def measured(found: Residuals, fit: Fit | None = None) -> Picture:
+    """Draw a measured track over the simulation and its analytic parabola, and the residuals.
+
+    With a fit, whose residuals are its `after`, also the track before it and the fitted values.
+    """
+    figure = Picture((13.0, 7.6))
+    lines = 0 if fit is None else min(len(fit.parameters), PARAMETERS)
+    top = 0.88 - 0.032 * max(0, lines - 1)
+    view = figure.add_axes((0.06, 0.08, 0.5, 0.8))
+    draw_measured(view, found, None if fit is None else fit.before.recording)
+    grid = figure.add_gridspec(2, 1, left=0.64, right=0.985, top=top, bottom=0.08, hspace=0.3)
+    upper = figure.add_subplot(grid[0])
+    draw_residuals(upper, found, 0)
+    upper.set_xlabel("")
+    draw_residuals(figure.add_subplot(grid[1]), found, 1)
+    figure.headline(0.06, 0.965, found.recording.title, 60)
+    said = [f"{len(found.track)} measured points, nothing fitted"]
+    if fit is not None:
+        fitted = zip(fit.parameters[:PARAMETERS], fit.values, fit.errors, strict=False)
+        said = [
+            f"{one.key} = {plus_minus(x, error)} {one.unit}".rstrip() for one, x, error in fitted
+        ]
+    for i, text in enumerate(said):
+        figure.remark(0.985, 0.965 - 0.032 * i, text, ha="right", va="center")
+    return figure
+
+
+def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -> Axes:
+    """Draw the machine, the simulated track, the analytic parabola, and the measured points.
+
+    The run that a fit started from is dotted.
+    """
+    recording, position = found.recording, found.track.position
+    window = window_of(recording)
+    far = window.padded(*[FAR] * 4)
+    corners = np.array([[window.left, window.bottom], [window.right, window.top]])
+    style.dress(ax, "x, m", "y, m")
+    shown = far.holds(position)
+    draw_scene(ax, recording.machine, around(np.concatenate([corners, position[shown]])))
+    parts, _ = analytic_of(recording)
+    draw_analytic(ax, parts)
+    for run, gid, colour, line, label in (
+        (before, "before", style.MUTED, ":", "before the fit"),
+        (recording, "track", style.TRACK, "-", "simulation"),
+    ):
+        if run is not None:
+            path = path_of(run, 0, FINE * float(np.ptp(ax.get_xlim())))
+            ax.plot(*path.T, line, color=colour, lw=1.6, zorder=5.0, gid=gid, label=label)
+    for chosen, colour, label in (
+        (found.used, style.STRIKE, "measured"),
+        (~found.used, style.STEEL, "measured, left out"),
+    ):
+        if chosen.any():
+            points = {**POINTS, "color": colour, "gid": label, "label": label}
+            ax.plot(*position[chosen].T, **points, zorder=8.0)
+    if not shown.all():
+        ax.text(
+            0.5, 0.97, f"{counted(int((~shown).sum()), 'point')} outside the picture",
+            transform=ax.transAxes, fontsize=style.NORMAL, color=style.STRIKE,
+            horizontalalignment="center", verticalalignment="top",
+        )  # fmt: skip
+    style.legend_above(ax, 3)
+    return ax
+
+
+def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
+    """Draw measured minus simulated x (axis 0) or y (axis 1) over time, with the impacts."""
+    used = found.used
+    times, values = found.track.t[used], found.values[used, axis]
+    factor, unit = style.scaled(values, "m")
+    name, rms = "xy"[axis], found.rms[axis]
+    style.dress(
+        ax,
+        "time, s",
+        f"residual in {name}, {unit}",
+        f"Measured − simulated {name}: RMS {write_size(rms, 'm')}",
+    )
+    ax.axhspan(-factor * rms, factor * rms, color=style.STEEL_LIGHT, zorder=0.5, gid="rms")
+    ax.axhline(0.0, color=style.TRACK, linewidth=1.6, zorder=2.0)
+    points = {**POINTS, "color": style.STRIKE, "gid": f"residual {name}"}
+    ax.plot(times, factor * values, **points, zorder=3.0)
+    bottom, top = ax.get_ylim()
+    ax.set_ylim(bottom, top + 0.12 * (top - bottom))
+    style.note(ax, "grey: ± RMS")
+    low, high = float(times[0]), float(times[-1])
+    margin = 0.03 * (high - low)
+    ax.set_xlim(low - margin, high + margin)
+    for event in struck_by_nominal(found.recording)[:10]:
+        if low - margin <= event["t"] <= high + margin:
+            ax.axvline(event["t"], color=style.MUTED, linewidth=1.0, linestyle=":", zorder=1.0)
+            ax.annotate(
+                Kind(event["kind"]).name.lower(),
+                (event["t"], 1.0), xycoords=("data", "axes fraction"), xytext=(-3, -3),
+                textcoords="offset points", fontsize=style.SMALL, color=style.MUTED,
+                horizontalalignment="right", verticalalignment="top",
+            )  # fmt: skip
+    return ax
+
+
+WIDTH, PANEL = 8.5, 3.6
+"""Width of the figure and height of the panel, inches."""
+
+LINE, HEAD, FOOT = 0.19, 0.5, 0.9
+"""Height of a line of text, over the panel and under it, inches."""
+
+LEFT, RIGHT = 0.9, 2.1
+"""Room left of the panel, and right of it for the legend, inches."""
+
+CHARACTERS = 105
+"""Characters of small text that go into a line."""
+
+LOOKS: dict[str, dict[str, Any]] = {
+    "fixed": {"color": ORANGE, "marker": "s", "markersize": 9.0},
+    "pymunk": {"color": GREEN, "marker": "o", "markersize": 6.5},
+    "contact": {"color": SKY, "marker": "P", "markersize": 8.0},
+    "exact": {"color": BLUE, "marker": "*", "markersize": 15.0},
+}
+"""Colour and marker of each method: readers need not tell the colours apart. In the order of
+drawing: of two at one place, the upper is the smaller."""
+
+TITLES = {"pymunk": "pymunk, aligned", "fixed": "pymunk, fixed step"}
+
+
+def workprecision(timings: Sequence[Timing], title: str, about: Mapping[str, str]) -> Picture:
+    """Draw run time against error, and below it what failed and what it ran on (`about`)."""
+    below = failures(timings, CHARACTERS)
+    said = [f"{key} {value}" if key in PACKAGES else value for key, value in about.items()]
+    below += wrap(" · ".join(said), CHARACTERS)
+    height = HEAD + PANEL + FOOT + LINE * len(below)
+    figure = Picture((WIDTH, height))
+    width = WIDTH - LEFT - RIGHT
+    box = (LEFT / WIDTH, 1.0 - (HEAD + PANEL) / height, width / WIDTH, PANEL / height)
+    ax = style.dress(figure.add_axes(box), "relative error", "run time, s", title)
+    draw_timings(ax, timings)
+    top = (0.2 + LINE * len(below)) / height
+    figure.remark(0.2 / WIDTH, top, "\n".join(below), fontsize=style.SMALL, gid="below")
+    return figure
+
+
+def draw_timings(ax: Axes, timings: Sequence[Timing]) -> Axes:
+    """Draw a line for each method; left is more accurate, down is faster."""
+    ax.set(xscale="log", yscale="log")
+    drawn: list[tuple[float, float]] = []
+    for method, look in LOOKS.items():
+        xy = [
+            (one.error, one.median)
+            for one in timings
+            if one.method == method and one.error is not None and one.median is not None
+        ]
+        if xy:
+            ax.plot(
+                *zip(*xy, strict=True), **look, linewidth=1.8, markeredgecolor="white",
+                markeredgewidth=0.8, gid=method, label=TITLES.get(method, method),
+            )  # fmt: skip
+        drawn += xy
+    decades(ax.xaxis, [error for error, _ in drawn], 7)
+    decades(ax.yaxis, [time for _, time in drawn], 6)
+    if drawn:
+        ax.legend(
+            loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=style.SMALL, frameon=False,
+        )  # fmt: skip
+    return ax
+
+
+def decades(
+    axis: Axis, values: Sequence[float], ticks: int, limits: tuple[float, float] | None = None
+) -> None:
+    """Set limits a bit around values, with powers of ten as ticks, at most so many."""
+    axis.set_minor_locator(NullLocator())
+    if not values:
+        axis.set_ticks([])
+        return
+    low, high = (log10(end) for end in limits or (min(values), max(values)))
+    if limits is None:
+        room = max(0.08 * (high - low), 0.3)
+        low, high = low - room, high + room
+    first, last = ceil(low), floor(high)
+    if last <= first:  # one power of ten alone tells nothing of the scale
+        low = first = floor(low)
+        last = first + 1
+        high = max(high, last)
+    step = ceil((last - first + 1) / ticks)
+    axis.set_view_interval(10.0**low, 10.0**high, ignore=True)
+    axis.set_major_locator(FixedLocator([10.0**k for k in range(last, first - 1, -step)]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
+
+
+def _power(value: float) -> str:
+    """Return a power of ten; those near 1 in full.
+
+    >>> _power(0.001), _power(1e-05), _power(1000.0)
+    ('0.001', '$10^{-5}$', '1000')
+    """
+    power = round(log10(value))
+    return f"{10.0**power:g}" if -3 <= power <= 3 else f"$10^{{{power}}}$"
+
+
+def failures(timings: Sequence[Timing], width: int) -> list[str]:
+    """Name what failed, in lines of at most `width` characters: with which steps, and why."""
+    lines = []
+    for method in METHODS:
+        failed = [one for one in timings if one.method == method and one.failed]
+        for why in dict.fromkeys(one.failed for one in failed):
+            steps = [f"{one.value:.2g}" for one in failed if one.failed == why and one.value]
+            at = f" at dt {', '.join(steps)}" if steps else ""
+            line = f"✕ {TITLES.get(method, method)}{at}: {why}"
+            lines += wrap(line, width, subsequent_indent="    ")
+    return lines

@@ -1,0 +1,34 @@
+#include <string.h>
+#include "layout.h"
+#include "memory.h"
+
+#define PAGE 65536.0
+#define MOST 4294901760.0 /* bytes that addresses of 32 bits reach, in whole pages */
+
+extern unsigned char __heap_base;
+
+static Room R;
+
+/* Up to where memory has been in use: beyond it is zero. */
+static double used;
+
+EXPORT Room *room(void) { return &R; }
+
+void *reserve(double count, unsigned size) {
+    double bytes = size * count, have = PAGE * __builtin_wasm_memory_size(0);
+    double begin = R.end > 0.0 ? R.end : (double)(unsigned long)&__heap_base;
+    begin = 16.0 * (double)(unsigned long)((begin + 15.0) / 16.0);
+    double to = begin + (bytes > 1.0 ? bytes : 1.0);
+    unsigned long pages = to > have ? (unsigned long)((to - have + PAGE - 1.0) / PAGE) : 0;
+    if (to > MOST || (pages && __builtin_wasm_memory_grow(0, pages) == (unsigned long)-1)) {
+        R.lacks = 1;
+        return 0;
+    }
+    void *place = (void *)(unsigned long)begin;
+    if (begin < used) memset(place, 0, (unsigned long)((used < to ? used : to) - begin));
+    used = used > to ? used : to;
+    R.end = to;
+    return place;
+}
+
+int has_room(void) { return !R.lacks; }

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, Status, borrow, constants, dtype, give_back
-from chutelab.machine import Machine, moved, origin
+from chutelab.machine import Machine, Pieces, moved, origin
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
@@ -70,27 +70,23 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     return recording
 
 
+def parts(machine: Machine) -> dict[str, Pieces]:
+    """Return the parts of all surfaces in the order of the core's, by the names of their shapes."""
+    rim = {} if machine.pulley is None else {"CIRCLE": machine.pulley.rim}
+    return {"SEGMENT": machine.segments, **rim, "ARC": machine.arcs}
+
+
 def pieces(machine: Machine) -> NDArray[Any]:
-    """Return all surfaces, segments, pulley and arcs, as rows of the core, as far as it asks."""
-    seg, arcs, wheel = machine.segments, machine.arcs, machine.pulley
-    s, w = len(seg.length), int(wheel is not None)
-    rows = np.zeros(s + w + len(arcs.surface), dtype("Surface"))
-    shapes = constants("Shape")
-    flat, bent = rows[:s], rows[s + w :]
-    for some, its in ((flat, seg), (bent, arcs)):
-        some["speed"], some["owner"] = its.speed, its.surface
-        some["opens"], some["closes"] = its.appears, its.vanishes
-    flat["x"], flat["y"] = seg.start.T
-    flat["tx"], flat["ty"] = seg.tangent.T
-    flat["length"] = seg.length
-    if wheel is not None:
-        rows["shape"][s] = shapes["CIRCLE"]
-        rows["radius"][s], rows["speed"][s] = wheel.radius, wheel.speed
-        rows["owner"][s] = wheel.surface
-        rows["opens"][s], rows["closes"][s] = -inf, inf
-    bent["shape"] = shapes["ARC"]
-    bent["x"], bent["y"] = arcs.center.T
-    bent["radius"], bent["begin"], bent["extent"] = arcs.radius, arcs.begin, arcs.extent
+    """Return all surfaces as rows of the core, as far as it asks."""
+    rows = np.zeros(sum(part.surface.size for part in parts(machine).values()), dtype("Surface"))
+    first = 0
+    for shape, part in parts(machine).items():
+        own = rows[first : (first := first + part.surface.size)]
+        own["shape"] = constants("Shape")[shape]
+        own["speed"], own["owner"] = part.speed, part.surface
+        own["opens"], own["closes"] = part.appears, part.vanishes
+        for name, values in part.told().items():
+            own[name] = values
     return rows
 
 
@@ -142,14 +138,12 @@ class Job:
         module.array("surfaces", dtype("Surface"), len(self.pieces))[:] = self.pieces
         pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials))
         pairs = pairs.reshape(self.kinds, -1)
-        own, wheel = pairs[:, : self.kinds], machine.pulley
+        own = pairs[:, : self.kinds]
         own["restitution"], own["friction"] = machine.pair_restitution, machine.pair_friction
         own["rolling"] = np.maximum.outer(machine.rolling, machine.rolling)
         others = pairs[:, self.kinds :]
         for name in ("restitution", "friction"):
-            values = [getattr(machine.segments, name), getattr(machine.arcs, name)]
-            if wheel is not None:
-                values.insert(1, np.asarray(getattr(wheel, name))[..., None])
+            values = [getattr(part, name) for part in parts(machine).values()]
             values = [np.broadcast_to(each, (self.kinds, each.shape[-1])) for each in values]
             others[name] = np.concatenate(values, axis=1)
         others["rolling"] = machine.rolling[:, None]

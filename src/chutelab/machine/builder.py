@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, inf
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from chutelab.core.module import borrow, constants, give_back
 from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Thread
 from chutelab.machine.releases import RefusedError, Releases, draw
 from chutelab.machine.rows import lay
-from chutelab.machine.shapes import Arcs, Segments
+from chutelab.machine.shapes import KINDS, Pieces
 from chutelab.scene import Fault, Plate, Scene
 from chutelab.scene.units import polygon_moment
 from chutelab.scene.variants import Family
@@ -58,8 +58,10 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         releases, radius = draw(module, scenes, watch)
     finally:
         give_back(module)
-    segments = _pieces(Segments, laid.segments, met, kinds)
-    arcs = _pieces(Arcs, laid.arcs, met, kinds) if laid.arcs.size else NO_ARCS
+    parts: dict[str, Any] = {
+        name: _pieces(KINDS[kind], rows, met, kinds)
+        for kind, (name, rows) in zip(KINDS, laid.parts.items(), strict=True)
+    }
     belt, particles = scene.incoming, scene.particles
     until: Any = value(scene.run, "until")
     worded = isinstance(until, str)
@@ -86,8 +88,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         surfaces=names,
         gravity=value(scene, "gravity"),
         particle=particle,
-        segments=segments,
-        arcs=arcs,
+        **parts,
         pulley=pulley,
         releases=releases,
         landing=names.index("outgoing") if "outgoing" in names else -1,
@@ -110,14 +111,16 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
 Met = Sequence[Sequence[tuple[Any, Any]]]
 """Restitution and friction of each surface with each kind of particles; numbers or arrays (N,)."""
 
-Some = TypeVar("Some", Segments, Arcs)
 
 SHARED = ("surface", "appears", "vanishes")
 """What pieces have alike in all scenes of a family."""
 
 
-def _pieces(kind: type[Some], rows: NDArray[Any], met: Met, kinds: int) -> Some:
-    """Return segments or arcs of their rows, (S,) or of a family (N, S)."""
+def _pieces(kind: type[Pieces], rows: NDArray[Any], met: Met, kinds: int) -> Pieces:
+    """Return one kind of pieces of their rows, (S,) or of a family (N, S)."""
+    shape = rows.shape[:-1]
+    if not rows.size:
+        rows = rows.reshape(-1)  # no piece of a family is none of one scene
     known = [name for name in kind.__dataclass_fields__ if name in (rows.dtype.names or ())]
     own = {name: rows[name] for name in known}
     if rows.ndim > 1:
@@ -127,29 +130,13 @@ def _pieces(kind: type[Some], rows: NDArray[Any], met: Met, kinds: int) -> Some:
             for name, array in own.items()
         }
     surface = own["surface"].astype(np.int64)
-    values = np.empty((2, len(met), kinds, *rows.shape[:-1]))
+    values = np.empty((2, len(met), kinds, *shape))
     for number, pairs in enumerate(met):
         for n, pair in enumerate(pairs):
             values[0, number, n], values[1, number, n] = pair
     values = values[:, surface]
     restitution, friction = values[:, :, 0] if kinds == 1 else values
     return kind(**own | {"surface": surface}, restitution=restitution.T, friction=friction.T)
-
-
-_NOTHING = np.empty(0)
-NO_ARCS = Arcs(
-    center=np.empty((0, 2)),
-    radius=_NOTHING,
-    begin=_NOTHING,
-    extent=_NOTHING,
-    speed=_NOTHING,
-    restitution=_NOTHING,
-    friction=_NOTHING,
-    surface=np.empty(0, dtype=np.int64),
-    appears=_NOTHING,
-    vanishes=_NOTHING,
-)
-"""Of a machine of straight surfaces only."""
 
 
 def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Particle:

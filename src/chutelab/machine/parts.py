@@ -110,6 +110,14 @@ class Pulley:
     surface: int
     incline: float = 0.0
 
+    @property
+    def rim(self) -> Arcs:
+        """Its surface, one piece: (1,), or in a family (N, 1)."""
+        own = {**vars(self), "begin": 0.0, "extent": 2.0 * pi, "appears": -inf, "vanishes": inf}
+        del own["incline"]
+        arrays = {name: np.asarray(value)[..., None] for name, value in own.items()}
+        return Arcs(center=np.zeros((1, 2)), **arrays)
+
 
 @dataclass(frozen=True)
 class Thread:
@@ -203,12 +211,7 @@ class Machine:
     def pieces(self) -> tuple[Pieces, ...]:
         """All pieces of its surfaces one by one: straight ones, arcs, and the drive pulley last."""
         found = [part.of(k) for part in self.parts for k in range(len(part.surface))]
-        if (wheel := self.pulley) is not None:
-            own = {**vars(wheel), "center": [0.0, 0.0], "begin": 0.0, "extent": 2.0 * pi}
-            own |= {"appears": -inf, "vanishes": inf}
-            del own["incline"]
-            found.append(Arcs(**{name: np.asarray(value)[()] for name, value in own.items()}))
-        return tuple(found)
+        return (*found, self.pulley.rim.of(0)) if self.pulley is not None else (*found,)
 
     @property
     def names(self) -> list[str]:

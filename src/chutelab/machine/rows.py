@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
-from math import inf, nan
+from math import inf, nan, prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, dtype
+from chutelab.machine.shapes import KINDS
 from chutelab.scene import Scene
 from chutelab.scene.variants import Family
 from chutelab.util.arrays import Numbers
@@ -85,16 +86,13 @@ class Laid:
 
     Attributes
     ----------
-    segments : ndarray, (S,) or (N, S)
-        Rows as `Segment` in layout.h.
-    arcs : ndarray, (A,) or (N, A)
-        As `Arc`.
+    parts : dict of ndarray, (S,) or (N, S)
+        For each of `KINDS` rows as that in layout.h, by the part of a machine.
     nominal : ndarray, () or (N,)
         As `Nominal`.
     """
 
-    segments: NDArray[Any]
-    arcs: NDArray[Any]
+    parts: dict[str, NDArray[Any]]
     nominal: NDArray[Any]
 
 
@@ -116,12 +114,13 @@ def lay(module: Module, scenes: Scene | Family, friction: Numbers) -> Laid:
         rows[:, column] = numbers[column]
     module.work("build")
     plan = module.structs["Plan"]
-    found = (
-        module.array(name, dtype(struct), every * count, of="Plan").copy().reshape((*shape, *more))
-        for name, struct, count, more in (
-            ("segments", "Segment", plan.segment_count, (plan.segment_count,)),
-            ("arcs", "Arc", plan.arc_count, (plan.arc_count,)),
-            ("nominal", "Nominal", 1, ()),
-        )
-    )
-    return Laid(*found)
+
+    def found(name: str, kind: str, *count: int) -> NDArray[Any]:
+        rows = module.array(name, dtype(kind), every * prod(count), of="Plan")
+        return rows.copy().reshape((*shape, *count))
+
+    parts = {
+        f"{kind.lower()}s": found(f"{kind.lower()}s", kind, getattr(plan, f"{kind.lower()}_count"))
+        for kind in KINDS
+    }
+    return Laid(parts, found("nominal", "Nominal"))

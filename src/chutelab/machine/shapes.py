@@ -124,6 +124,10 @@ class Pieces(ABC):
         """Return the points (P, 2) through which to draw one piece, m, as `at` has them."""
 
     @abstractmethod
+    def told(self) -> dict[str, Floats]:
+        """Return the numbers (..., S) that say where they are, under the core's names."""
+
+    @abstractmethod
     def where(self) -> str:
         """Say where one piece is."""
 
@@ -195,6 +199,10 @@ class Segments(Pieces):
 
     def path(self) -> Floats:
         return np.stack(self.ends)
+
+    def told(self) -> dict[str, Floats]:
+        (x, y), (tx, ty) = np.moveaxis(self.start, -1, 0), np.moveaxis(self.tangent, -1, 0)
+        return {"x": x, "y": y, "tx": tx, "ty": ty, "length": self.length}
 
     def where(self) -> str:
         # Rounding leaves 1e-17 where 0 is meant.
@@ -298,6 +306,12 @@ class Arcs(Pieces):
     def path(self) -> Floats:
         return self.at(np.linspace(0.0, self.way, 1 + ceil(self.extent / FINE)))
 
+    def told(self) -> dict[str, Floats]:
+        x, y = np.moveaxis(self.center, -1, 0)
+        return {"x": x, "y": y} | {
+            name: getattr(self, name) for name in ("radius", "begin", "extent")
+        }
+
     def where(self) -> str:
         x, y = np.round(self.center, 12) + 0.0
         said = f"radius {self.radius:.6g} m, about ({x:.6g}, {y:.6g}) m"
@@ -306,6 +320,10 @@ class Arcs(Pieces):
         first, last = np.degrees([self.begin, self.begin + self.extent])
         return f"{said}, {first:.6g}° to {last:.6g}°"
 
+
+KINDS: dict[str, type[Segments] | type[Arcs]] = {"Segment": Segments, "Arc": Arcs}
+"""Each kind of piece by the name of the core's rows, which with an s is that of the part of a
+`Machine` in small letters."""
 
 TOUCHES = 1e-9
 """Share of the machine's size by which an arc and another piece must cross; joints only touch."""

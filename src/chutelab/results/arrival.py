@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.machine import Machine, Pieces
+from chutelab.machine import Machine, Pieces, Segments
 from chutelab.results.record import EVENT, PARTICLES, Kind, Record, hermite, kept
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -115,14 +115,12 @@ def _ways_out(recording: Record, gone: Ints, ends: Floats) -> list[str]:
         elsewhere = (when[gone] > came) & ~np.isin(met[gone], (own, others))
         carried = (came > since) & ~elsewhere
         since = np.where(carried, came, since)
-        pieces = [
-            part[machine.segments.surface == own]
-            for part in (machine.segments.start, machine.segments.end)
-        ]
-        bent = machine.arcs.surface == own
-        pieces += [machine.arcs.center[bent]]
+        points: list[Floats] = []
+        for part in machine.parts:
+            mine = part.of(part.surface == own)
+            points += mine.ends if isinstance(mine, Segments) else [0.5 * np.add(*mine.boxes)]
         (first, low), (second, _) = (
-            edge(np.concatenate(pieces), axis=0) for edge in (np.min, np.max)
+            edge(np.concatenate(points), axis=0) for edge in (np.min, np.max)
         )
         for n in np.flatnonzero(carried).tolist():
             track = recording.track(int(gone[n]))

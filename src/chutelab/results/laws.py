@@ -8,7 +8,6 @@ what comes of it; `chutelab stress` has more laws, which take longer.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -199,27 +198,17 @@ def barriers(machine: Machine) -> NDArray[Any]:
 
     Straight ones, bent ones, and the drive pulley last; (P,), of a family (N, P).
     """
-    lines, arcs, wheel = machine.segments, machine.arcs, machine.pulley
-    straight = lines.length.shape[-1]
-    bent = straight + arcs.radius.shape[-1]
-    ahead = () if lines.length.ndim == 1 else (machine.count,)
-    rows = np.zeros((*ahead, bent + (wheel is not None)), core.dtype("Barrier"))
-    for part, own in ((lines, rows[..., :straight]), (arcs, rows[..., straight:bent])):
-        if own.shape[-1]:
-            own["speed"], own["surface"] = part.speed, part.surface
-            own["appears"], own["vanishes"] = part.appears, part.vanishes
-            place = lines.start if part is lines else arcs.center
-            own["x"], own["y"] = place[..., 0], place[..., 1]
-    own = rows[..., :straight]
-    own["length"] = lines.length
-    own["tx"], own["ty"] = lines.tangent[..., 0], lines.tangent[..., 1]
-    if bent > straight:
-        own = rows[..., straight:bent]
-        own["radius"], own["begin"], own["extent"] = arcs.radius, arcs.begin, arcs.extent
-    if wheel is not None:
-        own = rows[..., -1]
-        own["radius"], own["speed"], own["surface"] = wheel.radius, wheel.speed, wheel.surface
-        own["extent"], own["appears"], own["vanishes"] = inf, -inf, inf
+    ahead = () if machine.segments.length.ndim == 1 else (machine.count,)
+    rims = [] if machine.pulley is None else [machine.pulley.rim]
+    parts = [part for part in (*machine.parts, *rims) if part.surface.size]
+    rows = np.zeros((*ahead, sum(part.surface.size for part in parts)), core.dtype("Barrier"))
+    first = 0
+    for part in parts:
+        own = rows[..., first : (first := first + part.surface.size)]
+        own["speed"], own["surface"] = part.speed, part.surface
+        own["appears"], own["vanishes"] = part.appears, part.vanishes
+        for name, values in part.told().items():
+            own[name] = values
     return rows
 
 

@@ -27,6 +27,7 @@ from chutelab.checks.stress.barriers import (
 )
 from chutelab.checks.stress.blows import cone, rebound
 from chutelab.checks.stress.evidence import A_CONTACT, EPS, ROUNDINGS, Evidence, Verdict, worst
+from chutelab.machine import Segments
 from chutelab.results.ledger import ledger
 from chutelab.scene import Fault, Scene, SceneError
 
@@ -136,7 +137,7 @@ def momentum(e: Evidence) -> Verdict | None:
     sizes m |v|.
     """
     m = e.machine
-    if not e.crowd or m.pulley is not None or len(m.arcs.surface):
+    if not e.crowd or not all(isinstance(piece, Segments) for piece in e.pieces):
         return None
     along = np.eye(2)
     if len(m.segments.length):

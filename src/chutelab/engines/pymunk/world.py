@@ -294,7 +294,8 @@ class World:
                 float(restitution), min(float(friction), GRIP), r, -inf, inf,
                 turning.angular_velocity,
             ))  # fmt: skip
-        for n, (center, *ends) in enumerate(zip(arcs.center.tolist(), *arcs.ends, strict=True)):
+        sides = [zip(*pair, strict=True) for pair in zip(arcs.ends, arcs.inward, strict=True)]
+        for n, (center, *ends) in enumerate(zip(arcs.center.tolist(), *sides, strict=True)):
             self._bend(n, Vec2d(*center), ends, self._about(arcs, n))
         self.faces = list(self.by_shape.values())
         self.gates = any(face.appears > -inf or face.vanishes < inf for face in self.faces)
@@ -316,8 +317,10 @@ class World:
             "appears": float(parts.appears[n]), "vanishes": float(parts.vanishes[n]), "spin": 0.0,
         }  # fmt: skip
 
-    def _bend(self, n: int, center: Vec2d, ends: list[Floats], about: dict[str, Any]) -> None:
-        """Add an arc, and its ends (m)."""
+    def _bend(
+        self, n: int, center: Vec2d, ends: list[tuple[Floats, Floats]], about: dict[str, Any]
+    ) -> None:
+        """Add an arc, and its ends (m), each with the way into the arc there."""
         arcs = self.machine.arcs
         radius, begin, extent = (
             float(values[n]) for values in (arcs.radius, arcs.begin, arcs.extent)
@@ -335,40 +338,38 @@ class World:
         if extent >= 2.0 * pi:
             self._add(Bend(circle, tangent=None, foot=foot, begin=0.0, extent=inf, **about))
             return
-        outs = [
-            way * Vec2d(sin(angle), -cos(angle))
-            for way, angle in ((1.0, begin), (-1.0, begin + extent))
-        ]
         # Of the centre's way there, which bends no more than the sharpest arc.
         more = sqrt(2.0 * JOINT * self.hair * float(arcs.radius.min())) / (radius + self.radius)
-        before, after = (
-            more if self._goes_on(end, out, more) else 0.0
-            for end, out in zip(ends, outs, strict=True)
-        )
+        before, after = (more if self._goes_on(end, -inward, more) else 0.0 for end, inward in ends)
         self._add(Bend(
             circle, tangent=None, foot=foot, begin=begin - before, extent=extent + before + after,
             **about,
         ))  # fmt: skip
         # Out of it is along the surface at the first end, against it at the last.
-        for end, out, way in zip(ends, outs, (1.0, -1.0), strict=True):
+        for (end, inward), way in zip(ends, (1.0, -1.0), strict=True):
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
             point = pymunk.Circle(still, 0.0, end.tolist())
-            self._add(Face(point, tangent=out, **about | {"speed": way * about["speed"]}))
+            self._add(
+                Face(
+                    point,
+                    tangent=Vec2d(*(-inward).tolist()),
+                    **about | {"speed": way * about["speed"]},
+                )
+            )
 
     @cached_property
     def _onward(self) -> tuple[Floats, Floats]:
         """Ends of all pieces from left to right, (n, 2), m, and the way on into each, (n, 2)."""
-        parts, arcs = self.machine.segments, self.machine.arcs
-        some = ~arcs.whole
-        first, last = arcs.begin[some], (arcs.begin + arcs.extent)[some]
-        ends = np.concatenate([parts.start, parts.end, *(end[some] for end in arcs.ends)])
-        begins = np.stack([-np.sin(first), np.cos(first)], axis=-1)
-        back = np.stack([np.sin(last), -np.cos(last)], axis=-1)
-        ways = np.concatenate([parts.tangent, -parts.tangent, begins, back])
+        sides = [
+            (end[~part.whole], way[~part.whole])
+            for part in self.machine.parts
+            for end, way in zip(part.ends, part.inward, strict=True)
+        ]
+        ends, ways = (np.concatenate(each) for each in zip(*sides, strict=True))
         order = ends[:, 0].argsort(kind="stable")
         return ends[order], ways[order]
 
-    def _goes_on(self, end: Floats, out: Vec2d, bend: float) -> bool:
+    def _goes_on(self, end: Floats, out: Floats, bend: float) -> bool:
         """Tell whether another piece goes on from an end (m), turning by less than `bend` (rad)."""
         ends, ways = self._onward
         low, high = ends[:, 0].searchsorted([end[0] - self.hair, end[0] + 1.01 * self.hair])

@@ -251,8 +251,8 @@ def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
         size = min(points_of(ax, 0.3 * float(wheel.radius)), SMALLEST)
         return line(ax, gid, lambda index: holes[index], color=style.STEEL, ms=size, **dots)
 
-    if machine.pulley is not None and isinstance(wheel := machine.pieces[-1], Arcs):
-        moving.insert(0, turning("holes", wheel))
+    if machine.pulley is not None:
+        moving.insert(0, turning("holes", machine.pulley.rim.of(0)))
     moving += [
         turning(f"holes {machine.surfaces[piece.surface]}", piece)
         for piece in driven

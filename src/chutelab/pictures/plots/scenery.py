@@ -353,7 +353,8 @@ def window_of(recording: Recording) -> Window:
     ends = np.stack([machine.segments.start[free], machine.segments.end[free]], axis=1)
     still = (machine.segments.speed[free] == 0.0)[:, None]
     points.append(ends[near.holds(ends) | (still & far.holds(ends))])
-    points.append(machine.arcs.corners[near.holds(machine.arcs.corners)])
+    for part in machine.parts[1:]:
+        points.append(part.corners[near.holds(part.corners)])
     points.append(around(np.concatenate(points)).padded(*[NEARBY] * 4).nearest(fall))
     # Names stand left of the pulley and behind the plate.
     left = 0.06 if machine.pulley is None else 0.24

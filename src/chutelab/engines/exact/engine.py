@@ -154,7 +154,10 @@ def follow(
         while course != COURSE["FINISHED"]:
             began = perf_counter()
             course = module.run("follow_all", events, COURSE["NO_MEMORY"])
-            events = 2 * events if perf_counter() - began < SLICE else max(FIRST, events // 2)
+            if perf_counter() - began >= SLICE:
+                events = max(FIRST, events // 2)
+            elif course == COURSE["PAUSING"]:
+                events *= 2
             drain(module, recorder)
             exact: Any = module.structs["Exact"]
             if course == COURSE["HELD"]:

@@ -125,7 +125,6 @@ typedef struct {
 /* The particle under way. Ages count from its release. */
 typedef struct {
     const Lone *given;
-    const Obstacle *obstacles;
     double age, x, y, vx, vy, z; /* z: r ω, m/s */
     double entries[3];      /* J */
     double share, lever;    /* effective mass at the rim over m; m r2/I, or 0 */

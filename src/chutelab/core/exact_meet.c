@@ -235,8 +235,8 @@ static double enter(const Motion *m, int k, double until) {
 static int is_alike(int k, int left) {
     const Obstacle *a = O.all + k, *b = O.all + left;
     double near = ALIKE * O.touch;
-    return left >= O.first_arc && left < O.first_arc + 2 * O.arcs && fabs(a->x - b->x) <= near
-        && fabs(a->y - b->y) <= near && fabs(a->rho - b->rho) <= near;
+    return left >= O.faces && fabs(a->x - b->x) <= near && fabs(a->y - b->y) <= near
+        && fabs(a->rho - b->rho) <= near;
 }
 
 /* When a circle is met, before or at `until`; else infinite. */
@@ -250,8 +250,8 @@ static double meet_circle(const Motion *m, int k, double until) {
         m->vx * m->vx + m->vy * m->vy + (dx * m->ax + dy * m->ay), m->vx * m->ax + m->vy * m->ay,
         0.25 * (m->ax * m->ax + m->ay * m->ay) };
     for (int n = 0; n < 5; n++) gap[n] *= sense;
-    /* Arcs that lie on each other are left together. */
-    int leaving = m->left == k || (O.arcs > 1 && is_alike(k, m->left)) || is_shared(m->joint, k, 0);
+    /* Arcs that lie on each other, or on the pulley, are left together. */
+    int leaving = m->left == k || (O.arcs && is_alike(k, m->left)) || is_shared(m->joint, k, 0);
     leaving |= A.point && is_back(k, m->left);
     int touching = fabs(distance - rho) <= O.touch;
     /* The direction from the centre is as uncertain as the places are, over rho. */

@@ -8,8 +8,6 @@
 #include <stdlib.h>
 #include "exact.h"
 
-/* In `touch`; circles whose centres and radii differ by no more are in one place. */
-#define ALIKE 4.0
 /* Share of a curvature by which two pieces that leave a place in one direction differ at least. */
 #define CIRCULAR 1e-9
 /* Width, in `touch`, by which the boxes of faces are larger than they need be. */
@@ -22,8 +20,8 @@ Obstacles O;
 /* A segment, or a part of one, with its ends. */
 typedef struct { double x, y, ex, ey, length; const Segment *of; int source; } Part;
 
-/* A piece seen from a place where it ends, or which it passes. */
-typedef struct { double angle, bend; int piece, end, place; } Ray;
+/* A piece seen from a place where it ends, or which it passes; `number` counts those of the place. */
+typedef struct { double angle, bend; int piece, end, number; } Ray;
 
 static double *arena, *arena_end;
 static int arena_full;
@@ -64,7 +62,7 @@ static int ascending(const void *a, const void *b) {
 static int by_angle(const void *one, const void *other) {
     const Ray *a = one, *b = other;
     int by = compared(a->angle, b->angle);
-    return by ? by : a->piece != b->piece ? a->piece - b->piece : a->end - b->end;
+    return by ? by : a->number - b->number;
 }
 
 /* Where ends are, and the directions out of their pieces and to the left of these. */

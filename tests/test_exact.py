@@ -232,6 +232,14 @@ def test_beyond_the_matching_angle_the_plate_is_passed():
         assert bool(len(recording.select(Kind.IMPACT))) is meets
 
 
+@pytest.mark.parametrize("bend", [1e-6, 1e-9, 3e-10, 1e-11])
+def test_a_slide_into_a_slight_bend_goes_on(bend):
+    """The blow there takes v sin² of the angle at most, then g sin of it slows the slide."""
+    floor = {"name": "floor", "points": [[-1.0, 0.0], [0.0, 0.0], [1.0, bend]], "friction": 0.0}
+    end = thrown([-6e-4, 0.0], [1e-3, 0.0], floor, until=1.0).track(0)[-1]
+    assert hypot(*end["velocity"]) == pytest.approx(1e-3 - G * bend * 0.4, rel=1e-9)
+
+
 # The ends of moving surfaces
 
 
@@ -390,6 +398,17 @@ def test_what_a_wall_stops_on_a_belt_without_slip_is_rolling_at_once():
     assert after["velocity_after"] @ along == pytest.approx(pace, rel=1e-12)
     assert after["omega_after"] * r == pytest.approx(v - pace, rel=1e-12)
     assert ledger(recording).relative_residual < 1e-13
+
+
+def test_an_arc_that_lies_on_the_pulley_is_left_with_it():
+    """However the angle at which it leaves, cos φ = v²/(g ρ), is rounded."""
+    cover = {"name": "cover", "center": [0.0, 0.0], "radius": 0.3, "from_deg": 90, "to_deg": -60}
+    for speed in np.linspace(0.3, 1.6, 27).tolist():
+        belt = {"speed": speed, "pulley_radius": 0.3, "friction": "adhesion"}
+        tables = {"particle": {"radius": 0.02, "spin": False}, "incoming": belt, "surface": [cover]}
+        told = run({**tables, "run": {"until": 9.0}}).events
+        assert told["kind"].tolist() == [Kind.RELEASE, Kind.SEPARATION, Kind.EXIT]
+        assert told["position"][1, 1] == pytest.approx(speed**2 / G, rel=1e-12)
 
 
 # Streams

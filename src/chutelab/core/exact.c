@@ -468,12 +468,15 @@ static int stop_jammed(int obstacle, int side) {
 
 /* Go on sliding after a blow from another obstacle, or stay in the corner of the two. A touch ends the
    approach along what it slides on: where the two are not at right angles it takes but a part of it, and
-   the next touch would follow at once. */
+   the next touch would follow at once. What is faster meets something that is all but parallel, and goes
+   on. */
 static void slide_past(int obstacle, int side, double rebound, int soft) {
     Touch c = touch_now(), against = touch_of(obstacle, side);
     A.left = obstacle, A.left_side = side;
     A.order = rebound > 0.0 ? 1 : 2;
-    if (soft && along(&c) * (c.tx * against.nx + c.ty * against.ny) < 0.0) go_along(&c, 0.0);
+    double pace = along(&c);
+    if (soft && fabs(pace) <= REST * A.given->pace && pace * (c.tx * against.nx + c.ty * against.ny) < 0.0)
+        go_along(&c, 0.0);
     settle();
     if (A.way != ON_FACE) return;
     c = touch_now();

@@ -29,8 +29,8 @@
 /* Turns in which friction and rolling friction take their shares of a blow: each changes what the other
    has to stop by 5/7 at most. */
 #define SHARES 100
-/* Effective mass over m at the rim of a free disk, with I = m r2/2: an impulse moves the contact point 3 times as much as it would a
-   particle that does not turn. */
+/* Effective mass over m at the rim of a free disk, with I = m r2/2: an impulse moves the contact point 3
+   times as much as it would a particle that does not turn. */
 #define DISK_SHARE (1.0 / 3.0)
 /* Way, in `touch`, after which a point has been away from what it touches. */
 #define CLEAR 16.0
@@ -652,11 +652,11 @@ static void carry_round(double start, double pace) {
             above = height;
             write_knot();
         }
-        if (O.change_count && cut) A.age = stop;
+        if (cut) A.age = stop;
     }
     /* Where a gate opens or shuts the ride goes on, with another look at what is in the way. */
     if (A.age >= A.given->stop) end_track(TIME_IS_OVER);
-    else if (O.change_count && cut) return;
+    else if (cut) return;
     else if (struck) strike(found[1].obstacle, found[1].side);
     else {
         part_from(0);

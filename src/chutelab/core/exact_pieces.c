@@ -27,14 +27,13 @@ static double *arena, *arena_end;
 static int arena_full;
 
 /* Set doubles apart; where there is no room for them, ask for more. */
-static void *reserve(int count, int size) {
-    double *found = arena;
-    long doubles = ((long)count * size + 7) / 8;
+static void *reserve(double count, int size) {
+    double *found = arena, doubles = ceil(count * size / 8.0);
     if (doubles > arena_end - arena) {
         arena_full = 1;
         return 0;
     }
-    arena += doubles;
+    arena += (int)doubles;
     return found;
 }
 
@@ -560,7 +559,7 @@ static void find_handovers(void) {
 
 static int find_joints(void) {
     int tips = O.tip_count, epochs = O.change_count + 1;
-    O.onward = reserve(2 * tips * epochs, sizeof *O.onward);
+    O.onward = reserve(2.0 * tips * epochs, sizeof *O.onward);
     O.members = reserve(16 * tips, sizeof *O.members);
     O.sets = reserve(6 * tips, sizeof *O.sets);
     O.handovers = reserve(6 * tips, sizeof *O.handovers);

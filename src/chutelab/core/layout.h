@@ -16,7 +16,7 @@
 /* What a disk is doing. Free disks move on parabolas; riders and sleepers on a prescribed path. */
 enum Mode { WAITING, RIDING, FREE, ASLEEP, GONE };
 
-/* What ends a track, as in `recording.REASONS`. */
+/* What ends a track, as in `record.REASONS`. */
 enum Reason { BY_TIME, BY_LANDING, BY_SETTLING, BY_EXIT };
 
 /* Events, as in `recording.Kind`. */
@@ -353,12 +353,12 @@ typedef struct {
     int pad;
 } Lone;
 
-/* Why a track of the exact engine ended, as in `recording.REASONS`. */
+/* Why a track of the exact engine ended, as in `record.REASONS`. */
 enum Ending { TIME_IS_OVER, HAS_LANDED, HAS_SETTLED, HAS_LEFT };
 
 /* Why the exact engine came back. PAUSING: the budget of rounds is used up. FILLED: take knots and events,
-   and go on. NO_MEMORY: the core gets no more of it. NO_PROGRESS, DRIVEN, TOO_LONG: a particle is stuck, its track is over; go on with the others.
-   HELD: a spinning disk is held between surfaces of which one moves. */
+   and go on. NO_MEMORY: the core gets no more of it. NO_PROGRESS, DRIVEN, TOO_LONG: a particle is stuck, its
+   track is over; go on with the others. HELD: a spinning disk is held between surfaces of which one moves. */
 enum Course { FINISHED, PAUSING, FILLED, NO_MEMORY, NO_PROGRESS, DRIVEN, TOO_LONG, HELD };
 
 typedef struct { double radius, speed, incline; int surface, pad; } Wheel; /* [in] the drive pulley */

@@ -6,7 +6,7 @@
 - ``bundle``: the script of the page and that of the engine's thread, as `tools/build_page.py` makes
   them of the modules.
 - ``assets``: HTML, CSS, the catalogues of words, and the modules of TypeScript. Without a screen:
-  ``trig.ts``, ``random.ts``, ``scene.ts``, ``plan.ts`` and ``machine.ts`` (keys become surfaces),
+  ``trig.ts``, ``scene.ts``, ``plan.ts``, ``releases.ts``, ``machine.ts`` (keys become a machine),
   ``transfer.ts`` (the closed form), ``core.ts`` and ``worker.ts`` (the contact engine in its
   thread), ``engine.ts``, ``recording.ts``, ``lab.ts``, ``handles.ts``, ``view.ts``, ``words.ts``;
   and of a lesson's exercise, as `chutelab.classroom.exercises` has it, ``formula.ts``, ``draw.ts``,

@@ -30,8 +30,8 @@ rest, at 1e-9 m/s, are 200 times as far apart."""
 SLICE = 0.02
 """s of wall time between two looks at Ctrl-C and reports of progress."""
 
-FIRST = 16
-"""Events up to the first look: most lone runs have fewer."""
+FIRST, MOST = 16, 100_000
+"""Events up to the first look, as most lone runs have fewer, and between two looks."""
 
 COURSE = constants("Course")
 
@@ -154,7 +154,8 @@ def follow(
         while course != COURSE["FINISHED"]:
             began = perf_counter()
             course = module.run("follow_all", events, COURSE["NO_MEMORY"])
-            events = 2 * events if perf_counter() - began < SLICE else max(FIRST, events // 2)
+            early = perf_counter() - began < SLICE
+            events = min(2 * events, MOST) if early else max(FIRST, events // 2)
             drain(module, recorder)
             exact: Any = module.structs["Exact"]
             if course == COURSE["HELD"]:

@@ -12,7 +12,7 @@ from time import process_time
 
 from chutelab.engines.simulation import follow
 from chutelab.machine import build
-from chutelab.results.laws import judge
+from chutelab.results.laws import examine
 from chutelab.scene import load, shipped
 
 REPEATS = 5
@@ -36,7 +36,7 @@ def measure(name):
     recording = run()
     times = MANY if len(recording.knots) <= SHORT else 1
     pairs = [
-        (timed(run, times=times), timed(judge, recording, times=times)) for _ in range(REPEATS)
+        (timed(run, times=times), timed(examine, recording, times=times)) for _ in range(REPEATS)
     ]
     ran, judged = (median(part) for part in zip(*pairs, strict=True))
     share = median(laws / whole for whole, laws in pairs)

@@ -1,4 +1,4 @@
-// Runs the contact engine's core in node: `node contact_in_node.mjs core.wasm layout.json MEMORY OUT`.
+// Runs the core's contact engine in node: `node contact_in_node.mjs core.wasm layout.json MEMORY OUT`.
 //
 // MEMORY is what the module's memory holds before the run, OUT what is drained in the same slices,
 // knots and events, and at the end the ledger.

@@ -267,7 +267,7 @@ class _Draw:
                 **self.pair(),
             },
         }
-        # Nothing pushes back who is carried: a jam that reaches up to the pulley would be crushed.
+        # Nothing pushes back a carried disk: a jam that reaches up to the pulley would be crushed.
         out = tables["outgoing"]
         takes_away = self.g > 0.0 and out["speed"] > 0.3 * self.v and out["friction"] > 0.0
         if not takes_away:

@@ -34,7 +34,7 @@ def draw(seed, *, points=True):
 def only_blows(recording, apart=0.0):
     """Tell whether all contacts are blows, at least `apart` (s) from each other.
 
-    Read off events and knots: whoever touches nothing keeps its spin, and v + g t. The ride of an
+    Read off events and knots: what touches nothing keeps its spin, and v + g t. The ride of an
     adhesive belt, up to the first separation, does not count as a contact.
     """
     if np.isin(recording.events["kind"], LASTING).any():

@@ -1,6 +1,6 @@
 """Answers from outside, to hold engines against: brute force, no code of any engine.
 
-- `first_impacts`: who meets whom and when in a box; after each event all is predicted anew.
+- `first_impacts`: which disks meet and when in a box; after each event all is predicted anew.
 - `henderson`, `virial`, `wall_pressure`, `maxwell_boltzmann`: a gas of hard disks.
 - `overlaps`, `inside_surfaces`: how deep disks of a recording are in each other and in surfaces.
 
@@ -312,7 +312,7 @@ def free_from(recording, carried):
 
 
 def _free(recording, times):
-    """Yield each time, and places (k, 2) and radii (k,) of who is there then, and not carried."""
+    """Yield each time, and places (k, 2) and radii (k,) of what is there then, and not carried."""
     free = free_from(recording, recording.machine.releases.carried)
     times, r = np.atleast_1d(times), np.broadcast_to(recording.particle.radius, recording.count)
     for some in np.array_split(times, max(1, len(times) // 100)):

@@ -1,4 +1,4 @@
-"""The core of the contact engine through its arrays: what no scene file can ask for."""
+"""The contact engine in the core, through its arrays: what no scene file can ask for."""
 
 from __future__ import annotations
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import ast
 import re
 import subprocess
 import sys
 import zlib
 from html.parser import HTMLParser
+from importlib import import_module
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -95,13 +95,12 @@ def test_the_chapters_are_there(site):
 
 
 def public_names():
-    """What the modules say is public, read from their sources."""
+    """Return the full names that the modules with an `__all__` say are public."""
     for path in (ROOT / "src").rglob("*.py"):
-        package = ".".join(path.relative_to(ROOT / "src").with_suffix("").parts)
-        package = package.removesuffix(".__init__")
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
-                yield from (f"{package}.{name}" for name in ast.literal_eval(node.value))
+        if "\n__all__ = " in path.read_text(encoding="utf-8"):
+            package = ".".join(path.relative_to(ROOT / "src").with_suffix("").parts)
+            package = package.removesuffix(".__init__")
+            yield from (f"{package}.{name}" for name in import_module(package).__all__)
 
 
 def test_every_public_name_is_in_the_reference(site):

@@ -107,7 +107,7 @@ def judged(machines):
         if estimate.at_least:
             false += (wrong := took is not None and said > FACTOR * real)
         else:
-            # Of a run that was not followed to its end nobody knows how much longer it takes.
+            # Of a run that was not followed to its end it is not known how much longer it takes.
             told += 1
             wrong = FACTOR * said < real or (took is not None and said > FACTOR * real)
             right += not wrong

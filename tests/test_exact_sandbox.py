@@ -204,7 +204,7 @@ def test_over_a_shut_trapdoor_it_slides_and_into_an_open_one_it_falls():
     edge = gone.select(Kind.SEPARATION)[0]
     # Faster than sqrt(g r), it flies off at the edge.
     np.testing.assert_allclose(edge["position"], [0.0, 0.02], atol=1e-12)
-    # A door that shuts later is there for who comes then.
+    # A door that shuts later is there for what comes then.
     late = exact.run(gated(built, 1, appears=0.45))
     np.testing.assert_allclose(late.track(0)[-1]["position"], [1.9, 0.02], atol=1e-12)
 

@@ -196,9 +196,9 @@ def test_a_stream_runs_to_its_end():
     assert books.relative_residual < 0.02
     total = np.array([books.belt_work, books.restitution_loss, books.friction_loss])
     np.testing.assert_allclose(got.by_surface.sum(axis=0), total, rtol=1e-9)
-    # Belts do work on who slips, losses only take.
+    # Belts do work on what slips, losses only take.
     assert got.by_surface[:, 2].min() > -1e-9
-    # Whoever is carried leaves where cos φ1 = min(v²/(g ρ), 1), untouched by the others.
+    # What is carried leaves where cos φ1 = min(v²/(g ρ), 1), untouched by the others.
     left = got.select(Kind.SEPARATION, surface="incoming")
     assert len(left) == m.count
     np.testing.assert_allclose(np.hypot(*left["velocity_after"].T), 2.0, rtol=1e-12)

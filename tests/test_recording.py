@@ -300,7 +300,7 @@ def test_a_turning_disk_carries_energy_of_rotation():
 
 
 def test_of_several_blows_at_one_instant_the_first_and_the_last_state_are_kept():
-    """Who meets others has two knots at one time at most: nobody can ask for those between."""
+    """What meets others has two knots at one time at most: those between cannot be asked for."""
     crowd = scene.from_dict({
         "stream": {"count": 2, "rate": 10.0, "at": [0.0, 1.0], "velocity": [0.0, 0.0],
                    "interact": True},

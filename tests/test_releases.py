@@ -236,7 +236,7 @@ def test_layers_on_a_slow_pulley_ride_into_each_other(speed):
     [
         # sqrt(g (0.1063 + 0.05)) = 1.2383 m/s: all leave at the top.
         ("incoming.speed=1.24",),
-        # One layer, 14 mm between centres of 12.6 mm: nobody is nearer on the chord than that.
+        # One layer, 14 mm between centres of 12.6 mm: none is nearer on the chord than that.
         ("incoming.speed=0.7", "stream.bed_height=0", "stream.rate=50"),
         ("incoming.speed=0.7", "incoming.friction=0.5"),
         ("incoming.speed=0.7", "stream.interact=false"),

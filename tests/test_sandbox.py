@@ -114,15 +114,15 @@ def in_surfaces(recording):
     radius = of_each(machine.particle.radius, machine.count)
     ends = recording.knots["t"] if len(recording.knots) else np.zeros(1)
     times = np.linspace(ends.min(), ends.max(), 200)
-    for who in range(machine.count):
-        t, place = track_places(recording, who, times)
+    for particle in range(machine.count):
+        t, place = track_places(recording, particle, times)
         if not len(t) or not len(geometry.names):
             continue
         distance, side, over = geometry.look(place)
         there = geometry.there(t)
-        deep = np.where(there, 1.0 - distance / radius[who], -inf)
+        deep = np.where(there, 1.0 - distance / radius[particle], -inf)
         for piece in np.flatnonzero(np.isfinite(geometry.appears)):
-            # A gate shuts on nobody: who is in it then is not touched until it is clear of it.
+            # A gate shuts on no disk: one in it then is not touched until it is clear of it.
             if not t[0] < geometry.appears[piece] <= t[-1]:
                 continue
             since = np.flatnonzero(t >= geometry.appears[piece])
@@ -133,11 +133,11 @@ def in_surfaces(recording):
                 deep[piece, since[0] : until] = -inf
         if deep.max() > INSIDE:
             piece, at = np.unravel_index(deep.argmax(), deep.shape)
-            yield f"{who} in {geometry.names[piece]} by {deep.max():.2g} r at {t[at]:.6g} s"
+            yield f"{particle} in {geometry.names[piece]} by {deep.max():.2g} r at {t[at]:.6g} s"
         passes = (side[:, 1:] * side[:, :-1] < 0.0) & over[:, 1:] & over[:, :-1]
         passes &= there[:, 1:] & there[:, :-1]
         for piece, at in np.argwhere(passes):
-            yield f"{who} through {geometry.names[piece]} at {t[at]:.6g} s"
+            yield f"{particle} through {geometry.names[piece]} at {t[at]:.6g} s"
 
 
 def in_others(recording, most=INSIDE):
@@ -210,25 +210,25 @@ def blows(recording, particle, until):
 
 def differences(exact, contact):
     """Yield in what two answers differ, where none meet, by more than they promise of blows."""
-    for who in range(exact.count):
-        held = min(forced_from(exact, who), forced_from(contact, who))
-        (a, before), (b, until) = (blows(run, who, held) for run in (exact, contact))
+    for particle in range(exact.count):
+        held = min(forced_from(exact, particle), forced_from(contact, particle))
+        (a, before), (b, until) = (blows(run, particle, held) for run in (exact, contact))
         a, b = a[a["t"] < until], b[b["t"] < before]
         if a["kind"].tolist() != b["kind"].tolist() or (a["surface"] != b["surface"]).any():
-            yield f"{who}: other events"
+            yield f"{particle}: other events"
             continue
         for name in ("t", "position", "velocity_after", "omega_after"):
             apart = np.abs(a[name] - b[name]).max(initial=0.0)
             if not apart <= 1e-9 * np.abs(a[name]).max(initial=1.0):
-                yield f"{who}: {name} of an event by {apart:.1e}"
-        if exact.ended[who] != contact.ended[who]:
-            yield f"{who}: ended {exact.ended[who]} and {contact.ended[who]}"
-        if before == until == inf and not ends_apart(exact, contact)[who] <= 1e-9:
-            yield f"{who}: ends elsewhere"
+                yield f"{particle}: {name} of an event by {apart:.1e}"
+        if exact.ended[particle] != contact.ended[particle]:
+            yield f"{particle}: ended {exact.ended[particle]} and {contact.ended[particle]}"
+        if before == until == inf and not ends_apart(exact, contact)[particle] <= 1e-9:
+            yield f"{particle}: ends elsewhere"
 
 
 def ends_apart(one, other):
-    """How far apart the ends of tracks are, (N,), m; 0 of who was never released."""
+    """How far apart the ends of tracks are, (N,), m; 0 of those never released."""
     apart = np.zeros(one.count)
     a, b = (run.ends()[1]["position"] for run in (one, other))
     apart[one.released] = np.abs(a - b).max(axis=1)

@@ -48,14 +48,14 @@ def test_envelope_of_parabolas():
     assert cuts > 10
 
 
-# who has arrived ----------------------------------------------------------------------------------
+# what has arrived ---------------------------------------------------------------------------------
 
 R, MASS, BELT = 0.01, 0.01, 2.0
 """Radius, m, mass, kg, and speed of the belt at y = 0, m/s, of the cases by hand."""
 
 
 def by_hand(tracks, collisions=(), landings=()):
-    """A recording of tracks [(t, x, y, vx, vy), ...] and of who met whom, or the belt, at t."""
+    """A recording of tracks [(t, x, y, vx, vy), ...] and of what met, or met the belt, at t."""
     machine = build(from_dict({
         "particle": {"radius": R, "mass": MASS},
         "outgoing": {"speed": BELT, "drop": 1.0, "drop_from": "top", "start": -20.0, "length": 40},
@@ -113,7 +113,7 @@ def test_a_particle_arrives_on_what_lies_on_the_belt_and_on_nothing_else():
 
 
 def connected(recording, t):
-    """Return who is connected to the belt at t by gaps of less than 1 % of r: a plain count."""
+    """Return which are connected to the belt at t by gaps of less than 1 % of r: a plain count."""
     ((places,), _), (r,) = recording.at([t]), {float(recording.particle.radius)}
     there = np.isfinite(places[:, 0])
     level = recording.machine.segments.start[recording.machine.segments.surface == 2][0, 1]
@@ -130,7 +130,7 @@ def connected(recording, t):
 
 @pytest.mark.parametrize("name", ["stream", pytest.param("jet", marks=pytest.mark.slow)])
 def test_all_that_ride_the_belt_have_arrived(name):
-    """Counted at 400 instants: who is seen to lie there has arrived, and all have at the end."""
+    """Counted at 400 instants: what is seen to lie there has arrived, and all have at the end."""
     recording = simulate(load("stream")) if name == "stream" else simulate(crowded())
     came = arrivals(recording)["t"]
     end = float(recording.knots["t"].max())

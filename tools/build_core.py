@@ -1,4 +1,4 @@
-"""Build the core of the contact engine: C to WebAssembly, and its memory layout to JSON.
+"""Build the core: C to WebAssembly, and its memory layout to JSON.
 
     python tools/build_core.py           # writes core.wasm and layout.json beside the C files
     python tools/build_core.py --check   # builds anew and compares the bytes with what is there

@@ -2,7 +2,7 @@
 
 ===============  ==================================================================================
 `cases`          what is solved, what a method says about it, and its error
-`methods`        who solves it, with which parameter, and who cannot
+`methods`        what solves it, with which parameter, and what cannot
 `plain`          plain Pymunk as most people write it
 `ode`            SciPy's DOP853 with events, by hand (needs the extra ``bench``)
 `measure`        clocks, memory, the whole process; one `Record` for each case and method

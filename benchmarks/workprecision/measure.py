@@ -124,7 +124,7 @@ class Trial:
             scenes = [method.prepare(scene, value) for scene in case.scenes]
             run = partial(method.run, case.name, scenes[0], value)
             first, found = clocked(run)
-            # What a run says is looked at before it is repeated: who fails is not worth the time.
+            # What a run says is looked at before it is repeated: a failure is not worth the time.
             others = [method.run(case.name, scene, value) for scene in scenes[1:]]
             self._said = judge(case, [found, *others], self._said)
             self._watch = Stopwatch(run, first, patience)
@@ -201,7 +201,7 @@ def _judged_crowd(scene: Scene, found: object, blank: Record) -> Record:
     assert belt is not None
     assert out is not None
     last = seen[-1]
-    # Whoever has left the scene is in no frame, and left it downwards.
+    # A particle that has left the scene is in no frame, and left it downwards.
     lost = int(np.count_nonzero(~(last[:, 1] > belt.pulley_radius - out.drop)))
     if lost:
         raise MissedError(f"{lost:,} of {len(last):,} fell through the belt")

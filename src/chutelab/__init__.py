@@ -16,8 +16,8 @@ The rooms of the house; each imports only those below it:
 - `results`: recordings, ledger, comparison, summary;
 - `theory` and `machine`: the paper in closed form; a scene resolved to arrays for the engines;
 - `scene`: scene files;
-- `core`: what runs in Python and in the page alike, in C: builds machines, runs contact,
-  judges runs;
+- `core`: what runs in Python and in the page alike, in C: builds machines, runs the exact and
+  the contact engine, judges runs;
 - `util`: small things for all.
 
 What most people need is here: `scenes`, `load`, `Scene`, `SceneError`, `simulate`, `Recording`,

@@ -62,7 +62,7 @@ def bounded(seconds):
 
 
 def run(tables, engine, dt, patience=PATIENCE, name="test"):
-    """Simulate a scene on one of `stress.case.ENGINES`; dt is None for the exact one."""
+    """Simulate a scene on one of `case.ENGINES`; dt is None for the exact one."""
     scene = scene_of(tables, name, engine, dt)
     with bounded(patience) as progress:
         recording = judged(scene, engine=by_name(engine), progress=progress)

@@ -134,7 +134,7 @@ def test_energy_from_nothing_is_seen():
     assert good.holds
     # ½ m ((v + δ)² - v²) of what is in play.
     v = -evidence().recording.knots["velocity"][3, 1]
-    assert bad.figure == pytest.approx(0.008 * v * 1e-9 / evidence().energy, rel=0.05)
+    assert bad.figure == pytest.approx(0.008 * v * 1e-9 / evidence().bounds.energy, rel=0.05)
     assert not bad.holds
 
 

@@ -29,12 +29,12 @@ from chutelab.util.tables import Sheet
 
 ANSWERS: Final = {
     "theory": ("closed form, NumPy", "nothing, not even the machine"),
-    "exact": ("the next event, solved", "exact.c and its files"),
+    "exact": ("the next event, solved; C", "the machine's arrays"),
     "contact": ("impacts, contact dynamics; C", "the machine's arrays"),
     "pymunk": ("Chipmunk's solver, stepped", "the machine's arrays"),
     "dop853": ("SciPy's ODE solver, events", "the machine's arrays"),
 }
-"""The answers: how each is found, and what it shares with others. import-linter holds this."""
+"""The answers: how each is found, and what it shares with others."""
 
 BLOWS: Final = {"exact": 1e-12, "dop853": 1e-12, "contact": 1e-10, "pymunk": 1e-9}
 """Relative error allowed where all contacts are blows, for inputs whose change comes out no larger

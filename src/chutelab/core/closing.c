@@ -1,5 +1,5 @@
-/* After the solve of a step: what lasting contacts do to the ledger, who sticks, slips, parts or comes to
-   rest, and how tracks end in contact. */
+/* After the solve of a step: what lasting contacts do to the ledger, which of them stick, slip or open,
+   which disks come to rest, and how tracks end in contact. */
 
 #include "core.h"
 

@@ -239,8 +239,8 @@ double meet_surface(const Surface *s, const Disk *d, double span, double *approa
     }
     double away = sqrt(dx * dx + dy * dy), side = away >= s->radius ? 1 : -1;
     if (side * (away - s->radius) > sweep + r) return INFINITY;
-    /* The first of its outside, its inside and its ends: whoever comes in at an opening may meet an end
-       before what he would come to without it. */
+    /* The first of its outside, its inside and its ends: a disk that comes in at an opening may meet an
+       end first. */
     double first = INFINITY, speed;
     for (; side >= -1; side -= 2) {
         double h = INFINITY;

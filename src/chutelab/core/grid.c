@@ -1,4 +1,4 @@
-/* Who may meet whom in a step: a hash grid of the boxes that the disks can reach. */
+/* Which disks may meet in a step: a hash grid of the boxes that the disks can reach. */
 
 #include <string.h>
 #include "core.h"

@@ -244,7 +244,7 @@ static int add_touching(int i, int j, double radius, int *count) {
 
 /* Bring to rest what rattles without end, as far as it can: a disk, all that it touches and what
    touches that, out to JAMMED of them, are solved at once, without restitution. The contacts of the
-   step before, which nobody needs within a step, make room for the list. */
+   step before, which are not needed within a step, make room for the list. */
 static void jam(Contact *struck, double t) {
     int i = struck->i, count = 0, last = i, found, reached = 0;
     Contact *list = W.earlier;

@@ -16,10 +16,10 @@
 /* What a disk is doing. Free disks move on parabolas; riders and sleepers on a prescribed path. */
 enum Mode { WAITING, RIDING, FREE, ASLEEP, GONE };
 
-/* What ends a track, as in `record.REASONS`. */
+/* What ends a track, as in `results.REASONS`. */
 enum Reason { BY_TIME, BY_LANDING, BY_SETTLING, BY_EXIT };
 
-/* Events, as in `recording.Kind`. */
+/* Events, as in `results.Kind`. */
 enum Kind { RELEASE, SEPARATION, SLIP, IMPACT, LANDING, COLLISION, STICK, SETTLE, EXIT };
 
 enum Shape { SEGMENT, CIRCLE, ARC };
@@ -112,7 +112,7 @@ typedef struct {
     int stays;            /* steps on one surface, blows or not */
     int held_back;        /* `knot` is one after a blow and not written yet */
     int again;            /* the latest blow may be told together with the one before */
-    int ground;           /* surface that `stays` are on: who leaves it may have struck another last */
+    int ground;           /* surface that `stays` are on: a disk that leaves it may have struck another last */
 } Track;
 
 typedef struct {
@@ -353,12 +353,13 @@ typedef struct {
     int pad;
 } Lone;
 
-/* Why a track of the exact engine ended, as in `record.REASONS`. */
+/* Why a track of the exact engine ended, as in `results.REASONS`. */
 enum Ending { TIME_IS_OVER, HAS_LANDED, HAS_SETTLED, HAS_LEFT };
 
 /* Why the exact engine came back. PAUSING: the budget of rounds is used up. FILLED: take knots and events,
-   and go on. NO_MEMORY: the core gets no more of it. NO_PROGRESS, DRIVEN, TOO_LONG: a particle is stuck, its
-   track is over; go on with the others. HELD: a spinning disk is held between surfaces of which one moves. */
+   and go on. NO_MEMORY: the core gets no more of it. NO_PROGRESS, DRIVEN, TOO_LONG: a
+   particle is stuck, its track is over; go on with the others.
+   HELD: a spinning disk is held between surfaces of which one moves. */
 enum Course { FINISHED, PAUSING, FILLED, NO_MEMORY, NO_PROGRESS, DRIVEN, TOO_LONG, HELD };
 
 typedef struct { double radius, speed, incline; int surface, pad; } Wheel; /* [in] the drive pulley */

@@ -318,8 +318,8 @@ static double in_hollows(void) {
     return most;
 }
 
-/* Begin a step: where prescribed paths lead, who may meet, what lasts. A status other than DONE says
-   what was too small, and nothing has happened yet. */
+/* Begin a step: where prescribed paths lead, which disks may meet, which contacts last. A status other
+   than DONE says what was too small, and nothing has happened yet. */
 static int begin_step(void) {
     int woke;
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
@@ -380,7 +380,7 @@ static int begin_step(void) {
     } while (woke);
     W.length = h;
     if (W.contact_count) solve_contacts();
-    /* A fast belt may have thrown a disk further than the list of who is near foresaw. */
+    /* A fast belt may have thrown a disk further than its list of neighbours foresaw. */
     for (int i = W.low; i < W.high; i++)
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
     close_step(h);

@@ -68,8 +68,8 @@ void fall_asleep(void) {
         const Contact *c = W.contacts + n;
         if (c->two) parent[island_of(c->i)] = island_of(c->j);
     }
-    /* Of each island, at its root: may it sleep, and how do its surfaces move? `found` counts who
-       may not, `ux`, `uy` are free to hold the velocity once the step is closed. */
+    /* Of each island, at its root: may it sleep, and how do its surfaces move? `found` counts the
+       disks that may not, `ux`, `uy` are free to hold the velocity once the step is closed. */
     for (int i = W.low; i < W.high; i++) {
         W.found[i] = 0;
         W.moved[i] = -1;

@@ -6,7 +6,7 @@
 - `arrival`: which particles have come to a surface, or to what lies on it.
 - `comparison`: the first events of each particle, the paper's symbols, particle 0 and the theory.
 - `quantities`: the readers of the registry: a run's numbers by name and by particle.
-- `stream`: a stream as a whole: the envelope of its paths.
+- `stream`: a stream as a whole: flow, fates, steady power, the envelope of its paths.
 - `laws`: what every run is judged by.
 - `summary`: notes, tables, and the JSON object of ``chutelab run --json``.
 - `storage`: recordings as files.

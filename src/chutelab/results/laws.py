@@ -78,13 +78,13 @@ class Broken:
     def told(self) -> str:
         """What was broken, by which particle, where, when, and by how much."""
         more = f" and {self.particles - 1:,} more" if self.particles > 1 else ""
-        who = f"particle {self.particle}{more}" if self.particles else "all together"
+        which = f"particle {self.particle}{more}" if self.particles else "all together"
         where = f", {self.surface}" if self.surface else ""
         place = f", x = {self.position[0]:.6g} m, y = {self.position[1]:.6g} m"
         at = f"t = {self.t:.6g} s{place if self.particles else ''}"
         found = f"{number(self.amount)} {self.unit}".strip()
         allowed = f"{number(self.bound)} {self.unit}".strip()
-        return f"{self.law}: {who}{where} at {at}: {found}, allowed {allowed}"
+        return f"{self.law}: {which}{where} at {at}: {found}, allowed {allowed}"
 
     def __str__(self) -> str:
         return f"LAW BROKEN, {self.told}; do not trust these numbers; {self.advice}"

@@ -229,7 +229,7 @@ class Record(Shown):
         Ledger entries (J) of each surface, summed over particles. Of a family of machines (see
         `chutelab.engines.exact`), and of none else, those of each particle, (N, len(surfaces), 3).
     steps : int
-        Rounds (exact) or steps (contact, pymunk) taken.
+        Steps taken; of the exact engine the most events that a particle took.
     contacts : int
         Impacts and collisions resolved.
     seconds : float

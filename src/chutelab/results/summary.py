@@ -342,7 +342,7 @@ OTHERS = {
     "particles": ("integer", "how many there are"),
     "seconds": ("number", "from the validated scene to the recording, s; null of a recording that"
                 " was loaded and in summary.json, where the same run leaves the same bytes"),
-    "steps": ("integer", "steps, or rounds of the exact engine"),
+    "steps": ("integer", "steps; of the exact engine the most events that a particle took"),
     "contacts": ("integer", REGISTRY["contacts"].meaning),
     "fates": ("object", "how many particles ended where, see `results.arrival.fates`"),
     "crowd": ("object", "all particles together, see `results.stream.Crowd`; null of one"),

@@ -5,6 +5,6 @@
 - `files`: files that are written whole or not at all, CSV and TSV in them.
 - `signals`: Ctrl-C, TERM and HUP, all raised as a KeyboardInterrupt.
 - `tables`: tables for people, plain data for JSON, columns as a DataFrame.
-- `trig`: sine, cosine and arc tangent, the same bits in Python and JavaScript.
+- `trig`: sine, cosine and arc tangent, the same bits everywhere, and as in the core.
 - `versions`: what is installed, and on what figures were measured.
 """

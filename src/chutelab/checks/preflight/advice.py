@@ -316,7 +316,7 @@ def advice(
             f"pymunk steps {machine.count} particles one after the other, in about"
             f" {cost.seconds:.2g} s",
             {"run.engine": "auto"},
-            after=", for the exact engine: all of them at once",
+            after=", for the exact engine, which needs no steps",
         )
 
 

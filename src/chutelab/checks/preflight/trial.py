@@ -91,7 +91,7 @@ def _timed(machine: Machine, patience: float) -> Trial:
         if marks and share < marks[-1][1]:
             marks.clear()  # another engine has taken over
         marks.append((now, share))
-        # The contact engine's core is compiled once in a process, before its first step.
+        # The core is compiled once in a process, before its first step.
         if now - marks[0][0] > patience:
             raise EnoughError
 

@@ -30,8 +30,8 @@ rest, at 1e-9 m/s, are 200 times as far apart."""
 SLICE = 0.02
 """s of wall time between two looks at Ctrl-C and reports of progress."""
 
-FIRST = 16
-"""Events up to the first look: most lone runs have fewer."""
+FIRST, MOST = 16, 100_000
+"""Events up to the first look, as most lone runs have fewer, and between two looks."""
 
 COURSE = constants("Course")
 
@@ -154,13 +154,12 @@ def follow(
         while course != COURSE["FINISHED"]:
             began = perf_counter()
             course = module.run("follow_all", events, COURSE["NO_MEMORY"])
-            if perf_counter() - began >= SLICE:
-                events = max(FIRST, events // 2)
-            elif course == COURSE["PAUSING"]:
-                events *= 2
-            drain(module, recorder)
+            early = perf_counter() - began < SLICE
+            events = min(2 * events, MOST) if early else max(FIRST, events // 2)
             exact: Any = module.structs["Exact"]
-            if course == COURSE["HELD"]:
+            if course == COURSE["FILLED"]:
+                drain(module, recorder)
+            elif course == COURSE["HELD"]:
                 a, b = (recorder.machine.surfaces[surface] for surface in exact.other)
                 raise CornerError(
                     f"particle {exact.lone}, a spinning disk, is held between {a!r} and {b!r}, of"
@@ -178,15 +177,19 @@ def follow(
 
 def stuck(course: int, passed: float) -> str:
     """Return why a particle makes no progress, whose latest events took some time (s), or ""."""
-    return {
-        COURSE["NO_PROGRESS"]: f"{number('MOST_IDLE')} events in a row took no time; look for"
-        " surfaces that nearly touch where it is, and join their ends or move them apart",
-        COURSE[
-            "DRIVEN"
-        ]: f"{WINDOW} events took {passed:.2g} s: it is driven to and fro in a narrow"
-        " place; move the surfaces there apart, or lower their restitution",
-        COURSE["TOO_LONG"]: f"{ROUNDS} events, and no end of them; lower run.max_time",
-    }.get(course, "")
+    if course == COURSE["NO_PROGRESS"]:
+        return (
+            f"{number('MOST_IDLE')} events in a row took no time; look for surfaces that nearly"
+            " touch where it is, and join their ends or move them apart"
+        )
+    if course == COURSE["DRIVEN"]:
+        return (
+            f"{WINDOW} events took {passed:.2g} s: it is driven to and fro in a narrow place;"
+            " move the surfaces there apart, or lower their restitution"
+        )
+    if course == COURSE["TOO_LONG"]:
+        return f"{ROUNDS} events, and no end of them; lower run.max_time"
+    return ""
 
 
 def drain(module: Module, recorder: Recorder) -> None:
@@ -201,7 +204,8 @@ def drain(module: Module, recorder: Recorder) -> None:
 
 
 def collect(module: Module, recorder: Recorder) -> None:
-    """Take reasons and books."""
+    """Take what is still there, reasons and books."""
+    drain(module, recorder)
     exact: Any = module.structs["Exact"]
     lones = module.array("lones", dtype("Lone"), exact.lone_count, of="Exact")
     ended = recorder.ended != REASONS.index("stopped")

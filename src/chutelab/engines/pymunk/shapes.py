@@ -231,8 +231,8 @@ class Shapes:
     def _met(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         """Give a contact with a surface what its shapes do not have.
 
-        The end of a belt moves along its rim, and beside the face it is not met; nor is a gate by
-        whom it shut on.
+        The end of a belt moves along its rim, and beside the face it is not met; nor does a gate
+        touch a particle that it shut on.
         """
         shape, met = arbiter.shapes
         face = self.world.by_shape[met]

@@ -157,8 +157,8 @@ class Shared:
             )
             joint.error_bias = 0.0
             self.strings.setdefault(thread.particle, []).append(String(joint, thread.length))
-        # Rows by sorted id of their bodies; that of the Space's own is no particle's.
-        self.nobody = world.space.static_body.id
+        # Rows by sorted id of the bodies; the Space's own body, of surfaces, is no particle.
+        self.surfaces_body = world.space.static_body.id
         self.buffer, ids = batch.Buffer(), np.array(list(self.shapes.rank), dtype=np.uintp)
         self.row = ids.argsort()
         self.ids = ids[self.row]
@@ -289,7 +289,7 @@ class Shared:
         batch.get_space_bodies(space, self.fields, self.buffer)
         ids = np.frombuffer(self.buffer.int_buf(), dtype=np.uintp)
         self.state[0], after = self.state[1], self.state[1]
-        known = ids != self.nobody
+        known = ids != self.surfaces_body
         rows = self.row[self.ids.searchsorted(ids[known])]
         told = np.frombuffer(self.buffer.float_buf()).reshape(len(ids), -1)[known].T
         turned = self.angle

@@ -5,13 +5,11 @@
 - `widget`: the page in a notebook; the only module that needs anywidget.
 - ``bundle``: the script of the page and that of the engine's thread, as `tools/build_page.py` makes
   them of the modules.
-- ``assets``: HTML, CSS, the catalogues of words, and the modules of TypeScript. Without a screen:
-  ``trig.ts``, ``random.ts``, ``scene.ts``, ``plan.ts`` and ``machine.ts`` (keys become surfaces),
-  ``transfer.ts`` (the closed form), ``core.ts`` and ``worker.ts`` (the contact engine in its
-  thread), ``engine.ts``, ``recording.ts``, ``lab.ts``, ``handles.ts``, ``view.ts``, ``words.ts``;
-  and of a lesson's exercise, as `chutelab.classroom.exercises` has it, ``formula.ts``, ``draw.ts``,
-  ``judging.ts``, ``task.ts``. With one: ``exercise.ts``, ``stage.ts``, ``transport.ts`` and
-  ``app.ts``, which joins all.
+- ``assets``: HTML, CSS, the catalogues of words, and the modules of TypeScript; each says at its
+  top what it is. ``scene.ts``, ``plan.ts`` and ``machine.ts`` make a machine of keys, ``core.ts``
+  and ``worker.ts`` run it with the contact engine, in a thread; ``lab.ts`` holds scene and run,
+  ``transfer.ts`` and ``prediction.ts`` are the closed form, ``task.ts`` and ``exercise.ts`` a
+  lesson's exercise, ``stage.ts`` is the picture, and ``app.ts`` joins all.
 """
 
 from __future__ import annotations

@@ -115,11 +115,11 @@ def _tell(reasons: NDArray[Any], recording: Recording, missed: Bools) -> None:
                 if every > 1
                 else FATES[REASONS[ended[row, 0]]]
             )
-            who = f"{np.count_nonzero(missed[row])} of {every} particles" if every > 1 else "it"
-            said.append(f"{who} missed the outgoing belt: {fate}")
+            many = f"{np.count_nonzero(missed[row])} of {every} particles" if every > 1 else "it"
+            said.append(f"{many} missed the outgoing belt: {fate}")
         if restless[row].any():
-            who = f"{restless[row].sum()} of {every} particles" if every > 1 else "it"
-            said.append(f"{who} arrived, but never came to rest on a belt: {PAID} has only a part")
+            many = f"{restless[row].sum()} of {every} particles" if every > 1 else "it"
+            said.append(f"{many} arrived, but never came to rest on a belt: {PAID} has only a part")
         reasons[row] = "; ".join(said)
 
 
@@ -141,11 +141,11 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
     one surface count as one. Of a crowd the ways that more than `RARE` of it takes are told, the
     most frequent one first, such as ``plate, outgoing | outgoing``.
     """
-    who, surface = _met(recording)
-    place = np.arange(len(who)) - np.searchsorted(who, who)
+    particle, surface = _met(recording)
+    place = np.arange(len(particle)) - np.searchsorted(particle, particle)
     ways = np.full((recording.count, LONGEST + 1), -1)
     near = place <= LONGEST
-    ways[who[near], place[near]] = surface[near]
+    ways[particle[near], place[near]] = surface[near]
     # A way as one number: `np.unique` of rows takes ten times as long.
     taken, kinds, some = np.zeros(recording.count, dtype=np.int64), 1, len(recording.surfaces) + 1
     for met in ways.T[: place.max(initial=-1) + 1]:
@@ -180,9 +180,9 @@ def _met(recording: Recording) -> tuple[Ints, Ints]:
     order = some.nonzero()[0]
     order = order[np.argsort(recording.events["particle"][order], kind="stable")]
     # Columns are taken, not rows, which are ten times as large.
-    who, surface = recording.events["particle"][order], recording.events["surface"][order]
+    particle, surface = recording.events["particle"][order], recording.events["surface"][order]
     lands = kind[order] == Kind.LANDING
     landings = np.cumsum(lands) - lands
-    kept = landings == landings[np.searchsorted(who, who)]
-    kept[1:] &= (who[1:] != who[:-1]) | (surface[1:] != surface[:-1])
-    return who[kept], surface[kept]
+    kept = landings == landings[np.searchsorted(particle, particle)]
+    kept[1:] &= (particle[1:] != particle[:-1]) | (surface[1:] != surface[:-1])
+    return particle[kept], surface[kept]

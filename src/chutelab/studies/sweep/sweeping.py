@@ -250,7 +250,7 @@ def _check_same_version(client: Any, address: str) -> None:
 def _ask(dask: ModuleType, address: str) -> None:
     """Refuse an address at which no Dask scheduler answers, in time.
 
-    A client waits for ever for one who accepts a connection and says nothing, and prints a
+    A client waits for ever for a server that accepts a connection and says nothing, and prints a
     traceback of other faults after 20 s. The thread that asks first need not be waited for.
     """
     answers: SimpleQueue[str | Exception] = SimpleQueue()

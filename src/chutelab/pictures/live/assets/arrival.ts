@@ -20,7 +20,7 @@ const COLLISION = 5;
 /** Gap, as a share of the smaller radius, up to which two touch. */
 const TOUCH = 0.01;
 
-/** Instants at which it is looked who lies on the belt without a blow that was recorded. */
+/** Instants at which is looked what lies on the belt without a blow that was recorded. */
 const RESTS = 100;
 
 /** Of the time between two such instants, until the one is known at which a contact began. */
@@ -93,7 +93,7 @@ class Arrivals {
     this.due.sort((a, b) => a.t - b.t || late(a) - late(b) || a.disk - b.disk);
   }
 
-  /** Judge all contacts up to a time, and who lies on the belt then. @param t s */
+  /** Judge all contacts up to a time, and what lies on the belt then. @param t s */
   look(t: number) {
     const { found } = this;
     let n = 0;

@@ -70,7 +70,7 @@ class Bench {
     this.modes = ((free ? ["move", "line", "arc", "drop"] : []) as Mode[]).map((mode) =>
       [mode, button(mode, ({ detail }) => {
         this.set(mode);
-        // Nobody clicked: it was a key, so there is no mouse to draw with.
+        // It was a key, not a click, so there is no mouse to draw with.
         if (detail === 0 && mode !== "move") this.draw(this.example());
       })] as [Mode, any]);
     this.remove = button("delete", () => this.inspector.takeAway());
@@ -290,7 +290,7 @@ class Bench {
 
   seen = "";
 
-  /** Keep the mark in its place while somebody looks around. */
+  /** Keep the mark in its place while the view is moved. */
   follow() {
     const { scale, x, y, width, height } = this.stage.view;
     if (this.seen !== `${scale} ${x} ${y} ${width} ${height}`) this.mark();

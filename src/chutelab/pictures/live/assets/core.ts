@@ -4,7 +4,7 @@
 type Struct = { size: number, fields: Record<string, [number, string, number]> };
 export type Layout = { structs: Record<string, Struct>, enums: Record<string, Record<string,
   number>>, constants: Record<string, number> };
-/** Of a run that goes on after a change: spins, rad/s, and who is under way already */
+/** Of a run that goes on after a change: spins, rad/s, and which particles are under way already */
 export type Machine = import("./machine.ts").Machine & { spins?: number[], goesOn?: boolean[] };
 export type Event = { t: number, x: number, y: number, before: number[], after: number[],
   normal: number, tangent: number, disk: number, other: number, kind: number,

@@ -23,7 +23,7 @@ const DIAGRAMS: { id: string, unit: string, lines: Line[] }[] = [
 /** Times between the first and the last at which curves are drawn. */
 const MANY = 160;
 
-/** Knots of a track at which curves are drawn exactly; of more, nobody sees one. */
+/** Knots of a track at which curves are drawn exactly; of more, none can be seen. */
 const MOST_KNOTS = 300;
 
 /** Of a time, just before it: what an impact changes has two values then. */
@@ -90,7 +90,7 @@ class CurvesPanel {
     this.listen();
   }
 
-  /** Where the line stands, s; if nobody moves it, now. */
+  /** Where the line stands, s; if it is not moved, now. */
   cursor: number | null = null;
 
   samples: Sample[] = [];
@@ -191,7 +191,7 @@ class CurvesPanel {
     this.board.setAttribute("aria-valuetext", told.join(", "));
   }
 
-  /** The same as numbers, if somebody wants them. */
+  /** The same as numbers, if they are wanted. */
   tabulate() {
     const { words, samples } = this;
     if (!this.values.open) return;

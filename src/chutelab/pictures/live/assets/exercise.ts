@@ -245,7 +245,7 @@ class ExercisePanel {
       mark.className = `mark ${verdict}`;
       state.textContent = task.state(n);
       hint.disabled = read === hints.length;
-      // Whoever read all hints, or is right, may see how it goes.
+      // After all hints, or a right answer, the way may be seen.
       working.hidden = !(read === hints.length || verdict === "right" || revealed);
       working.disabled = revealed;
     };
@@ -265,7 +265,7 @@ class ExercisePanel {
       html("b", {}, this.words.say("exercise-explain")), html("br"), this.exercise.explain), field];
   }
 
-  /** Something has changed: show it, keep it, and tell whoever keeps the score. */
+  /** Something has changed: show it, keep it, and tell the platform that keeps the score. */
   tell() {
     const { task, words } = this;
     if (!task) return;

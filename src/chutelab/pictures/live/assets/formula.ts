@@ -1,5 +1,5 @@
-// Formulas of exercises: trees that Python's parser made of them (`exercises/catalogue.py`), and what
-// they know besides an exercise's own names.
+// Formulas of exercises: trees that Python's parser made of them (`exercises/catalogue.py`), and
+// what they know besides an exercise's own names.
 
 import { fixedText } from "./decimal.ts";
 import { separationWithSlip } from "./slip.ts";

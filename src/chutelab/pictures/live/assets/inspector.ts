@@ -98,7 +98,7 @@ class Inspector {
     }));
   }
 
-  /** Show the value that counts, unless somebody is about to type another. */
+  /** Show the value that counts, unless another is being typed. */
   fill(field: Field) {
     const its = this.inputs.get(field.key);
     if (!its) return;

@@ -1,4 +1,4 @@
-// The scene under somebody's hands: its values, its run, its clock. Nothing here draws.
+// The scene as it is changed: its values, its run, its clock. Nothing here draws.
 
 import { runOf } from "./breaches.ts";
 import { withValues } from "./keys.ts";
@@ -78,7 +78,7 @@ class Lab {
     this.tell("scene");
   }
 
-  /** Run from a time on, with what is there then: a crowd goes on under somebody's hands, all
+  /** Run from a time on, with what is there then: a crowd goes on while it is changed, all
    * others begin anew, since they take no time.
    * @param from s */
   run(from: number) {

@@ -34,7 +34,7 @@ function toldByRun(events: Event[], books: number[][], surfaces: string[]) {
 }
 
 /** The right answers as the machine gives them, by question from 0 on; none where no machine does.
- * @param page its data @param engine that nobody else uses */
+ * @param page its data @param engine that nothing else uses */
 function measured(
   scene: Given, page: any, numbers: DrawnNumbers, engine: Engine,
 ): Promise<Map<number, number>> {

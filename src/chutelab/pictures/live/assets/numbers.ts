@@ -1,5 +1,5 @@
 // The numbers of a transfer by the paper's symbols: as simulated, beside the closed form. Of a
-// crowd first those of the crowd, and of particle 0 if somebody asks.
+// crowd first those of the crowd, and of particle 0 if asked for.
 
 import { FEWEST, crowdOf, type CrowdNumbers } from "./crowd.ts";
 import { card, follow, html } from "./panels.ts";

@@ -197,7 +197,7 @@ class Track {
     return this.turns[i] + 0.5 * h * (this.at(i, SPIN) + spin);
   }
 
-  /** Angle at each knot, as far as somebody has asked. */
+  /** Angle at each knot, as far as it was asked for. */
   turns: number[] = [];
 
   /** Belt work, restitution loss and friction loss so far, J, straight between knots. */
@@ -272,7 +272,7 @@ class Recording {
     }
     for (const event of events) {
       const { index, goesOn } = its(event.disk);
-      // Who goes on after a change is not released once more.
+      // A particle that goes on after a change is not released once more.
       if (goesOn && event.kind === RELEASE && event.t === 0) continue;
       const other = event.other >= 0 ? its(event.other).index : event.other;
       this.events.push({ ...event, t: event.t + this.shift, disk: index, other });
@@ -329,7 +329,7 @@ class Recording {
       spins.push(state ? state.spin : 0);
       if (state) {
         const { x, y, vx, vy } = state;
-        // Whoever still rides the belt goes on riding.
+        // A particle that still rides the belt goes on riding.
         const carried = release.carried && x < 0 && !this.hasLeft(index, t);
         releases.push({ ...release, x, y, vx, vy, t: 0, carried });
         track.tip = 1;

@@ -93,10 +93,10 @@ class Stage {
     else this.rebuild();
   }
 
-  /** Whether nothing of the run is shown yet that somebody is to predict. */
+  /** Whether what is to be predicted of the run is still hidden. */
   blind = false;
 
-  /** Whether somebody has chosen what is shown. */
+  /** Whether the user has chosen what is shown. */
   moved = false;
 
   fit() {

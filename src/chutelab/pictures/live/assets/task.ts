@@ -90,7 +90,7 @@ class Task {
     return judge(this.case(n), value, this.others(n));
   }
 
-  /** Right answers for nobody's name, and for the other names. */
+  /** Right answers without a name, and for the other names. */
   * others(n: number): Iterable<[string, number]> {
     const { exercise } = this, seen = new Set([plainName(this.student)]);
     for (const name of [exercise.unnamed, ...this.names()]) {
@@ -149,7 +149,7 @@ class Task {
     return remarks ? `${said} (${remarks})` : said;
   }
 
-  /** What is told to whoever keeps the score. */
+  /** What is told to the platform that keeps the score. */
   get progress() {
     const { standings } = this, total = standings.length;
     const done = standings.filter(({ verdict }) => verdict === "right").length;

@@ -97,7 +97,7 @@ class Words {
     return `${this.fixed(value, places)}${unit === "degrees" ? "°" : unit ? ` ${unit}` : ""}`;
   }
 
-  /** A number that somebody typed, with point or comma; NaN if it is none. */
+  /** A number that was typed, with point or comma; NaN if it is none. */
   parse(text: string) {
     const plain = text.trim().replace("−", "-").replace(",", ".");
     return /^[-+.\de]+$/i.test(plain) ? Number(plain) : NaN;

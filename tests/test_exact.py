@@ -240,6 +240,14 @@ def test_a_slide_into_a_slight_bend_goes_on(bend):
     assert hypot(*end["velocity"]) == pytest.approx(1e-3 - G * bend * 0.4, rel=1e-9)
 
 
+@pytest.mark.parametrize("bend", [3e-12, 1e-11, 1e-10, 1e-9, 1e-8])
+def test_a_slow_disk_stays_on_a_floor_with_a_slight_hollow_bend(bend):
+    """It meets the second piece r/2 times the bend before the first one ends, about rounding."""
+    floor = {"name": "floor", "points": [[-1.0, 0.0], [0.0, 0.0], [1.0, bend]], "friction": 0.0}
+    end = thrown([-6e-4, 0.02], [0.05, 0.0], floor, until=1.0, radius=0.02).track(0)[-1]
+    assert end["position"] == pytest.approx([0.0494, 0.02], abs=1e-7)
+
+
 # The ends of moving surfaces
 
 

@@ -124,6 +124,7 @@ restitution = 1.0
 at = [0.0, 0.005]
 velocity = [0.0, 0.0]
 [run]
+engine = "contact"
 until = 1e6
 max_time = 1e6
 """

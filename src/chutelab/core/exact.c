@@ -762,7 +762,8 @@ static void leave_face(void) {
     double foot = (A.x - o->x) * o->tx + (A.y - o->y) * o->ty;
     int tip = 2 * A.on + (foot > 0.5 * o->length), face = A.side < 0;
     Onward to = O.onward[2 * (epoch_now() * O.tip_count + tip) + face];
-    go_on(to.obstacle, to.side, O.tips[tip].sets[face]);
+    if (to.meets) strike(to.obstacle, to.side);
+    else go_on(to.obstacle, to.side, O.tips[tip].sets[face]);
 }
 
 /* Move the particle on a face on to its next event and resolve it. */

@@ -77,7 +77,9 @@ typedef struct {
     int next;
 } Handover;
 
-typedef struct { int obstacle, side; } Onward; /* what a face goes over into at its end, or -1 */
+/* What a face goes over into at its end, or -1; or, in a hollow bend, what is met there: before its end, but
+   for rounding. */
+typedef struct { int obstacle, side, meets; } Onward;
 
 typedef struct {
     Obstacle *all;

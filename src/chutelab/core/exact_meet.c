@@ -374,7 +374,7 @@ void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
         int joint = tip->sets[over->face];
         Onward onward = O.onward[2 * (epoch * O.tip_count + over->tip) + over->face];
         if (over->onto) narrow(found, phi, angle, closing, (Bound){ 0.0, number, face, 1, joint });
-        else narrow(found, phi, angle, -closing, (Bound){ 0.0, onward.obstacle, onward.side, 1, joint });
+        else narrow(found, phi, angle, -closing, (Bound){ 0.0, onward.obstacle, onward.side, !onward.meets, joint });
     }
     if ((c->crown[0] != 0.0 || c->crown[1] != 0.0) && c->speed != 0.0) {
         double tilt = angle_of(c->crown[0], c->crown[1]);

@@ -12,6 +12,9 @@
 #define CIRCULAR 1e-9
 /* Width, in `touch`, by which the boxes of faces are larger than they need be. */
 #define BOX_TOUCHES 64.0
+/* rad; of a hollow bend this slight it may be, by rounding, that a piece ends before the next is met: it goes
+   on as the next. */
+#define SLIGHT 1e-7
 /* In place of an end: a piece that goes on through a place, first along it, then back. */
 #define THROUGH 2
 
@@ -451,24 +454,26 @@ static double angle_after(int n, int count, int turns) {
     return TURN - angle <= COLLINEAR ? 0.0 : angle;
 }
 
-static void go_onward(Onward *to, const Ray *r, int face, const Ray *other, int onto) {
+static void go_onward(Onward *to, const Ray *r, int face, const Ray *other, int onto, int meets) {
     if (r->end < THROUGH)
-        to[2 * tip_of(r) + (face < 0)] = (Onward){ face_of(other->piece, onto), onto };
+        to[2 * tip_of(r) + (face < 0)] = (Onward){ face_of(other->piece, onto), onto, meets };
 }
 
 /* Find what faces go over into at their ends: another face if that is flush, else the circle round the
    end, whose side is left open, 0. */
 static void find_onward(int epoch) {
     Onward *to = O.onward + epoch * 2 * O.tip_count;
-    for (int n = 0; n < 2 * O.tip_count; n++) to[n] = (Onward){ O.tips[n / 2].circle, 0 };
+    for (int n = 0; n < 2 * O.tip_count; n++) to[n] = (Onward){ O.tips[n / 2].circle, 0, 0 };
     for (int n = 0; n < O.tip_count; n++) {
         if (at_spot[O.tips[n].spot] != n) continue;
         int turns, count = sort_rays(list_rays(n), epoch, &turns);
         for (int k = 0; k < count; k++) {
-            if (!(fabs(angle_after(k, count, turns) - PI) <= COLLINEAR)) continue;
+            double angle = angle_after(k, count, turns);
+            if (!(angle > COLLINEAR && angle <= PI + COLLINEAR)) continue;
             const Ray *right = flat + k, *left = flat + (k + 1) % count;
-            go_onward(to, right, left_of(right), left, -left_of(left));
-            go_onward(to, left, -left_of(left), right, left_of(right));
+            int meets = angle < PI - SLIGHT;
+            go_onward(to, right, left_of(right), left, -left_of(left), meets);
+            go_onward(to, left, -left_of(left), right, left_of(right), meets);
         }
     }
 }

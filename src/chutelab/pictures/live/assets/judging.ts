@@ -68,8 +68,8 @@ const withUnit = (
   exercise: Exercise, value: number, unit: string,
 ) => `${shownNumber(exercise, value)} ${unit}`.trim();
 
-/** Judge a finite answer: right, a known mistake, right for another student, two mistakes at once, or
- * off.
+/** Judge a finite answer: right, a known mistake, right for another student, two mistakes at once,
+ * or off.
  * @param others names and
  *   right answers of others; looked at only if need be */
 function judge(its: Case, answer: number, others: Iterable<[string, number]> = []): Reply {

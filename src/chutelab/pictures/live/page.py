@@ -33,6 +33,7 @@ def html(
     language: str = "en",
     home: tuple[str, str] | None = None,
     exercise: Mapping[str, Any] | None = None,
+    lesson: Mapping[str, Any] | None = None,
 ) -> str:
     """Return the live page of a scene; the same scene and version give the same bytes.
 
@@ -46,6 +47,9 @@ def html(
         Text and address of a link back, for a page that is one of several.
     exercise : mapping, optional
         What `chutelab.classroom.exercises.catalogue.data_of` makes of an exercise.
+    lesson : mapping, optional
+        Title and question of a lesson, and its steps as
+        `chutelab.classroom.lessons.steps.data_of` has them.
 
     Raises
     ------
@@ -80,6 +84,7 @@ def html(
         "quantities": {row.name: {"symbol": row.symbol, "unit": row.unit} for row in shown},
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
         **({} if exercise is None else {"exercise": exercise}),
+        **({} if lesson is None else {"lesson": lesson}),
         "wasm": b64encode(zlib.compress((core / "core.wasm").read_bytes(), 9)).decode("ascii"),
     }
     # Within a script element nothing but an end tag must look like one.
@@ -107,12 +112,15 @@ def write(
     language: str = "en",
     home: tuple[str, str] | None = None,
     exercise: Mapping[str, Any] | None = None,
+    lesson: Mapping[str, Any] | None = None,
 ) -> int:
     """Write the live page of a scene, whole or not at all, and return its size in bytes.
 
     See `html`; a file that is there is replaced, its folder must be there.
     """
-    data = html(scene, language=language, home=home, exercise=exercise).encode("utf-8")
+    data = html(scene, language=language, home=home, exercise=exercise, lesson=lesson).encode(
+        "utf-8"
+    )
     with whole(Path(path)) as unfinished:
         unfinished.write_bytes(data)
     return len(data)

@@ -211,7 +211,7 @@ def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(
     assert not page.evaluate("chutelab.lab.playing")
     is_hidden()
     # It says what is to be done first, and the mark has the focus now.
-    assert "First your mark" in page.inner_text("#guess")
+    assert "First your flag" in page.inner_text("#guess")
     assert page.evaluate("document.activeElement.getAttribute('aria-describedby')") == "guess"
     for _ in range(3):
         page.keyboard.press("PageUp")

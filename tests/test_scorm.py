@@ -14,6 +14,7 @@ from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.pages import package
 from chutelab.cli import main
+from live.browser import to_step
 
 LIVE = Path(__file__).parent / "live"
 STAND_IN = LIVE / "node_modules" / "scorm-again" / "dist" / "scorm12.min.js"
@@ -203,11 +204,10 @@ def answers_of(name, student=ADA):
     return {str(case.number): f"{case.right:.4g}" for case in cases}
 
 
-def exercise_of(page, name="the-bounce"):
+def exercise_of(page):
     """The lesson's page, in a frame of a frame, once it has begun."""
     frame = page.frame_locator("iframe").frame_locator("iframe")
-    if find(name).page.live.get("predict", True):
-        frame.locator("#show-all").click()
+    to_step(frame)
     frame.locator(".question").first.wait_for()
     return frame
 
@@ -244,7 +244,7 @@ def test_a_lesson_is_left_resumed_and_completed_in_a_platform(platform, name):
     platform.start(name)
     right = answers_of(name)
     page = platform()
-    frame = exercise_of(page, name)
+    frame = exercise_of(page)
     assert ADA in frame.locator("#exercise").inner_text()
     assert check(frame, 1, "123456") == "off"
     assert check(frame, 2, "two metres") == "unread"
@@ -255,7 +255,7 @@ def test_a_lesson_is_left_resumed_and_completed_in_a_platform(platform, name):
     assert (data["core"]["lesson_status"], data["core"]["entry"]) == ("incomplete", "resume")
 
     page = platform()
-    frame = exercise_of(page, name)
+    frame = exercise_of(page)
     first = frame.locator('.question[data-question="1"]')
     assert "2 tries" in first.locator(".state").text_content()
     assert first.locator("input").input_value() == right["1"]
@@ -288,11 +288,15 @@ def test_a_long_explanation_and_a_long_name_come_back(platform):
     platform.start("the-bounce")
     name = 100 * "Zoë "
     page = platform(f"/?name={name}")
-    exercise_of(page).locator("#explain").fill(LONG)
+    frame = page.frame_locator("iframe").frame_locator("iframe")
+    to_step(frame, "explain")
+    frame.locator("textarea").fill(LONG)
     data, _ = leave(page, json.dumps(LONG, ensure_ascii=False))
     assert 3000 < len(data["suspend_data"]) <= 4096
     page = platform(f"/?name={name}")
-    assert exercise_of(page).locator("#explain").input_value() == LONG
+    frame = page.frame_locator("iframe").frame_locator("iframe")
+    to_step(frame, "explain")
+    assert frame.locator("textarea").input_value() == LONG
     assert {call[-1] for call in page.evaluate("calls")} == {"0"}
 
 
@@ -302,9 +306,9 @@ def test_platforms_that_refuse_or_are_none_are_told_of(platform):
     alone = page.locator("#alone")
     assert "press “Save to hand in”" in alone.inner_text()
     frame = page.frame_locator("iframe")
-    frame.locator("#show-all").click()
     frame.locator("#student").fill("Ada")
     frame.locator("#begin").click()
+    to_step(frame)
     assert check(frame, 1, answers_of("the-bounce", "Ada")["1"]) == "right"
     assert frame.locator("#result").inner_text() == "Save to hand in"
     page.close()

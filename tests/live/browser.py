@@ -25,6 +25,13 @@ DONE = """() => new Promise((resolve, reject) => {
 })"""
 
 
+def to_step(page, kind="numbers"):
+    """Skip the steps of a lesson up to one of a kind."""
+    page.locator(".page[data-kind]").wait_for()
+    while page.locator(".page").get_attribute("data-kind") != kind:
+        page.locator("#skip:visible, #step-next:enabled:visible").first.click()
+
+
 @pytest.fixture(scope="module")
 def browser():
     playwright = pytest.importorskip(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import zlib
 from base64 import b64encode
 from collections.abc import Mapping
@@ -64,6 +65,9 @@ def html(
     }
     palette = "".join(f"  --{k.replace('_', '-')}: {v};\n" for k, v in colours.items())
     css = f":root {{\n{palette}}}\n{_file('assets/page.css')}"
+    if lesson is not None:
+        css += _file("assets/lesson.css")
+    css = re.sub(r"/\*.*?\*/|\s+(?=\s)|(?<=[{;}])\s+", "", css, flags=re.DOTALL)
     core = files("chutelab.core")
     facts = describe(scene)
     live = live_of(scene, facts["scene"])
@@ -72,6 +76,9 @@ def html(
         facts["scene"]["live"] = {key: live[key] for key in given}
     # What the page's language has no words for is called as in the registry.
     shown = [row for row in REGISTRY.values() if row.symbol]
+    # What no reader of the file asks for is packed: the form of scene files and of the core.
+    rules = {name: facts.pop(name) for name in ("tables", "presets")}
+    rules["layout"] = json.loads((core / "layout.json").read_text(encoding="utf-8"))
     data = {
         **facts,
         "live": live,
@@ -82,10 +89,10 @@ def html(
             **json.loads(_file(f"assets/strings/{language}.json")),
         },
         "quantities": {row.name: {"symbol": row.symbol, "unit": row.unit} for row in shown},
-        "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
         **({} if exercise is None else {"exercise": exercise}),
         **({} if lesson is None else {"lesson": lesson}),
-        "wasm": b64encode(zlib.compress((core / "core.wasm").read_bytes(), 9)).decode("ascii"),
+        "rules": _packed(json.dumps(rules, separators=(",", ":")).encode()),
+        "wasm": _packed((core / "core.wasm").read_bytes()),
     }
     # Within a script element nothing but an end tag must look like one.
     packed = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
@@ -129,6 +136,10 @@ def write(
 @cache
 def _file(name: str) -> str:
     return (files("chutelab.pictures.live") / name).read_text(encoding="utf-8")
+
+
+def _packed(content: bytes) -> str:
+    return b64encode(zlib.compress(content, 9)).decode("ascii")
 
 
 def _hash(text: str) -> str:

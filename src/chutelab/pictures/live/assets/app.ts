@@ -1,18 +1,18 @@
 // The page: reads its data, starts the engine's thread, and joins the parts.
 
 import { Bench } from "./bench.ts";
-import { compiled } from "./core.ts";
+import { compiled, unpacked } from "./core.ts";
 import { Engine } from "./engine.ts";
 import { Arrows } from "./arrows.ts";
 import { CurvesPanel } from "./curves.ts";
 import { EnergyPanel } from "./energy.ts";
-import { ExercisePanel } from "./exercise.ts";
 import { Film } from "./film.ts";
 import { Inspector } from "./inspector.ts";
 import { Keep } from "./keep.ts";
 import { listenToKeys } from "./keyboard.ts";
 import { toToml } from "./keys.ts";
 import { Lab } from "./lab.ts";
+import { Lesson } from "./lesson.ts";
 import { watchLaws } from "./laws.ts";
 import { LandingPanel } from "./landing.ts";
 import { NumbersPanel } from "./numbers.ts";
@@ -56,6 +56,7 @@ async function start() {
     if (element.matches("button")) (element as HTMLElement).title = name;
   }
   try {
+    Object.assign(data, await unpacked(bytesOf(data.rules).buffer).json());
     await startPlan(await compiled(wasm), data.layout);
   } catch {
     byId("broken").remove();
@@ -76,16 +77,15 @@ async function start() {
   new Sound(lab, words);
   new Film(lab, stage, words);
   new Keep(byId("panels"), stage, lab, words);
-  if (data.live?.predict) new Prediction(stage, lab, words);
   listenToKeys(bench, lab, words);
   for (const panel of document.querySelectorAll("#panels > .card, .tools, .looks, .watch")) {
     const name = panel.matches(".card") ? panel.id : "tools";
     if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
   }
-  const exercise = data.exercise
-    && new ExercisePanel(byId("panels"), stage, lab, words, newEngine);
+  const lesson = data.lesson && new Lesson(stage, lab, words, newEngine);
+  if (!lesson && data.live?.predict) new Prediction(stage, lab, words);
   Object.assign(globalThis, {
-    chutelab: { lab, stage, panels, tools, exercise, toml: () => toToml(lab.given as any) },
+    chutelab: { lab, stage, panels, tools, lesson, toml: () => toToml(lab.given as any) },
   });
   byId("broken").remove();
 }

@@ -9,7 +9,7 @@ import type { Handle } from "./handles.ts";
 type Live = { predict?: boolean, controls?: string[] | null, panels?: string[] | null,
   ranges?: Record<string, [number, number]>,
   presets?: { name: string, set: Record<string, unknown> }[] };
-type Page = { tables: Record<string, Record<string, any>>, live?: Live };
+type Page = { tables: Record<string, Record<string, any>>, live?: Live, lesson?: object };
 /** A part of the scene; "scene" of the main numbers of all */
 type Section = { table: string, row: number, name: string };
 /** A number that can be typed; it is the n-th `part` `of` so many */
@@ -25,16 +25,16 @@ const isPartOf = (key: string, whole: string) =>
 
 /** @param key of a number, or of a point whole */
 function mayChange({ live }: Page, key: string) {
-  const controls = live?.controls ?? [];
-  return !controls.length || controls.some((one) => isPartOf(key, one) || isPartOf(one, key));
+  const controls = live?.controls;
+  return !controls || controls.some((one) => isPartOf(key, one) || isPartOf(one, key));
 }
 
 /** Whether things may be drawn and deleted: where not only some keys can be changed. */
-const mayDraw = ({ live }: Page) =>
-  !live?.controls?.length && (!live?.panels || live.panels.includes("edit"));
+const mayDraw = ({ live, lesson }: Page) =>
+  !lesson && !live?.controls && (!live?.panels || live.panels.includes("edit"));
 
 /** Whether the scene names what can be changed: few enough to be shown together. */
-const showsFew = ({ live }: Page) => Boolean(live?.controls?.length);
+const showsFew = ({ live }: Page) => Boolean(live?.controls);
 
 /** The handles of what can be changed. */
 function openHandles(handles: Handle[], page: Page) {

@@ -16,10 +16,13 @@ const GREATEST = 1e300;
 /** Doubles of a knot: t, x, y, vx, vy, spin, three entries of the ledger; and its disk. */
 const KNOT_ROW = 10;
 
+/** What was compressed by zlib. */
+const unpacked = (packed: ArrayBuffer) =>
+  new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate")));
+
 /** Compile what a page carries: the core, compressed by zlib. */
 async function compiled(wasm: ArrayBuffer) {
-  const plain = new Blob([wasm]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return WebAssembly.compile(await new Response(plain).arrayBuffer());
+  return WebAssembly.compile(await unpacked(wasm).arrayBuffer());
 }
 
 async function startCore(module: WebAssembly.Module, layout: Layout) {
@@ -264,4 +267,4 @@ function surfaceRows({ segments, arcs, pulley }: Machine, shapes: Record<string,
   return [...flat, ...wheels, ...bent];
 }
 
-export { Core, KNOT_ROW, Memory, compiled, startCore };
+export { Core, KNOT_ROW, Memory, compiled, startCore, unpacked };

@@ -26,7 +26,8 @@ class Keep {
       made.addEventListener("click", act);
       return made;
     };
-    const hasAddress = /^(https?|file):$/.test(location.protocol);
+    // In a lesson the step says which machine it is.
+    const hasAddress = !lab.data.lesson && /^(https?|file):$/.test(location.protocol);
     home.append(card("share", words.say("share"), html("div", { class: "row" },
       ...(hasAddress ? [button("copy-link", () => this.copy())] : []),
       button("save-scene", () => this.save("toml", this.toml, "application/toml")),
@@ -35,6 +36,7 @@ class Keep {
       button("save-numbers", () => this.table("numbers", this.numbers), true),
       html("label", {}, this.comma, ` ${words.say("decimal-comma")}`)), this.said));
     lab.on("scene", () => this.follow());
+    if (lab.data.lesson) return;
     addEventListener("hashchange", () => this.open());
     this.open();
   }
@@ -81,7 +83,7 @@ class Keep {
     this.told = given;
     if (first) return;
     this.hash = toHash(lab.first, given);
-    try {
+    if (!lab.data.lesson) try {
       history.replaceState(null, "", this.hash || location.href.replace(/#.*/s, ""));
     } catch {
       // A page without an address of its own, such as a frame's text, has none to change.

@@ -20,6 +20,10 @@ function partsOf(given: Given, key: string): (string | number)[] {
   return parts;
 }
 
+/** Returns a full path with the number of a row in place of its name. */
+export const indexed = (given: Given, key: string) => partsOf(given, key)
+  .map((part, n) => (typeof part === "number" ? `[${part}]` : n ? `.${part}` : part)).join("");
+
 /** Returns what is written at a full path; undefined if nothing is. */
 export function valueAt(given: Given, key: string): any {
   let found: any = given;

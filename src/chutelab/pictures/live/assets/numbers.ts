@@ -5,6 +5,7 @@ import { FEWEST, crowdOf, type CrowdNumbers } from "./crowd.ts";
 import { card, follow, html } from "./panels.ts";
 import { historyOf, type Stages } from "./stages.ts";
 import { predict } from "./prediction.ts";
+import { symbolsOf } from "./quantities.ts";
 import type { Lab } from "./lab.ts";
 import type { Recording } from "./recording.ts";
 import type { Scene } from "./scene.ts";
@@ -12,6 +13,10 @@ import type { Words } from "./words.ts";
 
 /** By the name of the quantity; its symbol and unit are in the page's data. */
 type Row = { id: string, simulated: number, analytic: number };
+
+/** What is told, as far as it happened. */
+const SHOWN = ["phi1_deg", "v1", "t2", "x2", "v2", "v2r", "t3", "x3", "v3", "y3", "d3", "landing.x",
+  "flight.t"];
 
 /** What is below this is rounding, in any of the units. */
 const ROUNDED = 1e-12;
@@ -38,33 +43,21 @@ function numbersOf(
 ): Row[] {
   // What leaves a wall or a hopper has not left a pulley.
   if (!isFinite(pulley)) stages = stages.map(({ hit, down }) => ({ hit, down }));
-  const speed = (v: number[]) => Math.hypot(v[0], v[1]);
-  const over = (value: (its: Stages, i: number) => number) => mean(stages.map(value));
-  // The paper counts x3 back from the plate, and heights down.
-  const simulated: Record<string, number> = {
-    phi1_deg: over(({ left }) => (left ? (Math.atan2(left.x, left.y) * 180) / Math.PI : NaN)),
-    v1: over(({ left }) => (left ? speed(left.after) : NaN)),
-    t2: over(({ left, hit }) => (left && hit ? hit.t - left.t : NaN)),
-    x2: over(({ left, hit }) => (left && hit ? hit.x - left.x : NaN)),
-    v2: over(({ hit }) => (hit ? speed(hit.before) : NaN)),
-    v2r: over(({ hit }) => (hit ? speed(hit.after) : NaN)),
-    t3: over(({ hit, down }) => (hit && down ? down.t - hit.t : NaN)),
-    x3: over(({ hit, down }) => (hit && down ? hit.x - down.x : NaN)),
-    v3: over(({ down }) => (down ? speed(down.before) : NaN)),
-    y3: over(({ hit, down }) => (hit && down ? hit.y - down.y : NaN)),
-    d3: over(({ down }, i) => (down ? pulley + radius[i] - down.y : NaN)),
-    "landing.x": over(({ down }) => (down ? down.x : NaN)),
+  const none = { mass: NaN, angle: NaN, beltSpeed: NaN, rate: NaN };
+  const each = stages.map((its, i) => ({
+    ...symbolsOf(its, { ...none, pulley, radius: radius[i] }),
+    "landing.x": its.down?.x ?? NaN,
     // With a plate between, t2 and t3 say it.
-    "flight.t": over(({ left, hit, down }) => (left && down && !hit ? down.t - left.t : NaN)),
-  };
+    "flight.t": its.left && its.down && !its.hit ? its.down.t - its.left.t : NaN,
+  }) as Record<string, number>);
   const { phi1, x2, x3 } = found;
   const analytic: Record<string, number> = {
     ...found,
     phi1_deg: (phi1 * 180) / Math.PI,
     "landing.x": (pulley + radius[0]) * Math.sin(phi1) + x2 - x3,
   };
-  return Object.keys(simulated).map((id) => ({
-    id, simulated: simulated[id], analytic: analytic[id] ?? NaN,
+  return SHOWN.map((id) => ({
+    id, simulated: mean(each.map((its) => its[id])), analytic: analytic[id] ?? NaN,
   }));
 }
 

@@ -15,6 +15,12 @@ function html(
   return element;
 }
 
+/** The nodes of a text that Python made of Markdown, where markup of its own is only text. */
+function grown(markup: string): Node[] {
+  const { body } = new DOMParser().parseFromString(markup, "text/html");
+  return [...body.childNodes].map((node) => document.importNode(node, true));
+}
+
 /** A drawing of the page's sprite, see page.html. */
 function icon(name: string) {
   const drawn = svg("svg", { class: "i", "aria-hidden": "true" });
@@ -79,7 +85,7 @@ function follow(lab: Lab, panel: HTMLDetailsElement, news: News[], act: () => vo
 /** What stands before the title of a panel. */
 const DRAWINGS: Record<string, string> = {
   edit: "slow", energy: "sum", numbers: "digits", landing: "bars", curves: "graph", share: "share",
-  exercise: "flag", flow: "flow",
+  flow: "flow",
 };
 
-export { card, eased, follow, html, icon, iconButton };
+export { card, eased, follow, grown, html, icon, iconButton };

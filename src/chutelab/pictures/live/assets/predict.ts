@@ -1,135 +1,133 @@
-// First say where it will land, then see: path, landing and numbers are hidden until then.
+// First say where it goes, then see: path, landing and numbers are not in the page until then.
 
 import { historyOf } from "./stages.ts";
 import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
 import type { Lab } from "./lab.ts";
-import type { Scene } from "./scene.ts";
 import type { Words } from "./words.ts";
+
+export type Place = [number, number];
 
 /** Steps of arrow keys, m; with Shift a tenth of it. */
 const MARK_STEP = 0.01;
 
-/** Where the outgoing belt runs; null if there is none. */
-function landingLine(
-  { incoming, outgoing }: Scene,
-): { y: number, left: number, right: number } | null {
-  return outgoing && incoming ? {
-    y: incoming.pulley_radius - outgoing.drop, left: outgoing.start,
-    right: outgoing.start + outgoing.length,
-  } : null;
-}
+/** Points of a sketch at most, and pixels from one to the next. */
+const MOST_POINTS = 20, APART = 12;
 
-/** Where it went: the mean of all landings, or of where tracks ended in a run without a belt to
- * land on; null as long as there is nothing. */
-function whereTo(lab: Lab, lands: boolean): [number, number] | null {
-  const { recording } = lab;
-  if (!recording || (!lands && recording.state === "running")) return null;
-  const places = lands ? historyOf(lab)?.landings ?? []
-    : recording.tracks.flatMap((track) => track.state(track.end) ?? []);
-  if (!places.length) return null;
-  const mean = (axis: "x" | "y") =>
-    places.reduce((sum, place) => sum + place[axis], 0) / places.length;
-  return [mean("x"), mean("y")];
-}
+/** What tells of a run; it is taken out of the page while that is to be predicted. */
+const TELLS = ".reveals, .tools, .looks, .watch, #panels > .card:not(#edit, #share), #share label";
 
-class Prediction {
-  /** Whether everything is hidden; whether the learner has said where. */
-  hides = true;
-  isSet = false;
-  always = false;
-  /** Whether play was pressed too early. */
-  asked = false;
-  at: [number, number] = [0, 0];
-  note;
-  show;
-  grip;
-  line;
-  belt?: { y: number, left: number, right: number } | null;
+const WAYS: Record<string, Place> = {
+  ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
+  PageUp: [10, 0], PageDown: [-10, 0],
+};
 
-  constructor(readonly stage: Stage, readonly lab: Lab, readonly words: Words) {
-    this.note = document.getElementById("guess") as any;
-    this.show = document.getElementById("show-all") as any;
-    this.grip = svg("g", { class: "guess", role: "slider", tabindex: 0 });
-    this.grip.append(svg("circle", { class: "room", r: 20 }),
-      svg("path", { d: "M0 0L-8 -17A9.5 9.5 0 1 1 8 -17Z" }));
-    this.grip.setAttribute("aria-label", words.say("mark"));
-    this.grip.setAttribute("aria-describedby", "guess");
-    this.line = svg("path", { class: "miss" });
-    stage.over.append(this.line, this.grip);
-    this.show.hidden = false;
-    this.show.textContent = words.say("show-at-once");
-    this.show.addEventListener("click", () => {
-      this.always = !this.always;
-      this.show.setAttribute("aria-pressed", String(this.always));
-      this.hide(!this.always);
-    });
-    lab.mayPlay = () => this.begin();
-    lab.on("scene", () => this.changed());
-    lab.on("run", () => this.place());
-    stage.painters.push(() => this.place());
-    this.listen();
-    this.changed();
-  }
+/** What hides the run. */
+class Curtain {
+  hides = false;
+  away: [Element, Comment][] = [];
 
-  given: object | undefined;
+  constructor(readonly stage: Stage, readonly lab: Lab) {}
 
-  /** Another scene asks anew. */
-  changed() {
-    const { lab, stage } = this, { view } = stage;
-    if (this.given === lab.given || !lab.scene) return;
-    const first = !this.given;
-    this.given = lab.given;
-    this.belt = landingLine(lab.scene);
-    if (first || !this.isSet) {
-      this.at = this.belt
-        ? [Math.min(Math.max(view.x, this.belt.left), this.belt.right), this.belt.y]
-        : [view.x, view.y];
-    }
-    this.isSet = this.asked = false;
-    if (!this.always) this.hide(true);
-  }
-
-  hide(hides: boolean) {
+  set(hides: boolean) {
     const { lab, stage } = this;
     this.hides = hides;
     if (hides) {
       lab.pause();
-      this.lab.t = lab.start;
-    }
+      lab.t = lab.start;
+      for (const element of document.querySelectorAll(TELLS)) {
+        const place = document.createComment("");
+        element.replaceWith(place);
+        this.away.push([element, place]);
+      }
+    } else for (const [element, place] of this.away.splice(0)) place.replaceWith(element);
     stage.blind = hides;
     document.documentElement.classList.toggle("predicting", hides);
     for (const id of ["time", "back", "forward"]) {
       (document.getElementById(id) as any).disabled = hides;
     }
     if (!lab.playing) lab.tell("time");
+    if (!hides) lab.tell("run");
     stage.rebuild();
   }
+}
 
-  /** Play was pressed. */
+/** A flag that is put where something is expected: on the outgoing belt, on the pulley, or
+ * anywhere. */
+class Flag {
+  at: Place = [0, 0];
+  isSet = false;
+  isOpen = true;
+  grip;
+  line;
+
+  /** @param what an event of the run, such as "landing"
+   * @param changed called once it is put somewhere */
+  constructor(
+    readonly stage: Stage, readonly lab: Lab, readonly words: Words, public what: string,
+    readonly changed: () => void, note = "",
+  ) {
+    this.grip = svg("g", { class: "guess", role: "slider", tabindex: 0 });
+    this.grip.append(svg("circle", { class: "room", r: 22, cy: -14 }),
+      svg("path", { class: "pole", d: "M0 0V-40" }), svg("path", { d: "M0 -41H25L19 -33L25 -25H0Z" }),
+      svg("circle", { class: "foot", r: 4.5 }));
+    this.grip.setAttribute("aria-label", words.say("mark"));
+    if (note) this.grip.setAttribute("aria-describedby", note);
+    this.line = svg("path", { class: "miss" });
+    stage.over.append(this.line, this.grip);
+    this.painter = () => this.place();
+    stage.painters.push(this.painter);
+    this.listen();
+    this.begin();
+  }
+
+  painter;
+
+  remove() {
+    this.grip.remove();
+    this.line.remove();
+    const { painters } = this.stage;
+    painters.splice(painters.indexOf(this.painter), 1);
+  }
+
+  /** Put it where nothing is said yet. */
   begin() {
-    if (!this.hides) return true;
-    if (this.isSet) this.hide(false);
-    else {
-      this.asked = true;
-      this.place();
-      this.grip.focus();
-    }
-    return this.isSet;
+    const { free } = this.stage.view, { view } = this.stage;
+    this.at = this.near(view.worldX(0.5 * (free.left + free.right)),
+      view.worldY(0.5 * (free.top + free.bottom)));
+    this.isSet = false;
+  }
+
+  /** Where the outgoing belt runs; null if it is not asked where on it. */
+  get belt() {
+    const { incoming, outgoing } = this.lab.scene ?? {};
+    return this.what === "landing" && outgoing && incoming ? {
+      y: incoming.pulley_radius - outgoing.drop, left: outgoing.start,
+      right: outgoing.start + outgoing.length,
+    } : null;
+  }
+
+  /** The place nearest to one where it can be. */
+  near(x: number, y: number): Place {
+    const { belt } = this, { pulley, radius } = this.lab.machine as any;
+    if (belt) return [Math.min(Math.max(x, belt.left), belt.right), belt.y];
+    if (this.what !== "separation" || !pulley) return [x, y];
+    const far = Math.max(Math.hypot(x, y), 1e-9), ride = pulley.radius + radius[0];
+    return [Math.max(0, (x * ride) / far), (y * ride) / far];
   }
 
   set(x: number, y: number) {
-    const { belt } = this;
-    this.at = belt ? [Math.min(Math.max(x, belt.left), belt.right), belt.y] : [x, y];
+    this.at = this.near(x, y);
     this.isSet = true;
     this.place();
+    this.changed();
   }
 
   listen() {
     const { grip, stage } = this;
     let held = false;
     grip.addEventListener("pointerdown", (event: PointerEvent) => {
-      if (!this.hides) return;
+      if (!this.isOpen) return;
       event.preventDefault();
       grip.focus();
       grip.setPointerCapture(event.pointerId);
@@ -147,35 +145,233 @@ class Prediction {
       });
     }
     grip.addEventListener("keydown", (event: KeyboardEvent) => {
-      const ways: Record<string, [number, number]> = {
-        ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
-        PageUp: [10, 0], PageDown: [-10, 0], Enter: [0, 0],
-      };
-      const way = ways[event.key];
-      if (!way || !this.hides) return;
+      const way = event.key === "Enter" ? [0, 0] : WAYS[event.key];
+      if (!way || !this.isOpen) return;
       event.preventDefault();
       const step = MARK_STEP * (event.shiftKey ? 0.1 : 1);
       this.set(this.at[0] + way[0] * step, this.at[1] + way[1] * step);
     });
   }
 
-  /** Put the mark where it belongs, and say how far off it was once that is known. */
+  /** Where it went: the mean of all that it happened to; null as long as there is nothing. */
+  get went(): Place | null {
+    const { lab: { recording }, what } = this, history = historyOf(this.lab);
+    if (!recording || !history || this.stage.blind || !this.isSet) return null;
+    const name = { separation: "left", impact: "hit", landing: "down" }[what];
+    const places = name ? history.stages.flatMap((its: any) => its[name] ?? [])
+      : recording.state === "running" ? []
+        : recording.tracks.flatMap((track) => track.state(track.end) ?? []);
+    const mean = (axis: "x" | "y") =>
+      places.reduce((sum, place) => sum + place[axis], 0) / places.length;
+    return places.length ? [mean("x"), mean("y")] : null;
+  }
+
+  /** How far off it was, m; NaN as long as that is not known. */
+  get off() {
+    const { went, at: [x, y] } = this;
+    return went ? Math.hypot(went[0] - x, this.belt ? 0 : went[1] - y) : NaN;
+  }
+
   place() {
-    const { lab, stage: { view }, words, grip, at: [x, y], belt } = this;
+    const { stage: { view }, words, grip, went, at: [x, y] } = this;
     grip.setAttribute("transform", `translate(${view.px(x)} ${view.py(y)})`);
     grip.setAttribute("aria-valuenow", String(x));
     grip.setAttribute("aria-valuetext",
-      [x, ...(belt ? [] : [y])].map((value) => words.value({ value, unit: "m" })).join(", "));
-    grip.setAttribute("aria-disabled", String(!this.hides));
-    grip.style.display = this.always ? "none" : "";
-    const went = !this.hides && this.isSet ? whereTo(lab, Boolean(belt)) : null;
+      [x, ...(this.belt ? [] : [y])].map((value) => words.value({ value, unit: "m" })).join(", "));
+    grip.setAttribute("aria-disabled", String(!this.isOpen));
     this.line.setAttribute("d", went
       ? `M${view.px(x)} ${view.py(y)}L${view.px(went[0])} ${view.py(went[1])}` : "");
-    const off = went ? Math.hypot(went[0] - x, belt ? 0 : went[1] - y) : 0;
-    const wish = this.isSet ? "mark-play" : this.asked ? "mark-first" : "mark-set";
-    const isOver = this.isSet && lab.recording?.state !== "running";
-    const said = this.always ? "" : this.hides ? words.say(wish)
-      : went ? words.say("mark-off", { distance: words.number(100 * off, 3) })
+  }
+}
+
+/** A path that is drawn into the picture by hand, or point by point with the keyboard. */
+class Sketch {
+  isOpen = true;
+  line;
+  pen;
+  tip: Place;
+
+  /** @param changed called whenever it is another one */
+  constructor(
+    readonly stage: Stage, readonly words: Words, public points: Place[],
+    readonly changed: () => void,
+  ) {
+    this.tip = points[points.length - 1] ?? stage.view.middle;
+    this.line = svg("path", { class: "sketch" });
+    this.pen = svg("g", { class: "guess pen", role: "slider", tabindex: 0 });
+    this.pen.append(svg("circle", { class: "room", r: 20 }), svg("circle", { class: "foot", r: 6 }));
+    this.pen.setAttribute("aria-label", words.say("sketch"));
+    this.pen.setAttribute("aria-describedby", "sketch-keys");
+    stage.over.append(this.line, this.pen);
+    this.drawer = () => this.draw();
+    stage.drawers.push(this.drawer);
+    this.stop = this.listen();
+    this.draw();
+  }
+
+  drawer;
+  stop;
+
+  remove() {
+    this.stop();
+    this.line.remove();
+    this.pen.remove();
+    const { drawers } = this.stage;
+    drawers.splice(drawers.indexOf(this.drawer), 1);
+  }
+
+  clear() {
+    this.points = [];
+    this.draw();
+    this.changed();
+  }
+
+  /** Draw with what is pressed on the picture, before anything else is done with it. */
+  listen() {
+    const { stage, pen } = this, { front, view, home } = stage, stopped = new AbortController();
+    const options = { capture: true, signal: stopped.signal };
+    let last: Place | null = null;
+    const add = (event: PointerEvent) => {
+      const at = stage.placeOf(event);
+      if (last && Math.hypot(at[0] - last[0], at[1] - last[1]) < APART) return;
+      last = at;
+      this.put([view.worldX(at[0]), view.worldY(at[1])]);
+    };
+    front.addEventListener("pointerdown", (event: PointerEvent) => {
+      if (!this.isOpen || event.button > 0) return;
+      event.stopPropagation();
+      event.preventDefault();
+      front.setPointerCapture(event.pointerId);
+      this.points = [];
+      last = null;
+      add(event);
+    }, options);
+    front.addEventListener("pointermove", (event: PointerEvent) => {
+      if (!last) return;
+      event.stopPropagation();
+      add(event);
+    }, options);
+    for (const end of ["pointerup", "pointercancel"]) {
+      front.addEventListener(end, () => {
+        if (last) this.thin();
+        last = null;
+      }, options);
+    }
+    pen.addEventListener("keydown", (event: KeyboardEvent) => {
+      const { key } = event, way = WAYS[key];
+      if (!this.isOpen || !(way || key === "Enter" || key === "Backspace")) return;
+      event.preventDefault();
+      event.stopPropagation();
+      const step = 0.05 * (event.shiftKey ? 0.1 : 1);
+      if (way) this.tip = [this.tip[0] + step * way[0], this.tip[1] + step * way[1]];
+      else if (key === "Enter") this.put(this.tip);
+      else this.points.pop();
+      this.thin();
+    });
+    home.classList.add("drawing");
+    return () => {
+      stopped.abort();
+      home.classList.remove("drawing");
+    };
+  }
+
+  put(at: Place) {
+    this.tip = at;
+    this.points.push(at.map((value) => Number(value.toFixed(3))) as Place);
+    this.draw();
+  }
+
+  /** Keep so many points that it is still the same line. */
+  thin() {
+    while (this.points.length > MOST_POINTS) {
+      this.points = this.points.filter((_, n) => n % 2 === 0 || n === this.points.length - 1);
+    }
+    this.draw();
+    this.changed();
+  }
+
+  draw() {
+    const { stage: { view }, points, tip, words } = this;
+    const at = ([x, y]: Place) => `${view.px(x).toFixed(1)} ${view.py(y).toFixed(1)}`;
+    this.line.setAttribute("d", points.length > 1 ? `M${points.map(at).join("L")}` : "");
+    this.pen.setAttribute("transform", `translate(${at(tip)})`);
+    this.pen.style.display = this.isOpen ? "" : "none";
+    this.pen.setAttribute("aria-valuenow", String(points.length));
+    this.pen.setAttribute("aria-valuetext", words.say("sketch-at", {
+      x: words.fixed(tip[0], 2), y: words.fixed(tip[1], 2), n: points.length,
+    }));
+  }
+}
+
+/** The question of a page without steps: where will it land? */
+class Prediction {
+  curtain;
+  flag;
+  always = false;
+  /** Whether play was pressed too early. */
+  asked = false;
+  note;
+  show;
+
+  constructor(readonly stage: Stage, readonly lab: Lab, readonly words: Words) {
+    this.curtain = new Curtain(stage, lab);
+    this.note = document.getElementById("guess") as any;
+    this.show = document.getElementById("show-all") as any;
+    this.flag = new Flag(stage, lab, words, "landing", () => this.tell(), "guess");
+    this.show.hidden = false;
+    this.show.textContent = words.say("show-at-once");
+    this.show.addEventListener("click", () => {
+      this.always = !this.always;
+      this.show.setAttribute("aria-pressed", String(this.always));
+      this.flag.grip.style.display = this.always ? "none" : "";
+      this.hide(!this.always);
+    });
+    lab.mayPlay = () => this.begin();
+    lab.on("scene", () => this.changed());
+    lab.on("run", () => this.tell());
+    stage.painters.push(() => this.tell());
+    this.changed();
+  }
+
+  given: object | undefined;
+
+  /** Another scene asks anew. */
+  changed() {
+    const { lab, flag } = this;
+    if (this.given === lab.given || !lab.scene) return;
+    if (!this.given || !flag.isSet) flag.begin();
+    this.given = lab.given;
+    flag.isSet = this.asked = false;
+    if (!this.always) this.hide(true);
+  }
+
+  hide(hides: boolean) {
+    this.curtain.set(hides);
+    this.flag.isOpen = hides;
+    this.flag.place();
+    this.tell();
+  }
+
+  /** Play was pressed. */
+  begin() {
+    const { flag, curtain } = this;
+    if (!curtain.hides) return true;
+    if (flag.isSet) this.hide(false);
+    else {
+      this.asked = true;
+      this.tell();
+      flag.grip.focus();
+    }
+    return flag.isSet;
+  }
+
+  /** Say what to do, and how far off it was once that is known. */
+  tell() {
+    const { lab, words, flag, always, curtain: { hides } } = this, { off } = flag;
+    const wish = flag.isSet ? "mark-play" : this.asked ? "mark-first" : "mark-set";
+    const isOver = flag.isSet && lab.recording?.state !== "running";
+    const said = always ? "" : hides ? words.say(wish)
+      : isFinite(off) ? words.say("mark-off", { distance: words.number(100 * off, 3) })
         : isOver ? words.say("mark-none") : "";
     this.note.hidden = !said;
     // Only what is new is read out.
@@ -183,4 +379,4 @@ class Prediction {
   }
 }
 
-export { Prediction };
+export { Curtain, Flag, Prediction, Sketch };

@@ -82,7 +82,10 @@ class Stage {
       left: inset("left"), top: inset("top"), right: width - inset("right"),
       bottom: height - inset("bottom"),
     };
-    this.corner = [inset("bottom") + 20, inset("left") + 24];
+    // In a lesson it stands above, where no belt is.
+    const low = style.getPropertyValue("--scale-at") ? height - inset("top") - 34
+      : inset("bottom") + 20;
+    this.corner = [low, inset("left") + 24];
     const dense = globalThis.devicePixelRatio || 1;
     this.canvas.width = Math.round(width * dense);
     this.canvas.height = Math.round(height * dense);

@@ -1,0 +1,283 @@
+// The runs that a step notes: a table that fills by a button, rows that set the machine, and the
+// paths of the runs, grey and numbered.
+
+import { toCsv, download, fileStem } from "./share.ts";
+import { historyOf } from "./stages.ts";
+import { html, grown, icon } from "./panels.ts";
+import { measure } from "./quantities.ts";
+import { Recording } from "./recording.ts";
+import { resolve, type Given, type Scene } from "./scene.ts";
+import { build } from "./machine.ts";
+import { svg } from "./scenery.ts";
+import { valueOfTree, known, type Tree } from "./formula.ts";
+import { valueAt, withValues } from "./keys.ts";
+import type { Engine } from "./engine.ts";
+import type { Lab } from "./lab.ts";
+import type { Stage } from "./stage.ts";
+import type { Words } from "./words.ts";
+
+type Row = { head: string, set: Record<string, unknown> };
+/** A formula of quantities, null of what is filled in by hand; what is given stands there already.
+ */
+type Column = { head: string, value: Tree | null, unit: string, given: (string | number)[] };
+export type Wanted = { columns: Column[], rows: Row[], free: number, set: Record<string, unknown> };
+/** A run of a row: what was changed for it, its values, and what was written by hand */
+export type Noted = { set?: Record<string, unknown>, values?: (number | null)[],
+  own?: Record<number, string>, head?: string };
+
+/** How far apart the numbers of paths are at least, px. */
+const ROOM = 30;
+
+/** The values of a scene, whatever way they are written. */
+const plain = (scene: Scene) =>
+  JSON.stringify(scene, (key, value) => (["given", "title", "live"].includes(key)
+    ? undefined : value === Infinity ? "inf" : value));
+
+class Runs {
+  root;
+  button;
+  wait;
+  body;
+  marks;
+  numbers;
+  /** Paths by row, m. */
+  paths: Map<number, { x: number, y: number }[]> = new Map();
+  /** Whether the button was pressed too early. */
+  asked = false;
+  /** The row that was noted last. */
+  latest = -1;
+
+  /** @param noted by row, kept by whoever keeps the answers
+   * @param changed called when something was noted
+   * @param label what a run of one's own is called */
+  constructor(
+    readonly lab: Lab, readonly stage: Stage, readonly words: Words, readonly wanted: Wanted,
+    readonly noted: Noted[], readonly changed: () => void, readonly newEngine: () => Engine,
+    readonly label: () => string,
+  ) {
+    this.button = html("button", { type: "button", class: "main", id: "note" }, icon("note"),
+      html("span", { class: "long" }, words.say("note-run")),
+      html("span", { class: "short" }, words.say("step-note")));
+    this.button.addEventListener("click", () => {
+      this.asked = Boolean(this.reason);
+      this.note();
+    });
+    this.wait = html("p", { class: "note", id: "note-wait", role: "status" });
+    this.button.setAttribute("aria-describedby", "note-wait");
+    this.body = html("tbody");
+    const head = wanted.columns.map(({ head: name, unit }) =>
+      html("th", { scope: "col" }, ...grown(name), unit ? `, ${words.unit(unit)}` : ""));
+    const csv = html("button", { type: "button", class: "quiet" }, words.say("csv"));
+    csv.addEventListener("click", () => this.save());
+    this.root = html("div", { class: "runs-of" }, html("div", { class: "wide", tabindex: "0",
+      role: "region", "aria-label": words.say("my-runs") },
+    html("table", { class: "runs" }, html("caption", { class: "hidden" }, words.say("my-runs")),
+      html("thead", {}, html("tr", {}, html("th", { scope: "col" }, words.say("my-runs")), ...head)),
+      this.body)), ...(wanted.rows.length ? [html("p", { class: "note" }, words.say("row-sets"))] : []),
+    csv);
+    this.marks = svg("g", { class: "ghosts", "aria-hidden": "true" });
+    this.numbers = svg("g", { class: "ghosts", "aria-hidden": "true" });
+    stage.paths.before(this.marks);
+    stage.over.append(this.numbers);
+    this.draw();
+    this.refresh();
+    this.again();
+  }
+
+  remove() {
+    this.marks.remove();
+    this.numbers.remove();
+  }
+
+  /** Whether every wanted run is there, or of a table of free rows one. */
+  get isDone() {
+    const { rows } = this.wanted;
+    return rows.length ? rows.every((_, n) => this.noted[n]?.values)
+      : this.noted.some((one) => one?.values);
+  }
+
+  given({ set }: { set?: Record<string, unknown> }): Given {
+    const { lab, wanted } = this;
+    return withValues(lab.first, { ...wanted.set, ...set });
+  }
+
+  /** The row of the machine as it is now, -1 if there is none. */
+  get row() {
+    const { lab, wanted: { rows, free }, noted } = this;
+    if (!lab.scene) return -1;
+    const now = plain(lab.scene);
+    const same = (one?: { set?: Record<string, unknown> }) => one?.set !== undefined
+      && plain(resolve(this.given(one), lab.data)) === now;
+    const found = rows.findIndex(same);
+    if (found >= 0) return found;
+    for (let n = rows.length; n < rows.length + free; n += 1) {
+      if (!noted[n]?.values || same(noted[n])) return n;
+    }
+    return -1;
+  }
+
+  /** Why there is nothing to be noted yet, by a word of the catalogue; "" if there is. */
+  get reason() {
+    const { lab } = this;
+    if (!lab.isOver || lab.t <= lab.start || lab.recording?.state !== "done") return "note-wait";
+    // A crowd that was changed under way is another run than that of the machine.
+    if (!lab.recording.books) return "note-again";
+    return this.row < 0 ? "note-no-row" : "";
+  }
+
+  /** Put what the run tells into its row. */
+  note() {
+    const { lab, wanted, noted, row } = this, history = historyOf(lab);
+    if (this.reason || !lab.recording || !lab.scene || !history) {
+      this.changed();
+      return;
+    }
+    const run = { recording: lab.recording, history, scene: lab.scene };
+    const values = wanted.columns.map(({ value }) => {
+      if (value === null) return null;
+      const found = valueOfTree(value, (name) => known(name) ?? measure(name, run));
+      return isFinite(found) ? Number(found.toPrecision(7)) : null;
+    });
+    const set = wanted.rows[row]?.set ?? this.changes;
+    const own = wanted.rows[row] ? {} : { head: this.label() };
+    noted[row] = { ...noted[row], set, values, ...own };
+    this.latest = row;
+    this.keepPath(row, lab.recording);
+    this.draw();
+    this.refresh();
+    this.changed();
+  }
+
+  /** What differs from the step's machine, by key. */
+  get changes() {
+    const { lab } = this, base = this.given({});
+    const found: Record<string, unknown> = {};
+    for (const key of lab.data.live?.controls ?? []) {
+      const [now, was] = [lab.given as Given, base].map((one) => valueAt(one, key));
+      if (JSON.stringify(now) !== JSON.stringify(was)) found[key] = now;
+    }
+    return found;
+  }
+
+  keepPath(row: number, recording: Recording) {
+    if (recording.machine.interact || recording.tracks.length > 1) return;
+    this.paths.set(row, recording.points(0, 2e-4));
+    this.drawPaths();
+  }
+
+  /** Run anew what was noted at an earlier visit, for its path. */
+  async again() {
+    const { lab, noted } = this, left = [...noted.keys()].filter((n) => noted[n]?.values);
+    if (!left.length) return;
+    const engine = this.newEngine();
+    for (const n of left) {
+      const machine = build(resolve(this.given(noted[n]), lab.data));
+      if (machine.interact || machine.releases.length > 1) continue;
+      const recording = new Recording(machine);
+      await new Promise<void>((done) => {
+        engine.run(machine, Infinity, (chunk) => {
+          recording.add(chunk);
+          if (recording.state !== "running") done();
+        });
+      });
+      this.keepPath(n, recording);
+    }
+    engine.worker.terminate();
+  }
+
+  /** Set the machine for a row. */
+  set(row: Row) {
+    this.lab.replace(this.given(row));
+    this.lab.restart();
+  }
+
+  /** The rows as they are now. */
+  draw() {
+    const { wanted: { columns, rows, free }, noted, words } = this;
+    const made = Array.from({ length: rows.length + free }, (_, n) => {
+      const row = rows[n], one = noted[n];
+      const badge = html("span", { class: "badge", "aria-hidden": "true" }, String(n + 1));
+      const named = row ? grown(row.head) : [one?.head ?? words.say("own-run")];
+      let head;
+      if (row) {
+        head = html("button", { type: "button", class: "set" }, badge, html("span", {}, ...named));
+        head.addEventListener("click", () => this.set(row));
+      } else head = html("span", {}, badge, ...named);
+      const cells = columns.map(({ value, given, head: name }, k) => {
+        if (given[n] !== undefined && given[n] !== "") {
+          const said = given[n];
+          return html("td", { class: "given" }, typeof said === "number"
+            ? words.plain(said) : words.local(said));
+        }
+        if (value === null) {
+          const input = html("input", { type: "text", maxlength: "40",
+            "aria-label": [head.textContent, ...grown(name).map((one) => one.textContent)].join(" ") });
+          input.value = one?.own?.[k] ?? "";
+          input.addEventListener("input", () => {
+            noted[n] = { ...noted[n], own: { ...noted[n]?.own, [k]: input.value } };
+            this.changed();
+          });
+          return html("td", {}, input);
+        }
+        const found = one?.values?.[k];
+        return html("td", one?.values ? {} : { class: "empty" }, one?.values
+          ? words.number(found ?? NaN) : words.say("to-do"));
+      });
+      return html("tr", n === this.latest ? { class: "new" } : {},
+        html("th", { scope: "row" }, head), ...cells);
+    });
+    this.body.replaceChildren(...made);
+  }
+
+  /** Say whether the run can be noted, and which row the machine is set for. */
+  refresh() {
+    const { words, reason, row } = this;
+    this.button.setAttribute("aria-disabled", String(reason !== ""));
+    const said = reason ? words.say(reason) : "";
+    if (this.wait.textContent !== said) this.wait.textContent = said;
+    [...this.body.rows].forEach((one: Element, n: number) =>
+      one.classList.toggle("now", n === row && n < this.wanted.rows.length));
+  }
+
+  /** Paths below that of the run, and above all their numbers, apart from the other paths. */
+  drawPaths() {
+    const { view } = this.stage, taken: [number, number][] = [];
+    this.marks.replaceChildren();
+    this.numbers.replaceChildren();
+    if (this.stage.blind) return;
+    const lines = new Map([...this.paths].sort(([a], [b]) => a - b).map(([n, points]) =>
+      [n, points.map(({ x, y }) => [view.px(x), view.py(y)] as [number, number])]));
+    for (const [n, line] of lines) {
+      this.marks.append(svg("polyline", { class: "ghost",
+        points: line.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" ") }));
+      const others = [...lines].flatMap(([m, its]) => (m === n ? [] : its));
+      const far = ([x, y]: [number, number]) => Math.min(ROOM,
+        ...others.map(([u, v]) => Math.hypot(u - x, v - y)),
+        ...taken.map(([u, v]) => Math.hypot(u - x, v - y) - 0.5 * ROOM));
+      const seen = line.filter(([x, y]) => x > 14 && x < view.width - 14 && y > 14
+        && y < view.height - 14);
+      const at = seen.reduce((best, one) => (far(one) >= far(best) ? one : best), seen[0]);
+      if (!at) continue;
+      taken.push(at);
+      const number = svg("text", { x: at[0], y: at[1] + 5, "text-anchor": "middle" });
+      number.textContent = String(n + 1);
+      this.numbers.append(svg("circle", { cx: at[0], cy: at[1], r: 11 }), number);
+    }
+  }
+
+  save() {
+    const { words, wanted: { columns, rows, free }, noted, lab } = this;
+    const text = (said: string) => grown(said).map((node) => node.textContent).join("").trim();
+    const table = [[words.say("my-runs"), ...columns.map(({ head, unit }) =>
+      (unit ? `${text(head)} [${words.unit(unit)}]` : text(head)))],
+    ...Array.from({ length: rows.length + free }, (_, n) => {
+      const { values, own, head = words.say("own-run") } = noted[n] ?? {};
+      return [rows[n] ? text(rows[n].head) : head,
+        ...columns.map(({ given }, k) => given[n] ?? values?.[k] ?? own?.[k] ?? "")];
+    })];
+    const csv = toCsv(table, words.comma);
+    download(`${fileStem(lab.data.lesson.title)}.csv`, `\ufeff${csv}`, "text/csv");
+  }
+}
+
+export { Runs };

@@ -1,0 +1,447 @@
+"""Lessons played through in their pages: by mouse, touch and keyboard, right, wrong and odd."""
+
+import json
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from chutelab.classroom.exercises import lesson as exercise
+from chutelab.classroom.exercises.catalogue import EXERCISES
+from chutelab.classroom.exercises.exercise import draw
+from chutelab.classroom.lessons import find, shipped_lessons
+from chutelab.classroom.lessons.pages import live_page
+from chutelab.classroom.lessons.reading import scene_of
+from chutelab.classroom.lessons.steps import quantities_in
+from chutelab.engines.simulation import simulate
+from chutelab.results.quantities import measure
+from live.browser import DONE
+
+AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
+
+STEPPED = [one.name for one in shipped_lessons() if one.steps]
+
+DESK, PHONE = (1366, 768), (390, 844)
+
+FAR = {"mouse": DESK, "touch": PHONE, "keyboard": DESK}
+"""By what a lesson is played, and how large the page is then."""
+
+
+@pytest.fixture
+def page_of(opened, tmp_path):
+    """Open the live page of a lesson."""
+
+    def open_(name, language="en", size=DESK, **options):
+        path = tmp_path / f"{name}-{language}.html"
+        live_page(find(name, language), path)
+        assert path.stat().st_size <= 450_000
+        view = {"width": size[0], "height": size[1]}
+        page = opened(path, viewport=view, **options)
+        page.evaluate(DONE)
+        return page
+
+    return open_
+
+
+@dataclass
+class Hand:
+    """Does things in a page as a pupil does, by one kind of input."""
+
+    page: object
+    by: str
+
+    def press(self, locator, *, force=False):
+        """Press a button."""
+        if self.by == "mouse":
+            locator.click(force=force)
+        elif self.by == "touch":
+            locator.tap(force=force)
+        else:
+            locator.focus()
+            self.page.keyboard.press(
+                "Space" if locator.get_attribute("type") == "radio" else "Enter"
+            )
+
+    def write(self, locator, text):
+        """Write into a field."""
+        locator.focus()
+        locator.fill("")
+        self.page.keyboard.type(text)
+
+    def draw(self, share):
+        """Draw a path down the picture."""
+        page = self.page
+        if self.by == "keyboard":
+            page.locator(".pen").focus()
+            for key in ("Enter", "ArrowLeft", "ArrowDown", "Enter", "ArrowDown", "Enter"):
+                page.keyboard.press(key)
+            return
+        box = page.locator("#stage").bounding_box()
+        places = [(box["x"] + box["width"] * (share - 0.03 * n),
+                   box["y"] + box["height"] * (0.35 + 0.05 * n)) for n in range(8)]  # fmt: skip
+        page.mouse.move(*places[0])
+        page.mouse.down()
+        for place in places[1:]:
+            page.mouse.move(*place)
+        page.mouse.up()
+
+    def mark(self):
+        """Put the flag somewhere."""
+        page = self.page
+        if self.by == "keyboard":
+            page.locator(".guess").focus()
+            for key in ("PageUp", "ArrowLeft"):
+                page.keyboard.press(key)
+            return
+        box = page.locator(".guess .room").bounding_box()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 40, box["y"] + box["height"] / 2, steps=3)
+        page.mouse.up()
+
+    def play(self):
+        """Play a run, and go to its end."""
+        self.press(self.page.locator("#play"))
+        self.page.evaluate(DONE)
+        self.page.evaluate("chutelab.lab.allow(1e9)")
+        self.page.evaluate(DONE)
+        self.page.locator("#time").focus()
+        self.page.keyboard.press("End")
+        self.page.evaluate("chutelab.lab.seek(1e9)")
+        self.page.evaluate("chutelab.lab.pause()")
+
+
+def step_of(page):
+    return page.evaluate("chutelab.lesson.kept.at")
+
+
+def run_of(lesson, step, row):
+    """What Python's engine of the page gives for a row of a table."""
+    changed = {**step.set, **(row.set if row else {})}
+    settings = [f"{key}={json.dumps(value)}" for key, value in changed.items()]
+    scene = scene_of(lesson, lesson.page.scene, [*lesson.page.settings, *settings])
+    return simulate(scene, engine="contact")
+
+
+def value_of(recording, formula):
+    """The value of a column."""
+    names = quantities_in(formula)
+    text = formula
+    for n, name in sorted(enumerate(names), key=lambda one: -len(one[1])):
+        text = re.sub(rf"(?<![\w.]){re.escape(name)}(?![\w.])", f"q{n}_", text)
+    known = {f"q{n}_": measure(recording, name) for n, name in enumerate(names)}
+    return eval(text, {**vars(math), "abs": abs, **known})
+
+
+def told(page):
+    """All that the page says, to the eye and to the ear."""
+    return page.evaluate("""() => {
+      const copy = document.body.cloneNode(true);
+      for (const one of copy.querySelectorAll("script, noscript, option")) one.remove();
+      return copy.outerHTML.replace(/<path[^>]*>|<polyline[^>]*>|transform="[^"]*"/g, "");
+    }""")
+
+
+def secrets(lesson, step):
+    """Numbers of a run that the page must not tell before it is predicted, in three digits."""
+    recording = run_of(lesson, step, None)
+    formulas = [one.value for other in lesson.steps for one in other.columns if one.value]
+    found = set()
+    for formula in [*formulas, "landing.x", "impact.vy", "impact.t", "landing.t", "ended.t"]:
+        try:
+            value = value_of(recording, formula)
+        except (KeyError, ValueError, ZeroDivisionError):
+            continue
+        if value == value and abs(value) > 1e-9 and abs(value * 100) % 1 > 1e-6:
+            found.add(f"{abs(value):.4g}")
+    return {one for one in found if len(one) > 4}
+
+
+def answered(hand, lesson, kind):
+    """Answer all that a step asks; `kind` is "right", "wrong" or "odd"."""
+    page, step = hand.page, lesson.steps[step_of(hand.page)]
+    for n, ask in enumerate(step.asks):
+        if ask.choices:
+            right = ask.right - 1
+            chosen = right if kind == "right" else (right + 1) % len(ask.choices)
+            name = f"ask-{step_of(page)}-{n}"
+            hand.press(page.locator(f'input[name="{name}"]').nth(chosen))
+        elif ask.mark:
+            hand.mark()
+        elif ask.sketch:
+            hand.draw(0.7)
+        else:
+            text = {"right": "What it pushes.", "wrong": "No idea", "odd": "<b>&lt;\\\"'; ½"}[kind]
+            hand.write(page.locator(f"#ask-{step_of(page)}-{n}"), text)
+
+
+@pytest.mark.parametrize(
+    ("by", "kind"), [("mouse", "right"), ("touch", "wrong"), ("keyboard", "odd")]
+)
+@pytest.mark.parametrize("name", STEPPED)
+def test_it_is_played_through(page_of, name, by, kind):
+    lesson = find(name)
+    page = page_of(name, size=FAR[by], has_touch=by == "touch")
+    hand = Hand(page, by)
+    hand.write(page.locator("#student"), "Ada")
+    hand.press(page.locator("#begin"))
+    for n, step in enumerate(lesson.steps):
+        assert step_of(page) == n
+        assert page.locator("[aria-current=step]").count() == 1
+        # Only what the step allows can be changed.
+        live = page.evaluate("chutelab.lab.data.live.controls")
+        assert len(live) == len(step.open(tuple(lesson.page.live.get("controls", ()))))
+        if step.kind == "predict":
+            text = told(page)
+            for secret in secrets(lesson, step):
+                assert secret not in text, secret
+            assert page.locator(".track, .ghost, #energy, #numbers, #curves").count() == 0
+            if step.asks:
+                hand.press(page.locator("#play"))
+                assert not page.evaluate("chutelab.lab.playing")
+                assert page.locator("#step-next").is_disabled()
+            assert apart(page, "#guess", "#stage")
+        answered(hand, lesson, kind)
+        if step.kind == "note":
+            noted(hand, lesson, step, kind)
+        elif step.kind in ("predict", "try"):
+            hand.play()
+        elif step.kind == "explain" and step.asks:
+            expected = [a for one in lesson.steps[:n] if one.kind == "predict" for a in one.asks]
+            told_of = page.locator(".reply:not([data-ask])")
+            assert told_of.count() <= len(expected)
+            rights = sum(bool(one.choices) for one in expected) if kind == "right" else 0
+            assert page.locator(".reply.right:not([data-ask])").count() >= rights
+            if page.locator("#written").count():
+                assert page.locator(".then").inner_text() == ""
+                hand.press(page.locator("#written"))
+            if step.then:
+                assert page.locator(".then").inner_text() != ""
+        elif step.kind == "numbers":
+            counted(hand, lesson, kind)
+        if step.kind != "numbers" or kind == "right":
+            assert page.evaluate("chutelab.lesson.kept.done").count(n) == 1, step.kind
+        if n + 1 < len(lesson.steps):
+            hand.press(page.locator("#step-next"))
+    assert page.locator("#step-next").is_hidden()
+
+
+def apart(page, first, second):
+    a, b = (page.locator(one).bounding_box() for one in (first, second))
+    return not a or a["y"] >= b["y"] + b["height"] - 1 or a["y"] + a["height"] <= b["y"] + 1
+
+
+def noted(hand, lesson, step, kind):
+    """Note a run for each row, from the last on; compare with Python's."""
+    page = hand.page
+    button = page.locator("#note")
+    assert button.get_attribute("aria-disabled") == "true"
+    hand.press(button, force=True)
+    assert page.locator("#guess").inner_text() != ""
+    rows = list(enumerate(step.rows))
+    for n, row in reversed(rows):
+        line = page.locator("table.runs tbody tr").nth(n)
+        hand.press(line.locator(".set"))
+        hand.play()
+        hand.press(button)
+        values = page.evaluate(f"chutelab.lesson.kept.runs[{step_of(page)}][{n}].values")
+        recording = run_of(lesson, step, row)
+        for value, column in zip(values, step.columns, strict=True):
+            if column.value:
+                expected = value_of(recording, column.value)
+                assert value is None or value == pytest.approx(expected, rel=1e-5, abs=1e-9)
+                assert (value is None) == (expected != expected)
+        assert "new" in line.get_attribute("class")
+    for n in range(step.free):
+        hand.play()
+        hand.press(button)
+        assert page.evaluate(f"chutelab.lesson.kept.runs[{step_of(page)}][{len(rows) + n}].values")
+    if kind == "odd":
+        for cell in page.locator("table.runs input").all():
+            hand.write(cell, "<i>")
+
+
+def counted(hand, lesson, kind):
+    """Answer the questions with numbers of one's own."""
+    page, task = hand.page, exercise(lesson.name, "Ada")
+    for n, right in enumerate(exercise_answers(lesson.name), start=1):
+        question = page.locator(f'[data-question="{n}"]')
+        if question.get_attribute("open") is None:
+            hand.press(question.locator("summary"))
+        typed = {"right": f"{right:.5g}", "wrong": f"{0.5 * right:.5g}", "odd": "about 3,5 metres"}
+        hand.write(question.locator("input"), typed[kind])
+        hand.press(question.locator(".check"))
+        verdict = question.locator(".reply").get_attribute("data-verdict")
+        assert (verdict == "right") == (kind == "right")
+        if kind == "wrong":
+            reply = task.check(n, float(typed[kind]))
+            assert reply.text in question.locator(".reply").inner_text()
+        if kind == "odd":
+            assert verdict == "unread"
+
+
+def exercise_answers(name):
+    return [one.right for one in draw(EXERCISES[name], "Ada")[1]]
+
+
+def test_what_was_done_is_kept_for_its_pupil_only(page_of):
+    page = page_of("the-bounce")
+    hand = Hand(page, "mouse")
+    hand.write(page.locator("#student"), "Mia Berg")
+    hand.press(page.locator("#begin"))
+    answered(hand, find("the-bounce"), "wrong")
+    hand.play()
+    hand.press(page.locator("#step-next"))
+    hand.press(page.locator("#step-next"))
+    hand.play()
+    hand.press(page.locator("#note"))
+    kept = page.evaluate("chutelab.lesson.kept")
+    # The same pupil goes on, with the path of what was noted.
+    page.reload()
+    page.evaluate(DONE)
+    assert page.evaluate("chutelab.lesson.kept") == kept
+    page.locator(".ghost").wait_for(state="attached")
+    # The next one sees neither name nor answers, in this tab or in another.
+    hand.press(page.locator("#somebody-else"))
+    assert "Mia" not in told(page)
+    assert page.locator("#student").input_value() == ""
+    hand.write(page.locator("#student"), "Ada")
+    hand.press(page.locator("#begin"))
+    assert page.locator("input:checked, .ghost, .sketch[d^=M]").count() == 0
+    assert step_of(page) == 0
+    page.evaluate("sessionStorage.clear()")
+    page.reload()
+    page.evaluate(DONE)
+    assert page.locator("#student").input_value() == ""
+    # A name is written in more than one way.
+    hand.write(page.locator("#student"), " mia  BERG")
+    hand.press(page.locator("#begin"))
+    assert page.evaluate("chutelab.lesson.kept") == kept
+
+
+def test_odd_things_that_were_kept_are_left_out(page_of):
+    page = page_of("the-bounce")
+    for odd in (
+        "{",
+        "7",
+        '{"steps": 7}',
+        '{"steps": {"at": 99, "done": "x", "said": 3, "runs": 4}}',
+        '{"steps": {"at": 3, "done": [77, -1], "said": {}, "runs": {"2": [3, null]}}}',
+    ):
+        page.evaluate(
+            "(odd) => localStorage.setItem('chutelab/the-bounce/ada', odd)", odd
+        )  # fmt: skip
+        page.evaluate("chutelab.lesson.leave()")
+        page.fill("#student", "Ada")
+        page.click("#begin")
+        # Nothing is opened beyond a prediction that was not made.
+        assert step_of(page) == 0
+
+
+def test_a_number_in_the_text_is_dragged_typed_and_moved_by_keys(page_of):
+    page = page_of("the-bounce")
+    page.click("#begin")
+    page.click("#skip")
+    number = page.locator(".scrub.num").first
+
+    def value():
+        return page.evaluate("chutelab.lab.given.plate.restitution")
+
+    assert value() == 0.5
+    box = number.bounding_box()
+    page.mouse.move(box["x"] + 10, box["y"] + 10)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 30, box["y"] + 10, steps=4)
+    page.mouse.up()
+    assert value() > 0.5
+    number.click()
+    page.keyboard.type("0,7")
+    page.keyboard.press("Enter")
+    assert value() == 0.7
+    page.keyboard.press("ArrowLeft")
+    assert value() == pytest.approx(0.695, abs=1e-9)
+    assert number.get_attribute("aria-valuetext") == "0.695"
+    # What cannot be is refused beside the value, and nothing is changed.
+    for odd in ("7", "x", ""):
+        field = page.locator(".values input[type=text]").last
+        field.fill(odd)
+        field.press("Enter")
+        assert page.locator(".values .why:not(:empty)").count() == 1
+        assert field.get_attribute("aria-invalid") == "true"
+        assert value() == pytest.approx(0.695)
+        field.press("Escape")
+        assert field.get_attribute("aria-invalid") is None
+    # One step of undo for each.
+    page.locator("#stage").focus()
+    page.evaluate("chutelab.lab.undo()")
+    assert value() == 0.7
+
+
+def test_the_table_is_a_file_for_spreadsheets(page_of):
+    page = page_of("the-bounce", "de")
+    page.click("#begin")
+    page.click("#skip")
+    page.click("#step-next")
+    page.evaluate("chutelab.lab.seek(1e9)")
+    page.click("#note")
+    with page.expect_download() as download:
+        page.click("text=Tabelle als CSV")
+    text = Path(download.value.path()).read_text(encoding="utf-8-sig")
+    head, first, *_ = text.splitlines()
+    assert head.startswith("meine Läufe;")
+    assert head.count(";") == 4
+    assert first.split(";")[1] == "-1"
+    assert re.fullmatch(r"-2,91\d+", first.split(";")[2])
+
+
+@pytest.mark.skipif(not AXE.is_file(), reason="needs npm ci in tests/live")
+@pytest.mark.parametrize(
+    ("language", "scheme", "size"),
+    [("en", "light", DESK), ("de", "dark", PHONE), ("de", "light", (844, 390))],
+)
+def test_axe_finds_nothing_in_any_step(page_of, language, scheme, size):
+    page = page_of("the-bounce", language, size, color_scheme=scheme)
+    lesson = find("the-bounce", language)
+    hand = Hand(page, "mouse")
+    axe = AXE.read_text(encoding="utf-8")
+
+    def is_clean():
+        assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+        page.evaluate(axe)
+        found = page.evaluate(
+            "axe.run().then(({violations}) => violations.map(({id, nodes}) =>"
+            " [id, nodes.map(({html}) => html.slice(0, 200))]))"
+        )
+        assert found == []
+        small = page.evaluate("""() => [...document.querySelectorAll("button, summary, select")]
+          .filter((one) => one.checkVisibility() && !one.closest(".question")
+            && Math.min(one.offsetWidth, one.offsetHeight) < 36)
+          .map((one) => one.outerHTML.slice(0, 90))""")
+        assert small == []
+
+    is_clean()
+    page.fill("#student", "Ada")
+    page.click("#begin")
+    for n in range(len(lesson.steps)):
+        is_clean()
+        answered(hand, lesson, "wrong")
+        if lesson.steps[n].kind == "note":
+            page.evaluate("chutelab.lab.seek(1e9)")
+            page.click("#note")
+        if page.locator("#written").count():
+            page.click("#written")
+        is_clean()
+        if n + 1 < len(lesson.steps):
+            page.click("#step-next")
+
+
+def test_nothing_but_the_page_itself_is_allowed(page_of, tmp_path):
+    page_of("the-bounce")
+    text = (tmp_path / "the-bounce-en.html").read_text(encoding="utf-8")
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', text)[1]
+    assert "default-src 'none'" in policy
+    assert "unsafe-inline" not in policy
+    assert "unsafe-eval" not in policy.replace("wasm-unsafe-eval", "")
+    assert json.loads(re.search(r'id="lab">(.*?)</script>', text, re.DOTALL)[1])["lesson"]["steps"]

@@ -17,6 +17,11 @@ function partsOf(given: Given, key: string): (string | number)[] {
   } else if (rows !== undefined && !Array.isArray(rows) && parts[1] === 0) {
     parts.splice(1, 1);
   }
+  // The page has every line as points.
+  const { points } = (rows as any)?.[parts[1]] ?? {};
+  if (parts[0] === "surface" && points && (parts[2] === "from" || parts[2] === "to")) {
+    parts.splice(2, 1, "points", parts[2] === "from" ? 0 : points.length - 1);
+  }
   return parts;
 }
 

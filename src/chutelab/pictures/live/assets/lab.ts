@@ -1,7 +1,7 @@
 // The scene as it is changed: its values, its run, its clock. Nothing here draws.
 
 import { runOf } from "./breaches.ts";
-import { withValues } from "./keys.ts";
+import { indexed, withValues } from "./keys.ts";
 import { build, type Machine } from "./machine.ts";
 import { Recording } from "./recording.ts";
 import { Fault, resolve, type Scene, type Given } from "./scene.ts";
@@ -36,7 +36,11 @@ class Lab {
 
   /** @param data of the page */
   constructor(readonly data: any, readonly engine: Engine) {
-    this.first = data.scene as Given;
+    const first = this.first = data.scene as Given, { live } = data;
+    const controls = live?.controls?.map((key: string) => indexed(first, key));
+    const ranges = Object.fromEntries(Object.entries(live?.ranges ?? {})
+      .map(([key, ends]) => [indexed(first, key), ends]));
+    data.live = { ...live, controls, ranges };
     engine.onFailure = () => this.refuse(new Fault("", undefined, "no-engine"));
     this.use(this.first);
   }

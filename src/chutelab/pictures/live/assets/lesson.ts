@@ -342,6 +342,7 @@ class Lesson {
       .filter(({ id }) => kept.said[id] !== undefined);
     const told = said.map(({ ask, id }) => {
       const value = kept.said[id], off = kept.said[`${id}.off`];
+      if (explains) this.draw(ask, value);
       const what = ask.choices.length ? grown(ask.choices[value] ?? "")
         : [ask.mark ? words.say("expected-flag", { x: words.fixed(value[0], 2) })
           : ask.sketch ? words.say("expected-sketch") : String(value)];
@@ -359,6 +360,18 @@ class Lesson {
     if (explains || !told.length) return told;
     return [html("p", { class: "said" }, words.say("you-expected"), " ",
       ...told.flatMap((one, k) => (k ? ["; ", one] : [one])))];
+  }
+
+  /** Show what was put or drawn into the picture, beside the run. */
+  draw({ mark, sketch }: Ask, value: any) {
+    const { stage, lab, words } = this, none = () => {};
+    if (!Array.isArray(value) || (!mark && !sketch)) return;
+    const tool = mark ? new Flag(stage, lab, words, mark.split(".")[0], none)
+      : new Sketch(stage, words, value as Place[], none);
+    tool.isOpen = false;
+    if (tool instanceof Flag) Object.assign(tool, { at: value, isSet: true });
+    else tool.draw();
+    this.tools.push(tool);
   }
 
   /** The button that ends the writing of words, before the explanation is shown. */

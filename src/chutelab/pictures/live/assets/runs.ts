@@ -255,13 +255,13 @@ class Runs {
         ...others.map(([u, v]) => Math.hypot(u - x, v - y)),
         ...taken.map(([u, v]) => Math.hypot(u - x, v - y) - 0.5 * ROOM));
       const seen = line.filter(([x, y]) => x > 14 && x < view.width - 14 && y > 14
-        && y < view.height - 14);
+        && y < view.height - 14).slice(0, -Math.ceil(0.08 * line.length));
       const at = seen.reduce((best, one) => (far(one) >= far(best) ? one : best), seen[0]);
       if (!at) continue;
       taken.push(at);
       const number = svg("text", { x: at[0], y: at[1] + 5, "text-anchor": "middle" });
       number.textContent = String(n + 1);
-      this.numbers.append(svg("circle", { cx: at[0], cy: at[1], r: 11 }), number);
+      this.numbers.append(svg("circle", { cx: at[0], cy: at[1], r: 10 }), number);
     }
   }
 

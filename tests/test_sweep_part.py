@@ -13,9 +13,8 @@ import pytest
 import chutelab
 from chutelab.scene import load
 from chutelab.studies.sweep import crew, sweep_to
-from chutelab.studies.sweep.batch import alone
 from chutelab.studies.sweep.part import part_of
-from chutelab.studies.sweep.rows import joined
+from chutelab.studies.sweep.plan import swept
 from chutelab.util.errors import InputError
 from typed import planned
 
@@ -74,7 +73,7 @@ def test_rows_that_are_there_are_not_simulated_again(interrupted, monkeypatch):
 
     def noting(block):
         asked.append(len(block.values))
-        return joined([alone(block, row) for row in range(len(block.values))])
+        return swept(block, apart=True)
 
     monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", noting)
     with crew() as team:

@@ -219,7 +219,7 @@ def caught(until):
     assert found.against == ("theory" if until == "landed" else "dop853")
 
 
-@pytest.mark.parametrize("until", ["landed", "settled"])
+@pytest.mark.parametrize("until", ["landed", pytest.param("settled", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("wrong", [heavier, livelier])
 def test_a_wrong_number_is_caught_from_outside(wrong, until, monkeypatch):
     drawn = scene.load("perpendicular", [f"run.until={until}"])

@@ -25,7 +25,7 @@ DONE = """() => new Promise((resolve, reject) => {
 })"""
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser():
     playwright = pytest.importorskip(
         "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'

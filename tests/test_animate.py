@@ -694,12 +694,13 @@ def blocks(data):
     return found
 
 
-@pytest.mark.parametrize(("fps", "delay"), [(25, 4), (50, 2)])
-def test_gif_reads_back_frame_by_frame(fps, delay, tmp_path):
-    recording = by_hand()
-    path = animate(recording, tmp_path / "lesson.gif", slow=1.5, fps=fps, width=320, height=180)
+def test_gif_reads_back_frame_by_frame_and_is_the_same_again(tmp_path):
+    recording, fps = by_hand(), 25
+    size = {"slow": 1.5, "fps": fps, "width": 320, "height": 180}
+    path = animate(recording, tmp_path / "lesson.gif", **size)
     assert path == tmp_path / "lesson.gif"
     assert list(tmp_path.iterdir()) == [path]
+    assert path.read_bytes() == animate(by_hand(), tmp_path / "again.gif", **size).read_bytes()
     begin, end = span(recording, laid_out(recording, 320, 180).window)
     shots = film(recording, begin, end, fps=fps, slow=1.5)
     with Image.open(path) as gif:
@@ -711,8 +712,8 @@ def test_gif_reads_back_frame_by_frame(fps, delay, tmp_path):
             assert gif.info["duration"] == 10 * shot.delay
     frames = blocks(path.read_bytes())
     assert [frame.delay for frame in frames] == [shot.delay for shot in shots]
-    # Exactly 25 or 50 frames a second, but for the holds.
-    assert {frame.delay for frame in frames} == {delay, 130}
+    # Exactly 25 frames a second, but for the holds.
+    assert {frame.delay for frame in frames} == {4, 130}
     assert all(frame.keeps for frame in frames)
     assert frames[0][:4] == (0, 0, 320, 180)
     assert all(frame.width * frame.height < 320 * 180 for frame in frames[1:])
@@ -812,14 +813,6 @@ def test_failure_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_the_same_recording_gives_the_same_file(tmp_path):
-    files = [
-        animate(by_hand(), tmp_path / f"{i}.gif", fps=5, slow=1.0, width=400, height=225)
-        for i in (1, 2)
-    ]
-    assert files[0].read_bytes() == files[1].read_bytes()
-
-
 # Videos
 
 
@@ -863,33 +856,10 @@ def test_missing_extra_is_named(tmp_path, monkeypatch):
 # The command line
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--out", "out", "--format", "avi"], "'avi' is not one of 'gif', 'mp4', 'webm'"),
-        (["--format", "mp4"], "give --out too"),
-        (["--out", "out", "--only", "png", "--format", "gif"], "add gif to --only"),
-    ],
-)
-def test_impossible_formats_are_refused(arguments, said, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(main, ["run", "perpendicular", *arguments])
-    assert result.exit_code == 2
-    assert said in " ".join(result.output.split())
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("arguments", "files"),
-    [
-        (["--only", "json,gif", "--format", "mp4"], ["lesson.mp4", "summary.json"]),
-        (["--only", "webm,strobe", "--format", "gif"], ["lesson.gif", "strobe.png"]),
-    ],
-)
-def test_films_and_the_still_can_be_chosen(arguments, files, tmp_path):
-    if "lesson.mp4" in files:
-        pytest.importorskip("imageio_ffmpeg")
-    out = tmp_path / "out"
+def test_films_and_the_still_can_be_chosen(tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    arguments = ["--only", "json,gif,strobe", "--format", "mp4"]
+    files, out = ["lesson.mp4", "strobe.png", "summary.json"], tmp_path / "out"
     result = CliRunner().invoke(main, ["run", "perpendicular", "--out", str(out), *arguments])
     assert result.exit_code == 0, result.output
     assert all(name in result.output.partition("wrote into")[2] for name in files)

@@ -150,16 +150,6 @@ def test_all_of_several_roots_are_reported(vx, points, off):
     assert ("2 solutions" in repr(found)) is (len(expected) == 2)
 
 
-def test_no_root_says_so_and_shows_the_nearest():
-    found = design.solve(inclined(), "plate.restitution=0:1", "landing.vx=5", points=11)
-    assert not found.solved
-    assert found.points.shape == (0, 1)
-    # Without bounce it keeps most.
-    assert found.nearest.values == (0.0,)
-    assert found.nearest.found[0] == pytest.approx(forward(TILT, 0.0, d1=R + 0.1))
-    assert "No solution in the range" in repr(found)
-
-
 def test_a_jump_over_the_target_is_no_root():
     given = chutelab.load("inclined-20")
     found = design.solve(given, "plate.angle_deg=10.353:11", "landing.vx=-0.85", points=11)
@@ -572,19 +562,6 @@ def test_bad_uncertainties_are_refused_before_anything_runs(given, said, monkeyp
     monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
     with pytest.raises(InputError, match=said):
         design.uncertainty(machine(), given)
-
-
-def test_restitution_dominates_and_the_picture_says_so(tmp_path):
-    given = ["restitution=0.5±0.05", "plate.distance=±5mm", "outgoing.drop=±5mm"]
-    found = design.uncertainty(machine(), given, samples=128)
-    assert found.quantities == ("landing.x", "belt_work")
-    assert "All samples touch plate, outgoing." in repr(found)
-    assert all(indices.first[0] > 0.8 for indices in found.indices)
-    figure = spread(found)
-    figure.write(tmp_path / "spread.png")
-    titles = [ax.get_title(loc="left") for ax in figure.axes]
-    assert titles.count("against plate.restitution") == 2
-    assert (tmp_path / "spread.png").stat().st_size > 10_000
 
 
 def propagate(folder, given, *options, code=0):

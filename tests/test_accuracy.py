@@ -1,7 +1,5 @@
 """An accuracy that can be asked for: what is said to be reached has been, and who says so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The answers: closed form, event-driven, contact dynamics, Pymunk, and SciPy's ODE solver."""
 
-from __future__ import annotations
-
 from collections import Counter
 from math import cos, isfinite, radians, sin
 

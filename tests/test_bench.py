@@ -1,7 +1,5 @@
 """`chutelab bench`: run time against error of a scene; the errors are told by formulas here."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace

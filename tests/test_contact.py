@@ -1,7 +1,5 @@
 """The contact engine against answers from outside: impacts, a gas, rides, a heap, crowds."""
 
-from __future__ import annotations
-
 import faulthandler
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The contact engine in the core, through its arrays: what no scene file can ask for."""
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 import subprocess

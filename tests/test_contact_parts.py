@@ -1,7 +1,5 @@
 """Arcs, gates, mixtures, inclined belts, rolling friction in the contact engine, by their laws."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import acos, atan, cos, hypot, pi, radians, sin, sqrt
 

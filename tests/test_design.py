@@ -1,7 +1,5 @@
 """Solving, optimising and propagating uncertainties, against closed forms written here."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

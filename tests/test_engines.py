@@ -1,7 +1,5 @@
 """The stepped engines, contact and pymunk, by laws written out here: flight, blows, belts, rest."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """The event-driven engine against formulas and differential equations written here."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, hypot, radians, sin, sqrt
 

@@ -1,7 +1,5 @@
 """The event-driven engine on arcs, against differential equations integrated here."""
 
-from __future__ import annotations
-
 from math import atan2, cos, hypot, pi, sin, sqrt
 
 import numpy as np

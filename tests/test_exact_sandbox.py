@@ -1,7 +1,5 @@
 """The event-driven engine on inclined belts, gates and mixtures, against laws written here."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import acos, cos, hypot, pi, radians, sin, sqrt
 

@@ -1,7 +1,5 @@
 """What scenes are expected to show: read, measured, judged."""
 
-from __future__ import annotations
-
 import json
 import re
 from functools import cache

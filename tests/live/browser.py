@@ -1,7 +1,5 @@
 """Pages in a real browser: none of them says anything on the console, or asks for anything."""
 
-from __future__ import annotations
-
 import shutil
 
 import pytest

@@ -16,8 +16,6 @@ from scipy.stats import norm
 import chutelab
 import typed as design
 from chutelab import scene
-from chutelab.classroom.book import Book
-from chutelab.classroom.exercises import lesson
 from chutelab.cli import main
 from chutelab.cli.studies import uncertain
 from chutelab.pictures.plots.studies import draw_scan, scan, spread
@@ -609,29 +607,8 @@ def test_sweep_refuses_uncertainties_before_it_runs(given, options, said, monkey
     assert said in propagate(tmp_path, given, *options, code=2).stderr
 
 
-LESSON = Path(__file__).parent.parent / "lessons" / "09-design"
-
-
-def test_a_search_answers_the_exercise_of_lesson_9():
-    """On the machine that the notebook makes of a student's numbers."""
-    told = json.loads((LESSON / "exercise.ipynb").read_text(encoding="utf-8"))
-    (made,) = [cell for cell in told["cells"] if "machine = " in "".join(cell["source"])]
-    task = lesson("design", "Ada")
-    names = {"book": Book("design"), "task": task}
-    exec("".join(made["source"]), names)
-    down = design.solve(names["machine"], "plate.angle_deg=5:60", "landing.vx=0")
-    assert task.check(1, down.answer.values[0]).right
-    assert "e-1" not in repr(down)
-    lining = design.solve(names["machine"], "plate.restitution=0.1:0.95", "landing.vx=0")
-    assert task.check(2, lining.answer.values[0]).right
-    price = f"belt_work={task.given.paid / 1000}"
-    assert task.check(
-        3, design.solve(names["machine"], "plate.angle_deg=5:60", price).points[0]
-    ).right
-
-
 def test_the_minimum_in_the_readme_is_inside_its_range():
-    text = (LESSON.parents[1] / "README.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
     line = re.search(
         r"^chutelab solve (\S+) --vary (\S+=(\d+):(\d+)) --minimize belt_work$", text, re.MULTILINE
     )

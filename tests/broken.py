@@ -18,28 +18,16 @@ def expect(**keys):
 # Text of the file, the keys at fault, and a word of what is allowed.
 BROKEN = {
     # wrong types
-    "string for number": (IN.replace("2", '"2.0"'), ["incoming.speed"], "to 1000000 or 0"),
-    "boolean for number": (IN.replace("0.1", "true"), ["incoming.pulley_radius"], "from 1e-09"),
-    "list for number": (IN + "[particle]\nmass = [1]", ["particle.mass"], "a number from 1e-27"),
     "date for number": (IN + "[particle]\nradius = 2020-01-01", ["particle.radius"], "a number"),
-    "table for number": (IN + "[run.dt]\nx = 1", ["run.dt"], "a number"),
-    "float for count": (IN + "[stream]\ncount = 1e4", ["stream.count"], "a whole number"),
     "boolean for count": (IN + "[stream]\ncount = true", ["stream.count"], "a whole number"),
-    "number for switch": (IN + "[particle]\nspin = 1", ["particle.spin"], "true or false"),
-    "string for switch": (IN + '[stream]\ninteract = "no"', ["stream.interact"], "true or false"),
     "number for title": ("title = 3\n" + IN, ["title"], "a string"),
     "number for table": ("plate = 3\n" + IN, ["plate"], "a table"),
     "list for table": ("run = []\n" + IN, ["run"], "a table"),
     "table for surfaces": (IN + '[surface]\nname = "a"', ["surface"], "[[surface]]"),
     "number for point": (FREE.replace("[0, 1]", "1"), ["stream.at"], "[x, y]"),
-    "text in point": (FREE.replace("[0, 1]", '[0, "1"]'), ["stream.at[1]"], "a number"),
-    "short point": (FREE.replace("[0, 1]", "[0]"), ["stream.at"], "[x, y]"),
     # out of range
     "absurd count": (IN + f"[stream]\ncount = {BIG}", ["stream.count"], "to 10000000"),
-    "NaN": (IN + PLATE + "angle_deg = nan", ["plate.angle_deg"], "a number"),
-    "infinity": (IN.replace("2", "inf"), ["incoming.speed"], "a number"),
     "overflow": (IN.replace("2", "1e999"), ["incoming.speed"], "a number"),
-    "NaN in point": (FREE.replace("[0, 1]", "[nan, 1]"), ["stream.at[0]"], "a number"),
     "endless title": (f'title = "{BIG}"\n' + IN, ["title"], "at most 200 characters"),
     "a million copies": (
         FREE + HOOD + "repeat = [[1000, 0.1, 0], [1000, 0, 0.1]]",
@@ -48,7 +36,6 @@ BROKEN = {
     ),
     "plate on its side": (IN + PLATE + "angle_deg = 90", ["plate.angle_deg"], "< 90, in degrees"),
     "plate overturned": (IN + PLATE + "angle_deg = -90", ["plate.angle_deg"], "> -90"),
-    "other end": (FREE + HOOD.replace("from", "# "), ["surface[0].from"], "missing"),
     # unknown words
     "unknown engine": (
         IN + '[run]\nengine = "box2d"',
@@ -86,29 +73,21 @@ BROKEN = {
         '"impact" or "top"',
     ),
     # unknown keys
-    "misspelt key": (IN + PLATE + "angel_deg = 3", ["plate.angel_deg"], "plate.angle_deg?"),
     "misspelt table": (IN.replace("incoming", "incomming"), ["incomming"], "incoming?"),
-    "key in wrong table": (IN + "drop = 3", ["incoming.drop"], "[outgoing]"),
     "key outside its table": ("restitution = 0\n" + IN, ["restitution"], "[incoming]"),
     "unheard-of key": (IN + "[run]\nqqq = 1", ["run.qqq"], "engine, until, max_time, dt"),
-    "key of a surface": (IN + HOOD + "colour = 1", ["surface[0].colour"], "points"),
     "quoted key": (IN + '"a.b" = 1', ['incoming."a.b"'], "unknown key"),
     # missing
     "no speed": (IN.replace("speed = 2", ""), ["incoming.speed"], "is missing"),
     "no distance": (IN + "[plate]", ["plate.distance"], "is missing"),
     "no drop": (IN + PLATE + "[outgoing]", ["outgoing.drop"], "is missing"),
-    "plate alone": (FREE + PLATE, ["incoming"], "[plate]"),
     "outgoing alone": (
         FREE + OUT + 'drop_from = "top"',
         ["incoming"],
         "[outgoing] needs the table [incoming]",
     ),
-    "no release": ("[stream]\ncount = 2", ["stream.at", "stream.velocity"], "[incoming]"),
     # surfaces
     "nameless": (FREE + HOOD.replace('name = "hood"', ""), ["surface[0].name"], "is missing"),
-    "reserved name": (FREE + HOOD.replace("hood", "plate"), ["surface[0].name"], "reserved"),
-    "name twice": (FREE + HOOD + HOOD, ["surface[1].name", "surface[0].name"], "unique"),
-    "name with a dot": (FREE + HOOD.replace("hood", "a.b"), ["surface[0].name"], "dots"),
     "empty name": (FREE + HOOD.replace("hood", ""), ["surface[0].name"], "1 to 40"),
     "no extent": (FREE + HOOD.replace("[1, 0]", "[0, 0.0]"), ["surface[0].to"], "differ"),
     "ends and points": (
@@ -116,41 +95,16 @@ BROKEN = {
         ["surface[0].from", "surface[0].to", "surface[0].points"],
         "not both",
     ),
-    "one point": (
-        FREE + '[[surface]]\nname = "a"\npoints = [[0, 0]]',
-        ["surface[0].points"],
-        "2 to 10000 points",
-    ),
-    "point repeated": (
-        FREE + '[[surface]]\nname = "a"\npoints = [[0, 0], [1, 1], [1, 1.0]]',
-        ["surface[0].points"],
-        "[1.0, 1.0] repeats",
-    ),
     # conflicts, naming both keys
-    "interact and exact": (
-        IN + '[stream]\ninteract = true\ncount = 2\n[run]\nengine = "exact"',
-        ["run.engine", "stream.interact", "stream.count = 2"],
-        "contact or pymunk",
-    ),
     "pymunk and points": (
         IN + '[particle]\nradius = 0\n[run]\nengine = "pymunk"',
         ["run.engine", "particle.radius"],
         "pymunk needs disks",
     ),
-    "contact and points": (
-        IN + '[particle]\nradius = 0\n[run]\nengine = "contact"',
-        ["run.engine", "particle.radius"],
-        "contact needs disks",
-    ),
     "interact and points": (
         IN + "[particle]\nradius = 0\n[stream]\ninteract = true",
         ["stream.interact", "particle.radius"],
         "never meet",
-    ),
-    "spin and points": (
-        IN + "[particle]\nradius = 0.0\nspin = true",
-        ["particle.spin", "particle.radius"],
-        "cannot turn",
     ),
     "spread on adhesive belt": (
         IN + "[stream]\nspeed_spread = 0.1",
@@ -167,13 +121,7 @@ BROKEN = {
         ["stream.velocity", "incoming.friction"],
         "Coulomb",
     ),
-    "landed nowhere": (IN + '[run]\nuntil = "landed"', ["run.until"], "[outgoing]"),
     "impact without plate": (IN + OUT, ["outgoing.drop_from"], 'outgoing.drop_from = "top"'),
-    "plate of no length": (
-        IN + PLATE + "above = 0\nbelow = 0",
-        ["plate.above", "plate.below"],
-        "length",
-    ),
     # expectations
     "number for expectations": ("expect = 3\n" + IN, ["expect"], "each headed by [[expect]]"),
     "table for expectations": (IN + "[expect]\nvalue = 1", ["expect"], "[[expect]]"),

@@ -1,7 +1,5 @@
 """The documentation site: whole, strict, and readable on a phone, in the dark, without network."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

@@ -196,14 +196,13 @@ def test_bodies_that_turn_by_their_moment_of_inertia(kind):
 
 
 @pytest.mark.parametrize("kind", INERTIA)
-@given(st.floats(0.1, 1.5), st.floats(0.2, 0.6))
-def test_with_endless_grip_it_leaves_where_a_rolling_body_would(kind, speed, radius):
+def test_with_endless_grip_it_leaves_where_a_rolling_body_would(kind):
     # Energy of a body that rolls round, N = 0: u = u0 + 2/(1+k) (1 - cos φ) = cos φ.
-    k, ratio = INERTIA[kind], speed**2 / (G * radius)
-    assume(ratio < 0.99)
+    ratio, radius = np.random.default_rng(1).uniform([[0.002], [0.2]], [[0.99], [0.6]], (2, 200))
+    k, speed = INERTIA[kind], np.sqrt(ratio * G * radius)
     found = transfer(
         speed=speed, pulley_radius=radius - 0.01, particle_radius=0.01, distance=1.0, spin=True,
         inertia=k, friction=1e12, unbounded_plate=False,
     )  # fmt: skip
     cosine = (ratio + 2.0 / (1.0 + k)) / (1.0 + 2.0 / (1.0 + k))
-    assert math.cos(found.phi1) == pytest.approx(cosine, rel=1e-10)
+    assert np.cos(found.phi1) == pytest.approx(cosine, rel=1e-10)

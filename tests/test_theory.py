@@ -12,6 +12,7 @@ from chutelab.scene import from_dict
 from chutelab.theory import STAGES, Reason, predict, transfer
 
 G = 9.81
+RNG = np.random.default_rng(7)
 SPEED = st.floats(0.3, 6.0)
 PULLEY = st.floats(0.03, 0.6)
 RADIUS = st.one_of(st.just(0.0), st.floats(1e-4, 0.02))
@@ -77,15 +78,16 @@ class TestSeparation:
         assert found.v1 == pytest.approx(v, rel=1e-12, abs=0.0)
         assert found.omega1 * r == pytest.approx(rim, abs=2e-12)
 
-    @given(st.floats(0.05, 0.999), PULLEY, st.booleans())
-    def test_ice_leaves_by_energy_alone(self, share, pulley, spin):
-        speed = math.sqrt(share * G * (pulley + 0.01))
+    @pytest.mark.parametrize("spin", [False, True])
+    def test_ice_leaves_by_energy_alone(self, spin):
+        share, pulley = RNG.uniform([[0.05], [0.03]], [[0.999], [0.6]], (2, 200))
+        speed = np.sqrt(share * G * (pulley + 0.01))
         ratio = speed**2 / (G * (pulley + 0.01))
         found = leave(
             speed=speed, pulley_radius=pulley, particle_radius=0.01, friction=0.0, spin=spin
         )
-        assert math.cos(found.phi1) == pytest.approx((2.0 + ratio) / 3.0, rel=4e-16, abs=0.0)
-        assert found.omega1 == 0.0
+        assert np.cos(found.phi1) == pytest.approx((2.0 + ratio) / 3.0, rel=4e-16, abs=0.0)
+        assert (found.omega1 == 0.0).all()
 
 
 class TestPaperEquations:
@@ -190,16 +192,20 @@ class TestInclinedPlate:
 
 
 class TestOutgoingBelt:
-    @given(SPEED, st.floats(-3.0, 3.0), st.booleans(), SHARE, st.floats(0.0, 1.0))
-    def test_belt_work_is_kinetic_gain_plus_heat(self, v, belt, spin, eps, mu):
+    @pytest.mark.parametrize("spin", [False, True])
+    def test_belt_work_is_kinetic_gain_plus_heat(self, spin):
         m, r = 0.3, 0.01
+        low, high = [[0.3], [-3.0], [0.0], [0.0]], [[6.0], [3.0], [1.0], [1.0]]
+        v, belt, eps, mu = RNG.uniform(low, high, (4, 200))
         found = transfer(
             speed=v, pulley_radius=0.3, distance=0.4, angle=0.2, restitution=eps, belt_speed=belt,
             particle_radius=r, mass=m, spin=spin, friction=0.4 if spin else np.inf,
             plate_friction=mu,
         )  # fmt: skip
-        assume(found.reason == "")
-        vx, rim = -float(found.v3x), float(r * found.omega2)
+        known = found.reason == ""
+        assert known.sum() > 100
+        vx, rim, belt = -found.v3x[known], r * found.omega2[known], belt[known]
+        work, heat = found.belt_work[known], found.slip_heat[known]
         if spin:
             end = vx + (belt - vx - rim) / 3.0
             end_rim = rim + 2.0 * (end - vx)
@@ -207,10 +213,10 @@ class TestOutgoingBelt:
         else:
             end, end_rim = belt, rim
         gain = 0.5 * m * (end**2 - vx**2) + 0.25 * m * (end_rim**2 - rim**2)
-        turned_over = m * (vx**2 + belt**2 + rim**2)
-        assert found.belt_work == pytest.approx(m * belt * (end - vx), abs=1e-14 * turned_over)
-        assert found.belt_work - found.slip_heat == pytest.approx(gain, abs=1e-14 * turned_over)
-        assert found.slip_heat >= 0.0
+        rounding = 1e-14 * m * (vx**2 + belt**2 + rim**2)
+        assert (np.abs(work - m * belt * (end - vx)) <= rounding).all()
+        assert (np.abs(work - heat - gain) <= rounding).all()
+        assert (heat >= 0.0).all()
 
 
 class TestDomain:

@@ -9,8 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chutelab import machine, scene
-from chutelab.engines import exact
-from chutelab.results import Kind
 from machines import nominal
 
 G, R, GAP, V, DROP, r = 9.81, 0.1, 0.5, 2.0, 0.5, 0.0063
@@ -202,18 +200,6 @@ def test_arcs_that_touch_do_not_cross():
         assert len(crossed(surface=[ring, wider])) == (1 if x else 0)
 
 
-def test_crossing_surfaces_are_warned_of():
-    assert built().warnings == ()
-    *_, high = built(outgoing={"drop_from": "top", "drop": 0.15}).warnings
-    assert high == machine.Caution("outgoing", crosses=machine.DRIVE_PULLEY)
-    leaning = {"angle_deg": -60.0, "distance": 0.02, "below": 0.3}
-    (through,) = built(plate=leaning, outgoing={"drop_from": "top"}).warnings
-    assert str(through) == "plate: it crosses the drive pulley"
-    hood = {"name": "hood", "points": [[0.4, 0.0], [0.8, 0.0], [0.8, 0.3]]}
-    assert built(surface=[hood]).warnings == (machine.Caution("hood", crosses="plate"),)
-    assert built(surface=[{**hood, "points": [[-0.5, R], [-0.5, 1.0]]}]).warnings == ()
-
-
 @pytest.mark.parametrize("bent", [False, True])
 def test_gates_cross_only_what_is_there_while_they_are(bent):
     flat = {"name": "flat", "from": [2.0, 2.0], "to": [3.0, 2.0]}
@@ -230,14 +216,6 @@ def test_gates_cross_only_what_is_there_while_they_are(bent):
         (({"closes_at": 2.0}, {}), said),
     ]:
         assert built(surface=[flat | times[0], upright | times[1]]).warnings == warnings
-
-
-@pytest.mark.parametrize(("below", "hit"), [(0.1, -0.4259), (None, None)])
-def test_a_flight_off_the_finite_plate_is_told_with_its_place(below, hit):
-    # the impact lies g (0.5937 / 2)²/2 - r = 0.4259 m below the pulley's top
-    found = built(plate={"below": below} if below else {}, outgoing={"drop_from": "top", "drop": 1})
-    hits = [caution.hit for caution in found.warnings if not caution.crosses]
-    assert hits == ([pytest.approx(hit, abs=5e-5)] if hit else [])
 
 
 def exit_box(found, particle=0):
@@ -298,17 +276,6 @@ def test_a_slow_release_is_drawn_along_the_belt():
     position, velocity, _ = nominal(scene.load("perpendicular", changes))
     assert position.tolist() == [0.0, R + r]
     assert velocity == pytest.approx((sqrt(1.5**2 + 2 * 0.4 * G * 1.0), 0.0), rel=1e-15, abs=0.0)
-
-
-@pytest.mark.parametrize("name", ["perpendicular", "inclined-60", "low-speed", "slip"])
-def test_the_engine_takes_the_nominal_particle_the_same_way(name):
-    loaded = scene.load(name)
-    position, velocity, place = nominal(loaded)
-    recording = exact.run(machine.build(loaded))
-    left, hit = (recording.select(kind)[0] for kind in (Kind.SEPARATION, Kind.IMPACT))
-    assert left["position"] == pytest.approx(position, abs=1e-14)
-    assert left["velocity_after"] == pytest.approx(velocity, abs=1e-14)
-    assert hit["position"] == pytest.approx(place, abs=1e-14)
 
 
 def test_a_box_may_stand_on_a_floor_from_the_beginning():
@@ -417,16 +384,6 @@ def test_nothing_is_released_in_a_conveyors_pulley(end):
     packed = {"fill": [[x - 0.4, y - 0.4], [x + 0.4, y + 0.4]], "count": 250}
     places = falling(particle=disk, conveyor=[belt], stream=packed).releases.position
     assert np.hypot(*(places - (x, y)).T).min() >= 0.22
-
-
-def test_an_inclined_belt_ends_where_the_pulley_is_tangential():
-    beta = radians(20.0)
-    found = machine.build(scene.load("perpendicular", ["incoming.incline_deg=20"]))
-    up, out = np.array([cos(beta), sin(beta)]), np.array([-sin(beta), cos(beta)])
-    assert found.segments.end[0] == pytest.approx(0.1 * out, rel=1e-14)
-    assert found.segments.start[0] == pytest.approx(0.1 * out - up, rel=1e-14)
-    assert found.releases.position[0] == pytest.approx((0.1 + 0.0063) * out - up, rel=1e-14)
-    assert found.releases.velocity[0] == pytest.approx(2.0 * up, rel=1e-14)
 
 
 MIXTURE = {

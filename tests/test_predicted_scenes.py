@@ -36,27 +36,6 @@ def same(found, known):
     )
 
 
-def test_an_inclined_belt_and_a_sphere_are_transfers_with_these_numbers():
-    belt = {"incline_deg": -14.0, "friction": 0.3, "length": 0.4, "pulley_radius": 0.2}
-    ball = {"spin": True, "shape": "sphere"}
-    plate = {"distance": 0.3, "friction": 0.2, "pivot_height": 0.1}
-    shared = {
-        "speed": 2.0, "pulley_radius": 0.2, "distance": 0.3, "pivot_height": 0.1,
-        "plate_friction": 0.2, "particle_radius": 0.004, "spin": True, "inertia": 0.4,
-        "friction": 0.3, "incline": math.radians(-14.0), "interval": 0.005,
-        "unbounded_plate": False,
-    }  # fmt: skip
-    for stream, way in [({}, 0.4), ({"at": [-0.15, 0.0]}, None)]:
-        if way is None:
-            # 0.204 m over the belt's direction, 0.2 m before it meets the pulley.
-            cos, sin = math.cos(math.radians(-14.0)), math.sin(math.radians(-14.0))
-            stream, way = {"at": [-0.2 * cos - 0.204 * sin, -0.2 * sin + 0.204 * cos]}, 0.2
-        found = predict(scene(particle=ball, incoming=belt, plate=plate, stream=stream))
-        once = transfer(**shared, ride_length=way, drop=0.0)
-        sunk = 0.204 * (1.0 - math.cos(once.phi1)) + float(once.y2)
-        same(found, transfer(**shared, ride_length=way, drop=0.9 - sunk))
-
-
 @pytest.mark.parametrize(
     ("engine", "grip", "ball", "off"),
     [

@@ -115,20 +115,14 @@ def test_the_other_surfaces_stand_where_the_scene_says():
         ({"plate": {"angle_deg": 60.0}}, "outgoing.drop_from", "never meets"),
         ({"incoming": {"speed": 0.0}}, "outgoing.drop_from", "never meets"),
         # from behind the plate, over its top, and back onto the face
-        (
-            {"plate": {"angle_deg": -30.0}, "stream": {"at": [0.8, 0.2], "velocity": [-2.0, 0.0]}},
-            "outgoing.drop_from",
-            "never meets",
-        ),
+        ({"plate": {"angle_deg": -30.0}, "stream": {"at": [0.8, 0.2], "velocity": [-2.0, 0.0]}},
+         "outgoing.drop_from", "never meets"),
         ({"plate": {"below": 0.2}}, "plate.below", "0.4259 m below the pivot"),
         ({"plate": {"pivot_height": -0.8}}, "plate.above", "0.4741 m above the pivot"),
-        (
-            {"plate": {"above": 0, "pivot_height": -1}, "outgoing": {"drop_from": "top"}},
-            "plate.above",
-            "more than 0",
-        ),
+        ({"plate": {"above": 0, "pivot_height": -1}, "outgoing": {"drop_from": "top"}},
+         "plate.above", "more than 0"),
     ],
-)
+)  # fmt: skip
 def test_a_machine_that_contradicts_itself_is_refused(tables, key, words):
     # the impact lies g (0.5937 / 2)²/2 - r = 0.4259 m below the pulley's top
     with pytest.raises(scene.SceneError, match=r"mine\.toml") as raised:
@@ -442,17 +436,13 @@ def test_what_a_pair_meets_with_is_said_by_pair_then_surface_then_material():
     coal = {"name": "lump", "material": "coal", "radius": 0.01}
     document = {
         "particle": [coal, {"name": "ball"}],
-        "surface": [
-            {"name": "plain", "from": [0.0, 0.0], "to": [1.0, 0.0]},
-            {"name": "told", "from": [0.0, -1.0], "to": [1.0, -1.0], "restitution": 0.9},
-            {"name": "lined", "from": [0.0, -2.0], "to": [1.0, -2.0], "material": "rubber"},
-        ],
+        "surface": [{"name": "plain", "from": [0.0, 0.0], "to": [1.0, 0.0]}, {"name": "told",
+         "from": [0.0, -1.0], "to": [1.0, -1.0], "restitution": 0.9}, {"name": "lined",
+         "from": [0.0, -2.0], "to": [1.0, -2.0], "material": "rubber"}],
         "pair": [{"between": ["told", "lump"], "friction": 0.07}],
-        "stream": [
-            {"particle": "lump", "at": [0.0, 1.0], "velocity": [0.0, 0.0], "interact": True},
-            {"particle": "ball", "at": [0.5, 1.0], "velocity": [0.0, 0.0], "friction": 0.04},
-        ],
-    }
+        "stream": [{"particle": "lump", "at": [0.0, 1.0], "velocity": [0.0, 0.0], "interact": True},
+         {"particle": "ball", "at": [0.5, 1.0], "velocity": [0.0, 0.0], "friction": 0.04}],
+    }  # fmt: skip
     found = machine.build(scene.from_dict(document))
     material = scene.materials.PRESETS["coal"].material
     assert found.segments.restitution.tolist() == [

@@ -16,7 +16,16 @@ import chutelab
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
 PICTURES = {"matplotlib", "imageio", "PIL"}
-EVERYTHING = PICTURES | {"numpy", "pydantic", "pymunk", "wasmtime", "scipy", "rich", "click"}
+EVERYTHING = PICTURES | {
+    "matplotlib.pyplot",
+    "numpy",
+    "pydantic",
+    "pymunk",
+    "wasmtime",
+    "scipy",
+    "rich",
+    "click",
+}
 
 WATCH = """
 import json, sys
@@ -75,10 +84,10 @@ def test_a_command_loads_what_it_needs_and_nothing_else(chain, tmp_path):
     assert dict(zip(chain, found, strict=True)) == chain
 
 
-def test_a_picture_loads_no_engine(tmp_path):
-    (loaded,) = loaded_by("run perpendicular -q --out out --only png", cwd=tmp_path)
+def test_pictures_load_no_engine_and_no_pyplot(tmp_path):
+    (loaded,) = loaded_by("run perpendicular -q --out out --only png,gif", cwd=tmp_path)
     assert "matplotlib" in loaded
-    assert not loaded & {"pymunk", "scipy", "rich"}
+    assert not loaded & {"pymunk", "scipy", "rich", "matplotlib.pyplot"}
 
 
 def test_importing_the_package_loads_nothing():

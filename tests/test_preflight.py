@@ -383,7 +383,7 @@ def test_pymunk_for_what_exact_does_at_once_is_noticed():
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=() if name in (*LONE, "stream", "hopper") else pytest.mark.slow)
+        pytest.param(name, marks=() if name in (*LONE, "stream") else pytest.mark.slow)
         for name in sc.shipped()
     ],
 )

@@ -298,7 +298,8 @@ class Stage {
   describe(grip: any, handle: Handle) {
     const { view, words } = this, x = view.px(handle.x), y = view.py(handle.y);
     grip.setAttribute("transform", `translate(${x} ${y})`);
-    grip.classList.toggle("own", handle.surface === this.part);
+    // A tool that is out is held by its ends at any time.
+    grip.classList.toggle("own", handle.surface === this.part || handle.says !== undefined);
     const [stem, , knob] = grip.children;
     knob.setAttribute("d", KNOBS[handle.shape]);
     if (handle.from) {

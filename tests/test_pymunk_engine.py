@@ -109,46 +109,6 @@ def test_steps_all_alike_converge_in_order_one():
     assert errors[-1] < 0.25 * errors[0]
 
 
-def fall(x, y, align):
-    """Two bounces on a ramp and off its end, somewhere in the world."""
-    ramp = face("ramp", (x, y - 0.5), (x + 1.0, y - 0.75), restitution=0.5, friction=0.2)
-    return run(dropped((x, y), (1.0, 0.0), ramp, run={"align": align}))
-
-
-@pytest.mark.parametrize("align", [True, False])
-def test_a_machine_far_away_runs_as_one_nearby(align):
-    # Its coordinates are known to 2^19 times 2^-52, some 1e-10 m.
-    near, away = fall(0.0, 0.0, align), fall(2.0**19, -(2.0**18), align)
-    assert near.events["kind"].tolist() == away.events["kind"].tolist()
-    assert Kind.IMPACT in near.events["kind"]
-    shift = away.events["position"] - near.events["position"]
-    np.testing.assert_allclose(
-        shift, np.tile([2.0**19, -(2.0**18)], (len(shift), 1)), rtol=0, atol=1e-9
-    )
-    np.testing.assert_allclose(away.events["t"], near.events["t"], rtol=0, atol=1e-9)
-
-
-def test_who_finds_its_place_taken_waits_until_it_is_free():
-    # The belt takes 2 r / v to carry one out of the next one's way; steps are 1 ms.
-    crowded = {
-        "particle": {"radius": 0.004}, "incoming": {"speed": 0.5, "pulley_radius": 0.1},
-        "stream": {"count": 12, "rate": 200.0, "interact": True}, "run": {"until": 1.0},
-    }  # fmt: skip
-    got = run(build(from_dict(crowded)))
-    t = got.select(Kind.RELEASE)["t"]
-    assert len(t) == 12
-    assert np.diff(t).min() >= 0.008 / 0.5 - 1e-12
-    assert np.diff(t).max() <= 0.008 / 0.5 + 1e-3 + 1e-12
-    places, _ = got.at(np.linspace(0.0, 1.0, 201))
-    apart = places[:, :, None] - places[:, None]
-    apart = np.hypot(*np.moveaxis(apart, -1, 0))[:, ~np.eye(12, dtype=bool)]
-    assert np.nanmin(apart) >= 0.008 - 1e-9
-    # Untouched, each leaves where cos φ1 = v²/(g ρ).
-    left = got.select(Kind.SEPARATION, surface="incoming")
-    cosine = left["position"][:, 1] / 0.104
-    np.testing.assert_allclose(cosine, 0.25 / (9.81 * 0.104), rtol=1e-9)
-
-
 @pytest.mark.parametrize("align", ["true", "false"])
 @pytest.mark.parametrize(("low", "high"), [(0.5, 9.0), (0.1, 0.5)])
 def test_a_wall_ends_the_ride_on_a_belt_that_holds(low, high, align):

@@ -13,9 +13,7 @@ import pytest
 import chutelab
 from chutelab.scene import load
 from chutelab.studies.sweep import crew, sweep_to
-from chutelab.studies.sweep.batch import alone
 from chutelab.studies.sweep.part import part_of
-from chutelab.studies.sweep.rows import joined
 from chutelab.util.errors import InputError
 from typed import planned
 
@@ -64,22 +62,6 @@ def test_a_sweep_goes_on_and_writes_the_same_bytes(interrupted, share, form):
     assert not part_of(out).exists()
     if share > 0.2:
         assert len(ran) < plan.count
-
-
-def test_rows_that_are_there_are_not_simulated_again(interrupted, monkeypatch):
-    plan, whole, kept = interrupted
-    part_of(Path("rows.csv")).write_bytes(kept)
-    asked = []
-
-    def noting(block):
-        asked.append(len(block.values))
-        return joined([alone(block, row) for row in range(len(block.values))])
-
-    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", noting)
-    with crew() as team:
-        sweep_to(plan, "rows.csv", team, resume=True)
-    assert sum(asked) == 1
-    assert Path("rows.csv").read_bytes() == whole
 
 
 def test_rows_of_another_sweep_are_refused(interrupted):

@@ -17,15 +17,6 @@ def last_places(recording):
     return recording.knots["position"][recording.offsets[1:] - 1]
 
 
-# Hopper.
-
-
-# Heap.
-
-
-# Galton board.
-
-
 def chi_squared(counts):
     """Return that of 13 bins against the binomial of 12 rows; three bins at each end are one."""
     expected = np.array([comb(12, k) for k in range(13)]) / 2.0**12 * counts.sum()
@@ -33,16 +24,14 @@ def chi_squared(counts):
     return ((pooled[0] - pooled[1]) ** 2 / pooled[1]).sum()
 
 
-def test_the_bins_of_the_galton_board_are_binomial():
-    recording = simulate(sc.load("galton"))
+@pytest.mark.parametrize("count", [150, pytest.param(500, marks=pytest.mark.slow)])
+def test_the_bins_of_the_galton_board_are_binomial(count):
+    recording = simulate(sc.load("galton", [f"stream.count={count}"]))
     x, y = last_places(recording).T
     bins = np.floor(x / 0.024 + 6.5).astype(int)
     assert (y < -0.2721).all(), "all are in the bins"
     # 9 classes, so 8 degrees of freedom: a fair board is above 20.09 once in a hundred times.
     assert chi_squared(np.bincount(bins, minlength=13)) < 20.09
-
-
-# Mixture.
 
 
 @pytest.mark.parametrize(
@@ -66,9 +55,6 @@ def test_who_falls_through_the_screen_is_smaller_than_its_gap(bar, small, large,
     assert fits.any()
     assert not through[never].any()
     assert through[fits].mean() > share
-
-
-# Gallery.
 
 
 def test_the_gallery_page_is_what_its_command_makes(tmp_path):

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from math import inf
 from pathlib import Path
 
@@ -254,6 +255,15 @@ def test_a_signal_waits_until_all_files_are_in_their_place(tmp_path, monkeypatch
     with raised(), pytest.raises(KeyboardInterrupt):
         make()
     assert sum(path.is_file() for path in tmp_path.rglob("*")) == 3
+
+
+def test_a_signal_that_other_code_has_swallowed_ends_the_next_run():
+    with raised():
+        with suppress(BaseException):
+            signal.raise_signal(signal.SIGTERM)
+        with pytest.raises(KeyboardInterrupt):
+            chutelab.simulate("stream", engine="contact")
+    chutelab.simulate("perpendicular")
 
 
 def test_what_is_ignored_or_somebody_elses_is_left_alone():

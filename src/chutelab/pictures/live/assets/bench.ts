@@ -25,7 +25,7 @@ const MOST_BALLS = 100;
 
 const ZOOM = 1.25;
 
-/** Shares of the picture from its middle at which there may be room for a part; px that are enough. */
+/** Shares of the picture from its middle where there may be room for a part; px that are enough. */
 const GRID = [-0.36, -0.24, -0.12, 0, 0.12, 0.24, 0.36], ROOM = 160;
 
 /** Places that are tried where a part cannot be at the best one. */

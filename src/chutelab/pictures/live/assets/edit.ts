@@ -156,7 +156,8 @@ function withName(given: Given, key: string, name: string): Given {
     pair.between = pair.between.map((one: string) => (one === old ? name : one));
   }
   if (key.startsWith("particle")) {
-    for (const stream of listOf(renamed.stream)) if (stream.particle === old) stream.particle = name;
+    const streams = listOf(renamed.stream).filter(({ particle }) => particle === old);
+    for (const stream of streams) stream.particle = name;
   }
   return renamed;
 }

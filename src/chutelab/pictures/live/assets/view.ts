@@ -78,7 +78,7 @@ class View {
     return ten * ([1, 2, 5].find((n) => n * ten >= rough) ?? 10);
   }
 
-  /** The size of things that are new here: a round number of m, no more than the picture is high. */
+  /** The size of things that are new here: a round number of m, within the picture's height. */
   get unit() {
     const high = (this.free.bottom - this.free.top) / this.scale;
     const ten = 10 ** Math.floor(Math.log10(high));

@@ -1,6 +1,6 @@
 """Build the scripts of the live page: TypeScript modules to one file each for page and thread.
 
-    python tools/build_page.py           # writes app.js and worker.js into pictures/live/bundle
+    python tools/build_page.py           # writes app.js, lessonpage.js and worker.js into live/bundle
     python tools/build_page.py --check   # builds anew and compares the bytes with what is there
 
 Needs node and esbuild in the version that `tests/live/package.json` pins: `npm ci --prefix
@@ -17,11 +17,11 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 LIVE = ROOT / "src" / "chutelab" / "pictures" / "live"
 BUNDLE = LIVE / "bundle"
-SCRIPTS = ("app", "worker")
+SCRIPTS = ("app", "lessonpage", "worker")
 
 
 def build(folder: Path) -> None:
-    """Write app.js and worker.js into a folder.
+    """Write app.js, lessonpage.js and worker.js into a folder.
 
     Raises
     ------

@@ -1,7 +1,5 @@
 """Pages in a real browser: none of them says anything on the console, or asks for anything."""
 
-from __future__ import annotations
-
 import shutil
 
 import pytest
@@ -32,7 +30,7 @@ def to_step(page, kind="numbers"):
         page.locator("#skip:visible, #step-next:enabled:visible").first.click()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser():
     playwright = pytest.importorskip(
         "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'

@@ -20,6 +20,7 @@ from chutelab.pictures.plots import style
 from chutelab.scene import Scene
 from chutelab.scene.messages import live_of
 from chutelab.scene.quantities import REGISTRY
+from chutelab.scene.tables import Live
 from chutelab.util.files import whole
 from chutelab.util.versions import own_version
 
@@ -29,19 +30,20 @@ COLOURS = ("track", "analytic", "belt", "strike", "stream")
 
 
 def html(
-    scene: Scene,
+    scene: Scene | None,
     *,
     language: str = "en",
     home: tuple[str, str] | None = None,
     exercise: Mapping[str, Any] | None = None,
     lesson: Mapping[str, Any] | None = None,
+    partly: bool = False,
 ) -> str:
     """Return the live page of a scene; the same scene and version give the same bytes.
 
     Parameters
     ----------
-    scene : Scene
-        Of disks or spheres, without strings.
+    scene : Scene, optional
+        Of disks or spheres, without strings. None begins with an empty machine.
     language : {"en", "de"}
         Of all that the page says; what the scene says stands as it is.
     home : tuple of str, optional
@@ -51,6 +53,8 @@ def html(
     lesson : mapping, optional
         Title and question of a lesson, and its steps as
         `chutelab.classroom.lessons.steps.data_of` has them.
+    partly : bool
+        Whether the page says what it cannot show of the scene, and leaves it out.
 
     Raises
     ------
@@ -69,65 +73,75 @@ def html(
         css += _file("assets/lesson.css")
     css = re.sub(r"/\*.*?\*/|\s+(?=\s)|(?<=[{;}])\s+", "", css, flags=re.DOTALL)
     core = files("chutelab.core")
-    facts = describe(scene)
-    live = live_of(scene, facts["scene"])
+    facts = describe(scene, partly=partly)
+    strings = json.loads(_file(f"assets/strings/{language}.json"))
+    title = strings["new-machine"] if scene is None else scene.title
+    if scene is None or "lacks" in facts:
+        facts["scene"]["title"] = title
+        live = Live().model_dump()
+    else:
+        live = live_of(scene, facts["scene"])
     if given := facts["scene"].get("live"):
         # As what is saved from the page will have it.
         facts["scene"]["live"] = {key: live[key] for key in given}
     # What the page's language has no words for is called as in the registry.
     shown = [row for row in REGISTRY.values() if row.symbol]
-    # What no reader of the file asks for is packed: the form of scene files and of the core.
-    rules = {name: facts.pop(name) for name in ("tables", "presets")}
-    rules["layout"] = json.loads((core / "layout.json").read_text(encoding="utf-8"))
+    # Packed, for it is long: all but the scene.
+    large = {
+        **{name: facts.pop(name) for name in ("tables", "presets")},
+        "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
+        "strings": {
+            **{f"number-{row.name}": row.meaning for row in shown},
+            **strings,
+        },
+        "quantities": {row.name: {"symbol": row.symbol, "unit": row.unit} for row in shown},
+        **({} if exercise is None else {"exercise": exercise}),
+        **({} if lesson is None else {"lesson": lesson}),
+    }
     data = {
         **facts,
         "live": live,
         "version": own_version(),
         "language": language,
-        "strings": {
-            **{f"number-{row.name}": row.meaning for row in shown},
-            **json.loads(_file(f"assets/strings/{language}.json")),
-        },
-        "quantities": {row.name: {"symbol": row.symbol, "unit": row.unit} for row in shown},
-        **({} if exercise is None else {"exercise": exercise}),
-        **({} if lesson is None else {"lesson": lesson}),
-        "rules": _packed(json.dumps(rules, separators=(",", ":")).encode()),
+        "packed": _packed(json.dumps(large, separators=(",", ":")).encode()),
         "wasm": _packed((core / "core.wasm").read_bytes()),
     }
     # Within a script element nothing but an end tag must look like one.
-    packed = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
-    script = _file("bundle/app.js")
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    script = _file(f"bundle/{'app' if lesson is None else 'lessonpage'}.js")
     return Template(_file("assets/page.html")).substitute(
         language=language,
-        title=escape(scene.title),
+        title=escape(title),
         version=escape(own_version()),
-        broken=escape(data["strings"]["broken-page"]),
+        broken=escape(strings["broken-page"]),
         home=f'<a class="home" href="{escape(home[1])}">{escape(home[0])}</a>' if home else "",
         css=css,
         css_hash=_hash(css),
         script=script,
         script_hash=_hash(script),
         worker=_file("bundle/worker.js"),
-        data=packed.replace("<", "\\u003c"),
+        data=text.replace("<", "\\u003c"),
     )
 
 
 def write(
-    scene: Scene,
+    scene: Scene | None,
     path: str | Path,
     *,
     language: str = "en",
     home: tuple[str, str] | None = None,
     exercise: Mapping[str, Any] | None = None,
     lesson: Mapping[str, Any] | None = None,
+    partly: bool = False,
 ) -> int:
     """Write the live page of a scene, whole or not at all, and return its size in bytes.
 
     See `html`; a file that is there is replaced, its folder must be there.
     """
-    data = html(scene, language=language, home=home, exercise=exercise, lesson=lesson).encode(
-        "utf-8"
+    page = html(
+        scene, language=language, home=home, exercise=exercise, lesson=lesson, partly=partly
     )
+    data = page.encode("utf-8")
     with whole(Path(path)) as unfinished:
         unfinished.write_bytes(data)
     return len(data)

@@ -113,7 +113,7 @@ class Lesson {
     }, "main");
     this.where = html("span", { class: "where note" });
     this.sheet = html("section", { class: "sheet", "aria-label": words.say("lesson") }, this.page,
-      html("div", { class: "turnbar" }, this.back, this.where, this.skip, this.next));
+      html("div", { class: "turnbar" }, this.back, this.where, this.next));
     document.querySelector("main")?.prepend(this.sheet);
     this.slot = html("span", { class: "slot" });
     document.querySelector(".transport")?.append(this.slot);
@@ -171,7 +171,7 @@ class Lesson {
     name.addEventListener("keydown", (event: KeyboardEvent) => {
       if (event.key === "Enter") begin();
     });
-    const go = html("button", { type: "button", id: "begin", class: "main" }, words.say("begin"));
+    const go = html("button", { type: "button", id: "begin", class: "main" }, words.say("lesson-begin"));
     go.addEventListener("click", begin);
     this.page.replaceChildren(
       html("h2", { tabindex: "-1" }, lesson.title), html("p", { class: "ask" }, lesson.question),
@@ -294,7 +294,7 @@ class Lesson {
       && ["try", "explain"].includes(step.kind)) as HTMLDetailsElement[];
     for (const one of shown) one.open = false;
     this.page.replaceChildren(head, ...this.textOf(step), ...this.expected(n), ...this.asked(n),
-      ...this.table(n), ...this.ready(step), html("div", { class: "then" }), ...shown,
+      ...(hides ? [this.skip] : []), ...this.table(n), ...this.ready(step), html("div", { class: "then" }), ...shown,
       ...this.exercise());
     this.list.replaceChildren(...steps.map(({ kind }, k) => {
       const done = kept.done.includes(k);
@@ -302,7 +302,7 @@ class Lesson {
         ? icon("tick") : String(k + 1)), html("span", {}, words.say(`step-${kind}`)));
       button.disabled = k > this.reach;
       if (k === n) button.setAttribute("aria-current", "step");
-      if (done) button.append(html("span", { class: "hidden" }, `, ${words.say("done")}`));
+      if (done) button.append(html("span", { class: "hidden" }, `, ${words.say("step-done")}`));
       button.addEventListener("click", () => this.go(k));
       return html("li", { class: done ? "done" : "" }, button);
     }));

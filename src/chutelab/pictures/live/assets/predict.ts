@@ -270,7 +270,7 @@ class Sketch {
     });
     return () => {
       stopped.abort();
-      home.classList.remove("drawing");
+      home.classList.remove("sketching");
     };
   }
 
@@ -295,7 +295,7 @@ class Sketch {
     this.line.setAttribute("d", points.length > 1 ? `M${points.map(at).join("L")}` : "");
     this.pen.setAttribute("transform", `translate(${at(tip)})`);
     this.pen.style.display = this.isOpen ? "" : "none";
-    this.stage.home.classList.toggle("drawing", this.isOpen);
+    this.stage.home.classList.toggle("sketching", this.isOpen);
     this.pen.setAttribute("aria-valuenow", String(points.length));
     this.pen.setAttribute("aria-valuetext", words.say("sketch-at", {
       x: words.fixed(tip[0], 2), y: words.fixed(tip[1], 2), n: points.length,

@@ -75,8 +75,8 @@ class Runs {
       html("thead", {}, html("tr", {}, html("th", { scope: "col" }, words.say("my-runs")), ...head)),
       this.body)), ...(wanted.rows.length ? [html("p", { class: "note" }, words.say("row-sets"))] : []),
     csv);
-    this.marks = svg("g", { class: "ghosts", "aria-hidden": "true" });
-    this.numbers = svg("g", { class: "ghosts", "aria-hidden": "true" });
+    this.marks = svg("g", { class: "noted-all", "aria-hidden": "true" });
+    this.numbers = svg("g", { class: "noted-all", "aria-hidden": "true" });
     stage.paths.before(this.marks);
     stage.over.append(this.numbers);
     this.draw();
@@ -248,7 +248,7 @@ class Runs {
     const lines = new Map([...this.paths].sort(([a], [b]) => a - b).map(([n, points]) =>
       [n, points.map(({ x, y }) => [view.px(x), view.py(y)] as [number, number])]));
     for (const [n, line] of lines) {
-      this.marks.append(svg("polyline", { class: "ghost",
+      this.marks.append(svg("polyline", { class: "noted",
         points: line.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" ") }));
       const others = [...lines].flatMap(([m, its]) => (m === n ? [] : its));
       const far = ([x, y]: [number, number]) => Math.min(ROOM,

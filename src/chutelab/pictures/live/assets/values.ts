@@ -1,7 +1,9 @@
 // The values that a step lets change: a row under the picture, and numbers in a sentence.
 
 import { roundUp } from "./chart.ts";
-import { checked, fieldsOf, type Field } from "./controls.ts";
+import { boundsOf, checked, fieldsOf, type Field } from "./controls.ts";
+import { Fields } from "./inspector.ts";
+import { valueAt } from "./keys.ts";
 import { html, icon } from "./panels.ts";
 import { Fault } from "./scene.ts";
 import type { Lab } from "./lab.ts";
@@ -13,7 +15,7 @@ const PULL = 4;
 /** How far a pointer may stray that clicks, px. */
 const STRAY = 4;
 
-/** A round step that leads through a range in about a hundred. */
+/** A round step that leads through a range in some two hundred. */
 const stepOf = ({ low, high, name }: Field) =>
   (name === "count" ? Math.max(1, Math.round((high - low) / 100))
     : isFinite(high - low) && high - low < 1e5 ? roundUp((high - low) / 200) : 0.1);
@@ -22,34 +24,47 @@ const within = ({ low, high }: Field, value: number) =>
   Math.min(high, Math.max(low, Number(value.toPrecision(12))));
 
 class Values {
+  row;
   root;
-  inputs: { key: string, input: any, slider: any }[] = [];
   scrubs: { key: string, button: any }[] = [];
-  /** The key that was changed last, which a refusal is about, and what was typed. */
-  last = "";
 
   constructor(readonly lab: Lab, readonly words: Words) {
-    this.root = html("div", { class: "values", role: "group", "aria-label": words.say("values") });
+    this.row = new Fields(lab, words, true, true);
+    this.root = html("div", { class: "values", role: "group", "aria-label": words.say("values") },
+      this.row.home);
     lab.on("scene", () => this.fill());
   }
 
-  /** What can be changed now, by key. */
+  /** What can be changed now, by key: numbers and words, and both coordinates of a point. */
   get fields(): Map<string, Field> {
     const { data, given, scene } = this.lab;
     if (!given || !scene) return new Map();
-    const all = { table: "scene", row: 0, name: "scene" };
-    return new Map(fieldsOf(data, given, scene, all).map((field) => [field.key, field]));
+    const all = fieldsOf(data, given, scene, { table: "scene", row: 0, name: "scene" });
+    const points = (data.live?.controls ?? []).flatMap((control: string) => {
+      const place = valueAt(given, control), [table] = control.split(/[.[]/);
+      if (!/\.points\[\d+\]$/.test(control) || !Array.isArray(place)) return [];
+      const owner = valueAt(given, control.replace(/\.points.*/, "")).name;
+      return place.map((value, part) => ({
+        key: `${control}[${part}]`, table, owner, name: "end", part, of: 2, value,
+        form: { type: "number" }, free: false, ...boundsOf(data, control), unit: "m",
+      }));
+    });
+    const plain = all.filter(({ value }) => ["number", "string"].includes(typeof value));
+    return new Map([...plain, ...points].map((field) => [field.key, field]));
   }
 
+  /** Take over a number, or what was typed. */
   change(key: string, value: number | string, done = true) {
-    const { lab } = this, field = this.fields.get(key);
+    const { lab, words } = this, field = this.fields.get(key);
     if (!field) return;
-    this.last = key;
+    lab.asked = "";
     try {
-      checked(field, value);
-      lab.change({ [key]: value }, { done });
+      lab.change({ [key]: typeof value === "number" ? value : checked(field, value, words) }, { done });
     } catch (error) {
       if (!(error instanceof Fault)) throw error;
+      // The reason stands at the field of the row.
+      lab.asked = key;
+      this.row.asking = this.row.entries.get(key)?.input;
       lab.refuse(error);
     }
   }
@@ -62,96 +77,22 @@ class Values {
     this.change(key, within(field, (Math.round(now / step) + steps) * step), done);
   }
 
-  nameOf({ table, name, owner, part, of }: Field, several: boolean) {
-    const { words } = this, which = of > 1 ? ` ${"xy"[part]}` : "";
-    const said = `${words.key(table, name)}${which}`;
-    return several && table !== "scene" ? `${words.name(owner)}: ${said}` : said;
+  nameOf({ table, name, owner, part, of }: Field) {
+    const { words } = this, said = `${words.key(table, name)}${of > 1 ? ` ${"xy"[part]}` : ""}`;
+    return table === "scene" ? said : `${words.name(owner)}: ${said}`;
   }
 
-  /** Make the row anew for what a step lets change. */
+  /** Forget the numbers of another step's sentences. */
   build() {
-    const { words } = this, fields = [...this.fields.values()];
     this.scrubs = [];
-    this.root.hidden = !fields.length;
-    this.inputs = fields.map((field, n) => {
-      const { key, low, high } = field, id = `value-${n}`;
-      const input = html("input", { type: "text", id, inputmode: "decimal", autocomplete: "off",
-        "aria-describedby": `${id}-why` });
-      const take = () => this.take(key, input);
-      input.addEventListener("change", take);
-      input.addEventListener("keydown", (event: KeyboardEvent) => {
-        if (event.key === "Enter") take();
-        if (event.key === "Escape") this.forgive();
-      });
-      const slider = html("input", { type: "range", min: String(low), max: String(high),
-        step: "any", tabindex: "-1", "aria-hidden": "true" });
-      const step = stepOf(field);
-      const slide = (done: boolean) =>
-        this.change(key, within(field, Math.round(slider.valueAsNumber / step) * step), done);
-      slider.addEventListener("input", () => slide(false));
-      slider.addEventListener("change", () => slide(true));
-      slider.hidden = !isFinite(high - low) || high - low > 1e5;
-      return { key, input, slider };
-    });
-    this.root.replaceChildren(...this.inputs.map(({ key, input, slider }, n) => {
-      const field = fields[n], name = this.nameOf(field, fields.length > 1);
-      slider.setAttribute("aria-label", name);
-      slider.removeAttribute("aria-hidden");
-      slider.removeAttribute("tabindex");
-      const button = (sign: number, drawing: string, word: string) => {
-        const made = html("button", { type: "button", class: "ib step",
-          "aria-label": `${name}: ${this.words.say(word)}` }, icon(drawing));
-        made.addEventListener("click", () => this.nudge(key, sign * 5));
-        return made;
-      };
-      return html("div", { class: "value" }, html("label", { for: input.id }, name),
-        html("span", { class: "typed" }, button(-1, "minus", "less"),
-          html("span", { class: "box" }, input,
-            html("span", { class: "unit" }, words.unit(field.unit))),
-          button(1, "plus", "more")),
-        slider, html("p", { class: "why", id: `${input.id}-why`, role: "status" }));
-    }));
     this.fill();
   }
 
-  /** Take over what was typed. */
-  take(key: string, input: any) {
-    const { lab, words } = this, field = this.fields.get(key), text = input.value.trim();
-    if (!field) return;
-    const word = text.toLowerCase() === words.say("adhesion").toLowerCase();
-    const value = word ? "adhesion" : words.parse(text);
-    const shown = typeof field.value === "number" ? words.brief(field.value) : field.value;
-    // What was only looked at keeps all its digits.
-    if (value === shown && !lab.fault) return;
-    input.setAttribute("aria-invalid", "true");
-    this.change(key, value === shown ? field.value : value);
-  }
-
-  /** Forget what cannot be. */
-  forgive() {
-    if (!this.lab.fault) return;
-    this.lab.fault = null;
-    this.lab.tell("scene");
-  }
-
-  /** Show what counts, and beside what was changed last why it cannot be. */
+  /** Show what counts. */
   fill() {
-    const { fields, words, lab: { fault } } = this;
-    for (const { key, input, slider } of this.inputs) {
-      const field = fields.get(key), why = input.closest(".value")?.querySelector(".why");
-      if (!field) continue;
-      const refused = fault && this.last === key && input.getAttribute("aria-invalid") === "true";
-      if (why) why.textContent = fault && this.last === key ? words.fault(fault) : "";
-      if (refused) continue;
-      input.removeAttribute("aria-invalid");
-      const said = typeof field.value === "number" ? words.plain(field.value)
-        : words.say(field.value);
-      if (document.activeElement !== input || input.value === "") input.value = said;
-      else if (words.parse(input.value) !== field.value) input.value = said;
-      if (typeof field.value !== "number") continue;
-      slider.value = String(field.value);
-      slider.setAttribute("aria-valuetext", `${said} ${words.unit(field.unit)}`);
-    }
+    const fields = [...this.fields.values()];
+    this.root.hidden = !fields.length;
+    this.row.show(fields, () => true);
     for (const { key, button } of this.scrubs) this.name(key, button);
   }
 
@@ -161,7 +102,7 @@ class Values {
     const field = this.fields.get(key), { words } = this;
     if (!field) return html("b", { class: "num" });
     const button = html("span", { class: "scrub num", role: "slider", tabindex: "0",
-      "aria-label": this.nameOf(field, true) });
+      "aria-label": this.nameOf(field) });
     for (const [name, value] of [["min", field.low], ["max", field.high]] as const) {
       if (isFinite(value)) button.setAttribute(`aria-value${name}`, String(value));
     }
@@ -223,14 +164,14 @@ class Values {
     const field = this.fields.get(key), { words } = this;
     if (!field || button.hidden) return;
     const input = html("input", { type: "text", class: "scrub", inputmode: "decimal",
-      "aria-label": this.nameOf(field, true) });
+      "aria-label": this.nameOf(field) });
     input.value = typeof field.value === "number" ? words.plain(field.value) : "";
     let isOver = false;
     const end = (takes: boolean) => {
       // To take it away takes its focus, too.
       if (isOver) return;
       isOver = true;
-      const value = words.parse(input.value), had = document.activeElement === input;
+      const { value } = input, had = document.activeElement === input;
       input.remove();
       button.hidden = false;
       if (takes) this.change(key, value);

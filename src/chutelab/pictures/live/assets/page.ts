@@ -1,0 +1,95 @@
+// What every page has: reads its data, starts the engine's thread, and joins the parts.
+
+import { Bench } from "./bench.ts";
+import { compiled, unpacked } from "./core.ts";
+import { Engine } from "./engine.ts";
+import { Arrows } from "./arrows.ts";
+import { CurvesPanel } from "./curves.ts";
+import { EnergyPanel } from "./energy.ts";
+import { Film } from "./film.ts";
+import { Inspector } from "./inspector.ts";
+import { Keep } from "./keep.ts";
+import { listenToKeys } from "./keyboard.ts";
+import { toToml } from "./keys.ts";
+import { Lab } from "./lab.ts";
+import { watchLaws } from "./laws.ts";
+import { LandingPanel } from "./landing.ts";
+import { NumbersPanel } from "./numbers.ts";
+import { startPlan } from "./plan.ts";
+import { Sound } from "./sound.ts";
+import { Stage } from "./stage.ts";
+import { Symbols } from "./symbols.ts";
+import { Tools } from "./tools.ts";
+import { Transport } from "./transport.ts";
+import { Words } from "./words.ts";
+import type { Palette } from "./palette.ts";
+
+type Parts = { lab: Lab, stage: Stage, words: Words, bench: Bench, inspector: Inspector,
+  newEngine: () => Engine };
+
+const byId = (id: string): any => document.getElementById(id);
+
+/** What is no base64 gives no core, as the engine then says. @param text base64 */
+function bytesOf(text: string) {
+  let binary = "";
+  try {
+    binary = atob(text);
+  } catch {
+    return new Uint8Array();
+  }
+  const bytes = new Uint8Array(binary.length);
+  for (let i = 0; i < binary.length; i += 1) bytes[i] = binary.charCodeAt(i);
+  return bytes;
+}
+
+/** @param join makes what only a sandbox has, or only a lesson */
+async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?: object }) {
+  const data = JSON.parse(byId("lab").textContent);
+  Object.assign(data, await unpacked(bytesOf(data.packed).buffer).json());
+  const words = new Words(data.language, data.strings);
+  const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
+  const wasm = bytesOf(data.wasm).buffer;
+  const newEngine = () => new Engine(
+    new Worker(URL.createObjectURL(source)), wasm, data.layout);
+  for (const element of document.querySelectorAll("[data-say]")) {
+    element.textContent = words.say((element as HTMLElement).dataset.say ?? "");
+  }
+  for (const element of document.querySelectorAll("[data-label]")) {
+    const name = words.say(element.getAttribute("data-label") ?? "");
+    element.setAttribute("aria-label", name);
+    if (element.matches("button")) (element as HTMLElement).title = name;
+  }
+  try {
+    await startPlan(await compiled(wasm), data.layout);
+  } catch {
+    byId("broken").remove();
+    byId("fault").textContent = words.say("fault-no-engine");
+    byId("fault").hidden = false;
+    return;
+  }
+  const lab = new Lab(data, newEngine());
+  const stage = new Stage(byId("stage"), lab, words);
+  const panels = [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel]
+    .map((Panel) => new Panel(byId("panels"), lab, words));
+  watchLaws(byId("law"), lab, words);
+  new Arrows(stage, words);
+  const tools = new Tools(byId("stage").parentElement, lab, stage, words, new Symbols(stage));
+  const inspector = new Inspector(byId("panels"), lab, words);
+  const bench = new Bench(byId("bench"), stage, inspector, lab, words);
+  new Transport(lab, stage, words);
+  new Sound(lab, words);
+  new Film(lab, stage, words);
+  new Keep(byId("panels"), stage, lab, words);
+  for (const panel of document.querySelectorAll("#panels > .card, .tools, .looks, .watch")) {
+    const name = panel.matches(".card") ? panel.id : "tools";
+    if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
+  }
+  const more = join({ lab, stage, words, bench, inspector, newEngine });
+  listenToKeys(bench, more.palette ?? null, lab, words);
+  Object.assign(globalThis, {
+    chutelab: { lab, stage, bench, panels, tools, ...more, toml: () => toToml(lab.given as any) },
+  });
+  byId("broken").remove();
+}
+
+export { start };

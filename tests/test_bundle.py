@@ -185,23 +185,16 @@ def test_the_same_bundle_has_the_same_bytes(web, tmp_path):
     made = bundle([find(2)], tmp_path / "again")
     for path in made:
         name = path.relative_to(tmp_path / "again")
-        # Pages have links to those lessons that are there.
+        # Pages have links to their neighbours.
         if name.parts[0] == "02-letting-go" and name.name not in ("index.html", "explanation.html"):
             assert path.read_bytes() == (web / name).read_bytes()
-    page = "02-letting-go/explanation.html"
-    assert "../06-grip-or-slip/" in (web / page).read_text(encoding="utf-8")
-    assert "../06-grip-or-slip/" not in (tmp_path / "again" / page).read_text(encoding="utf-8")
 
 
 def test_worksheets_cannot_smuggle_html_in():
-    made = html_of("# Title\n\n![x](lesson.gif)\n\n<script>alert(1)</script> [a](../b/README.md#c)")
+    made = html_of("# Title\n\n![x](lesson.gif)\n\n<script>alert(1)</script>")
     assert "<script>" not in made
     assert "<h1>" not in made
     assert "<img" not in made
-    assert '<a href="../b/index.html#c">a</a>' in made
-    # A lesson that is not there is named, and no link leads to it.
-    assert "see <a>b</a>" in html_of("see [b](../b/README.md)", ["a"])
-    assert '<a href="../a/index.html">' in html_of("[a](../a/README.md)", ["a"])
     # A figure is shown, what lies elsewhere is not.
     assert '<img src="split.png" alt="x" />' in html_of("![x](split.png)")
     for address in ("https://example.com/x.png", "../x.png", "machine.png"):
@@ -241,10 +234,10 @@ def hostile(tmp_path):
     (folder / "scene.toml").rename(folder / SCENE)
     said, name = json.dumps(EVIL), json.dumps(SCENE)
     plan = f'title = {said}\nquestion = {said}\nlevel = "start"\nscenes = [{name}]\n'
-    plan += "[picture]\nwidth = 320\nheight = 180\nfps = 10\nslow = 1\n"
+    plan += f"[[steps]]\nkind = 'explain'\ntext = {said}\nthen = {said}\n"
+    plan += f"[[steps.asks]]\ntext = {json.dumps(f'{EVIL} [x](javascript:alert(1))')}\n"
+    plan += f"[picture]\nwidth = 320\nheight = 180\nfps = 10\nslow = 1\nmachine = {said}\n"
     (folder / "lesson.toml").write_text(plan, encoding="utf-8")
-    sheet = f"# {EVIL}\n\n{EVIL}\n\n[x](javascript:alert(1))\n\n![{EVIL}](lesson.gif)\n"
-    (folder / "README.md").write_text(sheet, encoding="utf-8")
     return folder
 
 

@@ -1,6 +1,6 @@
 """Build the scripts of the live page: TypeScript modules to one file each for page and thread.
 
-    python tools/build_page.py           # writes app.js, lessonpage.js and worker.js into live/bundle
+    python tools/build_page.py           # writes the scripts into pictures/live/bundle
     python tools/build_page.py --check   # builds anew and compares the bytes with what is there
 
 Needs node and esbuild in the version that `tests/live/package.json` pins: `npm ci --prefix

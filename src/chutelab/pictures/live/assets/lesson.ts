@@ -322,6 +322,8 @@ class Lesson {
     const nodes = grown(text);
     for (const node of nodes) {
       if (!(node instanceof Element)) continue;
+      // It scrolls by itself where it is too wide, with the keyboard, too.
+      if (node.matches("table")) node.setAttribute("tabindex", "0");
       for (const place of node.querySelectorAll("[data-key]")) {
         place.replaceWith(this.values.scrub(place.getAttribute("data-key") ?? ""));
       }
@@ -461,6 +463,7 @@ class Lesson {
       (typeof value === "number" ? `${this.words.plain(value)} ${this.words.unit(unit)}`.trim()
         : this.words.say(value))).join("; "));
     this.tools.push(this.runs);
+    if (this.runs.isByHand) return [this.runs.root];
     this.slot.append(this.runs.button);
     return [this.runs.wait, this.runs.root];
   }

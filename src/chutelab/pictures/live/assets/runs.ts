@@ -73,7 +73,7 @@ class Runs {
       role: "region", "aria-label": words.say("my-runs") },
     html("table", { class: "runs" }, html("caption", { class: "hidden" }, words.say("my-runs")),
       html("thead", {}, html("tr", {}, html("th", { scope: "col" }, words.say("my-runs")), ...head)),
-      this.body)), ...(wanted.rows.length ? [html("p", { class: "note" }, words.say("row-sets"))] : []),
+      this.body)), ...(wanted.rows.length && !this.isByHand ? [html("p", { class: "note" }, words.say("row-sets"))] : []),
     csv);
     this.marks = svg("g", { class: "noted-all", "aria-hidden": "true" });
     this.numbers = svg("g", { class: "noted-all", "aria-hidden": "true" });
@@ -89,9 +89,15 @@ class Runs {
     this.numbers.remove();
   }
 
+  /** Whether nothing in it is told by a run. */
+  get isByHand() {
+    return this.wanted.columns.every(({ value }) => value === null);
+  }
+
   /** Whether every wanted run is there, or of a table of free rows one. */
   get isDone() {
     const { rows } = this.wanted;
+    if (this.isByHand) return this.noted.some((one) => Object.values(one?.own ?? {}).some(Boolean));
     return rows.length ? rows.every((_, n) => this.noted[n]?.values)
       : this.noted.some((one) => one?.values);
   }
@@ -199,7 +205,7 @@ class Runs {
       const badge = html("span", { class: "badge", "aria-hidden": "true" }, String(n + 1));
       const named = row ? grown(row.head) : [one?.head ?? words.say("own-run")];
       let head;
-      if (row) {
+      if (row && !this.isByHand) {
         head = html("button", { type: "button", class: "set" }, badge, html("span", {}, ...named));
         head.addEventListener("click", () => this.set(row));
       } else head = html("span", {}, badge, ...named);

@@ -21,7 +21,13 @@ from live.browser import DONE
 
 AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
 
-STEPPED = [one.name for one in shipped_lessons() if one.steps]
+CROWDS = ("a-stream", "the-hopper", "the-heap")
+
+STEPPED = [
+    pytest.param(one.name, marks=pytest.mark.slow) if one.name in CROWDS else one.name
+    for one in shipped_lessons()
+]
+"""The runs of crowds take a while."""
 
 DESK, PHONE = (1366, 768), (390, 844)
 

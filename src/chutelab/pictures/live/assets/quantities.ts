@@ -12,6 +12,9 @@ type Run = { recording: Recording, history: RunHistory, scene: Scene };
 /** Kind of an impact, as in the core. */
 const IMPACT = 3;
 
+/** Kinds of events that end a track, as in the core. */
+const ENDS: Record<string, number> = { settled: 7, exit: 8 };
+
 const DEGREES = 180 / Math.PI;
 
 const STATISTICS: Record<string, (sorted: number[]) => number> = {
@@ -21,8 +24,8 @@ const STATISTICS: Record<string, (sorted: number[]) => number> = {
     return Math.sqrt(STATISTICS.mean(values.map((value) => (value - mean) ** 2)));
   },
   min: (values) => values[0], max: (values) => values[values.length - 1],
-  q02: (values) => quantile(values, 0.02), q50: (values) => quantile(values, 0.5),
-  q98: (values) => quantile(values, 0.98),
+  ...Object.fromEntries([2, 25, 50, 75, 98].map((share) => [`q${String(share).padStart(2, "0")}`,
+    (values: number[]) => quantile(values, share / 100)])),
 };
 
 /** What an event tells under the name of a part of it; NaN of none. */
@@ -107,6 +110,10 @@ function measure(name: string, run: Run): number {
   if (head === "particles[0]") return each(parts.slice(1).join("."), run)[0];
   if (name === "contacts") return recording.contacts;
   if (name === "misses") return tracks.length - count(each("arrival.t", run));
+  if (head === "ended" && second in ENDS) {
+    return recording.events.filter(({ kind }) => kind === ENDS[second]).length;
+  }
+  if (name === "ended.unreleased") return tracks.filter((track) => !track.count).length;
   if (head === "ledger") {
     if (second === "by_surface") {
       const row = [...machine.surfaces, "particles"].indexOf(surface);

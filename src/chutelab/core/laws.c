@@ -37,8 +37,10 @@ Laws L;
 /* Share of the radius by which the pymunk engine's disks are larger, and so their levers. */
 #define HAIR 1e-10
 
-/* What all particles have together, and the largest and least of one. */
-static struct { double mass, heaviest, smallest, gravity, knot_t; } All;
+/* What all particles have together, and the largest and least of one. Of those that do not meet also what
+   is unexplained at their ends, J, the most that changes of it between two knots, and the least of what
+   `given_back` says. */
+static struct { double mass, heaviest, smallest, gravity, knot_t, residual, change, back; } All;
 
 static double square(double a) { return a * a; }
 
@@ -57,6 +59,16 @@ static double potential(int i, const double *knot) { return L.bodies[i].mass * L
 /* Energy at a knot, less what the books say it got, J: what is unexplained. */
 static double gain(int i, const double *knot) {
     return kinetic(i, knot) + potential(i, knot) - (knot[6] - knot[7] - knot[8]);
+}
+
+/* What a knot gives back of the losses that were booked, J, at most 0. Where the contact engine holds a
+   particle by itself in a nip, impulses of any size hold each other, and along normals seems to be given
+   what friction takes: only the sum is known. */
+static double given_back(const double *now) {
+    const double *before = now - L.row;
+    double normal = now[7] - before[7], slip = now[8] - before[8];
+    if (L.engine == ENGINE_CONTACT && !L.interact) return normal + slip;
+    return MIN(normal, slip);
 }
 
 /* Breaches. */
@@ -103,7 +115,7 @@ static int weigh(void) {
     L.energy = 0;
     for (int i = 0; i < L.particle_count; i++) {
         const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
-        double mass = L.bodies[i].mass, highest = 0;
+        double mass = L.bodies[i].mass, highest = 0, begin = 0, before = 0;
         All.mass += mass;
         All.heaviest = MAX(All.heaviest, mass);
         All.gravity = MAX(All.gravity, L.bodies[i].gravity);
@@ -120,9 +132,15 @@ static int weigh(void) {
             place = MAX(place, MAX(fabs(knot[1]), fabs(knot[2])));
             fastest = MAX(fastest, pace(knot));
             if (L.interact) continue;
-            highest = MAX(highest, fabs(knot[6]) + fabs(knot[7]) + fabs(knot[8])
-                + fabs(potential(i, knot)) + kinetic(i, knot));
+            double moving = kinetic(i, knot), lifted = potential(i, knot);
+            highest = MAX(highest, fabs(knot[6]) + fabs(knot[7]) + fabs(knot[8]) + fabs(lifted) + moving);
+            double now = moving + lifted - (knot[6] - knot[7] - knot[8]);
+            if (knot == first) begin = before = now;
+            else All.back = MIN(All.back, given_back(knot));
+            All.change = MAX(All.change, fabs(now - before));
+            before = now;
         }
+        All.residual += before - begin;
         if (L.interact && is_released(i)) {
             highest = kinetic(i, first);
             lifted += potential(i, last) - potential(i, first);
@@ -306,16 +324,6 @@ static double risen(void) {
     return found;
 }
 
-/* What a knot gives back of the losses that were booked, J, at most 0. Where the contact engine holds a
-   particle by itself in a nip, impulses of any size hold each other, and along normals seems to be given
-   what friction takes: only the sum is known. */
-static double given_back(int k) {
-    const double *before = KNOT(k - 1), *now = KNOT(k);
-    double normal = now[7] - before[7], slip = now[8] - before[8];
-    if (L.engine == ENGINE_CONTACT && !L.interact) return normal + slip;
-    return MIN(normal, slip);
-}
-
 static double sum_opened(double depth, double least, double step) {
     double deep = depth / least, share = MIN(MAX(PARTS, deep / DEEP), 1) * MAX(deep - SLOP, 0);
     return depth > 0 ? square(MIN(share, OPENS) * least / step) : 0;
@@ -381,13 +389,13 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
     int count = 0, found = 0, bad = 0, *rows = L.order;
     for (int i = 0; i < L.particle_count; i++) {
         for (int k = L.offsets[i] + 1; k < L.offsets[i + 1]; k++) {
-            if (given_back(k) < -most) rows[count++] = k;
+            if (given_back(KNOT(k)) < -most) rows[count++] = k;
         }
     }
     sort(rows, count, L.knots, L.row);
     for (int n = 0; n < count;) {
         Instant now = {KNOT(rows[n])[0], 0};
-        for (; n < count && KNOT(rows[n])[0] == now.t; n++) now.given += given_back(rows[n]);
+        for (; n < count && KNOT(rows[n])[0] == now.t; n++) now.given += given_back(KNOT(rows[n]));
         if (found == INSTANTS && now.given >= worst[found - 1].given) continue;
         int at = found < INSTANTS ? found++ : found - 1;
         for (; at > 0 && worst[at - 1].given > now.given; at--) worst[at] = worst[at - 1];
@@ -407,17 +415,18 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
    contact engine gained. Losses that are booked are never less than before but by what parting overlaps
    gives: where many do so at one instant, those that overlap there. */
 static void judge_books(double bound) {
-    double most = bound + L.parted, least = most, rise = 0, back = 0, residual = 0, low = 0;
+    double most = bound + L.parted, least = most, rise = 0, back = 0, residual = All.residual, low = 0;
     int crowd = L.interact && L.engine == ENGINE_CONTACT, count = 0, surface = -1;
+    int is_sound = !L.interact && All.change <= most && All.back >= -most;
     Group rises = {0}, backs = {0};
     Instant instants[INSTANTS];
-    if (crowd) count = beyond_overlaps(most, instants, &least);
-    for (int i = 0; i < L.particle_count; i++) {
+    if (crowd) is_sound = !(count = beyond_overlaps(most, instants, &least));
+    for (int i = 0; i < L.particle_count && (L.interact || !is_sound); i++) {
         if (!is_released(i)) continue;
         double first = gain(i, KNOT(L.offsets[i])), before = first;
         if (L.interact) residual += gain(i, KNOT(last_of(i))) - first;
-        for (int k = L.offsets[i] + 1; k < L.offsets[i + 1] && (!crowd || count); k++) {
-            double own = given_back(k);
+        for (int k = L.offsets[i] + 1; k < L.offsets[i + 1] && !is_sound; k++) {
+            double own = given_back(KNOT(k));
             int told = own < -most;
             if (told && crowd) {
                 told = 0;
@@ -434,7 +443,6 @@ static void judge_books(double bound) {
             rise = MAX(rise, change);
             add(&rises, i, k);
         }
-        if (!L.interact) residual += before - first;
     }
     if (L.interact && L.gained > bound) {
         tell(LAW_ENERGY, L.gained, bound);

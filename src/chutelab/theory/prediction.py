@@ -195,18 +195,27 @@ def ring_times(
 def first_in_flight(
     flight: Flight, obstacles: Obstacles, radius: float, horizon: float
 ) -> tuple[float, int]:
-    """Return when and with what the disk first collides up to `horizon`; (inf, -1)."""
+    """Return when and with what the disk first collides up to `horizon`; (inf, -1).
+
+    What it touches at the beginning, and does not move towards, it does not collide with: not with
+    the end of a face either along which it glides.
+    """
     start, normal = obstacles.start, obstacles.normal
     center, size = obstacles.center, obstacles.size
     height = np.sum((flight.position - start) * normal, axis=1)
     speed = normal @ flight.velocity
     bend = -0.5 * flight.gravity * normal[:, 1]
+    speed[np.abs(speed) <= ROUNDING * np.abs(flight.velocity).sum()] = 0.0
+    bend[np.abs(bend) <= ROUNDING * flight.gravity] = 0.0
+    glides = (speed == 0.0) & (bend == 0.0) & obstacles.on_face(flight.position)
+    touched = np.zeros(len(start), dtype=bool)
     faces, rings = np.full(len(start), np.inf), np.full(len(size), np.inf)
     off = ROUNDING * (np.abs(flight.position).sum() + np.abs(start).sum(axis=1) + radius)
     for side in (1.0, -1.0):
         # Where c + b t + a t² falls to 0, without cancellation; NaN if nowhere.
         c, b, a = side * height - radius, side * speed, side * bend
         c[np.abs(c) <= off] = 0.0
+        touched |= glides & (c == 0.0)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             square = b**2 - 4.0 * a * c
             root = np.sqrt(np.where(np.abs(square) <= 4.0 * np.abs(a) * off, 0.0, square))
@@ -220,7 +229,9 @@ def first_in_flight(
     places = flight.at(np.array([0.0, horizon, np.clip(turn, 0.0, horizon)]))
     room = 1.001 * (size + radius)[:, None]
     near = (center >= places.min(axis=0) - room) & (center <= places.max(axis=0) + room)
-    for index in np.flatnonzero(near.all(axis=1)) if horizon > 0.0 else ():
+    owner = obstacles.owner
+    left = (size == 0.0) & np.isin(owner, np.flatnonzero(touched))
+    for index in np.flatnonzero(near.all(axis=1) & ~left) if horizon > 0.0 else ():
         for side in (1.0, -1.0):
             if size[index] + side * radius <= 0.0:
                 continue

@@ -378,39 +378,38 @@ static void look_at_all(const Interval *some, int count, const double *box, Barr
     }
 }
 
-/* Find where particles are deeper in surfaces than is allowed, or pass them: one place, or each passage,
-   for each interval beside each piece. What stood in the way of a gate as it shut is spared until it
-   is clear of it; what overlapped at its release may go on doing so, no deeper. */
-void find_hits(void) {
+/* Find where a particle is deeper in surfaces than is allowed, or passes them: one place, or each passage,
+   for each interval beside each piece; return whether there is any. What stood in the way of a gate as it
+   shut is spared until it is clear of it; what overlapped at its release may go on doing so, no deeper. */
+int find_hits(int i) {
     Interval some[WIDTH];
-    L.hit_count = 0;
-    for (int i = 0; i < L.particle_count && L.piece_count; i++) {
-        Barrier *pieces = L.barriers + (L.family ? i * L.piece_count : 0);
-        double box[4];
-        int count = 0, first = 1;
-        At.particle = i;
-        At.radius = L.bodies[i].radius;
-        for (int k = 0; k < L.piece_count; k++) pieces[k].clear = NAN;
-        empty(box);
-        for (int k = L.offsets[i]; k < L.offsets[i + 1] - 1; k++) {
-            const double *a = KNOT(k), *b = a + L.row;
-            if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) continue;
-            Interval *now = some + count++;
-            curve_after(a, &now->path);
-            now->knot = k;
-            now->box[0] = least(now->path.x, 4);
-            now->box[1] = least(now->path.y, 4);
-            now->box[2] = most(now->path.x, 4);
-            now->box[3] = most(now->path.y, 4);
-            grow(box, now->box);
-            if (At.radius == 0) turn(&now->path, pieces, first, k);
-            first = 0;
-            if (count == WIDTH) {
-                look_at_all(some, count, box, pieces);
-                empty(box);
-                count = 0;
-            }
+    Barrier *pieces = L.barriers + (L.family ? i * L.piece_count : 0);
+    double box[4];
+    int count = 0, first = 1, before = L.hit_count;
+    if (!L.piece_count) return 0;
+    At.particle = i;
+    At.radius = L.bodies[i].radius;
+    for (int k = 0; k < L.piece_count; k++) pieces[k].clear = NAN;
+    empty(box);
+    for (int k = L.offsets[i]; k < L.offsets[i + 1] - 1; k++) {
+        const double *a = KNOT(k), *b = a + L.row;
+        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) continue;
+        Interval *now = some + count++;
+        curve_after(a, &now->path);
+        now->knot = k;
+        now->box[0] = least(now->path.x, 4);
+        now->box[1] = least(now->path.y, 4);
+        now->box[2] = most(now->path.x, 4);
+        now->box[3] = most(now->path.y, 4);
+        grow(box, now->box);
+        if (At.radius == 0) turn(&now->path, pieces, first, k);
+        first = 0;
+        if (count == WIDTH) {
+            look_at_all(some, count, box, pieces);
+            empty(box);
+            count = 0;
         }
-        look_at_all(some, count, box, pieces);
     }
+    look_at_all(some, count, box, pieces);
+    return L.hit_count > before;
 }

@@ -25,7 +25,6 @@ from chutelab.scene.units import (
     write_size,
 )
 from chutelab.util.errors import MISSING, Fault, did_you_mean
-from chutelab.util.trig import RADIANS
 
 THEORY: Final = "theory"
 UNPROMISED: Final = "none"
@@ -464,7 +463,7 @@ def surface_conflicts(path: str, surface: Mapping[str, Any]) -> Iterator[Fault]:
         if angles and (begin == end or abs(end - begin) > 360.0):
             text = f"must be another angle than {path}.from_deg, at most 360 from it"
             yield Fault(f"{path}.to_deg", end, text)
-        elif angles and abs(end - begin) * RADIANS * (surface.get("radius") or 1.0) < SHORTEST:
+        elif angles and math.radians(abs(end - begin)) * (surface.get("radius") or 1.0) < SHORTEST:
             text = f"so far from {path}.from_deg that the arc is {SHORTEST:g} m long, at least"
             yield Fault(f"{path}.to_deg", end, text)
         return

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, Status, borrow, constants, dtype, give_back
-from chutelab.machine import Machine, Pieces, moved, origin
+from chutelab.machine import Machine, Pieces
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
@@ -43,7 +43,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     -------
     Record
         Flights and blows to rounding error, lasting contacts of second order in `machine.dt`;
-        bit-identical on every machine, but for `seconds`.
+        bit-identical on every machine.
 
     Raises
     ------
@@ -54,20 +54,14 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     """
     if np.min(machine.particle.radius) <= 0.0:
         raise ValueError("particle.radius = 0: the contact engine needs a radius above 0 m")
-    begin = perf_counter()
-    place = origin(machine)
-    module = borrow()
+    module, recorder = borrow(), Recorder(machine)
     try:
-        job = Job(module, moved(machine, -place[0], -place[1]))
+        job = Job(module, recorder.near)
         stalled = job.run(progress)
-        recording = job.recording(machine, place, perf_counter() - begin)
+        job.write(recorder)
     finally:
         give_back(module)
-    if stalled is not None:
-        particle, t, (x, y) = stalled
-        reason = "too many impacts in one step; make run.dt shorter, or lower the restitution there"
-        raise StalledError(particle, t, (x + place[0], y + place[1]), reason, recording)
-    return recording
+    return recorder.finish(engine="contact", steps=job.steps, stalled=stalled)
 
 
 def parts(machine: Machine) -> dict[str, Pieces]:
@@ -97,6 +91,7 @@ class Job:
         self.module, self.machine = module, machine
         self.knots: list[NDArray[Any]] = []
         self.events: list[NDArray[Any]] = []
+        self.steps = 0
         # First disk of the part in which the run was stopped: from it on disks have not ended.
         self.stopped_from = machine.count
         self.pieces = pieces(machine)
@@ -149,8 +144,8 @@ class Job:
         others["rolling"] = machine.rolling[:, None]
         np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
 
-    def run(self, progress: Progress | None) -> tuple[int, float, tuple[float, float]] | None:
-        """Run to the end, or until a particle stalls: return which one, when and where."""
+    def run(self, progress: Progress | None) -> StalledError | None:
+        """Run to the end, or until a particle stalls: return which one."""
         steps, status = 64, Status.PAUSED
         with suppress(EnoughError):
             while status not in (Status.DONE, Status.STALLED):
@@ -167,7 +162,8 @@ class Job:
             return None
         world = self.module.world
         disk = self.module.array("disks", dtype("Disk"), self.machine.count)[world.stalled]
-        return world.stalled, world.now, (float(disk["x"]), float(disk["y"]))
+        reason = "too many impacts in one step; make run.dt shorter, or lower the restitution there"
+        return StalledError(world.stalled, world.now, (float(disk["x"]), float(disk["y"])), reason)
 
     def stop(self) -> Status:
         """End the run after the step that it is in."""
@@ -205,10 +201,9 @@ class Job:
         passed = (world.t - begin) / (end - begin) if begin < world.t < end else 0.0
         return float(min(1.0, ended + passed / n))
 
-    def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Record:
-        """Return what was recorded."""
-        recorder = Recorder(machine)
-        world, module = self.module.world, self.module
+    def write(self, recorder: Recorder) -> None:
+        """Write down what was recorded."""
+        world, module, count = self.module.world, self.module, self.machine.count
         # Each chunk is freed when it is handed over: together they are most of the memory.
         self.knots.reverse()
         self.events.reverse()
@@ -216,14 +211,12 @@ class Job:
             recorder.take_knots(self.knots.pop())
         while self.events:
             recorder.take_events(self.events.pop())
-        disks = module.array("disks", dtype("Disk"), machine.count)
-        reasons, late = disks["reason"].copy(), np.arange(machine.count) >= self.stopped_from
+        disks = module.array("disks", dtype("Disk"), count)
+        reasons, late = disks["reason"].copy(), np.arange(count) >= self.stopped_from
         reasons[late & (reasons == REASONS.index("time"))] = REASONS.index("stopped")
         recorder.ended[:] = reasons
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count
         recorder.gained = world.gained
-        return recorder.finish(
-            engine="contact", steps=world.step_count, seconds=seconds, origin=place
-        )
+        self.steps = world.step_count

@@ -120,13 +120,12 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     UnableError
         If it is not alone, SciPy is missing, or it gets where the equations here do not reach.
     """
-    machine = _plain(machine)
     try:
         from scipy.integrate import DOP853
         from scipy.optimize import brentq
     except ImportError:
         raise UnableError('SciPy is missing: pip install "chutelab[bench]"') from None
-    return _Run(machine, DOP853, brentq, progress).result()
+    return _Run(Recorder(machine), DOP853, brentq, progress).result()
 
 
 def _plain(machine: Machine) -> Machine:
@@ -159,7 +158,9 @@ def _plain(machine: Machine) -> Machine:
 class _Run:
     """One particle on its way; `base` is where the phase began, `t0` when."""
 
-    def __init__(self, machine: Machine, solver: Any, root: Any, progress: Progress | None) -> None:
+    def __init__(self, log: Recorder, solver: Any, root: Any, progress: Progress | None) -> None:
+        machine = _plain(log.near)
+        self.log = log
         self.machine, self.solver, self.root, self.progress = machine, solver, root, progress
         p, releases = machine.particle, machine.releases
         self.r, self.g = p.radius, np.array([0.0, -machine.gravity])
@@ -168,7 +169,6 @@ class _Run:
         self.t0, self.base = float(releases.t[0]), releases.position[0].copy()
         self.state = np.zeros(7)
         self.state[V] = releases.velocity[0]
-        self.log = Recorder(machine)
         self.things = _surfaces(machine)
         # Whether the left face of a segment was struck last.
         self.sides: dict[int, bool] = {}

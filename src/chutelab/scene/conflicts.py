@@ -424,8 +424,7 @@ def _pieces(look: Look) -> Iterator[Fault]:
             return
 
 
-ARC: Final = {"radius": None, "from_deg": 0.0, "to_deg": 360.0}
-"""What only an arc has, and its defaults."""
+ARC: Final = ("radius", "from_deg", "to_deg")
 
 
 def _differ(path: str) -> str:
@@ -458,8 +457,8 @@ def surface_conflicts(path: str, surface: Mapping[str, Any]) -> Iterator[Fault]:
                 text = f"so far from {path}.from_deg that the arc is {SHORTEST:g} m long, at least"
                 yield Fault(f"{path}.to_deg", end, text)
         return
-    for key, default in ARC.items():
-        if given.get(key) not in (None, default):
+    for key in ARC:
+        if key in given and (key == "radius" or given[key] not in (0.0, 360.0)):
             yield fault("center", f"a point [x, y], to go with {path}.{key}")
             return
     ends = [key for key in ("from", "to") if key in given]

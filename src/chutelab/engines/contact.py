@@ -96,15 +96,7 @@ class Job:
         self.stopped_from = machine.count
         self.pieces = pieces(machine)
         self.kinds, self.materials = len(machine.rolling), len(self.pieces)
-        self.owners = len(machine.surfaces)
-        self.settings()
-        module.work("lay_out_world")
-        self.fill()
-        module.work("prepare")
-
-    def settings(self) -> None:
-        """Fill in the numbers of the world."""
-        machine, world, wheel = self.machine, self.module.world, self.machine.pulley
+        self.owners, wheel = len(machine.surfaces), machine.pulley
         for name, value in (
             ("disk_count", machine.count), ("surface_count", len(self.pieces)),
             ("kind_count", self.kinds), ("owner_count", self.owners),
@@ -115,11 +107,8 @@ class Job:
             ("ride_incline", 0.0 if wheel is None else wheel.incline),
             ("g", machine.gravity), ("dt", machine.dt), ("end_time", machine.end_time),
         ):  # fmt: skip
-            setattr(world, name, value)
-
-    def fill(self) -> None:
-        """Fill in disks, surfaces and pairs."""
-        machine, module = self.machine, self.module
+            setattr(module.world, name, value)
+        module.work("lay_out_world")
         releases, particle = machine.releases, machine.particle
         disks = module.array("disks", dtype("Disk"), machine.count)
         disks["x"], disks["y"] = releases.position.T
@@ -143,6 +132,7 @@ class Job:
             others[name] = np.concatenate(values, axis=1)
         others["rolling"] = machine.rolling[:, None]
         np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
+        module.work("prepare")
 
     def run(self, progress: Progress | None) -> StalledError | None:
         """Run to the end, or until a particle stalls: return which one."""

@@ -6,6 +6,9 @@ the root is found between two samples by Brent's method. What happens there (New
 Coulomb friction) is written out here once more. Of Chutelab it takes the machine's arrays, and
 hands back a `Recording`; needs SciPy.
 
+`solve_ivp` has events of its own, and cannot serve: it looks at them at the ends of its steps only,
+which are as long as a flight here, and takes no longest step that depends on the speed.
+
 What it can miss: a contact that begins and ends between two samples, less than `PIECE` apart; what
 it cannot follow (rest in a corner, more than `MOST_PHASES` contacts) is refused.
 """

@@ -12,7 +12,6 @@ from chutelab.checks.agreement import agreement, order, verify
 from chutelab.core.module import dtype
 from chutelab.engines import exact, reference
 from chutelab.engines.contact import Job
-from chutelab.engines.exact import engine
 from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.simulation import simulate
 from chutelab.machine import builder
@@ -200,12 +199,12 @@ WRONG = 1e-6
 """Relative error of the planted formula."""
 
 
-def heavier(module, machine, *given, honest=engine.fill):
+def heavier(module, machine, *given, honest=exact.fill):
     honest(module, machine, *given)
     module.array("lones", dtype("Lone"), machine.count, of="Exact")["gravity"] *= 1.0 + WRONG
 
 
-def livelier(module, machine, *given, honest=engine.fill):
+def livelier(module, machine, *given, honest=exact.fill):
     honest(module, machine, *given)
     pieces = len(machine.segments.length) + len(machine.arcs.surface) + (machine.pulley is not None)
     module.array("materials", dtype("Pair"), pieces, of="Exact")["restitution"] *= 1.0 + WRONG
@@ -232,7 +231,7 @@ def test_a_wrong_number_is_caught_from_outside(wrong, until, monkeypatch):
     drawn = scene.load("perpendicular", [f"run.until={until}"])
     assert verify(drawn).failures == 0
     assert reach(drawn, 1e-9)[1].met
-    monkeypatch.setattr(engine, "fill", wrong)
+    monkeypatch.setattr(exact, "fill", wrong)
     caught(until)
 
 
@@ -272,7 +271,7 @@ def heavier_ode(run, *given, honest=reference._Run.__init__):
 @pytest.mark.parametrize(
     ("name", "where", "wrong"),
     [
-        ("exact", "chutelab.engines.exact.engine.fill", heavier),
+        ("exact", "chutelab.engines.exact.fill", heavier),
         ("contact", "chutelab.engines.contact.Job.settings", heavier_core),
         ("pymunk", "chutelab.engines.pymunk.lone.Lone.__init__", heavier_flight),
         ("dop853", "chutelab.engines.reference._Run.__init__", heavier_ode),

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from chutelab import machine, scene
 from chutelab.engines import exact, reference
-from chutelab.engines.exact import engine
 from chutelab.machine.releases import Releases
 from chutelab.results import Kind
 from chutelab.results.laws import judge
@@ -421,7 +420,7 @@ def test_events_at_one_time_go_by_particle():
 
 
 def test_a_run_without_an_end_is_stopped_and_keeps_what_it_recorded(monkeypatch):
-    monkeypatch.setattr(engine, "ROUNDS", 20)
+    monkeypatch.setattr(exact, "ROUNDS", 20)
     floor = {**FLOOR, "restitution": 1.0, "friction": 0.0}
     with pytest.raises(StalledError, match=r"particle 0 .* 20 events.* lower run.max_time") as end:
         thrown([0.0, 0.5], [0.3, 0.0], floor, until=60.0)
@@ -438,8 +437,8 @@ def test_a_run_without_an_end_is_stopped_and_keeps_what_it_recorded(monkeypatch)
 
 def test_a_particle_that_hardly_gets_on_is_stopped(monkeypatch):
     # Two bounces a second are too many here.
-    monkeypatch.setattr(engine, "WINDOW", 4)
-    monkeypatch.setattr(engine, "TICK", 0.5)
+    monkeypatch.setattr(exact, "WINDOW", 4)
+    monkeypatch.setattr(exact, "TICK", 0.5)
     floor = {**FLOOR, "restitution": 1.0, "friction": 0.0}
     period = 2.0 * sqrt(2.0 * 0.25 / G)
     with pytest.raises(StalledError, match=f"4 events took {3.5 * period:.2g} s: .* narrow"):
@@ -450,8 +449,8 @@ def test_a_particle_that_hardly_gets_on_is_stopped(monkeypatch):
 def test_a_run_that_is_looked_at_after_each_event_is_the_same(monkeypatch):
     floor = {**FLOOR, "restitution": 0.9, "friction": 0.2}
     whole = thrown([0.0, 0.5], [0.3, 0.0], floor, until="settled")
-    monkeypatch.setattr(engine, "FIRST", 1)
-    monkeypatch.setattr(engine, "SLICE", 0.0)
+    monkeypatch.setattr(exact, "FIRST", 1)
+    monkeypatch.setattr(exact, "SLICE", 0.0)
     pieces = thrown([0.0, 0.5], [0.3, 0.0], floor, until="settled")
     for array in ("knots", "offsets", "events", "by_surface"):
         assert getattr(whole, array).tobytes() == getattr(pieces, array).tobytes()

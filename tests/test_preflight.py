@@ -166,8 +166,8 @@ class Clock:
 def reports_by_steps(monkeypatch):
     """Engines report by steps and events alone: a busy machine gets as many as an idle one."""
     monkeypatch.setattr(pymunk, "SLICE", inf)
-    monkeypatch.setattr("chutelab.engines.exact.engine.SLICE", 0.0)
-    monkeypatch.setattr("chutelab.engines.exact.engine.FIRST", 20_000)
+    monkeypatch.setattr("chutelab.engines.exact.SLICE", 0.0)
+    monkeypatch.setattr("chutelab.engines.exact.FIRST", 20_000)
 
 
 @pytest.fixture
@@ -214,7 +214,7 @@ max_time = 1000
 )
 def test_the_bounces_to_come_follow_from_those_that_were(restitution, until, monkeypatch):
     """With ε they are a geometric series, down to 1e-9 m/s; without loss they are all alike."""
-    monkeypatch.setattr("chutelab.engines.exact.engine.FIRST", 1)
+    monkeypatch.setattr("chutelab.engines.exact.FIRST", 1)
     scene = sc.parse(BOUNCE.format(restitution, until))
     shares, whole = looks(scene)
     found = look_at(monkeypatch, scene, len(shares) // 4)

@@ -60,27 +60,15 @@ step things happen. Over two ratios of 4, half an order is a factor of 4 between
 
 @dataclass(frozen=True)
 class Agreement:
-    """One quantity in two answers.
+    """One quantity in two answers."""
 
-    Attributes
-    ----------
-    pair : str
-        Which two; one, of an answer that is left out.
-    quantity : str
-        What is compared; or why nothing is.
-    difference : float or None
-        Relative difference, or the order at which it vanishes; None if nothing is compared.
-    tolerance : float or None
-        What it must not exceed (with `least`: fall short of); None where nothing is promised.
-    least : bool
-        Whether the tolerance is one from below.
-    """
-
-    pair: str
-    quantity: str
+    pair: str  # which two; one, of an answer that is left out
+    quantity: str  # what is compared; or why nothing is
+    # relative difference, or the order at which it vanishes; None if nothing is compared
     difference: float | None = None
+    # what it must not exceed (with `least`: fall short of); None where nothing is promised
     tolerance: float | None = None
-    least: bool = False
+    least: bool = False  # whether the tolerance is one from below
 
     @property
     def holds(self) -> bool:
@@ -205,33 +193,20 @@ MOST_ALONE = 50
 
 @dataclass(frozen=True)
 class Finding:
-    """One expectation of a scene, looked at in one answer.
+    """One expectation of a scene, looked at in one answer."""
 
-    Attributes
-    ----------
-    quantity, unit, source : str
-        What was looked at, in what unit, and the source of the expected value.
-    engine : str
-        ``exact``, ``contact``, ``pymunk`` or ``theory``.
-    expected, simulated : float
-        In `unit`; NaN where the theory, or the run, has none.
-    error : float
-        Relative (see `chutelab.results.comparison`), or in `unit`; NaN if one of the two is.
-    tolerance : float or None
-        What the error must not exceed; None where nothing is promised.
-    relative : bool
-        Whether error and tolerance are relative.
-    """
-
+    # what was looked at, in what unit, and the source of the expected value
     quantity: str
     unit: str
     source: str
-    engine: str
+    engine: str  # ``exact``, ``contact``, ``pymunk`` or ``theory``
+    # in `unit`; NaN where the theory, or the run, has none
     expected: float
     simulated: float
+    # relative (see `chutelab.results.comparison`), or in `unit`; NaN if one of the two is
     error: float
-    tolerance: float | None
-    relative: bool
+    tolerance: float | None  # what the error must not exceed; None where nothing is promised
+    relative: bool  # whether error and tolerance are relative
 
     @property
     def holds(self) -> bool:
@@ -241,21 +216,12 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verification:
-    """All that `chutelab verify` finds out about a scene.
+    """All that `chutelab verify` finds out about a scene."""
 
-    Attributes
-    ----------
-    findings : tuple of Finding
-        In the order of the file, each with a row for every answer that has the quantity.
-    agreements : tuple of Agreement
-        Particle 0 alone, in the three answers.
-    skipped : dict of str
-        Engines that did not run the scene, and why.
-    """
-
+    # in the order of the file, each with a row for every answer that has the quantity
     findings: tuple[Finding, ...]
-    agreements: tuple[Agreement, ...]
-    skipped: dict[str, str]
+    agreements: tuple[Agreement, ...]  # particle 0 alone, in the three answers
+    skipped: dict[str, str]  # engines that did not run the scene, and why
 
     @property
     def failures(self) -> int:

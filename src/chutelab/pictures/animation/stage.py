@@ -63,32 +63,19 @@ TRAIL = 0.07
 
 @dataclass(frozen=True)
 class Layout:
-    """What the picture holds, and where.
+    """What the picture holds, and where."""
 
-    Attributes
-    ----------
-    width, height : int
-        Pixels.
-    title, question : str
-        What stands above the scene; the question may be empty.
-    shows : frozenset of str
-        Some of `SHOWS`.
-    view : tuple of float
-        Where the scene is: left, bottom, width and height as shares of the picture.
-    window : Window
-        What of the world is shown, of the shape of `view`.
-    fastest : float
-        m/s; particle 0's highest speed while it is in the window.
-    """
-
+    # pixels
     width: int
     height: int
+    # what stands above the scene; the question may be empty
     title: str
     question: str
-    shows: frozenset[str]
+    shows: frozenset[str]  # some of `SHOWS`
+    # where the scene is: left, bottom, width and height as shares of the picture
     view: tuple[float, float, float, float]
-    window: Window
-    fastest: float
+    window: Window  # what of the world is shown, of the shape of `view`
+    fastest: float  # m/s; particle 0's highest speed while it is in the window
 
     def reach(self, share: float, what: str) -> float:
         """Return the time (s) in which particle 0's highest speed covers a share of the window.

@@ -38,10 +38,10 @@ from chutelab.scene.units import symbol, with_unit, write_size
 from chutelab.studies.design import Solution, Uncertainty
 from chutelab.studies.measured import Fit, Residuals
 from chutelab.studies.measured.result import plus_minus
-from chutelab.studies.measured.track import counted
 from chutelab.studies.sweep import COLUMNS, REASON, Sweep, no_column
 from chutelab.studies.sweep.rows import RARE
 from chutelab.util.arrays import Bools, Floats
+from chutelab.util.tables import many
 from chutelab.util.versions import PACKAGES
 
 BARS = (style.TRACK, style.STREAM)
@@ -416,7 +416,7 @@ def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -
             ax.plot(*position[chosen].T, **points, zorder=8.0)
     if not shown.all():
         ax.text(
-            0.5, 0.97, f"{counted(int((~shown).sum()), 'point')} outside the picture",
+            0.5, 0.97, f"{many(int((~shown).sum()), 'point')} outside the picture",
             transform=ax.transAxes, fontsize=style.NORMAL, color=style.STRIKE,
             horizontalalignment="center", verticalalignment="top",
         )  # fmt: skip

@@ -117,14 +117,10 @@ def courses_of(recording: Recording) -> list[str]:
 class Quantity:
     """A number of a run, the value of a key of the scene, or a plain number."""
 
-    name: str
-    """As it was asked for."""
-
+    name: str  # as it was asked for
     unit: str
-
+    # of a run: its name, see `chutelab.scene.quantities`. Of the scene: the full path.
     key: str = ""
-    """Of a run: its name, see `chutelab.scene.quantities`. Of the scene: the full path."""
-
     source: Literal["run", "scene", "number"] = "run"
     ending: Ending = "any"
     number: float = 0.0
@@ -220,17 +216,11 @@ INSIDE: Final = 0.3819660112501051
 class Span:
     """A key of the scene and the range that is searched, low < high."""
 
-    key: str
-    """Full path, free surfaces by index."""
-
-    unit: str
-    """ "" for a pure number."""
-
+    key: str  # full path, free surfaces by index
+    unit: str  # "" for a pure number
     low: float
     high: float
-
-    start: float | None
-    """The scene's own value; None if it has none."""
+    start: float | None  # the scene's own value; None if it has none
 
     @property
     def width(self) -> float:
@@ -281,17 +271,12 @@ NO_RUN: Final = "no run"
 class Outcomes(NamedTuple):
     """What became of N variants."""
 
-    values: Floats
-    """The M quantities of each, (N, M); NaN where they did not happen."""
-
+    values: Floats  # the M quantities of each, (N, M); NaN where they did not happen
+    # surfaces touched by particle 0, such as ``plate, outgoing``; `NO_RUN` without a run
     courses: list[str]
-    """Surfaces touched by particle 0, such as ``plate, outgoing``; `NO_RUN` without a run."""
-
-    faults: list[str]
-    """Why there was no run; "" where there was one."""
-
+    faults: list[str]  # why there was no run; "" where there was one
+    # kind of each outcome, see `chutelab.studies.sweep.rows.touches`; `NO_RUN` without a run
     touches: list[str]
-    """Kind of each outcome, see `chutelab.studies.sweep.rows.touches`; `NO_RUN` without a run."""
 
 
 @dataclass
@@ -301,10 +286,8 @@ class Evaluator:
     scene: Scene
     keys: Sequence[str]
     quantities: Sequence[Quantity]
-
+    # called now and then with the share that is done of the `expected` variants
     progress: Progress | None = None
-    """Called now and then with the share that is done of the `expected` variants."""
-
     expected: int = 0
     runs: int = field(default=0, init=False)
 
@@ -382,33 +365,21 @@ STEADY: Final = 0.01
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What a key does to a quantity at a point.
+    """What a key does to a quantity at a point."""
 
-    Attributes
-    ----------
-    key, unit : str
-        What is changed, and its unit.
-    quantity, quantity_unit : str
-        What changes.
-    derivative : float
-        In quantity_unit per unit; NaN where the course changes within a millionth of the range.
-    step : float
-        One per cent of the key's value; of its range, if its value is 0.
-    lower, upper : float
-        The quantity with the key one `step` less and more; NaN where it has none.
-    courses : tuple of str
-        The way of particle 0 there.
-    """
-
+    # what is changed, and its unit
     key: str
     unit: str
+    # what changes
     quantity: str
     quantity_unit: str
+    # in quantity_unit per unit; NaN where the course changes within a millionth of the range
     derivative: float
-    step: float
+    step: float  # one per cent of the key's value; of its range, if its value is 0
+    # the quantity with the key one `step` less and more; NaN where it has none
     lower: float
     upper: float
-    courses: tuple[str, str]
+    courses: tuple[str, str]  # the way of particle 0 there
 
 
 def sensitivities(

@@ -60,24 +60,12 @@ STEPPED: Final = 1
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Variants to be simulated; can be sent to another process.
+    """Variants to be simulated; can be sent to another process."""
 
-    Attributes
-    ----------
-    scene : Scene
-        What is varied.
-    paths : tuple of str
-        Full paths of the K keys that are, free surfaces by index.
-    values : ndarray, (n, K)
-        The values of each variant.
-    engine : str or None
-        Overrides ``run.engine``.
-    """
-
-    scene: Scene
-    paths: tuple[str, ...]
-    values: Floats
-    engine: str | None = None
+    scene: Scene  # what is varied
+    paths: tuple[str, ...]  # full paths of the K keys that are, free surfaces by index
+    values: Floats  # (n, K); the values of each variant
+    engine: str | None = None  # overrides ``run.engine``
 
     def settings(self, row: int) -> dict[str, float]:
         """Return the values of one variant by path."""

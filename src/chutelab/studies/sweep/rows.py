@@ -32,7 +32,7 @@ from chutelab.scene.variants import Quantity
 from chutelab.util.arrays import Bools, Ints
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, unquoted, whole, write_lines
-from chutelab.util.tables import Sheet, Shown, frame, number
+from chutelab.util.tables import Sheet, Shown, frame, many, number
 from chutelab.util.versions import library
 
 Rows = Mapping[str, NDArray[Any]]
@@ -123,20 +123,20 @@ def _tell(reasons: NDArray[Any], recording: Recording, missed: Bools) -> None:
     if recording.machine.until != "settled":
         restless[:] = False
     for row in np.flatnonzero((missed | restless).any(axis=1)).tolist():
-        said = []
-        if missed[row].any():
-            # Of several particles a recording is of one variant.
-            fate = (
-                told_fates(Counter(fates(recording)[missed[row]].tolist()))
-                if every > 1
-                else FATES[REASONS[ended[row, 0]]]
+        fate = FATES.get(REASONS[ended[row, 0]])
+        if every > 1:  # A recording is of one variant then.
+            fate = told_fates(Counter(fates(recording)[missed[row]].tolist()))
+        reasons[row] = "; ".join(
+            f"{f'{some.sum()} of {every} particles' if every > 1 else 'it'} {what}"
+            for some, what in (
+                (missed[row], f"missed the outgoing belt: {fate}"),
+                (
+                    restless[row],
+                    f"arrived, but never came to rest on a belt: {PAID} has only a part",
+                ),
             )
-            many = f"{np.count_nonzero(missed[row])} of {every} particles" if every > 1 else "it"
-            said.append(f"{many} missed the outgoing belt: {fate}")
-        if restless[row].any():
-            many = f"{restless[row].sum()} of {every} particles" if every > 1 else "it"
-            said.append(f"{many} arrived, but never came to rest on a belt: {PAID} has only a part")
-        reasons[row] = "; ".join(said)
+            if some.any()
+        )
 
 
 LONGEST: Final = 6
@@ -170,8 +170,12 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
             kinds = len(found)
         taken, kinds = taken * some + met + 1, kinds * some
     _, example, taken = np.unique(taken, return_index=True, return_inverse=True)
-    every = [[recording.surfaces[k] for k in way if k >= 0] for way in ways[example].tolist()]
-    names = np.array(list(map(_named, every)), dtype=object)
+    names = np.empty(len(example), dtype=object)
+    for n, way in enumerate(ways[example].tolist()):
+        surfaces = [recording.surfaces[k] for k in way if k >= 0]
+        if len(surfaces) > LONGEST:
+            surfaces[LONGEST - 1 :] = ["and so on"]
+        names[n] = ", ".join(surfaces) or NOTHING
     if recording.count == variants:
         texts: NDArray[Any] = names[taken]
         return texts
@@ -181,12 +185,6 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
         often = [names[way] for way, count in counts if count > RARE * len(taken_here)]
         texts[row] = " | ".join(often or [names[counts[0][0]]])
     return texts
-
-
-def _named(surfaces: list[str]) -> str:
-    if len(surfaces) > LONGEST:
-        surfaces[LONGEST - 1 :] = ["and so on"]
-    return ", ".join(surfaces) or NOTHING
 
 
 def _met(recording: Recording) -> tuple[Ints, Ints]:
@@ -255,15 +253,13 @@ def synced(path: Path) -> None:
 def text_of(columns: Rows) -> str:
     """Return rows as lines of CSV, from which `columns_of` gets every bit back."""
     cells = [
-        values.tolist() if name in TEXTS else list(map(_number, values.tolist()))
+        values.tolist()
+        if name in TEXTS
+        # As few digits as give it back, a whole number without a point.
+        else ["" if isnan(x) else repr(x).removesuffix(".0") for x in values.tolist()]
         for name, values in columns.items()
     ]
     return "".join(csv_lines(zip(*cells, strict=True)))
-
-
-def _number(x: float) -> str:
-    """Write a number in as few digits as give it back, a whole one without a point."""
-    return "" if isnan(x) else repr(x).removesuffix(".0")
 
 
 def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
@@ -362,7 +358,7 @@ class Sweep(Shown):
         if len(reasons) > MOST_REASONS:
             notes.append(f"and {len(reasons) - MOST_REASONS:,} other reasons")
         return Sheet(
-            f"{self.title}: {len(self):,} variant{'s' if len(self) != 1 else ''}",
+            f"{self.title}: {many(len(self), 'variant', ',')}",
             ("", "", "least", "most", "rows"),
             tuple(rows),
             texts=2,

@@ -20,7 +20,7 @@ import crowds
 import drawn
 import sandbox
 from chutelab import scene
-from chutelab.checks.stress.evidence import Evidence
+from chutelab.checks.stress.barriers import Evidence
 from chutelab.cli import main
 from chutelab.engines import simulation
 from chutelab.engines.simulation import judged, simulate

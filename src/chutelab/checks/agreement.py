@@ -88,10 +88,7 @@ def agreement(scene: Scene, max_seconds: float = PATIENCE) -> tuple[Agreement, .
 
     An answer that takes longer than `max_seconds`, wall time, is left out.
 
-    Raises
-    ------
-    SceneError
-        If the geometry contradicts itself.
+    Raises a `SceneError` if the geometry contradicts itself.
     """
     alone = scene.alone()
     build(alone)
@@ -282,10 +279,7 @@ def verify(
     An engine that gets stuck, or takes longer than `max_seconds`, wall time, is left out. Where
     none is left, what is expected is not shown: all of it fails.
 
-    Raises
-    ------
-    SceneError
-        If no engine can run it.
+    Raises a `SceneError` if no engine can run it.
     """
     skipped = _skipped(scene) if scene.expect else {}
     recordings: dict[str, Recording] = {}

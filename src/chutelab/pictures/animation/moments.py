@@ -188,11 +188,8 @@ def film(
     the time `ask`, if it is given, the film holds, for viewers to predict what comes. Of a
     `crowd` it tells how many have come and gone, and holds at no impact of particle 0.
 
-    Raises
-    ------
-    ValueError
-        If `fps` is no divisor of 100 up to 50 (a shorter delay browsers take for 10 hundredths of a
-        second), or `slow` is not positive and finite.
+    Raises a `ValueError` if `fps` is no divisor of 100 up to 50 (a shorter delay browsers take for
+    10 hundredths of a second), or `slow` is not positive and finite.
     """
     if not 0 < fps <= 50 or 100 % fps:
         raise ValueError(

@@ -112,10 +112,7 @@ def lay_out(
 
     It shows all by default, but of a crowd not what particle 0 does.
 
-    Raises
-    ------
-    ValueError
-        If the picture is too small, or `shows` has an unknown name.
+    Raises a `ValueError` if the picture is too small, or `shows` has an unknown name.
     """
     if width < 320 or height < 180:  # text could not be read
         raise ValueError(f"{width} x {height} pixels: allowed are at least 320 x 180")
@@ -444,10 +441,7 @@ def write_video(
 ) -> None:
     """Write pictures, each for a delay in hundredths of a second, as a video of one of `VIDEOS`.
 
-    Raises
-    ------
-    VideoError
-        If the extra is not installed.
+    Raises a `VideoError` if the extra is not installed.
     """
     need_video(kind)
     from imageio.v2 import get_writer

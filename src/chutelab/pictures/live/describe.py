@@ -18,29 +18,16 @@ LISTS: Final = ("material", "pair", "conveyor", "surface")
 
 
 def describe(scene: Scene) -> dict[str, Any]:
-    """Return the scene and the rules of scene files as plain data for JSON.
+    """Return a scene of disks and spheres and the rules of scene files as plain data for JSON.
 
     A drop that is measured from the impact is written as one from the top of the pulley: the
     outgoing belt stays where it is while the plate is turned.
 
-    Parameters
-    ----------
-    scene : Scene
-        One scene, no family; of disks and spheres.
-
-    Returns
-    -------
-    dict
-        ``scene``: its keys as its file has them, with a seed beyond 2**53 as text. ``tables``: of
-        each key of each table (those outside of tables under ``scene``) default, unit, low and
-        high, its form as JSON Schema, and whether it is required. ``presets``: the numbers of each
-        material.
-
-    Raises
-    ------
-    SceneError
-        If the page cannot show it: mass points, boxes, polygons, strings, or too many particles; or
-        if the scene contradicts itself where it is laid out.
+    ``scene`` has its keys as its file has them, with a seed beyond 2**53 as text. ``tables`` has of
+    each key of each table (those outside of tables under ``scene``) default, unit, low and high,
+    its form as JSON Schema, and whether it is required. ``presets``: the numbers of each material.
+    Raises a `SceneError` if the page cannot show it: mass points, boxes, polygons, strings, or too
+    many particles; or if the scene contradicts itself where it is laid out.
     """
     allowed = "a page that answers shows disks and spheres"
     faults = []

@@ -36,21 +36,10 @@ def html(
 ) -> str:
     """Return the live page of a scene; the same scene and version give the same bytes.
 
-    Parameters
-    ----------
-    scene : Scene
-        Of disks or spheres, without strings.
-    language : {"en", "de"}
-        Of all that the page says; what the scene says stands as it is.
-    home : tuple of str, optional
-        Text and address of a link back, for a page that is one of several.
-    exercise : mapping, optional
-        What `chutelab.classroom.exercises.catalogue.data_of` makes of an exercise.
-
-    Raises
-    ------
-    SceneError
-        If there is something in the scene that the contact engine has not, by its key.
+    `language`, "en" or "de", is that of all that the page says; what the scene says stands as it
+    is. `home` is text and address of a link back, for a page that is one of several, and `exercise`
+    what `chutelab.classroom.exercises.catalogue.data_of` makes of one. Raises a `SceneError` if
+    there is something in the scene that the contact engine has not, by its key.
     """
     # The colours of every picture; page.css has those for the dark.
     colours = {

@@ -405,12 +405,8 @@ def split_velocity(
     They are to scale, with the theory's symbols and no number: v_2 before and v_2' after, v_t along
     the surface, v_n into it, φ_2 between surface and v_2, α between surface and the vertical.
 
-    Raises
-    ------
-    ValueError
-        If no particle hits that surface.
-    OSError
-        If the file cannot be written.
+    Raises a `ValueError` if no particle hits that surface; an `OSError` if the file cannot be
+    written.
     """
     impacts = recording.select(Kind.IMPACT, surface=surface)
     if not len(impacts):

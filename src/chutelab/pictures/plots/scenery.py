@@ -119,18 +119,9 @@ def track_times(
 
     They are its knots, the moments just before jumps, which are so drawn upright, and even parts
     of each piece, as many as its curvature asks for: over a time h a chord misses a curve by at
-    most h²/8 times its largest acceleration, and a cubic has that at one of its ends.
-
-    Parameters
-    ----------
-    recording : Recording
-        The run.
-    begin, end : float, optional
-        s; by default all of the track.
-    particle : int
-        Which one.
-    fine : float, optional
-        m; by default the share `FINE` of the track's extent.
+    most h²/8 times its largest acceleration, and a cubic has that at one of its ends. By default
+    `fine` (m) is the share `FINE` of the track's extent, and it is all of the track that is drawn,
+    else from `begin` to `end`, s.
     """
     track = recording.track(particle)
     t, place, velocity = track["t"], track["position"], track["velocity"]

@@ -55,10 +55,7 @@ MISSING = "///"
 def scan(solution: Solution) -> Picture:
     """Draw what a search over one key looked at: the quantity, its target, answers and jumps.
 
-    Raises
-    ------
-    ValueError
-        If several keys were varied.
+    Raises a `ValueError` if several keys were varied.
     """
     figure = Picture((9.0, 5.6))
     ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
@@ -227,10 +224,7 @@ it that is used for lines: what follows is too light on white."""
 def sweep_figure(swept: Sweep, column: str) -> Picture:
     """Draw one column of numbers of a sweep over its one or two varied keys.
 
-    Raises
-    ------
-    ValueError
-        If more than two keys vary, or there is no such column.
+    Raises a `ValueError` if more than two keys vary, or there is no such column.
     """
     if column not in COLUMNS:
         raise ValueError(no_column(column))
@@ -543,17 +537,12 @@ def decades(
     step = ceil((last - first + 1) / ticks)
     axis.set_view_interval(10.0**low, 10.0**high, ignore=True)
     axis.set_major_locator(FixedLocator([10.0**k for k in range(last, first - 1, -step)]))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
 
+    def written(value: float, _: object) -> str:
+        power = round(log10(value))
+        return f"{10.0**power:g}" if -3 <= power <= 3 else f"$10^{{{power}}}$"
 
-def _power(value: float) -> str:
-    """Return a power of ten; those near 1 in full.
-
-    >>> _power(0.001), _power(1e-05), _power(1000.0)
-    ('0.001', '$10^{-5}$', '1000')
-    """
-    power = round(log10(value))
-    return f"{10.0**power:g}" if -3 <= power <= 3 else f"$10^{{{power}}}$"
+    axis.set_major_formatter(FuncFormatter(written))
 
 
 def failures(timings: Sequence[Timing], width: int) -> list[str]:

@@ -141,10 +141,7 @@ class Quantity:
 def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
     """Return the quantity of a scene that has this name; messages call it `typed`.
 
-    Raises
-    ------
-    InputError
-        If the scene has no such quantity.
+    Raises an `InputError` if the scene has no such quantity.
     """
     row = lookup(name, scene.surfaces, [str(stream.name) for stream in scene.streams])
     if row is None:
@@ -158,10 +155,7 @@ def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
 def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quantity]:
     """Return a quantity, and the number, key of the scene or quantity that it is to equal.
 
-    Raises
-    ------
-    InputError
-        If one of them is unknown, or their units differ.
+    Raises an `InputError` if one of them is unknown, or their units differ.
     """
     typed = f"--target {name}={value}"
     left = measured(scene, name, typed)

@@ -71,11 +71,8 @@ def part_of(out: Path) -> Path:
 def unfinished(out: Path, plan: Plan, *, resume: bool) -> Iterator[Part]:
     """Keep the finished rows of a sweep until all are; with `resume`, from those that are there.
 
-    Raises
-    ------
-    InputError
-        If the file is of another sweep, not as it was written, there although not to `resume`, of
-        a sweep that still runs, or cannot be written.
+    Raises an `InputError` if the file is of another sweep, not as it was written, there although
+    not to `resume`, of a sweep that still runs, or cannot be written.
     """
     part, complete = Part(part_of(out), plan), False
     try:

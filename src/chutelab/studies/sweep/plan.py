@@ -76,13 +76,9 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
     """Validate the variants of a block, whose keys are plain numbers.
 
     A value is judged by its key, once for each. Rules between keys judge one variant for each
-    combination of the values that they ask for; other keys cannot change what they say.
-
-    Returns
-    -------
-    scene, sound, faults
-        One of the sound variants (None if there is none), the numbers of all of them, and what is
-        wrong with each of the others.
+    combination of the values that they ask for; other keys cannot change what they say. Returned
+    are one of the sound variants (None if there is none), the numbers of all of them, and what is
+    wrong with each of the others.
     """
     values = block.values
     good = np.stack([accepted(*column) for column in zip(block.paths, values.T, strict=True)]).T
@@ -182,9 +178,9 @@ def alone(scene: Scene, engine: str | None = None) -> Recording | str:
     return one_line(str(recording.laws[0])) if recording.laws else recording
 
 
-def row_of(scene: Scene, engine: str | None = None) -> Columns:
+def row_of(scene: Scene) -> Columns:
     """Simulate a scene and return its row; if it cannot be run, one that says why."""
-    found = alone(scene, engine)
+    found = alone(scene)
     return empty(1, found) if isinstance(found, str) else rows(found)
 
 

@@ -96,15 +96,9 @@ FATES = {
 
 
 def rows(recording: Recording, variants: int = 1) -> Columns:
-    """Return the rows of the variants of a recording.
+    """Return the rows of the variants of a recording: of one, or of a family of `variants`.
 
-    Parameters
-    ----------
-    recording : Recording
-        Of one variant; or of as many as there are particles, each on a machine of its own: its
-        scene is a family then.
-    variants : int
-        How many.
+    Those are as many as there are particles then, each on a machine of its own.
     """
     found, scene = empty(variants), recording.scene
     for name in found:

@@ -15,7 +15,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
-from chutelab.cli.console import progress, tell
+from chutelab.cli.console import RefusedError, progress, tell
 from chutelab.cli.options import (
     PICTURES,
     Count,
@@ -32,7 +32,6 @@ from chutelab.cli.options import (
     retitled,
     write_json,
 )
-from chutelab.cli.program import RefusedError
 from chutelab.util.errors import InputError
 from chutelab.util.files import write_lines, writing
 

@@ -98,15 +98,8 @@ CELLS: Final = 64
 
 def places(scene: Scene, machine: Machine) -> Iterator[Advice]:
     """Yield what may surprise about a machine and where its particles start."""
-    yield from _in_loops(scene, machine)
-    yield from _beyond_walls(scene, machine)
-    if machine.interact:
-        yield from _narrow(scene, machine)
-
-
-def _in_loops(scene: Scene, machine: Machine) -> Iterator[Advice]:
-    """Warn of releases between the carrying and the returning side of a conveyor."""
     for belt in scene.conveyor:
+        # Between its carrying and its returning side.
         way = np.subtract(belt.to, belt.from_)
         (x, y), (dx, dy) = (machine.releases.position - belt.from_).T, way / np.hypot(*way)
         along, aside = x * dx + y * dy, np.abs(x * dy - y * dx)
@@ -118,6 +111,9 @@ def _in_loops(scene: Scene, machine: Machine) -> Iterator[Advice]:
                 "a release above its carrying side",
                 {},
             )
+    yield from _beyond_walls(scene, machine)
+    if machine.interact:
+        yield from _narrow(scene, machine)
 
 
 def _narrow(scene: Scene, machine: Machine) -> Iterator[Advice]:
@@ -217,11 +213,8 @@ def _parts(low: Floats, high: Floats, walls: Floats) -> tuple[Ints, list[tuple[S
         for line, k, which in zip(*found, strict=True):
             pair = ((line, k), (line, k + 1)) if axis == 0 else ((k, line), (k + 1, line))
             blocked.append((pair, which))
-    return _labelled(open_[0], open_[1].T), blocked
-
-
-def _labelled(across: Bools, up: Bools) -> Ints:
-    """Return numbers of cells (n, n), the same for those that open sides connect."""
+    # Numbers of cells, the same for those that open sides connect.
+    across, up = open_[0], open_[1].T
     label = np.arange(CELLS * CELLS).reshape(CELLS, CELLS)
     while True:
         before = label.copy()
@@ -231,7 +224,7 @@ def _labelled(across: Bools, up: Bools) -> Ints:
             np.copyto(one, np.minimum(one, other), where=side)
             np.copyto(other, np.minimum(one, other), where=side)
         if (label == before).all():
-            return label
+            return label, blocked
 
 
 def advice(
@@ -270,7 +263,10 @@ def advice(
         yield from _ending(scene, machine, tried.recording)
     if tried.trouble:
         yield _advised(f"a trial run did not come to an end: {tried.trouble}")
-    if cost.memory > (there := _installed()):
+    there = inf  # bytes of the machine's memory, where that can be told
+    with suppress(AttributeError, ValueError, OSError):
+        there = float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    if cost.memory > there:
         yield Advice(
             f"the run may need {cost.memory / 1e9:.2g} GB of memory, and the machine has"
             f" {there / 1e9:.2g} GB",
@@ -311,14 +307,6 @@ def advice(
             {"run.engine": "auto"},
             after=", for the exact engine, which needs no steps",
         )
-
-
-def _installed() -> float:
-    """Return the memory of the machine, bytes; infinite where it cannot be told."""
-    try:
-        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return inf
 
 
 def _advised(

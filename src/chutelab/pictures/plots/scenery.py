@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.core.module import number as layout_number
 from chutelab.results import REASONS, Kind, Recording
+from chutelab.results.arrival import arrivals
 from chutelab.results.quantities import each
 from chutelab.results.stream import FEWEST
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -190,6 +191,21 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     books["potential"] = np.maximum(lifted, 0.0)
     books["start"] = at_release[released] - weight * zero
     return books
+
+
+def flow(recording: Recording) -> dict[str, Floats]:
+    """Return when particles are released, have arrived and have left for good, s, by these words.
+
+    Of the last two only what any of them does in the end.
+    """
+    first, last = recording.ends()
+    come = arrivals(recording)["t"]
+    gone = recording.ended[recording.released] == REASONS.index("exit")
+    return {
+        "released": first["t"],
+        "arrived": come[np.isfinite(come)],
+        "left the scene": last["t"][gone],
+    }
 
 
 MANY = 60

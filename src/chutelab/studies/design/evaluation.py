@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import groupby, product
 from math import nan
-from typing import Any, Final, Literal, NamedTuple, Protocol, TypeVar
+from typing import Any, Final, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,22 +38,10 @@ from chutelab.util.versions import library
 T = TypeVar("T")
 
 
-class Typed(Protocol):
-    """What an option takes once; messages call it `typed`."""
-
-    @property
-    def typed(self) -> str:
-        """The option and its value, as on the command line."""
-        ...
-
-
-G = TypeVar("G", bound=Typed)
-
-
 def each_once(
-    option: str, given: Sequence[G], read: Callable[[G], T], ask: str, most: int
+    option: str, given: Sequence[Any], read: Callable[[Any], T], ask: str, most: int
 ) -> tuple[T, ...]:
-    """Read what an option takes, given 1 to `most` times; each result has another `key`."""
+    """Read what an option takes, 1 to `most` times, as `typed`; each result has another `key`."""
     if not given:
         raise InputError(ask, option)
     if len(given) > most:
@@ -167,7 +155,18 @@ def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quant
         if text[0].isdigit() or text[0] in "+-.":
             allowed = f"{text} is no number of a quantity {_in(left.unit)}; {error}"
             raise InputError(allowed, typed) from None
-        right = _named(scene, text, typed)
+        if lookup(text, scene.surfaces) is not None:
+            right = measured(scene, text, typed)
+        else:
+            try:
+                found = quantity(scene, Vary(text, (0.0,), typed))
+            except InputError as fault:
+                allowed = f"{text} is neither a number, nor a quantity, nor a key of the scene"
+                raise InputError(f"{allowed}: {fault.allowed}", typed) from None
+            if not isinstance(value_at(scene, found.path), (int, float)):
+                said = f"{found.path} has no number as its value in this scene"
+                raise InputError(said, typed) from None
+            right = Quantity(found.path, found.unit, found.path, "scene")
     if right.source == "number" and right.unit == "":
         right = replace(right, name=f"{right.name} {left.unit}".strip(), unit=left.unit)
     if right.unit != left.unit:
@@ -177,20 +176,6 @@ def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quant
     if right == left:
         raise InputError("both sides are the same", typed)
     return left, right
-
-
-def _named(scene: Scene, text: str, typed: str) -> Quantity:
-    """Return the quantity or the key of a scene that a text names."""
-    if lookup(text, scene.surfaces) is not None:
-        return measured(scene, text, typed)
-    try:
-        found = quantity(scene, Vary(text, (0.0,), typed))
-    except InputError as error:
-        allowed = f"{text} is neither a number, nor a quantity, nor a key of the scene"
-        raise InputError(f"{allowed}: {error.allowed}", typed) from None
-    if not isinstance(value_at(scene, found.path), (int, float)):
-        raise InputError(f"{found.path} has no number as its value in this scene", typed)
-    return Quantity(found.path, found.unit, found.path, "scene")
 
 
 def _in(unit: str) -> str:

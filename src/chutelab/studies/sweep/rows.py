@@ -29,7 +29,7 @@ from chutelab.results.quantities import measured
 from chutelab.results.stream import told_fates
 from chutelab.scene.quantities import COLUMNS, FORMER, HEAT, PAID, REGISTRY, lookup
 from chutelab.scene.variants import Quantity
-from chutelab.util.arrays import Bools, Ints
+from chutelab.util.arrays import Bools
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, many, number
@@ -151,7 +151,18 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
     one surface count as one. Of a crowd the ways that more than `RARE` of it takes are told, the
     most frequent one first, such as ``plate, outgoing | outgoing``.
     """
-    particle, surface = _met(recording)
+    # Particles, and the surfaces that each meets up to its landing.
+    kind = recording.events["kind"]
+    some = (kind == Kind.IMPACT) | (kind == Kind.LANDING) | (kind == Kind.SETTLE)
+    order = some.nonzero()[0]
+    order = order[np.argsort(recording.events["particle"][order], kind="stable")]
+    # Columns are taken, not rows, which are ten times as large.
+    particle, surface = recording.events["particle"][order], recording.events["surface"][order]
+    lands = kind[order] == Kind.LANDING
+    landings = np.cumsum(lands) - lands
+    kept = landings == landings[np.searchsorted(particle, particle)]
+    kept[1:] &= (particle[1:] != particle[:-1]) | (surface[1:] != surface[:-1])
+    particle, surface = particle[kept], surface[kept]
     place = np.arange(len(particle)) - np.searchsorted(particle, particle)
     ways = np.full((recording.count, LONGEST + 1), -1)
     near = place <= LONGEST
@@ -179,21 +190,6 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
         often = [names[way] for way, count in counts if count > RARE * len(taken_here)]
         texts[row] = " | ".join(often or [names[counts[0][0]]])
     return texts
-
-
-def _met(recording: Recording) -> tuple[Ints, Ints]:
-    """Return particles and the surfaces that each meets up to its landing, (E,) each."""
-    kind = recording.events["kind"]
-    some = (kind == Kind.IMPACT) | (kind == Kind.LANDING) | (kind == Kind.SETTLE)
-    order = some.nonzero()[0]
-    order = order[np.argsort(recording.events["particle"][order], kind="stable")]
-    # Columns are taken, not rows, which are ten times as large.
-    particle, surface = recording.events["particle"][order], recording.events["surface"][order]
-    lands = kind[order] == Kind.LANDING
-    landings = np.cumsum(lands) - lands
-    kept = landings == landings[np.searchsorted(particle, particle)]
-    kept[1:] &= (particle[1:] != particle[:-1]) | (surface[1:] != surface[:-1])
-    return particle[kept], surface[kept]
 
 
 SUFFIXES: Final = {".csv": "csv", ".parquet": "parquet"}

@@ -190,16 +190,15 @@ def _without_ctrl_c() -> Iterator[None]:
 
 def _serve() -> None:
     """Prepare a worker process: it ends when its parent tells it to, or has died."""
+
+    def follow() -> None:
+        if (parent := multiprocessing.parent_process()) is not None:
+            parent.join()
+            os._exit(1)
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    Thread(target=_follow, daemon=True).start()
-
-
-def _follow() -> None:
-    """Wait for the end of the parent, however it comes, and end this process."""
-    if (parent := multiprocessing.parent_process()) is not None:
-        parent.join()
-        os._exit(1)
+    Thread(target=follow, daemon=True).start()
 
 
 def _cluster(address: str) -> Iterator[Crew]:

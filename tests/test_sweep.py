@@ -13,16 +13,13 @@ from chutelab.cli.studies import varied
 from chutelab.engines.exact import CornerError, run
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
-from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.scene import SceneError, load, parse
+from chutelab.scene import load, parse
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import with_unit
 from chutelab.scene.variants import (
     Family,
     Vary,
-    accepted,
-    quantity,
 )
 from chutelab.studies.sweep import (
     COLUMNS,
@@ -196,35 +193,6 @@ max_time = 2.0
 # what a row holds --------------------------------------------------------------------------------
 
 
-def test_a_row_holds_what_the_run_shows():
-    swept = sweep(load("belt-landing"), ["plate.restitution=0.25,0.5", "stream.rate=100,200"])
-    for row in range(len(swept)):
-        restitution, rate = (float(swept.columns[key][row]) for key in swept.quantities)
-        scene = load(
-            "belt-landing", [f"plate.restitution={restitution}", f"stream.rate={int(rate)}"]
-        )
-        recording = simulate(scene)
-        books, (down,) = ledger(recording), recording.select(Kind.LANDING)
-        outgoing = books.by_surface["outgoing"]
-        expected = {
-            "landing.x.mean": down["position"][0], "landing.x.spread": 0.0,
-            "landing.y.mean": down["position"][1],
-            "landing.vx.mean": down["velocity_before"][0], "landing.vx.spread": 0.0,
-            "landing.vy.mean": down["velocity_before"][1], "landing.vy.spread": 0.0,
-            "landing.t.mean": down["t"], "track.t.mean": recording.knots["t"][-1],
-            "arrival.x.mean": down["position"][0], "arrival.x.spread": 0.0,
-            "arrival.vx.mean": down["velocity_before"][0], "arrival.vx.spread": 0.0,
-            PAID: outgoing["belt_work"], HEAT: outgoing["friction_loss"],
-            "ledger.restitution_loss": books.restitution_loss,
-            "ledger.power": outgoing["belt_work"] * rate,
-            "impact.count": 1.0, "misses": 0.0, "ledger.residual": books.residual,
-        }  # fmt: skip
-        assert {name: swept.columns[name][row] for name in expected} == expected
-        assert set(expected) | {"error.max"} == set(COLUMNS)
-        error = swept.columns["error.max"][row]
-        assert error == pytest.approx(compare(recording).max, abs=1e-15)
-
-
 def test_a_stream_has_means_and_spreads():
     scene = load("stream-independent", ["stream.count=40", "stream.bed_height=0.05"])
     swept = sweep(scene, ["incoming.speed=1,2"])
@@ -302,18 +270,6 @@ def test_a_run_that_gets_stuck_is_a_row(monkeypatch):
 
 
 # validating many at once -------------------------------------------------------------------------
-
-
-def test_a_column_of_values_is_judged_as_each_by_itself():
-    values = np.array([-91.0, -90.0, -89.9, 0.0, 89.9, 90.0, 1e9])
-    judged = accepted("plate.angle_deg", values)
-    for value, good in zip(values.tolist(), judged.tolist(), strict=True):
-        try:
-            load("perpendicular", [f"plate.angle_deg={value}", "outgoing.drop_from=top"])
-            fine = True
-        except SceneError:
-            fine = False
-        assert good == fine
 
 
 DEPENDENT = """
@@ -413,21 +369,6 @@ def test_options_that_cannot_be_are_refused_before_anything_runs(options, allowe
     result = call("sweep", "perpendicular", "--vary", vary, *options, code=2)
     assert allowed in result.stderr
     assert not list(Path().iterdir())
-
-
-def test_units_are_read():
-    def read(text, ranges=False):
-        return varied([text], ranges=ranges)[0]
-
-    assert read("particle.mass=8g,1kg").values == (0.008, 1.0)
-    assert read("plate.distance=50cm,1m").values == (0.5, 1.0)
-    assert read("plate.restitution=0:50%:3").values == (0.0, 0.25, 0.5)
-    assert read("particle.mass=1kg:2kg", ranges=True).values == (1.0, 2.0)
-    scene = load("perpendicular")
-    for text in ("plate.angle_deg=0:60°:3", "particle.mass=1kg,2kg", "incoming.speed=20cm/s,1m/s"):
-        quantity(scene, read(text))
-    with pytest.raises(InputError, match="in kg, not in m"):
-        quantity(scene, read("particle.mass=1mm"))
 
 
 # grids and samples -------------------------------------------------------------------------------
@@ -574,13 +515,6 @@ def test_help_names_the_columns():
     said = " ".join(call("sweep", "--help").stdout.split())
     for name, row in COLUMNS.items():
         assert f"{name} {with_unit(row.meaning, row.unit)}" in said
-
-
-def test_a_sweep_shows_itself():
-    swept = sweep(load("perpendicular"), ["plate.angle_deg=0,80"])
-    assert "2 variants" in repr(swept)
-    assert "plate.angle_deg" in swept._repr_html_()
-    assert "never meets the plate" in repr(swept)
 
 
 def test_a_frame_has_the_columns():

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chutelab.scene import load
@@ -50,6 +50,7 @@ def test_parquet_has_them_too():
             )
 
 
+@settings(max_examples=40)
 @given(st.lists(st.floats(), min_size=1, max_size=4), st.text(st.characters(codec="utf-8")))
 def test_text_gives_rows_back(numbers, words):
     reason = " ".join(words.split())

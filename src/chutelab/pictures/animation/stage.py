@@ -158,16 +158,8 @@ class Stage:
     """Draws the moments of a film: the background once, and for each moment what moves on it.
 
     `slow` is seconds on the screen for one second of the recording. The analytic path is there from
-    the first moment on, or after the time `ask`, s.
-
-    Attributes
-    ----------
-    figure, view : Figure, Axes
-        The background, and where the scene is in it.
-    moving : list of Moving
-        What moves, from back to front.
-    writings : list of Writing
-        Texts that change.
+    the first moment on, or after the time `ask`, s. `figure` is the background and `view` the axes
+    of the scene in it; `moving` is what moves, from back to front; `writings` change.
     """
 
     def __init__(

@@ -144,7 +144,6 @@ class _Names:
 
     def __init__(self, ax: Axes, machine: Machine, found: Sequence[Pieces], shown: Window) -> None:
         self.ax, self.machine, self.shown = ax, machine, shown
-        self.frame = ax.get_window_extent().padded(-3.0)
         self.parts: dict[int, list[tuple[Pieces, Floats]]] = {}
         for piece in found:
             points = piece.path()
@@ -175,6 +174,7 @@ class _Names:
 
     def write(self) -> None:
         """Write all names. One for which there is no room is left out."""
+        frame, points = self.ax.get_window_extent().padded(-3.0), 72.0 / self.ax.figure.dpi
         for surface, parts in self.parts.items():
             label = self.ax.annotate(
                 style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
@@ -183,7 +183,13 @@ class _Names:
             )  # fmt: skip
             best: tuple[int, Spot, Bbox] | None = None
             for spot in self._spots(parts):
-                placed, box = self._placed(label, spot)
+                self._put(label, spot)
+                box, (where, offset, across, along) = label.get_window_extent(), spot
+                # Back over the edges of the axes.
+                right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
+                up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
+                offset = (offset[0] + right * points, offset[1] + up * points)
+                placed, box = (where, offset, across, along), box.translated(right, up)
                 # Lines, circles and releases that it would stand on.
                 on = (self.starts > box.min) & (self.starts < box.max)
                 hides = sum(line.intersects_bbox(box, filled=whole) for line, whole in self.lines)
@@ -204,16 +210,6 @@ class _Names:
         where, offset, across, along = spot
         label.xy, label.xyann = (float(where[0]), float(where[1])), offset
         label.set(ha=across, va=along)
-
-    def _placed(self, label: Any, spot: Spot) -> tuple[Spot, Bbox]:
-        """Return a spot shifted back over the edges of the axes, and the box of the name there."""
-        self._put(label, spot)
-        box, frame, (where, offset, across, along) = label.get_window_extent(), self.frame, spot
-        right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
-        up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
-        points = 72.0 / self.ax.figure.dpi
-        offset = (offset[0] + right * points, offset[1] + up * points)
-        return (where, offset, across, along), box.translated(right, up)
 
     def _said(self, surface: int, piece: Pieces) -> str:
         """Return what is written at a surface, of which a piece is shown."""

@@ -85,17 +85,10 @@ def unfinished(out: Path, plan: Plan, *, resume: bool) -> Iterator[Part]:
 
 
 class Part:
-    """The file, open and locked.
-
-    Attributes
-    ----------
-    path : Path
-        Where it is.
-    done : dict of int to (str, dict of str to ndarray)
-        The finished rows as text and as columns, by the numbers that their blocks begin with.
-    """
+    """The file, open and locked."""
 
     def __init__(self, path: Path, plan: Plan) -> None:
+        # The finished rows as text and as columns, by the numbers that their blocks begin with.
         self.done: dict[int, tuple[str, Columns]] = {}
         self.path, self._plan = path, plan
         self._chain = hashlib.sha256()

@@ -125,6 +125,7 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
         template, which, faults = screened(block)
         yield from ((np.array([row]), one_line(why)) for row, why in faults.items())
     stepped = (block.engine or block.scene.run.engine) in ("contact", "pymunk")
+    stepped |= bool(block.scene.string) or any(kind.outline for kind in block.scene.particles)
     # Members of a family are released, and have their gates, at the same times.
     timed = any(path.endswith(("opens_at", "closes_at", "stream.start")) for path in paths)
     # Whether a release lies on the belt is a matter of the last digits.

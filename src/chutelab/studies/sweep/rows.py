@@ -29,7 +29,6 @@ from chutelab.results.quantities import measured
 from chutelab.results.stream import told_fates
 from chutelab.scene.quantities import COLUMNS, FORMER, HEAT, PAID, REGISTRY, lookup
 from chutelab.scene.variants import Quantity
-from chutelab.util.arrays import Bools
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, many, number
@@ -105,22 +104,19 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
         if name in COLUMNS and lookup(name, scene.surfaces):
             found[name] = measured(recording, name)
     found[TOUCHES] = touches(recording, variants)
-    if scene.outgoing is not None:
-        _tell(found[REASON], recording, np.isnan(arrivals(recording)["t"]).reshape(variants, -1))
-    return found
-
-
-def _tell(reasons: NDArray[Any], recording: Recording, missed: Bools) -> None:
-    """Say what became of those that did not arrive, (V, M), and whose slip went on after that."""
+    if scene.outgoing is None:
+        return found
+    # What became of those that did not arrive, (V, M), and whose slip went on after that.
+    missed = np.isnan(arrivals(recording)["t"]).reshape(variants, -1)
     every, ended = missed.shape[1], recording.ended.reshape(missed.shape)
     restless = ~missed & (ended != REASONS.index("settled"))
     if recording.machine.until != "settled":
         restless[:] = False
     for row in np.flatnonzero((missed | restless).any(axis=1)).tolist():
         fate = FATES.get(REASONS[ended[row, 0]])
-        if every > 1:  # A recording is of one variant then.
+        if every > 1 and missed[row].any():  # A recording is of one variant then.
             fate = told_fates(Counter(fates(recording)[missed[row]].tolist()))
-        reasons[row] = "; ".join(
+        found[REASON][row] = "; ".join(
             f"{f'{some.sum()} of {every} particles' if every > 1 else 'it'} {what}"
             for some, what in (
                 (missed[row], f"missed the outgoing belt: {fate}"),
@@ -131,6 +127,7 @@ def _tell(reasons: NDArray[Any], recording: Recording, missed: Bools) -> None:
             )
             if some.any()
         )
+    return found
 
 
 LONGEST: Final = 6

@@ -18,7 +18,7 @@ import typed as design
 from chutelab import scene
 from chutelab.cli import main
 from chutelab.cli.studies import uncertain
-from chutelab.pictures.plots.studies import draw_scan, scan, spread
+from chutelab.pictures.plots.studies import scan, spread
 from chutelab.studies.design import roots
 from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, target
 from chutelab.studies.design.uncertainty import as_dict, indices, sampled, spreads
@@ -400,7 +400,7 @@ def test_scan_shows_pieces_target_and_answer():
     several = design.solve(inclined(), ["plate.restitution=0:1", "particle.mass=0.01:0.02"],
                            "landing.vx=0.2")  # fmt: skip
     with pytest.raises(ValueError, match="several keys"):
-        draw_scan(figure.axes[0], several)
+        scan(several)
 
 
 # x2 = d1 = R + d_okr for a point that leaves at the top: linear in both.

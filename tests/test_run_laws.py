@@ -21,7 +21,7 @@ import crowds
 import drawn
 import sandbox
 from chutelab import scene
-from chutelab.checks.stress.evidence import Evidence
+from chutelab.checks.stress.barriers import Evidence
 from chutelab.cli import main
 from chutelab.core import module
 from chutelab.engines import contact, exact, simulation

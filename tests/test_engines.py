@@ -256,27 +256,6 @@ def test_a_slide_leaves_few_knots_and_is_a_parabola_between_them(until):
     assert position[:, 0, 1] == pytest.approx(np.full(50, R), abs=1e-5 * R)
 
 
-@both
-@pytest.mark.parametrize("crowded", [False, True])
-def test_off_the_end_of_a_table_it_flies(engine, crowded):
-    # Friction leaves √(v² - 2 µ g L) of its speed at the end of the table; then it falls.
-    table = floor(friction=0.1, ends=(-1.0, 0.3))
-    if crowded:  # with another far away
-        places, velocities = [(0.0, R), (-0.9, R)], [(1.0, 0.0), (0.0, 0.0)]
-        machine = released(places, velocities, (0.0, 0.0), surface=table, until=1.0, gravity=G)
-        recording = ran(engine, machine)
-    else:
-        recording = simulated(engine, table, at=(0.0, R), velocity=(1.0, 0.0), until=1.0)
-    speed = sqrt(1.0 - 2.0 * 0.1 * G * 0.3)
-    end = recording.track(0)[-1]
-    fall = end["t"] - (1.0 - speed) / (0.1 * G)
-    # A step sees the end of the table: it rubs that much longer at most. Slower than √(g r) it
-    # would roll over the end; v = 0.64 m/s is faster.
-    assert end["velocity"][0] == pytest.approx(speed, abs=0.1 * G * 1e-3)
-    assert end["position"][0] == pytest.approx(0.3 + speed * fall, abs=speed * 1e-3)
-    assert end["position"][1] == pytest.approx(R - 0.5 * G * fall**2, abs=G * fall * 1e-3)
-
-
 @all_three
 @pytest.mark.parametrize("name", ["low-speed", "perpendicular"])
 def test_the_ride_stays_on_its_circle_and_is_braked_by_the_belt(engine, name):
@@ -294,21 +273,6 @@ def test_the_ride_stays_on_its_circle_and_is_braked_by_the_belt(engine, name):
     times = np.linspace(0.5, away["t"], 500)
     position, _ = recording.at(times)
     assert np.abs(np.hypot(*position[:, 0].T) / rho - 1.0).max() < 1e-9
-
-
-@both
-def test_a_ride_ends_where_something_is_in_its_way(engine):
-    # A wedge at 45° whose tip lies on the belt: n = (-1, 1)/√2, met r in front of its face.
-    scraper = face("scraper", (-0.5, 0.1), (-0.3, 0.3), restitution=0.5, friction=0.0)
-    recording = simulated(
-        engine, scraper, at=(-1.0, 0.1 + R), velocity=(1.0, 0.0), until=0.55,
-        incoming={"speed": 1.0, "pulley_radius": 0.1},
-    )  # fmt: skip
-    hit = recording.select(Kind.IMPACT, surface="scraper")[0]
-    assert hit["t"] == pytest.approx(0.5 + R - R * sqrt(2.0), abs=1e-12)
-    # (1 + ε) of the normal velocity, 1/√2, is given back along n.
-    after = np.array([1.0, 0.0]) + 1.5 * sqrt(0.5) * np.array([-1.0, 1.0]) / sqrt(2.0)
-    assert hit["velocity_after"] == pytest.approx(after, abs=1e-9)
 
 
 def in_the_way(place, end):

@@ -101,9 +101,6 @@ def test_a_box_is_drawn_turned_counterclockwise():
     assert placed(BOX, np.zeros(2), 0.0) == pytest.approx(BOX)
 
 
-# To scale
-
-
 # Streams
 
 

@@ -187,9 +187,6 @@ def test_rides_and_slides_come_to_what_exact_says_in_second_order(machine, most)
             assert off < factor * dt**2, (dt, name, off)
 
 
-# A heap
-
-
 # Crowds
 
 

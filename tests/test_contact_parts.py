@@ -465,12 +465,6 @@ def test_a_particle_waits_until_a_gate_in_its_place_opens():
         np.testing.assert_allclose(released, 0.2, rtol=0, atol=1e-12)
 
 
-# Mixtures
-
-
-# Inclined belts
-
-
 # Rolling friction
 
 

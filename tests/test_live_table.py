@@ -41,12 +41,6 @@ def faults(live):
     return {fault.key: fault.allowed for fault in caught.value.faults}
 
 
-def test_a_scene_without_it_offers_everything_and_hides_nothing():
-    live = sc.parse(MACHINE).live
-    assert (live.predict, live.controls, live.panels) == (False, None, None)
-    assert (live.ranges, live.presets) == ({}, ())
-
-
 def test_keys_may_be_written_with_dots_or_as_tables_and_survive_being_written():
     scene = sc.parse(MACHINE + LIVE)
     assert scene.live.ranges == {"plate.angle_deg": (-20.0, 70.0), "stream.count": (1.0, 5.0)}

@@ -282,23 +282,18 @@ def test_a_table_of_very_many_events_is_written_if_it_is_asked_for(monkeypatch):
     assert len(Path("out/events.csv").read_text(encoding="utf-8").splitlines()) == 5
 
 
-def test_a_run_says_what_it_wrote_and_only_chooses():
+def test_a_run_says_what_it_wrote_only_chooses_and_other_files_are_left():
+    Path("out").mkdir()
+    Path("out/notes.txt").write_text("mine", encoding="utf-8")
+    Path("out/summary.json").write_text("old", encoding="utf-8")
     chosen = ["--only", "json", "--only", "npz,csv"]
     files = ["events.csv", "trajectory.csv", "recording.npz", "summary.json"]
     text = call("run", "perpendicular", "--out", "out", *chosen).stdout
     assert f"wrote into out: {', '.join(files)}\n" in text
-    assert {path.name for path in Path("out").iterdir()} == set(files)
+    assert {path.name for path in Path("out").iterdir()} == {*files, "notes.txt"}
+    assert Path("out/notes.txt").read_text(encoding="utf-8") == "mine"
+    assert list(json.loads(Path("out/summary.json").read_text(encoding="utf-8"))) == TOP
     assert call("run", "perpendicular", "--quiet", "--out", "quiet", *chosen).output == ""
-
-
-def test_a_second_run_replaces_its_own_files_and_leaves_others():
-    out = Path("out")
-    out.mkdir()
-    (out / "notes.txt").write_text("mine", encoding="utf-8")
-    (out / "summary.json").write_text("old", encoding="utf-8")
-    call("run", "perpendicular", "--out", "out", "--only", "json")
-    assert (out / "notes.txt").read_text(encoding="utf-8") == "mine"
-    assert list(json.loads((out / "summary.json").read_text(encoding="utf-8"))) == TOP
 
 
 def test_a_destination_that_cannot_be_is_refused_before_the_run(monkeypatch):

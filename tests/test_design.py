@@ -594,7 +594,6 @@ def test_sweep_writes_samples_and_picture_of_uncertainties(tmp_path):
 @pytest.mark.parametrize(
     ("given", "options", "said"),
     [
-        ("restitution=0.5", [], "must be KEY=MEAN±SPREAD"),
         ("restitution=0.5±0.1", ["--out", "rows.parquet"], "ends in .csv"),
         ("restitution=0.5±0.1", ["--plot", "picture.gif"], "ends in .png or .svg"),
         ("restitution=0.5±0.1", ["--out", "not/there.csv"], "there is no folder not"),

@@ -75,11 +75,6 @@ def released(places, velocities, times, *, surface=FAR, until=0.2, dt=1e-3, spin
     return replace(machine, releases=releases)
 
 
-def pair(velocities, *, offset=0.0, **told):
-    """The second is released at 0.05 s where the first one comes to."""
-    return released([(0.0, 1.0), (0.1, 1.0 + offset)], velocities, (0.0, 0.05), **told)
-
-
 def last(recording, what="position"):
     return np.array([recording.track(n)[-1][what] for n in range(recording.count)])
 
@@ -159,34 +154,6 @@ def test_nothing_is_too_fast_to_be_stopped(engine, dt, speed, lean):
     assert hit["velocity_after"] == pytest.approx(after, abs=1e-11 * speed)
     far = hit["position"] + after * (1.5 - way) / speed
     assert last(recording)[0] == pytest.approx(far, abs=1e-11)
-
-
-@settings(max_examples=40)
-@given(
-    offset=st.floats(-1.8 * R, 1.8 * R),
-    restitution=st.floats(0.05, 1.0),
-    friction=st.floats(0.0, 2.0),
-    spin=st.booleans(),
-)
-def test_two_disks_keep_momentum_and_turn(offset, restitution, friction, spin):
-    given_ = {"restitution": restitution, "friction": friction, "spin": spin, "until": 0.1}
-    recording = contact.run(pair([(1.0, 0.0), (-1.0, 0.0)], offset=offset, **given_))
-    # Line of centres at the touch, from the first to the second.
-    c = np.array([sqrt(4.0 * R**2 - offset**2), offset]) / (2.0 * R)
-    t = np.array([-c[1], c[0]])
-    relative = np.array([2.0, 0.0])
-    push = 0.5 * M * (1.0 + restitution) * (relative @ c)
-    mass = 0.5 * M / 3.0 if spin else 0.5 * M
-    rub = np.clip(mass * (relative @ t), -friction * push, friction * push)
-    first = np.array([1.0, 0.0]) - (push * c + rub * t) / M
-    second = np.array([-1.0, 0.0]) + (push * c + rub * t) / M
-    assert last(recording, "velocity") == pytest.approx(np.array([first, second]), abs=1e-9)
-    spun = -rub * R / (0.5 * M * R**2) if spin else 0.0
-    assert last(recording, "omega") == pytest.approx([spun, spun], abs=1e-6)
-    books = ledger(recording)
-    lost = 0.25 * M * (1.0 - restitution**2) * (relative @ c) ** 2
-    assert books.by_surface["particles"]["restitution_loss"] == pytest.approx(lost, abs=1e-12)
-    assert books.relative_residual < 1e-12
 
 
 def test_a_blow_goes_through_a_row_within_one_step():

@@ -48,6 +48,18 @@ def conveyor(friction, spin=False):
 # Bouncing
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8, 0.99])
+def test_bounces_end_after_the_sum_of_the_series(restitution):
+    height = 0.7
+    floor = {**FLOOR, "restitution": restitution, "friction": 0.0}
+    recording = thrown([0.0, height], [0.0, 0.0], floor, until="settled")
+    fall = sqrt(2.0 * height / G)
+    series = 2.0 * restitution * G * fall / (G * (1.0 - restitution))
+    assert recording.ended[0] == 2
+    assert recording.select(Kind.SETTLE)["t"][0] == pytest.approx(fall + series, rel=1e-13)
+    assert ledger(recording).restitution_loss == pytest.approx(0.1 * G * height, rel=1e-12, abs=0.0)
+
+
 def test_without_loss_it_bounces_as_high_for_ever():
     floor = {**FLOOR, "restitution": 1.0, "friction": 0.0}
     recording = thrown([0.0, 0.5], [0.3, 0.0], floor, until=60.0)

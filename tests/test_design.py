@@ -20,7 +20,7 @@ from chutelab.cli import main
 from chutelab.cli.studies import uncertain
 from chutelab.pictures.plots.studies import draw_scan, scan, spread
 from chutelab.studies.design import roots
-from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, suits, target
+from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, target
 from chutelab.studies.design.uncertainty import as_dict, indices, sampled, spreads
 from chutelab.util.errors import InputError
 
@@ -295,15 +295,6 @@ def _has(given, name):
     return True
 
 
-def test_streams_and_released_particles_run_one_by_one():
-    given = machine()
-    keys, quantities = ["plate.restitution"], [measured(given, "landing.x")]
-    assert suits(given, keys, quantities)
-    assert not suits(given, keys, [measured(given, "contacts")])
-    assert not suits(given, ["stream.at[0]"], quantities)
-    assert not suits(chutelab.load("stream"), keys, quantities)
-
-
 def test_units_and_sides_of_a_target():
     given = machine()
     run = chutelab.simulate(given)
@@ -352,8 +343,8 @@ BAD = [
 @pytest.mark.parametrize(("arguments", "said"), BAD)
 def test_bad_questions_are_refused_before_anything_runs(arguments, said, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("chutelab.studies.design.evaluation.judged", None)
-    monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.judged", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.run", None)
     result = CliRunner().invoke(main, [*SOLVE, *arguments, "--out", "out"])
     assert result.exit_code == 2, result.output
     assert said in " ".join(result.output.split())
@@ -554,8 +545,8 @@ def test_uniform_and_relative_spreads():
     ],
 )
 def test_bad_uncertainties_are_refused_before_anything_runs(given, said, monkeypatch):
-    monkeypatch.setattr("chutelab.studies.design.evaluation.judged", None)
-    monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.judged", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.run", None)
     with pytest.raises(InputError, match=said):
         design.uncertainty(machine(), given)
 
@@ -600,8 +591,8 @@ def test_sweep_writes_samples_and_picture_of_uncertainties(tmp_path):
     ],
 )
 def test_sweep_refuses_uncertainties_before_it_runs(given, options, said, monkeypatch, tmp_path):
-    monkeypatch.setattr("chutelab.studies.design.evaluation.judged", None)
-    monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.judged", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.run", None)
     monkeypatch.chdir(tmp_path)
     assert said in propagate(tmp_path, given, *options, code=2).stderr
 

@@ -16,7 +16,7 @@ from chutelab.results.quantities import measure, measured
 from chutelab.results.summary import summary
 from chutelab.scene.quantities import FIRST, REGISTRY, STATISTICS, THEORY, lookup, whose
 from chutelab.scene.units import read_size, write_size
-from chutelab.studies.sweep.batch import Block, together
+from chutelab.studies.sweep.plan import Block, runs
 from machines import PERPENDICULAR
 
 G = 9.81
@@ -157,7 +157,7 @@ def test_each_row_of_the_registry_is_read_alone_in_a_crowd_and_in_a_family():
         assert isinstance(measure(crowd, name), float), name
     scene = sc.load("belt-landing")
     block = Block(scene, ("plate.restitution",), np.array([[0.3], [0.5]]))
-    ((family, rows),), _, _ = together(block)
+    ((rows, family),) = runs(block)
     alone = [simulate(scene.with_values(block.settings(row))) for row in rows]
     names = [name for name in names_of(scene) if name != "contacts"]
     assert len(names) > 400

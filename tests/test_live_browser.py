@@ -26,7 +26,7 @@ DRAG = """async ([count, seed]) => {
     const handle = stage.handles[Math.floor(random() * stage.handles.length)];
     const [x, y] = [handle.x + 0.3 * (random() - 0.5), handle.y + 0.3 * (random() - 0.5)];
     stage.take(handle.id);
-    stage.dragTo(x, y);
+    stage.dragTo([stage.view.px(x), stage.view.py(y)]);
     stage.letGo();
     if (lab.fault) continue;
     await done();

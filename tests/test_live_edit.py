@@ -68,9 +68,9 @@ def arc_through(a, b, c):
 def test_what_was_edited_is_a_scene_for_python_too_and_fits_in_an_address():
     scenes = [parse(TWO_KINDS), *map(load, SCENES)]
     edits = [
-        ["withLine", [3.0, -1.0], [3.5, -1.25]],
-        ["withArc", [4.0, 0.0], [4.5, 0.5], [5.0, 0.0]],
-        ["withParticle", [3.25, 0.5], 0.25],
+        ["part", "line", [[3.0, -1.0], [3.5, -1.25]]],
+        ["part", "arc", [[4.0, 0.0], [5.0, 0.0], [4.5, 0.5]]],
+        ["part", "ball", [[3.25, 0.5]], {"start": 0.25}],
         ["set", {"gravity": 1.62}],
     ]
     answers = ask(*({"ask": "edited", "given": given_of(one), "edits": edits} for one in scenes))
@@ -102,8 +102,8 @@ def test_an_arc_goes_through_the_three_points_in_the_order_they_were_set():
     given = given_of(load("perpendicular"))
     answers = ask(
         *(
-            {"ask": "edited", "given": given, "edits": [["withArc", *trio]]}
-            for trio in places.tolist()
+            {"ask": "edited", "given": given, "edits": [["part", "arc", [a, c, b]]]}
+            for a, b, c in places.tolist()
         )
     )
     arcs = 0
@@ -183,7 +183,7 @@ def test_numbers_have_their_range_and_controls_limit_them():
     )
     assert [field["key"] for field in free] == [
         "plate.distance", "plate.angle_deg", "plate.pivot_height", "plate.above",
-        "plate.restitution", "plate.friction",
+        "plate.below", "plate.restitution", "plate.friction",
     ]  # fmt: skip
     angle = free[1]
     assert (angle["value"], angle["unit"]) == (40.0, "degrees")
@@ -207,7 +207,7 @@ def test_a_material_s_numbers_are_shown_where_the_scene_says_none():
             for name in ("floor", "particle")
         )
     )
-    shown = {field["name"]: field["value"] for field in fields}
+    shown = {field["name"]: field.get("value") for field in fields}
     machine = build(scene)
     floor = machine.surfaces.index("floor")
     row = list(machine.segments.surface).index(floor)
@@ -224,12 +224,12 @@ def test_what_cannot_be_says_why_in_the_language(language, comma):
     field = {one["name"]: one for one in fields}
     bounded = {**field["distance"], "low": 0.25, "high": 1.5}
     high, none, positive, good, broken, part, parsed = ask(
-        {"ask": "checked", "field": bounded, "value": 1.75},
-        {"ask": "checked", "field": bounded, "value": None},
-        {"ask": "checked", "field": field["distance"], "value": 0},
-        {"ask": "checked", "field": bounded, "value": 1.5},
+        {"ask": "checked", "field": bounded, "text": f"1{comma}75"},
+        {"ask": "checked", "field": bounded, "text": "steep"},
+        {"ask": "checked", "field": field["distance"], "text": "0"},
+        {"ask": "checked", "field": bounded, "text": f" 1{comma}5"},
         {"ask": "edited", "given": given, "edits": [["set", {"plate.distance": -1.0}]]},
-        {"ask": "edited", "given": given, "edits": [["withLine", [5.0, 1.0], [5.0, 1.0]]]},
+        {"ask": "edited", "given": given, "edits": [["part", "line", [[5.0, 1.0], [5.0, 1.0]]]]},
         {"ask": "parse", "texts": ["1,5", " −0.25", "3e-3", "", "a", "1,5,2", "1.000,5"]},
         language=language,
     )
@@ -240,7 +240,7 @@ def test_what_cannot_be_says_why_in_the_language(language, comma):
     assert positive["fault"].endswith(said["fault-range"].format(low="1e−9", high="1000000"))
     assert good == {"value": 1.5}
     assert broken["key"] == "plate.distance"
-    assert part["fault"].startswith(f"{said['name-surface']} 1, {said['key-to']}: ")
+    assert part["fault"].startswith(f"{said['name-surface']} 1, {said['key-points']}: ")
     assert parsed == ["1.5", "-0.25", "0.003", "NaN", "NaN", "NaN", "NaN"]
 
 

@@ -284,8 +284,7 @@ def belts(places, **values):
 
 
 @pytest.mark.parametrize(
-    ("until", "spin", "restitution"),
-    [(3.0, True, 0.3), (3.0, False, 0.8), ("settled", False, 0.0)],
+    ("until", "spin", "restitution"), [(3.0, True, 0.3), (3.0, False, 0.8), ("settled", False, 0.0)]
 )
 def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restitution):
     # tan 20° < µ: friction holds it against any push. Both belts slip past it: it has not settled.

@@ -252,7 +252,7 @@ def one_of(built, n):
         ("low-speed", ("stream.count=40", "incoming.friction=0.4", "particle.spin=true")),
         ("two-sizes", ("stream[0].interact=false", "stream[1].interact=false")),
     ],
-)
+)  # fmt: skip
 def test_each_of_a_crowd_does_what_it_does_alone(name, overrides):
     built = machine.build(scene.load(name, overrides))
     together = exact.run(built)

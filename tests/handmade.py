@@ -131,13 +131,7 @@ def conveyor(name, start, end, radius, speed):
     return [*runs, Round(name, start, radius, speed=speed), Round(name, end, radius, speed=speed)]
 
 
-def machine_of(
-    *pieces,
-    at=((0.0, 1.0),),
-    stream=(),
-    radius=0.004,
-    **more,
-):
+def machine_of(*pieces, at=((0.0, 1.0),), stream=(), radius=0.004, **more):
     """A machine of these pieces without conveyors, particles released at these places at 0 s."""
     base = build(
         scene.parse('title = "By hand"\n[stream]\nat = [0.0, 1.0]\nvelocity = [0.0, 0.0]\n')

@@ -351,17 +351,6 @@ def test_where_nothing_helps_it_says_what_happens():
     assert advice.change == "if it is meant, leave it; the first contact wins"
 
 
-def test_an_arc_that_is_crossed_is_told_and_a_straight_one_is_cut_off_before_it():
-    crossed = PERPENDICULAR + (
-        '[[surface]]\nname = "peg"\ncenter = [2.0, 0.0]\nradius = 0.1\n'
-        '[[surface]]\nname = "chute"\nfrom = [1.5, 0.0]\nto = [2.0, 0.02]\n'
-    )
-    (advice,) = preflight(sc.parse(crossed)).advice
-    assert advice.warning == "chute: it crosses peg"
-    peg_alone = crossed.replace("to = [2.0, 0.02]", "to = [1.85, 0.02]")
-    assert not preflight(sc.parse(peg_alone)).advice
-
-
 def test_a_run_that_its_bound_stops_is_noticed():
     (advice,) = look("belt-landing", "run.max_time=2").advice
     assert "stopped at t = 2 s by run.max_time, before it is at rest" in advice.warning

@@ -1,5 +1,6 @@
 """The laws that the shipped scenes of piles and crowds show, measured on their recordings."""
 
+import re
 import subprocess
 import sys
 from math import comb, hypot
@@ -64,3 +65,14 @@ def test_the_gallery_page_is_what_its_command_makes(tmp_path):
     assert page == (root / "docs" / "gallery.md").read_bytes()
     pictures = {path.stem for path in (root / "docs" / "gallery").glob("*.png")}
     assert pictures == set(sc.shipped())
+
+
+@pytest.mark.parametrize("page", ["first-machine", "engineers"])
+def test_machines_of_the_docs_run_keep_the_laws_and_arrive(page):
+    text = (Path(__file__).parents[1] / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```toml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert blocks
+    for block in blocks:
+        recording = simulate(sc.parse(block))
+        assert recording.laws == ()
+        assert recording.summary()["fates"] == {"on outgoing": recording.count}

@@ -27,10 +27,9 @@ from chutelab.studies.sweep import (
     REASON,
     TEXTS,
     TOUCHES,
-    batch,
 )
-from chutelab.studies.sweep.batch import alone
-from chutelab.studies.sweep.rows import joined
+from chutelab.studies.sweep.plan import row_of
+from chutelab.studies.sweep.plan import swept as swept_block
 from chutelab.util.errors import InputError
 from typed import planned, sweep
 
@@ -116,8 +115,8 @@ free-fall | stream.count=1 | gravity=0,9.81 surface.ramp.restitution=0,0.5 surfa
 def test_rows_of_a_batch_are_those_of_single_runs(line):
     name, settings, varies = (part.split() for part in line.split("|"))
     block = block_of(load(*name, settings), varies)
-    singles = joined([alone(block, row) for row in range(len(block.values))])
-    assert_same(batch.swept(block), singles)
+    singles = swept_block(block, apart=True)
+    assert_same(swept_block(block), singles)
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))])
@@ -130,8 +129,8 @@ def test_samples_over_many_keys_are_single_runs(seed):
     ]  # fmt: skip
     scene = load("perpendicular", ["run.until=settled", "run.max_time=5.0"])
     block = block_of(scene, ranges, sample=60, seed=seed)
-    singles = joined([alone(block, row) for row in range(len(block.values))])
-    found = batch.swept(block)
+    singles = swept_block(block, apart=True)
+    found = swept_block(block)
     assert_same(found, singles)
     assert np.isfinite(found["landing.x.mean"]).sum() > 10
 
@@ -140,7 +139,7 @@ def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
     def never(*_):
         raise AssertionError("ran alone")
 
-    monkeypatch.setattr("chutelab.studies.sweep.batch.alone", never)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.alone", never)
     swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:50", "incoming.speed=0.5,2,4"])
     assert np.isfinite(swept.columns["landing.x.mean"]).sum() > 100
 
@@ -148,8 +147,8 @@ def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
 def test_surfaces_may_join_in_some_variants_only():
     scene = parse(JOINED)
     block = block_of(scene, ["outgoing.drop=0.3,0.5,0.6", "surface.ramp.friction=0:0.4:3"])
-    found = batch.swept(block)
-    singles = joined([alone(block, row) for row in range(len(block.values))])
+    found = swept_block(block)
+    singles = swept_block(block, apart=True)
     assert_same(found, singles)
     # Across the joint the particle slides onto the belt; beside it, it falls onto or under it.
     assert len(np.unique(found["landing.vy.mean"][[0, 3, 6]].round(6))) > 1
@@ -175,7 +174,7 @@ velocity = [0.0, 0.0]
 max_time = 2.0
 """
     block = block_of(parse(corner), ["surface.floor.speed=0:1:5", "surface.wall.restitution=0,0.3"])
-    singles = joined([alone(block, row) for row in range(len(block.values))])
+    singles = swept_block(block, apart=True)
     refused = []
 
     def watched(*given, **options):
@@ -185,8 +184,8 @@ max_time = 2.0
             refused.append(given[0].count)
             raise
 
-    monkeypatch.setattr("chutelab.studies.sweep.batch.run", watched)
-    assert_same(batch.swept(block), singles)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.run", watched)
+    assert_same(swept_block(block), singles)
     assert refused[0] == 10
     assert 1 <= refused.count(1) < 10
 
@@ -264,8 +263,8 @@ def test_a_run_that_gets_stuck_is_a_row(monkeypatch):
     def stuck(*_args, **_options):
         raise StalledError(0, 1.0, (0.0, 0.5), "it hangs")
 
-    monkeypatch.setattr("chutelab.studies.sweep.batch.judged", stuck)
-    monkeypatch.setattr("chutelab.studies.sweep.batch.run", stuck)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.judged", stuck)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.run", stuck)
     reasons = sweep(load("perpendicular"), ["plate.restitution=0,1"]).columns[REASON]
     assert ["it hangs" in reason for reason in reasons] == [True, True]
 
@@ -495,7 +494,7 @@ def test_a_crowds_ways_are_told_from_a_fiftieth_on(edge, told):
     falling = "[stream]\ncount = 100\nat = [0.0, 0.0]\nto = [0.99, 0.0]\nvelocity = [0.0, 0.0]\n"
     particle, end = "[particle]\nradius = 0.001\n", "[run]\nuntil = 0.5\n"
     crowd = parse(particle + falling + floors + end)
-    assert batch.row_of(crowd)[TOUCHES].tolist() == [told]
+    assert row_of(crowd)[TOUCHES].tolist() == [told]
 
 
 def test_a_map_is_hatched_where_the_plate_is_missed():

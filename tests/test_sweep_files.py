@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from chutelab.scene import load
 from chutelab.studies.sweep import COLUMNS, REASON, TEXTS, crew, planned, sweep, sweep_to
-from chutelab.studies.sweep.result import columns_of, text_of
+from chutelab.studies.sweep.rows import columns_of, text_of
 from chutelab.util.errors import InputError
 
 

@@ -17,6 +17,7 @@ from chutelab.results.laws import judge
 from chutelab.results.ledger import ledger
 from chutelab.results.record import hermite
 from chutelab.scene import from_dict
+from references import surface_gaps
 from sandbox import draw, tables
 
 INSIDE = 0.03
@@ -53,17 +54,11 @@ def places_of(recording, particle, radius):
 
 
 def in_surfaces(recording):
-    """Yield what is in a surface by more than it may: what passes one is, somewhere.
-
-    By the shapes of the machine, in which the engines have no part.
-    """
+    """Yield what is in a surface by more than it may: what passes one is, somewhere."""
     machine = recording.machine
     for particle, r in enumerate(of_each(machine.particle.radius, machine.count).tolist()):
         t, place = places_of(recording, particle, r)
-        for piece, name in zip(machine.pieces, machine.names, strict=True) if len(t) else ():
-            # A wheel is full: its inside is no place to be.
-            wheel = name == "pulley"
-            gap = np.hypot(*place.T) - machine.pulley.radius - r if wheel else piece.gap(place, r)
+        for piece, name, gap in surface_gaps(machine, place, r) if len(t) else ():
             deep = np.where(piece.there(t), -gap / r, -inf)
             if piece.gate and t[0] < piece.appears <= t[-1]:
                 # It shuts on no disk: one in it then is not touched until it is clear of it.

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-import chutelab
 from chutelab.cli import main
+from chutelab.core import module
+from chutelab.engines import contact as engine
+from chutelab.machine import build
 from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
 from chutelab.pictures.live.page import html
 from chutelab.scene import from_dict, load
@@ -66,13 +68,15 @@ def same_bits(page, folder, until=1.5):
         page.get_by_role("button", name="Save as scene").click()
     file = folder / "saved.toml"
     file.write_bytes(waiting.value.path().read_bytes())
-    recording = chutelab.simulate(load(file), engine="contact")
+    # All that the engine hands on, before the recorder drops states between impacts at one time.
+    job = engine.Job(module.Module(), build(load(file)))
+    assert job.run(None) is None
+    knots = np.concatenate(job.knots)
+    ours = knots.view("<f8").reshape(-1, 10)[:, :5]
     its = page.evaluate(TRACKS)
-    assert len(its) == recording.count
     for particle, track in enumerate(its):
-        knots = recording.track(particle)
-        ours = np.column_stack([knots["t"], knots["position"], knots["velocity"]])
-        assert np.array_equal(np.array(track).reshape(-1, 5), ours)
+        found = np.array(track).reshape(-1, 5)
+        assert np.array_equal(found, ours[knots["disk"] == particle])
     return sum(map(len, its))
 
 

@@ -357,8 +357,8 @@ class Bench {
 
   /** Places near the middle of what is seen that are far from all that is there, best first, m. */
   rooms(): Place[] {
-    const { lab, stage: { view } } = this, { left, right, top, bottom } = view.free;
-    const there = pointsOf(lab, view).flatMap(([, points]) => points);
+    const { stage } = this, { view } = stage, { left, right, top, bottom } = view.free;
+    const there = pointsOf(stage).flatMap(([, points]) => points);
     const [cx, cy] = [0.5 * (left + right), 0.5 * (top + bottom)];
     const found = GRID.flatMap((u) => GRID.map((v) => {
       const [x, y] = [cx + u * (right - left), cy + v * (bottom - top)];

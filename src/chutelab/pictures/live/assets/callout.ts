@@ -4,7 +4,6 @@ import { svg } from "./scenery.ts";
 import type { Inspector } from "./inspector.ts";
 import type { Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
-import type { View } from "./view.ts";
 
 type Point = [number, number];
 
@@ -18,36 +17,40 @@ const OWN = 4000, PATH = 60, OTHER = 30;
 /** Pixels from one of the points that stand for a line to the next. */
 const ALONG = 22;
 
+/** What is drawn of a body at its outside, and points of one of these at most. */
+const BODIES = ".belt, .wall, rect.steel", MOST = 200;
+
 /** Points along a line through points, those among them. */
 function along(points: Point[]): Point[] {
   return points.flatMap(([x, y], n) => {
     const [u, v] = points[n + 1] ?? [x, y];
-    const many = Math.min(200, Math.ceil(Math.hypot(u - x, v - y) / ALONG));
+    const many = Math.min(MOST, Math.ceil(Math.hypot(u - x, v - y) / ALONG));
     return Array.from({ length: Math.max(1, many) }, (_, k) =>
       [x + (k / many || 0) * (u - x), y + (k / many || 0) * (v - y)] as Point);
   });
 }
 
-/** Points along the surfaces of a machine, and where its balls start and are, px, by name. */
-function pointsOf({ machine, recording, t }: Lab, view: View): [string, Point[]][] {
+/** Points along what is drawn of a machine, and where its balls start and are, px, by name. */
+function pointsOf({ lab, view, scenery }: Stage): [string, Point[]][] {
+  const { machine, recording, t } = lab;
   if (!machine) return [];
-  const px = (x: number, y: number): Point => [view.px(x), view.py(y)];
-  const bend = (x: number, y: number, radius: number, begin: number, extent: number) =>
-    Array.from({ length: 25 }, (_, n) => begin + (n * extent) / 24).map((angle) =>
-      px(x + radius * Math.cos(angle), y + radius * Math.sin(angle)));
-  const { surfaces, segments, arcs, pulley, streams, releases } = machine;
-  return [
-    ...segments.map(({ ends: [x, y, u, v], surface }) =>
-      [surfaces[surface], along([px(x, y), px(u, v)])] as [string, Point[]]),
-    ...arcs.map(({ x, y, radius, begin, extent, surface }) =>
-      [surfaces[surface], bend(x, y, radius, begin, extent)] as [string, Point[]]),
-    ...(pulley ? [[surfaces[pulley.surface], bend(0, 0, pulley.radius, 0, 2 * Math.PI)] as
-      [string, Point[]]] : []),
-    ...releases.slice(0, 100).map((release, i) => {
-      const { x, y } = recording?.tracks[i]?.state(t) ?? release;
-      return [streams[release.stream], [px(x, y), px(release.x, release.y)]] as [string, Point[]];
-    }),
-  ];
+  const found: [string, Point[]][] = [];
+  for (const group of scenery.layer.children) {
+    for (const shape of group.querySelectorAll(BODIES)) {
+      const long = shape.getTotalLength(), many = Math.min(MOST, Math.ceil(long / ALONG));
+      const { a, b, c, d, e, f } = shape.getCTM() ?? new DOMMatrix();
+      found.push([group.getAttribute("data-part"), Array.from({ length: many + 1 }, (_, n) => {
+        const { x, y } = shape.getPointAtLength((n / many) * long);
+        return [a * x + c * y + e, b * x + d * y + f] as Point;
+      })]);
+    }
+  }
+  for (const [i, release] of machine.releases.slice(0, MOST).entries()) {
+    const { x, y } = recording?.tracks[i]?.state(t) ?? release;
+    found.push([machine.streams[release.stream], [
+      [view.px(x), view.py(y)], [view.px(release.x), view.py(release.y)]]]);
+  }
+  return found;
 }
 
 class Callout {
@@ -70,7 +73,7 @@ class Callout {
     const { free } = view, { offsetWidth: wide, offsetHeight: high } = panel;
     const isSeen = ([x, y]: Point) => x > 0 && x < view.width && y > 0 && y < view.height;
     const own: Point[] = [], other: Point[] = [];
-    for (const [name, points] of pointsOf(lab, view)) {
+    for (const [name, points] of pointsOf(stage)) {
       (parts.includes(name) ? own : other).push(...points.filter(isSeen));
     }
     const grips = stage.handles.filter(({ surface }) => parts.includes(surface))
@@ -106,4 +109,4 @@ class Callout {
   }
 }
 
-export { Callout, pointsOf };
+export { BODIES, Callout, pointsOf };

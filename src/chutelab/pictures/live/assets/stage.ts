@@ -1,6 +1,7 @@
 // The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
 
 import { openHandles } from "./controls.ts";
+import { BODIES } from "./callout.ts";
 import { endsOf } from "./edit.ts";
 import { ARROW, Handles, bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
 import { html } from "./panels.ts";
@@ -334,7 +335,7 @@ class Stage {
     for (const name of new Set([...this.parts, this.pointed])) {
       const own = this.parts.includes(name) ? "chosen" : "pointed";
       const bodies = this.drawingsOf(name).flatMap((group) =>
-        [...group.querySelectorAll(".belt, .wall, rect.steel")].map((shape) => {
+        [...group.querySelectorAll(BODIES)].map((shape) => {
           const wide = parseFloat(getComputedStyle(shape).strokeWidth) || 0;
           const copy = shape.cloneNode(false), by = group.getAttribute("transform");
           if (by) copy.setAttribute("transform", by);

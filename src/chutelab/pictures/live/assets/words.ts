@@ -118,7 +118,7 @@ class Words {
     const places = seen.every(({ part }) => part !== undefined);
     return seen.map((axis, n) => {
       const [table, name] = axis.key.replace(/\[\d+\]/g, "").split(".");
-      const what = places ? "xy"[n] : this.key(table, name);
+      const what = places ? `${axis.unit === "m/s" ? "v" : ""}${"xy"[n]}` : this.key(table, name);
       return bare ? this.value(axis) : `${what} = ${this.value(axis)}`;
     }).join(", ");
   }

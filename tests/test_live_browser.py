@@ -63,7 +63,7 @@ def lands_as_in_python(page, file, seed, count):
 
 
 @pytest.mark.parametrize(
-    "each", [pytest.param(6, id="few"), pytest.param(40, id="200", marks=pytest.mark.slow)]
+    "each", [pytest.param(3, id="few"), pytest.param(40, id="200", marks=pytest.mark.slow)]
 )
 def test_what_is_dragged_into_place_lands_as_it_does_in_python(shown, tmp_path, each):
     flights = 0

@@ -34,6 +34,7 @@ def html(
     language: str = "en",
     home: tuple[str, str] | None = None,
     exercise: Mapping[str, Any] | None = None,
+    lesson: Mapping[str, Any] | None = None,
     partly: bool = False,
 ) -> str:
     """Return the live page of a scene; the same scene and version give the same bytes.
@@ -48,6 +49,9 @@ def html(
         Text and address of a link back, for a page that is one of several.
     exercise : mapping, optional
         What `chutelab.classroom.exercises.catalogue.data_of` makes of an exercise.
+    lesson : mapping, optional
+        Title and question of a lesson, and its steps as
+        `chutelab.classroom.lessons.steps.data_of` has them.
     partly : bool
         Whether the page says what it cannot show of the scene, and leaves it out.
 
@@ -90,6 +94,7 @@ def html(
         "quantities": {row.name: {"symbol": row.symbol, "unit": row.unit} for row in shown},
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
         **({} if exercise is None else {"exercise": exercise}),
+        **({} if lesson is None else {"lesson": lesson}),
         "wasm": b64encode(zlib.compress((core / "core.wasm").read_bytes(), 9)).decode("ascii"),
     }
     # Within a script element nothing but an end tag must look like one.
@@ -117,13 +122,16 @@ def write(
     language: str = "en",
     home: tuple[str, str] | None = None,
     exercise: Mapping[str, Any] | None = None,
+    lesson: Mapping[str, Any] | None = None,
     partly: bool = False,
 ) -> int:
     """Write the live page of a scene, whole or not at all, and return its size in bytes.
 
     See `html`; a file that is there is replaced, its folder must be there.
     """
-    page = html(scene, language=language, home=home, exercise=exercise, partly=partly)
+    page = html(
+        scene, language=language, home=home, exercise=exercise, lesson=lesson, partly=partly
+    )
     data = page.encode("utf-8")
     with whole(Path(path)) as unfinished:
         unfinished.write_bytes(data)

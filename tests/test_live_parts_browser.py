@@ -71,6 +71,7 @@ def same_bits(page, folder, until=1.5):
     # All that the engine hands on, before the recorder drops states between impacts at one time.
     job = engine.Job(module.Module(), build(load(file)))
     assert job.run(None) is None
+    job.drain()
     knots = np.concatenate(job.knots)
     ours = knots.view("<f8").reshape(-1, 10)[:, :5]
     its = page.evaluate(TRACKS)

@@ -137,6 +137,9 @@ def test_belts_run_with_their_speed_and_wheels_turn_with_them(shown):
     assert gone == pytest.approx(0.04 * scale % 24, abs=1e-6)
     turned = (after[wheels, 0] - before[wheels, 0]) % 360
     assert turned == pytest.approx(np.degrees(0.04 / 0.1) % 360, abs=1e-6)
+    page.emulate_media(reduced_motion="reduce")
+    still = np.array(page.evaluate(at, 0.14))
+    assert np.array_equal(still, after)
 
 
 def test_particles_have_the_colour_of_their_material_or_of_their_speed(shown):

@@ -1,9 +1,10 @@
-// Where the card of what is chosen stands: in the best free place, with a line to that.
+// What shows that something is chosen: dashes round it, and a card beside it, in the best place.
 
 import { svg } from "./scenery.ts";
 import type { Inspector } from "./inspector.ts";
 import type { Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
+import type { Symbols } from "./symbols.ts";
 
 type Point = [number, number];
 
@@ -19,6 +20,9 @@ const ALONG = 22;
 
 /** What is drawn of a body at its outside, and points of one of these at most. */
 const BODIES = ".belt, .wall, rect.steel", MOST = 200;
+
+/** Pixels from a body to the line round it, and of radius of a ball there at least. */
+const AROUND = 6, LEAST = 3;
 
 /** Points along a line through points, those among them. */
 function along(points: Point[]): Point[] {
@@ -53,22 +57,66 @@ function pointsOf({ lab, view, scenery }: Stage): [string, Point[]][] {
   return found;
 }
 
+/** Dashes round what is chosen, a line round what is pointed at: below each body its own shape,
+ * wider, and over that a little less wide in the colour of the ground. */
+function drawOutline({ lab, view, outline, parts, pointed, scenery }: Stage) {
+  outline.replaceChildren();
+  const { machine, recording, t } = lab;
+  for (const name of new Set([...parts, pointed])) {
+    const own = parts.includes(name) ? "chosen" : "pointed";
+    const bodies = scenery.drawingsOf(name).flatMap((group) =>
+      [...group.querySelectorAll(BODIES)].map((shape) => {
+        const wide = parseFloat(getComputedStyle(shape).strokeWidth) || 0;
+        const copy = shape.cloneNode(false), by = group.getAttribute("transform");
+        if (by) copy.setAttribute("transform", by);
+        return [copy, wide] as [any, number];
+      }));
+    const stream = machine?.streams.indexOf(name) ?? -1;
+    machine?.releases.forEach((release, i) => {
+      if (release.stream !== stream || bodies.length > 40) return;
+      const state = recording?.tracks[i]?.state(t) ?? release;
+      const r = Math.max(LEAST, machine.radius[i] * view.scale);
+      bodies.push([svg("circle", { cx: view.px(state.x), cy: view.py(state.y), r }), 0]);
+    });
+    const layers: [number, string][] = [[AROUND + 1, own], [AROUND - 1, "within"]];
+    for (const [add, kind] of layers) {
+      for (const [shape, wide] of bodies) {
+        const copy = shape.cloneNode(false);
+        copy.setAttribute("class", kind);
+        copy.setAttribute("stroke-width", wide + 2 * add);
+        outline.append(copy);
+      }
+    }
+  }
+}
+
 class Callout {
   leader = svg("path", { class: "leader" });
 
-  constructor(readonly inspector: Inspector, readonly stage: Stage, readonly lab: Lab) {
+  constructor(
+    readonly inspector: Inspector, readonly stage: Stage, readonly lab: Lab,
+    readonly symbols: Symbols,
+  ) {
     stage.over.append(this.leader);
     inspector.listeners.push(() => this.place());
     stage.drawers.push(() => this.place());
   }
 
+  /** Place it, and the labels anew where it stands elsewhere. */
   place() {
+    const { stage } = this, before = JSON.stringify(stage.covered);
+    stage.covered = this.find();
+    if (JSON.stringify(stage.covered) !== before) this.symbols.draw();
+  }
+
+  /** @returns the box that it covers, px */
+  find(): Stage["covered"] {
     const { inspector: { panel, parts }, stage, lab, leader } = this, { view } = stage;
     leader.setAttribute("d", "");
     const floats = !panel.hidden && getComputedStyle(panel).position === "fixed";
     if (!floats) {
       panel.style.transform = "";
-      return;
+      return [];
     }
     const { free } = view, { offsetWidth: wide, offsetHeight: high } = panel;
     const isSeen = ([x, y]: Point) => x > 0 && x < view.width && y > 0 && y < view.height;
@@ -103,10 +151,14 @@ class Callout {
       Math.min(Math.max(y, at[1]), at[1] + high)];
     const far = (point: Point) => Math.hypot(edge(point)[0] - point[0], edge(point)[1] - point[1]);
     const [first] = own.sort((a, b) => far(a) - far(b));
-    if (!first || far(first) < OFF) return;
+    const covered = [{
+      left: at[0], right: at[0] + wide, top: at[1], bottom: at[1] + high,
+    }];
+    if (!first || far(first) < OFF) return covered;
     const [x, y] = first;
     leader.setAttribute("d", `M${edge(first)}L${x} ${y}m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0`);
+    return covered;
   }
 }
 
-export { BODIES, Callout, pointsOf };
+export { Callout, drawOutline, pointsOf };

@@ -11,6 +11,9 @@ import type { Words } from "./words.ts";
 /** Places of a slider, and a range that is narrow enough for one. */
 const PLACES = 100, NARROW = 400;
 
+/** Fields that are not under "More". */
+const FIRST = 3;
+
 type Entry = { row: any, input: any, why: any, slider: any, field: Field };
 
 /** Fields of a scene, with the reason for a value that cannot be below its own. */
@@ -42,7 +45,8 @@ class Fields {
       .map(({ table, name }) => words.key(table, name));
     const named = [...new Set(names)].slice(0, 2).join(", ");
     const more = html("details", { class: "more" },
-      html("summary", {}, words.say("more-keys", { keys: named }), icon("down")), ...rest);
+      html("summary", {}, html("span", {}, words.say("more-keys", { keys: named })), icon("down")),
+      ...rest);
     more.open = this.isOpen;
     more.addEventListener("toggle", () => { this.isOpen = more.open; });
     home.append(more);
@@ -281,7 +285,8 @@ class Inspector {
     const grain = all.filter(({ table }) => table === "particle")[stream];
     const fields = !section || this.parts.length > 1 ? []
       : [section, ...(grain ? [grain] : [])].flatMap((one) => fieldsOf(data, given, scene, one));
-    const order = kind?.main ?? MAIN[section?.table ?? ""] ?? [];
+    const order = (kind?.main ?? MAIN[section?.table ?? ""] ?? []).filter((key) =>
+      fields.some(({ table, name }) => key === name || key === `${table}.${name}`)).slice(0, FIRST);
     const place = ({ table, name }: Field) =>
       Math.max(order.indexOf(name), order.indexOf(`${table}.${name}`));
     const rank = (field: Field) => (place(field) >= 0 ? place(field) : field.name === "name" ? 99 : 9);

@@ -120,7 +120,7 @@ class Words {
       const [table, name] = axis.key.replace(/\[\d+\]/g, "").split(".");
       const what = places ? `${axis.unit === "m/s" ? "v" : ""}${"xy"[n]}` : this.key(table, name);
       return bare ? this.value(axis) : `${what} = ${this.value(axis)}`;
-    }).join(", ");
+    }).join(bare ? ", " : "\n");
   }
 
   /** A number that was typed, with point or comma; NaN if it is none. */

@@ -49,8 +49,8 @@ PARTS: Final = (
           opens_at=1.0),
 )  # fmt: skip
 """What can be added to a machine, a row each: its word, the key that begins it, its table, the key
-that each point set in the picture is for, those shown first (three of them), those that tell it from another part
-of its table, and what else it begins with (m: for a picture one metre high)."""
+that each point set in the picture is for, those shown first (three of them), those that tell it
+from another part of its table, and what else it begins with (m: for a picture one metre high)."""
 
 
 def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:

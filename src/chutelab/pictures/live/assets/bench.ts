@@ -386,7 +386,7 @@ class Bench {
       const [x, y] = [cx + u * (right - left), cy + v * (bottom - top)];
       const free = there.reduce((least, [px, py]) =>
         Math.min(least, Math.hypot(px - x, py - y)), ROOM);
-      return { good: free - 0.2 * Math.hypot(x - cx, y - cy), x, y };
+      return { good: free - 0.5 * Math.hypot(x - cx, y - cy), x, y };
     }));
     return found.sort((a, b) => b.good - a.good).slice(0, TRIES)
       .map(({ x, y }) => [view.worldX(x), view.worldY(y)]);

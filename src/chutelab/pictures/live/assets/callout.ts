@@ -24,6 +24,9 @@ const BODIES = ".belt, .wall, rect.steel", MOST = 200;
 /** Pixels from a body to the line round it, and of radius of a ball there at least. */
 const AROUND = 6, LEAST = 3;
 
+/** Width of a line that page.css gives its own, px. */
+const WALL = 4.5;
+
 /** Points along a line through points, those among them. */
 function along(points: Point[]): Point[] {
   return points.flatMap(([x, y], n) => {
@@ -66,7 +69,7 @@ function drawOutline({ lab, view, outline, parts, pointed, scenery }: Stage) {
     const own = parts.includes(name) ? "chosen" : "pointed";
     const bodies = scenery.drawingsOf(name).flatMap((group) =>
       [...group.querySelectorAll(BODIES)].map((shape) => {
-        const wide = parseFloat(getComputedStyle(shape).strokeWidth) || 0;
+      const wide = Number(shape.getAttribute("stroke-width") ?? WALL);
         const copy = shape.cloneNode(false), by = group.getAttribute("transform");
         if (by) copy.setAttribute("transform", by);
         return [copy, wide] as [any, number];
@@ -105,6 +108,8 @@ class Callout {
   /** Place it, and the labels anew where it stands elsewhere. */
   place() {
     const { stage } = this, before = JSON.stringify(stage.covered);
+    // What is dragged has no card.
+    if (stage.held) return;
     stage.covered = this.find();
     if (JSON.stringify(stage.covered) !== before) this.symbols.draw();
   }

@@ -216,7 +216,7 @@ class Palette {
       ["title", "stream", "view"].includes(key)) && given?.stream?.length === 0;
     if (bare !== classList.contains("bare")) {
       classList.toggle("bare", bare);
-      this.open(bare);
+      this.open(bare || this.bench.mode !== null);
       this.stage.resize();
     }
     classList.toggle("still", given !== undefined && isBare(given));

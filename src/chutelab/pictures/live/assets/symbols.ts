@@ -87,7 +87,7 @@ class Symbols {
   draw() {
     const { stage, layer } = this, { recording } = stage.lab;
     layer.replaceChildren();
-    if (!this.shown || !recording || recording.machine.interact) return;
+    if (!this.shown || !recording || recording.machine.interact || stage.held) return;
     const { left, hit, down } = historyOf(stage.lab)?.stages[0] ?? {}, { view } = stage;
     this.wanted = [];
     const { free } = view, all = { left: -1e9, right: 1e9, top: -1e9, bottom: 1e9 };

@@ -1,9 +1,12 @@
 """Panels and tools of the live page under a pointer and under the keyboard alone."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+
+import chutelab
 
 playwright = pytest.importorskip(
     "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
@@ -186,3 +189,103 @@ def test_a_broken_law_is_told_below_the_picture(shown):
     playwright.expect(line).to_be_hidden()
     page.evaluate(DAMAGE, [0, float("nan")])
     playwright.expect(line).to_contain_text("endlich")
+
+
+def wait(page, condition):
+    """A page without `eval` cannot be waited for by Playwright's own conditions."""
+    look = f"const look = () => ({condition} ? resolve() : setTimeout(look, 20));"
+    page.evaluate(f"() => new Promise((resolve) => {{ {look} look(); }})")
+
+
+PASSAGES = "ends => { const { flow } = chutelab.tools; flow.show(ends); return flow.passages; }"
+
+
+def test_a_flow_line_counts_a_throw_on_its_way_up_and_on_its_way_down(shown):
+    throw = Path(__file__).parents[1] / "lessons" / "01-the-parabola" / "throw.toml"
+    page = shown(str(throw), ["incoming.incline_deg=20"])
+    first = page.evaluate("() => chutelab.lab.recording.events.find(({ kind }) => kind === 1)")
+    (u, v, *_), t0, x0, y0 = first["after"], first["t"], first["x"], first["y"]
+    # v t - g t²/2 = rise: on the parabola between two knots, once up and once down.
+    rise = 0.9 * v**2 / (2 * 9.81)
+    roots = v / 9.81 + np.array([-1.0, 1.0]) * np.sqrt(v**2 - 2 * 9.81 * rise) / 9.81
+    found = page.evaluate(PASSAGES, [[x0 - 1.0, y0 + rise], [x0 + 3.0, y0 + rise]])
+    assert [passage["t"] for passage in found] == pytest.approx(t0 + roots, abs=1e-12)
+    assert [passage["at"] for passage in found] == pytest.approx(1.0 + u * roots, abs=1e-12)
+    # To the left of a line to the right is above it.
+    assert [passage["way"] for passage in found] == [-1, 1]
+    assert page.evaluate(PASSAGES, [[x0 - 2.0, y0 + rise], [x0 - 1.0, y0 + rise]]) == []
+
+
+def test_a_flow_line_counts_a_crowd_as_python_finds_it_by_small_steps(shown):
+    overrides = ["stream.count=40", "run.until='settled'"]
+    page = shown("stream", overrides)
+    ends = np.array([[0.45, -0.45], [0.65, -0.35]])
+    recording = chutelab.simulate("stream", overrides, engine="contact")
+    times = np.arange(0.0, recording.t.max(), 5e-5)
+    along = (ends[1] - ends[0]) / np.hypot(*(ends[1] - ends[0]))
+    places, wanted = recording.at(times)[0] - ends[0], []
+    for track in range(40):
+        x, y = places[:, track].T
+        left, at = along[0] * y - along[1] * x, along[0] * x + along[1] * y
+        inside = (at[:-1] >= 0.0) & (at[:-1] <= np.hypot(*(ends[1] - ends[0])))
+        passing = np.flatnonzero(inside & ((left[:-1] < 0) != (left[1:] < 0)))
+        wanted.extend(zip(times[passing], at[passing], strict=True))
+    page.evaluate("chutelab.lab.play()")
+    wait(page, "chutelab.lab.recording.state !== 'running'")
+    found = page.evaluate(PASSAGES, ends.tolist())
+    assert len(found) == len(wanted) > 20
+    seen = [(passage["t"], passage["at"]) for passage in found]
+    assert seen == pytest.approx(np.array(sorted(wanted)), abs=2e-4)
+    page.evaluate("chutelab.lab.seek(1e9)")
+    said = page.text_content("#flow .result")
+    assert f"{len(wanted)} of 40 so far" in said
+
+
+TAPS = """() => {
+  globalThis.taps = [];
+  class Node { connect(next) { return next; } start() {} stop() {} }
+  globalThis.AudioContext = class {
+    resume() {} get currentTime() { return performance.now() / 1000; }
+  };
+  globalThis.GainNode = class extends Node {
+    constructor(_, { gain }) { super(); taps.push(gain); }
+    gain = { exponentialRampToValueAtTime() {} };
+  };
+  globalThis.OscillatorNode = Node;
+}"""
+
+
+def test_impacts_sound_once_asked_louder_the_stronger(shown):
+    page = shown("low-speed", ["plate.restitution=0.2"])
+    page.evaluate(TAPS)
+    page.evaluate("chutelab.lab.play()")
+    page.wait_for_timeout(200)
+    assert page.evaluate("taps") == []
+    page.evaluate("chutelab.lab.restart()")
+    page.click("#sound")
+    assert page.get_attribute("#sound", "aria-pressed") == "true"
+    page.evaluate("""() => {
+      const { lab } = chutelab;
+      const blows = lab.recording.events.filter(({ kind }) => kind >= 3 && kind <= 5);
+      globalThis.strength = blows.map(({ before: [a, b], after: [c, d] }) =>
+        Math.hypot(c - a, d - b));
+      lab.playing = true;
+    }""")
+    wait(page, "!chutelab.lab.playing")
+    taps, strength = page.evaluate("[taps, strength]")
+    assert len(strength) >= 2
+    assert 0 < len(taps) <= len(strength)
+    assert max(taps) == pytest.approx(0.3)
+
+
+def test_a_video_of_the_picture_is_saved(shown):
+    page = shown("perpendicular")
+    with page.expect_download(timeout=30_000) as waiting:
+        page.click("#film")
+    video = waiting.value
+    assert video.suggested_filename.endswith(".webm")
+    content = video.path().read_bytes()
+    # EBML, the container of WebM.
+    assert content[:4] == b"\x1aE\xdf\xa3"
+    assert len(content) > 10_000
+    assert page.get_attribute("#film", "aria-pressed") == "false"

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from math import inf
 from pathlib import Path
 
@@ -256,6 +257,15 @@ def test_a_signal_waits_until_all_files_are_in_their_place(tmp_path, monkeypatch
     assert sum(path.is_file() for path in tmp_path.rglob("*")) == 3
 
 
+def test_a_signal_that_other_code_has_swallowed_ends_the_next_run():
+    with raised():
+        with suppress(BaseException):
+            signal.raise_signal(signal.SIGTERM)
+        with pytest.raises(KeyboardInterrupt):
+            chutelab.simulate("stream", engine="contact")
+    chutelab.simulate("perpendicular")
+
+
 def test_what_is_ignored_or_somebody_elses_is_left_alone():
     mine = signal.signal(signal.SIGTERM, lambda *_: None)
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -282,12 +292,14 @@ def test_what_the_laws_are_not_about_is_refused_by_its_key(name, key):
         "spoon", "spoon --engine contact", "cascade", "two-sizes", "two-sizes --engine pymunk",
         "inclined-conveyor", "inclined-conveyor --engine contact",
         "hopper --set stream.count=50 --set run.max_time=0.6",
-        "hopper --set stream.count=50 --set run.max_time=0.6 --engine pymunk",
         *(
             pytest.param(words, marks=pytest.mark.slow)
-            for words in ("hopper", "hopper --engine pymunk", "heap", "rock-box", "stream",
-                          "spoon --engine pymunk", "cascade --engine contact",
-                          "cascade --engine pymunk", "inclined-conveyor --engine pymunk")
+            for words in (
+                "hopper", "hopper --engine pymunk", "heap", "rock-box", "stream",
+                "hopper --set stream.count=50 --set run.max_time=0.6 --engine pymunk",
+                "spoon --engine pymunk", "cascade --engine contact", "cascade --engine pymunk",
+                "inclined-conveyor --engine pymunk",
+            )
         ),
     ],
 )  # fmt: skip

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, Status, borrow, constants, dtype, give_back
 from chutelab.machine import Machine, Pieces, moved, origin
+from chutelab.results.laws import take
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
@@ -58,9 +59,10 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     place = origin(machine)
     module = borrow()
     try:
-        job = Job(module, moved(machine, -place[0], -place[1]))
+        job = Job(module, moved(machine, -place[0], -place[1]), whole=not any(place))
         stalled = job.run(progress)
         recording = job.recording(machine, place, perf_counter() - begin)
+        take(module, recording)
     finally:
         give_back(module)
     if stalled is not None:
@@ -93,7 +95,7 @@ def pieces(machine: Machine) -> NDArray[Any]:
 class Job:
     """One run: fills the module's memory, and drains what it writes."""
 
-    def __init__(self, module: Module, machine: Machine) -> None:
+    def __init__(self, module: Module, machine: Machine, *, whole: bool = True) -> None:
         self.module, self.machine = module, machine
         self.knots: list[NDArray[Any]] = []
         self.events: list[NDArray[Any]] = []
@@ -102,18 +104,18 @@ class Job:
         self.pieces = pieces(machine)
         self.kinds, self.materials = len(machine.rolling), len(self.pieces)
         self.owners = len(machine.surfaces)
-        self.settings()
+        self.settings(whole)
         module.work("lay_out_world")
         self.fill()
-        module.work("prepare")
+        module.work("prepare_to_judge")
 
-    def settings(self) -> None:
+    def settings(self, whole: bool) -> None:
         """Fill in the numbers of the world."""
         machine, world, wheel = self.machine, self.module.world, self.machine.pulley
         for name, value in (
             ("disk_count", machine.count), ("surface_count", len(self.pieces)),
             ("kind_count", self.kinds), ("owner_count", self.owners),
-            ("interact", machine.interact),
+            ("interact", machine.interact), ("is_whole", whole),
             ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
             ("landing", machine.landing), ("ride_owner", 0),
             ("pulley", -1 if wheel is None else len(machine.segments.length)),
@@ -187,12 +189,19 @@ class Job:
     def proceed(self, steps: int) -> Status:
         """Run on for at most so many steps, and take what was written."""
         module = self.module
-        status = Status(module.run("run", steps, Status.LACKING))
-        for what, kept in (("knot", self.knots), ("event", self.events)):
-            if count := getattr(module.world, f"{what}_count"):
-                kept.append(module.array(f"{what}s", dtype(what.title()), count).copy())
-                setattr(module.world, f"{what}_count", 0)
+        status = Status(module.run("run_and_judge", steps, Status.LACKING))
+        if status is Status.FULL:
+            module.world.is_whole = False
+            self.drain()
         return status
+
+    def drain(self) -> None:
+        """Take what was written, so that there is room for more."""
+        world, module = self.module.world, self.module
+        for what, kept in (("knot", self.knots), ("event", self.events)):
+            if count := getattr(world, f"{what}_count"):
+                kept.append(module.array(f"{what}s", dtype(what.title()), count).copy())
+                setattr(world, f"{what}_count", 0)
 
     def share(self) -> float:
         """Return the share of the run that is done."""
@@ -207,6 +216,7 @@ class Job:
 
     def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Record:
         """Return what was recorded."""
+        self.drain()
         recorder = Recorder(machine)
         world, module = self.module.world, self.module
         # Each chunk is freed when it is handed over: together they are most of the memory.

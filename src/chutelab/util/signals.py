@@ -96,15 +96,23 @@ def ctrl_c_waits() -> Iterator[Callable[[], None]]:
     """Give a function that raises what a Ctrl-C would have raised before.
 
     So a run is interrupted where it can be, and keeps what it has. One that comes `GRACE` after the
-    first is obeyed at once. In a thread, and where there is another handler, nothing changes.
+    first is obeyed at once. In a thread, and where there is another handler, nothing changes. The
+    function also raises again what `raised` has raised: work that goes on shows that some code
+    which catches everything, an import say, has lost it.
     """
     came: list[float] = []
     before = signal.getsignal(signal.SIGINT)
+    told = False
 
     def look() -> None:
+        nonlocal told
         if came and callable(before):
             came.clear()
+            told = True
             before(signal.SIGINT, None)
+        if not told and _obeyed and _obey in (before, signal.getsignal(_obeyed[0][0])):
+            told = True
+            raise Terminated(_obeyed[0][0])
 
     def note(signum: int, frame: Any) -> None:
         if came and callable(before) and monotonic() - came[0] > GRACE:
@@ -121,7 +129,8 @@ def ctrl_c_waits() -> Iterator[Callable[[], None]]:
     finally:
         if changed:
             signal.signal(signal.SIGINT, before)
-    look()
+    if came:
+        look()
 
 
 def _obey(signum: int, _frame: object) -> None:

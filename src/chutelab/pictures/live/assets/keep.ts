@@ -1,24 +1,17 @@
 // What one takes along: a link, the scene, the picture, tables; and the address that follows.
 
 import { toToml } from "./keys.ts";
+import { pictureOf } from "./film.ts";
 import { numbersOf } from "./numbers.ts";
 import { card, html } from "./panels.ts";
 import { predict } from "./prediction.ts";
 import { Fault, type Given, type Scene } from "./scene.ts";
 import { download, fileStem, fromHash, knotRows, toCsv, toHash } from "./share.ts";
 import { historyOf } from "./stages.ts";
-import type { Lab } from "./lab.ts";
+import { isBare, type Lab } from "./lab.ts";
 import type { Recording } from "./recording.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
-
-/** What a picture of its own needs of the page's style. */
-const KEPT = ["fill", "stroke", "stroke-width", "stroke-linecap", "stroke-dasharray", "opacity",
-  "font-family", "font-size", "font-style", "paint-order", "text-anchor", "dominant-baseline",
-  "display", "stop-color", "stroke-linejoin", "font-weight"];
-
-/** Pixels of a saved picture for each of the page's. */
-const DENSE = 2;
 
 class Keep {
   comma;
@@ -36,7 +29,11 @@ class Keep {
     const hasAddress = /^(https?|file):$/.test(location.protocol);
     home.append(card("share", words.say("share"), html("div", { class: "row" },
       ...(hasAddress ? [button("copy-link", () => this.copy())] : []),
-      button("save-scene", () => this.save("toml", this.toml, "application/toml")),
+      button("save-scene", () => {
+        const bare = isBare(lab.given as Given);
+        this.said.textContent = bare ? words.say("save-needs-ball") : "";
+        if (!bare) this.save("toml", this.toml, "application/toml");
+      }),
       button("save-picture", () => this.picture()),
       button("save-knots", () => this.table("knots", knotRows(this.recording)), true),
       button("save-numbers", () => this.table("numbers", this.numbers), true),
@@ -115,40 +112,11 @@ class Keep {
     this.save(`${name}.csv`, `\ufeff${toCsv(rows, this.comma.checked)}`, "text/csv");
   }
 
-  /** The picture as it is now: surfaces and tracks, particles, tools. */
+  /** The picture as it is now. */
   async picture() {
-    const { stage } = this, { width, height } = stage.view;
-    const canvas = document.createElement("canvas");
-    canvas.width = DENSE * width;
-    canvas.height = DENSE * height;
-    const context = canvas.getContext("2d") as CanvasRenderingContext2D;
-    context.scale(DENSE, DENSE);
-    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--card");
-    context.fillRect(0, 0, width, height);
-    const layers = [await drawnSvg(stage.back, stage.back, width, height), stage.canvas,
-      await drawnSvg(stage.front, stage.over, width, height)];
-    for (const layer of layers) context.drawImage(layer, 0, 0, width, height);
+    const canvas = await pictureOf(this.stage);
     canvas.toBlob((blob) => { if (blob) this.save("png", blob, "image/png"); }, "image/png");
   }
-}
-
-/** A part of an SVG as an image, with the style it has on the page. */
-async function drawnSvg(
-  whole: any, part: any, width: number, height: number,
-): Promise<HTMLImageElement> {
-  const root = whole.cloneNode(false), copy = part.cloneNode(true);
-  const [from, to] = [part, copy].map((one) => [one, ...one.querySelectorAll("*")]);
-  from.forEach((element: Element, n: number) => {
-    const style = getComputedStyle(element);
-    for (const name of KEPT) to[n].setAttribute(name, style.getPropertyValue(name));
-  });
-  root.append(...(part === whole ? copy.childNodes : [copy]));
-  for (const [name, value] of Object.entries({ width, height })) root.setAttribute(name, value);
-  const image = new Image();
-  const text = new XMLSerializer().serializeToString(root);
-  image.src = `data:image/svg+xml,${encodeURIComponent(text)}`;
-  await image.decode();
-  return image;
 }
 
 export { Keep };

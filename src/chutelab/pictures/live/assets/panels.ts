@@ -79,7 +79,7 @@ function follow(lab: Lab, panel: HTMLDetailsElement, news: News[], act: () => vo
 /** What stands before the title of a panel. */
 const DRAWINGS: Record<string, string> = {
   edit: "slow", energy: "sum", numbers: "digits", landing: "bars", curves: "graph", share: "share",
-  exercise: "flag",
+  exercise: "flag", flow: "flow",
 };
 
 export { card, eased, follow, html, icon, iconButton };

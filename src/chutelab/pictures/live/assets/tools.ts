@@ -1,6 +1,8 @@
-// What measures in the picture, tape, angle, stop watch and tracer, and what the picture shows.
+// What measures in the picture, flow line, tape, angle, stop watch and tracer, and what the picture
+// shows.
 
 import { roundUp } from "./chart.ts";
+import { Flow } from "./flow.ts";
 import { eased, html, icon, iconButton } from "./panels.ts";
 import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
@@ -86,6 +88,7 @@ class Tools {
   bar;
   strobe;
   panel;
+  flow;
   dial?: any;
   laps?: any;
   starter?: any;
@@ -98,7 +101,7 @@ class Tools {
     stage.over.append(this.layer);
     const bar = html("div", { class: "tools", role: "group", "aria-label": words.say("tools") });
     document.getElementById("fit")?.after(bar);
-    for (const name of ["tape", "protractor", "watch", "tracer"] as const) {
+    for (const name of ["flow", "tape", "protractor", "watch", "tracer"] as const) {
       const button = iconButton(`tool-${name}`, name, words.say(`name-${name}`));
       button.setAttribute("aria-pressed", "false");
       button.addEventListener("click", () => this.toggle(name, button));
@@ -122,13 +125,18 @@ class Tools {
     this.hues();
     this.panel = this.watchPanel();
     home.append(this.panel);
+    this.flow = new Flow(document.getElementById("panels") as Element, lab, words);
     stage.further.push(() => this.handles());
     stage.drawers.push(() => this.draw());
+    const redraw = eased(() => this.draw());
     lab.on("run", () => {
       this.nameStrobe();
       if (this.on.has("tracer")) stage.placeHandles();
     });
-    lab.on("time", () => this.readWatch());
+    lab.on("time", () => {
+      this.readWatch();
+      if (this.on.has("flow")) redraw();
+    });
     const hover = eased(() => this.hover());
     for (const news of ["pointermove", "pointerdown"]) {
       stage.front.addEventListener(news, (event: PointerEvent) => {
@@ -206,6 +214,7 @@ class Tools {
     const [x, y] = view.middle;
     const at = (dx: number, dy: number) =>
       [this.tidy(x + dx * size), this.tidy(y + dy * size)] as Point;
+    if (name === "flow") this.flow.show(on ? [at(-1, -0.5), at(1, -0.5)] : []);
     if (name === "tape") this.tape = [at(-1, -0.5), at(1, -0.5)];
     if (name === "protractor") this.protractor = [at(-1, -0.5), at(1, -0.5), at(0, 0.7)];
     if (name === "watch") this.panel.hidden = !on;
@@ -237,12 +246,14 @@ class Tools {
         drag: (px, py) => [this.tidy(px), this.tidy(py)],
         change: ([px, py]) => {
           points[n] = [px, py];
+          if (tool === "flow") this.flow.move();
           this.refresh();
         },
-        says: `${tool === "tape" ? this.tapeTexts().join(", ") : this.angleText()}; `
+        says: `${this.texts[tool]().join(", ")}; `
           + `x = ${this.words.fixed(x, 3)} m, y = ${this.words.fixed(y, 3)} m`,
       }));
     };
+    if (this.on.has("flow")) point("flow", this.flow.ends, ["first", "second"]);
     if (this.on.has("tape")) point("tape", this.tape, ["first", "second"]);
     if (this.on.has("protractor")) point("protractor", this.protractor, ["vertex", "first", "second"]);
     const tracer = this.on.has("tracer") && this.tracerHandle();
@@ -310,6 +321,11 @@ class Tools {
     this.refresh();
   }
 
+  /** What a tool says, by its name. */
+  texts: Record<string, () => string[]> = {
+    flow: () => this.flow.says, tape: () => this.tapeTexts(), protractor: () => [this.angleText()],
+  };
+
   tapeTexts() {
     const [[x, y], [u, v]] = this.tape, { words } = this;
     return [`${words.fixed(Math.hypot(u - x, v - y), 3)} m`, `Δx = ${words.fixed(u - x, 3)} m`,
@@ -331,11 +347,16 @@ class Tools {
     const { layer, lab } = this, { view } = this.stage;
     const at = ([x, y]: Point) => [view.px(x), view.py(y)] as Point;
     layer.replaceChildren();
+    if (this.on.has("flow")) {
+      const [[x, y], [u, v]] = this.flow.ends.map(at);
+      layer.append(svg("path", { d: `M${x} ${y}L${u} ${v}`, class: "tape" }));
+      this.write(x > u ? [x, y - 20] : [u, v - 20], this.flow.says);
+    }
     if (this.on.has("tape")) {
       const [[x, y], [u, v]] = this.tape.map(at);
       layer.append(svg("path", { d: `M${x} ${y}L${u} ${v}`, class: "tape" }),
         svg("path", { d: `M${x} ${y}H${u}V${v}`, class: "thin" }));
-      this.texts([0.5 * (x + u), 0.5 * (y + v)], this.tapeTexts());
+      this.write([0.5 * (x + u), 0.5 * (y + v)], this.tapeTexts());
     }
     if (this.on.has("protractor")) {
       const [[x, y], [ax, ay], [bx, by]] = this.protractor.map(at);
@@ -347,19 +368,19 @@ class Tools {
         `${x + r * Math.cos(angle)} ${y + r * Math.sin(angle)}`);
       layer.append(svg("path", { d: `M${ax} ${ay}L${x} ${y}L${bx} ${by}`, class: "tape" }),
         svg("path", { d: `M${arc[0]}A${r} ${r} 0 0 ${sweep} ${arc[1]}`, class: "tape" }));
-      this.texts([x, y], [this.angleText()]);
+      this.write([x, y], [this.angleText()]);
     }
     const track = this.on.has("tracer") && lab.recording?.tracks[this.traced.index];
     if (track && track.count) {
       const t = Math.min(track.end, Math.max(track.begin, this.traced.t));
       const state = track.state(t) as State;
-      this.texts(at([state.x, state.y]), this.tracerTexts(t, state));
+      this.write(at([state.x, state.y]), this.tracerTexts(t, state));
     }
   }
 
   /** Lines of text beside a place, on the side where there is room.
    * @param place px */
-  texts([x, y]: Point, lines: string[]) {
+  write([x, y]: Point, lines: string[]) {
     const { view } = this.stage, right = x < view.width - 150;
     const top = Math.min(Math.max(y + 22, 22), view.height - 18 * lines.length + 8);
     lines.forEach((line, n) => {

@@ -1,0 +1,200 @@
+// What passes a line that one draws: how many, how many a second, and where across it.
+
+import { Chart, onWidth, roundUp } from "./chart.ts";
+import { histogram } from "./landing.ts";
+import { card, follow, html } from "./panels.ts";
+import { svg } from "./scenery.ts";
+import type { Lab } from "./lab.ts";
+import type { Recording, Track } from "./recording.ts";
+import type { Words } from "./words.ts";
+
+type Point = [number, number];
+
+/** When a centre passes the line, s; where, m from the line's first end; 1 where it comes from the
+ * left of the line, seen from its first end, -1 where it comes from the right. */
+export type Passage = { t: number, at: number, way: number };
+
+/** Halvings until the instant of a passage is known to rounding. */
+const HALVINGS = 52;
+
+/** Bars of the flow over time, about, and the least time of one, s. */
+const BARS = 12, SHORTEST = 0.01;
+
+/** Columns of a knot. */
+const X = 1, Y = 2, VX = 3, VY = 4;
+
+/** The passages of a track between two of its knots, its curve cut where its distance from the line
+ * is largest or smallest: in each part it grows or falls throughout. */
+function passagesOf(track: Track, i: number, [ax, ay]: Point, [bx, by]: Point): Passage[] {
+  const long = Math.hypot(bx - ax, by - ay), [ux, uy] = [(bx - ax) / long, (by - ay) / long];
+  const t = track.at(i, 0), h = track.at(i + 1, 0) - t;
+  if (!(h > 0 && long > 0)) return [];
+  // Distance to the left of the line, and its rate, at the knots and on the curve between them.
+  const off = (k: number) => (track.at(k, Y) - ay) * ux - (track.at(k, X) - ax) * uy;
+  const rate = (k: number) => h * (track.at(k, VY) * ux - track.at(k, VX) * uy);
+  const p = off(i), q = off(i + 1), v = rate(i), w = rate(i + 1);
+  const b = 3 * (q - p) - 2 * v - w, c = v + w - 2 * (q - p);
+  const height = (s: number) => p + s * (v + s * (b + s * c));
+  // Its slope v + 2 b s + 3 c s² is zero there.
+  const root = b * b - 3 * c * v, far = -b - Math.sign(b || 1) * Math.sqrt(Math.max(0, root));
+  const turns = [far / (3 * c), v / far].filter((s) => root > 0 && s > 0 && s < 1)
+    .sort((one, other) => one - other);
+  const found: Passage[] = [];
+  let from = 0, low = p;
+  for (const to of [...turns, 1]) {
+    const high = to < 1 ? height(to) : q;
+    if ((low < 0) !== (high < 0)) {
+      let [a, z] = [from, to];
+      for (let n = 0; n < HALVINGS; n += 1) {
+        const middle = 0.5 * (a + z);
+        if ((height(middle) < 0) === (low < 0)) a = middle;
+        else z = middle;
+      }
+      const [x] = track.curve(i, X, VX, h, z), [y] = track.curve(i, Y, VY, h, z);
+      const at = (x - ax) * ux + (y - ay) * uy;
+      if (at >= 0 && at <= long) found.push({ t: t + h * z, at, way: low < 0 ? -1 : 1 });
+    }
+    [from, low] = [to, high];
+  }
+  return found;
+}
+
+class Flow {
+  ends: Point[] = [];
+  rate;
+  across;
+  panel;
+  head;
+  charts;
+  /** Those found so far, in the order of time. */
+  passages: Passage[] = [];
+  /** Of which tracks, with how many knots of each looked at. */
+  tracks: Track[] = [];
+  seen: number[] = [];
+
+  constructor(home: Element, readonly lab: Lab, readonly words: Words) {
+    this.rate = new Chart(words, 132);
+    this.across = new Chart(words, 110);
+    this.head = html("p", { class: "result" });
+    this.charts = html("div", { hidden: "" },
+      html("p", { class: "chart-title" }, words.say("flow-rate")), this.rate.root,
+      html("p", { class: "chart-title" }, words.say("flow-across")), this.across.root);
+    this.panel = card("flow", words.say("flow"), this.head, this.charts);
+    this.panel.hidden = true;
+    home.prepend(this.panel);
+    follow(lab, this.panel, ["run"], () => this.draw());
+    follow(lab, this.panel, ["time"], () => this.fill());
+    onWidth(this.rate.root, (width) => {
+      this.rate.width = this.across.width = width;
+      this.draw();
+    });
+  }
+
+  /** Show it with its ends at two places, m, or not at all. */
+  show(ends: Point[]) {
+    this.ends = ends;
+    this.panel.hidden = !ends.length;
+    this.move();
+  }
+
+  /** An end was moved: count anew. */
+  move() {
+    this.tracks = [];
+    this.draw();
+  }
+
+  /** Look at what the run has added. */
+  count() {
+    const { ends: [from, to] } = this, recording = this.lab.recording as Recording;
+    if (this.tracks !== recording.tracks) {
+      this.tracks = recording.tracks;
+      this.seen = this.tracks.map(() => 0);
+      this.passages = [];
+    }
+    const more: Passage[] = [];
+    this.tracks.forEach((track, n) => {
+      const sure = track.count - track.tip - 1;
+      for (; this.seen[n] < sure; this.seen[n] += 1) {
+        more.push(...passagesOf(track, this.seen[n], from, to));
+      }
+    });
+    if (more.length) this.passages = [...this.passages, ...more].sort((a, b) => a.t - b.t);
+  }
+
+  /** How many have passed up to a time. @param t s */
+  until(t: number) {
+    const { passages } = this;
+    let [low, high] = [0, passages.length];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (passages[middle].t <= t) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  /** Width of the bars over time, s. */
+  get step() {
+    const { begin, end } = this.lab.recording as Recording;
+    return Math.max(SHORTEST, roundUp((end - begin) / BARS));
+  }
+
+  /** How many a second pass at a time: in the bar of the time that it is in, as far as it has come.
+   * @param t s */
+  perSecond(t: number) {
+    const { step } = this, from = Math.max(t - step, this.lab.start);
+    return t > from ? (this.until(t) - this.until(from)) / (t - from) : 0;
+  }
+
+  draw() {
+    const { recording } = this.lab, { rate, across } = this;
+    if (!this.ends.length || !recording || !isFinite(recording.begin)) return;
+    this.fill();
+    const { step, passages } = this;
+    this.charts.hidden = !passages.length;
+    if (!passages.length) return;
+    const first = passages[0].t, last = passages[passages.length - 1].t;
+    const mean = last > first ? (passages.length - 1) / (last - first) : 0;
+    const from = Math.floor(first / step), bars = Math.floor(last / step) - from + 1;
+    const counts: number[] = new Array(bars).fill(0);
+    for (const { t } of passages) counts[Math.floor(t / step) - from] += 1 / step;
+    rate.frame([from * step, (from + bars) * step], [0, Math.max(1, mean, ...counts) * 1.08],
+      { below: "t / s", beside: "1/s" });
+    const steps = counts.map((value, n) =>
+      `V${rate.py(value).toFixed(1)}H${rate.px((from + n + 1) * step).toFixed(1)}`).join("");
+    const d = `M${rate.px(from * step).toFixed(1)} ${rate.py(0)}${steps}V${rate.py(0)}`;
+    rate.marks.append(svg("path", { class: "bins", d }));
+    if (mean) rate.line([first, last], [mean, mean], "curve-b");
+    // From the middle of the line, as far as it reaches.
+    const [[ax, ay], [bx, by]] = this.ends, half = 0.5 * Math.hypot(bx - ax, by - ay);
+    const places = passages.map(({ at }) => 1e3 * (at - half));
+    const { from: left, width, counts: many } = histogram(places);
+    across.frame([left, left + width * many.length], [0, Math.max(1, ...many) * 1.08],
+      { below: "mm", beside: "n", whole: true });
+    const bins = many.map((value, n) =>
+      `V${across.py(value).toFixed(1)}H${across.px(left + (n + 1) * width).toFixed(1)}`).join("");
+    across.marks.append(svg("path", { class: "bins filled",
+      d: `M${across.px(left).toFixed(1)} ${across.py(0)}${bins}V${across.py(0)}Z` }));
+  }
+
+  /** What has passed up to the time that is shown. */
+  fill() {
+    if (!this.ends.length || !this.lab.recording) return;
+    this.rate.point(this.lab.t);
+    this.head.textContent = this.says.join(", ");
+  }
+
+  /** In words: how many a second, how many so far, and how many came back. */
+  get says() {
+    this.count();
+    const { words, lab: { t } } = this, n = this.until(t);
+    const back = this.passages.slice(0, n).reduce((sum, { way }) => sum + Number(way > 0), 0);
+    const less = Math.min(back, n - back);
+    const rate = this.perSecond(t), digits = rate >= 100 ? 3 : 2;
+    return [words.say("flow-per-second", { rate: words.number(rate, digits) }),
+      words.say("flow-so-far", { n, all: this.tracks.length }),
+      ...(less ? [words.say("flow-back", { n: less })] : [])];
+  }
+}
+
+export { Flow, passagesOf };

@@ -161,15 +161,6 @@ def test_no_number_of_the_answer_is_on_the_lessons_page(number, web):
     assert given_away(number, seen(card)) == set()
 
 
-def test_no_number_of_the_answer_is_in_titles_and_words_for_pictures(number):
-    lesson = find(number)
-    said = [lesson.title, lesson.question, lesson.picture.machine, lesson.picture.film]
-    said += [scene_of(lesson, name).title for name in lesson.scenes]
-    said += [scene_of(lesson, lesson.picture.scene, lesson.picture.set).title]
-    assert all(said)
-    assert given_away(number, "\n".join(said)) == set()
-
-
 def first_part(path):
     """The frames of a film up to the one that waits for a prediction, and the last frame."""
     with Image.open(path) as opened:

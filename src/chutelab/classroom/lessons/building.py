@@ -303,7 +303,7 @@ def notebook_of(lesson: Lesson) -> str:
             case "predict":
                 lines = "".join(f"    {m}: None,\n" for m in range(1, len(step.asks) + 1))
                 text(f"{place}-how", say("notebook-predict"))
-                code(place, f"book.predict({n}, {{\n{lines}}})")
+                code(place, f"predictions = {{\n{lines}}}\nbook.predict({n}, predictions)")
             case "try" if lesson.page is not None:
                 code(place, f"book.live({n})")
             case "note":

@@ -71,7 +71,8 @@ def worksheet(lesson: Lesson) -> str:
     commands = "\n".join(dict.fromkeys(_commands(lesson)))
     appendix = f"```sh\n{commands}\n```" if commands else ""
     if appendix and not all(name in shipped() for name in lesson.scenes):
-        copy = f"chutelab lesson new my-copy --from {lesson.number or lesson.name}"
+        model = lesson.name if lesson.number is None else lesson.number
+        copy = f"chutelab lesson new my-copy --from {model}"
         appendix = f"{said.say('sheet-copy', command=copy)}\n\n{appendix}"
     if appendix or lesson.terminal:
         parts += [f"## {said.say('sheet-terminal')}", appendix, lesson.terminal]

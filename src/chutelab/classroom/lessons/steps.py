@@ -155,8 +155,8 @@ TABLES: Final[dict[str, type[Table]]] = {
 }  # fmt: skip
 """Model of each table of a step by its key."""
 
-PLACES: Final = re.compile(r"\{([a-z]\w*(?:\.\w+)+)\}")
-"""Keys whose values stand in a text, such as ``{outgoing.speed}``."""
+PLACES: Final = re.compile(r"\{(gravity|[a-z]\w*(?:\.\w+)+)\}")
+"""Keys whose values stand in a text, such as ``{outgoing.speed}``: no groups of a formula."""
 
 FUNCTIONS: Final = ("abs", "acos", "atan2", "cos", "degrees", "hypot", "radians", "sin", "sqrt")
 """What formulas of columns know besides quantities."""

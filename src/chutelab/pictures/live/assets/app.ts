@@ -5,8 +5,8 @@ import { start } from "./page.ts";
 import { Palette } from "./palette.ts";
 import { Prediction } from "./predict.ts";
 
-start(({ lab, stage, words, bench, inspector }) => {
-  new Callout(inspector, stage, lab);
+start(({ lab, stage, words, bench, inspector, symbols }) => {
+  new Callout(inspector, stage, lab, symbols);
   const home = stage.home.parentElement as HTMLElement;
   const palette = bench.free ? new Palette(home, bench, stage, lab, words) : null;
   if (lab.data.live?.predict) new Prediction(stage, lab, words);

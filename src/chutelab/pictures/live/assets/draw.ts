@@ -6,7 +6,8 @@ import { DomainError, carried, known, valueOfTree, type Tree } from "./formula.t
 import { sha256 } from "./sha256.ts";
 
 /** Texts are templates; mistakes have name, formula and reply */
-type Question = { title: string, text: string, unit: string, answer: Tree, measured: Tree | null, angle: boolean,
+type Question = { title: string, text: string, unit: string, answer: Tree, measured: Tree | null,
+  angle: boolean,
   mistakes: [string, Tree, string][], general: string[], hints: string[], working: string[],
   source: string };
 /** Parameters have name, symbol, unit, meaning and the values to draw from */
@@ -155,7 +156,8 @@ function folded(letter: string) {
   return letter.toLowerCase().toUpperCase().toLowerCase();
 }
 
-/** A name without what people do not mean to differ in: case, spaces, Unicode forms, "Berg, Mia". */
+/** A name without what people do not mean to differ in: case, spaces, Unicode forms; "Berg, Mia" is
+ * "mia berg". */
 const plainName = (student: string) => Array.from(student.normalize("NFKC"), folded).join("")
   .replace(/^([^,]*[^,\s][^,]*),([^,]*[^,\s][^,]*)$/s, "$2 $1").split(/\s+/).filter(Boolean).join(" ");
 

@@ -25,7 +25,7 @@ import { Words } from "./words.ts";
 import type { Palette } from "./palette.ts";
 
 type Parts = { lab: Lab, stage: Stage, words: Words, bench: Bench, inspector: Inspector,
-  newEngine: () => Engine };
+  symbols: Symbols, newEngine: () => Engine };
 
 const byId = (id: string): any => document.getElementById(id);
 
@@ -73,7 +73,8 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
     .map((Panel) => new Panel(byId("panels"), lab, words));
   watchLaws(byId("law"), lab, words);
   new Arrows(stage, words);
-  const tools = new Tools(byId("stage").parentElement, lab, stage, words, new Symbols(stage));
+  const symbols = new Symbols(stage);
+  const tools = new Tools(byId("stage").parentElement, lab, stage, words, symbols);
   const inspector = new Inspector(byId("panels"), lab, words);
   const bench = new Bench(byId("bench"), stage, inspector, lab, words);
   new Transport(lab, stage, words);
@@ -84,7 +85,7 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
     const name = panel.matches(".card") ? panel.id : "tools";
     if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
   }
-  const more = join({ lab, stage, words, bench, inspector, newEngine });
+  const more = join({ lab, stage, words, bench, inspector, symbols, newEngine });
   listenToKeys(bench, more.palette ?? null, lab, words);
   Object.assign(globalThis, {
     chutelab: { lab, stage, bench, panels, tools, ...more, toml: () => toToml(lab.given as any) },

@@ -74,7 +74,8 @@ class Lab {
           machine[key] = [];
         }
       }
-      const goesOn = this.machine?.interact && machine.interact && this.t > 0;
+      // In a lesson a run is one machine's from its beginning, so that it can be noted.
+      const goesOn = !this.data.lesson && this.machine?.interact && machine.interact && this.t > 0;
       this.given = given;
       this.scene = scene;
       this.machine = machine;

@@ -126,8 +126,6 @@ class Runs {
   get reason() {
     const { lab } = this;
     if (!lab.isOver || lab.t <= lab.start || lab.recording?.state !== "done") return "note-wait";
-    // A crowd that was changed under way is another run than that of the machine.
-    if (!lab.recording.books) return "note-again";
     return this.row < 0 ? "note-no-row" : "";
   }
 

@@ -17,6 +17,7 @@ import argparse
 import subprocess
 import sys
 import tracemalloc
+from functools import partial
 from math import sqrt
 from statistics import median
 from time import perf_counter
@@ -112,7 +113,7 @@ def report(count, repeats):
     for _ in range(repeats):
         theirs.append(seconds(dop853, repeats=9)[0])
         if count == 1:
-            core.append(seconds(simulate, scene, "contact", repeats=9)[0])
+            core.append(seconds(partial(simulate, engine="contact"), scene, repeats=9)[0])
         ours.append(seconds(simulate, scene, repeats=each)[0])
     time, reference = median(ours), median(theirs)
     heights = recording.select(Kind.RELEASE)["position"][:, 1] - PULLEY - RADIUS

@@ -7,52 +7,40 @@ from math import inf, nan
 MACHINE = {
     "title": "All parts",
     "gravity": 9.81,
-    "particle": [
-        {"name": "small", "radius": 0.01, "shape": "sphere", "material": "ore", "spin": True,
-         "rolling_friction": 0.1},
-        {"name": "big", "radius": [0.01, 0.02], "density": 2500.0},
-    ],
+    "particle": [{"name": "small", "radius": 0.01, "shape": "sphere", "material": "ore",
+     "spin": True, "rolling_friction": 0.1}, {"name": "big", "radius": [0.01, 0.02],
+     "density": 2500.0}],
     "material": [{"name": "ore", "density": 3000.0, "restitution": 0.3, "friction": 0.5,
-                  "friction_steel": 0.4}],
-    "pair": [{"between": ["small", "hood"], "restitution": 0.2},
-             {"between": ["small", "big"], "friction": 0.1}],
+     "friction_steel": 0.4}],
+    "pair": [{"between": ["small", "hood"], "restitution": 0.2}, {"between": ["small", "big"],
+     "friction": 0.1}],
     "incoming": {"speed": 2.0, "pulley_radius": 0.2, "incline_deg": 10.0, "friction": 0.4},
     "plate": [{"distance": 0.5, "angle_deg": 20.0}, {"name": "flap", "pivot": [1.5, -1.0]}],
     "outgoing": {"drop": 1.2, "drop_from": "top", "speed": 1.0},
     "conveyor": [{"name": "carrier", "from": [2.0, -2.0], "to": [3.0, -1.8], "speed": 1.0}],
-    "surface": [
-        {"name": "hood", "from": [3.0, 0.5], "to": [3.5, 0.2], "friction": 0.2},
-        {"name": "spoon", "center": [3.0, -0.5], "radius": 0.3, "from_deg": 180.0, "to_deg": 270.0},
-        {"name": "gate", "points": [[4.0, 0.0], [4.5, 0.0], [4.6, 0.1]], "opens_at": 0.5,
-         "closes_at": 1.0},
-        {"name": "pegs", "center": [4.0, -1.0], "radius": 0.01,
-         "repeat": [[3, 0.1, 0.0], [2, 0.05, 0.1]]},
-    ],
-    "stream": [
-        {"name": "left", "particle": "small", "count": 3, "rate": "12 t/h", "bed_height": 0.05},
-        {"particle": "big", "count": 3, "at": [0.5, 1.0], "to": [0.9, 1.0], "velocity": [0.0, 0.0],
-         "rate": 20.0},
-        {"particle": "big", "count": 4, "fill": [[1.0, 1.0], [1.3, 1.3]], "start": 0.1},
-    ],
+    "surface": [{"name": "hood", "from": [3.0, 0.5], "to": [3.5, 0.2], "friction": 0.2},
+     {"name": "spoon", "center": [3.0, -0.5], "radius": 0.3, "from_deg": 180.0, "to_deg": 270.0},
+     {"name": "gate", "points": [[4.0, 0.0], [4.5, 0.0], [4.6, 0.1]], "opens_at": 0.5,
+     "closes_at": 1.0}, {"name": "pegs", "center": [4.0, -1.0], "radius": 0.01, "repeat": [[3, 0.1,
+     0.0], [2, 0.05, 0.1]]}],
+    "stream": [{"name": "left", "particle": "small", "count": 3, "rate": "12 t/h",
+     "bed_height": 0.05}, {"particle": "big", "count": 3, "at": [0.5, 1.0], "to": [0.9, 1.0],
+     "velocity": [0.0, 0.0], "rate": 20.0}, {"particle": "big", "count": 4, "fill": [[1.0, 1.0],
+     [1.3, 1.3]], "start": 0.1}],
     "run": {"until": 1.0},
 }  # fmt: skip
 """Everything that disks can have."""
 
 DOMINOES = {
-    "particle": [
-        {"name": "ball", "radius": 0.02},
-        {"name": "brick", "shape": "box", "size": [0.02, 0.06], "spin": True},
-        {"name": "wedge", "shape": "polygon", "points": [[0.0, 0.0], [0.05, 0.0], [0.0, 0.04]]},
-    ],
+    "particle": [{"name": "ball", "radius": 0.02}, {"name": "brick", "shape": "box", "size": [0.02,
+     0.06], "spin": True}, {"name": "wedge", "shape": "polygon", "points": [[0.0, 0.0], [0.05, 0.0],
+     [0.0, 0.04]]}],
     "surface": [{"name": "table", "from": [-1.0, 0.0], "to": [1.0, 0.0]}],
     "string": [{"from": [0.0, 0.5], "particle": 0}],
-    "stream": [
-        {"particle": "ball", "count": 2, "at": [0.0, 0.2], "velocity": [0.0, 0.0], "rate": 1.0,
-         "interact": True},
-        {"particle": "brick", "count": 2, "at": [0.2, 0.032], "to": [0.4, 0.032],
-         "velocity": [0.0, 0.0]},
-        {"particle": "wedge", "at": [0.6, 0.1], "velocity": [0.0, 0.0]},
-    ],
+    "stream": [{"particle": "ball", "count": 2, "at": [0.0, 0.2], "velocity": [0.0, 0.0],
+     "rate": 1.0, "interact": True}, {"particle": "brick", "count": 2, "at": [0.2, 0.032],
+     "to": [0.4, 0.032], "velocity": [0.0, 0.0]}, {"particle": "wedge", "at": [0.6, 0.1],
+     "velocity": [0.0, 0.0]}],
 }  # fmt: skip
 """What pymunk alone has."""
 
@@ -95,8 +83,8 @@ BY_HAND = [
     ("machine", {"particle[0].name": "a  b"}, "particle[0].name", "1 to 40 characters"),
     ("machine", {"stream[0].name": "a.b"}, "stream[0].name", "1 to 40 characters"),
     ("machine", {"particle[1].name": GONE, "stream[1].particle": "small",
-                 "stream[2].particle": "small", "pair[1].between": ["small", "gate"]},
-     "particle[1].name", "needed where there are several kinds"),
+     "stream[2].particle": "small", "pair[1].between": ["small", "gate"]}, "particle[1].name",
+     "needed where there are several kinds"),
     ("machine", {"conveyor[0].name": GONE}, "conveyor[0].name", "is missing"),
     ("machine", {"material[0].name": GONE}, "material[0].name", "is missing"),
     ("machine", {"plate[1].name": GONE}, "plate[1].name", "a plate with a pivot needs one"),
@@ -211,7 +199,7 @@ BY_HAND = [
     ("alone", {"run.until": "landed"}, "run.until", "[outgoing]"),
     # what is expected
     ("machine", {"expect": [{"quantity": "carriage.impact.count", "value": 1.0, "tolerance": "1",
-                             "source": "me"}]}, "expect[0].quantity", "no such quantity"),
+     "source": "me"}]}, "expect[0].quantity", "no such quantity"),
 ]  # fmt: skip
 
 

@@ -1,7 +1,5 @@
 """Random tall columns and silos of disks: where contacts wedge, and friction carries on walls."""
 
-from __future__ import annotations
-
 from math import sqrt, tan
 
 import numpy as np

@@ -1,18 +1,14 @@
 """A transfer written out by hand, whose every number is known, and the texts seen in a figure."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import replace
 from math import inf, sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from chutelab import scene
-from chutelab.machine import Arcs, Machine, Particle, Segments, build
+from chutelab.machine import Arcs, Particle, Segments, build
 from chutelab.machine.releases import Releases
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.recorder import Recorder
@@ -35,16 +31,16 @@ friction = {MU}
 EXACT = ("perpendicular", "inclined-40", "inclined-60", "low-speed", "slip", "belt-landing")
 
 
-def t_impact() -> float:
+def t_impact():
     return (R + DISTANCE - PARTICLE) / V
 
 
-def t_landing() -> float:
+def t_landing():
     down = G * t_impact()
     return t_impact() + (sqrt(down**2 + 2.0 * G * DROP) - down) / G
 
 
-def expected(since: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def expected(since):
     """Position and velocity after leaving the top at V, plate at t_impact: v_x becomes -ε V."""
     hit = R + DISTANCE - PARTICLE
     after = since >= t_impact()
@@ -54,7 +50,7 @@ def expected(since: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([x, y], axis=-1), np.stack([vx, -G * since], axis=-1)
 
 
-def by_hand(residual: float = 0.0, shift: float = 0.0) -> Recording:
+def by_hand(residual=0.0, shift=0.0):
     """One particle: ride, separation at 0.5 s, plate, landing; optionally with planted errors.
 
     `residual` J too few are booked as slip heat; the flight is `shift` m too high.
@@ -65,7 +61,7 @@ def by_hand(residual: float = 0.0, shift: float = 0.0) -> Recording:
     along = np.array([V, 0.0])
     lifted = np.array([0.0, shift])
 
-    def knot(t: float, position: np.ndarray, velocity: np.ndarray) -> None:
+    def knot(t, position, velocity):
         recorder.knots([0], [t], position, velocity, 0.0)
 
     knot(0.0, start, along)
@@ -126,9 +122,7 @@ class Round(NamedTuple):
     vanishes: float = inf
 
 
-def conveyor(
-    name: str, start: tuple[float, float], end: tuple[float, float], radius: float, speed: float
-) -> list[Line | Round]:
+def conveyor(name, start, end, radius, speed):
     """A belt round two pulleys, forward on top."""
     a, b = np.array(start), np.array(end)
     x, y = (b - a) / np.hypot(*(b - a))
@@ -138,12 +132,12 @@ def conveyor(
 
 
 def machine_of(
-    *pieces: Line | Round,
-    at: Sequence[tuple[float, float]] = ((0.0, 1.0),),
-    stream: Sequence[int] = (),
-    radius: float | np.ndarray = 0.004,
-    **more: Any,
-) -> Machine:
+    *pieces,
+    at=((0.0, 1.0),),
+    stream=(),
+    radius=0.004,
+    **more,
+):
     """A machine of these pieces without conveyors, particles released at these places at 0 s."""
     base = build(
         scene.parse('title = "By hand"\n[stream]\nat = [0.0, 1.0]\nvelocity = [0.0, 0.0]\n')
@@ -152,7 +146,7 @@ def machine_of(
     lines = [piece for piece in pieces if isinstance(piece, Line)]
     rounds = [piece for piece in pieces if isinstance(piece, Round)]
 
-    def common(of: Sequence[Line | Round]) -> dict[str, Any]:
+    def common(of):
         every = {key: np.array([float(getattr(one, key)) for one in of])
                  for key in ("speed", "appears", "vanishes")}  # fmt: skip
         every |= {key: np.full(len(of), 0.5) for key in ("restitution", "friction")}
@@ -186,7 +180,7 @@ def machine_of(
     return boxed(found)
 
 
-def recording_of(machine: Machine, *tracks: Any, ended: str = "time") -> Recording:
+def recording_of(machine, *tracks, ended="time"):
     """A recording of tracks, one a particle, of rows t, x, y, vx, vy, ω; angles are their sum."""
     recorder = Recorder(machine)
     for i, track in enumerate(tracks):
@@ -199,7 +193,7 @@ def recording_of(machine: Machine, *tracks: Any, ended: str = "time") -> Recordi
     return Recording.of(recorder.finish(engine="exact", steps=0))
 
 
-def seen(figure: Figure) -> list[Text]:
+def seen(figure):
     """All texts that are drawn, tick labels outside the view left out."""
     hidden = set()
     for ax in figure.axes:

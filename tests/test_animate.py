@@ -1,13 +1,10 @@
-from __future__ import annotations
-
 import subprocess
 import tempfile
-from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -16,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.patches import Rectangle
 from matplotlib.transforms import Bbox
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from chutelab import scene
@@ -32,9 +28,9 @@ from chutelab.pictures.animation.moments import (
     slowness,
     span,
 )
-from chutelab.pictures.animation.stage import TRAIL, Layout, lay_out, palette, write_gif
+from chutelab.pictures.animation.stage import TRAIL, lay_out, palette, write_gif
 from chutelab.pictures.plots import Window, style, window_of
-from chutelab.results import Kind, Recording
+from chutelab.results import Kind
 from chutelab.results.recorder import Recorder
 from handmade import (
     BELT_TIME,
@@ -63,27 +59,25 @@ WIDTH, HEIGHT = 800, 450
 FLOOR = Line("floor", (-0.6, 0.0), (0.6, 0.0))
 
 
-def moments_at(times: Sequence[float]) -> tuple[Moment, ...]:
+def moments_at(times):
     return tuple(Moment(t, 4, "") for t in times)
 
 
-def laid_out(recording: Recording, width: int = WIDTH, height: int = HEIGHT, **more: Any) -> Layout:
+def laid_out(recording, width=WIDTH, height=HEIGHT, **more):
     return lay_out(recording, width=width, height=height, **more)
 
 
-def stage_of(
-    recording: Recording, at: tuple[Moment, ...], slow: float = 5.0, layout: Layout | None = None
-) -> Stage:
+def stage_of(recording, at, slow=5.0, layout=None):
     return Stage(recording, layout or laid_out(recording), at, slow=slow)
 
 
-def moved(stage: Stage, index: int) -> dict[str, Any]:
+def moved(stage, index):
     """Draw a moment; return what moves in the scene, by name."""
     stage.frame(index)
     return {one.get_gid(): one for one, _ in stage.moving if one.axes is stage.view}
 
 
-def blocks_of(stage: Stage, index: int) -> list[dict[str, float]]:
+def blocks_of(stage, index):
     """Draw a moment; return the heights of the entries in each bar: put in, and is now."""
     stage.frame(index)
     blocks = [one for one, _ in stage.moving if isinstance(one, Rectangle)]
@@ -93,33 +87,33 @@ def blocks_of(stage: Stage, index: int) -> list[dict[str, float]]:
     ]
 
 
-def bar_axes(stage: Stage) -> Any:
+def bar_axes(stage):
     (axes,) = {one.axes for one, _ in stage.moving if isinstance(one, Rectangle)}
     return axes
 
 
-def clock(stage: Stage, index: int) -> str:
+def clock(stage, index):
     return stage.writings[0].said[index]
 
 
-def figures(stage: Stage, index: int) -> dict[str, str]:
+def figures(stage, index):
     """Return what is written beneath the bars; clock and caption are written before."""
     return {name: one.said[index] for name, one in zip(SIGNS, stage.writings[2:], strict=False)}
 
 
 @pytest.fixture(scope="module")
-def runs() -> dict[str, Recording]:
+def runs():
     names = (*EXACT, "free-fall")
     return {name: simulate(scene.load(scene.find(name))) for name in names}
 
 
-def filmed(recording: Recording) -> tuple[tuple[Moment, ...], float]:
+def filmed(recording):
     begin, end = span(recording, laid_out(recording).window)
     slow = slowness(end - begin)
     return film(recording, begin, end, fps=25, slow=slow), slow
 
 
-def recorded(*events: tuple[Kind, float, float, float]) -> Recording:
+def recorded(*events):
     """Particle 0 with events of (kind, s, m/s along x, N s) on the incoming belt."""
     machine = build(scene.parse(TEXT))
     recorder = Recorder(machine)
@@ -134,7 +128,7 @@ def recorded(*events: tuple[Kind, float, float, float]) -> Recording:
 
 
 @pytest.mark.parametrize(("fps", "delay"), [(25, 4), (50, 2)])
-def test_film_runs_evenly_and_holds_at_both_impacts(fps: int, delay: int) -> None:
+def test_film_runs_evenly_and_holds_at_both_impacts(fps, delay):
     slow = 8.0
     end = BELT_TIME + t_landing()
     shots = film(by_hand(), 0.4, end, fps=fps, slow=slow)
@@ -162,7 +156,7 @@ def test_film_runs_evenly_and_holds_at_both_impacts(fps: int, delay: int) -> Non
         ([1.0] * 6, [0.1, 0.2, 0.3, 0.4]),  # the first of equals
     ],
 )
-def test_film_holds_at_the_hardest_four_impacts(pushes: list[float], held: list[float]) -> None:
+def test_film_holds_at_the_hardest_four_impacts(pushes, held):
     impacts = [(Kind.IMPACT, 0.1 * (i + 1), 1.0, push) for i, push in enumerate(pushes)]
     shots = film(recorded((Kind.RELEASE, 0.0, 1.0, 0.0), *impacts), 0.0, 1.0, fps=25, slow=5.0)
     assert {shot.delay for shot in shots[:-1]} == {4, 75}
@@ -183,9 +177,7 @@ def test_film_holds_at_the_hardest_four_impacts(pushes: list[float], held: list[
           for end in (".avi", "", ".gif.txt")),
     ],
 )  # fmt: skip
-def test_impossible_wishes_are_refused(
-    name: str, options: dict[str, Any], said: str, tmp_path: Path
-) -> None:
+def test_impossible_wishes_are_refused(name, options, said, tmp_path):
     if name.endswith(".mp4"):
         pytest.importorskip("imageio_ffmpeg")
     with pytest.raises(ValueError, match=said):
@@ -193,14 +185,14 @@ def test_impossible_wishes_are_refused(
     assert not list(tmp_path.iterdir())
 
 
-def test_loops_take_five_to_ten_seconds_at_a_round_slowness(runs: dict[str, Recording]) -> None:
+def test_loops_take_five_to_ten_seconds_at_a_round_slowness(runs):
     for name, recording in runs.items():
         shots, slow = filmed(recording)
         assert float(f"{slow:.1e}") == slow, name
         assert 5.0 <= 0.01 * sum(shot.delay for shot in shots) <= 10.2, name
 
 
-def test_film_begins_as_the_particle_comes_into_view(runs: dict[str, Recording]) -> None:
+def test_film_begins_as_the_particle_comes_into_view(runs):
     recording = runs["perpendicular"]
     window = window_of(recording)
     begin, end = span(recording, window)
@@ -212,7 +204,7 @@ def test_film_begins_as_the_particle_comes_into_view(runs: dict[str, Recording])
     assert inset / window.width * 0.675 * 8.0 * 72.0 > 3.0
 
 
-def test_a_long_stream_is_filmed_for_three_lives_of_particle_0() -> None:
+def test_a_long_stream_is_filmed_for_three_lives_of_particle_0():
     text = TEXT + "[stream]\ncount = 100\nrate = 10.0\nbed_height = 0.02\n"
     recording = simulate(scene.parse(text))
     begin, end = span(recording, laid_out(recording).window)
@@ -224,7 +216,7 @@ def test_a_long_stream_is_filmed_for_three_lives_of_particle_0() -> None:
 # Words
 
 
-def test_a_landing_tells_of_the_flight_if_nothing_was_in_between() -> None:
+def test_a_landing_tells_of_the_flight_if_nothing_was_in_between():
     lesson = Path(__file__).parent.parent / "lessons" / "01-the-parabola"
     for speed in (2.0, 4.0):
         thrown = scene.load(lesson / "throw.toml", [f"incoming.speed={speed}"])
@@ -235,7 +227,7 @@ def test_a_landing_tells_of_the_flight_if_nothing_was_in_between() -> None:
     assert not any("of flight" in words for words in said)
 
 
-def test_words_tell_what_is_lost_in_the_step_of_an_engine_that_steps() -> None:
+def test_words_tell_what_is_lost_in_the_step_of_an_engine_that_steps():
     """At v = 2 m/s on the plate, with m = 2.1 g: m v² (1 - ε²) / 2 = 3.15 mJ."""
     trust = Path(__file__).parent.parent / "lessons" / "08-trust" / "fixed-steps.toml"
     stepped = judged(scene.load(trust))
@@ -244,7 +236,7 @@ def test_words_tell_what_is_lost_in_the_step_of_an_engine_that_steps() -> None:
     assert not any("no energy lost" in words for words in said)
 
 
-def test_words_tell_the_numbers_of_the_impacts() -> None:
+def test_words_tell_the_numbers_of_the_impacts():
     recording = by_hand()
     shots = film(recording, 0.4, BELT_TIME + t_landing(), fps=25, slow=8.0)
     said = {round(shot.t, 6): shot.words for shot in shots}
@@ -271,7 +263,7 @@ def test_words_tell_the_numbers_of_the_impacts() -> None:
     assert {shot.words for shot in flying} == {news, "in flight"}
 
 
-def test_words_of_a_weak_impact_give_way_to_what_goes_on(runs: dict[str, Recording]) -> None:
+def test_words_of_a_weak_impact_give_way_to_what_goes_on(runs):
     # It bounces ever lower, slides from 1.517 s on, and rides from 4.32 s on.
     shots, _ = filmed(runs["belt-landing"])
     bounces = runs["belt-landing"].select(Kind.IMPACT, surface="outgoing")["t"]
@@ -286,7 +278,7 @@ def test_words_of_a_weak_impact_give_way_to_what_goes_on(runs: dict[str, Recordi
 
 
 @pytest.mark.parametrize(("rode", "said"), [(2.0, False), (2.001, False), (2.1, True)])
-def test_a_stick_right_after_release_is_told_if_the_speed_changed(rode: float, said: bool) -> None:
+def test_a_stick_right_after_release_is_told_if_the_speed_changed(rode, said):
     release, stick = (Kind.RELEASE, 0.0, 2.0, 0.0), (Kind.STICK, 0.1, rode, 0.0)
     recording = recorded(release, stick, (Kind.SEPARATION, 0.5, rode, 0.0))
     shots = film(recording, 0.0, 1.0, fps=25, slow=5.0)
@@ -321,9 +313,7 @@ SLANTED = 0.5**0.5
         (BOWL, (-0.4976, 1.0032), (0.6, 0.8)),
     ],
 )
-def test_restitution_is_told_along_the_normal_at_the_contact(
-    piece: Line | Round, place: tuple[float, float], normal: tuple[float, float]
-) -> None:
+def test_restitution_is_told_along_the_normal_at_the_contact(piece, place, normal):
     """v·n goes from -2 to 0.4 · 2 m/s, whatever is along the surface."""
     recorder = Recorder(machine_of(piece))
     out = np.array(normal)
@@ -337,7 +327,7 @@ def test_restitution_is_told_along_the_normal_at_the_contact(
     assert ", ε = 0.4\n" in sentence(recording, recording.events[0])
 
 
-def test_separation_is_told_by_its_angle(runs: dict[str, Recording]) -> None:
+def test_separation_is_told_by_its_angle(runs):
     recording = runs["low-speed"]
     (event,) = recording.select(Kind.SEPARATION).copy()
     past = np.degrees(np.arccos(2.0**2 / (9.81 * 0.5063)))
@@ -346,7 +336,7 @@ def test_separation_is_told_by_its_angle(runs: dict[str, Recording]) -> None:
     assert f"leaves the drive pulley {past:.1f}° before the top" in sentence(recording, event)
 
 
-def test_a_ramp_is_left_by_its_name() -> None:
+def test_a_ramp_is_left_by_its_name():
     recording = simulate(
         scene.parse(
             "[[surface]]\nname = 'ramp'\nfrom = [0.0, 0.5]\nto = [1.0, 0.2]\nfriction = 0.1\n"
@@ -363,7 +353,7 @@ def test_a_ramp_is_left_by_its_name() -> None:
     assert "rides the incoming belt" not in words
 
 
-def test_what_was_struck_before_the_separation_does_not_bound_the_window() -> None:
+def test_what_was_struck_before_the_separation_does_not_bound_the_window():
     text = TEXT.split("[plate]")[0] + "friction = 0.5\n"
     text += "[stream]\nat = [-0.5, 0.3]\nvelocity = [2.0, 0.0]\n[run]\nuntil = 0.6\n"
     recording = simulate(scene.parse(text))
@@ -375,7 +365,7 @@ def test_what_was_struck_before_the_separation_does_not_bound_the_window() -> No
 # The stage
 
 
-def test_actors_stand_where_the_particle_is() -> None:
+def test_actors_stand_where_the_particle_is():
     recording = by_hand()
     times = BELT_TIME + np.array([0.1, t_impact() + 0.05])
     layout = laid_out(recording)
@@ -402,7 +392,7 @@ def test_actors_stand_where_the_particle_is() -> None:
         assert np.asarray(arrows.get_offsets()) == pytest.approx(np.tile(known, (3, 1)), abs=1e-14)
 
 
-def test_crowd_is_at_the_recorded_positions_and_says_how_many() -> None:
+def test_crowd_is_at_the_recorded_positions_and_says_how_many():
     text = TEXT + "[stream]\ncount = 700\nrate = 1000.0\nbed_height = 0.05\n"
     recording = simulate(scene.parse(text))
     times = [0.3, 0.8, 1.2]
@@ -426,8 +416,8 @@ def test_crowd_is_at_the_recorded_positions_and_says_how_many() -> None:
     assert "300 of 700" in [entry.get_text() for entry in legend.get_texts()]
 
 
-def test_particles_are_drawn_to_scale_or_visibly() -> None:
-    def width(radius: float) -> tuple[float, float]:
+def test_particles_are_drawn_to_scale_or_visibly():
+    def width(radius):
         text = f"{TEXT}[particle]\nradius = {radius}\n"
         stage = stage_of(simulate(scene.parse(text)), moments_at([0.6]))
         (x0, _), (x1, _) = stage.view.transData.transform([(0.0, 0.0), (2.0 * radius, 0.0)])
@@ -440,7 +430,7 @@ def test_particles_are_drawn_to_scale_or_visibly() -> None:
     assert drawn > true
 
 
-def stacked(stage: Stage) -> list[list[tuple[str, int]]]:
+def stacked(stage):
     """Return what is painted in each bar, from the bottom up: names, and rows of pixels."""
     shown = np.asarray(stage.frame(0))
     names = {bytes.fromhex(colour[1:]): name for name, colour in style.ENERGY.items()}
@@ -454,7 +444,7 @@ def stacked(stage: Stage) -> list[list[tuple[str, int]]]:
     return found
 
 
-def test_bars_add_up_to_the_energies_at_all_times() -> None:
+def test_bars_add_up_to_the_energies_at_all_times():
     times = [0.2, BELT_TIME + 0.2, BELT_TIME + t_impact(), BELT_TIME + t_landing()]
     stage = stage_of(by_hand(), moments_at(times))
     lowest = R + PARTICLE - 0.5 * G * t_landing() ** 2
@@ -480,7 +470,7 @@ def test_bars_add_up_to_the_energies_at_all_times() -> None:
 
 
 @pytest.mark.parametrize("planted", [0.0, 0.003, -0.003])
-def test_bars_add_up_with_the_residual_in_sight(planted: float) -> None:
+def test_bars_add_up_with_the_residual_in_sight(planted):
     stage = stage_of(by_hand(residual=planted), moments_at([BELT_TIME + t_landing()]))
     put_in, is_now = blocks_of(stage, 0)
     assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12, abs=0.0)
@@ -494,15 +484,13 @@ def test_bars_add_up_with_the_residual_in_sight(planted: float) -> None:
     assert ("residual" in right) is (planted > 0.0)
 
 
-def falling(
-    *pieces: Line | Round, at: Sequence[tuple[float, float]] = ((0.0, 0.5),), **more: Any
-) -> Recording:
+def falling(*pieces, at=((0.0, 0.5),), **more):
     """Particles that lie at their places for a second, each."""
     rows = [[(0, x, y, 0, 0, 0), (1, x, y, 0, 0, 0)] for x, y in at]
     return recording_of(machine_of(FLOOR, *pieces, at=at, **more), *rows, ended="settled")
 
 
-def test_rollers_turn_clockwise_and_marks_run_with_belts_and_round_arcs() -> None:
+def test_rollers_turn_clockwise_and_marks_run_with_belts_and_round_arcs():
     belt = conveyor("second", (-0.3, 0.1), (0.3, 0.2), 0.05, 0.4)
     spoon = Round("spoon", (0.0, 0.5), 0.4, 180.0, 170.0, speed=0.8)
     stage = stage_of(falling(*belt, spoon), moments_at([0.2, 0.25]))
@@ -511,7 +499,7 @@ def test_rollers_turn_clockwise_and_marks_run_with_belts_and_round_arcs() -> Non
     for index, t in enumerate((0.2, 0.25)):
         drawn = moved(stage, index)
         holes = [one for one, _ in stage.moving if one.get_gid() == "holes second"]
-        places = [np.asarray(one.get_xydata()) for one in holes]  # type: ignore[attr-defined]
+        places = [np.asarray(one.get_xydata()) for one in holes]
         for center, three in zip([(-0.3, 0.1), (0.3, 0.2)], places, strict=True):
             angle = 0.4 * t / 0.05
             first = 0.6 * 0.05 * np.array([np.sin(angle), np.cos(angle)])
@@ -531,7 +519,7 @@ def test_rollers_turn_clockwise_and_marks_run_with_belts_and_round_arcs() -> Non
         assert np.count_nonzero(turned < 1e-9) >= len(later) - 1
 
 
-def test_a_gate_is_seen_while_it_is_there() -> None:
+def test_a_gate_is_seen_while_it_is_there():
     gate = Line("gate", (-0.3, 0.25), (0.3, 0.25), vanishes=0.4)
     flap = Line("flap", (-0.3, 0.35), (0.3, 0.35), appears=0.7)
     times = [0.1, np.nextafter(0.4, 0.0), 0.4, 0.7, 0.9]
@@ -558,7 +546,7 @@ def test_a_gate_is_seen_while_it_is_there() -> None:
     ]
 
 
-def test_a_film_of_many_is_of_all_of_them_to_the_end() -> None:
+def test_a_film_of_many_is_of_all_of_them_to_the_end():
     spots = [(0.015 * (i % 40) - 0.3, 0.01 + 0.015 * (i // 40)) for i in range(400)]
     machine = machine_of(
         FLOOR, Line("gate", (-0.1, 0.3), (0.1, 0.3), vanishes=0.4), at=spots, radius=0.007,
@@ -586,7 +574,7 @@ def test_a_film_of_many_is_of_all_of_them_to_the_end() -> None:
     assert_readable(stage, 10)
 
 
-def test_strings_end_at_their_particles() -> None:
+def test_strings_end_at_their_particles():
     threads = (Thread((0.0, 0.9), 0, 0.4), Thread((0.3, 0.9), 1, 0.5))
     recording = falling(at=[(0.0, 0.5), (0.3, 0.5)], threads=threads)
     path = np.asarray(moved(stage_of(recording, moments_at([0.5])), 0)["strings"].get_xydata())
@@ -595,7 +583,7 @@ def test_strings_end_at_their_particles() -> None:
     assert second[[0, -2]] == pytest.approx(np.array([(0.3, 0.9), (0.3, 0.5)]))
 
 
-def test_what_is_not_asked_for_is_not_shown() -> None:
+def test_what_is_not_asked_for_is_not_shown():
     recording, at = by_hand(), moments_at([BELT_TIME + 0.2])
     full = stage_of(recording, at)
     bare = stage_of(recording, at, layout=laid_out(recording, shows=frozenset()))
@@ -606,7 +594,7 @@ def test_what_is_not_asked_for_is_not_shown() -> None:
     assert ["analytic" in one for one in analytic] == [True, False]
 
 
-def test_title_and_question_are_shown_and_cut_at_words() -> None:
+def test_title_and_question_are_shown_and_cut_at_words():
     recording, at = by_hand(), moments_at([0.6])
     asked = "Where does it land?"
     stage = stage_of(recording, at, layout=laid_out(recording, title="Mine", question=asked))
@@ -623,7 +611,7 @@ def test_title_and_question_are_shown_and_cut_at_words() -> None:
         assert 0.8 * WIDTH < text.get_window_extent().x1 <= 0.99 * WIDTH
 
 
-def test_frames_leave_no_traces_in_each_other(runs: dict[str, Recording]) -> None:
+def test_frames_leave_no_traces_in_each_other(runs):
     stage = stage_of(runs["perpendicular"], moments_at([0.5, 0.7, 0.9]))
     first = np.asarray(stage.frame(0))
     last = np.asarray(stage.frame(2))
@@ -636,7 +624,7 @@ def test_frames_leave_no_traces_in_each_other(runs: dict[str, Recording]) -> Non
     np.testing.assert_array_equal(np.asarray(fresh.frame(0))[scene_alone], last[scene_alone])
 
 
-def boxes_of(stage: Stage, index: int) -> list[tuple[str, Bbox]]:
+def boxes_of(stage, index):
     """Return where text is in the picture, what is painted as pixels included."""
     found = [(text.get_text(), text.get_window_extent()) for text in seen(stage.figure)]
     for text in seen(stage.figure):
@@ -649,7 +637,7 @@ def boxes_of(stage: Stage, index: int) -> list[tuple[str, Bbox]]:
     return found
 
 
-def assert_readable(stage: Stage, index: int) -> None:
+def assert_readable(stage, index):
     stage.frame(index)
     boxes = boxes_of(stage, index)
     for text, box in boxes:
@@ -664,7 +652,7 @@ def assert_readable(stage: Stage, index: int) -> None:
 
 
 @pytest.mark.parametrize("name", [*EXACT, "free-fall"])
-def test_no_text_is_cut_off_overlapping_or_small(name: str, runs: dict[str, Recording]) -> None:
+def test_no_text_is_cut_off_overlapping_or_small(name, runs):
     shots, slow = filmed(runs[name])
     layout = laid_out(runs[name], question="How much of the energy is left when it lands?")
     stage = stage_of(runs[name], shots, slow, layout)
@@ -685,7 +673,7 @@ class Block(NamedTuple):
     keeps: bool
 
 
-def blocks(data: bytes) -> list[Block]:
+def blocks(data):
     """Read the frames of a GIF by its specification; no frame may have colours of its own."""
     at, found = 13 + 3 * 2 ** ((data[10] & 7) + 1), []
     delay, keeps = 0, False
@@ -706,12 +694,13 @@ def blocks(data: bytes) -> list[Block]:
     return found
 
 
-@pytest.mark.parametrize(("fps", "delay"), [(25, 4), (50, 2)])
-def test_gif_reads_back_frame_by_frame(fps: int, delay: int, tmp_path: Path) -> None:
-    recording = by_hand()
-    path = animate(recording, tmp_path / "lesson.gif", slow=1.5, fps=fps, width=320, height=180)
+def test_gif_reads_back_frame_by_frame_and_is_the_same_again(tmp_path):
+    recording, fps = by_hand(), 25
+    size = {"slow": 1.5, "fps": fps, "width": 320, "height": 180}
+    path = animate(recording, tmp_path / "lesson.gif", **size)
     assert path == tmp_path / "lesson.gif"
     assert list(tmp_path.iterdir()) == [path]
+    assert path.read_bytes() == animate(by_hand(), tmp_path / "again.gif", **size).read_bytes()
     begin, end = span(recording, laid_out(recording, 320, 180).window)
     shots = film(recording, begin, end, fps=fps, slow=1.5)
     with Image.open(path) as gif:
@@ -723,16 +712,14 @@ def test_gif_reads_back_frame_by_frame(fps: int, delay: int, tmp_path: Path) -> 
             assert gif.info["duration"] == 10 * shot.delay
     frames = blocks(path.read_bytes())
     assert [frame.delay for frame in frames] == [shot.delay for shot in shots]
-    # Exactly 25 or 50 frames a second, but for the holds.
-    assert {frame.delay for frame in frames} == {delay, 130}
+    # Exactly 25 frames a second, but for the holds.
+    assert {frame.delay for frame in frames} == {4, 130}
     assert all(frame.keeps for frame in frames)
     assert frames[0][:4] == (0, 0, 320, 180)
     assert all(frame.width * frame.height < 320 * 180 for frame in frames[1:])
 
 
-def test_colours_are_nearly_the_stages_and_what_stands_still_keeps_its_own(
-    runs: dict[str, Recording], tmp_path: Path
-) -> None:
+def test_colours_are_nearly_the_stages_and_what_stands_still_keeps_its_own(runs, tmp_path):
     recording = runs["free-fall"]
     path = animate(recording, tmp_path / "lesson.gif", fps=2)
     shots, slow = filmed(recording)
@@ -762,9 +749,7 @@ def test_colours_are_nearly_the_stages_and_what_stands_still_keeps_its_own(
 
 
 @pytest.mark.parametrize(("name", "delay"), [("perpendicular", 40), ("stream", 50)])
-def test_a_film_is_small_and_a_streams_has_fewer_pictures_a_second(
-    name: str, delay: int, tmp_path: Path
-) -> None:
+def test_a_film_is_small_and_a_streams_has_fewer_pictures_a_second(name, delay, tmp_path):
     few = scene.load(name, overrides=["stream.count=4"] if name == "stream" else ())
     path = animate(simulate(few), tmp_path / "lesson.gif")
     with Image.open(path) as gif:
@@ -772,7 +757,7 @@ def test_a_film_is_small_and_a_streams_has_fewer_pictures_a_second(
     assert path.stat().st_size < 200_000
 
 
-def written(pictures: list[NDArray[np.uint8]], delays: list[int]) -> bytes:
+def written(pictures, delays):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "written.gif"
         write_gif(path, map(Image.fromarray, pictures), delays)
@@ -781,7 +766,7 @@ def written(pictures: list[NDArray[np.uint8]], delays: list[int]) -> bytes:
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.integers(1, 30), st.integers(2, 5))
 @settings(max_examples=20)
-def test_any_pictures_come_back_from_the_file(seed: int, w: int, h: int, count: int) -> None:
+def test_any_pictures_come_back_from_the_file(seed, w, h, count):
     draw = np.random.default_rng(seed)
     table = np.array([list(bytes.fromhex(colour[1:])) for colour in palette()], np.uint8)
     pictures = [draw.integers(0, len(table), (h, w))]
@@ -799,7 +784,7 @@ def test_any_pictures_come_back_from_the_file(seed: int, w: int, h: int, count: 
             np.testing.assert_array_equal(np.asarray(gif.convert("RGB")), picture)
 
 
-def test_only_what_changed_is_in_a_frame_and_what_stays_is_one_frame() -> None:
+def test_only_what_changed_is_in_a_frame_and_what_stays_is_one_frame():
     white = np.full((20, 30, 3), 255, dtype=np.uint8)
     dotted = white.copy()
     dotted[7:9, 11:14] = 0
@@ -811,14 +796,12 @@ def test_only_what_changed_is_in_a_frame_and_what_stays_is_one_frame() -> None:
     ]
 
 
-def test_failure_leaves_the_old_file_and_nothing_else(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_failure_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
     path = tmp_path / "lesson.gif"
     path.write_text("old")
     drawn = Stage.frame
 
-    def breaks(self: Stage, index: int) -> Any:
+    def breaks(self, index):
         if index == 7:
             raise RuntimeError("planted")
         return drawn(self, index)
@@ -830,19 +813,11 @@ def test_failure_leaves_the_old_file_and_nothing_else(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_the_same_recording_gives_the_same_file(tmp_path: Path) -> None:
-    files = [
-        animate(by_hand(), tmp_path / f"{i}.gif", fps=5, slow=1.0, width=400, height=225)
-        for i in (1, 2)
-    ]
-    assert files[0].read_bytes() == files[1].read_bytes()
-
-
 # Videos
 
 
 @pytest.mark.parametrize("kind", video.VIDEOS)
-def test_video_shows_the_stage_at_its_rate(kind: str, tmp_path: Path) -> None:
+def test_video_shows_the_stage_at_its_rate(kind, tmp_path):
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
     recording = by_hand()
     path = animate(recording, tmp_path / f"lesson.{kind}", fps=10, slow=1.0, width=320, height=180)
@@ -863,7 +838,7 @@ def test_video_shows_the_stage_at_its_rate(kind: str, tmp_path: Path) -> None:
         assert np.abs(shown - np.asarray(stage.frame(index))).mean() < 4.0
 
 
-def test_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(video, "find_spec", lambda _name: None)
     with pytest.raises(VideoError, match=r'pip install "chutelab\[video\]"'):
         animate(by_hand(), tmp_path / "lesson.mp4")
@@ -881,37 +856,10 @@ def test_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 # The command line
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--out", "out", "--format", "avi"], "'avi' is not one of 'gif', 'mp4', 'webm'"),
-        (["--format", "mp4"], "give --out too"),
-        (["--out", "out", "--only", "png", "--format", "gif"], "add gif to --only"),
-    ],
-)
-def test_impossible_formats_are_refused(
-    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(main, ["run", "perpendicular", *arguments])
-    assert result.exit_code == 2
-    assert said in " ".join(result.output.split())
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("arguments", "files"),
-    [
-        (["--only", "json,gif", "--format", "mp4"], ["lesson.mp4", "summary.json"]),
-        (["--only", "webm,strobe", "--format", "gif"], ["lesson.gif", "strobe.png"]),
-    ],
-)
-def test_films_and_the_still_can_be_chosen(
-    arguments: list[str], files: list[str], tmp_path: Path
-) -> None:
-    if "lesson.mp4" in files:
-        pytest.importorskip("imageio_ffmpeg")
-    out = tmp_path / "out"
+def test_films_and_the_still_can_be_chosen(tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    arguments = ["--only", "json,gif,strobe", "--format", "mp4"]
+    files, out = ["lesson.mp4", "strobe.png", "summary.json"], tmp_path / "out"
     result = CliRunner().invoke(main, ["run", "perpendicular", "--out", str(out), *arguments])
     assert result.exit_code == 0, result.output
     assert all(name in result.output.partition("wrote into")[2] for name in files)

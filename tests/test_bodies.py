@@ -1,7 +1,5 @@
 """Particles of any size to scale, turned as they are; streams by colour; strings."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import combinations
 
@@ -9,12 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from chutelab.machine import Machine
 from chutelab.machine.parts import Thread
 from chutelab.pictures.plots import Window, draw_scene, draw_tracks, overlay, style
 from chutelab.pictures.plots.machinery import (
@@ -24,25 +20,24 @@ from chutelab.pictures.plots.machinery import (
     strings,
 )
 from chutelab.pictures.plots.scenery import energies, places
-from chutelab.results import Recording
 from handmade import Line, machine_of, recording_of
 
 FLOOR = Line("floor", (-1.0, 0.0), (1.0, 0.0))
 BOX = np.array([(-0.02, -0.05), (0.02, -0.05), (0.02, 0.05), (-0.02, 0.05)])
 
 
-def still(place: tuple[float, float], end: float = 1.0) -> list[tuple[float, ...]]:
+def still(place, end=1.0):
     return [(0.0, *place, 0.0, 0.0, 0.0), (end, *place, 0.0, 0.0, 0.0)]
 
 
-def view(machine: Machine) -> Axes:
+def view(machine):
     figure = Figure(figsize=(7.0, 5.0))
     FigureCanvasAgg(figure)
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     return draw_scene(ax, machine, Window(-0.7, 0.7, -0.4, 0.6))
 
 
-def many(count: int, ended: str = "settled", at: float = 1.0) -> Recording:
+def many(count, ended="settled", at=1.0):
     spots = [(0.02 * (i % 30) - 0.3, 0.02 * (i // 30) + 0.01) for i in range(count)]
     machine = replace(machine_of(FLOOR, at=spots, radius=0.008), interact=True)
     return recording_of(machine, *(still(spot, at) for spot in spots), ended=ended)
@@ -55,9 +50,7 @@ def many(count: int, ended: str = "settled", at: float = 1.0) -> Recording:
     st.lists(st.tuples(st.floats(0.01, 0.5), st.floats(-30.0, 30.0)), min_size=2, max_size=8),
     st.floats(0.0, 1.0),
 )
-def test_angles_are_the_integral_of_the_angular_velocity(
-    knots: list[tuple[float, float]], share: float
-) -> None:
+def test_angles_are_the_integral_of_the_angular_velocity(knots, share):
     t = np.cumsum([step for step, _ in knots])
     omega = np.array([w for _, w in knots])
     rows = [(a, 0.0, 0.5, 0.0, 0.0, w) for a, w in zip(t, omega, strict=True)]
@@ -74,7 +67,7 @@ def test_angles_are_the_integral_of_the_angular_velocity(
     assert angles == pytest.approx([7.0 * now, integral], rel=1e-9, abs=1e-9)
 
 
-def test_an_angle_that_is_told_counts_more_than_the_sum_of_the_spin() -> None:
+def test_an_angle_that_is_told_counts_more_than_the_sum_of_the_spin():
     """0.3 rad more than ω = 1/s makes of the second interval, 2 s long: 0.15 rad by its middle."""
     rows = [(0, 0, 0.5, 0, 0, 1), (1, 0, 0.5, 0, 0, 1), (3, 0, 0.5, 0, 0, 1)]
     machine = machine_of(FLOOR, radius=0.054, outlines=(BOX,))
@@ -83,7 +76,7 @@ def test_an_angle_that_is_told_counts_more_than_the_sum_of_the_spin() -> None:
     assert angle == pytest.approx([0.5, 1.0, 2.15, 3.3, 3.3], abs=1e-5)
 
 
-def test_a_spin_that_an_impact_changes_turns_at_once_with_the_new_one() -> None:
+def test_a_spin_that_an_impact_changes_turns_at_once_with_the_new_one():
     rows = [
         (0, 0, 0.5, 0, 0, 2),
         (1, 0, 0.5, 0, 0, 2),
@@ -96,7 +89,7 @@ def test_a_spin_that_an_impact_changes_turns_at_once_with_the_new_one() -> None:
     assert np.isnan(angle[4])
 
 
-def test_a_box_is_drawn_turned_counterclockwise() -> None:
+def test_a_box_is_drawn_turned_counterclockwise():
     machine = machine_of(FLOOR, at=[(0.1, 0.3)], radius=0.054, outlines=(BOX,))
     # By π/2 in 1 s: what was its upper right corner is its upper left one.
     rows = [(0, 0.1, 0.3, 0, 0, np.pi / 2), (1, 0.1, 0.3, 0, 0, np.pi / 2)]
@@ -114,7 +107,7 @@ def test_a_box_is_drawn_turned_counterclockwise() -> None:
 # Streams
 
 
-def seen_by(colour: str, matrix: np.ndarray) -> np.ndarray:
+def seen_by(colour, matrix):
     """Return a colour's L*, a* and b* (CIE 1976, D65) as a dichromat sees it."""
     rgb = np.array(to_rgb(colour))
     linear = np.where(rgb > 0.04045, ((rgb + 0.055) / 1.055) ** 2.4, rgb / 12.92)
@@ -139,19 +132,19 @@ EYES = {
 
 
 @pytest.mark.parametrize("eyes", EYES)
-def test_streams_and_particle_0_can_be_told_apart_by_all_eyes(eyes: str) -> None:
+def test_streams_and_particle_0_can_be_told_apart_by_all_eyes(eyes):
     colours = [seen_by(colour, EYES[eyes]) for colour in (*stream_colours(5), style.STRIKE)]
     for one, other in combinations(colours, 2):
         # 2.3 is a just noticeable difference.
         assert np.hypot.reduce(one - other) > 12.0
 
 
-def test_ten_streams_have_ten_colours() -> None:
+def test_ten_streams_have_ten_colours():
     assert len(set(stream_colours(10))) == 10
     assert stream_colours(1) == [style.STREAM]
 
 
-def test_tracks_and_particles_have_the_colours_of_their_streams_and_a_legend_names_them() -> None:
+def test_tracks_and_particles_have_the_colours_of_their_streams_and_a_legend_names_them():
     spots = [(-0.2, 0.3), (0.0, 0.3), (0.2, 0.3)]
     machine = machine_of(FLOOR, at=spots, stream=[0, 0, 1], streams=("coarse", "fine"))
     recording = recording_of(machine, *map(still, spots))
@@ -163,14 +156,14 @@ def test_tracks_and_particles_have_the_colours_of_their_streams_and_a_legend_nam
     named = {
         text.get_text(): handle.get_color()
         for text, handle in zip(legend.get_texts(), legend.legend_handles, strict=True)
-    }  # type: ignore[union-attr]
+    }
     assert (named["coarse"], named["fine"]) == (first, second)
 
 
 # Strings
 
 
-def test_a_taut_string_is_straight_and_a_slack_one_sags() -> None:
+def test_a_taut_string_is_straight_and_a_slack_one_sags():
     machine = machine_of(FLOOR, at=[(0.0, 0.5), (0.2, 0.5)])
     threads = (Thread((0.0, 0.8), 0, 0.3), Thread((0.2, 0.8), 1, 0.5))
     recording = recording_of(
@@ -189,7 +182,7 @@ def test_a_taut_string_is_straight_and_a_slack_one_sags() -> None:
 # Many
 
 
-def test_of_many_those_that_lie_stay_to_be_seen() -> None:
+def test_of_many_those_that_lie_stay_to_be_seen():
     recording = many(90)
     particles = np.arange(90)
     assert np.isfinite(places(recording, particles, np.array([0.5, 3.0]))).all()
@@ -197,20 +190,20 @@ def test_of_many_those_that_lie_stay_to_be_seen() -> None:
     assert not np.isfinite(places(many(20), particles[:20], np.array([3.0]))).any()
 
 
-def test_the_overlay_of_many_shows_all_of_them_at_four_moments() -> None:
+def test_the_overlay_of_many_shows_all_of_them_at_four_moments():
     figure = overlay(many(90))
     small = [ax for ax in figure.axes if any(text.get_gid() == "moment" for text in ax.texts)]
     assert [ax.texts[0].get_text() for ax in small] == ["0 s", "0.333 s", "0.667 s", "1 s"]
     for ax in (figure.axes[0], *small):
         (crowd,) = [line for line in ax.lines if line.get_gid() == "stream stream"]
-        assert len(crowd.get_xdata()) == 90  # type: ignore[arg-type]
+        assert len(crowd.get_xdata()) == 90
     (tracks,) = figure.axes[0].collections
     assert len(tracks.get_paths()) == 12
     gids = {line.get_gid() for line in figure.axes[0].lines}
     assert not gids & {"track", "strobe", "impacts"}
 
 
-def test_potential_energy_of_different_masses_can_be_stacked() -> None:
+def test_potential_energy_of_different_masses_can_be_stacked():
     spots = [(0.0, 0.5), (0.2, 0.3)]
     machine = machine_of(FLOOR, at=spots)
     machine = replace(machine, particle=replace(machine.particle, mass=np.array([0.2, 0.7])))

@@ -1,7 +1,5 @@
 """Scenes of all parts, each broken in one place: refused by the command, with file and key."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """The lessons as web pages: whole, relative, readable by everybody."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

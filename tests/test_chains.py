@@ -1,7 +1,5 @@
 """Random chains and bowls: nothing passes anything, no energy from nowhere, engines agree."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, sin
 

@@ -19,9 +19,7 @@ from click.testing import CliRunner
 from PIL import Image
 
 import chutelab
-from broken import BROKEN
 from chutelab import scene as sc
-from chutelab.checks.agreement import BLOWS
 from chutelab.cli import console, main
 from test_summary import TOP
 
@@ -137,17 +135,18 @@ def test_a_changed_machine_does_not_go_by_the_bare_title():
 def test_settings_change_the_run():
     found = json.loads(call("run", "perpendicular", "--json", "--set", "plate.distance=0.3").stdout)
     assert found["impact"]["x"] == [pytest.approx(0.3937, rel=1e-15, abs=0.0)]
-    plain_steps = "--set", "run.align=false"
-    arguments = ("run", "perpendicular", "--json", "--engine", "pymunk", *plain_steps)
-    coarse = json.loads(call(*arguments).stdout)
-    fine = json.loads(call(*arguments, "--dt", "2e-4").stdout)
-    assert coarse["engine"] == fine["engine"] == "pymunk"
-    assert fine["steps"] > 2.5 * coarse["steps"]
     # An option is the setting of its name.
-    settings = ["--set", "run.engine=pymunk", "--set", "run.dt=0.0002"]
-    again = json.loads(call("run", "perpendicular", "--json", *settings, *plain_steps).stdout)
-    for result in (fine, again):
-        del result["seconds"]
+    words = ("run", "perpendicular", "--json", "--set", "run.align=false")
+    coarse, fine, again = (
+        json.loads(call(*words, *more).stdout) | {"seconds": 0.0}
+        for more in (
+            ("--engine", "pymunk"),
+            ("--engine", "pymunk", "--dt", "4e-4"),
+            ("--set", "run.engine=pymunk", "--set", "run.dt=0.0004"),
+        )
+    )
+    assert fine["engine"] == "pymunk"
+    assert fine["steps"] > 2 * coarse["steps"]
     assert again == fine
 
 
@@ -181,16 +180,6 @@ def test_the_papers_energy_and_power_are_marked_and_the_true_power_is_beside_the
     assert "Energy ledger until the landing, J" in call("run", "perpendicular").stdout
     timed = call("run", "perpendicular", "--set", "run.until=0.7").stdout
     assert "Energy ledger until t = 0.7 s, J" in timed
-
-
-def test_a_run_of_a_stream_tells_the_spread_of_the_landings():
-    bed = Path(__file__).parent.parent / "lessons" / "07-a-stream" / "bed.toml"
-    said = " ".join(call("run", bed, "--out", "out", "--only", "csv").output.split())
-    with Path("out/events.csv").open(encoding="utf-8") as file:
-        places = [float(row["x"]) for row in csv.DictReader(file) if row["kind"] == "landing"]
-    mean, spread = np.mean(places), np.std(places)
-    assert f"{len(places)} landed: touched the belt itself" in said
-    assert f"landing.x, m {mean:.6g} {spread:.6g}" in said
 
 
 @pytest.mark.parametrize(
@@ -293,16 +282,9 @@ def test_a_table_of_very_many_events_is_written_if_it_is_asked_for(monkeypatch):
     assert len(Path("out/events.csv").read_text(encoding="utf-8").splitlines()) == 5
 
 
-@pytest.mark.parametrize(
-    ("only", "files"),
-    [
-        (["json,csv"], ["events.csv", "trajectory.csv", "summary.json"]),
-        (["json", "npz,csv"], ["events.csv", "trajectory.csv", "recording.npz", "summary.json"]),
-        (["png"], ["overlay.png"]),
-    ],
-)
-def test_a_run_says_what_it_wrote_and_only_chooses(only, files):
-    chosen = [word for names in only for word in ("--only", names)]
+def test_a_run_says_what_it_wrote_and_only_chooses():
+    chosen = ["--only", "json", "--only", "npz,csv"]
+    files = ["events.csv", "trajectory.csv", "recording.npz", "summary.json"]
     text = call("run", "perpendicular", "--out", "out", *chosen).stdout
     assert f"wrote into out: {', '.join(files)}\n" in text
     assert {path.name for path in Path("out").iterdir()} == set(files)
@@ -368,6 +350,9 @@ def test_a_destination_that_cannot_be_is_refused_before_the_run(monkeypatch):
         (["--accuracy", "5 parsecs"], "'5 parsecs': must be"),
         (["--accuracy", "1e-30", "--out", "out"], "'1e-30': must be"),
         (["--frames", "3"], "No such option"),
+        (["--out", "out", "--format", "avi"], "'avi' is not one of 'gif', 'mp4', 'webm'"),
+        (["--format", "mp4"], "give --out too"),
+        (["--out", "out", "--only", "png", "--format", "gif"], "add gif to --only"),
         *((["--max-seconds", seconds], "--max-seconds") for seconds in ("0", "nan", "inf", "soon")),
         (["--max-seconds", "1", "--accuracy", "1mm"], "--accuracy"),
     ],
@@ -378,31 +363,6 @@ def test_bad_options_are_refused(arguments, says):
 
 
 # what goes wrong
-
-
-@pytest.mark.parametrize("case", list(BROKEN)[::20])
-def test_a_broken_scene_ends_with_2_and_names_file_and_key(case):
-    text, keys, _ = BROKEN[case]
-    Path("broken.toml").write_text(text, encoding="utf-8")
-    said = refused("run", "broken.toml", "--out", "out")
-    assert said.startswith("Error: broken.toml: ")
-    for key in keys:
-        assert key in said
-
-
-@pytest.mark.parametrize(
-    ("content", "says"),
-    [
-        (b"", "The scene is empty"),
-        (b"[incoming\nspeed = 2", "line 1, column 10"),
-    ],
-)
-def test_rubbish_ends_with_2_and_names_the_file(content, says):
-    Path("rubbish.toml").write_bytes(content)
-    for command in (["run", "--json"], ["run", "--out", "out"], ["check"]):
-        said = refused(*command, "rubbish.toml")
-        assert said.startswith("Error: rubbish.toml: ")
-        assert says in said
 
 
 def test_no_such_scene_and_a_folder_end_with_2():
@@ -641,19 +601,8 @@ def test_check_warns_and_says_what_to_change():
     assert said["warning"] == "outgoing: it crosses the drive pulley"
     assert said["change"] == "outgoing.drop = 0.223"
     (found,) = json.loads(call(*arguments, "--json").stdout)["scenes"]
-    assert list(found) == [
-        "scene",
-        "title",
-        "built",
-        "skipped",
-        "engine",
-        "why",
-        "ends",
-        "stepping",
-        "effort",
-        "theory",
-        "advice",
-    ]
+    keys = "scene title built skipped engine why ends stepping effort theory advice"
+    assert " ".join(found) == keys
     assert found["advice"][-1:] == [{**said, "settings": {"outgoing.drop": 0.223}}]
     settings = ["run.engine=pymunk", "run.align=false", "run.dt=0.01"]
     text = call("check", "perpendicular", *(f"--set={setting}" for setting in settings)).stdout
@@ -733,17 +682,6 @@ def test_show_prints_the_summary_of_the_run_and_makes_its_files_again():
     assert Path("again/trajectory.csv").read_text(encoding="utf-8").startswith("t,particle,x,y")
 
 
-def test_show_refuses_what_is_no_recording():
-    Path("rubbish.npz").write_bytes(b"PK\3\4 rubbish")
-    Path("empty.npz").write_bytes(b"")
-    np.savez("other.npz", a=np.zeros(3))
-    Path("folder").mkdir()
-    for name in ("rubbish.npz", "empty.npz", "other.npz", "folder", "nowhere.npz"):
-        said = refused("show", name, "--out", "out")
-        assert said.startswith(f"Error: {name}: ")
-        assert said.count("\n") == 1
-
-
 def test_show_says_what_was_probably_meant():
     said = refused("show", "perpendicular")
     advice = "show takes a recording.npz; for a scene: chutelab run "
@@ -782,13 +720,6 @@ def test_verify_finds_what_is_expected_and_the_answers_in_agreement():
     assert max(map(len, text.splitlines())) <= 80
 
 
-def test_verify_ends_with_1_when_answers_differ(monkeypatch):
-    monkeypatch.setitem(BLOWS, "exact", 0.0)
-    text = call("verify", "perpendicular", code=1).stdout
-    assert text.count("FAILED") == 1
-    assert text.endswith("1 outside the tolerance\n")
-
-
 def test_verify_ends_with_1_when_a_scene_shows_something_else():
     text = sc.shipped()["perpendicular-fast"].read_text(encoding="utf-8")
     Path("other.toml").write_text(text.replace("value = 0.61", "value = 0.62"), encoding="utf-8")
@@ -803,16 +734,13 @@ def test_verify_ends_with_1_when_a_scene_shows_something_else():
     assert found["failures"] == 4
     other, inclined = found["scenes"]
     assert list(other) == ["scene", "title", "expectations", "agreement", "skipped"]
-    assert list(other["expectations"][0]) == [
-        "quantity", "unit", "source", "engine", "expected", "simulated", "error", "tolerance",
-        "relative", "holds",
-    ]  # fmt: skip
+    keys = "quantity unit source engine expected simulated error tolerance relative holds"
+    assert " ".join(other["expectations"][0]) == keys
     wrong = [row for row in other["expectations"] if not row["holds"]]
     assert [(row["quantity"], row["expected"]) for row in wrong] == [("d3", 0.62)] * 4
     assert all(row["holds"] for row in inclined["expectations"])
-    assert list(inclined["agreement"][0]) == [
-        *("pair", "quantity", "difference", "tolerance", "least", "holds")
-    ]
+    keys = "pair quantity difference tolerance least holds"
+    assert " ".join(inclined["agreement"][0]) == keys
 
 
 def test_verify_says_what_cannot_be_compared():
@@ -823,8 +751,7 @@ def test_verify_says_what_cannot_be_compared():
     )
     assert "pymunk: left out: more than 0 with run.engine" in call("verify", "point.toml").stdout
     assert "nowhere: no such file" in refused("verify", "nowhere")
-    text = call("verify", "stream-independent", "free-fall").stdout
-    assert "\npymunk is left out: 10000 particles that do not meet" in text
+    text = call("verify", "free-fall").stdout
     assert "exact - theory: outside the model: there is no incoming conveyor" in text
 
 
@@ -871,13 +798,9 @@ def test_shells_complete_scenes_and_kinds():
         }
         code = "from chutelab.cli import main; main(prog_name='chutelab')"
         return subprocess.run(
-            [sys.executable, "-c", code],
-            env={**os.environ, "PYTHONPATH": SOURCES, **env},
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=60,
-        ).stdout.split()
+            [sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": SOURCES, **env},
+            capture_output=True, text=True, check=False, timeout=60,
+        ).stdout.split()  # fmt: skip
 
     expected = ["plain,perpendicular", "plain,perpendicular-fast", "file,perp"]
     assert sorted(completed("run", "perp")) == sorted(expected)

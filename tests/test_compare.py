@@ -1,7 +1,5 @@
 """Simulated against theory: quantities from the events, errors from their scales."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import acos, cos, hypot, isnan, nan, pi, radians, sin
 

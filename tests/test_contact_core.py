@@ -1,9 +1,6 @@
 """The contact engine in the core, through its arrays: what no scene file can ask for."""
 
-from __future__ import annotations
-
 import hashlib
-import os
 import shutil
 import subprocess
 import sys
@@ -286,55 +283,51 @@ def test_the_host_knows_the_statuses_of_the_core():
 
 
 START = """
+import os, sys
 from chutelab import simulate
 from chutelab.core import module
-kept = module._kept((module.files("chutelab.core") / "core.wasm").read_bytes())
-print(kept, float(simulate("perpendicular", engine="contact").knots["position"].sum()).hex())
+for cache in sys.argv[1:]:
+    os.environ["XDG_CACHE_HOME"] = cache
+    module._compiled.cache_clear()
+    module._idle.clear()
+    kept = module._kept((module.files("chutelab.core") / "core.wasm").read_bytes())
+    print(kept, float(simulate("perpendicular", engine="contact").knots["position"].sum()).hex())
 """
 
 
-@pytest.fixture(scope="module")
-def cached(tmp_path_factory):
-    """A folder of caches with the compiled core, and what a run gives."""
-    cache = tmp_path_factory.mktemp("whole") / "cache"
-    kept, result = started(cache)
-    assert kept.parent.parent == cache
-    return cache, kept, result
-
-
-def started(cache):
+def started(*caches):
+    """Start a process that runs with a cache after the other; where the core is kept, results."""
     done = subprocess.run(
-        [sys.executable, "-c", START], env={**os.environ, "XDG_CACHE_HOME": str(cache)},
-        capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
+        [sys.executable, "-c", START, *map(str, caches)], capture_output=True, text=True, timeout=60
+    )
     assert (done.returncode, done.stderr) == (0, "")
-    kept, result = done.stdout.split()
-    return Path(kept), result
+    kept, results = zip(*(line.rsplit(" ", 1) for line in done.stdout.splitlines()), strict=True)
+    return [Path(one) for one in kept], results
 
 
-@pytest.mark.parametrize(
-    "spoil", ["missing", "cut off", "damaged", "foreign", "another's", "no folder"]
-)
-def test_a_compiled_core_that_is_kept_costs_only_time(cached, tmp_path, spoil):
+def test_a_compiled_core_that_is_kept_costs_only_time(tmp_path):
     """What is loaded is machine code: a wrong byte in it once ended Python with a crash."""
-    cache, whole, result = cached
-    shutil.copytree(cache, tmp_path / "cache")
-    kept = tmp_path / "cache" / whole.relative_to(cache)
-    good = kept.read_bytes()
-    if spoil == "missing":
-        kept.unlink()
-    elif spoil == "cut off":
-        kept.write_bytes(good[:1000])
-    elif spoil == "damaged":
-        kept.write_bytes(good[:150_000] + bytes([good[150_000] ^ 255]) + good[150_001:])
-    elif spoil == "foreign":
-        code = good[32:].replace(b"wasmtime", b"wastetim")
-        kept.write_bytes(hashlib.sha256(code).digest() + code)
-    elif spoil == "another's":
-        kept.chmod(0o666)
-    else:
-        shutil.rmtree(tmp_path / "cache")
-        (tmp_path / "cache").write_text("a file")
-    assert started(tmp_path / "cache")[1] == result
-    if spoil not in ("another's", "no folder"):
-        assert kept.read_bytes() == good
+    (whole,), (result,) = started(tmp_path / "whole")
+    assert whole.parent.parent == tmp_path / "whole"
+    good = whole.read_bytes()
+    foreign = good[32:].replace(b"wasmtime", b"wastetim")
+    spoilt = {
+        "missing": None,
+        "cut off": good[:1000],
+        "damaged": good[:150_000] + bytes([good[150_000] ^ 255]) + good[150_001:],
+        "foreign": hashlib.sha256(foreign).digest() + foreign,
+        "another's": good,
+    }
+    for name, found in spoilt.items():
+        kept = tmp_path / name / whole.relative_to(tmp_path / "whole")
+        kept.parent.mkdir(parents=True, mode=0o700)
+        if found is not None:
+            kept.write_bytes(found)
+        if name == "another's":
+            kept.chmod(0o666)
+    (tmp_path / "no folder").write_text("a file")
+    kept, results = started(*(tmp_path / name for name in (*spoilt, "no folder")))
+    assert set(results) == {result}
+    for one in kept[:-1]:
+        assert one.read_bytes() == good
+        assert not one.stat().st_mode & 0o022

@@ -1,7 +1,5 @@
 """The contact engine where friction locks, and where what lay on a surface parts from it."""
 
-from __future__ import annotations
-
 from math import cos, pi, radians, sin, sqrt
 
 import numpy as np

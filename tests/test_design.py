@@ -1,7 +1,5 @@
 """Solving, optimising and propagating uncertainties, against closed forms written here."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
@@ -18,13 +16,11 @@ from scipy.stats import norm
 import chutelab
 import typed as design
 from chutelab import scene
-from chutelab.classroom.book import Book
-from chutelab.classroom.exercises import lesson
 from chutelab.cli import main
 from chutelab.cli.studies import uncertain
 from chutelab.pictures.plots.studies import draw_scan, scan, spread
 from chutelab.studies.design import roots
-from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, suits, target
+from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, target
 from chutelab.studies.design.uncertainty import as_dict, indices, sampled, spreads
 from chutelab.util.errors import InputError
 
@@ -148,16 +144,6 @@ def test_all_of_several_roots_are_reported(vx, points, off):
     # The picture is of the one next to ε = 0.5.
     assert found.answer.values[0] == min(found.points[:, 0], key=lambda x: abs(x - 0.5))
     assert ("2 solutions" in repr(found)) is (len(expected) == 2)
-
-
-def test_no_root_says_so_and_shows_the_nearest():
-    found = design.solve(inclined(), "plate.restitution=0:1", "landing.vx=5", points=11)
-    assert not found.solved
-    assert found.points.shape == (0, 1)
-    # Without bounce it keeps most.
-    assert found.nearest.values == (0.0,)
-    assert found.nearest.found[0] == pytest.approx(forward(TILT, 0.0, d1=R + 0.1))
-    assert "No solution in the range" in repr(found)
 
 
 def test_a_jump_over_the_target_is_no_root():
@@ -309,15 +295,6 @@ def _has(given, name):
     return True
 
 
-def test_streams_and_released_particles_run_one_by_one():
-    given = machine()
-    keys, quantities = ["plate.restitution"], [measured(given, "landing.x")]
-    assert suits(given, keys, quantities)
-    assert not suits(given, keys, [measured(given, "contacts")])
-    assert not suits(given, ["stream.at[0]"], quantities)
-    assert not suits(chutelab.load("stream"), keys, quantities)
-
-
 def test_units_and_sides_of_a_target():
     given = machine()
     run = chutelab.simulate(given)
@@ -366,8 +343,8 @@ BAD = [
 @pytest.mark.parametrize(("arguments", "said"), BAD)
 def test_bad_questions_are_refused_before_anything_runs(arguments, said, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("chutelab.studies.design.evaluation.judged", None)
-    monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.judged", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.run", None)
     result = CliRunner().invoke(main, [*SOLVE, *arguments, "--out", "out"])
     assert result.exit_code == 2, result.output
     assert said in " ".join(result.output.split())
@@ -568,23 +545,10 @@ def test_uniform_and_relative_spreads():
     ],
 )
 def test_bad_uncertainties_are_refused_before_anything_runs(given, said, monkeypatch):
-    monkeypatch.setattr("chutelab.studies.design.evaluation.judged", None)
-    monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.judged", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.run", None)
     with pytest.raises(InputError, match=said):
         design.uncertainty(machine(), given)
-
-
-def test_restitution_dominates_and_the_picture_says_so(tmp_path):
-    given = ["restitution=0.5±0.05", "plate.distance=±5mm", "outgoing.drop=±5mm"]
-    found = design.uncertainty(machine(), given, samples=128)
-    assert found.quantities == ("landing.x", "belt_work")
-    assert "All samples touch plate, outgoing." in repr(found)
-    assert all(indices.first[0] > 0.8 for indices in found.indices)
-    figure = spread(found)
-    figure.write(tmp_path / "spread.png")
-    titles = [ax.get_title(loc="left") for ax in figure.axes]
-    assert titles.count("against plate.restitution") == 2
-    assert (tmp_path / "spread.png").stat().st_size > 10_000
 
 
 def propagate(folder, given, *options, code=0):
@@ -628,35 +592,14 @@ def test_sweep_writes_samples_and_picture_of_uncertainties(tmp_path):
     ],
 )
 def test_sweep_refuses_uncertainties_before_it_runs(given, options, said, monkeypatch, tmp_path):
-    monkeypatch.setattr("chutelab.studies.design.evaluation.judged", None)
-    monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.judged", None)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.run", None)
     monkeypatch.chdir(tmp_path)
     assert said in propagate(tmp_path, given, *options, code=2).stderr
 
 
-LESSON = Path(__file__).parent.parent / "lessons" / "09-design"
-
-
-def test_a_search_answers_the_exercise_of_lesson_9():
-    """On the machine that the notebook makes of a student's numbers."""
-    told = json.loads((LESSON / "exercise.ipynb").read_text(encoding="utf-8"))
-    (made,) = [cell for cell in told["cells"] if "machine = " in "".join(cell["source"])]
-    task = lesson("design", "Ada")
-    names = {"book": Book("design"), "task": task}
-    exec("".join(made["source"]), names)
-    down = design.solve(names["machine"], "plate.angle_deg=5:60", "landing.vx=0")
-    assert task.check(1, down.answer.values[0]).right
-    assert "e-1" not in repr(down)
-    lining = design.solve(names["machine"], "plate.restitution=0.1:0.95", "landing.vx=0")
-    assert task.check(2, lining.answer.values[0]).right
-    price = f"belt_work={task.given.paid / 1000}"
-    assert task.check(
-        3, design.solve(names["machine"], "plate.angle_deg=5:60", price).points[0]
-    ).right
-
-
 def test_the_minimum_in_the_readme_is_inside_its_range():
-    text = (LESSON.parents[1] / "README.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
     line = re.search(
         r"^chutelab solve (\S+) --vary (\S+=(\d+):(\d+)) --minimize belt_work$", text, re.MULTILINE
     )

@@ -1,7 +1,6 @@
 """The documentation site: whole, strict, and readable on a phone, in the dark, without network."""
 
-from __future__ import annotations
-
+import json
 import re
 import subprocess
 import sys
@@ -90,7 +89,15 @@ def test_the_chapters_are_there(site):
         page = Page(site / "lessons" / lesson.parent.name / "index.html")
         assert "page.html" in page.parts
     assert "adhesion" in Page(site / "docs" / "physics.html").text
-    for name in ("start", "tour", "accuracy", "CONTRIBUTING", "CODE_OF_CONDUCT", "SECURITY"):
+    assert "live/inclined-20.html" in Page(site / "index.html").parts
+    said = (site / "keys.html").read_text(encoding="utf-8")
+    tables = json.loads((site / "scene.schema.json").read_text(encoding="utf-8"))["$defs"]
+    for key in {key for table in tables.values() for key in table["properties"]}:
+        assert f'<span class="pre">{key}</span>' in said, key
+    for name in (
+        *("start", "tour", "accuracy", "CONTRIBUTING", "CODE_OF_CONDUCT", "SECURITY"),
+        *("docs/first-machine", "docs/teachers", "docs/engineers"),
+    ):
         assert (site / f"{name}.html").is_file()
 
 

@@ -1,10 +1,7 @@
 """What air drag would do, against solutions in closed form, small-drag theory and SciPy."""
 
-from __future__ import annotations
-
 import json
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,8 +19,8 @@ G = 9.81
 AIR, VISCOSITY = 1.2, 1.8e-5
 
 
-def scene(**tables: Any) -> Any:
-    base: dict[str, Any] = {
+def scene(**tables):
+    base = {
         "incoming": {"speed": 2.0, "pulley_radius": 0.1},
         "plate": {"distance": 0.5},
         "outgoing": {"drop": 0.5},
@@ -33,10 +30,10 @@ def scene(**tables: Any) -> Any:
     return from_dict(base, "test")
 
 
-def by_scipy(found: Any, *, r: float, m: float, eps: float, alpha: float) -> tuple[float, float]:
+def by_scipy(found, *, r, m, eps, alpha):
     """Height of the impact on the plate and x of the landing, with drag by Schiller and Naumann."""
 
-    def rate(_: float, y: Any) -> list[float]:
+    def rate(_, y):
         v = math.hypot(y[2], y[3])
         re = AIR * v * 2 * r / VISCOSITY
         cd = 0.44 if re >= 1000 else 24 / re * (1 + 0.15 * re**0.687)
@@ -45,7 +42,7 @@ def by_scipy(found: Any, *, r: float, m: float, eps: float, alpha: float) -> tup
 
     n = np.array([-math.cos(alpha), -math.sin(alpha)])
 
-    def plate(_: float, y: Any) -> float:
+    def plate(_, y):
         return float((np.asarray(y[:2]) - [0.6, 0.1]) @ n - r)
 
     rho = 0.1 + r
@@ -54,7 +51,7 @@ def by_scipy(found: Any, *, r: float, m: float, eps: float, alpha: float) -> tup
     hit = start + np.array([found.x2, -found.y2])
     level = hit[1] - 0.5
 
-    def leg(place: Any, v: Any, event: Any) -> Any:
+    def leg(place, v, event):
         event.terminal, event.direction = True, -1.0
         run = solve_ivp(
             rate, (0.0, 9.0), [*place, *v], events=event, method="DOP853", rtol=1e-12, atol=1e-14
@@ -70,7 +67,7 @@ def by_scipy(found: Any, *, r: float, m: float, eps: float, alpha: float) -> tup
 
 @pytest.mark.parametrize("degrees", [-15.0, 0.0, 12.0])
 @pytest.mark.parametrize("r", [0.02, 0.004, 0.0006])
-def test_the_shifts_against_scipy(r: float, degrees: float) -> None:
+def test_the_shifts_against_scipy(r, degrees):
     m = 2650.0 * 4.0 / 3.0 * math.pi * r**3
     plate = {"angle_deg": degrees, "below": 2.0}
     one = scene(particle={"radius": r, "mass": m}, plate=plate)
@@ -85,7 +82,7 @@ def test_the_shifts_against_scipy(r: float, degrees: float) -> None:
     assert told.arrives
 
 
-def test_the_coefficient_of_a_sphere() -> None:
+def test_the_coefficient_of_a_sphere():
     assert drag_coefficient(1e-6) * 1e-6 == pytest.approx(24.0, rel=1e-4)  # Stokes
     assert drag_coefficient(1.0) == pytest.approx(24.0 * 1.15)
     assert drag_coefficient(100.0) == pytest.approx(0.24 * (1.0 + 0.15 * 100.0**0.687))
@@ -94,7 +91,7 @@ def test_the_coefficient_of_a_sphere() -> None:
     assert math.isinf(drag_coefficient(0.0))
 
 
-def test_the_share_of_the_weight() -> None:
+def test_the_share_of_the_weight():
     r, m, v = 0.01, 0.011, 5.0
     one = scene(particle={"radius": r, "mass": m})
     told = drag(one, predict(one), v)
@@ -118,7 +115,7 @@ def test_the_share_of_the_weight() -> None:
     assert f"would be a deceleration of {slowed:.2g} m/s² at" in str(told)
 
 
-def test_air_keeps_dust_from_the_plate() -> None:
+def test_air_keeps_dust_from_the_plate():
     for r in (5e-5, 1e-6):
         one = scene(particle={"radius": r, "mass": 2650.0 * 4 / 3 * math.pi * r**3})
         told = drag(one, predict(one), 0.0)
@@ -129,7 +126,7 @@ def test_air_keeps_dust_from_the_plate() -> None:
         assert "keep particle 0 from getting there" in str(told)
 
 
-def test_summary_report_and_check_tell_it() -> None:
+def test_summary_report_and_check_tell_it():
     one = scene()
     told = summary(simulate(one))["drag"]
     assert told["speed"] == pytest.approx(float(predict(one).v3), rel=1e-12)
@@ -151,7 +148,7 @@ def test_summary_report_and_check_tell_it() -> None:
     assert parts["air"].startswith(f"its drag {would}")
 
 
-def test_without_a_closed_form_only_the_share_is_told() -> None:
+def test_without_a_closed_form_only_the_share_is_told():
     free = from_dict(
         {"stream": {"at": [0.0, 1.0], "velocity": [3.0, 0.0]}, "run": {"until": 0.25}}, "test"
     )

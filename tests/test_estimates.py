@@ -3,8 +3,6 @@
 Thorough and slow; what it prints (`-s`) are the figures that the README tells.
 """
 
-from __future__ import annotations
-
 import sys
 from time import process_time
 

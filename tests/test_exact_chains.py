@@ -1,7 +1,5 @@
 """The event-driven engine on chains and in bowls: rims met again, joints of three pieces."""
 
-from __future__ import annotations
-
 from math import pi, sqrt
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The event-driven engine on inclined belts, gates and mixtures, against laws written here."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import acos, cos, hypot, pi, radians, sin, sqrt
 
@@ -10,10 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chutelab.engines import contact, exact, reference
-from chutelab.engines.simulation import simulate
 from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
-from chutelab.scene import SceneError, from_dict
 from machines import bent, face, gated, nominal, of_sizes, scene_of, thrown
 
 G, WHEEL, RADIUS = 9.81, 0.3, 0.02
@@ -84,17 +80,6 @@ def test_a_rising_belt_lets_go_where_its_equation_of_motion_says(
 
 
 # Kinds of particles
-
-
-def test_a_scene_with_points_beside_disks_is_refused_by_its_key():
-    kinds = [{"name": "a", "radius": 0.0}, {"name": "b", "radius": 0.01}]
-    streams = [
-        {"particle": "a", "at": [0.0, 1.0], "velocity": [0.0, 0.0]},
-        {"name": "two", "particle": "b", "at": [0.3, 1.0], "velocity": [0.0, 0.0]},
-    ]
-    tables = {"particle": kinds, "surface": [FAR], "stream": streams, "run": {"until": 1.0}}
-    with pytest.raises(SceneError, match=r"particle\[0\]\.radius = 0\.0: .*points beside disks"):
-        simulate(from_dict(tables))
 
 
 def test_a_sphere_rolls_down_with_five_sevenths_and_a_disk_with_two_thirds():

@@ -1,7 +1,5 @@
 """Exercises: numbers from a name, answers from theory, each mistake told from the others."""
 
-from __future__ import annotations
-
 import gc
 import json
 import re

@@ -11,7 +11,7 @@ from chutelab.classroom.lessons import find, scene_of
 from chutelab.classroom.lessons.texts import without_tex
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
-from chutelab.results import Kind
+from chutelab.results import Kind, Recording
 from chutelab.scene import from_dict
 
 SEEDS = range(10)
@@ -44,14 +44,10 @@ def flow(recording):
     return 0.5 * recording.count / (last - first)
 
 
-@pytest.fixture(scope="module")
-def emptied():
-    return bin_of(0.036)
-
-
-def test_the_summary_says_when_the_quarters_had_fallen_out(emptied):
-    path = find(10).folder / "slot.toml"
-    said = " ".join(CliRunner().invoke(main, ["run", str(path)]).output.split())
+def test_disks_run_as_fast_to_the_end_and_the_summary_says_when_quarters_fell_out(tmp_path):
+    told = ["run", str(find(10).folder / "slot.toml"), "--out", str(tmp_path), "--only", "npz"]
+    said = " ".join(CliRunner().invoke(main, told).output.split())
+    emptied = Recording.load(tmp_path / "recording.npz")
     found = re.search(
         r"(\d+) fell out of the machine: a quarter by ([\d.]+) s, half by ([\d.]+) s, three"
         r" quarters by ([\d.]+) s, the last at ([\d.]+) s\.",
@@ -61,11 +57,7 @@ def test_the_summary_says_when_the_quarters_had_fallen_out(emptied):
     assert int(found[1]) == emptied.count == 240
     ends = np.sort(emptied.select(Kind.EXIT)["t"])
     assert times == pytest.approx([*quarters(emptied), ends[-1]], abs=5.001e-4)
-    alone = CliRunner().invoke(main, ["run", "free-fall"]).output
-    assert "fell out" not in alone
-
-
-def test_disks_run_as_fast_to_the_end(emptied):
+    assert "fell out" not in CliRunner().invoke(main, ["run", "free-fall"]).output
     first, half, last = quarters(emptied)
     # A tank of water, whose level falls by as much, would take (√¾ - √½) / (√½ - √¼) for them.
     water = (0.5**0.5 - 0.25**0.5) / (0.75**0.5 - 0.5**0.5)

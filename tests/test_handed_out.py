@@ -20,7 +20,7 @@ from chutelab.classroom.exercises.exercise import draw, shown
 from chutelab.classroom.lessons import find, scene_of, shipped_lessons
 from chutelab.classroom.lessons.pages import bundle
 from chutelab.classroom.lessons.sheets import printed
-from chutelab.classroom.lessons.texts import without_tex, words_for
+from chutelab.classroom.lessons.texts import without_tex
 from chutelab.engines.simulation import judged
 from chutelab.pictures.animation.moments import ASK, asked, film, slowness, span
 from chutelab.pictures.animation.stage import lay_out, palette
@@ -151,16 +151,6 @@ def test_no_number_of_the_answer_is_on_the_lessons_page(number, web):
         rf'<li class="card">\s*<a href="{lesson.folder.name}/.*?</li>', index, re.DOTALL
     )
     assert given_away(number, seen(card)) == set()
-
-
-def test_no_number_of_the_answer_is_in_titles_and_words_for_pictures(number):
-    lesson = find(number)
-    said = [lesson.title, lesson.question, words_for("machine.png", lesson.text("README"))]
-    said += [words_for("lesson.gif", lesson.text("explanation"))]
-    said += [scene_of(lesson, name).title for name in lesson.scenes]
-    said += [scene_of(lesson, lesson.picture.scene, lesson.picture.set).title]
-    assert all(said)
-    assert given_away(number, "\n".join(said)) == set()
 
 
 def first_part(path):

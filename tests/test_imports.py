@@ -16,17 +16,27 @@ import chutelab
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
 PICTURES = {"matplotlib", "imageio", "PIL"}
-EVERYTHING = PICTURES | {"numpy", "pydantic", "pymunk", "wasmtime", "scipy", "rich", "click"}
+EVERYTHING = PICTURES | {
+    "matplotlib.pyplot",
+    "numpy",
+    "pydantic",
+    "pymunk",
+    "wasmtime",
+    "scipy",
+    "rich",
+    "click",
+}
 
 WATCH = """
 import json, sys
 from chutelab.cli import main
-try:
-    main(sys.argv[1:])
-except SystemExit as end:
-    assert end.code == 0, end.code
-loaded = sorted(name for name in {everything!r} if name in sys.modules)
-print("LOADED " + json.dumps(loaded), file=sys.stderr)
+for words in json.loads(sys.argv[1]):
+    try:
+        main(words.split())
+    except SystemExit as end:
+        assert end.code == 0, end.code
+    loaded = sorted(name for name in {everything!r} if name in sys.modules)
+    print("LOADED " + json.dumps(loaded), file=sys.stderr)
 """
 
 
@@ -43,55 +53,41 @@ def python(*arguments, cwd=None):
     )
 
 
-def loaded_by(*arguments, cwd=None):
+def loaded_by(*commands, cwd=None):
+    """Return what is loaded after each of some commands, one after the other in one process."""
     watch = WATCH.format(everything=sorted(EVERYTHING))
-    done = python("-c", watch, *arguments, cwd=cwd)
-    return set(json.loads(done.stderr.rpartition("LOADED ")[2]))
+    done = python("-c", watch, json.dumps(commands), cwd=cwd)
+    return [set(json.loads(found)) for found in re.findall("^LOADED (.*)", done.stderr, re.M)]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "needed"),
-    [
-        (["--help"], {"click"}),
-        (["--version"], {"click"}),
-        (["run", "--help"], {"click"}),
-        (["scenes", "--json"], {"click", "pydantic"}),
-        (["materials", "coal", "--json"], {"click", "pydantic"}),
-        (["schema"], {"click", "pydantic"}),
-        (["new", "-"], {"click", "pydantic"}),
-        (["check", "perpendicular"], {"click", "pydantic", "numpy", "rich", "wasmtime"}),
-        (["tables", "4", "--json"], {"click", "numpy"}),
-        (["run", "perpendicular", "--json"], {"click", "pydantic", "numpy", "wasmtime"}),
-        (["run", "perpendicular", "--quiet"], {"click", "pydantic", "numpy", "wasmtime"}),
-        (["run", "perpendicular"], {"click", "pydantic", "numpy", "rich", "wasmtime"}),
-        (
-            ["run", "perpendicular", "--json", "--engine", "pymunk"],
-            {"click", "pydantic", "numpy", "pymunk", "wasmtime"},
-        ),
-        (
-            ["run", "perpendicular", "--json", "--engine", "contact"],
-            {"click", "pydantic", "numpy", "wasmtime"},
-        ),
-        (
-            ["run", "stream", "--json", "--set", "stream.count=3"],
-            {"click", "pydantic", "numpy", "wasmtime"},
-        ),
-        (["check", "stream"], {"click", "pydantic", "numpy", "rich", "wasmtime"}),
-        (
-            ["run", "perpendicular", "--json", "--out", "out", "--only", "csv,npz,json"],
-            {"click", "pydantic", "numpy", "wasmtime"},
-        ),
-    ],
-    ids=lambda words: " ".join(sorted(words) if isinstance(words, set) else words),
-)
-def test_a_command_loads_what_it_needs_and_nothing_else(arguments, needed, tmp_path):
-    assert loaded_by(*arguments, cwd=tmp_path) == needed
+SCENES = {"click", "pydantic"}
+RUNS = SCENES | {"numpy", "wasmtime"}
+CHAINS = [
+    {
+        "--help": {"click"}, "--version": {"click"}, "run --help": {"click"},
+        "scenes --json": SCENES, "materials coal --json": SCENES, "schema": SCENES, "new -": SCENES,
+        "run perpendicular --json": RUNS, "run perpendicular --quiet": RUNS,
+        "run perpendicular --json --engine contact": RUNS,
+        "run stream --json --set stream.count=3": RUNS,
+        "run perpendicular --json --out out --only csv,npz,json": RUNS,
+        "run perpendicular --json --engine pymunk": RUNS | {"pymunk"},
+    },
+    {"tables 4 --json": {"click", "numpy"}, "run perpendicular": RUNS | {"rich"},
+     "check perpendicular": RUNS | {"rich"}, "check stream": RUNS | {"rich"}},
+]  # fmt: skip
+"""Commands, each of which needs all that those before it do, and what is loaded after it."""
 
 
-def test_a_picture_loads_no_engine(tmp_path):
-    loaded = loaded_by("run", "perpendicular", "-q", "--out", "out", "--only", "png", cwd=tmp_path)
+@pytest.mark.parametrize("chain", CHAINS)
+def test_a_command_loads_what_it_needs_and_nothing_else(chain, tmp_path):
+    found = loaded_by(*chain, cwd=tmp_path)
+    assert dict(zip(chain, found, strict=True)) == chain
+
+
+def test_pictures_load_no_engine_and_no_pyplot(tmp_path):
+    (loaded,) = loaded_by("run perpendicular -q --out out --only png,gif", cwd=tmp_path)
     assert "matplotlib" in loaded
-    assert not loaded & {"pymunk", "scipy", "rich"}
+    assert not loaded & {"pymunk", "scipy", "rich", "matplotlib.pyplot"}
 
 
 def test_importing_the_package_loads_nothing():

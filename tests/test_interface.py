@@ -21,19 +21,16 @@ PEG = {"center": [0.0, 0.0], "radius": 0.01}
 FUNCTIONS = {
     "simulate": lambda scene: chutelab.simulate(scene).measure("landing.x"),
     "predict": lambda scene: float(theory.predict(scene).x3),
-    "solve": lambda scene: chutelab.solve(
-        scene, {"plate.restitution": (0.1, 0.9)}, {"landing.vx": -0.6}, points=5
-    ).answer.values[0],
-    "minimize": lambda scene: design.minimize(
-        scene, {"plate.restitution": (0.1, 0.9)}, "dEk", points=5
-    ).answer.values[0],
-    "sweep": lambda scene: (
-        chutelab.sweep(scene, {"plate.restitution": [0.2, 0.4]}).columns["landing.x.mean"].sum()
-    ),
+    "solve": lambda scene: chutelab.solve(scene, {"plate.restitution": (0.1, 0.9)},
+     {"landing.vx": -0.6}, points=5).answer.values[0],
+    "minimize": lambda scene: design.minimize(scene, {"plate.restitution": (0.1, 0.9)}, "dEk",
+     points=5).answer.values[0],
+    "sweep": lambda scene: (chutelab.sweep(scene, {"plate.restitution": [0.2,
+     0.4]}).columns["landing.x.mean"].sum()),
     "preflight": lambda scene: preflight(scene).effort.contacts,
     "value": lambda scene: design.value(scene, "landing.x"),
     "load": lambda scene: chutelab.load(scene).gravity,
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -1,7 +1,6 @@
 """Laws that no scene may break: random machines of free surfaces, any particle."""
 
-from itertools import pairwise
-from math import inf
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -21,9 +20,9 @@ points = st.tuples(unit, unit)
 
 
 @st.composite
-def soups(draw, *, belts=True):
+def soups(draw):
     """A particle thrown into up to five surfaces with random ends, materials and belts."""
-    surfaces = []
+    surfaces, belts = [], draw(st.booleans())
     for n in range(draw(st.integers(1, 5))):
         corners = draw(st.lists(points, min_size=2, max_size=3, unique=True))
         assume(all(np.hypot(*np.subtract(a, b)) > 0.05 for a, b in pairwise(corners)))
@@ -33,7 +32,7 @@ def soups(draw, *, belts=True):
                 "points": [list(c) for c in corners],
                 "restitution": draw(st.sampled_from([0.0, 0.3, 0.8, 1.0])),
                 "friction": draw(st.sampled_from([0.0, 0.1, 0.6, 5.0])),
-                "speed": draw(st.sampled_from([0.0, 0.0, 1.5, -0.7])) if belts else 0.0,
+                "speed": draw(st.sampled_from([0.0, 1.5, -0.7])) if belts else 0.0,
             }
         )
     spin = draw(st.booleans())
@@ -70,7 +69,7 @@ def most(recording):
 
 fuzz = settings(
     deadline=None,
-    max_examples=80,
+    max_examples=120,
     suppress_health_check=list(HealthCheck),
     phases=[Phase.generate],
 )
@@ -78,57 +77,22 @@ fuzz = settings(
 
 @fuzz
 @given(soups())
-def test_the_ledger_closes_and_nothing_is_nan(soup):
-    _, recording = run(soup)
-    books = ledger(recording)
+def test_a_lone_particle_keeps_the_laws(soup):
+    """Numbers are finite, the ledger closes, only belts raise energy, and nothing is passed."""
+    built, recording = run(soup)
+    books, track = ledger(recording), recording.track(0)
     assert np.isfinite(recording.knots["position"]).all()
     assert abs(books.residual) <= most(recording)
     assert books.restitution_loss >= 0.0
     assert books.friction_loss >= 0.0
-
-
-@fuzz
-@given(soups(belts=False))
-def test_energy_never_rises_without_a_belt(soup):
-    _, recording = run(soup)
-    track = recording.track(0)
-    total = np.sum(recording.energies(track), axis=0)
-    assert (np.diff(total) <= 1e-12 * max(np.abs(total).max(), 1e-3)).all()
-
-
-@fuzz
-@given(soups())
-def test_nobody_passes_through_a_surface(soup):
-    built, recording = run(soup)
-    start = np.array(soup["stream"]["at"])
-    assume(gaps(built, start).min() > 0.0)
-    track = recording.track(0)
-    times = np.linspace(track["t"][0], track["t"][-1], 400)
-    position, _ = recording.at(times)
-    # Round an end the Hermite curve is off by ρ Δφ⁴/384 < 1e-9 ρ.
-    worst = min(gaps(built, p).min() for p in position[:, 0])
-    assert worst >= -1e-9 * max(1.0, built.particle.radius)
-
-
-@fuzz
-@given(soups())
-def test_the_mirror_image_moves_as_the_mirror_image(soup):
-    mirrored = {
-        **soup,
-        "surface": [{**s, "points": [[-x, y] for x, y in s["points"]]} for s in soup["surface"]],
-        "stream": {
-            "at": [-soup["stream"]["at"][0], soup["stream"]["at"][1]],
-            "velocity": [-soup["stream"]["velocity"][0], soup["stream"]["velocity"][1]],
-        },
-    }
-    _, one = run(soup)
-    _, other = run(mirrored)
-    # A bounce magnifies rounding; compare up to the fifth contact.
-    limit = min((r.events["t"][5] if len(r.events) > 5 else inf) for r in (one, other))
-    times = np.linspace(0.0, min(limit * (1.0 - 1e-9), one.track(0)["t"][-1]), 50)
-    p, q = one.at(times)[0], other.at(times)[0]
-    assert np.nanmax(np.abs(p * [-1, 1] - q), initial=0.0) < 1e-9
-    assert np.isnan(p).sum() == np.isnan(q).sum()
+    if not built.segments.speed.any():
+        total = np.sum(recording.energies(track), axis=0)
+        assert (np.diff(total) <= 1e-12 * max(np.abs(total).max(), 1e-3)).all()
+    if gaps(built, np.array(soup["stream"]["at"])).min() > 0.0:
+        position, _ = recording.at(np.linspace(track["t"][0], track["t"][-1], 400))
+        # Round an end the Hermite curve is off by ρ Δφ⁴/384 < 1e-9 ρ.
+        worst = min(gaps(built, p).min() for p in position[:, 0])
+        assert worst >= -1e-9 * max(1.0, built.particle.radius)
 
 
 @fuzz
@@ -210,8 +174,14 @@ def assert_repeats(given, engine):
     np.testing.assert_array_equal(slow.ended, fast.ended)
 
 
-@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
-@pytest.mark.parametrize("which", ["perpendicular", "slip", "free-fall", 4, 14, 28])
+@pytest.mark.parametrize(
+    ("which", "engine"),
+    [
+        *product(["perpendicular", "slip", "free-fall", 4, 14, 28], ["exact", "contact"]),
+        *product(["perpendicular", "free-fall", 14], ["pymunk"]),
+        *(pytest.param(which, "pymunk", marks=pytest.mark.slow) for which in ("slip", 4, 28)),
+    ],
+)
 def test_twice_as_fast_under_four_times_the_gravity(which, engine):
     given = scene.load(which) if isinstance(which, str) else draw(which)
     assert_repeats(given, engine)

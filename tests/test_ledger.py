@@ -72,14 +72,6 @@ def test_a_wrong_end_velocity_moves_the_residual_by_its_kinetic_energy(spins):
     assert set(asdict(true)) - same == {"kinetic", "residual"}
 
 
-def test_a_wrong_entry_moves_the_residual_as_well():
-    recording = shipped("perpendicular")
-    knots = recording.knots.copy()
-    knots["entries"][-1] += (0.0, 0.0, 1e-3)
-    moved = ledger(replace(recording, knots=knots)).residual - ledger(recording).residual
-    assert moved == pytest.approx(1e-3, rel=1e-12, abs=0.0)
-
-
 def test_nothing_turned_over_is_no_error():
     empty = Ledger((0.0, 0.0), (1.0, 1.0), 0.0, 0.0, 0.0, 0.0, 0.0, {}, {})
     assert empty.relative_residual == 0.0

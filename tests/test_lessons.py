@@ -59,7 +59,7 @@ CONTROLS = {
     0: ("surface.table.restitution", "gravity"),
     1: ("incoming.speed", "outgoing.drop"),
     2: ("incoming.speed",),
-    3: ("plate.restitution", "incoming.speed"),
+    3: ("plate.restitution", "incoming.speed", "incoming.pulley_radius", "outgoing.drop"),
     4: ("plate.angle_deg",),
     5: ("outgoing.speed", "outgoing.friction"),
     6: ("incoming.friction",),

@@ -32,7 +32,7 @@ def test_it_writes_one_file_with_the_scene_in_it(tmp_path):
     path = tmp_path / "lab.html"
     said = call("inclined-40", "--set", "plate.distance=0.07", "-o", path).stdout
     assert said == f"wrote {path}, {path.stat().st_size / 1000:.0f} kB\n"
-    assert path.stat().st_size <= 400_000
+    assert path.stat().st_size <= 450_000
     found = data_of(path)
     assert found["scene"]["plate"]["distance"] == 0.07
     assert found["scene"]["title"].endswith("; with plate.distance=0.07")

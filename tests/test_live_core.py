@@ -30,6 +30,7 @@ def same_runs(scenes):
         assert parse(answer["toml"]) == scene, given
         job = engine.Job(module.Module(), build(scene))
         assert job.run(None) is None
+        job.drain()
         assert answer["state"] == "done"
         knots = np.concatenate(job.knots)
         ours = knots.view("<f8").reshape(-1, 10)[:, :9]

@@ -47,6 +47,9 @@ def runs():
 def test_both_bars_are_equally_long_at_any_time(runs, name):
     _, answer = runs[name]
     for at in answer["ledgers"]:
+        # A lone particle's residual is rounding, which is not shown.
+        if name in ("perpendicular", "inclined-40", "slip", "low-speed", "spoon"):
+            assert "residual" not in dict(at["putIn"] + at["isNow"]), at
         parts = [value for _, value in at["putIn"] + at["isNow"]]
         put_in, is_now = (sum(value for _, value in at[side]) for side in ("putIn", "isNow"))
         assert min(parts) >= 0.0
@@ -54,13 +57,6 @@ def test_both_bars_are_equally_long_at_any_time(runs, name):
         # Energy by its definition, whatever was put in.
         assert at["kinetic"] >= 0.0
         assert at["potential"] >= -1e-12
-
-
-@pytest.mark.parametrize("name", ["perpendicular", "inclined-40", "slip", "low-speed", "spoon"])
-def test_a_lone_particle_leaves_no_residual_and_none_is_shown(runs, name):
-    _, answer = runs[name]
-    for at in answer["ledgers"]:
-        assert "residual" not in dict(at["putIn"] + at["isNow"]), at
 
 
 def test_the_numbers_are_those_of_pythons_recordings(runs):

@@ -335,15 +335,6 @@ def test_uncertainties_cover_the_truth_as_often_as_they_say(scene, real, fits):
             assert low <= count <= high
 
 
-def test_points_without_noise_give_the_parameters_exactly(scene, real):
-    track = filmed(real, noise=0.0)
-    exact = measured.residuals(real, track).simulated
-    track = measured.Track("A", "<exact>", track.seconds, exact, track.lines)
-    fitted = measured.fit(scene, track, KEYS)
-    assert fitted.values == pytest.approx(TRUTH, abs=1e-9)
-    assert (fitted.errors < 1e-9).all()
-
-
 def test_finds_the_clock_from_anywhere(scene, real):
     track = filmed(real, begin=0.45, seed=3).placed(t0=-40.0)
     fitted = measured.fit(scene, track, [*KEYS, "t0"])
@@ -472,14 +463,6 @@ def run(*arguments):
 
 
 ARGUMENTS = ("perpendicular", "--data", "perpendicular-track")
-
-
-def test_prints_residuals():
-    result = run(*ARGUMENTS)
-    assert result.exit_code == 0
-    for said in ("65 of 69", "55.5 mm", "worst point", "lines 68 to 71"):
-        assert said in result.output
-    assert "Fit" not in result.output
 
 
 def test_advises_a_clock_that_fits():

@@ -78,16 +78,6 @@ def test_worksheet_and_notebook_ask_the_same(lesson):
     assert "Write a decimal point, 0.05" in cells["questions-text"]
 
 
-@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.name)
-def test_a_notebook_runs_the_scenes_that_the_worksheet_runs(lesson):
-    code = "\n".join(cells_of(lesson).values())
-    for block in re.findall(r"^```sh\n(.*?)^```", lesson.text("README"), re.MULTILINE | re.DOTALL):
-        for line in block.splitlines():
-            said = re.sub(r"^chutelab run | --out \S+", "", line)
-            if line.startswith("chutelab run "):
-                assert f'"{said}"' in code
-
-
 def test_a_new_lesson_has_a_notebook_too(tmp_path):
     folder = start(tmp_path / "my-lesson")
     cells = cells_of(read(folder))

@@ -36,27 +36,6 @@ def same(found, known):
     )
 
 
-def test_an_inclined_belt_and_a_sphere_are_transfers_with_these_numbers():
-    belt = {"incline_deg": -14.0, "friction": 0.3, "length": 0.4, "pulley_radius": 0.2}
-    ball = {"spin": True, "shape": "sphere"}
-    plate = {"distance": 0.3, "friction": 0.2, "pivot_height": 0.1}
-    shared = {
-        "speed": 2.0, "pulley_radius": 0.2, "distance": 0.3, "pivot_height": 0.1,
-        "plate_friction": 0.2, "particle_radius": 0.004, "spin": True, "inertia": 0.4,
-        "friction": 0.3, "incline": math.radians(-14.0), "interval": 0.005,
-        "unbounded_plate": False,
-    }  # fmt: skip
-    for stream, way in [({}, 0.4), ({"at": [-0.15, 0.0]}, None)]:
-        if way is None:
-            # 0.204 m over the belt's direction, 0.2 m before it meets the pulley.
-            cos, sin = math.cos(math.radians(-14.0)), math.sin(math.radians(-14.0))
-            stream, way = {"at": [-0.2 * cos - 0.204 * sin, -0.2 * sin + 0.204 * cos]}, 0.2
-        found = predict(scene(particle=ball, incoming=belt, plate=plate, stream=stream))
-        once = transfer(**shared, ride_length=way, drop=0.0)
-        sunk = 0.204 * (1.0 - math.cos(once.phi1)) + float(once.y2)
-        same(found, transfer(**shared, ride_length=way, drop=0.9 - sunk))
-
-
 @pytest.mark.parametrize(
     ("engine", "grip", "ball", "off"),
     [
@@ -68,10 +47,18 @@ def test_an_inclined_belt_and_a_sphere_are_transfers_with_these_numbers():
         ("pymunk", 0.3, {"spin": True, "shape": "sphere"}, 1e-5),
     ],
 )
-@pytest.mark.parametrize(("degrees", "speed"), [(-14.0, 1.0), (-14.0, 2.0), (8.0, 2.5)])
-def test_a_lone_rider_of_an_inclined_belt_on_the_engines(degrees, speed, engine, grip, ball, off):
+@pytest.mark.parametrize(
+    ("degrees", "speed", "way"), [(-14.0, 1.0, 0.4), (-14.0, 2.0, 0.2), (8.0, 2.5, 0.4)]
+)
+def test_a_lone_rider_of_an_inclined_belt_on_the_engines(
+    degrees, speed, way, engine, grip, ball, off
+):
+    """Put on the belt 0.4 m from its end, where it begins, or 0.2 m."""
+    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    place = {"at": [-way * cos - 0.104 * sin, -way * sin + 0.104 * cos]} if way < 0.4 else {}
     one = scene(
         particle=ball,
+        stream=place,
         incoming={"incline_deg": degrees, "speed": speed, "friction": grip, "length": 0.4},
         plate={"distance": 0.2, "friction": 0.2, "below": 9.0},
         outgoing={"drop": 0.5, "drop_from": "impact"},
@@ -122,12 +109,12 @@ GATE = "outside the model: wall: it is a gate"
          "outside the model: particles interact"),
         ({"incoming": {"incline_deg": 12.0, "pulley_radius": 0.4}},
          "early contact: pulley: the flight comes down"),
-        ({"incoming": {"incline_deg": 12.0, "pulley_radius": 0.4},
-          "surface": wall(center=[-0.05, 0.413], radius=0.01)}, "early contact: wall: it is"),
+        ({"incoming": {"incline_deg": 12.0, "pulley_radius": 0.4}, "surface": wall(center=[-0.05,
+         0.413], radius=0.01)}, "early contact: wall: it is"),
         ({"incoming": {"incline_deg": 30.0, "pulley_radius": 0.4, "speed": 1.0, "friction": 0.3}},
          "outside the model: it does not get up"),
-        ({"incoming": {"incline_deg": 10.0, "speed": 2.5},
-          "surface": wall(center=[-0.6, 0.04], radius=0.05)}, "early contact: wall: it is in the"),
+        ({"incoming": {"incline_deg": 10.0, "speed": 2.5}, "surface": wall(center=[-0.6, 0.04],
+         radius=0.05)}, "early contact: wall: it is in the"),
         ({"incoming": {"incline_deg": 10.0}, "stream": {"at": [-0.5, 0.104]}},
          "outside the model: the release point"),
     ],
@@ -152,11 +139,8 @@ def test_reasons(tables, reason):
 def test_the_first_particle_of_the_first_stream_is_of_its_own_kind():
     one = from_dict(
         {
-            "particle": [
-                {"name": "large", "radius": 0.03, "mass": 0.3},
-                {"name": "small", "radius": [0.002, 0.006], "mass": 0.01, "shape": "sphere",
-                 "spin": True},
-            ],
+            "particle": [{"name": "large", "radius": 0.03, "mass": 0.3}, {"name": "small",
+             "radius": [0.002, 0.006], "mass": 0.01, "shape": "sphere", "spin": True}],
             "pair": [{"between": ["small", "plate"], "restitution": 0.25, "friction": 0.1}],
             "incoming": {"speed": 2.0, "pulley_radius": 0.1},
             "plate": {"distance": 0.5},

@@ -315,46 +315,22 @@ def applied(name, overrides, advice):
 @pytest.mark.parametrize(
     ("name", "overrides", "warning", "key"),
     [
-        (
-            "perpendicular",
-            ("outgoing.drop=0.15", "outgoing.drop_from=top", "plate.below=0.45"),
-            "outgoing: it crosses the drive pulley",
-            "outgoing.drop",
-        ),
-        (
-            "perpendicular",
-            ("outgoing.drop=0.4", "outgoing.drop_from=top"),
-            "0.4259 m below the pivot, off the finite plate",
-            "outgoing.drop",
-        ),
-        (
-            "perpendicular",
-            ("outgoing.drop=1", "outgoing.drop_from=top", "plate.below=0.1"),
-            "off the finite plate",
-            "plate.below",
-        ),
-        (
-            "perpendicular",
-            ("plate.angle_deg=80", "outgoing.drop_from=top", "outgoing.drop=1"),
-            "never meets the plate's line",
-            "plate.angle_deg",
-        ),
-        ("perpendicular", ("plate.below=2",), "outgoing: it crosses plate", "plate.below"),
-        (
-            "free-fall",
-            ("surface.ramp.to=[0.5,-0.1]",),
-            "floor: it crosses ramp",
-            "surface.ramp.points",
-        ),
-        ("perpendicular", ("outgoing.length=0.1",), "misses the outgoing belt", "outgoing.length"),
-        (
-            "perpendicular",
-            ("outgoing.start=1", "outgoing.length=2"),
-            "misses the outgoing belt",
-            "outgoing.start",
-        ),
+        ("perpendicular", ("outgoing.drop=0.15", "outgoing.drop_from=top", "plate.below=0.45"),
+         "outgoing: it crosses the drive pulley", "outgoing.drop"),
+        ("perpendicular", ("outgoing.drop=0.4", "outgoing.drop_from=top"),
+         "0.4259 m below the pivot, off the finite plate", "outgoing.drop"),
+        ("perpendicular", ("outgoing.drop=1", "outgoing.drop_from=top", "plate.below=0.1"),
+         "off the finite plate", "plate.below"),
+        ("perpendicular", ("plate.angle_deg=80", "outgoing.drop_from=top", "outgoing.drop=1"),
+         "never meets the plate's line", "plate.angle_deg"),
+        ("perpendicular", ("plate.below=2", ), "outgoing: it crosses plate", "plate.below"),
+        ("free-fall", ("surface.ramp.to=[0.5,-0.1]", ), "floor: it crosses ramp",
+         "surface.ramp.points"),
+        ("perpendicular", ("outgoing.length=0.1", ), "misses the outgoing belt", "outgoing.length"),
+        ("perpendicular", ("outgoing.start=1", "outgoing.length=2"), "misses the outgoing belt",
+         "outgoing.start"),
     ],
-)
+)  # fmt: skip
 def test_a_setting_that_is_recommended_does_away_with_its_warning(name, overrides, warning, key):
     found = look(name, *overrides)
     (advice,) = [advice for advice in found.advice if warning in advice.warning]
@@ -407,7 +383,7 @@ def test_pymunk_for_what_exact_does_at_once_is_noticed():
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=() if name in (*LONE, "stream", "hopper") else pytest.mark.slow)
+        pytest.param(name, marks=() if name in (*LONE, "stream") else pytest.mark.slow)
         for name in sc.shipped()
     ],
 )
@@ -488,22 +464,16 @@ WALLS = {
     # y = 0.3 + 0.4 x, past both sides of the box.
     "slope": ("points = [[-0.1, 0.26], [1.1, 0.74]]", lambda x, y: y < 0.3 + 0.4 * x),
     # A corner of the box is cut off by two pieces.
-    "corner": (
-        "points = [[-0.1, 0.2], [0.3, 0.2], [0.3, -0.1]]", lambda x, y: (y < 0.2) & (x < 0.3)
-    ),
-    "arc": (
-        "center = [1.0, 0.0]\nradius = 0.4\nfrom_deg = 80\nto_deg = 190",
-        lambda x, y: (x - 1.0) ** 2 + y**2 < 0.4**2,
-    ),
+    "corner": ("points = [[-0.1, 0.2], [0.3, 0.2], [0.3, -0.1]]", lambda x,
+     y: (y < 0.2) & (x < 0.3)),
+    "arc": ("center = [1.0, 0.0]\nradius = 0.4\nfrom_deg = 80\nto_deg = 190", lambda x,
+     y: (x - 1.0) ** 2 + y**2 < 0.4**2),
     "ends within": ("points = [[-0.1, 0.5], [0.9, 0.5]]", lambda x, y: x < -1.0),
     # Surfaces are hollow: a wide peg is filled, too, a narrow one is not.
-    "wide peg": (
-        "center = [0.5, 0.3]\nradius = 0.2", lambda x, y: (x - 0.5) ** 2 + (y - 0.3) ** 2 < 0.2**2
-    ),
+    "wide peg": ("center = [0.5, 0.3]\nradius = 0.2", lambda x,
+     y: (x - 0.5) ** 2 + (y - 0.3) ** 2 < 0.2**2),
     "peg": ("center = [0.5, 0.3]\nradius = 0.015", lambda x, y: x < -1.0),
-    "bucket": (
-        "points = [[0.2, 0.8], [0.2, 0.3], [0.7, 0.3], [0.7, 0.8]]", lambda x, y: x < -1.0
-    ),
+    "bucket": ("points = [[0.2, 0.8], [0.2, 0.3], [0.7, 0.3], [0.7, 0.8]]", lambda x, y: x < -1.0),
     "beside": ("points = [[0.0, 1.0], [0.0, 0.0], [1.0, 0.0]]", lambda x, y: x < -1.0),
 }  # fmt: skip
 

@@ -242,16 +242,10 @@ def test_a_slide_heats_quadratically_and_costs_the_belt_linearly(count, belt):
     friction, fall, thrown_at, radius = 0.3, 0.2, 2.0, 0.004
     recording = made(
         {
-            "stream": {
-                "at": [0.0, radius + fall], "velocity": [thrown_at, 0.0],
-                "count": count, "rate": 100.0,
-            },
-            "surface": [
-                {
-                    "name": "floor", "from": [-5.0, 0.0], "to": [5.0, 0.0],
-                    "restitution": 0.0, "friction": friction, "speed": belt,
-                }
-            ],
+            "stream": {"at": [0.0, radius + fall], "velocity": [thrown_at, 0.0], "count": count,
+             "rate": 100.0},
+            "surface": [{"name": "floor", "from": [-5.0, 0.0], "to": [5.0, 0.0], "restitution": 0.0,
+             "friction": friction, "speed": belt}],
             "run": {"until": "settled"},
         }
     )  # fmt: skip

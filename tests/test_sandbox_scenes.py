@@ -1,5 +1,6 @@
 """The laws that the shipped scenes of piles and crowds show, measured on their recordings."""
 
+import re
 import subprocess
 import sys
 from math import comb, hypot
@@ -16,15 +17,6 @@ def last_places(recording):
     return recording.knots["position"][recording.offsets[1:] - 1]
 
 
-# Hopper.
-
-
-# Heap.
-
-
-# Galton board.
-
-
 def chi_squared(counts):
     """Return that of 13 bins against the binomial of 12 rows; three bins at each end are one."""
     expected = np.array([comb(12, k) for k in range(13)]) / 2.0**12 * counts.sum()
@@ -32,16 +24,14 @@ def chi_squared(counts):
     return ((pooled[0] - pooled[1]) ** 2 / pooled[1]).sum()
 
 
-def test_the_bins_of_the_galton_board_are_binomial():
-    recording = simulate(sc.load("galton"))
+@pytest.mark.parametrize("count", [150, pytest.param(500, marks=pytest.mark.slow)])
+def test_the_bins_of_the_galton_board_are_binomial(count):
+    recording = simulate(sc.load("galton", [f"stream.count={count}"]))
     x, y = last_places(recording).T
     bins = np.floor(x / 0.024 + 6.5).astype(int)
     assert (y < -0.2721).all(), "all are in the bins"
     # 9 classes, so 8 degrees of freedom: a fair board is above 20.09 once in a hundred times.
     assert chi_squared(np.bincount(bins, minlength=13)) < 20.09
-
-
-# Mixture.
 
 
 @pytest.mark.parametrize(
@@ -67,9 +57,6 @@ def test_who_falls_through_the_screen_is_smaller_than_its_gap(bar, small, large,
     assert through[fits].mean() > share
 
 
-# Gallery.
-
-
 def test_the_gallery_page_is_what_its_command_makes(tmp_path):
     root = Path(__file__).parents[1]
     command = [sys.executable, root / "tools" / "gallery.py", tmp_path, "--text"]
@@ -78,3 +65,14 @@ def test_the_gallery_page_is_what_its_command_makes(tmp_path):
     assert page == (root / "docs" / "gallery.md").read_bytes()
     pictures = {path.stem for path in (root / "docs" / "gallery").glob("*.png")}
     assert pictures == set(sc.shipped())
+
+
+@pytest.mark.parametrize("page", ["first-machine", "engineers"])
+def test_machines_of_the_docs_run_keep_the_laws_and_arrive(page):
+    text = (Path(__file__).parents[1] / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```toml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert blocks
+    for block in blocks:
+        recording = simulate(sc.parse(block))
+        assert recording.laws == ()
+        assert recording.summary()["fates"] == {"on outgoing": recording.count}

@@ -74,24 +74,6 @@ def test_a_disk_held_in_a_moving_corner_goes_to_contact_unless_exact_was_asked_f
         simulate(scene.from_dict(MOVING_CORNER, "mine.toml"), engine="exact")
 
 
-@pytest.mark.parametrize(
-    ("name", "overrides", "engine"),
-    [
-        ("perpendicular", (), "exact"),
-        ("belt-landing", ("particle.spin=true",), "exact"),
-        ("stream-independent", ("stream.count=300", "stream.seed=5"), "exact"),
-        ("perpendicular", (), "pymunk"),
-        ("perpendicular", (), "contact"),
-        ("stream", ("stream.count=5", "run.until=1.0"), "contact"),
-        ("stream", ("stream.count=5", "run.until=1.0"), "pymunk"),
-    ],
-)
-def test_the_same_scene_and_seed_give_the_same_bits(name, overrides, engine):
-    one, other = (simulate(loaded(name, *overrides), engine=engine) for _ in range(2))
-    assert same(one, other)
-    assert len(one.events) > 0
-
-
 @pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
 def test_progress_goes_from_0_to_1(engine):
     shares = []

@@ -131,19 +131,6 @@ def test_a_pendulum_from_the_side_takes_a_quarter_of_its_period():
             assert there.angle == pytest.approx(-np.pi / 2 + abs(start + np.pi / 2), rel=1e-12)
 
 
-def test_rest_where_friction_holds_and_where_it_does_not():
-    # On the slope of angle s in the hollow, θ = -π/2 - s, it slides if tan s > µ.
-    mu = 0.4
-    for tilt, reason in [(math.atan(mu) - 1e-6, "stops"), (math.atan(mu) + 1e-3, "")]:
-        start = -np.pi / 2 - tilt
-        found = slide(radius=1.0, start=start, end=start + 1e-4, friction=mu)
-        assert found.reason == reason
-        if reason:
-            assert found.time == pytest.approx(0.0, abs=1e-12)
-            assert found.angle == pytest.approx(start, abs=1e-12)
-            assert found.speed == 0.0
-
-
 @pytest.mark.parametrize(
     "changes",
     [{"radius": 0.0}, {"speed": -1.0}, {"friction": -0.1}, {"friction": np.inf}, {"end": 9.0},

@@ -1,5 +1,7 @@
 """A stream as a whole, against sums written here."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -18,6 +20,11 @@ from chutelab.scene import SceneError, from_dict, load
 from typed import sweep
 
 G = 9.81
+
+
+@cache
+def stream():
+    return simulate(load("stream"))
 
 
 def test_envelope_of_parabolas():
@@ -131,7 +138,7 @@ def connected(recording, t):
 @pytest.mark.parametrize("name", ["stream", pytest.param("jet", marks=pytest.mark.slow)])
 def test_all_that_ride_the_belt_have_arrived(name):
     """Counted at 400 instants: what is seen to lie there has arrived, and all have at the end."""
-    recording = simulate(load("stream")) if name == "stream" else simulate(crowded())
+    recording = stream() if name == "stream" else simulate(crowded())
     came = arrivals(recording)["t"]
     end = float(recording.knots["t"].max())
     seen = np.full(recording.count, np.inf)
@@ -264,7 +271,7 @@ def test_a_crowds_summary_leads_with_the_crowd():
     assert told.index("All particles") < told.index("Energy ledger")
     assert "Particle 0" not in told
     assert "200 of 200 arrived on the outgoing belt" in told
-    landed = np.unique(simulate("stream").select("landing")["particle"])
+    landed = np.unique(stream().select("landing")["particle"])
     assert 100 < len(landed) < 200, "the others came to lie on these"
     assert f"{len(landed)} landed: touched the belt itself" in told
     assert "in the simulated slice" in told
@@ -273,7 +280,7 @@ def test_a_crowds_summary_leads_with_the_crowd():
 
 
 def test_what_is_told_of_a_crowd_is_counted_from_its_arrivals():
-    recording = simulate(load("stream"))
+    recording = stream()
     told, came = summary(recording), arrivals(recording)
     x = came["position"][:, 0]
     assert told["arrival"]["x"] == x.tolist()
@@ -330,7 +337,7 @@ def test_a_sweep_misses_only_what_never_came_to_the_belt():
     swept = sweep(load("stream"), ["plate.restitution=0.5"])
     assert swept.columns["misses"][0] == 0.0
     assert swept.columns["reason"][0] == ""
-    assert swept.columns["arrival.x.mean"][0] == measure(simulate(load("stream")), "arrival.x.mean")
+    assert swept.columns["arrival.x.mean"][0] == measure(stream(), "arrival.x.mean")
     short = sweep(load("stream", ["outgoing.start=0.52"]), ["plate.restitution=0.5"])
     missed = int(short.columns["misses"][0])
     assert 0 < missed < 200

@@ -10,7 +10,6 @@ from chutelab import scene
 from chutelab.engines.simulation import simulate
 from chutelab.results import REASONS, Kind
 from chutelab.results.comparison import compare
-from chutelab.results.ledger import ledger
 from chutelab.results.summary import schema, summary
 
 TOP = [
@@ -98,20 +97,6 @@ def test_columns_hold_the_first_event_of_each_particle_or_null(name, overrides):
         assert found["ended"]["t"][particle] == (float(track["t"][-1]) if len(track) else None)
         reason = found["ended"]["reason"][particle]
         assert reason == REASONS[recording.ended[particle]]
-
-
-def test_numbers_are_those_of_recording_ledger_and_comparison():
-    recording = run("belt-landing")
-    found, books, compared = printed(recording), ledger(recording), compare(recording)
-    for key in ("engine", "seconds", "steps", "contacts"):
-        assert found[key] == getattr(recording, key)
-    assert found["scene"] == "Bouncing, sliding, carried off"
-    assert found["ledger"]["kinetic"] == list(books.kinetic)
-    assert found["ledger"]["potential"] == list(books.potential)
-    for key in LEDGER[2:]:
-        assert found["ledger"][key] == getattr(books, key)
-    assert found["error"] == {**compared.errors, "max": compared.max}
-    assert found["ended"]["reason"] == ["settled"]
 
 
 def test_where_theory_ends_it_says_null_and_why():

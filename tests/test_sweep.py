@@ -13,16 +13,13 @@ from chutelab.cli.studies import varied
 from chutelab.engines.exact import CornerError, run
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
-from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.scene import SceneError, load, parse
+from chutelab.scene import load, parse
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import with_unit
 from chutelab.scene.variants import (
     Family,
     Vary,
-    accepted,
-    quantity,
 )
 from chutelab.studies.sweep import (
     COLUMNS,
@@ -30,10 +27,9 @@ from chutelab.studies.sweep import (
     REASON,
     TEXTS,
     TOUCHES,
-    batch,
 )
-from chutelab.studies.sweep.batch import alone
-from chutelab.studies.sweep.rows import joined
+from chutelab.studies.sweep.plan import row_of
+from chutelab.studies.sweep.plan import swept as swept_block
 from chutelab.util.errors import InputError
 from typed import planned, sweep
 
@@ -119,8 +115,8 @@ free-fall | stream.count=1 | gravity=0,9.81 surface.ramp.restitution=0,0.5 surfa
 def test_rows_of_a_batch_are_those_of_single_runs(line):
     name, settings, varies = (part.split() for part in line.split("|"))
     block = block_of(load(*name, settings), varies)
-    singles = joined([alone(block, row) for row in range(len(block.values))])
-    assert_same(batch.swept(block), singles)
+    singles = swept_block(block, apart=True)
+    assert_same(swept_block(block), singles)
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))])
@@ -133,8 +129,8 @@ def test_samples_over_many_keys_are_single_runs(seed):
     ]  # fmt: skip
     scene = load("perpendicular", ["run.until=settled", "run.max_time=5.0"])
     block = block_of(scene, ranges, sample=60, seed=seed)
-    singles = joined([alone(block, row) for row in range(len(block.values))])
-    found = batch.swept(block)
+    singles = swept_block(block, apart=True)
+    found = swept_block(block)
     assert_same(found, singles)
     assert np.isfinite(found["landing.x.mean"]).sum() > 10
 
@@ -143,7 +139,7 @@ def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
     def never(*_):
         raise AssertionError("ran alone")
 
-    monkeypatch.setattr("chutelab.studies.sweep.batch.alone", never)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.alone", never)
     swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:50", "incoming.speed=0.5,2,4"])
     assert np.isfinite(swept.columns["landing.x.mean"]).sum() > 100
 
@@ -151,8 +147,8 @@ def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
 def test_surfaces_may_join_in_some_variants_only():
     scene = parse(JOINED)
     block = block_of(scene, ["outgoing.drop=0.3,0.5,0.6", "surface.ramp.friction=0:0.4:3"])
-    found = batch.swept(block)
-    singles = joined([alone(block, row) for row in range(len(block.values))])
+    found = swept_block(block)
+    singles = swept_block(block, apart=True)
     assert_same(found, singles)
     # Across the joint the particle slides onto the belt; beside it, it falls onto or under it.
     assert len(np.unique(found["landing.vy.mean"][[0, 3, 6]].round(6))) > 1
@@ -178,7 +174,7 @@ velocity = [0.0, 0.0]
 max_time = 2.0
 """
     block = block_of(parse(corner), ["surface.floor.speed=0:1:5", "surface.wall.restitution=0,0.3"])
-    singles = joined([alone(block, row) for row in range(len(block.values))])
+    singles = swept_block(block, apart=True)
     refused = []
 
     def watched(*given, **options):
@@ -188,42 +184,13 @@ max_time = 2.0
             refused.append(given[0].count)
             raise
 
-    monkeypatch.setattr("chutelab.studies.sweep.batch.run", watched)
-    assert_same(batch.swept(block), singles)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.run", watched)
+    assert_same(swept_block(block), singles)
     assert refused[0] == 10
     assert 1 <= refused.count(1) < 10
 
 
 # what a row holds --------------------------------------------------------------------------------
-
-
-def test_a_row_holds_what_the_run_shows():
-    swept = sweep(load("belt-landing"), ["plate.restitution=0.25,0.5", "stream.rate=100,200"])
-    for row in range(len(swept)):
-        restitution, rate = (float(swept.columns[key][row]) for key in swept.quantities)
-        scene = load(
-            "belt-landing", [f"plate.restitution={restitution}", f"stream.rate={int(rate)}"]
-        )
-        recording = simulate(scene)
-        books, (down,) = ledger(recording), recording.select(Kind.LANDING)
-        outgoing = books.by_surface["outgoing"]
-        expected = {
-            "landing.x.mean": down["position"][0], "landing.x.spread": 0.0,
-            "landing.y.mean": down["position"][1],
-            "landing.vx.mean": down["velocity_before"][0], "landing.vx.spread": 0.0,
-            "landing.vy.mean": down["velocity_before"][1], "landing.vy.spread": 0.0,
-            "landing.t.mean": down["t"], "track.t.mean": recording.knots["t"][-1],
-            "arrival.x.mean": down["position"][0], "arrival.x.spread": 0.0,
-            "arrival.vx.mean": down["velocity_before"][0], "arrival.vx.spread": 0.0,
-            PAID: outgoing["belt_work"], HEAT: outgoing["friction_loss"],
-            "ledger.restitution_loss": books.restitution_loss,
-            "ledger.power": outgoing["belt_work"] * rate,
-            "impact.count": 1.0, "misses": 0.0, "ledger.residual": books.residual,
-        }  # fmt: skip
-        assert {name: swept.columns[name][row] for name in expected} == expected
-        assert set(expected) | {"error.max"} == set(COLUMNS)
-        error = swept.columns["error.max"][row]
-        assert error == pytest.approx(compare(recording).max, abs=1e-15)
 
 
 def test_a_stream_has_means_and_spreads():
@@ -296,25 +263,13 @@ def test_a_run_that_gets_stuck_is_a_row(monkeypatch):
     def stuck(*_args, **_options):
         raise StalledError(0, 1.0, (0.0, 0.5), "it hangs")
 
-    monkeypatch.setattr("chutelab.studies.sweep.batch.judged", stuck)
-    monkeypatch.setattr("chutelab.studies.sweep.batch.run", stuck)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.judged", stuck)
+    monkeypatch.setattr("chutelab.studies.sweep.plan.run", stuck)
     reasons = sweep(load("perpendicular"), ["plate.restitution=0,1"]).columns[REASON]
     assert ["it hangs" in reason for reason in reasons] == [True, True]
 
 
 # validating many at once -------------------------------------------------------------------------
-
-
-def test_a_column_of_values_is_judged_as_each_by_itself():
-    values = np.array([-91.0, -90.0, -89.9, 0.0, 89.9, 90.0, 1e9])
-    judged = accepted("plate.angle_deg", values)
-    for value, good in zip(values.tolist(), judged.tolist(), strict=True):
-        try:
-            load("perpendicular", [f"plate.angle_deg={value}", "outgoing.drop_from=top"])
-            fine = True
-        except SceneError:
-            fine = False
-        assert good == fine
 
 
 DEPENDENT = """
@@ -414,21 +369,6 @@ def test_options_that_cannot_be_are_refused_before_anything_runs(options, allowe
     result = call("sweep", "perpendicular", "--vary", vary, *options, code=2)
     assert allowed in result.stderr
     assert not list(Path().iterdir())
-
-
-def test_units_are_read():
-    def read(text, ranges=False):
-        return varied([text], ranges=ranges)[0]
-
-    assert read("particle.mass=8g,1kg").values == (0.008, 1.0)
-    assert read("plate.distance=50cm,1m").values == (0.5, 1.0)
-    assert read("plate.restitution=0:50%:3").values == (0.0, 0.25, 0.5)
-    assert read("particle.mass=1kg:2kg", ranges=True).values == (1.0, 2.0)
-    scene = load("perpendicular")
-    for text in ("plate.angle_deg=0:60°:3", "particle.mass=1kg,2kg", "incoming.speed=20cm/s,1m/s"):
-        quantity(scene, read(text))
-    with pytest.raises(InputError, match="in kg, not in m"):
-        quantity(scene, read("particle.mass=1mm"))
 
 
 # grids and samples -------------------------------------------------------------------------------
@@ -554,7 +494,7 @@ def test_a_crowds_ways_are_told_from_a_fiftieth_on(edge, told):
     falling = "[stream]\ncount = 100\nat = [0.0, 0.0]\nto = [0.99, 0.0]\nvelocity = [0.0, 0.0]\n"
     particle, end = "[particle]\nradius = 0.001\n", "[run]\nuntil = 0.5\n"
     crowd = parse(particle + falling + floors + end)
-    assert batch.row_of(crowd)[TOUCHES].tolist() == [told]
+    assert row_of(crowd)[TOUCHES].tolist() == [told]
 
 
 def test_a_map_is_hatched_where_the_plate_is_missed():
@@ -575,13 +515,6 @@ def test_help_names_the_columns():
     said = " ".join(call("sweep", "--help").stdout.split())
     for name, row in COLUMNS.items():
         assert f"{name} {with_unit(row.meaning, row.unit)}" in said
-
-
-def test_a_sweep_shows_itself():
-    swept = sweep(load("perpendicular"), ["plate.angle_deg=0,80"])
-    assert "2 variants" in repr(swept)
-    assert "plate.angle_deg" in swept._repr_html_()
-    assert "never meets the plate" in repr(swept)
 
 
 def test_a_frame_has_the_columns():

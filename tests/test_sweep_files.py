@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chutelab.scene import load
 from chutelab.studies.sweep import COLUMNS, REASON, TEXTS, crew, planned, sweep, sweep_to
-from chutelab.studies.sweep.result import columns_of, text_of
+from chutelab.studies.sweep.rows import columns_of, text_of
 from chutelab.util.errors import InputError
 
 
@@ -50,6 +50,7 @@ def test_parquet_has_them_too():
             )
 
 
+@settings(max_examples=40)
 @given(st.lists(st.floats(), min_size=1, max_size=4), st.text(st.characters(codec="utf-8")))
 def test_text_gives_rows_back(numbers, words):
     reason = " ".join(words.split())

@@ -25,9 +25,9 @@ from typed import planned, sweep
 
 @pytest.fixture(scope="module")
 def stepped(tmp_path_factory):
-    """A sweep of 40 rows in blocks of one, and its file as this process writes it."""
+    """A sweep of 16 rows in blocks of one, and its file as this process writes it."""
     out = tmp_path_factory.mktemp("whole") / "rows.csv"
-    plan = planned(load("perpendicular"), ["plate.angle_deg=-20:20:40"], engine="pymunk")
+    plan = planned(load("perpendicular"), ["plate.angle_deg=-20:20:16"], engine="pymunk")
     with crew() as team:
         sweep_to(plan, out, team)
     return plan, out.read_bytes()

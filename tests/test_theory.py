@@ -5,50 +5,18 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from chutelab.scene import from_dict
 from chutelab.theory import STAGES, Reason, predict, transfer
 
 G = 9.81
+RNG = np.random.default_rng(7)
 SPEED = st.floats(0.3, 6.0)
 PULLEY = st.floats(0.03, 0.6)
 RADIUS = st.one_of(st.just(0.0), st.floats(1e-4, 0.02))
 DISTANCE = st.floats(0.1, 1.5)
 ANGLE = st.integers(-60_000, 60_000).map(lambda thousandths: thousandths / 1000.0)
 SHARE = st.floats(0.0, 1.0)
-
-
-def disk_or_point_leaves(speed, radius, friction, *, spin):
-    """φ1, v1 and r ω1 from an ODE in φ for u = v²/(gR) and r ω: stick or roll, slip, leave."""
-    start = speed**2 / (G * radius)
-    gain, share = (4.0 / 3.0, 3.0) if spin else (0.0, 1.0)
-
-    def rolling(phi):
-        return start + gain * (1.0 - math.cos(phi))
-
-    def excess(phi):
-        return math.sin(phi) - share * friction * (math.cos(phi) - rolling(phi))
-
-    def slope(phi, state):
-        press = math.cos(phi) - state[0]
-        turning = -2.0 * friction * press * math.sqrt(G * radius / state[0]) if spin else 0.0
-        return [2.0 * math.sin(phi) - 2.0 * friction * press, turning]
-
-    def leaves(phi, state):
-        return math.cos(phi) - state[0]
-
-    leaves.terminal = True
-    onset = brentq(excess, 0.0, math.pi / 2, xtol=1e-15)
-    u = rolling(onset)
-    rim = speed - math.sqrt(G * radius * u) if spin else 0.0
-    run = solve_ivp(
-        slope, (onset, math.pi / 2), [u, rim], events=leaves, method="DOP853",
-        rtol=1e-13, atol=1e-15, max_step=0.05,
-    )  # fmt: skip
-    state = run.y_events[0][0]
-    return run.t_events[0][0], math.sqrt(G * radius * state[0]), state[1]
 
 
 def leave(**changes):
@@ -65,27 +33,15 @@ class TestSeparation:
         assert (found.phi1 == 0.0) == (ratio >= 1.0)
 
     @pytest.mark.parametrize("spin", [False, True])
-    @pytest.mark.parametrize("friction", [0.01, 0.3, 0.5, 1.0, 4.0, 30.0])
-    @pytest.mark.parametrize(("speed", "pulley"), [(2.0, 0.5), (0.3, 0.6), (1.0, 0.11)])
-    def test_finite_friction_against_an_ode(self, speed, pulley, friction, spin):
-        r = 0.004
-        found = leave(
-            speed=speed, pulley_radius=pulley, particle_radius=r, friction=friction, spin=spin
-        )
-        phi, v, rim = disk_or_point_leaves(speed, pulley + r, friction, spin=spin)
-        assert found.phi1 == pytest.approx(phi, rel=2e-12, abs=0.0)
-        assert found.v1 == pytest.approx(v, rel=1e-12, abs=0.0)
-        assert found.omega1 * r == pytest.approx(rim, abs=2e-12)
-
-    @given(st.floats(0.05, 0.999), PULLEY, st.booleans())
-    def test_ice_leaves_by_energy_alone(self, share, pulley, spin):
-        speed = math.sqrt(share * G * (pulley + 0.01))
+    def test_ice_leaves_by_energy_alone(self, spin):
+        share, pulley = RNG.uniform([[0.05], [0.03]], [[0.999], [0.6]], (2, 200))
+        speed = np.sqrt(share * G * (pulley + 0.01))
         ratio = speed**2 / (G * (pulley + 0.01))
         found = leave(
             speed=speed, pulley_radius=pulley, particle_radius=0.01, friction=0.0, spin=spin
         )
-        assert math.cos(found.phi1) == pytest.approx((2.0 + ratio) / 3.0, rel=4e-16, abs=0.0)
-        assert found.omega1 == 0.0
+        assert np.cos(found.phi1) == pytest.approx((2.0 + ratio) / 3.0, rel=4e-16, abs=0.0)
+        assert (found.omega1 == 0.0).all()
 
 
 class TestPaperEquations:
@@ -190,16 +146,20 @@ class TestInclinedPlate:
 
 
 class TestOutgoingBelt:
-    @given(SPEED, st.floats(-3.0, 3.0), st.booleans(), SHARE, st.floats(0.0, 1.0))
-    def test_belt_work_is_kinetic_gain_plus_heat(self, v, belt, spin, eps, mu):
+    @pytest.mark.parametrize("spin", [False, True])
+    def test_belt_work_is_kinetic_gain_plus_heat(self, spin):
         m, r = 0.3, 0.01
+        low, high = [[0.3], [-3.0], [0.0], [0.0]], [[6.0], [3.0], [1.0], [1.0]]
+        v, belt, eps, mu = RNG.uniform(low, high, (4, 200))
         found = transfer(
             speed=v, pulley_radius=0.3, distance=0.4, angle=0.2, restitution=eps, belt_speed=belt,
             particle_radius=r, mass=m, spin=spin, friction=0.4 if spin else np.inf,
             plate_friction=mu,
         )  # fmt: skip
-        assume(found.reason == "")
-        vx, rim = -float(found.v3x), float(r * found.omega2)
+        known = found.reason == ""
+        assert known.sum() > 100
+        vx, rim, belt = -found.v3x[known], r * found.omega2[known], belt[known]
+        work, heat = found.belt_work[known], found.slip_heat[known]
         if spin:
             end = vx + (belt - vx - rim) / 3.0
             end_rim = rim + 2.0 * (end - vx)
@@ -207,10 +167,10 @@ class TestOutgoingBelt:
         else:
             end, end_rim = belt, rim
         gain = 0.5 * m * (end**2 - vx**2) + 0.25 * m * (end_rim**2 - rim**2)
-        turned_over = m * (vx**2 + belt**2 + rim**2)
-        assert found.belt_work == pytest.approx(m * belt * (end - vx), abs=1e-14 * turned_over)
-        assert found.belt_work - found.slip_heat == pytest.approx(gain, abs=1e-14 * turned_over)
-        assert found.slip_heat >= 0.0
+        rounding = 1e-14 * m * (vx**2 + belt**2 + rim**2)
+        assert (np.abs(work - m * belt * (end - vx)) <= rounding).all()
+        assert (np.abs(work - heat - gain) <= rounding).all()
+        assert (heat >= 0.0).all()
 
 
 class TestDomain:
@@ -292,18 +252,6 @@ def wall(x0, y0, x1, y1):
 
 
 class TestPredict:
-    def test_is_transfer_where_nothing_is_in_the_way(self):
-        found = predict(scene(outgoing={"speed": 1.5}, stream={"rate": 50.0}))
-        same = transfer(
-            speed=2.0, pulley_radius=0.1, distance=0.5, particle_radius=0.004, belt_speed=1.5,
-            interval=0.02,
-        )  # fmt: skip
-        assert found.reason == ""
-        for names in STAGES.values():
-            for name in names:
-                assert getattr(found, name) == getattr(same, name)
-                assert getattr(found, name).shape == ()
-
     @pytest.mark.parametrize(
         ("tables", "reason"),
         [

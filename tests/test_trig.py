@@ -84,20 +84,22 @@ def test_a_quarter_turn_is_as_far_from_its_double_as_it_is():
     assert sin_cos(pi / 2.0)[1] == float(exact - Fraction(pi / 2.0))
 
 
-def test_the_core_has_the_same_bits():
+@pytest.mark.parametrize("every", [20, pytest.param(1, marks=pytest.mark.slow)])
+def test_the_core_has_the_same_bits(every):
     core = Module()
     for angles in ANGLES.values():
+        angles = angles[::every]
         up, across = sin_cos(angles)
         assert [core.call("sine", angle) for angle in angles.tolist()] == up.tolist()
         assert [core.call("cosine", angle) for angle in angles.tolist()] == across.tolist()
-    y, x = RNG.uniform(-20.0, 20.0, (2, 20_000))
+    y, x = RNG.uniform(-20.0, 20.0, (2, 20_000 // every))
     found = [core.call("angle_of", *pair) for pair in zip(y.tolist(), x.tolist(), strict=True)]
     assert found == atan2(y, x).tolist()
     directions = [(0.0, 0.0), (-0.0, -1.0), (1.0, 1.0), (1.0, 0.0), (-1.0, 0.0), (-1.0, -1.0)]
     assert [core.call("angle_of", *pair) for pair in directions] == [
         atan2(*pair) for pair in directions
     ]
-    cosines = RNG.uniform(-1.0, 1.0, 20_000)
+    cosines = RNG.uniform(-1.0, 1.0, 20_000 // every)
     found = [core.call("angle_of_cosine", one) for one in cosines.tolist()]
     assert found == arc_cos(cosines).tolist()
     assert all(isnan(core.call(name, 1.5e6)) for name in ("sine", "cosine"))

@@ -19,9 +19,9 @@ from typing import Any
 CORE = Path(__file__).parents[1] / "src" / "chutelab" / "core"
 
 EXPORTS = (
-    "room", "world", "lay_out_world", "prepare", "run", "plan", "lay_out_plan", "build", "drawing",
-    "draw", "exact", "lay_out_exact", "follow_all", "laws", "lay_out_laws", "judge", "sine",
-    "cosine", "angle_of", "angle_of_cosine",
+    "room", "world", "lay_out_world", "prepare", "prepare_to_judge", "run", "run_and_judge", "plan",
+    "lay_out_plan", "build", "drawing", "draw", "exact", "lay_out_exact", "follow_and_judge",
+    "laws", "lay_out_laws", "judge", "sine", "cosine", "angle_of", "angle_of_cosine",
 )  # fmt: skip
 """What a host can call."""
 

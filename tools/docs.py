@@ -15,11 +15,13 @@ import re
 import shutil
 import sys
 import tempfile
+from collections.abc import Iterator
 from importlib import import_module
 from inspect import getdoc
 from pathlib import Path
 from pkgutil import walk_packages
 from types import ModuleType
+from typing import Any
 
 from pydantic import BaseModel
 from sphinx.cmd.build import build_main
@@ -30,6 +32,7 @@ from chutelab.classroom.lessons import Lesson, shipped_lessons
 from chutelab.classroom.lessons.pages import LIVE, live_page
 from chutelab.pictures.live.page import write
 from chutelab.scene import SceneError, about, load
+from chutelab.scene.overrides import schema
 from chutelab.scene.quantities import REGISTRY, STATISTICS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -51,6 +54,26 @@ PLAY = """\
 <p><a href="{page}">Play with it in a window of its own</a></p>
 """
 
+
+HERO = """\
+<iframe class="hero" src="live/{name}.html" title="{title}"></iframe>
+"""
+
+FRONT = "inclined-20"
+"""The scene that plays on the first page."""
+
+PAGES = ("first-machine", "teachers", "engineers")
+"""Of `docs`, those that the first page leads to."""
+
+KEYS = """\
+# Keys of a scene
+
+What a scene file may say, table by table. Lengths are in m, angles in degrees, all else in SI
+units; a text such as `"4 mm"` or `"20 t/h"` stands for a number with its unit. `chutelab new`
+writes a file with all of them. For editors, <a href="scene.schema.json">scene.schema.json</a> is
+the schema: with `#:schema ./scene.schema.json` as the first line of a file beside it, they
+complete the keys and underline what is wrong.
+"""
 
 QUANTITIES = """\
 # Quantities of a run
@@ -89,11 +112,16 @@ def public_modules() -> dict[str, ModuleType]:
 def readme(pages: Path) -> None:
     """Make the first pages of the README."""
     found = sections((ROOT / "README.md").read_text(encoding="utf-8"))
-    first = [found[""], f"## Citing\n{found['Citing']}", f"## Licence\n{found['Licence']}"]
+    title, said = found[""].split("\n", 1)
+    hero = HERO.format(name=FRONT, title=load(FRONT).title)
+    first = [title, hero, said]
+    first += [f"## {name}\n{found[name]}" for name in ("Citing", "Licence")]
     contents = [
         tree(
-            *("start", "tour", "Gallery <docs/gallery>", "lessons/index", "docs/physics"),
-            *("Quantities <quantities>", "Accuracy and speed <accuracy>", "api"),
+            *("start", *(f"docs/{name}" for name in PAGES)),
+            *("tour", "Gallery <docs/gallery>", "lessons/index", "docs/physics"),
+            *("Keys of a scene <keys>", "Quantities <quantities>"),
+            *("Accuracy and speed <accuracy>", "api"),
         ),
         tree(*DEVELOPERS, options=":caption: For developers"),
     ]
@@ -121,7 +149,7 @@ def gallery(pages: Path, extra: Path) -> None:
             said = PLAY.format(page=f"../live/{page.name}", title=one.title)
         # Below its own words, which end with the next heading.
         text = re.sub(
-            rf"(^## `{one.name}`: .*?\n)(?=\n## |\Z)",
+            rf"(^### `{one.name}`: .*?\n)(?=\n##|\Z)",
             lambda found, said=said: f"{found[1]}\n{said}",
             text,
             flags=re.MULTILINE | re.DOTALL,
@@ -196,16 +224,18 @@ def keys(table: type) -> list[str]:
     if not issubclass(table, BaseModel):
         return []
     said = ["   .. list-table::", "      :header-rows: 1", ""]
-    rows = [("key", "default", "what it is")]
-    for key, told in table.model_json_schema()["properties"].items():
-        default = told.get("default")
-        shown = "" if default is None else f"``{json.dumps(default, ensure_ascii=False)}``"
-        rows.append(
-            (f"``{key}``", shown, re.sub(r"([*`|\\_])", r"\\\1", told.get("description", "")))
-        )
-    for first, *others in rows:
+    for first, *others in (("key", "default", "what it is"), *key_rows(table.model_json_schema())):
         said += [f"      * - {first}", *(f"        - {cell}" for cell in others)]
     return said
+
+
+def key_rows(table: dict[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Yield key, default and meaning of each key of a table's schema."""
+    for key, told in table["properties"].items():
+        default = told.get("default")
+        shown = "" if default is None else f"``{json.dumps(default, ensure_ascii=False)}``"
+        shown = "must be given" if key in table.get("required", ()) else shown
+        yield f"``{key}``", shown, re.sub(r"([*`|\\_])", r"\\\1", told.get("description", ""))
 
 
 def data(name: str, said: list[str]) -> list[str]:
@@ -230,6 +260,27 @@ def quantities(pages: Path) -> None:
     (pages / "quantities.md").write_text(text + "".join(rows), encoding="utf-8")
 
 
+def scene_keys(pages: Path, extra: Path) -> None:
+    """Make the page of all keys of a scene, and the schema beside it."""
+    told = schema()
+    (extra / "scene.schema.json").write_text(json.dumps(told), encoding="utf-8")
+    said, heads = [KEYS], {"Preset": "live.presets"}
+    for name, key in told["properties"].items():
+        for kind in re.findall(r"#/\$defs/(\w+)", json.dumps(key)):
+            heads[kind] = name
+    tables = sorted(
+        told["$defs"].items(),
+        key=lambda one: list(told["properties"]).index(heads[one[0]].partition(".")[0]),
+    )
+    for kind, table in (("", told), *tables):
+        head = f"`[{heads[kind]}]`" if kind else "Of the scene itself"
+        rows = [row for row in key_rows(table) if kind or row[0].strip("`") not in heads.values()]
+        lines = ["key", "default", "what it is"], ["---"] * 3, *rows
+        said += [f"\n## {head}\n\n{table['description']}\n\n" if kind else f"\n## {head}\n\n"]
+        said += ["| " + " | ".join(cells) + " |\n" for cells in lines]
+    (pages / "keys.md").write_text("".join(said), encoding="utf-8")
+
+
 def gather(pages: Path, extra: Path) -> None:
     """Lay out the sources of all pages, and beside them what is copied as it is."""
     readme(pages)
@@ -241,6 +292,7 @@ def gather(pages: Path, extra: Path) -> None:
     gallery(pages, extra)
     lessons(pages, extra)
     quantities(pages)
+    scene_keys(pages, extra)
     reference(pages)
     # A folder's README is its first page.
     for page in pages.rglob("*.md"):

@@ -21,6 +21,18 @@ from chutelab.scene import about, load
 SIZE = (6.4, 4.2)
 """Width and height of a picture, inches."""
 
+GROUPS = {
+    "A belt, a plate, a second belt": (
+        *("perpendicular", "inclined-20", "inclined-40", "inclined-60", "perpendicular-fast"),
+        *("two-sizes", "low-speed", "slip", "belt-landing"),
+    ),
+    "Streams": ("stream", "stream-independent", "rock-box", "spoon"),
+    "Bins, heaps, screens": ("hopper", "heap", "mixture", "galton"),
+    "Further machines": ("inclined-conveyor", "cascade", "free-fall"),
+    "Toys": ("dominoes", "cradle"),
+}
+"""The scenes by what one comes for."""
+
 DPI = 80
 """Dots to the inch: a picture has some 30 kB, one of a crowd up to 90."""
 
@@ -32,9 +44,14 @@ def text() -> str:
         "Made by `python tools/gallery.py` from `scenes/*.toml`; `chutelab run NAME --out DIR` runs"
         " one, and `chutelab verify NAME` checks what it promises.",
     ]
-    for one in about():
-        parts += [f"## `{one.name}`: {one.title}", f"![{one.title}](gallery/{one.name}.png)"]
-        parts.append("\n".join(one.look))
+    told = {one.name: one for one in about()}
+    for group, names in GROUPS.items():
+        parts.append(f"## {group}")
+        for name in names:
+            one = told.pop(name)
+            parts += [f"### `{name}`: {one.title}", f"![{one.title}](gallery/{name}.png)"]
+            parts.append("\n".join(one.look))
+    assert not told, f"in no group: {', '.join(told)}"
     return "\n\n".join(parts) + "\n"
 
 

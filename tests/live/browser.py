@@ -1,7 +1,5 @@
 """Pages in a real browser: none of them says anything on the console, or asks for anything."""
 
-from __future__ import annotations
-
 import shutil
 
 import pytest
@@ -25,7 +23,7 @@ DONE = """() => new Promise((resolve, reject) => {
 })"""
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser():
     playwright = pytest.importorskip(
         "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'

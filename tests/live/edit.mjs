@@ -21,11 +21,21 @@ const tried = (ask) => {
 
 const built = (given) => machine.build(scene.resolve(given, page));
 
+const EDIT = {
+  set: keys.withValues,
+  // A part by its name and points, m; its sizes are for a picture of so many m.
+  part: (now, name, points, { unit = 1, material = "", start = 0 } = {}) => {
+    const part = page.parts.find((one) => one.part === name);
+    return edit.withPart(now, part, points, unit, material, start, page.tables[part.table]);
+  },
+  copies: (now, names, by) => edit.withCopies(now, edit.rowsNamed(now, names), by)[0],
+  without: edit.without,
+};
+
 const ASK = {
   // A scene after some edits, as TOML, and what its address brings back.
   edited: ({ given, edits }) => tried(() => {
-    const changed = edits.reduce((now, [name, ...rest]) => (name === "set"
-      ? keys.withValues(now, ...rest) : edit[name](now, ...rest)), given);
+    const changed = edits.reduce((now, [name, ...rest]) => EDIT[name](now, ...rest), given);
     built(changed);
     const hash = share.toHash(given, changed);
     return {
@@ -37,7 +47,7 @@ const ASK = {
     const section = controls.sectionsOf(resolved).find((one) => one.name === name);
     return controls.fieldsOf(whole, given, resolved, section);
   },
-  checked: ({ field, value }) => tried(() => ({ value: controls.checked(field, value) })),
+  checked: ({ field, text }) => tried(() => ({ value: controls.checked(field, text, say) })),
   handles: async ({ given, live }) => {
     const { Handles } = await load("handles.js"), resolved = scene.resolve(given, page);
     const { list } = new Handles(resolved, machine.build(resolved), { ...page, live });

@@ -332,7 +332,7 @@ def show(recording: Path, *, output: Output) -> None:
 
 @command("Open a scene as a page that answers when you drag it.")
 def live(
-    scene: SceneName,
+    scene: SceneName = "",
     *,
     set_: Texts,
     out: Path | None,
@@ -340,6 +340,9 @@ def live(
     quiet: bool,
 ) -> None:
     """Show SCENE as a live page: drag the plate, and path, numbers and ledger follow.
+
+    Without SCENE it opens an empty picture with parts to build a machine of, and examples. Of a
+    scene with boxes, strings or mass points it says what it cannot show, and opens the rest.
 
     It is one HTML file with the contact engine in it, the same as in `chutelab run --engine
     contact`: any browser opens it, from a memory stick or on a phone, without installation or
@@ -350,6 +353,7 @@ def live(
     until the learner has set a mark; controls, panels, ranges and presets say what can be changed
     and what is shown.
 
+    chutelab live
     chutelab live inclined-40
     chutelab live inclined-40 --language de -o lab.html
     chutelab live perpendicular --set live.predict=true -o predict.html
@@ -365,11 +369,13 @@ def live(
     from chutelab.pictures.live.page import write
 
     check_file("-o", out)
-    loaded = loaded_as_told(scene, set_)
-    name = f"{Path(scene).name.removesuffix('.toml')}.html"
+    if set_ and not scene:
+        raise click.UsageError("--set needs a SCENE")
+    loaded = loaded_as_told(scene, set_) if scene else None
+    name = f"{Path(scene).name.removesuffix('.toml') or 'machine'}.html"
     path = Path(mkdtemp(prefix="chutelab-")) / name if out is None else out
     with writing(str(path)):
-        size = write(loaded, path, language=language)
+        size = write(loaded, path, language=language, partly=True)
     if out is None and not webbrowser.open(path.absolute().as_uri()):
         raise click.ClickException(f"no browser could be opened; the page is {path}")
     if not quiet:

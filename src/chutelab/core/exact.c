@@ -856,7 +856,7 @@ static void proceed(void) {
 
 /* Lay out what the host fills in, and what is written. */
 EXPORT int lay_out_exact(void) {
-    double members = E.family ? E.lone_count : 1, many = MIN(20.0 * E.lone_count, 1e5);
+    double members = E.family ? E.lone_count : 1, many = MIN(20.0 * E.lone_count, KEPT);
     RESERVE(E.segments, members * E.segment_count);
     RESERVE(E.arcs, members * E.arc_count);
     RESERVE(E.wheels, members * E.wheel_count);
@@ -873,7 +873,7 @@ EXPORT int lay_out_exact(void) {
 }
 
 /* Run all particles, for at most so many rounds; returns why it came back, see `enum Course`. */
-EXPORT int follow_all(int rounds) {
+int follow_all(int rounds) {
     for (; E.lone < E.lone_count; E.lone++, E.begun = 0) {
         int member = E.family ? E.lone : 0;
         if (E.laid != member + 1) {
@@ -884,8 +884,14 @@ EXPORT int follow_all(int rounds) {
             E.laid = member + 1;
         }
         do {
-            if (E.knot_room - E.knot_count < ROUND_KNOTS) return FILLED;
-            if (E.event_room - E.event_count < ROUND_EVENTS) return FILLED;
+            if (E.knot_room - E.knot_count < ROUND_KNOTS) {
+                if (E.knot_room > KEPT) return FILLED;
+                if (!STRETCH(E.knots, E.knot_count, E.knot_room)) return NO_MEMORY;
+            }
+            if (E.event_room - E.event_count < ROUND_EVENTS) {
+                if (E.event_room > KEPT) return FILLED;
+                if (!STRETCH(E.events, E.event_count, E.event_room)) return NO_MEMORY;
+            }
             if (!rounds--) return PAUSING;
             course = FINISHED;
             if (E.begun) proceed();

@@ -14,6 +14,9 @@ extern Laws L;
 /* A knot by its number. */
 #define KNOT(k) (L.knots + (long)(k) * L.row)
 
+/* laws.c */
+int judge(void);
+
 /* barriers.c */
 void shape_barriers(void);
 double beside(const Barrier *b, double x, double y);

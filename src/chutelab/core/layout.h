@@ -215,6 +215,7 @@ typedef struct {
     int gate_count, end_count, circle_count;
     /* the run */
     int interact;        /* disks meet each other */
+    int is_whole;        /* [in] all knots and events are still there: the host took none */
     int until;
     int landing;         /* owner that a disk lands on, or -1 */
     int ride_owner;      /* owner that rides are on */
@@ -378,6 +379,7 @@ typedef struct {
     int segment_count, arc_count, wheel_count, lone_count, surface_count, kind_count; /* [in] */
     int knot_room, event_room, room_size;
     int family, apart;      /* [in] each particle has surfaces, and books, of its own */
+    int is_whole;           /* [in] all knots and events are still there: the host took none */
     int until, landing;     /* [in] enum Until; surface that a particle lands on, or -1 */
     int most, window;       /* [in] rounds of a particle; rounds after which it is asked whether it gets on */
     double tick;            /* [in] s over its pace; mean time between events below which it does not */

@@ -578,6 +578,10 @@ EXPORT int run(int steps) {
     int status = W.full;
     for (W.full = 0; !status || make_room(status);) {
         status = run_on(steps);
+        if (W.is_whole && !W.interact) {
+            if (status == FULL_KNOTS && W.knot_room < KEPT) continue;
+            if (status == FULL_EVENTS && W.event_room < KEPT) continue;
+        }
         if (status == FULL_KNOTS && W.knot_count <= W.knot_room / 2) W.full = status;
         if (status == FULL_EVENTS && W.event_count <= W.event_room / 2) W.full = status;
         if (status == FULL_KNOTS || status == FULL_EVENTS) return FULL;

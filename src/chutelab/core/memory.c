@@ -31,4 +31,10 @@ void *reserve(double count, unsigned size) {
     return place;
 }
 
+void *stretch(const void *rows, int count, int had, unsigned size) {
+    void *place = reserve(2.0 * had, size);
+    if (place) memcpy(place, rows, (unsigned long)count * size);
+    return place;
+}
+
 int has_room(void) { return !R.lacks; }

@@ -207,22 +207,12 @@ static void make_contact_room(int room) {
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 
-static void make_knot_room(int room) {
-    W.knot_room = room;
-    RESERVE(W.knots, room);
-}
-
-static void make_event_room(int room) {
-    W.event_room = room;
-    RESERVE(W.events, room);
-}
-
-/* Make twice the room for what is full. Knots and events that were there have been taken. */
+/* Make twice the room for what is full. */
 int make_room(int full) {
     if (full == FULL_NEAR) make_near_room(2 * W.near_room);
     if (full == FULL_CONTACTS) make_contact_room(2 * W.contact_room);
-    if (full == FULL_KNOTS) make_knot_room(2 * W.knot_room);
-    if (full == FULL_EVENTS) make_event_room(2 * W.event_room);
+    if (full == FULL_KNOTS) STRETCH(W.knots, W.knot_count, W.knot_room);
+    if (full == FULL_EVENTS) STRETCH(W.events, W.event_count, W.event_room);
     return has_room();
 }
 
@@ -243,8 +233,10 @@ static int lay_out_work(void) {
     RESERVE(W.nearby, (double)MAX_NEARBY * n);
     RESERVE(W.everything, room);
     RESERVE(W.ends, 2.0 * room);
-    make_knot_room((rides ? 100 : 30) * n + 200);
-    make_event_room(40 * n + 1200);
+    W.knot_room = (rides ? 100 : 30) * n + 200;
+    W.event_room = 40 * n + 1200;
+    RESERVE(W.knots, W.knot_room);
+    RESERVE(W.events, W.event_room);
     make_contact_room(8 * n + 16);
     make_near_room(crowd ? 16 * n + 16 : 1);
     return has_room();

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, Status, borrow, constants, dtype, give_back
 from chutelab.machine import Machine, Pieces
+from chutelab.results.laws import take
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
@@ -56,12 +57,16 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         raise ValueError("particle.radius = 0: the contact engine needs a radius above 0 m")
     module, recorder = borrow(), Recorder(machine)
     try:
-        job = Job(module, recorder.near)
+        job = Job(module, recorder.near, whole=not any(recorder.origin))
         stalled = job.run(progress)
         job.write(recorder)
+        recording = recorder.finish(engine="contact", steps=module.world.step_count)
+        take(module, recording)
     finally:
         give_back(module)
-    return recorder.finish(engine="contact", steps=job.steps, stalled=stalled)
+    if stalled is not None:
+        raise recorder.stuck(stalled, recording)
+    return recording
 
 
 def parts(machine: Machine) -> dict[str, Pieces]:
@@ -87,11 +92,10 @@ def pieces(machine: Machine) -> NDArray[Any]:
 class Job:
     """One run: fills the module's memory, and drains what it writes."""
 
-    def __init__(self, module: Module, machine: Machine) -> None:
+    def __init__(self, module: Module, machine: Machine, *, whole: bool = True) -> None:
         self.module, self.machine = module, machine
         self.knots: list[NDArray[Any]] = []
         self.events: list[NDArray[Any]] = []
-        self.steps = 0
         # First disk of the part in which the run was stopped: from it on disks have not ended.
         self.stopped_from = machine.count
         self.pieces = pieces(machine)
@@ -100,7 +104,7 @@ class Job:
         for name, value in (
             ("disk_count", machine.count), ("surface_count", len(self.pieces)),
             ("kind_count", self.kinds), ("owner_count", self.owners),
-            ("interact", machine.interact),
+            ("interact", machine.interact), ("is_whole", whole),
             ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
             ("landing", machine.landing), ("ride_owner", 0),
             ("pulley", -1 if wheel is None else len(machine.segments.length)),
@@ -132,7 +136,7 @@ class Job:
             others[name] = np.concatenate(values, axis=1)
         others["rolling"] = machine.rolling[:, None]
         np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
-        module.work("prepare")
+        module.work("prepare_to_judge")
 
     def run(self, progress: Progress | None) -> StalledError | None:
         """Run to the end, or until a particle stalls: return which one."""
@@ -173,12 +177,19 @@ class Job:
     def proceed(self, steps: int) -> Status:
         """Run on for at most so many steps, and take what was written."""
         module = self.module
-        status = Status(module.run("run", steps, Status.LACKING))
-        for what, kept in (("knot", self.knots), ("event", self.events)):
-            if count := getattr(module.world, f"{what}_count"):
-                kept.append(module.array(f"{what}s", dtype(what.title()), count).copy())
-                setattr(module.world, f"{what}_count", 0)
+        status = Status(module.run("run_and_judge", steps, Status.LACKING))
+        if status is Status.FULL:
+            module.world.is_whole = False
+            self.drain()
         return status
+
+    def drain(self) -> None:
+        """Take what was written, so that there is room for more."""
+        world, module = self.module.world, self.module
+        for what, kept in (("knot", self.knots), ("event", self.events)):
+            if count := getattr(world, f"{what}_count"):
+                kept.append(module.array(f"{what}s", dtype(what.title()), count).copy())
+                setattr(world, f"{what}_count", 0)
 
     def share(self) -> float:
         """Return the share of the run that is done."""
@@ -193,6 +204,7 @@ class Job:
 
     def write(self, recorder: Recorder) -> None:
         """Write down what was recorded."""
+        self.drain()
         world, module, count = self.module.world, self.module, self.machine.count
         # Each chunk is freed when it is handed over: together they are most of the memory.
         self.knots.reverse()
@@ -209,4 +221,3 @@ class Job:
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count
         recorder.gained = world.gained
-        self.steps = world.step_count

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, borrow, constants, dtype, give_back, number
 from chutelab.machine import Machine
+from chutelab.results.laws import take
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
@@ -82,9 +83,13 @@ def run(machine: Machine, progress: Progress | None = None, *, apart: bool = Fal
         stalled = follow(module, recorder, progress)
         collect(module, recorder)
         rounds: int = module.structs["Exact"].rounds
+        recording = recorder.finish(engine="exact", steps=rounds)
+        take(module, recording)
     finally:
         give_back(module)
-    return recorder.finish(engine="exact", steps=rounds, stalled=stalled)
+    if stalled is not None:
+        raise recorder.stuck(stalled, recording)
+    return recording
 
 
 def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
@@ -100,8 +105,8 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
         ("segment_count", s), ("arc_count", a), ("wheel_count", w), ("lone_count", count),
         ("surface_count", owners), ("kind_count", kinds), ("family", family), ("apart", apart),
         ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
-        ("landing", machine.landing), ("far", far), ("most", ROUNDS), ("window", WINDOW),
-        ("tick", TICK),
+        ("landing", machine.landing), ("far", far), ("is_whole", far == 0.0), ("most", ROUNDS),
+        ("window", WINDOW), ("tick", TICK),
     ):  # fmt: skip
         setattr(exact, name, value)
     module.work("lay_out_exact")
@@ -146,11 +151,12 @@ def follow(module: Module, recorder: Recorder, progress: Progress | None) -> Sta
     with suppress(EnoughError):
         while course != COURSE["FINISHED"]:
             began = perf_counter()
-            course = module.run("follow_all", events, COURSE["NO_MEMORY"])
+            course = module.run("follow_and_judge", events, COURSE["NO_MEMORY"])
             early = perf_counter() - began < SLICE
             events = min(2 * events, MOST) if early else max(FIRST, events // 2)
             exact: Any = module.structs["Exact"]
             if course == COURSE["FILLED"]:
+                exact.is_whole = False
                 drain(module, recorder)
             elif course == COURSE["HELD"]:
                 a, b = (recorder.machine.surfaces[surface] for surface in exact.other)

@@ -19,7 +19,6 @@ asked for: most runs need few of them.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,8 +62,10 @@ class Recording(Record):
 
     @classmethod
     def of(cls, record: Record) -> Recording:
-        """Return a record as a recording; they share their arrays."""
-        return cls(**{field.name: getattr(record, field.name) for field in fields(record)})
+        """Return a record as a recording; they share their arrays, and what was found in them."""
+        recording = object.__new__(cls)
+        recording.__dict__.update(record.__dict__)
+        return recording
 
     @property
     def prediction(self) -> Transfer:

@@ -129,18 +129,34 @@ def judge(recording: Record) -> tuple[Broken, ...]:
 
 
 def examine(recording: Record) -> Findings:
-    """Have the core look at a run, of one knot or more."""
-    module, hit, breach = core.borrow(), core.dtype("Hit"), core.dtype("Breach")
-    try:
-        _lay_out(module, recording)
-        module.work("judge")
-        figures: Any = module.structs["Laws"]
-        figures = type(figures).from_buffer_copy(figures)
-        breaches = module.array("breaches", breach, figures.breach_count, of="Laws")
-        hits = module.array("hits", hit, figures.hit_count, of="Laws")
-        return Findings(breaches.copy(), np.sort(hits, order=("particle", "t")), figures)
-    finally:
-        core.give_back(module)
+    """Have the core look at a run, of one knot or more, unless it did so as the run ended."""
+    if _FOUND not in recording.found:
+        module = core.borrow()
+        try:
+            _lay_out(module, recording)
+            module.work("judge")
+            take(module, recording)
+        finally:
+            core.give_back(module)
+    found: Findings = recording.found[_FOUND]
+    return found
+
+
+_FOUND = "findings"
+"""Under which a recording keeps them."""
+
+
+def take(module: core.Module, recording: Record) -> None:
+    """Keep with a recording what the core found of it, if it has looked at the run in memory."""
+    figures: Any = module.structs["Laws"]
+    if not figures.breaches:
+        return
+    figures = type(figures).from_buffer_copy(figures)
+    breaches = module.array("breaches", core.dtype("Breach"), figures.breach_count, of="Laws")
+    hits = module.array("hits", core.dtype("Hit"), figures.hit_count, of="Laws").copy()
+    if len(hits) > 1:
+        hits.sort(order=("particle", "t"))
+    recording.found[_FOUND] = Findings(breaches.copy(), hits, figures)
 
 
 def _lay_out(module: core.Module, recording: Record) -> None:

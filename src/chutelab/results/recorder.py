@@ -167,8 +167,13 @@ class Recorder:
         chunk["normal_impulse"], chunk["tangential_impulse"] = normal_impulse, tangential_impulse
         self._events.append(chunk)
 
-    def finish(self, *, engine: str, steps: int, stalled: StalledError | None = None) -> Record:
-        """Sort what was collected, and freeze it; raise it with a particle that stalled, if any."""
+    def stuck(self, stalled: StalledError, record: Record) -> StalledError:
+        """Return what an engine is to raise: with the record, counted from the world's origin."""
+        (x, y), (x0, y0) = stalled.position, self.origin
+        return StalledError(stalled.particle, stalled.t, (x + x0, y + y0), stalled.reason, record)
+
+    def finish(self, *, engine: str, steps: int) -> Record:
+        """Sort what was collected, and freeze it."""
         count = len(self.ended)
         knots = _joined(self._knots, KNOT)
         owners = np.concatenate([np.empty(0, dtype=np.int64), *self._owners])
@@ -207,7 +212,7 @@ class Recorder:
             knots = knots.copy()
             for rows in (knots, events):
                 rows["position"] += self.origin
-        record = Record(
+        return Record(
             machine=self.machine,
             engine=engine,
             knots=knots,
@@ -220,11 +225,6 @@ class Recorder:
             angle=angle,
             gained=self.gained,
         )
-        if stalled is not None:
-            (x, y), (x0, y0) = stalled.position, self.origin
-            place = x + x0, y + y0
-            raise StalledError(stalled.particle, stalled.t, place, stalled.reason, record)
-        return record
 
 
 def _joined(chunks: list[NDArray[Any]], dtype: np.dtype[Any]) -> NDArray[Any]:

@@ -357,8 +357,21 @@ OPERATORS: Final[dict[type[ast.AST], str]] = {
 }  # fmt: skip
 
 
+class _Dotted(ast.NodeTransformer):
+    """Makes one name of a quantity such as ``landing.x``."""
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.Name:
+        return ast.Name(ast.unparse(node))
+
+
+def of_quantities(formula: str) -> ast.Expression:
+    """Parse a formula of quantities, each of which becomes one name."""
+    parsed: ast.Expression = _Dotted().visit(ast.parse(formula.strip(), mode="eval"))
+    return ast.fix_missing_locations(parsed)
+
+
 @cache
-def tree(formula: str) -> Any:
+def tree(formula: str, *, dotted: bool = False) -> Any:
     """Return a formula as nested lists: the name of an operation, then its operands.
 
     Numbers and truth values stand for themselves, and a text is a name.
@@ -374,8 +387,14 @@ def tree(formula: str) -> Any:
     ['compare', ['*', ['*', 0.5, 'm'], ['**', 'v0', 2]], '>', ['-', 1]]
     >>> tree("transfer(**throw, rebound='as-printed').v3x")
     ['.', ['call', 'transfer', [], [['throw'], ['rebound', ['text', 'as-printed']]]], 'v3x']
+
+    `dotted` takes quantities for names:
+
+    >>> tree("1000 * ledger.belt_work", dotted=True)
+    ['*', 1000, 'ledger.belt_work']
     """
-    return _of(ast.parse(formula.strip(), mode="eval").body)
+    read = of_quantities(formula) if dotted else ast.parse(formula.strip(), mode="eval")
+    return _of(read.body)
 
 
 def _of(node: ast.expr) -> Any:

@@ -58,6 +58,9 @@ SPLIT: Final = "split.png"
 MOST_PIXELS: Final = 3840 * 2160
 """Most pixels of a picture, as in `reading.Picture`."""
 
+NO_SETTINGS: Final = {"scene", "set", "machine", "film"}
+"""Keys of `reading.Picture` that are no settings of the film: which scene, and its words."""
+
 LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
 """Packages whose versions determine the bytes of a picture, besides its inputs."""
 
@@ -112,7 +115,7 @@ def build(
         scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
         # Lesson 8 shows a run that breaks a law.
         recording = judged(scene, progress=progress)
-        settings = lesson.picture.model_dump(exclude={"scene", "set", "split"})
+        settings = lesson.picture.model_dump(exclude={*NO_SETTINGS, "split"})
         path.parent.mkdir(parents=True, exist_ok=True)
         animate(recording, path, question=lesson.question, predict=True, comment=wanted, **settings)
         still(recording, machine, width=lesson.picture.width, height=lesson.picture.height)
@@ -167,7 +170,7 @@ def stamp_of(lesson: Lesson) -> str:
     for table in ("expect", "live"):  # neither shows in its picture
         scene.pop(table, None)
     # Without defaults, which the version determines.
-    settings = lesson.picture.model_dump(exclude_unset=True, exclude={"scene", "set"})
+    settings = lesson.picture.model_dump(exclude_unset=True, exclude=NO_SETTINGS)
     inputs = {"scene": scene, "picture": settings, "question": lesson.question, "predict": True}
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=True)
     digest = hashlib.sha256(text.encode("ascii")).hexdigest()[:32]

@@ -39,6 +39,7 @@ from chutelab.classroom.lessons.building import (
 )
 from chutelab.classroom.lessons.reading import Lesson, LessonError, scene_of, unusable
 from chutelab.classroom.lessons.sheets import printed
+from chutelab.classroom.lessons.steps import data_of as data_of_steps
 from chutelab.classroom.lessons.texts import ASSETS, INDEX, asset, html_of, own_words, words_for
 from chutelab.classroom.words import Words, words
 from chutelab.scene import Fault
@@ -247,11 +248,18 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
         text = "is missing: what the lesson's page offers; an empty table offers everything"
         raise LessonError(str(lesson.folder), [Fault("page", None, text)])
     scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
-    exercise = None
+    exercise, steps = None, None
+    if lesson.steps:
+        controls = lesson.page.live.get("controls", ())
+        steps = {
+            "title": lesson.title,
+            "question": lesson.question,
+            "steps": data_of_steps(lesson.steps, tuple(controls), words(lesson.language)),
+        }
     if lesson.name in EXERCISES:
         asked = own_words(lesson.text("README"))
         exercise = data_of(told(lesson.name, lesson.language), explain=asked or lesson.question)
-    return write(scene, path, language=lesson.language, home=home, exercise=exercise)
+    return write(scene, path, language=lesson.language, home=home, exercise=exercise, lesson=steps)
 
 
 def heading(lesson: Lesson) -> str:

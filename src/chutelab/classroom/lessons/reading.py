@@ -14,6 +14,16 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
+from chutelab.classroom.lessons.steps import (
+    LONGEST,
+    MOST,
+    TABLES,
+    Names,
+    Said,
+    Step,
+    in_language,
+    key,
+)
 from chutelab.classroom.words import words
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene.overrides import Override, at_path, joined
@@ -21,23 +31,10 @@ from chutelab.scene.quantities import lookup, suggestion
 from chutelab.scene.units import Number, Table, Text, Whole
 from chutelab.util.errors import did_you_mean, nearest
 
-MOST: Final = 20
-"""Most entries of a list: a lesson that needs more is two lessons."""
-
-LONGEST: Final = 200
-"""Most characters of a text: it must fit on a slide."""
-
-Said = Annotated[Text, Field(min_length=1, max_length=LONGEST)]
-Names = Annotated[tuple[Said, ...], Field(max_length=MOST)]
 Words = Annotated[Text, AfterValidator(lambda text: " ".join(text.split()))]
 """A text that may be broken into lines anywhere."""
 
 Answers = Annotated[tuple[Words, ...], Field(max_length=MOST)]
-
-
-def key(default: Any, what: str, allowed: str, **limits: Any) -> Any:
-    """Describe one key: its default, its definition in a sentence, and what it allows."""
-    return Field(default, description=f"{what}.", json_schema_extra={"allowed": allowed}, **limits)
 
 
 class Chosen(Table):
@@ -65,6 +62,8 @@ class Picture(Chosen):
         None, "Pictures a second; default: 25, of a stream 20", "10, 20, 25 or 50"
     )
     width: Whole = key(800, "Width, pixels", "a whole number from 320 to 3840", ge=320, le=3840)
+    machine: Said | None = key(None, "What machine.png shows, in words", "a text")
+    film: Said | None = key(None, "What lesson.gif shows, in words", "a text")
     split: bool = key(
         False, "Also make split.png: how the velocity at the plate splits", "true or false"
     )
@@ -94,12 +93,19 @@ class Teacher(Table):
         (), "What one can do afterwards", f"a list of at most {MOST} texts, each of one sentence"
     )
     say: Words = key("", "What to say and do in class", "a text")
-    predictions: Answers = key(
-        (), "Answers to the predictions, in their order", f"a list of at most {MOST} texts"
+    misconceptions: Annotated[tuple[tuple[Words, Words], ...], Field(max_length=MOST)] = key(
+        (),
+        "What pupils often believe, and a question that brings it out",
+        f"a list of at most {MOST} pairs of texts",
     )
     basic: Words = key("", "What to leave out for a short version", "a text")
     stretch: Words = key("", "What to add for students who are done", "a text")
-    curriculum: Words = key("", "Where it sits in a curriculum", "a text")
+    predictions: Answers = key(
+        (), "Answers to the predictions, in their order", f"a list of at most {MOST} texts"
+    )
+    curriculum: Answers | Words = key(
+        (), "Where it sits in curricula, by name", f"a list of at most {MOST} texts"
+    )
 
 
 class Lesson(Table):
@@ -123,6 +129,9 @@ class Lesson(Table):
         "What one looks at, and what it is in words",
         f'a table of at most {MOST} lines such as x3 = "distance back from the plate"; names with'
         " dots in quotes",
+    )
+    steps: Annotated[tuple[Step, ...], Field(max_length=MOST)] = key(
+        (), "What is done, step by step", f"at most {MOST} tables [[steps]]"
     )
     picture: Picture = key(Picture(), "How lesson.gif is made", "a table of keys and values")
     page: Page | None = key(None, "What its page offers", "a table of keys and values")
@@ -176,7 +185,9 @@ def split(folder: Path) -> tuple[int | None, str]:
     return (int(match[1]), match[2]) if match else (None, folder.name)
 
 
-TABLES: Final[dict[str, type[Table]]] = {"picture": Picture, "page": Page, "teacher": Teacher}
+PARTS_OF: Final[dict[str, type[Table]]] = {
+    "picture": Picture, "page": Page, "teacher": Teacher, **TABLES,
+}  # fmt: skip
 """Model of each table by its key."""
 
 
@@ -234,11 +245,14 @@ def read(folder: str | Path, language: str = "en") -> Lesson:
             raise unusable(source, f"too large: it has at most {LARGEST} bytes")
     elif source.exists():
         raise unusable(source, "cannot be read: it is no regular file")
-    document = _document(source)
     untranslated: list[str] = []
-    if words(language).language != "en":
+    document = _document(source)
+    words(language)  # refuses a language that there is not
+    document = in_language(document, language, untranslated)
+    if language != "en":
         over = source.with_name(f"lesson.{language}.toml")
-        document = _laid_over(document, _document(over) if over.is_file() else {}, untranslated)
+        if "steps" not in document:
+            document = _laid_over(document, _document(over) if over.is_file() else {}, untranslated)
         for name in ("README", "explanation"):
             file = source.with_name(f"{name}.{language}.md")
             if source.with_name(f"{name}.md").is_file() and not file.is_file():
@@ -285,16 +299,16 @@ def _laid_over(
 ) -> dict[str, Any]:
     """Lay the texts of a language over a plan; append the keys that are in English only."""
     made = dict(english)
-    for key in TEXTS:
-        said, there = english.get(key), texts.get(key)
+    for one in TEXTS:
+        said, there = english.get(one), texts.get(one)
         if isinstance(said, dict):
             there = there if isinstance(there, dict) else {}
-            made[key] = said | there
-            untranslated += [joined((key, name)) for name in said if name not in there]
+            made[one] = said | there
+            untranslated += [joined((one, name)) for name in said if name not in there]
         elif there is not None:
-            made[key] = there
+            made[one] = there
         elif said is not None:
-            untranslated.append(key)
+            untranslated.append(one)
     return made
 
 
@@ -370,7 +384,7 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
             if all(lookup(name, names) is None for names in surfaces):
                 text = f"no such quantity in its scenes; {suggestion(name, surfaces[0])}"
                 yield Fault(f"quantities.{name}", words, text)
-    for table in TABLES:
+    for table in ("picture", "page"):
         part = getattr(lesson, table)
         if not isinstance(part, Chosen):
             continue
@@ -400,10 +414,15 @@ def _faults(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
     """Return the errors of a validation in words, one fault a key."""
     faults: dict[tuple[str | int, ...], Fault] = {}
     for detail in error.errors(include_url=False):
-        table = TABLES.get(str(detail["loc"][0])) if len(detail["loc"]) > 1 else None
-        # The key, without the indices of what is in its value.
-        path = detail["loc"][: 2 if table else 1]
-        keys, missing = (table or Lesson).model_fields, detail["type"] == "missing"
+        # The key, without the indices of what is in its value, and the table it is in.
+        loc = detail["loc"]
+        table: type[Table] | None = Lesson
+        for n, part in enumerate(loc):
+            if isinstance(part, str):
+                if table is None:
+                    break
+                owner, table, path = table, PARTS_OF.get(part), loc[: n + 1]
+        keys, missing = owner.model_fields, detail["type"] == "missing"
         if detail["type"] == "extra_forbidden":
             near = nearest(str(path[-1]), keys)
             known = f"known are {', '.join(keys)}"

@@ -86,7 +86,9 @@ def _for_the_teacher(lesson: Lesson) -> str:
         ),
         **_of_exercise(lesson, said),
         "sheet-lengths": "\n".join(f"- {say(key)}: {text}" for key, text in lengths if text),
-        "sheet-curriculum": teacher.curriculum,
+        "sheet-curriculum": teacher.curriculum
+        if isinstance(teacher.curriculum, str)
+        else "\n".join(f"- {one}" for one in teacher.curriculum),
     }
     level = say("sheet-level", level=say(f"level-{lesson.level}"), minutes=lesson.minutes)
     parts = (f"## {say(key)}\n\n{text}" for key, text in sections.items() if text)

@@ -94,4 +94,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         pass
     except StalledError as stalled:
         stuck = stalled
-    return recorder.finish(engine="pymunk", steps=steps, stalled=stuck)
+    recording = recorder.finish(engine="pymunk", steps=steps)
+    if stuck is not None:
+        raise recorder.stuck(stuck, recording)
+    return recording

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any, Final
 
 from chutelab.machine import build
-from chutelab.scene import Fault, Scene, SceneError, to_dict
+from chutelab.scene import Fault, Scene, SceneError, load, to_dict
 from chutelab.scene.conflicts import EITHER
 from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
@@ -16,8 +17,43 @@ MOST: Final = 100_000
 
 LISTS: Final = ("material", "pair", "conveyor", "surface")
 
+EXAMPLES: Final = ("inclined-40", "cascade", "spoon", "hopper", "galton", "free-fall")
+"""Scenes that the empty page offers, with the words ``example-NAME`` in its catalogues."""
 
-def describe(scene: Scene) -> dict[str, Any]:
+
+def _part(
+    part: str, letter: str, table: str, places: str, main: str, needs: str = "", **row: Any
+) -> dict[str, Any]:
+    return {
+        "part": part, "letter": letter, "table": table, "places": places.split(),
+        "main": main.split(), "needs": needs.split(), "row": row,
+    }  # fmt: skip
+
+
+PARTS: Final = (
+    _part("belt", "E", "conveyor", "from to", "speed pulley_radius friction",
+          pulley_radius=0.05, speed=1.0),
+    _part("pulley", "U", "incoming", "", "speed pulley_radius length",
+          speed=2.0, pulley_radius=0.1, length=0.6),
+    _part("plate", "P", "plate", "pivot", "angle_deg below restitution",
+          angle_deg=30.0, above=0.05, below=0.3),
+    _part("line", "L", "surface", "points points", "restitution friction speed"),
+    _part("arc", "C", "surface", "arc arc arc", "radius restitution friction", "center"),
+    _part("ball", "B", "stream", "at", "velocity start restitution",
+          velocity=[0.0, 0.0], interact=True),
+    _part("stream", "R", "stream", "at to", "count rate velocity", "count",
+          velocity=[0.0, 0.0], count=60, rate=40.0, interact=True),
+    _part("pegs", "G", "surface", "center", "radius repeat restitution", "center repeat",
+          radius=0.012, repeat=[[6, 0.08, 0.0], [4, 0.04, -0.07]], restitution=0.4),
+    _part("gate", "D", "surface", "points points", "opens_at closes_at friction", "opens_at",
+          opens_at=1.0),
+)  # fmt: skip
+"""What can be added to a machine, a row each: its word, the key that begins it, its table, the key
+that each point set in the picture is for, those shown first, those that tell it from another part
+of its table, and what else it begins with (m: for a picture one metre high)."""
+
+
+def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     """Return the scene and the rules of scene files as plain data for JSON.
 
     A drop that is measured from the impact is written as one from the top of the pulley: the
@@ -25,16 +61,20 @@ def describe(scene: Scene) -> dict[str, Any]:
 
     Parameters
     ----------
-    scene : Scene
-        One scene, no family; of disks and spheres.
+    scene : Scene, optional
+        One scene, no family; of disks and spheres. None is a machine that is still empty.
+    partly : bool
+        Whether what the page cannot show is left out, instead of refused.
 
     Returns
     -------
     dict
-        ``scene``: its keys as its file has them, with a seed beyond 2**53 as text. ``tables``: of
-        each key of each table (those outside of tables under ``scene``) default, unit, low and
-        high, its form as JSON Schema, and whether it is required. ``presets``: the numbers of each
-        material.
+        ``scene``: its keys as its file has them, with a seed beyond 2**53 as text; ``stream`` is []
+        where there is none. ``tables``: of each key of each table (those outside of tables under
+        ``scene``) default, unit, low and high, its form as JSON Schema, and whether it is required.
+        ``presets``: the numbers of each material. ``parts``: see `PARTS`. Of an empty machine
+        ``examples``: scenes by name. Where something is left out ``lacks``: how many, by what it
+        is, and ``source``: the scene's file.
 
     Raises
     ------
@@ -42,24 +82,42 @@ def describe(scene: Scene) -> dict[str, Any]:
         If the page cannot show it: mass points, boxes, polygons, strings, or too many particles; or
         if the scene contradicts itself where it is laid out.
     """
+    materials = {
+        name: {key: getattr(preset.material, key) for key in VALUES}
+        for name, preset in PRESETS.items()
+    }
+    common: dict[str, Any] = {"tables": _rules(), "presets": materials, "parts": PARTS}
+    if scene is None:
+        examples = {name: describe(load(name))["scene"] for name in EXAMPLES}
+        return {"scene": {"stream": []}, **common, "examples": examples}
     allowed = "a page that answers shows disks and spheres"
     faults = []
-    for n, kind in enumerate(scene.particles):
-        table = scene.head("particle", n)
+    lacks: Counter[str] = Counter()
+    foreign = {n for n, kind in enumerate(scene.particles) if kind.outline or kind.radius == 0.0}
+    for n in sorted(foreign):
+        kind, table = scene.particles[n], scene.head("particle", n)
+        many = sum(s.count for s, its in zip(scene.streams, scene.kinds, strict=True) if its == n)
+        lacks[kind.shape if kind.outline else "point"] += many
         if kind.outline:
             faults.append(Fault(f"{table}.shape", kind.shape, allowed))
-        elif kind.radius == 0.0:
+        else:
             faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
+    if scene.string:
+        lacks["string"] = len(scene.string)
+        faults.append(Fault("string", None, f"{allowed}, without strings"))
+    if partly:
+        faults = []
     if scene.count > MOST:
         counts = [stream.count for stream in scene.streams]
         table = scene.head("stream", counts.index(max(counts)))
         text = f"a page has room for {MOST} particles, and these are {scene.count}"
         faults.append(Fault(f"{table}.count", max(counts), text))
-    if scene.string:
-        faults.append(Fault("string", None, f"{allowed}, without strings"))
     if faults:
         raise SceneError(scene.source, faults)
     tables = to_dict(scene)
+    if lacks:
+        _leave_out(tables, scene, foreign)
+        common |= {"lacks": dict(lacks), "source": scene.source}
     machine, out = build(scene), scene.outgoing
     if out is not None and out.drop_from == "impact":
         height = machine.segments.start[machine.segments.surface == machine.landing][0, 1].item()
@@ -79,11 +137,24 @@ def describe(scene: Scene) -> dict[str, Any]:
             # JavaScript's numbers have all digits of whole numbers up to here.
             if row.get("seed", 0) > 2**53:
                 row["seed"] = str(row["seed"])
-    materials = {
-        name: {key: getattr(preset.material, key) for key in VALUES}
-        for name, preset in PRESETS.items()
-    }
-    return {"scene": tables, "tables": _rules(), "presets": materials}
+    return {"scene": tables, **common}
+
+
+def _leave_out(tables: dict[str, Any], scene: Scene, kinds: set[int]) -> None:
+    """Take kinds of particles out of the keys of a scene, their streams, and all strings."""
+    names = {scene.particles[n].name for n in kinds}
+    for table, gone in (
+        ("particle", [n in kinds for n in range(len(scene.particles))]),
+        ("stream", [n in kinds for n in scene.kinds]),
+        ("pair", [bool(names & {*pair.between}) for pair in scene.pair]),
+    ):
+        rows = tables.pop(table, [])
+        rows = [rows] if isinstance(rows, dict) else rows
+        if kept := [row for row, out in zip(rows, gone, strict=False) if not out]:
+            tables[table] = kept
+    tables.setdefault("stream", [])
+    for table in ("string", "live"):
+        tables.pop(table, None)
 
 
 def _rules() -> dict[str, dict[str, dict[str, Any]]]:

@@ -19,6 +19,7 @@ from chutelab.pictures.plots import style
 from chutelab.scene import Scene
 from chutelab.scene.messages import live_of
 from chutelab.scene.quantities import REGISTRY
+from chutelab.scene.tables import Live
 from chutelab.util.files import whole
 from chutelab.util.versions import own_version
 
@@ -28,24 +29,31 @@ COLOURS = ("track", "analytic", "belt", "strike", "stream")
 
 
 def html(
-    scene: Scene,
+    scene: Scene | None,
     *,
     language: str = "en",
     home: tuple[str, str] | None = None,
     exercise: Mapping[str, Any] | None = None,
+    lesson: Mapping[str, Any] | None = None,
+    partly: bool = False,
 ) -> str:
     """Return the live page of a scene; the same scene and version give the same bytes.
 
     Parameters
     ----------
-    scene : Scene
-        Of disks or spheres, without strings.
+    scene : Scene, optional
+        Of disks or spheres, without strings. None begins with an empty machine.
     language : {"en", "de"}
         Of all that the page says; what the scene says stands as it is.
     home : tuple of str, optional
         Text and address of a link back, for a page that is one of several.
     exercise : mapping, optional
         What `chutelab.classroom.exercises.catalogue.data_of` makes of an exercise.
+    lesson : mapping, optional
+        Title and question of a lesson, and its steps as
+        `chutelab.classroom.lessons.steps.data_of` has them.
+    partly : bool
+        Whether the page says what it cannot show of the scene, and leaves it out.
 
     Raises
     ------
@@ -61,8 +69,14 @@ def html(
     palette = "".join(f"  --{k.replace('_', '-')}: {v};\n" for k, v in colours.items())
     css = f":root {{\n{palette}}}\n{_file('assets/page.css')}"
     core = files("chutelab.core")
-    facts = describe(scene)
-    live = live_of(scene, facts["scene"])
+    facts = describe(scene, partly=partly)
+    strings = json.loads(_file(f"assets/strings/{language}.json"))
+    title = strings["new-machine"] if scene is None else scene.title
+    if scene is None or "lacks" in facts:
+        facts["scene"]["title"] = title
+        live = Live().model_dump()
+    else:
+        live = live_of(scene, facts["scene"])
     if given := facts["scene"].get("live"):
         # As what is saved from the page will have it.
         facts["scene"]["live"] = {key: live[key] for key in given}
@@ -75,11 +89,12 @@ def html(
         "language": language,
         "strings": {
             **{f"number-{row.name}": row.meaning for row in shown},
-            **json.loads(_file(f"assets/strings/{language}.json")),
+            **strings,
         },
         "quantities": {row.name: {"symbol": row.symbol, "unit": row.unit} for row in shown},
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
         **({} if exercise is None else {"exercise": exercise}),
+        **({} if lesson is None else {"lesson": lesson}),
         "wasm": b64encode(zlib.compress((core / "core.wasm").read_bytes(), 9)).decode("ascii"),
     }
     # Within a script element nothing but an end tag must look like one.
@@ -87,7 +102,7 @@ def html(
     script = _file("bundle/app.js")
     return Template(_file("assets/page.html")).substitute(
         language=language,
-        title=escape(scene.title),
+        title=escape(title),
         version=escape(own_version()),
         broken=escape(data["strings"]["broken-page"]),
         home=f'<a class="home" href="{escape(home[1])}">{escape(home[0])}</a>' if home else "",
@@ -101,18 +116,23 @@ def html(
 
 
 def write(
-    scene: Scene,
+    scene: Scene | None,
     path: str | Path,
     *,
     language: str = "en",
     home: tuple[str, str] | None = None,
     exercise: Mapping[str, Any] | None = None,
+    lesson: Mapping[str, Any] | None = None,
+    partly: bool = False,
 ) -> int:
     """Write the live page of a scene, whole or not at all, and return its size in bytes.
 
     See `html`; a file that is there is replaced, its folder must be there.
     """
-    data = html(scene, language=language, home=home, exercise=exercise).encode("utf-8")
+    page = html(
+        scene, language=language, home=home, exercise=exercise, lesson=lesson, partly=partly
+    )
+    data = page.encode("utf-8")
     with whole(Path(path)) as unfinished:
         unfinished.write_bytes(data)
     return len(data)

@@ -21,18 +21,17 @@ from typing import Any, Final, Literal, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.engines.simulation import judged, simulate
+from chutelab.engines.simulation import simulate
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.quantities import measured as read
-from chutelab.results.recorder import StalledError
 from chutelab.scene import MISSING, AnyScene, Scene, SceneError, load
 from chutelab.scene.overrides import value_at
 from chutelab.scene.quantities import Ending, lookup, suggestion, whose
 from chutelab.scene.units import read_size
 from chutelab.scene.variants import Range, Varied, Vary, is_plain, quantity, reason, varied
-from chutelab.studies.sweep.batch import Block, one_line, together
+from chutelab.studies.sweep.plan import Block, runs
 from chutelab.studies.sweep.rows import touches
-from chutelab.util.arrays import Floats, Ints, Progress
+from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
 from chutelab.util.versions import library
 
@@ -269,17 +268,6 @@ def ranges(scene: Scene, vary: Varied) -> tuple[Span, ...]:
     return each_once("--vary", varied(vary, Range), read, ASK, MOST)
 
 
-def suits(scene: Scene, keys: Sequence[str], quantities: Sequence[Quantity]) -> bool:
-    """Tell whether variants of a scene can run at once, and all quantities be read off that."""
-    return (
-        scene.count == 1
-        and scene.stream.at is None
-        and scene.run.engine not in ("contact", "pymunk")
-        and all(map(is_plain, keys))
-        and all(quantity.key != "contacts" for quantity in quantities)
-    )
-
-
 FEWEST: Final = 8
 """Variants from which on it pays to run them at once."""
 
@@ -319,7 +307,6 @@ class Evaluator:
 
     expected: int = 0
     runs: int = field(default=0, init=False)
-    _done: float = field(default=0.0, init=False)
 
     def __call__(self, points: ArrayLike) -> Outcomes:
         """Run the variants at points, shape (N, K), K values of the keys each."""
@@ -329,46 +316,29 @@ class Evaluator:
         # The run that ends as the scene says comes last: what both runs know is read off that.
         wanted = {quantity.ending for quantity in self.quantities} - {"any"}
         endings = sorted(wanted, reverse=True) or ["scene"]
-
-        def read(ending: str, recording: Recording, rows: Ints) -> None:
-            for column, one in enumerate(self.quantities):
-                if one.ending in ("any", ending):
-                    values[rows, column] = one.of(recording)
-            courses[rows] = courses_of(recording)[: len(rows)]
-            kinds[rows] = touches(recording, len(rows))
-
-        left = set(range(len(table)))
-        if len(table) >= FEWEST and suits(self.scene, self.keys, self.quantities):
-            left = set()
-            for start, ending in product(range(0, len(table), BLOCK), endings):
-                base, part = self.scene.with_values(_until(ending)), table[start : start + BLOCK]
-                runs, refused, alone = together(Block(base, tuple(self.keys), part))
-                for recording, rows in runs:
-                    read(ending, recording, start + rows)
-                for row, fault in refused.items():
-                    faults[start + row] = one_line(fault)
-                left.update(start + row for row in alone)
-                self._ran(len(part) / len(endings))
-        for row in sorted(left):
-            given = dict(zip(self.keys, table[row].tolist(), strict=True))
-            try:
-                for ending in endings:
-                    recording = judged(self.scene.with_values(given | _until(ending)))
-                    read(ending, recording, np.array([row]))
-                    for broken in recording.laws[:1]:
-                        faults[row] = str(broken)
-            except (SceneError, StalledError) as error:
-                faults[row] = reason(error) if isinstance(error, SceneError) else str(error)
-            self._ran(1)
+        # A family does not count the contacts of each.
+        apart = len(table) < FEWEST or any(one.key == "contacts" for one in self.quantities)
+        done = 0.0
+        for start, ending in product(range(0, len(table), BLOCK), endings):
+            scene = self.scene.with_values(_until(ending))
+            block = Block(scene, tuple(self.keys), table[start : start + BLOCK])
+            for which, found in runs(block, apart=apart):
+                rows = start + which
+                if isinstance(found, str):
+                    faults[rows] = found
+                else:
+                    courses[rows] = courses_of(found)[: len(rows)]
+                    kinds[rows] = touches(found, len(rows))
+                    for column, one in enumerate(self.quantities):
+                        if one.ending in ("any", ending):
+                            values[rows, column] = one.of(found)
+                done += len(rows) / len(endings)
+                if self.progress is not None and self.expected:
+                    self.progress(min((self.runs + done) / self.expected, 1.0))
         values[faults != ""] = np.nan
         courses[faults != ""] = kinds[faults != ""] = NO_RUN
         self.runs += len(table)
         return Outcomes(values, courses.tolist(), faults.tolist(), kinds.tolist())
-
-    def _ran(self, variants: float) -> None:
-        self._done += variants
-        if self.progress is not None and self.expected:
-            self.progress(min(self._done / self.expected, 1.0))
 
 
 def _until(ending: str) -> dict[str, str]:

@@ -7,10 +7,8 @@
 >>> len(swept), swept.columns["landing.vx.mean"].round(3).tolist()
 (4, [0.0, -2.0, 0.0, -4.0])
 
-- `plan`: what is to be varied, looked at before anything runs; samples of ranges.
-- `rows`: what a row holds, and how it is read off a recording.
-- `batch`: a block of variants run: many at once through the exact engine, or one by one.
-- `result`: `Sweep`, and CSV and Parquet files.
+- `plan`: what is to be varied, looked at before anything runs; blocks of variants, run.
+- `rows`: what a row holds, read off a recording; `Sweep`, and CSV and Parquet files.
 - `part`: the file of the finished rows of a sweep that is not finished.
 - `sweeping`: `sweep`: variants run here, in processes, or on a Dask cluster.
 
@@ -18,10 +16,8 @@ SciPy, pyarrow, Dask and pandas are imported when they are needed.
 """
 
 from chutelab.scene.quantities import COLUMNS
-from chutelab.studies.sweep.batch import row_of
-from chutelab.studies.sweep.plan import DESIGNS, MOST_VARIANTS, Plan, planned
-from chutelab.studies.sweep.result import Sweep
-from chutelab.studies.sweep.rows import REASON, TEXTS, TOUCHES, no_column
+from chutelab.studies.sweep.plan import DESIGNS, MOST_VARIANTS, Plan, planned, row_of
+from chutelab.studies.sweep.rows import REASON, TEXTS, TOUCHES, Sweep, no_column
 from chutelab.studies.sweep.sweeping import (
     Crew,
     LostWorkersError,

@@ -26,8 +26,7 @@ import numpy as np
 from chutelab.scene import to_dict
 from chutelab.scene.quantities import COLUMNS
 from chutelab.studies.sweep.plan import Plan
-from chutelab.studies.sweep.result import columns_of, synced, text_of
-from chutelab.studies.sweep.rows import TEXTS, Columns
+from chutelab.studies.sweep.rows import TEXTS, Columns, columns_of, synced, text_of
 from chutelab.util.errors import InputError
 from chutelab.util.files import writing
 from chutelab.util.versions import version_of

@@ -1,36 +1,46 @@
-"""What is to be swept: which keys, over which values, in which order.
+"""What is to be swept, and blocks of it run: which keys, over which values, in which order.
 
-Values are grids, or samples of several ranges at once: Latin hypercube or Sobol points.
+Values are grids, or samples of several ranges at once: Latin hypercube or Sobol points. Variants
+that differ in plain numbers only run many at once: validating and building, which are slow one by
+one, are done on arrays too. What does not fit is run alone: that is never wrong, only slower.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from chutelab.engines.simulation import ENGINES
-from chutelab.scene import AnyScene, Scene, load
+from chutelab.engines.exact import CornerError, run
+from chutelab.engines.simulation import ENGINES, judged
+from chutelab.machine import Machine, RefusedError, build
+from chutelab.results import Recording
+from chutelab.results.recorder import StalledError
+from chutelab.scene import AnyScene, Scene, SceneError, load
 from chutelab.scene.variants import (
+    Family,
     Quantity,
     Range,
     Varied,
     Vary,
+    accepted,
     count_of,
     is_plain,
+    judged_by,
     quantities,
+    reason,
     varied,
 )
-from chutelab.studies.sweep.batch import Block
-from chutelab.util.arrays import Floats
+from chutelab.studies.sweep.rows import Columns, empty, rows
+from chutelab.util.arrays import Floats, Ints
 from chutelab.util.errors import InputError
 from chutelab.util.versions import library
 
 DESIGNS: Final = {"lhs": "LatinHypercube", "sobol": "Sobol"}
 """Names of the designs, and of the classes of `scipy.stats.qmc` that draw them."""
-
 
 MOST_VARIANTS: Final = 1_000_000
 """Rows of one sweep: some 300 MB while it runs."""
@@ -46,6 +56,163 @@ EXACT: Final = 16
 
 STEPPED: Final = 1
 """The same of variants that are stepped: each may take seconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Variants to be simulated; can be sent to another process.
+
+    Attributes
+    ----------
+    scene : Scene
+        What is varied.
+    paths : tuple of str
+        Full paths of the K keys that are, free surfaces by index.
+    values : ndarray, (n, K)
+        The values of each variant.
+    engine : str or None
+        Overrides ``run.engine``.
+    """
+
+    scene: Scene
+    paths: tuple[str, ...]
+    values: Floats
+    engine: str | None = None
+
+    def settings(self, row: int) -> dict[str, float]:
+        """Return the values of one variant by path."""
+        return dict(zip(self.paths, self.values[row].tolist(), strict=True))
+
+
+def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
+    """Validate the variants of a block, whose keys are plain numbers.
+
+    A value is judged by its key, once for each. Rules between keys judge one variant for each
+    combination of the values that they ask for; other keys cannot change what they say.
+
+    Returns
+    -------
+    scene, sound, faults
+        One of the sound variants (None if there is none), the numbers of all of them, and what is
+        wrong with each of the others.
+    """
+    values = block.values
+    good = np.stack([accepted(*column) for column in zip(block.paths, values.T, strict=True)]).T
+    sound = np.asarray(good.all(axis=1))
+    asked = np.full(len(block.paths), not sound.any())
+    while True:
+        telling = np.where(good & ~asked, 0.0, values)
+        _, first, group = np.unique(
+            np.hstack([telling, good]), axis=0, return_index=True, return_inverse=True
+        )
+        more = asked.copy()
+        for row in first[sound[first]].tolist():
+            by = judged_by(block.scene, block.settings(row))
+            more |= [path in by for path in block.paths]
+        if (more == asked).all():
+            break
+        asked = more
+    template, wrong = None, dict[int, str]()
+    for number, row in enumerate(first.tolist()):
+        try:
+            scene = block.scene.with_values(block.settings(row))
+            template = template or scene
+        except SceneError as error:
+            wrong[number] = reason(error)
+    faults = {n: wrong[g] for n, g in enumerate(group.ravel().tolist()) if g in wrong}
+    return template, np.delete(np.arange(len(values)), list(faults)), faults
+
+
+def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording | str]]:
+    """Run the variants of a block: many at once where that can be, else one by one.
+
+    Many at once, a variant is a particle with a machine of its own; numbers agree with those of the
+    variant alone to 1e-12. `apart` has all of them run one by one.
+
+    Yields
+    ------
+    which, found
+        Rows of the block, (N,), and their recording, which breaks no law: of one variant, or of a
+        family with a particle for each. Or, as text, why they have none.
+    """
+    which, paths = np.arange(len(block.values)), {*block.paths}
+    template = None
+    if not apart and all(map(is_plain, paths)):
+        template, which, faults = screened(block)
+        yield from ((np.array([row]), one_line(why)) for row, why in faults.items())
+    stepped = (block.engine or block.scene.run.engine) in ("contact", "pymunk")
+    # Members of a family are released, and have their gates, at the same times.
+    timed = any(path.endswith(("opens_at", "closes_at", "stream.start")) for path in paths)
+    # Whether a release lies on the belt is a matter of the last digits.
+    close = {"particle.radius", "incoming.pulley_radius", "incoming.length"} & paths
+    close = close if block.scene.stream.at is not None else set()
+    groups: list[Ints] = []
+    if template is not None and not (stepped or timed or close or template.count > 1):
+
+        def built(some: Ints) -> Machine:
+            columns = block.values[some].T.copy()
+            return build(Family(template, dict(zip(block.paths, columns, strict=True))))
+
+        while len(which) and not groups:
+            try:
+                machine = built(which)
+                groups = [which]
+            except RefusedError as refused:
+                for n, fault in refused.members.items():
+                    yield which[[n]], one_line(str(fault))
+                which = np.delete(which, list(refused.members))
+        which = which[:0]
+    left = which.tolist()
+    while groups:
+        which = groups.pop()
+        with suppress(CornerError, StalledError):
+            some = machine if len(which) == machine.count else built(which)
+            recording = Recording.of(run(some, apart=True))
+            if not recording.laws:
+                yield which, recording
+                continue
+        # Those that do not get through, or break a law, are found by halving.
+        halves = np.array_split(which, 2) if len(which) > 1 else []
+        groups += halves
+        left += [] if halves else which.tolist()
+    for row in left:
+        try:
+            found = alone(block.scene.with_values(block.settings(row)), block.engine)
+        except SceneError as error:
+            found = one_line(reason(error))
+        yield np.array([row]), found
+
+
+def alone(scene: Scene, engine: str | None = None) -> Recording | str:
+    """Return the recording of a scene, or why there is none, or none that can be believed."""
+    try:
+        recording = judged(scene, engine=engine)
+    except SceneError as error:
+        return one_line(reason(error))
+    except StalledError as error:
+        return one_line(f"the run got stuck: {error}")
+    return one_line(str(recording.laws[0])) if recording.laws else recording
+
+
+def row_of(scene: Scene, engine: str | None = None) -> Columns:
+    """Simulate a scene and return its row; if it cannot be run, one that says why."""
+    found = alone(scene, engine)
+    return empty(1, found) if isinstance(found, str) else rows(found)
+
+
+def swept(block: Block, *, apart: bool = False) -> Columns:
+    """Return the rows of a block, see `runs`."""
+    every = empty(len(block.values))
+    for which, found in runs(block, apart=apart):
+        own = empty(len(which), found) if isinstance(found, str) else rows(found, len(which))
+        for name, values in own.items():
+            every[name][which] = values
+    return every
+
+
+def one_line(why: str) -> str:
+    """Return a text without line breaks."""
+    return " ".join(why.split())
 
 
 @dataclass(frozen=True, eq=False)

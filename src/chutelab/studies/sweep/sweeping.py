@@ -32,11 +32,19 @@ from typing import Any, Final
 from chutelab.scene import AnyScene
 from chutelab.scene.quantities import COLUMNS
 from chutelab.scene.variants import Varied
-from chutelab.studies.sweep.batch import swept
 from chutelab.studies.sweep.part import unfinished
-from chutelab.studies.sweep.plan import Plan, planned
-from chutelab.studies.sweep.result import Sweep, format_of, synced, write, write_csv
-from chutelab.studies.sweep.rows import REASON, TEXTS, Columns, joined
+from chutelab.studies.sweep.plan import Plan, planned, swept
+from chutelab.studies.sweep.rows import (
+    REASON,
+    TEXTS,
+    Columns,
+    Sweep,
+    format_of,
+    joined,
+    synced,
+    write,
+    write_csv,
+)
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import InputError
 from chutelab.util.files import writing

@@ -1,6 +1,7 @@
 // The page: reads its data, starts the engine's thread, and joins the parts.
 
 import { Bench } from "./bench.ts";
+import { Callout } from "./callout.ts";
 import { compiled } from "./core.ts";
 import { Engine } from "./engine.ts";
 import { Arrows } from "./arrows.ts";
@@ -17,6 +18,7 @@ import { watchLaws } from "./laws.ts";
 import { LandingPanel } from "./landing.ts";
 import { NumbersPanel } from "./numbers.ts";
 import { startPlan } from "./plan.ts";
+import { Palette } from "./palette.ts";
 import { Prediction } from "./predict.ts";
 import { Sound } from "./sound.ts";
 import { Stage } from "./stage.ts";
@@ -72,12 +74,15 @@ async function start() {
   const tools = new Tools(byId("stage").parentElement, lab, stage, words, new Symbols(stage));
   const inspector = new Inspector(byId("panels"), lab, words);
   const bench = new Bench(byId("bench"), stage, inspector, lab, words);
+  new Callout(inspector, stage, lab);
+  const palette = bench.free
+    ? new Palette(byId("stage").parentElement, bench, stage, lab, words) : null;
   new Transport(lab, stage, words);
   new Sound(lab, words);
   new Film(lab, stage, words);
   new Keep(byId("panels"), stage, lab, words);
   if (data.live?.predict) new Prediction(stage, lab, words);
-  listenToKeys(bench, lab, words);
+  listenToKeys(bench, palette, lab, words);
   for (const panel of document.querySelectorAll("#panels > .card, .tools, .looks, .watch")) {
     const name = panel.matches(".card") ? panel.id : "tools";
     if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
@@ -85,7 +90,11 @@ async function start() {
   const exercise = data.exercise
     && new ExercisePanel(byId("panels"), stage, lab, words, newEngine);
   Object.assign(globalThis, {
-    chutelab: { lab, stage, panels, tools, exercise, toml: () => toToml(lab.given as any) },
+    chutelab: { lab, stage, bench, panels, tools, exercise, toml: () => toToml(lab.given as any) },
+  });
+  lab.on("scene", () => {
+    const heading = document.querySelector("h1") as HTMLElement;
+    if (lab.scene && heading.textContent !== lab.scene.title) heading.textContent = lab.scene.title;
   });
   byId("broken").remove();
 }

@@ -44,6 +44,9 @@ class Balls {
 
   constructor(readonly lab: Lab, readonly colour: (name: string) => string) {}
 
+  /** Whether a material has shades of its own. */
+  isShaded = (material: string) => material in SHADES;
+
   /** What names a particle's shades: its material, or the number of its stream. */
   kindOf(i: number): string {
     const { scene, machine } = this.lab, release = machine?.releases[i];

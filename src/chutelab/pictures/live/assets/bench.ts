@@ -1,91 +1,108 @@
-// What is done on the picture itself: look around, choose, draw, drop and delete.
+// What is done on the picture itself: look around, choose, move, draw, copy and delete.
 
 import { mayDraw } from "./controls.ts";
-import { surfaceAt, withArc, withLine, withParticle } from "./edit.ts";
+import { endsOf, rowsNamed, surfaceAt, withCopies, withPart, type Part } from "./edit.ts";
+import { pointsOf } from "./callout.ts";
 import { bodyOf, roundTo, type Handle } from "./handles.ts";
 import { html, iconButton } from "./panels.ts";
 import { svg } from "./scenery.ts";
+import type { Given } from "./scene.ts";
 import type { Stage } from "./stage.ts";
 import type { Inspector } from "./inspector.ts";
 import type { Lab } from "./lab.ts";
 import type { Words } from "./words.ts";
 
 type Place = [number, number];
-type Mode = "move" | "line" | "arc" | "drop";
-
-/** What stands on the buttons, see page.html. */
-const DRAWINGS: Record<string, string> = {
-  move: "select", line: "line", arc: "arc", drop: "ball", delete: "bin", "zoom-in": "plus",
-  "zoom-out": "minus",
-};
-
-/** Points that a thing is drawn by. */
-const POINTS = { move: 0, line: 2, arc: 3, drop: 1 };
 
 /** Pixels that a finger or a mouse may stray while it clicks. */
 const STRAY = 6;
 
-/** How far from a line it can be clicked, pixels. */
-const CLICK_REACH = 14;
+/** How far from a line, or from a ball, it can be clicked, pixels. */
+const CLICK_REACH = 14, BALL_REACH = 22;
+
+/** Balls that can be clicked while they move; more are a crowd. */
+const MOST_BALLS = 100;
 
 const ZOOM = 1.25;
+
+/** Shares of the picture from its middle where there may be room for a part; px that are enough. */
+const GRID = [-0.36, -0.24, -0.12, 0, 0.12, 0.24, 0.36], ROOM = 160;
+
+/** Places that are tried where a part cannot be at the best one. */
+const TRIES = 12;
 
 /** Pixels per metre. */
 const SCALES = [2, 2e5];
 
+/** Pixels that a key moves the view, or what is drawn with; with Shift a tenth. */
+const KEY = 20;
+
+/** Pixels that a copy lies beside what it is a copy of. */
+const ASIDE = [28, 28];
+
+/** Where a part has its points if no pointer sets them, in sizes of things that are new. */
+const EXAMPLES: Record<string, Place[]> = {
+  from: [[-0.2, 0], [0.2, 0]], points: [[-0.2, 0.06], [0.2, -0.06]],
+  arc: [[-0.2, 0], [0.2, 0], [0, -0.12]], at: [[-0.05, 0], [0.1, 0]], center: [[-0.25, 0.1]],
+};
+
 class Bench {
-  mode: Mode = "move";
-  /** The points that are set of what is being drawn. */
+  /** The part that is drawn; null while things are chosen and moved. */
+  mode: Part | null = null;
+  /** The points that are set of what is being drawn, m. */
   points: Place[] = [];
   /** Fingers on the picture, pixels. */
   fingers: Map<number, Place> = new Map();
-  draft;
-  chosen;
-  modes?: [Mode, any][];
-  remove?: any;
+  /** Material of the next balls, "" for that of the first. */
+  material = "";
+  /** Told when another tool is chosen. */
+  listeners: (() => void)[] = [];
+  free;
+  draft = svg("g", { class: "draft" });
+  chip;
+  /** Where the next point goes, m: at the pointer, or where keys moved it. */
+  cursor: Place | null = null;
 
   constructor(
     home: any, readonly stage: Stage, readonly inspector: Inspector, readonly lab: Lab,
     readonly words: Words,
   ) {
-    this.draft = svg("path", { class: "draft" });
-    this.chosen = svg("path", { class: "chosen" });
-    stage.over.prepend(this.chosen, this.draft);
-    inspector.mayDelete = mayDraw(lab.data);
+    stage.over.prepend(this.draft);
+    this.free = mayDraw(lab.data);
+    inspector.mayDelete = this.free;
+    inspector.duplicate = () => this.duplicate();
+    this.chip = html("div", { class: "float chip", role: "status" });
+    this.chip.hidden = true;
+    stage.home.after(this.chip);
     this.tools(home);
     this.listen();
-    inspector.listeners.push(() => this.mark());
-    lab.on("scene", () => this.mark());
-    stage.painters.push(() => this.follow());
-    this.set("move");
+    inspector.listeners.push(() => stage.choose(inspector.parts));
+    lab.on("scene", () => {
+      if (stage.parts.join() !== inspector.parts.join()) stage.choose(inspector.parts);
+    });
+    stage.drawers.push(() => this.sketch());
+    this.set(null);
   }
 
   tools(home: any) {
-    const { words, lab, stage } = this, free = mayDraw(lab.data);
-    const button = (id: string, act: (event: MouseEvent) => void) => {
-      const made = iconButton(`tool-${id}`, DRAWINGS[id], words.say(id));
+    const { words, lab, stage } = this;
+    const button = (id: string, drawing: string, act: () => void) => {
+      const made = iconButton(`tool-${id}`, drawing, words.say(id));
       made.addEventListener("click", act);
       return made;
     };
-    this.modes = ((free ? ["move", "line", "arc", "drop"] : []) as Mode[]).map((mode) =>
-      [mode, button(mode, ({ detail }) => {
-        this.set(mode);
-        // It was a key, not a click, so there is no mouse to draw with.
-        if (detail === 0 && mode !== "move") this.draw(this.example());
-      })] as [Mode, any]);
-    this.remove = button("delete", () => this.inspector.takeAway());
+    const select = button("select", "select", () => this.set(null));
+    this.listeners.push(() => select.setAttribute("aria-pressed", String(!this.mode)));
+    const { view } = stage;
     const middle = (factor: number) =>
-      this.zoom(factor, stage.view.px(stage.view.middle[0]), stage.view.py(stage.view.middle[1]));
-    const zooms = [
-      button("zoom-in", () => middle(ZOOM)), button("zoom-out", () => middle(1 / ZOOM)),
-    ];
-    home.prepend(...this.modes.map(([, made]) => made), ...(free ? [this.remove] : []), ...zooms);
+      this.zoom(factor, view.px(view.middle[0]), view.py(view.middle[1]));
+    home.prepend(...(this.free ? [select] : []), button("zoom-in", "plus", () => middle(ZOOM)),
+      button("zoom-out", "minus", () => middle(1 / ZOOM)));
     const presets = lab.data.live?.presets ?? [];
     if (!presets.length) return;
     const menu = html("select", { id: "presets", "aria-label": words.say("presets") });
     menu.append(new Option(words.say("presets"), ""),
-      ...presets.map(({ name }: { name: string }, n: number) =>
-        new Option(name, String(n))));
+      ...presets.map(({ name }: { name: string }, n: number) => new Option(name, String(n))));
     menu.addEventListener("change", () => {
       if (menu.value !== "") lab.change(presets[Number(menu.value)].set);
       menu.value = "";
@@ -93,53 +110,60 @@ class Bench {
     home.append(menu);
   }
 
-  set(mode: Mode) {
-    this.mode = mode;
+  /** Take a tool, which stays until another is taken; one without points is put at once. */
+  set(mode: Part | null) {
     this.points = [];
-    this.draft.setAttribute("d", "");
-    this.stage.home.classList.toggle("drawing", mode !== "move");
-    for (const [one, button] of this.modes ?? []) {
-      button.setAttribute("aria-pressed", String(one === mode));
-    }
+    this.mode = mode?.places.length ? mode : null;
+    this.cursor = null;
+    this.stage.home.classList.toggle("drawing", this.mode !== null);
+    if (this.mode) this.inspector.choose();
+    this.listeners.forEach((listener) => listener());
+    this.sketch();
+    if (mode && !this.mode) this.put(mode, []);
+  }
+
+  /** Begin to draw a part with keys, or the pointer. */
+  draw(part: Part) {
+    this.set(part);
+    this.stage.front.focus();
   }
 
   listen() {
-    const { front } = this.stage;
+    const { stage } = this, { front } = stage;
     front.addEventListener("pointerdown", (event: PointerEvent) => {
       if (event.target !== front || event.button > 0) return;
       front.setPointerCapture(event.pointerId);
-      const at = this.stage.placeOf(event);
+      const at = stage.placeOf(event);
       this.fingers.set(event.pointerId, at);
       this.pressed = this.fingers.size === 1 ? at : null;
-      this.grabbed = this.pressed && this.mode === "move"
-        ? this.bodyAt(at, event.pointerType) : null;
-      if (this.mode !== "move" && this.pressed) this.put(at);
+      if (this.mode && this.pressed) this.point(at, event.altKey);
+      else this.grabbed = this.pressed && this.bodyAt(at, event.pointerType);
     });
     front.addEventListener("pointermove", (event: PointerEvent) => {
-      const at = this.stage.placeOf(event);
-      if (this.mode !== "move") this.sketch(at);
+      const at = stage.placeOf(event);
+      if (this.mode) this.aim(at, event.altKey);
       else if (this.grabbed) this.carry(at, event);
       else if (this.fingers.has(event.pointerId)) {
         const alone = this.fingers.size === 1 && event.pointerType === "touch";
         // One finger on an empty place scrolls the page.
         if (alone) this.fingers.set(event.pointerId, at);
         else this.look(event.pointerId, at);
-      }
+      } else if (event.pointerType === "mouse" && !stage.held) this.hover(at);
     });
     front.addEventListener("pointerup", (event: PointerEvent) => {
       if (!this.fingers.delete(event.pointerId) || !this.pressed) return;
-      const at = this.stage.placeOf(event);
+      const at = stage.placeOf(event);
       const still = Math.hypot(at[0] - this.pressed[0], at[1] - this.pressed[1]) < STRAY;
-      if (this.mode === "move") {
-        if (still) this.pick(at);
-      } else if (!still) this.put(at);
+      if (!this.mode) {
+        if (still) this.pick(at, event.shiftKey);
+      } else if (!still && this.points.length) this.point(at, event.altKey);
       this.pressed = this.grabbed = null;
     });
     front.addEventListener("touchstart", (event: TouchEvent) => {
       const { touches } = event, box = front.getBoundingClientRect();
       const at: Place = [touches[0].clientX - box.left, touches[0].clientY - box.top];
       // The page must not scroll away under what is moved.
-      const body = this.mode === "move" && this.bodyAt(at, "touch");
+      const body = !this.mode && this.bodyAt(at, "touch");
       if (touches.length > 1 || body) event.preventDefault();
     }, { passive: false });
     front.addEventListener("pointercancel", (event: PointerEvent) => {
@@ -152,36 +176,95 @@ class Bench {
       event.preventDefault();
       const lines = event.deltaMode === 1 ? 20 : 1;
       this.zoom(2 ** (-(event.deltaY * lines) / (event.ctrlKey ? 80 : 400)),
-        ...this.stage.placeOf(event as any));
+        ...stage.placeOf(event as any));
     }, { passive: false });
-    this.stage.grips.addEventListener("focusin", ({ target }: FocusEvent) => {
+    front.addEventListener("keydown", (event: KeyboardEvent) => {
+      if (event.target === front && !event.ctrlKey && !event.metaKey && this.key(event)) {
+        event.preventDefault();
+      }
+    });
+    stage.grips.addEventListener("focusin", ({ target }: FocusEvent) => {
       const id = (target as Element).getAttribute("data-id");
-      const handle = this.stage.handles.find((one) => one.id === id);
-      if (handle) this.inspector.choose(handle.surface);
+      const handle = stage.handles.find((one) => one.id === id);
+      if (handle && !handle.change && this.inspector.part !== handle.surface) {
+        this.inspector.choose(handle.surface);
+      }
     });
   }
+
+  /** Draw with keys: arrows move the point, Enter sets it. Where H was pressed arrows move the
+   * view. */
+  key({ key, shiftKey }: KeyboardEvent): boolean {
+    const ways: Record<string, Place> = {
+      ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
+    };
+    const { stage } = this, { view } = stage, step = shiftKey ? 0.1 * KEY : KEY;
+    if (key.toLowerCase() === "h") this.moving = !this.moving;
+    else if (key in ways && this.mode) {
+      const [x, y] = this.cursor ?? this.points.at(-1) ?? view.middle, [dx, dy] = ways[key];
+      const far = shiftKey ? view.snap : roundTo(KEY / view.scale, view.snap) || view.snap;
+      this.cursor = [roundTo(x + dx * far, view.snap), roundTo(y - dy * far, view.snap)];
+      this.sketch();
+    } else if (key in ways && this.moving) {
+      view.x += (ways[key][0] * step) / view.scale;
+      view.y -= (ways[key][1] * step) / view.scale;
+      stage.moved = true;
+      stage.rebuild();
+    } else if (key === "Enter" && this.mode) this.take(this.cursor ?? this.next());
+    else return false;
+    return true;
+  }
+
+  /** Whether arrows move the view. */
+  moving = false;
 
   /** The body that is grabbed, and moves once the pointer has moved. */
   grabbed: Handle | null = null;
 
+  /** What is at a place, px: a ball, where it starts or is now, or a surface. */
+  nameAt([px, py]: Place) {
+    const { view, handles } = this.stage, { machine, recording, t } = this.lab;
+    if (!machine) return "";
+    const near = (x: number, y: number, r: number) =>
+      Math.hypot(view.px(x) - px, view.py(y) - py) < Math.max(r, BALL_REACH);
+    const start = handles.find(({ what, x, y }) => what === "release" && near(x, y, 0));
+    if (start) return start.surface;
+    const ball = machine.releases.findIndex((_, i) => {
+      const state = recording?.tracks[i]?.state(t);
+      return state && !state.ended && near(state.x, state.y, (machine.radius[i] ?? 0) * view.scale);
+    });
+    const name = surfaceAt(machine, view.worldX(px), view.worldY(py), CLICK_REACH / view.scale);
+    const few = machine.releases.length < MOST_BALLS;
+    return ball >= 0 && few ? machine.streams[machine.releases[ball].stream] : name;
+  }
+
   /** The body at a place, px, to move it: with a finger only one that is chosen. */
-  bodyAt([px, py]: Place, pointer: string) {
-    const { view, handles } = this.stage, { machine } = this.lab;
-    const [x, y] = [view.worldX(px), view.worldY(py)];
-    const name = machine ? surfaceAt(machine, x, y, CLICK_REACH / view.scale) : "";
-    if (!name || (pointer === "touch" && name !== this.inspector.part)) return null;
-    return bodyOf(handles, name, x, y);
+  bodyAt(at: Place, pointer: string) {
+    const { view, handles } = this.stage, { parts } = this.inspector, name = this.nameAt(at);
+    if (!name || (pointer === "touch" && !parts.includes(name))) return null;
+    const names = parts.includes(name) ? parts : [name];
+    const body = bodyOf(handles, names, view.worldX(at[0]), view.worldY(at[1]));
+    return body && { ...body, surface: name };
   }
 
   /** Move the body that is grabbed along. @param at pixels */
   carry(at: Place, event: PointerEvent) {
-    const { stage, grabbed, pressed } = this;
+    const { stage, grabbed, pressed, inspector } = this;
     if (stage.held || !grabbed || !pressed) return;
     if (Math.hypot(at[0] - pressed[0], at[1] - pressed[1]) < STRAY) return;
-    if (this.inspector.part !== grabbed.surface) this.inspector.choose(grabbed.surface);
-    stage.held = grabbed;
+    if (!inspector.parts.includes(grabbed.surface)) inspector.choose(grabbed.surface);
+    stage.hold(grabbed);
     // This move may be the only one: where all comes late, many are told as one.
     stage.aim(event);
+  }
+
+  /** Show what a click would choose. */
+  hover(at: Place) {
+    const { stage } = this, name = this.nameAt(at);
+    stage.front.classList.toggle("on-body", name !== "");
+    if (name === stage.pointed) return;
+    stage.pointed = name;
+    stage.drawOutline();
   }
 
   /** Where a finger came down that does nothing else. */
@@ -216,84 +299,202 @@ class Bench {
 
   waiting = 0;
 
-  /** @param at pixels */
-  worldOf([px, py]: Place): Place {
-    const { view } = this.stage;
-    return [roundTo(view.worldX(px), view.snap), roundTo(view.worldY(py), view.snap)];
+  /** The place that is meant, m. @param at pixels */
+  meant(at: Place, loose: boolean) {
+    const { stage, lab, mode } = this, { view } = stage;
+    if (loose || !lab.machine) {
+      const [x, y] = [view.worldX(at[0]), view.worldY(at[1])];
+      return { at: [roundTo(x, view.snap), roundTo(y, view.snap)] as Place, caught: false };
+    }
+    const last = this.points.length === 1 && mode?.places.length === 2 ? this.points[0] : undefined;
+    return view.near(at, endsOf(lab.machine, []), last);
+  }
+
+  /** The pointer is over a place, px. */
+  aim(at: Place, loose: boolean) {
+    const found = this.meant(at, loose), { magnet, view } = this.stage;
+    this.cursor = found.at;
+    magnet.classList.toggle("on", found.caught);
+    magnet.setAttribute("cx", view.px(found.at[0]));
+    magnet.setAttribute("cy", view.py(found.at[1]));
+    this.sketch();
   }
 
   /** Set a point of what is being drawn. @param at pixels */
-  put(at: Place) {
-    this.points.push(this.worldOf(at));
-    if (this.points.length >= POINTS[this.mode]) this.draw(this.points);
+  point(at: Place, loose: boolean) {
+    this.take(this.meant(at, loose).at);
   }
 
-  /** @param at pixels */
-  sketch(at: Place) {
-    const { view } = this.stage;
-    const corners = [...this.points, this.worldOf(at)]
-      .map(([x, y]) => `${view.px(x)} ${view.py(y)}`);
-    this.draft.setAttribute("d", corners.length > 1 ? `M${corners.join("L")}` : "");
-  }
-
-  /** Add what was drawn to the scene, and choose it. */
-  draw(points: Place[]) {
-    const { lab, mode } = this, { given, machine } = lab;
-    if (!given) return;
-    const [a, b, c] = points;
-    const start = machine?.interact ? roundTo(Math.max(0, lab.t), 1e-3) : 0;
-    const changed = mode === "line" ? withLine(given, a, b)
-      : mode === "arc" ? withArc(given, a, b, c) : withParticle(given, a, start);
-    const table = mode === "drop" ? "stream" : "surface";
-    this.set("move");
-    lab.replace(changed);
-    if (lab.fault) return;
-    this.inspector.choose(changed[table][changed[table].length - 1].name);
-    const made = this.stage.handles.findLast(({ surface }) => surface === this.inspector.part);
-    this.stage.gripOf.get(made?.id ?? "")?.focus();
-  }
-
-  /** A place for something new in the middle of what is seen. */
-  example(): Place[] {
-    const { left, right, top, bottom } = this.stage.view.free;
-    const at = (u: number, v: number) =>
-      this.worldOf([left + u * (right - left), top + v * (bottom - top)]);
-    return this.mode === "line" ? [at(0.4, 0.5), at(0.6, 0.6)]
-      : this.mode === "arc" ? [at(0.4, 0.5), at(0.5, 0.65), at(0.6, 0.5)] : [at(0.5, 0.25)];
-  }
-
-  /** Choose the surface that was clicked, or the scene. @param at pixels */
-  pick([px, py]: Place) {
-    const { view } = this.stage, { machine } = this.lab;
-    if (!machine) return;
-    const name = surfaceAt(machine, view.worldX(px), view.worldY(py), CLICK_REACH / view.scale);
-    this.inspector.choose(name || "scene");
-  }
-
-  /** Show what is chosen. */
-  mark() {
-    const { lab, stage, inspector } = this, { machine } = lab;
-    stage.part = inspector.part;
-    for (const { id, surface } of stage.handles) {
-      stage.gripOf.get(id)?.classList.toggle("own", surface === inspector.part);
+  /** @param at m */
+  take(at: Place) {
+    const { mode } = this;
+    if (!mode) return;
+    this.points.push(at);
+    this.cursor = null;
+    if (this.points.length < mode.places.length) {
+      this.sketch();
+      return;
     }
-    if (!machine || !this.remove) return;
-    this.remove.disabled = !inspector.canDelete;
-    const { view } = stage, surface = machine.surfaces.indexOf(inspector.part);
-    const own = (piece: { surface: number }) => piece.surface === surface;
-    const lines = machine.segments.filter(own).map(({ x, y, tx, ty, length }) =>
-      `M${view.px(x)} ${view.py(y)}L${view.px(x + tx * length)} ${view.py(y + ty * length)}`);
-    const arcs = machine.arcs.filter(own).map((arc) => stage.scenery.arcPath(arc));
-    this.chosen.setAttribute("d", [...lines, ...arcs].join(""));
-    this.seen = `${view.scale} ${view.x} ${view.y} ${view.width} ${view.height}`;
+    const { points } = this;
+    this.points = [];
+    this.put(mode, points);
   }
 
-  seen = "";
+  /** Where the next point would be without a pointer, m. */
+  next(): Place {
+    return this.example()[this.points.length];
+  }
 
-  /** Keep the mark in its place while the view is moved. */
-  follow() {
-    const { scale, x, y, width, height } = this.stage.view;
-    if (this.seen !== `${scale} ${x} ${y} ${width} ${height}`) this.mark();
+  /** Where a part has its points without a pointer: about a place, or the middle of what is seen.
+   * @param about m */
+  example(part = this.mode, about: Place = this.stage.view.middle): Place[] {
+    const { view } = this.stage, [first] = part?.places ?? [];
+    const shares = EXAMPLES[first] ?? [[0, 0]];
+    const size = Math.min(view.unit, (0.7 * (view.free.right - view.free.left)) / view.scale);
+    return shares.map(([u, v]) => [roundTo(about[0] + u * size, view.snap),
+      roundTo(about[1] + v * size, view.snap)]);
+  }
+
+  /** Places near the middle of what is seen that are far from all that is there, best first, m. */
+  rooms(): Place[] {
+    const { lab, stage: { view } } = this, { left, right, top, bottom } = view.free;
+    const there = pointsOf(lab, view).flatMap(([, points]) => points);
+    const [cx, cy] = [0.5 * (left + right), 0.5 * (top + bottom)];
+    const found = GRID.flatMap((u) => GRID.map((v) => {
+      const [x, y] = [cx + u * (right - left), cy + v * (bottom - top)];
+      const free = there.reduce((least, [px, py]) =>
+        Math.min(least, Math.hypot(px - x, py - y)), ROOM);
+      return { good: free - 0.2 * Math.hypot(x - cx, y - cy), x, y };
+    }));
+    return found.sort((a, b) => b.good - a.good).slice(0, TRIES)
+      .map(({ x, y }) => [view.worldX(x), view.worldY(y)]);
+  }
+
+  /** Add a part to the scene. Where its tool goes on, it is not chosen. */
+  put(part: Part, points: Place[]) {
+    const { lab } = this, { given, machine } = lab;
+    if (!given) return;
+    const start = machine?.interact ? roundTo(Math.max(0, lab.t), 1e-3) : 0;
+    const changed = withPart(given, part, points, this.stage.view.unit, this.material, start,
+      lab.data.tables[part.table]);
+    lab.asked = "";
+    // What is shown stays as it is while a machine grows.
+    this.stage.fitted = this.stage.moved = true;
+    lab.replace(changed);
+    this.sketch();
+    if (lab.fault) return;
+    const rows = changed[part.table];
+    this.made = part.table === "incoming" ? "incoming" : rows[rows.length - 1].name;
+    if (!this.mode) this.inspector.choose(this.made);
+  }
+
+  /** What was put last. */
+  made = "";
+
+  /** Put a part where it has room, and choose it: its handle has the focus. @param about m */
+  place(part: Part, about?: Place) {
+    this.set(null);
+    if (about) this.put(part, this.example(part, about));
+    else {
+      for (const place of part.places.length ? this.rooms() : [this.stage.view.middle]) {
+        this.put(part, part.places.length ? this.example(part, place) : []);
+        if (!this.lab.fault) break;
+      }
+    }
+    if (this.lab.fault) return;
+    const handle = this.stage.handles.find(({ surface }) => surface === this.inspector.part);
+    this.stage.gripOf.get(handle?.id ?? "")?.focus();
+  }
+
+  /** What is set of the part that is drawn, what is still missing, and how it would be. */
+  sketch() {
+    const { mode, stage, chip, words, draft } = this, { view } = stage;
+    draft.replaceChildren();
+    this.chip.hidden = mode === null;
+    if (!mode) {
+      stage.magnet.classList.remove("on");
+      return;
+    }
+    const all = this.cursor ? [...this.points, this.cursor] : this.points;
+    const pixels = all.map(([x, y]) => [view.px(x), view.py(y)] as Place);
+    if (pixels.length > 1) {
+      // An arc that has its ends and a third point is that already.
+      const [a, b, c] = pixels;
+      const turn = c && (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+      let path = `M${a}L${b}`;
+      if (c && Math.abs(turn) > 1) {
+        const far = (p: Place, q: Place) => Math.hypot(p[0] - q[0], p[1] - q[1]);
+        const radius = (far(a, b) * far(b, c) * far(a, c)) / (2 * Math.abs(turn));
+        const wide = (a[0] - c[0]) * (b[0] - c[0]) + (a[1] - c[1]) * (b[1] - c[1]) > 0 ? 1 : 0;
+        path = `M${a}A${radius} ${radius} 0 ${wide} ${turn > 0 ? 0 : 1} ${b}`;
+      }
+      draft.append(svg("path", { d: path }));
+    }
+    pixels.forEach(([cx, cy], n) => {
+      const text = svg("text", { x: cx, y: cy + 5, "text-anchor": "middle" });
+      text.textContent = String(n + 1);
+      const set = n < this.points.length ? "set" : "next";
+      draft.append(svg("circle", { cx, cy, r: 13, class: set }), text);
+      text.setAttribute("class", set);
+    });
+    const count = mode.places.length, now = this.points.length;
+    const told = `${mode.part} ${now}`;
+    if (told === chip.dataset.told) return;
+    chip.dataset.told = told;
+    const done = html("button", { type: "button", id: "done" }, words.say("done"),
+      html("span", { class: "note" }, " Esc"));
+    done.addEventListener("click", () => this.set(null));
+    const pips = html("span", { class: "pips", "aria-hidden": "true" }, ...mode.places.map((_, n) =>
+      html("i", { class: n < now ? "on" : "" })));
+    const key = mode.places[now], again = count > 1 && key === mode.places[0];
+    const where = `draw-${key}${again ? `-${now + 1}` : ""}`;
+    chip.replaceChildren(pips, html("b", {}, words.say("point-of", { now: now + 1, count })),
+      html("span", {}, words.say(where)), done);
+  }
+
+  /** Choose what was clicked, or nothing. @param add to what is chosen, or take it out of that */
+  pick(at: Place, add: boolean) {
+    const { inspector } = this, name = this.nameAt(at), { parts } = inspector;
+    if (!add) inspector.choose(...(name ? [name] : []));
+    else if (name) {
+      inspector.choose(...(parts.includes(name) ? parts.filter((one) => one !== name)
+        : [...parts, name]));
+    }
+  }
+
+  /** Rows that were copied. */
+  copied: [string, Given][] = [];
+
+  copy() {
+    const { given } = this.lab;
+    if (given) this.copied = rowsNamed(given, this.inspector.parts);
+  }
+
+  /** Put what was copied beside itself, each time further, and choose the copies. */
+  paste() {
+    const { lab, stage, copied } = this, { scale, snap } = stage.view;
+    if (!lab.given || !copied.length || !this.free) return;
+    const [given, names] = withCopies(lab.given, copied, [
+      roundTo(ASIDE[0] / scale, snap), roundTo(-ASIDE[1] / scale, snap)]);
+    lab.asked = "";
+    lab.replace(given);
+    if (lab.fault) return;
+    this.copied = rowsNamed(given, names);
+    this.inspector.choose(...names);
+  }
+
+  duplicate() {
+    const before = this.copied;
+    this.copy();
+    this.paste();
+    this.copied = before;
+  }
+
+  /** Choose all that has a name of its own. */
+  all() {
+    const { machine, handles } = { ...this.lab, handles: this.stage.handles };
+    const names = [...machine?.surfaces ?? [], ...machine?.streams ?? []];
+    this.inspector.choose(...names.filter((name) => bodyOf(handles, [name], 0, 0)));
   }
 }
 

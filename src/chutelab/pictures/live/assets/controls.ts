@@ -3,7 +3,9 @@
 import { valueAt } from "./keys.ts";
 import { pathOf } from "./checks.ts";
 import { Fault, met, type Scene, type Given } from "./scene.ts";
+import type { Form } from "./forms.ts";
 import type { Handle } from "./handles.ts";
+import type { Words } from "./words.ts";
 
 /** `[live]` of the scene */
 type Live = { predict?: boolean, controls?: string[] | null, panels?: string[] | null,
@@ -12,9 +14,11 @@ type Live = { predict?: boolean, controls?: string[] | null, panels?: string[] |
 type Page = { tables: Record<string, Record<string, any>>, live?: Live };
 /** A part of the scene; "scene" of the main numbers of all */
 type Section = { table: string, row: number, name: string };
-/** A number that can be typed; it is the n-th `part` `of` so many */
+/** What can be typed or chosen; it is the n-th `part` `of` so many. One that need not be there is
+ * `free`, and undefined if it is not. */
 export type Field = { key: string, table: string, owner: string, name: string, part: number,
-  of: number, unit: string, low: number, high: number, value: number | string };
+  of: number, unit: string, low: number, high: number, value: any, form: Form, free: boolean,
+  choices?: string[] };
 
 /** A key of the only plate can be written in two ways: this is one of them. */
 const plainKey = (key: string) => key.replace(/^(\w+)\[0\]/, "$1");
@@ -39,6 +43,11 @@ const showsFew = ({ live }: Page) => Boolean(live?.controls?.length);
 /** The handles of what can be changed. */
 function openHandles(handles: Handle[], page: Page) {
   return handles.flatMap((handle) => {
+    const { axes, values } = handle;
+    if (values) {
+      const keys = Object.keys(values(axes.map(({ value }) => value)));
+      return keys.every((key) => mayChange(page, key)) ? [handle] : [];
+    }
     const open = handle.axes.map((_, n) => n).filter((n) => mayChange(page, handle.axes[n].key));
     if (open.length === handle.axes.length) return [handle];
     if (!open.some((n) => handle.axes[n].step)) return [];
@@ -98,20 +107,23 @@ const MAIN: Record<string, string[]> = {
 };
 
 /** Keys that say nothing as the others are. */
-function idle(table: string, row: any) {
+function idle({ incoming }: Scene, table: string, row: any): string[] {
   if (table === "surface") {
-    return [...(row.points ? ["center", "radius", "from_deg", "to_deg"] : []),
-      ...(row.given.from ? ["points"] : [])];
+    return row.center ? ["from", "to", "points"]
+      : ["center", "radius", "from_deg", "to_deg", ...(row.given.from ? ["points"] : ["from", "to"])];
   }
+  if (table === "plate") return row.pivot ? ["distance", "pivot_height"] : ["name", "pivot"];
   if (table === "stream") {
     return [...(row.count === 1 ? ["rate", "width", "bed_height", "speed_spread", "seed"] : []),
-      ...(row.interact ? [] : ["restitution", "friction"])];
+      ...(row.interact ? [] : ["restitution", "friction"]), ...(row.to ? ["bed_height"] : []),
+      ...(row.fill ? ["at", "to", "rate", "bed_height", "speed_spread"] : []),
+      ...(incoming || row.at ? [] : ["at", "to"]), ...(row.at || row.fill ? [] : ["to"])];
   }
   const weighed = table === "particle" && (row.given.density ?? row.given.material) !== undefined;
-  return weighed ? ["mass"] : [];
+  return [...(weighed ? ["mass"] : []), ...(table === "outgoing" ? ["drop_from"] : [])];
 }
 
-function numberAt(scene: Scene, section: Section, key: string) {
+function valueOf(scene: Scene, section: Section, key: string) {
   const which = ["restitution", "friction"].indexOf(key), row = rowOf(scene, section);
   if (which < 0 || ["stream", "material", "pair"].includes(section.table)) return row[key];
   // It may be the material's.
@@ -119,47 +131,84 @@ function numberAt(scene: Scene, section: Section, key: string) {
   return value === Infinity ? "adhesion" : value;
 }
 
-/** The numbers of a section, in the order of their rules. */
+/** What can be changed of a section, in the order of the rules; of the scene, its main numbers. */
 function fieldsOf(page: Page, given: Given, scene: Scene, section: Section): Field[] {
   if (section.table === "scene") {
     const isMain = ({ table, row }: Section) => MAIN[table] && row === 0;
     const all = showsFew(page);
     return sectionsOf(scene).filter((one) => all || isMain(one))
-      .flatMap((one) => ownFields(page, given, scene, one)
-        .filter(({ name }) => all || MAIN[one.table].includes(name)));
+      .flatMap((one) => ownFields(page, given, scene, one).filter(({ name, value }) =>
+        (all || MAIN[one.table].includes(name)) && ["number", "string"].includes(typeof value)));
   }
   return ownFields(page, given, scene, section);
 }
 
+/** The forms that a value may have, each by itself. */
+const formsOf = (form: Form): Form[] => form.anyOf?.flatMap(formsOf) ?? [form];
+
+const isNested = (form: Form) => formsOf(form).some(({ prefixItems, items }) =>
+  (prefixItems?.[0] ?? items)?.type === "array");
+
 function ownFields(page: Page, given: Given, scene: Scene, section: Section): Field[] {
-  const { table } = section, silent = idle(table, rowOf(scene, section));
+  const { table } = section, silent = idle(scene, table, rowOf(scene, section));
   const fields: Field[] = [];
   for (const [name, rule] of Object.entries(page.tables[table] ?? {})) {
-    if (silent.includes(name) || (rule.unit === undefined && rule.low === undefined)) continue;
+    const { form, required = false } = rule;
+    if (silent.includes(name) || table === "view" && !rule.unit) continue;
     const path = table === "scene" ? name
       : given[table] === undefined ? `${table}.${name}` : pathOf(given, table, section.row, name);
     const add = (key: string, value: any, part = 0, of = 1) => {
-      if (Array.isArray(value)) {
-        value.forEach((entry, n) => add(`${key}[${n}]`, entry, n, value.length));
-      } else if ((typeof value === "number" || value === "adhesion") && mayChange(page, key)) {
-        const owner = section.name;
-        fields.push({ key, table, owner, name, part, of, value, ...boundsOf(page, key) });
-      }
+      if (!mayChange(page, key)) return;
+      const choices = name === "particle" ? scene.particles.map((kind) => String(kind.name))
+        : name === "material" && table === "particle" ? [...scene.materials.keys()]
+          : form.type === "boolean" ? [] : form.enum as string[] | undefined;
+      if (choices && form.type !== "boolean" && choices.length < 2) return;
+      const bounds = boundsOf(page, key);
+      fields.push({
+        key, table, owner: section.name, name, part, of, value, form, choices, ...bounds,
+        free: !required && (rule.default === undefined || name === "repeat") && of === 1,
+      });
     };
     const written = valueAt(given, path);
-    add(path, Array.isArray(written) ? written : numberAt(scene, section, name));
+    const value = written ?? valueOf(scene, section, name);
+    if (Array.isArray(value) && value.length && !isNested(form)) {
+      value.forEach((entry, n) => add(`${path}[${n}]`, entry, n, value.length));
+    } else add(path, typeof written === "string" || Array.isArray(written) ? written
+      : valueOf(scene, section, name));
   }
   return fields;
 }
 
-/** Refuse what is out of a field's range, or no number at all. */
-function checked({ key, low, high, name }: Field, value: number | string) {
-  if (value === "adhesion" && name === "friction") return value;
-  if (typeof value !== "number" || !isFinite(value)) throw new Fault(key, value, "number");
-  if (value < low || value > high) throw new Fault(key, value, "range", { low, high });
-  if (["count", "seed"].includes(name) && !Number.isInteger(value)) {
-    throw new Fault(key, value, "whole");
+/** What was typed or chosen, as the scene has it: nothing takes the key away.
+ * @throws {Fault} if it is out of the field's range, or is none of what may be there */
+function checked(field: Field, text: string, words: Words): any {
+  const { key, low, high, form, free } = field, plain = text.trim();
+  if (plain === "" && free) return undefined;
+  if (field.choices?.includes(plain)) return plain;
+  const forms = formsOf(form), takes = (type: string) => forms.some((one) => one.type === type);
+  const isWord = (word: unknown) =>
+    forms.some((one) => one.const === word || one.enum?.includes(word));
+  const sticks = plain.toLowerCase() === words.say("adhesion").toLowerCase();
+  if (sticks && isWord("adhesion")) return "adhesion";
+  const list = (row: string) => row.trim().split(/\s+/).map((entry) => words.parse(entry));
+  if (isNested(form)) return plain.split(";").map(list);
+  if (takes("array") && /\s/.test(plain)) return list(plain);
+  if (!takes("number") && !takes("integer")) {
+    if (field.of > 1) return numberIn(field, words.parse(plain));
+    if (takes("string")) return plain;
+    throw new Fault(key, plain, "form");
   }
+  const value = words.parse(plain);
+  if (Number.isNaN(value) && takes("string")) return plain;
+  return numberIn({ ...field, low, high }, value);
+}
+
+/** A number that is in the range of its field. */
+function numberIn({ key, low, high, form }: Field, value: number) {
+  if (!isFinite(value)) throw new Fault(key, value, "number");
+  if (value < low || value > high) throw new Fault(key, value, "range", { low, high });
+  const whole = formsOf(form).every(({ type }) => type === "integer");
+  if (whole && !Number.isInteger(value)) throw new Fault(key, value, "whole");
   return value;
 }
 

@@ -1,63 +1,127 @@
-// New surfaces and particles, and taking them away: each a scene made of another.
+// Parts added, copied and taken away: each a scene made of another.
 
+import { listOf } from "./checks.ts";
+import { valueAt, withValues } from "./keys.ts";
 import type { Machine } from "./machine.ts";
 import type { Given } from "./scene.ts";
 
-/** @param rows a table, several, or none */
-const listed = (
-  rows: any,
-): any[] => (rows === undefined ? [] : Array.isArray(rows) ? rows : [rows]);
+type Point = [number, number];
+
+/** A row of the palette, see `PARTS` in describe.py. */
+export type Part = { part: string, letter: string, table: string, places: string[],
+  main: string[], needs: string[], row: Given };
+
+/** Tables whose rows have names. */
+const NAMED = ["surface", "conveyor", "plate", "stream"];
+
+/** Keys that are places, or lists of them. */
+const PLACES = ["from", "to", "points", "center", "pivot", "at", "fill"];
+
+/** Radius of a ball in a picture one metre high, m. */
+const BALL = 0.02;
 
 const either = (rows: any[]) => (rows.length === 1 ? rows[0] : rows);
 
+/** Rows with names of a table; of the stream that a scene has without writing it, one. */
+const rowsOf = (given: Given, table: string): Given[] =>
+  (table === "stream" && given.stream === undefined ? [{}] : listOf(given[table]));
+
 /** A name that nothing has yet. */
 function freeName(given: Given, stem: string) {
-  const taken = new Set(["surface", "plate", "conveyor", "stream"].flatMap((table) =>
-    listed(given[table]).map(({ name }) => name)));
+  const taken = new Set([...NAMED, "particle"].flatMap((table) =>
+    listOf(given[table]).map(({ name }) => name)));
   let n = 1;
   while (taken.has(`${stem}${n}`)) n += 1;
   return `${stem}${n}`;
 }
 
-const withLine = (given: Given, from: [number, number], to: [number, number]): Given => ({
-  ...given, surface: [...listed(given.surface), { name: freeName(given, "line"), from, to }],
-});
+/** Put a row at the end of its table. */
+const withRow = (given: Given, table: string, row: Given): Given => (table === "incoming"
+  ? { ...given, incoming: row } : { ...given, [table]: [...rowsOf(given, table), row] });
 
-/** The arc through three points, or the line where they are on one.
- * @param b on its way */
-function withArc(
-  given: Given, a: [number, number], b: [number, number], c: [number, number],
-): Given {
+const roundOff = (value: number, digits: number) => Number(value.toFixed(digits));
+
+/** The keys of the arc from a point to another through a third, or of the line that they are on. */
+function arcOf(a: Point, c: Point, b: Point): Given {
   const [ux, uy, vx, vy] = [b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]];
   const twice = 2 * (ux * vy - uy * vx), u = ux * ux + uy * uy, v = vx * vx + vy * vy;
-  if (Math.abs(twice) < 1e-3 * Math.max(u, v)) return withLine(given, a, c);
+  if (Math.abs(twice) < 1e-3 * Math.max(u, v)) return { points: [a, c] };
   const x = (vy * u - uy * v) / twice, y = (ux * v - vx * u) / twice;
-  const round = (value: number) => Math.round(value * 1e4) / 1e4;
-  const angle = ([px, py]: [number, number]) =>
-    (Math.atan2(py - a[1] - y, px - a[0] - x) * 180) / Math.PI;
+  const angle = ([px, py]: Point) => (Math.atan2(py - a[1] - y, px - a[0] - x) * 180) / Math.PI;
   const turn = (from: number, to: number) => (to - from + 720) % 360;
   const [begin, middle, end] = [angle(a), angle(b), angle(c)];
   const forward = turn(begin, middle) <= turn(begin, end);
   const extent = forward ? turn(begin, end) : turn(begin, end) - 360;
   return {
-    ...given,
-    surface: [...listed(given.surface), {
-      name: freeName(given, "arc"), center: [round(a[0] + x), round(a[1] + y)],
-      radius: round(Math.hypot(x, y)), from_deg: Math.round(10 * begin) / 10,
-      to_deg: Math.round(10 * (begin + extent)) / 10,
-    }],
+    center: [roundOff(a[0] + x, 4), roundOff(a[1] + y, 4)], radius: roundOff(Math.hypot(x, y), 4),
+    from_deg: roundOff(begin, 1), to_deg: roundOff(begin + extent, 1),
   };
 }
 
-/** A particle that is let go at rest, of the first kind; with what is there already.
- * @param start s */
-function withParticle(given: Given, at: [number, number], start: number): Given {
-  const kinds = listed(given.particle), kind = kinds.length > 1 ? { particle: kinds[0].name } : {};
-  return {
-    ...given,
-    stream: [...(given.stream === undefined ? [{}] : listed(given.stream)),
-      { name: freeName(given, "drop"), ...kind, at, velocity: [0, 0], count: 1, start }],
-  };
+/** A kind of particles of a material, made where there is none; without one the first kind.
+ * @param radius m, of a kind that is made
+ * @returns the scene, and the name of the kind where there are several */
+function withKind(given: Given, material: string, radius: number): [Given, string | undefined] {
+  const empty = Array.isArray(given.stream) && !given.stream.length && !given.particle;
+  let kinds = empty ? [] : listOf(given.particle ?? {});
+  if (!material && kinds.length) return [given, kinds.length > 1 ? kinds[0].name : undefined];
+  const wanted = material || "steel", known = kinds.find((one) => one.material === wanted);
+  if (known) return [given, kinds.length > 1 ? known.name : undefined];
+  // Where there are several, each has a name.
+  kinds = kinds.map((one) => ({ name: freeName(given, "kind"), ...one }));
+  const name = kinds.some((one) => one.name === wanted) ? freeName(given, wanted) : wanted;
+  const size = kinds.length ? kinds[0].radius ?? 0.0063 : radius;
+  const made = { name, material: wanted, shape: "sphere", radius: size, spin: true };
+  return [{ ...given, particle: [...kinds, made] }, name];
+}
+
+/** A scene with one more part.
+ * @param points that were set, m
+ * @param unit m that a metre of the part's own sizes becomes
+ * @param material of particles, "" for that of the first
+ * @param start s, when a stream begins
+ * @param rules of the part's table */
+function withPart(
+  given: Given, part: Part, points: Point[], unit: number, material: string, start: number,
+  rules: Record<string, { unit?: string }>,
+): Given {
+  const row: Given = part.table === "incoming" ? {} : { name: freeName(given, part.part) };
+  part.places.forEach((key, n) => {
+    if (key === "points") row.points = [...(row.points ?? []), points[n]];
+    else if (key !== "arc") row[key] = points[n];
+  });
+  if (part.places[0] === "arc") Object.assign(row, arcOf(points[0], points[1], points[2]));
+  for (const [key, value] of Object.entries(part.row)) {
+    row[key] = key === "repeat"
+      ? value.map(([n, x, y]: number[]) => [n, roundOff(x * unit, 6), roundOff(y * unit, 6)])
+      : rules[key]?.unit === "m" ? roundOff(value * unit, 6) : structuredClone(value);
+  }
+  if (part.table !== "stream") return withRow(given, part.table, row);
+  const [kinds, kind] = withKind(given, material, BALL * unit);
+  if (kind) row.particle = kind;
+  if (start) row.start = start;
+  return withRow(kinds, "stream", row);
+}
+
+/** Rows of things by name: what a copy is made of. */
+const rowsNamed = (given: Given, names: string[]): [string, Given][] => NAMED.flatMap((table) =>
+  listOf(given[table]).filter(({ name }) => names.includes(name))
+    .map((row) => [table, row] as [string, Given]));
+
+/** A scene with copies of rows, moved on.
+ * @returns it, and the names of the copies */
+function withCopies(given: Given, rows: [string, Given][], [dx, dy]: Point): [Given, string[]] {
+  const moved = (value: any): any => (typeof value[0] === "number"
+    ? [roundOff(value[0] + dx, 9), roundOff(value[1] + dy, 9)] : value.map(moved));
+  const names: string[] = [];
+  const all = rows.reduce((scene, [table, row]) => {
+    const name = freeName(scene, row.name.replace(/\d+$/, ""));
+    const copy: Given = { ...structuredClone(row), name };
+    for (const key of PLACES) if (copy[key]) copy[key] = moved(copy[key]);
+    names.push(name);
+    return withRow(scene, table, copy);
+  }, given);
+  return [all, names];
 }
 
 /** The surface nearest to a place within reach; "" if none is.
@@ -84,18 +148,45 @@ function surfaceAt(
   return found;
 }
 
-/** What has a name of its own, or the damping plate or the outgoing belt, taken away. */
-function without(given: Given, name: string): Given {
-  const rest = { ...given };
-  for (const table of ["surface", "conveyor", "plate", "stream"]) {
-    if (given[table] === undefined) continue;
-    const kept = listed(given[table]).filter((row) =>
-      row.name !== name && !(table === "plate" && name === "plate" && !row.pivot));
-    const many = table === "surface" || table === "conveyor";
-    if (kept.length) rest[table] = many ? kept : either(kept);
-    else if (table !== "stream") delete rest[table];
+/** A scene with another name of a thing, wherever it is meant.
+ * @param key its full path */
+function withName(given: Given, key: string, name: string): Given {
+  const old = valueAt(given, key), renamed = withValues(given, { [key]: name });
+  for (const pair of listOf(renamed.pair)) {
+    pair.between = pair.between.map((one: string) => (one === old ? name : one));
   }
-  if (name === "outgoing") delete rest.outgoing;
+  if (key.startsWith("particle")) {
+    const streams = listOf(renamed.stream).filter(({ particle }) => particle === old);
+    for (const stream of streams) stream.particle = name;
+  }
+  return renamed;
+}
+
+/** The ends of lines and arcs of a machine, m, but for those of some parts. */
+function endsOf({ surfaces, segments, arcs }: Machine, not: string[]): Point[] {
+  const isOther = ({ surface }: { surface: number }) => !not.includes(surfaces[surface]);
+  const lines = segments.filter(isOther).flatMap(({ ends: [x, y, u, v] }) =>
+    [[x, y], [u, v]] as Point[]);
+  const bends = arcs.filter((arc) => isOther(arc) && arc.extent < 2 * Math.PI).flatMap((arc) =>
+    [arc.begin, arc.begin + arc.extent].map((angle) => [
+      arc.x + arc.radius * Math.cos(angle), arc.y + arc.radius * Math.sin(angle)] as Point));
+  return [...lines, ...bends].map((point) => point.map((value) =>
+    Number(value.toPrecision(12))) as Point);
+}
+
+/** Parts of a scene taken away by name; what remains without particles has no stream. */
+function without(given: Given, ...names: string[]): Given {
+  const rest = { ...given };
+  for (const table of NAMED) {
+    if (given[table] === undefined && table !== "stream") continue;
+    const kept = rowsOf(given, table).filter(({ name, pivot }, n) => !names.includes(
+      name ?? (table === "plate" && !pivot ? "plate" : n ? `${table}${n + 1}` : table)));
+    if (kept.length === rowsOf(given, table).length) continue;
+    const many = table === "surface" || table === "conveyor" || !kept.length;
+    if (kept.length || table === "stream") rest[table] = many ? kept : either(kept);
+    else delete rest[table];
+  }
+  for (const table of ["incoming", "outgoing"]) if (names.includes(table)) delete rest[table];
   return rest;
 }
 
@@ -103,4 +194,4 @@ function without(given: Given, name: string): Given {
 const canGo = (given: Given, name: string) =>
   JSON.stringify(without(given, name)) !== JSON.stringify(given);
 
-export { canGo, surfaceAt, withArc, withLine, withParticle, without };
+export { canGo, endsOf, rowsNamed, surfaceAt, withCopies, withKind, withName, withPart, without };

@@ -34,6 +34,12 @@ class Engine {
     this.onFailure();
   }
 
+  /** Hear no more of the latest run. */
+  stop() {
+    this.id += 1;
+    this.onChunk = () => {};
+  }
+
   /** Begin a run, and end the one before.
    * @param until s, to which one whose particles meet runs on */
   run(machine: Machine, until: number, onChunk: (chunk: Chunk) => void) {

@@ -6,13 +6,16 @@ import type { Scene } from "./scene.ts";
 /** A number of the scene; `part` of one that is a point */
 type Axis = { key: string, part?: number, value: number, unit: string, step: number,
   low: number, high: number };
-/** `what` is a word of the catalogue; `drag` tells the axes' values for a place in the world.
+/** `what` is a word of the catalogue; `drag` tells the axes' values for a place in the world, of
+ * which `values` makes those of the scene where the axes are no keys of it.
  * One of a tool takes them by `change` itself, and may say more than its values. One of a `whole`
- * body has the axes of all its places. */
-export type Handle = { id: string, surface: string, what: string, shape: "point" | "turn" | "arrow",
+ * body has the axes of all its places. `fixed` is the point that it is at an angle to. */
+export type Handle = { id: string, surface: string, what: string,
+  shape: "point" | "end" | "turn" | "arrow",
   x: number, y: number, from?: [number, number], axes: Axis[],
   drag: (x: number, y: number) => number[], change?: (numbers: number[]) => void,
-  says?: string, whole?: boolean };
+  values?: (numbers: number[]) => Record<string, unknown>,
+  says?: string, whole?: boolean, fixed?: [number, number], places?: [number, number][] };
 
 /** m of arrow for each m/s. */
 const ARROW = 0.08;
@@ -28,8 +31,11 @@ const STEPS: Record<string, number> = { m: 0.01, degrees: 1, "m/s": 0.1 };
 class Handles {
   list: Handle[] = [];
 
-  /** @param lab the page's data */
-  constructor(readonly scene: Scene, readonly machine: Machine, readonly lab: any) {
+  /** @param lab the page's data
+   * @param away m of a turning handle beyond the end that it turns */
+  constructor(
+    readonly scene: Scene, readonly machine: Machine, readonly lab: any, readonly away = 0,
+  ) {
     this.belts();
     this.plates();
     scene.conveyor.forEach((_, n) => this.conveyor(n));
@@ -53,9 +59,47 @@ class Handles {
 
   add(
     id: string, surface: string, what: string, shape: Handle["shape"], at: [number, number],
-    axes: Axis[], drag: Handle["drag"], from?: [number, number],
+    axes: Axis[], drag: Handle["drag"], from?: [number, number], fixed?: [number, number],
   ) {
-    this.list.push({ id, surface, what, shape, x: at[0], y: at[1], axes, drag, from });
+    this.list.push({ id, surface, what, shape, x: at[0], y: at[1], axes, drag, from, fixed });
+  }
+
+  /** A handle beyond an end that turns all about a point.
+   * @param now degrees
+   * @param values of the scene, for an angle */
+  turning(
+    surface: string, [cx, cy]: [number, number], end: [number, number], now: number,
+    key: string, values: (angle: number) => Record<string, unknown>,
+  ) {
+    const far = Math.hypot(end[0] - cx, end[1] - cy);
+    if (!far || !this.away) return;
+    const [ux, uy] = [(end[0] - cx) / far, (end[1] - cy) / far];
+    const base = Math.atan2(uy, ux) / DEGREE;
+    const bounds = this.axis(key, now, "degrees");
+    this.list.push({
+      id: `turn-${surface}`, surface, what: "turn", shape: "turn", from: end,
+      x: end[0] + this.away * ux, y: end[1] + this.away * uy, axes: [bounds],
+      drag: (x, y) => {
+        const turned = Math.atan2(y - cy, x - cx) / DEGREE - base;
+        return [now + turned - 360 * Math.round(turned / 360)];
+      },
+      values: ([angle]) => values(angle),
+    });
+  }
+
+  /** Turn a body by its points about their middle.
+   * @param points m, by their keys */
+  spin(surface: string, points: [string, [number, number]][]) {
+    const middle = [0, 1].map((part) =>
+      points.reduce((sum, [, point]) => sum + point[part] / points.length, 0)) as [number, number];
+    const end = points[points.length - 1][1], [x, y] = middle;
+    const now = Math.atan2(end[1] - points[0][1][1], end[0] - points[0][1][0]) / DEGREE;
+    this.turning(surface, middle, end, now, points[0][0], (angle) => {
+      const [c, s] = [Math.cos((angle - now) * DEGREE), Math.sin((angle - now) * DEGREE)];
+      return Object.fromEntries(points.map(([key, [px, py]]) => [key, [
+        x + c * (px - x) - s * (py - y), y + s * (px - x) + c * (py - y),
+      ].map((value) => Number(value.toFixed(9)))]));
+    });
   }
 
   /** A speed as an arrow along a direction. */
@@ -126,13 +170,15 @@ class Handles {
       const turned: (px: number, py: number, side: number) => number[] = (px, py, side) => [
         Math.atan2(-side * (px - x), side * (py - y)) / DEGREE, Math.hypot(px - x, py - y),
       ];
-      this.add(`${table}.angle_deg`, name, "angle", "turn",
+      this.add(`${table}.angle_deg`, name, "angle", "end",
         [x + plate.above * up[0], y + plate.above * up[1]],
         [this.axis(`${table}.angle_deg`, plate.angle_deg, "degrees"),
           this.axis(`${table}.above`, plate.above, "m")], (px, py) => turned(px, py, 1));
-      this.add(`${table}.below`, name, "end", "turn", [x - below * up[0], y - below * up[1]],
+      this.add(`${table}.below`, name, "end", "end", [x - below * up[0], y - below * up[1]],
         [this.axis(`${table}.angle_deg`, plate.angle_deg, "degrees"),
           this.axis(`${table}.below`, below, "m")], (px, py) => turned(px, py, -1));
+      this.turning(name, [x, y], [x - below * up[0], y - below * up[1]], plate.angle_deg,
+        `${table}.angle_deg`, (value) => ({ [`${table}.angle_deg`]: value }));
     });
   }
 
@@ -140,9 +186,10 @@ class Handles {
     const belt = this.scene.conveyor[n], table = `conveyor[${n}]`, r = belt.pulley_radius;
     const [[x0, y0], [x1, y1]] = [belt.from, belt.to];
     this.add(`${table}.from`, belt.name, "begin", "point", belt.from,
-      this.place(`${table}.from`, belt.from), (x, y) => [x, y]);
+      this.place(`${table}.from`, belt.from), (x, y) => [x, y], undefined, belt.to);
     this.add(`${table}.to`, belt.name, "end", "point", belt.to,
-      this.place(`${table}.to`, belt.to), (x, y) => [x, y]);
+      this.place(`${table}.to`, belt.to), (x, y) => [x, y], undefined, belt.from);
+    this.spin(belt.name, [[`${table}.from`, belt.from], [`${table}.to`, belt.to]]);
     this.add(`${table}.pulley_radius`, belt.name, "radius", "point", [x0, y0 - r],
       [this.axis(`${table}.pulley_radius`, r, "m")], (x, y) => [Math.hypot(x - x0, y - y0)]);
     const way = Math.hypot(x1 - x0, y1 - y0), [dx, dy] = [(x1 - x0) / way, (y1 - y0) / way];
@@ -167,21 +214,32 @@ class Handles {
       for (const [key, what, degrees] of whole ? [] : ([
         ["from_deg", "begin", row.from_deg], ["to_deg", "end", row.to_deg],
       ] as [string, string, number][])) {
-        this.add(`${table}.${key}`, row.name, what, "turn", at(degrees),
+        this.add(`${table}.${key}`, row.name, what, "end", at(degrees),
           [this.axis(`${table}.${key}`, degrees, "degrees")], (px, py) => {
             const angle = Math.atan2(py - y, px - x) / DEGREE;
             return [angle + 360 * Math.round((degrees - angle) / 360)];
           });
       }
+      if (!whole) {
+        const { from_deg: begin, to_deg: end } = row, mean = 0.5 * (begin + end);
+        this.turning(row.name, [x, y], middle, mean, `${table}.from_deg`, (angle) => {
+          const by = angle - mean, fit = by > 0 ? -360 : 360;
+          // Angles go once round either way.
+          const out = [begin + by, end + by].some((one) => Math.abs(one) > 360) ? fit : 0;
+          return { [`${table}.from_deg`]: begin + by + out, [`${table}.to_deg`]: end + by + out };
+        });
+      }
       return;
     }
     const keys = row.given.from ? ["from", "to"] : null;
     const { points = [] } = row;
+    const key = (i: number) => (keys ? `${table}.${keys[i]}` : `${table}.points[${i}]`);
     points.forEach((point, i) => {
-      const key = keys ? `${table}.${keys[i]}` : `${table}.points[${i}]`;
       const what = i === 0 ? "begin" : i === points.length - 1 ? "end" : "corner";
-      this.add(key, row.name, what, "point", point, this.place(key, point), (x, y) => [x, y]);
+      this.add(key(i), row.name, what, "point", point, this.place(key(i), point),
+        (x, y) => [x, y], undefined, points[i ? i - 1 : 1]);
     });
+    this.spin(row.name, points.map((point, i) => [key(i), point]));
     if (row.speed) {
       const [[x0, y0], [x1, y1]] = points;
       const way = Math.hypot(x1 - x0, y1 - y0);
@@ -192,11 +250,20 @@ class Handles {
 
   stream(n: number) {
     const { streams } = this.scene, stream = streams[n];
-    if (!stream.at) return;
     const table = streams.length > 1 ? `stream[${n}]` : "stream";
+    stream.fill?.forEach((corner, i) => {
+      const key = `${table}.fill[${i}]`;
+      this.add(key, stream.name, i ? "end" : "begin", "point", corner, this.place(key, corner),
+        (x, y) => [x, y]);
+    });
+    if (!stream.at) return;
     this.add(`${table}.at`, stream.name, "release", "point", stream.at,
       this.place(`${table}.at`, stream.at), (x, y) => [x, y]);
-    const { velocity } = stream;
+    const { velocity, to } = stream;
+    if (to) {
+      this.add(`${table}.to`, stream.name, "end", "point", to, this.place(`${table}.to`, to),
+        (x, y) => [x, y], undefined, stream.at);
+    }
     if (!velocity) return;
     const [x, y] = stream.at, [vx, vy] = velocity;
     this.add(`${table}.velocity`, stream.name, "velocity", "arrow",
@@ -207,24 +274,31 @@ class Handles {
 }
 
 /** What places a body, by the name of the handle. */
-const PLACES = ["pivot", "center", "height"], ENDS = ["begin", "end", "corner"];
+const PLACES = ["pivot", "center", "height", "release"], ENDS = ["begin", "end", "corner"];
 
-/** What moves a whole body by what it is grabbed at, m; null if it has a place of its own. */
-function bodyOf(handles: Handle[], name: string, x: number, y: number): Handle | null {
-  const own = handles.filter(({ id, surface, what }) => surface === name
-    && (PLACES.includes(what) || (ENDS.includes(what) && /^(surface|conveyor)/.test(id))));
+/** Whether a handle is a place of a body of its own. */
+const isPlace = ({ id, what, axes }: Handle) => PLACES.includes(what)
+  || (ENDS.includes(what) && axes.every(({ part }) => part !== undefined)
+    && /^(surface|conveyor|stream)/.test(id));
+
+/** What moves whole bodies by what one is grabbed at, m; null if none has a place of its own. */
+function bodyOf(handles: Handle[], names: string[], x: number, y: number): Handle | null {
+  const own = handles.filter((one) => names.includes(one.surface) && isPlace(one));
   if (!own.length) return null;
   return {
-    ...own[0], id: `body-${name}`, x, y, axes: own.flatMap(({ axes }) => axes), whole: true,
+    ...own[0], id: `body-${names[0]}`, x, y, axes: own.flatMap(({ axes }) => axes), whole: true,
+    places: own.map((one) => [one.x, one.y]),
     drag: (px, py) => own.flatMap((one) => one.drag(one.x + px - x, one.y + py - y)),
   };
 }
 
 /** The values of the scene that a handle's axes stand for, by key. */
-function valuesOf({ axes }: Handle, numbers: number[]): Record<string, unknown> {
+function valuesOf({ axes, values: own }: Handle, numbers: number[]): Record<string, unknown> {
   const values: Record<string, any> = {};
-  axes.forEach(({ key, part, low, high }, n) => {
-    const value = Math.min(high, Math.max(low, numbers[n]));
+  const held = axes.map(({ low, high }, n) => Math.min(high, Math.max(low, numbers[n])));
+  if (own) return own(held);
+  axes.forEach(({ key, part }, n) => {
+    const value = held[n];
     if (part === undefined) values[key] = value;
     else (values[key] ??= [])[part] = value;
   });
@@ -236,4 +310,4 @@ const roundTo = (
   value: number, step: number,
 ) => Number((Math.round(value / step) * step).toPrecision(12));
 
-export { ARROW, Handles, bodyOf, roundTo, valuesOf };
+export { ARROW, Handles, bodyOf, isPlace, roundTo, valuesOf };

@@ -1,136 +1,305 @@
-// Numbers that can be typed: of one part of the scene, or the main ones of all.
+// What can be typed: main numbers of the scene in a panel, and what is chosen in a card beside it.
 
 import { checked, fieldsOf, sectionsOf, showsFew, type Field } from "./controls.ts";
-import { canGo, without } from "./edit.ts";
-import { card, html } from "./panels.ts";
-import { Fault } from "./scene.ts";
+import { canGo, rowsNamed, withName, without, type Part } from "./edit.ts";
+import { card, html, icon, iconButton } from "./panels.ts";
+import { Fault, type Given } from "./scene.ts";
 import type { Lab } from "./lab.ts";
 import type { Words } from "./words.ts";
 
+/** Places of a slider, and a range that is narrow enough for one. */
+const PLACES = 100, NARROW = 400;
+
+type Entry = { row: any, input: any, why: any, slider: any, field: Field };
+
+/** Fields of a scene, with the reason for a value that cannot be below its own. */
+class Fields {
+  home = html("div", { class: "fields" });
+  entries: Map<string, Entry> = new Map();
+  built = "";
+
+  /** @param sliders whether numbers have one, too */
+  constructor(readonly lab: Lab, readonly words: Words, readonly sliders: boolean) {}
+
+  /** @param isFirst which are not under "More" */
+  show(fields: Field[], isFirst: (field: Field) => boolean) {
+    const built = JSON.stringify(fields.map(({ key, choices }) => [key, choices]));
+    if (built !== this.built) this.build(fields, isFirst);
+    this.built = built;
+    for (const field of fields) this.fill(field);
+  }
+
+  build(fields: Field[], isFirst: (field: Field) => boolean) {
+    const { words, home } = this;
+    this.entries.clear();
+    const rows = fields.map((field) => this.row(field));
+    const first = rows.filter((_, n) => isFirst(fields[n]));
+    const rest = rows.filter((_, n) => !isFirst(fields[n]));
+    home.replaceChildren(...first);
+    if (!rest.length) return;
+    const names = fields.filter((field) => !isFirst(field))
+      .map(({ table, name }) => words.key(table, name));
+    const named = [...new Set(names)].slice(0, 2).join(", ");
+    const more = html("details", { class: "more" },
+      html("summary", {}, words.say("more-keys", { keys: named }), icon("down")), ...rest);
+    more.open = this.isOpen;
+    more.addEventListener("toggle", () => { this.isOpen = more.open; });
+    home.append(more);
+  }
+
+  /** Whether the rest is shown, of one thing after the other. */
+  isOpen = false;
+
+  row(field: Field): any {
+    const { key, table, owner, name, part, of, unit, low, high, choices, form } = field;
+    const { words } = this, id = `field-${this.sliders ? "own-" : ""}${key}`;
+    const flag = form.type === "boolean";
+    const input = choices && !flag ? html("select", { id })
+      : html("input", flag ? { type: "checkbox", id }
+        : { type: "text", id, inputmode: "decimal", autocomplete: "off" });
+    if (choices && !flag) {
+      input.append(...(field.free ? [new Option("–", "")] : []),
+        ...choices.map((one) => new Option(words.choice(one), one)));
+    }
+    if (Math.abs(low) < 1e5 && Math.abs(high) < 1e5) {
+      input.title = words.say("from-to", { low: words.bound(low), high: words.bound(high) });
+    }
+    const typed = () => (flag ? input.checked : input.value);
+    input.addEventListener("change", () => this.take(key, typed()));
+    input.addEventListener("keydown", (event: KeyboardEvent) => {
+      if (event.key === "Enter") this.take(key, typed());
+      if (event.key === "Escape" && this.lab.asked === key) this.giveUp(key);
+    });
+    const whose = this.sliders || table === "scene" ? "" : `${words.name(owner)}: `;
+    const which = of > 1 ? ` ${(name === "radius" ? "≥≤" : "xy")[part]}` : "";
+    const label = html("label", { for: id }, `${whose}${words.key(table, name)}${which}`);
+    const why = html("div", { class: "why", id: `why-${id}` });
+    why.hidden = true;
+    const row = html("div", { class: "entry" }, label, html("span", { class: "value" }, input,
+      ...(flag || choices ? [] : [html("span", { class: "unit" }, words.unit(unit))])));
+    const slider = this.sliders && typeof field.value === "number" && !choices && of === 1
+      ? this.slider(field, row) : null;
+    row.append(why);
+    this.entries.set(key, { row, input, why, slider, field });
+    return row;
+  }
+
+  /** A slider over the range of a number, or of one that has none over twice what it is. */
+  slider({ key, name, low, high, value, table }: Field, row: any) {
+    const wide = high - low > NARROW, top = wide ? 2 * (Math.abs(value) || 0.5) : high;
+    const ten = 10 ** Math.floor(Math.log10(top)), end = Math.ceil(top / ten) * ten;
+    const from = wide ? Math.max(low, value < 0 ? -end : 0) : low;
+    const to = wide ? Math.min(end, high) : high;
+    const whole = this.lab.data.tables[table]?.[name]?.form.type === "integer";
+    const step = whole ? 1 : Number(((to - from) / PLACES).toPrecision(1));
+    const slider = html("input", { type: "range", min: String(from), max: String(to), step: String(step),
+      "aria-label": this.words.key(table, name) });
+    const move = (done: boolean) => {
+      this.lab.asked = "";
+      this.lab.change({ [key]: Number(slider.value) }, { done });
+    };
+    slider.addEventListener("input", () => move(false));
+    slider.addEventListener("change", () => move(true));
+    row.append(slider);
+    return slider;
+  }
+
+  /** Show the value that counts, and why one that was typed does not. */
+  fill(field: Field) {
+    const { lab, words } = this, its = this.entries.get(field.key);
+    if (!its) return;
+    its.field = field;
+    const { input, why, row, slider } = its;
+    const refused = lab.asked === field.key && lab.fault !== null && row.contains(this.asking);
+    row.classList.toggle("refused", refused);
+    why.hidden = !refused;
+    if (slider && typeof field.value === "number") slider.value = String(field.value);
+    if (refused) {
+      input.setAttribute("aria-invalid", "true");
+      input.setAttribute("aria-describedby", why.id);
+      const was = this.text(field) || "–";
+      const back = html("button", { type: "button" }, words.say("back-to", { value: was }));
+      back.addEventListener("click", () => this.giveUp(field.key));
+      const role = { role: "alert" };
+      const said = words.why(lab.fault as Fault, field.key);
+      why.replaceChildren(icon("stop"), html("p", role, `${said} ${words.say("still", { value: was })}`), back);
+      return;
+    }
+    input.removeAttribute("aria-invalid");
+    input.removeAttribute("aria-describedby");
+    if (input.type === "checkbox") input.checked = field.value;
+    else input.value = this.text(field);
+  }
+
+  /** A value as it is typed. */
+  text({ value, choices }: Field): string {
+    const { words } = this;
+    if (value === undefined || value === null) return "";
+    if (choices) return String(value);
+    if (typeof value === "number") return words.plain(value);
+    if (!Array.isArray(value)) return value === "adhesion" ? words.say(value) : value;
+    const row = (entries: any[]) => entries.map((one) => words.plain(one)).join(" ");
+    return Array.isArray(value[0]) ? value.map(row).join("; ") : row(value);
+  }
+
+  /** Told of the new name of what is shown. */
+  renamed: (name: string) => void = () => {};
+
+  /** The field in which something was typed. */
+  asking: any = null;
+
+  /** Take over what was typed. */
+  take(key: string, typed: string | boolean) {
+    const { lab, words } = this, its = this.entries.get(key);
+    if (!its) return;
+    const { field, input } = its;
+    // What was only looked at keeps all its digits.
+    if (typeof typed === "string" && typed.trim() === this.text(field)) {
+      if (lab.asked === key && lab.fault) this.giveUp(key);
+      return;
+    }
+    lab.asked = key;
+    this.asking = input;
+    try {
+      const value = typeof typed === "boolean" ? typed : checked(field, typed, words);
+      const whole = value === undefined ? key.replace(/(\..*)\[\d+\]$/, "$1") : key;
+      if (field.name === "name" && field.value && value) {
+        lab.replace(withName(lab.given as Given, key, value));
+        if (!lab.fault && field.table !== "particle") this.renamed(value);
+      } else lab.change({ [whole]: value });
+    } catch (error) {
+      if (!(error instanceof Fault)) throw error;
+      lab.refuse(error);
+    }
+  }
+
+  /** Back to the value that counts. */
+  giveUp(key: string) {
+    const { lab } = this, its = this.entries.get(key);
+    lab.asked = "";
+    lab.fault = null;
+    lab.tell("scene");
+    its?.input.focus();
+  }
+}
+
 class Inspector {
-  /** The name of the part that is shown. */
-  part = "scene";
+  /** The names of what is chosen. */
+  parts: string[] = [];
   listeners: (() => void)[] = [];
   choice;
-  remove;
-  list;
-  inputs: Map<string, { input: any, field: Field }> = new Map();
+  main;
+  own;
+  panel;
+  title;
+  buttons: Record<string, any> = {};
 
   constructor(home: Element, readonly lab: Lab, readonly words: Words) {
     this.choice = html("select", { "aria-label": words.say("part") });
-    this.choice.addEventListener("change", () => this.choose(this.choice.value));
-    this.remove = html("button", { type: "button" }, words.say("delete"));
-    this.remove.addEventListener("click", () => this.takeAway());
-    this.list = html("div", { class: "fields" });
-    home.append(card("edit", words.say("values"),
-      html("div", { class: "row" }, this.choice, this.remove), this.list));
+    this.choice.addEventListener("change", () =>
+      this.choose(...(this.choice.value === "scene" ? [] : [this.choice.value])));
+    this.main = new Fields(lab, words, false);
+    this.own = new Fields(lab, words, true);
+    this.own.renamed = (name) => this.choose(name);
+    home.append(card("edit", words.say("values"), html("div", { class: "row" }, this.choice),
+      this.main.home));
+    this.title = html("h2", {});
+    const button = (id: string, drawing: string, act: () => void) => {
+      this.buttons[id] = iconButton(`part-${id}`, drawing, words.say(id));
+      this.buttons[id].addEventListener("click", act);
+      return this.buttons[id];
+    };
+    this.panel = html("section", { class: "float chosen-card", id: "chosen", "aria-label": words.say("chosen") },
+      html("div", { class: "head" }, this.title, button("duplicate", "copy", () => this.duplicate()),
+        button("delete", "bin", () => this.takeAway()),
+        button("close", "close", () => this.choose())), this.own.home);
+    this.panel.hidden = true;
+    home.before(this.panel);
     lab.on("scene", () => this.refresh());
     this.refresh();
   }
 
-  /** Show a part of the scene; all of it where there is none of that name. */
-  choose(name: string) {
-    this.part = name;
+  /** The name of what is chosen last; "scene" of all where nothing is. */
+  get part() {
+    return this.parts.at(-1) ?? "scene";
+  }
+
+  /** Choose parts by name; none shows the whole scene. */
+  choose(...names: string[]) {
+    this.parts = names;
     this.refresh();
     this.listeners.forEach((listener) => listener());
   }
 
-  /** Whether what is shown can be deleted. */
+  /** What copies are made by; set by what knows where to put them. */
+  duplicate = () => {};
+
+  /** Whether all that is chosen can be deleted. */
   get canDelete() {
-    return this.lab.given !== undefined && canGo(this.lab.given, this.part);
+    const { given } = this.lab;
+    return given !== undefined && this.parts.length > 0
+      && this.parts.every((name) => canGo(given, name));
   }
 
   takeAway() {
-    const { lab, part } = this;
+    const { lab, parts } = this;
     if (!lab.given || !this.canDelete) return;
-    lab.replace(without(lab.given, part));
+    lab.asked = "";
+    lab.replace(without(lab.given, ...parts));
     if (lab.fault) return;
-    this.choose("scene");
-    document.getElementById("play")?.focus();
+    this.choose();
+    document.getElementById("picture")?.focus();
+  }
+
+  /** The part of the palette that a thing is. */
+  kindOf(name: string): Part | undefined {
+    const { given, data } = this.lab;
+    if (name === "incoming") return data.parts.find(({ part }: Part) => part === "pulley");
+    const [table, row] = rowsNamed(given as Given, [name])[0] ?? [];
+    const fits = data.parts.filter((part: Part) =>
+      part.table === table && part.needs.every((key) => row && key in row)) as Part[];
+    return fits.sort((a, b) => b.needs.length - a.needs.length)[0];
   }
 
   refresh() {
     const { lab, words, choice } = this;
     if (!lab.given || !lab.scene) return;
-    const all = sectionsOf(lab.scene), sections = showsFew(lab.data) ? all.slice(0, 1) : all;
-    choice.hidden = sections.length < 2;
-    const section = sections.find(({ name }) => name === this.part) ?? sections[0];
-    this.part = section.name;
-    const names = sections.map(({ name }) => name);
+    const { scene, given, data } = lab;
+    const all = sectionsOf(scene), few = showsFew(data);
+    const names = all.map(({ name }) => name);
+    this.parts = this.parts.filter((name) => names.includes(name));
+    choice.hidden = few || all.length < 2;
     if (JSON.stringify(names) !== this.names) {
       this.names = JSON.stringify(names);
       choice.replaceChildren(...names.map((name) => new Option(words.name(name), name)));
     }
     choice.value = this.part;
-    this.remove.hidden = !this.canDelete || !this.mayDelete;
-    const fields = fieldsOf(lab.data, lab.given, lab.scene, section);
-    const keys = fields.map(({ key }) => key);
-    if (keys.join() !== [...this.inputs.keys()].join()) this.rebuild(fields);
-    for (const field of fields) this.fill(field);
+    this.main.show(fieldsOf(data, given, scene, all[0]), () => true);
+    const section = all.find(({ name }) => name === this.part && name !== "scene");
+    const kind = section && this.kindOf(this.part);
+    const stream = section?.table === "stream" ? scene.kinds[section.row] : -1;
+    // A stream is shown with what it consists of.
+    const grain = all.filter(({ table }) => table === "particle")[stream];
+    const fields = !section || this.parts.length > 1 ? []
+      : [section, ...(grain ? [grain] : [])].flatMap((one) => fieldsOf(data, given, scene, one));
+    const order = kind?.main ?? [];
+    const place = ({ table, name }: Field) =>
+      Math.max(order.indexOf(name), order.indexOf(`${table}.${name}`));
+    const rank = (field: Field) => (place(field) >= 0 ? place(field) : field.name === "name" ? 99 : 9);
+    fields.sort((a, b) => rank(a) - rank(b));
+    this.own.show(fields, (field) => !order.length || place(field) >= 0);
+    this.panel.hidden = !section || (!fields.length && !this.mayDelete);
+    this.title.textContent = this.parts.length > 1 ? words.say("parts-chosen", { count: this.parts.length })
+      : words.name(this.part);
+    if (kind && this.parts.length === 1) this.title.prepend(icon(kind.part));
+    this.buttons.delete.hidden = !this.canDelete || !this.mayDelete;
+    this.buttons.duplicate.hidden = !this.mayDelete || !rowsNamed(given, this.parts).length;
   }
 
   /** Set where nothing may be taken away. */
   mayDelete = true;
 
   names: string | undefined;
-
-  rebuild(fields: Field[]) {
-    const { words } = this, several = this.part === "scene";
-    this.inputs.clear();
-    this.list.replaceChildren(...fields.map((field) => {
-      const { key, table, owner, name, part, of, unit, low, high } = field;
-      const input = html("input", { type: "text", inputmode: "decimal", autocomplete: "off" });
-      const ends = Math.abs(low) < 1e5 && Math.abs(high) < 1e5
-        ? words.say("from-to", { low: words.bound(low), high: words.bound(high) }) : "";
-      input.title = ends;
-      input.addEventListener("change", () => this.take(key));
-      input.addEventListener("keydown", (event: KeyboardEvent) => {
-        if (event.key === "Enter") this.take(key);
-        if (event.key !== "Escape" || !this.lab.fault) return;
-        this.lab.fault = null;
-        this.lab.tell("scene");
-      });
-      this.inputs.set(key, { input, field });
-      const whose = several && table !== "scene" ? `${words.name(owner)}: ` : "";
-      const which = of > 1 ? ` ${(name === "radius" ? "≥≤" : "xy")[part]}` : "";
-      return html("label", {}, html("span", {}, `${whose}${words.key(table, name)}${which}`), input,
-        html("span", { class: "unit" }, words.unit(unit)));
-    }));
-  }
-
-  /** Show the value that counts, unless another is being typed. */
-  fill(field: Field) {
-    const its = this.inputs.get(field.key);
-    if (!its) return;
-    its.field = field;
-    const refused = its.input.getAttribute("aria-invalid") === "true";
-    if (refused && this.lab.fault) return;
-    its.input.removeAttribute("aria-invalid");
-    its.input.value = typeof field.value === "number" ? this.words.plain(field.value)
-      : this.words.say(field.value);
-  }
-
-  /** Take over what was typed. */
-  take(key: string) {
-    const { lab, words } = this, its = this.inputs.get(key);
-    if (!its) return;
-    const { input, field } = its, text = input.value.trim();
-    const word = text.toLowerCase() === words.say("adhesion").toLowerCase();
-    const value = word ? "adhesion" : words.parse(text);
-    const shown = typeof field.value === "number" ? words.brief(field.value) : field.value;
-    // What was only looked at keeps all its digits.
-    if (value === shown && !lab.fault) return;
-    // What was typed stands until it is known to be possible.
-    input.setAttribute("aria-invalid", "true");
-    try {
-      checked(field, value);
-      if (value === shown) lab.replace(lab.given as any);
-      else lab.change({ [key]: value });
-    } catch (error) {
-      if (!(error instanceof Fault)) throw error;
-      lab.refuse(error);
-    }
-  }
 }
 
 export { Inspector };

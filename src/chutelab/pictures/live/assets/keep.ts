@@ -8,7 +8,7 @@ import { predict } from "./prediction.ts";
 import { Fault, type Given, type Scene } from "./scene.ts";
 import { download, fileStem, fromHash, knotRows, toCsv, toHash } from "./share.ts";
 import { historyOf } from "./stages.ts";
-import type { Lab } from "./lab.ts";
+import { isBare, type Lab } from "./lab.ts";
 import type { Recording } from "./recording.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
@@ -29,7 +29,11 @@ class Keep {
     const hasAddress = /^(https?|file):$/.test(location.protocol);
     home.append(card("share", words.say("share"), html("div", { class: "row" },
       ...(hasAddress ? [button("copy-link", () => this.copy())] : []),
-      button("save-scene", () => this.save("toml", this.toml, "application/toml")),
+      button("save-scene", () => {
+        const bare = isBare(lab.given as Given);
+        this.said.textContent = bare ? words.say("save-needs-ball") : "";
+        if (!bare) this.save("toml", this.toml, "application/toml");
+      }),
       button("save-picture", () => this.picture()),
       button("save-knots", () => this.table("knots", knotRows(this.recording)), true),
       button("save-numbers", () => this.table("numbers", this.numbers), true),

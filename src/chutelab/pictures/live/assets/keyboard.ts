@@ -3,19 +3,22 @@
 import { html } from "./panels.ts";
 import type { Bench } from "./bench.ts";
 import type { Lab } from "./lab.ts";
+import type { Palette } from "./palette.ts";
 import type { Words } from "./words.ts";
 
 /** What keys do, in words of the catalogue: `help-` and these. */
 const KEYS: [string, string][] = [
   ["play", "help-space"], ["step", "← →"], ["ends", "Home End"], ["tab", "Tab"],
   ["handle", "← → ↑ ↓"], ["fine", "help-shift"], ["undo", "help-ctrl-z"], ["redo", "help-ctrl-shift-z"],
-  ["taken", "help-delete"], ["escape", "Esc"], ["zoom", "+ −"], ["help", "?"],
+  ["taken", "help-delete"], ["copy", "help-ctrl-c"], ["duplicate", "help-ctrl-d"],
+  ["all", "help-ctrl-a"], ["letter", "E … R"], ["draw", "help-arrows"], ["view", "H"],
+  ["alt", "Alt"], ["escape", "help-esc"], ["zoom", "+ −"], ["help", "?"],
 ];
 
 /** Elements that have a use of their own for keys. */
 const BUSY = "button, input, select, textarea, summary, a, dialog, [role=slider]";
 
-function listenToKeys(bench: Bench, lab: Lab, words: Words) {
+function listenToKeys(bench: Bench, palette: Palette | null, lab: Lab, words: Words) {
   const click = (id: string) => document.getElementById(id)?.click();
   const close = html("button", { type: "button" }, words.say("close"));
   const dialog = html("dialog", { id: "help", "aria-label": words.say("help") },
@@ -28,13 +31,18 @@ function listenToKeys(bench: Bench, lab: Lab, words: Words) {
   document.getElementById("keys")?.addEventListener("click", () => dialog.showModal());
   const always: Record<string, () => void> = {
     "ctrl+z": () => lab.undo(), "ctrl+shift+z": () => lab.redo(), "ctrl+y": () => lab.redo(),
-    Escape: () => bench.set("move"),
+    Escape: () => (bench.mode ? bench.set(null) : bench.inspector.choose()),
   };
   const calm: Record<string, () => void> = {
     " ": () => click("play"), Home: () => click("restart"), End: () => lab.seek(lab.end),
     ArrowLeft: () => click("back"), ArrowRight: () => click("forward"),
     "+": () => click("tool-zoom-in"), "-": () => click("tool-zoom-out"),
     "?": () => dialog.showModal(),
+  };
+  // Letters count while the picture has the focus.
+  const drawn: Record<string, () => void> = {
+    v: () => bench.set(null), "ctrl+c": () => bench.copy(), "ctrl+v": () => bench.paste(),
+    "ctrl+d": () => bench.duplicate(), "ctrl+a": () => bench.all(),
   };
   const onHandles = [" ", "+", "-", "?"];
   addEventListener("keydown", (event) => {
@@ -44,9 +52,14 @@ function listenToKeys(bench: Bench, lab: Lab, words: Words) {
     const ctrl = event.ctrlKey || event.metaKey;
     const name = ctrl ? `ctrl+${event.shiftKey ? "shift+" : ""}${event.key.toLowerCase()}` : event.key;
     let act = typing && name !== "Escape" ? undefined : always[name];
-    const handle = target.matches("[role=slider]");
+    const handle = target.matches("[role=slider]"), picture = target.id === "picture";
     if (!ctrl && (handle ? onHandles.includes(name) : !target.closest(BUSY))) act ??= calm[name];
-    if (["Delete", "Backspace"].includes(name) && (handle || !target.closest(BUSY))) {
+    if (!typing && target.closest("#stage")) {
+      act ??= drawn[name];
+      const part = ctrl || event.altKey ? undefined : palette?.partOf(name);
+      if (part) act = () => bench.draw(part);
+    }
+    if (["Delete", "Backspace"].includes(name) && (handle || picture || !target.closest(BUSY))) {
       if (bench.inspector.mayDelete) act = () => bench.inspector.takeAway();
     }
     if (!act) return;

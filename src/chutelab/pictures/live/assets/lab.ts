@@ -18,6 +18,12 @@ const MOST_UNDO = 200;
 /** Slow motion and fast, in times of real time. */
 const RATES = [0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 4];
 
+/** Of a machine without particles yet, which no file can be: one far away, to build it with. */
+const NOWHERE = { at: [9e5, 9e5], velocity: [0, 0] };
+
+/** Whether a scene has no particles. */
+const isBare = ({ stream }: Given) => Array.isArray(stream) && !stream.length;
+
 class Lab {
   listeners: Map<News, Set<() => void>> = new Map();
   past: Given[] = [];
@@ -27,6 +33,8 @@ class Lab {
   playing = false;
   rate = 1;
   fault: Fault | null = null;
+  /** The key whose field says what is wrong; "" where the page says it. */
+  asked = "";
   /** What undo goes back to once what is dragged is let go. */
   before: Given | undefined = undefined;
   given?: Given;
@@ -54,8 +62,14 @@ class Lab {
    * `fault`. */
   use(given: Given): boolean {
     try {
-      const scene = resolve(given, this.data);
+      const scene = resolve(isBare(given) ? { ...given, stream: NOWHERE } : given, this.data);
       const machine = build(scene);
+      if (isBare(given)) {
+        scene.streams = [];
+        for (const key of ["releases", "radius", "mass", "inertia", "streams"] as const) {
+          machine[key] = [];
+        }
+      }
       const goesOn = this.machine?.interact && machine.interact && this.t > 0;
       this.given = given;
       this.scene = scene;
@@ -87,6 +101,12 @@ class Lab {
     if (from > 0 && this.recording) job = this.recording.goOn(from, machine);
     else this.recording = new Recording(machine);
     const { recording } = this;
+    if (!machine.releases.length) {
+      this.engine.stop();
+      recording.state = "done";
+      this.tellSoon();
+      return;
+    }
     this.engine.run(job, AHEAD + (from > 0 ? 0 : this.t), (chunk) => {
       recording.add(chunk);
       this.tellSoon();
@@ -222,4 +242,4 @@ class Lab {
   }
 }
 
-export { Lab, RATES };
+export { Lab, RATES, isBare };

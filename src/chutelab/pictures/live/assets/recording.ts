@@ -426,8 +426,8 @@ class Recording {
   /** Points of a track, its knots among them: straight lines between them miss it by `fine` (m). */
   points(index: number, fine: number) {
     const track = this.tracks[index];
+    if (!track?.count) return [];
     const { count } = track;
-    if (!count) return [];
     const points = Array.from({ length: count - 1 }, (_, i) => track.chords(i, fine).slice(1));
     return [{ t: track.begin, x: track.at(0, X), y: track.at(0, Y) }, ...points.flat()];
   }

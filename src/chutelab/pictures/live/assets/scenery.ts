@@ -31,9 +31,6 @@ const PLATE = 1.4;
 /** Pixels of radius from which on a pulley has spokes; and from one roller to the next. */
 const SPOKED = 9, ROLLERS = 128;
 
-/** Pixels between two lines of the grid, at least. */
-const MESH = 70;
-
 /** What moves with the time that is shown: cleats, or a wheel that turns. */
 type Moving = { element: any, speed: number, x?: number, y?: number, radius?: number };
 type Gate = { element: any, appears: number, vanishes: number };
@@ -82,6 +79,7 @@ class Scenery {
       bodies.push([isPlate ? this.plate(line) : this.wall(line), line]);
     }
     for (const [element, { surface, appears, vanishes }] of bodies) {
+      element.setAttribute("data-part", machine.surfaces[surface]);
       element.append(Object.assign(svg("title"), {
         textContent: this.words.name(machine.surfaces[surface]),
       }));
@@ -111,9 +109,7 @@ class Scenery {
 
   /** Lines at round numbers of metres, and a bar that tells how long one is. */
   drawGround(bottom: number, left: number) {
-    const { view, ground } = this, { width, height, scale } = view;
-    const rough = MESH / scale, ten = 10 ** Math.floor(Math.log10(rough));
-    const step = ten * ([1, 2, 5].find((n) => n * ten >= rough) ?? 10);
+    const { view, ground } = this, { width, height, scale, mesh: step } = view;
     const lines = (offset: number) => {
       let path = "";
       for (let n = Math.ceil(view.worldX(0) / step - offset); ; n += 1) {

@@ -1,7 +1,9 @@
 // The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
 
 import { openHandles } from "./controls.ts";
-import { ARROW, Handles, roundTo, valuesOf, type Handle } from "./handles.ts";
+import { endsOf } from "./edit.ts";
+import { ARROW, Handles, bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
+import { html } from "./panels.ts";
 import { Balls } from "./balls.ts";
 import { Scenery, svg } from "./scenery.ts";
 import { historyOf } from "./stages.ts";
@@ -12,6 +14,14 @@ import type { Words } from "./words.ts";
 
 /** Tracks that are drawn at most; more are a blot. */
 const MOST_TRACKS = 40;
+
+/** Pixels from an end to the handle that turns it, and from a body to the line round it. */
+const BEYOND = 38, AROUND = 6;
+
+/** Angles to which one is drawn that is so near, degrees. */
+const ROUND = 15, NEARLY = 1.5;
+
+type Point = [number, number];
 
 /** Pixels of radius that a particle has at least, and where there are few, which one looks for. */
 const LEAST = 1.2, LEAST_FEW = 3;
@@ -34,8 +44,14 @@ class Stage {
   handles: Handle[] = [];
   gripOf: Map<string, any> = new Map();
   held: Handle | null = null;
-  /** The part that is chosen, whose handles are seen. */
-  part = "";
+  /** The parts that are chosen; of one the handles are seen. */
+  parts: string[] = [];
+  /** What is held as it was before, what is chosen and what is pointed at, and what a place that is
+   * dragged was drawn to. */
+  ghost = svg("g", { class: "surfaces ghost" });
+  outline = svg("g", { class: "outline" });
+  magnet = svg("circle", { class: "magnet", r: 9 });
+  tip;
   fitted = false;
 
   constructor(readonly home: HTMLElement, readonly lab: Lab, readonly words: Words) {
@@ -43,7 +59,7 @@ class Stage {
     this.show = { strobe: true, trails: true, velocity: false, forces: false, handles: true };
     this.back = svg("svg", { "aria-hidden": "true" });
     this.canvas = document.createElement("canvas");
-    this.front = svg("svg", { role: "group" });
+    this.front = svg("svg", { role: "group", tabindex: 0, id: "picture" });
     this.front.setAttribute("aria-label", words.say("stage"));
     this.canvas.setAttribute("aria-hidden", "true");
     home.append(this.back, this.canvas, this.front);
@@ -51,11 +67,13 @@ class Stage {
     this.balls = new Balls(lab, (name) => this.colour(name));
     this.paths = svg("g", { class: "paths" });
     const { ground, layer, scale } = this.scenery;
-    this.back.append(steel(), ground, layer, this.paths, scale);
+    this.back.append(steel(), ground, this.ghost, this.outline, layer, this.paths, scale);
+    this.tip = html("p", { class: "tip", role: "status" });
+    home.after(this.tip);
     this.grips = svg("g", { class: "grips" });
     /** Further layers, of tools, lie below the handles. */
     this.over = svg("g", { class: "over" });
-    this.front.append(this.over, this.grips);
+    this.front.append(this.over, this.magnet, this.grips);
     new ResizeObserver(() => this.resize()).observe(home);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
       this.colours.clear();
@@ -266,7 +284,7 @@ class Stage {
     if (!machine || !scene) return;
     const { data } = this.lab;
     this.handles = this.show.handles
-      ? openHandles(new Handles(scene, machine, data).list, data) : [];
+      ? openHandles(new Handles(scene, machine, data, BEYOND / this.view.scale).list, data) : [];
     for (const more of this.further) this.handles.push(...more());
     const wanted = new Set(this.handles.map(({ id }) => id));
     for (const [id, grip] of this.gripOf) {
@@ -281,6 +299,63 @@ class Stage {
       this.describe(grip, handle);
       // Put in anew it would lose the focus.
       if (!grip.isConnected) this.grips.append(grip);
+    }
+    this.drawOutline();
+  }
+
+  /** Choose parts. */
+  choose(parts: string[]) {
+    this.parts = parts;
+    for (const handle of this.handles) {
+      this.gripOf.get(handle.id)?.classList.toggle("own", this.isSeen(handle));
+    }
+    this.drawOutline();
+  }
+
+  /** A handle is seen while its part alone is chosen, one of a tool always. */
+  isSeen({ surface, change }: Handle) {
+    return change !== undefined || (this.parts.length === 1 && this.parts[0] === surface);
+  }
+
+  /** The drawings of a part. */
+  drawingsOf(name: string): any[] {
+    return [...this.scenery.layer.children]
+      .filter((one: any) => one.getAttribute("data-part") === name);
+  }
+
+  /** What the pointer is over. */
+  pointed = "";
+
+  /** Dashes round what is chosen, a line round what is pointed at: below each body its own shape,
+   * wider, and over that a little less wide in the colour of the ground. */
+  drawOutline() {
+    this.outline.replaceChildren();
+    const { machine, recording, t } = this.lab, { view } = this;
+    for (const name of new Set([...this.parts, this.pointed])) {
+      const own = this.parts.includes(name) ? "chosen" : "pointed";
+      const bodies = this.drawingsOf(name).flatMap((group) =>
+        [...group.querySelectorAll(".belt, .wall, rect.steel")].map((shape) => {
+          const wide = parseFloat(getComputedStyle(shape).strokeWidth) || 0;
+          const copy = shape.cloneNode(false), by = group.getAttribute("transform");
+          if (by) copy.setAttribute("transform", by);
+          return [copy, wide] as [any, number];
+        }));
+      const stream = machine?.streams.indexOf(name) ?? -1;
+      machine?.releases.forEach((release, i) => {
+        if (release.stream !== stream || bodies.length > 40) return;
+        const state = recording?.tracks[i]?.state(t) ?? release;
+        const r = Math.max(LEAST_FEW, machine.radius[i] * view.scale);
+        bodies.push([svg("circle", { cx: view.px(state.x), cy: view.py(state.y), r }), 0]);
+      });
+      const layers: [number, string][] = [[AROUND + 1, own], [AROUND - 1, "within"]];
+      for (const [add, kind] of layers) {
+        for (const [shape, wide] of bodies) {
+          const copy = shape.cloneNode(false);
+          copy.setAttribute("class", kind);
+          copy.setAttribute("stroke-width", wide + 2 * add);
+          this.outline.append(copy);
+        }
+      }
     }
   }
 
@@ -298,8 +373,7 @@ class Stage {
   describe(grip: any, handle: Handle) {
     const { view, words } = this, x = view.px(handle.x), y = view.py(handle.y);
     grip.setAttribute("transform", `translate(${x} ${y})`);
-    // A tool that is out is held by its ends at any time.
-    grip.classList.toggle("own", handle.surface === this.part || handle.says !== undefined);
+    grip.classList.toggle("own", this.isSeen(handle));
     const [stem, , knob] = grip.children;
     knob.setAttribute("d", KNOBS[handle.shape]);
     if (handle.from) {
@@ -348,18 +422,23 @@ class Stage {
   /** Have what is held follow the pointer. */
   aim(event: PointerEvent) {
     if (!this.held) return;
-    const [px, py] = this.placeOf(event);
-    this.latest = [this.view.worldX(px), this.view.worldY(py)];
+    this.latest = this.placeOf(event);
+    this.loose = event.altKey;
+    this.finger = event.pointerType === "touch";
     // More events than frames come: the latest counts.
     if (!this.waiting) this.waiting = requestAnimationFrame(() => this.follow());
   }
 
-  /** Where the pointer has moved since the last frame. */
-  latest: [number, number] | undefined;
+  /** Where the pointer has moved since the last frame, px. */
+  latest: Point | undefined;
+
+  /** Whether places are drawn to nothing, and whether a finger holds them. */
+  loose = false;
+  finger = false;
 
   waiting = 0;
 
-  placeOf(event: PointerEvent): [number, number] {
+  placeOf(event: PointerEvent): Point {
     const box = this.front.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
   }
@@ -367,41 +446,113 @@ class Stage {
   follow() {
     cancelAnimationFrame(this.waiting);
     this.waiting = 0;
-    if (this.latest) this.dragTo(...this.latest);
+    if (this.latest) this.dragTo(this.latest);
     this.latest = undefined;
   }
 
   /** Take hold of a handle. */
   take(id: string) {
-    this.held = this.handles.find((handle) => handle.id === id) ?? null;
+    const handle = this.handles.find((one) => one.id === id);
+    if (!handle) return null;
     this.gripOf.get(id)?.classList.add("held");
-    return this.held;
+    return this.hold(handle);
   }
 
-  /** Move what is held to a place in the world, m. */
-  dragTo(x: number, y: number) {
-    if (!this.held) return;
-    const { snap } = this.view, { axes } = this.held;
-    const fine: Record<string, number> = {
-      degrees: 0.5, "m/s": Math.max(0.01, 0.5 * 10 ** Math.ceil(Math.log10(snap / ARROW))),
-    };
-    if (this.held.change) {
-      this.held.change(this.held.drag(x, y));
+  /** Hold a handle, or a body. Where it was stays to be seen. */
+  hold(handle: Handle): Handle {
+    this.held = handle;
+    if (handle.change) return handle;
+    const names = handle.whole ? this.parts : [handle.surface];
+    this.ghost.replaceChildren(...names.flatMap((name) =>
+      this.drawingsOf(name).map((one) => one.cloneNode(true))));
+    this.ends = this.lab.machine ? endsOf(this.lab.machine, names) : [];
+    this.was = this.words.values(handle.axes, true);
+    document.body.classList.add("dragging");
+    return handle;
+  }
+
+  /** Ends of other parts, m; and what the values of what is held were. */
+  ends: Point[] = [];
+  was = "";
+
+  /** Move what is held to a place, px. */
+  dragTo(at: Point) {
+    const { held, view } = this;
+    if (!held) return;
+    const [x, y] = [view.worldX(at[0]), view.worldY(at[1])];
+    if (held.change) {
+      held.change(held.drag(x, y));
       return;
     }
-    const { held } = this, near = (value: number) => roundTo(value, snap);
-    // A body moves by round steps, and keeps its shape.
-    const numbers = held.whole ? held.drag(held.x + near(x - held.x), held.y + near(y - held.y))
-      .map((value) => Number(value.toPrecision(12)))
-      : held.drag(x, y).map((value, n) => roundTo(value, fine[axes[n].unit] ?? snap));
-    this.lab.change(valuesOf(this.held, numbers), { done: false });
+    const { snap } = view, { axes } = held;
+    let caught: Point | null = null, numbers: number[];
+    if (held.whole) {
+      const by = this.shiftOf(held, at);
+      caught = by.caught;
+      numbers = held.drag(held.x + by.way[0], held.y + by.way[1])
+        .map((value) => Number(value.toPrecision(12)));
+    } else if (held.shape === "point" && axes.every(({ unit }) => unit === "m") && !this.loose) {
+      const near = view.near(at, this.ends, held.fixed);
+      if (near.caught) caught = near.at;
+      numbers = held.drag(...near.at).map((value) => Number(value.toPrecision(12)));
+    } else {
+      const speed = Math.max(0.01, 0.5 * 10 ** Math.ceil(Math.log10(snap / ARROW)));
+      const fine: Record<string, number> = { degrees: 0.5, "m/s": speed };
+      numbers = held.drag(x, y).map((value, n) => {
+        const round = roundTo(value, ROUND);
+        return axes[n].unit === "degrees" && !this.loose && Math.abs(value - round) < NEARLY
+          ? round : roundTo(value, fine[axes[n].unit] ?? snap);
+      });
+    }
+    this.magnet.classList.toggle("on", caught !== null);
+    if (caught) {
+      this.magnet.setAttribute("cx", view.px(caught[0]));
+      this.magnet.setAttribute("cy", view.py(caught[1]));
+    }
+    this.lab.change(valuesOf(held, numbers), { done: false });
+    this.tell(at);
+  }
+
+  /** How far a body goes: so that one of its ends meets one of another part, or by round steps. */
+  shiftOf({ x, y, places = [] }: Handle, at: Point): { way: Point, caught: Point | null } {
+    const { view } = this, [dx, dy] = [view.worldX(at[0]) - x, view.worldY(at[1]) - y];
+    for (const [px, py] of this.loose ? [] : places) {
+      const pixel: Point = [view.px(px + dx), view.py(py + dy)];
+      const near = view.near(pixel, this.ends);
+      if (this.ends.includes(near.at)) {
+        return { way: [near.at[0] - px, near.at[1] - py], caught: near.at };
+      }
+    }
+    return { way: [roundTo(dx, view.snap), roundTo(dy, view.snap)], caught: null };
+  }
+
+  /** The value that is changed, beside the pointer; or why it cannot be. */
+  tell([px, py]: Point) {
+    const { lab, words, held, view, tip } = this;
+    const now = this.handles.find(({ id }) => id === held?.id) ?? bodyOf(this.handles,
+      this.parts, 0, 0);
+    if (!held || !now) return;
+    tip.classList.toggle("refused", lab.fault !== null);
+    tip.replaceChildren(...(lab.fault ? [words.fault(lab.fault)] : [
+      html("b", {}, words.values(now.axes)), html("span", {}, words.say("was", { value: this.was })),
+    ]));
+    const { offsetWidth: wide, offsetHeight: high } = tip;
+    // A finger hides what is below it.
+    const left = Math.min(px + 22, view.width - wide - 8), over = this.finger ? -high - 40 : 26;
+    const top = Math.min(Math.max(py + over, 8), view.height - high - 8);
+    tip.style.transform = `translate(${Math.max(8, left)}px, ${top}px)`;
   }
 
   letGo() {
     if (!this.held) return;
     this.gripOf.get(this.held.id)?.classList.remove("held");
     this.held = null;
+    this.ghost.replaceChildren();
+    this.magnet.classList.remove("on");
+    document.body.classList.remove("dragging");
+    this.tip.replaceChildren();
     this.lab.settle();
+    this.rebuild();
   }
 
   nudge(handle: Handle, { key, shiftKey }: KeyboardEvent): boolean {
@@ -439,7 +590,8 @@ function steel() {
 
 const KNOBS = {
   point: "M-7 0A7 7 0 1 0 7 0A7 7 0 1 0 -7 0Z",
-  turn: "M0 -8L8 0L0 8L-8 0Z",
+  end: "M0 -8L8 0L0 8L-8 0Z",
+  turn: "M-11 0A11 11 0 1 0 11 0A11 11 0 1 0 -11 0ZM4.5 -2.5A5.2 5.2 0 1 0 5 2.5M5.200 -6v4h-4",
   arrow: "M-6 -7L8 0L-6 7Z",
 };
 

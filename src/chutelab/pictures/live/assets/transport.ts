@@ -93,7 +93,7 @@ class Transport {
     // What cannot be pressed any more loses the focus.
     if (undoButton.disabled && activeElement === undoButton) redoButton.focus();
     if (redoButton.disabled && activeElement === redoButton) undoButton.focus();
-    this.fault.hidden = !lab.fault;
+    this.fault.hidden = !lab.fault || lab.asked !== "" || document.body.matches(".dragging");
     if (lab.fault) this.fault.textContent = words.fault(lab.fault);
   }
 }

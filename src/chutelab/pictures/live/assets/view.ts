@@ -3,6 +3,7 @@
 import type { Machine, Segment } from "./machine.ts";
 import { memory } from "./plan.ts";
 
+type Point = [number, number];
 type Box = { left: number, bottom: number, right: number, top: number };
 
 class View {
@@ -70,10 +71,65 @@ class View {
   get snap() {
     return 10 ** Math.floor(Math.log10(1.5 / this.scale));
   }
+
+  /** From one line of the grid to the next: a round number of m. */
+  get mesh() {
+    const rough = MESH / this.scale, ten = 10 ** Math.floor(Math.log10(rough));
+    return ten * ([1, 2, 5].find((n) => n * ten >= rough) ?? 10);
+  }
+
+  /** The size of things that are new here: a round number of m, within the picture's height. */
+  get unit() {
+    const high = (this.free.bottom - this.free.top) / this.scale;
+    const ten = 10 ** Math.floor(Math.log10(high));
+    return ten * ([5, 2].find((n) => n * ten <= high) ?? 1);
+  }
+
+  /** The place that is meant by one of the picture, px: an end of something, a round angle as seen
+   * `from` a place, a line of the grid, or what rounds to a pixel.
+   * @param ends m
+   * @returns m, and whether it is one of the first three */
+  near([px, py]: Point, ends: Point[], from?: Point): { at: Point, caught: boolean } {
+    const far = ([x, y]: Point) => Math.hypot(this.px(x) - px, this.py(y) - py);
+    const end = ends.reduce((best: Point | null, one) =>
+      (far(one) < (best ? far(best) : CATCH) ? one : best), null);
+    if (end) return { at: end, caught: true };
+    const round = (value: number, step: number) =>
+      Number((Math.round(value / step) * step).toPrecision(12));
+    const [x, y] = [this.worldX(px), this.worldY(py)];
+    if (from) {
+      const [dx, dy] = [x - from[0], y - from[1]], long = Math.hypot(dx, dy);
+      const turn = Math.atan2(dy, dx), to = round(turn, TURN);
+      if (long * this.scale > CATCH && Math.abs(turn - to) < NEAR_TURN) {
+        const way = round(long, this.snap);
+        return { at: [Number((from[0] + way * Math.cos(to)).toFixed(9)),
+          Number((from[1] + way * Math.sin(to)).toFixed(9))], caught: true };
+      }
+    }
+    let caught = false;
+    const line = (value: number) => {
+      const to = round(value, 0.5 * this.mesh), isNear = Math.abs(to - value) * this.scale < LINE;
+      caught ||= isNear;
+      return isNear ? to : round(value, this.snap);
+    };
+    return { at: [line(x), line(y)], caught };
+  }
 }
+
+/** How near a place has to be to be meant, px: an end, a line of the grid. */
+const CATCH = 11, LINE = 5;
+
+/** Round angles, and how near one has to be, rad. */
+const TURN = Math.PI / 12, NEAR_TURN = Math.PI / 72;
+
+/** Pixels between two lines of the grid, at least. */
+const MESH = 70;
 
 /** m of belts and walls that are shown beyond all that matters. */
 const BEYOND = 0.35;
+
+/** What is shown where nothing is yet. */
+const EMPTY: Box = { left: -0.6, bottom: -0.6, right: 0.6, top: 0.4 };
 
 /** Share of the machine's size, of the fall of what has fallen off that is shown. */
 const FALL = 0.35;
@@ -122,11 +178,13 @@ function boxOf(
   const highest = [...points, ...machine.releases]
     .reduce((top, { y }) => Math.max(top, y), -Infinity);
   const still = machine.segments.filter(({ speed }) => !speed);
-  for (const [x, y] of still.flatMap(ends)) widen(x, Math.min(y, highest + BEYOND));
+  const ceiling = isFinite(highest) ? highest + BEYOND : Infinity;
+  for (const [x, y] of still.flatMap(ends)) widen(x, Math.min(y, ceiling));
   const [left, right] = [box.left - BEYOND, box.right + BEYOND];
   for (const [x, y] of machine.segments.filter(({ speed }) => speed).flatMap(ends)) {
     widen(isFinite(left) ? Math.min(Math.max(x, left), right) : x, y);
   }
+  if (!isFinite(box.left)) return EMPTY;
   const held = { ...box }, room = FALL * Math.max(box.right - box.left, box.top - box.bottom);
   for (const point of points.filter((one) => !inside(one))) {
     widen(Math.min(Math.max(point.x, held.left - room), held.right + room),

@@ -20,7 +20,9 @@ class Words {
 
   /** A surface or stream by its name: ours are translated, a scene's own stand as they are. */
   name(name: string) {
-    return this.catalogue[`name-${name}`] ?? name;
+    const [, stem, number] = /^([a-z]+)(\d+)$/.exec(name) ?? [];
+    const part = this.catalogue[`part-${stem}`];
+    return this.catalogue[`name-${name}`] ?? (part ? `${part} ${number}` : name);
   }
 
   /** A key of the scene, such as `plate.angle_deg`. */
@@ -42,6 +44,17 @@ class Words {
     }
     const why = this.say(`fault-${text}`, values);
     return where ? `${where}: ${why}` : why;
+  }
+
+  /** Why a value cannot be, below the field in which it was typed. */
+  why(fault: Fault, key: string) {
+    const text = fault.key === key ? this.fault({ ...fault, key: "" } as Fault) : this.fault(fault);
+    return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
+  }
+
+  /** A word of a scene's keys, such as that of a material. */
+  choice(word: string) {
+    return this.catalogue[`choice-${word}`] ?? word;
   }
 
   /** The end of a range. */
@@ -95,6 +108,19 @@ class Words {
   value({ value, unit }: Quantity) {
     const places = ({ degrees: 1, "m/s": 2 } as Record<string, number>)[unit] ?? 3;
     return `${this.fixed(value, places)}${unit === "degrees" ? "°" : unit ? ` ${unit}` : ""}`;
+  }
+
+  /** The values of a handle that are seen, the first two; with what they are, or bare. */
+  values(
+    axes: { key: string, value: number, unit: string, part?: number, step: number }[], bare = false,
+  ) {
+    const seen = axes.filter(({ step }) => step).slice(0, 2);
+    const places = seen.every(({ part }) => part !== undefined);
+    return seen.map((axis, n) => {
+      const [table, name] = axis.key.replace(/\[\d+\]/g, "").split(".");
+      const what = places ? "xy"[n] : this.key(table, name);
+      return bare ? this.value(axis) : `${what} = ${this.value(axis)}`;
+    }).join(", ");
   }
 
   /** A number that was typed, with point or comma; NaN if it is none. */

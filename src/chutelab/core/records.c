@@ -1,0 +1,142 @@
+/* Runs of the engines that are judged as they end, where their records lie: nothing of them is handed
+   out and in again. This is between the engines and the laws, and reads of either what layout.h says;
+   of engines that is what the host told them, and what they wrote. */
+
+#include <math.h>
+#include "laws.h"
+
+#define PI 3.14159265358979323846
+
+/* What a host may as well call itself. */
+Exact *exact(void);
+int follow_all(int rounds);
+World *world(void);
+int prepare(void);
+int run(int steps);
+
+/* Have the laws look at knots where they are; tell which are whose. Particles are one after the other. */
+static int take_knots(const Knot *knots, int count) {
+    L.knots = (double *)knots;
+    L.knot_count = count;
+    L.row = sizeof(Knot) / sizeof(double);
+    RESERVE(L.offsets, L.particle_count + 1);
+    if (!has_room()) return 0;
+    for (int k = 0, i = 0; k <= count; k++) {
+        int owner = k < count ? knots[k].disk : L.particle_count;
+        while (i <= owner) L.offsets[i++] = k;
+    }
+    return 1;
+}
+
+/* Numbers of events that are not finite. */
+static void take_events(const Event *events, int count) {
+    L.unreal = 0;
+    for (const Event *e = events; e < events + count; e++) {
+        double sum = 0;
+        for (const double *number = &e->t; number <= &e->tangent; number++) sum += 0 * *number;
+        if (sum == 0) continue;
+        for (const double *number = &e->t; number <= &e->tangent; number++) L.unreal += !isfinite(*number);
+    }
+}
+
+static int lay_out_pieces(void) {
+    RESERVE(L.bodies, L.particle_count);
+    RESERVE(L.barriers, (double)L.piece_count * (L.family ? L.particle_count : 1));
+    return has_room();
+}
+
+static int end_up(void) {
+    RESERVE(L.breaches, BREACHES);
+    RESERVE(L.order, 1);
+    RESERVE(L.places, 1);
+    return has_room() && judge();
+}
+
+/* The exact engine. */
+
+static void take_pieces(const Exact *e, int member) {
+    Barrier *b = L.barriers + (long)member * L.piece_count;
+    const Segment *straight = e->segments + (long)member * e->segment_count;
+    const Arc *bent = e->arcs + (long)member * e->arc_count;
+    for (const Segment *s = straight; s < straight + e->segment_count; s++)
+        *b++ = (Barrier){ .x = s->start[0], .y = s->start[1], .tx = s->tangent[0], .ty = s->tangent[1],
+                          .length = s->length, .speed = s->speed, .appears = s->appears,
+                          .vanishes = s->vanishes, .surface = s->surface };
+    for (const Arc *a = bent; a < bent + e->arc_count; a++)
+        *b++ = (Barrier){ .x = a->center[0], .y = a->center[1], .radius = a->radius, .begin = a->begin,
+                          .extent = a->extent, .speed = a->speed, .appears = a->appears,
+                          .vanishes = a->vanishes, .surface = a->surface };
+    if (!e->wheel_count) return;
+    const Wheel *w = e->wheels + member;
+    *b = (Barrier){ .radius = w->radius, .extent = 2 * PI, .speed = w->speed, .appears = -INFINITY,
+                    .vanishes = INFINITY, .surface = w->surface };
+}
+
+static int judge_exact(void) {
+    const Exact *e = exact();
+    L = (Laws){ .particle_count = e->lone_count, .engine = ENGINE_EXACT, .family = e->family,
+                .piece_count = e->segment_count + e->arc_count + e->wheel_count,
+                .pulley = e->wheel_count, .books = e->books, .surface_count = e->surface_count,
+                .book_rows = e->surface_count * (e->apart ? e->lone_count : 1),
+                .contacts = e->contacts, .steps = e->rounds };
+    take_events(e->events, e->event_count);
+    if (!take_knots(e->knots, e->knot_count) || !lay_out_pieces()) return 0;
+    for (int i = 0; i < e->lone_count; i++) {
+        const Lone *p = e->lones + i;
+        L.bodies[i] = (Body){ p->radius, p->mass, p->inertia, p->gravity };
+        L.largest = MAX(L.largest, p->radius);
+    }
+    for (int member = 0; member < (e->family ? e->lone_count : 1); member++) take_pieces(e, member);
+    return end_up();
+}
+
+/* As `follow_all`; a run that is over, and of which all is still there, is judged. */
+EXPORT int follow_and_judge(int rounds) {
+    int course = follow_all(rounds);
+    if (course == FINISHED && exact()->is_whole && !judge_exact()) return NO_MEMORY;
+    return course;
+}
+
+/* The contact engine. It makes other surfaces of those that it is told, so they are looked at before. */
+
+EXPORT int prepare_to_judge(void) {
+    const World *w = world();
+    const Surface *pulley = w->pulley < 0 ? 0 : w->surfaces + w->pulley;
+    L = (Laws){ .particle_count = w->disk_count, .piece_count = w->surface_count, .pulley = pulley != 0,
+                .engine = ENGINE_CONTACT, .dt = w->dt, .surface_count = w->owner_count + 1,
+                .book_rows = w->owner_count + 1, .interact = w->interact };
+    if (!lay_out_pieces()) return 0;
+    Barrier *b = L.barriers;
+    for (int k = 0; k < w->surface_count; k++) {
+        const Surface *s = w->surfaces + k;
+        Barrier *own = s == pulley ? L.barriers + w->surface_count - 1 : b++;
+        *own = (Barrier){ .x = s->x, .y = s->y, .tx = s->tx, .ty = s->ty, .length = s->length,
+                          .radius = s->radius, .begin = s->begin, .extent = s->extent,
+                          .speed = s->speed, .appears = s->opens, .vanishes = s->closes,
+                          .surface = s->owner };
+    }
+    for (int i = 0; i < w->disk_count; i++) {
+        const Disk *d = w->disks + i;
+        L.bodies[i] = (Body){ d->radius, d->mass, d->inertia, w->g };
+        L.largest = MAX(L.largest, d->radius);
+    }
+    return prepare();
+}
+
+static int judge_world(void) {
+    const World *w = world();
+    L.books = w->books;
+    L.contacts = w->impact_count;
+    L.steps = w->step_count;
+    L.gained = w->gained;
+    take_events(w->events, w->event_count);
+    return take_knots(w->knots, w->knot_count) && end_up();
+}
+
+/* As `run`; a run that is over, of particles that do not meet, and of which all is still there, is judged. */
+EXPORT int run_and_judge(int steps) {
+    int status = run(steps);
+    const World *w = world();
+    if (status == DONE && w->is_whole && !w->interact && !judge_world()) return LACKING;
+    return status;
+}

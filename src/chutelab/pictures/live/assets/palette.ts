@@ -1,0 +1,225 @@
+// Parts to build a machine of, one for each row of their table; and what the page of an empty
+// machine says: how to begin, and examples.
+
+import { Balls } from "./balls.ts";
+import { html, icon, iconButton } from "./panels.ts";
+import { Scenery, svg } from "./scenery.ts";
+import { build } from "./machine.ts";
+import { resolve, type Given } from "./scene.ts";
+import { View, boxOf } from "./view.ts";
+import type { Bench } from "./bench.ts";
+import type { Part } from "./edit.ts";
+import { isBare, type Lab } from "./lab.ts";
+import type { Stage } from "./stage.ts";
+import type { Words } from "./words.ts";
+
+/** Size of a picture of an example, px; and particles that it shows at most. */
+const WIDE = 176, HIGH = 104, MOST_BALLS = 400;
+
+/** Pixels that a finger moves before it drags a part instead of tapping it. */
+const STRAY = 8;
+
+/** What the first machine is, which a button makes. */
+const FIRST: Given = {
+  particle: { radius: 0.02, material: "rubber", shape: "sphere", spin: true },
+  incoming: { speed: 2, pulley_radius: 0.1, length: 0.8 },
+};
+
+/** A first machine as dashes: path, and words with their places. */
+const SKETCH = "M0 60H185A35 35 0 0 1 185 130H5M206 95A21 21 0 1 1 164 95A21 21 0 1 1 206 95"
+  + "M246 8L431 192L442 181L257 -3ZM0 254H603M0 280H603M126 47A11 11 0 1 1 104 47A11 11 0 1 1 126 47";
+
+class Palette {
+  panel;
+  opener;
+  tiles: [Part, any][];
+  start?: any;
+
+  constructor(
+    home: Element, readonly bench: Bench, readonly stage: Stage, readonly lab: Lab,
+    readonly words: Words,
+  ) {
+    this.tiles = lab.data.parts.map((part: Part) => [part, this.tile(part)]);
+    const name = words.say("parts");
+    this.panel = html("nav", { class: "float parts", "aria-label": name, id: "parts" },
+      html("h2", {}, name, html("small", {}, words.say("letter-key"))),
+      html("div", { class: "grid" }, ...this.tiles.map(([, tile]) => tile)), this.materials());
+    home.append(this.panel);
+    this.opener = iconButton("tool-add", "add", words.say("add-part"));
+    this.opener.addEventListener("click", () => this.open(this.panel.hidden));
+    document.getElementById("tool-select")?.after(this.opener);
+    // What is chosen has its card where the parts were.
+    bench.inspector.listeners.push(() => {
+      if (bench.inspector.parts.length) this.open(false);
+    });
+    bench.listeners.push(() => {
+      for (const [part, tile] of this.tiles) {
+        tile.setAttribute("aria-pressed", String(bench.mode === part));
+      }
+    });
+    if (lab.data.examples || lab.data.lacks) this.start = this.welcome(home);
+    this.open(false);
+    lab.on("scene", () => this.refresh());
+    this.refresh();
+    // Its letters count at once.
+    if (this.start) stage.front.focus();
+  }
+
+  open(on: boolean) {
+    this.panel.hidden = !on;
+    this.opener.setAttribute("aria-expanded", String(on));
+  }
+
+  /** The part that a letter begins. */
+  partOf(letter: string): Part | undefined {
+    return this.tiles.find(([part]) => part.letter === letter.toUpperCase())?.[0];
+  }
+
+  /** A part: pressed it is drawn in the picture, dragged it lies where it is let go, and with a
+   * finger or a key it lies in the middle. */
+  tile(part: Part) {
+    const { words, bench, stage } = this;
+    const tile = html("button", { type: "button", class: "tile", "aria-pressed": "false",
+      id: `part-${part.part}`, "aria-keyshortcuts": part.letter }, icon(part.part),
+    html("span", {}, words.say(`part-${part.part}`)), html("kbd", { "aria-hidden": "true" }, part.letter));
+    let from: [number, number] | null = null, dropped = false, pointer = "";
+    tile.addEventListener("pointerdown", (event: PointerEvent) => {
+      from = [event.clientX, event.clientY];
+      pointer = event.pointerType;
+      dropped = false;
+      if (pointer === "mouse") tile.setPointerCapture(event.pointerId);
+    });
+    tile.addEventListener("pointerup", (event: PointerEvent) => {
+      const far = from && Math.hypot(event.clientX - from[0], event.clientY - from[1]);
+      from = null;
+      if (pointer !== "mouse" || !far || far < STRAY) return;
+      dropped = true;
+      const over = document.elementFromPoint(event.clientX, event.clientY);
+      if (!stage.home.contains(over)) return;
+      const at = stage.placeOf(event), { view } = stage;
+      bench.place(part, [view.worldX(at[0]), view.worldY(at[1])]);
+    });
+    tile.addEventListener("click", ({ detail }: MouseEvent) => {
+      if (dropped) dropped = false;
+      else if (detail === 0 || pointer === "touch") bench.place(part);
+      else bench.set(bench.mode === part ? null : part);
+    });
+    return tile;
+  }
+
+  /** What the next balls consist of. */
+  materials() {
+    const { words, bench, lab } = this, balls = new Balls(lab, () => "");
+    const names = Object.keys(lab.data.presets).filter((name) => balls.isShaded(name));
+    const choices = names.map((name) => {
+      const drawn = balls.picture(name), said = words.choice(name);
+      const picture = html("canvas", { width: "44", height: "44", "aria-hidden": "true" });
+      picture.getContext("2d").drawImage(drawn, 0, 0, 44, 44);
+      const button = html("button", { type: "button", "aria-pressed": "false", title: said,
+        "aria-label": said }, picture);
+      button.addEventListener("click", () => {
+        bench.material = bench.material === name ? "" : name;
+        choices.forEach((one, n) =>
+          one.setAttribute("aria-pressed", String(names[n] === bench.material)));
+      });
+      return button;
+    });
+    return html("div", { class: "materials", role: "group", "aria-label": words.say("ball-of") },
+      html("p", {}, words.say("ball-of")), html("div", {}, ...choices));
+  }
+
+  /** How to begin, and examples; of a scene that is not shown whole, what is missing. */
+  welcome(home: Element) {
+    const { words, lab } = this, { data } = lab;
+    if (data.lacks) {
+      const what = Object.entries(data.lacks).map(([kind, count]) =>
+        words.say(`lack-${kind}`, { count: count as number })).join(", ");
+      const close = html("button", { type: "button" }, words.say("close"));
+      const note = html("aside", { class: "float lacks", id: "lacks" }, icon("stop"), html("div", {},
+        html("p", {}, words.say("lacks", { what })),
+        html("p", { class: "note" }, words.say("lacks-run"), " ",
+          html("code", {}, `chutelab run ${data.source}`))), close);
+      close.addEventListener("click", () => note.remove());
+      home.append(note);
+      return undefined;
+    }
+    const begin = html("button", { type: "button", class: "main", id: "begin" }, icon("belt"),
+      words.say("begin"));
+    begin.addEventListener("click", () => {
+      const { title } = lab.first;
+      this.show({ title, ...FIRST });
+    });
+    const sketch = svg("svg", { viewBox: "-8 -14 620 304", "aria-hidden": "true" });
+    sketch.append(svg("path", { d: SKETCH }));
+    for (const [word, x, y] of [["belt", 70, 101], ["ball", 114, 28], ["plate", 372, 76],
+      ["second", 317, 272]] as const) {
+      const text = svg("text", { x, y, "text-anchor": "middle" });
+      text.textContent = words.say(`sketch-${word}`);
+      sketch.append(text);
+    }
+    const examples = Object.entries<Given>(data.examples).map(([name, given]) => {
+      const button = html("button", { type: "button", class: "example", id: `example-${name}` },
+        this.picture(given), html("span", {}, words.say(`example-${name}`)));
+      button.addEventListener("click", () => this.show(given));
+      return button;
+    });
+    const start = [
+      html("section", { class: "hello", "aria-label": words.say("build") },
+        html("h2", {}, words.say("build")), html("p", { class: "note" },
+          words.say(matchMedia("(pointer: coarse)").matches ? "build-tap" : "build-how")),
+        begin, sketch),
+      html("section", { class: "float examples", "aria-label": words.say("examples") },
+        html("h2", {}, words.say("examples")), html("div", { class: "row" }, ...examples)),
+    ];
+    home.append(...start);
+    return start;
+  }
+
+  /** Begin with a scene. */
+  show(given: Given) {
+    this.lab.asked = "";
+    this.lab.replace(given);
+    this.stage.fit();
+    this.stage.fitted = false;
+    document.getElementById("play")?.focus();
+  }
+
+  /** A small picture of a scene: what it consists of, and its first particles. */
+  picture(given: Given) {
+    const drawn = svg("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, class: "thumb surfaces", "aria-hidden": "true" });
+    const scene = resolve(given, this.lab.data), machine = build(scene), view = new View();
+    view.resize(WIDE, HIGH);
+    view.free = { left: 0, top: 0, right: WIDE, bottom: HIGH };
+    view.fit(boxOf(machine, []), 8);
+    const scenery = new Scenery(view, this.words);
+    scenery.draw(machine, scene);
+    drawn.append(scenery.layer);
+    drawn.classList.toggle("fine", machine.arcs.length > 40);
+    machine.releases.slice(0, MOST_BALLS).forEach(({ x, y, stream, t }, i) => {
+      if (t > 0.5) return;
+      drawn.append(svg("circle", { cx: view.px(x), cy: view.py(y), class: `kind-${stream % 5}`,
+        r: Math.max(1.6, machine.radius[i] * view.scale) }));
+    });
+    return drawn;
+  }
+
+  /** While nothing is there, the page says how to begin. */
+  refresh() {
+    const { given } = this.lab, { classList } = document.documentElement;
+    const bare = Boolean(this.start) && Object.keys(given ?? {}).every((key) =>
+      ["title", "stream", "view"].includes(key)) && given?.stream?.length === 0;
+    if (bare !== classList.contains("bare")) {
+      classList.toggle("bare", bare);
+      this.open(bare);
+      this.stage.resize();
+    }
+    classList.toggle("still", given !== undefined && isBare(given));
+    for (const part of this.start ?? []) part.hidden = !bare;
+    for (const [part, tile] of this.tiles) {
+      if (part.places.length) continue;
+      tile.disabled = given?.[part.table] !== undefined;
+    }
+  }
+}
+
+export { Palette };

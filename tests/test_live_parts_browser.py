@@ -1,0 +1,285 @@
+"""Machines that are built in the page, from nothing: every part, with pointer and keys, saved."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import chutelab
+from chutelab.cli import main
+from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
+from chutelab.pictures.live.page import html
+from chutelab.scene import from_dict, load
+from live.browser import DONE
+
+AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
+
+# Of a run that is over: knots of each track, as Python has them.
+TRACKS = """chutelab.lab.recording.tracks.map(({ rows, count }) =>
+  Array.from({ length: count }, (_, n) => Array.from(rows.slice(10 * n, 10 * n + 5))))"""
+
+# One whose particles meet runs as far as it is asked to.
+WHOLE = """() => new Promise((resolve) => {
+  const { lab } = chutelab;
+  const look = () => {
+    lab.engine.allow(1e6);
+    if (lab.recording.state === "running") setTimeout(look, 5);
+    else resolve(lab.recording.state);
+  };
+  look();
+})"""
+
+
+@pytest.fixture
+def empty(opened, tmp_path):
+    """Open the page of an empty machine."""
+
+    def show(language="en", **options):
+        path = tmp_path / "machine.html"
+        path.write_text(html(None, language=language), encoding="utf-8")
+        page = opened(path, **{"viewport": {"width": 1366, "height": 768}, **options})
+        page.evaluate(DONE)
+        return page
+
+    return show
+
+
+def given(page):
+    return page.evaluate("chutelab.lab.given")
+
+
+def spot(page, u, v):
+    """Where a share of the picture's free part is on the screen, in whole pixels."""
+    box = page.locator("#stage").bounding_box()
+    free = page.evaluate("chutelab.stage.view.free")
+    across, up = free["right"] - free["left"], free["bottom"] - free["top"]
+    return round(box["x"] + free["left"] + u * across), round(box["y"] + free["top"] + v * up)
+
+
+def same_bits(page, folder, until=1.5):
+    """Save the scene, run the file in Python, and compare all knots with the page's."""
+    page.evaluate(f"chutelab.lab.change({{ 'run.until': {until} }})")
+    assert page.evaluate("chutelab.lab.fault && chutelab.lab.fault.message") is None
+    assert page.evaluate(WHOLE) == "done"
+    with page.expect_download() as waiting:
+        page.get_by_role("button", name="Save as scene").click()
+    file = folder / "saved.toml"
+    file.write_bytes(waiting.value.path().read_bytes())
+    recording = chutelab.simulate(load(file), engine="contact")
+    its = page.evaluate(TRACKS)
+    assert len(its) == recording.count
+    for particle, track in enumerate(its):
+        knots = recording.track(particle)
+        ours = np.column_stack([knots["t"], knots["position"], knots["velocity"]])
+        assert np.array_equal(np.array(track).reshape(-1, 5), ours)
+    return sum(map(len, its))
+
+
+def test_every_part_is_a_row_whose_keys_are_those_of_its_table():
+    tables = describe(None)["tables"]
+    for part in PARTS:
+        rules = tables[part["table"]]
+        points = {"center", "radius", "from_deg", "to_deg"} if "arc" in part["places"] else set()
+        keys = {*part["row"], *part["needs"], *points, *part["places"]} - {"arc"}
+        assert keys <= set(rules), part["part"]
+        mains = {key.rpartition(".")[2] for key in part["main"]}
+        assert mains <= {*rules, *tables["particle"]}, part["part"]
+    assert len({part["letter"] for part in PARTS}) == len(PARTS)
+    # Every table that places something has its part.
+    assert {part["table"] for part in PARTS} == {
+        "conveyor", "incoming", "plate", "surface", "stream"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [part["part"] for part in PARTS])
+def test_each_part_is_drawn_saved_and_runs_to_the_same_bits(empty, tmp_path, name):
+    page = empty()
+    (part,) = (one for one in PARTS if one["part"] == name)
+    # A ball that falls on it; the pointer sets all points of the part.
+    page.click("#part-ball")
+    page.mouse.click(*spot(page, 0.52, 0.3))
+    page.click("#tool-add")
+    page.click(f"#part-{name}")
+    shares = [(0.4, 0.5), (0.62, 0.55), (0.5, 0.65)]
+    for share in shares[: len(part["places"])]:
+        page.mouse.click(*spot(page, *share))
+    page.keyboard.press("Escape")
+    rows = given(page)[part["table"]]
+    row = rows if isinstance(rows, dict) else rows[-1]
+    assert {*part["row"], *part["needs"]} <= set(row)
+    assert same_bits(page, tmp_path) > 1
+
+
+def test_everything_that_a_part_can_say_has_a_field_and_is_saved(empty, tmp_path):
+    """All keys of each part but those that contradict what it is, from the tables of rules."""
+    page = empty()
+    page.click("#part-pulley")
+    names = ["belt", "plate", "line", "arc", "pegs", "gate", "stream"]
+    for name in names:
+        if page.locator("#parts").is_hidden():
+            page.click("#tool-add")
+        page.focus(f"#part-{name}")
+        page.keyboard.press("Enter")
+    keys = {}
+    for name in ["incoming", *(f"{one}1" for one in names)]:
+        page.evaluate(f"chutelab.bench.inspector.choose('{name}')")
+        keys[name] = {
+            id_.rpartition(".")[2].split("[")[0]
+            for id_ in page.evaluate(
+                "[...document.querySelectorAll('#chosen .entry [id^=field-]')].map((e) => e.id)"
+            )
+        }
+    tables = {name: set(rules) for name, rules in describe(None)["tables"].items()}
+    arc = {"center", "radius", "from_deg", "to_deg"}
+    straight = tables["surface"] - arc - {"from", "to"}
+    bent = tables["surface"] - {"from", "to", "points"}
+    assert keys["incoming"] == tables["incoming"]
+    assert keys["belt1"] == tables["conveyor"]
+    assert keys["plate1"] == tables["plate"] - {"distance", "pivot_height"}
+    assert keys["line1"] == keys["gate1"] == straight
+    assert keys["arc1"] == keys["pegs1"] == bent
+    # It has a line already, on which it is released: no box, and no height of a bed.
+    grain = tables["particle"] - {"mass", "name"} | {"name"}
+    assert keys["stream1"] == (tables["stream"] | grain) - {"bed_height", "particle"}
+    page.evaluate("chutelab.bench.inspector.choose('line1')")
+    page.locator("#chosen .more summary").click()
+
+    def typed(key, text):
+        page.locator(f"[id='field-own-{key}']").fill(text)
+        page.locator(f"[id='field-own-{key}']").press("Enter")
+
+    typed("surface[0].points", "-0.3 0.2; 0 0.1; 0.25 0.15")
+    typed("surface[0].repeat", "2 0 -0.15")
+    typed("surface[0].closes_at", "0.25")
+    page.select_option("[id='field-own-surface[0].material']", "rubber")
+    typed("surface[0].name", "ramp")
+    line = given(page)["surface"][0]
+    assert line["points"] == [[-0.3, 0.2], [0, 0.1], [0.25, 0.15]]
+    assert (line["repeat"], line["closes_at"]) == ([[2, 0, -0.15]], 0.25)
+    assert (line["material"], line["name"]) == ("rubber", "ramp")
+    typed("surface[0].closes_at", "")
+    assert "closes_at" not in given(page)["surface"][0]
+    # What was opened stays so.
+    page.evaluate("chutelab.bench.inspector.choose('stream1')")
+    typed("stream[0].rate", "0.4 t/h")
+    page.select_option("[id='field-own-particle[0].material']", "wood")
+    typed("particle[0].radius", "0.008 0.012")
+    stream, kind = given(page)["stream"][0], given(page)["particle"][0]
+    assert (stream["rate"], kind["material"], kind["radius"]) == ("0.4 t/h", "wood", [0.008, 0.012])
+    typed("stream[0].count", "12")
+    assert same_bits(page, tmp_path) >= 24
+
+
+def test_a_machine_of_twelve_parts_is_built_by_keyboard_alone(empty, tmp_path):
+    page = empty()
+
+    def part(letter, *moves):
+        """Draw a part: each point is moved to by arrow keys, and set."""
+        page.keyboard.press(letter)
+        for keys in moves:
+            for key in keys.split():
+                page.keyboard.press(f"Arrow{key}")
+            page.keyboard.press("Enter")
+        page.keyboard.press("v")
+
+    left, right, up, down = (f"{way} " * 3 for way in ("Left", "Right", "Up", "Down"))
+    # The picture has the focus once the page is there.
+    assert page.evaluate("document.activeElement.id") == "picture"
+    part("b", up * 2)
+    part("l", left * 2, right * 2 + down)
+    part("l", right, right + up)
+    part("e", left * 3 + down * 2, right * 3)
+    part("c", right * 4, right * 2, left + down)
+    part("p", left * 4)
+    part("g", left * 5 + down * 2)
+    part("d", right * 3 + down * 2, right)
+    part("r", up * 3 + left, right)
+    part("b", up * 2 + right)
+    part("l", down * 4 + left * 5, right * 8)
+    part("e", down * 3 + right * 5, right * 2)
+    made = given(page)
+    counts = {key: len(made[key]) for key in ("surface", "conveyor", "plate", "stream")}
+    assert counts == {"surface": 6, "conveyor": 2, "plate": 1, "stream": 3}
+    # The last one is chosen by Tab, moved and turned by arrows.
+    for _ in range(200):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.dataset.id") == "turn-belt2":
+            break
+    before = given(page)["conveyor"][1]
+    page.keyboard.press("ArrowUp")
+    after = given(page)["conveyor"][1]
+    angles = [np.arctan2(*np.subtract(one["to"], one["from"])[::-1]) for one in (before, after)]
+    assert np.degrees(angles[1] - angles[0]) == pytest.approx(1.0, abs=1.0)
+    assert angles[1] != angles[0]
+    page.keyboard.press("Control+z")
+    assert given(page) == made
+    assert same_bits(page, tmp_path, 0.8) > 100
+
+
+def test_the_first_machine_and_the_examples_are_one_click_away(empty):
+    page = empty("de")
+    assert page.get_by_text("Bau eine Maschine").is_visible()
+    assert page.locator(".examples button").count() == len(EXAMPLES)
+    assert page.locator("#panels").is_hidden()
+    page.click("#begin")
+    page.evaluate(DONE)
+    assert page.locator(".hello").is_hidden()
+    assert page.evaluate("chutelab.lab.recording.tracks.length") == 1
+    page.click("#undo")
+    assert page.locator(".hello").is_visible()
+    page.click("#example-cascade")
+    page.evaluate(DONE)
+    assert from_dict(given(page)) == from_dict(describe(load("cascade"))["scene"])
+    assert page.inner_text("h1") == load("cascade").title
+
+
+def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_path):
+    path = tmp_path / "dominoes.html"
+    done = CliRunner().invoke(main, ["live", "dominoes", "-o", str(path)])
+    assert done.exit_code == 0, done.output
+    page = opened(path)
+    page.evaluate(DONE)
+    said = page.inner_text("#lacks")
+    assert "20 boxes" in said
+    assert "chutelab run dominoes" in said
+    left = given(page)
+    assert [one["name"] for one in left["surface"]] == ["table", "bell"]
+    assert [one["particle"] for one in left["stream"]] == ["ball"]
+    assert page.evaluate("chutelab.lab.recording.tracks.length") == 1
+    page.get_by_role("button", name="Close").click()
+    assert page.locator("#lacks").count() == 0
+
+
+@pytest.mark.parametrize(
+    ("size", "scheme", "touch"),
+    [((1366, 768), "dark", False), ((390, 844), "light", True), ((800, 1100), "dark", True)],
+)
+def test_the_empty_page_and_the_card_are_accessible_and_fingers_hit(empty, size, scheme, touch):
+    viewport = {"width": size[0], "height": size[1]}
+    page = empty(viewport=viewport, color_scheme=scheme, has_touch=touch, is_mobile=touch)
+    if not AXE.is_file():
+        pytest.skip("needs axe: npm ci --prefix tests/live")
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+
+    def found():
+        told = page.evaluate("() => axe.run()")["violations"]
+        return [(one["id"], [node["html"][:120] for node in one["nodes"]]) for one in told]
+
+    assert found() == []
+    page.click("#begin")
+    page.evaluate(DONE)
+    page.evaluate("chutelab.bench.inspector.choose('incoming')")
+    speed = page.locator("#chosen input[type=text]").first
+    speed.fill("-3")
+    speed.press("Enter")
+    assert found() == []
+    assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+    card = page.locator("#chosen").bounding_box()
+    assert card["x"] >= 0.0
+    assert card["x"] + card["width"] <= size[0] + 0.5
+    least = 44.0 if touch else 24.0
+    sizes = page.evaluate("""() => [...document.querySelectorAll(".grip.own .room")]
+      .map((e) => e.getBoundingClientRect().width)""")
+    assert len(sizes) > 2
+    assert min(sizes) >= least

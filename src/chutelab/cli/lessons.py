@@ -11,7 +11,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
-from chutelab.cli.console import progress
+from chutelab.cli.console import InOrder, RefusedError, main, progress
 from chutelab.cli.options import (
     FileName,
     Folder,
@@ -22,7 +22,6 @@ from chutelab.cli.options import (
     check_file,
     command,
 )
-from chutelab.cli.program import InOrder, RefusedError, main
 from chutelab.util.files import whole, write_lines, writing
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
+from chutelab.cli.console import RefusedError
 from chutelab.cli.options import FileName, Folder, beginning, check_file, command, destination
-from chutelab.cli.program import RefusedError
 from chutelab.util.files import whole, writing
 
 if TYPE_CHECKING:

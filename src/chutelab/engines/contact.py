@@ -60,13 +60,11 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         job = Job(module, recorder.near, whole=not any(recorder.origin))
         stalled = job.run(progress)
         job.write(recorder)
-        recording = recorder.finish(engine="contact", steps=module.world.step_count)
-        take(module, recording)
+        record = recorder.finish(engine="contact", steps=module.world.step_count)
+        take(module, record)
     finally:
         give_back(module)
-    if stalled is not None:
-        raise recorder.stuck(stalled, recording)
-    return recording
+    return recorder.whole(record, stalled)
 
 
 def parts(machine: Machine) -> dict[str, Pieces]:
@@ -77,9 +75,10 @@ def parts(machine: Machine) -> dict[str, Pieces]:
 
 def pieces(machine: Machine) -> NDArray[Any]:
     """Return all surfaces as rows of the core, as far as it asks."""
-    rows = np.zeros(sum(part.surface.size for part in parts(machine).values()), dtype("Surface"))
+    every = parts(machine)
+    rows = np.zeros(sum(part.surface.size for part in every.values()), dtype("Surface"))
     first = 0
-    for shape, part in parts(machine).items():
+    for shape, part in every.items():
         own = rows[first : (first := first + part.surface.size)]
         own["shape"] = constants("Shape")[shape]
         own["speed"], own["owner"] = part.speed, part.surface
@@ -129,12 +128,11 @@ class Job:
         own = pairs[:, : self.kinds]
         own["restitution"], own["friction"] = machine.pair_restitution, machine.pair_friction
         own["rolling"] = np.maximum.outer(machine.rolling, machine.rolling)
-        others = pairs[:, self.kinds :]
-        for name in ("restitution", "friction"):
-            values = [getattr(part, name) for part in parts(machine).values()]
-            values = [np.broadcast_to(each, (self.kinds, each.shape[-1])) for each in values]
-            others[name] = np.concatenate(values, axis=1)
-        others["rolling"] = machine.rolling[:, None]
+        first = self.kinds
+        for part in parts(machine).values():
+            others = pairs[:, first : (first := first + len(part.surface))]
+            others["restitution"], others["friction"] = part.restitution, part.friction
+            others["rolling"] = machine.rolling[:, None]
         np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
         module.work("prepare_to_judge")
 
@@ -205,7 +203,7 @@ class Job:
     def write(self, recorder: Recorder) -> None:
         """Write down what was recorded."""
         self.drain()
-        world, module, count = self.module.world, self.module, self.machine.count
+        world, module = self.module.world, self.module
         # Each chunk is freed when it is handed over: together they are most of the memory.
         self.knots.reverse()
         self.events.reverse()
@@ -213,10 +211,9 @@ class Job:
             recorder.take_knots(self.knots.pop())
         while self.events:
             recorder.take_events(self.events.pop())
-        disks = module.array("disks", dtype("Disk"), count)
-        reasons, late = disks["reason"].copy(), np.arange(count) >= self.stopped_from
-        reasons[late & (reasons == REASONS.index("time"))] = REASONS.index("stopped")
-        recorder.ended[:] = reasons
+        recorder.ended[:] = module.array("disks", dtype("Disk"), self.machine.count)["reason"]
+        late = recorder.ended[self.stopped_from :]
+        late[late == REASONS.index("time")] = REASONS.index("stopped")
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count

@@ -167,10 +167,13 @@ class Recorder:
         chunk["normal_impulse"], chunk["tangential_impulse"] = normal_impulse, tangential_impulse
         self._events.append(chunk)
 
-    def stuck(self, stalled: StalledError, record: Record) -> StalledError:
-        """Return what an engine is to raise: with the record, counted from the world's origin."""
+    def whole(self, record: Record, stalled: StalledError | None) -> Record:
+        """Return a run's record; if a particle stalled, raise that with the record instead."""
+        if stalled is None:
+            return record
         (x, y), (x0, y0) = stalled.position, self.origin
-        return StalledError(stalled.particle, stalled.t, (x + x0, y + y0), stalled.reason, record)
+        place = x + x0, y + y0
+        raise StalledError(stalled.particle, stalled.t, place, stalled.reason, record)
 
     def finish(self, *, engine: str, steps: int) -> Record:
         """Sort what was collected, and freeze it."""

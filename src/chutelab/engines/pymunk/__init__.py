@@ -94,7 +94,4 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         pass
     except StalledError as stalled:
         stuck = stalled
-    recording = recorder.finish(engine="pymunk", steps=steps)
-    if stuck is not None:
-        raise recorder.stuck(stuck, recording)
-    return recording
+    return recorder.whole(recorder.finish(engine="pymunk", steps=steps), stuck)

@@ -23,6 +23,7 @@ from chutelab.machine import Arcs, Machine, Pieces, Segments
 from chutelab.pictures import BLUE, GREEN, ORANGE, PURPLE
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import Window, around, places, stays, subset
+from chutelab.pictures.plots.volumes import PLATE, draw_volumes, plates, thickness
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats, Ints
 
@@ -43,8 +44,10 @@ def pieces(machine: Machine) -> tuple[Pieces, ...]:
 
 def colour_of(machine: Machine, piece: Pieces) -> str:
     """Return the colour of a piece: of a belt, or of what stands still."""
-    belt = machine.surfaces[piece.surface] in ("incoming", "outgoing") or piece.speed != 0.0
-    return style.BELT if belt else style.INK
+    name = machine.surfaces[piece.surface]
+    if name in ("incoming", "outgoing") or piece.speed != 0.0:
+        return style.BELT
+    return style.STRIKE if name in plates(machine) else style.INK
 
 
 def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle | Line2D:
@@ -52,7 +55,8 @@ def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle
     color = look.pop("color", colour_of(machine, piece))
     gid = f"surface {machine.surfaces[piece.surface]}"
     if not (piece.whole and isinstance(piece, Arcs)):
-        (line,) = ax.plot(*piece.path().T, color=color, lw=2.6, zorder=2.0)
+        width = 1.6 if color == style.BELT else 2.6
+        (line,) = ax.plot(*piece.path().T, color=color, lw=width, zorder=2.0)
         line.set(solid_capstyle="butt", gid=gid, **look)
         return line
     out = np.hypot(*(machine.releases.position - piece.center).T) >= piece.radius
@@ -93,10 +97,7 @@ def draw_scene(
     shown = window.fitted(box.width / box.height)
     ax.set(xlim=(shown.left, shown.right), ylim=(shown.bottom, shown.top))
     ax.set_aspect("equal", adjustable="box")
-    if machine.pulley is not None:
-        face = {"facecolor": style.STEEL_LIGHT, "edgecolor": style.BELT, "linewidth": 2.0}
-        ax.add_patch(Circle((0.0, 0.0), machine.pulley.radius, **face))
-        ax.plot(0.0, 0.0, "+", color=style.STEEL, ms=AXIS, zorder=1.5)
+    draw_volumes(ax, machine, points_of(ax, 1.0))
     found = pieces(machine)
     for piece in found:
         look: dict[str, Any] = {"linewidth": 1.3} if small and not piece.whole else {}
@@ -126,9 +127,6 @@ SHARES = (0.5, 0.25, 0.75, 0.0, 1.0)
 LOOKED_AT = 8
 """Pieces of one surface beside which its name may stand."""
 
-BEFORE = 0.3
-"""Share of the window's width by which the incoming belt's name may stand before the belt."""
-
 FALL = 0.3
 """Share of the window's height below a gate in which a name would be in the way of what falls."""
 
@@ -139,28 +137,23 @@ FARTHER = (1.0, 2.5, 4.0)
 class _Names:
     """Writes the name of each surface that is seen, once, where it hides least, and no other name.
 
-    Parameters
-    ----------
-    ax : Axes
-        With its limits set.
-    machine : Machine
-        What is drawn.
-    found : sequence of Pieces
-        Its pieces.
-    shown : Window
-        What of the world is in the picture.
+    The axes have their limits; `found` are the machine's pieces, `shown` what is in the picture.
     """
 
     def __init__(self, ax: Axes, machine: Machine, found: Sequence[Pieces], shown: Window) -> None:
         self.ax, self.machine, self.shown = ax, machine, shown
-        self.frame = ax.get_window_extent().padded(-3.0)
         self.parts: dict[int, list[tuple[Pieces, Floats]]] = {}
         for piece in found:
-            part = self._part(piece)
-            if part is not None:
+            points = piece.path()
+            if len(points) == 2:
+                part = np.array(shown.clip(*points) or np.empty((0, 2)))
+            else:
+                part = points[shown.holds(points)]
+            if len(part):
                 self.parts.setdefault(int(piece.surface), []).append((piece, part))
         self.found = found
-        self.plates = {"plate", *(plate.name for plate in machine.scene.plates)}
+        self.plates = plates(machine)
+        self.thick = thickness(ax)
         self.lines = [
             (Path(ax.transData.transform(piece.path())), bool(piece.whole))
             for parts in self.parts.values()
@@ -180,16 +173,28 @@ class _Names:
 
     def write(self) -> None:
         """Write all names. One for which there is no room is left out."""
+        frame, points = self.ax.get_window_extent().padded(-3.0), 72.0 / self.ax.figure.dpi
         for surface, parts in self.parts.items():
+            color = colour_of(self.machine, parts[0][0])
+            color = color if color == style.BELT else style.INK
             label = self.ax.annotate(
                 style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
                 xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
-                color=colour_of(self.machine, parts[0][0]), path_effects=HALO, zorder=5.0,
+                color=color, path_effects=HALO, zorder=5.0,
             )  # fmt: skip
             best: tuple[int, Spot, Bbox] | None = None
             for spot in self._spots(parts):
-                placed, box = self._placed(label, spot)
-                hides = self._hides(box)
+                self._put(label, spot)
+                box, (where, offset, across, along) = label.get_window_extent(), spot
+                # Back over the edges of the axes.
+                right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
+                up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
+                offset = (offset[0] + right * points, offset[1] + up * points)
+                placed, box = (where, offset, across, along), box.translated(right, up)
+                # Lines, circles and releases that it would stand on.
+                on = (self.starts > box.min) & (self.starts < box.max)
+                hides = sum(line.intersects_bbox(box, filled=whole) for line, whole in self.lines)
+                hides += bool(on.all(axis=1).any())
                 if box.count_overlaps(self.taken) or (best is not None and hides >= best[0]):
                     continue
                 best = hides, placed, box
@@ -201,37 +206,11 @@ class _Names:
             self._put(label, best[1])
             self.taken.append(best[2].padded(1.0))
 
-    def _part(self, piece: Pieces) -> Floats | None:
-        """Return the points of a piece that are shown."""
-        points = piece.path()
-        if len(points) == 2:
-            ends = self.shown.clip(*points)
-            return None if ends is None else np.array(ends)
-        inside = self.shown.holds(points)
-        return points[inside] if inside.any() else None
-
-    def _hides(self, box: Bbox) -> int:
-        """Return how many lines, circles and releases a name would stand on."""
-        x, y = self.starts.T
-        on = (x > box.x0) & (x < box.x1) & (y > box.y0) & (y < box.y1)
-        crossed = sum(line.intersects_bbox(box, filled=whole) for line, whole in self.lines)
-        return int(crossed) + int(on.any())
-
     @staticmethod
     def _put(label: Any, spot: Spot) -> None:
         where, offset, across, along = spot
         label.xy, label.xyann = (float(where[0]), float(where[1])), offset
         label.set(ha=across, va=along)
-
-    def _placed(self, label: Any, spot: Spot) -> tuple[Spot, Bbox]:
-        """Return a spot shifted back over the edges of the axes, and the box of the name there."""
-        self._put(label, spot)
-        box, frame, (where, offset, across, along) = label.get_window_extent(), self.frame, spot
-        right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
-        up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
-        points = 72.0 / self.ax.figure.dpi
-        offset = (offset[0] + right * points, offset[1] + up * points)
-        return (where, offset, across, along), box.translated(right, up)
 
     def _said(self, surface: int, piece: Pieces) -> str:
         """Return what is written at a surface, of which a piece is shown."""
@@ -243,11 +222,12 @@ class _Names:
             leans = f"{angle:.3g}°".replace("-", "−")
             return f"{name}, {leans}\nε = {' / '.join(f'{one:.3g}' for one in values)}"
         if isinstance(piece, Segments):
-            moves = _motion(speed, piece.tangent)
+            x, y = piece.tangent * np.sign(speed)
+            moves = f"{abs(speed):.3g} m/s {ARROWS[round(4.0 / pi * np.arctan2(y, x)) % 8]}"
         else:
             moves = f"{abs(speed):.3g} m/s {'↻' if speed > 0.0 else '↺'}"
         if name == "incoming":
-            return f"incoming belt\n{moves if speed else 'at rest'}"
+            return f"incoming belt, {moves if speed else 'at rest'}"
         if name == "outgoing":
             return f"outgoing belt, {moves if speed else 'at rest'}"
         times = {(t, "closes") for one in self.found if one.surface == surface
@@ -272,13 +252,15 @@ class _Names:
             if angle > 0.0 and high[1] > self.shown.top - room:
                 share = max(0.0, self.shown.top - room - low[1]) / (high[1] - low[1])
                 where = low + (high - low) * share
-            yield where, (GAP, 0.0), "left", "top" if angle <= 0.0 else "bottom"
-        elif name == "incoming":
-            left = max(self.shown.left, part[0][0] - BEFORE * self.shown.width)
-            yield np.array([left, part[0][1]]), (4.0, -GAP), "left", "top"
+            along = "top" if angle <= 0.0 else "bottom"
+            yield where, (GAP + PLATE * self.thick, 0.0), "left", along
+        elif name == "incoming" and self.machine.pulley is not None:
+            # Between the strands, beyond the wheel at their end.
+            left = max(self.shown.left, part[0][0] + 1.2 * self.machine.pulley.radius)
+            yield np.array([left, part[0][1]]), (4.0, -GAP - 0.5 * self.thick), "left", "top"
         elif name == "outgoing":
             right = np.array([max(part[0][0], part[1][0]), part[0][1]])
-            yield right, (-6.0, -GAP), "right", "top"
+            yield right, (-6.0, -4.0 - self.thick), "right", "top"
         for farther in FARTHER:
             for piece, part in parts[:LOOKED_AT]:
                 for share in SHARES:
@@ -326,12 +308,7 @@ def _spot(where: Floats, gap: float, normal: Floats) -> Spot:
 
 
 ARROWS = "→↗↑↖←↙↓↘"
-
-
-def _motion(speed: float, along: Floats) -> str:
-    """Return a speed along a direction, and an arrow that shows where to."""
-    x, y = along * np.sign(speed)
-    return f"{abs(speed):.3g} m/s {ARROWS[round(4.0 / pi * np.arctan2(y, x)) % 8]}"
+"""Which way a straight surface moves, in eighths of a turn."""
 
 
 HUES = (style.STREAM, PURPLE, ORANGE, BLUE, GREEN)
@@ -362,25 +339,12 @@ def stream_handles(machine: Machine) -> list[Line2D]:
 
 
 class Bodies:
-    """Some particles of one look, which can be moved: to scale, or magnified so as to be seen.
+    """Some particles (n,) of one look, which can be moved: to scale, or magnified so as to be seen.
 
     Disks of one size are a line of markers, others a collection of circles; boxes and polygons are
-    never magnified.
-
-    Parameters
-    ----------
-    ax : Axes
-        With its limits set.
-    recording : Recording
-        The run.
-    particles : ndarray of int, (n,)
-        Which.
-    gid, color : str
-        Of the artists; polygons have "turned" added to theirs.
-    least : float
-        pt; the machine's largest disk is drawn at least so large, and others magnified alike.
-    edge : float
-        pt; width of the white edge of disks, which tells them apart where they overlap.
+    never magnified. The machine's largest disk is drawn at least `least` (pt) large, and others
+    magnified alike; disks have a white edge of `edge` (pt), which tells them apart where they
+    overlap. The axes have their limits; the `gid` of polygons has "turned" added to it.
     """
 
     def __init__(

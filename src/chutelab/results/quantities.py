@@ -8,6 +8,7 @@ is in `chutelab.scene.quantities`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from math import nan
 from typing import Any
 
@@ -22,8 +23,8 @@ from chutelab.util.arrays import Bools, Floats
 
 _STATISTICS: dict[str, Callable[[Floats], Any]] = {
     "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,
-    "q02": lambda values: np.quantile(values, 0.02), "q50": np.median,
-    "q98": lambda values: np.quantile(values, 0.98),
+    "q50": np.median,
+    **{f"q{percent:02}": partial(np.quantile, q=percent / 100) for percent in (2, 25, 75, 98)},
 }  # fmt: skip
 
 

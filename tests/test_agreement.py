@@ -69,7 +69,18 @@ def confirm(reason, recording):
         assert struck[:2] == ["plate", named], (reason, struck)
     else:
         assert kind is theory.Reason.MISSES, reason
-        assert struck[1:2] != ["outgoing"], (reason, struck)
+        if struck[1:2] != ["outgoing"]:
+            return
+        # Below the level at which it would lie on the belt it may clip an end of it: beyond that,
+        # and a radius from it.
+        hit = recording.select(Kind.IMPACT, Kind.LANDING)[1]
+        m, radius = recording.machine, recording.particle.radius
+        belt = m.segments.of(int(np.flatnonzero(m.segments.surface == m.landing)[0]))
+        ends = np.stack(belt.ends)
+        (x, y), (low, high) = hit["position"], ends[:, 0]
+        assert not low <= x <= high, (reason, struck)
+        assert np.hypot(*(hit["position"] - ends).T).min() == pytest.approx(radius, rel=1e-9)
+        assert y < ends[0, 1] + radius - 1e-9, (reason, struck)
 
 
 @pytest.mark.parametrize(

@@ -80,9 +80,10 @@ def parts(machine: Machine) -> dict[str, Pieces]:
 
 def pieces(machine: Machine) -> NDArray[Any]:
     """Return all surfaces as rows of the core, as far as it asks."""
-    rows = np.zeros(sum(part.surface.size for part in parts(machine).values()), dtype("Surface"))
+    every = parts(machine)
+    rows = np.zeros(sum(part.surface.size for part in every.values()), dtype("Surface"))
     first = 0
-    for shape, part in parts(machine).items():
+    for shape, part in every.items():
         own = rows[first : (first := first + part.surface.size)]
         own["shape"] = constants("Shape")[shape]
         own["speed"], own["owner"] = part.speed, part.surface
@@ -143,12 +144,11 @@ class Job:
         own = pairs[:, : self.kinds]
         own["restitution"], own["friction"] = machine.pair_restitution, machine.pair_friction
         own["rolling"] = np.maximum.outer(machine.rolling, machine.rolling)
-        others = pairs[:, self.kinds :]
-        for name in ("restitution", "friction"):
-            values = [getattr(part, name) for part in parts(machine).values()]
-            values = [np.broadcast_to(each, (self.kinds, each.shape[-1])) for each in values]
-            others[name] = np.concatenate(values, axis=1)
-        others["rolling"] = machine.rolling[:, None]
+        first = self.kinds
+        for part in parts(machine).values():
+            others = pairs[:, first : (first := first + len(part.surface))]
+            others["restitution"], others["friction"] = part.restitution, part.friction
+            others["rolling"] = machine.rolling[:, None]
         np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
 
     def run(self, progress: Progress | None) -> tuple[int, float, tuple[float, float]] | None:
@@ -226,10 +226,9 @@ class Job:
             recorder.take_knots(self.knots.pop())
         while self.events:
             recorder.take_events(self.events.pop())
-        disks = module.array("disks", dtype("Disk"), machine.count)
-        reasons, late = disks["reason"].copy(), np.arange(machine.count) >= self.stopped_from
-        reasons[late & (reasons == REASONS.index("time"))] = REASONS.index("stopped")
-        recorder.ended[:] = reasons
+        recorder.ended[:] = module.array("disks", dtype("Disk"), machine.count)["reason"]
+        late = recorder.ended[self.stopped_from :]
+        late[late == REASONS.index("time")] = REASONS.index("stopped")
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count

@@ -510,12 +510,16 @@ def kept(
     Arrays become read-only.
     """
     form = signature(reader)
+    name, usual = (reader.__module__, reader.__name__), [*form.parameters.values()][1:]
+    plain = (*name, *(one.default for one in usual))
 
     @wraps(reader)
     def read(record: Record, /, *args: Args.args, **more: Args.kwargs) -> Result:
-        given = form.bind(record, *args, **more)
-        given.apply_defaults()
-        key = (reader.__module__, reader.__name__, *given.args[1:])
+        key: tuple[Any, ...] = plain
+        if args or more:
+            given = form.bind(record, *args, **more)
+            given.apply_defaults()
+            key = (*name, *given.args[1:])
         if key not in record.found:
             record.found[key] = found = reader(record, *args, **more)
             if isinstance(found, np.ndarray):

@@ -31,7 +31,7 @@ rest, at 1e-9 m/s, are 200 times as far apart."""
 SLICE = 0.02
 """s of wall time between two looks at Ctrl-C and reports of progress."""
 
-FIRST, MOST = 16, 100_000
+FIRST, MOST = 256, 100_000
 """Events up to the first look, as most lone runs have fewer, and between two looks."""
 
 COURSE = constants("Course")
@@ -107,8 +107,8 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
         ("segment_count", s), ("arc_count", a), ("wheel_count", w), ("lone_count", count),
         ("surface_count", owners), ("kind_count", kinds), ("family", family), ("apart", apart),
         ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
-        ("landing", machine.landing), ("far", far), ("is_whole", far == 0.0), ("most", ROUNDS),
-        ("window", WINDOW), ("tick", TICK),
+        ("landing", machine.landing), ("far", far), ("is_whole", far == 0.0),
+        ("most", ROUNDS), ("window", WINDOW), ("tick", TICK),
     ):  # fmt: skip
         setattr(exact, name, value)
     module.work("lay_out_exact")

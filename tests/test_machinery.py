@@ -8,6 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from chutelab.engines.simulation import simulate
 from chutelab.pictures.plots import Window, draw_scene
 from handmade import Line, Round, machine_of
 
@@ -102,3 +103,16 @@ def test_names_never_lie_on_each_other_or_leave_the_picture(drawn_pieces):
     ax = drawn(machine_of(*pieces), Window(-1.0, 1.0, -0.7, 0.7))
     assert_apart_and_inside(ax)
     assert len(set(said(ax))) == len(ax.texts)
+
+
+@pytest.mark.parametrize("name", ["perpendicular", "inclined-40", "cascade", "inclined-conveyor"])
+def test_thickness_is_drawn_where_no_particle_comes(name):
+    recording = simulate(name)
+    times = np.linspace(*recording.t[[0, -1]], 2000)
+    places = recording.at(times)[0].reshape(-1, 2)
+    ax = drawn(recording.machine)
+    bodies = [one for one in ax.patches if one.get_zorder() < 2.0]
+    assert len(bodies) >= 5
+    for body in bodies:
+        outline = body.get_path().transformed(body.get_patch_transform())
+        assert not outline.contains_points(places[np.isfinite(places[:, 0])]).any()

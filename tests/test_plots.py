@@ -219,7 +219,7 @@ def test_a_plate_leaning_back_reads_its_angle():
     leaning = build(scene.parse(TEXT.replace("[outgoing]", "angle_deg = 10\n[outgoing]")))
     labels = [text.get_text() for text in plots.draw_scene(axes(), leaning).texts]
     assert "plate, 10°\nε = 0.5" in labels
-    assert "incoming belt\n2 m/s →" in labels
+    assert "incoming belt, 2 m/s →" in labels
     backward = build(scene.parse(TEXT.replace("drop", "speed = -1.5\ndrop")))
     labels = [text.get_text() for text in plots.draw_scene(axes(), backward).texts]
     assert "outgoing belt, 1.5 m/s ←" in labels

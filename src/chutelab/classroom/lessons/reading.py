@@ -61,13 +61,13 @@ class Picture(Chosen):
     fps: Literal[10, 20, 25, 50] | None = key(
         None, "Pictures a second; default: 25, of a stream 20", "10, 20, 25 or 50"
     )
-    width: Whole = key(800, "Width, pixels", "a whole number from 320 to 3840", ge=320, le=3840)
+    width: Whole = key(1280, "Width, pixels", "a whole number from 320 to 3840", ge=320, le=3840)
     machine: Said | None = key(None, "What machine.png shows, in words", "a text")
     film: Said | None = key(None, "What lesson.gif shows, in words", "a text")
     split: bool = key(
         False, "Also make split.png: how the velocity at the plate splits", "true or false"
     )
-    height: Whole = key(450, "Height, pixels", "a whole number from 180 to 2160", ge=180, le=2160)
+    height: Whole = key(720, "Height, pixels", "a whole number from 180 to 2160", ge=180, le=2160)
 
 
 class Page(Chosen):

@@ -23,11 +23,7 @@ from chutelab.machine.parts import Thread
 from chutelab.pictures.animation import Moment, Stage, VideoError, animate, film, moments
 from chutelab.pictures.animation import stage as video
 from chutelab.pictures.animation.actors import SIGNS
-from chutelab.pictures.animation.moments import (
-    sentence,
-    slowness,
-    span,
-)
+from chutelab.pictures.animation.moments import sentence, slowness, span
 from chutelab.pictures.animation.stage import TRAIL, lay_out, palette, write_gif
 from chutelab.pictures.plots import Window, style, window_of
 from chutelab.results import Kind
@@ -538,12 +534,8 @@ def test_a_gate_is_seen_while_it_is_there():
             rows.append(bool((row.max(axis=1) < 60).all()))
         seen_there.append(rows)
     assert seen_there == [
-        [True, False],
-        [True, False],
-        [False, False],
-        [False, True],
-        [False, True],
-    ]
+        [True, False], [True, False], [False, False], [False, True], [False, True],
+    ]  # fmt: skip
 
 
 def test_a_film_of_many_is_of_all_of_them_to_the_end():
@@ -800,10 +792,8 @@ def test_only_what_changed_is_in_a_frame_and_what_stays_is_one_frame():
     dotted[7:9, 11:14] = 0
     data = written([white, white, dotted, dotted, white], [4, 4, 130, 4, 4])
     assert [frame[:5] for frame in blocks(data)] == [
-        (0, 0, 30, 20, 8),
-        (11, 7, 3, 2, 134),
-        (11, 7, 3, 2, 4),
-    ]
+        (0, 0, 30, 20, 8), (11, 7, 3, 2, 134), (11, 7, 3, 2, 4),
+    ]  # fmt: skip
 
 
 def test_failure_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):

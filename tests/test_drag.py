@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 from scipy.integrate import solve_ivp
 
-from chutelab.cli.program import main
+from chutelab.cli.console import main
 from chutelab.engines.simulation import simulate
 from chutelab.results.summary import summary
 from chutelab.scene import from_dict

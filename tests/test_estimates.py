@@ -98,7 +98,7 @@ def judged(machines):
     right = told = false = count = 0
     for name, machine in machines:
         count += 1
-        estimate = effort(machine, trial(machine, choose(machine)))
+        estimate = effort(machine, trial(machine, choose(machine)), 0.0, 0)
         took = measured(machine)
         real, said = max(FLOOR, took or LONGEST), max(FLOOR, estimate.seconds)
         wrong = False

@@ -260,9 +260,9 @@ def test_the_theory_is_asked_for_its_own_symbols_only():
     ("more", "engines", "skipped"),
     [
         ("[particle]\nradius = 0\n", ["exact"],
-         dict.fromkeys(("contact", "pymunk"), "it has no mass points")),
+         {name: f'more than 0 with run.engine = "{name}"' for name in ("contact", "pymunk")}),
         ("[stream]\ncount = 3\ninteract = true\nrate = 20\n", ["contact", "pymunk"],
-         {"exact": "particles meet each other"}),
+         {"exact": "contact or pymunk, because stream.interact = true"}),
         (f"[stream]\ncount = {MOST_ALONE + 1}\n", ["exact", "contact"],
          {"pymunk": f"{MOST_ALONE + 1} particles that do not meet would take it minutes"}),
     ],

@@ -21,11 +21,10 @@ import crowds
 import drawn
 import sandbox
 from chutelab import scene
-from chutelab.checks.stress.evidence import Evidence
+from chutelab.checks.stress.barriers import Evidence
 from chutelab.cli import main
 from chutelab.core import module
-from chutelab.engines import contact, simulation
-from chutelab.engines.exact import engine as exact
+from chutelab.engines import contact, exact, simulation
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
 from chutelab.results import Recording, laws
@@ -94,7 +93,9 @@ def in_memory(tables, engine, change):
         recording = Recording.of(recorder.finish(engine="exact", steps=rounds))
     else:
         job.proceed(1)
-        recording = Recording.of(job.recording(machine, (0.0, 0.0), 0.0))
+        recorder = Recorder(machine)
+        job.write(recorder)
+        recording = Recording.of(recorder.finish(engine="contact", steps=job.steps))
     laws.take(core, recording)
     return recording
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chutelab.checks.preflight import Part
-from chutelab.checks.preflight.results import built
+from chutelab.checks.preflight.trial import built
 from chutelab.checks.stress import Evidence
 from chutelab.checks.stress.barriers import released_free
 from chutelab.machine import Arcs, Segments, build, shapes

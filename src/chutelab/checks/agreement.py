@@ -20,7 +20,7 @@ from chutelab.results import Recording
 from chutelab.results.comparison import compare, predicted, relative_error, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import each, measure
-from chutelab.scene import Scene, SceneError
+from chutelab.scene import Scene
 from chutelab.scene.quantities import lookup
 from chutelab.scene.units import with_unit, write_size
 from chutelab.studies.accuracy import STIR, UNABLE, answer, because, distance, stirred
@@ -60,27 +60,15 @@ step things happen. Over two ratios of 4, half an order is a factor of 4 between
 
 @dataclass(frozen=True)
 class Agreement:
-    """One quantity in two answers.
+    """One quantity in two answers."""
 
-    Attributes
-    ----------
-    pair : str
-        Which two; one, of an answer that is left out.
-    quantity : str
-        What is compared; or why nothing is.
-    difference : float or None
-        Relative difference, or the order at which it vanishes; None if nothing is compared.
-    tolerance : float or None
-        What it must not exceed (with `least`: fall short of); None where nothing is promised.
-    least : bool
-        Whether the tolerance is one from below.
-    """
-
-    pair: str
-    quantity: str
+    pair: str  # which two; one, of an answer that is left out
+    quantity: str  # what is compared; or why nothing is
+    # relative difference, or the order at which it vanishes; None if nothing is compared
     difference: float | None = None
+    # what it must not exceed (with `least`: fall short of); None where nothing is promised
     tolerance: float | None = None
-    least: bool = False
+    least: bool = False  # whether the tolerance is one from below
 
     @property
     def holds(self) -> bool:
@@ -100,10 +88,7 @@ def agreement(scene: Scene, max_seconds: float = PATIENCE) -> tuple[Agreement, .
 
     An answer that takes longer than `max_seconds`, wall time, is left out.
 
-    Raises
-    ------
-    SceneError
-        If the geometry contradicts itself.
+    Raises a `SceneError` if the geometry contradicts itself.
     """
     alone = scene.alone()
     build(alone)
@@ -123,7 +108,15 @@ def agreement(scene: Scene, max_seconds: float = PATIENCE) -> tuple[Agreement, .
         growth = max(1.0, distance(moved, found[base])[0] / STIR)
     except UNABLE:
         growth = inf
-    blows = not _lasts(found[base])
+    # Whether anything but gravity acts between blows, apart from the ride by adhesion.
+    track = found[base].track(0)
+    if found[base].machine.releases.carried[0]:
+        # None if it never leaves.
+        track = track[track["t"] >= each(found[base], "separation.t")[0]]
+    time, velocity = np.diff(track["t"]), np.diff(track["velocity"], axis=0)
+    velocity[:, 1] += found[base].gravity * time
+    speed = float(np.hypot(*track["velocity"].T).max(initial=0.0))
+    blows = not (np.abs(velocity[time > 0.0]) > 1e-9 * speed).any()
     for name, recording in found.items():
         even = name not in ORDERS or (blows and (alone.run.align or name == "contact"))
         allowed = BLOWS[name] * growth if even and isfinite(growth) else None
@@ -142,18 +135,6 @@ def agreement(scene: Scene, max_seconds: float = PATIENCE) -> tuple[Agreement, .
     if not isfinite(growth):
         rows.append(Agreement(base, f"a change of the inputs by {STIR:g} changes what happens"))
     return tuple(rows)
-
-
-def _lasts(found: Recording) -> bool:
-    """Tell whether anything but gravity acts between blows, apart from the ride by adhesion."""
-    track = found.track(0)
-    if found.machine.releases.carried[0]:
-        # None if it never leaves.
-        track = track[track["t"] >= each(found, "separation.t")[0]]
-    time, velocity = np.diff(track["t"]), np.diff(track["velocity"], axis=0)
-    velocity[:, 1] += found.gravity * time
-    speed = float(np.hypot(*track["velocity"].T).max(initial=0.0))
-    return bool((np.abs(velocity[time > 0.0]) > 1e-9 * speed).any())
 
 
 def _with_base(
@@ -205,33 +186,20 @@ MOST_ALONE = 50
 
 @dataclass(frozen=True)
 class Finding:
-    """One expectation of a scene, looked at in one answer.
+    """One expectation of a scene, looked at in one answer."""
 
-    Attributes
-    ----------
-    quantity, unit, source : str
-        What was looked at, in what unit, and the source of the expected value.
-    engine : str
-        ``exact``, ``contact``, ``pymunk`` or ``theory``.
-    expected, simulated : float
-        In `unit`; NaN where the theory, or the run, has none.
-    error : float
-        Relative (see `chutelab.results.comparison`), or in `unit`; NaN if one of the two is.
-    tolerance : float or None
-        What the error must not exceed; None where nothing is promised.
-    relative : bool
-        Whether error and tolerance are relative.
-    """
-
+    # what was looked at, in what unit, and the source of the expected value
     quantity: str
     unit: str
     source: str
-    engine: str
+    engine: str  # ``exact``, ``contact``, ``pymunk`` or ``theory``
+    # in `unit`; NaN where the theory, or the run, has none
     expected: float
     simulated: float
+    # relative (see `chutelab.results.comparison`), or in `unit`; NaN if one of the two is
     error: float
-    tolerance: float | None
-    relative: bool
+    tolerance: float | None  # what the error must not exceed; None where nothing is promised
+    relative: bool  # whether error and tolerance are relative
 
     @property
     def holds(self) -> bool:
@@ -241,21 +209,12 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verification:
-    """All that `chutelab verify` finds out about a scene.
+    """All that `chutelab verify` finds out about a scene."""
 
-    Attributes
-    ----------
-    findings : tuple of Finding
-        In the order of the file, each with a row for every answer that has the quantity.
-    agreements : tuple of Agreement
-        Particle 0 alone, in the three answers.
-    skipped : dict of str
-        Engines that did not run the scene, and why.
-    """
-
+    # in the order of the file, each with a row for every answer that has the quantity
     findings: tuple[Finding, ...]
-    agreements: tuple[Agreement, ...]
-    skipped: dict[str, str]
+    agreements: tuple[Agreement, ...]  # particle 0 alone, in the three answers
+    skipped: dict[str, str]  # engines that did not run the scene, and why
 
     @property
     def failures(self) -> int:
@@ -316,21 +275,19 @@ def verify(
     An engine that gets stuck, or takes longer than `max_seconds`, wall time, is left out. Where
     none is left, what is expected is not shown: all of it fails.
 
-    Raises
-    ------
-    SceneError
-        If no engine can run it.
+    Raises a `SceneError` if the geometry contradicts itself.
     """
-    skipped = _skipped(scene) if scene.expect else {}
+    build(scene)
+    skipped: dict[str, str] = {}
     recordings: dict[str, Recording] = {}
-    for engine in ENGINES:
-        if scene.expect and engine not in skipped:
-            try:
-                recordings[engine] = answer(scene, engine, progress, max_seconds=max_seconds)
-            except UNABLE as error:
-                if isinstance(error, SceneError) and error.faults[0].key != "run.engine":
-                    raise
-                skipped[engine] = because(error)
+    for engine in ENGINES if scene.expect else ():
+        if engine == "pymunk" and recordings and scene.count > MOST_ALONE and not scene.crowded:
+            skipped[engine] = f"{scene.count} particles that do not meet would take it minutes"
+            continue
+        try:
+            recordings[engine] = answer(scene, engine, progress, max_seconds=max_seconds)
+        except UNABLE as error:
+            skipped[engine] = because(error)
     prediction = predict(scene)
     findings: list[Finding] = []
     for expect in scene.expect:
@@ -368,16 +325,3 @@ def verify(
                 )
             )  # fmt: skip
     return Verification(tuple(findings), agreement(scene, max_seconds), skipped)
-
-
-def _skipped(scene: Scene) -> dict[str, str]:
-    """Return the engines that a scene is not for, with the reason."""
-    if any(kind.outline for kind in scene.particles) or scene.string:
-        return dict.fromkeys(("exact", "contact"), "it has disks only, and no strings")
-    if scene.crowded:
-        return {"exact": "particles meet each other"}
-    if any(kind.radius == 0.0 for kind in scene.particles):
-        return dict.fromkeys(("contact", "pymunk"), "it has no mass points")
-    if scene.count > MOST_ALONE:
-        return {"pymunk": f"{scene.count} particles that do not meet would take it minutes"}
-    return {}

@@ -1,14 +1,13 @@
 """The command line: parse, call the library, print.
 
 ============  =====================================================================================
-`program`     the command ``chutelab`` itself, and what becomes of errors
+`console`     the command ``chutelab`` itself, what commands print, and what becomes of errors
 `options`     options from signatures and docstrings; scenes with overrides; files of ``--out``
 `running`     ``run``, ``show``, ``live``
 `checking`    ``check``, ``verify``, ``stress``, ``bench``
 `studies`     ``sweep``, ``solve``, ``compare``
 `scenes`      ``scenes``, ``materials``, ``quantities``, ``schema``, ``new``, ``tables``, ``figure``
 `lessons`     ``lesson``: list, show, build, new, page, scorm, grade
-`console`     text and JSON on standard output, a bar on standard error
 ============  =====================================================================================
 
 Modules that take long to import are imported inside the commands that need them, so that
@@ -16,6 +15,6 @@ Modules that take long to import are imported inside the commands that need them
 """
 
 from chutelab.cli import checking, lessons, running, scenes, studies  # noqa: F401 - their commands
-from chutelab.cli.program import main
+from chutelab.cli.console import main
 
 __all__ = ["main"]

@@ -42,7 +42,7 @@ from typing import (
 import click
 from click.shell_completion import CompletionItem
 
-from chutelab.cli.program import RefusedError, main
+from chutelab.cli.console import RefusedError, main
 from chutelab.util.errors import cut, printable
 from chutelab.util.files import check, refuse_other, together, writing
 from chutelab.util.tables import plain

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import click
 from click.shell_completion import CompletionItem
 
-from chutelab.cli.console import progress, say, show_json
+from chutelab.cli.console import RefusedError, progress, say, show_json
 from chutelab.cli.console import show as show_parts
 from chutelab.cli.options import (
     Engine,
@@ -25,7 +25,6 @@ from chutelab.cli.options import (
     loaded_as_told,
     write_json,
 )
-from chutelab.cli.program import RefusedError
 from chutelab.util.errors import InputError
 from chutelab.util.files import writing
 from chutelab.util.tables import wrapped

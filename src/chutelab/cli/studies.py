@@ -5,8 +5,8 @@ from __future__ import annotations
 import csv
 import logging
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -15,7 +15,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
-from chutelab.cli.console import progress, tell
+from chutelab.cli.console import RefusedError, progress, tell
 from chutelab.cli.options import (
     PICTURES,
     Count,
@@ -32,14 +32,12 @@ from chutelab.cli.options import (
     retitled,
     write_json,
 )
-from chutelab.cli.program import RefusedError
 from chutelab.util.errors import InputError
 from chutelab.util.files import write_lines, writing
 
 if TYPE_CHECKING:
-    from chutelab.scene import Scene
     from chutelab.scene.variants import Vary
-    from chutelab.studies.design.uncertainty import Given, Uncertainty
+    from chutelab.studies.design.uncertainty import Given
 
 
 def complete_column(begun: str) -> list[CompletionItem]:
@@ -64,23 +62,19 @@ def varied(texts: Sequence[str], *, ranges: bool) -> list[Vary]:
         typed = f"--vary {text}"
         key, given = _halves(text, typed, form)
         parts = given.split(":")
-        if ranges:
-            if len(parts) != 2:
-                raise InputError(f"a range is between two ends: it {form}", typed)
-            values, unit = numbers(typed, parts, form)
-            found.append(Range(key, values, typed, unit))
-            continue
+        if ranges and len(parts) != 2:
+            raise InputError(f"a range is between two ends: it {form}", typed)
+        if not ranges and len(parts) not in (1, 3):
+            raise InputError(form, typed)
+        count = parts.pop().strip() if len(parts) == 3 else None
         if len(parts) == 1:
             parts = given.split(",")
             if len(parts) > MOST_VALUES:
                 raise InputError(f"{len(parts)} values, at most {MOST_VALUES} are allowed", typed)
-            values, unit = numbers(typed, parts, form)
-        elif len(parts) == 3:
-            (first, last), unit = numbers(typed, parts[:2], form)
-            values = _spaced(first, last, parts[2].strip(), typed)
-        else:
-            raise InputError(form, typed)
-        found.append(Vary(key, values, typed, unit))
+        values, unit = numbers(typed, parts, form)
+        if count is not None:
+            values = _spaced(values[0], values[1], count, typed)
+        found.append((Range if ranges else Vary)(key, values, typed, unit))
     return found
 
 
@@ -228,10 +222,23 @@ def sweep(
     if uncertainty:
         if resume or scheduler is not None or jobs != 1:
             raise click.UsageError("--resume, --jobs and --scheduler go with --vary only.")
-        from chutelab.studies.design.uncertainty import as_dict
+        from chutelab.studies.design.uncertainty import SAMPLES, as_dict
+        from chutelab.studies.design.uncertainty import uncertainty as propagate
 
         loaded = loaded_as_told(scene, set_, engine)
-        spread = _propagated(loaded, uncertainty, sample, seed, out, plot, quiet)
+        check_file("--out", out, (".csv",))
+        check_file("--plot", plot, PICTURES)
+        samples = SAMPLES if sample is None else sample
+        with progress("propagating", quiet=quiet) as meter:
+            given = uncertain(uncertainty)
+            spread = propagate(loaded, given, samples=samples, seed=seed, progress=meter)
+        with writing():
+            if out is not None:
+                write_lines(out, [spread.csv()])
+            if plot is not None:
+                from chutelab.pictures.plots.studies import spread as draw
+
+                draw(spread).write(plot)
         tell(as_dict(spread), spread, as_json=json_, quiet=quiet, wrote=wrote)
         return
     loaded = loaded_as_told(scene, set_)
@@ -246,11 +253,13 @@ def sweep(
         if plot is not None and several > 2:
             raise RefusedError(f"--plot draws one or two varied keys, not {several}")
         what = f"{plan.count:,} variants"
-        with (
-            _unlogged() if scheduler else nullcontext(),
-            crew(jobs, scheduler) as team,
-            progress(what, quiet=quiet, left=True) as update,
-        ):
+        with ExitStack() as stack:
+            if scheduler:
+                # Dask logs tracebacks; one message here says what failed.
+                stack.callback(logging.disable, logging.root.manager.disable)
+                logging.disable()
+            team = stack.enter_context(crew(jobs, scheduler))
+            update = stack.enter_context(progress(what, quiet=quiet, left=True))
             if out is None:
                 found = swept_by(plan, team, progress=update)
             else:
@@ -268,47 +277,6 @@ def sweep(
             sweep_figure(found, of).write(plot)
     told = {"scene": found.title, "variants": len(found), "columns": found.columns}
     tell(told, found, as_json=json_, quiet=quiet, wrote=wrote)
-
-
-def _propagated(
-    scene: Scene,
-    given: Sequence[str],
-    samples: int | None,
-    seed: int,
-    out: Path | None,
-    plot: Path | None,
-    quiet: bool,
-) -> Uncertainty:
-    """Propagate uncertain inputs; write all samples as CSV, and a picture, where asked for."""
-    from chutelab.studies import design
-    from chutelab.studies.design.uncertainty import SAMPLES
-
-    check_file("--out", out, (".csv",))
-    check_file("--plot", plot, PICTURES)
-    count = SAMPLES if samples is None else samples
-    with progress("propagating", quiet=quiet) as meter:
-        found = design.uncertainty(
-            scene, uncertain(given), samples=count, seed=seed, progress=meter
-        )
-    with writing():
-        if out is not None:
-            write_lines(out, [found.csv()])
-        if plot is not None:
-            from chutelab.pictures.plots.studies import spread
-
-            spread(found).write(plot)
-    return found
-
-
-@contextmanager
-def _unlogged() -> Iterator[None]:
-    """Keep Dask from logging tracebacks: one message here says what failed."""
-    before = logging.root.manager.disable
-    logging.disable()
-    try:
-        yield
-    finally:
-        logging.disable(before)
 
 
 def _kept(out: Path | None) -> str:

@@ -233,7 +233,8 @@ class Record(Shown):
     contacts : int
         Impacts and collisions resolved.
     seconds : float
-        Wall time from the validated scene to the recording; NaN in one that was loaded.
+        Wall time from the validated scene to the recording; NaN in one that was loaded, or
+        that an engine made without `simulate`.
     angle : ndarray, shape (K,), or (0,)
         How far a particle has turned counterclockwise since its release at each knot, rad, where
         some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not tell.

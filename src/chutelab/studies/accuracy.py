@@ -44,17 +44,10 @@ ALLOWED = (
 
 @dataclass(frozen=True)
 class Wanted:
-    """An accuracy.
+    """An accuracy."""
 
-    Attributes
-    ----------
-    size : float
-        The largest error that is good enough.
-    unit : {"relative", "m"}
-        "relative": of every answer of a run, see `chutelab.studies.accuracy`; "m": of places only.
-    """
-
-    size: float
+    size: float  # the largest error that is good enough
+    # "relative": of every answer of a run, see `chutelab.studies.accuracy`; "m": of places only
     unit: Literal["relative", "m"]
 
     def __post_init__(self) -> None:
@@ -273,40 +266,21 @@ many that do not help, the search ends."""
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What accuracy was asked for, and what was reached.
+    """What accuracy was asked for, and what was reached."""
 
-    Attributes
-    ----------
-    asked, unit : float, str
-        As in `Wanted`.
-    reached : float or None
-        Largest difference from the witness, in the same unit; None if there is none to tell.
-    method : str
-        How it is known; begins with "none" if it is not.
-    met : bool
-        Whether `reached` is at most `asked`.
-    worst : str
-        Which answer is the least accurate.
-    chaotic : bool
-        Whether it speaks of the crowd as a whole only, not of the ways of its particles.
-    dt : float or None
-        run.dt of the run, s; None for the exact engine.
-    runs : int
-        How many runs it took.
-    against : str or None
-        The witness: "theory", "dop853" or an engine.
-    """
-
+    # as in `Wanted`
     asked: float
     unit: str
+    # largest difference from the witness, in the same unit; None if there is none to tell
     reached: float | None
-    method: str
-    met: bool
-    worst: str
+    method: str  # how it is known; begins with "none" if it is not
+    met: bool  # whether `reached` is at most `asked`
+    worst: str  # which answer is the least accurate
+    # whether it speaks of the crowd as a whole only, not of the ways of its particles
     chaotic: bool
-    dt: float | None
-    runs: int
-    against: str | None
+    dt: float | None  # run.dt of the run, s; None for the exact engine
+    runs: int  # how many runs it took
+    against: str | None  # the witness: "theory", "dop853" or an engine
 
     @property
     def size(self) -> float:

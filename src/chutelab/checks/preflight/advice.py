@@ -15,16 +15,20 @@ from typing import Any, Final
 
 import numpy as np
 
-from chutelab.checks.preflight.results import (
+from chutelab.checks.preflight.trial import (
     Advice,
     Effort,
     Preflight,
     Stepping,
+    Trial,
     built,
     coverage,
+    effort,
+    peak,
     skipped,
+    stepping,
+    trial,
 )
-from chutelab.checks.preflight.trial import Trial, effort, peak, stepping, trial
 from chutelab.engines.simulation import choose
 from chutelab.machine import DRIVE_PULLEY, Caution, Machine, build
 from chutelab.machine.releases import squeeze
@@ -32,7 +36,7 @@ from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.record import blocks, hermite
 from chutelab.results.summary import waits
-from chutelab.scene import AnyScene, Plate, Scene, SceneError, load, shown
+from chutelab.scene import AnyScene, Scene, SceneError, load, shown
 from chutelab.scene.materials import DENSEST, LIGHTEST, PRESETS
 from chutelab.scene.units import write_size
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -94,15 +98,8 @@ CELLS: Final = 64
 
 def places(scene: Scene, machine: Machine) -> Iterator[Advice]:
     """Yield what may surprise about a machine and where its particles start."""
-    yield from _in_loops(scene, machine)
-    yield from _beyond_walls(scene, machine)
-    if machine.interact:
-        yield from _narrow(scene, machine)
-
-
-def _in_loops(scene: Scene, machine: Machine) -> Iterator[Advice]:
-    """Warn of releases between the carrying and the returning side of a conveyor."""
     for belt in scene.conveyor:
+        # Between its carrying and its returning side.
         way = np.subtract(belt.to, belt.from_)
         (x, y), (dx, dy) = (machine.releases.position - belt.from_).T, way / np.hypot(*way)
         along, aside = x * dx + y * dy, np.abs(x * dy - y * dx)
@@ -114,6 +111,9 @@ def _in_loops(scene: Scene, machine: Machine) -> Iterator[Advice]:
                 "a release above its carrying side",
                 {},
             )
+    yield from _beyond_walls(scene, machine)
+    if machine.interact:
+        yield from _narrow(scene, machine)
 
 
 def _narrow(scene: Scene, machine: Machine) -> Iterator[Advice]:
@@ -132,7 +132,10 @@ def _narrow(scene: Scene, machine: Machine) -> Iterator[Advice]:
             if not 0.0 < gap < GRAINS * largest or belt.away(end)[1] <= 0.0:
                 continue
             path = f"{scene.head('plate', number)}.below"
-            settings = {path: _shorter(machine, plate, name, GRAINS * largest - gap)}
+            # Its end is higher by what is missing, rounded to 1 mm.
+            (length,) = lines.length[lines.surface == machine.surfaces.index(name)]
+            shorter = (GRAINS * largest - gap) / cos(radians(plate.angle_deg))
+            settings = {path: float(np.floor(1e3 * (length - plate.above - shorter)) / 1e3)}
             try:
                 build(scene.with_values({**settings, "expect": None}))
             except SceneError:
@@ -146,24 +149,22 @@ def _narrow(scene: Scene, machine: Machine) -> Iterator[Advice]:
             )
 
 
-def _shorter(machine: Machine, plate: Plate, name: str, room: float) -> float:
-    """Return plate.below (m) for an end that is higher by some room, rounded down to 1 mm."""
-    lines = machine.segments
-    (length,) = lines.length[lines.surface == machine.surfaces.index(name)]
-    below = length - plate.above - room / cos(radians(plate.angle_deg))
-    return float(np.floor(1e3 * below) / 1e3)
-
-
 def _beyond_walls(scene: Scene, machine: Machine) -> Iterator[Advice]:
     """Warn of a `fill` that walls cut into parts: what starts in the smaller ones is outside."""
     starts = machine.releases
-    walls, owner = _walls(machine)
+    # What is there at t = 0 as straight pieces: ends (P, 2, 2), m, and surfaces (P,).
+    ends, owner = np.empty((0, 2, 2)), np.empty(0, dtype=np.int64)
+    for part in machine.parts:
+        for piece in map(part.of, np.flatnonzero(part.there(0.0))):
+            way = piece.path()
+            ends = np.concatenate([ends, np.stack([way[:-1], way[1:]], axis=1)])
+            owner = np.append(owner, np.full(len(way) - 1, piece.surface))
     for number, stream in enumerate(scene.streams):
         if stream.fill is None:
             continue
         low, high = np.array(stream.fill)
         mine = starts.position[starts.stream == number]
-        parts, blocked = _parts(low, high, walls)
+        parts, blocked = _parts(low, high, ends)
         column, row = np.clip((mine - low) / (high - low) * CELLS, 0, CELLS - 1).astype(int).T
         counts = np.bincount(parts[row, column], minlength=CELLS * CELLS)
         outside = len(mine) - counts.max()
@@ -182,18 +183,6 @@ def _beyond_walls(scene: Scene, machine: Machine) -> Iterator[Advice]:
             f"if it is meant, leave it; or a smaller {path}, or fewer particles",
             {},
         )
-
-
-def _walls(machine: Machine) -> tuple[Floats, Ints]:
-    """Return what is there at t = 0 as straight pieces: ends (P, 2, 2), m, and surfaces (P,)."""
-    found = [(np.empty((0, 2, 2)), np.empty(0, dtype=np.int64))]
-    for part in machine.parts:
-        for piece in map(part.of, np.flatnonzero(part.there(0.0))):
-            path = piece.path()
-            ends = np.stack([path[:-1], path[1:]], axis=1)
-            found.append((ends, np.full(len(ends), piece.surface)))
-    walls, owner = zip(*found, strict=True)
-    return np.concatenate(walls), np.concatenate(owner)
 
 
 Side = tuple[tuple[int, int], tuple[int, int]]
@@ -224,11 +213,8 @@ def _parts(low: Floats, high: Floats, walls: Floats) -> tuple[Ints, list[tuple[S
         for line, k, which in zip(*found, strict=True):
             pair = ((line, k), (line, k + 1)) if axis == 0 else ((k, line), (k + 1, line))
             blocked.append((pair, which))
-    return _labelled(open_[0], open_[1].T), blocked
-
-
-def _labelled(across: Bools, up: Bools) -> Ints:
-    """Return numbers of cells (n, n), the same for those that open sides connect."""
+    # Numbers of cells, the same for those that open sides connect.
+    across, up = open_[0], open_[1].T
     label = np.arange(CELLS * CELLS).reshape(CELLS, CELLS)
     while True:
         before = label.copy()
@@ -238,7 +224,7 @@ def _labelled(across: Bools, up: Bools) -> Ints:
             np.copyto(one, np.minimum(one, other), where=side)
             np.copyto(other, np.minimum(one, other), where=side)
         if (label == before).all():
-            return label
+            return label, blocked
 
 
 def advice(
@@ -277,7 +263,10 @@ def advice(
         yield from _ending(scene, machine, tried.recording)
     if tried.trouble:
         yield _advised(f"a trial run did not come to an end: {tried.trouble}")
-    if cost.memory > (there := _installed()):
+    there = inf  # bytes of the machine's memory, where that can be told
+    with suppress(AttributeError, ValueError, OSError):
+        there = float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    if cost.memory > there:
         yield Advice(
             f"the run may need {cost.memory / 1e9:.2g} GB of memory, and the machine has"
             f" {there / 1e9:.2g} GB",
@@ -318,14 +307,6 @@ def advice(
             {"run.engine": "auto"},
             after=", for the exact engine, which needs no steps",
         )
-
-
-def _installed() -> float:
-    """Return the memory of the machine, bytes; infinite where it cannot be told."""
-    try:
-        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return inf
 
 
 def _advised(

@@ -16,6 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.checks.stress.barriers import (
+    A_CONTACT,
+    EPS,
+    ROUNDINGS,
+    Evidence,
+    Verdict,
     cone,
     depth,
     no_one_through,
@@ -26,8 +31,8 @@ from chutelab.checks.stress.barriers import (
     rebound,
     released_free,
     settled_to_stay,
+    worst,
 )
-from chutelab.checks.stress.evidence import A_CONTACT, EPS, ROUNDINGS, Evidence, Verdict, worst
 from chutelab.machine import Segments
 from chutelab.results.ledger import ledger
 from chutelab.scene import Fault, Scene, SceneError

@@ -262,21 +262,11 @@ def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
 
 
 class Writing:
-    """A text that changes from frame to frame, by Pillow.
+    """A text that changes from frame to frame, by Pillow; `said` is that of each moment.
 
     Matplotlib lays a changed text out anew, which for the eight of a frame takes 3.3 ms, ten times
-    as long as Pillow.
-
-    Parameters
-    ----------
-    size, dpi : float
-        pt, and pixels to the inch.
-    x, y : float
-        Its place, pixels from the left and the top.
-    anchor : str
-        What of it is there, as Pillow names it, such as "rs": the right end of the base line.
-    said : list of str
-        The text of each moment.
+    as long as Pillow. Its size is in pt, its place in pixels from the left and the top; what of it
+    is there says `anchor`, as Pillow names it, such as "rs": the right end of the base line.
     """
 
     def __init__(
@@ -312,13 +302,9 @@ BASE = 0.78
 def stacks(books: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """Split a ledger into what was put in and where it is, all values positive.
 
-    An entry of the other sign changes sides: work that a braking belt takes out belongs to where
-    the energy is. Both sides add up to the same, see `SIGNS`.
-
-    Parameters
-    ----------
-    books : dict of ndarray, shape (T,)
-        J, as `chutelab.pictures.plots.scenery.energies` names them.
+    It is as `plots.scenery.energies` gives it, J, (T,) each. An entry of the other
+    sign changes sides: work that a braking belt takes out belongs to where the energy is. Both
+    sides add up to the same, see `SIGNS`.
     """
     signed = {name: sign * books[name] for name, sign in SIGNS.items()}
     put_in = {name: np.maximum(values, 0.0) for name, values in signed.items()}
@@ -328,10 +314,7 @@ def stacks(books: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Float
 def bars(ax: Axes, table: Axes, books: dict[str, Floats]) -> tuple[list[Moving], list[Writing]]:
     """Return the blocks of two stacked bars on `ax`, and a column of figures on `table`.
 
-    Parameters
-    ----------
-    books : dict of ndarray, shape (T,)
-        J, as for `stacks`; the highest bar sets the scale.
+    The ledger is as for `stacks`; the highest bar sets the scale.
     """
     sides = stacks(books)
     highest = float(np.max(sum(sides[0].values())))
@@ -341,11 +324,18 @@ def bars(ax: Axes, table: Axes, books: dict[str, Floats]) -> tuple[list[Moving],
     ax.set(xlim=(-0.6, 1.6), ylim=(0.0, 1.06 * factor * highest or 1.0))
     ax.set_xticks([0, 1], ["put in", "is now"], fontsize=style.SMALL)
     ax.tick_params(axis="x", length=0)
+
+    def block(name: str, left: float, base: Floats, height: Floats) -> Moving:
+        shape = Rectangle((left, 0.0), 0.8, 0.0, lw=0.0, color=style.ENERGY[name], gid=name)
+        shape.set_animated(True)
+        ax.add_patch(shape)
+        return shape, lambda index: shape.set_bounds(left, base[index], 0.8, height[index])
+
     moving = []
     for left, side in zip((-0.4, 0.6), sides, strict=True):
         base = np.zeros_like(books["start"])
         for name, values in side.items():
-            moving.append(_block(ax, name, left, base, factor * values))
+            moving.append(block(name, left, base, factor * values))
             base = base + factor * values
     table.set_axis_off()
     table.set(xlim=(0.0, 1.0), ylim=(len(SIGNS), 0.0))
@@ -361,11 +351,3 @@ def bars(ax: Axes, table: Axes, books: dict[str, Floats]) -> tuple[list[Moving],
         said = [text.replace("-", "−") for text in said]
         writings.append(Writing(style.SMALL, ax.figure.dpi, *place, "rs", said))
     return moving, writings
-
-
-def _block(ax: Axes, name: str, left: float, base: Floats, height: Floats) -> Moving:
-    """Return an entry's block of a bar, 0.8 wide."""
-    block = Rectangle((left, 0.0), 0.8, 0.0, lw=0.0, color=style.ENERGY[name], gid=name)
-    block.set_animated(True)
-    ax.add_patch(block)
-    return block, lambda index: block.set_bounds(left, base[index], 0.8, height[index])

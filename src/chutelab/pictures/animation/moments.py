@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from chutelab.machine import Machine
 from chutelab.pictures.plots import Window
-from chutelab.pictures.plots.scenery import STRUCK, action, nominal, one_of_many
+from chutelab.pictures.plots.scenery import STRUCK, action, flow, nominal, one_of_many
 from chutelab.pictures.plots.style import quantity
-from chutelab.results import PARTICLES, REASONS, Kind, Recording
-from chutelab.results.arrival import arrivals
+from chutelab.results import PARTICLES, Kind, Recording
 from chutelab.util.arrays import Bools, Floats, Ints
 
 
@@ -188,11 +187,8 @@ def film(
     the time `ask`, if it is given, the film holds, for viewers to predict what comes. Of a
     `crowd` it tells how many have come and gone, and holds at no impact of particle 0.
 
-    Raises
-    ------
-    ValueError
-        If `fps` is no divisor of 100 up to 50 (a shorter delay browsers take for 10 hundredths of a
-        second), or `slow` is not positive and finite.
+    Raises a `ValueError` if `fps` is no divisor of 100 up to 50 (a shorter delay browsers take for
+    10 hundredths of a second), or `slow` is not positive and finite.
     """
     if not 0 < fps <= 50 or 100 % fps:
         raise ValueError(
@@ -227,7 +223,12 @@ def film(
     delays[-1] = max(delays[-1], TAIL)
     if crowd:
         gates = _gates(recording.machine, times, slow)
-        words = [told or said for told, said in zip(gates, _counts(recording, times), strict=True)]
+        counts = [
+            [f"{n:,} {name}" for n in np.searchsorted(np.sort(when), times, side="right").tolist()]
+            for name, when in flow(recording).items()
+            if len(when)
+        ]
+        words = [told or ", ".join(said) for told, *said in zip(gates, *counts, strict=True)]
     else:
         words = _words(recording, own, held, times, slow)
     if ask is not None:
@@ -287,23 +288,6 @@ def _gates(machine: Machine, times: Floats, slow: float) -> list[str]:
         told[i][1] if i >= 0 and slow * (t - told[i][0]) <= TOLD else ""
         for t, i in zip(times.tolist(), last.tolist(), strict=True)
     ]
-
-
-def _counts(recording: Recording, times: Floats) -> list[str]:
-    """Return the caption of a crowd at each time: how many are released, have arrived, have left.
-
-    Of the last two only what any of them does in the end.
-    """
-    first, last = recording.ends()
-    come = arrivals(recording)["t"]
-    gone = last["t"][recording.ended[recording.released] == REASONS.index("exit")]
-    counted = {"released": first["t"], "arrived": come[np.isfinite(come)], "left the scene": gone}
-    told = [
-        [f"{n:,} {name}" for n in np.searchsorted(np.sort(when), times, side="right").tolist()]
-        for name, when in counted.items()
-        if len(when)
-    ]
-    return [", ".join(parts) for parts in zip(*told, strict=True)]
 
 
 def _words(

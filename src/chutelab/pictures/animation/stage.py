@@ -63,32 +63,19 @@ TRAIL = 0.07
 
 @dataclass(frozen=True)
 class Layout:
-    """What the picture holds, and where.
+    """What the picture holds, and where."""
 
-    Attributes
-    ----------
-    width, height : int
-        Pixels.
-    title, question : str
-        What stands above the scene; the question may be empty.
-    shows : frozenset of str
-        Some of `SHOWS`.
-    view : tuple of float
-        Where the scene is: left, bottom, width and height as shares of the picture.
-    window : Window
-        What of the world is shown, of the shape of `view`.
-    fastest : float
-        m/s; particle 0's highest speed while it is in the window.
-    """
-
+    # pixels
     width: int
     height: int
+    # what stands above the scene; the question may be empty
     title: str
     question: str
-    shows: frozenset[str]
+    shows: frozenset[str]  # some of `SHOWS`
+    # where the scene is: left, bottom, width and height as shares of the picture
     view: tuple[float, float, float, float]
-    window: Window
-    fastest: float
+    window: Window  # what of the world is shown, of the shape of `view`
+    fastest: float  # m/s; particle 0's highest speed while it is in the window
 
     def reach(self, share: float, what: str) -> float:
         """Return the time (s) in which particle 0's highest speed covers a share of the window.
@@ -126,10 +113,7 @@ def lay_out(
 
     It shows all by default, but of a crowd not what particle 0 does.
 
-    Raises
-    ------
-    ValueError
-        If the picture is too small, or `shows` has an unknown name.
+    Raises a `ValueError` if the picture is too small, or `shows` has an unknown name.
     """
     if width < 320 or height < 180:  # text could not be read
         raise ValueError(f"{width} x {height} pixels: allowed are at least 320 x 180")
@@ -176,16 +160,8 @@ class Stage:
     """Draws the moments of a film: the background once, and for each moment what moves on it.
 
     `slow` is seconds on the screen for one second of the recording. The analytic path is there from
-    the first moment on, or after the time `ask`, s.
-
-    Attributes
-    ----------
-    figure, view : Figure, Axes
-        The background, and where the scene is in it.
-    moving : list of Moving
-        What moves, from back to front.
-    writings : list of Writing
-        Texts that change.
+    the first moment on, or after the time `ask`, s. `figure` is the background and `view` the axes
+    of the scene in it; `moving` is what moves, from back to front; `writings` change.
     """
 
     def __init__(
@@ -461,10 +437,7 @@ def write_video(
 ) -> None:
     """Write pictures, each for a delay in hundredths of a second, as a video of one of `VIDEOS`.
 
-    Raises
-    ------
-    VideoError
-        If the extra is not installed.
+    Raises a `VideoError` if the extra is not installed.
     """
     need_video(kind)
     from imageio.v2 import get_writer

@@ -49,7 +49,7 @@ from chutelab.pictures.plots.style import Picture
 from chutelab.results import Kind, Recording
 from chutelab.results.comparison import prediction as predicted
 from chutelab.theory import Transfer
-from chutelab.theory.figures import Panel, PaperFigure
+from chutelab.theory.figures import PaperFigure
 from chutelab.util.arrays import Floats
 
 SIZE = (13.0, 7.6)
@@ -260,8 +260,21 @@ def paper_figure(found: PaperFigure) -> Picture:
         # Both of a pair have the same limits: the eye compares heights.
         first = axes[-1] if i % 2 else None
         ax = figure.add_subplot(grid[i], sharex=first, sharey=first)
+        axes.append(ax)
         ax.margins(MARGIN)
-        axes.append(draw_panel(ax, panel))
+        style.dress(ax, panel.x_label, panel.y_label, panel.title)
+        for line in panel.lines:
+            (color, dashes), solid = ROLES[line.role], line.role in ("plate", "belt")
+            ax.plot(
+                line.x, line.y, color=color, ls=dashes, lw=3.0 if solid else 1.8, label=line.label,
+                zorder=3.0 if solid else 4.0, gid=line.role,
+            )  # fmt: skip
+            if line.marks is not None:
+                ax.plot(*line.marks.T, "o", color=color, ms=4.5, mfc="white", zorder=5.0)
+        if panel.to_scale:
+            ax.set_aspect("equal", adjustable="box")
+        else:
+            ax.legend(loc="best", fontsize=style.SMALL, framealpha=0.85, edgecolor="none")
     for ax in axes:
         low, high = ax.get_ylim()
         if low > MARGIN * (high - low):
@@ -280,24 +293,6 @@ def paper_figure(found: PaperFigure) -> Picture:
         figure.remark(0.02, y / height, text, fontsize=style.SMALL, color=color)
         y -= TEXT * (text.count("\n") + 1)
     return figure
-
-
-def draw_panel(ax: Axes, panel: Panel) -> Axes:
-    """Draw one panel."""
-    style.dress(ax, panel.x_label, panel.y_label, panel.title)
-    for line in panel.lines:
-        (color, dashes), solid = ROLES[line.role], line.role in ("plate", "belt")
-        ax.plot(
-            line.x, line.y, color=color, ls=dashes, lw=3.0 if solid else 1.8, label=line.label,
-            zorder=3.0 if solid else 4.0, gid=line.role,
-        )  # fmt: skip
-        if line.marks is not None:
-            ax.plot(*line.marks.T, "o", color=color, ms=4.5, mfc="white", zorder=5.0)
-    if panel.to_scale:
-        ax.set_aspect("equal", adjustable="box")
-    else:
-        ax.legend(loc="best", fontsize=style.SMALL, framealpha=0.85, edgecolor="none")
-    return ax
 
 
 AWAY = 9.0
@@ -405,12 +400,8 @@ def split_velocity(
     They are to scale, with the theory's symbols and no number: v_2 before and v_2' after, v_t along
     the surface, v_n into it, φ_2 between surface and v_2, α between surface and the vertical.
 
-    Raises
-    ------
-    ValueError
-        If no particle hits that surface.
-    OSError
-        If the file cannot be written.
+    Raises a `ValueError` if no particle hits that surface; an `OSError` if the file cannot be
+    written.
     """
     impacts = recording.select(Kind.IMPACT, surface=surface)
     if not len(impacts):

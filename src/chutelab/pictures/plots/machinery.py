@@ -137,25 +137,19 @@ FARTHER = (1.0, 2.5, 4.0)
 class _Names:
     """Writes the name of each surface that is seen, once, where it hides least, and no other name.
 
-    Parameters
-    ----------
-    ax : Axes
-        With its limits set.
-    machine : Machine
-        What is drawn.
-    found : sequence of Pieces
-        Its pieces.
-    shown : Window
-        What of the world is in the picture.
+    The axes have their limits; `found` are the machine's pieces, `shown` what is in the picture.
     """
 
     def __init__(self, ax: Axes, machine: Machine, found: Sequence[Pieces], shown: Window) -> None:
         self.ax, self.machine, self.shown = ax, machine, shown
-        self.frame = ax.get_window_extent().padded(-3.0)
         self.parts: dict[int, list[tuple[Pieces, Floats]]] = {}
         for piece in found:
-            part = self._part(piece)
-            if part is not None:
+            points = piece.path()
+            if len(points) == 2:
+                part = np.array(shown.clip(*points) or np.empty((0, 2)))
+            else:
+                part = points[shown.holds(points)]
+            if len(part):
                 self.parts.setdefault(int(piece.surface), []).append((piece, part))
         self.found = found
         self.plates = plates(machine)
@@ -179,16 +173,28 @@ class _Names:
 
     def write(self) -> None:
         """Write all names. One for which there is no room is left out."""
+        frame, points = self.ax.get_window_extent().padded(-3.0), 72.0 / self.ax.figure.dpi
         for surface, parts in self.parts.items():
+            color = colour_of(self.machine, parts[0][0])
+            color = color if color == style.BELT else style.INK
             label = self.ax.annotate(
                 style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
                 xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
-                color=self._colour(parts[0][0]), path_effects=HALO, zorder=5.0,
+                color=color, path_effects=HALO, zorder=5.0,
             )  # fmt: skip
             best: tuple[int, Spot, Bbox] | None = None
             for spot in self._spots(parts):
-                placed, box = self._placed(label, spot)
-                hides = self._hides(box)
+                self._put(label, spot)
+                box, (where, offset, across, along) = label.get_window_extent(), spot
+                # Back over the edges of the axes.
+                right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
+                up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
+                offset = (offset[0] + right * points, offset[1] + up * points)
+                placed, box = (where, offset, across, along), box.translated(right, up)
+                # Lines, circles and releases that it would stand on.
+                on = (self.starts > box.min) & (self.starts < box.max)
+                hides = sum(line.intersects_bbox(box, filled=whole) for line, whole in self.lines)
+                hides += bool(on.all(axis=1).any())
                 if box.count_overlaps(self.taken) or (best is not None and hides >= best[0]):
                     continue
                 best = hides, placed, box
@@ -200,42 +206,11 @@ class _Names:
             self._put(label, best[1])
             self.taken.append(best[2].padded(1.0))
 
-    def _colour(self, piece: Pieces) -> str:
-        """Return the colour of a name: that of a belt, or ink."""
-        color = colour_of(self.machine, piece)
-        return color if color == style.BELT else style.INK
-
-    def _part(self, piece: Pieces) -> Floats | None:
-        """Return the points of a piece that are shown."""
-        points = piece.path()
-        if len(points) == 2:
-            ends = self.shown.clip(*points)
-            return None if ends is None else np.array(ends)
-        inside = self.shown.holds(points)
-        return points[inside] if inside.any() else None
-
-    def _hides(self, box: Bbox) -> int:
-        """Return how many lines, circles and releases a name would stand on."""
-        x, y = self.starts.T
-        on = (x > box.x0) & (x < box.x1) & (y > box.y0) & (y < box.y1)
-        crossed = sum(line.intersects_bbox(box, filled=whole) for line, whole in self.lines)
-        return int(crossed) + int(on.any())
-
     @staticmethod
     def _put(label: Any, spot: Spot) -> None:
         where, offset, across, along = spot
         label.xy, label.xyann = (float(where[0]), float(where[1])), offset
         label.set(ha=across, va=along)
-
-    def _placed(self, label: Any, spot: Spot) -> tuple[Spot, Bbox]:
-        """Return a spot shifted back over the edges of the axes, and the box of the name there."""
-        self._put(label, spot)
-        box, frame, (where, offset, across, along) = label.get_window_extent(), self.frame, spot
-        right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
-        up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
-        points = 72.0 / self.ax.figure.dpi
-        offset = (offset[0] + right * points, offset[1] + up * points)
-        return (where, offset, across, along), box.translated(right, up)
 
     def _said(self, surface: int, piece: Pieces) -> str:
         """Return what is written at a surface, of which a piece is shown."""
@@ -247,7 +222,8 @@ class _Names:
             leans = f"{angle:.3g}°".replace("-", "−")
             return f"{name}, {leans}\nε = {' / '.join(f'{one:.3g}' for one in values)}"
         if isinstance(piece, Segments):
-            moves = _motion(speed, piece.tangent)
+            x, y = piece.tangent * np.sign(speed)
+            moves = f"{abs(speed):.3g} m/s {ARROWS[round(4.0 / pi * np.arctan2(y, x)) % 8]}"
         else:
             moves = f"{abs(speed):.3g} m/s {'↻' if speed > 0.0 else '↺'}"
         if name == "incoming":
@@ -332,12 +308,7 @@ def _spot(where: Floats, gap: float, normal: Floats) -> Spot:
 
 
 ARROWS = "→↗↑↖←↙↓↘"
-
-
-def _motion(speed: float, along: Floats) -> str:
-    """Return a speed along a direction, and an arrow that shows where to."""
-    x, y = along * np.sign(speed)
-    return f"{abs(speed):.3g} m/s {ARROWS[round(4.0 / pi * np.arctan2(y, x)) % 8]}"
+"""Which way a straight surface moves, in eighths of a turn."""
 
 
 HUES = (style.STREAM, PURPLE, ORANGE, BLUE, GREEN)
@@ -368,25 +339,12 @@ def stream_handles(machine: Machine) -> list[Line2D]:
 
 
 class Bodies:
-    """Some particles of one look, which can be moved: to scale, or magnified so as to be seen.
+    """Some particles (n,) of one look, which can be moved: to scale, or magnified so as to be seen.
 
     Disks of one size are a line of markers, others a collection of circles; boxes and polygons are
-    never magnified.
-
-    Parameters
-    ----------
-    ax : Axes
-        With its limits set.
-    recording : Recording
-        The run.
-    particles : ndarray of int, (n,)
-        Which.
-    gid, color : str
-        Of the artists; polygons have "turned" added to theirs.
-    least : float
-        pt; the machine's largest disk is drawn at least so large, and others magnified alike.
-    edge : float
-        pt; width of the white edge of disks, which tells them apart where they overlap.
+    never magnified. The machine's largest disk is drawn at least `least` (pt) large, and others
+    magnified alike; disks have a white edge of `edge` (pt), which tells them apart where they
+    overlap. The axes have their limits; the `gid` of polygons has "turned" added to it.
     """
 
     def __init__(

@@ -21,6 +21,7 @@ from chutelab.pictures.plots.scenery import (
     FINE,
     drawn_tracks,
     energies,
+    flow,
     nominal,
     path_of,
     strobe_step,
@@ -29,7 +30,7 @@ from chutelab.pictures.plots.scenery import (
     track_times,
     upright,
 )
-from chutelab.results import REASONS, Recording
+from chutelab.results import Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.comparison import prediction as predicted
 from chutelab.results.ledger import ledger
@@ -362,24 +363,20 @@ def draw_flow(ax: Axes, recording: Recording) -> Axes:
     """
     style.dress(ax, "time, s", "particles", "Flow")
     first, last = recording.ends()
-    come, left = arrivals(recording), recording.ended[recording.released]
-    counted = (
-        ("released", first["t"], style.MUTED),
-        ("arrived", come["t"][np.isfinite(come["t"])], style.TRACK),
-        ("left the scene", last["t"][left == REASONS.index("exit")], style.STRIKE),
-    )
+    counted = flow(recording)
     ends = float(first["t"].min()), float(last["t"].max())
-    if not (np.ptp(first["t"]) or any(len(times) for _, times, _ in counted[1:])):
+    if not (np.ptp(first["t"]) or len(counted["arrived"]) or len(counted["left the scene"])):
         return draw_speeds(ax, recording)
-    for name, times, color in counted:
+    colours = (style.MUTED, style.TRACK, style.STRIKE)
+    for (name, times), color in zip(counted.items(), colours, strict=True):
         if len(times):
             clock = np.concatenate([ends[:1], np.sort(times), ends[1:]])
             count = np.append(np.arange(len(times) + 1), len(times))
             (steps,) = ax.step(clock, count, where="post", color=color, lw=1.6, gid=name)
             steps.set_label(f"{name} {len(times):,}")
-    flow, whole = flows(recording)
-    if flow is not None:
-        said = f"{number(flow)} t/h arrive, of the slice"
+    slice_, whole = flows(recording)
+    if slice_ is not None:
+        said = f"{number(slice_)} t/h arrive, of the slice"
         style.note(ax, said if whole is None else f"{number(whole)} t/h arrive")
     ax.set(xlim=ends if ends[1] > ends[0] else None, ylim=(0.0, 1.08 * recording.count))
     ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.core.module import number as layout_number
 from chutelab.results import REASONS, Kind, Recording
+from chutelab.results.arrival import arrivals
 from chutelab.results.quantities import each
 from chutelab.results.stream import FEWEST
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -119,18 +120,9 @@ def track_times(
 
     They are its knots, the moments just before jumps, which are so drawn upright, and even parts
     of each piece, as many as its curvature asks for: over a time h a chord misses a curve by at
-    most h²/8 times its largest acceleration, and a cubic has that at one of its ends.
-
-    Parameters
-    ----------
-    recording : Recording
-        The run.
-    begin, end : float, optional
-        s; by default all of the track.
-    particle : int
-        Which one.
-    fine : float, optional
-        m; by default the share `FINE` of the track's extent.
+    most h²/8 times its largest acceleration, and a cubic has that at one of its ends. By default
+    `fine` (m) is the share `FINE` of the track's extent, and it is all of the track that is drawn,
+    else from `begin` to `end`, s.
     """
     track = recording.track(particle)
     t, place, velocity = track["t"], track["position"], track["velocity"]
@@ -199,6 +191,21 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     books["potential"] = np.maximum(lifted, 0.0)
     books["start"] = at_release[released] - weight * zero
     return books
+
+
+def flow(recording: Recording) -> dict[str, Floats]:
+    """Return when particles are released, have arrived and have left for good, s, by these words.
+
+    Of the last two only what any of them does in the end.
+    """
+    first, last = recording.ends()
+    come = arrivals(recording)["t"]
+    gone = recording.ended[recording.released] == REASONS.index("exit")
+    return {
+        "released": first["t"],
+        "arrived": come[np.isfinite(come)],
+        "left the scene": last["t"][gone],
+    }
 
 
 MANY = 60

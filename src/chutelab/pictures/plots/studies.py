@@ -33,15 +33,15 @@ from chutelab.pictures.plots.scenery import (
     window_of,
 )
 from chutelab.pictures.plots.style import Picture
-from chutelab.results import Kind, Recording
+from chutelab.results import Kind
 from chutelab.scene.units import symbol, with_unit, write_size
 from chutelab.studies.design import Solution, Uncertainty
 from chutelab.studies.measured import Fit, Residuals
 from chutelab.studies.measured.result import plus_minus
-from chutelab.studies.measured.track import counted
 from chutelab.studies.sweep import COLUMNS, REASON, Sweep, no_column
 from chutelab.studies.sweep.rows import RARE
 from chutelab.util.arrays import Bools, Floats
+from chutelab.util.tables import many
 from chutelab.util.versions import PACKAGES
 
 BARS = (style.TRACK, style.STREAM)
@@ -55,24 +55,14 @@ MISSING = "///"
 def scan(solution: Solution) -> Picture:
     """Draw what a search over one key looked at: the quantity, its target, answers and jumps.
 
-    Raises
-    ------
-    ValueError
-        If several keys were varied.
+    Each smooth piece is a line, so that jumps are gaps. Raises a `ValueError` if several keys were
+    varied.
     """
-    figure = Picture((9.0, 5.6))
-    ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
-    draw_scan(ax, solution)
-    _titles(figure, solution.base.title, solution.asked)
-    style.legend_above(ax, 4)
-    return figure
-
-
-def draw_scan(ax: Axes, solution: Solution) -> Axes:
-    """Draw the scan of one key: each smooth piece a line, so that jumps are gaps."""
     found = solution.scan
     if found is None:
         raise ValueError("several keys were varied: there is no line to draw")
+    figure = Picture((9.0, 5.6))
+    ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
     key, (name, *_), (unit, *_) = solution.ranges[0], solution.quantities, solution.units
     factor, said = style.scaled(found.values, unit)
     style.dress(ax, with_unit(key.key, key.unit), with_unit(name, said))
@@ -111,7 +101,9 @@ def draw_scan(ax: Axes, solution: Solution) -> Axes:
                 fontsize=style.NORMAL, horizontalalignment="right" if left else "left", zorder=7.0,
                 bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
             )  # fmt: skip
-    return ax
+    _titles(figure, solution.base.title, solution.asked)
+    style.legend_above(ax, 4)
+    return figure
 
 
 def spread(found: Uncertainty) -> Picture:
@@ -227,10 +219,7 @@ it that is used for lines: what follows is too light on white."""
 def sweep_figure(swept: Sweep, column: str) -> Picture:
     """Draw one column of numbers of a sweep over its one or two varied keys.
 
-    Raises
-    ------
-    ValueError
-        If more than two keys vary, or there is no such column.
+    Raises a `ValueError` if more than two keys vary, or there is no such column.
     """
     if column not in COLUMNS:
         raise ValueError(no_column(column))
@@ -288,7 +277,16 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
     if sampled:
         ax.plot(first, z, "o", markersize=3.5, color=style.TRACK, alpha=0.7)
     else:
-        _draw_lines(ax, first, second if len(keys) == 2 else np.zeros(len(z)), z)
+        others = second if len(keys) == 2 else np.zeros(len(z))
+        values = np.unique(others)
+        shades = mpl.colormaps[COLORS](np.linspace(0.0, LIGHTEST, len(values)))
+        for value, shade in zip(values.tolist(), shades, strict=True):
+            chosen = np.flatnonzero(others == value)
+            chosen = chosen[np.argsort(first[chosen], kind="stable")]
+            ax.plot(
+                first[chosen], z[chosen], color=shade if len(values) > 1 else style.TRACK,
+                lw=1.8, marker="o" if len(chosen) <= DOTS else "", ms=4.0, label=f"{value:g}",
+            )  # fmt: skip
     if len(keys) == 2:
         ax.legend(
             title=style.plain(names[1]), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8,
@@ -300,19 +298,6 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
         margin = 0.03 * (high - low)
         ax.set_xlim(low - margin, high + margin)
     return ax
-
-
-def _draw_lines(ax: Axes, x: Floats, others: Floats, z: Floats) -> None:
-    """Draw a line over x for each value of another key."""
-    values = np.unique(others)
-    shades = mpl.colormaps[COLORS](np.linspace(0.0, LIGHTEST, len(values)))
-    for value, shade in zip(values.tolist(), shades, strict=True):
-        chosen = np.flatnonzero(others == value)
-        chosen = chosen[np.argsort(x[chosen], kind="stable")]
-        ax.plot(
-            x[chosen], z[chosen], color=shade if len(values) > 1 else style.TRACK, linewidth=1.8,
-            marker="o" if len(chosen) <= DOTS else "", markersize=4.0, label=f"{value:g}",
-        )  # fmt: skip
 
 
 def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> ScalarMappable:
@@ -327,11 +312,13 @@ def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> Sca
         # White where the sign changes: that is often what is looked for.
         reach = float(np.nanmax(np.abs(field)))
         limits = {"cmap": "RdBu_r", "vmin": -reach, "vmax": reach}
+    mesh = ax.pcolormesh(x, y, field, shading="nearest", rasterized=True, **limits)
     if missing.any():
         hatched = np.zeros(field.shape)
         hatched[up, across] = missing
         # Contours follow the edges of the cells where each cell has the same value at both.
-        edges = [np.repeat(_edges(values), 2)[1:-1] for values in (x, y)]
+        corners = np.asarray(mesh.get_coordinates())
+        edges = [np.repeat(line, 2)[1:-1] for line in (corners[0, :, 0], corners[:, 0, 1])]
         whole = hatched.repeat(2, axis=0).repeat(2, axis=1)
         ax.contourf(*edges, whole, levels=[0.5, 1.5], colors="none", hatches=[MISSING], zorder=3.0)
         ax.contour(*edges, whole, levels=[0.5], colors=[style.INK], linewidths=0.6, zorder=3.0)
@@ -340,16 +327,7 @@ def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> Sca
             [never], ["never meets the plate"], loc="lower right", bbox_to_anchor=(1.0, 1.0),
             frameon=False, fontsize=style.SMALL, borderaxespad=0.2,
         )  # fmt: skip
-    return ax.pcolormesh(x, y, field, shading="nearest", rasterized=True, **limits)
-
-
-def _edges(middles: Floats) -> Floats:
-    """Return where cells around some middles begin and end, as `pcolormesh` has them."""
-    between = 0.5 * (middles[1:] + middles[:-1])
-    if not len(between):
-        return np.array([middles[0] - 0.5, middles[0] + 0.5])
-    first, last = 2.0 * middles[0] - between[0], 2.0 * middles[-1] - between[-1]
-    return np.concatenate([[first], between, [last]])
+    return mesh
 
 
 PARAMETERS = 6
@@ -362,35 +340,13 @@ POINTS: dict[str, Any] = {"ls": "none", "marker": "+", "ms": 7.0, "mew": 1.3}
 def measured(found: Residuals, fit: Fit | None = None) -> Picture:
     """Draw a measured track over the simulation and its analytic parabola, and the residuals.
 
-    With a fit, whose residuals are its `after`, also the track before it and the fitted values.
+    With a fit, whose residuals are its `after`, also, dotted, the track that it started from, and
+    the fitted values.
     """
     figure = Picture((13.0, 7.6))
     lines = 0 if fit is None else min(len(fit.parameters), PARAMETERS)
     top = 0.88 - 0.032 * max(0, lines - 1)
-    view = figure.add_axes((0.06, 0.08, 0.5, 0.8))
-    draw_measured(view, found, None if fit is None else fit.before.recording)
-    grid = figure.add_gridspec(2, 1, left=0.64, right=0.985, top=top, bottom=0.08, hspace=0.3)
-    upper = figure.add_subplot(grid[0])
-    draw_residuals(upper, found, 0)
-    upper.set_xlabel("")
-    draw_residuals(figure.add_subplot(grid[1]), found, 1)
-    figure.headline(0.06, 0.965, found.recording.title, 60)
-    said = [f"{len(found.track)} measured points, nothing fitted"]
-    if fit is not None:
-        fitted = zip(fit.parameters[:PARAMETERS], fit.values, fit.errors, strict=False)
-        said = [
-            f"{one.key} = {plus_minus(x, error)} {one.unit}".rstrip() for one, x, error in fitted
-        ]
-    for i, text in enumerate(said):
-        figure.remark(0.985, 0.965 - 0.032 * i, text, ha="right", va="center")
-    return figure
-
-
-def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -> Axes:
-    """Draw the machine, the simulated track, the analytic parabola, and the measured points.
-
-    The run that a fit started from is dotted.
-    """
+    ax = figure.add_axes((0.06, 0.08, 0.5, 0.8))
     recording, position = found.recording, found.track.position
     window = window_of(recording)
     far = window.padded(*[FAR] * 4)
@@ -400,6 +356,7 @@ def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -
     draw_scene(ax, recording.machine, around(np.concatenate([corners, position[shown]])))
     parts, _ = analytic_of(recording)
     draw_analytic(ax, parts)
+    before = None if fit is None else fit.before.recording
     for run, gid, colour, line, label in (
         (before, "before", style.MUTED, ":", "before the fit"),
         (recording, "track", style.TRACK, "-", "simulation"),
@@ -416,12 +373,26 @@ def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -
             ax.plot(*position[chosen].T, **points, zorder=8.0)
     if not shown.all():
         ax.text(
-            0.5, 0.97, f"{counted(int((~shown).sum()), 'point')} outside the picture",
+            0.5, 0.97, f"{many(int((~shown).sum()), 'point')} outside the picture",
             transform=ax.transAxes, fontsize=style.NORMAL, color=style.STRIKE,
             horizontalalignment="center", verticalalignment="top",
         )  # fmt: skip
     style.legend_above(ax, 3)
-    return ax
+    grid = figure.add_gridspec(2, 1, left=0.64, right=0.985, top=top, bottom=0.08, hspace=0.3)
+    upper = figure.add_subplot(grid[0])
+    draw_residuals(upper, found, 0)
+    upper.set_xlabel("")
+    draw_residuals(figure.add_subplot(grid[1]), found, 1)
+    figure.headline(0.06, 0.965, found.recording.title, 60)
+    said = [f"{len(found.track)} measured points, nothing fitted"]
+    if fit is not None:
+        fitted = zip(fit.parameters[:PARAMETERS], fit.values, fit.errors, strict=False)
+        said = [
+            f"{one.key} = {plus_minus(x, error)} {one.unit}".rstrip() for one, x, error in fitted
+        ]
+    for i, text in enumerate(said):
+        figure.remark(0.985, 0.965 - 0.032 * i, text, ha="right", va="center")
+    return figure
 
 
 def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
@@ -483,7 +454,10 @@ TITLES = {"pymunk": "pymunk, aligned", "fixed": "pymunk, fixed step"}
 
 
 def workprecision(timings: Sequence[Timing], title: str, about: Mapping[str, str]) -> Picture:
-    """Draw run time against error, and below it what failed and what it ran on (`about`)."""
+    """Draw run time against error, and below it what failed and what it ran on (`about`).
+
+    Each method is a line; left is more accurate, down is faster.
+    """
     below = failures(timings, CHARACTERS)
     said = [f"{key} {value}" if key in PACKAGES else value for key, value in about.items()]
     below += wrap(" · ".join(said), CHARACTERS)
@@ -492,14 +466,6 @@ def workprecision(timings: Sequence[Timing], title: str, about: Mapping[str, str
     width = WIDTH - LEFT - RIGHT
     box = (LEFT / WIDTH, 1.0 - (HEAD + PANEL) / height, width / WIDTH, PANEL / height)
     ax = style.dress(figure.add_axes(box), "relative error", "run time, s", title)
-    draw_timings(ax, timings)
-    top = (0.2 + LINE * len(below)) / height
-    figure.remark(0.2 / WIDTH, top, "\n".join(below), fontsize=style.SMALL, gid="below")
-    return figure
-
-
-def draw_timings(ax: Axes, timings: Sequence[Timing]) -> Axes:
-    """Draw a line for each method; left is more accurate, down is faster."""
     ax.set(xscale="log", yscale="log")
     drawn: list[tuple[float, float]] = []
     for method, look in LOOKS.items():
@@ -520,7 +486,9 @@ def draw_timings(ax: Axes, timings: Sequence[Timing]) -> Axes:
         ax.legend(
             loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=style.SMALL, frameon=False,
         )  # fmt: skip
-    return ax
+    top = (0.2 + LINE * len(below)) / height
+    figure.remark(0.2 / WIDTH, top, "\n".join(below), fontsize=style.SMALL, gid="below")
+    return figure
 
 
 def decades(
@@ -543,17 +511,12 @@ def decades(
     step = ceil((last - first + 1) / ticks)
     axis.set_view_interval(10.0**low, 10.0**high, ignore=True)
     axis.set_major_locator(FixedLocator([10.0**k for k in range(last, first - 1, -step)]))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
 
+    def written(value: float, _: object) -> str:
+        power = round(log10(value))
+        return f"{10.0**power:g}" if -3 <= power <= 3 else f"$10^{{{power}}}$"
 
-def _power(value: float) -> str:
-    """Return a power of ten; those near 1 in full.
-
-    >>> _power(0.001), _power(1e-05), _power(1000.0)
-    ('0.001', '$10^{-5}$', '1000')
-    """
-    power = round(log10(value))
-    return f"{10.0**power:g}" if -3 <= power <= 3 else f"$10^{{{power}}}$"
+    axis.set_major_formatter(FuncFormatter(written))
 
 
 def failures(timings: Sequence[Timing], width: int) -> list[str]:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import groupby, product
 from math import nan
-from typing import Any, Final, Literal, NamedTuple, Protocol, TypeVar
+from typing import Any, Final, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,22 +38,10 @@ from chutelab.util.versions import library
 T = TypeVar("T")
 
 
-class Typed(Protocol):
-    """What an option takes once; messages call it `typed`."""
-
-    @property
-    def typed(self) -> str:
-        """The option and its value, as on the command line."""
-        ...
-
-
-G = TypeVar("G", bound=Typed)
-
-
 def each_once(
-    option: str, given: Sequence[G], read: Callable[[G], T], ask: str, most: int
+    option: str, given: Sequence[Any], read: Callable[[Any], T], ask: str, most: int
 ) -> tuple[T, ...]:
-    """Read what an option takes, given 1 to `most` times; each result has another `key`."""
+    """Read what an option takes, 1 to `most` times, as `typed`; each result has another `key`."""
     if not given:
         raise InputError(ask, option)
     if len(given) > most:
@@ -117,14 +105,10 @@ def courses_of(recording: Recording) -> list[str]:
 class Quantity:
     """A number of a run, the value of a key of the scene, or a plain number."""
 
-    name: str
-    """As it was asked for."""
-
+    name: str  # as it was asked for
     unit: str
-
+    # of a run: its name, see `chutelab.scene.quantities`. Of the scene: the full path.
     key: str = ""
-    """Of a run: its name, see `chutelab.scene.quantities`. Of the scene: the full path."""
-
     source: Literal["run", "scene", "number"] = "run"
     ending: Ending = "any"
     number: float = 0.0
@@ -145,10 +129,7 @@ class Quantity:
 def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
     """Return the quantity of a scene that has this name; messages call it `typed`.
 
-    Raises
-    ------
-    InputError
-        If the scene has no such quantity.
+    Raises an `InputError` if the scene has no such quantity.
     """
     row = lookup(name, scene.surfaces, [str(stream.name) for stream in scene.streams])
     if row is None:
@@ -162,10 +143,7 @@ def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
 def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quantity]:
     """Return a quantity, and the number, key of the scene or quantity that it is to equal.
 
-    Raises
-    ------
-    InputError
-        If one of them is unknown, or their units differ.
+    Raises an `InputError` if one of them is unknown, or their units differ.
     """
     typed = f"--target {name}={value}"
     left = measured(scene, name, typed)
@@ -177,7 +155,18 @@ def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quant
         if text[0].isdigit() or text[0] in "+-.":
             allowed = f"{text} is no number of a quantity {_in(left.unit)}; {error}"
             raise InputError(allowed, typed) from None
-        right = _named(scene, text, typed)
+        if lookup(text, scene.surfaces) is not None:
+            right = measured(scene, text, typed)
+        else:
+            try:
+                found = quantity(scene, Vary(text, (0.0,), typed))
+            except InputError as fault:
+                allowed = f"{text} is neither a number, nor a quantity, nor a key of the scene"
+                raise InputError(f"{allowed}: {fault.allowed}", typed) from None
+            if not isinstance(value_at(scene, found.path), (int, float)):
+                said = f"{found.path} has no number as its value in this scene"
+                raise InputError(said, typed) from None
+            right = Quantity(found.path, found.unit, found.path, "scene")
     if right.source == "number" and right.unit == "":
         right = replace(right, name=f"{right.name} {left.unit}".strip(), unit=left.unit)
     if right.unit != left.unit:
@@ -187,20 +176,6 @@ def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quant
     if right == left:
         raise InputError("both sides are the same", typed)
     return left, right
-
-
-def _named(scene: Scene, text: str, typed: str) -> Quantity:
-    """Return the quantity or the key of a scene that a text names."""
-    if lookup(text, scene.surfaces) is not None:
-        return measured(scene, text, typed)
-    try:
-        found = quantity(scene, Vary(text, (0.0,), typed))
-    except InputError as error:
-        allowed = f"{text} is neither a number, nor a quantity, nor a key of the scene"
-        raise InputError(f"{allowed}: {error.allowed}", typed) from None
-    if not isinstance(value_at(scene, found.path), (int, float)):
-        raise InputError(f"{found.path} has no number as its value in this scene", typed)
-    return Quantity(found.path, found.unit, found.path, "scene")
 
 
 def _in(unit: str) -> str:
@@ -220,17 +195,11 @@ INSIDE: Final = 0.3819660112501051
 class Span:
     """A key of the scene and the range that is searched, low < high."""
 
-    key: str
-    """Full path, free surfaces by index."""
-
-    unit: str
-    """ "" for a pure number."""
-
+    key: str  # full path, free surfaces by index
+    unit: str  # "" for a pure number
     low: float
     high: float
-
-    start: float | None
-    """The scene's own value; None if it has none."""
+    start: float | None  # the scene's own value; None if it has none
 
     @property
     def width(self) -> float:
@@ -281,17 +250,12 @@ NO_RUN: Final = "no run"
 class Outcomes(NamedTuple):
     """What became of N variants."""
 
-    values: Floats
-    """The M quantities of each, (N, M); NaN where they did not happen."""
-
+    values: Floats  # the M quantities of each, (N, M); NaN where they did not happen
+    # surfaces touched by particle 0, such as ``plate, outgoing``; `NO_RUN` without a run
     courses: list[str]
-    """Surfaces touched by particle 0, such as ``plate, outgoing``; `NO_RUN` without a run."""
-
-    faults: list[str]
-    """Why there was no run; "" where there was one."""
-
+    faults: list[str]  # why there was no run; "" where there was one
+    # kind of each outcome, see `chutelab.studies.sweep.rows.touches`; `NO_RUN` without a run
     touches: list[str]
-    """Kind of each outcome, see `chutelab.studies.sweep.rows.touches`; `NO_RUN` without a run."""
 
 
 @dataclass
@@ -301,10 +265,8 @@ class Evaluator:
     scene: Scene
     keys: Sequence[str]
     quantities: Sequence[Quantity]
-
+    # called now and then with the share that is done of the `expected` variants
     progress: Progress | None = None
-    """Called now and then with the share that is done of the `expected` variants."""
-
     expected: int = 0
     runs: int = field(default=0, init=False)
 
@@ -382,33 +344,21 @@ STEADY: Final = 0.01
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What a key does to a quantity at a point.
+    """What a key does to a quantity at a point."""
 
-    Attributes
-    ----------
-    key, unit : str
-        What is changed, and its unit.
-    quantity, quantity_unit : str
-        What changes.
-    derivative : float
-        In quantity_unit per unit; NaN where the course changes within a millionth of the range.
-    step : float
-        One per cent of the key's value; of its range, if its value is 0.
-    lower, upper : float
-        The quantity with the key one `step` less and more; NaN where it has none.
-    courses : tuple of str
-        The way of particle 0 there.
-    """
-
+    # what is changed, and its unit
     key: str
     unit: str
+    # what changes
     quantity: str
     quantity_unit: str
+    # in quantity_unit per unit; NaN where the course changes within a millionth of the range
     derivative: float
-    step: float
+    step: float  # one per cent of the key's value; of its range, if its value is 0
+    # the quantity with the key one `step` less and more; NaN where it has none
     lower: float
     upper: float
-    courses: tuple[str, str]
+    courses: tuple[str, str]  # the way of particle 0 there
 
 
 def sensitivities(

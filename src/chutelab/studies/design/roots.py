@@ -54,15 +54,9 @@ class Change:
 
     low: float
     high: float
-
-    values: Floats
-    """The M quantities on both sides, (2, M); NaN where they have no value."""
-
-    courses: tuple[str, str]
-    """The way of particle 0 before and after."""
-
-    fault: str = ""
-    """Why there is no run on one of the sides, "" if there is."""
+    values: Floats  # the M quantities on both sides, (2, M); NaN where they have no value
+    courses: tuple[str, str]  # the way of particle 0 before and after
+    fault: str = ""  # why there is no run on one of the sides, "" if there is
 
     @property
     def at(self) -> float:

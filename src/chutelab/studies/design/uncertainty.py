@@ -36,18 +36,12 @@ INTERVAL: Final = (0.025, 0.975)
 
 @dataclass(frozen=True, eq=False)
 class Indices:
-    """Sobol indices of one quantity, arrays of shape (K,) and (K, 2).
+    """Sobol indices of one quantity, arrays of shape (K,) and (K, 2)."""
 
-    Attributes
-    ----------
-    first, total : ndarray
-        Share of the variance that an input explains alone, and with all its interactions.
-    first_interval, total_interval : ndarray
-        Bootstrap intervals at 95 %.
-    """
-
+    # share of the variance that an input explains alone, and with all its interactions
     first: Floats
     total: Floats
+    # bootstrap intervals at 95 %
     first_interval: Floats
     total_interval: Floats
 
@@ -130,25 +124,16 @@ class Given(NamedTuple):
 
 @dataclass(frozen=True)
 class Spread:
-    """A number of the scene that is not known exactly.
+    """A number of the scene that is not known exactly."""
 
-    Attributes
-    ----------
-    key, unit : str
-        Its full path, and its unit.
-    mean, spread : float
-        Normal: mean and standard deviation. Uniform: middle and half-width.
-    law : {"normal", "uniform"}
-        How it is distributed.
-    low, high : float
-        The least and the largest value that the scene allows; the distribution is cut there.
-    """
-
+    # its full path, and its unit
     key: str
     unit: str
+    # normal: mean and standard deviation. Uniform: middle and half-width.
     mean: float
     spread: float
-    law: str
+    law: str  # "normal" or "uniform"
+    # the least and the largest value that the scene allows; the distribution is cut there
     low: float
     high: float
 
@@ -245,22 +230,13 @@ MOST_SAMPLES: Final = 1 << 20
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """Of M quantities over some samples; those without a value do not count.
+    """Of M quantities over some samples; those without a value do not count."""
 
-    Attributes
-    ----------
-    share : float
-        Of all samples.
-    mean, deviation : ndarray, shape (M,)
-        Means and standard deviations; NaN without a single value.
-    interval : ndarray, shape (M, 2)
-        95 % intervals.
-    """
-
-    share: float
+    share: float  # of all samples
+    # (M,); means and standard deviations; NaN without a single value
     mean: Floats
     deviation: Floats
-    interval: Floats
+    interval: Floats  # (M, 2); 95 % intervals
 
 
 def statistics(outputs: Floats, total: int) -> Statistics:

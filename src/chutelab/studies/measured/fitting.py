@@ -55,10 +55,8 @@ def placements(track: Track) -> dict[str, Parameter]:
 def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter, ...]:
     """Return the parameters that keys name.
 
-    Raises
-    ------
-    MeasuredError
-        With all keys that are unknown, no number, without a value to start from, or given twice.
+    Raises a `MeasuredError` with all keys that are unknown, no number, without a value to start
+    from, or given twice.
     """
     document, placed = to_dict(scene, defaults=True), placements(track)
     faults: list[Fault] = []
@@ -83,10 +81,7 @@ def changed(
 ) -> tuple[Scene, Track]:
     """Return scene and track with the values of some parameters changed.
 
-    Raises
-    ------
-    SceneError
-        If the scene refuses a value, or two that do not go together.
+    Raises a `SceneError` if the scene refuses a value, or two that do not go together.
     """
     given = {one.key: float(value) for one, value in zip(parameters, values, strict=True)}
     place = {key: given.pop(key, one.start) for key, one in placements(track).items()}

@@ -120,10 +120,7 @@ class _Columns:
 def find(name_or_path: str | Path) -> Path:
     """Return the file meant: one that exists, or else the shipped track of this name.
 
-    Raises
-    ------
-    MeasuredError
-        If there is neither.
+    Raises a `MeasuredError` if there is neither.
     """
     path = Path(name_or_path)
     with suppress(OSError, ValueError):

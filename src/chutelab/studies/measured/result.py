@@ -127,23 +127,15 @@ def _neighbours(left: Floats) -> float:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that a fit may change.
+    """A number that a fit may change."""
 
-    Attributes
-    ----------
-    key, unit : str
-        What it is called: a full path in the scene as it was given, or a key of `placements`; ""
-        for the unit of a pure number.
-    start : float
-        Its value in the scene or the placement.
-    low, high : float
-        The least and the largest value that are searched: those that are allowed, but not below
-        `SMALLEST` of the start where 0 is not.
-    """
-
+    # what it is called: a full path in the scene as it was given, or a key of `placements`; "" for
+    # the unit of a pure number
     key: str
     unit: str
-    start: float
+    start: float  # its value in the scene or the placement
+    # the least and the largest value that are searched: those that are allowed, but not below
+    # `SMALLEST` of the start where 0 is not
     low: float
     high: float
 

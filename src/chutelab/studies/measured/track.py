@@ -12,7 +12,7 @@ from chutelab.results import Recording
 from chutelab.scene import AnyScene, Fault, Scene, SceneError, load
 from chutelab.scene.units import write_size
 from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.tables import Sheet, Shown
+from chutelab.util.tables import Sheet, Shown, many
 
 
 class MeasuredError(SceneError):
@@ -134,7 +134,7 @@ class Track(Shown):
         named = f'"{self.name}"' if self.name else "track"
         text = f"{named} of {self.source}: {len(self)} points"
         if self.skipped:
-            text += f", {counted(self.skipped, 'line')} without a position"
+            text += f", {many(self.skipped, 'line')} without a position"
         return text
 
     def sheet(self) -> Sheet:
@@ -142,15 +142,6 @@ class Track(Shown):
         columns = (("time, s", self.t), ("x, m", self.x), ("y, m", self.y))
         rows = tuple((name, f"{v.min():.4g}", f"{v.max():.4g}") for name, v in columns)
         return Sheet(self.said(), ("", "least", "most"), rows)
-
-
-def counted(number: int, thing: str) -> str:
-    """Return a number of things.
-
-    >>> counted(1, "line"), counted(3, "line")
-    ('1 line', '3 lines')
-    """
-    return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
 ROUNDING = 1e-9
@@ -216,7 +207,7 @@ class Residuals(Shown):
             lines = self.track.lines[outside]
             if len(lines):
                 span = f"line {lines[0]}" if len(lines) == 1 else f"lines {lines[0]} to {lines[-1]}"
-                parts.append(f"{counted(len(lines), 'point')} {where} ({span})")
+                parts.append(f"{many(len(lines), 'point')} {where} ({span})")
         return " and ".join(parts)
 
     def sheet(self) -> Sheet:

@@ -5,6 +5,9 @@ It has lines of JSON. The first one is about the sweep, and has the process that
 one has the number that a block of rows begins with, the rows as text, and the SHA-256 of what
 stands in all lines up to there: a line that is changed, doubled, moved or missing is found. It is
 no protection against rows whose hashes were computed for them.
+
+SQLite would lock and sync as well. It could not name the line that was changed or the process that
+still writes, leaves a journal beside the file when it is killed, and needs the hashes all the same.
 """
 
 from __future__ import annotations
@@ -68,11 +71,8 @@ def part_of(out: Path) -> Path:
 def unfinished(out: Path, plan: Plan, *, resume: bool) -> Iterator[Part]:
     """Keep the finished rows of a sweep until all are; with `resume`, from those that are there.
 
-    Raises
-    ------
-    InputError
-        If the file is of another sweep, not as it was written, there although not to `resume`, of
-        a sweep that still runs, or cannot be written.
+    Raises an `InputError` if the file is of another sweep, not as it was written, there although
+    not to `resume`, of a sweep that still runs, or cannot be written.
     """
     part, complete = Part(part_of(out), plan), False
     try:
@@ -85,17 +85,10 @@ def unfinished(out: Path, plan: Plan, *, resume: bool) -> Iterator[Part]:
 
 
 class Part:
-    """The file, open and locked.
-
-    Attributes
-    ----------
-    path : Path
-        Where it is.
-    done : dict of int to (str, dict of str to ndarray)
-        The finished rows as text and as columns, by the numbers that their blocks begin with.
-    """
+    """The file, open and locked."""
 
     def __init__(self, path: Path, plan: Plan) -> None:
+        # The finished rows as text and as columns, by the numbers that their blocks begin with.
         self.done: dict[int, tuple[str, Columns]] = {}
         self.path, self._plan = path, plan
         self._chain = hashlib.sha256()
@@ -119,18 +112,32 @@ class Part:
         mine = start + b', "process": %10d}\n' % os.getpid()
         self._chain.update(start)
         first = self._file.readline(LONGEST)
+        found = _object(first)
         # It may have been cut off in its first line, and then has no rows.
         new = not first.endswith(b"\n") and (mine.startswith(first) or first.startswith(start))
         self._ours = new
-        if not new and not resume:
-            raise InputError(
-                f"{self.path} holds the finished rows of a sweep that was interrupted: go on"
-                " with --resume, or remove the file"
-            )
-        if not new:
-            self._check_same(first, json.loads(mine))
-            if len(first) != len(mine) or not first.startswith(start):
-                raise InputError(f"{self.path}, line 1: not as it was written: remove the file")
+        told = json.loads(mine)
+        other = ", ".join(words for key, words in WORDS.items() if found.get(key) != told[key])
+        faults = (
+            (
+                not resume,
+                " holds the finished rows of a sweep that was interrupted: go on with --resume, or"
+                " remove the file",
+            ),
+            (not found, " holds no rows of a sweep: remove it, or choose --out"),
+            (
+                other,
+                f" is of another sweep, with a difference in {other}: repeat that command, or"
+                " remove the file and begin anew",
+            ),
+            (
+                len(first) != len(mine) or not first.startswith(start),
+                ", line 1: not as it was written: remove the file",
+            ),
+        )
+        wrong = "" if new else next((said for bad, said in faults if bad), "")
+        if wrong:
+            raise InputError(f"{self.path}{wrong}")
         self._file.seek(0)
         self._file.write(mine)
         self._file.flush()
@@ -140,17 +147,6 @@ class Part:
         synced(self.path)
         self._ours = True
 
-    def _check_same(self, first: bytes, head: dict[str, Any]) -> None:
-        """Refuse a file whose first line is not that of this sweep, and say in what it differs."""
-        found = _object(first)
-        if not found:
-            raise InputError(f"{self.path} holds no rows of a sweep: remove it, or choose --out")
-        if other := [words for key, words in WORDS.items() if found.get(key) != head[key]]:
-            raise InputError(
-                f"{self.path} is of another sweep, with a difference in {', '.join(other)}:"
-                " repeat that command, or remove the file and begin anew"
-            )
-
     def _read(self) -> int:
         """Read the finished blocks, and return how many bytes they take."""
         length = 0
@@ -159,29 +155,23 @@ class Part:
             # The last one may have been cut off.
             if not line.endswith(b"\n") and len(line) < LONGEST:
                 break
-            try:
-                begin, text, columns = self._block(line)
-            except (ValueError, TypeError, RecursionError, csv.Error):
+            sound, plan = False, self._plan
+            with suppress(ValueError, TypeError, RecursionError, csv.Error):
+                begin, text, _ = json.loads(line)
+                genuine = line == self._line(begin, text) and begin not in self.done
+                columns = columns_of((*plan.keys, *COLUMNS, *TEXTS), text)
+                given = np.stack([columns[key] for key in plan.keys], axis=1)
+                planned = plan.block(begin, begin + plan.begins.step).values
+                sound = genuine and begin in plan.begins and np.array_equal(given, planned)
+            if not sound:
                 raise InputError(
                     f"{self.path}, line {number}: not as it was written: rows have been changed,"
                     " doubled, moved or removed. Remove this line and all after it and go on with"
                     " --resume, which simulates them again; or remove the file and begin anew"
-                ) from None
+                )
             self.done[begin] = text, columns
             length += len(line)
         return length
-
-    def _block(self, line: bytes) -> tuple[int, str, Columns]:
-        """Return what a line says; a ValueError or the like if it cannot be the next one."""
-        begin, text, _ = json.loads(line)
-        if line != self._line(begin, text) or begin in self.done or begin not in self._plan.begins:
-            raise ValueError
-        columns = columns_of((*self._plan.keys, *COLUMNS, *TEXTS), text)
-        given = np.stack([columns[key] for key in self._plan.keys], axis=1)
-        planned = self._plan.block(begin, begin + self._plan.begins.step).values
-        if not np.array_equal(given, planned):
-            raise ValueError
-        return begin, text, columns
 
     def add(self, begin: int, columns: Columns) -> None:
         """Add a finished block."""

@@ -60,24 +60,12 @@ STEPPED: Final = 1
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Variants to be simulated; can be sent to another process.
+    """Variants to be simulated; can be sent to another process."""
 
-    Attributes
-    ----------
-    scene : Scene
-        What is varied.
-    paths : tuple of str
-        Full paths of the K keys that are, free surfaces by index.
-    values : ndarray, (n, K)
-        The values of each variant.
-    engine : str or None
-        Overrides ``run.engine``.
-    """
-
-    scene: Scene
-    paths: tuple[str, ...]
-    values: Floats
-    engine: str | None = None
+    scene: Scene  # what is varied
+    paths: tuple[str, ...]  # full paths of the K keys that are, free surfaces by index
+    values: Floats  # (n, K); the values of each variant
+    engine: str | None = None  # overrides ``run.engine``
 
     def settings(self, row: int) -> dict[str, float]:
         """Return the values of one variant by path."""
@@ -88,13 +76,9 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
     """Validate the variants of a block, whose keys are plain numbers.
 
     A value is judged by its key, once for each. Rules between keys judge one variant for each
-    combination of the values that they ask for; other keys cannot change what they say.
-
-    Returns
-    -------
-    scene, sound, faults
-        One of the sound variants (None if there is none), the numbers of all of them, and what is
-        wrong with each of the others.
+    combination of the values that they ask for; other keys cannot change what they say. Returned
+    are one of the sound variants (None if there is none), the numbers of all of them, and what is
+    wrong with each of the others.
     """
     values = block.values
     good = np.stack([accepted(*column) for column in zip(block.paths, values.T, strict=True)]).T
@@ -141,6 +125,7 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
         template, which, faults = screened(block)
         yield from ((np.array([row]), one_line(why)) for row, why in faults.items())
     stepped = (block.engine or block.scene.run.engine) in ("contact", "pymunk")
+    stepped |= bool(block.scene.string) or any(kind.outline for kind in block.scene.particles)
     # Members of a family are released, and have their gates, at the same times.
     timed = any(path.endswith(("opens_at", "closes_at", "stream.start")) for path in paths)
     # Whether a release lies on the belt is a matter of the last digits.
@@ -194,9 +179,9 @@ def alone(scene: Scene, engine: str | None = None) -> Recording | str:
     return one_line(str(recording.laws[0])) if recording.laws else recording
 
 
-def row_of(scene: Scene, engine: str | None = None) -> Columns:
+def row_of(scene: Scene) -> Columns:
     """Simulate a scene and return its row; if it cannot be run, one that says why."""
-    found = alone(scene, engine)
+    found = alone(scene)
     return empty(1, found) if isinstance(found, str) else rows(found)
 
 

@@ -29,10 +29,9 @@ from chutelab.results.quantities import measured
 from chutelab.results.stream import told_fates
 from chutelab.scene.quantities import COLUMNS, FORMER, HEAT, PAID, REGISTRY, lookup
 from chutelab.scene.variants import Quantity
-from chutelab.util.arrays import Bools, Ints
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, unquoted, whole, write_lines
-from chutelab.util.tables import Sheet, Shown, frame, number
+from chutelab.util.tables import Sheet, Shown, frame, many, number
 from chutelab.util.versions import library
 
 Rows = Mapping[str, NDArray[Any]]
@@ -96,47 +95,39 @@ FATES = {
 
 
 def rows(recording: Recording, variants: int = 1) -> Columns:
-    """Return the rows of the variants of a recording.
+    """Return the rows of the variants of a recording: of one, or of a family of `variants`.
 
-    Parameters
-    ----------
-    recording : Recording
-        Of one variant; or of as many as there are particles, each on a machine of its own: its
-        scene is a family then.
-    variants : int
-        How many.
+    Those are as many as there are particles then, each on a machine of its own.
     """
     found, scene = empty(variants), recording.scene
     for name in found:
         if name in COLUMNS and lookup(name, scene.surfaces):
             found[name] = measured(recording, name)
     found[TOUCHES] = touches(recording, variants)
-    if scene.outgoing is not None:
-        _tell(found[REASON], recording, np.isnan(arrivals(recording)["t"]).reshape(variants, -1))
-    return found
-
-
-def _tell(reasons: NDArray[Any], recording: Recording, missed: Bools) -> None:
-    """Say what became of those that did not arrive, (V, M), and whose slip went on after that."""
+    if scene.outgoing is None:
+        return found
+    # What became of those that did not arrive, (V, M), and whose slip went on after that.
+    missed = np.isnan(arrivals(recording)["t"]).reshape(variants, -1)
     every, ended = missed.shape[1], recording.ended.reshape(missed.shape)
     restless = ~missed & (ended != REASONS.index("settled"))
     if recording.machine.until != "settled":
         restless[:] = False
     for row in np.flatnonzero((missed | restless).any(axis=1)).tolist():
-        said = []
-        if missed[row].any():
-            # Of several particles a recording is of one variant.
-            fate = (
-                told_fates(Counter(fates(recording)[missed[row]].tolist()))
-                if every > 1
-                else FATES[REASONS[ended[row, 0]]]
+        fate = FATES.get(REASONS[ended[row, 0]])
+        if every > 1 and missed[row].any():  # A recording is of one variant then.
+            fate = told_fates(Counter(fates(recording)[missed[row]].tolist()))
+        found[REASON][row] = "; ".join(
+            f"{f'{some.sum()} of {every} particles' if every > 1 else 'it'} {what}"
+            for some, what in (
+                (missed[row], f"missed the outgoing belt: {fate}"),
+                (
+                    restless[row],
+                    f"arrived, but never came to rest on a belt: {PAID} has only a part",
+                ),
             )
-            many = f"{np.count_nonzero(missed[row])} of {every} particles" if every > 1 else "it"
-            said.append(f"{many} missed the outgoing belt: {fate}")
-        if restless[row].any():
-            many = f"{restless[row].sum()} of {every} particles" if every > 1 else "it"
-            said.append(f"{many} arrived, but never came to rest on a belt: {PAID} has only a part")
-        reasons[row] = "; ".join(said)
+            if some.any()
+        )
+    return found
 
 
 LONGEST: Final = 6
@@ -157,7 +148,18 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
     one surface count as one. Of a crowd the ways that more than `RARE` of it takes are told, the
     most frequent one first, such as ``plate, outgoing | outgoing``.
     """
-    particle, surface = _met(recording)
+    # Particles, and the surfaces that each meets up to its landing.
+    kind = recording.events["kind"]
+    some = (kind == Kind.IMPACT) | (kind == Kind.LANDING) | (kind == Kind.SETTLE)
+    order = some.nonzero()[0]
+    order = order[np.argsort(recording.events["particle"][order], kind="stable")]
+    # Columns are taken, not rows, which are ten times as large.
+    particle, surface = recording.events["particle"][order], recording.events["surface"][order]
+    lands = kind[order] == Kind.LANDING
+    landings = np.cumsum(lands) - lands
+    kept = landings == landings[np.searchsorted(particle, particle)]
+    kept[1:] &= (particle[1:] != particle[:-1]) | (surface[1:] != surface[:-1])
+    particle, surface = particle[kept], surface[kept]
     place = np.arange(len(particle)) - np.searchsorted(particle, particle)
     ways = np.full((recording.count, LONGEST + 1), -1)
     near = place <= LONGEST
@@ -170,8 +172,12 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
             kinds = len(found)
         taken, kinds = taken * some + met + 1, kinds * some
     _, example, taken = np.unique(taken, return_index=True, return_inverse=True)
-    every = [[recording.surfaces[k] for k in way if k >= 0] for way in ways[example].tolist()]
-    names = np.array(list(map(_named, every)), dtype=object)
+    names = np.empty(len(example), dtype=object)
+    for n, way in enumerate(ways[example].tolist()):
+        surfaces = [recording.surfaces[k] for k in way if k >= 0]
+        if len(surfaces) > LONGEST:
+            surfaces[LONGEST - 1 :] = ["and so on"]
+        names[n] = ", ".join(surfaces) or NOTHING
     if recording.count == variants:
         texts: NDArray[Any] = names[taken]
         return texts
@@ -181,27 +187,6 @@ def touches(recording: Recording, variants: int = 1) -> NDArray[Any]:
         often = [names[way] for way, count in counts if count > RARE * len(taken_here)]
         texts[row] = " | ".join(often or [names[counts[0][0]]])
     return texts
-
-
-def _named(surfaces: list[str]) -> str:
-    if len(surfaces) > LONGEST:
-        surfaces[LONGEST - 1 :] = ["and so on"]
-    return ", ".join(surfaces) or NOTHING
-
-
-def _met(recording: Recording) -> tuple[Ints, Ints]:
-    """Return particles and the surfaces that each meets up to its landing, (E,) each."""
-    kind = recording.events["kind"]
-    some = (kind == Kind.IMPACT) | (kind == Kind.LANDING) | (kind == Kind.SETTLE)
-    order = some.nonzero()[0]
-    order = order[np.argsort(recording.events["particle"][order], kind="stable")]
-    # Columns are taken, not rows, which are ten times as large.
-    particle, surface = recording.events["particle"][order], recording.events["surface"][order]
-    lands = kind[order] == Kind.LANDING
-    landings = np.cumsum(lands) - lands
-    kept = landings == landings[np.searchsorted(particle, particle)]
-    kept[1:] &= (particle[1:] != particle[:-1]) | (surface[1:] != surface[:-1])
-    return particle[kept], surface[kept]
 
 
 SUFFIXES: Final = {".csv": "csv", ".parquet": "parquet"}
@@ -255,15 +240,13 @@ def synced(path: Path) -> None:
 def text_of(columns: Rows) -> str:
     """Return rows as lines of CSV, from which `columns_of` gets every bit back."""
     cells = [
-        values.tolist() if name in TEXTS else list(map(_number, values.tolist()))
+        values.tolist()
+        if name in TEXTS
+        # As few digits as give it back, a whole number without a point.
+        else ["" if isnan(x) else repr(x).removesuffix(".0") for x in values.tolist()]
         for name, values in columns.items()
     ]
     return "".join(csv_lines(zip(*cells, strict=True)))
-
-
-def _number(x: float) -> str:
-    """Write a number in as few digits as give it back, a whole one without a point."""
-    return "" if isnan(x) else repr(x).removesuffix(".0")
 
 
 def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
@@ -362,7 +345,7 @@ class Sweep(Shown):
         if len(reasons) > MOST_REASONS:
             notes.append(f"and {len(reasons) - MOST_REASONS:,} other reasons")
         return Sheet(
-            f"{self.title}: {len(self):,} variant{'s' if len(self) != 1 else ''}",
+            f"{self.title}: {many(len(self), 'variant', ',')}",
             ("", "", "least", "most", "rows"),
             tuple(rows),
             texts=2,

@@ -23,8 +23,8 @@ from concurrent.futures import (
 )
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
+from itertools import chain, islice
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from threading import Thread
 from types import ModuleType
 from typing import Any, Final
@@ -96,15 +96,15 @@ class Crew:
         if self.executor is None:
             yield from ((number, work(job)) for number, job in jobs)
             return
-        left, again, deaths = iter(jobs), list[Job](), 0
-        running: dict[Future[Any], Job] = {}
-        job = next(left, None)
+        left, deaths = iter(jobs), 0
+        given: dict[int, Any] = {}  # jobs that are not done, by number
+        running: dict[Future[Any], int] = {}
         while True:
             try:
-                while job is not None and len(running) < self.ahead:
+                for number, job in islice(left, self.ahead - len(running)):
+                    given[number] = job
                     with _without_ctrl_c():
-                        running[self.executor.submit(work, job[1])] = job
-                    job = again.pop() if again else next(left, None)
+                        running[self.executor.submit(work, job)] = number
                 if not running:
                     return
                 finished = wait(running, PATIENCE, FIRST_COMPLETED).done
@@ -113,7 +113,8 @@ class Crew:
                 for future in finished:
                     result = future.result()
                     deaths = 0
-                    yield running.pop(future)[0], result
+                    del given[running[future]]
+                    yield running.pop(future), result
             except BrokenExecutor:
                 deaths += 1
                 if self.anew is None or deaths > ATTEMPTS:
@@ -123,8 +124,7 @@ class Crew:
                     ) from None
                 self.executor.shutdown(wait=False)
                 self.executor = self.anew()
-                again += [*running.values(), *([job] if job is not None else [])]
-                job, running = again.pop(), {}
+                left, given, running = chain(list(given.items()), left), {}, {}
 
 
 @contextmanager
@@ -190,16 +190,15 @@ def _without_ctrl_c() -> Iterator[None]:
 
 def _serve() -> None:
     """Prepare a worker process: it ends when its parent tells it to, or has died."""
+
+    def follow() -> None:
+        if (parent := multiprocessing.parent_process()) is not None:
+            parent.join()
+            os._exit(1)
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    Thread(target=_follow, daemon=True).start()
-
-
-def _follow() -> None:
-    """Wait for the end of the parent, however it comes, and end this process."""
-    if (parent := multiprocessing.parent_process()) is not None:
-        parent.join()
-        os._exit(1)
+    Thread(target=follow, daemon=True).start()
 
 
 def _cluster(address: str) -> Iterator[Crew]:
@@ -259,28 +258,22 @@ def _ask(dask: ModuleType, address: str) -> None:
     """Refuse an address at which no Dask scheduler answers, in time.
 
     A client waits for ever for a server that accepts a connection and says nothing, and prints a
-    traceback of other faults after 20 s. The thread that asks first need not be waited for.
+    traceback of other faults after 20 s.
     """
-    answers: SimpleQueue[str | Exception] = SimpleQueue()
 
     async def ask() -> str:
         security = dask.Security().get_connection_args("client")
         async with dask.rpc(address, connection_args=security) as scheduler:
             return str((await scheduler.identity())["type"])
 
-    def run() -> None:
-        try:
-            answers.put(asyncio.run(ask()))
-        except Exception as error:
-            answers.put(error)
-
-    Thread(target=run, daemon=True).start()
-    found: str | Exception = TimeoutError(f"nothing in {PATIENCE:g} s")
-    with suppress(Empty):
-        found = answers.get(timeout=PATIENCE)
+    try:
+        found = asyncio.run(asyncio.wait_for(ask(), PATIENCE))
+    except TimeoutError:
+        found = f"nothing in {PATIENCE:g} s"
+    except Exception as error:
+        found = " ".join(str(error).split()) or type(error).__name__
     if found != "Scheduler":
-        said = " ".join(f"{found}".split()) or type(found).__name__
-        raise InputError(f"--scheduler {address}: no Dask scheduler answers: {said}")
+        raise InputError(f"--scheduler {address}: no Dask scheduler answers: {found}")
 
 
 AHEAD: Final = 64

@@ -1,4 +1,8 @@
-"""`run`: a machine whose particles meet no other in, a recording out; the core does the rest."""
+"""The event-driven engine: particles move on exact arcs, the next event is solved, not stepped.
+
+It is in C, in `chutelab.core` (exact.c and its files), and shares nothing with the contact
+engine's; here `run` goes from a machine to a recording. There is no contact between particles.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, borrow, constants, dtype, give_back, number
-from chutelab.machine import Machine, moved, origin
+from chutelab.machine import Machine
 from chutelab.results.laws import take
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
@@ -73,25 +77,17 @@ def run(machine: Machine, progress: Progress | None = None, *, apart: bool = Fal
     points = np.equal(machine.particle.radius, 0.0)
     if 0 < np.count_nonzero(points) < points.size and machine.segments.start.ndim == 2:
         raise ValueError("the exact engine has no points beside disks")
-    begin = perf_counter()
-    place = origin(machine)
-    near = moved(machine, -place[0], -place[1])
     module, recorder = borrow(), Recorder(machine, apart=apart)
     try:
-        fill(module, near, max(map(abs, place)), apart)
+        fill(module, recorder.near, max(map(abs, recorder.origin)), apart)
         stalled = follow(module, recorder, progress)
         collect(module, recorder)
         rounds: int = module.structs["Exact"].rounds
-        recording = recorder.finish(
-            engine="exact", steps=rounds, seconds=perf_counter() - begin, origin=place
-        )
-        take(module, recording)
+        record = recorder.finish(engine="exact", steps=rounds)
+        take(module, record)
     finally:
         give_back(module)
-    if stalled is not None:
-        particle, t, (x, y), reason = stalled
-        raise StalledError(particle, t, (x + place[0], y + place[1]), reason, recording)
-    return recording
+    return recorder.whole(record, stalled)
 
 
 def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
@@ -147,10 +143,8 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
     lones["exit_box"] = releases.exit_box
 
 
-def follow(
-    module: Module, recorder: Recorder, progress: Progress | None
-) -> tuple[int, float, tuple[float, float], str] | None:
-    """Run to the end; return which particle first made no progress, when, where, and why."""
+def follow(module: Module, recorder: Recorder, progress: Progress | None) -> StalledError | None:
+    """Run to the end; return which particle first made no progress."""
     stalled, course, events = None, COURSE["PAUSING"], FIRST
     with suppress(EnoughError):
         while course != COURSE["FINISHED"]:
@@ -170,7 +164,7 @@ def follow(
                     ' engine = "contact"'
                 )
             if (why := stuck(course, exact.passed)) and stalled is None:
-                stalled = exact.lone, exact.t, (exact.x, exact.y), why
+                stalled = StalledError(exact.lone, exact.t, (exact.x, exact.y), why)
             if progress is not None:
                 progress(exact.lone / exact.lone_count)
         return stalled

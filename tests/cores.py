@@ -4,6 +4,7 @@ import numpy as np
 
 from chutelab.core import module
 from chutelab.engines import contact as engine
+from chutelab.results.recorder import Recorder
 
 
 class Core:
@@ -51,11 +52,13 @@ class Core:
     def run(self):
         """Run to the end and return the recording; a stall is an error."""
         stalled = self.job.run(None)
-        assert stalled is None, f"stalled: particle, t, place = {stalled}"
+        assert stalled is None, str(stalled)
         return self.recording()
 
     def recording(self):
-        return self.job.recording(self.machine, (0.0, 0.0), 0.0)
+        recorder = Recorder(self.machine)
+        self.job.write(recorder)
+        return recorder.finish(engine="contact", steps=self.job.steps)
 
     def step(self, steps=1):
         """Run on for some steps, making room where it is full; True at the end of the run."""

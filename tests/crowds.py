@@ -85,7 +85,7 @@ def hollow(seed):
         # At the wall, inside, or anywhere near.
         away = one_of(room, room * sqrt(rng.uniform()), arc["radius"] * rng.uniform(0.0, 2.5))
         x = arc["center"] + max(away, 0.0) * np.array([cos(turned), sin(turned)])
-        depths = surface_depths(built, x[None], r, 0.0).values()
+        depths = surface_depths(built, x[None], r, 0.0)
         apart = min((np.hypot(*(x - other)) for other in places), default=inf)
         if apart < 2.0 * r or max(float(depth[0]) for depth in depths) > 1e-9 * r:
             continue

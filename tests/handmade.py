@@ -5,6 +5,7 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 from matplotlib.text import Text
 
 from chutelab import scene
@@ -29,6 +30,11 @@ drop = {DROP}
 friction = {MU}
 """
 EXACT = ("perpendicular", "inclined-40", "inclined-60", "low-speed", "slip", "belt-landing")
+SHOWN = [
+    *("inclined-60", "belt-landing", "free-fall"),
+    *(pytest.param(name, marks=pytest.mark.slow) for name in EXACT[:2] + EXACT[3:5]),
+]
+"""Scenes whose pictures are drawn; those with the most and the longest texts by default."""
 
 
 def t_impact():
@@ -131,13 +137,7 @@ def conveyor(name, start, end, radius, speed):
     return [*runs, Round(name, start, radius, speed=speed), Round(name, end, radius, speed=speed)]
 
 
-def machine_of(
-    *pieces,
-    at=((0.0, 1.0),),
-    stream=(),
-    radius=0.004,
-    **more,
-):
+def machine_of(*pieces, at=((0.0, 1.0),), stream=(), radius=0.004, **more):
     """A machine of these pieces without conveyors, particles released at these places at 0 s."""
     base = build(
         scene.parse('title = "By hand"\n[stream]\nat = [0.0, 1.0]\nvelocity = [0.0, 0.0]\n')
@@ -215,3 +215,17 @@ def seen(figure):
         for text in figure.findobj(Text)
         if text.get_visible() and text.get_text().strip() and text not in hidden
     ]
+
+
+def assert_legible(figure, most):
+    """No text is cut off, smaller than 9 pt, or by more than `most` pixels on another."""
+    boxes = [(text, text.get_window_extent()) for text in seen(figure)]
+    frame = figure.bbox
+    for i, (text, box) in enumerate(boxes):
+        assert text.get_fontsize() >= 9.0 or "mathdefault" in text.get_text()
+        assert frame.x0 <= box.x0 < box.x1 <= frame.x1, text
+        assert frame.y0 <= box.y0 < box.y1 <= frame.y1, text
+        for other, near in boxes[:i]:
+            beside = min(box.x1, near.x1) - max(box.x0, near.x0)
+            above = min(box.y1, near.y1) - max(box.y0, near.y0)
+            assert min(beside, above) < most, (text, other)

@@ -9,7 +9,7 @@ import numpy as np
 
 from chutelab.core.module import Module
 from chutelab.machine import Arcs, Particle, build
-from chutelab.machine.rows import lay
+from chutelab.machine.builder import lay
 from chutelab.scene import from_dict
 
 PERPENDICULAR = """
@@ -53,7 +53,7 @@ def scene_of(**tables):
 
 def nominal(scene):
     """Return where free flight of the nominal particle begins, its velocity, and where it hits."""
-    found = lay(Module(), scene, scene.met(scene.kinds[0], "incoming")[1]).nominal
+    found = lay(Module(), scene, scene.met(scene.kinds[0], "incoming")[1])[1]
     return found["position"], found["velocity"], found["hit"]
 
 

@@ -274,32 +274,23 @@ def inside_surfaces(recording, machine, times):
     return Depth.of(
         depth / r
         for t, x, r in _free(recording, times)
-        for depth in surface_depths(machine, x, r, t).values()
+        for depth in surface_depths(machine, x, r, t)
     )
 
 
 def surface_depths(machine, x, r, t):
-    """Return how deep (m) disks (k, 2), (k,) are in what is there at a time (s).
+    """Return how deep (m) disks (k, 2), (k,) are in each piece that is there at a time (s)."""
+    return [-gap for piece, _, gap in surface_gaps(machine, x, r) if piece.there(t)]
 
-    By numbers of segments and, from there on, of arcs; and in the pulley.
+
+def surface_gaps(machine, x, r):
+    """Yield each piece of a machine, its name, and how far disks (k, 2), (k,) are from it, m.
+
+    By its shape, in which the engines have no part. A wheel is full: its inside is no place to be.
     """
-    s, found = machine.segments, {}
-    for k in np.flatnonzero((s.appears <= t) & (t < s.vanishes)).tolist():
-        d = x - s.start[k]
-        d = d - np.clip(d @ s.tangent[k], 0.0, s.length[k])[:, None] * s.tangent[k]
-        found[k] = r - np.hypot(*d.T)
-    a = machine.arcs
-    for k in np.flatnonzero((a.appears <= t) & (t < a.vanishes)).tolist():
-        # The nearest point is where the ray from the centre meets the arc, or else an end: the
-        # angle from the arc's middle, 0 to pi, clipped to half of its extent.
-        d, middle = x - a.center[k], a.begin[k] + 0.5 * a.extent[k]
-        angle = np.angle((d[:, 0] + 1j * d[:, 1]) * np.exp(-1j * middle))
-        angle = middle + np.clip(angle, -0.5 * a.extent[k], 0.5 * a.extent[k])
-        nearest = a.radius[k] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        found[len(s.length) + k] = r - np.hypot(*(d - nearest).T)
-    if machine.pulley is not None:
-        found["pulley"] = machine.pulley.radius + r - np.hypot(*x.T)
-    return found
+    for piece, name in zip(machine.pieces, machine.names, strict=True):
+        wheel = name == "pulley"
+        yield piece, name, np.hypot(*x.T) - machine.pulley.radius - r if wheel else piece.gap(x, r)
 
 
 def free_from(recording, carried):

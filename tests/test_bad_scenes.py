@@ -83,12 +83,10 @@ def test_a_key_that_is_no_text_is_refused(place):
     [
         ("perpendiculer", "no such file, and no shipped scene of this name; did you mean perp"),
         ("scenes/inclined-30.toml", "did you mean inclined-"),
-        ("nothing-like-it", "there are belt-landing, "),
-        ("", '"": no such file'),
-        ("nul\0byte", "nul\\x00byte: no such file"),
-        ("x" * 5000, "xxx...: no such file"),
+        ("nothing-like-it", "there are belt-landing, "), ("", '"": no such file'),
+        ("nul\0byte", "nul\\x00byte: no such file"), ("x" * 5000, "xxx...: no such file"),
     ],
-)
+)  # fmt: skip
 def test_a_scene_that_is_nowhere_is_answered_with_similar_names(name, says, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     said = message(scene.load, name)
@@ -121,19 +119,12 @@ def test_all_faults_of_a_file_come_in_one_message_conflicts_too():
         scene.parse(text, "all.toml")
     faults = {fault.key: fault.value for fault in caught.value.faults}
     assert faults == {
-        "incoming.speed": -1,
-        "incoming.pulley_radius": scene.MISSING,
-        "plate.distance": "far",
-        "plate.angel_deg": 20,
-        "surface[0].restitution": 2,
-        "surface[1].points[1][1]": pytest.approx(math.nan, nan_ok=True),
-        "stream.count": 0,
-        "run.until": "landed",
-        "particle.spin": True,
-        "stream.interact": True,
-        "surface[0].to": scene.MISSING,
-        "surface[1].name": "a",
-    }
+        "incoming.speed": -1, "incoming.pulley_radius": scene.MISSING, "plate.distance": "far",
+        "plate.angel_deg": 20, "surface[0].restitution": 2,
+        "surface[1].points[1][1]": pytest.approx(math.nan, nan_ok=True), "stream.count": 0,
+        "run.until": "landed", "particle.spin": True, "stream.interact": True,
+        "surface[0].to": scene.MISSING, "surface[1].name": "a",
+    }  # fmt: skip
     lines = str(caught.value).splitlines()
     assert lines[0] == "all.toml: 12 faults"
     assert len(lines) == 13
@@ -198,7 +189,7 @@ def test_a_message_carries_no_terminal_commands():
         ("outgoing.speed=1", "outgoing.drop is missing"),
         ("run.engine=exact,pymunk", "(from --set run.engine=exact,pymunk)"),
     ],
-)
+)  # fmt: skip
 def test_a_bad_override_is_named_as_it_was_given(override, says):
     said = message(scene.parse, 'title = "T"\n' + IN + PLATE + HOOD, "x.toml", [override])
     assert said.startswith("x.toml: ")

@@ -212,7 +212,7 @@ def test_bench_json(tmp_path, monkeypatch):
         (["perpendicular", "--dt", "0"], "1e-07<=x<=0.1"),
         (["perpendicular", "--out", ""], "the name of a folder is empty"),
     ],
-)
+)  # fmt: skip
 def test_what_bench_cannot_use_is_refused(arguments, allowed, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = call(*arguments, code=2)

@@ -13,12 +13,7 @@ from matplotlib.figure import Figure
 
 from chutelab.machine.parts import Thread
 from chutelab.pictures.plots import Window, draw_scene, draw_tracks, overlay, style
-from chutelab.pictures.plots.machinery import (
-    draw_bodies,
-    placed,
-    stream_colours,
-    strings,
-)
+from chutelab.pictures.plots.machinery import draw_bodies, placed, stream_colours, strings
 from chutelab.pictures.plots.scenery import energies, places
 from handmade import Line, machine_of, recording_of
 
@@ -78,11 +73,8 @@ def test_an_angle_that_is_told_counts_more_than_the_sum_of_the_spin():
 
 def test_a_spin_that_an_impact_changes_turns_at_once_with_the_new_one():
     rows = [
-        (0, 0, 0.5, 0, 0, 2),
-        (1, 0, 0.5, 0, 0, 2),
-        (1, 0, 0.5, 0, 0, -3),
-        (2, 0, 0.5, 0, 0, -3),
-    ]
+        (0, 0, 0.5, 0, 0, 2), (1, 0, 0.5, 0, 0, 2), (1, 0, 0.5, 0, 0, -3), (2, 0, 0.5, 0, 0, -3),
+    ]  # fmt: skip
     recording = recording_of(machine_of(FLOOR), rows)
     angle = recording.at([0.5, 1.0, 1.5, 2.0, 2.1]).angle[:, 0]
     assert angle[:4] == pytest.approx([1.0, 2.0, 0.5, -1.0], abs=1e-14)
@@ -99,9 +91,6 @@ def test_a_box_is_drawn_turned_counterclockwise():
     expected = [(0.15, 0.28), (0.15, 0.32), (0.05, 0.32), (0.05, 0.28)]
     assert corners == pytest.approx(np.array(expected), abs=1e-12)
     assert placed(BOX, np.zeros(2), 0.0) == pytest.approx(BOX)
-
-
-# To scale
 
 
 # Streams

@@ -63,7 +63,7 @@ def test_a_bundle_has_an_index_and_a_page_for_each_lesson(web):
         assert files >= {"lesson.gif", "still.png", "machine.png", "end.png"}
         # The teacher's key is in it.
         assert "lesson.toml" not in files
-        assert (web / name / "page.html").stat().st_size <= 400_000
+        assert (web / name / "page.html").stat().st_size <= 450_000
     page = (web / "06-grip-or-slip" / "index.html").read_text(encoding="utf-8")
     assert "The textbook angle is the limit" not in page
     told = (web / "06-grip-or-slip" / "explanation.html").read_text(encoding="utf-8")
@@ -99,7 +99,7 @@ def test_the_bundle_of_all_lessons_is_whole_and_small(tmp_path):
     assert broken_links(tmp_path / "web") == set()
     pages = {path.parent.name: path.stat().st_size for path in tmp_path.rglob("page.html")}
     assert len(pages) == len(shipped_lessons())
-    assert max(pages.values()) <= 400_000
+    assert max(pages.values()) <= 450_000
     assert (
         sum(path.stat().st_size for path in tmp_path.rglob("*.*")) < 12_000_000
     )  # of it the wheel 2 million
@@ -185,23 +185,16 @@ def test_the_same_bundle_has_the_same_bytes(web, tmp_path):
     made = bundle([find(2)], tmp_path / "again")
     for path in made:
         name = path.relative_to(tmp_path / "again")
-        # Pages have links to those lessons that are there.
+        # Pages have links to their neighbours.
         if name.parts[0] == "02-letting-go" and name.name not in ("index.html", "explanation.html"):
             assert path.read_bytes() == (web / name).read_bytes()
-    page = "02-letting-go/explanation.html"
-    assert "../06-grip-or-slip/" in (web / page).read_text(encoding="utf-8")
-    assert "../06-grip-or-slip/" not in (tmp_path / "again" / page).read_text(encoding="utf-8")
 
 
 def test_worksheets_cannot_smuggle_html_in():
-    made = html_of("# Title\n\n![x](lesson.gif)\n\n<script>alert(1)</script> [a](../b/README.md#c)")
+    made = html_of("# Title\n\n![x](lesson.gif)\n\n<script>alert(1)</script>")
     assert "<script>" not in made
     assert "<h1>" not in made
     assert "<img" not in made
-    assert '<a href="../b/index.html#c">a</a>' in made
-    # A lesson that is not there is named, and no link leads to it.
-    assert "see <a>b</a>" in html_of("see [b](../b/README.md)", ["a"])
-    assert '<a href="../a/index.html">' in html_of("[a](../a/README.md)", ["a"])
     # A figure is shown, what lies elsewhere is not.
     assert '<img src="split.png" alt="x" />' in html_of("![x](split.png)")
     for address in ("https://example.com/x.png", "../x.png", "machine.png"):
@@ -241,10 +234,10 @@ def hostile(tmp_path):
     (folder / "scene.toml").rename(folder / SCENE)
     said, name = json.dumps(EVIL), json.dumps(SCENE)
     plan = f'title = {said}\nquestion = {said}\nlevel = "start"\nscenes = [{name}]\n'
-    plan += "[picture]\nwidth = 320\nheight = 180\nfps = 10\nslow = 1\n"
+    plan += f"[[steps]]\nkind = 'explain'\ntext = {said}\nthen = {said}\n"
+    plan += f"[[steps.asks]]\ntext = {json.dumps(f'{EVIL} [x](javascript:alert(1))')}\n"
+    plan += f"[picture]\nwidth = 320\nheight = 180\nfps = 10\nslow = 1\nmachine = {said}\n"
     (folder / "lesson.toml").write_text(plan, encoding="utf-8")
-    sheet = f"# {EVIL}\n\n{EVIL}\n\n[x](javascript:alert(1))\n\n![{EVIL}](lesson.gif)\n"
-    (folder / "README.md").write_text(sheet, encoding="utf-8")
     return folder
 
 

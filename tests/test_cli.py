@@ -282,23 +282,18 @@ def test_a_table_of_very_many_events_is_written_if_it_is_asked_for(monkeypatch):
     assert len(Path("out/events.csv").read_text(encoding="utf-8").splitlines()) == 5
 
 
-def test_a_run_says_what_it_wrote_and_only_chooses():
+def test_a_run_says_what_it_wrote_only_chooses_and_other_files_are_left():
+    Path("out").mkdir()
+    Path("out/notes.txt").write_text("mine", encoding="utf-8")
+    Path("out/summary.json").write_text("old", encoding="utf-8")
     chosen = ["--only", "json", "--only", "npz,csv"]
     files = ["events.csv", "trajectory.csv", "recording.npz", "summary.json"]
     text = call("run", "perpendicular", "--out", "out", *chosen).stdout
     assert f"wrote into out: {', '.join(files)}\n" in text
-    assert {path.name for path in Path("out").iterdir()} == set(files)
+    assert {path.name for path in Path("out").iterdir()} == {*files, "notes.txt"}
+    assert Path("out/notes.txt").read_text(encoding="utf-8") == "mine"
+    assert list(json.loads(Path("out/summary.json").read_text(encoding="utf-8"))) == TOP
     assert call("run", "perpendicular", "--quiet", "--out", "quiet", *chosen).output == ""
-
-
-def test_a_second_run_replaces_its_own_files_and_leaves_others():
-    out = Path("out")
-    out.mkdir()
-    (out / "notes.txt").write_text("mine", encoding="utf-8")
-    (out / "summary.json").write_text("old", encoding="utf-8")
-    call("run", "perpendicular", "--out", "out", "--only", "json")
-    assert (out / "notes.txt").read_text(encoding="utf-8") == "mine"
-    assert list(json.loads((out / "summary.json").read_text(encoding="utf-8"))) == TOP
 
 
 def test_a_destination_that_cannot_be_is_refused_before_the_run(monkeypatch):
@@ -452,18 +447,11 @@ def test_a_reader_that_has_gone_or_a_full_device_is_no_reason_for_a_traceback():
 @pytest.mark.parametrize(
     "arguments",
     [
-        "run slip --out",
-        "live slip -o",
-        "sweep slip --vary plate.angle_deg=0,1 --plot",
-        "compare slip --data",
-        "show",
-        "new",
-        "lesson show",
-        "lesson new",
-        "lesson page -o",
+        "run slip --out", "live slip -o", "sweep slip --vary plate.angle_deg=0,1 --plot",
+        "compare slip --data", "show", "new", "lesson show", "lesson new", "lesson page -o",
         "lesson grade",
     ],
-)
+)  # fmt: skip
 def test_a_name_that_no_file_can_have_is_refused(arguments, name, says):
     assert says in refused(*arguments.split(), name)
 
@@ -472,22 +460,17 @@ def test_a_name_that_no_file_can_have_is_refused(arguments, name, says):
 @pytest.mark.parametrize(
     "arguments",
     [
-        "run slip --out /proc/x",
-        "sweep slip --vary incoming.speed=1,2 --out /proc/x.csv",
+        "run slip --out /proc/x", "sweep slip --vary incoming.speed=1,2 --out /proc/x.csv",
         "sweep slip --vary incoming.speed=1,2 --plot /proc/x.png",
         "sweep slip --uncertainty incoming.speed=2±0.1 --plot /proc/x.png",
         "live slip -o /proc/x.html",
         "solve slip --vary incoming.speed=1:2 --minimize belt_work --out /proc/x",
-        "compare slip --data perpendicular-track --out /proc/x",
-        "bench slip --out /proc/x",
-        "figure 6 --out /proc/x",
-        "lesson build 1 --force --out /proc/x",
-        "lesson page 1 -o /proc/x",
-        "lesson new /proc/x",
-        "lesson grade mine.ipynb --out /proc/x.csv",
-        "new /proc/x.toml",
+        "compare slip --data perpendicular-track --out /proc/x", "bench slip --out /proc/x",
+        "figure 6 --out /proc/x", "lesson build 1 --force --out /proc/x",
+        "lesson page 1 -o /proc/x", "lesson new /proc/x",
+        "lesson grade mine.ipynb --out /proc/x.csv", "new /proc/x.toml",
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_written_to_is_refused_before_the_work(arguments, monkeypatch):
     """Nothing is simulated, searched, drawn or marked."""
     Path("mine.ipynb").write_text("{}", encoding="utf-8")
@@ -496,19 +479,12 @@ def test_what_cannot_be_written_to_is_refused_before_the_work(arguments, monkeyp
         pytest.fail("the work has begun")
 
     works = (
-        "engines.simulation.judged",
-        "studies.sweep.swept_by",
-        "studies.sweep.sweep_to",
-        "studies.design.uncertainty",
-        "studies.design.minimize",
-        "studies.measured.residuals",
-        "checks.workprecision.measure",
-        "pictures.live.page.html",
-        "classroom.grading.grade",
-        "pictures.plots.figure.paper_figure",
-        "classroom.lessons.building.judged",
+        "engines.simulation.judged", "studies.sweep.swept_by", "studies.sweep.sweep_to",
+        "studies.design.uncertainty", "studies.design.minimize", "studies.measured.residuals",
+        "checks.workprecision.measure", "pictures.live.page.html", "classroom.grading.grade",
+        "pictures.plots.figure.paper_figure", "classroom.lessons.building.judged",
         "classroom.lessons.pages._lesson",
-    )
+    )  # fmt: skip
     # All imported first: one that is imported later would keep what stands for another's.
     modules = [import_module(f"chutelab.{work.rpartition('.')[0]}") for work in works]
     for module, work in zip(modules, works, strict=True):

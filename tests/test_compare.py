@@ -56,13 +56,11 @@ def from_events(recording):
 
 
 CASES = [
-    ("perpendicular", ()),
-    ("inclined-20", ()),
+    ("perpendicular", ()), ("inclined-20", ()),
     ("inclined-60", ("outgoing.speed=-1.5", "stream.rate=40")),
-    ("low-speed", ("particle.mass=0.3",)),
-    ("slip", ()),
+    ("low-speed", ("particle.mass=0.3",)), ("slip", ()),
     ("stream-independent", ("stream.count=30",)),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "overrides"), CASES)

@@ -19,13 +19,7 @@ from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
 from cores import Core
 from crowds import crowd, hop_step
-from machines import (
-    SLIDES,
-    box,
-    over_the_pulley,
-    ramp,
-    scene_of,
-)
+from machines import SLIDES, box, over_the_pulley, ramp, scene_of
 from references import (
     first_impacts,
     henderson,
@@ -55,8 +49,7 @@ def dilute(seed, count, *, spin, gravity):
 @pytest.mark.parametrize(
     ("seed", "count", "spin", "gravity"),
     [
-        (0, 60, True, G),
-        (1, 60, False, 0.0),
+        (0, 60, True, G), (1, 60, False, 0.0),
         *(pytest.param(seed, 200, spin, g, marks=pytest.mark.slow)
           for seed in range(3) for spin in (True, False) for g in (0.0, G)),
     ],
@@ -185,9 +178,6 @@ def test_rides_and_slides_come_to_what_exact_says_in_second_order(machine, most)
         for name, factor in (("t", 100.0), ("velocity_after", 1000.0)):
             off = np.abs(told[name] - left[name]).max(initial=0.0)
             assert off < factor * dt**2, (dt, name, off)
-
-
-# A heap
 
 
 # Crowds

@@ -1,21 +1,17 @@
 """The contact engine in the core, through its arrays: what no scene file can ask for."""
 
 import hashlib
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
-from importlib.resources import files
 from math import cos, hypot, inf, sin
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from chutelab.core.module import Status, constants, dtype
-from chutelab.machine import build
+from chutelab.core.module import Status, constants
 from chutelab.results import Kind
-from chutelab.scene import load
 from cores import Core, modes
 from machines import boxed, face, of_sizes, scene_of, thrown
 
@@ -233,51 +229,6 @@ def test_sleepers_on_a_belt_ride_it_and_fall_off_its_end():
         assert x[1] - x[0] == pytest.approx(0.5 * speed, abs=1e-6)
 
 
-# The same bits elsewhere
-
-
-def memory_of(module):
-    """Return all bytes of a module's memory, from 0 on."""
-    return module._bytes.tobytes()
-
-
-def all_bytes(core):
-    """Run in slices of 64 steps, as the other host does, and return knots, events and ledger."""
-    drained, status = {"knot": [], "event": []}, None
-    while True:
-        status = Status(core.module.run("run", 64, Status.LACKING))
-        for what, kept in drained.items():
-            count = getattr(core.world, f"{what}_count")
-            kept.append(core.module.array(f"{what}s", dtype(what.title()), count).tobytes())
-            setattr(core.world, f"{what}_count", 0)
-        if status is Status.DONE:
-            break
-        assert status in (Status.PAUSED, Status.FULL)
-    books = core.module.array("books", np.dtype("<f8"), 3 * (core.job.owners + 1)).tobytes()
-    return b"".join(drained["knot"] + drained["event"]) + books
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
-@pytest.mark.parametrize("crowded", [False, True])
-def test_in_node_it_does_the_same_to_the_bit(tmp_path, crowded):
-    if crowded:
-        machine = build(load("stream", ["stream.count=60", "particle.spin=true"]))
-    else:
-        machine = build(load("perpendicular", ["incoming.friction=0.5", 'run.until="settled"']))
-    core = Core(machine)
-    # All of the memory: the core's own data are as `_initialize` left them in both.
-    (tmp_path / "memory").write_bytes(memory_of(core.module))
-    here = files("chutelab.core")
-    script = Path(__file__).with_name("contact_in_node.mjs")
-    command = ["node", str(script), str(here / "core.wasm"), str(here / "layout.json")]
-    subprocess.run(
-        [*command, str(tmp_path / "memory"), str(tmp_path / "out")], check=True, timeout=60
-    )
-    mine, its = all_bytes(core), (tmp_path / "out").read_bytes()
-    assert len(mine) == len(its) > 1000
-    assert mine == its
-
-
 def test_the_host_knows_the_statuses_of_the_core():
     assert {status.name: status.value for status in Status} == constants("Status")
 
@@ -312,12 +263,10 @@ def test_a_compiled_core_that_is_kept_costs_only_time(tmp_path):
     good = whole.read_bytes()
     foreign = good[32:].replace(b"wasmtime", b"wastetim")
     spoilt = {
-        "missing": None,
-        "cut off": good[:1000],
+        "missing": None, "cut off": good[:1000],
         "damaged": good[:150_000] + bytes([good[150_000] ^ 255]) + good[150_001:],
-        "foreign": hashlib.sha256(foreign).digest() + foreign,
-        "another's": good,
-    }
+        "foreign": hashlib.sha256(foreign).digest() + foreign, "another's": good,
+    }  # fmt: skip
     for name, found in spoilt.items():
         kept = tmp_path / name / whole.relative_to(tmp_path / "whole")
         kept.parent.mkdir(parents=True, mode=0o700)

@@ -253,18 +253,6 @@ def test_in_an_elastic_hollow_without_gravity_a_crowd_keeps_its_energy(seed, ext
     assert LOSSES in {broken.law for broken in judge(planted)}
 
 
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
-@pytest.mark.parametrize("friction", [0.0, 0.2, 0.5])
-@pytest.mark.parametrize("seed", [0, 1, 2, 3, 24, 60])
-def test_in_a_hollow_without_gravity_a_crowd_only_loses(seed, friction, restitution):
-    for spin in (False, True):
-        recording = hollow_crowd(seed, pi, restitution, friction, spin=spin, run={"until": 0.5})
-        books = ledger(recording)
-        assert residual(recording) < 1e-12
-        assert judge(recording) == ()
-        assert min(books.restitution_loss, books.friction_loss) >= 0.0
-
-
 @pytest.mark.parametrize("count", [60, pytest.param(300, marks=pytest.mark.slow)])
 def test_no_crowd_in_hollows_breaks_a_law(count):
     """And those in which one had sunk in, came over a slit's end, or lay in a wedge of two."""
@@ -463,12 +451,6 @@ def test_a_particle_waits_until_a_gate_in_its_place_opens():
         recording = run(thrown(machine, [[0.1 * n, 0.0] for n in range(count)]))
         released = recording.select(Kind.RELEASE)["t"]
         np.testing.assert_allclose(released, 0.2, rtol=0, atol=1e-12)
-
-
-# Mixtures
-
-
-# Inclined belts
 
 
 # Rolling friction

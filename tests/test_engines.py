@@ -75,11 +75,6 @@ def released(places, velocities, times, *, surface=FAR, until=0.2, dt=1e-3, spin
     return replace(machine, releases=releases)
 
 
-def pair(velocities, *, offset=0.0, **told):
-    """The second is released at 0.05 s where the first one comes to."""
-    return released([(0.0, 1.0), (0.1, 1.0 + offset)], velocities, (0.0, 0.05), **told)
-
-
 def last(recording, what="position"):
     return np.array([recording.track(n)[-1][what] for n in range(recording.count)])
 
@@ -161,34 +156,6 @@ def test_nothing_is_too_fast_to_be_stopped(engine, dt, speed, lean):
     assert last(recording)[0] == pytest.approx(far, abs=1e-11)
 
 
-@settings(max_examples=40)
-@given(
-    offset=st.floats(-1.8 * R, 1.8 * R),
-    restitution=st.floats(0.05, 1.0),
-    friction=st.floats(0.0, 2.0),
-    spin=st.booleans(),
-)
-def test_two_disks_keep_momentum_and_turn(offset, restitution, friction, spin):
-    given_ = {"restitution": restitution, "friction": friction, "spin": spin, "until": 0.1}
-    recording = contact.run(pair([(1.0, 0.0), (-1.0, 0.0)], offset=offset, **given_))
-    # Line of centres at the touch, from the first to the second.
-    c = np.array([sqrt(4.0 * R**2 - offset**2), offset]) / (2.0 * R)
-    t = np.array([-c[1], c[0]])
-    relative = np.array([2.0, 0.0])
-    push = 0.5 * M * (1.0 + restitution) * (relative @ c)
-    mass = 0.5 * M / 3.0 if spin else 0.5 * M
-    rub = np.clip(mass * (relative @ t), -friction * push, friction * push)
-    first = np.array([1.0, 0.0]) - (push * c + rub * t) / M
-    second = np.array([-1.0, 0.0]) + (push * c + rub * t) / M
-    assert last(recording, "velocity") == pytest.approx(np.array([first, second]), abs=1e-9)
-    spun = -rub * R / (0.5 * M * R**2) if spin else 0.0
-    assert last(recording, "omega") == pytest.approx([spun, spun], abs=1e-6)
-    books = ledger(recording)
-    lost = 0.25 * M * (1.0 - restitution**2) * (relative @ c) ** 2
-    assert books.by_surface["particles"]["restitution_loss"] == pytest.approx(lost, abs=1e-12)
-    assert books.relative_residual < 1e-12
-
-
 def test_a_blow_goes_through_a_row_within_one_step():
     # Five at rest in a row, hair by hair; a sixth comes and the blow goes through them all.
     gap, speed, start = 1e-4, 2.0, 0.1
@@ -256,27 +223,6 @@ def test_a_slide_leaves_few_knots_and_is_a_parabola_between_them(until):
     assert position[:, 0, 1] == pytest.approx(np.full(50, R), abs=1e-5 * R)
 
 
-@both
-@pytest.mark.parametrize("crowded", [False, True])
-def test_off_the_end_of_a_table_it_flies(engine, crowded):
-    # Friction leaves √(v² - 2 µ g L) of its speed at the end of the table; then it falls.
-    table = floor(friction=0.1, ends=(-1.0, 0.3))
-    if crowded:  # with another far away
-        places, velocities = [(0.0, R), (-0.9, R)], [(1.0, 0.0), (0.0, 0.0)]
-        machine = released(places, velocities, (0.0, 0.0), surface=table, until=1.0, gravity=G)
-        recording = ran(engine, machine)
-    else:
-        recording = simulated(engine, table, at=(0.0, R), velocity=(1.0, 0.0), until=1.0)
-    speed = sqrt(1.0 - 2.0 * 0.1 * G * 0.3)
-    end = recording.track(0)[-1]
-    fall = end["t"] - (1.0 - speed) / (0.1 * G)
-    # A step sees the end of the table: it rubs that much longer at most. Slower than √(g r) it
-    # would roll over the end; v = 0.64 m/s is faster.
-    assert end["velocity"][0] == pytest.approx(speed, abs=0.1 * G * 1e-3)
-    assert end["position"][0] == pytest.approx(0.3 + speed * fall, abs=speed * 1e-3)
-    assert end["position"][1] == pytest.approx(R - 0.5 * G * fall**2, abs=G * fall * 1e-3)
-
-
 @all_three
 @pytest.mark.parametrize("name", ["low-speed", "perpendicular"])
 def test_the_ride_stays_on_its_circle_and_is_braked_by_the_belt(engine, name):
@@ -294,21 +240,6 @@ def test_the_ride_stays_on_its_circle_and_is_braked_by_the_belt(engine, name):
     times = np.linspace(0.5, away["t"], 500)
     position, _ = recording.at(times)
     assert np.abs(np.hypot(*position[:, 0].T) / rho - 1.0).max() < 1e-9
-
-
-@both
-def test_a_ride_ends_where_something_is_in_its_way(engine):
-    # A wedge at 45° whose tip lies on the belt: n = (-1, 1)/√2, met r in front of its face.
-    scraper = face("scraper", (-0.5, 0.1), (-0.3, 0.3), restitution=0.5, friction=0.0)
-    recording = simulated(
-        engine, scraper, at=(-1.0, 0.1 + R), velocity=(1.0, 0.0), until=0.55,
-        incoming={"speed": 1.0, "pulley_radius": 0.1},
-    )  # fmt: skip
-    hit = recording.select(Kind.IMPACT, surface="scraper")[0]
-    assert hit["t"] == pytest.approx(0.5 + R - R * sqrt(2.0), abs=1e-12)
-    # (1 + ε) of the normal velocity, 1/√2, is given back along n.
-    after = np.array([1.0, 0.0]) + 1.5 * sqrt(0.5) * np.array([-1.0, 1.0]) / sqrt(2.0)
-    assert hit["velocity_after"] == pytest.approx(after, abs=1e-9)
 
 
 def in_the_way(place, end):
@@ -353,8 +284,7 @@ def belts(places, **values):
 
 
 @pytest.mark.parametrize(
-    ("until", "spin", "restitution"),
-    [(3.0, True, 0.3), (3.0, False, 0.8), ("settled", False, 0.0)],
+    ("until", "spin", "restitution"), [(3.0, True, 0.3), (3.0, False, 0.8), ("settled", False, 0.0)]
 )
 def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restitution):
     # tan 20° < µ: friction holds it against any push. Both belts slip past it: it has not settled.

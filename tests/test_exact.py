@@ -1,18 +1,16 @@
 """The event-driven engine against formulas and differential equations written here."""
 
 from dataclasses import replace
-from math import cos, hypot, radians, sin, sqrt
+from math import cos, hypot, sin, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
 
 from chutelab import machine, scene
 from chutelab.engines import exact, reference
-from chutelab.engines.exact import engine
 from chutelab.machine.releases import Releases
 from chutelab.results import Kind
+from chutelab.results.laws import judge
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
 from chutelab.studies.accuracy import apart, each, sizes
@@ -75,32 +73,6 @@ def test_without_loss_it_bounces_as_high_for_ever():
 # Sliding and rolling
 
 
-@pytest.mark.parametrize(
-    ("spin", "friction", "pull"),
-    [
-        (False, 0.2, sin(0.6) - 0.2 * cos(0.6)),
-        (False, 0.0, sin(0.6)),
-        (False, 0.7, 0.0),
-        (True, 0.7, 2.0 / 3.0 * sin(0.6)),
-        (True, 0.1, sin(0.6) - 0.1 * cos(0.6)),
-    ],
-)
-def test_down_a_slope_of_angle_06(spin, friction, pull):
-    top, down = np.array([0.0, 2.0]), np.array([cos(0.6), -sin(0.6)])
-    normal = np.array([sin(0.6), cos(0.6)])
-    slope = {
-        "name": "slope",
-        "from": top.tolist(),
-        "to": (top + 4.0 * down).tolist(),
-        "friction": friction,
-        "restitution": 0.0,
-    }
-    start = top + 0.5 * down + 0.01 * normal
-    recording = thrown(start.tolist(), [0.0, 0.0], slope, until=0.8, radius=0.01, spin=spin)
-    moved = recording.at([0.8])[0][0, 0] - start
-    np.testing.assert_allclose(moved, 0.5 * pull * G * 0.8**2 * down, rtol=0, atol=1e-13)
-
-
 def test_from_belt_to_wall_it_stays_in_the_corner_and_the_belt_pays_for_heat():
     belt = {"name": "belt", "from": [-1, 0], "to": [2, 0], "friction": 0.3, "speed": 2.0}
     wall = {"name": "wall", "from": [1, -0.5], "to": [1, 1], "restitution": 0.3, "friction": 0.0}
@@ -121,25 +93,6 @@ def test_in_a_vee_it_comes_to_rest_touching_both_sides():
 
 
 # Ends, joints, grazing
-
-
-@given(st.floats(-0.045, 0.045), st.floats(0.0, 1.0))
-def test_a_disk_clips_the_end_of_a_surface(offset, restitution):
-    r, drop = 0.05, 1.0
-    post = {"name": "post", "from": [0, 0], "to": [0, -1], "restitution": restitution}
-    recording = thrown([offset, drop], [0.0, 0.0], {**post, "friction": 0.0}, until=0.6, radius=r)
-    hit = recording.select(Kind.IMPACT)[0]
-    # contact where the centre is r from the end, which is the origin
-    y = sqrt(r**2 - offset**2)
-    normal = np.array([offset, y]) / r
-    before = np.array([0.0, -sqrt(2.0 * G * (drop - y))])
-    np.testing.assert_allclose(hit["position"], [offset, y], rtol=0, atol=1e-14)
-    np.testing.assert_allclose(
-        hit["velocity_after"],
-        before - (1.0 + restitution) * (before @ normal) * normal,
-        rtol=0,
-        atol=1e-12,
-    )
 
 
 R, EDGE = 0.05, {"restitution": 0.0, "friction": 0.0}
@@ -200,103 +153,20 @@ def test_a_slide_into_a_slight_bend_goes_on(bend):
     assert hypot(*end["velocity"]) == pytest.approx(1e-3 - G * bend * 0.4, rel=1e-9)
 
 
-@pytest.mark.parametrize("bend", [3e-12, 1e-11, 1e-10, 1e-9, 1e-8])
-def test_a_slow_disk_stays_on_a_floor_with_a_slight_hollow_bend(bend):
-    """It meets the second piece r/2 times the bend before the first one ends, about rounding."""
+@pytest.mark.parametrize("speed", [0.05, 0.5])
+@pytest.mark.parametrize("bend", [3e-12, 1e-11, 1e-10, 1e-9, 3e-9, 1e-8])
+def test_a_disk_stays_on_a_floor_with_a_slight_hollow_bend(bend, speed):
+    """It meets the second piece r/2 times the bend before the first one ends, about rounding.
+
+    From there on it goes up at `bend`, not along a cubic that starts level: that would be lower by
+    up to 4/27 of the way times the bend.
+    """
     floor = {"name": "floor", "points": [[-1.0, 0.0], [0.0, 0.0], [1.0, bend]], "friction": 0.0}
-    end = thrown([-6e-4, 0.02], [0.05, 0.0], floor, until=1.0, radius=0.02).track(0)[-1]
-    assert end["position"] == pytest.approx([0.0494, 0.02], abs=1e-7)
-
-
-# The ends of moving surfaces
-
-
-def rim_speed(tangent, speed, normal):
-    """Speed of the surface along (n_y, -n_x): v s, s = 1 where n·L >= 0 (L left of it), else -1."""
-    left = np.array([-tangent[1], tangent[0]])
-    return speed if normal @ left >= 0.0 else -speed
-
-
-def blown(normal, velocity, points, *, speed, restitution, friction, spin):
-    """Throw a disk, r = 0.05, at the origin without gravity, to meet it at a normal."""
-    r, way = 0.05, 0.2
-    return run(
-        {
-            "gravity": 0.0,
-            "particle": {"radius": r, "spin": spin, "mass": 0.1},
-            "surface": [
-                {
-                    "name": "belt",
-                    "points": np.asarray(points).tolist(),
-                    "speed": speed,
-                    "restitution": restitution,
-                    "friction": friction,
-                }
-            ],
-            "stream": {
-                "at": (r * normal - way * velocity).tolist(),
-                "velocity": velocity.tolist(),
-            },
-            "run": {"until": 0.3},
-        }
-    )
-
-
-def direction(angle):
-    return np.array([cos(angle), sin(angle)])
-
-
-@given(
-    st.floats(-3.0, 3.0),
-    st.sampled_from([1.0, -1.0]),
-    st.floats(-1.4, 1.4),
-    st.floats(-1.3, 1.3),
-    st.floats(-3.0, 3.0),
-    st.sampled_from([0.0, 0.2, 1.0, 1e6]),
-    st.booleans(),
-)
-def test_the_end_of_a_belt_strikes_like_a_roller(lean, course, turn, aim, speed, friction, spin):
-    # The belt lies along `inward` from the origin and runs towards the origin, or away from it;
-    # the normal is up to 80° off straight out, the way in up to 75° off the normal.
-    inward = direction(lean)
-    tangent = -course * inward
-    normal = direction(lean + np.pi + turn)
-    velocity = -direction(lean + np.pi + turn + aim)
-    # At the very tip, where the rim changes its direction, rounding decides.
-    assume(abs(turn) > 1e-9 and velocity @ inward > 1e-3)
-    restitution, share = 0.6, 1.0 / 3.0 if spin else 1.0
-    far = 2.0 * inward
-    points = [far, [0.0, 0.0]] if course > 0.0 else [[0.0, 0.0], far]
-    recording = blown(
-        normal, velocity, points,
-        speed=speed, restitution=restitution, friction=friction, spin=spin,
-    )  # fmt: skip
-    hit = recording.select(Kind.IMPACT)[0]
-    np.testing.assert_allclose(hit["position"], 0.05 * normal, rtol=0, atol=1e-14)
-    along = np.array([normal[1], -normal[0]])
-    approach = -velocity @ normal
-    slip = velocity @ along - rim_speed(tangent, speed, normal)
-    most = friction * (1.0 + restitution) * approach
-    push = np.clip(-share * slip, -most, most)
-    after = restitution * approach * normal + (velocity @ along + push) * along
-    np.testing.assert_allclose(hit["velocity_after"], after, rtol=0, atol=1e-12)
-    assert hit["omega_after"] == pytest.approx(2.0 * push / 0.05 if spin else 0.0, abs=1e-11)
-
-
-@pytest.mark.parametrize("share", [0.02, 0.3, 0.5, 0.7, 0.98])
-def test_a_belt_bent_sharply_runs_on_round_its_joint(share):
-    # It turns right by 150° at the origin: normals from the first face's to the second's.
-    bend = radians(150.0)
-    first, second = direction(0.0), direction(-bend)
-    normal = direction(0.5 * np.pi - share * bend)
-    recording = blown(
-        normal, -normal, [-first, [0.0, 0.0], second],
-        speed=0.7, restitution=0.5, friction=1e6, spin=False,
-    )  # fmt: skip
-    after = recording.select(Kind.IMPACT)[0]["velocity_after"]
-    np.testing.assert_allclose(
-        after, 0.5 * normal + 0.7 * np.array([normal[1], -normal[0]]), rtol=0, atol=1e-12
-    )
+    run = thrown([-6e-4, 0.02], [speed, 0.0], floor, until=1.0, radius=0.02)
+    assert run.track(0)[-1]["position"] == pytest.approx([speed - 6e-4, 0.02], abs=2e-7)
+    x, y = run.at(np.linspace(0.0, 1.0, 100)).position[:, 0].T
+    assert np.all(y - 0.02 > bend * np.maximum(x, 0.0) - 1e-11 * speed)
+    assert judge(run) == ()
 
 
 # Round the pulley
@@ -390,7 +260,7 @@ def one_of(built, n):
         ("low-speed", ("stream.count=40", "incoming.friction=0.4", "particle.spin=true")),
         ("two-sizes", ("stream[0].interact=false", "stream[1].interact=false")),
     ],
-)
+)  # fmt: skip
 def test_each_of_a_crowd_does_what_it_does_alone(name, overrides):
     built = machine.build(scene.load(name, overrides))
     together = exact.run(built)
@@ -412,7 +282,7 @@ def test_events_at_one_time_go_by_particle():
 
 
 def test_a_run_without_an_end_is_stopped_and_keeps_what_it_recorded(monkeypatch):
-    monkeypatch.setattr(engine, "ROUNDS", 20)
+    monkeypatch.setattr(exact, "ROUNDS", 20)
     floor = {**FLOOR, "restitution": 1.0, "friction": 0.0}
     with pytest.raises(StalledError, match=r"particle 0 .* 20 events.* lower run.max_time") as end:
         thrown([0.0, 0.5], [0.3, 0.0], floor, until=60.0)
@@ -429,8 +299,8 @@ def test_a_run_without_an_end_is_stopped_and_keeps_what_it_recorded(monkeypatch)
 
 def test_a_particle_that_hardly_gets_on_is_stopped(monkeypatch):
     # Two bounces a second are too many here.
-    monkeypatch.setattr(engine, "WINDOW", 4)
-    monkeypatch.setattr(engine, "TICK", 0.5)
+    monkeypatch.setattr(exact, "WINDOW", 4)
+    monkeypatch.setattr(exact, "TICK", 0.5)
     floor = {**FLOOR, "restitution": 1.0, "friction": 0.0}
     period = 2.0 * sqrt(2.0 * 0.25 / G)
     with pytest.raises(StalledError, match=f"4 events took {3.5 * period:.2g} s: .* narrow"):
@@ -441,8 +311,8 @@ def test_a_particle_that_hardly_gets_on_is_stopped(monkeypatch):
 def test_a_run_that_is_looked_at_after_each_event_is_the_same(monkeypatch):
     floor = {**FLOOR, "restitution": 0.9, "friction": 0.2}
     whole = thrown([0.0, 0.5], [0.3, 0.0], floor, until="settled")
-    monkeypatch.setattr(engine, "FIRST", 1)
-    monkeypatch.setattr(engine, "SLICE", 0.0)
+    monkeypatch.setattr(exact, "FIRST", 1)
+    monkeypatch.setattr(exact, "SLICE", 0.0)
     pieces = thrown([0.0, 0.5], [0.3, 0.0], floor, until="settled")
     for array in ("knots", "offsets", "events", "by_surface"):
         assert getattr(whole, array).tobytes() == getattr(pieces, array).tobytes()

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from chutelab.engines import contact, exact
+from chutelab.engines import exact
 from chutelab.machine import build
 from chutelab.scene import from_dict
 from judge import faults
@@ -130,15 +130,3 @@ def test_the_laws_see_an_engine_that_sorts_no_joint(with_fault):
     )
     drawn, run = ran({"radius": 0.008}, JOINTS["end"], (-0.5, 0.0081), (2.0, 0.0))
     assert any(said.startswith("in p1") for said in faults(run, drawn))
-
-
-def test_contact_ends_at_the_same_places():
-    """The other engine, at its own order."""
-    for surfaces, radius, at, velocity, until in [
-        ([PIPE], 0.1, (-0.9, 0.5), (0.0, 0.0), 6.0),
-        (JOINTS["end"], 0.008, (-0.5, 0.0081), (2.0, 0.0), 0.6),
-    ]:
-        drawn, run = ran({"radius": radius}, surfaces, at, velocity, until=until)
-        other = contact.run(build(from_dict(drawn)))
-        end, there = (each.track(0)[-1]["position"] for each in (run, other))
-        np.testing.assert_allclose(end, there, rtol=0, atol=2e-4)

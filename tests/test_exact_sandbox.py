@@ -52,16 +52,12 @@ def test_a_belt_that_is_too_steep_lets_it_slide_back():
 @pytest.mark.parametrize(
     ("degrees", "speed", "friction", "given", "shape"),
     [
-        (12.0, 1.2, "adhesion", None, "disk"),
-        (35.0, 1.7, "adhesion", None, "disk"),
-        (-15.0, 0.6, "adhesion", None, "disk"),
-        (15.0, 1.2, 0.45, 0.2, "disk"),
-        (25.0, 1.0, 0.9, 2.5, "disk"),
-        (20.0, 0.5, 0.3, 3.5, "disk"),
-        (15.0, 1.0, 0.6, 3.5, "spinning disk"),
-        (-10.0, 0.8, 0.2, 0.8, "spinning sphere"),
+        (12.0, 1.2, "adhesion", None, "disk"), (35.0, 1.7, "adhesion", None, "disk"),
+        (-15.0, 0.6, "adhesion", None, "disk"), (15.0, 1.2, 0.45, 0.2, "disk"),
+        (25.0, 1.0, 0.9, 2.5, "disk"), (20.0, 0.5, 0.3, 3.5, "disk"),
+        (15.0, 1.0, 0.6, 3.5, "spinning disk"), (-10.0, 0.8, 0.2, 0.8, "spinning sphere"),
     ],
-)
+)  # fmt: skip
 def test_a_rising_belt_lets_go_where_its_equation_of_motion_says(
     degrees, speed, friction, given, shape
 ):

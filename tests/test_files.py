@@ -24,21 +24,14 @@ def is_number(text):
 @pytest.mark.parametrize(
     ("text", "cell"),
     [
-        ("=1+1", "'=1+1"),
-        ("@SUM(A1:A9)", "'@SUM(A1:A9)"),
-        ("+1+1", "'+1+1"),
-        ("-1-1", "'-1-1"),
-        ("-2*cmd|' /C calc'!A0", "'-2*cmd|' /C calc'!A0"),
-        ("a;=1+1;b", "a;'=1+1;b"),
-        ("\t=1+1", "\t'=1+1"),
-        ("a\r\n =1+1", "a\r\n '=1+1"),
-        ('a;"=1+1;', "a;\"'=1+1;"),
-        ("＝1+1", "'＝1+1"),
-        ("'=1+1", "''=1+1"),
+        ("=1+1", "'=1+1"), ("@SUM(A1:A9)", "'@SUM(A1:A9)"), ("+1+1", "'+1+1"), ("-1-1", "'-1-1"),
+        ("-2*cmd|' /C calc'!A0", "'-2*cmd|' /C calc'!A0"), ("a;=1+1;b", "a;'=1+1;b"),
+        ("\t=1+1", "\t'=1+1"), ("a\r\n =1+1", "a\r\n '=1+1"), ('a;"=1+1;', "a;\"'=1+1;"),
+        ("＝1+1", "'＝1+1"), ("'=1+1", "''=1+1"),
         ("a=b, x+y - 3; see a@b", "a=b, x+y - 3; see a@b"),
         *((text, text) for text in ("", "plate", "-0.5", "+1e-9", "-inf", "1;2")),
     ],
-)
+)  # fmt: skip
 def test_no_text_is_a_formula(text, cell):
     assert harmless(text) == cell
     assert unquoted(cell) == text

@@ -1,11 +1,13 @@
 """Lesson 0: the track is what it says it is, and fits find what the explanation says."""
 
+import re
 from math import pi, sqrt
 
 import numpy as np
 import pytest
 
 from chutelab.classroom.lessons import find, scene_of
+from chutelab.classroom.lessons.sheets import sheet
 from chutelab.classroom.lessons.texts import without_tex
 from chutelab.engines.simulation import simulate
 from chutelab.studies import measured
@@ -33,7 +35,7 @@ def film(lesson):
 
 
 def explained(lesson):
-    return " ".join(without_tex(lesson.text("explanation")).split())
+    return " ".join(without_tex(sheet(lesson, "explanation")).split())
 
 
 def heights(t, e=0.8, g=9.81, h=1.0):
@@ -56,7 +58,19 @@ def test_the_track_is_made_as_the_explanation_says(lesson, film):
     text = (lesson.folder / "ball.csv").read_text(encoding="utf-8")
     assert text == "".join(["made_not_filmed\n", "t,x,y\n", *rows])
     assert (len(film), film.name) == (75, "made_not_filmed")
-    assert "made, not filmed" in lesson.text("README")
+    said = sheet(lesson, "student")
+    assert "made, not filmed" in said
+    # The marks that the worksheet gives: the tops, and the lowest marks beside the bounces.
+    times, tops = (
+        [float(cell) for cell in re.findall(r"\d\.\d+|(?<=\| )0(?= \|)", row)]
+        for row in re.findall(r"^\| \$[ty]\$.*$", said, re.MULTILINE)
+    )
+    y = marks[:, 1]
+    lows = [i for i in range(1, len(y) - 1) if y[i] < min(y[i - 1], y[i + 1])]
+    highs = [i for i in range(1, len(y) - 1) if y[i - 1] < y[i] >= y[i + 1] and y[i] > 0.2]
+    assert times[1::2] == pytest.approx([FRAMES[i] for i in lows[:3]], abs=5e-4)
+    assert times[2::2] == pytest.approx([FRAMES[i] for i in highs[:3]], abs=5e-4)
+    assert tops == [y[0], *(y[i] for i in highs[:3])]
 
 
 def test_the_scene_does_not_tell_what_is_to_be_found(scene):

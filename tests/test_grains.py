@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from chutelab.classroom.lessons import find, scene_of
+from chutelab.classroom.lessons.sheets import sheet
 from chutelab.classroom.lessons.texts import without_tex
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
@@ -18,7 +19,7 @@ SEEDS = range(10)
 
 
 def explained(number):
-    return " ".join(without_tex(find(number).text("explanation")).split())
+    return " ".join(without_tex(sheet(find(number), "explanation")).split())
 
 
 # The hopper

@@ -128,8 +128,7 @@ SHAPE = {
     "stream": {"particle": "b", "count": 2, "seed": 2**53 - 1, "rate": "12.5 t/h"},
 }
 EDITS = {
-    "a value": {"gravity": 3.0},
-    "a default": {"incoming.length": 0.30000000000000004},
+    "a value": {"gravity": 3.0}, "a default": {"incoming.length": 0.30000000000000004},
     "a row by its name": {"surface.wall.speed": -2.5},
     "a row by its number": {"surface[1].radius": 1e-3},
     "part of a point": {"surface[0].from[1]": 5e-324},
@@ -138,7 +137,7 @@ EDITS = {
     "a table that comes": {"run.until": 2.0},
     "the only stream by its number": {"stream[0].count": 7},
     "several": {"particle[1].mass": 0.5, "particle[1].radius": 0.25, "stream.seed": 12},
-}
+}  # fmt: skip
 
 
 def test_keys_that_are_changed_are_those_that_python_changes():

@@ -14,12 +14,14 @@ from live.node import ask, needs_node, page_scene
 pytestmark = needs_node
 
 SCENES = [
-    ("perpendicular",), ("inclined-40",), ("stream", "stream.count=60"), ("slip",), ("spoon",),
-    ("cascade",), ("two-sizes",), ("hopper", "stream.count=150"), ("inclined-conveyor",),
+    ("perpendicular",), ("inclined-40",), ("stream", "stream.count=30"), ("slip",), ("spoon",),
+    ("cascade",), ("two-sizes",), ("hopper", "stream.count=40"), ("inclined-conveyor",),
+    ("perpendicular", "incoming.friction=0.5", "run.until=settled"),
     ("belt-landing",), ("free-fall",), ("low-speed",), ("mixture", "stream.fines.count=30"),
     ("slip", "particle.shape=sphere", "particle.spin=true"),
     *(("stream", "stream.count=20", f"stream.seed={seed}") for seed in (2**32, 2**53 - 1)),
 ]  # fmt: skip
+MANY = [("stream", "stream.count=60"), ("hopper", "stream.count=150")]
 
 
 def same_runs(scenes):
@@ -44,8 +46,9 @@ def same_runs(scenes):
         assert np.array_equal(np.array(answer["books"]), books), given
 
 
-def test_the_pages_host_runs_every_kind_of_scene_as_python_does():
-    same_runs([load(name, overrides) for name, *overrides in SCENES])
+@pytest.mark.parametrize("scenes", [SCENES, pytest.param(MANY, marks=pytest.mark.slow)])
+def test_the_pages_host_runs_every_kind_of_scene_as_python_does(scenes):
+    same_runs([load(name, overrides) for name, *overrides in scenes])
 
 
 @pytest.mark.parametrize("count", [24, pytest.param(200, marks=pytest.mark.slow)])

@@ -41,12 +41,6 @@ def faults(live):
     return {fault.key: fault.allowed for fault in caught.value.faults}
 
 
-def test_a_scene_without_it_offers_everything_and_hides_nothing():
-    live = sc.parse(MACHINE).live
-    assert (live.predict, live.controls, live.panels) == (False, None, None)
-    assert (live.ranges, live.presets) == ({}, ())
-
-
 def test_keys_may_be_written_with_dots_or_as_tables_and_survive_being_written():
     scene = sc.parse(MACHINE + LIVE)
     assert scene.live.ranges == {"plate.angle_deg": (-20.0, 70.0), "stream.count": (1.0, 5.0)}
@@ -81,19 +75,14 @@ def test_drops_are_measured_from_where_the_page_measures_them():
     ("key", "says"),
     [
         ("plate.angel_deg", "did you mean plate.angle_deg?"),
-        ("plat.angle_deg", "did you mean plate?"),
-        ("stream.at[0]", "no stream.at[0]"),
-        ("surface[1].to", "no surface[1]"),
-        ("surface.hod.to", "did you mean surface.hood?"),
-        ("surface.to", "by name"),
-        ("conveyor[0].speed", "no [[conveyor]]"),
-        ("plate", "a whole table"),
-        ("surface[0]", "a whole table"),
-        ("live.predict", "no part of the machine"),
-        ("expect[0].value", "no part of the machine"),
+        ("plat.angle_deg", "did you mean plate?"), ("stream.at[0]", "no stream.at[0]"),
+        ("surface[1].to", "no surface[1]"), ("surface.hod.to", "did you mean surface.hood?"),
+        ("surface.to", "by name"), ("conveyor[0].speed", "no [[conveyor]]"),
+        ("plate", "a whole table"), ("surface[0]", "a whole table"),
+        ("live.predict", "no part of the machine"), ("expect[0].value", "no part of the machine"),
         ("a  b", "no key, such as plate.angle_deg"),
     ],
-)
+)  # fmt: skip
 def test_a_key_that_the_scene_has_not_is_named_wherever_it_stands(key, says):
     text = MACHINE.replace("[[surface]]", '[[surface]]\nname = "floor"\nfrom = [0, 0]\nto = [1, 0]'
                            "\n[[surface]]") if key == "surface.to" else MACHINE  # fmt: skip

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from chutelab.engines.simulation import simulate
 from chutelab.pictures.plots import Window, draw_scene
 from handmade import Line, Round, machine_of
 
@@ -54,39 +54,6 @@ def test_a_roller_shows_how_it_turns(speed, arrow):
     assert said(ax) == [f"roller, 0.5 m/s {arrow}"]
 
 
-def test_a_gate_is_dashed_and_faded_and_says_when_it_moves():
-    ax = drawn(
-        machine_of(
-            Line("wall", (-1.0, 0.5), (-0.1, 0.0)),
-            Line("gate", (-0.1, 0.0), (0.1, 0.0), vanishes=0.4),
-            Line("flap", (0.5, 0.0), (0.9, 0.0), appears=1.25),
-            Line("valve", (0.5, -0.5), (0.9, -0.5), vanishes=0.5),
-            Line("valve", (0.5, -0.5), (0.9, -0.5), appears=2.0),
-        )
-    )
-    look = {one.get_gid(): one for one in ax.lines}
-    assert look["surface wall"].get_linestyle() == "-"
-    assert to_rgb(look["surface wall"].get_color()) == (0.0, 0.0, 0.0)
-    for gate in ("gate", "flap", "valve"):
-        assert look[f"surface {gate}"].is_dashed()
-        assert to_rgb(look[f"surface {gate}"].get_color())[0] == pytest.approx(0.5, abs=0.01)
-    assert set(said(ax)) == {
-        "wall", "gate, opens at 0.4 s", "flap, closes at 1.25 s",
-        "valve, opens at 0.5 s, closes at 2 s",
-    }  # fmt: skip
-
-
-def test_the_name_of_a_gate_is_not_where_it_lets_fall():
-    hopper = [Line("hopper", (s * 0.3, 0.4), (s * 0.05, 0.0)) for s in (-1.0, 1.0)]
-    gate = Line("gate", (-0.05, 0.0), (0.05, 0.0), vanishes=0.4)
-    bin_ = Line("bin", (-0.4, -0.5), (0.4, -0.5))
-    ax = drawn(machine_of(*hopper, gate, bin_))
-    (name,) = [text for text in ax.texts if text.get_text().startswith("gate")]
-    box = name.get_window_extent()
-    (left, low), (right, high) = ax.transData.transform([(-0.05, -0.25), (0.05, 0.0)])
-    assert box.x1 < left or box.x0 > right or box.y1 < low or box.y0 > high
-
-
 PLACES = st.tuples(st.floats(-1.0, 1.0), st.floats(-0.7, 0.7))
 
 
@@ -102,3 +69,16 @@ def test_names_never_lie_on_each_other_or_leave_the_picture(drawn_pieces):
     ax = drawn(machine_of(*pieces), Window(-1.0, 1.0, -0.7, 0.7))
     assert_apart_and_inside(ax)
     assert len(set(said(ax))) == len(ax.texts)
+
+
+@pytest.mark.parametrize("name", ["perpendicular", "inclined-40", "cascade", "inclined-conveyor"])
+def test_thickness_is_drawn_where_no_particle_comes(name):
+    recording = simulate(name)
+    times = np.linspace(*recording.t[[0, -1]], 2000)
+    places = recording.at(times)[0].reshape(-1, 2)
+    ax = drawn(recording.machine)
+    bodies = [one for one in ax.patches if one.get_zorder() < 2.0]
+    assert len(bodies) >= 5
+    for body in bodies:
+        outline = body.get_path().transformed(body.get_patch_transform())
+        assert not outline.contains_points(places[np.isfinite(places[:, 0])]).any()

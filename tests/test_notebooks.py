@@ -2,7 +2,7 @@
 
 import json
 import re
-from math import atan2, degrees, sqrt
+from math import hypot, sqrt
 
 import pytest
 from click.testing import CliRunner
@@ -12,6 +12,9 @@ from chutelab.classroom.book import Book
 from chutelab.classroom.grading import words_of as written_in
 from chutelab.classroom.lessons import LessonError, read, shipped_lessons
 from chutelab.classroom.lessons.building import build_notebook, notebook_of, start
+from chutelab.classroom.lessons.sheets import sheet
+from chutelab.classroom.lessons.steps import data_of, html_of
+from chutelab.classroom.words import LANGUAGES, words
 from chutelab.cli import main
 from chutelab.results.quantities import measure
 from chutelab.util.errors import InputError
@@ -30,9 +33,6 @@ def test_a_translated_worksheet_makes_a_notebook_in_its_language():
     for english in LESSONS:
         lesson = read(english.folder, "de")
         text = notebook_of(lesson)
-        assert bool(text) == ("README.de.md" not in lesson.untranslated)
-        if not text:
-            continue
         made.append(lesson.number)
         path = lesson.folder / "exercise.de.ipynb"
         assert path.read_bytes() == text.encode(), f"run: chutelab lesson build {lesson.number}"
@@ -43,11 +43,11 @@ def test_a_translated_worksheet_makes_a_notebook_in_its_language():
             if cell["cell_type"] == "code":
                 assert source.replace(', language="de"', "") == theirs[cell["id"]]
             else:
-                assert source != theirs[cell["id"]]
+                assert source != theirs[cell["id"]] or "|" in source
                 assert not re.search(r"\b(?:the|and|with|your)\b", re.sub(r"`.*?`", "", source))
         assert 'language="de"' in text.replace("\\", "")
         assert written_in(path) == {}
-    assert {0, 1, 2, 3} <= set(made)
+    assert made == [lesson.number for lesson in LESSONS]
 
 
 def words_of(text):
@@ -61,35 +61,52 @@ def test_shipped_notebooks_are_what_their_lessons_make_of_them(lesson):
 
 
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.name)
-def test_worksheet_and_notebook_ask_the_same(lesson):
-    """All that stands under "Predict" and "Compare" is in the notebook, and each number asked."""
-    text, cells = lesson.text("README"), cells_of(lesson)
-    for part in ("Predict", "Compare"):
-        asked = re.search(rf"^## {part}\n(.*?)^## ", text, re.MULTILINE | re.DOTALL)[1]
-        assert words_of(asked) in words_of(cells[f"{part.lower()}-text"])
-    asked = re.search(r"^## Predict\n(.*?)^## ", text, re.MULTILINE | re.DOTALL)[1]
-    numbers = re.findall(r"^(\d+)\. ", asked, re.MULTILINE)
-    assert eval(cells["predict"].partition("= ")[2]) == dict.fromkeys(map(int, numbers))
-    opening = re.search(r"^# .*?\n(.*?)^## ", text, re.MULTILINE | re.DOTALL)[1]
-    # Of the picture the notebook has its own.
-    opening = re.sub(r"^!\[.*\]\(machine.png\)$", "", opening, flags=re.MULTILINE)
-    assert words_of(opening) in words_of(cells["title"])
-    assert "In a terminal" not in " ".join(cells.values())
-    assert "Write a decimal point, 0.05" in cells["questions-text"]
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_page_worksheet_and_notebook_ask_the_same(lesson, language):
+    """Each text, question, choice and row of each step is on all three."""
+    one = read(lesson.folder, language)
+    paper = words_of(sheet(one, "student"))
+    file = "exercise.ipynb" if language == "en" else f"exercise.{language}.ipynb"
+    cells = json.loads((one.folder / file).read_text(encoding="utf-8"))["cells"]
+    sources = {cell["id"]: "".join(cell["source"]) for cell in cells}
+    book = words_of(" ".join(sources.values()))
+    page = data_of(one.steps, tuple(one.page.live["controls"]), words(language))
+    local = words(language).local
+    for n, (step, told) in enumerate(zip(one.steps, page, strict=True), 1):
+        asked = [step.text, *(part for ask in step.asks for part in (ask.text, *ask.choices))]
+        if step.rows and not all(column.value for column in step.columns):
+            asked += [local(row.head) for row in step.rows]
+        for text in asked:
+            # A value that stands in a text is another one on each.
+            for part in re.split(r"\{(?:gravity|\w+(?:\.\w+)+)\}", text):
+                assert words_of(part) in paper
+                if step.kind != "numbers":
+                    assert words_of(part) in book
+        assert told["kind"] == step.kind
+        assert [ask["text"] for ask in told["asks"]] == [
+            html_of(ask.text, inline=True) for ask in step.asks
+        ]
+        assert [row["set"] for row in told["rows"]] == [row.set for row in step.rows]
+        assert len(told["columns"]) == len(step.columns)
+        if step.kind == "predict":
+            given = re.search(r"\{.*\}", sources[f"step-{n}"], re.DOTALL)[0]
+            assert eval(given) == dict.fromkeys(range(1, len(step.asks) + 1))
+    assert "import math" in sources["machine"]
 
 
 def test_a_new_lesson_has_a_notebook_too(tmp_path):
     folder = start(tmp_path / "my-lesson")
     cells = cells_of(read(folder))
     assert cells["machine"].endswith('book = Book(".")\nbook.machine()')
-    assert '"perpendicular",' in cells["run"]
-    assert {"predict", "compare", "explanation", "live"} <= set(cells)
-    assert not {"name", "questions-text", "progress"} & set(cells)
-    readme = (folder / "README.md").read_text(encoding="utf-8")
-    (folder / "README.md").write_text(readme.replace("everybody", "nobody"), encoding="utf-8")
+    assert cells["step-3"] == "book.note(3)"
+    assert {"step-1", "step-2", "explanation", "step-4"} <= set(cells)
+    assert not {"name", "progress"} & set(cells)
+    plan = (folder / "lesson.toml").read_text(encoding="utf-8")
+    plan = plan.replace("Where does the particle land?", "Where will it land?")
+    (folder / "lesson.toml").write_text(plan, encoding="utf-8")
     built = CliRunner().invoke(main, ["lesson", "build", str(folder)])
     assert "exercise.ipynb: written" in built.stdout
-    assert "nobody" in cells_of(read(folder))["predict-text"]
+    assert "Where will it land?" in cells_of(read(folder))["step-1-text"]
     assert not build_notebook(read(folder)).made
 
 
@@ -97,20 +114,39 @@ def test_cells_of_its_own_stand_where_they_say(tmp_path):
     folder = start(tmp_path / "my-lesson")
     own = folder / "notebook.py"
     own.write_text(
-        "# needs: notebook,fit\n\n# %% Run 1\nfirst = 1\n\n# %% Run 1\nsecond = 2\n\n"
-        "# %% [markdown] Run\n# In *words*.\n#\n# Twice.\n\n# %% Compare\nlast = 3\n",
+        "# needs: notebook,fit\n\n# %% 3\nfirst = 1\n\n# %% 3\nsecond = 2\n\n"
+        "# %% [markdown:en] 2\n# In *words*.\n#\n# Twice.\n\n# %% [markdown:de] 2\n# Deutsch.\n\n"
+        "# %% 4\nlast = 3\n",
         encoding="utf-8",
     )
     build_notebook(read(folder))
     cells = cells_of(read(folder))
-    assert [cells[name] for name in ("run", "run-1-own-1", "compare-own-1")] == [
+    assert [cells[name] for name in ("step-3-own-1", "step-3-own-2", "step-4-own-1")] == [
         "first = 1", "second = 2", "last = 3",
     ]  # fmt: skip
-    assert "In *words*.\n\nTwice." in cells.values()
+    assert cells["step-2-own-1"] == "In *words*.\n\nTwice."
+    assert "Deutsch." in notebook_of(read(folder, "de"))
     assert "chutelab[notebook,fit]" in cells["title"]
     own.write_text("# %% Elsewhere\nx = 1\n", encoding="utf-8")
     with pytest.raises(LessonError, match="no place for a cell # %% Elsewhere"):
         build_notebook(read(folder))
+
+
+def test_a_table_is_filled_by_its_runs_and_explained_by_what_was_expected():
+    """Fall of 0.8 m from 2 and 4 m/s: √(2 h/g), v t, and Pythagoras."""
+    book = Book("the-parabola")
+    rows = {head: [float(cell) for cell in cells] for head, *cells in book.note(3).sheet().rows}
+    for head, v, g in (("2 m/s", 2.0, G), ("4 m/s", 4.0, G), ("Moon", 2.0, 1.62)):
+        t = sqrt(2.0 * 0.8 / g)
+        assert rows[head] == pytest.approx([t, v * t, hypot(v, g * t)], rel=1e-5)
+    assert rows["10 × mass"] == rows["2 m/s"]
+    assert measure(book.noted[3][1], "landing.x") == pytest.approx(rows["4 m/s"][1], rel=1e-5)
+    assert "the time of the fall" not in str(book.predict(1, {1: None}))
+    assert "You expected" not in str(book.explain(4))
+    assert "0.9" in str(book.predict(1, {1: 0.9, 2: 2}))
+    told = str(book.explain(4))
+    assert "You expected: **2** doubles. *It flies twice as far" in told
+    assert "0.404 s" in told
 
 
 def test_a_book_runs_what_is_said_as_on_the_command_line():
@@ -118,7 +154,7 @@ def test_a_book_runs_what_is_said_as_on_the_command_line():
     runs = book.run("throw.toml", "throw.toml --set incoming.speed=4 --set gravity=1.62")
     fall = sqrt(2 * 0.8 / 1.62)
     assert measure(runs[1], "flight.t") == pytest.approx(fall, rel=1e-12)
-    assert "time of the fall, from one belt to the other, s" in runs._repr_html_()
+    assert "time of the fall, s" in runs._repr_html_()
     assert measure(runs[1], "landing.x") == pytest.approx(4.0 * fall, rel=1e-12)
     assert measure(runs[0], "landing.x") == pytest.approx(2.0 * sqrt(2 * 0.8 / G), rel=1e-12)
     page = runs._repr_html_()
@@ -126,19 +162,14 @@ def test_a_book_runs_what_is_said_as_on_the_command_line():
     assert "time of flight, from the first to the second" in page
     assert not re.search(r"engine|rounds|residual|turned over|e-1\d", page + repr(runs[0]))
     # What was not simulated is the theory's, in the same unit; of several particles there is none.
-    sheet = (
-        Book("the-bounce")
-        .run("perpendicular --set run.until=0.6", "perpendicular --set stream.count=2")
+    told = (
+        Book("turning-the-plate")
+        .run("any-angle.toml --set run.until=0.1", "any-angle.toml --set stream.count=2")
         .sheet()
     )
-    rows = {words: cells for words, *cells in sheet.rows}
-    phi2 = rows["angle between plate and velocity, before the impact, degrees"]
-    expected = degrees(atan2(2.0, 0.29685 * G))
-    assert [float(cell) for cell in phi2] == pytest.approx([expected, expected], rel=1e-5)
-    told = str(book.compare({1: 0.4, 2: None, 3: "the same"}))
-    assert "You predicted: 1. 0.4; 3. the same" in told
-    assert "throw.toml --set incoming.speed=4" in told
-    assert "no prediction yet" in str(Book(1).compare({1: None}))
+    rows = {said: cells for said, *cells in told.rows}
+    assert {*rows} >= {"φ2, degrees", "v2', m/s"}
+    assert len(set(rows["v2', m/s"])) == 1
     with pytest.raises(InputError, match="--out: a notebook knows --set"):
         book.run("throw.toml --out here")
 

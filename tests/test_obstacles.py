@@ -75,3 +75,16 @@ def test_a_touch_is_a_contact_and_a_miss_is_none(lines, bends, time):
         throw = Flight(np.array([0.0, -less]), np.array([0.0, 2.0]), 10.0)
         found, _ = first_in_flight(throw, Obstacles.of(lines, bends), 0.03, 0.35)
         assert found == pytest.approx(met, abs=1e-6)
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.3, 0.7])
+def test_what_is_touched_from_the_beginning_is_no_contact_without_an_approach(turned):
+    """A fall along a wall, past its lower end; and a throw along a ceiling, from which it falls."""
+    r, down, along = 0.03, np.array([0.0, -1.0]), np.array([math.cos(turned), math.sin(turned)])
+    wall = Obstacles.of([("wall", (r, 0.0), (r, 1.0))])
+    assert first_in_flight(Flight(np.array([0.0, 0.5]), down, 10.0), wall, r, 1.0) == (math.inf, -1)
+    # Below a ceiling that rises at an angle, in the middle of it.
+    across = np.array([-along[1], along[0]])
+    ceiling = Obstacles.of([("ceiling", tuple(-along), tuple(along))])
+    throw = Flight(-r * across, 2.0 * along, 10.0)
+    assert first_in_flight(throw, ceiling, r, 0.2) == (math.inf, -1)

@@ -104,16 +104,6 @@ def test_a_fixed_step_must_be_shorter_than_what_a_surface_catches(dt, safe):
     assert bool(told) is not safe
 
 
-def test_the_step_that_is_recommended_does():
-    bad = ("run.engine=pymunk", "run.align=false", "run.dt=0.01")
-    (advice,) = look("perpendicular", *bad).advice
-    assert advice.change.startswith("run.align = true, or run.dt = ")
-    dt = advice.change.rpartition(" = ")[2]
-    assert look("perpendicular", *bad, f"run.dt={dt}").advice == ()
-    assert advice.settings == {"run.align": True}
-    assert applied("perpendicular", bad, advice).advice == ()
-
-
 def test_releases_that_wait_for_a_free_place_are_noticed():
     """A thousand a second on one spot, where 158 find room."""
     overrides = ["stream.count=5", "stream.rate=1000", "stream.interact=true"]
@@ -166,8 +156,8 @@ class Clock:
 def reports_by_steps(monkeypatch):
     """Engines report by steps and events alone: a busy machine gets as many as an idle one."""
     monkeypatch.setattr(pymunk, "SLICE", inf)
-    monkeypatch.setattr("chutelab.engines.exact.engine.SLICE", 0.0)
-    monkeypatch.setattr("chutelab.engines.exact.engine.FIRST", 20_000)
+    monkeypatch.setattr("chutelab.engines.exact.SLICE", 0.0)
+    monkeypatch.setattr("chutelab.engines.exact.FIRST", 20_000)
 
 
 @pytest.fixture
@@ -214,7 +204,7 @@ max_time = 1000
 )
 def test_the_bounces_to_come_follow_from_those_that_were(restitution, until, monkeypatch):
     """With ε they are a geometric series, down to 1e-9 m/s; without loss they are all alike."""
-    monkeypatch.setattr("chutelab.engines.exact.engine.FIRST", 1)
+    monkeypatch.setattr("chutelab.engines.exact.FIRST", 1)
     scene = sc.parse(BOUNCE.format(restitution, until))
     shares, whole = looks(scene)
     found = look_at(monkeypatch, scene, len(shares) // 4)
@@ -323,10 +313,12 @@ def applied(name, overrides, advice):
          "off the finite plate", "plate.below"),
         ("perpendicular", ("plate.angle_deg=80", "outgoing.drop_from=top", "outgoing.drop=1"),
          "never meets the plate's line", "plate.angle_deg"),
-        ("perpendicular", ("plate.below=2", ), "outgoing: it crosses plate", "plate.below"),
-        ("free-fall", ("surface.ramp.to=[0.5,-0.1]", ), "floor: it crosses ramp",
+        ("perpendicular", ("run.engine=pymunk", "run.align=false", "run.dt=0.01"),
+         "may pass through", "run.align"),
+        ("perpendicular", ("plate.below=2",), "outgoing: it crosses plate", "plate.below"),
+        ("free-fall", ("surface.ramp.to=[0.5,-0.1]",), "floor: it crosses ramp",
          "surface.ramp.points"),
-        ("perpendicular", ("outgoing.length=0.1", ), "misses the outgoing belt", "outgoing.length"),
+        ("perpendicular", ("outgoing.length=0.1",), "misses the outgoing belt", "outgoing.length"),
         ("perpendicular", ("outgoing.start=1", "outgoing.length=2"), "misses the outgoing belt",
          "outgoing.start"),
     ],
@@ -351,17 +343,6 @@ def test_where_nothing_helps_it_says_what_happens():
     assert advice.change == "if it is meant, leave it; the first contact wins"
 
 
-def test_an_arc_that_is_crossed_is_told_and_a_straight_one_is_cut_off_before_it():
-    crossed = PERPENDICULAR + (
-        '[[surface]]\nname = "peg"\ncenter = [2.0, 0.0]\nradius = 0.1\n'
-        '[[surface]]\nname = "chute"\nfrom = [1.5, 0.0]\nto = [2.0, 0.02]\n'
-    )
-    (advice,) = preflight(sc.parse(crossed)).advice
-    assert advice.warning == "chute: it crosses peg"
-    peg_alone = crossed.replace("to = [2.0, 0.02]", "to = [1.85, 0.02]")
-    assert not preflight(sc.parse(peg_alone)).advice
-
-
 def test_a_run_that_its_bound_stops_is_noticed():
     (advice,) = look("belt-landing", "run.max_time=2").advice
     assert "stopped at t = 2 s by run.max_time, before it is at rest" in advice.warning
@@ -371,8 +352,8 @@ def test_a_run_that_its_bound_stops_is_noticed():
 
 
 def test_pymunk_for_what_exact_does_at_once_is_noticed():
-    (advice,) = look("stream-independent", "run.engine=pymunk").advice
-    assert "10000 particles one after the other" in advice.warning
+    (advice,) = look("stream-independent", "stream.count=100", "run.engine=pymunk").advice
+    assert "100 particles one after the other" in advice.warning
     assert advice.change.startswith('run.engine = "auto"')
     small = look(
         "perpendicular", "run.engine=pymunk", "particle.radius=1e-4", "particle.mass=1e-8"

@@ -3,12 +3,15 @@
 import json
 import math
 import os
+import re
 
 import pytest
 from click.testing import CliRunner
 from markdown_it import MarkdownIt
 
 from chutelab.classroom.exercises import EXERCISES, lesson
+from chutelab.classroom.exercises.exercise import draw
+from chutelab.classroom.exercises.judging import is_rounded
 from chutelab.classroom.grading import LARGEST_RESULT, Grade, grade
 from chutelab.cli import main
 
@@ -134,12 +137,59 @@ def test_the_same_student_twice_and_answers_of_another_are_told(returned):
     again = returned("2.json", result(" ADA "))
     copied = returned("3.json", result("Cleo", answers=result()["answers"]))
     unnamed = returned("4.json", result("Your name", answers={}))
-    assert [row.reason for row in grade([ada, again, copied, unnamed])] == [
+    reasons = [row.reason for row in grade([ada, again, copied, unnamed])]
+    assert [reason.partition(" (by chance: ")[0] for reason in reasons] == [
         "",
         f"same lesson and student as {ada}",
         "answers 1 are right for the numbers of Ada",
         "the name was left at 'your name'",
     ]
+
+
+def test_it_is_told_how_likely_a_copied_answer_is_by_chance(returned):
+    """v = -ε v0 has few values: one of them is right for many; three answers at once are not.
+
+    Shares are counted here among names of this test's own, as a check of those of the grading.
+    """
+    names = [f"pupil {n}" for n in range(400)]
+    rights = [[case.right for case in draw(EXERCISES["the-bounce"], name)[1]] for name in names]
+
+    def told(answers):
+        ada = returned("1.json", result("Ada", answers={}))
+        ben = returned("2.json", result("Ben", answers={str(n): x for n, x in answers.items()}))
+        return [row.reason for row in grade([ada, ben])][1]
+
+    ada = [case.right for case in draw(EXERCISES["the-bounce"], "Ada")[1]]
+    share = sum(is_rounded(ada[0], right[0]) for right in rights) / len(names)
+    said = told({1: ada[0]})
+    chance = re.search(r"are right for the numbers of Ada \(by chance: (.*)\)", said)[1]
+    if chance == "this may be chance":
+        assert share > 0.03
+    else:
+        assert 1.0 / float(chance.removeprefix("1 in ")) == pytest.approx(share, rel=0.6, abs=0.01)
+    assert "(by chance: 1 in 302)" in told({1: ada[0], 2: ada[1], 3: ada[2]})
+    # A mistake with one's own numbers is no sign of copying, whatever it is right for.
+    assert told({1: -right("Ben")}) == ""
+
+
+def test_one_page_tells_of_a_class(returned, tmp_path):
+    answers = {"1": right("Mia Berg"), "2": 2.0 * right("Mia Berg")}
+    returned("1.json", result("Berg, Mia", answers=answers, words={"explain": SAID}))
+    returned("2.json", result("Mia Berg", answers={"1": -right("Mia Berg")}))
+    returned("3.json", "{")
+    page = tmp_path / "class.html"
+    marking = ["lesson", "grade", str(tmp_path / "class"), "--report", str(page), "-q"]
+    assert CliRunner().invoke(main, marking).exit_code == 0
+    text = page.read_text(encoding="utf-8")
+    # One pupil under both names: the numbers are the same ones.
+    assert "<td class=right>✓ right<small>2 tries, 1 hint</small>" in text
+    assert "<td class=wrong>sign or direction<small>2 tries, 1 hint</small>" in text
+    assert "<td class=none>no answer" in text
+    assert "Not counted" in text
+    assert "not a result file: not JSON" in text
+    assert "<td>1 of 2" in text
+    for markup in ("<b>", "<i>", "<img", "<script", "\x1b"):
+        assert markup not in text
 
 
 def test_the_report_keeps_all_files_of_one_name(returned, tmp_path):
@@ -182,7 +232,7 @@ def test_table_csv_json_and_report_tell_of_a_class(returned, tmp_path):
     shown = CliRunner(env={"COLUMNS": "200"}).invoke(main, marking)
     assert shown.exit_code == 0
     assert "1 of 4 (1* 0 0 0)" in shown.output
-    assert out.read_text(encoding="utf-8").splitlines()[1].endswith("Ada,the-bounce,1,0,0,0,1,4,1,")
+    assert "Ada,the-bounce,1,0,0,0,1,4,1,," in out.read_text(encoding="utf-8").splitlines()[1]
     as_json = json.loads(CliRunner().invoke(main, [*marking, "--json"]).output)
     assert [one["student"] for one in as_json["grades"]] == ["Ada", "*Ben* | <i>", ""]
     assert as_json["grades"][0]["revealed"] == [1]

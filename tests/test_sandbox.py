@@ -1,7 +1,7 @@
 """Random machines of all parts and mixtures of all kinds: laws that every run of them must keep."""
 
 from dataclasses import replace
-from math import inf, pi
+from math import inf
 
 import numpy as np
 import pytest
@@ -15,7 +15,9 @@ from chutelab.machine import build
 from chutelab.results import Kind, Recording
 from chutelab.results.laws import judge
 from chutelab.results.ledger import ledger
+from chutelab.results.record import hermite
 from chutelab.scene import from_dict
+from references import surface_gaps
 from sandbox import draw, tables
 
 INSIDE = 0.03
@@ -27,117 +29,46 @@ NEAR = 2e-5
 SLOW, DT = 8.0, 1e-3
 """Blows of less than so many times the weight during a step (s) may count as rest."""
 
-PLACES = 6
-"""Places between two knots at which a track is looked at."""
-
-
-class Geometry:
-    """Distances to the surfaces of a machine, written once more: the engines have their own."""
-
-    def __init__(self, machine):
-        self.segments, self.arcs, self.pulley = machine.segments, machine.arcs, machine.pulley
-        wheel = [-inf] * (machine.pulley is not None)
-        self.appears = np.concatenate([self.segments.appears, self.arcs.appears, wheel])
-        self.vanishes = np.concatenate(
-            [self.segments.vanishes, self.arcs.vanishes, np.negative(wheel)]
-        )
-        owner = np.concatenate(
-            [self.segments.surface, self.arcs.surface, np.zeros(len(wheel), int)]
-        )
-        self.names = [machine.surfaces[n] for n in owner]
-
-    def look(self, place):
-        """Return, of points (M, 2), distance, side and whether the foot is inside: each (P, M)."""
-        rows = []
-        seg, arcs = self.segments, self.arcs
-        for a, b in zip(seg.start, seg.end, strict=True):
-            along, away = b - a, place - a
-            share = away @ along / (along @ along)
-            far = away - np.clip(share, 0.0, 1.0)[:, None] * along
-            side = along[0] * away[:, 1] - along[1] * away[:, 0]
-            rows.append((np.hypot(*far.T), side, (share >= 0.0) & (share <= 1.0)))
-        ends = arcs.ends
-        for n, (center, radius) in enumerate(zip(arcs.center, arcs.radius, strict=True)):
-            x, y = (place - center).T
-            turn = np.mod(np.arctan2(y, x) - arcs.begin[n], 2.0 * pi)
-            on, aside = turn <= arcs.extent[n], np.hypot(x, y) - radius
-            corner = np.minimum(*(np.hypot(*(place - end[n]).T) for end in ends))
-            rows.append((np.where(on, np.abs(aside), corner), aside, on))
-        if self.pulley is not None:
-            aside = np.hypot(*place.T) - self.pulley.radius
-            # A wheel is full: its inside is no place to be.
-            rows.append((aside, aside, np.ones(len(place), dtype=bool)))
-        return tuple(np.array(column) for column in zip(*rows, strict=True))
-
-    def there(self, t):
-        """Which pieces are there at times (M,), (P, M)."""
-        return (self.appears[:, None] <= t) & (t < self.vanishes[:, None])
+PLACES, STRIDE = 6, 0.25
+"""Places between two knots at which a track is looked at, at least, and radii between two."""
 
 
 def of_each(value, count):
     return np.broadcast_to(value, count)
 
 
-def track_places(recording, particle, times):
-    """Times and places on the track of a particle: its knots, some between, and some times."""
+def places_of(recording, particle, radius):
+    """Return times (M,), s, and places (M, 2) on a track: its knots, and as many between that it
+    moves by less than `STRIDE`."""
     track = recording.track(particle)
-    if not len(track):
-        return np.zeros(0), np.zeros((0, 2))
-    t = track["t"]
-    share = np.arange(1, PLACES) / PLACES
-    between = (t[:-1, None] + np.diff(t)[:, None] * share).ravel()
-    own = np.concatenate([between, times[(times >= t[0]) & (times <= t[-1])]])
-    # `at` finds the place of one particle among all: pick the cubic's knots here instead.
-    left = (
-        np.clip(np.searchsorted(t, own, side="right") - 1, 0, len(t) - 2) if len(t) > 1 else own * 0
-    )
-    if len(t) > 1:
-        a, b, h = track[left], track[left + 1], t[left + 1] - t[left]
-        s = np.divide(own - t[left], h, out=np.zeros_like(h), where=h > 0.0)[:, None]
-        h = h[:, None]
-        # The cubic with these ends and these velocities at them.
-        place = (
-            (1.0 - s) ** 2 * ((1.0 + 2.0 * s) * a["position"] + s * h * a["velocity"])
-            + s * s * ((3.0 - 2.0 * s) * b["position"] - (1.0 - s) * h * b["velocity"])
-        )  # fmt: skip
-    else:
-        own, place = np.zeros(0), np.zeros((0, 2))
-    every = np.concatenate([t, own])
-    order = np.argsort(every, kind="stable")
-    return every[order], np.concatenate([track["position"], place])[order]
+    if len(track) < 2:
+        return track["t"], track["position"]
+    step = np.diff(track["t"])
+    fast = np.hypot(*track["velocity"].T).max() + recording.gravity * step
+    count = np.maximum(PLACES, np.ceil(step * fast / (STRIDE * radius))).astype(int)
+    left = np.repeat(np.arange(len(step)), count)
+    share = (np.arange(len(left)) - np.repeat(np.cumsum(count) - count, count)) / count[left]
+    place = np.stack([hermite(track, left, share, axis)[0] for axis in (0, 1)], axis=-1)
+    t = track["t"][left] + share * step[left]
+    return np.append(t, track["t"][-1]), np.append(place, track["position"][-1:], axis=0)
 
 
 def in_surfaces(recording):
-    """Yield what is in a surface by more than it may, or passes one."""
+    """Yield what is in a surface by more than it may: what passes one is, somewhere."""
     machine = recording.machine
-    geometry = Geometry(machine)
-    radius = of_each(machine.particle.radius, machine.count)
-    ends = recording.knots["t"] if len(recording.knots) else np.zeros(1)
-    times = np.linspace(ends.min(), ends.max(), 200)
-    for particle in range(machine.count):
-        t, place = track_places(recording, particle, times)
-        if not len(t) or not len(geometry.names):
-            continue
-        distance, side, over = geometry.look(place)
-        there = geometry.there(t)
-        deep = np.where(there, 1.0 - distance / radius[particle], -inf)
-        for piece in np.flatnonzero(np.isfinite(geometry.appears)):
-            # A gate shuts on no disk: one in it then is not touched until it is clear of it.
-            if not t[0] < geometry.appears[piece] <= t[-1]:
-                continue
-            since = np.flatnonzero(t >= geometry.appears[piece])
-            if deep[piece, since[0]] > 0.0 or deep[piece, since[0] - 1] > -INSIDE:
-                clear = np.flatnonzero(deep[piece, since] <= 0.0)
-                until = since[clear[0]] if len(clear) else len(t)
-                there[piece, since[0] : until] = False
-                deep[piece, since[0] : until] = -inf
-        if deep.max() > INSIDE:
-            piece, at = np.unravel_index(deep.argmax(), deep.shape)
-            yield f"{particle} in {geometry.names[piece]} by {deep.max():.2g} r at {t[at]:.6g} s"
-        passes = (side[:, 1:] * side[:, :-1] < 0.0) & over[:, 1:] & over[:, :-1]
-        passes &= there[:, 1:] & there[:, :-1]
-        for piece, at in np.argwhere(passes):
-            yield f"{particle} through {geometry.names[piece]} at {t[at]:.6g} s"
+    for particle, r in enumerate(of_each(machine.particle.radius, machine.count).tolist()):
+        t, place = places_of(recording, particle, r)
+        for piece, name, gap in surface_gaps(machine, place, r) if len(t) else ():
+            deep = np.where(piece.there(t), -gap / r, -inf)
+            if piece.gate and t[0] < piece.appears <= t[-1]:
+                # It shuts on no disk: one in it then is not touched until it is clear of it.
+                since = np.flatnonzero(t >= piece.appears)
+                if deep[since[0]] > 0.0:
+                    clear = np.flatnonzero(deep[since] <= 0.0)
+                    deep[since[0] : since[clear[0]] if len(clear) else len(t)] = -inf
+            if deep.max() > INSIDE:
+                at = deep.argmax()
+                yield f"{particle} in {name} by {deep[at]:.2g} r at {t[at]:.6g} s"
 
 
 def in_others(recording, most=INSIDE):

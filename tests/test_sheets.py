@@ -50,14 +50,6 @@ def test_sheets_are_printed_and_refuse_what_cannot_be(tmp_path):
         assert raw == said
     made = start(tmp_path / "mine")
     assert "for the teacher" in chutelab("lesson", "show", made, "--sheet", "teacher").output
-    (made / "README.md").write_text("# Mine\n\n## Predict\n\nx\n", encoding="utf-8")
-    result = chutelab("lesson", "show", made, "--sheet", "student")
-    assert result.exit_code == 2
-    assert "a sheet needs the parts ## Run, ## Compare" in result.output
-    (made / "explanation.md").unlink()
-    result = chutelab("lesson", "show", made, "--sheet", "explanation")
-    assert result.exit_code == 2
-    assert "explanation.md: is not there, or empty" in result.output
 
 
 @pytest.mark.parametrize(
@@ -111,14 +103,11 @@ def test_every_sheet_is_a_page_that_is_whole_and_a_pdf_of_a_page_or_two(number, 
     assert "$" not in page.text
     assert "\\" not in page.text
     assert page.tags.count("math") == html_of(sheet(lesson, which)).count("<math")
-    # Room to write: under each prediction, and where one is asked for words of one's own.
-    worksheet = lesson.text("README")
-    asked = worksheet.partition("## Predict")[2].partition("## Run")[0]
-    questions = len(re.findall(r"^\d+\. ", asked, re.MULTILINE))
-    questions += "**In your own words.**" in worksheet
+    # Room to write: under each question without sentences to choose from.
+    questions = sum(not ask.choices for step in lesson.steps for ask in step.asks)
     assert page.classes.count("answer") == (questions if which == "student" else 0)
     pdf = printed(lesson, which, "pdf")
-    assert pages(pdf) <= 3
+    assert pages(pdf) <= 4
 
 
 @pytest.mark.parametrize(
@@ -155,14 +144,14 @@ EVIL = '#panic() \\ " ] [ $ * _ ` <x> @y // /* "); #eval("1")'
 
 def test_no_text_of_a_lesson_is_a_command_of_the_printer(tmp_path):
     folder = start(tmp_path / "mine")
-    for name in ("README", "explanation"):
-        file = folder / f"{name}.md"
-        text = file.read_text(encoding="utf-8")
-        table = f"| {EVIL} | b |\n|---|---|\n| {EVIL} | |\n"
-        more = f"\n\n{EVIL}\n\n- {EVIL}\n\n{table}\n`{EVIL.replace('`', '')}`\n"
-        file.write_text(text + more, encoding="utf-8")
+    table = f"| {EVIL} | b |\n|---|---|\n| {EVIL} | |\n"
+    more = f"\n\n{EVIL}\n\n- {EVIL}\n\n{table}\n`{EVIL.replace('`', '')}`\n"
     plan = (folder / "lesson.toml").read_text(encoding="utf-8")
-    (folder / "lesson.toml").write_text(plan.replace('"Mine"', f"'{EVIL}'"), encoding="utf-8")
+    plan = plan.replace('"Mine"', f"'{EVIL}'")
+    quoted = f"'''{more}'''"
+    for name in ("text", "then"):
+        plan = re.sub(rf"^{name} = .*$", lambda _, n=name: f"{n} = {quoted}", plan, flags=re.M)
+    (folder / "lesson.toml").write_text(plan, encoding="utf-8")
     lesson = read(folder)
     for which in SHEETS:
         assert pages(printed(lesson, which, "pdf")) >= 1
@@ -176,12 +165,17 @@ def test_pictures_beside_a_text_are_in_its_sheets_and_no_others(tmp_path):
     secret = tmp_path / "secret.png"
     Image.new("RGB", (20, 10)).save(secret)
     without = printed(read(folder), "student", "pdf")
-    file = folder / "README.md"
+    file = folder / "lesson.toml"
     text = file.read_text(encoding="utf-8")
-    file.write_text(f"{text}\n![red](red.png)\n", encoding="utf-8")
+
+    def shows(picture):
+        made = text.replace('text = "Sketch its path."', f'text = "Sketch it. ![it]({picture})"')
+        file.write_text(made, encoding="utf-8")
+
+    shows("red.png")
     assert len(printed(read(folder), "student", "pdf")) > len(without)
     assert "data:image/png;base64," in printed(read(folder), "student", "html").decode()
     for name in ("../secret.png", secret, "gone.png", "https://example.com/x.png"):
-        file.write_text(f"{text}\n![it]({name})\n", encoding="utf-8")
+        shows(name)
         assert "data:image/png" not in printed(read(folder), "student", "html").decode()
         printed(read(folder), "student", "pdf")

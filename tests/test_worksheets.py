@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import shutil
 from functools import cache
 from math import acos, atan, cos, degrees, erfc, hypot, log, pi, radians, sin, sqrt, tan
@@ -16,7 +17,7 @@ from chutelab.classroom.exercises import find as find_exercise
 from chutelab.classroom.exercises.exercise import draw, shown
 from chutelab.classroom.lessons import find, scene_of, shipped_lessons
 from chutelab.classroom.lessons.sheets import sheet
-from chutelab.classroom.lessons.texts import without_tex, words_for
+from chutelab.classroom.lessons.texts import without_tex
 from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.results import Kind
@@ -42,7 +43,7 @@ def worksheet(number):
     if number == "physics":
         return without_tex(PHYSICS.read_text(encoding="utf-8"))
     lesson = find(number)
-    texts = (lesson.text("README"), lesson.text("explanation"), lesson.teacher.say)
+    texts = (sheet(lesson, "student"), sheet(lesson, "explanation"), lesson.teacher.say)
     return without_tex("\n\n".join(texts))
 
 
@@ -51,21 +52,6 @@ def commands(text):
     lines = [line for block in blocks for line in block.splitlines()]
     assert all(line.startswith("chutelab ") for line in lines)
     return lines
-
-
-@pytest.mark.parametrize("number", NUMBERS)
-def test_a_worksheet_asks_and_an_explanation_tells_and_both_fit_about_a_page(number):
-    lesson = find(number)
-    asked, told = lesson.text("README"), lesson.text("explanation")
-    head = f"# Lesson {number}. {lesson.title}\n\n"
-    assert asked.startswith(f"{head}![")
-    assert told.startswith(f"{head}*The explanation: open it when your table is filled in.*\n\n![")
-    heads = re.findall(r"^## (.*)$", asked, re.MULTILINE)
-    assert heads == ["Predict", "Run", "Compare", "Afterwards"]
-    assert links(asked.partition("## Afterwards")[2]) == ["explanation.md", "exercise.ipynb"]
-    for text in (asked, told):
-        assert 80 < len(text.split()) < 600
-        assert max(map(len, text.splitlines())) < 240
 
 
 def ends_as_told(line, result):
@@ -98,9 +84,10 @@ def test_commands_of_worksheets_run_as_they_stand(number, line, tmp_path, monkey
     monkeypatch.chdir(tmp_path / "lesson")
     # What --out writes is slow, and tested elsewhere: one file shows that the option is right.
     only = ["--only", "csv"] if "--out" in line and "compare" not in line else []
-    result = chutelab(*line.split()[1:], *only)
+    result = chutelab(*shlex.split(line)[1:], *only)
     assert ends_as_told(line, result)
-    if line.startswith("chutelab run") and "--details" not in line:
+    # A disk that rolls makes next to no heat, and that is told.
+    if line.startswith("chutelab run") and "--details" not in line and "spin" not in line:
         # Nothing of rounding: no zero has a sign, nothing is a trillionth.
         assert not re.search(r"(?<![\w.])-0(?![.\d])|\de-1\d|turned over|engine", result.stdout)
 
@@ -111,7 +98,7 @@ def test_slow_commands_of_worksheets_run_too(number, tmp_path, monkeypatch):
     shutil.copytree(find(number).folder, tmp_path / "lesson")
     monkeypatch.chdir(tmp_path / "lesson")
     for line in commands(worksheet(number)):
-        assert ends_as_told(line, chutelab(*line.split()[1:])), line
+        assert ends_as_told(line, chutelab(*shlex.split(line)[1:])), line
 
 
 def test_commands_of_the_overview_run(tmp_path, monkeypatch):
@@ -119,9 +106,9 @@ def test_commands_of_the_overview_run(tmp_path, monkeypatch):
     text = (find(1).folder.parent / "README.md").read_text(encoding="utf-8")
     for line in commands(text):
         if "page" not in line and "build" not in line:
-            assert chutelab(*line.split()[1:]).exit_code == 0, line
+            assert chutelab(*shlex.split(line)[1:]).exit_code == 0, line
     for lesson in shipped_lessons():
-        row = f"({lesson.folder.name}/README.md) | {lesson.question} | {lesson.level} |"
+        row = f"({lesson.folder.name}/exercise.ipynb) | {lesson.question} | {lesson.level} |"
         assert row in text
 
 
@@ -373,15 +360,15 @@ STATED = {
         "grows: {0.84},": B1[3][1],
         "0.84, {0.80} and": B2[3][1],
         "and {0.74} m/s": B3[3][1],
-        "| 0.05 | {0.550}": 0.55,
-        "| 0.1 | {0.600}": 0.6,
-        "| 0.2 | {0.700}": 0.7,
-        "0.550 | {0.371}": 0.5 * G * 0.275**2,
-        "0.600 | {0.441}": 0.5 * G * 0.3**2,
-        "0.700 | {0.601}": 0.5 * G * 0.35**2,
-        "0.371 | {0.137}": B1[3][2],
-        "0.441 | {0.127}": B2[3][2],
-        "0.601 | {0.112}": B3[3][2],
+        "R = 0.05 m | {0.550}": 0.55,
+        "R = 0.1 m | {0.600}": 0.6,
+        "R = 0.2 m | {0.700}": 0.7,
+        "0.550 | | {0.371}": 0.5 * G * 0.275**2,
+        "0.600 | | {0.441}": 0.5 * G * 0.3**2,
+        "0.700 | | {0.601}": 0.5 * G * 0.35**2,
+        "0.371 | | {0.137}": B1[3][2],
+        "0.441 | | {0.127}": B2[3][2],
+        "0.601 | | {0.112}": B3[3][2],
     },
     4: {
         "20°: φ2 = {56.9}°": plate(20)[0],
@@ -549,16 +536,18 @@ has to be, from formulas written here."""
 
 GIVEN = {
     0: {"1.05", "0.7", "0.8", "9.81", "0.8003", "0.0002", "9.815", "0.008",
-        "0.45", "0.796", "9.83", "2.7", "0.75", "10.0"},
-    1: {"0.2", "0.4", "0.8", "1.62", "9.81"},
-    2: {"0.5", "1.5", "2.3"},
+        "0.45", "0.796", "9.83", "2.7", "0.75", "10.0", "0.5", "1.62",
+        "0.433", "0.800", "1.167", "1.433", "1.733", "1.967", "1.018", "0.658", "0.428", "0.278"},
+    1: {"0.8", "0.9", "1.62", "9.81"},
+    2: {"0.5", "1.5", "2.3", "6.3"},
     3: {"0.5", "0.05", "0.1", "0.2"},
     4: {"0.1", "0.05", "3.2", "0.12", "6.3"},
     5: {"0.1", "0.3", "0.8"},
     6: {"0.5", "6.3"},
-    7: {"0.5", "3.6", "3.3"},
+    7: {"0.05", "0.24", "0.3", "0.048", "0.5", "3.6", "3.3"},
     8: {"0.2", "0.16", "0.1", "0.05", "0.02", "1.2",
-        "9.7e-4", "4.9e-4", "6.5e-4", "7.8e-4", "2.4e-4"},
+        "9.7e-4", "4.9e-4", "6.5e-4", "7.8e-4", "2.4e-4", "9.7e-5", "0.004",
+        "0.4", "0.5", "0.6", "6.3"},
     9: {"0.1", "0.5", "0.05", "0.3"},
     11: {"0.1", "0.2", "0.3", "0.5", "0.8"},
 }  # fmt: skip
@@ -586,16 +575,17 @@ def test_no_number_of_a_worksheet_goes_unlooked_at(number):
     assert found - looked_at - GIVEN.get(number, set()) == set()
 
 
-@pytest.mark.parametrize("number", NUMBERS[:9])
+@pytest.mark.parametrize("number", NUMBERS)
 def test_teachers_sheets_have_a_key_goals_and_every_mistake_that_is_named(number):
     lesson, told = find(number), sheet(find(number), "teacher")
     heads = re.findall(r"^## (.*)$", told, re.MULTILINE)
     assert heads == [
-        "Goals", "What to say", "Key to the predictions", "Key to the exercise",
-        "Mistakes to expect", "Shorter and longer", "Where it sits",
+        "Goals", "Plan", "What to say", "What pupils often believe", "Key to the questions",
+        "Key to the exercise", "Mistakes to expect", "Shorter and longer", "Where it sits",
     ]  # fmt: skip
-    asked = sheet(lesson, "student").partition("## Predict")[2].partition("## Run")[0]
-    assert len(lesson.teacher.predictions) == len(re.findall(r"^\d+\. ", asked, re.MULTILINE))
+    assert len(lesson.teacher.misconceptions) == 3
+    for name in ("NGSS", "IB", "Sekundarstufe II"):
+        assert name in told
     assert f"{lesson.minutes} minutes" in told
     _, cases = draw(find_exercise(number), "your name")
     for case in cases:
@@ -622,22 +612,28 @@ KEYS = {
     "Moon the fall takes 0.994 s, and the particle flies {1.99} m": 2.0 * sqrt(2.0 * 0.8 / 1.62),
     "(2 g): {0.204} m at 2 m/s": 4.0 / (2.0 * G),
     "which is {0.0217} J": 0.008 * G * RC * (1.0 - cos(radians(angle(1.5, RC)))),
-    "by {12} mJ, from 4": 500.0 * 0.008 * (4.0 - 1.0),
-    "12 mJ, from {4} to": 500.0 * 0.008,
-    "to {16} mJ.": 500.0 * 0.008 * 4.0,
+    "4 mJ {12} mJ 16 mJ": 500.0 * 0.008 * (4.0 - 1.0),
+    "from {4} mJ to": 500.0 * 0.008,
+    "4 mJ to {16} mJ.": 500.0 * 0.008 * 4.0,
     "4.28 = {0.70}": 3.0 / DOWN,
-    "of them: at {23.2}°": degrees(slipping(0.5, U0)[0]),
-    "{16} mm, twice its diameter": 4e3 * 0.004,
+    "at {23.2}°, and faster": degrees(slipping(0.5, U0)[0]),
+    "1 mm 8 mm {16} mm": 4e3 * 0.004,
     "keys: at {44.4}°": TWO_KEYS[0],
     "ε = {0.276} the particle lands": TWO_KEYS[1],
 }
+
+
+def keys_of(number):
+    """Right sentences, replies and answers of the questions of a lesson."""
+    asks = [ask for step in find(number).steps for ask in step.asks]
+    return [text for ask in asks for text in (*ask.choices, *ask.replies, ask.answer)]
 
 
 def test_numbers_of_the_keys_are_right():
     texts = {}
     for number in NUMBERS:
         told = find(number).teacher
-        texts[number] = without_tex(" ".join([*told.predictions, told.stretch]))
+        texts[number] = without_tex(" ".join([*keys_of(number), told.stretch]))
     for said, value in KEYS.items():
         assert re.sub("[{}]", "", said).lower() in " ".join(texts.values()).lower()
         (text,) = re.findall(r"\{(.*)\}", said)
@@ -653,11 +649,11 @@ def test_nothing_tells_of_the_misprint_before_the_explanation_of_lesson_3():
     lesson = find(3)
     cells = json.loads((lesson.folder / "exercise.ipynb").read_text(encoding="utf-8"))["cells"]
     sources = ["".join(cell["source"]) for cell in cells]
-    before = sources[: next(i for i, text in enumerate(sources) if text.startswith("## Run"))]
+    before = sources[: next(i for i, text in enumerate(sources) if text.startswith("## 2. Try"))]
     shown_first = [
         lesson.title, lesson.question, sheet(lesson, "student"), find_exercise(3).title, *before,
         (lesson.folder / "table-1.toml").read_text(encoding="utf-8"),
-        lesson.text("README"), words_for("lesson.gif", lesson.text("explanation")),
+        lesson.picture.film,
     ]  # fmt: skip
     for text in shown_first:
         assert not re.search("misprint|wrong|fault|not what the paper", text), text
@@ -774,4 +770,4 @@ def test_particles_fall_through_as_lesson_8_says():
         assert surfaces(dt) == {"plate", "outgoing"}
     assert surfaces(1.2e-3) == surfaces(4e-3) == {"plate"}
     assert surfaces(8e-3) == surfaces(1e-2) == set()
-    assert scene_of(find(8)).run.dt == 4e-3
+    assert scene_of(find(8), "fixed-steps.toml").run.dt == 4e-3

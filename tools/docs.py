@@ -28,8 +28,9 @@ from sphinx.cmd.build import build_main
 from sphinx.pycode import ModuleAnalyzer
 
 import chutelab
-from chutelab.classroom.lessons import Lesson, shipped_lessons
+from chutelab.classroom.lessons import shipped_lessons
 from chutelab.classroom.lessons.pages import LIVE, live_page
+from chutelab.classroom.lessons.sheets import sheet
 from chutelab.pictures.live.page import write
 from chutelab.scene import SceneError, about, load
 from chutelab.scene.overrides import schema
@@ -111,7 +112,8 @@ def public_modules() -> dict[str, ModuleType]:
 
 def readme(pages: Path) -> None:
     """Make the first pages of the README."""
-    found = sections((ROOT / "README.md").read_text(encoding="utf-8"))
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    found = sections(text.replace("/exercise.ipynb", "/README.md"))
     title, said = found[""].split("\n", 1)
     hero = HERO.format(name=FRONT, title=load(FRONT).title)
     first = [title, hero, said]
@@ -165,24 +167,19 @@ def lessons(pages: Path, extra: Path) -> None:
     )
     for one in shipped:
         name = one.folder.name
+        text = sheet(one, "student")
         if one.page is not None:
             (extra / "lessons" / name).mkdir(parents=True)
             live_page(one, extra / "lessons" / name / LIVE)
-        lesson_page(one, pages / "lessons" / name)
+            text += "\n## Try it\n\n" + PLAY.format(page=LIVE, title=one.title)
+        folder = pages / "lessons" / name
+        listed = tree("Explanation <explanation>")
+        (folder / "README.md").write_text(f"{text}\n{listed}", encoding="utf-8")
+        (folder / "explanation.md").write_text(sheet(one, "explanation"), encoding="utf-8")
     start = pages / "lessons" / "README.md"
     listed = tree(*(f"{one.folder.name}/index" for one in shipped))
-    start.write_text(f"{start.read_text(encoding='utf-8')}\n{listed}", encoding="utf-8")
-
-
-def lesson_page(lesson: Lesson, folder: Path) -> None:
-    """Add to a worksheet the live page, and what lies beside it."""
-    worksheet = folder / "README.md"
-    text = worksheet.read_text(encoding="utf-8")
-    if lesson.page is not None:
-        text += "\n## Try it\n\n" + PLAY.format(page=LIVE, title=lesson.title)
-    beside = sorted(path.stem for path in folder.glob("*.md") if path != worksheet)
-    listed = tree(*(f"{name.capitalize()} <{name}>" for name in beside))
-    worksheet.write_text(f"{text}\n{listed}", encoding="utf-8")
+    text = start.read_text(encoding="utf-8").replace("/exercise.ipynb", "/README.md")
+    start.write_text(f"{text}\n{listed}", encoding="utf-8")
 
 
 def reference(pages: Path) -> None:

@@ -1,23 +1,20 @@
 # needs: notebook,fit
 
-# %% Run 1
+# %% [markdown:en] 4
+# A fit uses all points of the track at once. `t0` is when the ball was released, between two frames.
+
+# %% [markdown:de] 4
+# Ein Fit nutzt alle Punkte der Messreihe auf einmal. `t0` ist der Zeitpunkt des Loslassens, zwischen zwei Bildern.
+
+# %% 4
 from chutelab import measured
 
 scene = book.scene("drop.toml")
 film = measured.read(book.file("ball.csv"))
 film
 
-# %% Run 1
-runs = book.run("drop.toml")
-runs
+# %% 4
+measured.fit(scene, film, ["t0"])
 
-# %% Run 1
-began = measured.fit(scene, film, ["t0"])
-began
-
-# %% Run 1
-found = measured.fit(scene, film, ["gravity", "surface.table.restitution", "t0"])
-found
-
-# %% [markdown] Try it live
-# The ball is pushed sideways, so that the bounces lie beside each other. Does it stop at once, or after infinitely many bounces? Change ε, or take the ball to the Moon.
+# %% 4
+measured.fit(scene, film, ["gravity", "surface.table.restitution", "t0"])

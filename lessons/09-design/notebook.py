@@ -1,35 +1,35 @@
 # needs: notebook,design
 
-# %% Run 1
+# %% 3
 from chutelab import design
 
 scene = book.scene("inclined-20")
 down = design.solve(scene, {"plate.angle_deg": (11, 60)}, {"landing.vx": 0})
 down
 
-# %% Run 1
+# %% 3
 design.solve(scene, {"plate.angle_deg": (11, 60)}, {"landing.vx": 1})
 
-# %% Run 1
+# %% 3
 least = design.minimize(scene, {"plate.angle_deg": (11, 60)}, "belt_work")
 least
 
-# %% Run 1
+# %% 3
 from chutelab.pictures.plots.studies import scan, spread
 
 scan(least)
 
-# %% Run 1
+# %% 3
 design.minimize(scene, {"plate.angle_deg": (11, 60)}, "dEk")
 
-# %% Run 2
+# %% 4
 slower = book.scene("inclined-20", "outgoing.speed=1")
 design.minimize(slower, {"plate.angle_deg": (11, 60)}, "belt_work")
 
-# %% Run 2
+# %% 4
 design.minimize(slower, {"plate.angle_deg": (11, 60)}, "slip_heat")
 
-# %% Run 3
+# %% 4
 both = design.solve(
     scene,
     {"plate.angle_deg": (20, 60), "plate.restitution": (0.1, 0.9)},
@@ -38,7 +38,7 @@ both = design.solve(
 )
 both
 
-# %% Run 4
+# %% 5
 sure = design.uncertainty(
     book.scene("inclined-40"),
     {
@@ -51,19 +51,22 @@ sure = design.uncertainty(
 )
 sure
 
-# %% Run 4
+# %% 5
 spread(sure)
 
-# %% Run 5
+# %% 5
 from chutelab import figures
 from chutelab.pictures.plots.figure import paper_figure
 
 paper_figure(figures.figure(6))
 
-# %% [markdown] Questions
+# %% [markdown:en] 7
 # The machine with your numbers, for searches of your own, such as `design.solve(machine, {"plate.angle_deg": (5, 60)}, {"landing.vx": 0})`:
 
-# %% Questions
+# %% [markdown:de] 7
+# Die Maschine mit deinen Zahlen, für eine eigene Suche, zum Beispiel `design.solve(machine, {"plate.angle_deg": (5, 60)}, {"landing.vx": 0})`:
+
+# %% 7
 given = task.given
 machine = book.scene(
     "inclined-20",
@@ -77,6 +80,3 @@ machine = book.scene(
     f"plate.restitution={given.e}",
     f"outgoing.speed={given.vb}",
 )
-
-# %% [markdown] Try it live
-# Turn the plate by hand. Which angle would you build, and how sure are you of it?

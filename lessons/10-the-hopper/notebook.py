@@ -1,16 +1,10 @@
-# %% Run 2
-runs = book.run(
-    "slot.toml --set surface.slider.from=[0.012,0]",
-    "slot.toml --set surface.slider.from=[0.03,0]",
-    "slot.toml --set surface.slider.from=[0.006,0]",
-    "slot.toml --set surface.slider.from=[0.006,0] --set stream.seed=1",
-)
-runs
+# %% [markdown:en] 3
+# What happened in the last run?
 
-# %% Run 2
+# %% [markdown:de] 3
+# Was ist im letzten Lauf geschehen?
+
+# %% 3
 import chutelab
 
-chutelab.overlay(runs[3])
-
-# %% [markdown] Try it live
-# Pull the end of the slider while the disks run. Where is the flow fast, where does nothing move, and when does an arch form?
+chutelab.overlay(book.noted[3][5])

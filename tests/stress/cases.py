@@ -158,10 +158,4 @@ def drawn_cases():
 
 def all_cases():
     """Return the cases."""
-    return (
-        *extremes.CASES,
-        *geometry.CASES,
-        *extremes.lasting_cases(),
-        *_twins(),
-        *drawn_cases(),
-    )
+    return (*extremes.CASES, *geometry.CASES, *extremes.lasting_cases(), *_twins(), *drawn_cases())

@@ -11,6 +11,7 @@ A run is said as on the command line, without ``chutelab run``.
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +20,11 @@ from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chutelab.classroom.lessons.reading import Lesson, beside, find, scene_of, unit_in
+from chutelab.classroom.exercises.catalogue import of_quantities
+from chutelab.classroom.lessons.reading import Lesson, beside, find, machine_of, scene_of
+from chutelab.classroom.lessons.steps import FUNCTIONS, Ask, Column, quantities_in
+from chutelab.classroom.lessons.texts import without_tex
+from chutelab.classroom.words import Words, words
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
 from chutelab.results.comparison import compare, predicted
@@ -35,6 +40,11 @@ from chutelab.util.tables import Sheet, Shown, number
 if TYPE_CHECKING:
     from chutelab.pictures.plots.style import Picture
 
+KNOWN = {"__builtins__": {}, "abs": abs, "nan": nan} | {
+    name: getattr(math, name) for name in FUNCTIONS if name != "abs"
+}
+"""What formulas of columns know besides quantities."""
+
 AT_HAND = "--set", "--engine", "--dt"
 """Options of ``chutelab run`` that a notebook knows, besides ``--details``."""
 
@@ -46,6 +56,8 @@ class Runs(Shown):
     lesson: Lesson
     recordings: Mapping[str, Recording]  # by what was said
     details: bool = False
+    noted: Sheet | None = None
+    """The table that they fill."""
 
     def __getitem__(self, index: int) -> Recording:
         return list(self.recordings.values())[index]
@@ -55,11 +67,12 @@ class Runs(Shown):
 
     def sheet(self) -> Sheet:
         """Return the quantities that the lesson looks at, a column for each run."""
+        if self.noted is not None:
+            return self.noted
         rows = []
-        for name, words in self.lesson.quantities.items():
-            unit = unit_in(self.lesson, name)
-            values = (number(_value(one, name)) for one in self.recordings.values())
-            rows.append((f"{words}, {unit}" if unit else words, *values))
+        for column in self.lesson.columns.values():
+            values = (number(value_of(one, column)) for one in self.recordings.values())
+            rows.append((_head(column, words(self.lesson.language)), *values))
         return Sheet("", ("", *self.recordings), tuple(rows))
 
     def _repr_html_(self) -> str:
@@ -70,6 +83,19 @@ class Runs(Shown):
             unfold += f"<details><summary>{escape(said)}: the summary</summary>{head}{parts}"
             unfold += "</details>"
         return self.sheet().html() + unfold
+
+
+def _head(column: Column, said: Words) -> str:
+    unit = said.unit(column.unit)
+    return without_tex(f"{column.head}, {unit}" if unit else column.head)
+
+
+def value_of(recording: Recording, column: Column) -> float:
+    """Return what a column tells of a run; NaN where the machine has none such."""
+    formula = of_quantities(column.value or "nan")
+    names = quantities_in(column.value or "nan")
+    told = {name: _value(recording, name) for name in names}
+    return float(eval(compile(formula, "<column>", "eval"), KNOWN, told))
 
 
 def _value(recording: Recording, name: str) -> float:
@@ -92,6 +118,8 @@ class Book:
     lesson : str or int
         By number or name, as `chutelab.classroom.lessons.find` takes it; "." is that of the folder
         the notebook is in.
+    language : str
+        Of its texts.
 
     Raises
     ------
@@ -99,9 +127,10 @@ class Book:
         If there is none.
     """
 
-    def __init__(self, lesson: str | int) -> None:
-        self._lesson = find(lesson)
-        self._runs: dict[str, Recording] = {}
+    def __init__(self, lesson: str | int, language: str = "en") -> None:
+        self._lesson = find(lesson, language)
+        self._expected: dict[str, tuple[Ask, Any]] = {}
+        self.noted: dict[int, Runs] = {}
         self._details = False
 
     def machine(self) -> Picture:
@@ -133,7 +162,6 @@ class Book:
             scene, settings, details = _read(one)
             found[one] = simulate(scene_of(self._lesson, scene, settings))
             self._details = self._details or details
-        self._runs |= found
         return Runs(self._lesson, found, self._details)
 
     def scene(self, name: str, *settings: str) -> Scene:
@@ -168,16 +196,47 @@ class Book:
         heads = ("", "largest relative error", "residual, share of the energy turned over")
         return Sheet("", heads, tuple(rows))
 
-    def compare(self, predictions: Mapping[int, Any]) -> Sheet:
-        """Return all runs so far side by side, with what was predicted beneath."""
-        mine = [f"{n}. {said}" for n, said in predictions.items() if said not in (None, "", ...)]
-        head = f"You predicted: {'; '.join(mine)}" if mine else "You wrote down no prediction yet."
-        if not self._runs:
-            return Sheet("", (), (), notes=(head,))
-        sheet = Runs(self._lesson, self._runs).sheet()
-        # A row for each run: many columns are hard to read.
-        rows = tuple(zip(*[sheet.columns, *sheet.rows], strict=True))
-        return Sheet("What came out", rows[0], rows[1:], notes=(head,))
+    def predict(self, step: int, predictions: Mapping[int, Any]) -> Sheet:
+        """Keep what is predicted in a step, by question; `explain` shows it again."""
+        asks = self._lesson.steps[step - 1].asks
+        mine = {
+            without_tex(asks[n - 1].text): (asks[n - 1], said)
+            for n, said in predictions.items()
+            if said not in (None, "", ...) and 1 <= n <= len(asks)
+        }
+        self._expected |= mine
+        rows = tuple((text, str(said)) for text, (_, said) in mine.items())
+        say = words(self._lesson.language).say
+        return Sheet("", (say("book-expected"), ""), rows, texts=2)
+
+    def note(self, step: int) -> Runs:
+        """Make the runs of a step's table, and fill it in; they are kept in `noted`.
+
+        Raises
+        ------
+        SceneError
+            With all faults of a scene and its settings.
+        """
+        one, said = self._lesson.steps[step - 1], words(self._lesson.language)
+        rows, found = [], {}
+        for n, row in enumerate(one.rows):
+            recording = simulate(machine_of(self._lesson, one, row))
+            cells = []
+            for column in one.columns:
+                # What is less than a trillionth is rounding.
+                value = number(round(value_of(recording, column), 12)) if column.value else ""
+                cells.append(said.local(str(column.given[n]) if column.given else value))
+            head = without_tex(said.local(row.head))
+            found[head] = recording
+            rows.append((head, *cells))
+        heads = (said.say("sheet-run"), *(_head(column, said) for column in one.columns))
+        self.noted[step] = Runs(self._lesson, found, noted=Sheet("", heads, tuple(rows)))
+        return self.noted[step]
+
+    def explain(self, step: int) -> Explanation:
+        """Return what is said after a step, and to what was expected."""
+        expected, self._expected = self._expected, {}
+        return Explanation(self._lesson, expected, self._lesson.steps[step - 1].then)
 
     def landings(self, runs: Runs) -> Picture:
         """Draw where the particles of some runs land, mean, spread, lowest and highest layer."""
@@ -191,16 +250,37 @@ class Book:
         figure.tight_layout()
         return figure
 
-    def live(self) -> Any:
-        """Return the lesson's live page as a widget."""
+    def live(self, step: int = 1) -> Any:
+        """Return the lesson's live page, with the machine of a step, as a widget."""
         from chutelab.pictures.live import live
 
         page = self._lesson.page
         if page is None:
             raise InputError(f"lesson {self._lesson.name} has no page: [page] is not in its plan")
         # The student has predicted already.
-        shown = [*page.settings, Override("live.predict", False)]
+        changed = {**self._lesson.steps[step - 1].set, "live.predict": False}
+        shown = [*page.settings, *(Override(key, value) for key, value in changed.items())]
         return live(scene_of(self._lesson, page.scene, shown))
+
+
+@dataclass(frozen=True, repr=False)
+class Explanation:
+    """What is said after a step; a notebook shows it."""
+
+    lesson: Lesson
+    expected: Mapping[str, tuple[Ask, Any]]
+    then: str
+
+    def __repr__(self) -> str:
+        return without_tex(self._repr_markdown_())
+
+    def _repr_markdown_(self) -> str:
+        say, lines = words(self.lesson.language).say, []
+        for ask, said in self.expected.values():
+            lines.append(f"{' '.join(ask.text.split())} {say('book-expected')} **{said}**")
+            if ask.choices and isinstance(said, int) and 1 <= said <= len(ask.choices):
+                lines[-1] += f" {ask.choices[said - 1]}. *{ask.replies[said - 1]}*"
+        return "\n\n".join([*lines, self.then.strip()])
 
 
 def _read(said: str) -> tuple[str, list[str], bool]:

@@ -10,6 +10,7 @@ there is one, and `report` what the class did, lesson by lesson.
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 import re
@@ -18,8 +19,11 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from html import escape
 from importlib.util import find_spec
 from pathlib import Path
+from string import Template
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
@@ -30,6 +34,7 @@ from chutelab.classroom.exercises.exercise import draw, plain
 from chutelab.classroom.exercises.judging import is_rounded, judge
 from chutelab.classroom.kernel import ForgedError, run
 from chutelab.classroom.lessons.reading import OWN_WORDS
+from chutelab.classroom.lessons.texts import asset
 from chutelab.classroom.words import LANGUAGES, words
 from chutelab.util.errors import InputError, MissingLibraryError, cut, printable, printable_lines
 from chutelab.util.files import csv_lines
@@ -135,6 +140,7 @@ Name = Annotated[
 # JSON has texts for keys.
 QuestionNumber = Annotated[int, Field(strict=False)]
 Answer = Annotated[float, Field(allow_inf_nan=False)]
+Times = Annotated[int, Field(ge=0, le=1_000_000)]
 Key = Annotated[str, StringConstraints(max_length=40)]
 Words = Annotated[str, StringConstraints(max_length=LONGEST_TEXT)]
 
@@ -151,6 +157,8 @@ class Work(BaseModel):
     lesson: Key
     student: Name
     answers: Annotated[dict[QuestionNumber, Answer], Field(max_length=MOST_QUESTIONS)] = {}
+    tries: Annotated[dict[QuestionNumber, Times], Field(max_length=MOST_QUESTIONS)] = {}
+    hints: Annotated[dict[QuestionNumber, Times], Field(max_length=MOST_QUESTIONS)] = {}
     revealed: Annotated[list[int], Field(max_length=MOST_QUESTIONS)] = []
     words: Annotated[dict[Key, Words], Field(max_length=MOST_QUESTIONS)] = {}
 
@@ -166,7 +174,7 @@ def _work(found: object) -> Work:
     if work.lesson not in EXERCISES:
         raise ValueError(f"no lesson {work.lesson!r} has an exercise")
     count = len(EXERCISES[work.lesson].questions)
-    if not {*work.answers, *work.revealed} <= set(range(1, count + 1)):
+    if not {*work.answers, *work.revealed, *work.tries, *work.hints} <= set(range(1, count + 1)):
         raise ValueError(f"the lesson has questions 1 to {count} only")
     return work
 
@@ -211,6 +219,8 @@ class Grade:
     reason: str = ""  # what to know about this row
     answers: Mapping[int, float] = field(default_factory=dict, compare=False)  # by question
     mistakes: Mapping[int, str] = field(default_factory=dict, compare=False)  # known ones
+    tries: Mapping[int, int] = field(default_factory=dict, compare=False)  # answers checked
+    hints: Mapping[int, int] = field(default_factory=dict, compare=False)  # hints read
     words: Mapping[str, str] = field(default_factory=dict, compare=False)  # what was written
 
     @property
@@ -280,29 +290,70 @@ def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
         yield row
 
 
-def _copied(row: Grade, before: Iterable[Grade]) -> Iterator[str]:
-    """Say which wrong answers are right for another student's numbers, or the other way round."""
-    for other in before:
-        if other.lesson == row.lesson:
-            if found := _right_for(row, other):
-                yield printable(f"answers {found} are right for the numbers of {other.student}")
-            if found := _right_for(other, row):
-                yield printable(f"answers {found} of {other.file} are right for these numbers")
+def _copied(row: Grade, before: Sequence[Grade]) -> Iterator[str]:
+    """Say which wrong answers are right for another student's numbers, or the other way round.
+
+    With each goes how likely it is that this happens to one who copied from nobody: that wrong
+    answers of the one are right for the numbers of any of the others.
+    """
+    others = [one for one in before if one.lesson == row.lesson]
+    for other in others:
+        for mine, its, said in (
+            (row, other, f"are right for the numbers of {other.student}"),
+            (other, row, f"of {other.file} are right for these numbers"),
+        ):
+            if found := _right_for(mine, its):
+                chance = _chance(mine, found, len(others))
+                likely = f"1 in {1.0 / chance:,.0f}" if chance < LIKELY else "this may be chance"
+                listed = ", ".join(map(str, found))
+                yield printable(f"answers {listed} {said} (by chance: {likely})")
 
 
-def _right_for(row: Grade, other: Grade) -> str:
-    """Return the questions whose answers are wrong, and right for the numbers of another."""
+def _right_for(row: Grade, other: Grade) -> list[int]:
+    """Return the questions whose answers are wrong, and right for the numbers of another.
+
+    An answer that follows from the student's own numbers by a known mistake is no sign of that.
+    """
     _, cases = draw(EXERCISES[row.lesson], other.student)
     wrong = [n for n, mark in enumerate(row.marks, 1) if not mark and n in row.answers]
-    return ", ".join(str(n) for n in wrong if is_rounded(row.answers[n], cases[n - 1].right))
+    unexplained = [n for n in wrong if n not in row.mistakes]
+    return [n for n in unexplained if is_rounded(row.answers[n], cases[n - 1].right)]
 
 
-def write_csv(grades: Iterable[Grade], path: str | Path) -> Path:
+LIKELY: Final = 0.05
+"""Chance from which on an answer that is right for another may well be a coincidence."""
+
+DRAWS: Final = 300
+"""Draws of numbers that tell how often an answer is right for somebody."""
+
+
+@cache
+def _drawn(lesson: str) -> tuple[tuple[float, ...], ...]:
+    """Return the right answers of made-up students."""
+    exercise = EXERCISES[lesson]
+    return tuple(
+        tuple(case.right for case in draw(exercise, f"nobody {n}")[1]) for n in range(DRAWS)
+    )
+
+
+def _chance(row: Grade, questions: Sequence[int], others: int) -> float:
+    """Return how likely these answers are all right for at least one of so many other students."""
+    fits = sum(
+        all(is_rounded(row.answers[n], right[n - 1]) for n in questions)
+        for right in _drawn(row.lesson)
+    )
+    # What was never seen in so many draws may still happen: Laplace's rule of succession.
+    share = (fits + 1) / (DRAWS + 2)
+    return 1.0 - (1.0 - share) ** others
+
+
+def write_csv(grades: Iterable[Grade], path: str | Path, *, decimal_comma: bool = False) -> Path:
     """Write a row per grade, as soon as it comes; at the end the file is there, whole.
 
     Until then the rows are in a file beside it, ``NAME.part``. An exception, of `grades` or of the
     disk, leaves it there if there are marks in it; so does the end of the program. Each row in it
-    is whole.
+    is whole. It begins with a byte order mark, from which Excel tells that it is UTF-8;
+    `decimal_comma` is for an Excel whose numbers have one: cells are then apart by semicolons.
 
     Raises
     ------
@@ -312,21 +363,32 @@ def write_csv(grades: Iterable[Grade], path: str | Path) -> Path:
     path = Path(path)
     part = path.with_name(f"{path.name}.part")
     heads = [f"q{i + 1}" for i in range(max(len(one.questions) for one in EXERCISES.values()))]
+    answers = [f"answer{i + 1}" for i in range(len(heads))]
     marked = False
+
+    def written(number: float | None) -> object:
+        return str(number).replace(".", ",") if decimal_comma and number is not None else number
 
     def rows() -> Iterator[list[object]]:
         nonlocal marked
-        yield ["file", "student", "lesson", *heads, "total", "out_of", "revealed", "reason"]
+        last = ["total", "out_of", "revealed", "reason", *answers, "mistakes", "tries", "hints"]
+        yield ["file", "student", "lesson", *heads, *last]
         for row in grades:
             marks = [*row.marks, *[None] * (len(heads) - len(row.marks))]
             revealed = " ".join(map(str, row.revealed))
             cells = [row.file, row.student, row.lesson, *marks]
-            yield [*cells, row.total, row.out_of, revealed, row.reason]
+            numbers = [written(row.answers.get(n)) for n in range(1, len(heads) + 1)]
+            named = "; ".join(f"{n}: {mistake}" for n, mistake in row.mistakes.items())
+            counts = sum(row.tries.values()), sum(row.hints.values())
+            told = [row.total, row.out_of, revealed, row.reason, *numbers, named, *counts]
+            yield [*cells, *told]
             marked = marked or bool(row.marks)
 
     with part.open("xb", buffering=0) as file:
         try:
-            for line in csv_lines(rows(), end="\r\n"):
+            file.write(codecs.BOM_UTF8)
+            separator = ";" if decimal_comma else ","
+            for line in csv_lines(rows(), separator=separator, end="\r\n"):
                 size, left = file.tell(), line.encode("utf-8", "replace")
                 try:
                     while left:
@@ -371,6 +433,8 @@ def _marked(file: str, work: Work, reasons: Sequence[str] = ()) -> Grade:
         revealed=tuple(sorted({*work.revealed})),
         reason="; ".join(filter(None, reasons)),
         answers=work.answers,
+        tries=work.tries,
+        hints=work.hints,
         mistakes={reply.question: reply.mistake for reply in replies if reply.mistake},
         words={key: text.strip() for key, text in work.words.items() if text.strip()},
     )
@@ -394,6 +458,8 @@ def _works(reports: object) -> list[Work]:
             raise ForgedError(f"its report is not from chutelab: {error}") from None
         first = works.setdefault((work.lesson, plain(work.student)), work)
         first.answers |= work.answers
+        first.tries |= work.tries
+        first.hints |= work.hints
         first.revealed += work.revealed
     return list(works.values())
 
@@ -461,3 +527,68 @@ def _lesson(name: str, rows: list[Grade]) -> Iterator[str]:
 def _literal(text: str) -> str:
     """Return a text in which nothing is Markdown."""
     return _MARKUP.sub(r"\\\g<0>", " ".join(text.split()))
+
+
+def page(grades: Iterable[Grade]) -> str:
+    """Return the report of a class as one HTML page: by lesson, students and their questions.
+
+    Each answer is right, a mistake by its name, or a number, with how often it was tried and how
+    many hints were read. Below are what was written, and the files that did not count.
+    """
+    rows = list(grades)
+    parts = []
+    for name, exercise in EXERCISES.items():
+        of_lesson = [row for row in rows if row.marks and row.lesson == name]
+        if not of_lesson:
+            continue
+        heads = "".join(
+            f"<th scope=col>{n}. {escape(one.title)}" for n, one in enumerate(exercise.questions, 1)
+        )
+        right = "".join(
+            f"<td>{sum(marks)} of {len(of_lesson)}"
+            for marks in zip(*(row.marks for row in of_lesson), strict=True)
+        )
+        lines = "".join(
+            f"<tr><th scope=row>{escape(row.student)}<td>{row.total}"
+            f"{''.join(_cell(row, n) for n in range(1, row.out_of + 1))}<td>{escape(row.reason)}"
+            for row in sorted(of_lesson, key=lambda row: plain(row.student))
+        )
+        parts.append(
+            f"<h2>{exercise.number}. {escape(exercise.title)}</h2>\n<table><thead><tr>"
+            f"<th scope=col>student<th scope=col>marks{heads}<th scope=col>remarks</thead>"
+            f"<tbody>{lines}</tbody><tfoot><tr><th scope=row>right<td>{right}<td></tfoot></table>"
+        )
+        said = "".join(
+            f"<dt>{escape(row.student)}<dd>{escape(text)}"
+            for row in of_lesson
+            for text in row.words.values()
+        )
+        parts.append(f"<dl>{said}</dl>" if said else "")
+    rest = "".join(
+        f"<tr><th scope=row>{escape(row.file)}<td>{escape(row.reason)}"
+        for row in rows
+        if not row.marks
+    )
+    if rest:
+        parts.append(f"<h2>Not counted</h2>\n<table><tr><th>file<th>why{rest}</table>")
+    return Template(asset("report.html")).substitute(body="\n".join(parts))
+
+
+def _cell(row: Grade, number: int) -> str:
+    """Return what a student did in a question."""
+    kind, said = "none", "no answer"
+    if row.marks[number - 1]:
+        kind, said = "right", "✓ right"
+    elif number in row.answers:
+        shown = f"✗ {row.answers[number]:.4g}"
+        kind, said = "wrong", escape(row.mistakes.get(number, shown))
+    counts = [
+        f"{many} {what if many == 1 else whats}"
+        for many, what, whats in (
+            (row.tries.get(number, 0), "try", "tries"),
+            (row.hints.get(number, 0), "hint", "hints"),
+        )
+        if many
+    ]
+    counts += ["working shown"] if number in row.revealed else []
+    return f"<td class={kind}>{said}<small>{', '.join(counts)}</small>"

@@ -116,8 +116,8 @@ def show(
     from rich.text import Text
 
     from chutelab.classroom.lessons import find, scene_of
-    from chutelab.classroom.lessons.reading import unit_in
-    from chutelab.classroom.lessons.texts import plain_of
+    from chutelab.classroom.lessons.sheets import worksheet
+    from chutelab.classroom.lessons.texts import plain_of, without_tex
     from chutelab.classroom.words import words
     from chutelab.util.tables import Sheet
 
@@ -134,15 +134,15 @@ def show(
         console.show(Text(f"{say('untranslated')}\n"))
     heads = (say("show-scene"), say("show-shows"))
     console.show(head, Sheet(say("show-scenes"), heads, scenes, texts=2))
-    if found.quantities:
+    if found.columns:
         unit = words(language).unit
         rows = tuple(
-            (name, unit(unit_in(found, name)), what) for name, what in found.quantities.items()
+            (name, unit(one.unit), without_tex(one.head)) for name, one in found.columns.items()
         )
         columns = (say("show-quantity"), say("show-unit"), say("show-meaning"))
         console.show(Sheet(say("show-quantities"), columns, rows, texts=3))
     console.show(Text(f"\n{say('show-files', folder=found.folder)}\n"))
-    console.show(Markdown(plain_of(found.text("README")), hyperlinks=False))
+    console.show(Markdown(plain_of(worksheet(found)), hyperlinks=False))
 
 
 def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | None) -> None:
@@ -357,6 +357,7 @@ def grade(
     out: Annotated[Path | None, FileName(dir_okay=False, path_type=Path)],
     report: Path | None,
     time_limit: Annotated[float, Number(1.0, 3600.0)] = 60.0,
+    decimal_comma: bool,
     json_: bool,
     quiet: bool,
 ) -> None:
@@ -377,19 +378,27 @@ def grade(
     source. Working that was shown is in the column "revealed", and has a * in the table;
     a result file can be written so that it does not tell.
 
+    An answer that is wrong, but right for another student's numbers, is told, with how likely that
+    is if nobody copied.
+
     Ctrl-C, or a crash, keeps the marks so far, in FILE.part.
 
-    chutelab lesson grade returned/ --out class.csv --report class.md
+    chutelab lesson grade returned/ --out class.csv --report class.html
     chutelab lesson grade anna.ipynb the-bounce-Ben.chutelab.json --time-limit 30
 
     --out FILE  Write the marks into this CSV file, a row for each file returned. Until the last is
         marked, the rows are in FILE.part.
-    --report FILE  Write what the class did into this Markdown file: by lesson how many were right,
-        which mistakes were made how often, and what students wrote.
+    --report FILE  Write what the class did into this file. One that ends in .html is a page to look
+        at: students and questions, mistakes by name, tries and hints, what students wrote, and
+        files that did not count. Any other is Markdown: how many were right, which mistakes were
+        made how often, what students wrote.
+    --decimal-comma  Write the CSV for an Excel with a decimal comma: numbers have one, and cells
+        are apart by semicolons.
     --time-limit S  Seconds that a notebook may run. [default]
     -q, --quiet  Print no table, and show no progress bar.
     """
     from chutelab.classroom.grading import grade as grade_returned
+    from chutelab.classroom.grading import page as class_page
     from chutelab.classroom.grading import report as class_report
     from chutelab.classroom.grading import write_csv
     from chutelab.util.tables import Sheet
@@ -447,7 +456,7 @@ def grade(
             if out is None:
                 deque(marked(update), maxlen=0)
             else:
-                write_csv(marked(update), out)
+                write_csv(marked(update), out, decimal_comma=decimal_comma)
     finally:
         if done and json_:
             console.show_json({"format": 1, "grades": done})
@@ -459,7 +468,8 @@ def grade(
             console.say(f"the marks of {count} are in {part}", err=True)
     if report is not None:
         with writing(f"--report {report}"):
-            write_lines(report, [class_report(done)], errors="replace")
+            told = class_page(done) if report.suffix == ".html" else class_report(done)
+            write_lines(report, [told], errors="replace")
     for target in filter(None, (out, report)):
         if not json_:
             console.say(f"wrote {target}")

@@ -75,6 +75,7 @@ class Output:
         5, but no events.csv of more than 100,000 events. May be repeated.
     --format  With --out: the lesson picture as this instead of a GIF; mp4 and webm need the extra
         chutelab[video].
+    --no-energy  With --out: the lesson picture without the energy ledger; the machine is larger.
     --details  For experts: engine and steps, errors and residuals down to rounding, in the summary
         and in overlay.png; of a crowd particle 0, too.
     -q, --quiet  Print no summary and no progress bar.
@@ -83,6 +84,7 @@ class Output:
     out: Folder
     only: Annotated[Texts, complete_kinds]
     format_: Literal["gif", "mp4", "webm"] | None
+    no_energy: bool
     details: bool
     json_: bool
     quiet: bool
@@ -97,6 +99,10 @@ class Output:
             option = "--only chooses among" if self.only else "--format is for one of"
             raise click.UsageError(f"{option} the files of --out DIR: give --out too.")
         kinds = tuple(kind for kind in KINDS if kind in (chosen or USUAL))
+        if self.no_energy and (self.out is None or not {*FILMS}.intersection(kinds)):
+            raise click.UsageError(
+                "--no-energy is for the lesson picture: give --out DIR, with gif."
+            )
         if self.format_ is not None:
             others = set(kinds) - set(FILMS)
             if len(others) == len(kinds):
@@ -128,7 +134,7 @@ class Output:
                 if kind in FILMS:
                     from chutelab.pictures.animation import animate
 
-                    animate(recording, path)
+                    animate(recording, path, energy=not self.no_energy)
                 elif kind in ("png", "strobe"):
                     from chutelab.pictures import plots
 

@@ -42,11 +42,12 @@ static double most(const double *a, int n) {
     return found;
 }
 
-static void grow(double *box, double x, double y) {
-    box[0] = MIN(box[0], x);
-    box[1] = MIN(box[1], y);
-    box[2] = MAX(box[2], x);
-    box[3] = MAX(box[3], y);
+/* Have a box hold another one. */
+static void grow(double *box, const double *by) {
+    box[0] = MIN(box[0], by[0]);
+    box[1] = MIN(box[1], by[1]);
+    box[2] = MAX(box[2], by[2]);
+    box[3] = MAX(box[3], by[3]);
 }
 
 static void empty(double *box) {
@@ -82,11 +83,11 @@ void shape_barriers(void) {
                 double x = side & 1 ? 0 : 1 - side, y = side & 1 ? 2 - side : 0;
                 x = b->x + b->radius * x;
                 y = b->y + b->radius * y;
-                if (is_within(b, x, y, 0)) grow(b->box, x, y);
+                if (is_within(b, x, y, 0)) grow(b->box, (double[]){ x, y, x, y });
             }
         }
-        grow(b->box, b->end[0], b->end[1]);
-        grow(b->box, b->end[2], b->end[3]);
+        grow(b->box, (double[]){ b->end[0], b->end[1], b->end[0], b->end[1] });
+        grow(b->box, (double[]){ b->end[2], b->end[3], b->end[2], b->end[3] });
     }
 }
 
@@ -148,9 +149,9 @@ void place_at(const double *knot, double share, double *x, double *y) {
     *y = r * r * (r * c.y[0] + 3 * s * c.y[1]) + s * s * (3 * r * c.y[2] + s * c.y[3]);
 }
 
-/* Least and largest coefficient of the square of the distance from a place, m2. */
-static double squares(const Curve *c, double x0, double y0, double *largest) {
-    double x[4], y[4], q[7];
+/* Coefficients of the square of the distance from a place, m2. */
+static void square_distance(const Curve *c, double x0, double y0, double *q) {
+    double x[4], y[4];
     for (int k = 0; k < 4; k++) {
         x[k] = c->x[k] - x0;
         y[k] = c->y[k] - y0;
@@ -158,30 +159,41 @@ static double squares(const Curve *c, double x0, double y0, double *largest) {
 #define DOT(i, j) (x[i] * x[j] + y[i] * y[j])
     q[0] = DOT(0, 0);
     q[1] = DOT(0, 1);
-    q[2] = (6 * DOT(0, 2) + 9 * DOT(1, 1)) / 15;
-    q[3] = (2 * DOT(0, 3) + 18 * DOT(1, 2)) / 20;
-    q[4] = (6 * DOT(1, 3) + 9 * DOT(2, 2)) / 15;
+    q[2] = 0.4 * DOT(0, 2) + 0.6 * DOT(1, 1);
+    q[3] = 0.1 * DOT(0, 3) + 0.9 * DOT(1, 2);
+    q[4] = 0.4 * DOT(1, 3) + 0.6 * DOT(2, 2);
     q[5] = DOT(2, 3);
     q[6] = DOT(3, 3);
 #undef DOT
-    *largest = most(q, 7);
-    return least(q, 7);
+}
+
+/* Whether none of some coefficients is less, or none more, than a bound. */
+static int all_from(const double *a, int n, double bound) {
+    int yes = 1;
+    for (int k = 0; k < n; k++) yes &= a[k] >= bound;
+    return yes;
+}
+
+static int all_to(const double *a, int n, double bound) {
+    int yes = 1;
+    for (int k = 0; k < n; k++) yes &= a[k] <= bound;
+    return yes;
 }
 
 static int is_clear_of_end(const Curve *c, const double *end, double limit) {
-    double largest, reach = MAX(limit, 0);
-    return squares(c, end[0], end[1], &largest) >= reach * reach;
+    double q[7], reach = MAX(limit, 0);
+    square_distance(c, end[0], end[1], q);
+    return all_from(q, 7, reach * reach);
 }
 
 static int is_clear_of_line(const Curve *c, const Barrier *b, double limit) {
-    double d[4], feet[4];
+    double d[4], feet[4], reach = MAX(limit, 0);
     for (int k = 0; k < 4; k++) d[k] = beside(b, c->x[k], c->y[k]);
-    if (least(d, 4) >= limit || most(d, 4) <= -limit) return 1;
+    if (all_from(d, 4, limit) || all_to(d, 4, -limit)) return 1;
     for (int k = 0; k < 4; k++) feet[k] = foot(b, c->x[k], c->y[k]);
-    double beyond = least(feet, 4) - b->length, before = -most(feet, 4);
-    if (MAX(beyond, before) >= MAX(limit, 0)) return 1;
-    if (before >= 0) return is_clear_of_end(c, b->end, limit);
-    return beyond >= 0 && is_clear_of_end(c, b->end + 2, limit);
+    if (all_to(feet, 4, -reach) || all_from(feet, 4, b->length + reach)) return 1;
+    if (all_to(feet, 4, 0)) return is_clear_of_end(c, b->end, limit);
+    return all_from(feet, 4, b->length) && is_clear_of_end(c, b->end + 2, limit);
 }
 
 /* Whether all of a path is left of the ray from the centre through an end, or right of it. */
@@ -194,9 +206,9 @@ static int is_aside(const Curve *c, const Barrier *b, const double *end, double 
 }
 
 static int is_clear_of_bow(const Curve *c, const Barrier *b, double limit) {
-    double largest, smallest = squares(c, b->x, b->y, &largest);
-    double outer = b->radius + limit, inner = b->radius - limit;
-    if (smallest >= outer * outer || (inner > 0 && largest <= inner * inner)) return 1;
+    double q[7], outer = b->radius + limit, inner = b->radius - limit;
+    square_distance(c, b->x, b->y, q);
+    if (all_from(q, 7, outer * outer) || (inner > 0 && all_to(q, 7, inner * inner))) return 1;
     if (b->whole) return 0;
     /* Beyond the ends: not counterclockwise of the first, or not clockwise of the last; of an arc of
        more than half a circle neither. */
@@ -351,15 +363,10 @@ static void turn(const Curve *c, Barrier *pieces, int first, int knot) {
 /* An interval of a track: its path, and the box about that. */
 typedef struct { Curve path; double box[4]; int knot; } Interval;
 
-/* Look at some intervals that follow each other. */
-static void look_at_all(const Interval *some, int count, Barrier *pieces) {
-    double box[4], margin = MAX(At.radius - L.allowed, 0);
+/* Look at some intervals that follow each other, in a common box. */
+static void look_at_all(const Interval *some, int count, const double *box, Barrier *pieces) {
+    double margin = MAX(At.radius - L.allowed, 0);
     int near = 0;
-    empty(box);
-    for (int n = 0; n < count; n++) {
-        grow(box, some[n].box[0], some[n].box[1]);
-        grow(box, some[n].box[2], some[n].box[3]);
-    }
     for (int k = 0; k < L.piece_count; k++) {
         if (!apart(box, pieces[k].box, margin)) pieces[near++].near = k;
     }
@@ -371,33 +378,38 @@ static void look_at_all(const Interval *some, int count, Barrier *pieces) {
     }
 }
 
-/* Find where particles are deeper in surfaces than is allowed, or pass them: one place, or each passage,
-   for each interval beside each piece. What stood in the way of a gate as it shut is spared until it
-   is clear of it; what overlapped at its release may go on doing so, no deeper. */
-void find_hits(void) {
+/* Find where a particle is deeper in surfaces than is allowed, or passes them: one place, or each passage,
+   for each interval beside each piece; return whether there is any. What stood in the way of a gate as it
+   shut is spared until it is clear of it; what overlapped at its release may go on doing so, no deeper. */
+int find_hits(int i) {
     Interval some[WIDTH];
-    L.hit_count = 0;
-    for (int i = 0; i < L.particle_count && L.piece_count; i++) {
-        Barrier *pieces = L.barriers + (L.family ? i * L.piece_count : 0);
-        int count = 0, first = 1;
-        At.particle = i;
-        At.radius = L.bodies[i].radius;
-        for (int k = 0; k < L.piece_count; k++) pieces[k].clear = NAN;
-        for (int k = L.offsets[i]; k < L.offsets[i + 1] - 1; k++) {
-            const double *a = KNOT(k), *b = a + L.row;
-            if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) continue;
-            Interval *now = some + count++;
-            curve_after(a, &now->path);
-            now->knot = k;
-            empty(now->box);
-            for (int n = 0; n < 4; n++) grow(now->box, now->path.x[n], now->path.y[n]);
-            if (At.radius == 0) turn(&now->path, pieces, first, k);
-            first = 0;
-            if (count == WIDTH) {
-                look_at_all(some, count, pieces);
-                count = 0;
-            }
+    Barrier *pieces = L.barriers + (L.family ? i * L.piece_count : 0);
+    double box[4];
+    int count = 0, first = 1, before = L.hit_count;
+    if (!L.piece_count) return 0;
+    At.particle = i;
+    At.radius = L.bodies[i].radius;
+    for (int k = 0; k < L.piece_count; k++) pieces[k].clear = NAN;
+    empty(box);
+    for (int k = L.offsets[i]; k < L.offsets[i + 1] - 1; k++) {
+        const double *a = KNOT(k), *b = a + L.row;
+        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) continue;
+        Interval *now = some + count++;
+        curve_after(a, &now->path);
+        now->knot = k;
+        now->box[0] = least(now->path.x, 4);
+        now->box[1] = least(now->path.y, 4);
+        now->box[2] = most(now->path.x, 4);
+        now->box[3] = most(now->path.y, 4);
+        grow(box, now->box);
+        if (At.radius == 0) turn(&now->path, pieces, first, k);
+        first = 0;
+        if (count == WIDTH) {
+            look_at_all(some, count, box, pieces);
+            empty(box);
+            count = 0;
         }
-        look_at_all(some, count, pieces);
     }
+    look_at_all(some, count, box, pieces);
+    return L.hit_count > before;
 }

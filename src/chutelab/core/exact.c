@@ -551,6 +551,11 @@ static void go_on(int obstacle, int side, int joint) {
         }
     }
     rest_on(obstacle, side, 0.0);
+    /* A slight bend turns the way: without a knot behind it the cubic from there on would be pressed into the
+       next face. */
+    const Knot *before = E.knots + E.knot_count - 1;
+    double turned = length_of(A.vx - before->vx, A.vy - before->vy);
+    if (turned > COLLINEAR * length_of(A.vx, A.vy)) write_knot();
     if (onto && A.slip != 0.0) write_event(SLIP, o->surface);
 }
 

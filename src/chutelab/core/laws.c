@@ -37,8 +37,6 @@ Laws L;
 /* Share of the radius by which the pymunk engine's disks are larger, and so their levers. */
 #define HAIR 1e-10
 
-/* What all particles have together, and the largest and least of one. */
-static struct { double mass, heaviest, smallest, gravity, knot_t; } All;
 
 static double square(double a) { return a * a; }
 
@@ -59,16 +57,37 @@ static double gain(int i, const double *knot) {
     return kinetic(i, knot) + potential(i, knot) - (knot[6] - knot[7] - knot[8]);
 }
 
+/* What a knot gives back of the losses that were booked, J, at most 0. Where the contact engine holds a
+   particle by itself in a nip, impulses of any size hold each other, and along normals seems to be given
+   what friction takes: only the sum is known. */
+static double given_back(const double *now) {
+    const double *before = now - L.row;
+    double normal = now[7] - before[7], slip = now[8] - before[8];
+    if (L.engine == ENGINE_CONTACT && !L.interact) return normal + slip;
+    return MIN(normal, slip);
+}
+
 /* Breaches. */
+
+/* Knots that break a law, as they are found in the order of particles. */
+typedef struct { int particles, particle, latest, knot; } Group;
+
+/* What all particles have together, and the largest and least of one; of pieces the largest coordinate and
+   length of straight ones, coordinate and radius of bent ones, and speed. Of particles that do not meet also
+   what is unexplained at their ends, J, the most that changes of it between two knots, and the least of
+   what `given_back` says. */
+static struct {
+    double mass, heaviest, smallest, gravity, size[4], belts;
+    double t, knot_t, place, fastest, lifted, entries[3], residual, change, back;
+    Group bad;
+    int unreal;
+} All;
 
 static Breach *tell(int law, double amount, double bound) {
     Breach *one = L.breaches + L.breach_count++;
     *one = (Breach){All.knot_t, NAN, NAN, amount, bound, law, 0, -1, -1, -1, 0};
     return one;
 }
-
-/* Knots that break a law, as they are found in the order of particles. */
-typedef struct { int particles, particle, latest, knot; } Group;
 
 static void add(Group *group, int i, int knot) {
     const double *now = KNOT(knot), *first = KNOT(group->knot);
@@ -93,64 +112,72 @@ static void tell_group(int law, const Group *group, double amount, double bound)
 
 /* Bounds. */
 
-/* Look at all numbers: tell whether they are finite, and find the largest of each kind; also the energy in
-   play, J: what every particle had at most, and what was booked on it, or of a crowd what was turned over.
-   The clock's own rounding moves a particle: half an ulp of t, times its speed. */
-static int weigh(void) {
-    double t = 0, place = 0, fastest = 0, size[4] = {0}, entries[3] = {0}, lifted = 0;
-    Group bad = {0};
-    int unreal = L.unreal;
-    L.energy = 0;
-    for (int i = 0; i < L.particle_count; i++) {
-        const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
-        double mass = L.bodies[i].mass, highest = 0;
-        All.mass += mass;
-        All.heaviest = MAX(All.heaviest, mass);
-        All.gravity = MAX(All.gravity, L.bodies[i].gravity);
-        All.smallest = i ? MIN(All.smallest, L.bodies[i].radius) : L.bodies[i].radius;
-        for (const double *knot = first; knot <= last; knot += L.row) {
-            double sum = 0;
-            for (int n = 0; n < 9; n++) sum += 0 * knot[n];
-            if (sum != 0) { /* NAN: one of them is not finite. */
-                for (int n = 0; n < 9; n++) unreal += !isfinite(knot[n]);
-                add(&bad, i, L.offsets[i] + (knot - first) / L.row);
-            }
-            t = MAX(t, fabs(knot[0]));
-            All.knot_t = MAX(All.knot_t, knot[0]);
-            place = MAX(place, MAX(fabs(knot[1]), fabs(knot[2])));
-            fastest = MAX(fastest, pace(knot));
-            if (L.interact) continue;
-            highest = MAX(highest, fabs(knot[6]) + fabs(knot[7]) + fabs(knot[8])
-                + fabs(potential(i, knot)) + kinetic(i, knot));
-        }
-        if (L.interact && is_released(i)) {
-            highest = kinetic(i, first);
-            lifted += potential(i, last) - potential(i, first);
-            for (int n = 0; n < 3; n++) entries[n] += last[6 + n];
-        }
-        L.energy += highest;
-    }
-    L.energy += fabs(lifted) + fabs(entries[0]) + fabs(entries[1]) + fabs(entries[2]);
-    for (int n = 0; n < 3 * L.book_rows; n++) unreal += !isfinite(L.books[n]);
-    if (bad.particles) tell_group(LAW_FINITE, &bad, unreal, 0);
-    else if (unreal) tell(LAW_FINITE, unreal, 0);
-    if (unreal) return 0;
-    L.speed = sqrt(fastest);
-    double *start = size, *length = size + 1, *center = size + 2, *radius = size + 3;
+/* The largest sizes of pieces, and what all particles have together. */
+static void weigh_machine(void) {
+    double *start = All.size, *length = All.size + 1, *center = All.size + 2, *radius = All.size + 3;
     for (int k = 0; k < L.piece_count * (L.family ? L.particle_count : 1); k++) {
         const Barrier *b = L.barriers + k;
         double *from = b->radius ? center : start;
         *from = MAX(*from, MAX(fabs(b->x), fabs(b->y)));
         *length = MAX(*length, b->length);
         *radius = MAX(*radius, b->radius);
-        L.speed = MAX(L.speed, fabs(b->speed));
+        All.belts = MAX(All.belts, fabs(b->speed));
     }
-    L.rounding = ROUNDINGS * EPS;
-    L.length = MAX(MAX(L.largest, *start + *length), MAX(place, L.speed * t));
-    if (*radius) L.length = MAX(L.length, *center + *radius + L.largest);
-    L.rounding *= L.length;
-    L.arcs = ON_ARCS * (L.largest + *radius);
-    return 1;
+    for (int i = 0; i < L.particle_count; i++) {
+        const Body *body = L.bodies + i;
+        All.mass += body->mass;
+        All.heaviest = MAX(All.heaviest, body->mass);
+        All.gravity = MAX(All.gravity, body->gravity);
+        All.smallest = i ? MIN(All.smallest, body->radius) : body->radius;
+    }
+}
+
+/* Look at all numbers of a particle: return whether they are finite, and find the largest of each kind; also
+   the energy in play, J: what it had at most, and what was booked on it, or of a crowd what was turned
+   over. */
+static int weigh(int i) {
+    const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
+    double highest = 0, begin = 0, before = 0;
+    int unreal = 0;
+    for (const double *knot = first; knot <= last; knot += L.row) {
+        double sum = 0;
+        for (int n = 0; n < 9; n++) sum += 0 * knot[n];
+        if (sum != 0) { /* NAN: one of them is not finite. */
+            for (int n = 0; n < 9; n++) unreal += !isfinite(knot[n]);
+            add(&All.bad, i, L.offsets[i] + (knot - first) / L.row);
+        }
+        All.t = MAX(All.t, fabs(knot[0]));
+        All.knot_t = MAX(All.knot_t, knot[0]);
+        All.place = MAX(All.place, MAX(fabs(knot[1]), fabs(knot[2])));
+        All.fastest = MAX(All.fastest, pace(knot));
+        if (L.interact) continue;
+        double moving = kinetic(i, knot), lifted = potential(i, knot);
+        highest = MAX(highest, fabs(knot[6]) + fabs(knot[7]) + fabs(knot[8]) + fabs(lifted) + moving);
+        double now = moving + lifted - (knot[6] - knot[7] - knot[8]);
+        if (knot == first) begin = before = now;
+        else All.back = MIN(All.back, given_back(knot));
+        All.change = MAX(All.change, fabs(now - before));
+        before = now;
+    }
+    All.residual += before - begin;
+    if (L.interact && is_released(i)) {
+        highest = kinetic(i, first);
+        All.lifted += potential(i, last) - potential(i, first);
+        for (int n = 0; n < 3; n++) All.entries[n] += last[6 + n];
+    }
+    L.energy += highest;
+    All.unreal += unreal;
+    return !unreal;
+}
+
+/* Tell whether all numbers are finite, once all particles are weighed. */
+static int are_finite(void) {
+    L.energy += fabs(All.lifted) + fabs(All.entries[0]) + fabs(All.entries[1]) + fabs(All.entries[2]);
+    All.unreal += L.unreal;
+    for (int n = 0; n < 3 * L.book_rows; n++) All.unreal += !isfinite(L.books[n]);
+    if (All.bad.particles) tell_group(LAW_FINITE, &All.bad, All.unreal, 0);
+    else if (All.unreal) tell(LAW_FINITE, All.unreal, 0);
+    return !All.unreal;
 }
 
 /* Largest acceleration towards the centre of an arc that a particle moves along inside, m/s2. Outside it
@@ -217,11 +244,23 @@ static double energy_parted(void) {
     return allowed;
 }
 
-static void find_bounds(void) {
-    L.bent = L.engine == ENGINE_EXACT ? 0 : bent_inside();
+/* How deep a disk may be in a surface, by what was weighed so far, and an acceleration inside arcs. The
+   clock's own rounding moves a particle: half an ulp of t, times its speed. */
+static void find_allowed(double bent) {
+    const double *start = All.size, *length = All.size + 1, *center = All.size + 2, *radius = All.size + 3;
+    L.speed = MAX(sqrt(All.fastest), All.belts);
+    L.length = MAX(MAX(L.largest, *start + *length), MAX(All.place, L.speed * All.t));
+    if (*radius) L.length = MAX(L.length, *center + *radius + L.largest);
+    L.rounding = ROUNDINGS * EPS * L.length;
+    L.arcs = ON_ARCS * (L.largest + *radius);
+    L.bent = bent;
     L.late = lateness();
     int lone = L.engine == ENGINE_CONTACT && !L.interact;
     L.allowed = L.rounding + L.arcs + L.late + (lone ? BULGE * L.largest : 0);
+}
+
+static void find_bounds(void) {
+    find_allowed(L.engine == ENGINE_EXACT ? 0 : bent_inside());
     L.energy_bound = energy_share();
     L.parted = energy_parted();
     /* m v w, where constant acceleration is as good as the true way but for a velocity w. */
@@ -306,16 +345,6 @@ static double risen(void) {
     return found;
 }
 
-/* What a knot gives back of the losses that were booked, J, at most 0. Where the contact engine holds a
-   particle by itself in a nip, impulses of any size hold each other, and along normals seems to be given
-   what friction takes: only the sum is known. */
-static double given_back(int k) {
-    const double *before = KNOT(k - 1), *now = KNOT(k);
-    double normal = now[7] - before[7], slip = now[8] - before[8];
-    if (L.engine == ENGINE_CONTACT && !L.interact) return normal + slip;
-    return MIN(normal, slip);
-}
-
 static double sum_opened(double depth, double least, double step) {
     double deep = depth / least, share = MIN(MAX(PARTS, deep / DEEP), 1) * MAX(deep - SLOP, 0);
     return depth > 0 ? square(MIN(share, OPENS) * least / step) : 0;
@@ -381,13 +410,13 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
     int count = 0, found = 0, bad = 0, *rows = L.order;
     for (int i = 0; i < L.particle_count; i++) {
         for (int k = L.offsets[i] + 1; k < L.offsets[i + 1]; k++) {
-            if (given_back(k) < -most) rows[count++] = k;
+            if (given_back(KNOT(k)) < -most) rows[count++] = k;
         }
     }
     sort(rows, count, L.knots, L.row);
     for (int n = 0; n < count;) {
         Instant now = {KNOT(rows[n])[0], 0};
-        for (; n < count && KNOT(rows[n])[0] == now.t; n++) now.given += given_back(rows[n]);
+        for (; n < count && KNOT(rows[n])[0] == now.t; n++) now.given += given_back(KNOT(rows[n]));
         if (found == INSTANTS && now.given >= worst[found - 1].given) continue;
         int at = found < INSTANTS ? found++ : found - 1;
         for (; at > 0 && worst[at - 1].given > now.given; at--) worst[at] = worst[at - 1];
@@ -407,17 +436,18 @@ static int beyond_overlaps(double most, Instant *worst, double *least) {
    contact engine gained. Losses that are booked are never less than before but by what parting overlaps
    gives: where many do so at one instant, those that overlap there. */
 static void judge_books(double bound) {
-    double most = bound + L.parted, least = most, rise = 0, back = 0, residual = 0, low = 0;
+    double most = bound + L.parted, least = most, rise = 0, back = 0, residual = All.residual, low = 0;
     int crowd = L.interact && L.engine == ENGINE_CONTACT, count = 0, surface = -1;
+    int is_sound = !L.interact && All.change <= most && All.back >= -most;
     Group rises = {0}, backs = {0};
     Instant instants[INSTANTS];
-    if (crowd) count = beyond_overlaps(most, instants, &least);
-    for (int i = 0; i < L.particle_count; i++) {
+    if (crowd) is_sound = !(count = beyond_overlaps(most, instants, &least));
+    for (int i = 0; i < L.particle_count && (L.interact || !is_sound); i++) {
         if (!is_released(i)) continue;
         double first = gain(i, KNOT(L.offsets[i])), before = first;
         if (L.interact) residual += gain(i, KNOT(last_of(i))) - first;
-        for (int k = L.offsets[i] + 1; k < L.offsets[i + 1] && (!crowd || count); k++) {
-            double own = given_back(k);
+        for (int k = L.offsets[i] + 1; k < L.offsets[i + 1] && !is_sound; k++) {
+            double own = given_back(KNOT(k));
             int told = own < -most;
             if (told && crowd) {
                 told = 0;
@@ -434,7 +464,6 @@ static void judge_books(double bound) {
             rise = MAX(rise, change);
             add(&rises, i, k);
         }
-        if (!L.interact) residual += before - first;
     }
     if (L.interact && L.gained > bound) {
         tell(LAW_ENERGY, L.gained, bound);
@@ -498,14 +527,23 @@ EXPORT int lay_out_laws(void) {
     return has_room();
 }
 
-/* Judge a run, if there is room for all hits. */
+/* Judge a run, if there is room for all hits. Each particle is looked at once, while its knots are at hand:
+   what is not deeper than it might be for itself alone is not so in any run. Where something is, or could
+   be at every contact, as in steps that are all alike, all are looked at again. */
 static void judge_all(void) {
+    int again = L.alike;
     L.breach_count = L.hit_count = 0;
+    L.energy = 0;
     memset(&All, 0, sizeof All);
     shape_barriers();
-    if (!weigh()) return; /* The other laws say nothing about what is no number. */
+    weigh_machine();
+    find_allowed(0);
+    for (int i = 0; i < L.particle_count; i++)
+        if (weigh(i) && !again) again = find_hits(i);
+    if (!are_finite()) return; /* The other laws say nothing about what is no number. */
     find_bounds();
-    find_hits();
+    L.hit_count = 0;
+    for (int i = 0; i < L.particle_count && again; i++) find_hits(i);
     if (L.hit_count > L.hit_room) return;
     double bound = L.energy_bound * L.energy;
     tell_hits(1);

@@ -23,6 +23,6 @@ double beside(const Barrier *b, double x, double y);
 int is_within(const Barrier *b, double x, double y, double margin);
 double distance(const Barrier *b, double x, double y);
 void place_at(const double *knot, double share, double *x, double *y);
-void find_hits(void);
+int find_hits(int particle);
 
 #endif

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core.module import REAL, Module, Status, borrow, constants, dtype, give_back
-from chutelab.machine import Machine, Pieces, moved, origin
+from chutelab.machine import Machine, Pieces
 from chutelab.results.laws import take
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
@@ -44,7 +44,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     -------
     Record
         Flights and blows to rounding error, lasting contacts of second order in `machine.dt`;
-        bit-identical on every machine, but for `seconds`.
+        bit-identical on every machine.
 
     Raises
     ------
@@ -55,21 +55,16 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     """
     if np.min(machine.particle.radius) <= 0.0:
         raise ValueError("particle.radius = 0: the contact engine needs a radius above 0 m")
-    begin = perf_counter()
-    place = origin(machine)
-    module = borrow()
+    module, recorder = borrow(), Recorder(machine)
     try:
-        job = Job(module, moved(machine, -place[0], -place[1]), whole=not any(place))
+        job = Job(module, recorder.near, whole=not any(recorder.origin))
         stalled = job.run(progress)
-        recording = job.recording(machine, place, perf_counter() - begin)
-        take(module, recording)
+        job.write(recorder)
+        record = recorder.finish(engine="contact", steps=job.steps)
+        take(module, record)
     finally:
         give_back(module)
-    if stalled is not None:
-        particle, t, (x, y) = stalled
-        reason = "too many impacts in one step; make run.dt shorter, or lower the restitution there"
-        raise StalledError(particle, t, (x + place[0], y + place[1]), reason, recording)
-    return recording
+    return recorder.whole(record, stalled)
 
 
 def parts(machine: Machine) -> dict[str, Pieces]:
@@ -80,9 +75,10 @@ def parts(machine: Machine) -> dict[str, Pieces]:
 
 def pieces(machine: Machine) -> NDArray[Any]:
     """Return all surfaces as rows of the core, as far as it asks."""
-    rows = np.zeros(sum(part.surface.size for part in parts(machine).values()), dtype("Surface"))
+    every = parts(machine)
+    rows = np.zeros(sum(part.surface.size for part in every.values()), dtype("Surface"))
     first = 0
-    for shape, part in parts(machine).items():
+    for shape, part in every.items():
         own = rows[first : (first := first + part.surface.size)]
         own["shape"] = constants("Shape")[shape]
         own["speed"], own["owner"] = part.speed, part.surface
@@ -99,19 +95,12 @@ class Job:
         self.module, self.machine = module, machine
         self.knots: list[NDArray[Any]] = []
         self.events: list[NDArray[Any]] = []
+        self.steps = 0
         # First disk of the part in which the run was stopped: from it on disks have not ended.
         self.stopped_from = machine.count
         self.pieces = pieces(machine)
         self.kinds, self.materials = len(machine.rolling), len(self.pieces)
-        self.owners = len(machine.surfaces)
-        self.settings(whole)
-        module.work("lay_out_world")
-        self.fill()
-        module.work("prepare_to_judge")
-
-    def settings(self, whole: bool) -> None:
-        """Fill in the numbers of the world."""
-        machine, world, wheel = self.machine, self.module.world, self.machine.pulley
+        self.owners, wheel = len(machine.surfaces), machine.pulley
         for name, value in (
             ("disk_count", machine.count), ("surface_count", len(self.pieces)),
             ("kind_count", self.kinds), ("owner_count", self.owners),
@@ -122,11 +111,8 @@ class Job:
             ("ride_incline", 0.0 if wheel is None else wheel.incline),
             ("g", machine.gravity), ("dt", machine.dt), ("end_time", machine.end_time),
         ):  # fmt: skip
-            setattr(world, name, value)
-
-    def fill(self) -> None:
-        """Fill in disks, surfaces and pairs."""
-        machine, module = self.machine, self.module
+            setattr(module.world, name, value)
+        module.work("lay_out_world")
         releases, particle = machine.releases, machine.particle
         disks = module.array("disks", dtype("Disk"), machine.count)
         disks["x"], disks["y"] = releases.position.T
@@ -143,16 +129,16 @@ class Job:
         own = pairs[:, : self.kinds]
         own["restitution"], own["friction"] = machine.pair_restitution, machine.pair_friction
         own["rolling"] = np.maximum.outer(machine.rolling, machine.rolling)
-        others = pairs[:, self.kinds :]
-        for name in ("restitution", "friction"):
-            values = [getattr(part, name) for part in parts(machine).values()]
-            values = [np.broadcast_to(each, (self.kinds, each.shape[-1])) for each in values]
-            others[name] = np.concatenate(values, axis=1)
-        others["rolling"] = machine.rolling[:, None]
+        first = self.kinds
+        for part in parts(machine).values():
+            others = pairs[:, first : (first := first + len(part.surface))]
+            others["restitution"], others["friction"] = part.restitution, part.friction
+            others["rolling"] = machine.rolling[:, None]
         np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
+        module.work("prepare_to_judge")
 
-    def run(self, progress: Progress | None) -> tuple[int, float, tuple[float, float]] | None:
-        """Run to the end, or until a particle stalls: return which one, when and where."""
+    def run(self, progress: Progress | None) -> StalledError | None:
+        """Run to the end, or until a particle stalls: return which one."""
         steps, status = 64, Status.PAUSED
         with suppress(EnoughError):
             while status not in (Status.DONE, Status.STALLED):
@@ -169,7 +155,8 @@ class Job:
             return None
         world = self.module.world
         disk = self.module.array("disks", dtype("Disk"), self.machine.count)[world.stalled]
-        return world.stalled, world.now, (float(disk["x"]), float(disk["y"]))
+        reason = "too many impacts in one step; make run.dt shorter, or lower the restitution there"
+        return StalledError(world.stalled, world.now, (float(disk["x"]), float(disk["y"])), reason)
 
     def stop(self) -> Status:
         """End the run after the step that it is in."""
@@ -214,10 +201,9 @@ class Job:
         passed = (world.t - begin) / (end - begin) if begin < world.t < end else 0.0
         return float(min(1.0, ended + passed / n))
 
-    def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Record:
-        """Return what was recorded."""
+    def write(self, recorder: Recorder) -> None:
+        """Write down what was recorded."""
         self.drain()
-        recorder = Recorder(machine)
         world, module = self.module.world, self.module
         # Each chunk is freed when it is handed over: together they are most of the memory.
         self.knots.reverse()
@@ -226,14 +212,11 @@ class Job:
             recorder.take_knots(self.knots.pop())
         while self.events:
             recorder.take_events(self.events.pop())
-        disks = module.array("disks", dtype("Disk"), machine.count)
-        reasons, late = disks["reason"].copy(), np.arange(machine.count) >= self.stopped_from
-        reasons[late & (reasons == REASONS.index("time"))] = REASONS.index("stopped")
-        recorder.ended[:] = reasons
+        recorder.ended[:] = module.array("disks", dtype("Disk"), self.machine.count)["reason"]
+        late = recorder.ended[self.stopped_from :]
+        late[late == REASONS.index("time")] = REASONS.index("stopped")
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count
         recorder.gained = world.gained
-        return recorder.finish(
-            engine="contact", steps=world.step_count, seconds=seconds, origin=place
-        )
+        self.steps = world.step_count

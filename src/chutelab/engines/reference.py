@@ -6,6 +6,9 @@ the root is found between two samples by Brent's method. What happens there (New
 Coulomb friction) is written out here once more. Of Chutelab it takes the machine's arrays, and
 hands back a `Recording`; needs SciPy.
 
+`solve_ivp` has events of its own, and cannot serve: it looks at them at the ends of its steps only,
+which are as long as a flight here, and takes no longest step that depends on the speed.
+
 What it can miss: a contact that begins and ends between two samples, less than `PIECE` apart; what
 it cannot follow (rest in a corner, more than `MOST_PHASES` contacts) is refused.
 """
@@ -120,13 +123,12 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     UnableError
         If it is not alone, SciPy is missing, or it gets where the equations here do not reach.
     """
-    machine = _plain(machine)
     try:
         from scipy.integrate import DOP853
         from scipy.optimize import brentq
     except ImportError:
         raise UnableError('SciPy is missing: pip install "chutelab[bench]"') from None
-    return _Run(machine, DOP853, brentq, progress).result()
+    return _Run(Recorder(machine), DOP853, brentq, progress).result()
 
 
 def _plain(machine: Machine) -> Machine:
@@ -134,7 +136,7 @@ def _plain(machine: Machine) -> Machine:
     if machine.count > 1:
         raise UnableError("it integrates one particle")
     kind = int(machine.releases.kind[0])
-    parts, wheel, p = machine.segments, machine.pulley, machine.particle
+    parts, wheel = machine.segments, machine.pulley
     for there, what in (
         (machine.outlines[kind] is not None or machine.threads, "disks without strings"),
         (len(machine.arcs.surface), "straight surfaces, and the drive pulley"),
@@ -145,21 +147,20 @@ def _plain(machine: Machine) -> Machine:
             raise UnableError(f"it integrates {what}, only")
     if len(machine.rolling) == 1:
         return machine
-    met = {key: getattr(parts, key)[kind] for key in ("restitution", "friction")}
+    pair = {key: getattr(parts, key)[kind] for key in ("restitution", "friction")}
     if wheel is not None:
-        wheel = replace(
-            wheel, restitution=wheel.restitution[kind], friction=float(wheel.friction[kind])
-        )
-    numbers = {key: float(np.broadcast_to(value, 1)[0]) for key, value in vars(p).items()}
-    return replace(
-        machine, segments=replace(parts, **met), pulley=wheel, particle=replace(p, **numbers)
-    )
+        met: dict[str, Any] = {key: float(getattr(wheel, key)[kind]) for key in pair}
+        wheel = replace(wheel, **met)
+    segments = replace(parts, **pair)
+    return replace(machine, segments=segments, pulley=wheel, particle=machine.particle.of(0))
 
 
 class _Run:
     """One particle on its way; `base` is where the phase began, `t0` when."""
 
-    def __init__(self, machine: Machine, solver: Any, root: Any, progress: Progress | None) -> None:
+    def __init__(self, log: Recorder, solver: Any, root: Any, progress: Progress | None) -> None:
+        machine = _plain(log.near)
+        self.log = log
         self.machine, self.solver, self.root, self.progress = machine, solver, root, progress
         p, releases = machine.particle, machine.releases
         self.r, self.g = p.radius, np.array([0.0, -machine.gravity])
@@ -168,7 +169,6 @@ class _Run:
         self.t0, self.base = float(releases.t[0]), releases.position[0].copy()
         self.state = np.zeros(7)
         self.state[V] = releases.velocity[0]
-        self.log = Recorder(machine)
         self.things = _surfaces(machine)
         # Whether the left face of a segment was struck last.
         self.sides: dict[int, bool] = {}
@@ -346,7 +346,7 @@ class _Run:
         """Integrate until something happens, and resolve it."""
         self.state[X] = self.state[WORK] = self.state[HEAT] = 0.0
         guards = list(self.meetings(on))
-        guards += list(self.changes(on) if on is not None else self.exits())
+        guards += [("exit", -1, self.to_exit)] if on is None else self.changes(on)
         left, first = self.machine.end_time - self.t0, None
         if on is None:
             for n in self.touching().values():
@@ -401,7 +401,13 @@ class _Run:
                 values[k] = seen[-1]
                 for at in np.flatnonzero((seen[:-1] > 0.0) & (seen[1:] <= 0.0)).tolist():
                     low = step.t_old if at == 0 else times[at - 1]
-                    t = self.moment(dense, guard, low, times[at])
+
+                    def value(t: float, dense: Any = dense, guard: Guard = guard) -> float:
+                        return float(guard(dense(t)[:, None])[0])
+
+                    t = times[at]  # the sample is the root, to rounding, unless
+                    if value(t) < 0.0 < value(low):
+                        t = float(self.root(value, low, t, xtol=1e-300, rtol=8.9e-16))
                     place = self.base + dense(t)[X]
                     beside = name not in ("left", "right") or self.things[index].within(place)
                     if t < earliest and beside:
@@ -413,16 +419,6 @@ class _Run:
                 self.knot(step.t, step.y)
         self.state, self.t0 = step.y.copy(), self.machine.end_time
         return "time", -1
-
-    def moment(self, dense: Any, guard: Guard, low: float, high: float) -> float:
-        """Return when a guard falls to 0 between two times."""
-
-        def value(t: float) -> float:
-            return float(guard(dense(t)[:, None])[0])
-
-        if value(high) >= 0.0 or value(low) <= 0.0:
-            return high  # the sample is the root, to rounding
-        return float(self.root(value, low, high, xtol=1e-300, rtol=8.9e-16))
 
     def meetings(self, on: _Lasting | None) -> Iterator[tuple[str, int, Guard]]:
         """Yield the gaps to all but what the particle lies on, and what that goes over into."""
@@ -458,10 +454,10 @@ class _Run:
 
         return left
 
-    def exits(self) -> Iterator[tuple[str, int, Guard]]:
-        left, bottom, right, top = self.machine.releases.exit_box[0]
-        low, high = np.array([left, bottom]) - self.base, np.array([right, top]) - self.base
-        yield "exit", -1, lambda y: np.minimum(y[X].T - low, high - y[X].T).min(axis=1)
+    def to_exit(self, y: Floats) -> Floats:
+        """Return how far it is from leaving the scene."""
+        low, high = self.machine.releases.exit_box[0].reshape(2, 2) - self.base
+        return np.asarray(np.minimum(y[X].T - low, high - y[X].T).min(axis=1))
 
     def changes(self, on: _Lasting) -> Iterator[tuple[str, int, Guard]]:
         """Yield what ends a contact: no load, no slip, too little friction, the end of a face."""

@@ -3,8 +3,7 @@
 - `parts`: `Machine`, its particle and its pulley.
 - `shapes`: straight and bent pieces of surfaces: nearest point, gap, ends, box, path to draw.
 - `releases`: where, when and how fast each particle starts.
-- `rows`: a scene as one row of numbers, of which the core lays the surfaces.
-- `builder`: `build`, from a validated scene to a machine.
+- `builder`: `build`, from a validated scene, as rows of numbers, to a machine.
 """
 
 from chutelab.machine.builder import build

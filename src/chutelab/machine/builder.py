@@ -1,29 +1,120 @@
 """`build`: a scene, or a family of them, as a machine.
 
-The core lays the surfaces. Where the nominal particle (no spread, lowest layer) meets the unbounded
-line of the plate gives the height of the outgoing belt, and that the lower end of the plate. A
-release that overlaps a surface is refused, or moved out where it is by rounding only.
+The core takes a scene as one row of numbers, a family as many rows, and lays the surfaces. Keys of
+the scene's tables have their own names in `layout.h`; NaN is what is not given. Where the nominal
+particle (no spread, lowest layer) meets the unbounded line of the plate gives the height of the
+outgoing belt, and that the lower end of the plate. A release that overlaps a surface is refused, or
+moved out where it is by rounding only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil, inf
+from itertools import chain
+from math import ceil, inf, nan, prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import borrow, constants, give_back
+from chutelab.core.module import REAL, Module, borrow, constants, dtype, give_back
 from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Thread
-from chutelab.machine.releases import RefusedError, Releases, draw
-from chutelab.machine.rows import lay
+from chutelab.machine.releases import RefusedError, draw
 from chutelab.machine.shapes import KINDS, Pieces
 from chutelab.scene import Fault, Plate, Scene
 from chutelab.scene.units import polygon_moment
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import Floats, Ints, Watch, unwatched
+from chutelab.util.arrays import Floats, Ints, Numbers, Watch, unwatched
 from chutelab.util.trig import RADIANS, hypot
+
+WORDS = {"adhesion": inf, "impact": 0.0, "top": 1.0}
+"""Numbers of what keys may say in words; `drop_from` as in layout.h."""
+
+WORD = 2**32
+"""Seeds are handed over as two numbers below it."""
+
+
+def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
+    """Return all numbers of a scene; of a family what varies is an array (N,).
+
+    `friction` is that of the nominal particle on the incoming belt, inf with adhesion.
+    """
+    scene, value, found = scenes.scene, scenes.value, list[Any]()
+
+    def add(struct: str, table: Any, **own: Any) -> None:
+        fields: Any = dtype(struct).fields
+        for key, (kind, _) in fields.items():
+            name, width = "from_" if key == "from" else key, kind.itemsize // 8
+            one = own[name] if name in own else value(table, name)
+            if type(one) is float:
+                found.append(one)
+            elif one is None:
+                found.extend([nan] * width)
+            elif isinstance(one, tuple):
+                flat = [*chain(*one)] if one and isinstance(one[0], tuple) else one
+                found.extend([*flat, *[nan] * (width - len(flat))])
+            else:
+                found.append(WORDS[one] if isinstance(one, str) else one)
+
+    add("SceneKeys", scene)
+    for kind in scene.particles:
+        add("ParticleKeys", kind, corners=len(kind.outline))
+    for stream, number in zip(scene.streams, scene.kinds, strict=True):
+        add("StreamKeys", stream, kind=number, seed=(stream.seed % WORD, stream.seed // WORD))
+    if scene.incoming is not None:
+        adheres = isinstance(value(scene.incoming, "friction"), str)
+        add("IncomingKeys", scene.incoming, friction=friction, adheres=adheres)
+    for plate in scene.plates:
+        add("PlateKeys", plate)
+    if scene.outgoing is not None:
+        add("OutgoingKeys", scene.outgoing)
+    for conveyor in scene.conveyor:
+        add("ConveyorKeys", conveyor)
+    for surface in scene.surface:
+        add("SurfaceKeys", surface, corners=len(surface.points or ()))
+    for string in scene.string:
+        add("StringKeys", string)
+    return [*found, *chain(*(point for one in scene.surface for point in one.points or ()))]
+
+
+def lay(
+    module: Module, scenes: Scene | Family, friction: Numbers
+) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
+    """Have the core lay the surfaces of a scene, or of all N scenes of a family.
+
+    Returns
+    -------
+    parts : dict of ndarray, (S,) or (N, S)
+        For each of `KINDS` rows as that in layout.h, by the part of a machine.
+    nominal : ndarray, () or (N,)
+        As `Nominal`.
+    """
+    scene, numbers = scenes.scene, row(scenes, friction)
+    shape = (len(scenes),) if isinstance(scenes, Family) else ()
+    plan, every = module.structs["Plan"], shape[0] if shape else 1
+    plan.members, plan.width = every, len(numbers)
+    plan.particles, plan.streams = len(scene.particles), len(scene.streams)
+    plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
+    plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
+    plan.surfaces, plan.strings = len(scene.surface), len(scene.string)
+    module.work("lay_out_plan")
+    rows = module.array("rows", REAL, every * len(numbers), of="Plan").reshape(every, -1)
+    varies = [n for n, number in enumerate(numbers) if isinstance(number, np.ndarray)]
+    rows[:] = [nan if n in varies else number for n, number in enumerate(numbers)]
+    for column in varies:
+        rows[:, column] = numbers[column]
+    module.work("build")
+    plan = module.structs["Plan"]
+
+    def found(name: str, kind: str, *count: int) -> NDArray[Any]:
+        rows = module.array(name, dtype(kind), every * prod(count), of="Plan")
+        return rows.copy().reshape((*shape, *count))
+
+    parts = {
+        f"{kind.lower()}s": found(f"{kind.lower()}s", kind, getattr(plan, f"{kind.lower()}_count"))
+        for kind in KINDS
+    }
+    return parts, found("nominal", "Nominal")
 
 
 def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
@@ -49,18 +140,20 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     scene, value = scenes.scene, scenes.value
     names, meeting = scene.surfaces, scene.meetings(value)
     kinds = 1 if family else len(scene.particles)
-    met = [[_with_grip(*meeting(kind, name)) for kind in range(kinds)] for name in names]
+    met = [[meeting(kind, name) for kind in range(kinds)] for name in names]
+    # Adhesion is friction without a bound.
+    met = [[(e, inf if isinstance(mu, str) else mu) for e, mu in pairs] for pairs in met]
     grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
     module = borrow()
     try:
-        laid = lay(module, scenes, grip)
-        warnings = _judged(scenes, laid.nominal)
+        rows, nominal = lay(module, scenes, grip)
+        warnings = _judged(scenes, nominal)
         releases, radius = draw(module, scenes, watch)
     finally:
         give_back(module)
     parts: dict[str, Any] = {
-        name: _pieces(KINDS[kind], rows, met, kinds)
-        for kind, (name, rows) in zip(KINDS, laid.parts.items(), strict=True)
+        name: _pieces(kind, rows[name], met, kinds)
+        for name, kind in zip(rows, KINDS.values(), strict=True)
     }
     belt, particles = scene.incoming, scene.particles
     until: Any = value(scene.run, "until")
@@ -83,6 +176,11 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     if not family:
         every = range(len(particles))
         pairs = np.array([[meeting(a, b) for b in every] for a in every])
+    threads = []
+    for string in scene.string:
+        x, y = releases.position[string.particle].tolist()
+        reach = float(hypot(x - string.from_[0], y - string.from_[1]))
+        threads.append(Thread(string.from_, string.particle, string.length or reach))
     return Machine(
         scenes=scenes,
         surfaces=names,
@@ -101,7 +199,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         pair_friction=pairs[..., 1],
         rolling=np.array([value(kind, "rolling_friction") for kind in particles]),
         outlines=tuple(np.array(kind.outline) if kind.outline else None for kind in particles),
-        threads=() if family else _threads(scene, releases),
+        threads=() if family else tuple(threads),
         streams=tuple(str(stream.name) for stream in scene.streams),
         engine=scene.run.engine,
         plate_warnings=warnings,
@@ -164,15 +262,6 @@ def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Part
     return Particle(radius, mass * cube, inertia * (cube * square))
 
 
-def _threads(scene: Scene, releases: Releases) -> tuple[Thread, ...]:
-    threads = []
-    for string in scene.string:
-        x, y = releases.position[string.particle].tolist()
-        reach = hypot(x - string.from_[0], y - string.from_[1])
-        threads.append(Thread(string.from_, string.particle, string.length or reach))
-    return tuple(threads)
-
-
 def _judged(scenes: Scene | Family, nominal: NDArray[Any]) -> tuple[Caution, ...]:
     """Return what may surprise about the plate; raise if the geometry contradicts itself."""
     scene, members = scenes.scene, nominal.reshape(-1)
@@ -216,8 +305,3 @@ def _fault(scenes: Scene | Family, plate: Plate | None, nominal: Any, member: in
     if nominal["contradiction"] == kinds["HIT_ABOVE"]:
         return Fault("plate.above", above, allowed)
     return Fault("plate.below", nominal["below"].item(), allowed)
-
-
-def _with_grip(restitution: Any, friction: Any) -> tuple[Any, Any]:
-    """Return restitution and friction, where adhesion is friction without a bound."""
-    return restitution, inf if isinstance(friction, str) else friction

@@ -110,7 +110,7 @@ class Pulley:
     surface: int
     incline: float = 0.0
 
-    @property
+    @cached_property
     def rim(self) -> Arcs:
         """Its surface, one piece: (1,), or in a family (N, 1)."""
         own = {**vars(self), "begin": 0.0, "extent": 2.0 * pi, "appears": -inf, "vanishes": inf}

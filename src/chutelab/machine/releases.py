@@ -159,7 +159,7 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
     Parameters
     ----------
     module : Module
-        In which the scene's surfaces are laid, see `machine.rows.lay`.
+        In which the scene's surfaces are laid, see `machine.builder.lay`.
     scenes : Scene or Family
         What is released.
     watch : callable

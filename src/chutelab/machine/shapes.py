@@ -201,8 +201,11 @@ class Segments(Pieces):
         return np.stack(self.ends)
 
     def told(self) -> dict[str, Floats]:
-        (x, y), (tx, ty) = np.moveaxis(self.start, -1, 0), np.moveaxis(self.tangent, -1, 0)
-        return {"x": x, "y": y, "tx": tx, "ty": ty, "length": self.length}
+        start, tangent = self.start, self.tangent
+        return {
+            "x": start[..., 0], "y": start[..., 1], "tx": tangent[..., 0], "ty": tangent[..., 1],
+            "length": self.length,
+        }  # fmt: skip
 
     def where(self) -> str:
         # Rounding leaves 1e-17 where 0 is meant.
@@ -307,8 +310,7 @@ class Arcs(Pieces):
         return self.at(np.linspace(0.0, self.way, 1 + ceil(self.extent / FINE)))
 
     def told(self) -> dict[str, Floats]:
-        x, y = np.moveaxis(self.center, -1, 0)
-        return {"x": x, "y": y} | {
+        return {"x": self.center[..., 0], "y": self.center[..., 1]} | {
             name: getattr(self, name) for name in ("radius", "begin", "extent")
         }
 

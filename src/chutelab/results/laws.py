@@ -115,8 +115,17 @@ def judge(recording: Record) -> tuple[Broken, ...]:
     """Judge a run: return the laws that it breaks, each once, in the order of `LAWS`."""
     if not len(recording.knots):
         return ()
-    found = examine(recording)
-    return tuple(_broken(recording, row, found.figures) for row in found.breaches)
+    found, machine = examine(recording), recording.machine
+    pulley = machine.segments.length.shape[-1] + machine.arcs.radius.shape[-1]
+    told = []
+    for row in found.breaches.tolist():
+        t, x, y, amount, bound, which, particles, particle, surface, piece, _ = row
+        name, law = recording.surfaces[surface] if surface >= 0 else "", LAWS[which]
+        if machine.pulley is not None and piece == pulley:
+            name = "pulley"
+        advice, unit = _advice(recording, law, found.figures), UNITS.get(law, "J")
+        told.append(Broken(law, particles, particle, t, (x, y), name, amount, bound, unit, advice))
+    return tuple(told)
 
 
 def examine(recording: Record) -> Findings:
@@ -226,19 +235,6 @@ def barriers(machine: Machine) -> NDArray[Any]:
         for name, values in part.told().items():
             own[name] = values
     return rows
-
-
-def _broken(recording: Record, row: NDArray[Any], figures: Any) -> Broken:
-    """Return a law that is broken in words."""
-    t, x, y, amount, bound, which, particles, particle, surface, piece, _ = row.tolist()
-    law, m = LAWS[which], recording.machine
-    name = recording.surfaces[surface] if surface >= 0 else ""
-    if m.pulley is not None and piece == m.segments.length.shape[-1] + m.arcs.radius.shape[-1]:
-        name = "pulley"
-    advice = _advice(recording, law, figures)
-    return Broken(
-        law, particles, particle, t, (x, y), name, amount, bound, UNITS.get(law, "J"), advice
-    )
 
 
 def _advice(recording: Record, law: str, figures: Any) -> str:

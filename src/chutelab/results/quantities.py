@@ -8,6 +8,7 @@ is in `chutelab.scene.quantities`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from math import nan
 from typing import Any
 
@@ -22,8 +23,8 @@ from chutelab.util.arrays import Bools, Floats
 
 _STATISTICS: dict[str, Callable[[Floats], Any]] = {
     "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,
-    "q02": lambda values: np.quantile(values, 0.02), "q50": np.median,
-    "q98": lambda values: np.quantile(values, 0.98),
+    "q50": np.median,
+    **{f"q{percent:02}": partial(np.quantile, q=percent / 100) for percent in (2, 25, 75, 98)},
 }  # fmt: skip
 
 
@@ -66,7 +67,13 @@ def each(recording: Record, name: str) -> Floats:
         case ["arrival", key]:
             return column(arrivals(recording), key)
         case ["belt_work" | "slip_heat" | "power" as what]:
-            return _until_no_slip(recording, what)
+            # What the belt pays until a lone particle does not slip.
+            settled = recording.ended_by("settled") & (
+                recording.count == 1 or bool(recording.family)
+            )
+            entry = "friction_loss" if what == "slip_heat" else "belt_work"
+            work = np.where(settled, paid(recording, "outgoing", entry), nan)
+            return np.asarray(work * (recording.machine.scenes.rate if what == "power" else 1.0))
     values = symbols(recording)[name.removesuffix("_deg")]
     return np.degrees(values) if name.endswith("_deg") else values
 
@@ -76,16 +83,6 @@ def _at_end(recording: Record, values: Any) -> Floats:
     found = np.full(recording.count, nan)
     found[recording.released] = values
     return found
-
-
-def _until_no_slip(recording: Record, what: str) -> Floats:
-    """Return what the outgoing belt pays until a lone particle does not slip, (N,)."""
-    if recording.count > 1 and not recording.family:
-        return np.full(recording.count, nan)
-    settled = recording.ended_by("settled")
-    entry = "friction_loss" if what == "slip_heat" else "belt_work"
-    work = np.where(settled, paid(recording, "outgoing", entry), nan)
-    return np.asarray(work * (recording.machine.scenes.rate if what == "power" else 1.0))
 
 
 def measured(recording: Record, name: str) -> Floats:

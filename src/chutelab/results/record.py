@@ -233,7 +233,8 @@ class Record(Shown):
     contacts : int
         Impacts and collisions resolved.
     seconds : float
-        Wall time from the validated scene to the recording; NaN in one that was loaded.
+        Wall time from the validated scene to the recording; NaN in one that was loaded, or
+        that an engine made without `simulate`.
     angle : ndarray, shape (K,), or (0,)
         How far a particle has turned counterclockwise since its release at each knot, rad, where
         some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not tell.
@@ -510,12 +511,16 @@ def kept(
     Arrays become read-only.
     """
     form = signature(reader)
+    name, usual = (reader.__module__, reader.__name__), [*form.parameters.values()][1:]
+    plain = (*name, *(one.default for one in usual))
 
     @wraps(reader)
     def read(record: Record, /, *args: Args.args, **more: Args.kwargs) -> Result:
-        given = form.bind(record, *args, **more)
-        given.apply_defaults()
-        key = (reader.__module__, reader.__name__, *given.args[1:])
+        key: tuple[Any, ...] = plain
+        if args or more:
+            given = form.bind(record, *args, **more)
+            given.apply_defaults()
+            key = (*name, *given.args[1:])
         if key not in record.found:
             record.found[key] = found = reader(record, *args, **more)
             if isinstance(found, np.ndarray):

@@ -6,13 +6,12 @@ end.
 
 from __future__ import annotations
 
-from math import nan
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine import Machine
+from chutelab.machine import Machine, moved, origin
 from chutelab.results.record import EVENT, KNOT, REASONS, Kind, Record
 from chutelab.util.arrays import Floats, Ints
 
@@ -57,11 +56,13 @@ class EnoughError(Exception):
 class Recorder:
     """Grows by chunks; `finish` turns it into a frozen `Record` of the machine's run.
 
-    With `apart`, `by_surface` is kept for each particle, (N, S, 3).
+    With `apart`, `by_surface` is kept for each particle, (N, S, 3). What is written down is counted
+    from `origin`, m, see `chutelab.machine.origin`: engines run `near`, the machine moved there.
     """
 
     def __init__(self, machine: Machine, *, apart: bool = False) -> None:
-        self.machine = machine
+        self.machine, self.origin = machine, origin(machine)
+        self.near = moved(machine, -self.origin[0], -self.origin[1])
         count, owners = machine.count, len(machine.surfaces) + 1  # and the particles
         self.entries = np.zeros((count, 3))
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
@@ -166,15 +167,16 @@ class Recorder:
         chunk["normal_impulse"], chunk["tangential_impulse"] = normal_impulse, tangential_impulse
         self._events.append(chunk)
 
-    def finish(
-        self,
-        *,
-        engine: str,
-        steps: int,
-        seconds: float = nan,
-        origin: tuple[float, float] = (0.0, 0.0),
-    ) -> Record:
-        """Sort what was collected, counted from `origin` (m), and freeze it."""
+    def whole(self, record: Record, stalled: StalledError | None) -> Record:
+        """Return a run's record; if a particle stalled, raise that with the record instead."""
+        if stalled is None:
+            return record
+        (x, y), (x0, y0) = stalled.position, self.origin
+        place = x + x0, y + y0
+        raise StalledError(stalled.particle, stalled.t, place, stalled.reason, record)
+
+    def finish(self, *, engine: str, steps: int) -> Record:
+        """Sort what was collected, and freeze it."""
         count = len(self.ended)
         knots = _joined(self._knots, KNOT)
         owners = np.concatenate([np.empty(0, dtype=np.int64), *self._owners])
@@ -209,10 +211,10 @@ class Recorder:
         if count > 1 or np.count_nonzero(t[1:] < t[:-1]):
             # At one time by particle, then as they came.
             events = events.take(np.lexsort((events["particle"].copy(), t.copy())))
-        if any(origin):
+        if any(self.origin):
             knots = knots.copy()
             for rows in (knots, events):
-                rows["position"] += origin
+                rows["position"] += self.origin
         return Record(
             machine=self.machine,
             engine=engine,
@@ -223,7 +225,6 @@ class Recorder:
             by_surface=self.by_surface.copy(),
             steps=steps,
             contacts=self.contacts,
-            seconds=seconds,
             angle=angle,
             gained=self.gained,
         )

@@ -96,7 +96,10 @@ def load(path: str | Path) -> Record:
     path = Path(path)
     kind = "not a recording as `chutelab run --out` writes it"
     try:
-        with zipfile.ZipFile(_regular(path)) as archive:
+        if path.exists() and not path.is_file():
+            # A pipe would be waited for.
+            raise OSError(ESPIPE, "it is no regular file")  # noqa: TRY301
+        with zipfile.ZipFile(path) as archive:
             about = json.loads(str(_array(archive, "about")))
             if about.get("format") == FORMAT:
                 return _recording(about, archive)
@@ -119,13 +122,6 @@ def load(path: str | Path) -> Record:
 
 class _UnfitError(ValueError):
     """What a file holds is not what a run leaves; the text says in what."""
-
-
-def _regular(path: Path) -> Path:
-    """Return a path that is not of a pipe, which would be waited for, or of a device."""
-    if path.exists() and not path.is_file():
-        raise OSError(ESPIPE, "it is no regular file")
-    return path
 
 
 def _array(archive: zipfile.ZipFile, name: str, room: int = 0) -> NDArray[Any]:

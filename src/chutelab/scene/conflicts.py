@@ -25,7 +25,6 @@ from chutelab.scene.units import (
     write_size,
 )
 from chutelab.util.errors import MISSING, Fault, did_you_mean
-from chutelab.util.trig import RADIANS
 
 THEORY: Final = "theory"
 UNPROMISED: Final = "none"
@@ -242,9 +241,9 @@ def _names(look: Look) -> Iterator[Fault]:
             yield row.fault("material", f"no such material; {allowed}")
 
 
-def _texts(rows: Iterable[Row], key: str = "name") -> list[str]:
-    """Return the texts that rows have under a key."""
-    return [text for row in rows if isinstance(text := row[key], str)]
+def _texts(rows: Iterable[Row]) -> list[str]:
+    """Return the names that rows have."""
+    return [text for row in rows if isinstance(text := row["name"], str)]
 
 
 def _there_are(names: Sequence[str]) -> str:
@@ -288,7 +287,7 @@ def _kind(look: Look, kind: Row) -> Iterator[Fault]:
             yield kind.missing("mass", f"kg, because {path('radius')} is 0")
     elif not shaped:
         key, density = _density(look, kind)
-        radius = _mean(radius)
+        radius = 0.5 * sum(radius) if isinstance(radius, LIST) else radius
         if density is not None and (mass := sphere_mass(density, radius)) < LIGHTEST:
             text = f"with {path('radius')} = {radius:g} m a mass of at least {LIGHTEST:g} kg"
             yield kind.fault(key, f"{text}, not {mass:.3g} kg")
@@ -305,11 +304,6 @@ def _kind(look: Look, kind: Row) -> Iterator[Fault]:
         if given(key):
             text = f"is for what is round; a {shape} has a mass, and a size of its own"
             yield kind.fault(key, text)
-
-
-def _mean(radius: Any) -> Any:
-    """Return a radius, or the mean of a range of radii."""
-    return 0.5 * sum(radius) if isinstance(radius, LIST) else radius
 
 
 def _density(look: Look, kind: Row) -> tuple[str, float | None]:
@@ -439,48 +433,48 @@ def _differ(path: str) -> str:
 
 def surface_conflicts(path: str, surface: Mapping[str, Any]) -> Iterator[Fault]:
     """Yield what is wrong with how one free surface is laid out; `path` is the surface's own."""
-    start, to, points = (surface.get(key) for key in ("from", "to", "points"))
-    center, opens = surface.get("center"), surface.get("opens_at")
-    if opens is not None and opens == surface.get("closes_at"):
-        yield Fault(f"{path}.opens_at", opens, f"must differ from {path}.closes_at")
-    if center is None:
-        for key in ARC:
-            if surface.get(key) not in (None, *([0.0, 360.0] if key != "radius" else [])):
-                yield Fault(f"{path}.center", MISSING, f"a point [x, y], to go with {path}.{key}")
-                return
-    else:
-        for key, value in (("from", start), ("to", to), ("points", points)):
-            if value is not None:
-                text = (
-                    f"give either {path}.center and radius, of an arc, or this, of a straight one"
-                )
-                yield Fault(f"{path}.{key}", value, text)
-        if surface.get("radius") is None:
-            yield Fault(f"{path}.radius", MISSING, f"m, to go with {path}.center")
-        begin = surface.get("from_deg")
-        begin, end = 0.0 if begin is None else begin, surface.get("to_deg")
-        end = 360.0 if end is None else end
-        angles = isinstance(begin, int | float) and isinstance(end, int | float)
-        if angles and (begin == end or abs(end - begin) > 360.0):
-            text = f"must be another angle than {path}.from_deg, at most 360 from it"
-            yield Fault(f"{path}.to_deg", end, text)
-        elif angles and abs(end - begin) * RADIANS * (surface.get("radius") or 1.0) < SHORTEST:
-            text = f"so far from {path}.from_deg that the arc is {SHORTEST:g} m long, at least"
-            yield Fault(f"{path}.to_deg", end, text)
+    given = {key: value for key, value in surface.items() if value is not None}
+
+    def fault(key: str, allowed: str) -> Fault:
+        return Fault(f"{path}.{key}", given.get(key, MISSING), allowed)
+
+    if "opens_at" in given and given["opens_at"] == given.get("closes_at"):
+        yield fault("opens_at", f"must differ from {path}.closes_at")
+    if "center" in given:
+        for key in ("from", "to", "points"):
+            if key in given:
+                text = "of an arc, or this, of a straight one"
+                yield fault(key, f"give either {path}.center and radius, {text}")
+        if "radius" not in given:
+            yield fault("radius", f"m, to go with {path}.center")
+        begin, end = given.get("from_deg", 0.0), given.get("to_deg", 360.0)
+        if isinstance(begin, int | float) and isinstance(end, int | float):
+            way = abs(end - begin)
+            if way == 0.0 or way > 360.0:
+                text = f"must be another angle than {path}.from_deg, at most 360 from it"
+                yield Fault(f"{path}.to_deg", end, text)
+            elif math.radians(way) * (given.get("radius") or 1.0) < SHORTEST:
+                text = f"so far from {path}.from_deg that the arc is {SHORTEST:g} m long, at least"
+                yield Fault(f"{path}.to_deg", end, text)
         return
-    if points is not None:
-        for key, value in (("from", start), ("to", to)):
-            if value is not None:
-                text = f"give either from and to, or {path}.points, not both"
-                yield Fault(f"{path}.{key}", value, text)
-    elif start is None and to is None:
+    for key in ARC:
+        if key in given and (key == "radius" or given[key] not in (0.0, 360.0)):
+            yield fault("center", f"a point [x, y], to go with {path}.{key}")
+            return
+    ends = [key for key in ("from", "to") if key in given]
+    if "points" in given:
+        for key in ends:
+            yield fault(key, f"give either from and to, or {path}.points, not both")
+    elif not ends:
         text = "give from and to, or points = [[x, y], ...], or of an arc center and radius"
-        yield Fault(f"{path}.points", MISSING, text)
-    elif start is None or to is None:
-        key, other = ("from", "to") if start is None else ("to", "from")
-        yield Fault(f"{path}.{key}", MISSING, f"a point [x, y], to go with {path}.{other}")
-    elif isinstance(start, LIST) and isinstance(to, LIST) and not apart(start, to):
-        yield Fault(f"{path}.to", to, _differ(path))
+        yield fault("points", text)
+    elif len(ends) == 1:
+        key = "to" if ends == ["from"] else "from"
+        yield fault(key, f"a point [x, y], to go with {path}.{ends[0]}")
+    elif all(isinstance(given[key], LIST) for key in ends) and not apart(
+        given["from"], given["to"]
+    ):
+        yield fault("to", _differ(path))
 
 
 def stream_name(row: int) -> str:

@@ -133,17 +133,16 @@ def rule_at(parts: Sequence[str | int]) -> Mapping[str, Any] | None:
         if rule is None:
             return None
         # Of what may be a table or a list of tables the one that the path goes on in.
-        below = [_below(_referred(choice), part) for choice in rule.get("anyOf", [_referred(rule)])]
+        below: list[Any] = []
+        for choice in map(_referred, rule.get("anyOf", [rule])):
+            if isinstance(part, str):
+                keys = choice.get("properties", {})
+                below.append(keys.get(part, choice.get("additionalProperties")))
+            else:
+                first = choice.get("prefixItems", [])
+                below.append(first[part] if part < len(first) else choice.get("items"))
         rule = next((found for found in below if isinstance(found, Mapping)), None)
     return None if rule is None else _referred(rule)
-
-
-def _below(rule: Mapping[str, Any], part: str | int) -> Any:
-    """Return what a rule says of a key, or of an entry of a list."""
-    if isinstance(part, str):
-        return rule.get("properties", {}).get(part, rule.get("additionalProperties"))
-    first = rule.get("prefixItems", [])
-    return first[part] if part < len(first) else rule.get("items")
 
 
 def unit_of(parts: Sequence[str | int]) -> str:

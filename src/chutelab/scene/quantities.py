@@ -74,7 +74,8 @@ KINDS: Final = {
 
 STATISTICS: Final = {
     "mean": "mean", "spread": "standard deviation", "min": "least", "max": "largest",
-    "q02": "2 % have less", "q50": "median", "q98": "98 % have less",
+    "q02": "2 % have less", "q25": "a quarter has less", "q50": "median",
+    "q75": "three quarters have less", "q98": "98 % have less",
 }  # fmt: skip
 """What is told of all particles together; those without a value do not count."""
 

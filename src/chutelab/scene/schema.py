@@ -367,7 +367,7 @@ class SceneTables(Table):
             filled._fill("name", stream_name(number))
         if isinstance(typed, str):
             filled._fill("rate", typed)
-            mass = self.particles[kind].mean_mass
+            mass = self.particles[kind].mean_of(self.particles[kind].mass)
             filled._resolve("rate", tonnes_per_hour(typed) / 3.6 / mass / self.slices(number))
         return filled
 

@@ -100,13 +100,8 @@ class Particle(Resolved):
         span: tuple[float, float] | None = self._typed.get("radius")  # type: ignore[assignment]
         return span
 
-    @property
-    def mean_mass(self) -> Any:
-        """Mean mass, kg, which goes with the cube of the radius."""
-        return self.mean_of(self.mass)
-
     def mean_of(self, mass: Any) -> Any:
-        """Return the mean mass, kg, if one of the mean radius has a mass (kg)."""
+        """Return the mean mass, kg, if one of the mean radius has a mass (kg): it goes with r³."""
         if self.span is None:
             return mass
         low, high = self.span

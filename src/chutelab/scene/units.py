@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from math import hypot, isfinite, nan, pi
+from operator import lt
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import (
@@ -233,6 +234,17 @@ def _free(name: str) -> str:
     return name
 
 
+def _must(holds: Callable[[Any], bool], words: str) -> AfterValidator:
+    """Refuse values that do not hold; say what they must be."""
+
+    def judged(value: Any) -> Any:
+        if not holds(value):
+            raise ValueError(f"must be {words}")
+        return value
+
+    return AfterValidator(judged)
+
+
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Whole = Annotated[int, Field(strict=True)]
 Switch = Annotated[bool, Field(strict=True)]
@@ -298,10 +310,7 @@ Gravity = Annotated[Amount, OrLeast(WEAKEST)]
 Speed = Annotated[Amount, OrLeast(SLOWEST)]
 
 
-def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
-    if not ends[0] < ends[1]:
-        raise ValueError("must be [from, to] with from < to")
-    return ends
+_ASCENDING: Final = _must(lambda ends: ends[0] < ends[1], "[from, to] with from < to")
 
 
 def flat(given: object) -> Any:
@@ -329,7 +338,7 @@ Ranges = Annotated[
         Text,
         Annotated[
             tuple[Number, Number],
-            AfterValidator(_ascending),
+            _ASCENDING,
             Worded("[from, to] with from < to"),
         ],
     ],
@@ -346,34 +355,28 @@ Values = Annotated[
 
 Span = Annotated[
     tuple[Length, Length],
-    AfterValidator(_ascending),
+    _ASCENDING,
     Worded("a range [from, to] with from < to"),
 ]
 """A range [from, to]."""
 
 
-def _box(corners: tuple[Point, Point]) -> tuple[Point, Point]:
-    (left, bottom), (right, top) = corners
-    if not (left < right and bottom < top):
-        raise ValueError("must be [[left, bottom], [right, top]]")
-    return corners
-
-
 Box = Annotated[
-    tuple[Point, Point], AfterValidator(_box), Worded("a box [[left, bottom], [right, top]]")
+    tuple[Point, Point],
+    _must(lambda box: all(map(lt, *box)), "[[left, bottom], [right, top]]"),
+    Worded("a box [[left, bottom], [right, top]]"),
 ]
 Size = Annotated[tuple[Length, Length], Worded(f"[width, height] of two numbers from {SHORTEST:g}")]
 Two = Annotated[tuple[Text, Text], Worded('two names ["a", "b"]')]
 
 
-def _convex(points: tuple[Point, ...]) -> tuple[Point, ...]:
+def is_convex(points: tuple[Point, ...]) -> bool:
+    """Tell whether points are the corners of a convex polygon, in their order."""
     turns = [
         (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
         for a, b, c in zip(points, points[1:] + points[:1], points[2:] + points[:2], strict=True)
     ]
-    if not (all(turn > 0.0 for turn in turns) or all(turn < 0.0 for turn in turns)):
-        raise ValueError("must be the corners of a convex polygon, in their order")
-    return points
+    return all(turn > 0.0 for turn in turns) or all(turn < 0.0 for turn in turns)
 
 
 def about_centroid(points: tuple[Point, ...]) -> tuple[Point, ...]:
@@ -401,7 +404,11 @@ def polygon_moment(points: tuple[Point, ...]) -> float:
     return sum(c * s for c, s in zip(crosses, squares, strict=True)) / (6.0 * sum(crosses))
 
 
-Corners = Annotated[tuple[Point, ...], Field(min_length=3, max_length=32), AfterValidator(_convex)]
+Corners = Annotated[
+    tuple[Point, ...],
+    Field(min_length=3, max_length=32),
+    _must(is_convex, "the corners of a convex polygon, in their order"),
+]
 
 Copies = Annotated[
     tuple[Annotated[Whole, Field(ge=1, le=1_000)], Coordinate, Coordinate],
@@ -425,12 +432,6 @@ def tonnes_per_hour(text: str) -> float:
     return float(match[1]) if match else nan
 
 
-def _rate(rate: float | str) -> float | str:
-    if isinstance(rate, str) and not 1e-6 <= tonnes_per_hour(rate) <= 1e6:
-        raise ValueError('must be a number from 1e-06 to 1000000000, or a text such as "120 t/h"')
-    return rate
-
-
 # A scene resolves both to a number, which is all that others see.
 if TYPE_CHECKING:
     Rate = float
@@ -440,7 +441,10 @@ else:
     Rate = Annotated[
         Annotated[Number, Field(ge=1e-6, le=1e9)]
         | Annotated[Text, Field(max_length=40), Worded('a text such as "120 t/h"')],
-        AfterValidator(_rate),
+        _must(
+            lambda rate: not isinstance(rate, str) or 1e-6 <= tonnes_per_hour(rate) <= 1e6,
+            'a number from 1e-06 to 1000000000, or a text such as "120 t/h"',
+        ),
     ]
 
 

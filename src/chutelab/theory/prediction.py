@@ -7,8 +7,8 @@ are segments and arcs without thickness, touched from either side at the disk's 
 The gap to each side of a face or an arc, and to each end, is a function of time (on the ride, of
 the angle) that is followed between its turning points: the disk collides at the first instant at
 which a gap falls to zero, touching included. A gap that is zero from the beginning falls if the
-disk approaches or is pressed, and not if it leaves or goes along. Zero is what rounding makes of
-the numbers, so a graze to within rounding is one.
+disk approaches or is pressed, and not if it leaves or goes along, past an end either. Zero is what
+rounding makes of the numbers, so a graze to within rounding is one.
 """
 
 from __future__ import annotations
@@ -201,6 +201,9 @@ def first_in_flight(
     height = np.sum((flight.position - start) * normal, axis=1)
     speed = normal @ flight.velocity
     bend = -0.5 * flight.gravity * normal[:, 1]
+    speed[np.abs(speed) <= ROUNDING * np.abs(flight.velocity).sum()] = 0.0
+    bend[np.abs(bend) <= ROUNDING * flight.gravity] = 0.0
+    along = (speed == 0.0) & (bend == 0.0) & obstacles.on_face(flight.position)
     faces, rings = np.full(len(start), np.inf), np.full(len(size), np.inf)
     off = ROUNDING * (np.abs(flight.position).sum() + np.abs(start).sum(axis=1) + radius)
     for side in (1.0, -1.0):
@@ -220,7 +223,9 @@ def first_in_flight(
     places = flight.at(np.array([0.0, horizon, np.clip(turn, 0.0, horizon)]))
     room = 1.001 * (size + radius)[:, None]
     near = (center >= places.min(axis=0) - room) & (center <= places.max(axis=0) + room)
-    for index in np.flatnonzero(near.all(axis=1)) if horizon > 0.0 else ():
+    along &= np.abs(np.abs(height) - radius) <= off
+    ends = (size == 0.0) & np.isin(obstacles.owner, np.flatnonzero(along))
+    for index in np.flatnonzero(near.all(axis=1) & ~ends) if horizon > 0.0 else ():
         for side in (1.0, -1.0):
             if size[index] + side * radius <= 0.0:
                 continue
@@ -285,8 +290,7 @@ class Course:
         # Up along the plate, and out of its struck face.
         sin, cos = sin_cos(self.angle)
         self.up, self.normal = np.array([-sin, cos]), np.array([-cos, -sin])
-        pivot = self.belt.pulley_radius + plate.distance, plate.pivot_height
-        self.pivot = np.array(pivot, dtype=np.float64)
+        self.pivot = np.array([self.belt.pulley_radius + plate.distance, plate.pivot_height])
         self.incline = self.belt.incline_deg * RADIANS
         # Up along the incoming belt, and out of its upper side.
         sin, cos = sin_cos(self.incline)
@@ -337,8 +341,7 @@ class Course:
 
 def free_surfaces(scene: Scene) -> tuple[list[Line], list[Bend]]:
     """Return the straight and round pieces of further plates, conveyors and free surfaces."""
-    lines: list[Line] = []
-    bends: list[Bend] = []
+    lines, bends = list[Line](), list[Bend]()
     for plate in scene.plates:
         if plate.pivot is not None:
             sin, cos = sin_cos(plate.angle_deg * RADIANS)
@@ -397,8 +400,7 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     from chutelab.scene import load
 
     scene = load(scene)
-    fault = outside(scene)
-    if fault:
+    if fault := outside(scene):
         return cut(unanswered(), "separation", Reason.OUTSIDE.because(fault))
     found = unbounded(scene, rebound)
     if np.isnan(found.phi1):
@@ -407,8 +409,7 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     if scene.outgoing is not None and course.belt_height is None:
         # Nothing places the belt, nor the plate's lower end: there is no machine to look at.
         return cut(found, "separation", str(found.reason))
-    trouble = hindrance(course)
-    return found if trouble is None else cut(found, *trouble)
+    return cut(found, *trouble) if (trouble := hindrance(course)) else found
 
 
 def unbounded(scenes: Scene | Family, rebound: Rebound = "corrected") -> Transfer:
@@ -595,6 +596,5 @@ def hindrance(course: Course) -> tuple[str, str] | None:
         return "landing", course.meets(Reason.SECOND, name, what)
     x = float(course.impact[0] - found.x3)
     if lands and not out.start <= x <= out.start + out.length:
-        what = f"it comes down at x = {x:.4g} m, off the belt"
-        return "landing", Reason.MISSES.because(what)
+        return "landing", Reason.MISSES.because(f"it comes down at x = {x:.4g} m, off the belt")
     return None

@@ -10,9 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 
-def did_you_mean(
-    word: str, known: Iterable[str], otherwise: str, *, most: int = 1, cutoff: float = 0.6
-) -> str:
+def did_you_mean(word: str, known: Iterable[str], otherwise: str, *, most: int = 1) -> str:
     """Ask for the names that are most like a word, up to `most`; say something else if none is.
 
     >>> did_you_mean("hod", ["hood", "floor"], "there are hood, floor")
@@ -20,7 +18,7 @@ def did_you_mean(
     >>> did_you_mean("x", ["hood", "floor"], "there are hood, floor")
     'there are hood, floor'
     """
-    near = difflib.get_close_matches(word, list(known), n=most, cutoff=cutoff)
+    near = difflib.get_close_matches(word, list(known), n=most)
     return f"did you mean {' or '.join(near)}?" if near else otherwise
 
 

@@ -176,9 +176,9 @@ def _cell(text: str) -> Any:
     return Text.assemble((first, "bold"), end, rest) if end else Text(text, STYLES.get(text, ""))
 
 
-def wrapped(text: str, width: int = WIDTH) -> list[str]:
-    """Return a text in lines of at most `width` characters, broken between words."""
-    return wrap(text, width, break_on_hyphens=False)
+def wrapped(text: str) -> list[str]:
+    """Return a text in lines of at most `WIDTH` characters, broken between words."""
+    return wrap(text, WIDTH, break_on_hyphens=False)
 
 
 def number(value: float) -> str:

@@ -4,22 +4,17 @@ Those of libraries differ in the last bit from one to another. The core's ``trig
 uses too, has the same operations in the same order. The polynomials are those of fdlibm (Sun
 Microsystems, 1993), which are free to use.
 
-All take plain numbers, for which NumPy is not loaded, or arrays.
+All take numbers or arrays.
 """
 
 from __future__ import annotations
 
-from math import nan, pi, sqrt
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any
 
-if TYPE_CHECKING:
-    from chutelab.util.arrays import Floats, Numbers
+import numpy as np
 
-RADIANS = pi / 180.0
+RADIANS = np.pi / 180.0
 """Of one degree."""
-
-FEW = 32
-"""Numbers that are faster one by one than as an array."""
 
 LARGEST_ANGLE = 1e6
 """rad; beyond, π/2 in three parts of 33 bits is no longer subtracted exactly."""
@@ -54,11 +49,7 @@ _QUARTER, _QUARTER_LOW = 1.57079632679489655800e00, 6.12323399573676603587e-17
 _STRAIGHT, _STRAIGHT_LOW = 3.14159265358979311600e00, 1.22464679914735317723e-16
 
 
-@overload
-def sin_cos(angle: float) -> tuple[float, float]: ...
-@overload
-def sin_cos(angle: Floats) -> tuple[Floats, Floats]: ...
-def sin_cos(angle: Numbers) -> tuple[Numbers, Numbers]:
+def sin_cos(angle: Any) -> tuple[Any, Any]:
     """Return sine and cosine, each to less than 1 unit in the last place.
 
     Parameters
@@ -68,41 +59,10 @@ def sin_cos(angle: Numbers) -> tuple[Numbers, Numbers]:
 
     Examples
     --------
-    >>> sin_cos(0.5 * pi)
-    (1.0, 6.123233995736766e-17)
+    >>> float(sin_cos(0.5 * np.pi)[1])
+    6.123233995736766e-17
     """
-    if not isinstance(angle, float | int):
-        return _sin_cos(angle)
-    angle = float(angle)
-    if not -LARGEST_ANGLE <= angle <= LARGEST_ANGLE:
-        return nan, nan
-    turns, sine, cosine = _octant(angle)
-    quarter = int(turns) & 3
-    if quarter == 0:
-        return sine, cosine
-    if quarter == 1:
-        return cosine, -sine
-    return (-sine, -cosine) if quarter == 2 else (-cosine, sine)
-
-
-def _sin_cos(angle: Floats) -> tuple[Floats, Floats]:
-    import numpy as np
-
-    if angle.size <= FEW:
-        pairs = np.array([*map(sin_cos, angle.ravel().tolist())]).reshape(-1, 2)
-        return pairs[:, 0].reshape(angle.shape), pairs[:, 1].reshape(angle.shape)
-    turns, sine, cosine = _octant(np.where(np.abs(angle) <= LARGEST_ANGLE, angle, nan))
-    quarter = turns - 4.0 * np.floor(0.25 * turns)
-    odd = (quarter == 1.0) | (quarter == 3.0)
-    up, across = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
-    return (
-        np.where(quarter >= 2.0, -up, up),
-        np.where((quarter == 1.0) | (quarter == 2.0), -across, across),
-    )
-
-
-def _octant(angle: Any) -> tuple[Any, Any, Any]:
-    """Return how many quarter turns an angle is, rounded; sine and cosine of what is left."""
+    angle = np.where(np.abs(angle) <= LARGEST_ANGLE, angle, np.nan)[()]
     turns = (angle * _QUARTERS + _ROUND) - _ROUND
     # The rest, as the sum of x and a tail, without its first digits cancelling away.
     first = angle - turns * _PART1
@@ -121,14 +81,16 @@ def _octant(angle: Any) -> tuple[Any, Any, Any]:
     half = 0.5 * z
     one = 1.0 - half
     cosine = one + (((1.0 - one) - half) + (z * r - x * tail))
-    return turns, sine, cosine
+    quarter = turns - 4.0 * np.floor(0.25 * turns)
+    odd = (quarter == 1.0) | (quarter == 3.0)
+    up, across = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
+    return (
+        np.where(quarter >= 2.0, -up, up)[()],
+        np.where((quarter == 1.0) | (quarter == 2.0), -across, across)[()],
+    )
 
 
-@overload
-def atan2(y: float, x: float) -> float: ...
-@overload
-def atan2(y: Floats, x: Floats) -> Floats: ...
-def atan2(y: Numbers, x: Numbers) -> Numbers:
+def atan2(y: Any, x: Any) -> Any:
     """Return the angle of a vector from the x axis, to 1.5 units in the last place.
 
     Parameters
@@ -141,13 +103,6 @@ def atan2(y: Numbers, x: Numbers) -> Numbers:
     float or ndarray
         rad, more than -π, at most π.
     """
-    if isinstance(y, float | int) and isinstance(x, float | int):
-        return _angle(float(y), float(x))
-    import numpy as np
-
-    y, x = np.broadcast_arrays(np.asarray(y, dtype=np.float64), np.asarray(x, dtype=np.float64))
-    if y.size <= FEW:
-        return np.array([*map(_angle, y.ravel().tolist(), x.ravel().tolist())]).reshape(y.shape)
     up, across = np.abs(y), np.abs(x)
     steep, back = up > across, x < 0.0
     low, high = np.where(steep, across, up), np.where(steep, up, across)
@@ -158,60 +113,25 @@ def atan2(y: Numbers, x: Numbers) -> Numbers:
     rest = np.where(middle, np.where(most, _EIGHTH_LOW, _HALF_LOW), 0.0)
     base = np.where(steep, _QUARTER, np.where(back, _STRAIGHT, 0.0))
     lack = np.where(steep, _QUARTER_LOW, np.where(back, _STRAIGHT_LOW, 0.0))
-    turned = _summed(base, lack, np.where(steep != back, -1.0, 1.0), angle, rest, t)
-    return np.asarray(np.where(y < 0.0, -turned, turned))
-
-
-def _angle(y: float, x: float) -> float:
-    up, across = abs(y), abs(x)
-    steep, back = up > across, x < 0.0
-    low, high = (across, up) if steep else (up, across)
-    at, angle, rest = 0.0, 0.0, 0.0
-    if low > 0.6875 * high:
-        at, angle, rest = 1.0, _EIGHTH, _EIGHTH_LOW
-    elif low > 0.4375 * high:
-        at, angle, rest = 0.5, _HALF, _HALF_LOW
-    t = (low - at * high) / (1.0 if high == 0.0 else high + at * low)
-    base, lack = 0.0, 0.0
-    if steep:
-        base, lack = _QUARTER, _QUARTER_LOW
-    elif back:
-        base, lack = _STRAIGHT, _STRAIGHT_LOW
-    turned: float = _summed(base, lack, -1.0 if steep != back else 1.0, angle, rest, t)
-    return -turned if y < 0.0 else turned
-
-
-def _summed(base: Any, lack: Any, sign: Any, angle: Any, rest: Any, t: Any) -> Any:
-    """Return base + lack + sign (angle + rest + the arc tangent of t), rounded once."""
+    # base + lack + sign (angle + rest + the arc tangent of t), rounded once
+    sign = np.where(steep != back, -1.0, 1.0)
     z = t * t
     w = z * z
     odd = z * (_A0 + w * (_A2 + w * (_A4 + w * (_A6 + w * (_A8 + w * _A10)))))
     even = w * (_A1 + w * (_A3 + w * (_A5 + w * (_A7 + w * _A9))))
     part = sign * angle
-    most = base + part
-    lost = part - (most - base)
-    return most + (((lost + lack) + sign * rest) + sign * (t - t * (odd + even)))
+    whole = base + part
+    lost = part - (whole - base)
+    turned = whole + (((lost + lack) + sign * rest) + sign * (t - t * (odd + even)))
+    return np.where(y < 0.0, -turned, turned)[()]
 
 
-@overload
-def arc_cos(cosine: float) -> float: ...
-@overload
-def arc_cos(cosine: Floats) -> Floats: ...
-def arc_cos(cosine: Numbers) -> Numbers:
+def arc_cos(cosine: Any) -> Any:
     """Return the angle from 0 to π (rad) of a cosine, to 2.5 units in the last place, or NaN."""
     square = (1.0 - cosine) * (1.0 + cosine)
-    if isinstance(cosine, float | int):
-        return _angle(sqrt(square), float(cosine)) if square >= 0.0 else nan
-    import numpy as np
-
-    return atan2(np.sqrt(np.where(square >= 0.0, square, nan)), cosine)
+    return atan2(np.sqrt(np.where(square >= 0.0, square, np.nan)), cosine)
 
 
 def hypot(x: Any, y: Any) -> Any:
     """Return the length of a vector, for sizes of which squares neither overflow nor vanish."""
-    square = x * x + y * y
-    if isinstance(square, float):
-        return sqrt(square)
-    import numpy as np
-
-    return np.sqrt(square)
+    return np.sqrt(x * x + y * y)

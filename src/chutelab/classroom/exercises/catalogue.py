@@ -249,13 +249,15 @@ def _asked(case: Case) -> Passage:
 
 
 def report() -> list[dict[str, object]]:
-    """Return lesson, student, answers and shown workings of all tasks of this process, as JSON."""
+    """Return what was done in all tasks of this process, as JSON."""
     return [
         {
             "lesson": task.lesson,
             "student": task.student,
             "answers": {str(number): answer for number, answer in task.answers.items()},
             "revealed": list(task.revealed),
+            "tries": {str(one.number): one.tries for one in task._standings if one.tries},
+            "hints": {str(one.number): one.hints for one in task._standings if one.hints},
         }
         for task in list(OPENED)  # another thread may be opening one
     ]
@@ -361,7 +363,7 @@ class _Dotted(ast.NodeTransformer):
     """Makes one name of a quantity such as ``landing.x``."""
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.Name:
-        return ast.Name(ast.unparse(node))
+        return ast.Name(ast.unparse(node), ast.Load())
 
 
 def of_quantities(formula: str) -> ast.Expression:
@@ -472,6 +474,7 @@ def _question(asked: Question, language: str) -> dict[str, Any]:
         "title": asked.title,
         "text": _line(asked.text),
         "unit": words(language).unit(asked.unit),
+        "angle": asked.unit == "degrees",
         "answer": tree(asked.answer),
         "measured": tree(asked.measured) if asked.measured else None,
         "mistakes": [

@@ -312,7 +312,9 @@ def _general(language: str, *, angle: bool) -> tuple[Trace, ...]:
     for power in range(1, MOST_TENS + 1):
         raised, times = str(power).translate(_RAISED), f"{10**power:,}".replace(",", " ")
         for way, factor in (("large", 10.0**power), ("small", 10.0**-power)):
-            says = said.say("reply-ten", power=raised, times=times, way=said.say(way))
+            # An angle has no kg or g.
+            key = "reply-ten-angle" if angle else "reply-ten"
+            says = said.say(key, power=raised, times=times, way=said.say(way))
             found.append(trace("mistake-ten", says, factor))
             found.append(trace("mistake-ten", f"{says} {said.say('reply-ten-sign')}", -factor))
     if angle:
@@ -355,9 +357,11 @@ class Case:
         """A mistake of the question's own, and one of `BESIDES` on top of it."""
         own = {known.name for known in self.question.mistakes}
         english, say = words().say, words(self.numbers.language).say
+        of_angle = "-angle" if self.question.unit == "degrees" else ""
         for first in self.mistakes[: len(own)]:
-            for key, says, factor in BESIDES:
+            for key, besides, factor in BESIDES:
                 if english(key) not in own:
+                    says = besides + of_angle if key == "mistake-ten" else besides
                     name = english("pair", first=first.name, second=english(key))
                     called = say("pair", first=first.called, second=say(key))
                     yield Trace(name, called, f"{first.says} {say(says)}", factor * first.number)
@@ -380,12 +384,15 @@ class Case:
 
 
 def plain(student: str) -> str:
-    """Return a name in lower case, with single spaces and in one Unicode form.
+    """Return a name in lower case, with single spaces and in one Unicode form, first name first.
 
-    >>> plain("  Ada  LOVELACE ")
-    'ada lovelace'
+    >>> plain("  Ada  LOVELACE "), plain("Berg, Mia")
+    ('ada lovelace', 'mia berg')
     """
-    return " ".join(unicodedata.normalize("NFKC", student).casefold().split())
+    last, comma, first = unicodedata.normalize("NFKC", student).casefold().partition(",")
+    # Learning platforms write "Berg, Mia".
+    turned = comma and last.strip() and first.strip() and "," not in first
+    return " ".join((f"{first} {last}" if turned else last + comma + first).split())
 
 
 def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] | None:

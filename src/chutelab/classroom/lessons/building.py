@@ -4,12 +4,11 @@
 in a comment of the GIF itself. A new lesson comes from the template or is a copy of another: it
 validates and builds at once.
 
-``exercise.ipynb`` has the parts of the worksheet; a translated worksheet makes one in its language.
-A block of commands becomes a cell that runs the same (`classroom.book`); paragraphs that begin with
-``*In a terminal`` are left out. ``notebook.py``, in the percent format, has what only the notebook
-has: a cell ``# %% Run`` follows what stands under "Run", a cell ``# %% Run 2`` takes the place of
-its second block, and ``# %% [markdown] Run`` is text; a line ``# needs: notebook,fit`` names the
-extras of the package that it takes. The same files make the same bytes.
+``exercise.ipynb`` has the steps, ``exercise.LANGUAGE.ipynb`` has them in another language; the runs
+of tables are made by `classroom.book`. ``notebook.py``, in the percent format, has what only the
+notebook has: ``# %% 3`` is a cell at the end of step 3, ``# %% [markdown:de] 3`` a text in German;
+a line ``# needs: notebook,fit`` names the extras of the package that it takes. The same files make
+the same bytes.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ import hashlib
 import json
 import re
 import shutil
-import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass
 from errno import ELOOP
@@ -34,7 +32,6 @@ from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import UNNAMED
 from chutelab.classroom.lessons.reading import (
     OWN_WORDS,
-    PARTS,
     Lesson,
     LessonError,
     read,
@@ -43,6 +40,7 @@ from chutelab.classroom.lessons.reading import (
     split,
     unusable,
 )
+from chutelab.classroom.lessons.sheets import asked, table
 from chutelab.classroom.words import words
 from chutelab.engines.simulation import judged
 from chutelab.scene import Fault, to_dict
@@ -124,21 +122,17 @@ def build(
     return Built(path, path.stat().st_size, made)
 
 
-def build_notebook(lesson: Lesson, folder: Path | None = None) -> Built | None:
-    """Make the notebook of a lesson, unless it is there already; None if there is none to make.
-
-    That is so if its worksheet has not all the parts of a notebook, see `cells`.
+def build_notebook(lesson: Lesson, folder: Path | None = None) -> Built:
+    """Make the notebook of a lesson, unless it is there already.
 
     Raises
     ------
     LessonError
-        If a cell of the lesson's own belongs to no part.
+        If a cell of the lesson's own belongs to no step.
     OSError
         If the file cannot be written.
     """
     text = notebook_of(lesson)
-    if not text:
-        return None
     path = (lesson.folder if folder is None else folder) / name_of(lesson.language)
     made = not path.is_file() or path.read_text(encoding="utf-8") != text
     if made:
@@ -167,8 +161,8 @@ def stamp_of(lesson: Lesson) -> str:
     """
     lesson = _in_english(lesson)
     scene = to_dict(scene_of(lesson, lesson.picture.scene, lesson.picture.set))
-    for table in ("expect", "live"):  # neither shows in its picture
-        scene.pop(table, None)
+    for hidden in ("expect", "live"):  # neither shows in its picture
+        scene.pop(hidden, None)
     # Without defaults, which the version determines.
     settings = lesson.picture.model_dump(exclude_unset=True, exclude=NO_SETTINGS)
     inputs = {"scene": scene, "picture": settings, "question": lesson.question, "predict": True}
@@ -263,155 +257,99 @@ def name_of(language: str) -> str:
 
 
 def notebook_of(lesson: Lesson) -> str:
-    """Return the text of a lesson's notebook, JSON; "" if its worksheet has not all of `PARTS`.
-
-    The worksheet is that in the lesson's language; so is the notebook.
+    """Return the text of a lesson's notebook, JSON: its steps, in the lesson's language.
 
     Raises
     ------
     LessonError
-        If a cell of ``notebook.py`` belongs to no part.
+        If a cell of ``notebook.py`` belongs to no step.
     """
-    say = words(lesson.language).say
-    heading, *pieces = re.split(r"^## (.*)\n+", lesson.text("README"), flags=re.MULTILINE)
-    parts = dict(zip(pieces[::2], pieces[1::2], strict=True))
-    heads = [say(key) for key in PARTS]
-    if not parts.keys() >= {*heads}:
-        return ""
-    predict, run, compare = (parts[head] for head in heads)
-    own = _own(lesson)
-    left = dict.fromkeys(own)
+    said = words(lesson.language)
+    say, own, exercise = said.say, _own(lesson), EXERCISES.get(lesson.name)
     cells: list[dict[str, Any]] = []
 
-    def add(kind: str, name: str, source: str, place: str = "") -> None:
+    def add(kind: str, name: str, *parts: str) -> None:
+        source = "\n\n".join(part.strip() for part in parts if part.strip())
         cell: dict[str, Any] = {"cell_type": kind, "id": name, "metadata": {}}
         if kind == "code":
             cell |= {"execution_count": None, "outputs": []}
         cells.append(cell | {"source": source.splitlines(keepends=True)})
-        left.pop(place, None)
 
     text, code = partial(add, "markdown"), partial(add, "code")
-
-    def add_own(place: str) -> None:
-        for n, (kind, source) in enumerate(own.get(place, ()), start=1):
-            add(kind, f"{place}-own-{n}".lower().replace(" ", "-"), source, place)
-
-    def prose(part: str) -> str:
-        """Return paragraphs on a line each, without those that are for a terminal.
-
-        Lists and tables keep their line breaks.
-        """
-        terminal = f"*{say('notebook-terminal')}"
-        paragraphs = re.split(r"\n{2,}", part.strip())
-        kept = [textwrap.dedent(one) for one in paragraphs if not one.startswith(terminal)]
-        broken = r"\n(?!\s*(?:[-*] |\||\d+\. )|#)\s*"
-        return "\n\n".join(re.sub(broken, " ", one) for one in kept)
-
-    exercise = EXERCISES.get(lesson.name)
-    title, _, opening = heading.partition("\n")
-    # The notebook draws the machine itself: a student may have no other file.
-    opening = prose(re.sub(r"^!\[.*\n+", "", opening, flags=re.MULTILINE))
-    order = say("notebook-order-exercise" if exercise is not None else "notebook-order")
+    title = lesson.title
+    if lesson.number is not None:
+        title = say("sheet-title", number=lesson.number, title=title)
     needs = re.search(r"^# needs: *(.*)$", _source(lesson), re.MULTILINE)
     extras = say("notebook-needs", extras=needs[1] if needs else "notebook")
-    text("title", f"{title}\n\n{opening}\n\n{order}\n\n{extras}")
+    text("title", f"# {title}", f"**{lesson.question}**", say("notebook-order"), extras)
     shipped = any(one.folder == lesson.folder for one in shipped_lessons())
-    book = f"book = Book({json.dumps(lesson.name if shipped else '.')})\nbook.machine()"
-    code("machine", f"from chutelab.classroom.book import Book\n\n{book}")
+    name = f'"{lesson.name}"' if shipped else '"."'
+    language = "" if lesson.language == "en" else f', language="{lesson.language}"'
+    opened = f"from chutelab.classroom.book import Book\n\nbook = Book({name}{language})"
+    code("machine", "import math\n", f"{opened}\nbook.machine()")
     if exercise is not None:
-        text("name-text", f"## {say('notebook-name-head')}\n\n{say('notebook-name')}")
-        language = "" if lesson.language == "en" else f', language="{lesson.language}"'
+        text("name-text", f"## {say('notebook-name-head')}", say("notebook-name"))
         task = f'task = lesson("{exercise.name}", student=student{language})\ntask'
         given = f'from chutelab.classroom.exercises import lesson\n\nstudent = "{UNNAMED}"\n'
         code("name", given + task)
-    text("predict-text", f"## {heads[0]}\n\n{prose(predict)}\n\n{say('notebook-predict')}")
-    asked = re.findall(r"^(\d+)\. ", predict, flags=re.MULTILINE)
-    lines = "".join(f"    {number}: None,\n" for number in asked)
-    code("predict", f"predictions = {{\n{lines}}}")
-    add_own("Predict")
-
-    # The texts under "Run", and a cell for each block of commands.
-    before, *pieces = re.split(r"^```sh\n(.*?)^```$", run, flags=re.MULTILINE | re.DOTALL)
-    head = f"## {heads[1]}\n\n"
-    for n, (block, after) in enumerate(zip(pieces[::2], pieces[1::2], strict=True), start=1):
-        name, place = "run" if n == 1 else f"run-{n}", f"Run {n}"
-        if said := f"{head}{prose(before)}".strip():
-            text(f"{name}-text", said)
-        for i, (kind, source) in enumerate(own.get(place) or [("code", _commands(block))]):
-            add(kind, name if i == 0 else f"run-{n}-own-{i}", source, place)
-        if place not in own and " --out " in block:
-            code(f"{name}-picture", "import chutelab\n\nchutelab.overlay(runs[0])")
-        head, before = "", after
-    if rest := prose(before):
-        text("run-end", rest)
-    add_own("Run")
-
-    compared = prose(compare)
-    fill = f"\n\n{say('notebook-fill')}" if "|---" in compared else ""
-    text("compare-text", f"## {heads[2]}\n\n{compared}{fill}")
-    code("compare", "book.compare(predictions)")
-    add_own("Compare")
-    text("explain-text", f"## {say('notebook-explain-head')}\n\n{say('notebook-explain')}")
-    text(OWN_WORDS, say("notebook-words"))
-    if exercise is not None:
-        questions = say("notebook-questions", first=exercise.parameters[0].name)
-        text("questions-text", f"## {say('notebook-questions-head')}\n\n{questions}")
-        add_own("Questions")
-        for n in range(1, len(exercise.questions) + 1):
-            code(f"question-{n}", f"task.question({n})")
-            code(f"answer-{n}", f"answer_{n} = None\ntask.check({n}, answer_{n})")
-    if lesson.page is not None:
-        (_, said), *_ = own.get("Try it live", [("markdown", "")])
-        text("live-text", f"## {say('notebook-live')}\n\n{said}".strip(), "Try it live")
-        code("live", "book.live()")
-    if exercise is not None:
-        text("progress-text", f"## {say('notebook-progress')}")
-        code("progress", "task.progress()")
-    if left:
-        raise unusable(lesson.folder / OWN, f"there is no place for a cell # %% {next(iter(left))}")
+    for n, step in enumerate(lesson.steps, 1):
+        head, place = f"## {n}. {say(f'step-{step.kind}')}", f"step-{n}"
+        if step.kind == "numbers" and exercise is not None:
+            questions = say("notebook-questions", first=exercise.parameters[0].name)
+            text(f"{place}-text", head, step.text, questions)
+        else:
+            text(f"{place}-text", head, *asked(lesson, step))
+        match step.kind:
+            case "predict":
+                lines = "".join(f"    {m}: None,\n" for m in range(1, len(step.asks) + 1))
+                text(f"{place}-how", say("notebook-predict"))
+                code(place, f"predictions = {{\n{lines}}}\nbook.predict({n}, predictions)")
+            case "try" if lesson.page is not None:
+                code(place, f"book.live({n})")
+            case "note":
+                if any(one.value for one in step.columns) and step.rows:
+                    code(place, f"book.note({n})")
+                if not all(one.value or one.given for one in step.columns):
+                    text(f"{place}-table", say("notebook-fill"), table(step, said))
+            case "explain":
+                # What is graded is in a cell of a name of its own: the last one's.
+                last = not any(one.kind == "explain" for one in lesson.steps[n:])
+                if step.asks:
+                    text(OWN_WORDS if last else f"{place}-words", say("notebook-words"))
+                code(place, f"book.explain({n})")
+        for m, (kind, source) in enumerate(own.pop(str(n), ()), 1):
+            add(kind, f"{place}-own-{m}", source)
+        if step.kind == "numbers" and exercise is not None:
+            for m in range(1, len(exercise.questions) + 1):
+                code(f"question-{m}", f"task.question({m})")
+                code(f"answer-{m}", f"answer_{m} = None\ntask.check({m}, answer_{m})")
+            text("progress-text", f"## {say('notebook-progress')}")
+            code("progress", "task.progress()")
+    if own:
+        raise unusable(lesson.folder / OWN, f"there is no place for a cell # %% {next(iter(own))}")
     kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
     about = {"kernelspec": kernel, "language_info": {"name": "python"}}
     made = {"cells": cells, "metadata": about, "nbformat": 4, "nbformat_minor": 5}
     return json.dumps(made, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
 
 
-def _source(lesson: Lesson, name: str = OWN) -> str:
-    path = lesson.folder / name
+def _source(lesson: Lesson) -> str:
+    path = lesson.folder / OWN
     return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 
 def _own(lesson: Lesson) -> dict[str, list[tuple[str, str]]]:
-    """Return the kinds and sources of the cells in ``notebook.py`` by their places.
+    """Return kinds and sources of the cells in ``notebook.py`` by the numbers of their steps.
 
-    In another language the texts, in their order, are those of ``notebook.LANGUAGE.py``.
+    A text that begins with another language, as in ``# %% [markdown:de] 3``, is left out.
     """
-    found = _cells_in(_source(lesson))
-    told = _cells_in(_source(lesson, f"notebook.{lesson.language}.py"))
-    for place, cells in told.items():
-        texts = iter(cells)
-        found[place] = [
-            next(texts, cell) if cell[0] == "markdown" else cell for cell in found.get(place, ())
-        ]
-    return found
-
-
-def _cells_in(source: str) -> dict[str, list[tuple[str, str]]]:
     found: dict[str, list[tuple[str, str]]] = {}
-    pieces = re.split(r"^# %% *(\[markdown\])? *(.*)\n", source, flags=re.MULTILINE)
-    for markdown, place, source in zip(pieces[1::3], pieces[2::3], pieces[3::3], strict=True):
-        kind = "markdown" if markdown else "code"
-        if markdown:
+    pieces = re.split(
+        r"^# %% *(?:\[(markdown)(?::(\w+))?\])? *(.*)\n", _source(lesson), flags=re.MULTILINE
+    )
+    for kind, language, place, source in zip(*(pieces[n::4] for n in (1, 2, 3, 4)), strict=True):
+        if kind:
             source = re.sub(r"^# ?", "", source, flags=re.MULTILINE)
-        found.setdefault(place.strip(), []).append((kind, source.strip("\n")))
+        if language in (None, lesson.language):
+            found.setdefault(place.strip(), []).append((kind or "code", source.strip("\n")))
     return found
-
-
-def _commands(block: str) -> str:
-    """Return the cell that runs the scenes of ``chutelab run`` in a block; other commands are left.
-
-    What is left needs a cell in `OWN`.
-    """
-    found = re.findall(r"^chutelab run (.*?)$", block, flags=re.MULTILINE)
-    runs = [re.sub(r" --(out|only) \S+", "", line) for line in found]
-    lines = "".join(f"    {json.dumps(run, ensure_ascii=False)},\n" for run in runs)
-    return f"runs = book.run(\n{lines})\nruns"

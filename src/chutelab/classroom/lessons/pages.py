@@ -12,7 +12,6 @@ import re
 import shutil
 from base64 import urlsafe_b64encode
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from errno import ENOTDIR
 from hashlib import sha256
 from html import escape
@@ -29,7 +28,6 @@ from PIL.GifImagePlugin import GifImageFile
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import data_of, told
 from chutelab.classroom.lessons.building import (
-    MACHINE,
     PICTURE,
     build,
     check_inside,
@@ -38,9 +36,9 @@ from chutelab.classroom.lessons.building import (
     name_of,
 )
 from chutelab.classroom.lessons.reading import Lesson, LessonError, scene_of, unusable
-from chutelab.classroom.lessons.sheets import printed
+from chutelab.classroom.lessons.sheets import printed, sheet, worksheet
 from chutelab.classroom.lessons.steps import data_of as data_of_steps
-from chutelab.classroom.lessons.texts import ASSETS, INDEX, asset, html_of, own_words, words_for
+from chutelab.classroom.lessons.texts import ASSETS, INDEX, asset, html_of, without_tex
 from chutelab.classroom.words import Words, words
 from chutelab.scene import Fault
 from chutelab.util.errors import MissingLibraryError, printable
@@ -107,8 +105,7 @@ def bundle(
         for i, lesson in enumerate(lessons):
             before = _link(lessons[i - 1], "prev", "← {}") if i > 0 else ""
             after = _link(lessons[i + 1], "next", "{} →") if i + 1 < len(lessons) else ""
-            folders = [one.folder.name for one in lessons]
-            cards += _lesson(lesson, made, folders, before, after, wheel=wheel)
+            cards += _lesson(lesson, made, before, after, wheel=wheel)
             if progress is not None:
                 progress((i + 1) / len(lessons))
         said = words(lessons[0].language if lessons else "en")
@@ -141,9 +138,7 @@ def _address(*names: str) -> str:
     return "/".join(quote(os.fsencode(name)) for name in names)
 
 
-def _lesson(
-    lesson: Lesson, made: Path, folders: Sequence[str], before: str, after: str, *, wheel: bool
-) -> str:
+def _lesson(lesson: Lesson, made: Path, before: str, after: str, *, wheel: bool) -> str:
     """Make the folder of one of the lessons, with links to its neighbours; return its card."""
     folder = made / lesson.folder.name
     folder.mkdir()
@@ -161,7 +156,7 @@ def _lesson(
         width, height = film.size
     said = words(lesson.language)
     say = said.say
-    worksheet, explanation = lesson.text("README"), lesson.text("explanation")
+    asked, explanation = worksheet(lesson), sheet(lesson, "explanation")
     # Links to the live page, the sheet, the notebook and the scenes.
     doors = []
     if lesson.page is not None:
@@ -169,9 +164,8 @@ def _lesson(
         live_page(lesson, folder / LIVE, home=home)
         doors.append(f'<li><a class="main" href="{LIVE}">{say("page-try")}</a></li>')
     kind = "pdf" if find_spec("typst") else "html"
-    with suppress(LessonError):  # a worksheet of other parts is on the page alone
-        (folder / f"worksheet.{kind}").write_bytes(printed(lesson, "student", kind))
-        doors.append(f'<li><a href="worksheet.{kind}">{say("page-print")}</a></li>')
+    (folder / f"worksheet.{kind}").write_bytes(printed(lesson, "student", kind))
+    doors.append(f'<li><a href="worksheet.{kind}">{say("page-print")}</a></li>')
     names = (name_of(language) for language in (lesson.language, "en"))
     if book := next((name for name in names if (folder / name).is_file()), ""):
         door = f'<li><a href="{book}" download>{say("page-notebook")}</a></li>'
@@ -195,8 +189,8 @@ def _lesson(
         "lesson.html",
         said,
         **facts,
-        alt=escape(words_for(MACHINE, worksheet) or lesson.title),
-        worksheet=note + html_of(worksheet, folders),
+        alt=escape(lesson.picture.machine or lesson.title),
+        worksheet=note + html_of(asked),
         doors="\n".join(doors),
         before=before,
         after=after,
@@ -206,8 +200,8 @@ def _lesson(
         "explanation.html",
         said,
         **facts,
-        alt=escape(words_for(PICTURE, explanation) or lesson.title),
-        explanation=html_of(explanation, folders),
+        alt=escape(lesson.picture.film or lesson.title),
+        explanation=html_of(explanation),
         back=escape(say("page-back", title=lesson.title)),
     )
     (folder / EXPLANATION).write_text(page, encoding="utf-8")
@@ -248,17 +242,17 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
         text = "is missing: what the lesson's page offers; an empty table offers everything"
         raise LessonError(str(lesson.folder), [Fault("page", None, text)])
     scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
-    exercise, steps = None, None
-    if lesson.steps:
-        controls = lesson.page.live.get("controls", ())
-        steps = {
-            "title": lesson.title,
-            "question": lesson.question,
-            "steps": data_of_steps(lesson.steps, tuple(controls), words(lesson.language)),
-        }
+    controls = tuple(lesson.page.live.get("controls", ()))
+    steps = {
+        "title": lesson.title,
+        "question": lesson.question,
+        "steps": data_of_steps(lesson.steps, controls, words(lesson.language)),
+    }
+    exercise = None
     if lesson.name in EXERCISES:
-        asked = own_words(lesson.text("README"))
-        exercise = data_of(told(lesson.name, lesson.language), explain=asked or lesson.question)
+        own = [ask.text for one in lesson.steps if one.kind == "explain" for ask in one.asks]
+        explain = without_tex(" ".join(own[-1].split())) if own else lesson.question
+        exercise = data_of(told(lesson.name, lesson.language), explain=explain)
     return write(scene, path, language=lesson.language, home=home, exercise=exercise, lesson=steps)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -18,16 +18,19 @@ from chutelab.classroom.lessons.steps import (
     LONGEST,
     MOST,
     TABLES,
+    Column,
+    Markdown,
     Names,
+    Row,
     Said,
     Step,
+    faults_of,
     in_language,
     key,
 )
 from chutelab.classroom.words import words
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene.overrides import Override, at_path, joined
-from chutelab.scene.quantities import lookup, suggestion
 from chutelab.scene.units import Number, Table, Text, Whole
 from chutelab.util.errors import did_you_mean, nearest
 
@@ -61,13 +64,13 @@ class Picture(Chosen):
     fps: Literal[10, 20, 25, 50] | None = key(
         None, "Pictures a second; default: 25, of a stream 20", "10, 20, 25 or 50"
     )
-    width: Whole = key(800, "Width, pixels", "a whole number from 320 to 3840", ge=320, le=3840)
+    width: Whole = key(1280, "Width, pixels", "a whole number from 320 to 3840", ge=320, le=3840)
     machine: Said | None = key(None, "What machine.png shows, in words", "a text")
     film: Said | None = key(None, "What lesson.gif shows, in words", "a text")
     split: bool = key(
         False, "Also make split.png: how the velocity at the plate splits", "true or false"
     )
-    height: Whole = key(450, "Height, pixels", "a whole number from 180 to 2160", ge=180, le=2160)
+    height: Whole = key(720, "Height, pixels", "a whole number from 180 to 2160", ge=180, le=2160)
 
 
 class Page(Chosen):
@@ -100,10 +103,7 @@ class Teacher(Table):
     )
     basic: Words = key("", "What to leave out for a short version", "a text")
     stretch: Words = key("", "What to add for students who are done", "a text")
-    predictions: Answers = key(
-        (), "Answers to the predictions, in their order", f"a list of at most {MOST} texts"
-    )
-    curriculum: Answers | Words = key(
+    curriculum: Answers = key(
         (), "Where it sits in curricula, by name", f"a list of at most {MOST} texts"
     )
 
@@ -124,15 +124,10 @@ class Lesson(Table):
         "What is simulated",
         f"a list of 1 to {MOST} names: of shipped scenes, or of .toml files beside lesson.toml",
     )
-    quantities: Annotated[dict[Said, Said], Field(max_length=MOST)] = key(
-        {},
-        "What one looks at, and what it is in words",
-        f'a table of at most {MOST} lines such as x3 = "distance back from the plate"; names with'
-        " dots in quotes",
-    )
     steps: Annotated[tuple[Step, ...], Field(max_length=MOST)] = key(
-        (), "What is done, step by step", f"at most {MOST} tables [[steps]]"
+        ..., "What is done, step by step", f"1 to {MOST} tables [[steps]]", min_length=1
     )
+    terminal: Markdown = key("", "What else can be done in a terminal", "a text")
     picture: Picture = key(Picture(), "How lesson.gif is made", "a table of keys and values")
     page: Page | None = key(None, "What its page offers", "a table of keys and values")
     teacher: Teacher | None = key(
@@ -168,15 +163,10 @@ class Lesson(Table):
         """The number its folder begins with; None for one that has none."""
         return split(self._folder)[0]
 
-    def text(self, name: str) -> str:
-        """Return ``README`` or ``explanation``, in Markdown; "" if the lesson has none.
-
-        It is in English where there is none in the lesson's language.
-        """
-        for file in (f"{name}.{self._language}.md", f"{name}.md"):
-            if (path := self._folder / file).is_file():
-                return path.read_text(encoding="utf-8")
-        return ""
+    @property
+    def columns(self) -> dict[str, Column]:
+        """What its tables tell of a run, by formulas."""
+        return {one.value: one for step in self.steps for one in step.columns if one.value}
 
 
 def split(folder: Path) -> tuple[int | None, str]:
@@ -198,14 +188,11 @@ def shipped_lessons(language: str = "en") -> list[Lesson]:
 
 PLAN: Final = "lesson.toml"
 
-PARTS: Final = ("part-predict", "part-run", "part-compare")
-"""The parts of a worksheet, and of a notebook, by the keys of their headings."""
-
 OWN_WORDS: Final = "explanation"
 """Id of the cell of a notebook in which a student writes in words."""
 
 LARGEST: Final = 1 << 20
-"""Bytes of it, and characters of a worksheet or an explanation."""
+"""Bytes of it."""
 
 
 class LessonError(SceneError):
@@ -225,9 +212,7 @@ def read(folder: str | Path, language: str = "en") -> Lesson:
     folder
         Where ``lesson.toml`` is.
     language
-        Of its texts: those of ``lesson.LANGUAGE.toml`` are laid over it, and ``README`` and
-        ``explanation`` are read from ``README.LANGUAGE.md`` and so on. What is not there is in
-        English.
+        Of its texts; what there is not in it is in English.
 
     Raises
     ------
@@ -249,14 +234,6 @@ def read(folder: str | Path, language: str = "en") -> Lesson:
     document = _document(source)
     words(language)  # refuses a language that there is not
     document = in_language(document, language, untranslated)
-    if language != "en":
-        over = source.with_name(f"lesson.{language}.toml")
-        if "steps" not in document:
-            document = _laid_over(document, _document(over) if over.is_file() else {}, untranslated)
-        for name in ("README", "explanation"):
-            file = source.with_name(f"{name}.{language}.md")
-            if source.with_name(f"{name}.md").is_file() and not file.is_file():
-                untranslated.append(file.name)
     faults: list[Fault] = []
     sound = document
     try:
@@ -266,14 +243,13 @@ def read(folder: str | Path, language: str = "en") -> Lesson:
         # The sound keys are still checked, so that all faults are listed at once.
         faulty = {detail["loc"][0] for detail in error.errors()}
         sound = {name: value for name, value in document.items() if name not in faulty}
-        needed = {"title": "-", "level": "start", "question": "-", "scenes": ["-"]}
+        needed: dict[str, Any] = {"title": "-", "level": "start", "question": "-", "scenes": ["-"]}
+        needed |= {"steps": [{"kind": "try"}]}
         lesson = Lesson.model_validate(needed | sound)
     lesson._folder = source.parent.resolve()
     lesson._language, lesson._untranslated = language, tuple(untranslated)
     if "scenes" in sound:
         faults += _misfits(lesson)
-    for text in sorted(source.parent.glob("*.md")):
-        faults += _unread(text)
     if faults:
         raise LessonError(str(source), faults)
     return lesson
@@ -288,42 +264,6 @@ def _document(source: Path) -> dict[str, Any]:
         raise unusable(source, "not UTF-8 text; save the file as UTF-8") from None
     except (ValueError, RecursionError) as error:
         raise unusable(source, f"not TOML: {error}") from None
-
-
-TEXTS: Final = ("title", "question", "quantities", "teacher")
-"""The keys of ``lesson.LANGUAGE.toml``; of the tables, each line replaces one of English."""
-
-
-def _laid_over(
-    english: dict[str, Any], texts: Mapping[str, Any], untranslated: list[str]
-) -> dict[str, Any]:
-    """Lay the texts of a language over a plan; append the keys that are in English only."""
-    made = dict(english)
-    for one in TEXTS:
-        said, there = english.get(one), texts.get(one)
-        if isinstance(said, dict):
-            there = there if isinstance(there, dict) else {}
-            made[one] = said | there
-            untranslated += [joined((one, name)) for name in said if name not in there]
-        elif there is not None:
-            made[one] = there
-        elif said is not None:
-            untranslated.append(one)
-    return made
-
-
-def _unread(text: Path) -> Iterator[Fault]:
-    """Yield why a text of a lesson cannot be shown."""
-    if not text.is_file():
-        return
-    try:
-        with text.open(encoding="utf-8") as file:
-            if len(file.read(LARGEST + 1)) > LARGEST:
-                yield Fault(text.name, None, f"too large: it has at most {LARGEST} characters")
-    except OSError as error:
-        yield Fault(text.name, None, f"cannot be read: {error.strerror or error}")
-    except UnicodeDecodeError:
-        yield Fault(text.name, None, "not UTF-8 text; save the file as UTF-8")
 
 
 def _strays(folder: Path) -> list[Fault]:
@@ -378,12 +318,6 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
         except SceneError as error:
             for fault in error.faults:
                 yield Fault(here, name, f"{error.file}: {fault}")
-    if len(scenes) == len(lesson.scenes):  # one that is broken may be the one that has a quantity
-        surfaces = [scene.surfaces for scene in scenes.values()]
-        for name, words in lesson.quantities.items():
-            if all(lookup(name, names) is None for names in surfaces):
-                text = f"no such quantity in its scenes; {suggestion(name, surfaces[0])}"
-                yield Fault(f"quantities.{name}", words, text)
     for table in ("picture", "page"):
         part = getattr(lesson, table)
         if not isinstance(part, Chosen):
@@ -402,12 +336,31 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
                     yield Fault(f"{table}.{fault.key}", fault.value, fault.allowed)
                 else:
                     yield Fault(f"{table}.set", list(part.set), str(fault))
+            return
+    if len(scenes) == len(lesson.scenes):
+        yield from faults_of(lesson.steps, *_machines(lesson))
 
 
-def unit_in(lesson: Lesson, quantity: str) -> str:
-    """Return the unit of a quantity in the first of a lesson's scenes that has it."""
-    found = (lookup(quantity, scene_of(lesson, name).surfaces) for name in lesson.scenes)
-    return next((row.unit for row in found if row is not None), "")
+def _machines(lesson: Lesson) -> tuple[Callable[[Mapping[str, Any]], Scene], Mapping[str, Any]]:
+    """Return how to load the machine of steps with changed keys, and what their page offers."""
+    page = lesson.page or Page()
+    laid = page.settings if lesson.page else []
+
+    def machine(changed: Mapping[str, Any]) -> Scene:
+        return scene_of(lesson, page.scene, [*laid, *(Override(k, v) for k, v in changed.items())])
+
+    return machine, page.live
+
+
+def machine_of(lesson: Lesson, step: Step, row: Row | None = None) -> Scene:
+    """Load the machine of a step, or of a row of its table.
+
+    Raises
+    ------
+    SceneError
+        With all faults of the scene and the settings.
+    """
+    return _machines(lesson)[0]({**step.set, **(row.set if row else {})})
 
 
 def _faults(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:

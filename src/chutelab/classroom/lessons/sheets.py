@@ -1,14 +1,16 @@
 """Three sheets, and what they are printed as: Markdown, a web page in one file, a PDF on A4.
 
-The student's is the worksheet, `README.md`, with a line for the name; it says nothing of what comes
-out. The explanation is `explanation.md`. The teacher's is made of the table ``[teacher]`` of
-``lesson.toml`` and of the exercise. All three are in the lesson's language.
+All are made of the lesson's steps: the student's asks, the explanation has what is said when steps
+are done, the teacher's has plan, key, goals and mistakes, with the table ``[teacher]`` and the
+exercise. They are in the lesson's language.
 """
 
 from __future__ import annotations
 
 import base64
+import json
 import re
+import shlex
 from collections.abc import Iterable, Iterator
 from html import escape
 from importlib.util import find_spec
@@ -24,9 +26,12 @@ from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import UNNAMED, told
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import with_unit
-from chutelab.classroom.lessons.reading import PARTS, Lesson, Teacher, unusable
+from chutelab.classroom.lessons.reading import Lesson, Page, Teacher, machine_of
+from chutelab.classroom.lessons.steps import PLACES, Ask, Step
 from chutelab.classroom.lessons.texts import asset, parsed, parser, typeset
 from chutelab.classroom.words import Words, words
+from chutelab.scene import shipped
+from chutelab.scene.overrides import parts_of, unit_of, value_at
 from chutelab.util.errors import MissingLibraryError
 from chutelab.util.versions import own_version
 
@@ -36,41 +41,95 @@ SHEETS: Final = ("student", "teacher", "explanation")
 def sheet(lesson: Lesson, which: str) -> str:
     """Return one of `SHEETS` of a lesson, as Markdown.
 
-    Raises
-    ------
-    LessonError
-        If the lesson's worksheet has not the parts "Predict", "Run" and "Compare", or if it has no
-        explanation.
+    The student's sheet asks, and has no number of the answer on it.
     """
     say = words(lesson.language).say
+    title = lesson.title
+    if lesson.number is not None:
+        title = say("sheet-title", number=lesson.number, title=title)
+    film = f"![{lesson.picture.film or lesson.title}](lesson.gif)"
     match which:
         case "student":
-            text = lesson.text("README")
-            heads = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
-            # A worksheet that is not translated has the English headings.
-            for language in dict.fromkeys((lesson.language, "en")):
-                parts = [words(language).say(key) for key in PARTS]
-                if not (missing := [name for name in parts if name not in heads]):
-                    break
-            else:
-                said = f"a sheet needs the parts ## {', ## '.join(missing)} of the worksheet"
-                raise unusable(lesson.folder / "README.md", said)
-            title, _, rest = text.partition("\n")
-            made = f"{title}\n\n{say('sheet-name')}\n{rest}"
+            parts = [say("sheet-name"), worksheet(lesson)]
         case "explanation":
-            made = lesson.text("explanation")
-            if not made:
-                raise unusable(lesson.folder / "explanation.md", "is not there, or empty")
+            parts = [film, *(step.then for step in lesson.steps)]
         case _:
-            title = lesson.title
-            if lesson.number is not None:
-                title = say("sheet-title", number=lesson.number, title=title)
-            head = f"# {say('sheet-teacher', title=title)}"
-            made = f"{head}\n\n{_for_the_teacher(lesson)}\n"
+            title = say("sheet-teacher", title=title)
+            parts = [_for_the_teacher(lesson)]
     if lesson.untranslated:
-        title, _, rest = made.partition("\n")
-        made = f"{title}\n\n*{say('untranslated')}*\n{rest}"
-    return made
+        parts.insert(0, f"*{say('untranslated')}*")
+    return "\n\n".join([f"# {title}", *(part.strip() for part in parts if part)]) + "\n"
+
+
+def worksheet(lesson: Lesson) -> str:
+    """Return the steps of a lesson as Markdown, and in an appendix the commands for its tables."""
+    said = words(lesson.language)
+    shown = f"![{lesson.picture.machine or lesson.title}](machine.png)"
+    parts = [f"**{lesson.question}**", shown, said.say("sheet-page")]
+    for n, step in enumerate(lesson.steps, 1):
+        parts += [f"## {n}. {said.say(f'step-{step.kind}')}", *asked(lesson, step)]
+    commands = "\n".join(dict.fromkeys(_commands(lesson)))
+    appendix = f"```sh\n{commands}\n```" if commands else ""
+    if appendix and not all(name in shipped() for name in lesson.scenes):
+        model = lesson.name if lesson.number is None else lesson.number
+        copy = f"chutelab lesson new my-copy --from {model}"
+        appendix = f"{said.say('sheet-copy', command=copy)}\n\n{appendix}"
+    if appendix or lesson.terminal:
+        parts += [f"## {said.say('sheet-terminal')}", appendix, lesson.terminal]
+    return "\n\n".join(part.strip() for part in parts if part)
+
+
+def asked(lesson: Lesson, step: Step) -> Iterator[str]:
+    """Yield the parts of what a step asks, as Markdown: its text, its questions, its table."""
+    said = words(lesson.language)
+    scene = machine_of(lesson, step)
+
+    def value(found: re.Match[str]) -> str:
+        return with_unit(value_at(scene, found[1]), unit_of(parts_of(found[1])), said)
+
+    yield PLACES.sub(value, step.text).strip()
+    for n, ask in enumerate(step.asks, 1):
+        how = "mark" if ask.mark else "sketch" if ask.sketch else ""
+        hint = f" *{said.say(f'sheet-{how}')}*" if how else ""
+        choices = "".join(f"\n   - ☐ {one}" for one in ask.choices)
+        yield f"{n}. {PLACES.sub(value, ask.text).strip()}{hint}{choices}"
+    if step.columns:
+        yield table(step, said)
+    if step.kind == "numbers" and lesson.name in EXERCISES:
+        questions = told(lesson.name, lesson.language).questions
+        rows = "".join(
+            f"\n| {n}. {one.title}, {said.unit(one.unit)} | |".replace(",  |", " |")
+            for n, one in enumerate(questions, 1)
+        )
+        yield said.say("sheet-numbers")
+        yield f"| {said.say('sheet-question')} | {said.say('sheet-answer')} |\n|---|---|{rows}"
+
+
+def table(step: Step, said: Words) -> str:
+    """Return the table of a step as Markdown, with empty cells for what is to be found."""
+    heads = (f"{one.head}, {said.unit(one.unit)}" if one.unit else one.head for one in step.columns)
+    lines = [[said.say("sheet-run"), *heads], ["---"] * (1 + len(step.columns))]
+    for n, row in enumerate(step.rows):
+        given = (said.local(str(one.given[n])) if one.given else "" for one in step.columns)
+        lines.append([said.local(row.head), *given])
+    lines += [[""] * len(lines[0])] * step.free
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _commands(lesson: Lesson) -> Iterator[str]:
+    """Yield the commands that make the runs of the tables."""
+    page = lesson.page or Page()
+    scene = page.scene or lesson.scenes[0]
+    for step in lesson.steps:
+        for row in step.rows:
+            changed = {**step.set, **row.set}.items()
+            texts = ((k, v if isinstance(v, str) else json.dumps(v)) for k, v in changed)
+            keys = [*page.set, *(f"{key}={text}" for key, text in texts)]
+            # The last one of a key counts.
+            kept = {one.partition("=")[0]: one for one in keys}.values()
+            sets = "".join(f" --set {shlex.quote(one)}" for one in kept if "title" not in one)
+            if any(column.value for column in step.columns):
+                yield f"chutelab run {scene}{sets}"
 
 
 def _for_the_teacher(lesson: Lesson) -> str:
@@ -78,21 +137,48 @@ def _for_the_teacher(lesson: Lesson) -> str:
     said = words(lesson.language)
     say, teacher = said.say, lesson.teacher or Teacher()
     lengths = (("sheet-basic", teacher.basic), ("sheet-stretch", teacher.stretch))
+    plan = "".join(
+        f"\n| {n} | {say(f'step-{step.kind}')} | {step.minutes} | {_first(step)} |"
+        for n, step in enumerate(lesson.steps, 1)
+    )
+    beliefs = "".join(f"\n| {idea} | {question} |" for idea, question in teacher.misconceptions)
+    answers = [
+        f"- {n}.{m} {without_places(ask.text)} **{_answer(ask)}**"
+        for n, step in enumerate(lesson.steps, 1)
+        for m, ask in enumerate(step.asks, 1)
+        if _answer(ask)
+    ]
     sections = {
         "sheet-goals": "\n".join(f"- {goal}" for goal in teacher.goals),
+        "sheet-plan": f"| {say('sheet-plan-columns')} |\n|---|---|---|---|{plan}",
         "sheet-say": teacher.say,
-        "sheet-predictions": "\n".join(
-            f"{n}. {answer}" for n, answer in enumerate(teacher.predictions, 1)
-        ),
+        "sheet-misconceptions": beliefs
+        and f"| {say('sheet-misconceptions-columns')} |\n|---|---|{beliefs}",
+        "sheet-predictions": "\n".join(answers),
         **_of_exercise(lesson, said),
         "sheet-lengths": "\n".join(f"- {say(key)}: {text}" for key, text in lengths if text),
-        "sheet-curriculum": teacher.curriculum
-        if isinstance(teacher.curriculum, str)
-        else "\n".join(f"- {one}" for one in teacher.curriculum),
+        "sheet-curriculum": "\n".join(f"- {one}" for one in teacher.curriculum),
     }
     level = say("sheet-level", level=say(f"level-{lesson.level}"), minutes=lesson.minutes)
     parts = (f"## {say(key)}\n\n{text}" for key, text in sections.items() if text)
     return "\n\n".join([f"{lesson.question}\n\n{level}", *parts])
+
+
+def _first(step: Step) -> str:
+    """Return the first sentence of what a step says, for the plan."""
+    said = step.text or " ".join(ask.text for ask in step.asks) or "–"
+    return without_places(re.split(r"(?<=[.?!:]) ", " ".join(said.split()))[0])
+
+
+def _answer(ask: Ask) -> str:
+    """Return the key to a question."""
+    chosen = ask.choices[ask.right - 1] if ask.choices and ask.right else ""
+    return f"{chosen}. {ask.answer}".strip() if chosen else ask.answer
+
+
+def without_places(text: str) -> str:
+    """Return a text in which the places of values are dots."""
+    return PLACES.sub("…", " ".join(text.split()))
 
 
 def _of_exercise(lesson: Lesson, said: Words) -> dict[str, str]:
@@ -150,17 +236,14 @@ def printed(lesson: Lesson, which: str, kind: str) -> bytes:
 
 
 def _to_be_answered(tree: SyntaxTreeNode) -> list[SyntaxTreeNode]:
-    """Return what is to be answered in writing.
-
-    That is the items of the first part, the predictions, and a paragraph that asks at the end of
-    the third, the comparison.
-    """
-    heads = [i for i, node in enumerate(tree.children) if node.tag == "h2"]
-    heads.append(len(tree.children))
-    first, third = (tree.children[slice(*heads[i : i + 2])] for i in (0, 2))
-    lists = [node for node in first if node.type == "ordered_list"]
-    asks = third[-1].type == "paragraph" and third[-1].children[0].content.endswith("?")
-    return [item for node in lists for item in node.children] + third[-1:] * asks
+    """Return what is to be answered in writing: numbered questions without choices."""
+    return [
+        item
+        for node in tree.children
+        if node.type == "ordered_list"
+        for item in node.children
+        if not any(part.type == "bullet_list" for part in item.children)
+    ]
 
 
 def _title(tree: SyntaxTreeNode) -> str:

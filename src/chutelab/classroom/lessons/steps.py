@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import inf
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field
@@ -16,6 +17,9 @@ from pydantic import BeforeValidator, Field
 from chutelab.classroom.exercises.catalogue import of_quantities, tree
 from chutelab.classroom.lessons.texts import parser
 from chutelab.classroom.words import LANGUAGES, Words
+from chutelab.scene import MISSING, Fault, Scene, SceneError
+from chutelab.scene.overrides import value_at
+from chutelab.scene.quantities import lookup, suggestion, whose
 from chutelab.scene.units import Table, Text, Whole
 
 MOST: Final = 20
@@ -151,8 +155,8 @@ TABLES: Final[dict[str, type[Table]]] = {
 }  # fmt: skip
 """Model of each table of a step by its key."""
 
-PLACES: Final = re.compile(r"\{([a-z]\w*(?:\.\w+)+)\}")
-"""Keys whose values stand in a text, such as ``{outgoing.speed}``."""
+PLACES: Final = re.compile(r"\{(gravity|[a-z]\w*(?:\.\w+)+)\}")
+"""Keys whose values stand in a text, such as ``{outgoing.speed}``: no groups of a formula."""
 
 FUNCTIONS: Final = ("abs", "acos", "atan2", "cos", "degrees", "hypot", "radians", "sin", "sqrt")
 """What formulas of columns know besides quantities."""
@@ -166,6 +170,77 @@ def quantities_in(formula: str) -> list[str]:
     """
     names = {one.id for one in ast.walk(of_quantities(formula)) if isinstance(one, ast.Name)}
     return sorted(names.difference(FUNCTIONS))
+
+
+def faults_of(
+    steps: Sequence[Step],
+    machine: Callable[[Mapping[str, Any]], Scene],
+    live: Mapping[str, Any],
+) -> Iterator[Fault]:
+    """Yield what cannot be done on the page of the steps.
+
+    That is a key that cannot be changed there, a value out of its range, a quantity that the
+    machine has not, and lists that do not fit together.
+
+    Parameters
+    ----------
+    machine
+        Loads the machine with keys changed, or raises a `SceneError`.
+    live
+        What the page offers: ``controls`` and ``ranges``.
+    """
+    controls, ranges = tuple(live.get("controls", ())), live.get("ranges", {})
+    for n, step in enumerate(steps):
+        here = f"steps[{n}]"
+        own = step.open(controls)
+        for one in own:
+            if controls and one not in controls:
+                yield Fault(f"{here}.controls", one, "must be one of page.live.controls")
+        try:
+            scene = machine(step.set)
+        except SceneError as error:
+            yield Fault(f"{here}.set", step.set, str(error.faults[0]))
+            continue
+        texts = (step.text, step.then, *(ask.text for ask in step.asks))
+        for place in PLACES.findall(" ".join(texts)):
+            if place not in own or value_at(scene, place) is MISSING:
+                yield Fault(f"{here}.text", place, "must be one of the step's controls")
+        for m, row in enumerate(step.rows):
+            there = f"{here}.rows[{m}].set"
+            for name, value in row.set.items():
+                low, high = ranges.get(name, (-inf, inf))
+                if name not in own:
+                    yield Fault(f"{there}.{name}", value, "must be one of the step's controls")
+                elif isinstance(value, float | int) and not low <= value <= high:
+                    yield Fault(f"{there}.{name}", value, f"must be from {low} to {high}")
+            try:
+                machine({**step.set, **row.set})
+            except SceneError as error:
+                yield Fault(there, row.set, str(error.faults[0]))
+        for m, column in enumerate(step.columns):
+            there = f"{here}.columns[{m}]"
+            if column.given and len(column.given) != len(step.rows):
+                yield Fault(f"{there}.given", list(column.given), "must have an entry for each row")
+            try:
+                names = quantities_in(column.value) if column.value else []
+            except (SyntaxError, ValueError):
+                yield Fault(f"{there}.value", column.value, "must be a formula of quantities")
+                continue
+            for name in names:
+                row_of = lookup(name, scene.surfaces)
+                if row_of is None or (said := whose(row_of, scene.count)):
+                    hint = said if row_of else suggestion(name, scene.surfaces)
+                    yield Fault(f"{there}.value", name, f"no quantity of this machine; {hint}")
+        for m, ask in enumerate(step.asks):
+            if len(ask.replies) != len(ask.choices):
+                text = "must have a text for each of choices"
+                yield Fault(f"{here}.asks[{m}].replies", list(ask.replies), text)
+            if ask.choices and not 1 <= (ask.right or 0) <= len(ask.choices):
+                text = "must say which of choices is right, from 1 on"
+                yield Fault(f"{here}.asks[{m}].right", ask.right, text)
+            if ask.mark is not None and lookup(ask.mark, scene.surfaces) is None:
+                text = f"no quantity of this machine; {suggestion(ask.mark, scene.surfaces)}"
+                yield Fault(f"{here}.asks[{m}].mark", ask.mark, text)
 
 
 def html_of(text: str, *, inline: bool = False) -> str:

@@ -8,7 +8,7 @@ and ``\,`` for a narrow space.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -168,10 +168,6 @@ def _typeset(part: Part) -> str:
 
 ASSETS: Final = Path(__file__).parent / "assets"
 INDEX: Final = "index.html"
-_ADDRESSES: Final = (
-    (r"(^|/)README(\.\w+)?\.md(?=$|#)", rf"\1{INDEX}"),
-    (r"\bexplanation(\.\w+)?\.md$", "#explanation"),
-)
 
 _FORMULA: Final = re.compile(
     r"(```.*?```|`[^`]*`)|\$\$(.+?)\$\$|(?<![\\\w$])\$(?![\s$])([^$]+?)(?<![\s\\])\$(?!\w)",
@@ -212,25 +208,16 @@ def mathml(tex: str, *, display: bool = False) -> str:
     return _BESIDE.sub(r'\g<0><mspace width="0.167em" />', made)
 
 
-def html_of(markdown: str, folders: Collection[str] | None = None) -> str:
+def html_of(markdown: str) -> str:
     """Return the HTML of a worksheet, without its title and its pictures, which the page has.
 
-    Raw HTML is shown, not obeyed; formulas are MathML. Links to worksheets and to the explanation
-    become links to pages. With `folders`, those of the lessons that are there, a link to another
-    one leads nowhere: its words stay.
+    Raw HTML is shown, not obeyed; formulas are MathML.
     """
     read = parser()
     worksheet = SyntaxTreeNode(read.parse(markdown))
     worksheet.children = [
         part for part in worksheet.children if part.tag != "h1" and not _elsewhere(part)
     ]
-    for link in worksheet.walk():
-        if link.type == "link":
-            for file, page in _ADDRESSES:
-                link.attrs["href"] = re.sub(file, page, str(link.attrs["href"]))
-            other = re.match(r"\.\./([^/]+)/", str(link.attrs["href"]))
-            if other and folders is not None and other[1] not in folders:
-                del link.attrs["href"]
     made = str(read.renderer.render(worksheet.to_tokens(), read.options, {}))
     # Wide tables and code scroll by themselves, with the keyboard, too.
     return re.sub("<(pre|table)>", r'<\1 tabindex="0">', made)
@@ -256,20 +243,6 @@ def plain_of(markdown: str) -> str:
     return without_tex(text)
 
 
-def own_words(worksheet: str) -> str:
-    r"""Return what a worksheet asks to be answered in words, "" if nothing.
-
-    That is its last paragraph that begins in bold and ends with a question mark.
-
-    >>> own_words("Look.\n\n**In your own words.** What grows,\nand why?\n\n## Afterwards")
-    'What grows, and why?'
-    """
-    paragraphs = re.split(r"\n{2,}", worksheet.strip())
-    asked = [re.fullmatch(r"\*\*[^*]+\*\* (.*\?)", one, re.DOTALL) for one in paragraphs]
-    found = [one[1] for one in asked if one]
-    return without_tex(" ".join(found[-1].split())) if found else ""
-
-
 def without_tex(markdown: str) -> str:
     r"""Return a text whose formulas are written with plain characters.
 
@@ -282,11 +255,3 @@ def without_tex(markdown: str) -> str:
         return str(code) if code else plain(parsed(display or inline))
 
     return _FORMULA.sub(written, markdown)
-
-
-def words_for(picture: str, markdown: str) -> str | None:
-    """Return the words that stand for a picture in a text, None if it is not in there."""
-    for node in SyntaxTreeNode(parser().parse(markdown)).walk():
-        if node.type == "image" and node.attrs["src"] == picture:
-            return node.content
-    return None

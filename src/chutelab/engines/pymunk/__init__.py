@@ -18,7 +18,7 @@ import numpy as np
 from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.pymunk.shared import Shared
 from chutelab.engines.pymunk.world import World
-from chutelab.machine import Machine, moved, origin
+from chutelab.machine import Machine
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
@@ -55,16 +55,9 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     """
     if np.min(machine.particle.radius) <= 0.0:
         raise ValueError("particle.radius = 0: pymunk needs disks with a radius above 0 m")
-    begin, steps = perf_counter(), 0
-    recorder, place = Recorder(machine), origin(machine)
-    machine = moved(machine, -place[0], -place[1])
-
-    def finished() -> Record:
-        return recorder.finish(
-            engine="pymunk", steps=steps, seconds=perf_counter() - begin, origin=place
-        )
-
-    asked, told = 0, begin
+    recorder, steps, stuck = Recorder(machine), 0, None
+    machine = recorder.near
+    asked, told = 0, perf_counter()
 
     def report(share: float) -> None:
         nonlocal asked, told
@@ -98,10 +91,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         if progress is not None:
             progress(1.0)
     except EnoughError:
-        return finished()
+        pass
     except StalledError as stalled:
-        stalled.recording = finished()
-        x, y = stalled.position
-        stalled.position = x + place[0], y + place[1]
-        raise
-    return finished()
+        stuck = stalled
+    return recorder.whole(recorder.finish(engine="pymunk", steps=steps), stuck)

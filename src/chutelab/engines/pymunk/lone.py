@@ -403,8 +403,17 @@ class Lone:
         end = trial(h)
         pushing = [c.face.surface for c in end.contacts]
         surface = self.on if self.on in pushing or not pushing else pushing[0]
-        if self.on >= 0 and surface != self.on and self._come_onto(surface, end):
-            return True
+        if self.on >= 0 and surface != self.on:
+            # Over to another surface without a blow.
+            if surface == self.machine.landing and not self.landed:
+                self.landed = True
+                self._tell(Kind.LANDING, surface)
+                if self.machine.until == "landed":
+                    self._end("landed")
+                    return True
+            elif end.slips:
+                self._tell(Kind.SLIP, surface)
+            self.slipping = end.slips or None
         if self.machine.until == "settled" and self._lies(end, h):
             if self.slipping != 0:
                 self._tell(Kind.STICK, surface)
@@ -467,19 +476,6 @@ class Lone:
             self.tracks.step(np.array([True]), (self.t - h, self.t), state, entries)
         if self.t >= self.machine.end_time:
             self._end("time")
-
-    def _come_onto(self, surface: int, end: Step) -> bool:
-        """Go over to another surface without a blow; True if the track ends there."""
-        if surface == self.machine.landing and not self.landed:
-            self.landed = True
-            self._tell(Kind.LANDING, surface)
-            if self.machine.until == "landed":
-                self._end("landed")
-                return True
-        elif end.slips:
-            self._tell(Kind.SLIP, surface)
-        self.slipping = end.slips or None
-        return False
 
     def _lies(self, end: Step, h: float) -> bool:
         """Tell whether a step without slip changed nothing, on a surface to settle on.

@@ -288,31 +288,22 @@ class World:
         if wheel is not None:
             turning = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             turning.angular_velocity = -wheel.speed / wheel.radius
-            restitution, friction = map(self.paired, (wheel.restitution, wheel.friction))
-            self._add(Face(
-                pymunk.Circle(turning, wheel.radius), wheel.surface, None, wheel.speed,
-                float(restitution), min(float(friction), GRIP), r, -inf, inf,
-                turning.angular_velocity,
-            ))  # fmt: skip
+            about = self._about(wheel.rim, 0) | {"spin": turning.angular_velocity}
+            self._add(Face(pymunk.Circle(turning, wheel.radius), tangent=None, **about))
         sides = [zip(*pair, strict=True) for pair in zip(arcs.ends, arcs.inward, strict=True)]
         for n, (center, *ends) in enumerate(zip(arcs.center.tolist(), *sides, strict=True)):
             self._bend(n, Vec2d(*center), ends, self._about(arcs, n))
         self.faces = list(self.by_shape.values())
         self.gates = any(face.appears > -inf or face.vanishes < inf for face in self.faces)
 
-    def paired(self, values: ArrayLike) -> Any:
-        """Return pair values, (S,) or (K, S), or of the pulley one or (K,), with the particle."""
-        values, kinds = np.asarray(values), len(self.machine.pair_restitution)
-        return values[self.machine.releases.kind[self.particle]] if kinds > 1 else values
-
     def _about(self, parts: Segments | Arcs, n: int) -> dict[str, Any]:
-        """Return what a face knows of a segment or arc."""
-        restitution, friction = (
-            self.paired(values)[n] for values in (parts.restitution, parts.friction)
-        )
+        """Return what a face knows of a segment or arc; pair values are (S,), or (K, S)."""
+        several = len(self.machine.pair_restitution) > 1
+        at = (self.machine.releases.kind[self.particle], n) if several else n
         return {
             "surface": int(parts.surface[n]), "speed": float(parts.speed[n]),
-            "restitution": float(restitution), "friction": min(float(friction), GRIP),
+            "restitution": float(parts.restitution[at]),
+            "friction": min(float(parts.friction[at]), GRIP),
             "radius": self.radius,
             "appears": float(parts.appears[n]), "vanishes": float(parts.vanishes[n]), "spin": 0.0,
         }  # fmt: skip

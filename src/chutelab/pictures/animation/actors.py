@@ -240,7 +240,7 @@ def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
         return np.concatenate(placed)
 
     dots: dict[str, Any] = {"ls": "none", "marker": "o", "mew": 0.0}
-    moving = [line(ax, "marks", marks, color="white", ms=3.2, **dots)]
+    moving = [line(ax, "marks", marks, color=style.CLEAT, ms=3.2, **dots)]
 
     def turning(gid: str, wheel: Arcs) -> Moving:
         turned = wheel.speed * times / wheel.radius

@@ -107,6 +107,7 @@ def lay_out(
     title: str | None = None,
     question: str = "",
     shows: frozenset[str] | None = None,
+    energy: bool = True,
 ) -> Layout:
     """Choose the window such that everything that moves, arrows included, is in the picture.
 
@@ -116,7 +117,8 @@ def lay_out(
     """
     if width < 320 or height < 180:  # text could not be read
         raise ValueError(f"{width} x {height} pixels: allowed are at least 320 x 180")
-    wanted, shows = shows, frozenset(SHOWS) if shows is None else shows
+    usual = frozenset(SHOWS if energy else SHOWS[:-1])
+    wanted, shows = shows, usual if shows is None else shows
     if unknown := sorted(shows - set(SHOWS)):
         raise ValueError(f"show = {unknown[0]!r}: allowed are {', '.join(SHOWS)}")
     if one_of_many(recording) or (wanted is None and as_crowd(recording)):
@@ -372,6 +374,8 @@ def palette() -> tuple[str, ...]:
         style.STEEL,
         style.STEEL_LIGHT,
         style.ENERGY["start"],
+        style.BELT_BODY,
+        style.CLEAT,
     ]
     # Where a grey edge would otherwise be shown in a dull colour.
     greys += ["#303030", "#686868", "#787878", "#D4D4D4"]
@@ -461,12 +465,13 @@ def animate(
     path: str | Path,
     *,
     fps: int | None = None,
-    width: int = 800,
-    height: int = 450,
+    width: int = 1280,
+    height: int = 720,
     slow: float | None = None,
     title: str | None = None,
     question: str = "",
     show: Collection[str] | None = None,
+    energy: bool = True,
     predict: bool = False,
     comment: str = "",
 ) -> Path:
@@ -496,6 +501,8 @@ def animate(
         at round times), "velocity" (of particle 0, an arrow with its components) and "energy"
         (the ledger as bars; without it the scene is wider). By default all, but of a crowd
         neither strobe dots nor velocity, and no impact of particle 0 is told.
+    energy : bool, optional
+        Whether `show` has "energy", where it is not given.
     predict : bool, optional
         Let viewers predict: the film begins without the analytic parabola, and waits as
         the particle comes to the top of the drive pulley, or as it begins.
@@ -526,8 +533,9 @@ def animate(
     fps = (25 if recording.count == 1 else 20) if fps is None else fps
     shows = None if show is None else frozenset([show] if isinstance(show, str) else show)
     layout = lay_out(
-        recording, width=width, height=height, title=title, question=question, shows=shows
-    )
+        recording, width=width, height=height, title=title, question=question, shows=shows,
+        energy=energy,
+    )  # fmt: skip
     begin, end = span(recording, layout.window)
     pace = slowness(end - begin) if slow is None else slow
     ask = asked(recording, begin) if predict else None
@@ -544,7 +552,7 @@ def animate(
     return path
 
 
-def still(recording: Recording, path: str | Path, *, width: int = 800, height: int = 450) -> Path:
+def still(recording: Recording, path: str | Path, *, width: int = 1280, height: int = 720) -> Path:
     """Write the machine as the film begins, without a path, as a PNG: the scene of the film alone.
 
     Parameters, result and errors are as of `animate`; width and height are the film's, of which the

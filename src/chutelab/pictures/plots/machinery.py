@@ -23,6 +23,7 @@ from chutelab.machine import Arcs, Machine, Pieces, Segments
 from chutelab.pictures import BLUE, GREEN, ORANGE, PURPLE
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import Window, around, places, stays, subset
+from chutelab.pictures.plots.volumes import PLATE, draw_volumes, plates, thickness
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats, Ints
 
@@ -43,8 +44,10 @@ def pieces(machine: Machine) -> tuple[Pieces, ...]:
 
 def colour_of(machine: Machine, piece: Pieces) -> str:
     """Return the colour of a piece: of a belt, or of what stands still."""
-    belt = machine.surfaces[piece.surface] in ("incoming", "outgoing") or piece.speed != 0.0
-    return style.BELT if belt else style.INK
+    name = machine.surfaces[piece.surface]
+    if name in ("incoming", "outgoing") or piece.speed != 0.0:
+        return style.BELT
+    return style.STRIKE if name in plates(machine) else style.INK
 
 
 def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle | Line2D:
@@ -52,7 +55,8 @@ def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle
     color = look.pop("color", colour_of(machine, piece))
     gid = f"surface {machine.surfaces[piece.surface]}"
     if not (piece.whole and isinstance(piece, Arcs)):
-        (line,) = ax.plot(*piece.path().T, color=color, lw=2.6, zorder=2.0)
+        width = 1.6 if color == style.BELT else 2.6
+        (line,) = ax.plot(*piece.path().T, color=color, lw=width, zorder=2.0)
         line.set(solid_capstyle="butt", gid=gid, **look)
         return line
     out = np.hypot(*(machine.releases.position - piece.center).T) >= piece.radius
@@ -93,10 +97,7 @@ def draw_scene(
     shown = window.fitted(box.width / box.height)
     ax.set(xlim=(shown.left, shown.right), ylim=(shown.bottom, shown.top))
     ax.set_aspect("equal", adjustable="box")
-    if machine.pulley is not None:
-        face = {"facecolor": style.STEEL_LIGHT, "edgecolor": style.BELT, "linewidth": 2.0}
-        ax.add_patch(Circle((0.0, 0.0), machine.pulley.radius, **face))
-        ax.plot(0.0, 0.0, "+", color=style.STEEL, ms=AXIS, zorder=1.5)
+    draw_volumes(ax, machine, points_of(ax, 1.0))
     found = pieces(machine)
     for piece in found:
         look: dict[str, Any] = {"linewidth": 1.3} if small and not piece.whole else {}
@@ -126,9 +127,6 @@ SHARES = (0.5, 0.25, 0.75, 0.0, 1.0)
 LOOKED_AT = 8
 """Pieces of one surface beside which its name may stand."""
 
-BEFORE = 0.3
-"""Share of the window's width by which the incoming belt's name may stand before the belt."""
-
 FALL = 0.3
 """Share of the window's height below a gate in which a name would be in the way of what falls."""
 
@@ -154,7 +152,8 @@ class _Names:
             if len(part):
                 self.parts.setdefault(int(piece.surface), []).append((piece, part))
         self.found = found
-        self.plates = {"plate", *(plate.name for plate in machine.scene.plates)}
+        self.plates = plates(machine)
+        self.thick = thickness(ax)
         self.lines = [
             (Path(ax.transData.transform(piece.path())), bool(piece.whole))
             for parts in self.parts.values()
@@ -176,10 +175,12 @@ class _Names:
         """Write all names. One for which there is no room is left out."""
         frame, points = self.ax.get_window_extent().padded(-3.0), 72.0 / self.ax.figure.dpi
         for surface, parts in self.parts.items():
+            color = colour_of(self.machine, parts[0][0])
+            color = color if color == style.BELT else style.INK
             label = self.ax.annotate(
                 style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
                 xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
-                color=colour_of(self.machine, parts[0][0]), path_effects=HALO, zorder=5.0,
+                color=color, path_effects=HALO, zorder=5.0,
             )  # fmt: skip
             best: tuple[int, Spot, Bbox] | None = None
             for spot in self._spots(parts):
@@ -226,7 +227,7 @@ class _Names:
         else:
             moves = f"{abs(speed):.3g} m/s {'↻' if speed > 0.0 else '↺'}"
         if name == "incoming":
-            return f"incoming belt\n{moves if speed else 'at rest'}"
+            return f"incoming belt, {moves if speed else 'at rest'}"
         if name == "outgoing":
             return f"outgoing belt, {moves if speed else 'at rest'}"
         times = {(t, "closes") for one in self.found if one.surface == surface
@@ -251,13 +252,15 @@ class _Names:
             if angle > 0.0 and high[1] > self.shown.top - room:
                 share = max(0.0, self.shown.top - room - low[1]) / (high[1] - low[1])
                 where = low + (high - low) * share
-            yield where, (GAP, 0.0), "left", "top" if angle <= 0.0 else "bottom"
-        elif name == "incoming":
-            left = max(self.shown.left, part[0][0] - BEFORE * self.shown.width)
-            yield np.array([left, part[0][1]]), (4.0, -GAP), "left", "top"
+            along = "top" if angle <= 0.0 else "bottom"
+            yield where, (GAP + PLATE * self.thick, 0.0), "left", along
+        elif name == "incoming" and self.machine.pulley is not None:
+            # Between the strands, beyond the wheel at their end.
+            left = max(self.shown.left, part[0][0] + 1.2 * self.machine.pulley.radius)
+            yield np.array([left, part[0][1]]), (4.0, -GAP - 0.5 * self.thick), "left", "top"
         elif name == "outgoing":
             right = np.array([max(part[0][0], part[1][0]), part[0][1]])
-            yield right, (-6.0, -GAP), "right", "top"
+            yield right, (-6.0, -4.0 - self.thick), "right", "top"
         for farther in FARTHER:
             for piece, part in parts[:LOOKED_AT]:
                 for share in SHARES:

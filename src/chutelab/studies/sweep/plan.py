@@ -34,7 +34,7 @@ from chutelab.scene.variants import (
     reason,
     varied,
 )
-from chutelab.studies.sweep.rows import Columns, empty, rows
+from chutelab.studies.sweep.rows import REASON, Columns, empty, rows
 from chutelab.util.arrays import Floats, Ints
 from chutelab.util.errors import InputError
 from chutelab.util.versions import library
@@ -189,7 +189,7 @@ def swept(block: Block, *, apart: bool = False) -> Columns:
     """Return the rows of a block, see `runs`."""
     every = empty(len(block.values))
     for which, found in runs(block, apart=apart):
-        own = empty(len(which), found) if isinstance(found, str) else rows(found, len(which))
+        own = {REASON: found} if isinstance(found, str) else rows(found, len(which))
         for name, values in own.items():
             every[name][which] = values
     return every

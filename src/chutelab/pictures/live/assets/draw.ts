@@ -7,6 +7,7 @@ import { sha256 } from "./sha256.ts";
 
 /** Texts are templates; mistakes have name, formula and reply */
 type Question = { title: string, text: string, unit: string, answer: Tree, measured: Tree | null,
+  angle: boolean,
   mistakes: [string, Tree, string][], general: string[], hints: string[], working: string[],
   source: string };
 /** Parameters have name, symbol, unit, meaning and the values to draw from */
@@ -71,8 +72,9 @@ class DrawnNumbers {
   }
 }
 
-/** What any question knows, with what each makes of a right answer of 1, by the key of its name. */
-function generalMistakes(exercise: Exercise): [string, string, number][] {
+/** What any question knows, with what each makes of a right answer of 1, by the key of its name.
+ * @param ofAngle whether degrees are asked for, which have no kg or g */
+function generalMistakes(exercise: Exercise, ofAngle: boolean): [string, string, number][] {
   const its = (id: string, values = {}) => worded(exercise, id, values);
   const found: [string, string, number][] = [
     ["mistake-sign", its("reply-sign"), -1],
@@ -82,7 +84,7 @@ function generalMistakes(exercise: Exercise): [string, string, number][] {
   for (let tens = 1; tens <= MOST_TENS; tens += 1) {
     const times = String(10 ** tens).replace(/\B(?=(\d{3})+$)/g, " ");
     for (const [way, factor] of [["large", 10 ** tens], ["small", 10 ** -tens]] as const) {
-      const says = its("reply-ten", { power: "⁰¹²³⁴⁵⁶"[tens], times, way: its(way) });
+      const says = its(ofAngle ? "reply-ten-angle" : "reply-ten", { power: "⁰¹²³⁴⁵⁶"[tens], times, way: its(way) });
       found.push(["mistake-ten", says, factor],
         ["mistake-ten", `${says} ${its("reply-ten-sign")}`, -factor]);
     }
@@ -107,18 +109,19 @@ class Case {
 
   /** Its own mistakes, then the general ones that it does not replace. */
   get mistakes(): Trace[] {
-    const { exercise } = this.numbers, { general } = this.question;
-    return [...this.own, ...generalMistakes(exercise).flatMap(([id, says, factor]) =>
+    const { exercise } = this.numbers, { general, angle } = this.question;
+    return [...this.own, ...generalMistakes(exercise, angle).flatMap(([id, says, factor]) =>
       (general.includes(id)
         ? [{ called: worded(exercise, id), says, number: this.right * factor }] : []))];
   }
 
   /** A mistake of its own, and what is common on top of it. */
   get pairs(): Trace[] {
-    const { exercise } = this.numbers, { general } = this.question;
+    const { exercise } = this.numbers, { general, angle } = this.question;
+    const of = angle ? "-angle" : "";
     const more = ([
-      ["mistake-sign", "besides-sign", -1], ["mistake-ten", "besides-large", 1e3],
-      ["mistake-ten", "besides-small", 1e-3],
+      ["mistake-sign", "besides-sign", -1], ["mistake-ten", `besides-large${of}`, 1e3],
+      ["mistake-ten", `besides-small${of}`, 1e-3],
     ] as [string, string, number][]).filter(([id]) => general.includes(id));
     return this.own.flatMap((first) => more.map(([id, besides, factor]) => ({
       called: worded(exercise, "pair", { first: first.called, second: worded(exercise, id) }),
@@ -153,9 +156,10 @@ function folded(letter: string) {
   return letter.toLowerCase().toUpperCase().toLowerCase();
 }
 
-/** A name without what people do not mean to differ in: case, spaces, Unicode forms. */
+/** A name without what people do not mean to differ in: case, spaces, Unicode forms; "Berg, Mia" is
+ * "mia berg". */
 const plainName = (student: string) => Array.from(student.normalize("NFKC"), folded).join("")
-  .split(/\s+/).filter(Boolean).join(" ");
+  .replace(/^([^,]*[^,\s][^,]*),([^,]*[^,\s][^,]*)$/s, "$2 $1").split(/\s+/).filter(Boolean).join(" ");
 
 /** The numbers of one draw. */
 function drawnAt(exercise: Exercise, student: string, attempt: number) {

@@ -1,0 +1,213 @@
+"""The event-driven engine: particles move on exact arcs, the next event is solved, not stepped.
+
+It is in C, in `chutelab.core` (exact.c and its files), and shares nothing with the contact
+engine's; here `run` goes from a machine to a recording. There is no contact between particles.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from math import prod
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.core.module import REAL, Module, borrow, constants, dtype, give_back, number
+from chutelab.machine import Machine
+from chutelab.results.laws import take
+from chutelab.results.record import REASONS, Record
+from chutelab.results.recorder import EnoughError, Recorder, StalledError
+from chutelab.util.arrays import Progress
+
+ROUNDS = 500_000
+"""Most events of a particle. One at ε = 0.999 comes to rest within some 20,000, at 0.9999 within
+200,000; one that rattles at 7 ms a period for the default max_time needs 10,000."""
+
+WINDOW = 10_000
+"""Events after which it is asked whether a particle gets on."""
+
+TICK = 1e-12
+"""s over `Machine.pace`; mean time between events below which it does not: the last bounces before
+rest, at 1e-9 m/s, are 200 times as far apart."""
+
+SLICE = 0.02
+"""s of wall time between two looks at Ctrl-C and reports of progress."""
+
+FIRST, MOST = 256, 100_000
+"""Events up to the first look, as most lone runs have fewer, and between two looks."""
+
+COURSE = constants("Course")
+
+
+class CornerError(RuntimeError):
+    """A spinning disk held between moving surfaces: beyond the exact engine."""
+
+
+def run(machine: Machine, progress: Progress | None = None, *, apart: bool = False) -> Record:
+    """Run a machine whose particles do not interact.
+
+    Parameters
+    ----------
+    machine : Machine
+        From `chutelab.machine.build`.
+    progress : callable, optional
+        Called with the share of particles that have ended, now and then; may end the run.
+    apart : bool
+        Keep the books of the particles apart: `Record.by_surface` is (N, S, 3) then.
+
+    Returns
+    -------
+    Record
+        Events to rounding error; bit-identical for the same machine.
+
+    Raises
+    ------
+    ValueError
+        If the particles interact, or some but not all are points.
+    CornerError
+        If a spinning disk is held between surfaces of which one moves.
+    StalledError
+        If a particle has event after event without progress; its track ends there, and the
+        recording has those of all others.
+    """
+    if machine.interact:
+        raise ValueError("the exact engine has no contacts between particles")
+    points = np.equal(machine.particle.radius, 0.0)
+    if 0 < np.count_nonzero(points) < points.size and machine.segments.start.ndim == 2:
+        raise ValueError("the exact engine has no points beside disks")
+    module, recorder = borrow(), Recorder(machine, apart=apart)
+    try:
+        fill(module, recorder.near, max(map(abs, recorder.origin)), apart)
+        stalled = follow(module, recorder, progress)
+        collect(module, recorder)
+        rounds: int = module.structs["Exact"].rounds
+        record = recorder.finish(engine="exact", steps=rounds)
+        take(module, record)
+    finally:
+        give_back(module)
+    return recorder.whole(record, stalled)
+
+
+def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
+    """Hand a machine over to the core, whose coordinates were rounded `far` off (m)."""
+    count, segments, arcs = machine.count, machine.segments, machine.arcs
+    family, wheel = segments.length.ndim == 2, machine.pulley
+    members = count if family else 1
+    s, a, w = segments.length.shape[-1], len(arcs.surface), int(wheel is not None)
+    columns, owners = s + a + w, len(machine.surfaces) + 1
+    kinds = members if family else len(machine.rolling)
+    exact: Any = module.structs["Exact"]
+    for name, value in (
+        ("segment_count", s), ("arc_count", a), ("wheel_count", w), ("lone_count", count),
+        ("surface_count", owners), ("kind_count", kinds), ("family", family), ("apart", apart),
+        ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
+        ("landing", machine.landing), ("far", far), ("is_whole", far == 0.0),
+        ("most", ROUNDS), ("window", WINDOW), ("tick", TICK),
+    ):  # fmt: skip
+        setattr(exact, name, value)
+    module.work("lay_out_exact")
+
+    def rows(name: str, kind: str, *shape: int) -> NDArray[Any]:
+        found = module.array(name, dtype(kind), prod(shape), of="Exact")
+        return found.reshape(shape)
+
+    materials = rows("materials", "Pair", kinds, columns)
+    for name, kind, part, first, many in (
+        ("segments", "Segment", segments, 0, s), ("arcs", "Arc", arcs, s, a),
+    ):  # fmt: skip
+        if not many:
+            continue
+        own = rows(name, kind, members, many)
+        for field in own.dtype.names or ():
+            if field != "end":
+                own[field] = getattr(part, field)
+        for field in ("restitution", "friction"):
+            materials[field][:, first : first + many] = getattr(part, field)
+    if wheel is not None:
+        own = rows("wheels", "Wheel", members)
+        for field in ("radius", "speed", "incline", "surface"):
+            own[field] = getattr(wheel, field)
+        materials["restitution"][:, -1] = wheel.restitution
+        materials["friction"][:, -1] = wheel.friction
+    lones, releases = rows("lones", "Lone", count), machine.releases
+    lones["release"], lones["stop"] = releases.t, machine.end_time - releases.t
+    lones["position"], lones["velocity"] = releases.position, releases.velocity
+    for field in ("radius", "mass", "inertia"):
+        lones[field] = getattr(machine.particle, field)
+    lones["gravity"], lones["pace"] = machine.gravity, machine.pace
+    several = len(machine.rolling) > 1
+    lones["rolling"] = machine.rolling[releases.kind] if several else machine.rolling[0]
+    lones["kind"], lones["carried"] = releases.kind, releases.carried
+    lones["exit_box"] = releases.exit_box
+
+
+def follow(module: Module, recorder: Recorder, progress: Progress | None) -> StalledError | None:
+    """Run to the end; return which particle first made no progress."""
+    stalled, course, events = None, COURSE["PAUSING"], FIRST
+    with suppress(EnoughError):
+        while course != COURSE["FINISHED"]:
+            began = perf_counter()
+            course = module.run("follow_and_judge", events, COURSE["NO_MEMORY"])
+            early = perf_counter() - began < SLICE
+            events = min(2 * events, MOST) if early else max(FIRST, events // 2)
+            exact: Any = module.structs["Exact"]
+            if course == COURSE["FILLED"]:
+                exact.is_whole = False
+                drain(module, recorder)
+            elif course == COURSE["HELD"]:
+                a, b = (recorder.machine.surfaces[surface] for surface in exact.other)
+                raise CornerError(
+                    f"particle {exact.lone}, a spinning disk, is held between {a!r} and {b!r}, of"
+                    " which one moves; the exact engine cannot follow that: run it with"
+                    ' engine = "contact"'
+                )
+            if (why := stuck(course, exact.passed)) and stalled is None:
+                stalled = StalledError(exact.lone, exact.t, (exact.x, exact.y), why)
+            if progress is not None:
+                progress(exact.lone / exact.lone_count)
+        return stalled
+    recorder.ended[module.structs["Exact"].lone :] = REASONS.index("stopped")
+    return stalled
+
+
+def stuck(course: int, passed: float) -> str:
+    """Return why a particle makes no progress, whose latest events took some time (s), or ""."""
+    if course == COURSE["NO_PROGRESS"]:
+        return (
+            f"{number('MOST_IDLE')} events in a row took no time; look for surfaces that nearly"
+            " touch where it is, and join their ends or move them apart"
+        )
+    if course == COURSE["DRIVEN"]:
+        return (
+            f"{WINDOW} events took {passed:.2g} s: it is driven to and fro in a narrow place;"
+            " move the surfaces there apart, or lower their restitution"
+        )
+    if course == COURSE["TOO_LONG"]:
+        return f"{ROUNDS} events, and no end of them; lower run.max_time"
+    return ""
+
+
+def drain(module: Module, recorder: Recorder) -> None:
+    """Take what was written, so that there is room for more."""
+    exact: Any = module.structs["Exact"]
+    if exact.knot_count:
+        recorder.take_knots(module.array("knots", dtype("Knot"), exact.knot_count, of="Exact"))
+        exact.knot_count = 0
+    if exact.event_count:
+        recorder.take_events(module.array("events", dtype("Event"), exact.event_count, of="Exact"))
+        exact.event_count = 0
+
+
+def collect(module: Module, recorder: Recorder) -> None:
+    """Take what is still there, reasons and books."""
+    drain(module, recorder)
+    exact: Any = module.structs["Exact"]
+    lones = module.array("lones", dtype("Lone"), exact.lone_count, of="Exact")
+    ended = recorder.ended != REASONS.index("stopped")
+    recorder.ended[ended] = lones["reason"][ended]
+    recorder.by_surface[:] = module.array(
+        "books", REAL, recorder.by_surface.size, of="Exact"
+    ).reshape(recorder.by_surface.shape)
+    recorder.contacts = exact.contacts

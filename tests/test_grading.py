@@ -20,6 +20,7 @@ from chutelab.classroom import grading
 from chutelab.classroom.exercises import EXERCISES, lesson
 from chutelab.classroom.grading import LARGEST, Grade, grade, write_csv
 from chutelab.classroom.kernel import Ran
+from chutelab.classroom.lessons import find as find_lesson
 from chutelab.cli import main
 
 pytest.importorskip("nbclient")
@@ -75,7 +76,7 @@ async def run_through(found):
 
     book = nbformat.reads(json.dumps(found), 4)
     nbformat.validate(book)
-    await NotebookClient(book, timeout=60, kernel_name="python3").async_execute()
+    await NotebookClient(book, timeout=200, kernel_name="python3").async_execute()
     return {cell.id: cell for cell in book.cells}
 
 
@@ -93,7 +94,14 @@ def test_notebooks_run_as_shipped_and_say_not_attempted(name, monkeypatch):
         assert f"Question {number}: not attempted" in text_of(cells[f"answer-{number}"])
         assert "text/html" in cells[f"question-{number}"].outputs[-1]["data"]
     assert "0 of 4 done" in text_of(cells["progress"])
-    assert "application/vnd.jupyter.widget-view+json" in cells["step-2"].outputs[-1]["data"]
+    steps = find_lesson(name).steps
+    for n in [n for n, step in enumerate(steps, 1) if step.kind == "try"]:
+        assert "application/vnd.jupyter.widget-view+json" in cells[f"step-{n}"].outputs[-1]["data"]
+    for n in [n for n, step in enumerate(steps, 1) if step.kind == "note" and step.rows]:
+        if any(column.value for column in steps[n - 1].columns):
+            # The table, once.
+            assert len(cells[f"step-{n}"].outputs) == 1
+            assert steps[n - 1].rows[0].head[-3:] in text_of(cells[f"step-{n}"])
 
 
 @pytest.mark.parametrize("name", NOTEBOOKS)

@@ -360,7 +360,7 @@ def test_the_csv_has_a_row_each_and_no_formula(tmp_path):
             4,
             (2, 3),
             "late, but good",
-            answers={1: 0.5, 2: 3.0},
+            answers={1: -0.5, 2: 3.0},
             mistakes={2: "a missing ½"},
             tries={1: 2, 2: 1},
             hints={2: 3},
@@ -371,13 +371,13 @@ def test_the_csv_has_a_row_each_and_no_formula(tmp_path):
     path = write_csv(grades, tmp_path / "class.csv")
     assert path.read_bytes().decode() == HEAD + (
         '?.ipynb,\'=HYPERLINK(1),landing,1,0,1,1,3,4,2 3,"late, but good",'
-        "0.5,3.0,,,2: a missing ½,3,3\r\n"
+        "-0.5,3.0,,,2: a missing ½,3,3\r\n"
         "b.ipynb,,,,,,,0,0,,not a notebook: not JSON,,,,,,0,0\r\n"
         "c.ipynb,a;'=1+1,,,,,,0,0,,,,,,,,0,0\r\n"
     )
     german = write_csv(grades, tmp_path / "class.csv", decimal_comma=True)
     first = german.read_text(encoding="utf-8-sig").splitlines()[1]
-    assert first.endswith(";2 3;late, but good;0,5;3,0;;;2: a missing ½;3;3")
+    assert first.endswith(";2 3;late, but good;-0,5;3,0;;;2: a missing ½;3;3")
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(OSError, match="nowhere"):
         write_csv(grades, tmp_path / "nowhere" / "class.csv")

@@ -137,6 +137,9 @@ def test_belts_run_with_their_speed_and_wheels_turn_with_them(shown):
     assert gone == pytest.approx(0.04 * scale % 24, abs=1e-6)
     turned = (after[wheels, 0] - before[wheels, 0]) % 360
     assert turned == pytest.approx(np.degrees(0.04 / 0.1) % 360, abs=1e-6)
+    page.emulate_media(reduced_motion="reduce")
+    still = np.array(page.evaluate(at, 0.14))
+    assert np.array_equal(still, after)
 
 
 def test_particles_have_the_colour_of_their_material_or_of_their_speed(shown):
@@ -156,6 +159,113 @@ def test_particles_have_the_colour_of_their_material_or_of_their_speed(shown):
     assert found == tuple(int(colour[n : n + 2], 16) for n in (0, 2, 4))
 
 
+def test_what_is_dragged_leaves_its_place_faint_and_tells_its_value_at_the_pointer(shown):
+    page = shown("inclined-40")
+    pivot = page.evaluate("chutelab.stage.handles.find(({ id }) => id === 'plate.pivot')")
+    angle = np.radians(40.0)
+    # Idle there are no handles; the plate is clicked where it is none.
+    assert page.locator(".grip.own").count() == 0
+    x, y = page.evaluate(
+        SCREEN, [pivot["x"] + 0.3 * np.sin(angle), pivot["y"] - 0.3 * np.cos(angle)]
+    )
+    page.mouse.click(x, y)
+    assert page.locator("#chosen").is_visible()
+    turn = page.evaluate("chutelab.stage.handles.find(({ id }) => id === 'turn-plate')")
+    start = page.evaluate(SCREEN, [turn["x"], turn["y"]])
+    page.mouse.move(*start)
+    page.mouse.down()
+    far = np.hypot(turn["x"] - pivot["x"], turn["y"] - pivot["y"])
+    # To 60.8 degrees from the vertical, which is nearly a round angle.
+    to = np.radians(60.8)
+    goal = pivot["x"] + far * np.sin(to), pivot["y"] - far * np.cos(to)
+    page.mouse.move(*page.evaluate(SCREEN, goal), steps=3)
+    page.evaluate("() => new Promise((then) => setTimeout(then, 60))")
+    tip = page.locator(".tip")
+    assert tip.inner_text().split("\n") == ["angle α = 60.0°", "was 40.0°"]
+    assert page.locator(".ghost .steel").count() == 1
+    assert not page.locator("#chosen").is_visible()
+    # With Alt it is as exact as the pointer.
+    page.keyboard.down("Alt")
+    page.mouse.move(*[place + 1 for place in page.evaluate(SCREEN, goal)])
+    page.mouse.move(*page.evaluate(SCREEN, goal))
+    page.mouse.up()
+    page.keyboard.up("Alt")
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == pytest.approx(60.8, abs=0.5)
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") != 60.0
+    assert page.locator(".ghost > *").count() == 0
+    assert page.locator("#chosen").is_visible()
+    page.click("#undo")
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 40.0
+
+
+def test_what_cannot_be_is_said_at_the_pointer_and_nothing_moves(shown):
+    stream = '[[stream]]\nname = "drop"\nat = [0.3, 0.3]\nvelocity = [0.0, 0.0]\n'
+    page = shown("belt-landing", ["outgoing.drop_from=top"], more=stream)
+    page.mouse.click(*page.evaluate(SCREEN, [0.3, 0.3]))
+    before = page.evaluate("chutelab.toml()")
+    inside = [0.602, 0.0]  # 2 mm from the plate, a third of the radius
+    page.mouse.move(*page.evaluate(SCREEN, [0.3, 0.3]))
+    page.mouse.down()
+    page.mouse.move(*page.evaluate(SCREEN, inside))
+    page.evaluate("() => new Promise((then) => setTimeout(then, 60))")
+    assert "start inside a surface" in page.inner_text(".tip.refused")
+    assert page.locator("#fault").is_hidden()
+    page.mouse.up()
+    assert page.evaluate("chutelab.toml()") == before
+
+
+@over("inclined-40", "cascade", "spoon")
+def test_the_card_of_what_is_chosen_covers_neither_it_nor_another_card(shown, name, size):
+    page = shown(name, viewport={"width": size[0], "height": size[1]})
+    names = page.evaluate("[...chutelab.lab.machine.surfaces, ...chutelab.lab.machine.streams]")
+    for one in names:
+        page.evaluate("(name) => chutelab.bench.inspector.choose(name)", one)
+        card = page.locator("#chosen").bounding_box()
+        right, bottom = card["x"] + card["width"], card["y"] + card["height"]
+        assert 0.0 <= card["x"] < right <= size[0]
+        if size[0] < 1200:
+            continue
+        assert 0.0 <= card["y"] < bottom <= size[1]
+        shapes = page.evaluate("""() => [...document.querySelectorAll(".outline .chosen")]
+          .flatMap((shape) => Array.from({ length: 60 }, (_, n) => {
+            const { x, y } = shape.getPointAtLength((n / 59) * shape.getTotalLength());
+            const at = new DOMPoint(x, y).matrixTransform(shape.getScreenCTM());
+            return [at.x, at.y];
+          }))""")
+        assert shapes
+        covered = [p for p in shapes if card["x"] < p[0] < right and card["y"] < p[1] < bottom]
+        # A belt may be as long as the picture is wide.
+        assert len(covered) <= 0.05 * len(shapes), one
+        for other in page.locator("#panels, .transport, .bench, header > *").all():
+            its = other.bounding_box()
+            apart = (
+                its["x"] >= right or its["x"] + its["width"] <= card["x"]
+                or its["y"] >= bottom or its["y"] + its["height"] <= card["y"]
+            )  # fmt: skip
+            assert apart, other.get_attribute("class")
+
+
+def test_a_badge_says_when_the_engine_is_slower_than_time(shown):
+    page = shown("perpendicular")
+    assert page.locator("#slow").is_hidden()
+    # An engine that computes 0.3 s of the machine in each second.
+    page.evaluate("""() => {
+      const { lab } = chutelab;
+      lab.recording.state = "running";
+      lab.playing = true;
+      lab.tick = (seconds) => { lab.t += 0.3 * seconds; };
+    }""")
+    badge = page.locator("#slow")
+    badge.wait_for(state="visible", timeout=5000)
+    assert badge.inner_text() == "computing at 0.3×"
+    badge.click()
+    assert "nothing is left out" in page.inner_text("#slow-why")
+    # In slow motion that is fast enough.
+    page.evaluate("chutelab.lab.rate = 0.25")
+    badge.wait_for(state="hidden", timeout=5000)
+    assert page.locator("#slow-why").is_hidden()
+
+
 def test_the_projector_shows_the_machine_large_and_little_else(shown):
     page = shown("perpendicular")
     size = "parseFloat(getComputedStyle(document.documentElement).fontSize)"
@@ -165,6 +275,13 @@ def test_the_projector_shows_the_machine_large_and_little_else(shown):
     assert page.locator("#bench").is_hidden()
     assert page.locator("#numbers").is_hidden()
     assert page.locator("#energy").is_visible()
+    # Left alone it shows title, picture and time; the pointer or a key brings the rest.
+    page.locator("#energy").wait_for(state="hidden", timeout=6000)
+    assert page.locator("#play").is_visible()
+    assert page.locator("#views").is_hidden()
+    page.keyboard.press("Tab")
+    assert page.locator("#energy").is_visible()
+    page.mouse.move(400, 300)
     page.click("#full")
     assert page.evaluate(size) == before
     assert page.locator("#bench").is_visible()

@@ -60,7 +60,7 @@ def opened(browser):
     yield open_
     for context in contexts:
         context.close()
-    assert not said, said
+    assert said == [], said
 
 
 @pytest.fixture

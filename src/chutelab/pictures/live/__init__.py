@@ -9,7 +9,8 @@
   top what it is. ``scene.ts``, ``plan.ts`` and ``machine.ts`` make a machine of keys, ``core.ts``
   and ``worker.ts`` run it with the contact engine, in a thread; ``lab.ts`` holds scene and run,
   ``transfer.ts`` and ``prediction.ts`` are the closed form, ``task.ts`` and ``exercise.ts`` a
-  lesson's exercise, ``stage.ts`` is the picture, and ``app.ts`` joins all.
+  lesson's exercise, ``stage.ts`` is the picture, ``bench.ts`` what is done on it, ``palette.ts``
+  what it is built of, ``inspector.ts`` what is typed, and ``app.ts`` joins all.
 """
 
 from __future__ import annotations

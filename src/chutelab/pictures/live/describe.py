@@ -35,7 +35,7 @@ PARTS: Final = (
           pulley_radius=0.05, speed=1.0),
     _part("pulley", "U", "incoming", "", "speed pulley_radius length",
           speed=2.0, pulley_radius=0.1, length=0.6),
-    _part("plate", "P", "plate", "pivot", "angle_deg below restitution",
+    _part("plate", "P", "plate", "pivot", "angle_deg distance restitution below",
           angle_deg=30.0, above=0.05, below=0.3),
     _part("line", "L", "surface", "points points", "restitution friction speed"),
     _part("arc", "C", "surface", "arc arc arc", "radius restitution friction", "center"),
@@ -49,8 +49,8 @@ PARTS: Final = (
           opens_at=1.0),
 )  # fmt: skip
 """What can be added to a machine, a row each: its word, the key that begins it, its table, the key
-that each point set in the picture is for, those shown first, those that tell it from another part
-of its table, and what else it begins with (m: for a picture one metre high)."""
+that each point set in the picture is for, those shown first (three of them), those that tell it
+from another part of its table, and what else it begins with (m: for a picture one metre high)."""
 
 
 def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:

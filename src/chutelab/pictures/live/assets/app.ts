@@ -71,10 +71,11 @@ async function start() {
     .map((Panel) => new Panel(byId("panels"), lab, words));
   watchLaws(byId("law"), lab, words);
   new Arrows(stage, words);
-  const tools = new Tools(byId("stage").parentElement, lab, stage, words, new Symbols(stage));
+  const symbols = new Symbols(stage);
+  const tools = new Tools(byId("stage").parentElement, lab, stage, words, symbols);
   const inspector = new Inspector(byId("panels"), lab, words);
   const bench = new Bench(byId("bench"), stage, inspector, lab, words);
-  new Callout(inspector, stage, lab);
+  new Callout(inspector, stage, lab, symbols);
   const palette = bench.free
     ? new Palette(byId("stage").parentElement, bench, stage, lab, words) : null;
   new Transport(lab, stage, words);

@@ -6,6 +6,7 @@ import { pointsOf } from "./callout.ts";
 import { bodyOf, roundTo, type Handle } from "./handles.ts";
 import { html, iconButton } from "./panels.ts";
 import { svg } from "./scenery.ts";
+import { boxOf } from "./view.ts";
 import type { Given } from "./scene.ts";
 import type { Stage } from "./stage.ts";
 import type { Inspector } from "./inspector.ts";
@@ -24,6 +25,9 @@ const CLICK_REACH = 14, BALL_REACH = 22;
 const MOST_BALLS = 100;
 
 const ZOOM = 1.25;
+
+/** Share of the machine that is in sight, or everything can be shown. */
+const IN_SIGHT = 0.25;
 
 /** Shares of the picture from its middle where there may be room for a part; px that are enough. */
 const GRID = [-0.36, -0.24, -0.12, 0, 0.12, 0.24, 0.36], ROOM = 160;
@@ -73,7 +77,11 @@ class Bench {
     inspector.duplicate = () => this.duplicate();
     this.chip = html("div", { class: "float chip", role: "status" });
     this.chip.hidden = true;
-    stage.home.after(this.chip);
+    this.lost = html("button", { type: "button", class: "float lost" }, words.say("fit"));
+    this.lost.hidden = true;
+    this.lost.addEventListener("click", () => document.getElementById("fit")?.click());
+    stage.drawers.push(() => { this.lost.hidden ||= !stage.moved; });
+    stage.home.after(this.chip, this.lost);
     this.tools(home);
     this.listen();
     inspector.listeners.push(() => stage.choose(inspector.parts));
@@ -294,8 +302,22 @@ class Bench {
     this.waiting ||= requestAnimationFrame(() => {
       this.waiting = 0;
       stage.rebuild();
+      this.offer();
     });
   }
+
+  /** Offer to show everything where little of the machine is in sight. */
+  offer() {
+    const { stage: { view }, lab: { machine }, lost } = this;
+    if (!machine) return;
+    const { left, right, top, bottom } = boxOf(machine, []);
+    const share = (low: number, high: number, end: number) =>
+      Math.max(0, Math.min(high, end) - Math.max(low, 0)) / Math.max(1, high - low);
+    lost.hidden = share(view.px(left), view.px(right), view.width)
+      * share(view.py(top), view.py(bottom), view.height) >= IN_SIGHT;
+  }
+
+  lost;
 
   waiting = 0;
 
@@ -357,14 +379,14 @@ class Bench {
 
   /** Places near the middle of what is seen that are far from all that is there, best first, m. */
   rooms(): Place[] {
-    const { lab, stage: { view } } = this, { left, right, top, bottom } = view.free;
-    const there = pointsOf(lab, view).flatMap(([, points]) => points);
+    const { stage } = this, { view } = stage, { left, right, top, bottom } = view.free;
+    const there = pointsOf(stage).flatMap(([, points]) => points);
     const [cx, cy] = [0.5 * (left + right), 0.5 * (top + bottom)];
     const found = GRID.flatMap((u) => GRID.map((v) => {
       const [x, y] = [cx + u * (right - left), cy + v * (bottom - top)];
       const free = there.reduce((least, [px, py]) =>
         Math.min(least, Math.hypot(px - x, py - y)), ROOM);
-      return { good: free - 0.2 * Math.hypot(x - cx, y - cy), x, y };
+      return { good: free - 0.5 * Math.hypot(x - cx, y - cy), x, y };
     }));
     return found.sort((a, b) => b.good - a.good).slice(0, TRIES)
       .map(({ x, y }) => [view.worldX(x), view.worldY(y)]);

@@ -1,10 +1,10 @@
-// Where the card of what is chosen stands: in the best free place, with a line to that.
+// What shows that something is chosen: dashes round it, and a card beside it, in the best place.
 
 import { svg } from "./scenery.ts";
 import type { Inspector } from "./inspector.ts";
 import type { Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
-import type { View } from "./view.ts";
+import type { Symbols } from "./symbols.ts";
 
 type Point = [number, number];
 
@@ -18,59 +18,115 @@ const OWN = 4000, PATH = 60, OTHER = 30;
 /** Pixels from one of the points that stand for a line to the next. */
 const ALONG = 22;
 
+/** What is drawn of a body at its outside, and points of one of these at most. */
+const BODIES = ".belt, .wall, rect.steel", MOST = 200;
+
+/** Pixels from a body to the line round it, and of radius of a ball there at least. */
+const AROUND = 6, LEAST = 3;
+
+/** Width of a line that page.css gives its own, px. */
+const WALL = 4.5;
+
 /** Points along a line through points, those among them. */
 function along(points: Point[]): Point[] {
   return points.flatMap(([x, y], n) => {
     const [u, v] = points[n + 1] ?? [x, y];
-    const many = Math.min(200, Math.ceil(Math.hypot(u - x, v - y) / ALONG));
+    const many = Math.min(MOST, Math.ceil(Math.hypot(u - x, v - y) / ALONG));
     return Array.from({ length: Math.max(1, many) }, (_, k) =>
       [x + (k / many || 0) * (u - x), y + (k / many || 0) * (v - y)] as Point);
   });
 }
 
-/** Points along the surfaces of a machine, and where its balls start and are, px, by name. */
-function pointsOf({ machine, recording, t }: Lab, view: View): [string, Point[]][] {
+/** Points along what is drawn of a machine, and where its balls start and are, px, by name. */
+function pointsOf({ lab, view, scenery }: Stage): [string, Point[]][] {
+  const { machine, recording, t } = lab;
   if (!machine) return [];
-  const px = (x: number, y: number): Point => [view.px(x), view.py(y)];
-  const bend = (x: number, y: number, radius: number, begin: number, extent: number) =>
-    Array.from({ length: 25 }, (_, n) => begin + (n * extent) / 24).map((angle) =>
-      px(x + radius * Math.cos(angle), y + radius * Math.sin(angle)));
-  const { surfaces, segments, arcs, pulley, streams, releases } = machine;
-  return [
-    ...segments.map(({ ends: [x, y, u, v], surface }) =>
-      [surfaces[surface], along([px(x, y), px(u, v)])] as [string, Point[]]),
-    ...arcs.map(({ x, y, radius, begin, extent, surface }) =>
-      [surfaces[surface], bend(x, y, radius, begin, extent)] as [string, Point[]]),
-    ...(pulley ? [[surfaces[pulley.surface], bend(0, 0, pulley.radius, 0, 2 * Math.PI)] as
-      [string, Point[]]] : []),
-    ...releases.slice(0, 100).map((release, i) => {
-      const { x, y } = recording?.tracks[i]?.state(t) ?? release;
-      return [streams[release.stream], [px(x, y), px(release.x, release.y)]] as [string, Point[]];
-    }),
-  ];
+  const found: [string, Point[]][] = [];
+  for (const group of scenery.layer.children) {
+    for (const shape of group.querySelectorAll(BODIES)) {
+      const long = shape.getTotalLength(), many = Math.min(MOST, Math.ceil(long / ALONG));
+      const { a, b, c, d, e, f } = shape.getCTM() ?? new DOMMatrix();
+      found.push([group.getAttribute("data-part"), Array.from({ length: many + 1 }, (_, n) => {
+        const { x, y } = shape.getPointAtLength((n / many) * long);
+        return [a * x + c * y + e, b * x + d * y + f] as Point;
+      })]);
+    }
+  }
+  for (const [i, release] of machine.releases.slice(0, MOST).entries()) {
+    const { x, y } = recording?.tracks[i]?.state(t) ?? release;
+    found.push([machine.streams[release.stream], [
+      [view.px(x), view.py(y)], [view.px(release.x), view.py(release.y)]]]);
+  }
+  return found;
+}
+
+/** Dashes round what is chosen, a line round what is pointed at: below each body its own shape,
+ * wider, and over that a little less wide in the colour of the ground. */
+function drawOutline({ lab, view, outline, parts, pointed, scenery }: Stage) {
+  outline.replaceChildren();
+  const { machine, recording, t } = lab;
+  for (const name of new Set([...parts, pointed])) {
+    const own = parts.includes(name) ? "chosen" : "pointed";
+    const bodies = scenery.drawingsOf(name).flatMap((group) =>
+      [...group.querySelectorAll(BODIES)].map((shape) => {
+      const wide = Number(shape.getAttribute("stroke-width") ?? WALL);
+        const copy = shape.cloneNode(false), by = group.getAttribute("transform");
+        if (by) copy.setAttribute("transform", by);
+        return [copy, wide] as [any, number];
+      }));
+    const stream = machine?.streams.indexOf(name) ?? -1;
+    machine?.releases.forEach((release, i) => {
+      if (release.stream !== stream || bodies.length > 40) return;
+      const state = recording?.tracks[i]?.state(t) ?? release;
+      const r = Math.max(LEAST, machine.radius[i] * view.scale);
+      bodies.push([svg("circle", { cx: view.px(state.x), cy: view.py(state.y), r }), 0]);
+    });
+    const layers: [number, string][] = [[AROUND + 1, own], [AROUND - 1, "within"]];
+    for (const [add, kind] of layers) {
+      for (const [shape, wide] of bodies) {
+        const copy = shape.cloneNode(false);
+        copy.setAttribute("class", kind);
+        copy.setAttribute("stroke-width", wide + 2 * add);
+        outline.append(copy);
+      }
+    }
+  }
 }
 
 class Callout {
   leader = svg("path", { class: "leader" });
 
-  constructor(readonly inspector: Inspector, readonly stage: Stage, readonly lab: Lab) {
+  constructor(
+    readonly inspector: Inspector, readonly stage: Stage, readonly lab: Lab,
+    readonly symbols: Symbols,
+  ) {
     stage.over.append(this.leader);
     inspector.listeners.push(() => this.place());
     stage.drawers.push(() => this.place());
   }
 
+  /** Place it, and the labels anew where it stands elsewhere. */
   place() {
+    const { stage } = this, before = JSON.stringify(stage.covered);
+    // What is dragged has no card.
+    if (stage.held) return;
+    stage.covered = this.find();
+    if (JSON.stringify(stage.covered) !== before) this.symbols.draw();
+  }
+
+  /** @returns the box that it covers, px */
+  find(): Stage["covered"] {
     const { inspector: { panel, parts }, stage, lab, leader } = this, { view } = stage;
     leader.setAttribute("d", "");
     const floats = !panel.hidden && getComputedStyle(panel).position === "fixed";
     if (!floats) {
       panel.style.transform = "";
-      return;
+      return [];
     }
     const { free } = view, { offsetWidth: wide, offsetHeight: high } = panel;
     const isSeen = ([x, y]: Point) => x > 0 && x < view.width && y > 0 && y < view.height;
     const own: Point[] = [], other: Point[] = [];
-    for (const [name, points] of pointsOf(lab, view)) {
+    for (const [name, points] of pointsOf(stage)) {
       (parts.includes(name) ? own : other).push(...points.filter(isSeen));
     }
     const grips = stage.handles.filter(({ surface }) => parts.includes(surface))
@@ -100,10 +156,14 @@ class Callout {
       Math.min(Math.max(y, at[1]), at[1] + high)];
     const far = (point: Point) => Math.hypot(edge(point)[0] - point[0], edge(point)[1] - point[1]);
     const [first] = own.sort((a, b) => far(a) - far(b));
-    if (!first || far(first) < OFF) return;
+    const covered = [{
+      left: at[0], right: at[0] + wide, top: at[1], bottom: at[1] + high,
+    }];
+    if (!first || far(first) < OFF) return covered;
     const [x, y] = first;
     leader.setAttribute("d", `M${edge(first)}L${x} ${y}m-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0`);
+    return covered;
   }
 }
 
-export { Callout, pointsOf };
+export { Callout, drawOutline, pointsOf };

@@ -13,7 +13,7 @@ type Live = { predict?: boolean, controls?: string[] | null, panels?: string[] |
   presets?: { name: string, set: Record<string, unknown> }[] };
 type Page = { tables: Record<string, Record<string, any>>, live?: Live };
 /** A part of the scene; "scene" of the main numbers of all */
-type Section = { table: string, row: number, name: string };
+export type Section = { table: string, row: number, name: string };
 /** What can be typed or chosen; it is the n-th `part` `of` so many. One that need not be there is
  * `free`, and undefined if it is not. */
 export type Field = { key: string, table: string, owner: string, name: string, part: number,
@@ -212,4 +212,4 @@ function numberIn({ key, low, high, form }: Field, value: number) {
   return value;
 }
 
-export { checked, fieldsOf, mayDraw, openHandles, sectionsOf, showsFew };
+export { MAIN, checked, fieldsOf, mayDraw, openHandles, sectionsOf, showsFew };

@@ -42,8 +42,8 @@ function sampleAt(recording: Recording, index: number, t: number): Sample | null
 /** Samples of a particle over all its time, with the values before and after each of its knots. */
 function samplesOf(recording: Recording, index: number): Sample[] {
   const track = recording.tracks[index];
-  if (!track?.count) return [];
-  const { begin, end } = track;
+  const { begin, end } = track ?? { begin: NaN, end: NaN };
+  if (!(end >= begin)) return [];
   const span = end - begin;
   const times = Array.from({ length: MANY + 1 }, (_, n) => begin + (span * n) / MANY);
   times[MANY] = end;

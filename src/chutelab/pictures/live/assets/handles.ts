@@ -265,7 +265,8 @@ class Handles {
         (x, y) => [x, y], undefined, stream.at);
     }
     if (!velocity) return;
-    const [x, y] = stream.at, [vx, vy] = velocity;
+    // Beside the ball, which is grabbed itself: one that is let go at rest has it there, too.
+    const [x, y] = [stream.at[0] + this.away, stream.at[1]], [vx, vy] = velocity;
     this.add(`${table}.velocity`, stream.name, "velocity", "arrow",
       [x + ARROW * vx, y + ARROW * vy], [0, 1].map((part) =>
         this.axis(`${table}.velocity`, velocity[part], "m/s", part)),

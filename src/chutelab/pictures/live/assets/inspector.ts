@@ -1,7 +1,8 @@
 // What can be typed: main numbers of the scene in a panel, and what is chosen in a card beside it.
 
-import { checked, fieldsOf, sectionsOf, showsFew, type Field } from "./controls.ts";
+import { MAIN, checked, fieldsOf, sectionsOf, showsFew, type Field, type Section } from "./controls.ts";
 import { canGo, rowsNamed, withName, without, type Part } from "./edit.ts";
+import { listOf } from "./checks.ts";
 import { card, html, icon, iconButton } from "./panels.ts";
 import { Fault, type Given } from "./scene.ts";
 import type { Lab } from "./lab.ts";
@@ -9,6 +10,9 @@ import type { Words } from "./words.ts";
 
 /** Places of a slider, and a range that is narrow enough for one. */
 const PLACES = 100, NARROW = 400;
+
+/** Fields that are not under "More". */
+const FIRST = 3;
 
 type Entry = { row: any, input: any, why: any, slider: any, field: Field };
 
@@ -41,7 +45,8 @@ class Fields {
       .map(({ table, name }) => words.key(table, name));
     const named = [...new Set(names)].slice(0, 2).join(", ");
     const more = html("details", { class: "more" },
-      html("summary", {}, words.say("more-keys", { keys: named }), icon("down")), ...rest);
+      html("summary", {}, html("span", {}, words.say("more-keys", { keys: named })), icon("down")),
+      ...rest);
     more.open = this.isOpen;
     more.addEventListener("toggle", () => { this.isOpen = more.open; });
     home.append(more);
@@ -252,12 +257,10 @@ class Inspector {
   }
 
   /** The part of the palette that a thing is. */
-  kindOf(name: string): Part | undefined {
-    const { given, data } = this.lab;
-    if (name === "incoming") return data.parts.find(({ part }: Part) => part === "pulley");
-    const [table, row] = rowsNamed(given as Given, [name])[0] ?? [];
+  kindOf({ table, row }: Section): Part | undefined {
+    const { given, data } = this.lab, keys = listOf(given?.[table])[row] ?? {};
     const fits = data.parts.filter((part: Part) =>
-      part.table === table && part.needs.every((key) => row && key in row)) as Part[];
+      part.table === table && part.needs.every((key) => key in keys)) as Part[];
     return fits.sort((a, b) => b.needs.length - a.needs.length)[0];
   }
 
@@ -276,13 +279,14 @@ class Inspector {
     choice.value = this.part;
     this.main.show(fieldsOf(data, given, scene, all[0]), () => true);
     const section = all.find(({ name }) => name === this.part && name !== "scene");
-    const kind = section && this.kindOf(this.part);
+    const kind = section && this.kindOf(section);
     const stream = section?.table === "stream" ? scene.kinds[section.row] : -1;
     // A stream is shown with what it consists of.
     const grain = all.filter(({ table }) => table === "particle")[stream];
     const fields = !section || this.parts.length > 1 ? []
       : [section, ...(grain ? [grain] : [])].flatMap((one) => fieldsOf(data, given, scene, one));
-    const order = kind?.main ?? [];
+    const order = (kind?.main ?? MAIN[section?.table ?? ""] ?? []).filter((key) =>
+      fields.some(({ table, name }) => key === name || key === `${table}.${name}`)).slice(0, FIRST);
     const place = ({ table, name }: Field) =>
       Math.max(order.indexOf(name), order.indexOf(`${table}.${name}`));
     const rank = (field: Field) => (place(field) >= 0 ? place(field) : field.name === "name" ? 99 : 9);

@@ -62,7 +62,10 @@ class Palette {
     lab.on("scene", () => this.refresh());
     this.refresh();
     // Its letters count at once.
-    if (this.start) stage.front.focus();
+    if (!this.start || matchMedia("(pointer: coarse)").matches) return;
+    stage.front.classList.add("quiet");
+    stage.front.focus();
+    addEventListener("keydown", () => stage.front.classList.remove("quiet"), { once: true });
   }
 
   open(on: boolean) {
@@ -149,7 +152,8 @@ class Palette {
       const { title } = lab.first;
       this.show({ title, ...FIRST });
     });
-    const sketch = svg("svg", { viewBox: "-8 -14 620 304", "aria-hidden": "true" });
+    const sketch = svg("svg", {
+      viewBox: "-8 -14 620 304", class: "sketch", "aria-hidden": "true" });
     sketch.append(svg("path", { d: SKETCH }));
     for (const [word, x, y] of [["belt", 70, 101], ["ball", 114, 28], ["plate", 372, 76],
       ["second", 317, 272]] as const) {
@@ -167,11 +171,13 @@ class Palette {
       html("section", { class: "hello", "aria-label": words.say("build") },
         html("h2", {}, words.say("build")), html("p", { class: "note" },
           words.say(matchMedia("(pointer: coarse)").matches ? "build-tap" : "build-how")),
-        begin, sketch),
+        begin),
+      sketch,
       html("section", { class: "float examples", "aria-label": words.say("examples") },
         html("h2", {}, words.say("examples")), html("div", { class: "row" }, ...examples)),
     ];
     home.append(...start);
+    this.stage.home.append(sketch);
     return start;
   }
 
@@ -210,11 +216,10 @@ class Palette {
       ["title", "stream", "view"].includes(key)) && given?.stream?.length === 0;
     if (bare !== classList.contains("bare")) {
       classList.toggle("bare", bare);
-      this.open(bare);
+      this.open(bare || this.bench.mode !== null);
       this.stage.resize();
     }
     classList.toggle("still", given !== undefined && isBare(given));
-    for (const part of this.start ?? []) part.hidden = !bare;
     for (const [part, tile] of this.tiles) {
       if (part.places.length) continue;
       tile.disabled = given?.[part.table] !== undefined;

@@ -91,10 +91,17 @@ class Scenery {
     }
   }
 
+  /** The drawings of a part. */
+  drawingsOf(name: string): any[] {
+    return [...this.layer.children].filter((one) => one.getAttribute("data-part") === name);
+  }
+
   /** Move what moves to a time, s. */
   turn(t: number) {
     const { scale } = this.view;
-    for (const { element, speed, x, y, radius } of this.moving) {
+    // Where little should move, only the particles do.
+    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    for (const { element, speed, x, y, radius } of calm ? [] : this.moving) {
       if (radius === undefined) {
         element.setAttribute("stroke-dashoffset", String(-((speed * t * scale) % PITCH)));
       } else {

@@ -1,6 +1,7 @@
 // The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
 
 import { openHandles } from "./controls.ts";
+import { drawOutline } from "./callout.ts";
 import { endsOf } from "./edit.ts";
 import { ARROW, Handles, bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
 import { html } from "./panels.ts";
@@ -15,8 +16,8 @@ import type { Words } from "./words.ts";
 /** Tracks that are drawn at most; more are a blot. */
 const MOST_TRACKS = 40;
 
-/** Pixels from an end to the handle that turns it, and from a body to the line round it. */
-const BEYOND = 38, AROUND = 6;
+/** Pixels from an end to the handle that turns it. */
+const BEYOND = 38;
 
 /** Angles to which one is drawn that is so near, degrees. */
 const ROUND = 15, NEARLY = 1.5;
@@ -317,46 +318,14 @@ class Stage {
     return change !== undefined || (this.parts.length === 1 && this.parts[0] === surface);
   }
 
-  /** The drawings of a part. */
-  drawingsOf(name: string): any[] {
-    return [...this.scenery.layer.children]
-      .filter((one: any) => one.getAttribute("data-part") === name);
-  }
+  /** Boxes on the picture that labels keep clear of, px. */
+  covered: { left: number, right: number, top: number, bottom: number }[] = [];
 
   /** What the pointer is over. */
   pointed = "";
 
-  /** Dashes round what is chosen, a line round what is pointed at: below each body its own shape,
-   * wider, and over that a little less wide in the colour of the ground. */
   drawOutline() {
-    this.outline.replaceChildren();
-    const { machine, recording, t } = this.lab, { view } = this;
-    for (const name of new Set([...this.parts, this.pointed])) {
-      const own = this.parts.includes(name) ? "chosen" : "pointed";
-      const bodies = this.drawingsOf(name).flatMap((group) =>
-        [...group.querySelectorAll(".belt, .wall, rect.steel")].map((shape) => {
-          const wide = parseFloat(getComputedStyle(shape).strokeWidth) || 0;
-          const copy = shape.cloneNode(false), by = group.getAttribute("transform");
-          if (by) copy.setAttribute("transform", by);
-          return [copy, wide] as [any, number];
-        }));
-      const stream = machine?.streams.indexOf(name) ?? -1;
-      machine?.releases.forEach((release, i) => {
-        if (release.stream !== stream || bodies.length > 40) return;
-        const state = recording?.tracks[i]?.state(t) ?? release;
-        const r = Math.max(LEAST_FEW, machine.radius[i] * view.scale);
-        bodies.push([svg("circle", { cx: view.px(state.x), cy: view.py(state.y), r }), 0]);
-      });
-      const layers: [number, string][] = [[AROUND + 1, own], [AROUND - 1, "within"]];
-      for (const [add, kind] of layers) {
-        for (const [shape, wide] of bodies) {
-          const copy = shape.cloneNode(false);
-          copy.setAttribute("class", kind);
-          copy.setAttribute("stroke-width", wide + 2 * add);
-          this.outline.append(copy);
-        }
-      }
-    }
+    drawOutline(this);
   }
 
   /** Handles of tools. */
@@ -399,9 +368,15 @@ class Stage {
   listen() {
     this.front.addEventListener("pointerdown", (event: PointerEvent) => {
       const grip = (event.target as Element).closest(".grip");
-      if (!grip || !this.take(grip.getAttribute("data-id") ?? "")) return;
+      if (!grip) return;
+      // Of several within reach the nearest is meant.
+      const [px, py] = this.placeOf(event), { view } = this;
+      const far = ({ x, y }: Handle) => Math.hypot(view.px(x) - px, view.py(y) - py);
+      const [meant] = this.handles.filter((one) => this.isSeen(one)
+        || one.id === grip.getAttribute("data-id")).sort((a, b) => far(a) - far(b));
+      if (!this.take(meant.id)) return;
       event.preventDefault();
-      (grip as any).focus();
+      this.gripOf.get(meant.id).focus();
       this.front.setPointerCapture(event.pointerId);
     });
     this.front.addEventListener("pointermove", (event: PointerEvent) => this.aim(event));
@@ -464,7 +439,7 @@ class Stage {
     if (handle.change) return handle;
     const names = handle.whole ? this.parts : [handle.surface];
     this.ghost.replaceChildren(...names.flatMap((name) =>
-      this.drawingsOf(name).map((one) => one.cloneNode(true))));
+      this.scenery.drawingsOf(name).map((one) => one.cloneNode(true))));
     this.ends = this.lab.machine ? endsOf(this.lab.machine, names) : [];
     this.was = this.words.values(handle.axes, true);
     document.body.classList.add("dragging");

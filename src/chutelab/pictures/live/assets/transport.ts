@@ -10,6 +10,12 @@ const PLACES = 1000;
 /** No frame counts for more than this, s: a page that was hidden goes on where it was. */
 const LONGEST = 0.1;
 
+/** s over which the pace is measured, and the share of what is played from which on it is slow. */
+const GAUGED = 2, SLOW = 0.95;
+
+/** ms without the pointer or a key after which a projector shows the picture alone. */
+const ASLEEP = 3000;
+
 class Transport {
   playButton;
   time;
@@ -19,6 +25,8 @@ class Transport {
   redoButton;
   fault;
   then;
+  slow;
+  why;
 
   constructor(readonly lab: Lab, stage: Stage, readonly words: Words) {
     const element = (id: string) => document.getElementById(id) as any;
@@ -54,6 +62,10 @@ class Transport {
       lab.pause();
       lab.seek(lab.start + (lab.end - lab.start) * share);
     });
+    this.slow = element("slow");
+    this.why = element("slow-why");
+    this.why.textContent = words.say("slow-why");
+    this.slow.addEventListener("click", () => this.explain(this.why.hidden));
     this.undoButton = element("undo");
     this.redoButton = element("redo");
     this.fault = element("fault");
@@ -67,9 +79,36 @@ class Transport {
 
   /** @param now ms */
   frame(now: number) {
-    this.lab.tick(Math.min((now - this.then) / 1000, LONGEST));
+    const { lab } = this, seconds = Math.min((now - this.then) / 1000, LONGEST), before = lab.t;
+    lab.tick(seconds);
+    this.gauge(seconds, lab.t - before);
     this.then = now;
     requestAnimationFrame((next) => this.frame(next));
+  }
+
+  /** Real seconds and those that were shown, of the last frames that were played. */
+  frames: [number, number][] = [];
+
+  /** Say so where the engine is slower than what it is played at, on the mean of two seconds. */
+  gauge(seconds: number, shown: number) {
+    const { lab, frames, slow, words } = this;
+    if (!lab.playing) frames.length = 0;
+    else frames.push([seconds, shown]);
+    const total = (n: number) => frames.reduce((sum, frame) => sum + frame[n], 0);
+    while (total(0) - (frames[0]?.[0] ?? 0) > GAUGED) frames.shift();
+    const pace = total(1) / total(0), under = lab.recording?.state === "running";
+    const isSlow = total(0) > 0.5 * GAUGED && under && pace < SLOW * Math.min(1, lab.rate);
+    if (slow.hidden === isSlow) {
+      slow.hidden = !isSlow;
+      if (!isSlow) this.explain(false);
+    }
+    const said = isSlow ? words.say("slow", { pace: words.number(pace, 1) }) : "";
+    if (slow.textContent !== said) slow.textContent = said;
+  }
+
+  explain(on: boolean) {
+    this.slow.setAttribute("aria-expanded", String(on));
+    this.why.hidden = !on;
   }
 
   /** A sixtieth of a second of what is shown, in the pace it is shown. */
@@ -102,9 +141,28 @@ class Transport {
 function project() {
   const { classList } = document.documentElement, on = classList.toggle("projector");
   document.getElementById("full")?.setAttribute("aria-pressed", String(on));
+  if (on) wake();
   // Where a page may not take the screen, it is large all the same.
   if (on) document.documentElement.requestFullscreen?.().catch(() => {});
   else if (document.fullscreenElement) document.exitFullscreen();
+}
+
+let sleep = 0;
+
+/** Show for a while what else a projector has. */
+function wake() {
+  const { classList } = document.documentElement;
+  classList.add("awake");
+  clearTimeout(sleep);
+  sleep = setTimeout(() => {
+    if (!document.querySelector("#panels :focus, #views :focus-visible")) classList.remove("awake");
+  }, ASLEEP);
+}
+
+for (const news of ["pointermove", "pointerdown", "keydown"]) {
+  addEventListener(news, () => {
+    if (document.documentElement.matches(".projector")) wake();
+  });
 }
 
 export { Transport };

@@ -118,9 +118,9 @@ class Words {
     const places = seen.every(({ part }) => part !== undefined);
     return seen.map((axis, n) => {
       const [table, name] = axis.key.replace(/\[\d+\]/g, "").split(".");
-      const what = places ? "xy"[n] : this.key(table, name);
+      const what = places ? `${axis.unit === "m/s" ? "v" : ""}${"xy"[n]}` : this.key(table, name);
       return bare ? this.value(axis) : `${what} = ${this.value(axis)}`;
-    }).join(", ");
+    }).join(bare ? ", " : "\n");
   }
 
   /** A number that was typed, with point or comma; NaN if it is none. */

@@ -58,7 +58,7 @@ class Core:
     def recording(self):
         recorder = Recorder(self.machine)
         self.job.write(recorder)
-        return recorder.finish(engine="contact", steps=self.job.steps)
+        return recorder.finish(engine="contact", steps=self.world.step_count)
 
     def step(self, steps=1):
         """Run on for some steps, making room where it is full; True at the end of the run."""

@@ -1,6 +1,7 @@
 """The answers: closed form, event-driven, contact dynamics, Pymunk, and SciPy's ODE solver."""
 
 from collections import Counter
+from dataclasses import replace
 from math import cos, isfinite, radians, sin
 
 import numpy as np
@@ -249,9 +250,8 @@ def test_a_wrong_formula_is_caught_from_outside(file, text, wrong, with_fault):
     caught("landed")
 
 
-def heavier_core(job, *given, honest=Job.settings):
-    honest(job, *given)
-    job.module.world.g *= 1.0 + WRONG
+def heavier_core(job, module, machine, *, honest=Job.__init__, **more):
+    honest(job, module, replace(machine, gravity=machine.gravity * (1.0 + WRONG)), **more)
 
 
 def heavier_flight(run, *given, honest=Lone.__init__):
@@ -268,7 +268,7 @@ def heavier_ode(run, *given, honest=reference._Run.__init__):
     ("name", "where", "wrong"),
     [
         ("exact", "chutelab.engines.exact.fill", heavier),
-        ("contact", "chutelab.engines.contact.Job.settings", heavier_core),
+        ("contact", "chutelab.engines.contact.Job.__init__", heavier_core),
         ("pymunk", "chutelab.engines.pymunk.lone.Lone.__init__", heavier_flight),
         ("dop853", "chutelab.engines.reference._Run.__init__", heavier_ode),
     ],
@@ -291,7 +291,7 @@ def test_what_places_the_belt_is_shared_by_the_engines_and_told_by_the_theory(mo
     def sunk(*given):
         laid = honest(*given)
         for end in ("start", "end"):
-            laid.parts["segments"][end][2, 1] -= lower
+            laid[0]["segments"][end][2, 1] -= lower
         return laid
 
     monkeypatch.setattr(builder, "lay", sunk)

@@ -20,6 +20,7 @@ from chutelab.classroom import grading
 from chutelab.classroom.exercises import EXERCISES, lesson
 from chutelab.classroom.grading import LARGEST, Grade, grade, write_csv
 from chutelab.classroom.kernel import Ran
+from chutelab.classroom.lessons import find as find_lesson
 from chutelab.cli import main
 
 pytest.importorskip("nbclient")
@@ -75,7 +76,7 @@ async def run_through(found):
 
     book = nbformat.reads(json.dumps(found), 4)
     nbformat.validate(book)
-    await NotebookClient(book, timeout=60, kernel_name="python3").async_execute()
+    await NotebookClient(book, timeout=200, kernel_name="python3").async_execute()
     return {cell.id: cell for cell in book.cells}
 
 
@@ -93,7 +94,14 @@ def test_notebooks_run_as_shipped_and_say_not_attempted(name, monkeypatch):
         assert f"Question {number}: not attempted" in text_of(cells[f"answer-{number}"])
         assert "text/html" in cells[f"question-{number}"].outputs[-1]["data"]
     assert "0 of 4 done" in text_of(cells["progress"])
-    assert "application/vnd.jupyter.widget-view+json" in cells["step-2"].outputs[-1]["data"]
+    steps = find_lesson(name).steps
+    for n in [n for n, step in enumerate(steps, 1) if step.kind == "try"]:
+        assert "application/vnd.jupyter.widget-view+json" in cells[f"step-{n}"].outputs[-1]["data"]
+    for n in [n for n, step in enumerate(steps, 1) if step.kind == "note" and step.rows]:
+        if any(column.value for column in steps[n - 1].columns):
+            # The table, once.
+            assert len(cells[f"step-{n}"].outputs) == 1
+            assert steps[n - 1].rows[0].head[-3:] in text_of(cells[f"step-{n}"])
 
 
 @pytest.mark.parametrize("name", NOTEBOOKS)
@@ -352,7 +360,7 @@ def test_the_csv_has_a_row_each_and_no_formula(tmp_path):
             4,
             (2, 3),
             "late, but good",
-            answers={1: 0.5, 2: 3.0},
+            answers={1: -0.5, 2: 3.0},
             mistakes={2: "a missing ½"},
             tries={1: 2, 2: 1},
             hints={2: 3},
@@ -363,13 +371,13 @@ def test_the_csv_has_a_row_each_and_no_formula(tmp_path):
     path = write_csv(grades, tmp_path / "class.csv")
     assert path.read_bytes().decode() == HEAD + (
         '?.ipynb,\'=HYPERLINK(1),landing,1,0,1,1,3,4,2 3,"late, but good",'
-        "0.5,3.0,,,2: a missing ½,3,3\r\n"
+        "-0.5,3.0,,,2: a missing ½,3,3\r\n"
         "b.ipynb,,,,,,,0,0,,not a notebook: not JSON,,,,,,0,0\r\n"
         "c.ipynb,a;'=1+1,,,,,,0,0,,,,,,,,0,0\r\n"
     )
     german = write_csv(grades, tmp_path / "class.csv", decimal_comma=True)
     first = german.read_text(encoding="utf-8-sig").splitlines()[1]
-    assert first.endswith(";2 3;late, but good;0,5;3,0;;;2: a missing ½;3;3")
+    assert first.endswith(";2 3;late, but good;-0,5;3,0;;;2: a missing ½;3;3")
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(OSError, match="nowhere"):
         write_csv(grades, tmp_path / "nowhere" / "class.csv")

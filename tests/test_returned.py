@@ -167,7 +167,7 @@ def test_it_is_told_how_likely_a_copied_answer_is_by_chance(returned):
         assert share > 0.03
     else:
         assert 1.0 / float(chance.removeprefix("1 in ")) == pytest.approx(share, rel=0.6, abs=0.01)
-    assert "(by chance: 1 in 302)" in told({1: ada[0], 2: ada[1], 3: ada[2]})
+    assert "(by chance: at most 1 in 302)" in told({1: ada[0], 2: ada[1], 3: ada[2]})
     # A mistake with one's own numbers is no sign of copying, whatever it is right for.
     assert told({1: -right("Ben")}) == ""
 

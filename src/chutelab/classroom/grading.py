@@ -303,8 +303,9 @@ def _copied(row: Grade, before: Sequence[Grade]) -> Iterator[str]:
             (other, row, f"of {other.file} are right for these numbers"),
         ):
             if found := _right_for(mine, its):
-                chance = _chance(mine, found, len(others))
-                likely = f"1 in {1.0 / chance:,.0f}" if chance < LIKELY else "this may be chance"
+                chance, seen = _chance(mine, found, len(others))
+                likely = f"{'' if seen else 'at most '}1 in {1.0 / chance:,.0f}"
+                likely = likely if chance < LIKELY else "this may be chance"
                 listed = ", ".join(map(str, found))
                 yield printable(f"answers {listed} {said} (by chance: {likely})")
 
@@ -336,15 +337,18 @@ def _drawn(lesson: str) -> tuple[tuple[float, ...], ...]:
     )
 
 
-def _chance(row: Grade, questions: Sequence[int], others: int) -> float:
-    """Return how likely these answers are all right for at least one of so many other students."""
+def _chance(row: Grade, questions: Sequence[int], others: int) -> tuple[float, bool]:
+    """Return how likely these answers are all right for at least one of so many other students.
+
+    And whether that was ever so in all draws: if not, it is a bound.
+    """
     fits = sum(
         all(is_rounded(row.answers[n], right[n - 1]) for n in questions)
         for right in _drawn(row.lesson)
     )
     # What was never seen in so many draws may still happen: Laplace's rule of succession.
     share = (fits + 1) / (DRAWS + 2)
-    return 1.0 - (1.0 - share) ** others
+    return 1.0 - (1.0 - share) ** others, fits > 0
 
 
 def write_csv(grades: Iterable[Grade], path: str | Path, *, decimal_comma: bool = False) -> Path:
@@ -366,9 +370,6 @@ def write_csv(grades: Iterable[Grade], path: str | Path, *, decimal_comma: bool 
     answers = [f"answer{i + 1}" for i in range(len(heads))]
     marked = False
 
-    def written(number: float | None) -> object:
-        return str(number).replace(".", ",") if decimal_comma and number is not None else number
-
     def rows() -> Iterator[list[object]]:
         nonlocal marked
         last = ["total", "out_of", "revealed", "reason", *answers, "mistakes", "tries", "hints"]
@@ -377,7 +378,7 @@ def write_csv(grades: Iterable[Grade], path: str | Path, *, decimal_comma: bool 
             marks = [*row.marks, *[None] * (len(heads) - len(row.marks))]
             revealed = " ".join(map(str, row.revealed))
             cells = [row.file, row.student, row.lesson, *marks]
-            numbers = [written(row.answers.get(n)) for n in range(1, len(heads) + 1)]
+            numbers = [row.answers.get(n) for n in range(1, len(heads) + 1)]
             named = "; ".join(f"{n}: {mistake}" for n, mistake in row.mistakes.items())
             counts = sum(row.tries.values()), sum(row.hints.values())
             told = [row.total, row.out_of, revealed, row.reason, *numbers, named, *counts]
@@ -387,8 +388,8 @@ def write_csv(grades: Iterable[Grade], path: str | Path, *, decimal_comma: bool 
     with part.open("xb", buffering=0) as file:
         try:
             file.write(codecs.BOM_UTF8)
-            separator = ";" if decimal_comma else ","
-            for line in csv_lines(rows(), separator=separator, end="\r\n"):
+            signs = {"separator": ";", "decimal": ","} if decimal_comma else {}
+            for line in csv_lines(rows(), **signs, end="\r\n"):
                 size, left = file.tell(), line.encode("utf-8", "replace")
                 try:
                     while left:

@@ -180,8 +180,10 @@ static int all_to(const double *a, int n, double bound) {
     return yes;
 }
 
+/* Whether a path that is beyond an end, by rounding not quite, is clear of the piece: from where that is met
+   to the end it is no more than rounding. */
 static int is_clear_of_end(const Curve *c, const double *end, double limit) {
-    double q[7], reach = MAX(limit, 0);
+    double q[7], reach = MAX(limit + L.rounding, 0);
     square_distance(c, end[0], end[1], q);
     return all_from(q, 7, reach * reach);
 }
@@ -192,15 +194,17 @@ static int is_clear_of_line(const Curve *c, const Barrier *b, double limit) {
     if (all_from(d, 4, limit) || all_to(d, 4, -limit)) return 1;
     for (int k = 0; k < 4; k++) feet[k] = foot(b, c->x[k], c->y[k]);
     if (all_to(feet, 4, -reach) || all_from(feet, 4, b->length + reach)) return 1;
-    if (all_to(feet, 4, 0)) return is_clear_of_end(c, b->end, limit);
-    return all_from(feet, 4, b->length) && is_clear_of_end(c, b->end + 2, limit);
+    if (all_to(feet, 4, L.rounding)) return is_clear_of_end(c, b->end, limit);
+    return all_from(feet, 4, b->length - L.rounding) && is_clear_of_end(c, b->end + 2, limit);
 }
 
-/* Whether all of a path is left of the ray from the centre through an end, or right of it. */
+/* Whether all of a path is left of the ray from the centre through an end, or right of it, but for rounding:
+   by no more than that along the arc where a particle inside can touch it. */
 static int is_aside(const Curve *c, const Barrier *b, const double *end, double side) {
+    double off = L.rounding * MAX(b->radius - At.radius, 0);
     for (int k = 0; k < 4; k++) {
         double x = c->x[k] - b->x, y = c->y[k] - b->y;
-        if (side * ((end[0] - b->x) * y - (end[1] - b->y) * x) < 0) return 0;
+        if (side * ((end[0] - b->x) * y - (end[1] - b->y) * x) < -off) return 0;
     }
     return 1;
 }

@@ -527,6 +527,13 @@ EXPORT int lay_out_laws(void) {
     return has_room();
 }
 
+/* Find the knots of a particle behind those of the one before. */
+static void find_track(int i) {
+    int k = L.offsets[i];
+    while (k < L.knot_count && ((const Knot *)KNOT(k))->disk == i) k++;
+    L.offsets[i + 1] = k;
+}
+
 /* Judge a run, if there is room for all hits. Each particle is looked at once, while its knots are at hand:
    what is not deeper than it might be for itself alone is not so in any run. Where something is, or could
    be at every contact, as in steps that are all alike, all are looked at again. */
@@ -538,8 +545,10 @@ static void judge_all(void) {
     shape_barriers();
     weigh_machine();
     find_allowed(0);
-    for (int i = 0; i < L.particle_count; i++)
+    for (int i = 0; i < L.particle_count; i++) {
+        if (L.owned) find_track(i);
         if (weigh(i) && !again) again = find_hits(i);
+    }
     if (!are_finite()) return; /* The other laws say nothing about what is no number. */
     find_bounds();
     L.hit_count = 0;

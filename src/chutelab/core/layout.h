@@ -508,7 +508,7 @@ typedef struct {                                                                
 
 typedef struct {
     double *knots;          /* [in] rows of t, x, y, vx, vy, spin, three entries of the ledger */
-    int *offsets;           /* [in] (particles + 1) first knot of each, and behind the last */
+    int *offsets;           /* (particles + 1) first knot of each, and behind the last: [in], or `owned` */
     Body *bodies;           /* [in] (particles) */
     Barrier *barriers;      /* [in] (pieces), of a family (particles, pieces) */
     double *books;          /* [in] (book_rows, 3) entries of each surface, J */
@@ -527,6 +527,7 @@ typedef struct {
     int family;             /* [in] each particle has pieces of its own */
     int pulley;             /* [in] piece 0 ends on a drive pulley */
     int contacts, steps;    /* [in] that were made */
+    int owned;              /* [in] behind its numbers a knot says whose it is: rows are those of `Knot` */
     int unreal;             /* [in] numbers that are not finite, beside knots and books */
     double dt;              /* [in] s; step, 0 of the exact engine */
     double gained;          /* [in] J; by which solves broke their law of energy */

@@ -14,18 +14,12 @@ World *world(void);
 int prepare(void);
 int run(int steps);
 
-/* Have the laws look at knots where they are; tell which are whose. Particles are one after the other. */
-static int take_knots(const Knot *knots, int count) {
+/* Have the laws look at knots where they are. */
+static void take_knots(const Knot *knots, int count) {
     L.knots = (double *)knots;
     L.knot_count = count;
     L.row = sizeof(Knot) / sizeof(double);
-    RESERVE(L.offsets, L.particle_count + 1);
-    if (!has_room()) return 0;
-    for (int k = 0, i = 0; k <= count; k++) {
-        int owner = k < count ? knots[k].disk : L.particle_count;
-        while (i <= owner) L.offsets[i++] = k;
-    }
-    return 1;
+    L.owned = 1;
 }
 
 /* Numbers of events that are not finite. */
@@ -46,6 +40,7 @@ static int lay_out_pieces(void) {
 }
 
 static int end_up(void) {
+    RESERVE(L.offsets, L.particle_count + 1);
     RESERVE(L.breaches, BREACHES);
     RESERVE(L.order, 1);
     RESERVE(L.places, 1);
@@ -80,7 +75,8 @@ static int judge_exact(void) {
                 .book_rows = e->surface_count * (e->apart ? e->lone_count : 1),
                 .contacts = e->contacts, .steps = e->rounds };
     take_events(e->events, e->event_count);
-    if (!take_knots(e->knots, e->knot_count) || !lay_out_pieces()) return 0;
+    take_knots(e->knots, e->knot_count);
+    if (!lay_out_pieces()) return 0;
     for (int i = 0; i < e->lone_count; i++) {
         const Lone *p = e->lones + i;
         L.bodies[i] = (Body){ p->radius, p->mass, p->inertia, p->gravity };
@@ -130,7 +126,8 @@ static int judge_world(void) {
     L.steps = w->step_count;
     L.gained = w->gained;
     take_events(w->events, w->event_count);
-    return take_knots(w->knots, w->knot_count) && end_up();
+    take_knots(w->knots, w->knot_count);
+    return end_up();
 }
 
 /* As `run`; a run that is over, of particles that do not meet, and of which all is still there, is judged. */

@@ -60,7 +60,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         job = Job(module, recorder.near, whole=not any(recorder.origin))
         stalled = job.run(progress)
         job.write(recorder)
-        record = recorder.finish(engine="contact", steps=job.steps)
+        record = recorder.finish(engine="contact", steps=module.world.step_count)
         take(module, record)
     finally:
         give_back(module)
@@ -95,7 +95,6 @@ class Job:
         self.module, self.machine = module, machine
         self.knots: list[NDArray[Any]] = []
         self.events: list[NDArray[Any]] = []
-        self.steps = 0
         # First disk of the part in which the run was stopped: from it on disks have not ended.
         self.stopped_from = machine.count
         self.pieces = pieces(machine)
@@ -219,4 +218,3 @@ class Job:
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count
         recorder.gained = world.gained
-        self.steps = world.step_count

@@ -35,7 +35,7 @@ rest, at 1e-9 m/s, are 200 times as far apart."""
 SLICE = 0.02
 """s of wall time between two looks at Ctrl-C and reports of progress."""
 
-FIRST, MOST = 256, 100_000
+FIRST, MOST = 16, 100_000
 """Events up to the first look, as most lone runs have fewer, and between two looks."""
 
 COURSE = constants("Course")

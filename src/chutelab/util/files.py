@@ -207,7 +207,7 @@ def unquoted(cell: str) -> str:
 
 
 def csv_lines(
-    rows: Iterable[Iterable[object]], *, separator: str = ",", end: str = "\n"
+    rows: Iterable[Iterable[object]], *, separator: str = ",", decimal: str = ".", end: str = "\n"
 ) -> Iterator[str]:
     r"""Yield rows as lines of CSV, cells quoted where they must be.
 
@@ -219,7 +219,12 @@ def csv_lines(
     # `writerow` returns what `write` does: the line.
     # Cells are only quoted for the line ends that it writes itself, so it writes both.
     out = csv.writer(SimpleNamespace(write=str), delimiter=separator, lineterminator="\r\n")
-    return (out.writerow(map(harmless, row)).removesuffix("\r\n") + end for row in rows)
+
+    def cell(value: object) -> object:
+        is_number = isinstance(value, float) and decimal != "."
+        return str(value).replace(".", decimal) if is_number else harmless(value)
+
+    return (out.writerow(map(cell, row)).removesuffix("\r\n") + end for row in rows)
 
 
 def write_lines(path: str | Path, texts: Iterable[str], *, errors: str = "strict") -> Path:

@@ -113,7 +113,8 @@ class Sheet:
         from rich.console import Console
 
         out = io.StringIO()
-        Console(file=out, width=UNBOUNDED, color_system=None).print(self)
+        # In a notebook rich would show the table, not write it.
+        Console(file=out, width=UNBOUNDED, color_system=None, force_jupyter=False).print(self)
         return "\n".join(
             printable(line.rstrip()) for line in out.getvalue().strip("\n").split("\n")
         )

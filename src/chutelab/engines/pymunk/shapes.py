@@ -109,7 +109,7 @@ class Shapes:
         if self.table is not None or self.gates:
             space.on_collision(PARTICLE, SURFACE, pre_solve=self._met)
         if self.table is not None:
-            space.on_collision(PARTICLE, PARTICLE, pre_solve=self._meet)
+            space.on_collision(PARTICLE, PARTICLE, pre_solve=self._met)
         if self.corners:
             space.iterations = FACES
         for kind in (PARTICLE, SURFACE, ROLLER) if self.corners else ():
@@ -229,14 +229,14 @@ class Shapes:
         return chain
 
     def _met(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
-        """Give a contact with a surface what its shapes do not have.
+        """Give a contact what its shapes do not have: of two particles the values of their kinds.
 
         The end of a belt moves along its rim, and beside the face it is not met; nor does a gate
         touch a particle that it shut on.
         """
         shape, met = arbiter.shapes
-        face = self.world.by_shape[met]
-        if met in self.out:
+        face = self.world.by_shape.get(met)
+        if face is not None and met in self.out:
             assert shape.body is not None
             assert isinstance(met, pymunk.Circle)
             normal = -arbiter.normal
@@ -246,14 +246,9 @@ class Shapes:
         if (shape, face) in self.shut:
             arbiter.process_collision = False
         if self.table is not None:
-            pair = self.table[:, self.kind[shape], self.column[face]]
+            column = self.kind[met] if face is None else self.column[face]
+            pair = self.table[:, self.kind[shape], column]
             arbiter.restitution, arbiter.friction = pair.tolist()
-
-    def _meet(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
-        """Give a contact of two particles the values of their kinds."""
-        assert self.table is not None
-        one, other = (self.kind[shape] for shape in arbiter.shapes)
-        arbiter.restitution, arbiter.friction = self.table[:, one, other].tolist()
 
     def _note(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         """Note what was done at each point of a contact; what Pymunk tells itself are sums."""

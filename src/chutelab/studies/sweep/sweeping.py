@@ -25,6 +25,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from threading import Thread
 from types import ModuleType
 from typing import Any, Final
@@ -258,22 +259,28 @@ def _ask(dask: ModuleType, address: str) -> None:
     """Refuse an address at which no Dask scheduler answers, in time.
 
     A client waits for ever for a server that accepts a connection and says nothing, and prints a
-    traceback of other faults after 20 s.
+    traceback of other faults after 20 s. The thread that asks first need not be waited for.
     """
+    answers: SimpleQueue[str | Exception] = SimpleQueue()
 
     async def ask() -> str:
         security = dask.Security().get_connection_args("client")
         async with dask.rpc(address, connection_args=security) as scheduler:
             return str((await scheduler.identity())["type"])
 
-    try:
-        found = asyncio.run(asyncio.wait_for(ask(), PATIENCE))
-    except TimeoutError:
-        found = f"nothing in {PATIENCE:g} s"
-    except Exception as error:
-        found = " ".join(str(error).split()) or type(error).__name__
+    def run() -> None:
+        try:
+            answers.put(asyncio.run(ask()))
+        except Exception as error:
+            answers.put(error)
+
+    Thread(target=run, daemon=True).start()
+    found: str | Exception = TimeoutError(f"nothing in {PATIENCE:g} s")
+    with suppress(Empty):
+        found = answers.get(timeout=PATIENCE)
     if found != "Scheduler":
-        raise InputError(f"--scheduler {address}: no Dask scheduler answers: {found}")
+        said = " ".join(f"{found}".split()) or type(found).__name__
+        raise InputError(f"--scheduler {address}: no Dask scheduler answers: {said}")
 
 
 AHEAD: Final = 64

@@ -102,7 +102,7 @@ class Stage {
       bottom: height - inset("bottom"),
     };
     // In a lesson it stands above, where no belt is.
-    const low = style.getPropertyValue("--scale-at") ? height - inset("top") - 34
+    const low = style.getPropertyValue("--scale-at") ? height - 44
       : inset("bottom") + 20;
     this.corner = [low, inset("left") + 24];
     const dense = globalThis.devicePixelRatio || 1;

@@ -67,7 +67,7 @@ def html(
         **{f"energy-{name}": colour for name, colour in style.ENERGY.items()},
     }
     palette = "".join(f"  --{k.replace('_', '-')}: {v};\n" for k, v in colours.items())
-    css = f":root {{\n{palette}}}\n{_file('assets/page.css')}"
+    css = f":root {{\n{palette}}}\n{_file('bundle/page.css')}"
     core = files("chutelab.core")
     facts = describe(scene, partly=partly)
     strings = json.loads(_file(f"assets/strings/{language}.json"))

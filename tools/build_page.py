@@ -1,6 +1,6 @@
-"""Build the scripts of the live page: TypeScript modules to one file each for page and thread.
+"""Build the live page: TypeScript modules to one file each for page and thread, and its style.
 
-    python tools/build_page.py           # writes the scripts into pictures/live/bundle
+    python tools/build_page.py           # writes into pictures/live/bundle
     python tools/build_page.py --check   # builds anew and compares the bytes with what is there
 
 Needs node and esbuild in the version that `tests/live/package.json` pins: `npm ci --prefix
@@ -17,11 +17,15 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 LIVE = ROOT / "src" / "chutelab" / "pictures" / "live"
 BUNDLE = LIVE / "bundle"
-SCRIPTS = ("app", "lessonpage", "worker")
+SOURCES = {
+    "app.ts": "app.js", "lessonpage.ts": "lessonpage.js", "worker.ts": "worker.js",
+    "page.css": "page.css", "lesson.css": "lesson.css",
+}  # fmt: skip
+"""What is built, and what is made of it."""
 
 
 def build(folder: Path) -> None:
-    """Write app.js, lessonpage.js and worker.js into a folder.
+    """Write scripts and styles into a folder.
 
     Raises
     ------
@@ -31,7 +35,7 @@ def build(folder: Path) -> None:
     esbuild = shutil.which("esbuild", path=ROOT / "tests" / "live" / "node_modules" / ".bin")
     if esbuild is None:
         sys.exit("needs esbuild: npm ci --prefix tests/live")
-    sources = [str(LIVE / "assets" / f"{name}.ts") for name in SCRIPTS]
+    sources = [str(LIVE / "assets" / name) for name in SOURCES]
     flags = ["--bundle", "--minify", "--format=iife", "--target=es2022", "--charset=utf8"]
     command = [esbuild, *sources, *flags, "--log-level=warning", f"--outdir={folder}"]
     if code := subprocess.run(command, check=False).returncode:
@@ -42,7 +46,7 @@ def main() -> int:
     """Build, or compare with what is committed; 1 if that is not what the sources give."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--check", action="store_true", help="compare, write nothing")
-    names = [f"{name}.js" for name in SCRIPTS]
+    names = list(SOURCES.values())
     if not parser.parse_args().check:
         build(BUNDLE)
         print(f"{sum((BUNDLE / name).stat().st_size for name in names)} bytes")

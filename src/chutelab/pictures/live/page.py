@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import zlib
 from base64 import b64encode
 from collections.abc import Mapping
@@ -68,10 +67,9 @@ def html(
         **{f"energy-{name}": colour for name, colour in style.ENERGY.items()},
     }
     palette = "".join(f"  --{k.replace('_', '-')}: {v};\n" for k, v in colours.items())
-    css = f":root {{\n{palette}}}\n{_file('assets/page.css')}"
+    css = f":root {{\n{palette}}}\n{_file('bundle/page.css')}"
     if lesson is not None:
-        css += _file("assets/lesson.css")
-    css = re.sub(r"/\*.*?\*/|\s+(?=\s)|(?<=[{;}])\s+", "", css, flags=re.DOTALL)
+        css += _file("bundle/lesson.css")
     core = files("chutelab.core")
     facts = describe(scene, partly=partly)
     strings = json.loads(_file(f"assets/strings/{language}.json"))

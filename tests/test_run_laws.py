@@ -95,7 +95,8 @@ def in_memory(tables, engine, change):
         job.proceed(1)
         recorder = Recorder(machine)
         job.write(recorder)
-        recording = Recording.of(recorder.finish(engine="contact", steps=job.steps))
+        steps = subject.step_count
+        recording = Recording.of(recorder.finish(engine="contact", steps=steps))
     laws.take(core, recording)
     return recording
 

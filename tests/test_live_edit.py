@@ -174,11 +174,12 @@ def test_numbers_have_their_range_and_controls_limit_them():
     given = given_of(load("inclined-40"))
     controls = ["plate.angle_deg", "incoming.speed"]
     live = {"controls": controls, "ranges": {"plate.angle_deg": [10, 60]}}
-    free, some, main, handles, every = ask(
+    free, some, main, handles, every, none = ask(
         {"ask": "fields", "given": given, "name": "plate", "live": {"controls": None}},
         {"ask": "fields", "given": given, "name": "plate", "live": live},
         {"ask": "fields", "given": given, "name": "scene", "live": live},
         {"ask": "handles", "given": given, "live": live},
+        {"ask": "handles", "given": given, "live": {"controls": None}},
         {"ask": "handles", "given": given, "live": {"controls": []}},
     )
     assert [field["key"] for field in free] == [
@@ -195,7 +196,7 @@ def test_numbers_have_their_range_and_controls_limit_them():
     keys = [key for _, axes, _ in handles for key in axes]
     assert set(keys) == {"plate.angle_deg", "incoming.speed"}
     assert all(len(axes) == len(values) for _, axes, values in handles)
-    assert len(every) > len(handles)
+    assert len(every) > len(handles) > len(none) == 0
 
 
 def test_a_material_s_numbers_are_shown_where_the_scene_says_none():

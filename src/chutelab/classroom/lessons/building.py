@@ -26,6 +26,7 @@ from math import prod
 from pathlib import Path
 from typing import Any, Final
 
+from PIL import Image
 from PIL.GifImagePlugin import GifImageFile
 
 from chutelab.classroom.exercises import EXERCISES
@@ -118,7 +119,12 @@ def build(
         animate(recording, path, question=lesson.question, predict=True, comment=wanted, **settings)
         still(recording, machine, width=lesson.picture.width, height=lesson.picture.height)
         if lesson.picture.split:
-            split_velocity(recording, path.with_name(SPLIT))
+            split = path.with_name(SPLIT)
+            split_velocity(recording, split)
+            with Image.open(split) as drawn:
+                # It is in the lesson's page, which is to be small.
+                few = drawn.convert("RGB").quantize(32, dither=Image.Dither.NONE)
+            few.save(split, optimize=True)
     return Built(path, path.stat().st_size, made)
 
 

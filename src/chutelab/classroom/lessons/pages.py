@@ -7,12 +7,14 @@ with the platform; and the live page, in a frame, which speaks with ``scorm.js``
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
-from base64 import urlsafe_b64encode
+from base64 import b64encode, urlsafe_b64encode
 from collections.abc import Callable, Mapping, Sequence
 from errno import ENOTDIR
+from functools import partial
 from hashlib import sha256
 from html import escape
 from importlib.metadata import PackageNotFoundError, distribution
@@ -262,9 +264,20 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
         own = [ask.text for one in lesson.steps if one.kind == "explain" for ask in one.asks]
         explain = without_tex(" ".join(own[-1].split())) if own else lesson.question
         exercise = data_of(told(lesson.name, lesson.language), explain=explain)
+    told_lesson = json.loads(_PICTURE.sub(partial(_inlined, lesson), json.dumps(told_lesson)))
     return write(
         scene, path, language=lesson.language, home=home, exercise=exercise, lesson=told_lesson
     )
+
+
+_PICTURE = re.compile(r'(?<= src=\\")[\w.-]+\.png(?=\\")')
+"""The file of a picture in a text of a lesson, in JSON."""
+
+
+def _inlined(lesson: Lesson, found: re.Match[str]) -> str:
+    """Return a picture beside a lesson as an address that holds it: a page is one file."""
+    data = b64encode((lesson.folder / found[0]).read_bytes()).decode("ascii")
+    return f"data:image/png;base64,{data}"
 
 
 def heading(lesson: Lesson) -> str:

@@ -177,8 +177,8 @@ def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | N
 def build(lessons: LessonNames = (), *, out: Folder, force: bool, quiet: bool) -> None:
     """Make lesson.gif and exercise.ipynb of each LESSON (default: all shipped), where they changed.
 
-    The notebook is made of README.md (Predict, Run, Compare), notebook.py and the exercise. Where
-    there is a README.de.md, exercise.de.ipynb is made, too.
+    The notebooks are made of the steps in lesson.toml, notebook.py and the exercise, one for each
+    language that the texts are there in.
 
     A picture is up to date if it was made from the same scene and settings with the same versions
     of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes

@@ -284,9 +284,9 @@ def test_the_stamp_is_the_comment_of_the_picture(small, tmp_path):
 def test_shipped_pictures_show_what_the_lessons_say(lesson):
     assert is_current(lesson), f"run: chutelab lesson build {lesson.number}"
     picture = lesson.folder / "lesson.gif"
-    assert picture.stat().st_size < 200_000
+    assert picture.stat().st_size < 400_000
     with Image.open(picture) as film:
-        assert film.size == (800, 450)
+        assert film.size == (1280, 720)
         assert film.n_frames > 40
 
 

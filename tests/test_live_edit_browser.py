@@ -205,6 +205,7 @@ def test_all_of_that_goes_with_the_keyboard_alone(shown):
     while page.locator("#undo").is_enabled():
         page.keyboard.press("Enter")
     assert page.evaluate("document.activeElement.id") == "redo"
+    page.evaluate(DONE)
     page.focus("#time")
     page.keyboard.press("End")
     assert page.evaluate("chutelab.lab.t") == page.evaluate("chutelab.lab.end")

@@ -118,7 +118,9 @@ def test_below_a_joint_of_three_pieces_it_goes_straight_on():
 
 @pytest.mark.slow
 def test_the_laws_see_an_engine_that_overlooks_rims(with_fault):
-    with_fault("exact_meet.c", "MIN(t, enter(m, k, until)) : t;", "t : t;")
+    with_fault(
+        "exact_meet.c", "MIN(t, enter(m, k, until)) : t;", "(enter(m, k, until) < 0 ? t : t) : t;"
+    )
     drawn, run = ran({"radius": 0.1}, [PIPE], (-0.9, 0.5), until=2.0)
     assert any(said.startswith("through p0") for said in faults(run, drawn))
 

@@ -12,9 +12,6 @@
 
 #define PI 3.14159265358979323846
 
-/* Intervals whose common box tells which pieces they may meet: those that follow each other are near
-   each other. */
-#define WIDTH 32
 /* A flight of 5 m is looked at every millimetre, where it has to be. */
 #define HALVINGS 12
 /* Places of each interval at which it is asked whether a particle has got clear of a gate. */

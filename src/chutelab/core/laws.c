@@ -201,21 +201,37 @@ static int are_finite(void) {
     return !All.unreal;
 }
 
-/* Largest acceleration towards the centre of an arc that a particle moves along inside, m/s2. Outside it
-   is never more than gravity's: what is faster leaves. No particle is inside the drive pulley. */
-static double bent_inside(void) {
+/* Largest acceleration towards the centre of a bent piece of knots of a particle that are inside, m/s2. */
+static double bent_by(const Barrier *b, double r, int first, int end) {
+    double inner = b->radius - r, low = MAX(inner - 0.1 * r, 0), found = 0;
+    for (int k = first; k < end && inner > 0; k++) {
+        const double *knot = KNOT(k);
+        double far = square(knot[1] - b->x) + square(knot[2] - b->y);
+        if (far < square(low) || far >= square(inner + 0.1 * r)) continue;
+        if (is_within(b, knot[1], knot[2], 0)) found = MAX(found, pace(knot) / inner);
+    }
+    return found;
+}
+
+/* The same of all particles and pieces. Outside it is never more than gravity's: what is faster leaves. No
+   particle is inside the drive pulley. */
+PAIRED static double bent_inside(void) {
     double found = 0;
-    for (int n = 0; n < L.piece_count; n++) {
-        const Barrier *b = L.barriers + n;
-        if (b->radius == 0 || (L.pulley && n == L.piece_count - 1)) continue;
-        for (int i = 0; i < L.particle_count; i++) {
-            double r = L.bodies[i].radius, inner = b->radius - r, low = MAX(inner - 0.1 * r, 0);
-            for (int k = L.offsets[i]; k < L.offsets[i + 1] && inner > 0; k++) {
-                const double *knot = KNOT(k);
-                double far = square(knot[1] - b->x) + square(knot[2] - b->y);
-                if (far < square(low) || far >= square(inner + 0.1 * r)) continue;
-                if (!is_within(b, knot[1], knot[2], 0)) continue;
-                found = MAX(found, pace(knot) / inner);
+    int bent = 0;
+    for (int n = 0; n < L.piece_count - (L.pulley != 0); n++) bent += L.barriers[n].radius > 0;
+    for (int i = 0; i < L.particle_count && bent; i++) {
+        double r = L.bodies[i].radius;
+        for (int first = L.offsets[i], end; first < L.offsets[i + 1]; first = end) {
+            Two low = two_at(KNOT(first) + 1), high = low;
+            for (end = first + 1; end < MIN(first + WIDTH, L.offsets[i + 1]); end++) {
+                Two place = two_at(KNOT(end) + 1);
+                low = lesser(low, place);
+                high = larger(high, place);
+            }
+            for (int n = 0; n < L.piece_count - (L.pulley != 0); n++) {
+                const Barrier *b = L.barriers + n;
+                int is_off = is_any((low > two_at(b->box + 2)) | (high < two_at(b->box)));
+                if (b->radius > 0 && !is_off) found = MAX(found, bent_by(b, r, first, end));
             }
         }
     }

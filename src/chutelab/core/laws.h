@@ -24,6 +24,10 @@ PAIRED static inline int is_all(Truth a) { return __builtin_wasm_all_true_i64x2(
 
 extern Laws L;
 
+/* Intervals, or knots, whose common box tells which pieces they may meet: those that follow each other are
+   near each other. */
+#define WIDTH 32
+
 /* A knot by its number. */
 #define KNOT(k) (L.knots + (long)(k) * L.row)
 

@@ -26,9 +26,8 @@ from chutelab.classroom.lessons.texts import without_tex
 from chutelab.classroom.words import Words, words
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
-from chutelab.results.comparison import compare, predicted
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import measure
+from chutelab.results.quantities import compare, measure, predicted
 from chutelab.results.summary import facts, sheets
 from chutelab.scene import Scene
 from chutelab.scene.conflicts import of_quantities

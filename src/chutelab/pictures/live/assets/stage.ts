@@ -321,6 +321,9 @@ class Stage {
   /** What the pointer is over. */
   pointed = "";
 
+  /** The frame round several that are chosen, px. */
+  frame: { left: number, right: number, top: number, bottom: number } | null = null;
+
   drawOutline() {
     drawOutline(this);
   }

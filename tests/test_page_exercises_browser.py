@@ -71,7 +71,7 @@ def test_the_machine_of_a_student_says_what_is_right(page_of, name):
         assert page.locator("#machine").is_hidden()
         close = f"{0.97 * right:.6g}"
         reply = lesson(name, "Ada").check(n + 1, float(close))
-        assert says(page, n + 1, close) == ("off", f"✗ {reply.heading}. {reply.text}")
+        assert says(page, n + 1, close) == ("off", f"↻ {reply.heading}. {reply.text}")
     page.locator("#machine").click()
     for key, formula in EXERCISES[name].machine.items():
         expected = cases[0].numbers.of(formula)

@@ -13,7 +13,7 @@ from time import process_time
 
 from chutelab.core.module import Module
 from chutelab.engines.simulation import follow
-from chutelab.machine import build
+from chutelab.machine import ahead
 from chutelab.scene import load, shipped
 
 SHORT, MANY = 50_000, 20
@@ -44,12 +44,12 @@ def measure(name):
     scene = load(name)
 
     def judged():
-        recording = follow(build(scene), None, None)
+        recording = follow(ahead(scene), None, None)
         return recording, recording.laws
 
     def bare(honest=Module.run):
         Module.run = unjudged(honest)
-        follow(build(scene), None, None)
+        follow(ahead(scene), None, None)
         Module.run = honest
 
     recording, _ = judged()

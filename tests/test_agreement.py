@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from chutelab import machine, scene, theory
 from chutelab.checks.agreement import agreement, order, verify
 from chutelab.core.module import dtype
-from chutelab.engines import exact, reference
+from chutelab.engines import exact, reference, simulation
 from chutelab.engines.contact import Job
 from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.simulation import simulate
@@ -228,6 +228,7 @@ def test_a_wrong_number_is_caught_from_outside(wrong, until, monkeypatch):
     drawn = scene.load("perpendicular", [f"run.until={until}"])
     assert verify(drawn).failures == 0
     assert reach(drawn, 1e-9)[1].met
+    monkeypatch.setattr(simulation, "ahead", builder.build)  # not in the core, so that it is filled
     monkeypatch.setattr(exact, "fill", wrong)
     caught(until)
 
@@ -274,6 +275,7 @@ def heavier_ode(run, *given, honest=reference._Run.__init__):
     ],
 )
 def test_what_is_wrong_in_one_engine_is_wrong_in_no_other(name, where, wrong, monkeypatch):
+    monkeypatch.setattr(simulation, "ahead", builder.build)
     monkeypatch.setattr(where, wrong)
     failed = [row.pair for row in agreement(scene.load("perpendicular")) if not row.holds]
     assert any(name in pair for pair in failed)
@@ -294,6 +296,7 @@ def test_what_places_the_belt_is_shared_by_the_engines_and_told_by_the_theory(mo
             laid[0]["segments"][end][2, 1] -= lower
         return laid
 
+    monkeypatch.setattr(simulation, "ahead", builder.build)
     monkeypatch.setattr(builder, "lay", sunk)
     wrong = [simulate(given, engine=engine) for engine in ("exact", "contact", "pymunk")]
     monkeypatch.undo()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chutelab import machine, scene
-from chutelab.engines.simulation import ENGINES, choose, simulate
+from chutelab.engines.simulation import ENGINES, choose, follow, simulate
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import EnoughError
@@ -152,3 +152,76 @@ def test_a_time_limit_ends_a_run(engine):
 def test_a_time_limit_is_a_number_above_0(seconds):
     with pytest.raises(ValueError, match=r"max_seconds = .*: a finite number above 0 s"):
         simulate(loaded("perpendicular"), max_seconds=seconds)
+
+
+KINDS = """
+[[particle]]
+name = "a"
+radius = [0.004, 0.01]
+spin = true
+rolling_friction = 0.02
+[[particle]]
+name = "b"
+radius = 0.006
+mass = 0.02
+shape = "sphere"
+spin = true
+[[surface]]
+name = "bowl"
+center = [{x}, 0.5]
+radius = 0.5
+from_deg = 200
+to_deg = 340
+friction = 0.3
+[[surface]]
+name = "floor"
+from = [{low}, -0.4]
+to = [{high}, -0.4]
+[[pair]]
+between = ["a", "floor"]
+restitution = 0.3
+[[stream]]
+particle = "a"
+at = [{x}, 0.6]
+velocity = [0.1, 0]
+count = 5
+rate = 20
+speed_spread = 0.1
+[[stream]]
+particle = "b"
+at = [{left}, 0.6]
+velocity = [0, 0]
+count = 3
+rate = 7
+start = 0.1
+[run]
+until = {until}
+"""
+
+
+def kinds(x=0.0, until='"settled"'):
+    return KINDS.format(x=x, low=x - 1.0, high=x + 1.0, left=x - 0.2, until=until)
+
+
+@pytest.mark.parametrize(
+    ("text", "near"),
+    [
+        (scene.find("slip").read_text("utf-8"), True),
+        (scene.find("spoon").read_text("utf-8"), True),
+        (kinds(), True),
+        (kinds(until="0.45"), True),
+        (kinds(x=20.0), False),
+        (kinds(x=1000.0), False),
+    ],
+    ids=["slip", "spoon", "kinds", "for a time", "aside", "far off"],
+)
+@pytest.mark.parametrize("engine", ["exact", "contact"])
+def test_a_machine_that_the_core_builds_as_it_runs_is_the_one_handed_over(text, near, engine):
+    """To the last bit; it is built in Python only when it is asked for, or far from the origin."""
+    given = scene.parse(text)
+    found = simulate(given, engine=engine)
+    assert found.machine.is_ahead == near
+    assert same(found, follow(machine.build(given), engine, None))
+    assert found.contacts > 0
+    assert not found.laws
+    assert not found.machine.is_ahead

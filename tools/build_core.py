@@ -21,7 +21,8 @@ CORE = Path(__file__).parents[1] / "src" / "chutelab" / "core"
 EXPORTS = (
     "room", "world", "lay_out_world", "prepare", "prepare_to_judge", "run", "run_and_judge", "plan",
     "lay_out_plan", "build", "drawing", "draw", "exact", "lay_out_exact", "follow_and_judge",
-    "laws", "lay_out_laws", "judge", "sine", "cosine", "angle_of", "angle_of_cosine",
+    "run_exact", "run_world", "laws", "lay_out_laws", "judge", "sine", "cosine", "angle_of",
+    "angle_of_cosine",
 )  # fmt: skip
 """What a host can call."""
 

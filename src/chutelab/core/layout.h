@@ -301,6 +301,12 @@ typedef struct {
 /* A string from a point to a particle; without a length as long as it has to be at the release. */
 typedef struct { double from[2], length, particle; } StringKeys;
 
+/* What a run needs beside these tables, for a plan that is run as it is: of the run, of each kind of
+   particles, and then restitution and friction of each kind, as `Pair`: with each kind, with each surface. */
+typedef struct { double max_time, until; } RunKeys; /* s; `until` is NaN where it is a word */
+
+typedef struct { double mass, inertia, rolling; } BodyKeys; /* kg, kg m2; of the mean radius */
+
 /* Pieces of surfaces. Speeds are along the tangent, and clockwise round an arc. */
 typedef struct {                                                                         /* [out] */
     double start[2], end[2], tangent[2], length, speed;
@@ -328,15 +334,22 @@ typedef struct {                                                                
     int off;                /* the hit is above or below the plate: HIT_ABOVE, HIT_BELOW, or SOUND */
 } Nominal;
 
+/* What a run comes back with that the host has to prepare: it has words for what is wrong with the plan, time
+   for releases that take long to draw, and another origin for what is far off. */
+#define ASIDE -1
+
 /* Machines: rows of numbers in, surfaces out; of each member of a family as many. */
 typedef struct {
     double *rows;           /* [in] (members, width) */
-    int members, width;     /* [in] */
+    double *terms;          /* [in] (term_width) of a plan that is run: `RunKeys` and what follows it */
+    int members, width, term_width; /* [in] */
+    int owners;             /* [in] of a plan that is run: how many names its surfaces have */
     int particles, streams, incoming, plates, outgoing, conveyors, surfaces, strings; /* [in] counts */
     Segment *segments;      /* [out] (members, segment_count) */
     Arc *arcs;
     Nominal *nominal;       /* [out] (members) */
     int segment_count, arc_count; /* [out] of each */
+    int pad;
 } Plan;
 
 /* A particle that meets no other, for the exact engine. */

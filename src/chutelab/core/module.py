@@ -82,6 +82,9 @@ def number(name: str) -> Any:
     return _layout()["constants"][name]
 
 
+ASIDE = -1
+
+
 class Status(IntEnum):
     """Why the core came back, as in layout.h."""
 
@@ -90,6 +93,10 @@ class Status(IntEnum):
     FULL = 2
     STALLED = 3
     LACKING = 4
+
+
+class AsideError(Exception):
+    """The core leaves it to the host to prepare this run, see `ASIDE` of layout.h."""
 
 
 class Module:
@@ -173,6 +180,8 @@ class Module:
         """Call a function for so many steps at most, as `work`; `lacking` tells of no memory."""
         status: int = self.call(name, steps)
         self._look()
+        if status == ASIDE:
+            raise AsideError
         if status == lacking:
             raise MemoryError(f"the core has {self.size / 2**30:.1f} GiB, and gets no more")
         return status

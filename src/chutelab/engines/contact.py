@@ -6,6 +6,7 @@ The engine itself is in C, in `chutelab.core`; here `run` goes from a machine to
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from math import inf
 from time import perf_counter
 from typing import Any
@@ -13,12 +14,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import REAL, Module, Status, borrow, constants, dtype, give_back
-from chutelab.machine import Machine, Pieces
+from chutelab.core.module import (
+    REAL,
+    AsideError,
+    Module,
+    Status,
+    borrow,
+    constants,
+    dtype,
+    give_back,
+)
+from chutelab.machine import Machine, Pieces, hand_over
 from chutelab.results.laws import take
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
-from chutelab.util.arrays import Progress
+from chutelab.util.arrays import Progress, unwatched
+
+UNTIL = {name.removeprefix("UNTIL_").lower(): one for name, one in constants("Until").items()}
 
 GREATEST = 1e300
 """Friction without a bound, as a number that can be multiplied by zero."""
@@ -53,7 +65,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     StalledError
         If a particle does not get on; it has the recording so far.
     """
-    if np.min(machine.particle.radius) <= 0.0:
+    if not machine.is_ahead and np.min(machine.particle.radius) <= 0.0:
         raise ValueError("particle.radius = 0: the contact engine needs a radius above 0 m")
     module, recorder = borrow(), Recorder(machine)
     try:
@@ -62,6 +74,9 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         job.write(recorder)
         record = recorder.finish(engine="contact", steps=module.world.step_count)
         take(module, record)
+    except AsideError:
+        machine.finish(unwatched if progress is None else partial(progress, 0.0))
+        return run(machine, progress)
     finally:
         give_back(module)
     return recorder.whole(record, stalled)
@@ -96,19 +111,29 @@ class Job:
         self.knots: list[NDArray[Any]] = []
         self.events: list[NDArray[Any]] = []
         # First disk of the part in which the run was stopped: from it on disks have not ended.
-        self.stopped_from = machine.count
-        self.pieces = pieces(machine)
+        self.stopped_from, self.owners = machine.count, len(machine.surfaces)
+        for name, value in (
+            ("interact", machine.interact), ("is_whole", whole), ("until", UNTIL[machine.until]),
+            ("landing", machine.landing), ("ride_owner", 0), ("dt", machine.dt),
+        ):  # fmt: skip
+            setattr(module.world, name, value)
+        self.begin = "run_world" if machine.is_ahead else "run_and_judge"
+        if machine.is_ahead:
+            hand_over(module, machine.scene)
+        else:
+            self.fill()
+
+    def fill(self) -> None:
+        """Hand the machine over."""
+        module, machine = self.module, self.machine
+        self.pieces, wheel = pieces(machine), machine.pulley
         self.kinds, self.materials = len(machine.rolling), len(self.pieces)
-        self.owners, wheel = len(machine.surfaces), machine.pulley
         for name, value in (
             ("disk_count", machine.count), ("surface_count", len(self.pieces)),
             ("kind_count", self.kinds), ("owner_count", self.owners),
-            ("interact", machine.interact), ("is_whole", whole),
-            ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
-            ("landing", machine.landing), ("ride_owner", 0),
             ("pulley", -1 if wheel is None else len(machine.segments.length)),
             ("ride_incline", 0.0 if wheel is None else wheel.incline),
-            ("g", machine.gravity), ("dt", machine.dt), ("end_time", machine.end_time),
+            ("g", machine.gravity), ("end_time", machine.end_time),
         ):  # fmt: skip
             setattr(module.world, name, value)
         module.work("lay_out_world")
@@ -175,7 +200,8 @@ class Job:
     def proceed(self, steps: int) -> Status:
         """Run on for at most so many steps, and take what was written."""
         module = self.module
-        status = Status(module.run("run_and_judge", steps, Status.LACKING))
+        status = Status(module.run(self.begin, steps, Status.LACKING))
+        self.begin = "run_and_judge"
         if status is Status.FULL:
             module.world.is_whole = False
             self.drain()
@@ -192,11 +218,12 @@ class Job:
     def share(self) -> float:
         """Return the share of the run that is done."""
         world, n = self.module.world, self.machine.count
-        end, ended = self.machine.end_time, world.done / n
+        end, ended = world.end_time, world.done / n
         if self.machine.interact:
             return float(min(1.0, max(ended, world.t / end if end > 0.0 else 1.0)))
         # One after the other, each from its release on.
-        begin = float(self.machine.releases.t[world.low]) if world.low < n else end
+        disks = self.module.array("disks", dtype("Disk"), n)
+        begin = float(disks["release"][world.low]) if world.low < n else end
         passed = (world.t - begin) / (end - begin) if begin < world.t < end else 0.0
         return float(min(1.0, ended + passed / n))
 

@@ -7,6 +7,7 @@ engine's; here `run` goes from a machine to a recording. There is no contact bet
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from math import prod
 from time import perf_counter
 from typing import Any
@@ -14,12 +15,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import REAL, Module, borrow, constants, dtype, give_back, number
-from chutelab.machine import Machine
+from chutelab.core.module import (
+    REAL,
+    AsideError,
+    Module,
+    borrow,
+    constants,
+    dtype,
+    give_back,
+    number,
+)
+from chutelab.machine import Machine, hand_over
 from chutelab.results.laws import take
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
-from chutelab.util.arrays import Progress
+from chutelab.util.arrays import Progress, unwatched
 
 ROUNDS = 500_000
 """Most events of a particle. One at ε = 0.999 comes to rest within some 20,000, at 0.9999 within
@@ -39,6 +49,8 @@ FIRST, MOST = 16, 100_000
 """Events up to the first look, as most lone runs have fewer, and between two looks."""
 
 COURSE = constants("Course")
+
+UNTIL = {name.removeprefix("UNTIL_").lower(): one for name, one in constants("Until").items()}
 
 
 class CornerError(RuntimeError):
@@ -74,20 +86,36 @@ def run(machine: Machine, progress: Progress | None = None, *, apart: bool = Fal
     """
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
-    points = np.equal(machine.particle.radius, 0.0)
-    if 0 < np.count_nonzero(points) < points.size and machine.segments.start.ndim == 2:
+    ahead = machine.is_ahead
+    points = False if ahead else np.equal(machine.particle.radius, 0.0)
+    if 0 < np.count_nonzero(points) < np.size(points) and machine.segments.start.ndim == 2:
         raise ValueError("the exact engine has no points beside disks")
     module, recorder = borrow(), Recorder(machine, apart=apart)
     try:
-        fill(module, recorder.near, max(map(abs, recorder.origin)), apart)
-        stalled = follow(module, recorder, progress)
+        if ahead:
+            hand_over(module, machine.scene)
+            ask(module, machine, 0.0, apart)
+        else:
+            fill(module, recorder.near, max(map(abs, recorder.origin)), apart)
+        stalled = follow(module, recorder, progress, "run_exact" if ahead else "follow_and_judge")
         collect(module, recorder)
         rounds: int = module.structs["Exact"].rounds
         record = recorder.finish(engine="exact", steps=rounds)
         take(module, record)
+    except AsideError:
+        machine.finish(unwatched if progress is None else partial(progress, 0.0))
+        return run(machine, progress, apart=apart)
     finally:
         give_back(module)
     return recorder.whole(record, stalled)
+
+
+def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:
+    """Tell the core how to run, on coordinates that were rounded `far` off (m)."""
+    exact: Any = module.structs["Exact"]
+    exact.apart, exact.until = apart, UNTIL[machine.until]
+    exact.landing, exact.far, exact.is_whole = machine.landing, far, far == 0.0
+    exact.most, exact.window, exact.tick = ROUNDS, WINDOW, TICK
 
 
 def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
@@ -101,12 +129,10 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
     exact: Any = module.structs["Exact"]
     for name, value in (
         ("segment_count", s), ("arc_count", a), ("wheel_count", w), ("lone_count", count),
-        ("surface_count", owners), ("kind_count", kinds), ("family", family), ("apart", apart),
-        ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
-        ("landing", machine.landing), ("far", far), ("is_whole", far == 0.0),
-        ("most", ROUNDS), ("window", WINDOW), ("tick", TICK),
+        ("surface_count", owners), ("kind_count", kinds), ("family", family),
     ):  # fmt: skip
         setattr(exact, name, value)
+    ask(module, machine, far, apart)
     module.work("lay_out_exact")
 
     def rows(name: str, kind: str, *shape: int) -> NDArray[Any]:
@@ -143,13 +169,19 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
     lones["exit_box"] = releases.exit_box
 
 
-def follow(module: Module, recorder: Recorder, progress: Progress | None) -> StalledError | None:
-    """Run to the end; return which particle first made no progress."""
+def follow(
+    module: Module, recorder: Recorder, progress: Progress | None, begin: str = "follow_and_judge"
+) -> StalledError | None:
+    """Run to the end; return which particle first made no progress.
+
+    The core goes on from `begin`: it builds the machine, or has it.
+    """
     stalled, course, events = None, COURSE["PAUSING"], FIRST
     with suppress(EnoughError):
         while course != COURSE["FINISHED"]:
             began = perf_counter()
-            course = module.run("follow_and_judge", events, COURSE["NO_MEMORY"])
+            course = module.run(begin, events, COURSE["NO_MEMORY"])
+            begin = "follow_and_judge"
             early = perf_counter() - began < SLICE
             events = min(2 * events, MOST) if early else max(FIRST, events // 2)
             exact: Any = module.structs["Exact"]

@@ -7,9 +7,7 @@ from dataclasses import replace
 from math import inf
 from time import perf_counter
 
-import numpy as np
-
-from chutelab.machine import Machine, build
+from chutelab.machine import Machine, ahead
 from chutelab.results import Recording, record
 from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.scene import AnyScene, Fault, Overrides, Scene, SceneError, load
@@ -133,20 +131,23 @@ def judged(
                 cut.append(error)
                 raise EnoughError from None
 
+        machine = ahead(scene)
         try:
-            machine = build(scene, look)
-        except EnoughError:
-            counts = [stream.count for stream in scene.streams]
-            most = counts.index(max(counts))
-            key = f"{scene.head('stream', most)}.count"
-            allowed = "fewer, or more seconds: those allowed were over before all had a place to"
-            raise _refused(scene, key, counts[most], f"{allowed} start") from None
-        try:
+            if choose(machine, engine) == "pymunk":
+                machine.finish(look)
             recording = follow(machine, engine, watched)
         except StalledError as stalled:
             if not cut or stalled.recording is None:
                 raise
             recording = Recording.of(stalled.recording)
+        except EnoughError:
+            if cut:
+                raise cut[0] from None
+            counts = [stream.count for stream in scene.streams]
+            most = counts.index(max(counts))
+            key = f"{scene.head('stream', most)}.count"
+            allowed = "fewer, or more seconds: those allowed were over before all had a place to"
+            raise _refused(scene, key, counts[most], f"{allowed} start") from None
         if (engine or machine.engine) == "auto" and not cut and recording.laws:
             recording = _instead(machine, recording, watched)
     # In place: a copy would be judged anew.
@@ -201,7 +202,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
             if "exact" in (engine, scene.run.engine):
                 raise _refused(scene, "run.engine", "exact", str(error)) from error
             name = "contact"
-    if np.any(np.equal(machine.particle.radius, 0.0)):
+    if any(scene.particles[kind].radius == 0.0 for kind in scene.kinds):
         raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
     if name == "contact":
         from chutelab.engines.contact import run as stepped

@@ -3,10 +3,11 @@
 - `parts`: `Machine`, its particle and its pulley.
 - `shapes`: straight and bent pieces of surfaces: nearest point, gap, ends, box, path to draw.
 - `releases`: where, when and how fast each particle starts.
-- `builder`: `build`, from a validated scene, as rows of numbers, to a machine.
+- `builder`: `build`, from a validated scene, as rows of numbers, to a machine; `ahead`, to one that
+  the core builds as it runs.
 """
 
-from chutelab.machine.builder import build
+from chutelab.machine.builder import ahead, build, hand_over
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
     Caution,
@@ -31,7 +32,9 @@ __all__ = [
     "RefusedError",
     "Segments",
     "Thread",
+    "ahead",
     "build",
+    "hand_over",
     "moved",
     "origin",
 ]

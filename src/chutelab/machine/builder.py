@@ -77,6 +77,61 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
     return [*found, *chain(*(point for one in scene.surface for point in one.points or ()))]
 
 
+def counts(scene: Scene) -> dict[str, int]:
+    """Return how many tables of each kind a scene has, as a plan of the core has them."""
+    return {
+        "particles": len(scene.particles), "streams": len(scene.streams),
+        "incoming": scene.incoming is not None, "outgoing": scene.outgoing is not None,
+        "plates": len(scene.plates), "conveyors": len(scene.conveyor),
+        "surfaces": len(scene.surface), "strings": len(scene.string),
+    }  # fmt: skip
+
+
+Told = tuple[dict[str, int], Floats, Floats]
+
+
+def told(scene: Scene) -> Told:
+    """Return all that the core needs to build the machine of a scene and to run it.
+
+    Sizes of the plan, its row, and its terms, see `Plan` in layout.h. A scene never changes: they
+    are found once.
+    """
+    if scene._told is None:
+        names, kinds, meeting = scene.surfaces, range(len(scene.particles)), scene.meetings()
+        masses, inertias = bodies(scene)
+        rolling = [kind.rolling_friction for kind in scene.particles]
+        until = scene.run.until
+        terms = [scene.run.max_time, nan if isinstance(until, str) else until]
+        for kind in kinds:
+            terms += masses[kind], inertias[kind], rolling[kind]
+        for kind in kinds:
+            for other in (*kinds, *names):
+                bounces, grips = meeting(kind, other)
+                # Adhesion is friction without a bound.
+                grips = inf if isinstance(grips, str) else grips
+                rolls = 0.0 if isinstance(other, str) else rolling[other]
+                terms += bounces, grips, max(rolling[kind], rolls)
+        grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
+        line = np.array(row(scene, grip), dtype=REAL)
+        numbers = np.array(terms, dtype=REAL)
+        sizes = {
+            "members": 1, "width": len(line), "term_width": len(numbers), "owners": len(names),
+        }  # fmt: skip
+        scene._told = sizes | counts(scene), line, numbers
+    found: Told = scene._told
+    return found
+
+
+def hand_over(module: Module, scene: Scene) -> None:
+    """Tell the core a scene, which it is to build and to run."""
+    sizes, line, terms = told(scene)
+    plan = module.structs["Plan"]
+    for name, size in sizes.items():
+        setattr(plan, name, size)
+    module.work("lay_out_plan")
+    module.fill("Plan", rows=line, terms=terms)
+
+
 def lay(
     module: Module, scenes: Scene | Family, friction: Numbers
 ) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
@@ -93,10 +148,8 @@ def lay(
     shape = (len(scenes),) if isinstance(scenes, Family) else ()
     plan, every = module.structs["Plan"], shape[0] if shape else 1
     plan.members, plan.width = every, len(numbers)
-    plan.particles, plan.streams = len(scene.particles), len(scene.streams)
-    plan.incoming, plan.outgoing = scene.incoming is not None, scene.outgoing is not None
-    plan.plates, plan.conveyors = len(scene.plates), len(scene.conveyor)
-    plan.surfaces, plan.strings = len(scene.surface), len(scene.string)
+    for name, count in counts(scene).items():
+        setattr(plan, name, count)
     module.work("lay_out_plan")
     rows = module.array("rows", REAL, every * len(numbers), of="Plan").reshape(every, -1)
     varies = [n for n, number in enumerate(numbers) if isinstance(number, np.ndarray)]
@@ -198,12 +251,36 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         pair_restitution=pairs[..., 0],
         pair_friction=pairs[..., 1],
         rolling=np.array([value(kind, "rolling_friction") for kind in particles]),
-        outlines=tuple(np.array(kind.outline) if kind.outline else None for kind in particles),
+        outlines=_outlines(scene),
         threads=() if family else tuple(threads),
         streams=tuple(str(stream.name) for stream in scene.streams),
         engine=scene.run.engine,
         plate_warnings=warnings,
     )
+
+
+def ahead(scene: Scene) -> Machine:
+    """Return the machine of a scene, which is built when more of it is asked for than its keys."""
+    until, names, machine = scene.run.until, scene.surfaces, object.__new__(Machine)
+    vars(machine).update(
+        build=build,
+        scenes=scene,
+        surfaces=names,
+        landing=names.index("outgoing") if "outgoing" in names else -1,
+        until=until if isinstance(until, str) else "time",
+        dt=scene.run.dt,
+        align=scene.run.align,
+        interact=scene.crowded,
+        engine=scene.run.engine,
+        count=scene.count,
+        outlines=_outlines(scene),
+        **({} if scene.string else {"threads": ()}),
+    )
+    return machine
+
+
+def _outlines(scene: Scene) -> tuple[Floats | None, ...]:
+    return tuple(np.array(kind.outline) if kind.outline else None for kind in scene.particles)
 
 
 Met = Sequence[Sequence[tuple[Any, Any]]]
@@ -237,16 +314,22 @@ def _pieces(kind: type[Pieces], rows: NDArray[Any], met: Met, kinds: int) -> Pie
     return kind(**own | {"surface": surface}, restitution=restitution.T, friction=friction.T)
 
 
-def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Particle:
-    """Return the particles: numbers if all are alike, else arrays (N,)."""
-    scene, masses, inertias = scenes.scene, list[Any](), list[Any]()
-    for one in scene.particles:
+def bodies(scenes: Scene | Family) -> tuple[list[Any], list[Any]]:
+    """Return mass (kg) and moment of inertia (kg m²) of each kind of particles, of mean radius."""
+    masses, inertias = list[Any](), list[Any]()
+    for one in scenes.scene.particles:
         mass, size = scenes.value(one, "mass"), scenes.value(one, "radius")
         turning = one.moment * mass * (size * size)
         if one.outline:
             turning = mass * polygon_moment(one.outline) if one.spin else 0.0
         masses.append(mass)
         inertias.append(turning)
+    return masses, inertias
+
+
+def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Particle:
+    """Return the particles: numbers if all are alike, else arrays (N,)."""
+    scene, (masses, inertias) = scenes.scene, bodies(scenes)
     if isinstance(scenes, Family):
         first = scene.kinds[0]
         return Particle(scenes.value(scene.particle, "radius"), masses[first], inertias[first])

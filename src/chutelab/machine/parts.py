@@ -18,7 +18,7 @@ from chutelab.machine.releases import Releases
 from chutelab.machine.shapes import Arcs, Pieces, Segments, crossings
 from chutelab.scene import Scene
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import Floats
+from chutelab.util.arrays import Floats, Watch, unwatched
 
 DRIVE_PULLEY = "the drive pulley"
 
@@ -138,6 +138,9 @@ class Machine:
 
     A family of machines, one for each particle, is one machine in which surfaces, gravity, radius
     and mass of the particle, the pulley's numbers and the end time have a value for each, (N,).
+
+    One that `is_ahead` has only what needs no geometry, and `build`; the rest is built when it is
+    first asked for. An engine that has the core build it never asks.
     """
 
     scenes: Scene | Family  # what it was built from
@@ -163,6 +166,22 @@ class Machine:
     engine: str  # what the scene asks for: "auto", "exact", "contact" or "pymunk"
     plate_warnings: tuple[Caution, ...]  # of a nominal particle that misses the plate
 
+    @property
+    def is_ahead(self) -> bool:
+        """Whether it is not built yet."""
+        return "releases" not in vars(self)
+
+    def finish(self, watch: Watch = unwatched) -> None:
+        """Build what is not built yet, see `chutelab.machine.build`."""
+        if self.is_ahead:
+            vars(self).update(vars(vars(self)["build"](self.scenes, watch)))
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in Machine.__dataclass_fields__ or not self.is_ahead:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        self.finish()
+        return vars(self)[name]
+
     def __repr__(self) -> str:
         return f"<Machine of {self.scene!r}>"
 
@@ -185,7 +204,7 @@ class Machine:
         """
         return np.sqrt(np.where(np.greater(self.gravity, 0.0), self.gravity, EARTH) / EARTH)
 
-    @property
+    @cached_property
     def count(self) -> int:
         """Number of particles."""
         return len(self.releases.t)

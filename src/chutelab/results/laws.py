@@ -115,7 +115,10 @@ def judge(recording: Record) -> tuple[Broken, ...]:
     """Judge a run: return the laws that it breaks, each once, in the order of `LAWS`."""
     if not len(recording.knots):
         return ()
-    found, machine = examine(recording), recording.machine
+    found = examine(recording)
+    if not len(found.breaches):
+        return ()
+    machine = recording.machine
     pulley = machine.segments.length.shape[-1] + machine.arcs.radius.shape[-1]
     told = []
     for row in found.breaches.tolist():

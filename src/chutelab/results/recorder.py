@@ -61,8 +61,12 @@ class Recorder:
     """
 
     def __init__(self, machine: Machine, *, apart: bool = False) -> None:
-        self.machine, self.origin = machine, origin(machine)
-        self.near = moved(machine, -self.origin[0], -self.origin[1])
+        self.machine, self.origin, self.near = machine, (0.0, 0.0), machine
+        self._angular = False
+        if not machine.is_ahead:
+            self.origin = origin(machine)
+            self.near = moved(machine, -self.origin[0], -self.origin[1])
+            self._angular = any(outline is not None for outline in machine.outlines)
         count, owners = machine.count, len(machine.surfaces) + 1  # and the particles
         self.entries = np.zeros((count, 3))
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
@@ -72,7 +76,6 @@ class Recorder:
         self._knots: list[NDArray[Any]] = []
         self._owners: list[Ints] = []
         self._angles: list[Floats] = []
-        self._angular = any(outline is not None for outline in machine.outlines)
         self._events: list[NDArray[Any]] = []
 
     def knots(

@@ -111,6 +111,8 @@ class SceneTables(Table):
     live: Live = Field(default_factory=Live)
 
     _source: str = PrivateAttr("<scene>")
+    _told: Any = PrivateAttr(None)
+    """What the core is told of it, see `chutelab.machine.builder.told`."""
 
     @classmethod
     def validated(cls, document: Mapping[str, Any]) -> Self:

@@ -1,0 +1,194 @@
+/* From a scene's numbers to an engine, in the core's memory: its machine is built, its releases are drawn,
+   and all is handed to the engine that is to run it. This is between the builder and the engines, and
+   knows of engines what layout.h says they are told. */
+
+#include <string.h>
+#include "plan.h"
+
+/* Particles and places that are looked at while releases are drawn: some 10 ms. What takes longer is left to
+   the host, which looks at its clock meanwhile. */
+#define LOOKS 1000000
+/* Distance from the world's origin, in machine sizes, from which on the host may count places from elsewhere:
+   it does so at twice as much, of a box that these places may not fill. */
+#define FAR_OFF 4.0
+/* Friction without a bound, as a number that can be multiplied by zero. */
+#define GREATEST 1e300
+/* m/s2; gravity for which bounds on speeds are written. */
+#define EARTH 9.81
+
+Exact *exact(void);
+int lay_out_exact(void);
+int follow_and_judge(int rounds);
+World *world(void);
+int lay_out_world(void);
+int prepare_to_judge(void);
+int run_and_judge(int steps);
+Drawing *drawing(void);
+int build(void);
+int draw(void);
+
+/* What a run needs beside the tables: see layout.h. */
+static const RunKeys *run_keys;
+static const BodyKeys *bodies;
+static const Pair *pairs;
+static int own_pairs; /* of a kind: with each kind, then with each surface */
+
+static void find_terms(void) {
+    run_keys = (const RunKeys *)P.terms;
+    bodies = (const BodyKeys *)(run_keys + 1);
+    pairs = (const Pair *)(bodies + P.particles);
+    own_pairs = P.particles + P.owners;
+}
+
+static const Pair *pair_with(int kind, int surface) { return pairs + kind * own_pairs + P.particles + surface; }
+
+/* Whether all is far from the world's origin. */
+static int is_far_off(void) {
+    double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY }, size = 0.0;
+    if (P.incoming) return 0;
+    for (int n = 0; n < 2; n++) {
+        for (const Segment *s = P.segments; s < P.segments + P.segment_count; s++) {
+            low[n] = MIN(low[n], MIN(s->start[n], s->end[n]));
+            high[n] = MAX(high[n], MAX(s->start[n], s->end[n]));
+        }
+        for (const Arc *a = P.arcs; a < P.arcs + P.arc_count; a++) {
+            double way[2];
+            sin_cos(a->begin, way + 1, way);
+            low[n] = MIN(low[n], a->center[n] + a->radius * way[n]);
+            high[n] = MAX(high[n], a->center[n] + a->radius * way[n]);
+        }
+        size = MAX(size, high[n] - low[n]);
+    }
+    return fabs(low[0] + high[0]) > 2.0 * FAR_OFF * size || fabs(low[1] + high[1]) > 2.0 * FAR_OFF * size;
+}
+
+/* Build the machine and draw its releases: 1, or ASIDE; 0 if there is no memory. */
+static int make_machine(void) {
+    Drawing *d = drawing();
+    if (!build()) return 0;
+    d->looks = LOOKS;
+    find_terms();
+    int is_sound = P.nominal->contradiction == SOUND && !is_far_off();
+    return is_sound && draw() == DONE && d->refusals->why == ACCEPTED ? 1 : ASIDE;
+}
+
+/* What `Start` and the tables say of a particle. */
+typedef struct { const Start *start; const BodyKeys *body; double mass, inertia; int kind, carried; } Released;
+
+/* Go to the next particle; streams follow each other. */
+static Released released(const Tables *t, int i, int *stream, int *first) {
+    const Start *start = drawing()->starts + i;
+    while (i >= *first + (int)t->streams[*stream].count) *first += (int)t->streams[(*stream)++].count;
+    int kind = (int)t->streams[*stream].kind;
+    const BodyKeys *body = bodies + kind;
+    double size = start->radius / t->particles[kind].radius, square = size * size, cube = square * size;
+    if (t->particles[kind].radius == 0.0) square = cube = 1.0;
+    return (Released){ start, body, body->mass * cube, body->inertia * (cube * square), kind,
+                       drawing()->carried[*stream] };
+}
+
+static double end_of_run(void) {
+    double latest = -INFINITY, end;
+    for (const Start *s = drawing()->starts; s < drawing()->starts + drawing()->count; s++) latest = MAX(latest, s->t);
+    end = latest + run_keys->max_time;
+    return run_keys->until < end ? run_keys->until : end;
+}
+
+static int take_up_exact(void) {
+    Exact *e = exact();
+    int stream = 0, first = 0;
+    Tables t = tables_of(0);
+    double end = end_of_run(), g = t.scene->gravity, pace = sqrt((g > 0.0 ? g : EARTH) / EARTH);
+    e->segment_count = P.segment_count;
+    e->arc_count = P.arc_count;
+    e->wheel_count = P.incoming;
+    e->lone_count = drawing()->count;
+    e->kind_count = P.particles;
+    e->surface_count = P.owners + 1;
+    if (!lay_out_exact()) return 0;
+    memcpy(e->segments, P.segments, P.segment_count * sizeof(Segment));
+    memcpy(e->arcs, P.arcs, P.arc_count * sizeof(Arc));
+    if (P.incoming)
+        *e->wheels = (Wheel){ t.incoming->pulley_radius, t.incoming->speed, t.incoming->incline_deg * RADIANS, 0, 0 };
+    Pair *pair = e->materials;
+    for (int kind = 0; kind < P.particles; kind++) {
+        for (int n = 0; n < P.segment_count; n++) *pair++ = *pair_with(kind, P.segments[n].surface);
+        for (int n = 0; n < P.arc_count; n++) *pair++ = *pair_with(kind, P.arcs[n].surface);
+        if (P.incoming) *pair++ = *pair_with(kind, 0);
+    }
+    for (int i = 0; i < e->lone_count; i++) {
+        Released one = released(&t, i, &stream, &first);
+        const Start *s = one.start;
+        Lone *p = e->lones + i;
+        *p = (Lone){ .release = s->t, .stop = end - s->t, .position = { s->position[0], s->position[1] },
+                     .velocity = { s->velocity[0], s->velocity[1] }, .radius = s->radius, .mass = one.mass,
+                     .inertia = one.inertia, .rolling = one.body->rolling, .gravity = g, .pace = pace,
+                     .kind = one.kind, .carried = one.carried };
+        memcpy(p->exit_box, s->exit_box, sizeof p->exit_box);
+    }
+    return 1;
+}
+
+/* Build what the plan says, and run it with the exact engine, see `follow_and_judge`; or ASIDE. */
+EXPORT int run_exact(int rounds) {
+    int made = make_machine();
+    if (made == ASIDE) return ASIDE;
+    return made && take_up_exact() ? follow_and_judge(rounds) : NO_MEMORY;
+}
+
+static Surface *take_segments(Surface *to) {
+    for (const Segment *s = P.segments; s < P.segments + P.segment_count; s++)
+        *to++ = (Surface){ .x = s->start[0], .y = s->start[1], .tx = s->tangent[0], .ty = s->tangent[1],
+                           .length = s->length, .speed = s->speed, .opens = s->appears, .closes = s->vanishes,
+                           .shape = SEGMENT, .owner = s->surface };
+    return to;
+}
+
+static int take_up_world(void) {
+    World *w = world();
+    int stream = 0, first = 0;
+    Tables t = tables_of(0);
+    w->disk_count = drawing()->count;
+    w->surface_count = P.segment_count + P.arc_count + P.incoming;
+    w->kind_count = P.particles;
+    w->owner_count = P.owners;
+    w->pulley = P.incoming ? P.segment_count : -1;
+    w->ride_incline = P.incoming ? t.incoming->incline_deg * RADIANS : 0.0;
+    w->g = t.scene->gravity;
+    w->end_time = end_of_run();
+    if (!lay_out_world()) return 0;
+    Surface *to = take_segments(w->surfaces);
+    if (P.incoming)
+        *to++ = (Surface){ .radius = t.incoming->pulley_radius, .extent = 2.0 * PI, .speed = t.incoming->speed,
+                           .opens = -INFINITY, .closes = INFINITY, .shape = CIRCLE };
+    for (const Arc *a = P.arcs; a < P.arcs + P.arc_count; a++)
+        *to++ = (Surface){ .x = a->center[0], .y = a->center[1], .radius = a->radius, .begin = a->begin,
+                           .extent = a->extent, .speed = a->speed, .opens = a->appears, .closes = a->vanishes,
+                           .shape = ARC, .owner = a->surface };
+    Pair *pair = w->pairs;
+    for (int kind = 0; kind < P.particles; kind++) {
+        for (int n = 0; n < own_pairs - P.owners + w->surface_count; n++) {
+            int with = n - P.particles;
+            *pair = with < 0 ? pairs[kind * own_pairs + n] : *pair_with(kind, w->surfaces[with].owner);
+            pair->friction = MIN(pair->friction, GREATEST);
+            pair++;
+        }
+    }
+    for (int i = 0; i < w->disk_count; i++) {
+        Released one = released(&t, i, &stream, &first);
+        const Start *s = one.start;
+        Disk *d = w->disks + i;
+        *d = (Disk){ .x = s->position[0], .y = s->position[1], .vx = s->velocity[0], .vy = s->velocity[1],
+                     .radius = s->radius, .mass = one.mass, .inertia = one.inertia, .release = s->t,
+                     .kind = one.kind, .rides = one.carried };
+        memcpy(d->exit_box, s->exit_box, sizeof d->exit_box);
+    }
+    return prepare_to_judge();
+}
+
+/* The same with the contact engine, see `run_and_judge`. */
+EXPORT int run_world(int steps) {
+    int made = make_machine();
+    if (made == ASIDE) return ASIDE;
+    return made && take_up_world() ? run_and_judge(steps) : LACKING;
+}

@@ -341,7 +341,7 @@ typedef struct {                                                                
 /* Machines: rows of numbers in, surfaces out; of each member of a family as many. */
 typedef struct {
     double *rows;           /* [in] (members, width) */
-    double *terms;          /* [in] (term_width) of a plan that is run: `RunKeys` and what follows it */
+    double *terms;          /* (term_width) of a plan that is run, behind its row: `RunKeys` and what follows */
     int members, width, term_width; /* [in] */
     int owners;             /* [in] of a plan that is run: how many names its surfaces have */
     int particles, streams, incoming, plates, outgoing, conveyors, surfaces, strings; /* [in] counts */

@@ -15,6 +15,7 @@ from hashlib import sha256
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -111,7 +112,7 @@ class Module:
         engine, module = _compiled()
         self._store = wasmtime.Store(engine)
         try:
-            self._exports = wasmtime.Instance(self._store, module, []).exports(self._store)
+            self._exports: Any = wasmtime.Instance(self._store, module, []).exports(self._store)
         except wasmtime.WasmtimeError as error:
             # Addresses for all that it may grow to are set apart, and there may be too few.
             raise MemoryError(" ".join(str(error).split())) from error
@@ -126,7 +127,11 @@ class Module:
     def call(self, name: str, *numbers: float) -> Any:
         """Call a function of the core."""
         if name not in self._functions:
-            self._functions[name] = self._exports[name]
+            self._functions[name] = function = self._exports[name]
+            # It would ask for its own type in every call: half of what a call takes.
+            known = function.type(self._store)
+            own = SimpleNamespace(params=known.params, results=known.results)
+            function.type = lambda _: own
         return self._functions[name](self._store, *numbers)
 
     def forget(self) -> None:

@@ -20,8 +20,8 @@ EXPORT Plan *plan(void) { return &P; }
 
 /* Lay out the rows of numbers, which the host fills in. */
 EXPORT int lay_out_plan(void) {
-    RESERVE(P.rows, (double)P.members * P.width);
-    RESERVE(P.terms, P.term_width);
+    RESERVE(P.rows, (double)P.members * P.width + P.term_width);
+    P.terms = P.rows + P.members * P.width;
     RESERVE(P.nominal, P.members);
     return has_room();
 }

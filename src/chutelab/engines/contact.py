@@ -239,8 +239,9 @@ class Job:
         while self.events:
             recorder.take_events(self.events.pop())
         recorder.ended[:] = module.array("disks", dtype("Disk"), self.machine.count)["reason"]
-        late = recorder.ended[self.stopped_from :]
-        late[late == REASONS.index("time")] = REASONS.index("stopped")
+        if self.stopped_from < self.machine.count:
+            late = recorder.ended[self.stopped_from :]
+            late[late == REASONS.index("time")] = REASONS.index("stopped")
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count

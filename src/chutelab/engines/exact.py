@@ -237,9 +237,8 @@ def collect(module: Module, recorder: Recorder) -> None:
     drain(module, recorder)
     exact: Any = module.structs["Exact"]
     lones = module.array("lones", dtype("Lone"), exact.lone_count, of="Exact")
-    ended = recorder.ended != REASONS.index("stopped")
-    recorder.ended[ended] = lones["reason"][ended]
-    recorder.by_surface[:] = module.array(
-        "books", REAL, recorder.by_surface.size, of="Exact"
-    ).reshape(recorder.by_surface.shape)
+    # Those from `lone` on were stopped.
+    recorder.ended[: exact.lone] = lones["reason"][: exact.lone]
+    books = module.array("books", REAL, recorder.by_surface.size, of="Exact")
+    recorder.by_surface = books.copy().reshape(recorder.by_surface.shape)
     recorder.contacts = exact.contacts

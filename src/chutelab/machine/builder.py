@@ -87,14 +87,14 @@ def counts(scene: Scene) -> dict[str, int]:
     }  # fmt: skip
 
 
-Told = tuple[dict[str, int], Floats, Floats]
+Told = tuple[dict[str, int], Floats]
 
 
 def told(scene: Scene) -> Told:
     """Return all that the core needs to build the machine of a scene and to run it.
 
-    Sizes of the plan, its row, and its terms, see `Plan` in layout.h. A scene never changes: they
-    are found once.
+    Sizes of the plan, and its row with its terms, see `Plan` in layout.h. A scene never changes:
+    they are found once.
     """
     if scene._told is None:
         names, kinds, meeting = scene.surfaces, range(len(scene.particles)), scene.meetings()
@@ -112,24 +112,23 @@ def told(scene: Scene) -> Told:
                 rolls = 0.0 if isinstance(other, str) else rolling[other]
                 terms += bounces, grips, max(rolling[kind], rolls)
         grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
-        line = np.array(row(scene, grip), dtype=REAL)
-        numbers = np.array(terms, dtype=REAL)
+        line = row(scene, grip)
         sizes = {
-            "members": 1, "width": len(line), "term_width": len(numbers), "owners": len(names),
+            "members": 1, "width": len(line), "term_width": len(terms), "owners": len(names),
         }  # fmt: skip
-        scene._told = sizes | counts(scene), line, numbers
+        scene._told = sizes | counts(scene), np.array([*line, *terms], dtype=REAL)
     found: Told = scene._told
     return found
 
 
 def hand_over(module: Module, scene: Scene) -> None:
     """Tell the core a scene, which it is to build and to run."""
-    sizes, line, terms = told(scene)
+    sizes, numbers = told(scene)
     plan = module.structs["Plan"]
     for name, size in sizes.items():
         setattr(plan, name, size)
     module.work("lay_out_plan")
-    module.fill("Plan", rows=line, terms=terms)
+    module.fill("Plan", rows=numbers)
 
 
 def lay(

@@ -145,6 +145,8 @@ def examine(recording: Record) -> Findings:
     return found
 
 
+_NO_BREACHES, _NO_HITS = np.empty(0, core.dtype("Breach")), np.empty(0, core.dtype("Hit"))
+
 _FOUND = "findings"
 """Under which a recording keeps them."""
 
@@ -155,11 +157,12 @@ def take(module: core.Module, recording: Record) -> None:
     if not figures.breaches:
         return
     figures = type(figures).from_buffer_copy(figures)
-    breaches = module.array("breaches", core.dtype("Breach"), figures.breach_count, of="Laws")
-    hits = module.array("hits", core.dtype("Hit"), figures.hit_count, of="Laws").copy()
-    if len(hits) > 1:
+    breaches, hits = _NO_BREACHES, _NO_HITS
+    if figures.breach_count or figures.hit_count:
+        breaches = module.array("breaches", breaches.dtype, figures.breach_count, of="Laws").copy()
+        hits = module.array("hits", hits.dtype, figures.hit_count, of="Laws").copy()
         hits.sort(order=("particle", "t"))
-    recording.found[_FOUND] = Findings(breaches.copy(), hits, figures)
+    recording.found[_FOUND] = Findings(breaches, hits, figures)
 
 
 def _lay_out(module: core.Module, recording: Record) -> None:

@@ -182,11 +182,9 @@ class Recorder:
         """Sort what was collected, and freeze it."""
         count = len(self.ended)
         knots = _joined(self._knots, KNOT)
-        owners = np.concatenate([np.empty(0, dtype=np.int64), *self._owners])
-        self._owners.clear()
-        angle = np.concatenate([np.zeros(0), *self._angles])
-        self._angles.clear()
-        if np.any(owners[1:] < owners[:-1]):
+        owners = _joined(self._owners, np.dtype(np.int64))
+        angle = _joined(self._angles, np.dtype(float))
+        if np.count_nonzero(owners[1:] < owners[:-1]):
             order = np.argsort(owners, kind="stable")
             knots = knots.take(order)
             angle = angle.take(order) if self._angular else angle
@@ -200,6 +198,9 @@ class Recorder:
         sizes = np.bincount(owners, minlength=count)
         offsets = np.zeros(count + 1, dtype=np.int64)
         sizes.cumsum(out=offsets[1:])
+        ended = self.ended.copy()
+        if np.count_nonzero(sizes) < count:
+            ended[(sizes == 0) & (ended == REASONS.index("time"))] = REASONS.index("unreleased")
         lonely = (sizes == 1).nonzero()[0]
         if len(lonely):
             # A track needs two knots: a single one is doubled.
@@ -207,8 +208,6 @@ class Recorder:
                 angle = np.insert(angle, offsets[lonely], angle[offsets[lonely]])
             knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])
             np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
-        ended = self.ended.copy()
-        ended[(sizes == 0) & (ended == REASONS.index("time"))] = REASONS.index("unreleased")
         events = _joined(self._events, EVENT)
         t = events["t"]
         if count > 1 or np.count_nonzero(t[1:] < t[:-1]):

@@ -237,8 +237,8 @@ class Bench {
 
   stretch([px, py]: Place) {
     const [x, y] = this.band as Place;
-    this.draft.replaceChildren(svg("rect", { class: "band-frame", x: Math.min(x, px), y: Math.min(y, py),
-      width: Math.abs(px - x), height: Math.abs(py - y) }));
+    this.draft.replaceChildren(svg("rect", { class: "band-frame", x: Math.min(x, px),
+      y: Math.min(y, py), width: Math.abs(px - x), height: Math.abs(py - y) }));
   }
 
   /** Choose all that the frame meets that ends at a place, px, with what is chosen. */

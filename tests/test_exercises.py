@@ -356,23 +356,6 @@ def test_somebody_elses_right_answer_is_recognised():
     assert "the numbers of “your name”" in reply.text
 
 
-def exchange(name):
-    """All that is said about one question of a lesson, a line each."""
-    task, cases = lesson(name, "Ada Lovelace"), draw(EXERCISES[name], "Ada Lovelace")[1]
-    number = 1 + EXERCISES[task.lesson].number % 4
-    case = cases[number - 1]
-    own = [trace.number for trace in case.mistakes[: len(case.question.mistakes)]]
-    answers = [case.right, *own, 1.03 * case.right, 3.3 * case.right, None]
-    said = [task, task.question(number), *(task.check(number, answer) for answer in answers)]
-    said += [task.hint(number), task.hint(number), task.hint(number), task.reveal(number)]
-    return [" ".join(str(one).split()) for one in said]
-
-
-def test_what_is_said_stays_as_it_is_word_for_word():
-    stored = (SOLUTIONS / "replies.txt").read_text(encoding="utf-8").splitlines()
-    assert [line for name in NAMES for line in exchange(name)] == stored
-
-
 def test_no_reply_gives_the_answer_away():
     for name in NAMES:
         task = lesson(name, "secret")

@@ -21,8 +21,8 @@ from chutelab.classroom.lessons.texts import without_tex
 from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.results import Kind
-from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
+from chutelab.results.quantities import compare
 from chutelab.scene import load
 
 G = 9.81

@@ -224,7 +224,7 @@ class Bench {
   /** Where a frame begins that chooses all that it meets, px. */
   band: Place | null = null;
 
-  /** A finger that stays on a body chooses it, too, or not any more; elsewhere it begins a frame. */
+  /** A finger that stays on a body chooses it too, or not any more; elsewhere it begins a frame. */
   holdDown(at: Place) {
     if (this.nameAt(at)) {
       this.pick(at, true);

@@ -24,6 +24,9 @@ const BODIES = ".belt, .wall, rect.steel", MOST = 200;
 /** Pixels from a body to the line round it, and of radius of a ball there at least. */
 const AROUND = 6, LEAST = 3;
 
+/** Pixels above the bar that tells the scale and below it that are to be free. */
+const SCALE = [38, 16];
+
 /** Pixels from bodies to the frame round several. */
 const FRAME = 12;
 
@@ -61,6 +64,24 @@ function pointsOf({ lab, view, scenery }: Stage): [string, Point[]][] {
       [view.px(x), view.py(y)], [view.px(release.x), view.py(release.y)]]]);
   }
   return found;
+}
+
+/** Where the bar that tells the scale meets nothing: from its corner up, then further to the right;
+ * its corner where all is full.
+ * @param long of the bar, px
+ * @param low, left px of its corner from below and from the left */
+function scalePlace(stage: Stage, long: number, [low, left]: Point): Point {
+  const { view, lab } = stage, { recording } = lab, { free } = view;
+  const path = recording ? stage.trackPoints(recording, 4 / view.scale) : [];
+  const there = [...pointsOf(stage).map(([, points]) => points),
+    ...path.map((points) => along(points.map(({ x, y }) => [view.px(x), view.py(y)])))].flat();
+  for (let x = left; x + long < free.right; x += SCALE[0]) {
+    for (let y = view.height - low; y > free.top + SCALE[0]; y -= ALONG) {
+      if (!there.some(([u, v]) => u > x - OFF && u < x + long + OFF && v > y - SCALE[0]
+        && v < y + SCALE[1])) return [view.height - y, x];
+    }
+  }
+  return [low, left];
 }
 
 /** Dashes round what is chosen, a line round what is pointed at: below each body its own shape,
@@ -181,4 +202,4 @@ class Callout {
   }
 }
 
-export { Callout, drawOutline, pointsOf };
+export { Callout, drawOutline, pointsOf, scalePlace };

@@ -129,6 +129,11 @@ class Chart {
     this.marks.append(svg("polyline", { points: points.join(" "), class: `curve ${kind}` }));
   }
 
+  /** @param kind the class of its line */
+  dot(x: number, y: number, kind: string) {
+    this.marks.append(svg("circle", { cx: this.px(x), cy: this.py(y), r: 3, class: `last ${kind}` }));
+  }
+
   /** A line upright across all of it. */
   point(x: number) {
     const px = this.px(x).toFixed(1);

@@ -5,6 +5,7 @@ import { compiled, unpacked } from "./core.ts";
 import { Engine } from "./engine.ts";
 import { Arrows } from "./arrows.ts";
 import { CurvesPanel } from "./curves.ts";
+import { FEWEST } from "./crowd.ts";
 import { EnergyPanel } from "./energy.ts";
 import { Film } from "./film.ts";
 import { Inspector } from "./inspector.ts";
@@ -71,7 +72,10 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
   const newEngine = (own = newThread()) => new Engine(own, module, data.layout);
   const lab = new Lab(data, newEngine(thread));
   const stage = new Stage(byId("stage"), lab, words);
-  const panels = [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel]
+  // Of a crowd its numbers lead, and where it arrives.
+  const crowd = (lab.machine?.releases.length ?? 0) >= FEWEST && !data.lesson;
+  const panels = (crowd ? [NumbersPanel, LandingPanel, EnergyPanel, CurvesPanel]
+    : [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel])
     .map((Panel) => new Panel(byId("panels"), lab, words));
   watchLaws(byId("law"), lab, words);
   new Arrows(stage, words);

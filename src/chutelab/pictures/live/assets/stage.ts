@@ -1,7 +1,7 @@
 // The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
 
 import { openHandles } from "./controls.ts";
-import { drawOutline } from "./callout.ts";
+import { drawOutline, scalePlace } from "./callout.ts";
 import { endsOf } from "./edit.ts";
 import { ARROW, Handles, bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
 import { html } from "./panels.ts";
@@ -158,7 +158,8 @@ class Stage {
   }
 
   /** Pixels from below and from the left of the bar that tells the scale. */
-  corner: [number, number] = [20, 24];
+  corner: Point = [20, 24];
+  scaleAt: Point = this.corner;
 
   /** What tools draw anew when the view, the machine or its run has changed. */
   drawers: (() => void)[] = [];
@@ -166,8 +167,11 @@ class Stage {
   rebuild() {
     if (this.view.width < 2) return;
     const { machine, scene } = this.lab;
-    this.scenery.drawGround(...this.corner);
     if (machine) this.scenery.draw(machine, scene);
+    const long = this.view.mesh * this.view.scale;
+    // Under what is dragged it stays.
+    if (!this.held) this.scaleAt = scalePlace(this, long, this.corner);
+    this.scenery.drawGround(...this.scaleAt);
     this.drawTracks();
     this.placeHandles();
     this.paint();

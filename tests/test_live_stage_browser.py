@@ -398,13 +398,13 @@ def test_the_projector_shows_the_machine_large_and_little_else(shown):
     assert page.evaluate(size) > 1.15 * before
     assert page.locator("#bench").is_hidden()
     assert page.locator("#numbers").is_hidden()
-    assert page.locator("#numbers" if name == "stream" else "#energy").is_visible()
+    assert page.locator("#energy").is_visible()
     # Left alone it shows title, picture and time; the pointer or a key brings the rest.
     page.locator("#energy").wait_for(state="hidden", timeout=6000)
     assert page.locator("#play").is_visible()
     assert page.locator("#views").is_hidden()
     page.keyboard.press("Tab")
-    assert page.locator("#numbers" if name == "stream" else "#energy").is_visible()
+    assert page.locator("#energy").is_visible()
     page.mouse.move(400, 300)
     page.click("#full")
     assert page.evaluate(size) == before

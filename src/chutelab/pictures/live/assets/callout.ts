@@ -24,8 +24,8 @@ const BODIES = ".belt, .wall, rect.steel", MOST = 200;
 /** Pixels from a body to the line round it, and of radius of a ball there at least. */
 const AROUND = 6, LEAST = 3;
 
-/** Pixels above the bar that tells the scale and below it that are to be free. */
-const SCALE = [38, 16];
+/** Pixels above the bar that tells the scale, and on its other sides, that are to be free. */
+const SCALE = [38, 14];
 
 /** Pixels from bodies to the frame round several. */
 const FRAME = 12;
@@ -77,8 +77,8 @@ function scalePlace(stage: Stage, long: number, [low, left]: Point): Point {
     ...path.map((points) => along(points.map(({ x, y }) => [view.px(x), view.py(y)])))].flat();
   for (let x = left; x + long < free.right; x += SCALE[0]) {
     for (let y = view.height - low; y > free.top + SCALE[0]; y -= ALONG) {
-      if (!there.some(([u, v]) => u > x - OFF && u < x + long + OFF && v > y - SCALE[0]
-        && v < y + SCALE[1])) return [view.height - y, x];
+      if (!there.some(([u, v]) => u > x - SCALE[1] && u < x + long + SCALE[1]
+        && v > y - SCALE[0] && v < y + SCALE[1])) return [view.height - y, x];
     }
   }
   return [low, left];

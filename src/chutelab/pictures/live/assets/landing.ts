@@ -41,6 +41,7 @@ function runningMean(values: number[]): { mean: number, error: number }[] {
 class LandingPanel {
   bars;
   means;
+  charts;
   result;
   panel;
 
@@ -48,9 +49,11 @@ class LandingPanel {
     this.bars = new Chart(words, 150);
     this.means = new Chart(words, 130);
     this.result = html("p", { class: "result" });
-    this.panel = card("landing", words.say("landing"),
+    this.charts = html("div", {},
       html("p", { class: "chart-title" }, words.say("landing-histogram")), this.bars.root,
-      html("p", { class: "chart-title" }, words.say("landing-mean")), this.means.root, this.result,
+      html("p", { class: "chart-title" }, words.say("landing-mean")), this.means.root);
+    this.charts.hidden = true;
+    this.panel = card("landing", words.say("landing"), this.charts, this.result,
       html("p", { class: "note" }, words.say("landing-note")));
     this.panel.hidden = true;
     home.append(this.panel);
@@ -75,6 +78,7 @@ class LandingPanel {
     if (this.panel.hidden || !this.panel.open) return;
     this.arrivals = historyOf(this.lab)?.arrivals.list ?? [];
     const places = this.arrivals.map(({ x }) => x);
+    this.charts.hidden = !places.length;
     const all = histogram(places);
     const { from, width, counts } = all;
     this.all = all;

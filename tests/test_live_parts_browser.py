@@ -176,6 +176,78 @@ def test_everything_that_a_part_can_say_has_a_field_and_is_saved(empty, tmp_path
     assert same_bits(page, tmp_path) >= 24
 
 
+def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_path):
+    page = empty()
+    page.click("#begin")
+    page.evaluate(DONE)
+
+    def typed(key, text):
+        field = page.locator(f"[id='field-own-{key}']")
+        field.scroll_into_view_if_needed()
+        field.fill(text)
+        field.press("Enter")
+
+    def more():
+        if page.locator("#chosen .more").get_attribute("open") is None:
+            page.locator("#chosen .more summary").click()
+
+    page.click("#make-material")
+    assert page.inner_text("#chosen h2") == "Material material1"
+    typed("material[0].density", "2100")
+    typed("material[0].restitution_rubber", "0.61")
+    typed("material[0].name", "brick")
+    assert page.inner_text("#chosen h2") == "Material brick"
+    page.evaluate("chutelab.bench.inspector.choose('stream')")
+    more()
+    page.select_option("[id='field-own-particle.material']", "brick")
+    page.click("#make-pair")
+    assert page.inner_text("#chosen h2") == "Pair 1"
+    assert page.locator("[id='field-own-pair[0].between[1]']").input_value() == "incoming"
+    typed("pair[0].restitution", "0.35")
+    # Whatever the pair's partner is, it can be another one.
+    page.evaluate("chutelab.bench.inspector.choose('run')")
+    typed("run.max_time", "12")
+    typed("run.dt", "0.0005")
+    typed("run.until", "0.8")
+    typed("run.until", "settled")
+    assert page.evaluate("chutelab.lab.fault") is None
+    scene = given(page)
+    assert scene["run"] == {"max_time": 12, "dt": 0.0005, "until": "settled"}
+    assert (
+        scene["material"][0] | {"density": 2100, "restitution_rubber": 0.61, "name": "brick"}
+        == (scene["material"][0])
+    )
+    (pair,) = scene["pair"]
+    assert pair["between"][1] == "incoming"
+    assert pair["restitution"] == 0.35
+    assert same_bits(page, tmp_path) > 1
+    # A pair goes by its card; a material that is used cannot, and the page says why.
+    page.evaluate("chutelab.bench.inspector.choose('pair 1')")
+    page.click("#part-delete")
+    assert "pair" not in given(page)
+    page.evaluate("chutelab.bench.inspector.choose('material brick')")
+    page.click("#part-delete")
+    assert page.locator("#fault").is_visible()
+    assert given(page)["material"][0]["name"] == "brick"
+
+
+def test_the_page_turns_to_the_other_language_as_it_is(shown):
+    page = shown("inclined-40", viewport={"width": 1366, "height": 768})
+    page.evaluate("chutelab.lab.change({ 'plate.angle_deg': 33 })")
+    page.click("#language")
+    page.wait_for_load_state()
+    page.evaluate(DONE)
+    assert page.evaluate("document.documentElement.lang") == "de"
+    assert page.locator("#energy summary").inner_text() == "Energie"
+    assert page.locator("#language").get_attribute("aria-label") == "English"
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 33.0
+    page.click("#language")
+    page.wait_for_load_state()
+    page.evaluate(DONE)
+    assert page.locator("#energy summary").inner_text() == "Energy"
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 33.0
+
+
 def test_a_machine_of_twelve_parts_is_built_by_keyboard_alone(empty, tmp_path):
     page = empty()
 

@@ -52,6 +52,12 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
   // A thread takes its time to begin.
   const thread = newThread();
   Object.assign(data, await unpacked(bytesOf(data.packed).buffer).json());
+  const asked = new URLSearchParams(location.search).get("lang");
+  if (asked && asked === data.other?.language) {
+    const { language, strings } = data;
+    Object.assign(data, data.other, { other: { language, strings } });
+    document.documentElement.lang = asked;
+  }
   const words = new Words(data.language, data.strings);
   for (const element of document.querySelectorAll("[data-say]")) {
     element.textContent = words.say((element as HTMLElement).dataset.say ?? "");

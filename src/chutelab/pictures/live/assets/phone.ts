@@ -11,7 +11,7 @@ const NARROW = "(max-width: 719px)";
 /** Of each drawer what lies in it: elsewhere on a wider page. */
 const DRAWERS: Record<string, string> = {
   tape: ".tools, .watch", eye: ".choices",
-  more: "#restart, #back, #forward, #reset, #fit, #tool-zoom-in, #tool-zoom-out, #sound, #film, #full, #keys, #share, #presets",
+  more: "#restart, #back, #forward, #reset, #fit, #tool-zoom-in, #tool-zoom-out, #sound, #film, #full, #language, #keys, #share, #presets",
 };
 
 class Phone {

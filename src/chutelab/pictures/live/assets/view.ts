@@ -180,7 +180,8 @@ function boxOf(
     .reduce((top, { y }) => Math.max(top, y), -Infinity);
   const still = machine.segments.filter(({ speed }) => !speed);
   const lowest = Math.min(...still.flatMap(ends).map(([, y]) => y));
-  const above = Math.min(BEYOND, ABOVE * Math.max(0, highest - lowest));
+  // Of a crowd that lies in it little of what is above matters.
+  const above = machine.interact ? Math.min(BEYOND, ABOVE * Math.max(0, highest - lowest)) : BEYOND;
   const ceiling = isFinite(highest) ? highest + above : Infinity;
   for (const [x, y] of still.flatMap(ends)) widen(x, Math.min(y, ceiling));
   const [left, right] = [box.left - BEYOND, box.right + BEYOND];

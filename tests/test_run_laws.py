@@ -20,10 +20,10 @@ import columns
 import crowds
 import drawn
 import sandbox
+from chutelab import core as module
 from chutelab import scene
 from chutelab.checks.stress.barriers import Evidence
 from chutelab.cli import main
-from chutelab.core import module
 from chutelab.engines import contact, exact, simulation
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build

@@ -21,6 +21,7 @@ from PIL import Image
 import chutelab
 from chutelab import scene as sc
 from chutelab.cli import console, main
+from shared import call
 from test_summary import TOP
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
@@ -32,13 +33,6 @@ def _elsewhere(tmp_path, monkeypatch):
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     monkeypatch.delenv("CHUTELAB_DEBUG", raising=False)
-
-
-def call(*arguments, code=0):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    assert "Traceback" not in result.output
-    return result
 
 
 def refused(*arguments):

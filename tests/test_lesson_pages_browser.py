@@ -11,13 +11,14 @@ import pytest
 from chutelab.classroom.exercises import lesson as exercise
 from chutelab.classroom.exercises.catalogue import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
-from chutelab.classroom.lessons import find, shipped_lessons
+from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.pages import live_page
 from chutelab.classroom.lessons.reading import scene_of
 from chutelab.classroom.lessons.steps import quantities_in
 from chutelab.engines.simulation import simulate
 from chutelab.results.quantities import measure
 from live.browser import DONE
+from shared import lessons
 
 AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
 
@@ -25,7 +26,7 @@ CROWDS = ("a-stream", "the-hopper", "the-heap")
 
 STEPPED = [
     pytest.param(one.name, marks=pytest.mark.slow) if one.name in CROWDS else one.name
-    for one in shipped_lessons()
+    for one in lessons()
 ]
 """The runs of crowds take a while."""
 

@@ -17,7 +17,7 @@ from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.simulation import simulate
 from chutelab.machine import builder
 from chutelab.results import REASONS, Kind
-from chutelab.results.comparison import compare
+from chutelab.results.quantities import compare
 from chutelab.scene.quantities import THEORY
 from chutelab.studies.accuracy import reach
 from drawn import draw

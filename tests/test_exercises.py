@@ -298,7 +298,7 @@ def test_what_is_no_known_mistake_is_told_how_far_off_it_is():
         1 / 3.3: "70 % too small",
         33.0: "more than 10 times too large",
         1 / 3333.0: "more than 100 times too small",
-        -1.23: "The sign is wrong",
+        -1.23: "The sign is the other one",
         0.0: "The answer is not 0",
     }
     for ratio, text in replies.items():

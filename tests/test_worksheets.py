@@ -17,10 +17,11 @@ from chutelab.classroom.exercises.exercise import draw, shown
 from chutelab.classroom.lessons import find, scene_of
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.classroom.lessons.texts import without_tex
+from chutelab.classroom.words import words
 from chutelab.engines.simulation import judged, simulate
 from chutelab.results import Kind
-from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
+from chutelab.results.quantities import compare
 from chutelab.scene import load
 from shared import chutelab, lessons
 
@@ -576,6 +577,12 @@ def test_no_number_of_a_worksheet_goes_unlooked_at(number):
     assert found - looked_at - GIVEN.get(number, set()) == set()
 
 
+def said_by(step):
+    """The first sentence of a step, or of what it asks."""
+    text = step.text or " ".join(ask.text for ask in step.asks) or words().say("sheet-numbers")
+    return re.match(r".*?[.?!:](?= |$)|.*", " ".join(text.split()))[0]
+
+
 @pytest.mark.parametrize("number", NUMBERS)
 def test_teachers_sheets_have_a_key_goals_and_every_mistake_that_is_named(number):
     lesson, told = find(number), sheet(find(number), "teacher")
@@ -588,6 +595,13 @@ def test_teachers_sheets_have_a_key_goals_and_every_mistake_that_is_named(number
     for name in ("NGSS", "IB", "Sekundarstufe II"):
         assert name in told
     assert f"{lesson.minutes} minutes" in told
+    # The plan quotes each step, with values where a page has fields.
+    plan = re.search(r"^## Plan\n(.*?)^## ", told, re.MULTILINE | re.DOTALL)[1]
+    rows = [line.strip("| ").split(" | ") for line in plan.strip().splitlines()[2:]]
+    assert [int(minutes) for _, _, minutes, _ in rows] == [one.minutes for one in lesson.steps]
+    for step, (_, _, _, said) in zip(lesson.steps, rows, strict=True):
+        pattern = re.sub(r"\\\{[a-z_.\\]+\\\}", r"-?[0-9.]+.*", re.escape(said_by(step)))
+        assert re.fullmatch(pattern, said), (pattern, said)
     _, cases = draw(find_exercise(number), "your name")
     for case in cases:
         assert f"Answer: {shown(case.right)} {case.question.unit}".strip() in told

@@ -5,7 +5,7 @@
 `options`     options from signatures and docstrings; scenes with overrides; files of ``--out``
 `running`     ``run``, ``show``, ``live``
 `checking`    ``check``, ``verify``, ``stress``, ``bench``
-`studies`     ``sweep``, ``solve``, ``compare``
+`studies`     ``sweep``, ``solve``, ``compare``, ``discharge``
 `scenes`      ``scenes``, ``materials``, ``quantities``, ``schema``, ``new``, ``tables``, ``figure``
 `lessons`     ``lesson``: list, show, build, new, page, scorm, grade
 ============  =====================================================================================

@@ -31,7 +31,7 @@ class Verdict(StrEnum):
 
     RIGHT = "right"
     MISTAKE = "known mistake"
-    OFF = "off"
+    OFF = "not yet"
     UNREAD = "not a number"
     BLANK = "not attempted"
     UNKNOWN = "no such question"
@@ -39,8 +39,8 @@ class Verdict(StrEnum):
 
 MARKS: Final = {
     Verdict.RIGHT: ("✓", GREEN),
-    Verdict.MISTAKE: ("✗", VERMILION),
-    Verdict.OFF: ("✗", VERMILION),
+    Verdict.MISTAKE: ("↻", VERMILION),
+    Verdict.OFF: ("↻", VERMILION),
     Verdict.UNREAD: ("?", ORANGE),
     Verdict.BLANK: ("○", GREY),
     Verdict.UNKNOWN: ("?", ORANGE),

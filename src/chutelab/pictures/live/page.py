@@ -86,7 +86,7 @@ def html(
     shown = [row for row in REGISTRY.values() if row.symbol]
     # Packed, for it is long: all but the scene.
     large = {
-        **{name: facts.pop(name) for name in ("tables", "presets")},
+        **{name: facts.pop(name) for name in ("tables", "rules", "presets")},
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
         "strings": {
             **{f"number-{row.name}": row.meaning for row in shown},

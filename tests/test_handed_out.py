@@ -126,7 +126,7 @@ def given_away(number, text):
     return numbers_in(text) & answers(number) - TOLD.get(number, set())
 
 
-@pytest.mark.parametrize("kind", ["md", "html", "pdf"])
+@pytest.mark.parametrize("kind", ["md", "html", pytest.param("pdf", marks=pytest.mark.slow)])
 def test_no_number_of_the_answer_is_on_the_students_sheet(number, kind):
     sheet = printed(find(number), "student", kind)
     if kind == "pdf":
@@ -184,6 +184,9 @@ def dashes(frame):
     return int((scene == colour).all(axis=-1).sum())
 
 
+@pytest.mark.parametrize(
+    "number", [pytest.param(n, marks=pytest.mark.slow if n % 4 else ()) for n in NUMBERS]
+)
 def test_a_film_begins_without_the_path_and_waits(number):
     lesson = find(number)
     before, last = first_part(lesson.folder / "lesson.gif")

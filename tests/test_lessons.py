@@ -153,6 +153,11 @@ def test_all_faults_of_a_file_are_in_one_message(tmp_path):
         assert said in message
 
 
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory):
+    return start(tmp_path_factory.mktemp("fresh") / "my-lesson")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -184,8 +189,8 @@ def test_all_faults_of_a_file_are_in_one_message(tmp_path):
         ("title =", "title = =", "not TOML"),
     ],
 )
-def test_a_fault_names_file_key_value_and_what_is_allowed(tmp_path, old, new, said):
-    folder = start(tmp_path / "my-lesson")
+def test_a_fault_names_file_key_value_and_what_is_allowed(fresh, tmp_path, old, new, said):
+    folder = Path(shutil.copytree(fresh, tmp_path / "my-lesson"))
     plan = folder / "lesson.toml"
     text = plan.read_text(encoding="utf-8")
     assert old in text

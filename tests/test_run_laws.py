@@ -439,3 +439,9 @@ def test_five_hundred_random_sound_scenes_raise_no_alarm(name, first):
 )
 def test_runs_that_are_wrong_say_so(name, seed):
     assert alarms(name, [seed]) == []
+
+
+@pytest.mark.parametrize("name", ["perpendicular", "low-speed", "inclined-conveyor", "spoon"])
+def test_a_mass_point_lies_on_what_carries_it(name):
+    recording = recorded(scene.to_dict(scene.load(name, {"particle.radius": 0.0})))
+    assert not recording.laws

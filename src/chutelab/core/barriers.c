@@ -120,11 +120,15 @@ PAIRED static Curve curve_after(const double *knot) {
     return (Curve){{ from, from + third * two_at(knot + 3), to - third * two_at(next + 3), to }};
 }
 
+PAIRED static Two place_on(const Curve *c, double share) {
+    double s = share, r = 1 - s;
+    return r * r * (r * c->p[0] + 3 * s * c->p[1]) + s * s * (3 * r * c->p[2] + s * c->p[3]);
+}
+
 /* Where a particle is at a share of the interval after a knot. */
 PAIRED void place_at(const double *knot, double share, double *x, double *y) {
     Curve c = curve_after(knot);
-    double s = share, r = 1 - s;
-    Two place = r * r * (r * c.p[0] + 3 * s * c.p[1]) + s * s * (3 * r * c.p[2] + s * c.p[3]);
+    Two place = place_on(&c, share);
     *x = place[0];
     *y = place[1];
 }
@@ -194,8 +198,8 @@ PAIRED static int is_clear_of_bow(const Curve *c, const Barrier *b, double limit
     double outer = b->radius + limit, inner = b->radius - limit;
     Two q[4];
     square_distance(c, two_at(&b->x), q);
-    int is_inside = inner > 0 && q[0][0] <= inner * inner;
-    if (is_inside ? all_to(q, 4, inner * inner) : all_from(q, 4, outer * outer)) return 1;
+    /* Of a mass point both may hold to begin with: then the limit is below 0. */
+    if (all_from(q, 4, outer * outer) || (inner > 0 && all_to(q, 4, inner * inner))) return 1;
     if (b->whole) return 0;
     /* Beyond the ends: not counterclockwise of the first, or not clockwise of the last; of an arc of
        more than half a circle neither. */
@@ -333,7 +337,8 @@ PAIRED static void turn(const Curve *c, Barrier *pieces, int first, int knot) {
         const Barrier *b = pieces + k;
         double far = 0, before = pieces[k].side;
         for (int n = 0; n < 4; n++) {
-            double d = beside(b, c->p[n][0], c->p[n][1]);
+            Two place = place_on(c, n / 3.0);
+            double d = beside(b, place[0], place[1]);
             if (fabs(d) > fabs(far)) far = d;
         }
         pieces[k].side = far;

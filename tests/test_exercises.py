@@ -298,7 +298,7 @@ def test_what_is_no_known_mistake_is_told_how_far_off_it_is():
         1 / 3.3: "70 % too small",
         33.0: "more than 10 times too large",
         1 / 3333.0: "more than 100 times too small",
-        -1.23: "The sign is wrong",
+        -1.23: "The sign is the other one",
         0.0: "The answer is not 0",
     }
     for ratio, text in replies.items():
@@ -331,7 +331,7 @@ def test_two_mistakes_at_once_are_both_named(name):
 def test_no_random_answer_is_named_for_a_mistake_that_leads_elsewhere(name):
     task = lesson(name, "random")
     cases = draw(EXERCISES[name], "random")[1]
-    for i, (times, power) in enumerate(np.random.default_rng(3).normal(size=(1000, 2)).tolist()):
+    for i, (times, power) in enumerate(np.random.default_rng(3).normal(size=(240, 2)).tolist()):
         number = 1 + i % 4
         answer = cases[number - 1].right * times * 10.0**power
         reply = judge(cases[number - 1], answer)

@@ -232,6 +232,22 @@ def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_pa
     assert given(page)["material"][0]["name"] == "brick"
 
 
+def test_parts_and_the_card_of_what_is_chosen_take_turns_and_what_is_on_looks_so(shown):
+    page = shown("inclined-40", viewport={"width": 1366, "height": 768})
+    page.evaluate("chutelab.bench.inspector.choose('plate')")
+    page.click("#tool-add")
+    assert page.locator("#parts").is_visible()
+    assert page.locator("#chosen").is_hidden()
+    page.evaluate("chutelab.bench.inspector.choose('plate')")
+    assert page.locator("#parts").is_hidden()
+    # Under the pointer, too, a tool that is on can be told from one that is not.
+    page.click("#tool-tape")
+    ground = "getComputedStyle(document.getElementById('tool-tape')).backgroundColor"
+    under = page.evaluate(ground)
+    page.mouse.move(600, 300)
+    assert under == page.evaluate(ground) == "rgb(0, 100, 157)"
+
+
 def test_the_page_turns_to_the_other_language_as_it_is(shown):
     page = shown("inclined-40", viewport={"width": 1366, "height": 768})
     page.evaluate("chutelab.lab.change({ 'plate.angle_deg': 33 })")

@@ -80,7 +80,7 @@ class Fields {
       if (event.key === "Escape" && this.lab.asked === key) this.giveUp(key);
     });
     const whose = !this.owned || table === "scene" ? "" : `${words.name(owner)}: `;
-    const which = of > 1 ? ` ${(name === "radius" ? "≥≤" : "xy")[part]}` : "";
+    const which = of > 1 ? ` ${(name === "radius" ? "≥≤" : choices ? "12" : "xy")[part]}` : "";
     const label = html("label", { for: id }, `${whose}${words.key(table, name)}${which}`);
     const why = html("div", { class: "why", id: `why-${id}` });
     why.hidden = true;

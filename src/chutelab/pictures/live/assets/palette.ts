@@ -48,7 +48,6 @@ class Palette {
     this.opener = iconButton("tool-add", "add", words.say("add-part"));
     this.opener.addEventListener("click", () => this.open(this.panel.hidden));
     document.getElementById("tool-select")?.after(this.opener);
-    // What is chosen has its card where the parts were.
     bench.inspector.listeners.push(() => {
       if (bench.inspector.parts.length) this.open(false);
     });
@@ -69,6 +68,8 @@ class Palette {
   }
 
   open(on: boolean) {
+    // What is chosen has its card where the parts are.
+    if (on && this.bench.inspector.parts.length) this.bench.inspector.choose();
     this.panel.hidden = !on;
     this.opener.setAttribute("aria-expanded", String(on));
   }

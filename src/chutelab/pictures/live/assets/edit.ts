@@ -223,5 +223,5 @@ const canGo = (given: Given, name: string) =>
   JSON.stringify(without(given, name)) !== JSON.stringify(given);
 
 export {
-  canGo, endsOf, rowsNamed, surfaceAt, withCopies, withKind, withName, withPart, withRowOf, without,
+  canGo, endsOf, rowsNamed, surfaceAt, withCopies, withName, withPart, withRowOf, without,
 };

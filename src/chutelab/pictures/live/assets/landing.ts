@@ -84,9 +84,9 @@ class LandingPanel {
     this.all = all;
     this.bars.frame([from, from + width * Math.max(1, counts.length)],
       [0, Math.max(1, ...counts) * 1.08], { below: "x / m", beside: "n", whole: true });
-    this.outline = svg("path", { class: "bins", d: this.steps(all) });
     this.filled = svg("path", { class: "bins filled" });
-    this.bars.marks.append(this.outline, this.filled);
+    this.bars.marks.append(
+      svg("path", { class: "bins", d: this.bars.bars(from, width, counts) }), this.filled);
     this.running = runningMean(places);
     const { running } = this;
     const some = running.map((_, i) => i)
@@ -106,13 +106,6 @@ class LandingPanel {
     this.fill();
   }
 
-  steps({ from, width, counts }: Histogram) {
-    const { bars } = this;
-    const tops = counts.map((count, i) =>
-      `V${bars.py(count).toFixed(1)}H${bars.px(from + (i + 1) * width).toFixed(1)}`);
-    return `M${bars.px(from).toFixed(1)} ${bars.py(0)}${tops.join("")}V${bars.py(0)}Z`;
-  }
-
   /** What has arrived up to now. */
   fill() {
     const { arrivals, words, all } = this;
@@ -123,7 +116,7 @@ class LandingPanel {
       const bin = Math.floor(arrivals[n].x / all.width) - Math.round(all.from / all.width);
       counts[bin] += 1;
     }
-    this.filled.setAttribute("d", this.steps({ ...all, counts }));
+    this.filled.setAttribute("d", this.bars.bars(all.from, all.width, counts));
     this.means.point(n || NaN);
     // Before the first one arrives the whole is told.
     const which = n || arrivals.length, { mean, error } = this.running[which - 1];
@@ -137,8 +130,6 @@ class LandingPanel {
   all: Histogram | undefined;
 
   running: { mean: number, error: number }[] = [];
-
-  outline: any;
 
   filled: any;
 }

@@ -66,7 +66,9 @@ class Phone {
       if ((target as Element).closest(".ib")) this.show("");
     });
     this.is.addEventListener("change", () => this.arrange());
-    new MutationObserver(() => this.refresh()).observe(panels.parentElement as Element,
+    new MutationObserver(() => {
+      if (this.is.matches) this.refresh();
+    }).observe(panels.parentElement as Element,
       { subtree: true, attributeFilter: ["hidden", "class"] });
     bench.listeners.push(() => this.mark());
     bench.inspector.listeners.push(() => {

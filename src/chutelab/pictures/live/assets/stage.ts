@@ -71,6 +71,10 @@ class Stage {
     this.back.append(steel(), ground, this.ghost, this.outline, layer, this.paths, scale);
     this.tip = html("p", { class: "tip", role: "status" });
     home.after(this.tip);
+    new ResizeObserver(([{ borderBoxSize: [{ inlineSize, blockSize }] }]) => {
+      this.tipSize = [inlineSize, blockSize];
+      if (this.held && this.at) this.tell(this.at);
+    }).observe(this.tip);
     this.grips = svg("g", { class: "grips" });
     /** Further layers, of tools, lie below the handles. */
     this.over = svg("g", { class: "over" });
@@ -505,8 +509,13 @@ class Stage {
     return { way: [roundTo(dx, view.snap), roundTo(dy, view.snap)], caught: null };
   }
 
+  /** Width and height of what is told, px; and where it was told. */
+  tipSize: Point = [0, 0];
+  at?: Point;
+
   /** The value that is changed, beside the pointer; or why it cannot be. */
-  tell([px, py]: Point) {
+  tell(at: Point) {
+    const [px, py] = this.at = at;
     const { lab, words, held, view, tip } = this;
     const now = this.handles.find(({ id }) => id === held?.id) ?? bodyOf(this.handles,
       this.parts, 0, 0);
@@ -515,7 +524,8 @@ class Stage {
     tip.replaceChildren(...(lab.fault ? [words.fault(lab.fault)] : [
       html("b", {}, words.values(now.axes)), html("span", {}, words.say("was", { value: this.was })),
     ]));
-    const { offsetWidth: wide, offsetHeight: high } = tip;
+    // To ask for the size now would have all laid out once more.
+    const [wide, high] = this.tipSize;
     // A finger hides what is below it.
     const left = Math.min(px + 22, view.width - wide - 8), over = this.finger ? -high - 40 : 26;
     const top = Math.min(Math.max(py + over, 8), view.height - high - 8);

@@ -17,10 +17,8 @@ from chutelab.classroom.lessons.reading import scene_of
 from chutelab.classroom.lessons.steps import quantities_in
 from chutelab.engines.simulation import simulate
 from chutelab.results.quantities import measure
-from live.browser import DONE
+from live.browser import DONE, axe
 from shared import lessons
-
-AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
 
 CROWDS = ("a-stream", "the-hopper", "the-heap")
 
@@ -410,7 +408,6 @@ def test_the_table_is_a_file_for_spreadsheets(page_of):
     assert re.fullmatch(r"-2,91\d+", first.split(";")[2])
 
 
-@pytest.mark.skipif(not AXE.is_file(), reason="needs npm ci in tests/live")
 @pytest.mark.parametrize(
     ("language", "scheme", "size"),
     [("en", "light", DESK), ("de", "dark", PHONE), ("de", "light", (844, 390))],
@@ -419,16 +416,10 @@ def test_axe_finds_nothing_in_any_step(page_of, language, scheme, size):
     page = page_of("the-bounce", language, size, color_scheme=scheme)
     lesson = find("the-bounce", language)
     hand = Hand(page, "mouse")
-    axe = AXE.read_text(encoding="utf-8")
 
     def is_clean():
         assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-        page.evaluate(axe)
-        found = page.evaluate(
-            "axe.run().then(({violations}) => violations.map(({id, nodes}) =>"
-            " [id, nodes.map(({html}) => html.slice(0, 200))]))"
-        )
-        assert found == []
+        assert axe(page) == []
         small = page.evaluate("""() => [...document.querySelectorAll("button, summary, select")]
           .filter((one) => one.checkVisibility() && !one.closest(".question")
             && Math.min(one.offsetWidth, one.offsetHeight) < 36)

@@ -1,6 +1,7 @@
 """Pages in a real browser: none of them says anything on the console, or asks for anything."""
 
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -21,6 +22,23 @@ DONE = """() => new Promise((resolve, reject) => {
   };
   look();
 })"""
+
+
+AXE = Path(__file__).parent / "node_modules" / "axe-core" / "axe.min.js"
+
+
+def axe(page):
+    """Return what axe-core finds wrong with a page as it is now: each rule and where."""
+    if not AXE.is_file():
+        pytest.skip("needs axe: npm ci --prefix tests/live")
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    # It asks for style sheets again, which a file may not, and takes no formula for a text.
+    rules = {"empty-table-header": {"enabled": False}}
+    found = page.evaluate("(how) => axe.run(how)", {"preload": False, "rules": rules})
+    assert len(found["passes"]) > 10
+    return [
+        (one["id"], [node["html"][:200] for node in one["nodes"]]) for one in found["violations"]
+    ]
 
 
 def to_step(page, kind="numbers"):

@@ -230,22 +230,3 @@ def test_what_rattles_sinks_in_by_no_more_than_blows_leave(seed):
     recording = contact.run(build(from_dict(drawn)))
     assert list(in_others(recording, 0.0165)) == []
     assert judge(recording) == ()
-
-
-def test_what_is_wrong_is_seen():
-    """A track is moved, or an entry of the ledger changed: the same laws see it."""
-    run = contact.run(build(draw(7)))
-    assert faults(run) == []
-    deep = run.knots.copy()
-    struck = run.events[run.events["kind"] == Kind.IMPACT][0]
-    # As if the first surface that is met were 5 % of a radius further away.
-    radius = np.broadcast_to(run.machine.particle.radius, run.count)[struck["particle"]]
-    away = struck["velocity_after"] - struck["velocity_before"]
-    deep["position"] -= 0.05 * radius * away / np.hypot(*away)
-    assert any(" in " in fault for fault in in_surfaces(replace(run, knots=deep)))
-    near = run.knots.copy()
-    near["position"] *= 0.9
-    assert any(in_others(replace(run, knots=near)))
-    booked = run.knots.copy()
-    booked["entries"][:, 1] *= 1.0 + 1e-6
-    assert any(fault.startswith("ledger") for fault in faults(replace(run, knots=booked)))

@@ -1,7 +1,6 @@
 """The sheets of lessons: printed, and as files in Markdown, HTML and PDF."""
 
 import re
-import sys
 from html.parser import HTMLParser
 
 import pytest
@@ -75,15 +74,6 @@ def test_sheets_go_into_a_folder_with_names_of_their_own(tmp_path):
     names = sorted(path.name for path in out.iterdir())
     assert "02-letting-go-teacher.pdf" in names
     assert {"01-the-parabola-student.md", "09-design-student.md"} <= set(names)
-
-
-def test_without_the_library_a_pdf_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "typst", None)
-    monkeypatch.setattr("chutelab.classroom.lessons.sheets.find_spec", lambda name: None)
-    result = chutelab("lesson", "show", 1, "--sheet", "student", "-o", tmp_path / "a.pdf")
-    assert result.exit_code == 2
-    assert 'pip install "chutelab[pdf]"' in result.output
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("which", SHEETS)

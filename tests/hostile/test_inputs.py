@@ -11,7 +11,7 @@ import pytest
 
 import chutelab
 from hostile.inputs import KINDS
-from hostile.worker import PATIENCE, fault
+from hostile.worker import PATIENCE
 
 TESTS = Path(__file__).parents[1]
 MEMORY = 2 << 20
@@ -82,22 +82,3 @@ def check(kind, seed, count, folder):
     codes = {row["code"] for row in found}
     assert 2 in codes
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < MEMORY
-
-
-@pytest.mark.parametrize(
-    ("code", "said", "left", "wrong"),
-    [
-        (0, "done", [], ""),
-        (2, "Error: plate.angle_deg = 95", [], ""),
-        (1, "no solution", [], ""),
-        (1, "chutelab failed: ValueError: x; please report it", [], "a failure of ours"),
-        (1, "Traceback (most recent call last)", [], "a failure of ours"),
-        (1, "oh", [], "exit code 1"),
-        (-11, "", [], "exit code -11"),
-        (2, " \n", [], "no message"),
-        (2, "title = '\x1b[31m'", [], "control characters"),
-        (0, "done", [".chutelab-x"], "left over: .chutelab-x"),
-    ],
-)
-def test_what_is_wrong_is_seen(code, said, left, wrong):
-    assert fault(code, said, left) == wrong

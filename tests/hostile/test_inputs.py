@@ -60,7 +60,7 @@ def results(kind, seed, count, folder):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_some(kind, tmp_path):
-    check(kind, seed=0, count=max(3, round(60 * SHARES[kind])), folder=tmp_path)
+    check(kind, seed=0, count=max(3, round(40 * SHARES[kind])), folder=tmp_path)
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sandbox
-from chutelab.core import module
+from chutelab import core as module
 from chutelab.engines import contact as engine
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from chutelab import core as module
 from chutelab.cli import main
-from chutelab.core import module
 from chutelab.engines import contact as engine
 from chutelab.machine import build
 from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe

@@ -329,22 +329,26 @@ PAIRED static void look(const Curve *c, Barrier *b, int number, int knot) {
     settle(c, 0, 1, 0);
 }
 
+/* Side of a piece on which a path is where it first is off it, from its beginning on or back from its end:
+   1 or -1, or 0 if it stays on it, or gets beyond its ends. */
+PAIRED static int side_of(const Barrier *b, const Curve *c, int is_end) {
+    for (double share = 1.0 / (1 << HALVINGS); share <= 1; share *= 2) {
+        Two place = place_on(c, is_end ? 1 - share : share);
+        double d = beside(b, place[0], place[1]);
+        if (fabs(d) <= L.allowed) continue;
+        return is_within(b, place[0], place[1], side_margin()) ? (d > 0) - (d < 0) : 0;
+    }
+    return 0;
+}
+
 /* Where a mass point comes to a piece from one side and goes on on the other: such a passage at a knot,
    as where a blow does not turn a point back, is in no interval. */
-PAIRED static void turn(const Curve *c, Barrier *pieces, int first, int knot) {
+PAIRED static void turn(const Curve *before, const Curve *after, const Barrier *pieces, int knot) {
     const double *now = KNOT(knot);
     for (int k = 0; k < L.piece_count; k++) {
         const Barrier *b = pieces + k;
-        double far = 0, before = pieces[k].side;
-        for (int n = 0; n < 4; n++) {
-            Two place = place_on(c, n / 3.0);
-            double d = beside(b, place[0], place[1]);
-            if (fabs(d) > fabs(far)) far = d;
-        }
-        pieces[k].side = far;
-        if (first || MIN(fabs(far), fabs(before)) <= L.allowed || (far > 0) == (before > 0)) continue;
-        if (!is_within(b, now[1], now[2], side_margin()) || !is_there(b, now[0])
-            || distance(b, now[1], now[2]) > L.allowed) continue;
+        if (distance(b, now[1], now[2]) > L.allowed || !is_there(b, now[0])) continue;
+        if (side_of(b, before, 1) * side_of(b, after, 0) >= 0) continue;
         At.number = k;
         add_hit(now[0], now[1], now[2], 0, 1);
     }
@@ -374,6 +378,7 @@ PAIRED int find_hits(int i) {
     Interval some[WIDTH];
     Barrier *pieces = L.barriers + (L.family ? i * L.piece_count : 0);
     Box box = all_apart();
+    Curve last;
     int count = 0, first = 1, before = L.hit_count;
     if (!L.piece_count) return 0;
     At.particle = i;
@@ -391,7 +396,8 @@ PAIRED int find_hits(int i) {
         now->box.high = larger(larger(c.p[0], c.p[1]), larger(c.p[2], c.p[3]));
         box.low = lesser(box.low, now->box.low);
         box.high = larger(box.high, now->box.high);
-        if (At.radius == 0) turn(&now->path, pieces, first, k);
+        if (At.radius == 0 && !first) turn(&last, &c, pieces, k);
+        last = c;
         first = 0;
         if (count == WIDTH) {
             look_at_all(some, count, &box, pieces);

@@ -68,8 +68,7 @@ def html(
     }
     palette = "".join(f"  --{k.replace('_', '-')}: {v};\n" for k, v in colours.items())
     css = f":root {{\n{palette}}}\n{_file('bundle/page.css')}"
-    if lesson is not None:
-        css += _file("bundle/lesson.css")
+    css += _file(f"bundle/{'sandbox' if lesson is None else 'lesson'}.css")
     core = files("chutelab.core")
     facts = describe(scene, partly=partly)
     strings = json.loads(_file(f"assets/strings/{language}.json"))

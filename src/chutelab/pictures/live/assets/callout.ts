@@ -101,7 +101,9 @@ function drawOutline(stage: Stage) {
   stage.frame = null;
   if (parts.length < 2) return;
   const { x, y, width, height } = all.getBBox();
-  stage.frame = { left: x - FRAME, right: x + width + FRAME, top: y - FRAME, bottom: y + height + FRAME };
+  stage.frame = {
+    left: x - FRAME, right: x + width + FRAME, top: y - FRAME, bottom: y + height + FRAME,
+  };
   outline.append(svg("rect", { class: "frame-all", x: x - FRAME, y: y - FRAME, rx: 6,
     width: width + 2 * FRAME, height: height + 2 * FRAME }));
 }

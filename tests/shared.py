@@ -2,12 +2,18 @@
 
 from functools import cache
 
+import pytest
 from click.testing import CliRunner
 
 from chutelab.classroom.lessons import shipped_lessons
 from chutelab.cli import main
 
 lessons = cache(shipped_lessons)
+
+
+def seeds(few, many):
+    """Return numbers up to `many`, of which all from `few` on are slow."""
+    return [*range(few), *(pytest.param(n, marks=pytest.mark.slow) for n in range(few, many))]
 
 
 def chutelab(*arguments):

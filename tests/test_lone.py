@@ -31,6 +31,7 @@ from chutelab.studies.accuracy import apart, each, sizes, stirred
 from crowds import hop_step
 from drawn import draw, only_blows
 from references import normal_of
+from shared import seeds
 
 LONGEST = 4e-3
 """s; the first step tried."""
@@ -191,23 +192,7 @@ def check(engine, seed):
     raise AssertionError(found)
 
 
-@pytest.mark.parametrize("seed", range(16))
-def test_contact_comes_to_what_exact_says(seed):
-    check(contact, seed)
-
-
-@pytest.mark.parametrize("seed", [2, 3, 4, 5, 6, 9, 10, 13])
-def test_pymunk_comes_to_what_exact_says(seed):
-    check(pymunk, seed)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(16, 500))
-def test_contact_comes_to_what_exact_says_everywhere(seed):
-    check(contact, seed)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(500))
-def test_pymunk_comes_to_what_exact_says_everywhere(seed):
-    check(pymunk, seed)
+@pytest.mark.parametrize("seed", seeds(16, 500))
+@pytest.mark.parametrize("engine", [contact, pymunk])
+def test_a_stepped_engine_comes_to_what_exact_says(engine, seed):
+    check(engine, seed)

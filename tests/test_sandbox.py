@@ -19,6 +19,7 @@ from chutelab.results.record import hermite
 from chutelab.scene import from_dict
 from references import surface_gaps
 from sandbox import draw, tables
+from shared import seeds
 
 INSIDE = 0.03
 """Radii that no particle may be in a surface or in another."""
@@ -205,20 +206,12 @@ def check(seed, folder):
         assert (finer <= np.maximum(NEAR, 0.25 * apart)).all(), (apart, finer)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(12, 300))
 def test_laws_hold_on_any_machine(seed, tmp_path):
     check(seed, tmp_path)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12, 300))
-def test_laws_hold_on_three_hundred_machines(seed, tmp_path):
-    check(seed, tmp_path)
-
-
-@pytest.mark.parametrize(
-    "seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 12))]
-)
+@pytest.mark.parametrize("seed", seeds(3, 12))
 def test_what_rattles_sinks_in_by_no_more_than_blows_leave(seed):
     """Without gravity a row of 46 disks runs into a floor: its blows have no end.
 

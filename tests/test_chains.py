@@ -139,17 +139,11 @@ def verdict(seed):
     return ("chaotic", f"from {finish:.3g} s on") if len(parted) else ("sound", "")
 
 
-def test_contact_engine_on_chains_and_bowls():
-    assert judged(contact.run, range(60)) == {}
-
-
-def test_contact_engine_where_it_was_unsound():
-    assert judged(contact.run, ONCE) == {}
-
-
-@pytest.mark.slow
-def test_contact_engine_on_thousands():
-    assert judged(contact.run, range(MANY)) == {}
+@pytest.mark.parametrize(
+    "seeds", [(*range(60), *ONCE), pytest.param(range(MANY), marks=pytest.mark.slow)]
+)
+def test_contact_engine_on_chains_and_bowls(seeds):
+    assert judged(contact.run, seeds) == {}
 
 
 SHOWN = (420, 652, 819, 1472, 1591, 2847)

@@ -58,25 +58,19 @@ def results(kind, seed, count, folder):
     return found
 
 
+@pytest.mark.parametrize(
+    ("seed", "cases"), [(0, 40), pytest.param(1, ASKED, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("kind", KINDS)
-def test_some(kind, tmp_path):
-    check(kind, seed=0, count=max(3, round(40 * SHARES[kind])), folder=tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-def test_as_many_as_asked(kind, tmp_path):
-    check(kind, seed=1, count=round(ASKED * SHARES[kind]), folder=tmp_path)
-
-
-def check(kind, seed, count, folder):
-    found = results(kind, seed, count, folder)
+def test_what_is_wrong_is_refused_and_nothing_else_happens(kind, seed, cases, tmp_path):
+    count = round(cases * SHARES[kind])
+    found = results(kind, seed, count, tmp_path)
     assert len(found) == count
     wrong = [row for row in found if row["wrong"]]
     told = "\n\n".join(
         f"{row['case']} {row.get('words')}: {row['wrong']}\n{row['said']}" for row in wrong[:8]
     )
-    assert not wrong, f"{len(wrong)} of {count} cases, in {folder}:\n{told}"
+    assert not wrong, f"{len(wrong)} of {count} cases, in {tmp_path}:\n{told}"
     assert max(row["seconds"] for row in found) < PATIENCE
     # Both what may be and what may not has to occur, or the mutants are too wild or too tame.
     codes = {row["code"] for row in found}

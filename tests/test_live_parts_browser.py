@@ -11,7 +11,7 @@ from chutelab.machine import build
 from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
 from chutelab.pictures.live.page import html
 from chutelab.scene import from_dict, load
-from live.browser import DONE, axe
+from live.browser import DONE, axe, spot
 
 # Of a run that is over: knots of each track, as Python has them.
 TRACKS = """chutelab.lab.recording.tracks.map(({ rows, count }) =>
@@ -45,14 +45,6 @@ def empty(opened, tmp_path):
 
 def given(page):
     return page.evaluate("chutelab.lab.given")
-
-
-def spot(page, u, v):
-    """Where a share of the picture's free part is on the screen, in whole pixels."""
-    box = page.locator("#stage").bounding_box()
-    free = page.evaluate("chutelab.stage.view.free")
-    across, up = free["right"] - free["left"], free["bottom"] - free["top"]
-    return round(box["x"] + free["left"] + u * across), round(box["y"] + free["top"] + v * up)
 
 
 def same_bits(page, folder, until=1.5):

@@ -5,7 +5,6 @@ import os
 import shutil
 import subprocess
 import sys
-from html.parser import HTMLParser
 from urllib.parse import unquote
 from zipfile import ZipFile
 
@@ -16,30 +15,7 @@ from chutelab.classroom.lessons.building import start
 from chutelab.classroom.lessons.pages import bundle
 from chutelab.classroom.lessons.texts import html_of
 from live.browser import axe
-from shared import chutelab, lessons
-
-
-class Page(HTMLParser):
-    """The tags of a page with their attributes, its text, and the addresses in it."""
-
-    def __init__(self, page):
-        super().__init__()
-        self.tags, self.text = [], ""
-        self.feed(page)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_data(self, data):
-        self.text += data
-
-    def told(self, name, tag=""):
-        """Values of an attribute, of all tags or of some."""
-        return [given[name] for one, given in self.tags if name in given and tag in ("", one)]
-
-    @property
-    def addresses(self):
-        return [where for name in ("href", "src", "data-film") for where in self.told(name)]
+from shared import Page, chutelab, lessons
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """Machines that are built in the page, from nothing: every part, with pointer and keys, saved."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -13,9 +11,7 @@ from chutelab.machine import build
 from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
 from chutelab.pictures.live.page import html
 from chutelab.scene import from_dict, load
-from live.browser import DONE
-
-AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
+from live.browser import DONE, axe, spot
 
 # Of a run that is over: knots of each track, as Python has them.
 TRACKS = """chutelab.lab.recording.tracks.map(({ rows, count }) =>
@@ -49,14 +45,6 @@ def empty(opened, tmp_path):
 
 def given(page):
     return page.evaluate("chutelab.lab.given")
-
-
-def spot(page, u, v):
-    """Where a share of the picture's free part is on the screen, in whole pixels."""
-    box = page.locator("#stage").bounding_box()
-    free = page.evaluate("chutelab.stage.view.free")
-    across, up = free["right"] - free["left"], free["bottom"] - free["top"]
-    return round(box["x"] + free["left"] + u * across), round(box["y"] + free["top"] + v * up)
 
 
 def same_bits(page, folder, until=1.5):
@@ -352,22 +340,14 @@ def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_
 def test_the_empty_page_and_the_card_are_accessible_and_fingers_hit(empty, size, scheme, touch):
     viewport = {"width": size[0], "height": size[1]}
     page = empty(viewport=viewport, color_scheme=scheme, has_touch=touch, is_mobile=touch)
-    if not AXE.is_file():
-        pytest.skip("needs axe: npm ci --prefix tests/live")
-    page.evaluate(AXE.read_text(encoding="utf-8"))
-
-    def found():
-        told = page.evaluate("() => axe.run()")["violations"]
-        return [(one["id"], [node["html"][:120] for node in one["nodes"]]) for one in told]
-
-    assert found() == []
+    assert axe(page) == []
     page.click("#begin")
     page.evaluate(DONE)
     page.evaluate("chutelab.bench.inspector.choose('incoming')")
     speed = page.locator("#chosen input[type=text]").first
     speed.fill("-3")
     speed.press("Enter")
-    assert found() == []
+    assert axe(page) == []
     assert page.evaluate("document.documentElement.scrollWidth") == size[0]
     card = page.locator("#chosen").bounding_box()
     assert card["x"] >= 0.0

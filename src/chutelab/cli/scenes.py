@@ -173,10 +173,10 @@ def schema(*, run: bool) -> None:
 def quantities(*, json_: bool) -> None:
     """List the quantities of a run, for [[expect]], solve and sweep, and from Python measure.
 
-    SURFACE is the name of any surface. Of several particles, particles[0].landing.x is that of the
-    first one, landing.x.mean the stream's (likewise .spread, .min, .max, and .q02, .q25, .q50,
-    .q75, .q98, what so many percent are below), and by_stream.NAME.landing.x.mean that of one
-    stream. The ledger counts up to run.until.
+    SURFACE is the name of any surface, SENSOR that of any sensor. Of several particles,
+    particles[0].landing.x is that of the first one, landing.x.mean the stream's (likewise .spread,
+    .min, .max, and .q02, .q25, .q50, .q75, .q98, what so many percent are below), and
+    by_stream.NAME.landing.x.mean that of one stream. The ledger counts up to run.until.
     """
     from chutelab.scene.quantities import REGISTRY
     from chutelab.util.tables import Sheet

@@ -51,7 +51,7 @@ EITHER: Final = {"particle": "particles", "plate": "plates", "stream": "streams"
 ALWAYS: Final = ("particle", "stream", "run")
 """Tables that a scene has without writing them."""
 
-NO_MACHINE: Final = ("expect", "view", "live")
+NO_MACHINE: Final = ("sensor", "expect", "view", "live")
 """Tables that say nothing of the machine."""
 
 LEAST_VIEW: Final = 1e-6
@@ -345,7 +345,7 @@ def _tables(look: Look) -> Iterator[Fault]:
 def _names(look: Look) -> Iterator[Fault]:
     """Say which names are there twice, or missing, or lead nowhere."""
     surfaces: dict[object, str] = {}
-    for table in (*SURFACES, "particle", "stream", "material"):
+    for table in (*SURFACES, "particle", "stream", "material", "sensor"):
         known = surfaces if table in SURFACES else {}
         rows = look.rows(table)
         for row in rows:
@@ -489,10 +489,11 @@ def stream_name(row: int) -> str:
 
 
 def _expectations(look: Look, streams: Sequence[Row]) -> Iterator[Fault]:
-    if not all(map(look.sound, SURFACES)):
+    if not all(map(look.sound, (*SURFACES, "sensor"))):
         return
     surfaces = [*filter(look.has, ("incoming", "outgoing")), *["plate"] * look.damps]
     surfaces += [name for table in SURFACES for name in _texts(look.rows(table))]
+    surfaces += [f"sensor.{name}" for name in _texts(look.rows("sensor"))]
     names = [
         name if isinstance(name := stream["name"], str) else stream_name(number)
         for number, stream in enumerate(streams)

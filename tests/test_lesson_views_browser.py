@@ -5,16 +5,17 @@ Each view is also a picture in the test's own folder: `pytest --basetemp=DIR` ke
 
 import pytest
 
-from chutelab.classroom.lessons import find, shipped_lessons
+from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.pages import live_page
 from live.browser import DONE
+from shared import lessons
 
 DESK, WALL, PHONE = (1366, 768), (1920, 1080), (390, 844)
 
 QUICK = [("trust", DESK, "light", "en"), ("letting-go", PHONE, "dark", "de")]
 WHOLE = [
     (one.name, size, scheme, language)
-    for one in shipped_lessons()
+    for one in lessons()
     for size in (DESK, WALL, PHONE)
     for scheme, language in (("light", "de"), ("dark", "en"))
 ]

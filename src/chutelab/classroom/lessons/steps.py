@@ -253,6 +253,11 @@ def html_of(text: str, *, inline: bool = False) -> str:
     return PLACES.sub(r'<span data-key="\1"></span>', str(made)).strip()
 
 
+def _unbroken(text: str) -> str:
+    """Return a text in which a number keeps its unit beside it."""
+    return re.sub(r"(?<=\d) (?=\S{1,3}(?:[\s,]|$))", "\N{NO-BREAK SPACE}", text)
+
+
 def data_of(steps: Sequence[Step], controls: tuple[str, ...], said: Words) -> list[dict[str, Any]]:
     """Return steps as plain data for the JSON of a page.
 
@@ -287,7 +292,7 @@ def data_of(steps: Sequence[Step], controls: tuple[str, ...], said: Words) -> li
                 for one in step.columns
             ],
             "rows": [
-                {"head": html_of(said.local(one.head), inline=True), "set": one.set}
+                {"head": html_of(_unbroken(said.local(one.head)), inline=True), "set": one.set}
                 for one in step.rows
             ],
             "free": step.free,

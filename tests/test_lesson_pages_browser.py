@@ -38,22 +38,6 @@ FAR = {"mouse": DESK, "touch": PHONE, "keyboard": DESK}
 """By what a lesson is played, and how large the page is then."""
 
 
-@pytest.fixture
-def page_of(opened, tmp_path):
-    """Open the live page of a lesson."""
-
-    def open_(name, language="en", size=DESK, **options):
-        path = tmp_path / f"{name}-{language}.html"
-        live_page(find(name, language), path)
-        assert path.stat().st_size <= 450_000
-        view = {"width": size[0], "height": size[1]}
-        page = opened(path, viewport=view, **options)
-        page.evaluate(DONE)
-        return page
-
-    return open_
-
-
 def step_of(page):
     return page.evaluate("chutelab.lesson.kept.at")
 

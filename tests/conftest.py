@@ -11,8 +11,8 @@ import pytest
 import wasmtime
 from hypothesis import settings
 
-from chutelab.core import module
-from live.browser import browser, opened, shown  # noqa: F401
+from chutelab import core as module
+from live.browser import browser, opened, page_of, shown  # noqa: F401
 
 ROOT = Path(__file__).parents[1]
 

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from chutelab import machine, scene, theory
 from chutelab.checks.agreement import agreement, order, verify
-from chutelab.core.module import dtype
+from chutelab.core import dtype
 from chutelab.engines import exact, reference, simulation
 from chutelab.engines.contact import Job
 from chutelab.engines.pymunk.lone import Lone

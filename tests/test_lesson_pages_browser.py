@@ -3,120 +3,39 @@
 import json
 import math
 import re
-from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import pytest
+from pypdf import PdfReader
 
 from chutelab.classroom.exercises import lesson as exercise
 from chutelab.classroom.exercises.catalogue import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
-from chutelab.classroom.lessons import find, shipped_lessons
-from chutelab.classroom.lessons.pages import live_page
+from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.reading import scene_of
 from chutelab.classroom.lessons.steps import quantities_in
 from chutelab.engines.simulation import simulate
 from chutelab.results.quantities import measure
-from live.browser import DONE
-
-AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
+from live.browser import DONE, Hand, axe
+from shared import lessons
 
 CROWDS = ("a-stream", "the-hopper", "the-heap")
 
-STEPPED = [
-    pytest.param(one.name, marks=pytest.mark.slow) if one.name in CROWDS else one.name
-    for one in shipped_lessons()
+WAYS = [("mouse", "right"), ("touch", "wrong"), ("keyboard", "odd")]
+PLAYED = [
+    pytest.param(
+        one.name, *way, marks=pytest.mark.slow if one.name in CROWDS or (n + k) % 3 else ()
+    )
+    for n, one in enumerate(lessons())
+    for k, way in enumerate(WAYS)
 ]
-"""The runs of crowds take a while."""
+"""Each lesson in one way, by turns; in all of them, and crowds, whose runs take a while, slowly."""
 
 DESK, PHONE = (1366, 768), (390, 844)
 
 FAR = {"mouse": DESK, "touch": PHONE, "keyboard": DESK}
 """By what a lesson is played, and how large the page is then."""
-
-
-@pytest.fixture
-def page_of(opened, tmp_path):
-    """Open the live page of a lesson."""
-
-    def open_(name, language="en", size=DESK, **options):
-        path = tmp_path / f"{name}-{language}.html"
-        live_page(find(name, language), path)
-        assert path.stat().st_size <= 450_000
-        view = {"width": size[0], "height": size[1]}
-        page = opened(path, viewport=view, **options)
-        page.evaluate(DONE)
-        return page
-
-    return open_
-
-
-@dataclass
-class Hand:
-    """Does things in a page as a pupil does, by one kind of input."""
-
-    page: object
-    by: str
-
-    def press(self, locator, *, force=False):
-        """Press a button."""
-        if self.by == "mouse":
-            locator.click(force=force)
-        elif self.by == "touch":
-            locator.tap(force=force)
-        else:
-            locator.focus()
-            self.page.keyboard.press(
-                "Space" if locator.get_attribute("type") == "radio" else "Enter"
-            )
-
-    def write(self, locator, text):
-        """Write into a field."""
-        locator.focus()
-        locator.fill("")
-        self.page.keyboard.type(text)
-
-    def draw(self, share):
-        """Draw a path down the picture."""
-        page = self.page
-        if self.by == "keyboard":
-            page.locator(".pen").focus()
-            for key in ("Enter", "ArrowLeft", "ArrowDown", "Enter", "ArrowDown", "Enter"):
-                page.keyboard.press(key)
-            return
-        box = page.locator("#stage").bounding_box()
-        places = [(box["x"] + box["width"] * (share - 0.03 * n),
-                   box["y"] + box["height"] * (0.35 + 0.05 * n)) for n in range(8)]  # fmt: skip
-        page.mouse.move(*places[0])
-        page.mouse.down()
-        for place in places[1:]:
-            page.mouse.move(*place)
-        page.mouse.up()
-
-    def mark(self):
-        """Put the flag somewhere."""
-        page = self.page
-        if self.by == "keyboard":
-            page.locator(".guess").focus()
-            for key in ("PageUp", "ArrowLeft"):
-                page.keyboard.press(key)
-            return
-        box = page.locator(".guess .room").bounding_box()
-        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-        page.mouse.down()
-        page.mouse.move(box["x"] + 40, box["y"] + box["height"] / 2, steps=3)
-        page.mouse.up()
-
-    def play(self):
-        """Play a run, and go to its end."""
-        self.press(self.page.locator("#play"))
-        self.page.evaluate(DONE)
-        self.page.evaluate("chutelab.lab.allow(1e9)")
-        self.page.evaluate(DONE)
-        self.page.locator("#time").focus()
-        self.page.keyboard.press("End")
-        self.page.evaluate("chutelab.lab.seek(1e9)")
-        self.page.evaluate("chutelab.lab.pause()")
 
 
 def step_of(page):
@@ -183,13 +102,10 @@ def answered(hand, lesson, kind):
             hand.write(page.locator(f"#ask-{step_of(page)}-{n}"), text)
 
 
-@pytest.mark.parametrize(
-    ("by", "kind"), [("mouse", "right"), ("touch", "wrong"), ("keyboard", "odd")]
-)
-@pytest.mark.parametrize("name", STEPPED)
+@pytest.mark.parametrize(("name", "by", "kind"), PLAYED)
 def test_it_is_played_through(page_of, name, by, kind):
     lesson = find(name)
-    page = page_of(name, size=FAR[by], has_touch=by == "touch")
+    page = page_of(name, size=FAR[by], has_touch=by == "touch", is_mobile=by == "touch")
     hand = Hand(page, by)
     hand.write(page.locator("#student"), "Ada")
     hand.press(page.locator("#begin"))
@@ -408,25 +324,22 @@ def test_the_table_is_a_file_for_spreadsheets(page_of):
     assert re.fullmatch(r"-2,91\d+", first.split(";")[2])
 
 
-@pytest.mark.skipif(not AXE.is_file(), reason="needs npm ci in tests/live")
 @pytest.mark.parametrize(
     ("language", "scheme", "size"),
-    [("en", "light", DESK), ("de", "dark", PHONE), ("de", "light", (844, 390))],
+    [
+        ("en", "light", DESK),
+        ("de", "dark", PHONE),
+        pytest.param("de", "light", (844, 390), marks=pytest.mark.slow),
+    ],
 )
 def test_axe_finds_nothing_in_any_step(page_of, language, scheme, size):
     page = page_of("the-bounce", language, size, color_scheme=scheme)
     lesson = find("the-bounce", language)
     hand = Hand(page, "mouse")
-    axe = AXE.read_text(encoding="utf-8")
 
     def is_clean():
         assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-        page.evaluate(axe)
-        found = page.evaluate(
-            "axe.run().then(({violations}) => violations.map(({id, nodes}) =>"
-            " [id, nodes.map(({html}) => html.slice(0, 200))]))"
-        )
-        assert found == []
+        assert axe(page) == []
         small = page.evaluate("""() => [...document.querySelectorAll("button, summary, select")]
           .filter((one) => one.checkVisibility() && !one.closest(".question")
             && Math.min(one.offsetWidth, one.offsetHeight) < 36)
@@ -437,7 +350,6 @@ def test_axe_finds_nothing_in_any_step(page_of, language, scheme, size):
     page.fill("#student", "Ada")
     page.click("#begin")
     for n in range(len(lesson.steps)):
-        is_clean()
         answered(hand, lesson, "wrong")
         if lesson.steps[n].kind == "note":
             page.evaluate("chutelab.lab.seek(1e9)")
@@ -456,3 +368,61 @@ def test_nothing_but_the_page_itself_is_allowed(page_of, tmp_path):
     assert "default-src 'none'" in policy
     assert "unsafe-inline" not in policy
     assert "unsafe-eval" not in policy.replace("wasm-unsafe-eval", "")
+
+
+@pytest.mark.parametrize(
+    ("name", "language"),
+    [
+        ("the-bounce", "de"),
+        *(
+            pytest.param(one.name, language, marks=pytest.mark.slow)
+            for one in lessons()
+            for language in ("en", "de")
+            if (one.name, language) != ("the-bounce", "de")
+        ),
+    ],
+)
+def test_it_is_printed_one_step_after_the_other_with_room_to_write(page_of, name, language):
+    page, lesson = page_of(name, language, color_scheme="dark"), find(name, language)
+    page.fill("#student", "Ada")
+    page.click("#begin")
+    answered(Hand(page, "mouse"), lesson, "wrong")
+    places = """[...document.querySelectorAll("#stage, .paper")].map((one) =>
+      [one.className, one.parentElement.className])"""
+    before = page.evaluate(places)
+    # On paper: in black on white, and no wider than a page.
+    page.emulate_media(media="print")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.set_viewport_size({"width": 680, "height": 900})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 680
+    too_wide = """() => [...document.querySelectorAll(".paper :is(p, li, table, img, math, .line)")]
+      .filter((one) => one.getBoundingClientRect().right > 681).map((one) => one.outerHTML)"""
+    assert page.evaluate(too_wide) == []
+    operated = page.locator("button, input, textarea, select, details").all()
+    assert not any(one.is_visible() for one in operated)
+    heads = page.locator(".paper h2").all_inner_texts()
+    assert [int(head.split(".")[0]) for head in heads] == [*range(1, len(lesson.steps) + 1)]
+    for n, step in enumerate(lesson.steps):
+        section = page.locator(".paper section").nth(n)
+        assert section.locator("li:has-text('☐'), li:has-text('☒')").count() == sum(
+            len(ask.choices) for ask in step.asks
+        )
+        if step.columns:
+            assert section.locator("table").last.locator("tr").count() == (
+                1 + len(step.rows) + step.free
+            )
+        # What is not yet answered in words has lines.
+        open_ = sum(not (one.choices or one.mark or one.sketch) for one in step.asks)
+        assert section.locator(".line").count() >= (3 * open_ if n else 0)
+    assert page.locator(".paper li:has-text('☒')").count() == sum(
+        bool(ask.choices) for ask in lesson.steps[0].asks
+    )
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    page.emulate_media(media="null")
+    assert page.evaluate(places) == before
+    # The browser itself says before and after.
+    pdf = PdfReader(BytesIO(page.pdf(format="A4")))
+    text = " ".join("".join(one.extract_text().split()) for one in pdf.pages)
+    assert [one for one in heads if "".join(one.split()) not in text] == []
+    assert len(pdf.pages) <= 9
+    assert page.evaluate(places) == before

@@ -1,32 +1,14 @@
-"""The live page's modules: types and style where node is; the words that they say."""
+"""The words that the live page's modules say."""
 
 import json
 import re
-import subprocess
 
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import SAID, data_of
-from chutelab.pictures.live.page import LANGUAGES
+from chutelab.pictures.live.page import LANGUAGES, html
+from chutelab.scene import load
 from chutelab.scene.quantities import REGISTRY
-from live.node import ASSETS, HERE, NODE, needs_node
-
-SCORM = ASSETS.parents[2] / "classroom" / "lessons" / "assets" / "scorm"
-
-
-@needs_node
-def test_types_and_style():
-    """What has not changed since is kept: the second time takes a third of the first."""
-    root, kept = HERE.parents[1], HERE / "node_modules" / ".cache"
-    for tool, *arguments in (
-        ("typescript/bin/tsc", "-p", HERE, "--incremental", "--tsBuildInfoFile", kept / "tsc"),
-        ("eslint/bin/eslint.js", "-c", HERE / "eslint.config.js", "--cache", "--cache-location",
-         kept / "eslint", ASSETS, SCORM, HERE),
-    ):  # fmt: skip
-        done = subprocess.run(
-            [str(NODE), HERE / "node_modules" / tool, *arguments],
-            cwd=root, capture_output=True, text=True,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stdout + done.stderr
+from live.node import ASSETS
 
 
 def test_every_language_has_every_word_and_no_other():
@@ -63,3 +45,14 @@ def test_every_word_of_an_exercise_is_in_its_catalogue():
         said = re.findall(r'\b(?:worded\((?:exercise, )?|its\()"([\w-]+)"', text)
         assert said
         assert set(said) <= set(told), name
+
+
+def test_every_colour_that_a_style_names_is_set():
+    """A property that is not set is no colour at all, and what it paints is not seen."""
+    for lesson in (None, {"title": "", "steps": []}):
+        page = html(load("perpendicular"), lesson=lesson)
+        style = re.search("<style>(.*)</style>", page, re.DOTALL)[1]
+        used = set(re.findall(r"var\(--([\w-]+)\)", style))
+        # The share of the time that is computed is set by the page.
+        assert used - {"ready"} <= set(re.findall(r"--([\w-]+):", style))
+        assert len(used) > 30

@@ -241,6 +241,8 @@ def test_the_machine_is_fitted_into_what_the_cards_leave_free(shown, name, size)
     for x, y in track:
         assert free["left"] <= x <= free["right"]
         assert free["top"] - 1 <= y <= free["bottom"] + 1
+    if name in ("inclined-40", "cascade", "spoon"):
+        the_card_of_what_is_chosen_covers_neither_it_nor_another_card(page, size)
 
 
 def test_belts_run_with_their_speed_and_wheels_turn_with_them(shown):
@@ -338,9 +340,7 @@ def test_what_cannot_be_is_said_at_the_pointer_and_nothing_moves(shown):
     assert page.evaluate("chutelab.toml()") == before
 
 
-@over("inclined-40", "cascade", "spoon")
-def test_the_card_of_what_is_chosen_covers_neither_it_nor_another_card(shown, name, size):
-    page = shown(name, viewport={"width": size[0], "height": size[1]})
+def the_card_of_what_is_chosen_covers_neither_it_nor_another_card(page, size):
     names = page.evaluate("[...chutelab.lab.machine.surfaces, ...chutelab.lab.machine.streams]")
     for one in names:
         page.evaluate("(name) => chutelab.bench.inspector.choose(name)", one)
@@ -434,3 +434,70 @@ def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
             # A line of text is taller than its letters.
             apart = min(right, right2) - max(left, left2), min(bottom, bottom2) - max(top, top2)
             assert not (own or own2) or min(apart) <= 5.0, (text, other, apart)
+
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+
+# Where the last of what is seen of an element ends.
+LAST = """(all) => Math.max(...[...all.querySelectorAll("*")]
+  .filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect().bottom))"""
+
+# Of what can be pressed and is seen, what is less than a finger: name, width and height.
+SMALL = """() => [...document.querySelectorAll(
+    "button, select, summary, label:has([type=checkbox]), input:not([type=checkbox]), .grip .room")]
+  .filter((one) => one.checkVisibility())
+  .map((one) => [one.id || one.textContent, one.getBoundingClientRect()])
+  .map(([name, { width, height }]) => [name, width, height])
+  .filter(([, width, height]) => width > 0 && (width < 43.9 || height < 43.9))"""
+
+
+@pytest.mark.parametrize(("name", "size"), [("perpendicular", (390, 844)), ("stream", (320, 568))])
+def test_on_a_phone_one_card_or_drawer_lies_under_the_picture(shown, name, size):
+    phone = PHONE | {"viewport": {"width": size[0], "height": size[1]}}
+    page = shown(name, **phone)
+    dock, sheet = (
+        page.locator(".dock"),
+        ".drawer:visible, .parts:visible, #panels:visible, #chosen:visible",
+    )
+    picture = page.locator("#stage").bounding_box()
+
+    def look():
+        """Picture, time and tools are seen whole, and below the time one thing, to its end."""
+        assert page.locator("#stage").bounding_box() == picture
+        assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+        play, bar = page.locator(".transport").bounding_box(), dock.bounding_box()
+        assert bar["y"] + bar["height"] == pytest.approx(size[1], abs=1)
+        assert page.locator(sheet).count() == 1
+        box = page.locator(sheet).bounding_box()
+        assert play["y"] + play["height"] - 1 <= box["y"]
+        assert box["y"] + box["height"] <= bar["y"] + 1
+        page.locator(sheet).evaluate("(one) => one.scrollTo(0, 1e6)")
+        last = page.locator(sheet).evaluate(LAST)
+        assert last <= bar["y"] + 1
+        assert page.evaluate(SMALL) == []
+
+    look()
+    assert page.locator("#numbers" if name == "stream" else "#energy").is_visible()
+    for tab in page.locator(".tabs button").all():
+        tab.click()
+        assert page.locator(f"#{tab.get_attribute('data-of')}").is_visible()
+        assert page.locator("#panels > .card:visible").count() == 1
+        look()
+    for tool, seen in (("add", "#part-belt"), ("tape", "#tool-tape"), ("eye", "#show-grid"),
+                       ("more", "#keys")):  # fmt: skip
+        page.click(f"#dock-{tool}")
+        page.locator(seen).scroll_into_view_if_needed()
+        assert page.locator(seen).is_visible()
+        look()
+    # What is taken leaves the picture to be measured in; what is chosen has its card.
+    page.click("#dock-tape")
+    page.click("#tool-tape")
+    assert page.locator(".measures .tape").count() == 1
+    assert page.locator(".tabs").is_visible()
+    page.evaluate("chutelab.bench.inspector.choose(chutelab.lab.machine.surfaces[0])")
+    assert page.locator("#chosen").is_visible()
+    look()
+    # Turned, or on a wider window, all is where it belongs there.
+    page.set_viewport_size({"width": 1366, "height": 768})
+    assert page.locator(".bench #tool-tape").is_visible()
+    assert page.locator("#panels > .card:visible").count() > 2

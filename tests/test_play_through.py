@@ -1,4 +1,4 @@
-"""Every lesson's page, played through by mouse and by keyboard: it says what Python says."""
+"""The exercise of every lesson's page, by mouse, touch and keyboard: it says what Python says."""
 
 import json
 from collections import deque
@@ -13,64 +13,24 @@ from chutelab.classroom.grading import grade
 from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.pages import live_page
 from chutelab.classroom.words import words
-from live.browser import DONE
+from live.browser import DONE, Hand
 
 STUDENT = "Zoë O'Neil"
 NONSENSE = ["two metres", "", "  ", "NaN", "1/0", "2..5", "<b>1</b>", "9" * 400, "😀", "x = 3"]
 WRITTEN = 'Die Platte nimmt ½ m v² (1 - ε²).\n<b>Not</b> g, \\ or "it".'
 
-QUICK = [("the-bounce", "mouse", "en", 1), ("the-parabola", "keyboard", "en", 1)]
-WHOLE = [(name, way, "en", 6) for name in EXERCISES for way in ("mouse", "keyboard")]
+QUICK = [("the-bounce", "keyboard", "en", 1)]
+WHOLE = [(name, way, "en", 6) for name in EXERCISES for way in ("mouse", "touch", "keyboard")]
 GERMAN = [("the-bounce", "mouse", "de", 6)]
 
 
-class Mouse:
-    """Clicks on what is there; letters come from a keyboard all the same."""
-
-    def __init__(self, page):
-        self.page = page
-
-    def press(self, locator):
-        locator.click()
-
-    def write(self, field, text):
-        field.click(click_count=3)
-        self.replace(text)
-
-    def replace(self, text):
-        """Write in place of what is selected."""
-        if text:
-            self.page.keyboard.insert_text(text)
-        else:
-            self.page.keyboard.press("Delete")
-
-    def answer(self, question, typed):
-        self.write(question.locator("input"), typed)
-        question.locator(".check").click()
-
-
-class Keys(Mouse):
-    """Tab to what is there; no mouse, and no focus that the page did not give."""
-
-    def to(self, locator):
-        for _ in range(400):
-            if locator.evaluate("(found) => found === document.activeElement"):
-                return
-            self.page.keyboard.press("Tab")
-        raise AssertionError(f"no key leads to {locator}")
-
-    def press(self, locator):
-        self.to(locator)
-        self.page.keyboard.press("Enter")
-
-    def write(self, field, text):
-        self.to(field)
-        self.page.keyboard.press("Control+A")
-        self.replace(text)
-
-    def answer(self, question, typed):
-        self.write(question.locator("input"), typed)
-        self.page.keyboard.press("Enter")
+def answer(hand, question, typed):
+    """Type an answer, and have it checked by the button or by Enter."""
+    hand.write(question.locator("input"), typed)
+    if hand.by == "keyboard":
+        hand.page.keyboard.press("Enter")
+    else:
+        hand.press(question.locator(".check"))
 
 
 def one_line(text):
@@ -105,9 +65,11 @@ def test_a_lesson_is_played_through(name, way, language, most, opened, tmp_path,
     _, cases = draw(EXERCISES[name], STUDENT)
     path = tmp_path / "page.html"
     live_page(find(name, language), path)
-    page = opened(path, viewport={"width": 1366, "height": 900})
+    touches = way == "touch"
+    view = {"width": 390, "height": 844} if touches else {"width": 1366, "height": 900}
+    page = opened(path, viewport=view, has_touch=touches, is_mobile=touches)
     page.evaluate(DONE)
-    hand = {"mouse": Mouse, "keyboard": Keys}[way](page)
+    hand = Hand(page, way)
     assert page.locator(".question").count() == 0
     hand.write(page.locator("#student"), STUDENT)
     hand.press(page.locator("#begin"))
@@ -120,7 +82,7 @@ def test_a_lesson_is_played_through(name, way, language, most, opened, tmp_path,
             hand.press(question.locator("summary"))
         assert one_line(task.question(n).text) in one_line(question.inner_text())
         for typed in NONSENSE[n - 1 :: len(cases)][:most]:
-            hand.answer(question, typed)
+            answer(hand, question, typed)
             verdict = task.check(n, typed).verdict
             assert verdict in (Verdict.BLANK, Verdict.UNREAD)
             assert reply.get_attribute("data-verdict") == verdict.name.lower(), typed
@@ -135,7 +97,7 @@ def test_a_lesson_is_played_through(name, way, language, most, opened, tmp_path,
             typed = f"{value:.3g}" if value == case.right else f"{value:.6g}"
             wanted = task.check(n, float(typed))
             verdicts.add(wanted.verdict)
-            hand.answer(question, said.local(typed))
+            answer(hand, question, said.local(typed))
             advice = said.say("python-hint", number=n)
             text = wanted.text.removesuffix(advice)
             expected = f"{MARKS[wanted.verdict][0]} {wanted.heading}. {text}"

@@ -58,6 +58,7 @@ CONTRACT = {
     "conveyor": (),
     "surface": (),
     "string": (),
+    "sensor": (),
     "stream": {"name": "stream", "particle": None, "count": 1, "rate": 200.0, "width": None,
      "start": 0.0, "bed_height": 0.0, "speed_spread": 0.0, "seed": 0, "at": None, "to": None,
      "fill": None, "velocity": None, "interact": False, "restitution": 0.5, "friction": 0.3},
@@ -457,7 +458,9 @@ def test_another_unit_is_refused(text, says):
         sc.load("perpendicular", text)
 
 
-@pytest.mark.parametrize("table", ["surface", "material", "pair", "conveyor", "string", "expect"])
+@pytest.mark.parametrize(
+    "table", ["surface", "material", "pair", "conveyor", "string", "sensor", "expect"]
+)
 def test_one_pair_of_brackets_is_answered_with_two(table):
     text = f"{CONVEYOR}\n[{table}]\nname = 'a'\n"
     with pytest.raises(sc.SceneError) as caught:

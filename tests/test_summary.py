@@ -16,7 +16,7 @@ TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
     "impact", "landing", "arrival", "flight", "track", "ended", "fates", "crowd", "stopped",
     "plugged", "waited", "squeezed", "rolling", "steady", "drag", "laws", "instead", "ledger",
-    "theory", "theory_as_printed", "error", "accuracy",
+    "sensors", "theory", "theory_as_printed", "error", "accuracy",
 ]  # fmt: skip
 BEFORE = ["t", "x", "y", "vx", "vy"]
 LEDGER = [

@@ -1,9 +1,12 @@
 """Pages in a real browser: none of them says anything on the console, or asks for anything."""
 
 import shutil
+from pathlib import Path
 
 import pytest
 
+from chutelab.classroom.lessons import find
+from chutelab.classroom.lessons.pages import live_page
 from chutelab.pictures.live.page import html
 from chutelab.scene import load, parse, to_toml
 
@@ -23,11 +26,143 @@ DONE = """() => new Promise((resolve, reject) => {
 })"""
 
 
+AXE = Path(__file__).parent / "node_modules" / "axe-core" / "axe.min.js"
+
+
+def axe(page):
+    """Return what axe-core finds wrong with a page as it is now: each rule and where."""
+    if not AXE.is_file():
+        pytest.skip("needs axe: npm ci --prefix tests/live")
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    # It asks for style sheets again, which a file may not, and takes no formula for a text.
+    rules = {"empty-table-header": {"enabled": False}}
+    found = page.evaluate("(how) => axe.run(how)", {"preload": False, "rules": rules})
+    assert len(found["passes"]) > 10
+    return [
+        (one["id"], [node["html"][:200] for node in one["nodes"]]) for one in found["violations"]
+    ]
+
+
+def spot(page, u, v):
+    """Where a share of the picture's free part is on the screen, in whole pixels."""
+    box = page.locator("#stage").bounding_box()
+    free = page.evaluate("chutelab.stage.view.free")
+    across, up = free["right"] - free["left"], free["bottom"] - free["top"]
+    return round(box["x"] + free["left"] + u * across), round(box["y"] + free["top"] + v * up)
+
+
 def to_step(page, kind="numbers"):
     """Skip the steps of a lesson up to one of a kind."""
     page.locator(".page[data-kind]").wait_for()
     while page.locator(".page").get_attribute("data-kind") != kind:
         page.locator("#skip:visible, #step-next:enabled:visible").first.click()
+
+
+CLICKED = """() => {
+  globalThis.clicked = new Promise((resolve) => {
+    addEventListener("click", () => setTimeout(resolve, 0, true), { capture: true, once: true });
+    setTimeout(resolve, 3000, false);
+  });
+}"""
+
+
+class Hand:
+    """Does things in a page as a pupil does, by `mouse`, `touch` or `keyboard`.
+
+    The keyboard goes with Tab to what it uses: no focus that the page does not give.
+    """
+
+    def __init__(self, page, by):
+        self.page, self.by = page, by
+
+    def to(self, locator):
+        """Go to an element by Tab, and by an arrow within a group."""
+        if self.by != "keyboard":
+            locator.focus()
+            return
+        for _ in range(400):
+            if locator.evaluate("(one) => one === document.activeElement"):
+                return
+            near = "({ name }) => name && name === document.activeElement.name"
+            self.page.keyboard.press("ArrowDown" if locator.evaluate(near) else "Tab")
+        raise AssertionError(f"no key leads to {locator}")
+
+    def press(self, locator, *, force=False):
+        """Press a button, or choose a choice."""
+        if self.by == "mouse":
+            locator.click(force=force)
+        elif self.by == "touch":
+            # The click comes some time after the finger; a busy browser may drop a tap.
+            for _ in range(3):
+                self.page.evaluate(CLICKED)
+                locator.tap(force=force)
+                if self.page.evaluate("clicked"):
+                    return
+            raise AssertionError(f"no tap reaches {locator}")
+        else:
+            self.to(locator)
+            choice = locator.get_attribute("type") == "radio"
+            self.page.keyboard.press("Space" if choice else "Enter")
+
+    def write(self, field, text):
+        """Write into a field, in place of what is there."""
+        if self.by == "keyboard":
+            self.to(field)
+        else:
+            self.press(field)
+        self.page.keyboard.press("Control+A")
+        if text:
+            self.page.keyboard.insert_text(text)
+        else:
+            self.page.keyboard.press("Delete")
+
+    def drag(self, places):
+        """Draw a path through places, px, by mouse or finger."""
+        if self.by == "mouse":
+            mouse = self.page.mouse
+            mouse.move(*places[0])
+            mouse.down()
+            for place in places[1:]:
+                mouse.move(*place)
+            mouse.up()
+            return
+        session = self.page.context.new_cdp_session(self.page)
+        kinds = ["touchStart", *["touchMove"] * (len(places) - 1), "touchEnd"]
+        for kind, place in zip(kinds, [*places, None], strict=True):
+            points = [{"x": place[0], "y": place[1]}] if place else []
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    def draw(self, share):
+        """Draw a path down the picture, from a share of its width on."""
+        if self.by == "keyboard":
+            self.to(self.page.locator(".pen"))
+            for key in ("Enter", "ArrowLeft", "ArrowDown", "Enter", "ArrowDown", "Enter"):
+                self.page.keyboard.press(key)
+            return
+        box = self.page.locator("#stage").bounding_box()
+        self.drag([(box["x"] + box["width"] * (share - 0.03 * n),
+                    box["y"] + box["height"] * (0.35 + 0.05 * n)) for n in range(8)])  # fmt: skip
+
+    def mark(self):
+        """Put the flag somewhere."""
+        if self.by == "keyboard":
+            self.to(self.page.locator(".guess"))
+            for key in ("PageUp", "ArrowLeft"):
+                self.page.keyboard.press(key)
+            return
+        box = self.page.locator(".guess .room").bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        self.drag([(x, y), *[(x + share * (box["x"] + 40 - x), y) for share in (0.3, 0.6, 1.0)]])
+
+    def play(self):
+        """Play a run, and go to its end."""
+        self.press(self.page.locator("#play"))
+        self.page.evaluate(DONE)
+        self.page.evaluate("chutelab.lab.allow(1e9)")
+        self.page.evaluate(DONE)
+        self.to(self.page.locator("#time"))
+        self.page.keyboard.press("End")
+        self.page.evaluate("chutelab.lab.pause()")
 
 
 @pytest.fixture(scope="session")
@@ -83,3 +218,19 @@ def shown(opened, tmp_path):
         return page
 
     return show
+
+
+@pytest.fixture
+def page_of(opened, tmp_path):
+    """Open the live page of a lesson."""
+
+    def open_(name, language="en", size=(1366, 768), **options):
+        path = tmp_path / f"{name}-{language}.html"
+        live_page(find(name, language), path)
+        assert path.stat().st_size <= 450_000
+        view = {"width": size[0], "height": size[1]}
+        page = opened(path, viewport=view, **options)
+        page.evaluate(DONE)
+        return page
+
+    return open_

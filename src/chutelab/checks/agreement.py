@@ -291,7 +291,7 @@ def verify(
     findings: list[Finding] = []
     for expect in scene.expect:
         quantity, names = expect.quantity, [str(stream.name) for stream in scene.streams]
-        row = lookup(quantity, scene.surfaces, names)
+        row = lookup(quantity, scene.places, names)
         assert row is not None
         told = predicted(prediction, row)
         values = {engine: measure(recordings[engine], quantity) for engine in recordings}

@@ -102,7 +102,7 @@ def _value(recording: Recording, name: str) -> float:
 
     NaN where the scene has none, or one for each of several particles.
     """
-    row = lookup(name, recording.scene.surfaces, recording.machine.streams)
+    row = lookup(name, recording.scene.places, recording.machine.streams)
     if row is None or whose(row, recording.count):
         return nan
     found = measure(recording, name)

@@ -44,6 +44,7 @@ KINDS = {
     "mp4": ("lesson.mp4",),
     "webm": ("lesson.webm",),
     "strobe": ("strobe.png",),
+    "sensors": ("sensors.csv", "sensors.png"),
 }
 """What ``--only`` takes, and the files it stands for."""
 
@@ -71,8 +72,8 @@ class Output:
     film, and a film that cannot be written here.
 
     --out DIR  Write pictures, tables and the recording into this folder.
-    --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe; without, the first
-        5, but no events.csv of more than 100,000 events. May be repeated.
+    --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe,sensors; without,
+        the first 5, but no events.csv of more than 100,000 events. May be repeated.
     --format  With --out: the lesson picture as this instead of a GIF; mp4 and webm need the extra
         chutelab[video].
     --no-energy  With --out: the lesson picture without the energy ledger; the machine is larger.
@@ -145,6 +146,11 @@ class Output:
                 elif kind == "csv":
                     tables = ("events", "trajectory")[self.leaves_out(recording) :]
                     recording.to_csv(folder, only=tables)
+                elif kind == "sensors":
+                    from chutelab.pictures.plots.figure import sensors
+
+                    recording.to_csv(folder, only=["sensors"])
+                    sensors(recording).write(folder / "sensors.png")
                 elif kind == "npz":
                     recording.save(path)
                 else:

@@ -120,11 +120,15 @@ PAIRED static Curve curve_after(const double *knot) {
     return (Curve){{ from, from + third * two_at(knot + 3), to - third * two_at(next + 3), to }};
 }
 
+PAIRED static Two place_on(const Curve *c, double share) {
+    double s = share, r = 1 - s;
+    return r * r * (r * c->p[0] + 3 * s * c->p[1]) + s * s * (3 * r * c->p[2] + s * c->p[3]);
+}
+
 /* Where a particle is at a share of the interval after a knot. */
 PAIRED void place_at(const double *knot, double share, double *x, double *y) {
     Curve c = curve_after(knot);
-    double s = share, r = 1 - s;
-    Two place = r * r * (r * c.p[0] + 3 * s * c.p[1]) + s * s * (3 * r * c.p[2] + s * c.p[3]);
+    Two place = place_on(&c, share);
     *x = place[0];
     *y = place[1];
 }
@@ -194,8 +198,8 @@ PAIRED static int is_clear_of_bow(const Curve *c, const Barrier *b, double limit
     double outer = b->radius + limit, inner = b->radius - limit;
     Two q[4];
     square_distance(c, two_at(&b->x), q);
-    int is_inside = inner > 0 && q[0][0] <= inner * inner;
-    if (is_inside ? all_to(q, 4, inner * inner) : all_from(q, 4, outer * outer)) return 1;
+    /* Of a mass point both may hold to begin with: then the limit is below 0. */
+    if (all_from(q, 4, outer * outer) || (inner > 0 && all_to(q, 4, inner * inner))) return 1;
     if (b->whole) return 0;
     /* Beyond the ends: not counterclockwise of the first, or not clockwise of the last; of an arc of
        more than half a circle neither. */
@@ -325,21 +329,26 @@ PAIRED static void look(const Curve *c, Barrier *b, int number, int knot) {
     settle(c, 0, 1, 0);
 }
 
+/* Side of a piece on which a path is where it first is off it, from its beginning on or back from its end:
+   1 or -1, or 0 if it stays on it, or gets beyond its ends. */
+PAIRED static int side_of(const Barrier *b, const Curve *c, int is_end) {
+    for (double share = 1.0 / (1 << HALVINGS); share <= 1; share *= 2) {
+        Two place = place_on(c, is_end ? 1 - share : share);
+        double d = beside(b, place[0], place[1]);
+        if (fabs(d) <= L.allowed) continue;
+        return is_within(b, place[0], place[1], side_margin()) ? (d > 0) - (d < 0) : 0;
+    }
+    return 0;
+}
+
 /* Where a mass point comes to a piece from one side and goes on on the other: such a passage at a knot,
    as where a blow does not turn a point back, is in no interval. */
-PAIRED static void turn(const Curve *c, Barrier *pieces, int first, int knot) {
+PAIRED static void turn(const Curve *before, const Curve *after, const Barrier *pieces, int knot) {
     const double *now = KNOT(knot);
     for (int k = 0; k < L.piece_count; k++) {
         const Barrier *b = pieces + k;
-        double far = 0, before = pieces[k].side;
-        for (int n = 0; n < 4; n++) {
-            double d = beside(b, c->p[n][0], c->p[n][1]);
-            if (fabs(d) > fabs(far)) far = d;
-        }
-        pieces[k].side = far;
-        if (first || MIN(fabs(far), fabs(before)) <= L.allowed || (far > 0) == (before > 0)) continue;
-        if (!is_within(b, now[1], now[2], side_margin()) || !is_there(b, now[0])
-            || distance(b, now[1], now[2]) > L.allowed) continue;
+        if (distance(b, now[1], now[2]) > L.allowed || !is_there(b, now[0])) continue;
+        if (side_of(b, before, 1) * side_of(b, after, 0) >= 0) continue;
         At.number = k;
         add_hit(now[0], now[1], now[2], 0, 1);
     }
@@ -369,6 +378,7 @@ PAIRED int find_hits(int i) {
     Interval some[WIDTH];
     Barrier *pieces = L.barriers + (L.family ? i * L.piece_count : 0);
     Box box = all_apart();
+    Curve last;
     int count = 0, first = 1, before = L.hit_count;
     if (!L.piece_count) return 0;
     At.particle = i;
@@ -386,7 +396,8 @@ PAIRED int find_hits(int i) {
         now->box.high = larger(larger(c.p[0], c.p[1]), larger(c.p[2], c.p[3]));
         box.low = lesser(box.low, now->box.low);
         box.high = larger(box.high, now->box.high);
-        if (At.radius == 0) turn(&now->path, pieces, first, k);
+        if (At.radius == 0 && !first) turn(&last, &c, pieces, k);
+        last = c;
         first = 0;
         if (count == WIDTH) {
             look_at_all(some, count, &box, pieces);

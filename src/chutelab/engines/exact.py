@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import (
+from chutelab.core import (
     REAL,
     AsideError,
     Module,

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from chutelab.results.arrival import arrivals, never
 from chutelab.results.ledger import ledger, ledger_of_each
 from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
+from chutelab.results.sensors import first_passages, reading
 from chutelab.scene import Scene
 from chutelab.scene.quantities import (
     FIRST,
@@ -381,6 +382,8 @@ def each(recording: Record, name: str) -> Floats:
             return np.asarray(np.fmin(*met) - left)
         case ["impact", surface, key]:
             return column(first(recording, "impact", surface), key)
+        case ["sensor", sensor, key]:
+            return first_passages(recording, sensor)[key]
         case ["separation" | "impact" | "landing" as event, key]:
             return column(first(recording, event), key)
         case ["arrival", key]:
@@ -431,6 +434,8 @@ def measured(recording: Record, name: str) -> Floats:
             return count(np.isnan(each(recording, "arrival.t")))
         case ["error", "max"]:
             return worst(recording)
+        case ["sensor", sensor, "count" | "back" | "rate" | "mass_rate" | "depth" as key]:
+            return np.array([float(getattr(reading(recording, sensor), key))])
         case ["ledger", "by_surface", surface, entry]:
             return paid(recording, surface, entry)
         case ["ledger", "power"]:
@@ -468,7 +473,7 @@ def measure(recording: Record, name: str) -> float:
     KeyError
         If the scene has no quantity of that name, or the name does not say of which particle.
     """
-    surfaces = recording.scene.surfaces
+    surfaces = recording.scene.places
     row = lookup(name, surfaces, recording.machine.streams)
     if row is None:
         raise KeyError(f"no quantity {name!r}; {suggestion(name, surfaces)}")

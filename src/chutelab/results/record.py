@@ -40,6 +40,10 @@ PARTICLES = "particles"
 """Name under which the losses of particle-particle contacts are booked."""
 
 
+QUANTILES = (0.02, 0.5, 0.98)
+"""Shares of a stream on the near side of its one edge, its middle and its other edge."""
+
+
 class Kind(IntEnum):
     """What happened in an event."""
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from chutelab.machine import build
 from chutelab.results.record import ENGINES, ENTRIES, EVENT, KNOT, REASONS, Kind, Record
+from chutelab.results.sensors import sensed
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
@@ -53,8 +54,8 @@ come to 60, and a file that is made to fill the memory to 1000."""
 FAR = 1e100
 """Bound on every number: energies and distances computed from it stay finite."""
 
-TABLES = ("events", "trajectory")
-"""What `to_csv` writes."""
+TABLES = ("events", "trajectory", "sensors")
+"""What `to_csv` can write; the last only where it is asked for."""
 
 COLUMNS = ("t", "particle", "other", "kind", "surface")
 """Fields of an event that events.csv begins with."""
@@ -230,9 +231,9 @@ def to_csv(
     folder: str | Path,
     *,
     step: float | None = None,
-    only: Collection[str] = TABLES,
+    only: Collection[str] = TABLES[:2],
 ) -> list[Path]:
-    """Write events.csv and trajectory.csv, each whole or not at all.
+    """Write events.csv, trajectory.csv and sensors.csv, each whole or not at all.
 
     Parameters
     ----------
@@ -243,7 +244,7 @@ def to_csv(
     step : float, optional
         Interval of the trajectory, s; by default that of `instants`.
     only : collection of str
-        Which of the two.
+        Which of the three; by default the first two.
 
     Raises
     ------
@@ -298,6 +299,8 @@ def _table(recording: Record, name: str, step: float | None) -> Iterator[Sequenc
                 f"step = {step!r}: the trajectory would have up to {many:.3g} rows, and"
                 f" {MOST_ROWS:,} are what a spreadsheet opens; allowed: {least}"
             )
+    if name == "sensors":
+        return _passages(recording)
     return _events(recording) if name == "events" else _trajectory(recording, step)
 
 
@@ -344,3 +347,11 @@ def _trajectory(recording: Record, step: float | None) -> Iterator[Sequence[obje
         (position,), (velocity,) = recording.at([t])
         for i in np.flatnonzero(np.isfinite(position[:, 0])).tolist():
             yield t, i, *position[i].tolist(), *velocity[i].tolist()
+
+
+def _passages(recording: Record) -> Iterator[Sequence[object]]:
+    yield "sensor", "t", "particle", "way", "along", "x", "y", "vx", "vy", "radius", "mass"
+    for sensor in recording.scene.sensor:
+        for t, particle, way, along, place, velocity in sensed(recording, sensor.name).tolist():
+            own = float(recording.radius[particle]), float(recording.mass[particle])
+            yield sensor.name, t, particle, way, along, *place, *velocity, *own

@@ -17,14 +17,11 @@ import numpy as np
 
 from chutelab.results.arrival import CARRIED, Places, arrivals, fates
 from chutelab.results.quantities import each, measure
-from chutelab.results.record import ENTRIES, Record
+from chutelab.results.record import ENTRIES, QUANTILES, Record
 from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.units import with_unit
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.tables import Sheet, Shown, number
-
-QUANTILES = (0.02, 0.5, 0.98)
-"""Shares of the paths that an envelope leaves on its right: its two edges, and the middle."""
 
 FEWEST = 20
 """Least number of particles whose paths have an envelope."""

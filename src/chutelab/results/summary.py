@@ -20,6 +20,8 @@ from chutelab.results.laws import judge
 from chutelab.results.ledger import Ledger, ledger
 from chutelab.results.quantities import column, compare, each, first, predicted, prediction
 from chutelab.results.record import REASONS, Kind, Record
+from chutelab.results.sensors import readings
+from chutelab.results.sensors import sheet as sensor_sheet
 from chutelab.results.stream import FLOW, crowd, steady
 from chutelab.scene.quantities import REGISTRY, THEORY, Quantity
 from chutelab.theory import Drag, Transfer, drag, predict
@@ -287,6 +289,8 @@ def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
     )
     balance = ledger(recording).sheet(details=details)
     parts.append(replace(balance, title=f"Energy ledger until {ends}, J"))
+    if (sensors := sensor_sheet(recording)) is not None:
+        parts.append(sensors)
     notes = [str(note) for read, _ in NOTES.values() if (note := read(recording)) is not None]
     if (layered := layers(recording)) is not None:
         notes.insert(
@@ -330,7 +334,9 @@ LISTS: dict[str, dict[str, Quantity]] = {}
 """What each particle has, a list each: rows of the registry by the two parts of their names."""
 
 for _row in REGISTRY.values():
-    if _row.of == "particle" and "SURFACE" not in _row.name:
+    if _row.of == "particle" and _row.name == _row.name.replace("SURFACE", "").replace(
+        "SENSOR", ""
+    ):
         _home, _key = _row.name.split(".")
         LISTS.setdefault(_home, {})[_key] = _row
 
@@ -349,6 +355,7 @@ OTHERS = {
     "laws": ("array", "laws of every run that this one broke, see `results.laws.Broken`"),
     "instead": ("string", "why another engine ran first, see `Recording.instead`"),
     "ledger": ("object", "where the energy went, see `results.ledger.Ledger`"),
+    "sensors": ("object", "what the scene's sensors tell, see `results.sensors.Reading`"),
     "theory": ("object", "what the closed form predicts of particle 0, and why it stops"),
     "theory_as_printed": ("object", "the same with Eq. (9) as it is printed; null with friction of"
                           " the plate, or where it leans"),
@@ -389,6 +396,7 @@ def summary(recording: Record, accuracy: Mapping[str, Any] | None = None) -> dic
         "laws": judge(recording),
         "instead": recording.instead or None,
         "ledger": ledger(recording),
+        "sensors": readings(recording),
         "theory": _theory(prediction(recording)),
         "theory_as_printed": as_printed,
         "error": {**error.errors, "max": error.max},

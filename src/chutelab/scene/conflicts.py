@@ -51,7 +51,7 @@ EITHER: Final = {"particle": "particles", "plate": "plates", "stream": "streams"
 ALWAYS: Final = ("particle", "stream", "run")
 """Tables that a scene has without writing them."""
 
-NO_MACHINE: Final = ("expect", "view", "live")
+NO_MACHINE: Final = ("sensor", "expect", "view", "live")
 """Tables that say nothing of the machine."""
 
 LEAST_VIEW: Final = 1e-6
@@ -254,8 +254,9 @@ RULES: Final[dict[str, list[list[str]]]] = tomllib.loads(
 
 
 @cache
-def _compiled(when: str) -> CodeType:
-    return compile(when, f"<{when}>", "eval")
+def compiled(formula: str) -> CodeType:
+    """Return a formula for `eval`."""
+    return compile(formula, f"<{formula}>", "eval")
 
 
 class _Names(dict[str, Any]):
@@ -288,7 +289,7 @@ def contradictions(look: Look, table: str, rows: Sequence[Row]) -> Iterator[Faul
         for keys, when, _, said in RULES[table]:
             for key in keys.split():
                 names["key"] = key
-                if eval(_compiled(when), {"__builtins__": {}}, names) and (
+                if eval(compiled(when), {"__builtins__": {}}, names) and (
                     row.given(key) or row.sound(key)
                 ):
                     text = said.format_map(_Names(row.path, its=row, run=run))
@@ -344,7 +345,7 @@ def _tables(look: Look) -> Iterator[Fault]:
 def _names(look: Look) -> Iterator[Fault]:
     """Say which names are there twice, or missing, or lead nowhere."""
     surfaces: dict[object, str] = {}
-    for table in (*SURFACES, "particle", "stream", "material"):
+    for table in (*SURFACES, "particle", "stream", "material", "sensor"):
         known = surfaces if table in SURFACES else {}
         rows = look.rows(table)
         for row in rows:
@@ -407,22 +408,16 @@ def _mass(look: Look, kind: Row) -> Iterator[Fault]:
     radius = kind["radius"]
     if radius == 0.0 or kind["shape"] in ("box", "polygon"):
         return
-    key, density = _density(look, kind)
+    key, density, name = "density", kind["density"], kind["material"]
+    if density is None and not kind.given("mass") and isinstance(name, str):
+        own = [row["density"] for row in look.rows("material") if row["name"] == name]
+        if not own and name in PRESETS:
+            own = [PRESETS[name].material.density]
+        key, density = "material", own[0] if own and look.sound("material") else None
     radius = 0.5 * sum(radius) if isinstance(radius, LIST) else radius
     if density is not None and (mass := sphere_mass(density, radius)) < LIGHTEST:
         text = f"with {kind.path('radius')} = {radius:g} m a mass of at least {LIGHTEST:g} kg"
         yield kind.fault(key, f"{text}, not {mass:.3g} kg")
-
-
-def _density(look: Look, kind: Row) -> tuple[str, float | None]:
-    """Return the key that a kind's density comes from, and the density; None if it has a mass."""
-    density, name = kind["density"], kind["material"]
-    if density is not None or kind.given("mass") or not isinstance(name, str):
-        return "density", density
-    found = [own["density"] for own in look.rows("material") if own["name"] == name]
-    if not found and name in PRESETS:
-        found = [PRESETS[name].material.density]
-    return "material", found[0] if found and look.sound("material") else None
 
 
 def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterator[Fault]:
@@ -494,10 +489,11 @@ def stream_name(row: int) -> str:
 
 
 def _expectations(look: Look, streams: Sequence[Row]) -> Iterator[Fault]:
-    if not all(map(look.sound, SURFACES)):
+    if not all(map(look.sound, (*SURFACES, "sensor"))):
         return
     surfaces = [*filter(look.has, ("incoming", "outgoing")), *["plate"] * look.damps]
     surfaces += [name for table in SURFACES for name in _texts(look.rows(table))]
+    surfaces += [f"sensor.{name}" for name in _texts(look.rows("sensor"))]
     names = [
         name if isinstance(name := stream["name"], str) else stream_name(number)
         for number, stream in enumerate(streams)

@@ -32,7 +32,7 @@ from chutelab.util.errors import MISSING, Fault, InputError, nearest
 Location = tuple[str | int, ...]
 """Path of keys and indices, as Pydantic gives it."""
 
-LISTS: Final = ("material", "pair", "conveyor", "surface", "string", "expect")
+LISTS: Final = ("material", "pair", "conveyor", "surface", "string", "sensor", "expect")
 """Tables that are always lists; of those in `EITHER` there may be one or several."""
 
 _WORDS: Final = {

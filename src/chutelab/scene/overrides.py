@@ -56,7 +56,7 @@ def schema() -> dict[str, Any]:
 
 _schema = cache(schema)
 
-NAMED: Final = ("particle", "material", "plate", "conveyor", "surface", "stream")
+NAMED: Final = ("particle", "material", "plate", "conveyor", "surface", "stream", "sensor")
 """Tables of which there may be several, with names."""
 
 _SEGMENT: Final = re.compile(rf"({WORDS})((?:\[\d{{1,9}}\])*)")

@@ -28,7 +28,7 @@ Ending = Literal["any", "scene", "settled"]
 
 
 class Quantity(NamedTuple):
-    """A quantity of a run; ``SURFACE`` in its name and meaning stands for any surface."""
+    """A quantity of a run; ``SURFACE`` and ``SENSOR`` in it stand for any of these."""
 
     name: str
 
@@ -85,6 +85,7 @@ EVENTS: Final = {
     "landing": ("outgoing", "the landing on the belt itself", "touched the outgoing belt itself"),
     "arrival": ("outgoing", "the arrival on the belt or its load", "arrived on the outgoing belt"),
     "impact.SURFACE": ("", "the impact on SURFACE", "met SURFACE"),
+    "sensor.SENSOR": ("", "the first passage of SENSOR", "passed SENSOR"),
 }
 """What happens to a particle, for the first time: the table that it needs, a noun and a verb."""
 
@@ -117,7 +118,8 @@ def _event(event: str) -> Iterator[Quantity]:
         ("vy_after", "m/s", "upward velocity just after {}", {}),
         ("count", "", f"particles that {verb}", {"impact": ITSELF}),
     ):
-        if not (key.endswith("_after") and event in ("separation", "arrival")):
+        once = event in ("separation", "arrival", "sensor.SENSOR")
+        if not (key.endswith("_after") and once) and (event, key) != ("sensor.SENSOR", "count"):
             of: Of = "stream" if key == "count" else "particle"
             columns = swept.get(event, ())
             yield Quantity(
@@ -150,6 +152,12 @@ REGISTRY: Final = {
     row.name: row
     for row in (
         *chain.from_iterable(map(_event, EVENTS)),
+        Quantity("sensor.SENSOR.speed", "m/s", "speed at the first passage of SENSOR"),
+        Quantity("sensor.SENSOR.count", "", "passages of SENSOR from the left of its line", "run"),
+        Quantity("sensor.SENSOR.back", "", "passages of SENSOR the other way", "run"),
+        Quantity("sensor.SENSOR.rate", "1/s", "particles per time through SENSOR", "run"),
+        Quantity("sensor.SENSOR.mass_rate", "kg/s", "mass per time through SENSOR", "run"),
+        Quantity("sensor.SENSOR.depth", "m", "depth of the stream at SENSOR", "run"),
         Quantity("flight.t", "s", "time of flight from the incoming belt",
                  needs=("incoming",), symbol="t"),
         Quantity("track.t", "s", "time from the release to the end", ending="scene", columns=MEAN),
@@ -267,15 +275,17 @@ def lookup(name: str, surfaces: Collection[str], streams: Collection[str] = ()) 
 def _row(name: str, surfaces: Collection[str]) -> Quantity | None:
     """Return the row of a quantity without statistic."""
     row = REGISTRY.get(name)
-    if row is None or "SURFACE" in name:
+    if row is None or "SURFACE" in name or "SENSOR" in name:
         parts = name.split(".")
-        place = {"impact": 1, "ledger": 2}.get(parts[0], len(parts))
+        place = {"impact": 1, "sensor": 1, "ledger": 2}.get(parts[0], len(parts))
+        any_ = "SENSOR" if parts[0] == "sensor" else "SURFACE"
         surface = parts[place] if place < len(parts) else ""
-        row = REGISTRY.get(".".join([*parts[:place], "SURFACE", *parts[place + 1 :]]))
-        there = surface in surfaces or (place == 2 and surface == "particles")
+        row = REGISTRY.get(".".join([*parts[:place], any_, *parts[place + 1 :]]))
+        known = f"sensor.{surface}" if parts[0] == "sensor" else surface
+        there = known in surfaces or (place == 2 and surface == "particles")
         if row is None or not there or (place == 1 and surface in NEEDED.values()):
             return None
-        row = row._replace(name=name, meaning=row.meaning.replace("SURFACE", surface))
+        row = row._replace(name=name, meaning=row.meaning.replace(any_, surface))
     return row if all(table in surfaces for table in row.needs) else None
 
 
@@ -306,17 +316,14 @@ def suggestion(name: str, surfaces: Collection[str]) -> str:
     keys = ", ".join([*some, "contacts", "ledger.belt_work"])
     theirs = "phi1_deg to slip_heat, " if {"incoming", "plate"} <= {*surfaces} else ""
     there_are = f"there are {theirs}{keys} and other keys of `chutelab run --json`"
-    return did_you_mean(name, _names(surfaces), there_are)
-
-
-def _names(surfaces: Collection[str]) -> list[str]:
-    """Return the names of a scene with these surfaces, or with the first ones of very many."""
-    found: list[str] = []
+    # Of a thousand surfaces some will do: looking for likeness takes long.
+    known: list[str] = []
     for row in REGISTRY.values():
         statistics = STATISTICS if row.of == "particle" else ()
-        # Of a thousand surfaces some will do: looking for likeness takes long.
-        for surface in list(surfaces)[:50] if "SURFACE" in row.name else [""]:
-            name = row.name.replace("SURFACE", surface)
-            if lookup(name, surfaces):
-                found += [name, *(f"{name}.{statistic}" for statistic in statistics)]
-    return found
+        for surface in list(surfaces)[:50] if "S" in row.name else [""]:
+            one = row.name.replace("SURFACE", surface)
+            if surface.startswith("sensor."):
+                one = row.name.replace("sensor.SENSOR", surface)
+            if lookup(one, surfaces):
+                known += [one, *(f"{one}.{statistic}" for statistic in statistics)]
+    return did_you_mean(name, known, there_are)

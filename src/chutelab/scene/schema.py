@@ -21,6 +21,7 @@ from chutelab.scene.tables import (
     Particle,
     Plate,
     Run,
+    Sensor,
     Stream,
     String,
     Surface,
@@ -51,6 +52,7 @@ TABLES: Final[dict[str, type[Table]]] = {
     "string": String,
     "stream": Stream,
     "run": Run,
+    "sensor": Sensor,
     "expect": Expect,
     "view": View,
     "live": Live,
@@ -106,6 +108,7 @@ class SceneTables(Table):
         (Stream(),), alias="stream", min_length=1, max_length=MOST_KINDS
     )
     run: Run = Field(default_factory=Run)
+    sensor: tuple[Sensor, ...] = Field((), max_length=MOST_KINDS)
     expect: tuple[Expect, ...] = Field((), max_length=MOST_EXPECTATIONS)
     view: View | None = None
     live: Live = Field(default_factory=Live)
@@ -294,6 +297,11 @@ class SceneTables(Table):
         """Names of its surfaces, as the ledger has them."""
         tables = [name for name in ("incoming", "plate", "outgoing") if getattr(self, name)]
         return (*tables, *(str(free.name) for free in self.free))
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of all that quantities are told of: surfaces, and ``sensor.NAME`` of sensors."""
+        return (*self.surfaces, *(f"sensor.{sensor.name}" for sensor in self.sensor))
 
     def __repr__(self) -> str:
         names = self.surfaces

@@ -374,6 +374,16 @@ class Run(Table):
     )
 
 
+class Sensor(Table):
+    """A line across a stream that counts what passes. No engine looks at it."""
+
+    name: Name = described(..., "Name of the sensor")
+    from_: Point = described(
+        ..., "First end [x, y]; what comes from its left counts on", "m", alias="from"
+    )
+    to: Point = described(..., "Second end [x, y]", "m")
+
+
 class View(Table):
     """What pictures, film and page show, instead of what they choose. No engine looks at it."""
 

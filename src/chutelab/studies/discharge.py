@@ -17,7 +17,7 @@ import numpy as np
 
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
-from chutelab.results.stream import QUANTILES
+from chutelab.results.record import QUANTILES
 from chutelab.scene import AnyScene, Scene, from_dict, load, to_dict
 from chutelab.theory.discharge import LEFT_OUT, METHODS, Discharge, DischargeError, Path, discharge
 from chutelab.util.arrays import Floats, Progress

@@ -38,8 +38,7 @@ from chutelab.classroom.lessons.building import (
     name_of,
 )
 from chutelab.classroom.lessons.reading import Lesson, LessonError, scene_of, unusable
-from chutelab.classroom.lessons.sheets import printed, sheet, worksheet
-from chutelab.classroom.lessons.steps import Ask, Step
+from chutelab.classroom.lessons.sheets import printed, sheet, values_of, worksheet
 from chutelab.classroom.lessons.steps import data_of as data_of_steps
 from chutelab.classroom.lessons.texts import ASSETS, INDEX, asset, html_of, without_tex
 from chutelab.classroom.words import Words, words
@@ -246,19 +245,18 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
         raise LessonError(str(lesson.folder), [Fault("page", None, text)])
     scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
     exercise, said = None, words(lesson.language)
-    live = scene.live
-    asks = (Ask(text=said.say("page-where"), mark="landing.x"),) if scene.outgoing else ()
-    # A lesson without steps asks where it lands, if it is to be predicted, and lets one try.
-    steps = lesson.steps or [
-        *([Step(kind="predict", text=lesson.question, asks=asks)] if live.predict and asks else []),
-        Step(kind="try", text=lesson.question),
-        *([Step(kind="numbers")] if lesson.name in EXERCISES else []),
-    ]
+    steps = data_of_steps(lesson.steps, tuple(scene.live.controls or ()), said)
+    for step, data in zip(lesson.steps, steps, strict=True):
+        # What stands there until the page puts a field in its place, and on paper.
+        value = values_of(lesson, step)
+        for key in dict.fromkeys(_FIELD.findall(data["text"])):
+            place = f'<span data-key="{key}">'
+            data["text"] = data["text"].replace(place, place + value(key))
     told_lesson = {
         "name": lesson.name,
         "title": lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}",
         "question": lesson.question,
-        "steps": data_of_steps(steps, tuple(live.controls or ()), said),
+        "steps": steps,
     }
     if lesson.name in EXERCISES:
         own = [ask.text for one in lesson.steps if one.kind == "explain" for ask in one.asks]
@@ -269,6 +267,9 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
         scene, path, language=lesson.language, home=home, exercise=exercise, lesson=told_lesson
     )
 
+
+_FIELD = re.compile(r'<span data-key="([\w.]+)">')
+"""The place of a value in a text, and its key."""
 
 _PICTURE = re.compile(r'(?<= src=\\")[\w.-]+\.png(?=\\")')
 """The file of a picture in a text of a lesson, in JSON."""

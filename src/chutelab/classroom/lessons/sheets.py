@@ -11,7 +11,7 @@ import base64
 import json
 import re
 import shlex
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from importlib.util import find_spec
 from pathlib import Path
@@ -100,15 +100,16 @@ def asked(lesson: Lesson, step: Step) -> Iterator[str]:
         yield f"| {said.say('sheet-question')} | {said.say('sheet-answer')} |\n|---|---|{rows}"
 
 
+def values_of(lesson: Lesson, step: Step) -> Callable[[str], str]:
+    """Return what says the value that a key has in a step's machine, with its unit."""
+    scene, said = machine_of(lesson, step), words(lesson.language)
+    return lambda key: with_unit(value_at(scene, key), unit_of(parts_of(key)), said)
+
+
 def with_values(lesson: Lesson, step: Step, text: str) -> str:
     """Return a text of a step in which the machine's values stand where a page has fields."""
-    scene = machine_of(lesson, step)
-
-    def value(found: re.Match[str]) -> str:
-        given, unit = value_at(scene, found[1]), unit_of(parts_of(found[1]))
-        return with_unit(given, unit, words(lesson.language))
-
-    return PLACES.sub(value, text).strip()
+    value = values_of(lesson, step)
+    return PLACES.sub(lambda found: value(found[1]), text).strip()
 
 
 def table(step: Step, said: Words) -> str:

@@ -227,9 +227,9 @@ def faults_of(
                 yield Fault(f"{there}.value", column.value, "must be a formula of quantities")
                 continue
             for name in names:
-                row_of = lookup(name, scene.surfaces)
+                row_of = lookup(name, scene.places)
                 if row_of is None or (said := whose(row_of, scene.count)):
-                    hint = said if row_of else suggestion(name, scene.surfaces)
+                    hint = said if row_of else suggestion(name, scene.places)
                     yield Fault(f"{there}.value", name, f"no quantity of this machine; {hint}")
         for m, ask in enumerate(step.asks):
             if len(ask.replies) != len(ask.choices):
@@ -238,8 +238,8 @@ def faults_of(
             if ask.choices and not 1 <= (ask.right or 0) <= len(ask.choices):
                 text = "must say which of choices is right, from 1 on"
                 yield Fault(f"{here}.asks[{m}].right", ask.right, text)
-            if ask.mark is not None and lookup(ask.mark, scene.surfaces) is None:
-                text = f"no quantity of this machine; {suggestion(ask.mark, scene.surfaces)}"
+            if ask.mark is not None and lookup(ask.mark, scene.places) is None:
+                text = f"no quantity of this machine; {suggestion(ask.mark, scene.places)}"
                 yield Fault(f"{here}.asks[{m}].mark", ask.mark, text)
 
 
@@ -251,6 +251,11 @@ def html_of(text: str, *, inline: bool = False) -> str:
     """
     made = parser().renderInline(text) if inline else parser().render(text)
     return PLACES.sub(r'<span data-key="\1"></span>', str(made)).strip()
+
+
+def _unbroken(text: str) -> str:
+    """Return a text in which a number keeps its unit beside it."""
+    return re.sub(r"(?<=\d) (?=\S{1,3}(?:[\s,]|$))", "\N{NO-BREAK SPACE}", text)
 
 
 def data_of(steps: Sequence[Step], controls: tuple[str, ...], said: Words) -> list[dict[str, Any]]:
@@ -287,7 +292,7 @@ def data_of(steps: Sequence[Step], controls: tuple[str, ...], said: Words) -> li
                 for one in step.columns
             ],
             "rows": [
-                {"head": html_of(said.local(one.head), inline=True), "set": one.set}
+                {"head": html_of(_unbroken(said.local(one.head)), inline=True), "set": one.set}
                 for one in step.rows
             ],
             "free": step.free,

@@ -88,8 +88,12 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         name: {key: getattr(preset.material, key) for key in VALUES}
         for name, preset in PRESETS.items()
     }
+    rules = {
+        table: [[keys.split(), tree(when), *text.split()] for keys, when, text, _ in rows if text]
+        for table, rows in RULES.items()
+    }
     common: dict[str, Any] = {
-        "tables": _rules(), "rules": _contradictions(), "presets": materials, "parts": PARTS,
+        "tables": _rules(), "rules": rules, "presets": materials, "parts": PARTS,
     }  # fmt: skip
     if scene is None:
         examples = {name: describe(load(name))["scene"] for name in EXAMPLES}
@@ -192,13 +196,6 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
     count = rules["stream"]["count"]
     count["high"] = count["form"]["maximum"] = MOST
     return rules
-
-
-def _contradictions() -> dict[str, list[list[Any]]]:
-    return {
-        table: [[keys.split(), tree(when), *text.split()] for keys, when, text, _ in rows if text]
-        for table, rows in RULES.items()
-    }
 
 
 def _rule(path: list[str | int]) -> dict[str, Any]:

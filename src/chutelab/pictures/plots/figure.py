@@ -7,7 +7,7 @@ printed on the left, corrected on the right.
 
 from __future__ import annotations
 
-from math import floor, log10
+from math import floor, isfinite, log10
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -48,9 +48,11 @@ from chutelab.pictures.plots.scenery import (
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Kind, Recording
 from chutelab.results.quantities import prediction as predicted
+from chutelab.results.sensors import flow, readings, sensed
 from chutelab.theory import Transfer
 from chutelab.theory.figures import PaperFigure
 from chutelab.util.arrays import Floats
+from chutelab.util.tables import number
 
 SIZE = (13.0, 7.6)
 """Width and height of the figure, inches."""
@@ -176,6 +178,7 @@ def draw_view(
     draw_tracks(ax, recording, marks=not crowd)
     if crowd and not one_of_many(recording):
         draw_envelope(ax, recording)
+    draw_sensors(ax, recording)
     handles = ax.get_legend_handles_labels()[0]
     if bodies:
         t = fullest(recording)
@@ -186,6 +189,46 @@ def draw_view(
     if legend:
         style.legend_above(ax, 4, handles)
     return ax
+
+
+def draw_sensors(ax: Axes, recording: Recording) -> Axes:
+    """Draw the sensors of the scene: dashed lines with their names at the upper end."""
+    for sensor in recording.scene.sensor:
+        ends = np.array([sensor.from_, sensor.to])
+        ax.plot(*ends.T, ls="--", lw=1.2, color=style.INK, marker="_", ms=7.0, gid="sensor")
+        ax.annotate(
+            style.plain(sensor.name), ends[ends[:, 1].argmax()], (0.0, 4.0), fontsize=style.SMALL,
+            textcoords="offset points", ha="center", zorder=6.0,
+        )  # fmt: skip
+    return ax
+
+
+BINS = 40
+"""Bins of the flow through a sensor over time, and of the places along it."""
+
+
+def sensors(recording: Recording) -> Picture:
+    """Draw for each sensor of the scene the flow through it over time, and where it passes."""
+    told = readings(recording)
+    figure = Picture((9.6, 1.2 + 2.6 * max(1, len(told))))
+    figure.headline(0.04, 1.0 - 0.35 / figure.get_figheight(), recording.title)
+    last = float(recording.knots["t"].max(initial=1e-9))
+    for row, (name, one) in enumerate(told.items()):
+        found = sensed(recording, name)
+        left, right = (figure.add_subplot(len(told), 2, 2 * row + 1 + n) for n in (0, 1))
+        edges, counted = flow(found, last / BINS, last)
+        style.dress(left, "time, s", "particles per s", name)
+        left.stairs(counted / (last / BINS), edges, fill=True, color=style.STREAM)
+        told_of = f"{one.count} passed, {one.back} back; {number(one.rate)} /s"
+        style.note(left, told_of)
+        style.dress(right, "along the sensor, m", "particles", "")
+        right.hist(found["along"][found["way"] > 0], BINS // 2, color=style.STREAM)
+        style.note(right, f"depth {style.quantity(one.depth, 'm')}" if isfinite(one.depth) else "")
+    figure.subplots_adjust(
+        left=0.085, right=0.975, hspace=0.6, wspace=0.22,
+        top=1.0 - 0.95 / figure.get_figheight(), bottom=0.6 / figure.get_figheight(),
+    )  # fmt: skip
+    return figure
 
 
 def fullest(recording: Recording) -> float:

@@ -35,7 +35,8 @@ from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import each
 from chutelab.results.quantities import prediction as predicted
-from chutelab.results.stream import QUANTILES, envelopes, flows
+from chutelab.results.record import QUANTILES
+from chutelab.results.stream import envelopes, flows
 from chutelab.results.summary import layers
 from chutelab.scene import Scene
 from chutelab.scene.quantities import REGISTRY

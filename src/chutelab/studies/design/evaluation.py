@@ -131,9 +131,9 @@ def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
 
     Raises an `InputError` if the scene has no such quantity.
     """
-    row = lookup(name, scene.surfaces, [str(stream.name) for stream in scene.streams])
+    row = lookup(name, scene.places, [str(stream.name) for stream in scene.streams])
     if row is None:
-        allowed = f"no such quantity here; {suggestion(name, scene.surfaces)}"
+        allowed = f"no such quantity here; {suggestion(name, scene.places)}"
         raise InputError(allowed, typed or name)
     if which := whose(row, scene.count):
         raise InputError(which, typed or name)
@@ -155,7 +155,7 @@ def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quant
         if text[0].isdigit() or text[0] in "+-.":
             allowed = f"{text} is no number of a quantity {_in(left.unit)}; {error}"
             raise InputError(allowed, typed) from None
-        if lookup(text, scene.surfaces) is not None:
+        if lookup(text, scene.places) is not None:
             right = measured(scene, text, typed)
         else:
             try:

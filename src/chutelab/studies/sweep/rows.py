@@ -101,7 +101,7 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
     """
     found, scene = empty(variants), recording.scene
     for name in found:
-        if name in COLUMNS and lookup(name, scene.surfaces):
+        if name in COLUMNS and lookup(name, scene.places):
             found[name] = measured(recording, name)
     found[TOUCHES] = touches(recording, variants)
     if scene.outgoing is None:

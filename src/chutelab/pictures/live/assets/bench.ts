@@ -224,7 +224,7 @@ class Bench {
   /** Where a frame begins that chooses all that it meets, px. */
   band: Place | null = null;
 
-  /** A finger that stays on a body chooses it, too, or not any more; elsewhere it begins a frame. */
+  /** A finger that stays on a body chooses it too, or not any more; elsewhere it begins a frame. */
   holdDown(at: Place) {
     if (this.nameAt(at)) {
       this.pick(at, true);
@@ -237,8 +237,8 @@ class Bench {
 
   stretch([px, py]: Place) {
     const [x, y] = this.band as Place;
-    this.draft.replaceChildren(svg("rect", { class: "band-frame", x: Math.min(x, px), y: Math.min(y, py),
-      width: Math.abs(px - x), height: Math.abs(py - y) }));
+    this.draft.replaceChildren(svg("rect", { class: "band-frame", x: Math.min(x, px),
+      y: Math.min(y, py), width: Math.abs(px - x), height: Math.abs(py - y) }));
   }
 
   /** Choose all that the frame meets that ends at a place, px, with what is chosen. */

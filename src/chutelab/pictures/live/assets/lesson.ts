@@ -5,6 +5,7 @@
 import { Questions, isInWords } from "./exercise.ts";
 import { plainName, type Exercise } from "./draw.ts";
 import { grown, html, icon, iconButton } from "./panels.ts";
+import { printed } from "./paper.ts";
 import { Curtain, Flag, Sketch, type Place } from "./predict.ts";
 import { Runs, type Noted, type Wanted } from "./runs.ts";
 import { LONGEST_NAME, LONGEST_WORDS, Task } from "./task.ts";
@@ -17,7 +18,7 @@ import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
 
 /** Texts are HTML that Python made of Markdown; `right` counts from 1 */
-type Ask = { text: string, mark: string | null, choices: string[], replies: string[],
+export type Ask = { text: string, mark: string | null, choices: string[], replies: string[],
   right: number | null, sketch: boolean };
 type Step = Wanted & { kind: "predict" | "try" | "note" | "explain" | "numbers", text: string,
   controls: string[], asks: Ask[], then: string };
@@ -60,6 +61,7 @@ class Lesson {
   curtain;
   sheet;
   list;
+  nav;
   page;
   back;
   next;
@@ -95,7 +97,9 @@ class Lesson {
     this.list = html("ol", { class: "steps" });
     const title = document.querySelector("header h1") as HTMLElement;
     title.textContent = this.lesson.title;
-    title.parentElement?.after(html("nav", { "aria-label": words.say("steps") }, this.list));
+    this.nav = html("nav", { "aria-label": words.say("steps") }, this.list);
+    title.parentElement?.after(this.nav);
+    new ResizeObserver(() => this.fitSteps()).observe(this.nav);
     this.page = html("div", { class: "page" });
     const button = (id: string, act: () => void, kind = "") => {
       const made = html("button", { type: "button", id, class: kind }, words.say(id));
@@ -123,9 +127,7 @@ class Lesson {
     const print = iconButton("print", "print", words.say("print"));
     print.addEventListener("click", () => globalThis.print());
     document.getElementById("views")?.append(print, this.who);
-    addEventListener("beforeprint", () => this.page.append(...this.others()));
-    addEventListener("afterprint", () => this.page.querySelectorAll(".other").forEach(
-      (one: Element) => one.remove()));
+    printed(this);
     lab.mayPlay = () => this.mayPlay();
     for (const news of ["scene", "run", "time"] as const) lab.on(news, () => this.look());
     stage.drawers.push(() => this.runs?.drawPaths());
@@ -133,6 +135,13 @@ class Lesson {
     if (again) this.begin(again);
     else this.welcome();
     this.listen();
+  }
+
+  /** Name all steps where there is room, else the present one. */
+  fitSteps() {
+    const { list, nav } = this;
+    list.classList.remove("many");
+    list.classList.toggle("many", list.offsetWidth > nav.offsetWidth);
   }
 
   place(what: string) {
@@ -306,7 +315,7 @@ class Lesson {
       button.addEventListener("click", () => this.go(k));
       return html("li", { class: done ? "done" : "" }, button);
     }));
-    this.list.classList.toggle("many", steps.length > 6);
+    this.fitSteps();
     this.back.disabled = n === 0;
     this.where.textContent = words.say("step-of", { n: n + 1, many: steps.length });
     document.title = `${n + 1}. ${name} – ${title}`;
@@ -481,15 +490,6 @@ class Lesson {
       this.look();
       this.keep();
     }).root];
-  }
-
-  /** All other steps, to be printed. */
-  others(): Node[] {
-    return this.lesson.steps.flatMap(({ kind, text, asks }, n) => (n === this.kept.at ? [] : [
-      html("section", { class: "other" }, html("h2", {}, `${n + 1}. ${this.words.say(`step-${kind}`)}`),
-        ...grown(text), ...asks.map(({ text: question, choices }) => html("div", {},
-          ...grown(question), html("ul", {}, ...choices.map((one) => html("li", {}, ...grown(one))))))),
-    ]));
   }
 
   /** Whether all that a step asks is answered. */

@@ -33,6 +33,19 @@ const plain = (scene: Scene) =>
   JSON.stringify(scene, (key, value) => (["given", "title", "live"].includes(key)
     ? undefined : value === Infinity ? "inf" : value));
 
+/** A table as rows of cells: numbers, and the markup of heads and of what is empty or by hand. */
+function tableOf({ columns, rows, free }: Wanted, noted: Noted[], words: Words) {
+  const written = (text: string) => html("i", {}, text).innerHTML;
+  return [
+    [words.say("my-runs"), ...columns.map(({ head, unit }) => (unit ? `${head}, ${words.unit(unit)}` : head))],
+    ...Array.from({ length: rows.length + free }, (_, n) => {
+      const { values, own, head } = noted[n] ?? {};
+      return [rows[n]?.head ?? written(head ?? words.say("own-run")), ...columns.map(({ given }, k) =>
+        given[n] ?? values?.[k] ?? written(own?.[k] ?? ""))];
+    }),
+  ];
+}
+
 class Runs {
   root;
   button;
@@ -245,7 +258,9 @@ class Runs {
 
   /** Paths below that of the run, and above all their numbers, apart from the other paths. */
   drawPaths() {
-    const { view } = this.stage, taken: [number, number][] = [];
+    const { view, home } = this.stage, taken: [number, number][] = [];
+    const labels: DOMRect[] = [...home.querySelectorAll(".symbols text")]
+      .map((one: any) => one.getBBox());
     this.marks.replaceChildren();
     this.numbers.replaceChildren();
     if (this.stage.blind) return;
@@ -257,7 +272,9 @@ class Runs {
       const others = [...lines].flatMap(([m, its]) => (m === n ? [] : its));
       const far = ([x, y]: [number, number]) => Math.min(ROOM,
         ...others.map(([u, v]) => Math.hypot(u - x, v - y)),
-        ...taken.map(([u, v]) => Math.hypot(u - x, v - y) - 0.5 * ROOM));
+        ...taken.map(([u, v]) => Math.hypot(u - x, v - y) - 0.5 * ROOM),
+        ...labels.map((box) => Math.hypot(x - Math.min(Math.max(x, box.x), box.x + box.width),
+          y - Math.min(Math.max(y, box.y), box.y + box.height)) - 0.5 * ROOM));
       const seen = line.filter(([x, y]) => x > 14 && x < view.width - 14 && y > 14
         && y < view.height - 14).slice(0, -Math.ceil(0.08 * line.length));
       const at = seen.reduce((best, one) => (far(one) >= far(best) ? one : best), seen[0]);
@@ -270,18 +287,12 @@ class Runs {
   }
 
   save() {
-    const { words, wanted: { columns, rows, free }, noted, lab } = this;
-    const text = (said: string) => grown(said).map((node) => node.textContent).join("").trim();
-    const table = [[words.say("my-runs"), ...columns.map(({ head, unit }) =>
-      (unit ? `${text(head)} [${words.unit(unit)}]` : text(head)))],
-    ...Array.from({ length: rows.length + free }, (_, n) => {
-      const { values, own, head = words.say("own-run") } = noted[n] ?? {};
-      return [rows[n] ? text(rows[n].head) : head,
-        ...columns.map(({ given }, k) => given[n] ?? values?.[k] ?? own?.[k] ?? "")];
-    })];
-    const csv = toCsv(table, words.comma);
+    const { words, wanted, noted, lab } = this;
+    const csv = toCsv(tableOf(wanted, noted, words).map((row) => row.map((cell) =>
+      (typeof cell === "number" ? cell
+        : grown(cell).map((node) => node.textContent).join("").trim()))), words.comma);
     download(`${fileStem(lab.data.lesson.title)}.csv`, `\ufeff${csv}`, "text/csv");
   }
 }
 
-export { Runs };
+export { Runs, tableOf };

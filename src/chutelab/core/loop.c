@@ -1,5 +1,6 @@
 /* The run: releases and rides, steps, and how tracks end. */
 
+#include <string.h>
 #include "core.h"
 
 World W;
@@ -318,11 +319,36 @@ static double in_hollows(void) {
     return most;
 }
 
+/* Note what all disks have together as a step begins. */
+static void note_totals(void) {
+    Total *all = W.totals + W.total_count++;
+    *all = (Total){.t = W.t};
+    for (int i = W.low; i < W.high; i++) {
+        const Disk *d = W.disks + i;
+        const Track *track = W.tracks + i;
+        double state[5] = {d->x, d->y, d->vx, d->vy, d->spin}, entries[3];
+        int lasts = d->mode == FREE && track->lasted;
+        if (!track->begun) continue;
+        for (int n = 0; n < 3; n++) entries[n] = d->entries[n] - (lasts ? d->ahead[n] : 0);
+        if (lasts) memcpy(state, track->held + 1, sizeof state);
+        if (d->mode == ASLEEP) memcpy(state + 2, &d->ux, 2 * sizeof(double));
+        if (d->mode == RIDING) {
+            /* What the belt has done since the last knot, see `ride_knot`. */
+            ride_at(d, W.t, state);
+            entries[0] -= d->mass * (W.gx * (state[0] - track->knot[1]) + W.gy * (state[1] - track->knot[2]));
+        }
+        all->kinetic += 0.5 * (d->mass * (square(state[2]) + square(state[3])) + d->inertia * square(state[4]));
+        all->potential += d->mass * W.g * state[1];
+        for (int n = 0; n < 3; n++) all->entries[n] += entries[n];
+    }
+}
+
 /* Begin a step: where prescribed paths lead, which disks may meet, which contacts last. A status other
    than DONE says what was too small, and nothing has happened yet. */
 static int begin_step(void) {
     int woke;
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
+    if (W.total_count >= W.total_room) return FULL_TOTALS;
     double next = set_gates(W.t), h = W.dt, stride = 0;
     for (int i = W.low; i < W.high && W.g > 0; i++) h = MIN(h, hop_time(W.disks + i, W.g));
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
@@ -384,6 +410,7 @@ static int begin_step(void) {
     for (int i = W.low; i < W.high; i++)
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
     close_step(h);
+    if (W.interact) note_totals();
     return DONE;
 }
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from chutelab.core.module import REAL, Module, Status, borrow, constants, dtype, give_back
 from chutelab.machine import Machine, Pieces
 from chutelab.results.laws import take
-from chutelab.results.record import REASONS, Record
+from chutelab.results.record import REASONS, TOTAL, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 
@@ -218,3 +218,5 @@ class Job:
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count
         recorder.gained = world.gained
+        rows = module.array("totals", dtype("Total"), world.total_count)
+        recorder.totals = rows.view(TOTAL).copy()

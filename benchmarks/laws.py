@@ -11,7 +11,7 @@ import sys
 from statistics import median
 from time import process_time
 
-from chutelab.core.module import Module
+from chutelab.core import Module
 from chutelab.engines.simulation import follow
 from chutelab.machine import build
 from chutelab.scene import load, shipped

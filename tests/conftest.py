@@ -11,7 +11,7 @@ import pytest
 import wasmtime
 from hypothesis import settings
 
-from chutelab.core import module
+from chutelab import core as module
 from live.browser import browser, opened, shown  # noqa: F401
 
 ROOT = Path(__file__).parents[1]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chutelab.core import module
+from chutelab import core as module
 from chutelab.engines import contact as engine
 from chutelab.results.recorder import Recorder
 

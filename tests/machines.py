@@ -7,7 +7,7 @@ from math import cos, inf, sin
 
 import numpy as np
 
-from chutelab.core.module import Module
+from chutelab.core import Module
 from chutelab.machine import Arcs, Particle, build
 from chutelab.machine.builder import lay
 from chutelab.scene import from_dict

@@ -11,7 +11,7 @@ from chutelab.engines.reference import UnableError
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import Kind
-from chutelab.results.comparison import compare
+from chutelab.results.quantities import compare
 from chutelab.scene.quantities import THEORY
 from chutelab.studies.accuracy import (
     FLOOR,

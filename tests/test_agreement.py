@@ -10,14 +10,14 @@ from scipy.integrate import quad
 
 from chutelab import machine, scene, theory
 from chutelab.checks.agreement import agreement, order, verify
-from chutelab.core.module import dtype
+from chutelab.core import dtype
 from chutelab.engines import exact, reference
 from chutelab.engines.contact import Job
 from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.simulation import simulate
 from chutelab.machine import builder
 from chutelab.results import REASONS, Kind
-from chutelab.results.comparison import compare
+from chutelab.results.quantities import compare
 from chutelab.scene.quantities import THEORY
 from chutelab.studies.accuracy import reach
 from drawn import draw

@@ -3,16 +3,16 @@
 import csv
 import json
 from dataclasses import replace
+from functools import partial
 from math import sqrt
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from PIL import Image
 
+import shared
 from chutelab.checks import workprecision as bench
 from chutelab.checks.workprecision import MANY_STEPS, METHODS, Stopwatch, Timing, measure
-from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.pictures.plots.studies import LOOKS
@@ -20,12 +20,7 @@ from chutelab.pictures.plots.studies import workprecision as draw
 from chutelab.scene import load
 from chutelab.util.versions import environment
 
-
-def call(*arguments, code=0):
-    result = CliRunner().invoke(main, ["bench", *map(str, arguments)])
-    assert result.exit_code == code, result.output
-    assert "Traceback" not in result.output
-    return result
+call = partial(shared.call, "bench")
 
 
 # Clocks.

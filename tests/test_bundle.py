@@ -12,17 +12,12 @@ from urllib.parse import unquote
 from zipfile import ZipFile
 
 import pytest
-from click.testing import CliRunner
 
-from chutelab.classroom.lessons import find, shipped_lessons
+from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.building import start
 from chutelab.classroom.lessons.pages import bundle
 from chutelab.classroom.lessons.texts import html_of
-from chutelab.cli import main
-
-
-def chutelab(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+from shared import chutelab, lessons
 
 
 class Page(HTMLParser):
@@ -98,7 +93,7 @@ def test_the_bundle_of_all_lessons_is_whole_and_small(tmp_path):
     assert result.exit_code == 0
     assert broken_links(tmp_path / "web") == set()
     pages = {path.parent.name: path.stat().st_size for path in tmp_path.rglob("page.html")}
-    assert len(pages) == len(shipped_lessons())
+    assert len(pages) == len(lessons())
     assert max(pages.values()) <= 450_000
     assert (
         sum(path.stat().st_size for path in tmp_path.rglob("*.*")) < 12_000_000

@@ -9,7 +9,7 @@ import pytest
 from chutelab import scene, theory
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
-from chutelab.results.comparison import compare, relative_error
+from chutelab.results.quantities import compare, relative_error
 from chutelab.scene.quantities import THEORY
 
 M, R, r = 0.008, 0.1, 0.0063

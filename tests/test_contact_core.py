@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chutelab.core.module import Status, constants
+from chutelab.core import Status, constants
 from chutelab.results import Kind
 from cores import Core, modes
 from machines import boxed, face, of_sizes, scene_of, thrown
@@ -236,7 +236,7 @@ def test_the_host_knows_the_statuses_of_the_core():
 START = """
 import os, sys
 from chutelab import simulate
-from chutelab.core import module
+from chutelab import core as module
 for cache in sys.argv[1:]:
     os.environ["XDG_CACHE_HOME"] = cache
     module._compiled.cache_clear()

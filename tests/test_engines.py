@@ -1,14 +1,8 @@
 """The stepped engines, contact and pymunk, by laws written out here: flight, blows, belts, rest."""
 
-import os
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from importlib import import_module
 from math import cos, hypot, radians, sin, sqrt
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -432,23 +426,6 @@ def test_an_interrupt_leaves_nothing_behind_for_the_next_run():
     with pytest.raises(KeyboardInterrupt):
         contact.run(machine, interrupt)
     assert same(contact.run(machine), whole)
-
-
-@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-def test_ctrl_c_stops_a_long_run_at_once():
-    environment = {**os.environ, "PYTHONPATH": str(Path(chutelab.__file__).parents[1])}
-    words = ["run", "stream", "--set", "stream.count=20000", "--set", "stream.rate=1000"]
-    command = [sys.executable, "-m", "chutelab", *words, "--engine", "contact", "--json"]
-    with subprocess.Popen(
-        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as running:
-        time.sleep(2.0)
-        assert running.poll() is None
-        running.send_signal(signal.SIGINT)
-        out, said = running.communicate(timeout=10.0)
-    assert running.returncode == 130
-    assert out == ""
-    assert said.strip().endswith("Interrupted.")
 
 
 @both

@@ -246,7 +246,7 @@ def test_what_hangs_and_prints_is_stopped_and_marked_for_what_it_had(tmp_path, i
 @pytest.mark.parametrize(
     ("sent", "remark"),
     [
-        ("SIGTERM", "it sent its parent process a signal"),
+        pytest.param("SIGTERM", "it sent its parent process a signal", marks=pytest.mark.slow),
         ("SIGKILL", "the kernel died in code cell 3"),
         pytest.param("SIGSTOP", "", marks=pytest.mark.slow),
     ],
@@ -335,7 +335,16 @@ def test_a_forged_report_is_refused(monkeypatch, tmp_path, report):
     assert row.reason.startswith("refused: its report")
 
 
-@pytest.mark.parametrize("said", ["b'x' * 10_000_000", "b'[' * 100_000 + b'\\n'", "b'5\\n'"])
+@pytest.mark.parametrize(
+    "said",
+    [
+        "b'x' * 10_000_000",
+        *(
+            pytest.param(one, marks=pytest.mark.slow)
+            for one in ("b'[' * 100_000 + b'\\n'", "b'5\\n'")
+        ),
+    ],
+)
 def test_what_a_notebook_says_in_place_of_its_kernel_is_refused(tmp_path, in_own_tmp, said):
     pipes = (
         "import os\nfor one in range(3, 50):\n    try: os.write(one, {})\n    except OSError: pass"
@@ -417,7 +426,7 @@ def test_rows_are_on_the_disk_as_they_come_and_a_full_one_tears_none(tmp_path):
     ("sent", "code"),
     [
         (signal.SIGTERM, 143),
-        (signal.SIGKILL, -signal.SIGKILL),
+        pytest.param(signal.SIGKILL, -signal.SIGKILL, marks=pytest.mark.slow),
         pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow),
     ],
 )

@@ -17,7 +17,7 @@ from pypdf import PdfReader
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises import find as find_exercise
 from chutelab.classroom.exercises.exercise import draw, shown
-from chutelab.classroom.lessons import find, scene_of, shipped_lessons
+from chutelab.classroom.lessons import find, scene_of
 from chutelab.classroom.lessons.pages import bundle
 from chutelab.classroom.lessons.sheets import printed
 from chutelab.classroom.lessons.steps import quantities_in
@@ -27,8 +27,9 @@ from chutelab.pictures.animation.moments import ASK, asked, film, slowness, span
 from chutelab.pictures.animation.stage import lay_out, palette
 from chutelab.pictures.plots import style
 from chutelab.results.quantities import measure
+from shared import lessons
 
-NUMBERS = [lesson.number for lesson in shipped_lessons()]
+NUMBERS = [lesson.number for lesson in lessons()]
 
 TOLD = {
     0: {"30", "60"},  # frames a second
@@ -112,7 +113,7 @@ def seen(page):
 @pytest.fixture(scope="module")
 def web(tmp_path_factory):
     folder = tmp_path_factory.mktemp("web") / "lessons"
-    bundle(shipped_lessons(), folder, wheel=False)
+    bundle(lessons(), folder, wheel=False)
     return folder
 
 
@@ -125,7 +126,7 @@ def given_away(number, text):
     return numbers_in(text) & answers(number) - TOLD.get(number, set())
 
 
-@pytest.mark.parametrize("kind", ["md", "html", "pdf"])
+@pytest.mark.parametrize("kind", ["md", "html", pytest.param("pdf", marks=pytest.mark.slow)])
 def test_no_number_of_the_answer_is_on_the_students_sheet(number, kind):
     sheet = printed(find(number), "student", kind)
     if kind == "pdf":
@@ -183,6 +184,9 @@ def dashes(frame):
     return int((scene == colour).all(axis=-1).sum())
 
 
+@pytest.mark.parametrize(
+    "number", [pytest.param(n, marks=pytest.mark.slow if n % 4 else ()) for n in NUMBERS]
+)
 def test_a_film_begins_without_the_path_and_waits(number):
     lesson = find(number)
     before, last = first_part(lesson.folder / "lesson.gif")

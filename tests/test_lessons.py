@@ -7,19 +7,18 @@ from math import inf
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from PIL import Image
 
-from chutelab.classroom.lessons import LessonError, find, read, scene_of, shipped_lessons
+from chutelab.classroom.lessons import LessonError, find, read, scene_of
 from chutelab.classroom.lessons.building import build, comment_of, is_current, start
 from chutelab.classroom.lessons.reading import machine_of
 from chutelab.classroom.lessons.steps import quantities_in
-from chutelab.cli import main
 from chutelab.machine import build as build_machine
 from chutelab.pictures.live.describe import describe
 from chutelab.scene import MISSING
 from chutelab.scene.overrides import value_at
 from chutelab.scene.quantities import lookup, whose
+from shared import chutelab, lessons
 
 NAMES = [
     "film-a-ball",
@@ -34,17 +33,12 @@ NAMES = [
 ]
 
 
-def chutelab(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
 # What there is -----------------------------------------------------------------------------------
 
 
 def test_the_lessons_are_in_order():
-    lessons = shipped_lessons()
-    assert [lesson.name for lesson in lessons][: len(NAMES)] == NAMES
-    assert [lesson.number for lesson in lessons] == list(range(len(lessons)))
+    assert [lesson.name for lesson in lessons()][: len(NAMES)] == NAMES
+    assert [lesson.number for lesson in lessons()] == list(range(len(lessons())))
 
 
 @pytest.mark.parametrize("wanted", [3, "3", "03", "the-bounce", "03-the-bounce", "The-Bounce"])
@@ -62,7 +56,7 @@ def test_what_is_not_there_is_refused_with_advice(wanted, said):
     assert said in result.stderr
 
 
-NUMBERS = [lesson.number for lesson in shipped_lessons()]
+NUMBERS = [lesson.number for lesson in lessons()]
 
 
 @pytest.mark.parametrize("number", NUMBERS)
@@ -159,6 +153,11 @@ def test_all_faults_of_a_file_are_in_one_message(tmp_path):
         assert said in message
 
 
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory):
+    return start(tmp_path_factory.mktemp("fresh") / "my-lesson")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -190,8 +189,8 @@ def test_all_faults_of_a_file_are_in_one_message(tmp_path):
         ("title =", "title = =", "not TOML"),
     ],
 )
-def test_a_fault_names_file_key_value_and_what_is_allowed(tmp_path, old, new, said):
-    folder = start(tmp_path / "my-lesson")
+def test_a_fault_names_file_key_value_and_what_is_allowed(fresh, tmp_path, old, new, said):
+    folder = Path(shutil.copytree(fresh, tmp_path / "my-lesson"))
     plan = folder / "lesson.toml"
     text = plan.read_text(encoding="utf-8")
     assert old in text
@@ -280,7 +279,7 @@ def test_the_stamp_is_the_comment_of_the_picture(small, tmp_path):
     assert comment_of(tmp_path / "missing.gif") == ""
 
 
-@pytest.mark.parametrize("lesson", shipped_lessons(), ids=lambda lesson: lesson.name)
+@pytest.mark.parametrize("lesson", lessons(), ids=lambda lesson: lesson.name)
 def test_shipped_pictures_show_what_the_lessons_say(lesson):
     assert is_current(lesson), f"run: chutelab lesson build {lesson.number}"
     picture = lesson.folder / "lesson.gif"
@@ -368,7 +367,7 @@ def test_list_names_every_lesson():
     for name in NAMES:
         assert name in printed
     listed = json.loads(chutelab("lesson", "list", "--json").stdout)["lessons"]
-    assert [one["name"] for one in listed] == [lesson.name for lesson in shipped_lessons()]
+    assert [one["name"] for one in listed] == [lesson.name for lesson in lessons()]
     assert set(listed[3]["files"]) >= {"lesson.gif", "lesson.toml", "table-1.toml"}
 
 

@@ -53,6 +53,10 @@ REFUSED = {
         **THROWN,
         "surface": [{"name": "a", "center": [5, 5], "radius": 1, "from_deg": 9, "to_deg": 9}],
     },
+    "an arc of less than an atom": {
+        **THROWN, "surface": [{"name": "a", "center": [5, 5], "radius": 1e-3, "to_deg": 1e-5}],
+    },
+    "two damping plates": {**BELTS, "plate": [{"distance": 0.3}, {"distance": 0.4}]},
     "a name that is there twice": {**THROWN, "surface": [WALL, WALL]},
     "a conveyor of no length": {
         **THROWN,

@@ -5,19 +5,16 @@ import os
 import re
 import subprocess
 import sys
+from functools import partial
 
 import pytest
-from click.testing import CliRunner
 
-from chutelab.cli import main
+import shared
 
 pytest.importorskip("chutelab.pictures.live.describe")
 
 
-def call(*arguments, code=0):
-    result = CliRunner().invoke(main, ["live", *map(str, arguments)])
-    assert result.exit_code == code, result.output
-    return result
+call = partial(shared.call, "live")
 
 
 def data_of(path):

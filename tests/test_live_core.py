@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sandbox
-from chutelab.core import module
+from chutelab import core as module
 from chutelab.engines import contact as engine
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
@@ -51,6 +51,6 @@ def test_the_pages_host_runs_every_kind_of_scene_as_python_does(scenes):
     same_runs([load(name, overrides) for name, *overrides in scenes])
 
 
-@pytest.mark.parametrize("count", [24, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.slow)])
 def test_it_runs_scenes_with_any_keys_as_python_does(count):
     same_runs([from_dict(sandbox.tables(seed)) for seed in range(count)])

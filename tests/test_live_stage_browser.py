@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from live.browser import DONE
+
 playwright = pytest.importorskip(
     "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
 )
@@ -57,6 +59,128 @@ def test_a_plate_is_moved_by_its_body_and_a_line_keeps_its_shape(shown):
     assert way[0] == pytest.approx([-40 / scale, -25 / scale], abs=2.0 / scale)
     page.click("#undo")
     assert np.array_equal(page.evaluate("chutelab.lab.scene.surface[0].points"), before)
+
+
+def frame(page):
+    """The frame round what is chosen, on the screen; None without one."""
+    box = page.locator("#stage").bounding_box()
+    found = page.evaluate("chutelab.stage.frame")
+    return found and [
+        found["left"] + box["x"], found["top"] + box["y"],
+        found["right"] + box["x"], found["bottom"] + box["y"],
+    ]  # fmt: skip
+
+
+def ends(page):
+    """Of the lines that are put into a scene, m."""
+    rows = page.evaluate("chutelab.lab.given.surface.filter(({ points }) => points)")
+    return np.array([row["points"] for row in rows])
+
+
+LINES = """
+[[surface]]
+name = "one"
+points = [[0.3, -0.1], [0.5, -0.2]]
+[[surface]]
+name = "two"
+points = [[-0.4, -0.2], [-0.1, -0.3]]
+"""
+
+
+def test_several_are_chosen_by_a_frame_and_move_together_by_it(shown):
+    page = shown("free-fall", more=LINES, viewport={"width": 1366, "height": 768})
+    box = page.locator("#stage").bounding_box()
+    free, before = page.evaluate("chutelab.stage.view.free"), ends(page)
+    # Shift and drag over all of the picture: a frame meets what lies in it.
+    page.keyboard.down("Shift")
+    page.mouse.move(box["x"] + free["left"] + 4, box["y"] + free["top"] + 4)
+    page.mouse.down()
+    page.mouse.move(box["x"] + free["right"] - 4, box["y"] + free["bottom"] - 4, steps=3)
+    assert page.locator(".band-frame").is_visible()
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    many = page.evaluate("chutelab.bench.inspector.parts")
+    assert {"one", "two"} <= set(many)
+    # All that is chosen lies in its frame.
+    left, top, right, bottom = frame(page)
+    boxes = page.evaluate("""chutelab.bench.inspector.parts.flatMap((name) =>
+      chutelab.stage.scenery.drawingsOf(name).map((one) => {
+        const { left, right, top, bottom } = one.getBoundingClientRect();
+        return [left, right, top, bottom];
+      }))""")
+    for west, east, north, south in boxes:
+        assert left - 1 < west <= east < right + 1
+        assert top - 1 < north <= south < bottom + 1
+    # The frame is dragged where nothing is in it.
+    bare = page.evaluate("""() => {
+      const { stage, bench } = chutelab, { left, right, top, bottom } = stage.frame;
+      const { free } = stage.view;
+      for (let x = Math.max(left, free.left) + 9; x < Math.min(right, free.right) - 9; x += 9) {
+        for (let y = Math.max(top, free.top) + 9; y < Math.min(bottom, free.bottom) - 9; y += 9) {
+          if (!bench.nameAt([x, y])) return [x, y];
+        }
+      }
+    }""")
+    x, y = bare[0] + box["x"], bare[1] + box["y"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 30, y - 20, steps=3)
+    page.mouse.up()
+    page.evaluate(DONE)
+    moved = ends(page) - before
+    assert np.ptp(moved.reshape(-1, 2), axis=0) == pytest.approx(0, abs=1e-9)
+    scale = page.evaluate("chutelab.stage.view.scale")
+    assert moved[0, 0] * scale == pytest.approx([30, 20], abs=12)
+    # One undo takes all back; arrows move all, too.
+    page.click("#undo")
+    assert ends(page) == pytest.approx(before)
+    page.focus("#picture")
+    page.keyboard.press("ArrowUp")
+    page.evaluate(DONE)
+    moved = (ends(page) - before).reshape(-1, 2)
+    assert np.ptp(moved, axis=0) == pytest.approx(0, abs=1e-9)
+    assert moved[0, 0] == 0.0
+    assert moved[0, 1] > 0.0
+
+
+def test_a_finger_that_stays_chooses_a_further_body_and_draws_a_frame(shown):
+    phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+    page = shown("free-fall", more=LINES, **phone)
+    session = page.context.new_cdp_session(page)
+
+    def touch(kind, *points):
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [
+            {"x": x, "y": y} for x, y in points]})  # fmt: skip
+
+    def on(name):
+        row = page.evaluate(
+            "(name) => chutelab.lab.scene.surface.find((one) => one.name === name)", name
+        )
+        x, y = page.evaluate(SCREEN, np.mean(row["points"], axis=0).tolist())
+        return x, y
+
+    chosen = "chutelab.bench.inspector.parts"
+    first, second = "one", "two"
+    page.touchscreen.tap(*on(first))
+    assert page.evaluate(chosen) == [first]
+    assert frame(page) is None
+    touch("touchStart", on(second))
+    page.wait_for_timeout(700)
+    touch("touchEnd")
+    assert page.evaluate(chosen) == [first, second]
+    assert frame(page)
+    # On an empty place a finger that stays draws a frame; the page does not scroll meanwhile.
+    page.keyboard.press("Escape")
+    assert page.evaluate(chosen) == []
+    box = page.locator("#stage").bounding_box()
+    x, y = box["x"] + 6, box["y"] + 70
+    touch("touchStart", (x, y))
+    page.wait_for_timeout(700)
+    touch("touchMove", (x + 100, y + 60))
+    touch("touchMove", (box["x"] + box["width"] - 6, box["y"] + box["height"] - 6))
+    touch("touchEnd")
+    assert {first, second} <= set(page.evaluate(chosen))
+    assert page.evaluate("scrollY") == 0
 
 
 def test_one_finger_on_an_empty_place_moves_neither_view_nor_machine(shown):
@@ -310,3 +434,70 @@ def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
             # A line of text is taller than its letters.
             apart = min(right, right2) - max(left, left2), min(bottom, bottom2) - max(top, top2)
             assert not (own or own2) or min(apart) <= 5.0, (text, other, apart)
+
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+
+# Where the last of what is seen of an element ends.
+LAST = """(all) => Math.max(...[...all.querySelectorAll("*")]
+  .filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect().bottom))"""
+
+# Of what can be pressed and is seen, what is less than a finger: name, width and height.
+SMALL = """() => [...document.querySelectorAll(
+    "button, select, summary, label:has([type=checkbox]), input:not([type=checkbox]), .grip .room")]
+  .filter((one) => one.checkVisibility())
+  .map((one) => [one.id || one.textContent, one.getBoundingClientRect()])
+  .map(([name, { width, height }]) => [name, width, height])
+  .filter(([, width, height]) => width > 0 && (width < 43.9 || height < 43.9))"""
+
+
+@pytest.mark.parametrize(("name", "size"), [("perpendicular", (390, 844)), ("stream", (320, 568))])
+def test_on_a_phone_one_card_or_drawer_lies_under_the_picture(shown, name, size):
+    phone = PHONE | {"viewport": {"width": size[0], "height": size[1]}}
+    page = shown(name, **phone)
+    dock, sheet = (
+        page.locator(".dock"),
+        ".drawer:visible, .parts:visible, #panels:visible, #chosen:visible",
+    )
+    picture = page.locator("#stage").bounding_box()
+
+    def look():
+        """Picture, time and tools are seen whole, and below the time one thing, to its end."""
+        assert page.locator("#stage").bounding_box() == picture
+        assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+        play, bar = page.locator(".transport").bounding_box(), dock.bounding_box()
+        assert bar["y"] + bar["height"] == pytest.approx(size[1], abs=1)
+        assert page.locator(sheet).count() == 1
+        box = page.locator(sheet).bounding_box()
+        assert play["y"] + play["height"] - 1 <= box["y"]
+        assert box["y"] + box["height"] <= bar["y"] + 1
+        page.locator(sheet).evaluate("(one) => one.scrollTo(0, 1e6)")
+        last = page.locator(sheet).evaluate(LAST)
+        assert last <= bar["y"] + 1
+        assert page.evaluate(SMALL) == []
+
+    look()
+    assert page.locator("#energy").is_visible()
+    for tab in page.locator(".tabs button").all():
+        tab.click()
+        assert page.locator(f"#{tab.get_attribute('data-of')}").is_visible()
+        assert page.locator("#panels > .card:visible").count() == 1
+        look()
+    for tool, seen in (("add", "#part-belt"), ("tape", "#tool-tape"), ("eye", "#show-grid"),
+                       ("more", "#keys")):  # fmt: skip
+        page.click(f"#dock-{tool}")
+        page.locator(seen).scroll_into_view_if_needed()
+        assert page.locator(seen).is_visible()
+        look()
+    # What is taken leaves the picture to be measured in; what is chosen has its card.
+    page.click("#dock-tape")
+    page.click("#tool-tape")
+    assert page.locator(".measures .tape").count() == 1
+    assert page.locator(".tabs").is_visible()
+    page.evaluate("chutelab.bench.inspector.choose(chutelab.lab.machine.surfaces[0])")
+    assert page.locator("#chosen").is_visible()
+    look()
+    # Turned, or on a wider window, all is where it belongs there.
+    page.set_viewport_size({"width": 1366, "height": 768})
+    assert page.locator(".bench #tool-tape").is_visible()
+    assert page.locator("#panels > .card:visible").count() > 2

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from chutelab.classroom.book import Book
 from chutelab.classroom.grading import words_of as written_in
-from chutelab.classroom.lessons import LessonError, read, shipped_lessons
+from chutelab.classroom.lessons import LessonError, read
 from chutelab.classroom.lessons.building import build_notebook, notebook_of, start
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.classroom.lessons.steps import data_of, html_of
@@ -18,9 +18,10 @@ from chutelab.classroom.words import LANGUAGES, words
 from chutelab.cli import main
 from chutelab.results.quantities import measure
 from chutelab.util.errors import InputError
+from shared import lessons
 
 G = 9.81
-LESSONS = shipped_lessons()
+LESSONS = lessons()
 
 
 def cells_of(lesson):

@@ -58,7 +58,7 @@ def test_digits_are_those_of_python():
 
 
 def test_a_formula_with_what_pages_do_not_know_is_refused():
-    for formula in ("[x for x in y]", "x if y else z", "x and y", "x // y", "f'{x}'", "x is y"):
+    for formula in ("[x for x in y]", "x if y else z", "x in y", "x // y", "f'{x}'", "x is y"):
         with pytest.raises(ValueError, match="pages do not know"):
             tree(formula)
 
@@ -107,7 +107,7 @@ def answers_to(case, rng):
     ("name", "language"),
     [
         pytest.param(
-            name, language, marks=() if n % 3 == 0 or language == "en" else pytest.mark.slow
+            name, language, marks=() if (n % 2 == 0) == (language == "en") else pytest.mark.slow
         )
         for n, name in enumerate(NAMES)
         for language in LANGUAGES

@@ -8,8 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from chutelab.engines.simulation import simulate
-from chutelab.results.comparison import compare
-from chutelab.results.quantities import each
+from chutelab.results.quantities import compare, each
 from chutelab.scene import from_dict
 from chutelab.theory import STAGES, Reason, drag, predict, transfer
 

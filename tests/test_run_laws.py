@@ -20,10 +20,10 @@ import columns
 import crowds
 import drawn
 import sandbox
+from chutelab import core as module
 from chutelab import scene
 from chutelab.checks.stress.barriers import Evidence
 from chutelab.cli import main
-from chutelab.core import module
 from chutelab.engines import contact, exact, simulation
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
@@ -382,17 +382,24 @@ def in_steps(tables):
     return replace(m, dt=min(m.dt, 0.9 * float(np.min(m.particle.radius)) / v))
 
 
+def of_points(n):
+    """Return a random machine of chains and bowls, met by a mass point."""
+    tables = chains.tables(n)
+    return build(scene.from_dict({**tables, "particle": {"radius": 0.0, "mass": 0.01}}))
+
+
 LONE = "exact", "contact", "pymunk"
 SOUND = {
     "sandbox, apart": (220, lambda n: build(sandbox.draw(2 * n)), ("exact", "contact")),
     "sandbox, meeting": (120, lambda n: build(sandbox.draw(2 * n + 1)), ("contact",)),
     "sandbox, Pymunk": (20, lambda n: in_steps(sandbox.tables(2 * n + 1)), ("pymunk",)),
     "chains and bowls": (60, lambda n: build(chains.draw(n)), LONE),
+    "mass points": (60, of_points, ("exact",)),
     "all of a scene file": (40, lambda n: build(drawn.draw(n, points=False)), LONE),
     "crowds of all sizes": (20, lambda n: crowds.crowd(n, count=40)[1], ("contact",)),
     "columns": (20, lambda n: build(scene.from_dict(columns.column(n, 40))), ("contact",)),
 }
-"""How many sound machines of each generator, 500 in all, and the engines that they run on."""
+"""How many sound machines of each generator, 560 in all, and the engines that they run on."""
 
 MADE = "Chipmunk makes 0.1 % of the energy turned over in one step where a heap is struck at g = 0"
 
@@ -439,3 +446,26 @@ def test_five_hundred_random_sound_scenes_raise_no_alarm(name, first):
 )
 def test_runs_that_are_wrong_say_so(name, seed):
     assert alarms(name, [seed]) == []
+
+
+@pytest.mark.parametrize("name", ["perpendicular", "low-speed", "inclined-conveyor", "spoon"])
+def test_a_mass_point_lies_on_what_carries_it(name):
+    recording = recorded(scene.to_dict(scene.load(name, {"particle.radius": 0.0})))
+    assert not recording.laws
+
+
+@pytest.mark.parametrize("piece", [HOP, BOWL])
+def test_a_mass_point_that_a_blow_does_not_turn_back_is_seen(piece):
+    """From its first blow on, its track is the mirror image of what it was."""
+    whole = recorded({**piece, "particle": {"radius": 0.0, "mass": 0.01}})
+    assert not whole.laws
+    blow = whole.select("impact")[0]
+    later = whole.knots["t"] >= blow["t"]
+    later[np.flatnonzero(later)[0]] = False  # the state before the blow
+
+    def mirrored(knots):
+        for part in ("position", "velocity"):
+            knots[part][later, 1] *= -1.0
+        knots["position"][later, 1] += 2.0 * blow["position"][1]
+
+    assert laws.THROUGH in names(spoilt(whole, knots=mirrored))

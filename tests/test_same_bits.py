@@ -39,6 +39,7 @@ EVERY = [
     "solve perpendicular --vary plate.angle_deg=0:60 --vary incoming.speed=1:3"
     " --minimize belt_work --out least",
     "compare perpendicular --data perpendicular-track --out compared",
+    "discharge slip --out discharged",
     "lesson list --json",
     "lesson show 3",
     "lesson build 1 --out built",

@@ -216,7 +216,9 @@ def test_laws_hold_on_three_hundred_machines(seed, tmp_path):
     check(seed, tmp_path)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(
+    "seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 12))]
+)
 def test_what_rattles_sinks_in_by_no_more_than_blows_leave(seed):
     """Without gravity a row of 46 disks runs into a floor: its blows have no end.
 

@@ -6,18 +6,13 @@ from html.parser import HTMLParser
 
 import pytest
 import typst
-from click.testing import CliRunner
 from PIL import Image
 
-from chutelab.classroom.lessons import find, read, shipped_lessons
+from chutelab.classroom.lessons import find, read
 from chutelab.classroom.lessons.building import start
 from chutelab.classroom.lessons.sheets import SHEETS, printed, sheet
 from chutelab.classroom.lessons.texts import html_of, parsed, plain, typeset, without_tex
-from chutelab.cli import main
-
-
-def chutelab(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+from shared import chutelab, lessons
 
 
 def pages(pdf):
@@ -92,7 +87,7 @@ def test_without_the_library_a_pdf_says_what_to_install(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("which", SHEETS)
-@pytest.mark.parametrize("number", [lesson.number for lesson in shipped_lessons()])
+@pytest.mark.parametrize("number", [lesson.number for lesson in lessons()])
 def test_every_sheet_is_a_page_that_is_whole_and_a_pdf_of_a_page_or_two(number, which):
     lesson = find(number)
     page = Page(printed(lesson, which, "html").decode("utf-8"))

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from functools import partial
 from math import inf
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 import chutelab
+import shared
 from chutelab import scene
 from chutelab.checks import agreement  # noqa: F401 - or it would keep what a test puts in
 from chutelab.checks.stress import LAWS, Verdict
@@ -36,11 +38,7 @@ def listed(folder):
 # The command
 
 
-def call(*arguments, code=0):
-    outcome = CliRunner().invoke(main, ["stress", *map(str, arguments)])
-    assert outcome.exit_code == code, outcome.output
-    assert "Traceback" not in outcome.output
-    return outcome
+call = partial(shared.call, "stress")
 
 
 def test_each_law_is_a_line_with_figure_and_bound():

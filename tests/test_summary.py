@@ -9,7 +9,7 @@ import pytest
 from chutelab import scene
 from chutelab.engines.simulation import simulate
 from chutelab.results import REASONS, Kind
-from chutelab.results.comparison import compare
+from chutelab.results.quantities import compare
 from chutelab.results.summary import schema, summary
 
 TOP = [

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from chutelab.cli import main
 from chutelab.cli.studies import varied
 from chutelab.engines.exact import CornerError, run
 from chutelab.engines.simulation import simulate
@@ -31,6 +29,7 @@ from chutelab.studies.sweep import (
 from chutelab.studies.sweep.plan import row_of
 from chutelab.studies.sweep.plan import swept as swept_block
 from chutelab.util.errors import InputError
+from shared import call
 from typed import planned, sweep
 
 PAID, HEAT = (f"ledger.by_surface.outgoing.{name}" for name in ("belt_work", "friction_loss"))
@@ -60,12 +59,6 @@ max_time = 5.0
 @pytest.fixture(autouse=True)
 def _elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-
-
-def call(*arguments, code=0):
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def block_of(scene, varies, **options):

@@ -6,7 +6,7 @@ from math import isnan, nan, pi
 import numpy as np
 import pytest
 
-from chutelab.core.module import Module
+from chutelab.core import Module
 from chutelab.util.trig import LARGEST_ANGLE, RADIANS, arc_cos, atan2, sin_cos
 
 LONG = np.longdouble

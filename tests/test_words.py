@@ -48,6 +48,23 @@ def test_verdicts_are_called_what_they_are():
         assert words().say(f"verdict-{one.name.lower()}") == one.value
 
 
+def test_a_reply_says_not_yet_and_never_wrong():
+    for language, right, later in (("en", "right", "not yet"), ("de", "richtig", "noch nicht")):
+        said = catalogue(language)
+        assert (said["verdict-right"], said["verdict-off"]) == (right, later)
+        replies = [text for key, text in said.items() if re.match("verdict|off|reply|besides", key)]
+        replies += [one.called for name in EXERCISES for one in mistakes_of(name, language)]
+        for text in replies:
+            assert not re.search(r"(?i)\b(wrong|invalid|falsch\w*|ungültig)\b", text), text
+
+
+def mistakes_of(name, language):
+    """What a pupil's mistakes are called."""
+    task = lesson(name, "Ada", language=language)
+    for number, case in enumerate(draw(EXERCISES[name], "Ada")[1], start=1):
+        yield from (task.check(number, trace.number) for trace in case.mistakes)
+
+
 def test_an_unknown_language_is_told_which_there_are():
     with pytest.raises(LanguageError, match=r"no language 'fr'; there are en, de"):
         lesson("the-bounce", "Ada", language="fr")

@@ -10,34 +10,31 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy.optimize import fsolve
 
 from chutelab.classroom.exercises import find as find_exercise
 from chutelab.classroom.exercises.exercise import draw, shown
-from chutelab.classroom.lessons import find, scene_of, shipped_lessons
+from chutelab.classroom.lessons import find, scene_of
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.classroom.lessons.texts import without_tex
-from chutelab.cli import main
+from chutelab.classroom.words import words
 from chutelab.engines.simulation import judged, simulate
 from chutelab.results import Kind
-from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
+from chutelab.results.quantities import compare
 from chutelab.scene import load
+from shared import chutelab, lessons
 
 G = 9.81
 BALL = 0.0063  # radius of the particle where a scene does not say, m
 X2 = 0.6 - BALL  # way to the plate of `perpendicular`, m
 T2 = X2 / 2.0  # s
 RC = 0.5 + BALL  # path of the centre round the pulley of `low-speed`, m
-NUMBERS = range(len(shipped_lessons()))
+NUMBERS = range(len(lessons()))
 PHYSICS = Path(__file__).parent.parent / "docs" / "physics.md"
 
 
-def chutelab(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
+@cache
 def worksheet(number):
     """All that a lesson says, worksheet, explanation and what to say; or docs/physics.md."""
     if number == "physics":
@@ -45,6 +42,11 @@ def worksheet(number):
     lesson = find(number)
     texts = (sheet(lesson, "student"), sheet(lesson, "explanation"), lesson.teacher.say)
     return without_tex("\n\n".join(texts))
+
+
+@cache
+def in_a_line(number):
+    return " ".join(worksheet(number).split())
 
 
 def commands(text):
@@ -107,7 +109,7 @@ def test_commands_of_the_overview_run(tmp_path, monkeypatch):
     for line in commands(text):
         if "page" not in line and "build" not in line:
             assert chutelab(*shlex.split(line)[1:]).exit_code == 0, line
-    for lesson in shipped_lessons():
+    for lesson in lessons():
         row = f"({lesson.folder.name}/exercise.ipynb) | {lesson.question} | {lesson.level} |"
         assert row in text
 
@@ -559,7 +561,7 @@ GIVEN = {
     [(number, said, value) for number, all_ in STATED.items() for said, value in all_.items()],
 )
 def test_numbers_of_worksheets_are_right(number, said, value):
-    assert re.sub("[{}]", "", said) in " ".join(worksheet(number).split())
+    assert re.sub("[{}]", "", said) in in_a_line(number)
     (text,) = re.findall(r"\{(-?[\d.]+)\}", said)
     half = 0.5 * 10.0 ** -len(text.partition(".")[2])
     assert abs(float(text) - value) <= half * (1.0 + 1e-9)
@@ -575,6 +577,12 @@ def test_no_number_of_a_worksheet_goes_unlooked_at(number):
     assert found - looked_at - GIVEN.get(number, set()) == set()
 
 
+def said_by(step):
+    """The first sentence of a step, or of what it asks."""
+    text = step.text or " ".join(ask.text for ask in step.asks) or words().say("sheet-numbers")
+    return re.match(r".*?[.?!:](?= |$)|.*", " ".join(text.split()))[0]
+
+
 @pytest.mark.parametrize("number", NUMBERS)
 def test_teachers_sheets_have_a_key_goals_and_every_mistake_that_is_named(number):
     lesson, told = find(number), sheet(find(number), "teacher")
@@ -587,6 +595,13 @@ def test_teachers_sheets_have_a_key_goals_and_every_mistake_that_is_named(number
     for name in ("NGSS", "IB", "Sekundarstufe II"):
         assert name in told
     assert f"{lesson.minutes} minutes" in told
+    # The plan quotes each step, with values where a page has fields.
+    plan = re.search(r"^## Plan\n(.*?)^## ", told, re.MULTILINE | re.DOTALL)[1]
+    rows = [line.strip("| ").split(" | ") for line in plan.strip().splitlines()[2:]]
+    assert [int(minutes) for _, _, minutes, _ in rows] == [one.minutes for one in lesson.steps]
+    for step, (_, _, _, said) in zip(lesson.steps, rows, strict=True):
+        pattern = re.sub(r"\\\{[a-z_.\\]+\\\}", r"-?[0-9.]+.*", re.escape(said_by(step)))
+        assert re.fullmatch(pattern, said), (pattern, said)
     _, cases = draw(find_exercise(number), "your name")
     for case in cases:
         assert f"Answer: {shown(case.right)} {case.question.unit}".strip() in told

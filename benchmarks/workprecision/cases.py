@@ -20,7 +20,7 @@ import numpy as np
 
 from chutelab.machine import build
 from chutelab.results import Kind, Recording
-from chutelab.results.comparison import relative_error, scales
+from chutelab.results.quantities import relative_error, scales
 from chutelab.scene import Scene, from_dict
 from chutelab.theory import predict, transfer
 from chutelab.util.arrays import Floats
@@ -53,7 +53,7 @@ class Reference:
     values : dict of ndarray, (N,)
         By quantity.
     sizes : dict of float
-        Scale of each quantity, as `chutelab.results.comparison.relative_error` takes it.
+        Scale of each quantity, as `chutelab.results.quantities.relative_error` takes it.
     """
 
     values: Answer
@@ -205,7 +205,7 @@ SIZES = {
     "t2": "time", "y2": "length", "t3": "time", "x3": "length", "v3x": "speed", "v3y": "speed",
     "t_grip": "time", "x_grip": "length",
 }  # fmt: skip
-"""What kind of quantity each is; see `chutelab.results.comparison.scales`."""
+"""What kind of quantity each is; see `chutelab.results.quantities.scales`."""
 
 CROWD = 1000
 """Particles of the two cases with many."""

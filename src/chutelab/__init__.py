@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from chutelab.pictures.plots import overlay as overlay
     from chutelab.results import Kind as Kind
     from chutelab.results import Recording as Recording
-    from chutelab.results.comparison import compare as compare
+    from chutelab.results.quantities import compare as compare
     from chutelab.results.quantities import measure as measure
     from chutelab.scene import Scene as Scene
     from chutelab.scene import SceneError as SceneError
@@ -63,7 +63,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Kind": "results:Kind", "LawWarning": "util.errors:LawWarning",
     "Recording": "results:Recording", "Scene": "scene:Scene", "SceneError": "scene:SceneError",
-    "animate": "pictures.animation:animate", "compare": "results.comparison:compare",
+    "animate": "pictures.animation:animate", "compare": "results.quantities:compare",
     "design": "studies.design", "exercises": "classroom.exercises", "figures": "theory.figures",
     "live": "pictures.live:live", "load": "scene:load", "measure": "results.quantities:measure",
     "measured": "studies.measured", "overlay": "pictures.plots:overlay", "scenes": "scene:shipped",

@@ -349,7 +349,7 @@ MISTAKES = {
         "ε on both components": lambda g: g.e * hypot(g.v0, g.vy),
         "the equation as printed": lambda g: hypot(into(g), g.e * along(g)),
         "a bounce without loss": lambda g: hypot(g.v0, g.vy),
-        "ε on the wrong component": lambda g: hypot(g.e * g.v0, g.vy),
+        "ε on the other component": lambda g: hypot(g.e * g.v0, g.vy),
         "component along the plate forgotten": lambda g: g.e * into(g),
     },
     ("turning-the-plate", 3): {
@@ -358,7 +358,7 @@ MISTAKES = {
         ),
         "the plate not turned": lambda g: -g.e * g.v0,
         "ε forgotten": lambda g: along(g) * sin(radians(g.alpha)) - into(g) * cos(radians(g.alpha)),
-        "ε on the wrong component": lambda g: (
+        "ε on the other component": lambda g: (
             g.e * along(g) * sin(radians(g.alpha)) - into(g) * cos(radians(g.alpha))
         ),
         "rebound into the plate": lambda g: (
@@ -370,7 +370,7 @@ MISTAKES = {
     },
     ("turning-the-plate", 4): {
         "velocity at the pivot's distance": lambda g: degrees(atan(2 * matching(g))),
-        "distance from the wrong place": lambda g: degrees(atan(g.v0**2 / (2 * G * g.d))),
+        "distance from another place": lambda g: degrees(atan(g.v0**2 / (2 * G * g.d))),
         "angle from the horizontal": lambda g: degrees(atan(1 / matching(g))),
         "the tangent, not the angle": matching,
     },
@@ -479,7 +479,7 @@ MISTAKES = {
     ("design", 1): {
         "ε forgotten": lambda g: plate_for(g, 0.0, 1.0),
         "the fall forgotten": lambda g: degrees(atan(sqrt(g.e))),
-        "ε on the wrong component": lambda g: plate_for(g, 0.0, 1.0, g.e),
+        "ε on the other component": lambda g: plate_for(g, 0.0, 1.0, g.e),
         "angle from the horizontal": lambda g: 90 - plate_at(g, 0.0),
         "the tangent, not the angle": lambda g: tan(radians(plate_at(g, 0.0))),
     },

@@ -17,9 +17,8 @@ import numpy as np
 
 from chutelab.machine import build
 from chutelab.results import Recording
-from chutelab.results.comparison import compare, predicted, relative_error, scales
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import each, measure
+from chutelab.results.quantities import compare, each, measure, predicted, relative_error, scales
 from chutelab.scene import Scene
 from chutelab.scene.quantities import lookup
 from chutelab.scene.units import with_unit, write_size
@@ -196,7 +195,7 @@ class Finding:
     # in `unit`; NaN where the theory, or the run, has none
     expected: float
     simulated: float
-    # relative (see `chutelab.results.comparison`), or in `unit`; NaN if one of the two is
+    # relative (see `chutelab.results.quantities`), or in `unit`; NaN if one of the two is
     error: float
     tolerance: float | None  # what the error must not exceed; None where nothing is promised
     relative: bool  # whether error and tolerance are relative

@@ -20,18 +20,17 @@ from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chutelab.classroom.exercises.catalogue import of_quantities
 from chutelab.classroom.lessons.reading import Lesson, beside, find, machine_of, scene_of
 from chutelab.classroom.lessons.steps import FUNCTIONS, Ask, Column, quantities_in
 from chutelab.classroom.lessons.texts import without_tex
 from chutelab.classroom.words import Words, words
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
-from chutelab.results.comparison import compare, predicted
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import measure
+from chutelab.results.quantities import compare, measure, predicted
 from chutelab.results.summary import facts, sheets
 from chutelab.scene import Scene
+from chutelab.scene.conflicts import of_quantities
 from chutelab.scene.overrides import Override
 from chutelab.scene.quantities import lookup, whose
 from chutelab.util.errors import InputError

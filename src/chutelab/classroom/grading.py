@@ -302,23 +302,20 @@ def _copied(row: Grade, before: Sequence[Grade]) -> Iterator[str]:
             (row, other, f"are right for the numbers of {other.student}"),
             (other, row, f"of {other.file} are right for these numbers"),
         ):
-            if found := _right_for(mine, its):
+            # An answer that follows from the student's own numbers by a known mistake is no sign.
+            _, cases = draw(EXERCISES[mine.lesson], its.student)
+            found = [
+                n
+                for n, mark in enumerate(mine.marks, 1)
+                if not mark and n in mine.answers and n not in mine.mistakes
+                and is_rounded(mine.answers[n], cases[n - 1].right)
+            ]  # fmt: skip
+            if found:
                 chance, seen = _chance(mine, found, len(others))
                 likely = f"{'' if seen else 'at most '}1 in {1.0 / chance:,.0f}"
                 likely = likely if chance < LIKELY else "this may be chance"
                 listed = ", ".join(map(str, found))
                 yield printable(f"answers {listed} {said} (by chance: {likely})")
-
-
-def _right_for(row: Grade, other: Grade) -> list[int]:
-    """Return the questions whose answers are wrong, and right for the numbers of another.
-
-    An answer that follows from the student's own numbers by a known mistake is no sign of that.
-    """
-    _, cases = draw(EXERCISES[row.lesson], other.student)
-    wrong = [n for n, mark in enumerate(row.marks, 1) if not mark and n in row.answers]
-    unexplained = [n for n in wrong if n not in row.mistakes]
-    return [n for n in unexplained if is_rounded(row.answers[n], cases[n - 1].right)]
 
 
 LIKELY: Final = 0.05

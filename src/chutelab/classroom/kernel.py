@@ -194,7 +194,10 @@ class _Heard:
                 died = f"the kernel died{where}" if cell >= 0 else "the kernel did not start"
                 self.trouble = self.trouble or died
                 return
-            match _message(line):
+            message: object = None
+            with suppress(ValueError, RecursionError):
+                message = json.loads(line)
+            match message:
                 case {"folder": str(folder)} if not self.folder:
                     self.folder = folder
                 case {"cell": 0} if cell < 0:
@@ -218,13 +221,6 @@ class _Heard:
                     raise ForgedError("its kernel said what no chutelab says")
 
 
-def _message(line: bytes) -> object:
-    try:
-        return json.loads(line)
-    except (ValueError, RecursionError):
-        return None
-
-
 def _end(watcher: subprocess.Popen[bytes], folder: str) -> int:
     """Have the watcher end the kernel; return its exit code."""
     assert watcher.stdin is not None
@@ -238,19 +234,15 @@ def _end(watcher: subprocess.Popen[bytes], folder: str) -> int:
     if watcher.returncode not in ENDS:
         watcher.kill()
         if folder:
-            _sweep(folder)
+            import psutil
+
+            # Its processes have the folder in their environment.
+            for process in psutil.process_iter():
+                with suppress(psutil.Error):
+                    if process.environ().get("IPYTHONDIR") == folder:
+                        process.kill()
+            _remove(folder)
     return watcher.wait()
-
-
-def _sweep(folder: str) -> None:
-    """Clean up without a watcher; its processes have the folder in their environment."""
-    import psutil
-
-    for process in psutil.process_iter():
-        with suppress(psutil.Error):
-            if process.environ().get("IPYTHONDIR") == folder:
-                process.kill()
-    _remove(folder)
 
 
 def _remove(folder: str) -> None:
@@ -288,7 +280,13 @@ def _watch() -> None:
         signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
     code = 0
     gone = Event()
-    Thread(target=_wait_for_end, args=(gone,), daemon=True).start()
+
+    def follow() -> None:
+        while os.read(0, 1):
+            pass
+        gone.set()
+
+    Thread(target=follow, daemon=True).start()
     folder = tempfile.mkdtemp(prefix="chutelab-grade-")
     try:
         _say(sys.stdout.buffer, folder=folder)
@@ -309,7 +307,11 @@ def _watch() -> None:
             if len(started) > PROCESSES:
                 code = TOO_MANY
                 break
-            if sum(map(_resident, started)) > MEMORY:
+            held = 0
+            for one in started:
+                with suppress(psutil.Error):
+                    held += one.memory_info().rss
+            if held > MEMORY:
                 code = TOO_MUCH
                 break
         if _POSIX:
@@ -331,12 +333,6 @@ def _watch() -> None:
         _remove(folder)
         # Not through the interpreter's end: a thread still reads standard input.
         os._exit(code)
-
-
-def _wait_for_end(gone: Event) -> None:
-    while os.read(0, 1):
-        pass
-    gone.set()
 
 
 def _alive() -> list[Any]:
@@ -368,16 +364,6 @@ def _any_left() -> bool:
     return sys.platform != "linux" and bool(_alive())
 
 
-def _resident(process: Any) -> int:
-    """Return the bytes of memory that a process holds, 0 if it is over."""
-    import psutil
-
-    try:
-        return int(process.memory_info().rss)
-    except psutil.Error:
-        return 0
-
-
 def _prctl(option: int, value: int) -> None:
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
@@ -394,9 +380,18 @@ def _say(stream: IO[bytes], **message: object) -> None:
 def _work() -> None:
     """Run the cells that standard input holds."""
     if _POSIX:
+        import resource
+
         _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         signal.pthread_sigmask(signal.SIG_SETMASK, [])
-        _limit()
+        for what, most in (
+            (resource.RLIMIT_CORE, 0),
+            (resource.RLIMIT_FSIZE, LARGEST_FILE),
+            # Not the address space: WebAssembly reserves much more than it uses.
+            (resource.RLIMIT_DATA, MEMORY),
+        ):
+            with suppress(ValueError, OSError):
+                resource.setrlimit(what, (most, most))
     cells, time_limit = json.loads(sys.stdin.buffer.read())
     pipe = os.fdopen(os.dup(1), "wb")
     nowhere = os.open(os.devnull, os.O_RDWR)
@@ -465,20 +460,6 @@ def _work() -> None:
     tell(end=True)
     # Threads and what is registered for the end do not keep it.
     os._exit(0)
-
-
-def _limit() -> None:
-    import resource
-
-    limits = [
-        (resource.RLIMIT_CORE, 0),
-        (resource.RLIMIT_FSIZE, LARGEST_FILE),
-        # Not the address space: WebAssembly reserves much more than it uses.
-        (resource.RLIMIT_DATA, MEMORY),
-    ]
-    for what, most in limits:
-        with suppress(ValueError, OSError):
-            resource.setrlimit(what, (most, most))
 
 
 def _said(error: BaseException) -> str:

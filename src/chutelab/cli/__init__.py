@@ -4,9 +4,9 @@
 `console`     the command ``chutelab`` itself, what commands print, and what becomes of errors
 `options`     options from signatures and docstrings; scenes with overrides; files of ``--out``
 `running`     ``run``, ``show``, ``live``
-`checking`    ``check``, ``verify``, ``stress``, ``bench``
-`studies`     ``sweep``, ``solve``, ``compare``
-`scenes`      ``scenes``, ``materials``, ``quantities``, ``schema``, ``new``, ``tables``, ``figure``
+`studies`     ``sweep``, ``solve``, ``compare``, ``discharge``
+`scenes`      ``scenes``, ``materials``, ``quantities``, ``schema``, ``new``, ``tables``,
+              ``figure``, ``check``, ``verify``, ``stress``, ``bench``
 `lessons`     ``lesson``: list, show, build, new, page, scorm, grade
 ============  =====================================================================================
 
@@ -14,7 +14,7 @@ Modules that take long to import are imported inside the commands that need them
 ``chutelab --help`` answers at once.
 """
 
-from chutelab.cli import checking, lessons, running, scenes, studies  # noqa: F401 - their commands
+from chutelab.cli import lessons, running, scenes, studies  # noqa: F401 - their commands
 from chutelab.cli.console import main
 
 __all__ = ["main"]

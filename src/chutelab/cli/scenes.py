@@ -1,25 +1,47 @@
-"""What you need to write a scene, and the paper: seven commands.
+"""Scenes: what you need to write one, whether one is to be trusted, and the paper's tables.
 
 ``scenes``, ``materials``, ``quantities``, ``schema`` and ``new``; ``tables`` and ``figure``, the
-paper's tables and figures as printed beside computed.
+paper's as printed beside computed; ``check``, ``verify``, ``stress`` and ``bench``: is a scene, an
+answer, a run right.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import click
 from click.shell_completion import CompletionItem
 
-from chutelab.cli import console
-from chutelab.cli.console import RefusedError
-from chutelab.cli.options import FileName, Folder, beginning, check_file, command, destination
+from chutelab.cli.console import RefusedError, progress, say, tell
+from chutelab.cli.options import (
+    Count,
+    Engine,
+    FileName,
+    Folder,
+    Number,
+    SceneName,
+    Seconds,
+    Texts,
+    beginning,
+    check_file,
+    command,
+    complete_scene,
+    destination,
+    loaded_as_told,
+)
 from chutelab.util.files import whole, writing
 
 if TYPE_CHECKING:
+    from chutelab.checks.workprecision import Timing
     from chutelab.scene.materials import Preset
+    from chutelab.util.tables import Sheet
 
 STANDARD_OUTPUT = Path("-")
 
@@ -33,7 +55,7 @@ def scenes(*, json_: bool) -> None:
     listed = [{**asdict(scene), "path": str(scene.path)} for scene in about()]
     rows = [(s.name, f"{s.title}\n{s.look[0] if s.look else ''}") for s in about()]
     table = Sheet("", ("scene", "what it shows"), tuple(rows), texts=2)
-    console.tell({"scenes": listed}, table, as_json=json_)
+    tell({"scenes": listed}, table, as_json=json_)
 
 
 def complete_material(begun: str) -> list[CompletionItem]:
@@ -117,9 +139,7 @@ def materials(material: Annotated[str | None, complete_material] = None, *, json
         to_copy = TO_COPY.format(name=material) + "\n".join(
             f"{key} = {getattr(one.material, key)!r}" for key in VALUES
         )
-    console.tell(
-        {"materials": told, "sources": list(numbers)}, *tables, as_json=json_, wrote=to_copy
-    )
+    tell({"materials": told, "sources": list(numbers)}, *tables, as_json=json_, wrote=to_copy)
 
 
 TO_COPY = """
@@ -146,7 +166,7 @@ def schema(*, run: bool) -> None:
     else:
         from chutelab.scene import schema as described
 
-    console.say(json.dumps(described(), indent=2))
+    say(json.dumps(described(), indent=2))
 
 
 @command("List the quantities of a run: names, units, meanings.")
@@ -165,7 +185,7 @@ def quantities(*, json_: bool) -> None:
     told = [{key: getattr(row, key) for key in keys} for row in REGISTRY.values()]
     rows = tuple((row.name, row.unit, row.meaning) for row in REGISTRY.values())
     listed = Sheet("Quantities of a run", ("", "", ""), rows, texts=3)
-    console.tell({"quantities": told}, listed, as_json=json_)
+    tell({"quantities": told}, listed, as_json=json_)
 
 
 @command("Write a complete, commented scene to start from.")
@@ -181,14 +201,14 @@ def new(
     from chutelab.scene import template
 
     if path == STANDARD_OUTPUT:
-        console.say(template(), end="")
+        say(template(), end="")
         return
     check_file("", path)
     if path.exists() and not force:
         raise RefusedError(f"{path} is there already; --force overwrites it.")
     with writing(str(path)), whole(path) as unfinished:
         unfinished.write_text(template(), encoding="utf-8")
-    console.say(f"wrote {path}; run it with: chutelab run {path}")
+    say(f"wrote {path}; run it with: chutelab run {path}")
 
 
 @command("Compute the paper's tables anew, beside what is printed.")
@@ -211,7 +231,7 @@ def tables(
     rebound: Literal["as-printed", "corrected"] = "as-printed" if as_printed else "corrected"
     found = [table(int(n), rebound) for n in ([number] if number else "1345")]
     told = [{**asdict(t), "cells": t.cells, "differing": t.differing} for t in found]
-    console.tell({"tables": told}, *found, as_json=json_)
+    tell({"tables": told}, *found, as_json=json_)
 
 
 @command("Draw the paper's figures again, as printed and corrected.")
@@ -248,4 +268,244 @@ def figure(number: int, *, out: Folder, json_: bool) -> None:
             f" -v3y: {found.sweep}"
         )
     told = {key: getattr(found, key) for key in ("title", "meaning", "missing", "columns")}
-    console.tell({"figure": found.number, **told}, found, as_json=json_, wrote=wrote)
+    tell({"figure": found.number, **told}, found, as_json=json_, wrote=wrote)
+
+
+@command("Look at a scene before it runs, or say all that is wrong.")
+def check(scenes: Annotated[Texts, complete_scene], *, set_: Texts, json_: bool) -> None:
+    """Look at each SCENE before it runs, or say all that is wrong with it.
+
+    Says what will be built and what is skipped, which engine runs and why, what a run will cost in
+    time and memory, what the closed form covers, and for each warning what to change: surfaces that
+    cross, a plate that leaves a crowd less than three grains above the belt, a box that is filled
+    through walls, a bed that rides a slow belt by adhesion. What a run costs comes from a trial of
+    the whole of it, cut off after 1 s: the cost of longer ones is estimated from how far it got, or
+    not given.
+    """
+    from chutelab.checks.preflight import Preflight, preflight
+    from chutelab.scene import SceneError, load
+    from chutelab.util.tables import plain
+
+    refused = False
+    found: dict[str, Preflight] = {}
+    for name in scenes:
+        try:
+            found[name] = preflight(load(name, set_))
+        except SceneError as error:
+            refused = True
+            say(f"Error: {error}", err=True)
+    looks = [{"scene": name, **plain(look)} for name, look in found.items()]
+    titled = (replace(look, title=f"{name}: {look.title}") for name, look in found.items())
+    tell({"scenes": looks}, *titled, as_json=json_)
+    if refused:
+        click.get_current_context().exit(2)
+
+
+@command("Check what scenes promise; compare independent answers.")
+def verify(
+    scenes: Annotated[Texts, complete_scene] = (),
+    *,
+    max_seconds: Seconds = 300.0,
+    jobs: Annotated[int, Count(min=0)] = 0,
+    json_: bool,
+) -> None:
+    """Check what each SCENE is expected to show (default: all shipped ones).
+
+    Every [[expect]] of a scene is looked at on each engine that can run it, and in the theory.
+    Then theory, exact, contact, pymunk and, where SciPy is installed, its DOP853 are compared on
+    its particle 0, taken alone. Exit code 1 if an error is larger than its tolerance.
+
+    --max-seconds S  Leave out an answer that takes longer than S seconds. [default]
+    --jobs N  Spread the scenes over N processes; 0, the default, is one for each processor.
+    """
+    from chutelab.checks import agreement
+    from chutelab.scene import load, shipped
+    from chutelab.studies.sweep import crew
+    from chutelab.util.tables import Sheet, plain
+
+    loaded = {name: load(name) for name in scenes or shipped()}
+    work = partial(agreement.verify, max_seconds=max_seconds)
+    answered: dict[int, agreement.Verification] = {}
+    with (
+        progress("verifying") as update,
+        crew(min(len(loaded), jobs or os.cpu_count() or 1)) as team,
+    ):
+        for number, answer in team.results(work, enumerate(loaded.values())):
+            answered[number] = answer
+            if update is not None:
+                update(len(answered) / len(loaded))
+    found = {name: answered[number] for number, name in enumerate(loaded)}
+    failures = sum(answer.failures for answer in found.values())
+    answers = [
+        {
+            "scene": name,
+            "title": loaded[name].title,
+            "expectations": [{**plain(row), "holds": row.holds} for row in answer.findings],
+            "agreement": [
+                {**plain(row), "pair": row.pair.split(", "), "holds": row.holds}
+                for row in answer.agreements
+            ],
+            "skipped": answer.skipped,
+        }
+        for name, answer in found.items()
+    ]
+    shares = {name: shared for name, (_, shared) in agreement.ANSWERS.items()}
+    rows = tuple((name, *told) for name, told in agreement.ANSWERS.items())
+    common = Sheet("What the answers have in common", ("", "", ""), rows, texts=3)
+    both = (found[name].sheets(f"{name}: {loaded[name].title}") for name in found)
+    tell(
+        {"failures": failures, "shares": shares, "scenes": answers},
+        *chain.from_iterable(both),
+        common,
+        as_json=json_,
+        wrote="Errors and tolerances are relative where they have no unit.\n"
+        + (f"{failures} outside the tolerance" if failures else "all within the tolerance"),
+    )
+    if failures:
+        click.get_current_context().exit(1)
+
+
+@command("Run a scene and judge it by laws that every run must keep.")
+def stress(scene: SceneName, *, engine: Engine, dt: float | None, set_: Texts, json_: bool) -> None:
+    """Run SCENE and judge the run by laws that it must keep, whatever the scene.
+
+    No particle passes a surface, sinks into one or bounces off nothing; energy rises only by a
+    belt's work; ledger and momentum close. Each law that has something to say about the scene is a
+    line, with what was found and what it must not exceed. What the engine does not promise for such
+    a scene is listed with the reason. Exit code 1 if a law is broken. For scenes of disks without
+    strings.
+    """
+    from chutelab.checks.stress import Evidence, judge, need_judged
+    from chutelab.engines.simulation import judged
+    from chutelab.results.recorder import StalledError
+    from chutelab.util.tables import Sheet, plain
+
+    loaded = loaded_as_told(scene, set_, engine, dt)
+    need_judged(loaded)
+    try:
+        with progress("simulating") as update:
+            recording = judged(loaded, progress=update)
+    except StalledError as stalled:
+        raise click.ClickException(str(stalled)) from stalled
+    run = Evidence(recording)
+    found = judge(run)
+    broken = sum(one.broken for one in found)
+    about = {"scene": scene, "title": recording.title, "engine": run.engine, "dt": run.dt}
+    laws = [{"law": one.law, **plain(one), "holds": one.holds} for one in found]
+    rows = []
+    for one in found:
+        kept = "ok" if one.holds else "FAILED" if one.broken else "-"
+        said = "; not promised: ".join(filter(None, [one.detail, one.unpromised]))
+        rows.append((kept, one.law, f"{one.figure:.2g}", f"{one.bound:.2g}", said))
+    steps = "" if run.dt is None else f", steps of {run.dt:.4g} s"
+    title = f"{recording.title}\nengine {run.engine}{steps}"
+    table = Sheet(title, ("", "law", "figure", "bound", ""), tuple(rows), texts=2, tail=1)
+    unpromised = sum(bool(one.unpromised) for one in found)
+    verdict = f"all {len(found)} laws kept"
+    if broken:
+        verdict = f"{broken} of {len(found)} laws broken"
+    elif unpromised:
+        verdict = f"{len(found) - unpromised} laws kept, {unpromised} not promised"
+    tell({**about, "broken": broken, "laws": laws}, table, as_json=json_, wrote=verdict)
+    if broken:
+        click.get_current_context().exit(1)
+
+
+@command("Measure run time against error of a scene, and draw the diagram.")
+def bench(
+    scene: SceneName,
+    *,
+    engine: tuple[Literal["exact", "contact", "pymunk", "fixed"], ...],
+    dt: Annotated[tuple[float, ...], Number(1e-7, 0.1)],
+    repeats: Annotated[int, Count(1, 1000)] = 9,
+    max_seconds: Seconds = 60.0,
+    set_: Texts,
+    out: Folder,
+    json_: bool,
+) -> None:
+    """Measure how long each engine takes on SCENE with each step, and how wrong it is.
+
+    SCENE is a scene file or the name of a shipped one. Its run.engine, run.dt and run.align are
+    ignored.
+
+    Errors are relative, the largest of all answers of a run, against one that the engine had no
+    part in, as with `run --accuracy`: the closed form where it speaks of the whole run, else an
+    engine that shares no formula with the first. Of particles that meet, only totals are compared.
+    A step may be right by luck, where it happens to end at a contact: look at several. Of many
+    particles there are fewer steps, and fixed is left out unless it is asked for. Long steps come
+    first; what there is no time for is listed.
+
+    The first run is reported separately from the median of the repeats (what is over in less than
+    20 ms runs several times in a row); imports are never timed.
+
+    How to read the diagram: a point is one run with one step, further left is more accurate,
+    further down is faster, and both axes count powers of ten. A line is an engine: where it lies
+    lower, take that engine for the accuracy you need.
+
+    --engine  Only this engine; fixed is pymunk with run.align = false. May be repeated.
+    --dt S  A step of the engines that step, in place of the usual ones. May be repeated.
+    --repeats N  Timed runs after the first, at most; fewer of what takes long. [default]
+    --max-seconds S  Leave out what is not measured after S seconds, repeats aside: short steps of
+        crowds. [default]
+    --out DIR  Write work-precision.tsv and work-precision.png into this folder.
+    """
+    from chutelab.checks.workprecision import Timing, measure
+    from chutelab.util.files import tsv_text
+    from chutelab.util.versions import environment, measured_on
+
+    loaded = loaded_as_told(scene, set_)
+    about = environment()
+    files = ["work-precision.tsv", "work-precision.png"]
+    with destination(out, files) as into:
+        with progress("measuring") as update:
+            timings = measure(
+                loaded, engine, dt, repeats=repeats, max_seconds=max_seconds, progress=update
+            )
+        if into is not None:
+            from chutelab.pictures.plots.studies import workprecision
+
+            text = tsv_text(timings, Timing, {"scene": loaded.title, **about})
+            (into / files[0]).write_text(text, encoding="utf-8")
+            workprecision(timings, loaded.title, about).write(into / files[1])
+    told = {"scene": loaded.title, "environment": about, "records": timings}
+    table = _table(loaded.title, timings, measured_on(about))
+    wrote = f"wrote into {out}: {', '.join(files)}" if out else ""
+    tell(told, table, as_json=json_, wrote=wrote)
+
+
+def _table(title: str, timings: Sequence[Timing], measured: str) -> Sheet:
+    """Return the table of a scene, with notes: failures, how errors are known, the machine."""
+    from chutelab.util.tables import Sheet
+
+    rows = [
+        (
+            "" if before is not None and before.method == one.method else one.method,
+            "" if one.value is None else f"{one.value:.0e}",
+            duration(one.first),
+            duration(one.median),
+            "" if one.median is None else str(one.repeats),
+            "failed" if one.error is None else f"{one.error:.1e}",
+            one.quantity,
+        )
+        for one, before in zip(timings, [None, *timings], strict=False)
+    ]
+    heads = ("engine", "dt", "first", "median", "runs", "error", "of")
+    notes = [
+        f"{one.method} failed{'' if one.value is None else f' at dt {one.value:.0e}'}: {one.failed}"
+        for one in timings
+        if one.failed
+    ]
+    for how in dict.fromkeys(one.how for one in timings if one.how):
+        methods = dict.fromkeys(one.method for one in timings if one.how == how)
+        notes.append(f"error of {', '.join(methods)}: {how}")
+    return Sheet(title, heads, tuple(rows), tail=1, notes=(*notes, measured))
+
+
+def duration(seconds: float | None) -> str:
+    """Return a time in three digits, with its unit; "" for none."""
+    if seconds is None:
+        return ""
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("µs", 1e6)):
+        if seconds * factor >= 1.0:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds * 1e9:.0f} ns"

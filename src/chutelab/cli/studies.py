@@ -1,4 +1,4 @@
-"""``sweep``, ``solve`` and ``compare``: many variants of a scene, the right one, a measured one."""
+"""``sweep``, ``solve``, ``compare``, ``discharge``: variants, the right one, film and formulas."""
 
 from __future__ import annotations
 
@@ -481,3 +481,52 @@ def compare(
     names = [name for name in COMPARED if fitted is not None or name != "fit.json"]
     wrote = f"wrote into {out}: {', '.join(names)}" if out else ""
     tell(as_dict(found, fitted), *parts, as_json=json_, wrote=wrote)
+
+
+@command("Lay engineers' discharge methods over the simulated stream.")
+def discharge(
+    scene: SceneName,
+    *,
+    heights: str = "",
+    set_: Texts,
+    out: Folder,
+    json_: bool,
+) -> None:
+    """Lay the stream that leaves SCENE's pulley, as five methods have it, over the simulated one.
+
+    Of the scene only the incoming belt, its particles and its first stream are simulated: they fly
+    freely. The table gives edges and centre of the stream at heights above the pulley's axis; the
+    picture shows all of them.
+
+    The methods: point, the mass point of the paper; cema; booth, which has slip; golka, with a
+    path for each edge; korzen, with air drag. Those of M.H.E.A., Goodyear and Dunlop are left out,
+    as their rules are not known well enough.
+
+    chutelab discharge slip
+    chutelab discharge stream --set incoming.friction=0.6 --heights 0,-0.5,-1 --out out
+
+    --heights Y,Y,...  Heights above the pulley's axis, m; default: 0,-0.2,-0.4,-0.6,-0.8,-1.
+    --out DIR  Write discharge.png and discharge.json into this folder.
+    """
+    from rich.text import Text
+
+    from chutelab.studies.discharge import HEIGHTS, side_by_side
+
+    try:
+        wanted = [float(part) for part in heights.split(",")] if heights else HEIGHTS
+    except ValueError:
+        raise InputError(f"{heights!r}: numbers such as 0,-0.5,-1", "--heights") from None
+    loaded = loaded_as_told(scene, set_)
+    names = ("discharge.png", "discharge.json")
+    with destination(out, names) as place:
+        with progress("simulating"):
+            found = side_by_side(loaded, wanted)
+        if place is not None:
+            from chutelab.pictures.plots.studies import discharge_figure
+
+            with progress("drawing"):
+                discharge_figure(found).write(place / names[0])
+            write_json(found.as_dict(), place / names[1])
+    wrote = f"wrote into {out}: {', '.join(names)}" if out else ""
+    title = Text(found.scene.title, style="bold")
+    tell(found.as_dict(), title, found.sheet(), as_json=json_, wrote=wrote)

@@ -1,7 +1,227 @@
-"""What runs in Python and in the page alike, in C.
+"""What runs in Python and in the page alike, in C; in Python as WebAssembly, run by wasmtime.
 
-- `*.c`: the machine of a scene and its releases, the contact engine, the exact engine, and the laws
-  by which every run is judged; built to `core.wasm` by `python tools/build_core.py`. `layout.h`
-  says what they share with their host, and is a way in.
-- `module`: the core in memory, run by wasmtime; numbers in, numbers out.
+`*.c` are the machine of a scene and its releases, the contact engine, the exact engine, and the
+laws by which every run is judged; built to `core.wasm` by `python tools/build_core.py`. `layout.h`
+says what they share with their host, and is a way in. Here is the core in memory: numbers in,
+numbers out, its arrays as NumPy's. Nothing else in the package knows that it is WebAssembly.
 """
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+from contextlib import suppress
+from enum import IntEnum
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import wasmtime
+from numpy.typing import NDArray
+
+from chutelab.util.files import whole
+
+LARGE = 64 * 2**20
+"""Bytes beyond which a used memory is let go rather than kept for the next run."""
+
+SUBJECTS = ("Room", "World", "Plan", "Drawing", "Laws", "Exact")
+"""Structs of layout.h of which the core has one each."""
+
+TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}
+
+REAL, INTEGER = np.dtype(TYPES["double"]), np.dtype(TYPES["int"])
+
+
+@cache
+def _layout() -> dict[str, Any]:
+    text = (files(__package__) / "layout.json").read_text(encoding="utf-8")
+    described: dict[str, Any] = json.loads(text)
+    return described
+
+
+@cache
+def dtype(struct: str) -> np.dtype[Any]:
+    """Return a struct of layout.h as a NumPy type."""
+    described = _layout()["structs"][struct]
+    fields = described["fields"]
+    return np.dtype(
+        {
+            "names": list(fields),
+            "formats": [
+                (TYPES[kind], (n,)) if n > 1 else TYPES[kind] for _, kind, n in fields.values()
+            ],
+            "offsets": [offset for offset, _, _ in fields.values()],
+            "itemsize": described["size"],
+        }
+    )
+
+
+@cache
+def _struct(name: str) -> type[ctypes.Structure]:
+    """Return a struct as a structure of ctypes, which is read and set ten times as fast."""
+    kinds = {"double": ctypes.c_double, "int": ctypes.c_int32, "pointer": ctypes.c_uint32}
+    fields = _layout()["structs"][name]["fields"]
+    rows = [
+        (field, kinds[kind] * n if n > 1 else kinds[kind]) for field, (_, kind, n) in fields.items()
+    ]
+    return type(name, (ctypes.Structure,), {"_fields_": rows})
+
+
+@cache
+def constants(enum: str) -> dict[str, int]:
+    """Return an enum of layout.h."""
+    values: dict[str, int] = _layout()["enums"][enum]
+    return values
+
+
+@cache
+def number(name: str) -> Any:
+    """Return a number that layout.h defines: a float if it has a point or an exponent."""
+    return _layout()["constants"][name]
+
+
+class Status(IntEnum):
+    """Why the core came back, as in layout.h."""
+
+    DONE = 0
+    PAUSED = 1
+    FULL = 2
+    STALLED = 3
+    LACKING = 4
+
+
+class Module:
+    """One instance of the module, with a memory of its own.
+
+    Each subject of the core has one struct of numbers and of pointers to arrays, which a function
+    named like it gives; `world` is that of the contact engine. The core lays out its arrays itself;
+    `forget` frees them all.
+    """
+
+    def __init__(self) -> None:
+        engine, module = _compiled()
+        self._store = wasmtime.Store(engine)
+        try:
+            self._exports = wasmtime.Instance(self._store, module, []).exports(self._store)
+        except wasmtime.WasmtimeError as error:
+            # Addresses for all that it may grow to are set apart, and there may be too few.
+            raise MemoryError(" ".join(str(error).split())) from error
+        self._functions: dict[str, Any] = {}
+        self.call("_initialize")
+        self._memory: Any = self._exports["memory"]
+        self._bytes = np.empty(0, np.uint8)
+        self._begins = {name: self.call(name.lower()) for name in SUBJECTS}
+        self._look()
+        self.forget()
+
+    def call(self, name: str, *numbers: float) -> Any:
+        """Call a function of the core."""
+        if name not in self._functions:
+            self._functions[name] = self._exports[name]
+        return self._functions[name](self._store, *numbers)
+
+    def forget(self) -> None:
+        """Free all arrays and reset all structs."""
+        for struct in self.structs.values():
+            ctypes.memset(ctypes.addressof(struct), 0, ctypes.sizeof(struct))
+
+    def work(self, name: str) -> None:
+        """Call a function that may take more memory; it makes all views of arrays invalid.
+
+        Raises
+        ------
+        MemoryError
+            If there is no more to be had.
+        """
+        done = self.call(name)
+        self._look()
+        if not done:
+            raise MemoryError(f"the core has {self.size / 2**30:.1f} GiB, and gets no more")
+
+    def _look(self) -> None:
+        """Look at the memory anew; it moves when it grows, and with it every array."""
+        size = self._memory.data_len(self._store)
+        if size == self.size:
+            return
+        address = ctypes.addressof(self._memory.data_ptr(self._store).contents)
+        self._bytes = np.ctypeslib.as_array((ctypes.c_uint8 * size).from_address(address))
+        self.structs: dict[str, Any] = {
+            name: _struct(name).from_address(address + begin)
+            for name, begin in self._begins.items()
+        }
+        self.world: Any = self.structs["World"]
+
+    @property
+    def size(self) -> int:
+        """Bytes of its memory."""
+        return len(self._bytes)
+
+    def array(self, name: str, kind: np.dtype[Any], count: int, of: str = "World") -> NDArray[Any]:
+        """Return a view of the array that a field points to, good until `work` or `run`."""
+        begin: int = getattr(self.structs[of], name)
+        rows: NDArray[Any] = self._bytes[begin : begin + kind.itemsize * count].view(kind)
+        return rows
+
+    def fill(self, of: str, **arrays: NDArray[Any]) -> None:
+        """Copy arrays, flat and contiguous, to where the fields of a struct point."""
+        for name, array in arrays.items():
+            self.array(name, np.dtype(np.uint8), array.nbytes, of)[:] = array.view(np.uint8)
+
+    def run(self, name: str, steps: int, lacking: int) -> int:
+        """Call a function for so many steps at most, as `work`; `lacking` tells of no memory."""
+        status: int = self.call(name, steps)
+        self._look()
+        if status == lacking:
+            raise MemoryError(f"the core has {self.size / 2**30:.1f} GiB, and gets no more")
+        return status
+
+
+@cache
+def _compiled() -> tuple[wasmtime.Engine, wasmtime.Module]:
+    """Return the module, compiled: that takes 60 ms, to load what the last time kept 1 ms."""
+    engine, source = wasmtime.Engine(), (files(__package__) / "core.wasm").read_bytes()
+    # Kept for this version of wasmtime in the user's cache folder.
+    folder = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    name = sha256(source + version("wasmtime").encode("ascii")).hexdigest()[:16]
+    home = Path(folder) if folder else Path("~/.cache").expanduser()
+    kept = home / "chutelab" / f"{name}.core"
+    with suppress(OSError, wasmtime.WasmtimeError):
+        data, states = kept.read_bytes(), [kept.stat(), kept.parent.stat()]
+        # What is loaded is run as it is: nothing damaged, nothing that another user can write. On
+        # Windows its place says so.
+        own = os.name == "nt" or all(
+            one.st_uid == os.geteuid() and not one.st_mode & 0o022 for one in states
+        )
+        if sha256(data[32:]).digest() == data[:32] and own:
+            return engine, wasmtime.Module.deserialize(engine, data[32:])
+    module = wasmtime.Module(engine, source)
+    code = bytes(module.serialize())
+    with suppress(OSError):
+        kept.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with whole(kept) as unfinished:
+            unfinished.write_bytes(sha256(code).digest() + code)
+    return engine, module
+
+
+_idle: list[Module] = []
+
+
+def borrow() -> Module:
+    """Return a module that is not in use, reset; give it back with `give_back`."""
+    try:
+        module = _idle.pop()
+    except IndexError:
+        return Module()
+    module.forget()
+    return module
+
+
+def give_back(module: Module) -> None:
+    """Keep a module for the next run, unless its memory has grown large."""
+    if module.size <= LARGE:
+        _idle.append(module)

@@ -12,52 +12,37 @@
 
 #define PI 3.14159265358979323846
 
-/* Intervals whose common box tells which pieces they may meet: those that follow each other are near
-   each other. */
-#define WIDTH 32
 /* A flight of 5 m is looked at every millimetre, where it has to be. */
 #define HALVINGS 12
 /* Places of each interval at which it is asked whether a particle has got clear of a gate. */
 #define GATED 64
 
-typedef struct { double x[4], y[4]; } Curve;
+typedef struct { Two p[4]; } Curve;
+
+/* Lower left and upper right corner. */
+typedef struct { Two low, high; } Box;
 
 /* An interval of a track beside a piece, while it is halved. */
 static struct {
     Barrier *piece;
     int particle, number, knot; /* of the piece; of the knot before */
-    double radius, limit;       /* m; how near a centre may come, where it is not to be looked at */
+    double radius, limit;       /* m; how near a centre may come, where it is not to be looked at ... */
+    double begin, margin;       /* ... to begin with; how far a box may be from a piece that is met */
     int deepest;                /* the hit of this interval that passes nothing, or -1 */
 } At;
 
-static double least(const double *a, int n) {
-    double found = a[0];
-    for (int k = 1; k < n; k++) found = MIN(found, a[k]);
-    return found;
+/* Have the box of a piece hold a place. */
+static void grow(double *box, double x, double y) {
+    box[0] = MIN(box[0], x);
+    box[1] = MIN(box[1], y);
+    box[2] = MAX(box[2], x);
+    box[3] = MAX(box[3], y);
 }
 
-static double most(const double *a, int n) {
-    double found = a[0];
-    for (int k = 1; k < n; k++) found = MAX(found, a[k]);
-    return found;
-}
+PAIRED static Box all_apart(void) { return (Box){ both(INFINITY), both(-INFINITY) }; }
 
-/* Have a box hold another one. */
-static void grow(double *box, const double *by) {
-    box[0] = MIN(box[0], by[0]);
-    box[1] = MIN(box[1], by[1]);
-    box[2] = MAX(box[2], by[2]);
-    box[3] = MAX(box[3], by[3]);
-}
-
-static void empty(double *box) {
-    box[0] = box[1] = INFINITY;
-    box[2] = box[3] = -INFINITY;
-}
-
-static int apart(const double *a, const double *b, double margin) {
-    return a[0] >= b[2] + margin || a[2] <= b[0] - margin || a[1] >= b[3] + margin
-        || a[3] <= b[1] - margin;
+PAIRED static int apart(const Box *a, const double *piece, double margin) {
+    return is_any((a->low >= two_at(piece + 2) + margin) | (a->high <= two_at(piece) - margin));
 }
 
 /* Pieces: where they are. */
@@ -66,7 +51,8 @@ void shape_barriers(void) {
     int count = L.piece_count * (L.family ? L.particle_count : 1);
     for (int k = 0; k < count; k++) {
         Barrier *b = L.barriers + k;
-        empty(b->box);
+        b->box[0] = b->box[1] = INFINITY;
+        b->box[2] = b->box[3] = -INFINITY;
         if (b->radius == 0) {
             b->end[0] = b->x;
             b->end[1] = b->y;
@@ -83,11 +69,11 @@ void shape_barriers(void) {
                 double x = side & 1 ? 0 : 1 - side, y = side & 1 ? 2 - side : 0;
                 x = b->x + b->radius * x;
                 y = b->y + b->radius * y;
-                if (is_within(b, x, y, 0)) grow(b->box, (double[]){ x, y, x, y });
+                if (is_within(b, x, y, 0)) grow(b->box, x, y);
             }
         }
-        grow(b->box, (double[]){ b->end[0], b->end[1], b->end[0], b->end[1] });
-        grow(b->box, (double[]){ b->end[2], b->end[3], b->end[2], b->end[3] });
+        grow(b->box, b->end[0], b->end[1]);
+        grow(b->box, b->end[2], b->end[3]);
     }
 }
 
@@ -127,92 +113,93 @@ double distance(const Barrier *b, double x, double y) {
 
 /* Paths: cubics by their control points. */
 
-static void curve_after(const double *knot, Curve *c) {
+PAIRED static Curve curve_after(const double *knot) {
     const double *next = knot + L.row;
-    double third = (next[0] - knot[0]) / 3;
-    c->x[0] = knot[1];
-    c->y[0] = knot[2];
-    c->x[1] = knot[1] + third * knot[3];
-    c->y[1] = knot[2] + third * knot[4];
-    c->x[2] = next[1] - third * next[3];
-    c->y[2] = next[2] - third * next[4];
-    c->x[3] = next[1];
-    c->y[3] = next[2];
+    double third = (next[0] - knot[0]) * (1.0 / 3);
+    Two from = two_at(knot + 1), to = two_at(next + 1);
+    return (Curve){{ from, from + third * two_at(knot + 3), to - third * two_at(next + 3), to }};
+}
+
+PAIRED static Two place_on(const Curve *c, double share) {
+    double s = share, r = 1 - s;
+    return r * r * (r * c->p[0] + 3 * s * c->p[1]) + s * s * (3 * r * c->p[2] + s * c->p[3]);
 }
 
 /* Where a particle is at a share of the interval after a knot. */
-void place_at(const double *knot, double share, double *x, double *y) {
-    Curve c;
-    curve_after(knot, &c);
-    double s = share, r = 1 - s;
-    *x = r * r * (r * c.x[0] + 3 * s * c.x[1]) + s * s * (3 * r * c.x[2] + s * c.x[3]);
-    *y = r * r * (r * c.y[0] + 3 * s * c.y[1]) + s * s * (3 * r * c.y[2] + s * c.y[3]);
+PAIRED void place_at(const double *knot, double share, double *x, double *y) {
+    Curve c = curve_after(knot);
+    Two place = place_on(&c, share);
+    *x = place[0];
+    *y = place[1];
 }
 
-/* Coefficients of the square of the distance from a place, m2. */
-static void square_distance(const Curve *c, double x0, double y0, double *q) {
-    double x[4], y[4];
-    for (int k = 0; k < 4; k++) {
-        x[k] = c->x[k] - x0;
-        y[k] = c->y[k] - y0;
-    }
-#define DOT(i, j) (x[i] * x[j] + y[i] * y[j])
-    q[0] = DOT(0, 0);
-    q[1] = DOT(0, 1);
-    q[2] = 0.4 * DOT(0, 2) + 0.6 * DOT(1, 1);
-    q[3] = 0.1 * DOT(0, 3) + 0.9 * DOT(1, 2);
-    q[4] = 0.4 * DOT(1, 3) + 0.6 * DOT(2, 2);
-    q[5] = DOT(2, 3);
-    q[6] = DOT(3, 3);
-#undef DOT
+/* The sums of each of two pairs. */
+PAIRED static Two sums(Two a, Two b) {
+    return __builtin_shufflevector(a, b, 0, 2) + __builtin_shufflevector(a, b, 1, 3);
 }
 
-/* Whether none of some coefficients is less, or none more, than a bound. */
-static int all_from(const double *a, int n, double bound) {
-    int yes = 1;
-    for (int k = 0; k < n; k++) yes &= a[k] >= bound;
-    return yes;
+/* Coefficients of the square of the distance from a place, m2; the last of seven is there twice. */
+PAIRED static void square_distance(const Curve *c, Two place, Two *q) {
+    Two a = c->p[0] - place, b = c->p[1] - place, d = c->p[2] - place, e = c->p[3] - place, last = e * e;
+    q[0] = sums(a * a, a * b);
+    q[1] = sums(0.4 * (a * d) + 0.6 * (b * b), 0.1 * (a * e) + 0.9 * (b * d));
+    q[2] = sums(0.4 * (b * e) + 0.6 * (d * d), d * e);
+    q[3] = sums(last, last);
 }
 
-static int all_to(const double *a, int n, double bound) {
-    int yes = 1;
-    for (int k = 0; k < n; k++) yes &= a[k] <= bound;
-    return yes;
+/* Whether none of some pairs of coefficients is less, or none more, than a bound. */
+PAIRED static int all_from(const Two *a, int n, double bound) {
+    Truth yes = a[0] >= bound;
+    for (int k = 1; k < n; k++) yes &= a[k] >= bound;
+    return is_all(yes);
+}
+
+PAIRED static int all_to(const Two *a, int n, double bound) {
+    Truth yes = a[0] <= bound;
+    for (int k = 1; k < n; k++) yes &= a[k] <= bound;
+    return is_all(yes);
+}
+
+/* Products with a vector of the ways from a place to the control points. */
+PAIRED static void along_vector(const Curve *c, Two place, Two vector, Two *found) {
+    found[0] = sums((c->p[0] - place) * vector, (c->p[1] - place) * vector);
+    found[1] = sums((c->p[2] - place) * vector, (c->p[3] - place) * vector);
 }
 
 /* Whether a path that is beyond an end, by rounding not quite, is clear of the piece: from where that is met
    to the end it is no more than rounding. */
-static int is_clear_of_end(const Curve *c, const double *end, double limit) {
-    double q[7], reach = MAX(limit + L.rounding, 0);
-    square_distance(c, end[0], end[1], q);
-    return all_from(q, 7, reach * reach);
+PAIRED static int is_clear_of_end(const Curve *c, const double *end, double limit) {
+    double reach = MAX(limit + L.rounding, 0);
+    Two q[4];
+    square_distance(c, two_at(end), q);
+    return all_from(q, 4, reach * reach);
 }
 
-static int is_clear_of_line(const Curve *c, const Barrier *b, double limit) {
-    double d[4], feet[4], reach = MAX(limit, 0);
-    for (int k = 0; k < 4; k++) d[k] = beside(b, c->x[k], c->y[k]);
-    if (all_from(d, 4, limit) || all_to(d, 4, -limit)) return 1;
-    for (int k = 0; k < 4; k++) feet[k] = foot(b, c->x[k], c->y[k]);
-    if (all_to(feet, 4, -reach) || all_from(feet, 4, b->length + reach)) return 1;
-    if (all_to(feet, 4, L.rounding)) return is_clear_of_end(c, b->end, limit);
-    return all_from(feet, 4, b->length - L.rounding) && is_clear_of_end(c, b->end + 2, limit);
+PAIRED static int is_clear_of_line(const Curve *c, const Barrier *b, double limit) {
+    Two from = two_at(&b->x), tangent = two_at(&b->tx), d[2], feet[2];
+    double reach = MAX(limit, 0);
+    along_vector(c, from, (Two){ -tangent[1], tangent[0] }, d);
+    if (all_from(d, 2, limit) || all_to(d, 2, -limit)) return 1;
+    along_vector(c, from, tangent, feet);
+    if (all_to(feet, 2, -reach) || all_from(feet, 2, b->length + reach)) return 1;
+    if (all_to(feet, 2, L.rounding)) return is_clear_of_end(c, b->end, limit);
+    return all_from(feet, 2, b->length - L.rounding) && is_clear_of_end(c, b->end + 2, limit);
 }
 
 /* Whether all of a path is left of the ray from the centre through an end, or right of it, but for rounding:
    by no more than that along the arc where a particle inside can touch it. */
-static int is_aside(const Curve *c, const Barrier *b, const double *end, double side) {
-    double off = L.rounding * MAX(b->radius - At.radius, 0);
-    for (int k = 0; k < 4; k++) {
-        double x = c->x[k] - b->x, y = c->y[k] - b->y;
-        if (side * ((end[0] - b->x) * y - (end[1] - b->y) * x) < -off) return 0;
-    }
-    return 1;
+PAIRED static int is_aside(const Curve *c, const Barrier *b, const double *end, double side) {
+    Two center = two_at(&b->x), out = side * (two_at(end) - center), beyond[2];
+    along_vector(c, center, (Two){ -out[1], out[0] }, beyond);
+    return all_from(beyond, 2, -L.rounding * MAX(b->radius - At.radius, 0));
 }
 
-static int is_clear_of_bow(const Curve *c, const Barrier *b, double limit) {
-    double q[7], outer = b->radius + limit, inner = b->radius - limit;
-    square_distance(c, b->x, b->y, q);
-    if (all_from(q, 7, outer * outer) || (inner > 0 && all_to(q, 7, inner * inner))) return 1;
+PAIRED static int is_clear_of_bow(const Curve *c, const Barrier *b, double limit) {
+    double outer = b->radius + limit, inner = b->radius - limit;
+    Two q[4];
+    square_distance(c, two_at(&b->x), q);
+    /* Of a mass point both may hold to begin with: then the limit is below 0. */
+    if (all_from(q, 4, outer * outer) || (inner > 0 && all_to(q, 4, inner * inner))) return 1;
     if (b->whole) return 0;
     /* Beyond the ends: not counterclockwise of the first, or not clockwise of the last; of an arc of
        more than half a circle neither. */
@@ -221,9 +208,8 @@ static int is_clear_of_bow(const Curve *c, const Barrier *b, double limit) {
     return off && is_clear_of_end(c, b->end, limit) && is_clear_of_end(c, b->end + 2, limit);
 }
 
-static int is_clear(const Curve *c) {
-    return At.piece->radius == 0 ? is_clear_of_line(c, At.piece, At.limit)
-                                 : is_clear_of_bow(c, At.piece, At.limit);
+PAIRED static int is_clear(const Curve *c, const Barrier *b, double limit) {
+    return b->radius == 0 ? is_clear_of_line(c, b, limit) : is_clear_of_bow(c, b, limit);
 }
 
 /* Hits. */
@@ -273,9 +259,9 @@ static void ask_for(double depth) {
 }
 
 /* What is left of an interval: note it if it is bad. */
-static void measure(const Curve *c, double begin, double size) {
+PAIRED static void measure(const Curve *c, double begin, double size) {
     const Barrier *b = At.piece;
-    double deep[2], x[2] = {c->x[0], c->x[3]}, y[2] = {c->y[0], c->y[3]};
+    double deep[2], x[2] = { c->p[0][0], c->p[3][0] }, y[2] = { c->p[0][1], c->p[3][1] };
     for (int n = 0; n < 2; n++) deep[n] = At.radius - distance(b, x[n], y[n]);
     int at = deep[1] > deep[0];
     int passes = (beside(b, x[0], y[0]) > 0) != (beside(b, x[1], y[1]) > 0)
@@ -298,8 +284,8 @@ static void measure(const Curve *c, double begin, double size) {
     }
 }
 
-static void halve(const double *a, double *first, double *last) {
-    double middle = 0.5 * (a[1] + a[2]);
+PAIRED static void halve(const Two *a, Two *first, Two *last) {
+    Two middle = 0.5 * (a[1] + a[2]);
     first[0] = a[0];
     first[1] = 0.5 * (a[0] + a[1]);
     first[2] = 0.5 * (first[1] + middle);
@@ -309,34 +295,33 @@ static void halve(const double *a, double *first, double *last) {
     first[3] = last[0] = 0.5 * (first[2] + last[1]);
 }
 
-static void settle(const Curve *c, double begin, double size, int halvings) {
-    if (is_clear(c)) return;
+PAIRED static void settle(const Curve *c, double begin, double size, int halvings) {
+    if (is_clear(c, At.piece, At.limit)) return;
     if (halvings == HALVINGS) {
         measure(c, begin, size);
         return;
     }
     Curve first, last;
-    halve(c->x, first.x, last.x);
-    halve(c->y, first.y, last.y);
+    halve(c->p, first.p, last.p);
     settle(&first, begin, 0.5 * size, halvings + 1);
     settle(&last, begin + 0.5 * size, 0.5 * size, halvings + 1);
 }
 
 /* Look at an interval beside one piece that its box is not clear of. */
-static void look(const Curve *c, Barrier *b, int number, int knot) {
+PAIRED static void look(const Curve *c, Barrier *b, int number, int knot) {
+    if (is_clear(c, b, At.begin)) return;
     At.piece = b;
     At.number = number;
     At.knot = knot;
     At.deepest = -1;
-    At.limit = At.radius > 0 ? MAX(At.radius - L.allowed, 0) : -L.allowed;
-    if (is_clear(c)) return;
+    At.limit = At.begin;
     double t = KNOT(knot)[0], next = KNOT(knot + 1)[0];
     if (next < b->appears + L.dt || t > b->vanishes) return;
     if (L.pulley && number == 0) {
         /* The incoming belt ends on the pulley: beyond it that is what is near. */
-        int beyond = 1;
-        for (int k = 0; k < 4; k++) beyond = beyond && foot(b, c->x[k], c->y[k]) >= b->length;
-        if (beyond) return;
+        Two feet[2];
+        along_vector(c, two_at(&b->x), two_at(&b->tx), feet);
+        if (all_from(feet, 2, b->length)) return;
     }
     double spared = forgiven(next);
     if (spared == INFINITY) return;
@@ -344,40 +329,44 @@ static void look(const Curve *c, Barrier *b, int number, int knot) {
     settle(c, 0, 1, 0);
 }
 
+/* Side of a piece on which a path is where it first is off it, from its beginning on or back from its end:
+   1 or -1, or 0 if it stays on it, or gets beyond its ends. */
+PAIRED static int side_of(const Barrier *b, const Curve *c, int is_end) {
+    for (double share = 1.0 / (1 << HALVINGS); share <= 1; share *= 2) {
+        Two place = place_on(c, is_end ? 1 - share : share);
+        double d = beside(b, place[0], place[1]);
+        if (fabs(d) <= L.allowed) continue;
+        return is_within(b, place[0], place[1], side_margin()) ? (d > 0) - (d < 0) : 0;
+    }
+    return 0;
+}
+
 /* Where a mass point comes to a piece from one side and goes on on the other: such a passage at a knot,
    as where a blow does not turn a point back, is in no interval. */
-static void turn(const Curve *c, Barrier *pieces, int first, int knot) {
+PAIRED static void turn(const Curve *before, const Curve *after, const Barrier *pieces, int knot) {
     const double *now = KNOT(knot);
     for (int k = 0; k < L.piece_count; k++) {
         const Barrier *b = pieces + k;
-        double far = 0, before = pieces[k].side;
-        for (int n = 0; n < 4; n++) {
-            double d = beside(b, c->x[n], c->y[n]);
-            if (fabs(d) > fabs(far)) far = d;
-        }
-        pieces[k].side = far;
-        if (first || MIN(fabs(far), fabs(before)) <= L.allowed || (far > 0) == (before > 0)) continue;
-        if (!is_within(b, now[1], now[2], side_margin()) || !is_there(b, now[0])
-            || distance(b, now[1], now[2]) > L.allowed) continue;
+        if (distance(b, now[1], now[2]) > L.allowed || !is_there(b, now[0])) continue;
+        if (side_of(b, before, 1) * side_of(b, after, 0) >= 0) continue;
         At.number = k;
         add_hit(now[0], now[1], now[2], 0, 1);
     }
 }
 
 /* An interval of a track: its path, and the box about that. */
-typedef struct { Curve path; double box[4]; int knot; } Interval;
+typedef struct { Curve path; Box box; int knot; } Interval;
 
 /* Look at some intervals that follow each other, in a common box. */
-static void look_at_all(const Interval *some, int count, const double *box, Barrier *pieces) {
-    double margin = MAX(At.radius - L.allowed, 0);
+PAIRED static void look_at_all(const Interval *some, int count, const Box *box, Barrier *pieces) {
     int near = 0;
     for (int k = 0; k < L.piece_count; k++) {
-        if (!apart(box, pieces[k].box, margin)) pieces[near++].near = k;
+        if (!apart(box, pieces[k].box, At.margin)) pieces[near++].near = k;
     }
     for (int k = 0; k < near; k++) {
         Barrier *b = pieces + pieces[k].near;
-        for (int n = 0; n < count; n++) {
-            if (!apart(some[n].box, b->box, margin)) look(&some[n].path, b, pieces[k].near, some[n].knot);
+        for (const Interval *now = some; now < some + count; now++) {
+            if (!apart(&now->box, b->box, At.margin)) look(&now->path, b, pieces[k].near, now->knot);
         }
     }
 }
@@ -385,35 +374,37 @@ static void look_at_all(const Interval *some, int count, const double *box, Barr
 /* Find where a particle is deeper in surfaces than is allowed, or passes them: one place, or each passage,
    for each interval beside each piece; return whether there is any. What stood in the way of a gate as it
    shut is spared until it is clear of it; what overlapped at its release may go on doing so, no deeper. */
-int find_hits(int i) {
+PAIRED int find_hits(int i) {
     Interval some[WIDTH];
     Barrier *pieces = L.barriers + (L.family ? i * L.piece_count : 0);
-    double box[4];
+    Box box = all_apart();
+    Curve last;
     int count = 0, first = 1, before = L.hit_count;
     if (!L.piece_count) return 0;
     At.particle = i;
     At.radius = L.bodies[i].radius;
+    At.margin = MAX(At.radius - L.allowed, 0);
+    At.begin = At.radius > 0 ? At.margin : -L.allowed;
     for (int k = 0; k < L.piece_count; k++) pieces[k].clear = NAN;
-    empty(box);
     for (int k = L.offsets[i]; k < L.offsets[i + 1] - 1; k++) {
         const double *a = KNOT(k), *b = a + L.row;
         if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) continue;
         Interval *now = some + count++;
-        curve_after(a, &now->path);
+        Curve c = now->path = curve_after(a);
         now->knot = k;
-        now->box[0] = least(now->path.x, 4);
-        now->box[1] = least(now->path.y, 4);
-        now->box[2] = most(now->path.x, 4);
-        now->box[3] = most(now->path.y, 4);
-        grow(box, now->box);
-        if (At.radius == 0) turn(&now->path, pieces, first, k);
+        now->box.low = lesser(lesser(c.p[0], c.p[1]), lesser(c.p[2], c.p[3]));
+        now->box.high = larger(larger(c.p[0], c.p[1]), larger(c.p[2], c.p[3]));
+        box.low = lesser(box.low, now->box.low);
+        box.high = larger(box.high, now->box.high);
+        if (At.radius == 0 && !first) turn(&last, &c, pieces, k);
+        last = c;
         first = 0;
         if (count == WIDTH) {
-            look_at_all(some, count, box, pieces);
-            empty(box);
+            look_at_all(some, count, &box, pieces);
+            box = all_apart();
             count = 0;
         }
     }
-    look_at_all(some, count, box, pieces);
+    look_at_all(some, count, &box, pieces);
     return L.hit_count > before;
 }

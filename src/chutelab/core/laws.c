@@ -132,40 +132,61 @@ static void weigh_machine(void) {
     }
 }
 
+/* Look for numbers that are not finite in a particle's track: return how many there are. */
+static int find_unreal(int i) {
+    int unreal = 0;
+    for (int k = L.offsets[i]; k < L.offsets[i + 1]; k++) {
+        int own = 0;
+        for (int n = 0; n < 9; n++) own += !isfinite(KNOT(k)[n]);
+        if (own) add(&All.bad, i, k);
+        unreal += own;
+    }
+    return unreal;
+}
+
 /* Look at all numbers of a particle: return whether they are finite, and find the largest of each kind; also
    the energy in play, J: what it had at most, and what was booked on it, or of a crowd what was turned
    over. */
-static int weigh(int i) {
+PAIRED static int weigh(int i) {
+    if (!is_released(i)) return 1;
     const double *first = KNOT(L.offsets[i]), *last = KNOT(last_of(i));
-    double highest = 0, begin = 0, before = 0;
-    int unreal = 0;
-    for (const double *knot = first; knot <= last; knot += L.row) {
-        double sum = 0;
-        for (int n = 0; n < 9; n++) sum += 0 * knot[n];
-        if (sum != 0) { /* NAN: one of them is not finite. */
-            for (int n = 0; n < 9; n++) unreal += !isfinite(knot[n]);
-            add(&All.bad, i, L.offsets[i] + (knot - first) / L.row);
-        }
-        All.t = MAX(All.t, fabs(knot[0]));
-        All.knot_t = MAX(All.knot_t, knot[0]);
-        All.place = MAX(All.place, MAX(fabs(knot[1]), fabs(knot[2])));
-        All.fastest = MAX(All.fastest, pace(knot));
-        if (L.interact) continue;
-        double moving = kinetic(i, knot), lifted = potential(i, knot);
-        highest = MAX(highest, fabs(knot[6]) + fabs(knot[7]) + fabs(knot[8]) + fabs(lifted) + moving);
-        double now = moving + lifted - (knot[6] - knot[7] - knot[8]);
-        if (knot == first) begin = before = now;
-        else All.back = MIN(All.back, given_back(knot));
-        All.change = MAX(All.change, fabs(now - before));
+    double mass = L.bodies[i].mass, half = 0.5 * mass, turning = 0.5 * L.bodies[i].inertia;
+    double weight = mass * L.bodies[i].gravity, begin = gain(i, first), before = begin;
+    int is_nip = L.engine == ENGINE_CONTACT && !L.interact, row = L.row;
+    /* The largest x and y, change of what is unexplained and energy in play, speed squared; the least that
+       was given back; and all numbers times zero: that is zero if they are finite. */
+    Two place = both(0), energy = both(0), fastest = both(0), back = both(0), zero = both(0);
+    Two old = two_at(first + 7);
+    for (const double *knot = first; knot <= last; knot += row) {
+        Two at = size_of(two_at(knot + 1)), v = two_at(knot + 3), rest = two_at(knot + 5), losses = two_at(knot + 7);
+        Two given = losses - old, squares = v * v, works = size_of(rest), lost = size_of(losses);
+        double swift = squares[0] + squares[1], moving = half * swift + turning * square(rest[0]);
+        double now = moving + weight * knot[2] - (rest[1] - losses[0] - losses[1]);
+        double in_play = works[1] + lost[0] + lost[1] + weight * at[1] + moving;
+        zero += 0 * (two_at(knot) + at + v + rest + losses);
+        if (is_nip) given = both(given[0] + given[1]);
+        place = larger(place, at);
+        energy = larger(energy, size_of((Two){ now - before, in_play }));
+        fastest = larger(fastest, both(swift));
+        back = lesser(back, given);
         before = now;
+        old = losses;
     }
-    All.residual += before - begin;
-    if (L.interact && is_released(i)) {
-        highest = kinetic(i, first);
+    All.t = MAX(All.t, MAX(fabs(first[0]), fabs(last[0])));
+    All.knot_t = MAX(All.knot_t, last[0]);
+    All.place = MAX(All.place, MAX(place[0], place[1]));
+    All.fastest = MAX(All.fastest, fastest[0]);
+    if (L.interact) {
+        L.energy += kinetic(i, first);
         All.lifted += potential(i, last) - potential(i, first);
         for (int n = 0; n < 3; n++) All.entries[n] += last[6 + n];
+    } else {
+        L.energy += energy[1];
+        All.residual += before - begin;
+        All.change = MAX(All.change, energy[0]);
+        All.back = MIN(All.back, MIN(back[0], back[1]));
     }
-    L.energy += highest;
+    int unreal = is_all(zero == 0) ? 0 : find_unreal(i);
     All.unreal += unreal;
     return !unreal;
 }
@@ -180,21 +201,37 @@ static int are_finite(void) {
     return !All.unreal;
 }
 
-/* Largest acceleration towards the centre of an arc that a particle moves along inside, m/s2. Outside it
-   is never more than gravity's: what is faster leaves. No particle is inside the drive pulley. */
-static double bent_inside(void) {
+/* Largest acceleration towards the centre of a bent piece of knots of a particle that are inside, m/s2. */
+static double bent_by(const Barrier *b, double r, int first, int end) {
+    double inner = b->radius - r, low = MAX(inner - 0.1 * r, 0), found = 0;
+    for (int k = first; k < end && inner > 0; k++) {
+        const double *knot = KNOT(k);
+        double far = square(knot[1] - b->x) + square(knot[2] - b->y);
+        if (far < square(low) || far >= square(inner + 0.1 * r)) continue;
+        if (is_within(b, knot[1], knot[2], 0)) found = MAX(found, pace(knot) / inner);
+    }
+    return found;
+}
+
+/* The same of all particles and pieces. Outside it is never more than gravity's: what is faster leaves. No
+   particle is inside the drive pulley. */
+PAIRED static double bent_inside(void) {
     double found = 0;
-    for (int n = 0; n < L.piece_count; n++) {
-        const Barrier *b = L.barriers + n;
-        if (b->radius == 0 || (L.pulley && n == L.piece_count - 1)) continue;
-        for (int i = 0; i < L.particle_count; i++) {
-            double r = L.bodies[i].radius, inner = b->radius - r, low = MAX(inner - 0.1 * r, 0);
-            for (int k = L.offsets[i]; k < L.offsets[i + 1] && inner > 0; k++) {
-                const double *knot = KNOT(k);
-                double far = square(knot[1] - b->x) + square(knot[2] - b->y);
-                if (far < square(low) || far >= square(inner + 0.1 * r)) continue;
-                if (!is_within(b, knot[1], knot[2], 0)) continue;
-                found = MAX(found, pace(knot) / inner);
+    int bent = 0;
+    for (int n = 0; n < L.piece_count - (L.pulley != 0); n++) bent += L.barriers[n].radius > 0;
+    for (int i = 0; i < L.particle_count && bent; i++) {
+        double r = L.bodies[i].radius;
+        for (int first = L.offsets[i], end; first < L.offsets[i + 1]; first = end) {
+            Two low = two_at(KNOT(first) + 1), high = low;
+            for (end = first + 1; end < MIN(first + WIDTH, L.offsets[i + 1]); end++) {
+                Two place = two_at(KNOT(end) + 1);
+                low = lesser(low, place);
+                high = larger(high, place);
+            }
+            for (int n = 0; n < L.piece_count - (L.pulley != 0); n++) {
+                const Barrier *b = L.barriers + n;
+                int is_off = is_any((low > two_at(b->box + 2)) | (high < two_at(b->box)));
+                if (b->radius > 0 && !is_off) found = MAX(found, bent_by(b, r, first, end));
             }
         }
     }

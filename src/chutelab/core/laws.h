@@ -9,7 +9,24 @@
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 
+/* Two numbers side by side, such as x and y: what is done to both takes one instruction. */
+#define PAIRED __attribute__((target("simd128")))
+typedef double Two __attribute__((vector_size(16), aligned(8)));
+typedef long long Truth __attribute__((vector_size(16)));
+
+PAIRED static inline Two two_at(const double *place) { return *(const Two *)place; }
+PAIRED static inline Two both(double a) { return (Two){ a, a }; }
+PAIRED static inline Two lesser(Two a, Two b) { return __builtin_wasm_pmin_f64x2(a, b); }
+PAIRED static inline Two larger(Two a, Two b) { return __builtin_wasm_pmax_f64x2(a, b); }
+PAIRED static inline Two size_of(Two a) { return __builtin_wasm_abs_f64x2(a); }
+PAIRED static inline int is_any(Truth a) { return __builtin_wasm_any_true_v128(a); }
+PAIRED static inline int is_all(Truth a) { return __builtin_wasm_all_true_i64x2(a); }
+
 extern Laws L;
+
+/* Intervals, or knots, whose common box tells which pieces they may meet: those that follow each other are
+   near each other. */
+#define WIDTH 32
 
 /* A knot by its number. */
 #define KNOT(k) (L.knots + (long)(k) * L.row)

@@ -475,7 +475,6 @@ typedef struct {
     double appears, vanishes; /* [in] s; it is there from the one to the other */
     double end[4];          /* both ends, x and y */
     double box[4];          /* m; left, bottom, right, top */
-    double side;            /* m; how far a mass point got beside it in the interval before */
     double clear;           /* s; when a particle got clear of a gate, see `forgiven`; NAN: not known */
     int surface;            /* [in] which surface it is part of */
     int whole;              /* whether it is bent all round */

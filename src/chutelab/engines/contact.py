@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import REAL, Module, Status, borrow, constants, dtype, give_back
+from chutelab.core import REAL, Module, Status, borrow, constants, dtype, give_back
 from chutelab.machine import Machine, Pieces
 from chutelab.results.laws import take
 from chutelab.results.record import REASONS, TOTAL, Record

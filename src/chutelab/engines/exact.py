@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import REAL, Module, borrow, constants, dtype, give_back, number
+from chutelab.core import REAL, Module, borrow, constants, dtype, give_back, number
 from chutelab.machine import Machine
 from chutelab.results.laws import take
 from chutelab.results.record import REASONS, Record

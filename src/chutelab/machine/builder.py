@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import REAL, Module, borrow, constants, dtype, give_back
+from chutelab.core import REAL, Module, borrow, constants, dtype, give_back
 from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Thread
 from chutelab.machine.releases import RefusedError, draw
 from chutelab.machine.shapes import KINDS, Pieces

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.core.module import INTEGER, Module, Status, constants, dtype
+from chutelab.core import INTEGER, Module, Status, constants, dtype
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.scene.variants import Family
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers, Watch

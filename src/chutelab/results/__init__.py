@@ -4,8 +4,8 @@
 - `recorder`: what engines write a run into.
 - `ledger`: where the energy went, in total and by surface.
 - `arrival`: which particles have come to a surface, or to what lies on it.
-- `comparison`: the first events of each particle, the paper's symbols, particle 0 and the theory.
-- `quantities`: the readers of the registry: a run's numbers by name and by particle.
+- `quantities`: the readers of the registry, a run's numbers by name and by particle; the paper's
+  symbols; particle 0 and the theory.
 - `stream`: a stream as a whole: flow, fates, steady power, the envelope of its paths.
 - `laws`: what every run is judged by.
 - `summary`: notes, tables, and the JSON object of ``chutelab run --json``.
@@ -70,7 +70,7 @@ class Recording(Record):
     @property
     def prediction(self) -> Transfer:
         """What the theory predicts for the scene, see `chutelab.theory.predict`."""
-        from chutelab.results.comparison import prediction
+        from chutelab.results.quantities import prediction
 
         return prediction(self)
 

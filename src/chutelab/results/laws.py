@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core import module as core
+from chutelab import core
 from chutelab.machine import Machine
 from chutelab.results.record import EVENT, Record, kept
 from chutelab.util.tables import number

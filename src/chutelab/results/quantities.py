@@ -1,25 +1,344 @@
-"""The readers of the registry: the one place where quantities are read off a recording.
+"""What is read off a recording: the registry's quantities, and particle 0 beside the theory.
 
 `measure` gives a quantity of a run by its name, such as ``landing.x.mean``, `each` that of each
 particle, such as ``landing.x``, and `measured` that of each variant of a family. A quantity's row
-is in `chutelab.scene.quantities`.
+is in `chutelab.scene.quantities`. `compare` holds the paper's symbols of particle 0 against the
+theory.
+
+One error serves everywhere: |simulated - theory| / max(|theory|, scale), where the scale is what
+the quantity is measured by in its scene: d1 for lengths, v2 for speeds, t2 + t3 for times, 1 rad
+for angles, ½ m v2² for energies.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
-from math import nan
+from math import degrees, isfinite, nan
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from chutelab.results.arrival import arrivals
-from chutelab.results.comparison import column, first, paid, symbols, worst
+from chutelab.results.arrival import arrivals, never
 from chutelab.results.ledger import ledger, ledger_of_each
-from chutelab.results.record import ENTRIES, REASONS, Record
-from chutelab.scene.quantities import FIRST, lookup, suggestion, whose
-from chutelab.util.arrays import Bools, Floats
+from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
+from chutelab.scene import Scene
+from chutelab.scene.quantities import (
+    FIRST,
+    NEEDED,
+    THEORY,
+    Quantity,
+    lookup,
+    suggestion,
+    whose,
+)
+from chutelab.scene.units import with_unit
+from chutelab.scene.variants import Family
+from chutelab.theory import Transfer, predict, unbounded
+from chutelab.util.arrays import Bools, Floats, Numbers
+from chutelab.util.tables import Sheet, Shown, number
+
+ALONG = 1e-14
+"""Share of the rebound speed below which its part away from the plate is rounding."""
+
+
+@kept
+def first(recording: Record, event: str, surface: str | None = None) -> NDArray[Any]:
+    """Return the first "separation", "impact" or "landing" of each particle, (N,), dtype `EVENT`.
+
+    From the incoming belt, on the plate and on the outgoing belt, unless another surface is given.
+    NaN throughout where it did not happen. Read-only.
+    """
+    surface, events = surface or NEEDED[event], never(recording.count)
+    if surface in recording.surfaces:
+        found = recording.first(recording.select(event, surface=surface))
+        events[found["particle"]] = found
+    return events
+
+
+def column(events: NDArray[Any], name: str) -> Floats:
+    """Return ``t``, ``x``, ``y``, ``vx``, ``vy``, ``vx_after`` or ``vy_after`` of events, SI."""
+    if name == "t":
+        return np.asarray(events["t"])
+    if name in ("x", "y"):
+        return np.asarray(events["position"][:, "xy".index(name)])
+    when = "after" if name.endswith("_after") else "before"
+    return np.asarray(events[f"velocity_{when}"][:, "xy".index(name[1])])
+
+
+def paid(recording: Record, surface: str, entry: str) -> Floats:
+    """Return an entry of a surface of each variant, (V,), J; of a family V = N, else 1."""
+    books = recording.by_surface.reshape(-1, len(recording.surfaces), len(ENTRIES))
+    return np.asarray(books[:, recording.surface_index(surface), ENTRIES.index(entry)])
+
+
+def symbols(recording: Record) -> dict[str, Floats]:
+    """Return `THEORY` of each particle, (N,), SI units and radians; NaN without one."""
+    left, hit, down = (first(recording, event).copy() for event in NEEDED)
+    # In the paper's frame an impact is counted from the separation, a landing from the impact.
+    hit[np.isnan(left["t"])] = never(1)
+    down[np.isnan(hit["t"])] = never(1)
+    own = recording.particle
+    found = from_events(recording.machine.scenes, left, hit, down, own.radius, own.mass)
+    return found | until_no_slip(recording, down["t"])
+
+
+def until_no_slip(recording: Record, landed: Floats) -> dict[str, Floats]:
+    """Return the theory's belt work and slip heat of each particle that landed then (s), (N,), J.
+
+    Known of a lone particle that slips no more, and met nothing but the belt since it landed.
+    """
+    found = np.full((2, recording.count), nan)
+    if (recording.count == 1 or recording.family) and "outgoing" in recording.surfaces:
+        events = recording.events
+        there = np.isfinite(landed) & recording.ended_by("settled")
+        away = events["surface"] != recording.surface_index("outgoing")
+        away &= events["t"] > landed[events["particle"]]
+        there[events["particle"][away]] = False
+        for row, entry in zip(found, ("belt_work", "friction_loss"), strict=True):
+            row[there] = paid(recording, "outgoing", entry)[there]
+    return dict(zip(("belt_work", "slip_heat"), found, strict=True))
+
+
+def from_events(
+    scenes: Scene | Family,
+    left: NDArray[Any],
+    hit: NDArray[Any],
+    down: NDArray[Any],
+    radius: Numbers,
+    mass: Numbers,
+) -> dict[str, Floats]:
+    """Return what separation, impact and landing tell of `THEORY`, in the paper's frame.
+
+    x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate. The events
+    are (N,), of one scene or a family of N, and NaN, as `never` has it, where one did not happen;
+    radius (m) and mass (kg) are the particles'.
+    """
+    value, scene = scenes.value, scenes.scene
+    plate = scene.plate
+    top = nan if scene.incoming is None else value(scene.incoming, "pulley_radius")
+    belt = nan if scene.outgoing is None else value(scene.outgoing, "speed")
+    alpha = np.radians(nan if plate is None else value(plate, "angle_deg"))
+    (x1, y1), (x2, y2), (x3, y3) = (event["position"].T for event in (left, hit, down))
+    (ux, uy), (wx, wy) = hit["velocity_before"].T, hit["velocity_after"].T
+    vx, vy = down["velocity_before"].T
+    sine, cosine = np.sin(alpha), np.cos(alpha)
+    away, along = -(wx * cosine + wy * sine), wx * sine - wy * cosine
+    # Rounding must not choose between π and -π for a rebound up along the plate.
+    away = np.where(np.abs(away) <= ALONG * np.hypot(wx, wy), 0.0, away)
+    energy = 0.5 * mass * (vx * vx + belt * belt)
+    return {
+        "phi1": np.arctan2(x1, y1),
+        "v1": np.hypot(*left["velocity_after"].T),
+        "t2": hit["t"] - left["t"],
+        "x2": x2 - x1,
+        "y2": y1 - y2,
+        "v2": np.hypot(ux, uy),
+        "v2r": np.hypot(wx, wy),
+        "phi2": np.arctan2(ux * cosine + uy * sine, ux * sine - uy * cosine),
+        "phi2r": np.arctan2(away, along + 0.0),  # + 0.0: the angle of no rebound is 0, not -π
+        "t3": down["t"] - hit["t"],
+        "x3": x2 - x3,
+        "y3": y2 - y3,
+        "v3x": -vx,
+        "v3y": -vy,
+        "v3": np.hypot(vx, vy),
+        "d3": top + radius - y3,
+        "dEk": energy,
+        "P": energy * scenes.rate,
+    }
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison(Shown):
+    """Particle 0 of a recording beside the theory, SI units and radians.
+
+    Attributes
+    ----------
+    simulated, theory : dict of float
+        All of `THEORY`; NaN where the particle, or the theory, does not get so far.
+    errors : dict of float
+        Relative errors of the quantities that both have.
+    reason : str
+        Why the theory stops, "" if it does not.
+    """
+
+    simulated: dict[str, float]
+    theory: dict[str, float]
+    errors: dict[str, float]
+    reason: str
+
+    @property
+    def max(self) -> float | None:
+        """Largest of the errors; None if nothing could be compared."""
+        return max(self.errors.values(), default=None)
+
+    def sheet(self, *, details: bool = False) -> Sheet:
+        """Return every quantity that one of the two has, and the largest error.
+
+        Beside the paper's power is the true one, the belt work at the same rate of particles.
+        Errors are in percent; with `details` they are as they are, down to rounding.
+        """
+
+        def written(error: float) -> str:
+            return f"{error:.1e}" if details else f"{100.0 * error:.3f}"
+
+        rows = []
+        energy, power = self.theory["dEk"], self.theory["P"]
+        rate = power / energy if energy > 0.0 else nan
+        for name, row in THEORY.items():
+            simulated, theory = self.simulated[name], self.theory[name]
+            if row.unit == "degrees":
+                simulated, theory = degrees(simulated), degrees(theory)
+            if isfinite(simulated) or isfinite(theory):
+                error = written(self.errors[name]) if name in self.errors else ""
+                what = with_unit(row.meaning, row.unit)
+                rows.append((name, what, number(simulated), number(theory), error))
+                if name == "belt_work" and isfinite(rate):
+                    true = (number(rate * simulated), number(rate * theory))
+                    rows.append(("", "its power, to compare with P, W", *true, ""))
+        foot: list[tuple[str, ...]] = []
+        if self.max is not None:
+            foot = [("max", "largest relative error", "", "", written(self.max))]
+        begun = any(isfinite(value) for value in self.theory.values())
+        ends = "No closed form from here on" if begun else "No closed form"
+        return Sheet(
+            "Particle 0",
+            ("", "", "simulated", "theory", "error" if details else "error, %"),
+            tuple(rows),
+            foot=tuple(foot),
+            texts=2,
+            notes=(f"{ends}; {self.reason}",) if self.reason else (),
+        )
+
+
+def predicted(prediction: Transfer, row: Quantity) -> float:
+    """Return what the theory predicts of a quantity, in its unit; NaN where it has none."""
+    value = float(getattr(prediction, row.field)) if row.theory else nan
+    return degrees(value) if row.unit == "degrees" else value
+
+
+@kept
+def prediction(recording: Record) -> Transfer:
+    """Return what the theory predicts for the scene of a recording, see `chutelab.theory`."""
+    return predict(recording.scene)
+
+
+def compare(recording: Record) -> Comparison:
+    """Compare particle 0 with the theory's prediction for its scene."""
+    answer = prediction(recording)
+    theory = {name: float(getattr(answer, name)) for name in THEORY}
+    found = {name: float(values[0]) for name, values in symbols(recording).items()}
+    sizes = scales(recording.scene, answer)
+    return Comparison(
+        simulated=found,
+        theory=theory,
+        errors={
+            name: float(relative_error(found[name], theory[name], sizes[row.kind]))
+            for name, row in THEORY.items()
+            if isfinite(theory[name]) and isfinite(found[name])
+        },
+        reason=str(answer.reason),
+    )
+
+
+def relative_error(simulated: ArrayLike, theory: ArrayLike, scale: ArrayLike) -> Floats:
+    """Return |simulated - theory| / max(|theory|, scale), of numbers or arrays.
+
+    A scale of NaN counts as 0; where the theory is 0 as well, the difference itself is returned.
+    """
+    off = np.abs(np.subtract(simulated, theory))
+    size = np.fmax(np.abs(theory), np.where(np.isfinite(scale), scale, 0.0))
+    return np.asarray(off / np.where(size > 0.0, size, 1.0))
+
+
+def scales(scenes: Scene | Family, prediction: Transfer) -> dict[str, Any]:
+    """Return the scale of each kind of quantity in a scene; NaN where the theory has none.
+
+    Floats, or arrays (N,) where scene and prediction have such.
+    """
+    scene = scenes.scene
+    v2, t2, t3 = prediction.v2, prediction.t2, prediction.t3
+    energy = 0.5 * scenes.value(scene.particle, "mass") * (v2 * v2)
+    d1: Any = nan
+    if scene.incoming is not None and scene.plate is not None:
+        d1 = scenes.value(scene.incoming, "pulley_radius") + scenes.value(scene.plate, "distance")
+    found = {
+        "length": d1,
+        "speed": v2,
+        "time": np.where(np.isfinite(t3), t2 + t3, t2),
+        "angle": 1.0,
+        "energy": energy,
+        "power": energy * scenes.rate,
+    }
+    return {kind: float(size) if np.ndim(size) == 0 else size for kind, size in found.items()}
+
+
+OTHER = (Kind.COLLISION, Kind.STICK, Kind.SETTLE)
+"""Events that the theory's equations do not know of, before the landing or on another surface."""
+
+
+def worst(recording: Record) -> Floats:
+    """Return the largest relative error of particle 0 of each of V variants, (V,); NaN without one.
+
+    V is 1, or of a family as many as there are particles: `predict` takes one scene at a time, so
+    of a family the events tell how far the equations hold.
+    """
+    scene, family, count = recording.scene, recording.family, recording.count
+    if family is None:
+        found = compare(recording).max
+        return np.array([nan if found is None else found])
+    if scene.incoming is None or scene.plate is None:
+        return np.full(count, nan)
+    # The equations need a release on the belt, at its speed.
+    belt, start = scene.incoming, recording.offsets[:-1]
+    release = recording.knots[np.where(recording.released, start, 0)]
+    (x, y), (vx, vy) = release["position"].T, release["velocity"].T
+    radius, mass = recording.particle.radius, recording.particle.mass
+    begins = recording.released & (y == family.value(belt, "pulley_radius") + radius) & (x <= 0.0)
+    begins &= -family.value(belt, "length") <= x
+    begins &= (vx == family.value(belt, "speed")) & (vy == 0.0)
+    left, hit, down = _described(recording, begins)
+    simulated = from_events(family, left, hit, down, radius, mass)
+    simulated |= until_no_slip(recording, down["t"])
+    theory = unbounded(family)
+    sizes = scales(family, theory)
+    largest = np.full(count, nan)
+    for name, values in simulated.items():
+        errors = relative_error(values, getattr(theory, name), sizes[THEORY[name].kind])
+        largest = np.fmax(largest, np.where(np.isfinite(errors), errors, nan))
+    return largest
+
+
+def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
+    """Return separation, impact and landing of each of N variants of one particle.
+
+    The equations hold where these are its first three events, in this order. They did not happen
+    from the first event on that is another one, nor in variants whose `holds`, (N,), is false.
+    """
+    events = recording.events
+    kinds = [int(kind) for kind in (Kind.SEPARATION, Kind.IMPACT, Kind.LANDING, *OTHER)]
+    # Grip and slip on the belt and the pulley are in the equations.
+    known = events["kind"] == Kind.STICK
+    known &= events["surface"] == recording.surface_index("incoming")
+    order = (np.isin(events["kind"], kinds) & ~known).nonzero()[0]
+    own = events.take(order[np.argsort(events["particle"][order], kind="stable")])
+    place = np.arange(len(own)) - np.searchsorted(own["particle"], own["particle"])
+    found = []
+    for n in range(len(NEEDED)):
+        at, one = place == n, never(len(holds))
+        one[own["particle"][at]] = own[at]
+        found.append(one)
+    # An impact that throws a carried particle off the belt is no separation of the theory.
+    holds = holds & ~(found[0]["t"] >= found[1]["t"])
+    for one, (event, surface) in zip(found, NEEDED.items(), strict=True):
+        holds = holds & (one["kind"] == Kind[event.upper()])
+        holds &= one["surface"] == recording.surface_index(surface)
+        one[~holds] = never(1)
+    return found
+
 
 _STATISTICS: dict[str, Callable[[Floats], Any]] = {
     "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,

@@ -16,10 +16,9 @@ import numpy as np
 
 from chutelab.machine.releases import Squeeze, squeeze
 from chutelab.results.arrival import CARRIED, arrivals, fates
-from chutelab.results.comparison import column, compare, first, predicted, prediction
 from chutelab.results.laws import judge
 from chutelab.results.ledger import Ledger, ledger
-from chutelab.results.quantities import each
+from chutelab.results.quantities import column, compare, each, first, predicted, prediction
 from chutelab.results.record import REASONS, Kind, Record
 from chutelab.results.stream import FLOW, crowd, steady
 from chutelab.scene.quantities import REGISTRY, THEORY, Quantity

@@ -2,14 +2,21 @@
 
 Every rule speaks only when a comparison is *true*. A `Look` answers NaN for a key that is itself at
 fault, and no comparison with NaN is true: so the rules work on a half-broken scene, and all faults
-of a file come out in one message.
+of a file come out in one message. Rules about one row of a table are data, `RULES`, of which the
+live page gets those that it needs. No page may evaluate text, so `tree` turns a formula into lists
+that a small evaluator (``pictures/live/assets/formula.ts``) walks.
 """
 
 from __future__ import annotations
 
+import ast
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from types import CodeType
 from typing import Any, Final
 
 from chutelab.scene.materials import PRESETS
@@ -18,7 +25,6 @@ from chutelab.scene.units import (
     LIGHTEST,
     MOST_PARTICLES,
     MOST_PIECES,
-    SHORTEST,
     apart,
     read_size,
     sphere_mass,
@@ -57,6 +63,88 @@ SURFACES: Final = ("plate", "conveyor", "surface")
 """Lists of tables that are surfaces with names of their own."""
 
 
+OPERATORS: Final[dict[type[ast.AST], str]] = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**",
+    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
+    ast.And: "and", ast.Or: "or",
+}  # fmt: skip
+
+
+class _Dotted(ast.NodeTransformer):
+    """Makes one name of a quantity such as ``landing.x``."""
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.Name:
+        return ast.Name(ast.unparse(node), ast.Load())
+
+
+def of_quantities(formula: str) -> ast.Expression:
+    """Parse a formula of quantities, each of which becomes one name."""
+    parsed: ast.Expression = _Dotted().visit(ast.parse(formula.strip(), mode="eval"))
+    return ast.fix_missing_locations(parsed)
+
+
+@cache
+def tree(formula: str, *, dotted: bool = False) -> Any:
+    """Return a formula as nested lists: the name of an operation, then its operands.
+
+    Numbers and truth values stand for themselves, and a text is a name.
+
+    Raises
+    ------
+    ValueError
+        If there is something in it that pages do not know.
+
+    Examples
+    --------
+    >>> tree("0.5 * m * v0**2 > -1")
+    ['compare', ['*', ['*', 0.5, 'm'], ['**', 'v0', 2]], '>', ['-', 1]]
+    >>> tree("transfer(**throw, rebound='as-printed').v3x")
+    ['.', ['call', 'transfer', [], [['throw'], ['rebound', ['text', 'as-printed']]]], 'v3x']
+
+    `dotted` takes quantities for names:
+
+    >>> tree("1000 * ledger.belt_work", dotted=True)
+    ['*', 1000, 'ledger.belt_work']
+    """
+    read = of_quantities(formula) if dotted else ast.parse(formula.strip(), mode="eval")
+    return _of(read.body)
+
+
+def _of(node: ast.expr) -> Any:
+    match node:
+        case ast.Constant(bool() | int() | float() as value):
+            return value
+        case ast.Constant(str(text)):
+            return ["text", text]
+        case ast.Name(name):
+            return name
+        case ast.UnaryOp(ast.USub(), operand):
+            return ["-", _of(operand)]
+        case ast.UnaryOp(ast.Not(), operand):
+            return ["not", _of(operand)]
+        case ast.BoolOp(operator, operands):
+            return [OPERATORS[type(operator)], *map(_of, operands)]
+        case ast.BinOp(left, operator, right) if type(operator) in OPERATORS:
+            return [OPERATORS[type(operator)], _of(left), _of(right)]
+        case ast.Compare(left, operators, others) if {*map(type, operators)} <= {*OPERATORS}:
+            parts = zip(operators, others, strict=True)
+            rest = [part for one, other in parts for part in (OPERATORS[type(one)], _of(other))]
+            return ["compare", _of(left), *rest]
+        case ast.Attribute(value, name):
+            return [".", _of(value), name]
+        case ast.Subscript(value, index):
+            return ["item", _of(value), _of(index)]
+        case ast.List(items):
+            return ["list", *map(_of, items)]
+        case ast.Lambda(ast.arguments() as taken, body):
+            return ["lambda", [one.arg for one in taken.args], _of(body)]
+        case ast.Call(function, arguments, keywords):
+            # An unpacked table (**table) has no name.
+            named = [[one.arg, _of(one.value)] if one.arg else [_of(one.value)] for one in keywords]
+            return ["call", _of(function), [*map(_of, arguments)], named]
+    raise ValueError(f"pages do not know {ast.unparse(node)!r}")
+
+
 class Row:
     """A table, or one of several, sound or not; keys that are not written have their defaults."""
 
@@ -84,7 +172,11 @@ class Row:
         return self._look.sound(self.path(key) if key else self.head)
 
     def __getitem__(self, key: str) -> Any:
-        """Return the value of a key, or its default; NaN if it is at fault or its table absent."""
+        """Return the value of a key, or its default; NaN if it is at fault or its table absent.
+
+        A name in code, such as `from_`, does for the key.
+        """
+        key = key.rstrip("_")
         path, look = f"{self.head}.{key}", self._look
         look.asked.add(path)
         if look.faulty and not look.sound(path):
@@ -155,6 +247,56 @@ class Look:
         return any(plate.given("distance") for plate in self.rows("plate"))
 
 
+RULES: Final[dict[str, list[list[str]]]] = tomllib.loads(
+    (Path(__file__).parent / "rules.toml").read_text(encoding="utf-8")
+)
+"""By tables: keys, when, what the page says, what Python says; the file says what they mean."""
+
+
+@cache
+def compiled(formula: str) -> CodeType:
+    """Return a formula for `eval`."""
+    return compile(formula, f"<{formula}>", "eval")
+
+
+class _Names(dict[str, Any]):
+    """What names in a rule stand for: what is known here, all others by a function."""
+
+    def __init__(self, other: Callable[[str], Any], **known: Any) -> None:
+        super().__init__(known)
+        self.other = other
+
+    def __missing__(self, name: str) -> Any:
+        return self.other(name)
+
+
+def contradictions(look: Look, table: str, rows: Sequence[Row]) -> Iterator[Fault]:
+    """Yield what `RULES` find in rows of a table."""
+    run = look.row("run")
+
+    def near(a: object, b: object) -> bool:
+        return isinstance(a, LIST) and isinstance(b, LIST) and not apart(a, b)
+
+    for number, row in enumerate(rows):
+        if not (row.content or row.sound()):
+            continue
+        earlier = rows[:number]
+        names = _Names(
+            row.__getitem__, abs=abs, radians=math.radians, near=near, run=run, has=look.has,
+            number=lambda value: isinstance(value, int | float), given=row.given, sound=row.sound,
+            before=lambda key, rows=earlier: any(one.given(key) for one in rows),
+        )  # fmt: skip
+        for keys, when, _, said in RULES[table]:
+            for key in keys.split():
+                names["key"] = key
+                if eval(compiled(when), {"__builtins__": {}}, names) and (
+                    row.given(key) or row.sound(key)
+                ):
+                    text = said.format_map(_Names(row.path, its=row, run=run))
+                    value = row[key]
+                    yield Fault(row.path(key), MISSING if value is None else value, text)
+
+
 def conflicts(look: Look) -> Iterator[Fault]:
     """Yield every conflict between keys; each names all the keys concerned."""
     kinds, streams = look.rows("particle", 1), look.rows("stream", 1)
@@ -162,22 +304,12 @@ def conflicts(look: Look) -> Iterator[Fault]:
     yield from _names(look)
     yield from _pairs(look)
     for kind in kinds:
-        yield from _kind(look, kind)
+        yield from _mass(look, kind)
     yield from _engine(look, kinds, streams)
     for stream in streams:
-        yield from _release(look, stream, kinds)
-    for number, plate in enumerate(look.rows("plate")):
-        yield from _plate(plate, look.rows("plate")[:number])
-    for surface in look.rows("surface"):
-        if surface.content or surface.sound():
-            known = {
-                key: value if surface.sound(key) else math.nan
-                for key, value in surface.content.items()
-            }
-            yield from surface_conflicts(surface.head, known)
-    for conveyor in look.rows("conveyor"):
-        if conveyor.sound() and not apart(conveyor["from"], conveyor["to"]):
-            yield conveyor.fault("to", _differ(conveyor.head))
+        yield from _width(stream, kinds)
+    for table in RULES:
+        yield from contradictions(look, table, look.rows(table, int(table in ALWAYS)))
     yield from _pieces(look)
     count = sum(stream["count"] for stream in streams)
     for string in look.rows("string"):
@@ -271,50 +403,21 @@ def _pairs(look: Look) -> Iterator[Fault]:
                 yield Fault(path, name, f"no such kind or surface; {allowed}")
 
 
-def _kind(look: Look, kind: Row) -> Iterator[Fault]:
-    """Say what is wrong with a kind of particles."""
-    path, given = kind.path, kind.given
-    shape, radius, spin = kind["shape"], kind["radius"], kind["spin"]
-    shaped = shape in ("box", "polygon")
-    if given("mass") and given("density"):
-        yield kind.fault("density", f"give either {path('mass')} or this, not both")
-    if radius == 0.0 and not shaped:
-        if spin is True:
-            yield kind.fault("spin", f"{path('radius')} is 0, and a mass point cannot turn")
-        if given("density"):
-            yield kind.fault("density", f"{path('radius')} is 0: give a mass")
-        if given("material") and not given("mass"):
-            yield kind.missing("mass", f"kg, because {path('radius')} is 0")
-    elif not shaped:
-        key, density = _density(look, kind)
-        radius = 0.5 * sum(radius) if isinstance(radius, LIST) else radius
-        if density is not None and (mass := sphere_mass(density, radius)) < LIGHTEST:
-            text = f"with {path('radius')} = {radius:g} m a mass of at least {LIGHTEST:g} kg"
-            yield kind.fault(key, f"{text}, not {mass:.3g} kg")
-    if kind["rolling_friction"] > 0.0 and spin is False and not shaped:
-        text = f"needs {path('spin')} = true: what never turns never rolls"
-        yield kind.fault("rolling_friction", text)
-    for key, needed in (("size", "box"), ("points", "polygon")):
-        if shape == needed and not given(key) and kind.sound(key):
-            what = "[width, height]" if key == "size" else "its corners [[x, y], ...]"
-            yield kind.missing(key, f"{what}, m; a {needed} needs them")
-        elif given(key) and shape != needed and kind.sound("shape"):
-            yield kind.fault(key, f'is for {path("shape")} = "{needed}"')
-    for key in ("radius", "density") if shaped else ():
-        if given(key):
-            text = f"is for what is round; a {shape} has a mass, and a size of its own"
-            yield kind.fault(key, text)
-
-
-def _density(look: Look, kind: Row) -> tuple[str, float | None]:
-    """Return the key that a kind's density comes from, and the density; None if it has a mass."""
-    density, name = kind["density"], kind["material"]
-    if density is not None or kind.given("mass") or not isinstance(name, str):
-        return "density", density
-    found = [own["density"] for own in look.rows("material") if own["name"] == name]
-    if not found and name in PRESETS:
-        found = [PRESETS[name].material.density]
-    return "material", found[0] if found and look.sound("material") else None
+def _mass(look: Look, kind: Row) -> Iterator[Fault]:
+    """Say if the density of a kind of round particles gives too small a mass."""
+    radius = kind["radius"]
+    if radius == 0.0 or kind["shape"] in ("box", "polygon"):
+        return
+    key, density, name = "density", kind["density"], kind["material"]
+    if density is None and not kind.given("mass") and isinstance(name, str):
+        own = [row["density"] for row in look.rows("material") if row["name"] == name]
+        if not own and name in PRESETS:
+            own = [PRESETS[name].material.density]
+        key, density = "material", own[0] if own and look.sound("material") else None
+    radius = 0.5 * sum(radius) if isinstance(radius, LIST) else radius
+    if density is not None and (mass := sphere_mass(density, radius)) < LIGHTEST:
+        text = f"with {kind.path('radius')} = {radius:g} m a mass of at least {LIGHTEST:g} kg"
+        yield kind.fault(key, f"{text}, not {mass:.3g} kg")
 
 
 def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterator[Fault]:
@@ -346,24 +449,11 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
         yield run.fault("engine", "string[0] needs pymunk")
 
 
-def _release(look: Look, stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
-    """Say what is wrong with where and how fast a stream is released."""
-    path, given = stream.path, stream.given
-    until, fills = look.row("run")["until"], given("fill")
-    if isinstance(until, int | float) and stream["start"] >= until:
-        text = f"less than run.until = {until:g} s, when the run ends: nothing would be released"
-        yield stream.fault("start", text)
-    for key in ("at", "to", "rate", "bed_height", "speed_spread"):
-        if fills and given(key):
-            yield stream.fault(key, f"{path('fill')} releases all at once in its box")
-    if given("to") and not (given("at") or fills):
-        yield stream.missing("at", f"a point [x, y], m, to go with {path('to')}")
-    if given("to") and given("bed_height"):
-        text = f"is a height above a point; {path('to')} makes a line of it"
-        yield stream.fault("bed_height", text)
+def _width(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
+    """Say if a stream is narrower than the slice of it that is simulated."""
     name = stream["particle"]
     kind = next((kind for kind in kinds if kind["name"] == name), kinds[0])
-    radius, width = kind["radius"], stream["width"] if given("width") else math.nan
+    radius, width = kind["radius"], stream["width"] if stream.given("width") else math.nan
     if width == width and kind.sound("radius"):
         size = sum(radius) if isinstance(radius, LIST) else 2.0 * radius
         if kind["shape"] in ("box", "polygon") or size == 0.0:
@@ -372,37 +462,6 @@ def _release(look: Look, stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
         elif width < size:
             text = f"must be at least the diameter of a particle, {size:g} m: one slice"
             yield stream.fault("width", text)
-    if not look.has("incoming"):
-        for key, what in (("at", "release point [x, y], m"), ("velocity", "[vx, vy], m/s")):
-            if not given(key) and not fills and stream.sound(key):
-                yield stream.missing(key, f"{what}; required without [incoming]")
-
-
-def _plate(plate: Row, earlier: Sequence[Row]) -> Iterator[Fault]:
-    """Say what is wrong with a plate: of two sorts, of which the first is there once at most."""
-    path, given, sound = plate.path, plate.given, plate.sound
-    hangs, damps = given("pivot"), given("distance")
-    if plate["above"] == 0.0 and plate["below"] == 0.0:
-        yield plate.fault("above", f"a plate needs a length; {path('below')} is 0 too")
-    if hangs and damps:
-        text = f"give either {path('distance')}, of the damping plate, or this, of a further one"
-        yield plate.fault("pivot", text)
-    elif hangs:
-        if not given("name") and sound("name"):
-            yield plate.missing("name", "a name; a plate with a pivot needs one")
-        if given("pivot_height"):
-            text = f"is the damping plate's; {path('pivot')} has the height"
-            yield plate.fault("pivot_height", text)
-    elif not damps and sound("distance") and sound("pivot"):
-        text = "m from the pulley to the pivot; or of a further plate name and pivot = [x, y]"
-        yield plate.missing("distance", text)
-    elif damps:
-        if given("name"):
-            text = f"is for a further plate, with {path('pivot')}; this one is called plate"
-            yield plate.fault("name", text)
-        if any(other.given("distance") for other in earlier):
-            text = "there is a damping plate already; a further one has name and pivot"
-            yield plate.fault("distance", text)
 
 
 def _pieces(look: Look) -> Iterator[Fault]:
@@ -422,59 +481,6 @@ def _pieces(look: Look) -> Iterator[Fault]:
             text = f"at most {MOST_PIECES} pieces of surfaces, copies too, in all, not {count}"
             yield surface.fault("repeat" if repeat else "points", text)
             return
-
-
-ARC: Final = ("radius", "from_deg", "to_deg")
-
-
-def _differ(path: str) -> str:
-    return f"must differ from {path}.from by at least {SHORTEST:g} m"
-
-
-def surface_conflicts(path: str, surface: Mapping[str, Any]) -> Iterator[Fault]:
-    """Yield what is wrong with how one free surface is laid out; `path` is the surface's own."""
-    given = {key: value for key, value in surface.items() if value is not None}
-
-    def fault(key: str, allowed: str) -> Fault:
-        return Fault(f"{path}.{key}", given.get(key, MISSING), allowed)
-
-    if "opens_at" in given and given["opens_at"] == given.get("closes_at"):
-        yield fault("opens_at", f"must differ from {path}.closes_at")
-    if "center" in given:
-        for key in ("from", "to", "points"):
-            if key in given:
-                text = "of an arc, or this, of a straight one"
-                yield fault(key, f"give either {path}.center and radius, {text}")
-        if "radius" not in given:
-            yield fault("radius", f"m, to go with {path}.center")
-        begin, end = given.get("from_deg", 0.0), given.get("to_deg", 360.0)
-        if isinstance(begin, int | float) and isinstance(end, int | float):
-            way = abs(end - begin)
-            if way == 0.0 or way > 360.0:
-                text = f"must be another angle than {path}.from_deg, at most 360 from it"
-                yield Fault(f"{path}.to_deg", end, text)
-            elif math.radians(way) * (given.get("radius") or 1.0) < SHORTEST:
-                text = f"so far from {path}.from_deg that the arc is {SHORTEST:g} m long, at least"
-                yield Fault(f"{path}.to_deg", end, text)
-        return
-    for key in ARC:
-        if key in given and (key == "radius" or given[key] not in (0.0, 360.0)):
-            yield fault("center", f"a point [x, y], to go with {path}.{key}")
-            return
-    ends = [key for key in ("from", "to") if key in given]
-    if "points" in given:
-        for key in ends:
-            yield fault(key, f"give either from and to, or {path}.points, not both")
-    elif not ends:
-        text = "give from and to, or points = [[x, y], ...], or of an arc center and radius"
-        yield fault("points", text)
-    elif len(ends) == 1:
-        key = "to" if ends == ["from"] else "from"
-        yield fault(key, f"a point [x, y], to go with {path}.{ends[0]}")
-    elif all(isinstance(given[key], LIST) for key in ends) and not apart(
-        given["from"], given["to"]
-    ):
-        yield fault("to", _differ(path))
 
 
 def stream_name(row: int) -> str:

@@ -306,17 +306,12 @@ def suggestion(name: str, surfaces: Collection[str]) -> str:
     keys = ", ".join([*some, "contacts", "ledger.belt_work"])
     theirs = "phi1_deg to slip_heat, " if {"incoming", "plate"} <= {*surfaces} else ""
     there_are = f"there are {theirs}{keys} and other keys of `chutelab run --json`"
-    return did_you_mean(name, _names(surfaces), there_are)
-
-
-def _names(surfaces: Collection[str]) -> list[str]:
-    """Return the names of a scene with these surfaces, or with the first ones of very many."""
-    found: list[str] = []
+    # Of a thousand surfaces some will do: looking for likeness takes long.
+    known: list[str] = []
     for row in REGISTRY.values():
         statistics = STATISTICS if row.of == "particle" else ()
-        # Of a thousand surfaces some will do: looking for likeness takes long.
         for surface in list(surfaces)[:50] if "SURFACE" in row.name else [""]:
-            name = row.name.replace("SURFACE", surface)
-            if lookup(name, surfaces):
-                found += [name, *(f"{name}.{statistic}" for statistic in statistics)]
-    return found
+            one = row.name.replace("SURFACE", surface)
+            if lookup(one, surfaces):
+                known += [one, *(f"{one}.{statistic}" for statistic in statistics)]
+    return did_you_mean(name, known, there_are)

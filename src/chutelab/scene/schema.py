@@ -57,10 +57,10 @@ TABLES: Final[dict[str, type[Table]]] = {
 }
 
 DEFAULTS: Final = {
-    name: {key: field.default for key, field in table.model_fields.items()}
+    name: {field.alias or key: field.default for key, field in table.model_fields.items()}
     for name, table in TABLES.items()
 }
-"""Of the keys of each table, by their names in code."""
+"""Of the keys of each table."""
 
 
 def _one_or_several(given: object) -> object:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from chutelab.scene.conflicts import UNPROMISED, ConflictError, surface_conflicts
+from chutelab.scene.conflicts import UNPROMISED, ConflictError, Look, contradictions
 from chutelab.scene.units import (
     LARGEST,
     MOST_PARTICLES,
@@ -259,10 +259,10 @@ class Surface(Table):
 
     @model_validator(mode="after")
     def _ends_become_points(self) -> Self:
-        values = {name.rstrip("_"): getattr(self, name) for name in Surface.model_fields}
-        given = {name.rstrip("_") for name in self.model_fields_set}
-        values = {name: value if name in given else None for name, value in values.items()}
-        if faults := list(surface_conflicts("surface", values)):
+        given = {name.rstrip("_"): getattr(self, name) for name in self.model_fields_set}
+        defaults = {name.rstrip("_"): field.default for name, field in Surface.model_fields.items()}
+        look = Look({"surface": given}, {"surface": defaults, "run": {}})
+        if faults := list(contradictions(look, "surface", [look.row("surface")])):
             raise ConflictError(faults)
         if self.from_ is not None:
             self._fill("points", (self.from_, self.to))

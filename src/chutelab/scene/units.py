@@ -291,13 +291,13 @@ class OrLeast:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        return core_schema.no_info_after_validator_function(self._judged, handler(source))
+        def judged(number: float) -> float:
+            if 0.0 < number < self.least:
+                # Its words are those of the JSON Schema.
+                raise PydanticCustomError("least", "too small a number")
+            return number
 
-    def _judged(self, number: float) -> float:
-        if 0.0 < number < self.least:
-            # Its words are those of the JSON Schema.
-            raise PydanticCustomError("least", "too small a number")
-        return number
+        return core_schema.no_info_after_validator_function(judged, handler(source))
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

@@ -3,5 +3,6 @@
 - `accuracy`: the step that reaches an accuracy, and what was reached.
 - `sweep`: many variants of one scene, a row for each.
 - `design`: what to change so that a quantity becomes what it should be; uncertainty.
+- `discharge`: the stream by engineers' methods beside the simulated one.
 - `measured`: measured tracks over the model: read, compare, fit.
 """

@@ -23,8 +23,8 @@ from chutelab.engines import reference
 from chutelab.engines.simulation import judged
 from chutelab.machine import build
 from chutelab.results import ENTRIES, Kind, Recording
-from chutelab.results.comparison import compare, first, prediction, scales
 from chutelab.results.ledger import ledger
+from chutelab.results.quantities import compare, first, prediction, scales
 from chutelab.results.recorder import StalledError
 from chutelab.scene import AnyScene, Scene, SceneError, load
 from chutelab.scene.quantities import NEEDED, THEORY
@@ -145,7 +145,7 @@ def together(recording: Recording) -> Iterator[Answer]:
 
 
 def sizes(recording: Recording) -> dict[str, float]:
-    """Return what each kind of answer is measured by: as in `results.comparison`, where it can be.
+    """Return what each kind of answer is measured by: as in `results.quantities`, where it can be.
 
     Otherwise by the extent of the way, its duration and the highest speed; energies always by the
     energy that was turned over.

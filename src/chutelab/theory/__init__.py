@@ -7,6 +7,7 @@ chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167
 - `transfer`: Eqs. (2)-(16) and their generalisations, vectorised; plain numbers in.
 - `slide`: sliding and rolling on a round surface: along a chute, and round the pulley to where it
   is left, by adhesion, at finite friction, or by bodies that roll.
+- `discharge`: where a bed leaves its pulley by five methods of engineers; loading points.
 - `prediction`: `predict`, particle 0 of a scene, or the reason why the closed form does not hold
   for it; `unbounded`, the same without looking at the finite machine.
 - `drag`: what air drag, left out everywhere else, would do.

@@ -184,25 +184,24 @@ def shifts(course: Course) -> tuple[float, float]:
     return shift, nan if landed is None else (landed[0] - lands).real
 
 
+def step(state: State, rate: Callable[[complex], complex], h: float) -> State:
+    """Return the state h (s) later, by one classical Runge-Kutta step; `rate` as in `fly`."""
+    z, v = state
+    a = rate(v)
+    b = rate(v + 0.5 * h * a)
+    c = rate(v + 0.5 * h * b)
+    d = rate(v + h * c)
+    return z + h * (v + h / 6.0 * (a + b + c)), v + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+
+
 def fly(
     start: State, rate: Callable[[complex], complex], gap: Callable[[complex], float], about: float
 ) -> State | None:
     """Fly until a gap closes; None if it does not in three times the time that it takes about, s.
 
     `rate` gives the acceleration (m/s²) from the velocity, `gap` a distance (m) from the place.
-    Classical Runge-Kutta; the last step is cut where the gap, taken for linear and then by secants,
-    is 0.
+    The last step is cut where the gap, taken for linear and then by secants, is 0.
     """
-
-    def step(state: State, h: float) -> State:
-        """Return the state a step of h (s) later."""
-        z, v = state
-        a = rate(v)
-        b = rate(v + 0.5 * h * a)
-        c = rate(v + 0.5 * h * b)
-        d = rate(v + h * c)
-        return z + h * (v + h / 6.0 * (a + b + c)), v + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-
     vx = start[1].real
     relief = -rate(start[1]).real / vx if vx else 0.0
     h = min(about / STEPS, 0.25 / relief) if relief > 0.0 else about / STEPS
@@ -210,7 +209,7 @@ def fly(
         return start if about == 0.0 else None
     state, before = start, gap(start[0])
     for _ in range(int(3.0 * about / h) + 1):
-        ahead = step(state, h)
+        ahead = step(state, rate, h)
         after = gap(ahead[0])
         if after <= 0.0:
             break
@@ -221,7 +220,7 @@ def fly(
     for _ in range(8):
         cut = high - after * (high - low) / (after - before)
         low, before, high = high, after, cut
-        ahead = step(state, cut)
+        ahead = step(state, rate, cut)
         after = gap(ahead[0])
         if abs(after) <= 1e-15 or after == before:
             break

@@ -47,7 +47,13 @@ def aside(folder: Path, target: Path | None = None) -> Iterator[Path]:
         anchor = next((path for path in (folder, *folder.parents) if path.exists()), folder)
         if not anchor.is_dir():
             raise NotADirectoryError(ENOTDIR, f"{anchor} is a file, not a folder", str(folder))
-        _remove_left_over(anchor)
+        # Folders of programs that were killed: old ones whose lock is free. Not on Windows.
+        for path in anchor.glob(f"{_ASIDE}????????"):
+            with suppress(OSError):
+                if time.time() - path.lstat().st_mtime > _OLD and not path.is_symlink():
+                    with _held(path) as free:
+                        if free:
+                            shutil.rmtree(path)
         with tempfile.TemporaryDirectory(prefix=_ASIDE, dir=anchor) as made, _held(Path(made)):
             yield Path(made)
     except OSError as error:
@@ -112,16 +118,6 @@ def _held(folder: Path) -> Iterator[bool]:
             yield True
     finally:
         os.close(descriptor)
-
-
-def _remove_left_over(anchor: Path) -> None:
-    """Remove folders of programs that were killed: old ones whose lock is free. Not on Windows."""
-    for path in anchor.glob(f"{_ASIDE}????????"):
-        with suppress(OSError):
-            if time.time() - path.lstat().st_mtime > _OLD and not path.is_symlink():
-                with _held(path) as free:
-                    if free:
-                        shutil.rmtree(path)
 
 
 @contextmanager

@@ -72,6 +72,12 @@ class Sheet:
         headed = any(len(row) == 1 for row in rows)
         parts: list[Any] = [Text(f"\n{self.title}", style="bold")] if self.title else []
 
+        def cell(text: str) -> Text:
+            first, end, rest = text.partition("\n")
+            if end:
+                return Text.assemble((first, "bold"), end, rest)
+            return Text(text, STYLES.get(text, ""))
+
         def begun(*, header: bool) -> Table:
             table = Table(
                 box=box.SIMPLE_HEAD,
@@ -102,7 +108,7 @@ class Sheet:
             table = table or begun(header=False)
             if number == len(self.rows):
                 table.add_section()
-            table.add_row(*map(_cell, row), style=STYLES["FAILED"] if "FAILED" in row else "")
+            table.add_row(*map(cell, row), style=STYLES["FAILED"] if "FAILED" in row else "")
         if self.notes:
             notes = [line for note in self.notes for line in wrapped(note)]
             parts.append(Text("\n".join(["", *notes])))
@@ -168,13 +174,6 @@ class Shown:
 
     def _repr_html_(self) -> str:
         return self.sheet().html()
-
-
-def _cell(text: str) -> Any:
-    from rich.text import Text
-
-    first, end, rest = text.partition("\n")
-    return Text.assemble((first, "bold"), end, rest) if end else Text(text, STYLES.get(text, ""))
 
 
 def wrapped(text: str) -> list[str]:

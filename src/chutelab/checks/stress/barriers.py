@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core.module import number
+from chutelab.core import number
 from chutelab.machine import Machine, Pieces
 from chutelab.results import Kind, Recording
 from chutelab.results.laws import Findings, alike, examine, inner_radius

@@ -24,10 +24,11 @@ from hashlib import sha256
 from itertools import combinations
 from math import degrees, isclose, isfinite, radians
 from pathlib import Path
-from types import CodeType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any, Final
 
 from chutelab.classroom.words import words
+from chutelab.scene.conflicts import compiled
 from chutelab.theory import transfer
 
 DIGITS: Final = 4
@@ -105,11 +106,6 @@ FUNCTIONS: Final[dict[str, Any]] = {
 """Names in formulas, besides the exercise's own, g and `chutelab.theory.transfer`."""
 
 
-@cache
-def _compiled(formula: str) -> CodeType:
-    return compile(formula, f"<{formula}>", "eval")
-
-
 class Numbers(dict[str, Any]):
     """The parameters of one draw and all that follows from them, by name.
 
@@ -137,7 +133,7 @@ class Numbers(dict[str, Any]):
 
     def of(self, formula: str) -> Any:
         """Return the value of a formula."""
-        return eval(_compiled(formula), self.known, self)
+        return eval(compiled(formula), self.known, self)
 
     def text(self, template: str) -> str:
         """Return a template on one line, with every ``{name}`` replaced by its number."""
@@ -216,10 +212,12 @@ def read(file: Path) -> Exercise:
     for asked in found["questions"]:
         asked["mistakes"] = [Mistake(*row) for row in asked["mistakes"]]
     found["questions"] = [Question(**asked) for asked in found["questions"]]
-    found["parameters"] = [
-        Parameter(name, symbol, unit, meaning, _choices(values))
-        for name, symbol, unit, meaning, values in found["parameters"]
-    ]
+    for row in found["parameters"]:
+        if isinstance(row[-1], dict):
+            # The round numbers of a range, its ends included.
+            first, last, step = (row[-1][key] for key in ("from", "to", "step"))
+            row[-1] = [round(first + i * step, 9) for i in range(round((last - first) / step) + 1)]
+    found["parameters"] = [Parameter(*row) for row in found["parameters"]]
     return Exercise(name=file.stem, **found)
 
 
@@ -252,15 +250,6 @@ def translated(exercise: Exercise, file: Path, language: str) -> Exercise:
     ]
     new: Exercise = texts(found, exercise, "title", "story")
     return replace(new, questions=questions, parameters=parameters, language=language, whole=whole)
-
-
-def _choices(values: list[float] | dict[str, float]) -> list[float]:
-    """Return a list as it is, or the round numbers of a range, its ends included."""
-    if isinstance(values, list):
-        return values
-    first, last, step = values["from"], values["to"], values["step"]
-    count = round((last - first) / step) + 1
-    return [round(first + i * step, 9) for i in range(count)]
 
 
 @dataclass(frozen=True)

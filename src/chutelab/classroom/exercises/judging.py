@@ -31,7 +31,7 @@ class Verdict(StrEnum):
 
     RIGHT = "right"
     MISTAKE = "known mistake"
-    OFF = "off"
+    OFF = "not yet"
     UNREAD = "not a number"
     BLANK = "not attempted"
     UNKNOWN = "no such question"
@@ -39,8 +39,8 @@ class Verdict(StrEnum):
 
 MARKS: Final = {
     Verdict.RIGHT: ("✓", GREEN),
-    Verdict.MISTAKE: ("✗", VERMILION),
-    Verdict.OFF: ("✗", VERMILION),
+    Verdict.MISTAKE: ("↻", VERMILION),
+    Verdict.OFF: ("↻", VERMILION),
     Verdict.UNREAD: ("?", ORANGE),
     Verdict.BLANK: ("○", GREY),
     Verdict.UNKNOWN: ("?", ORANGE),
@@ -255,8 +255,12 @@ def _read(answer: Any, say: Callable[..., str]) -> float | str | None:
         return say("unread-complex")
     if isinstance(answer, (list, tuple, np.ndarray)):
         items = answer.ravel().tolist() if isinstance(answer, np.ndarray) else answer
+        match answer:
+            case (int(whole), int(digits)) if type(answer) is tuple and digits >= 0:
+                # A decimal comma makes two numbers of one.
+                return say("unread-comma", whole=whole, digits=digits)
         if len(items) > 1:
-            return _of_several(answer, items, say)
+            return say("unread-several", count=len(items))
         return _read(items[0], say) if items else None
     if callable(answer):
         return say("unread-function")
@@ -264,14 +268,6 @@ def _read(answer: Any, say: Callable[..., str]) -> float | str | None:
     if isnan(value):
         return say("unread-nan")
     return say("unread-divided") if isinf(value) else value
-
-
-def _of_several(answer: object, items: Sequence[Any], say: Callable[..., str]) -> str:
-    """Say what to do about several values: one to pick, or a decimal comma, which makes two."""
-    match answer:
-        case (int(whole), int(digits)) if type(answer) is tuple and digits >= 0:
-            return say("unread-comma", whole=whole, digits=digits)
-    return say("unread-several", count=len(items))
 
 
 def _of_text(text: str, say: Callable[..., str]) -> str | None:

@@ -82,17 +82,12 @@ def worksheet(lesson: Lesson) -> str:
 def asked(lesson: Lesson, step: Step) -> Iterator[str]:
     """Yield the parts of what a step asks, as Markdown: its text, its questions, its table."""
     said = words(lesson.language)
-    scene = machine_of(lesson, step)
-
-    def value(found: re.Match[str]) -> str:
-        return with_unit(value_at(scene, found[1]), unit_of(parts_of(found[1])), said)
-
-    yield PLACES.sub(value, step.text).strip()
+    yield with_values(lesson, step, step.text)
     for n, ask in enumerate(step.asks, 1):
         how = "mark" if ask.mark else "sketch" if ask.sketch else ""
         hint = f" *{said.say(f'sheet-{how}')}*" if how else ""
         choices = "".join(f"\n   - ☐ {one}" for one in ask.choices)
-        yield f"{n}. {PLACES.sub(value, ask.text).strip()}{hint}{choices}"
+        yield f"{n}. {with_values(lesson, step, ask.text)}{hint}{choices}"
     if step.columns:
         yield table(step, said)
     if step.kind == "numbers" and lesson.name in EXERCISES:
@@ -103,6 +98,17 @@ def asked(lesson: Lesson, step: Step) -> Iterator[str]:
         )
         yield said.say("sheet-numbers")
         yield f"| {said.say('sheet-question')} | {said.say('sheet-answer')} |\n|---|---|{rows}"
+
+
+def with_values(lesson: Lesson, step: Step, text: str) -> str:
+    """Return a text of a step in which the machine's values stand where a page has fields."""
+    scene = machine_of(lesson, step)
+
+    def value(found: re.Match[str]) -> str:
+        given, unit = value_at(scene, found[1]), unit_of(parts_of(found[1]))
+        return with_unit(given, unit, words(lesson.language))
+
+    return PLACES.sub(value, text).strip()
 
 
 def table(step: Step, said: Words) -> str:
@@ -138,12 +144,12 @@ def _for_the_teacher(lesson: Lesson) -> str:
     say, teacher = said.say, lesson.teacher or Teacher()
     lengths = (("sheet-basic", teacher.basic), ("sheet-stretch", teacher.stretch))
     plan = "".join(
-        f"\n| {n} | {say(f'step-{step.kind}')} | {step.minutes} | {_first(step)} |"
+        f"\n| {n} | {say(f'step-{step.kind}')} | {step.minutes} | {_first(lesson, step)} |"
         for n, step in enumerate(lesson.steps, 1)
     )
     beliefs = "".join(f"\n| {idea} | {question} |" for idea, question in teacher.misconceptions)
     answers = [
-        f"- {n}.{m} {without_places(ask.text)} **{_answer(ask)}**"
+        f"- {n}.{m} {with_values(lesson, step, ask.text)} **{_answer(ask)}**"
         for n, step in enumerate(lesson.steps, 1)
         for m, ask in enumerate(step.asks, 1)
         if _answer(ask)
@@ -164,21 +170,18 @@ def _for_the_teacher(lesson: Lesson) -> str:
     return "\n\n".join([f"{lesson.question}\n\n{level}", *parts])
 
 
-def _first(step: Step) -> str:
+def _first(lesson: Lesson, step: Step) -> str:
     """Return the first sentence of what a step says, for the plan."""
-    said = step.text or " ".join(ask.text for ask in step.asks) or "–"
-    return without_places(re.split(r"(?<=[.?!:]) ", " ".join(said.split()))[0])
+    asks = " ".join(ask.text for ask in step.asks)
+    text = step.text or asks or words(lesson.language).say("sheet-numbers")
+    said = with_values(lesson, step, text)
+    return re.split(r"(?<=[.?!:]) ", " ".join(said.split()))[0]
 
 
 def _answer(ask: Ask) -> str:
     """Return the key to a question."""
     chosen = ask.choices[ask.right - 1] if ask.choices and ask.right else ""
     return f"{chosen}. {ask.answer}".strip() if chosen else ask.answer
-
-
-def without_places(text: str) -> str:
-    """Return a text in which the places of values are dots."""
-    return PLACES.sub("…", " ".join(text.split()))
 
 
 def _of_exercise(lesson: Lesson, said: Words) -> dict[str, str]:

@@ -14,10 +14,10 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BeforeValidator, Field
 
-from chutelab.classroom.exercises.catalogue import of_quantities, tree
 from chutelab.classroom.lessons.texts import parser
 from chutelab.classroom.words import LANGUAGES, Words
 from chutelab.scene import MISSING, Fault, Scene, SceneError
+from chutelab.scene.conflicts import of_quantities, tree
 from chutelab.scene.overrides import value_at
 from chutelab.scene.quantities import lookup, suggestion, whose
 from chutelab.scene.units import Table, Text, Whole
@@ -257,7 +257,7 @@ def data_of(steps: Sequence[Step], controls: tuple[str, ...], said: Words) -> li
     """Return steps as plain data for the JSON of a page.
 
     Texts are HTML with MathML, heads and choices without paragraphs; `controls` of a step are all
-    that can be changed in it. The value of a column is a formula as `exercises.catalogue.tree` has
+    that can be changed in it. The value of a column is a formula as `scene.conflicts.tree` has
     it, in which a quantity is a name with dots. What is for the teacher is left out.
     """
     return [

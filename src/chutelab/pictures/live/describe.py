@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
-from chutelab.scene.conflicts import EITHER
+from chutelab.scene.conflicts import EITHER, RULES, tree
 from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
@@ -72,6 +72,8 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         ``scene``: its keys as its file has them, with a seed beyond 2**53 as text; ``stream`` is []
         where there is none. ``tables``: of each key of each table (those outside of tables under
         ``scene``) default, unit, low and high, its form as JSON Schema, and whether it is required.
+        ``rules``: what contradicts what within a row of a table, by tables: keys, condition, id of
+        a text, and the other key in it.
         ``presets``: the numbers of each material. ``parts``: see `PARTS`. Of an empty machine
         ``examples``: scenes by name. Where something is left out ``lacks``: how many, by what it
         is, and ``source``: the scene's file.
@@ -86,7 +88,13 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         name: {key: getattr(preset.material, key) for key in VALUES}
         for name, preset in PRESETS.items()
     }
-    common: dict[str, Any] = {"tables": _rules(), "presets": materials, "parts": PARTS}
+    rules = {
+        table: [[keys.split(), tree(when), *text.split()] for keys, when, text, _ in rows if text]
+        for table, rows in RULES.items()
+    }
+    common: dict[str, Any] = {
+        "tables": _rules(), "rules": rules, "presets": materials, "parts": PARTS,
+    }  # fmt: skip
     if scene is None:
         examples = {name: describe(load(name))["scene"] for name in EXAMPLES}
         return {"scene": {"stream": []}, **common, "examples": examples}

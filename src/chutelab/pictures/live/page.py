@@ -68,8 +68,7 @@ def html(
     }
     palette = "".join(f"  --{k.replace('_', '-')}: {v};\n" for k, v in colours.items())
     css = f":root {{\n{palette}}}\n{_file('bundle/page.css')}"
-    if lesson is not None:
-        css += _file("bundle/lesson.css")
+    css += _file(f"bundle/{'sandbox' if lesson is None else 'lesson'}.css")
     core = files("chutelab.core")
     facts = describe(scene, partly=partly)
     strings = json.loads(_file(f"assets/strings/{language}.json"))
@@ -86,7 +85,7 @@ def html(
     shown = [row for row in REGISTRY.values() if row.symbol]
     # Packed, for it is long: all but the scene.
     large = {
-        **{name: facts.pop(name) for name in ("tables", "presets")},
+        **{name: facts.pop(name) for name in ("tables", "rules", "presets")},
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
         "strings": {
             **{f"number-{row.name}": row.meaning for row in shown},

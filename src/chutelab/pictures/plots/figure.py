@@ -47,7 +47,7 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Kind, Recording
-from chutelab.results.comparison import prediction as predicted
+from chutelab.results.quantities import prediction as predicted
 from chutelab.theory import Transfer
 from chutelab.theory.figures import PaperFigure
 from chutelab.util.arrays import Floats

@@ -1,20 +1,23 @@
 """The machine and its particles to scale.
 
-Pulleys, belts, plates, chutes, pegs and gates, with their names; disks of any size, boxes and
-polygons turned as they are, and strings.
+Pulleys, belts, plates, chutes, pegs and gates, with their names and with what lies behind their
+surfaces; disks of any size, boxes and polygons turned as they are, and strings.
+
+As in the live page, the surface that particles meet is the outer edge of a belt and the struck face
+of a plate; what is drawn of their thickness lies on the other side, and no engine knows of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from math import degrees, inf, pi
+from math import atan2, degrees, inf, pi
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, PolyCollection
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox
@@ -23,7 +26,6 @@ from chutelab.machine import Arcs, Machine, Pieces, Segments
 from chutelab.pictures import BLUE, GREEN, ORANGE, PURPLE
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import Window, around, places, stays, subset
-from chutelab.pictures.plots.volumes import PLATE, draw_volumes, plates, thickness
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats, Ints
 
@@ -35,6 +37,109 @@ TWO_LINES = 32.0
 
 GATE: dict[str, Any] = {"ls": (0, (2.2, 1.1))}
 """How a piece that is not always there is drawn, in half its colour."""
+
+
+THICK = (3.0, 8.0, 0.0165)
+"""Thickness of belts: at least and at most so many pt, and as a share of the axes' height."""
+
+PLATE = 1.4
+"""Thickness of plates in that of belts."""
+
+STRANDS = 4.5
+"""Of a belt without pulleys of its own: distance of its two strands in its thickness."""
+
+HUB = 7.0
+"""pt of radius from which on a wheel has a hub."""
+
+HALF = 40
+"""Points of half a circle."""
+
+BEHIND = 0.7
+"""Their z-order: below all surfaces, above the grid."""
+
+
+def thickness(ax: Axes) -> float:
+    """Return how thick belts are in these axes, pt."""
+    least, most, share = THICK
+    return min(most, max(least, share * ax.get_window_extent().height * 72.0 / ax.figure.dpi))
+
+
+def draw_volumes(ax: Axes, machine: Machine, points: float) -> None:
+    """Draw what lies behind a machine's surfaces, where a length of 1 m is so many pt."""
+    thick = thickness(ax) / points
+    own = [piece for piece in machine.pieces if not piece.gate]
+    for surface in sorted({int(piece.surface) for piece in own}):
+        parts = [one for one in own if one.surface == surface]
+        flat = [one for one in parts if isinstance(one, Segments)]
+        wheels = [one for one in parts if isinstance(one, Arcs) and one.whole and one.speed]
+        name = machine.surfaces[surface]
+        centers, radius = np.array([one.center for one in wheels]), 0.0
+        if machine.pulley is not None and surface == machine.pulley.surface:
+            radius = machine.pulley.radius
+            back = flat[0].start - radius * flat[0].normal(flat[0].at(0.0))
+            centers = np.array([back, [0.0, 0.0]])
+        elif flat and len(wheels) > 1:
+            radius = float(wheels[0].radius)
+        if radius:
+            _loop(ax, centers, radius, max(radius - 1.15 * thick, 0.4 * radius), thick, points)
+        elif flat and (name == "outgoing" or flat[0].speed):
+            for piece in flat:
+                _belt(ax, piece, thick, points)
+        for piece in flat if name in plates(machine) else ():
+            # The steel lies on the right of the struck face.
+            face, deep = piece.path(), PLATE * thick * piece.normal(piece.at(0.5 * piece.way))
+            outline = _closed(np.concatenate([face, face[::-1] - deep]))
+            _add(ax, outline, style.STEEL_LIGHT, style.STEEL)
+
+
+def plates(machine: Machine) -> set[str]:
+    """Return the names of a machine's plates."""
+    return {plate.name or "plate" for plate in machine.scene.plates}
+
+
+def _add(ax: Axes, outline: Path, face: str, edge: str, width: float = 0.7) -> None:
+    patch = PathPatch(outline, facecolor=face, edgecolor=edge, linewidth=width, zorder=BEHIND)
+    ax.add_patch(patch)
+
+
+def _stadium(axes: Floats, radius: float) -> Floats:
+    """Return the outline of a loop round two axes (2, 2), m, counterclockwise."""
+    way = axes[1] - axes[0]
+    first = atan2(way[1], way[0]) - 0.5 * np.pi
+    angles = first + np.linspace(0.0, np.pi, HALF)
+    ends = [angles, angles + np.pi]
+    around = [np.stack([np.cos(one), np.sin(one)], axis=-1) for one in ends]
+    return np.concatenate([axes[1] + radius * around[0], axes[0] + radius * around[1]])
+
+
+def _closed(points: Floats) -> Path:
+    return Path(np.concatenate([points, points[:1]]), closed=True)
+
+
+def _loop(ax: Axes, axes: Floats, radius: float, wheel: float, thick: float, points: float) -> None:
+    """Draw a belt round two axes, its outer edge at a radius (m), on wheels of another."""
+    outer, inner = _stadium(axes, radius), _stadium(axes, radius - thick)
+    # What runs backward is a hole.
+    _add(ax, Path.make_compound_path(_closed(outer), _closed(inner[::-1])), style.BELT_BODY, "none")
+    for center in axes:
+        circle = Circle(tuple(center.tolist()), wheel, zorder=BEHIND + 0.1)
+        circle.set(facecolor=style.STEEL_LIGHT, edgecolor=style.STEEL, linewidth=0.9)
+        ax.add_patch(circle)
+        if wheel * points > HUB:
+            hub = Circle(tuple(center.tolist()), 0.16 * wheel, zorder=BEHIND + 0.3)
+            hub.set(facecolor=style.STEEL, edgecolor=style.MUTED, linewidth=0.7)
+            ax.add_patch(hub)
+
+
+def _belt(ax: Axes, piece: Segments, thick: float, points: float) -> None:
+    """Draw a belt without pulleys of its own: a loop below what it carries."""
+    ends = piece.path()
+    ends = ends[np.argsort(ends[:, 0])]
+    way = (ends[1] - ends[0]) / float(piece.length)
+    down = np.array([way[1], -way[0]])
+    turn = min(0.5 * (STRANDS + 1.0) * thick, 0.25 * float(piece.length))
+    axes = ends + turn * down
+    _loop(ax, axes, turn, max(turn - 1.6 * thick, 0.3 * turn), thick, points)
 
 
 def pieces(machine: Machine) -> tuple[Pieces, ...]:

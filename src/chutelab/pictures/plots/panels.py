@@ -32,9 +32,9 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.results import Recording
 from chutelab.results.arrival import arrivals
-from chutelab.results.comparison import prediction as predicted
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import each
+from chutelab.results.quantities import prediction as predicted
 from chutelab.results.stream import QUANTILES, envelopes, flows
 from chutelab.results.summary import layers
 from chutelab.scene import Scene

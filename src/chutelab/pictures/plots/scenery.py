@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.core.module import number as layout_number
+from chutelab.core import number as layout_number
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.quantities import each

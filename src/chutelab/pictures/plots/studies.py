@@ -20,7 +20,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from chutelab.checks.workprecision import METHODS, Timing
-from chutelab.pictures import BLUE, GREEN, ORANGE, SKY
+from chutelab.pictures import BLUE, GREEN, ORANGE, PURPLE, SKY
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.panels import analytic_of, draw_analytic
@@ -36,10 +36,12 @@ from chutelab.pictures.plots.style import Picture
 from chutelab.results import Kind
 from chutelab.scene.units import symbol, with_unit, write_size
 from chutelab.studies.design import Solution, Uncertainty
+from chutelab.studies.discharge import SideBySide, stream_at
 from chutelab.studies.measured import Fit, Residuals
 from chutelab.studies.measured.result import plus_minus
 from chutelab.studies.sweep import COLUMNS, REASON, Sweep, no_column
 from chutelab.studies.sweep.rows import RARE
+from chutelab.theory.discharge import NAMES
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.tables import many
 from chutelab.util.versions import PACKAGES
@@ -392,6 +394,60 @@ def measured(found: Residuals, fit: Fit | None = None) -> Picture:
         ]
     for i, text in enumerate(said):
         figure.remark(0.985, 0.965 - 0.032 * i, text, ha="right", va="center")
+    return figure
+
+
+METHOD_COLOURS = (style.ANALYTIC, style.BELT, style.STRIKE, PURPLE, style.STEEL)
+"""Of the methods of discharge, in their order."""
+
+METHOD_LINES = ("-", (0, (5.0, 1.5)), "-.", (0, (1.5, 1.0)), (0, (7.0, 1.5, 1.5, 1.5)))
+"""Their lines, for readers without colours."""
+
+
+HEIGHTS_OF_BAND = 80
+"""Heights at which the simulated stream is cut for the picture."""
+
+
+def discharge_figure(found: SideBySide) -> Picture:
+    """Draw the stream as engineers' methods have it over the one that is simulated."""
+    figure = Picture((9.6, 7.2))
+    ax = figure.add_axes((0.08, 0.08, 0.89, 0.74))
+    style.dress(ax, "x, m", "y, m")
+    known = np.concatenate([rows.ravel() for rows in found.lines.values()])
+    circles = [path.radius for one in found.methods.values() for path in one.paths]
+    lowest, top = float(found.heights.min()), max(circles, default=0.0)
+    right = float(np.nanmax(known, initial=top))
+    corners = np.array([[-1.2 * top, 1.3 * top + 0.03], [1.03 * right, lowest]])
+    draw_scene(ax, found.recording.machine, around(corners))
+    # All of it has left the belt below the place where the first of it does.
+    first = min(
+        (path.at([0.0])[0, 1] for one in found.methods.values() for path in one.paths), default=top
+    )
+    heights = np.linspace(first, lowest, HEIGHTS_OF_BAND)
+    sides = [
+        np.stack([x, heights], axis=-1)[np.isfinite(x)] for x in stream_at(found.recording, heights)
+    ]
+    ax.fill(
+        *np.concatenate([sides[0], sides[2][::-1]]).T, color=style.STREAM, alpha=0.45, lw=0.0,
+        zorder=3.0, gid="simulated", label="simulated, 2 to 98 %",
+    )  # fmt: skip
+    ax.plot(*sides[1].T, color=style.TRACK, lw=1.2, zorder=3.5)
+    looks: dict[str, Any] = dict(
+        zip(NAMES, zip(METHOD_COLOURS, METHOD_LINES, strict=True), strict=True)
+    )
+    for name, one in found.methods.items():
+        colour, line = looks[name]
+        label = NAMES[name]
+        for path in one.paths:
+            fall = 1.1 * (path.radius - lowest)
+            last = (path.speed + np.sqrt(path.speed**2 + 2.0 * path.gravity * fall)) / path.gravity
+            places = path.at(np.linspace(0.0, last, 200))
+            ax.plot(*places.T, color=colour, ls=line, lw=1.5, zorder=5.0, gid=name, label=label)
+            label = ""
+    style.legend_above(ax, 4)
+    figure.headline(0.04, 0.955, found.scene.title)
+    said = [f"{name}: {why}" for name, why in found.refused.items()]
+    figure.remark(0.04, 0.92, shorten("; ".join(said), 110, placeholder=" …"), va="center")
     return figure
 
 

@@ -25,7 +25,6 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from threading import Thread
 from types import ModuleType
 from typing import Any, Final
@@ -259,25 +258,31 @@ def _ask(dask: ModuleType, address: str) -> None:
     """Refuse an address at which no Dask scheduler answers, in time.
 
     A client waits for ever for a server that accepts a connection and says nothing, and prints a
-    traceback of other faults after 20 s. The thread that asks first need not be waited for.
+    traceback of other faults after 20 s. The thread that asks gives up in time too: as long as it
+    tries again, Dask draws its pauses from the random numbers of `random`, which are the caller's.
     """
-    answers: SimpleQueue[str | Exception] = SimpleQueue()
+    found: str | Exception = TimeoutError(f"nothing in {PATIENCE:g} s")
 
     async def ask() -> str:
         security = dask.Security().get_connection_args("client")
-        async with dask.rpc(address, connection_args=security) as scheduler:
+        async with (
+            asyncio.timeout(PATIENCE),
+            dask.rpc(address, connection_args=security) as scheduler,
+        ):
             return str((await scheduler.identity())["type"])
 
     def run() -> None:
+        nonlocal found
         try:
-            answers.put(asyncio.run(ask()))
+            found = asyncio.run(ask())
+        except TimeoutError:
+            pass
         except Exception as error:
-            answers.put(error)
+            found = error
 
-    Thread(target=run, daemon=True).start()
-    found: str | Exception = TimeoutError(f"nothing in {PATIENCE:g} s")
-    with suppress(Empty):
-        found = answers.get(timeout=PATIENCE)
+    asking = Thread(target=run, daemon=True)
+    asking.start()
+    asking.join(PATIENCE + 1.0)
     if found != "Scheduler":
         said = " ".join(f"{found}".split()) or type(found).__name__
         raise InputError(f"--scheduler {address}: no Dask scheduler answers: {said}")

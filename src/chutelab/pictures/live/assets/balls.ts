@@ -33,8 +33,9 @@ const STEPS = 8;
 /** Pixels of radius below which a ball is a flat disc. */
 const SHADED = 2.5;
 
-/** Radius of a picture of a ball, px: others are drawn by scaling it. */
-const PICTURE = 48;
+/** Radius of the largest picture of a ball, px: larger ones are drawn by scaling it; and how many
+ * pictures are kept. */
+const LARGEST = 48, KEPT = 200;
 
 class Balls {
   hue: Hue = "material";
@@ -75,28 +76,30 @@ class Balls {
       context.stroke();
       return;
     }
-    const picture = this.picture(this.kindOf(i)), wide = (r * picture.width) / (2 * PICTURE);
+    const size = Math.min(LARGEST, Math.ceil(r * (globalThis.devicePixelRatio || 1)));
+    const picture = this.picture(this.kindOf(i), size), wide = (r * picture.width) / (2 * size);
     context.drawImage(picture, x - wide, y - wide, 2 * wide, 2 * wide);
   }
 
-  /** A shaded ball, made once. */
-  picture(kind: string) {
-    const known = this.pictures.get(kind);
+  /** A shaded ball, made once for each radius, px: to draw a large one small takes long. */
+  picture(kind: string, size = LARGEST) {
+    const name = `${kind} ${size}`, known = this.pictures.get(name);
     if (known) return known;
-    const canvas = document.createElement("canvas"), half = PICTURE + 1;
+    if (this.pictures.size > KEPT) this.pictures.clear();
+    const canvas = document.createElement("canvas"), half = size + 1;
     canvas.width = canvas.height = 2 * half;
     const context = canvas.getContext("2d") as CanvasRenderingContext2D;
     const [light, middle, dark] = SHADES[kind] ?? STREAMS[Number(kind)];
-    const shade = context.createRadialGradient(half - 0.32 * PICTURE, half - 0.4 * PICTURE, 0,
-      half - 0.32 * PICTURE, half - 0.4 * PICTURE, 1.6 * PICTURE);
+    const shade = context.createRadialGradient(half - 0.32 * size, half - 0.4 * size, 0,
+      half - 0.32 * size, half - 0.4 * size, 1.6 * size);
     shade.addColorStop(0, light);
     shade.addColorStop(0.38, middle);
     shade.addColorStop(1, dark);
     context.fillStyle = shade;
     context.beginPath();
-    context.arc(half, half, PICTURE, 0, 2 * Math.PI);
+    context.arc(half, half, size, 0, 2 * Math.PI);
     context.fill();
-    this.pictures.set(kind, canvas);
+    this.pictures.set(name, canvas);
     return canvas;
   }
 

@@ -3,7 +3,7 @@
 import { mayDraw } from "./controls.ts";
 import { endsOf, rowsNamed, surfaceAt, withCopies, withPart, type Part } from "./edit.ts";
 import { pointsOf } from "./callout.ts";
-import { bodyOf, roundTo, type Handle } from "./handles.ts";
+import { bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
 import { html, iconButton } from "./panels.ts";
 import { svg } from "./scenery.ts";
 import { boxOf } from "./view.ts";
@@ -17,6 +17,11 @@ type Place = [number, number];
 
 /** Pixels that a finger or a mouse may stray while it clicks. */
 const STRAY = 6;
+
+/** ms after which a finger holds what it is on. */
+const HOLD = 450;
+
+const distance = ([x, y]: Place, [u, v]: Place) => Math.hypot(u - x, v - y);
 
 /** How far from a line, or from a ball, it can be clicked, pixels. */
 const CLICK_REACH = 14, BALL_REACH = 22;
@@ -146,10 +151,18 @@ class Bench {
       this.pressed = this.fingers.size === 1 ? at : null;
       if (this.mode && this.pressed) this.point(at, event.altKey);
       else this.grabbed = this.pressed && this.bodyAt(at, event.pointerType);
+      this.band = this.free && event.shiftKey && !this.mode && !this.nameAt(at) ? at : null;
+      if (this.band) this.grabbed = null;
+      clearTimeout(this.holding);
+      if (event.pointerType === "touch" && this.pressed && this.free && !this.mode) {
+        this.holding = setTimeout(() => this.holdDown(at), HOLD);
+      }
     });
     front.addEventListener("pointermove", (event: PointerEvent) => {
       const at = stage.placeOf(event);
+      if (this.pressed && distance(at, this.pressed) > STRAY) clearTimeout(this.holding);
       if (this.mode) this.aim(at, event.altKey);
+      else if (this.band) this.stretch(at);
       else if (this.grabbed) this.carry(at, event);
       else if (this.fingers.has(event.pointerId)) {
         const alone = this.fingers.size === 1 && event.pointerType === "touch";
@@ -159,14 +172,18 @@ class Bench {
       } else if (event.pointerType === "mouse" && !stage.held) this.hover(at);
     });
     front.addEventListener("pointerup", (event: PointerEvent) => {
+      clearTimeout(this.holding);
       if (!this.fingers.delete(event.pointerId) || !this.pressed) return;
-      const at = stage.placeOf(event);
-      const still = Math.hypot(at[0] - this.pressed[0], at[1] - this.pressed[1]) < STRAY;
-      if (!this.mode) {
+      const at = stage.placeOf(event), still = distance(at, this.pressed) < STRAY;
+      if (this.band && !still) this.catch(at);
+      else if (!this.mode) {
         if (still) this.pick(at, event.shiftKey);
       } else if (!still && this.points.length) this.point(at, event.altKey);
-      this.pressed = this.grabbed = null;
+      this.pressed = this.grabbed = this.band = null;
     });
+    front.addEventListener("touchmove", (event: TouchEvent) => {
+      if (this.band) event.preventDefault();
+    }, { passive: false });
     front.addEventListener("touchstart", (event: TouchEvent) => {
       const { touches } = event, box = front.getBoundingClientRect();
       const at: Place = [touches[0].clientX - box.left, touches[0].clientY - box.top];
@@ -175,8 +192,10 @@ class Bench {
       if (touches.length > 1 || body) event.preventDefault();
     }, { passive: false });
     front.addEventListener("pointercancel", (event: PointerEvent) => {
+      clearTimeout(this.holding);
       this.fingers.delete(event.pointerId);
-      this.pressed = null;
+      this.pressed = this.band = null;
+      this.draft.replaceChildren();
     });
     front.addEventListener("wheel", (event: WheelEvent) => {
       const page = document.documentElement;
@@ -200,8 +219,41 @@ class Bench {
     });
   }
 
+  holding = 0;
+
+  /** Where a frame begins that chooses all that it meets, px. */
+  band: Place | null = null;
+
+  /** A finger that stays on a body chooses it too, or not any more; elsewhere it begins a frame. */
+  holdDown(at: Place) {
+    if (this.nameAt(at)) {
+      this.pick(at, true);
+      this.pressed = this.grabbed = null;
+    } else {
+      this.band = at;
+      this.stretch([at[0] + 24, at[1] + 24]);
+    }
+  }
+
+  stretch([px, py]: Place) {
+    const [x, y] = this.band as Place;
+    this.draft.replaceChildren(svg("rect", { class: "band-frame", x: Math.min(x, px),
+      y: Math.min(y, py), width: Math.abs(px - x), height: Math.abs(py - y) }));
+  }
+
+  /** Choose all that the frame meets that ends at a place, px, with what is chosen. */
+  catch([px, py]: Place) {
+    const { stage, inspector } = this, [x, y] = this.band as Place;
+    const within = ([u, v]: Place) => (u - x) * (u - px) <= 0 && (v - y) * (v - py) <= 0;
+    const met = pointsOf(stage).filter(([, points]) => points.some(within)).map(([name]) => name);
+    this.draft.replaceChildren();
+    inspector.choose(...new Set([...inspector.parts, ...met.filter((name) => this.movable(name))]));
+  }
+
+  movable = (name: string) => bodyOf(this.stage.handles, [name], 0, 0) !== null;
+
   /** Draw with keys: arrows move the point, Enter sets it. Where H was pressed arrows move the
-   * view. */
+   * view, else all that is chosen if that is several. */
   key({ key, shiftKey }: KeyboardEvent): boolean {
     const ways: Record<string, Place> = {
       ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
@@ -213,6 +265,11 @@ class Bench {
       const far = shiftKey ? view.snap : roundTo(KEY / view.scale, view.snap) || view.snap;
       this.cursor = [roundTo(x + dx * far, view.snap), roundTo(y - dy * far, view.snap)];
       this.sketch();
+    } else if (key in ways && !this.moving && stage.frame) {
+      const body = bodyOf(stage.handles, stage.parts, 0, 0), [dx, dy] = ways[key];
+      const far = shiftKey ? view.snap : 10 * view.snap;
+      if (body) this.lab.change(valuesOf(body, body.drag(dx * far, -dy * far).map((value) =>
+        Number(value.toPrecision(12)))));
     } else if (key in ways && this.moving) {
       view.x += (ways[key][0] * step) / view.scale;
       view.y -= (ways[key][1] * step) / view.scale;
@@ -248,7 +305,10 @@ class Bench {
 
   /** The body at a place, px, to move it: with a finger only one that is chosen. */
   bodyAt(at: Place, pointer: string) {
-    const { view, handles } = this.stage, { parts } = this.inspector, name = this.nameAt(at);
+    const { view, handles, frame } = this.stage, { parts } = this.inspector;
+    const isIn = frame && at[0] > frame.left && at[0] < frame.right && at[1] > frame.top
+      && at[1] < frame.bottom;
+    const name = isIn ? parts[0] : this.nameAt(at);
     if (!name || (pointer === "touch" && !parts.includes(name))) return null;
     const names = parts.includes(name) ? parts : [name];
     const body = bodyOf(handles, names, view.worldX(at[0]), view.worldY(at[1]));
@@ -259,7 +319,7 @@ class Bench {
   carry(at: Place, event: PointerEvent) {
     const { stage, grabbed, pressed, inspector } = this;
     if (stage.held || !grabbed || !pressed) return;
-    if (Math.hypot(at[0] - pressed[0], at[1] - pressed[1]) < STRAY) return;
+    if (distance(at, pressed) < STRAY) return;
     if (!inspector.parts.includes(grabbed.surface)) inspector.choose(grabbed.surface);
     stage.hold(grabbed);
     // This move may be the only one: where all comes late, many are told as one.
@@ -445,8 +505,7 @@ class Bench {
       const turn = c && (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
       let path = `M${a}L${b}`;
       if (c && Math.abs(turn) > 1) {
-        const far = (p: Place, q: Place) => Math.hypot(p[0] - q[0], p[1] - q[1]);
-        const radius = (far(a, b) * far(b, c) * far(a, c)) / (2 * Math.abs(turn));
+        const radius = (distance(a, b) * distance(b, c) * distance(a, c)) / (2 * Math.abs(turn));
         const wide = (a[0] - c[0]) * (b[0] - c[0]) + (a[1] - c[1]) * (b[1] - c[1]) > 0 ? 1 : 0;
         path = `M${a}A${radius} ${radius} 0 ${wide} ${turn > 0 ? 0 : 1} ${b}`;
       }
@@ -514,9 +573,9 @@ class Bench {
 
   /** Choose all that has a name of its own. */
   all() {
-    const { machine, handles } = { ...this.lab, handles: this.stage.handles };
+    const { machine } = this.lab;
     const names = [...machine?.surfaces ?? [], ...machine?.streams ?? []];
-    this.inspector.choose(...names.filter((name) => bodyOf(handles, [name], 0, 0)));
+    this.inspector.choose(...names.filter(this.movable));
   }
 }
 

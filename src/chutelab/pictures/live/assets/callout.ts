@@ -24,6 +24,9 @@ const BODIES = ".belt, .wall, rect.steel", MOST = 200;
 /** Pixels from a body to the line round it, and of radius of a ball there at least. */
 const AROUND = 6, LEAST = 3;
 
+/** Pixels from bodies to the frame round several. */
+const FRAME = 12;
+
 /** Width of a line that page.css gives its own, px. */
 const WALL = 4.5;
 
@@ -61,15 +64,19 @@ function pointsOf({ lab, view, scenery }: Stage): [string, Point[]][] {
 }
 
 /** Dashes round what is chosen, a line round what is pointed at: below each body its own shape,
- * wider, and over that a little less wide in the colour of the ground. */
-function drawOutline({ lab, view, outline, parts, pointed, scenery }: Stage) {
+ * wider, and over that a little less wide in the colour of the ground. Round several that are
+ * chosen a frame by which they are moved. */
+function drawOutline(stage: Stage) {
+  const { lab, view, outline, parts, pointed, scenery } = stage;
   outline.replaceChildren();
+  const all = svg("g");
+  outline.append(all);
   const { machine, recording, t } = lab;
   for (const name of new Set([...parts, pointed])) {
     const own = parts.includes(name) ? "chosen" : "pointed";
     const bodies = scenery.drawingsOf(name).flatMap((group) =>
       [...group.querySelectorAll(BODIES)].map((shape) => {
-      const wide = Number(shape.getAttribute("stroke-width") ?? WALL);
+        const wide = Number(shape.getAttribute("stroke-width") ?? WALL);
         const copy = shape.cloneNode(false), by = group.getAttribute("transform");
         if (by) copy.setAttribute("transform", by);
         return [copy, wide] as [any, number];
@@ -87,10 +94,18 @@ function drawOutline({ lab, view, outline, parts, pointed, scenery }: Stage) {
         const copy = shape.cloneNode(false);
         copy.setAttribute("class", kind);
         copy.setAttribute("stroke-width", wide + 2 * add);
-        outline.append(copy);
+        (own === "chosen" ? all : outline).append(copy);
       }
     }
   }
+  stage.frame = null;
+  if (parts.length < 2) return;
+  const { x, y, width, height } = all.getBBox();
+  stage.frame = {
+    left: x - FRAME, right: x + width + FRAME, top: y - FRAME, bottom: y + height + FRAME,
+  };
+  outline.append(svg("rect", { class: "frame-all", x: x - FRAME, y: y - FRAME, rx: 6,
+    width: width + 2 * FRAME, height: height + 2 * FRAME }));
 }
 
 class Callout {

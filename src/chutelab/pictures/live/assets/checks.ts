@@ -1,8 +1,9 @@
 // What no scene may say: values that do not have the form of their key, keys that contradict each
 // other, names that lead nowhere. The rules are Python's, of `chutelab.scene`.
 import { fits, type Form } from "./forms.ts";
+import { valueOfTree } from "./formula.ts";
 import { RADIANS } from "./trig.ts";
-import type { Given, Lab, Point, Scene, Rule, Surface } from "./scene.ts";
+import type { Given, Lab, Point, Scene, Rule } from "./scene.ts";
 
 /** What a `Fault` says: key, value, id of a text, and its words. */
 type Wrong = [string, unknown, string, Record<string, number | string>?];
@@ -130,16 +131,12 @@ export function* straysOf(
 }
 
 /** Yields what contradicts each other. */
-export function* conflictsOf(scene: Scene, given: Given): Generator<Wrong> {
+export function* conflictsOf(scene: Scene, given: Given, lab: Lab): Generator<Wrong> {
   yield* beltConflicts(scene);
   yield* kindConflicts(scene, given);
-  yield* plateConflicts(scene, given);
-  for (const [n, one] of scene.surface.entries()) yield* layoutConflicts(one, `surface[${n}]`);
-  for (const [n, { from, to }] of scene.conveyor.entries()) {
-    if (tooNear(from, to)) yield [`conveyor[${n}].to`, to, "same-points"];
-  }
+  yield* contradictions(scene, given, lab);
   yield* pieceConflicts(scene);
-  for (const n of scene.streams.keys()) yield* releaseConflicts(scene, given, n);
+  for (const n of scene.streams.keys()) yield* rateConflicts(scene, given, n);
   const counts = scene.streams.map(({ count }) => count);
   const most = scene.most;
   if (counts.reduce((sum, count) => sum + count, 0) > most) {
@@ -177,12 +174,16 @@ function* beltConflicts(scene: Scene): Generator<Wrong> {
   }
 }
 
+/** Yields surfaces with points too near to each other, and the one with which they are too many. */
 function* pieceConflicts(
   { incoming, outgoing, plates, conveyor, surface }: Scene,
 ): Generator<Wrong> {
   let count = Number(incoming !== null) + Number(outgoing !== null) + plates.length;
   count += 4 * conveyor.length;
   for (const [n, one] of surface.entries()) {
+    if (one.points?.some((point, place) => tooNear(point, one.points?.[place + 1]))) {
+      yield [`surface[${n}].points`, one.points, "same-points"];
+    }
     const { points, repeat, opens_at: opens, closes_at: closes } = one;
     const twice = opens !== undefined && closes !== undefined && opens < closes;
     count += repeat.reduce((many, [copies]) => many * copies,
@@ -198,106 +199,45 @@ function* pieceConflicts(
 function* kindConflicts(scene: Scene, given: Given): Generator<Wrong> {
   for (const [n, kind] of scene.particles.entries()) {
     const path = (key: string) => pathOf(given, "particle", n, key);
-    if ("mass" in kind.given && "density" in kind.given) {
-      yield [path("density"), kind.density, "mass-and-density"];
-    }
     if (!(kind.mass >= LEAST_MASS)) yield [path("mass"), kind.mass, "range", { low: LEAST_MASS, high: 1e6 }];
     if (kind.span !== undefined && kind.span[0] >= kind.span[1]) {
       yield [path("radius"), kind.span, "not-ascending"];
     }
-    if (kind.rolling_friction > 0.0 && !kind.spin) {
-      yield [path("rolling_friction"), kind.rolling_friction, "needs-spin"];
-    }
   }
 }
 
-function* plateConflicts(scene: Scene, given: Given): Generator<Wrong> {
-  let damping = 0;
-  for (const [n, plate] of scene.plates.entries()) {
-    const path = (key: string) => pathOf(given, "plate", n, key);
-    if (plate.above === 0.0 && plate.below === 0.0) yield [path("above"), 0.0, "no-length"];
-    const { pivot, distance, name } = plate;
-    if (pivot !== undefined) {
-      if (distance !== undefined) yield [path("pivot"), pivot, "not-both", { other: "distance" }];
-      if (name === undefined) yield [path("name"), name, "missing"];
-      if ("pivot_height" in plate.given) {
-        yield [path("pivot_height"), plate.pivot_height, "not-both", { other: "pivot" }];
-      }
-    } else {
-      if (distance === undefined) yield [path("distance"), distance, "missing"];
-      if (name !== undefined) yield [path("name"), name, "not-both", { other: "distance" }];
-      damping += 1;
-      if (damping > 1) yield [path("distance"), distance, "one-plate"];
-    }
-  }
-}
-
-function* layoutConflicts(one: Surface, key: string): Generator<Wrong> {
-  const { given, center, points, opens_at: opens } = one;
-  const { from, to } = given;
-  if (opens !== undefined && opens === one.closes_at) {
-    yield [`${key}.opens_at`, opens, "same-times"];
-  }
-  if (center !== undefined) {
-    for (const other of ["from", "to", "points"]) {
-      if (given[other] !== undefined) {
-        yield [`${key}.${other}`, given[other], "not-both", { other: "center" }];
+/** Yields what the rules that Python has too find within a row of a table. */
+function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<Wrong> {
+  const tables: Record<string, any[]> = {
+    plate: scene.plates, particle: scene.particles, stream: scene.streams,
+    surface: scene.surface, conveyor: scene.conveyor,
+  };
+  for (const [table, rows] of Object.entries(tables)) {
+    for (const [n, row] of rows.entries()) {
+      const has = (one: any) => (key: string) => one[key] !== undefined;
+      const known: Record<string, unknown> = {
+        abs: Math.abs, radians: (angle: number) => angle * RADIANS, near: tooNear, run: scene.run,
+        number: Number.isFinite, given: has(row.given), has: has(given), sound: () => true,
+        before: (key: string) => rows.slice(0, n).some((one) => has(one.given)(key)),
+      };
+      for (const [keys, when, text, other] of rules[table]) {
+        const wrong = keys.find((key) => valueOfTree(when, (name) =>
+          (name === "key" ? key : known[name] ?? row[name.replace(/_$/, "")] ?? NaN)));
+        if (wrong === undefined) continue;
+        const words = other === undefined ? undefined : { other };
+        yield [pathOf(given, table, n, wrong), row.given[wrong] ?? row[wrong], text, words];
       }
     }
-    if (one.radius === undefined) yield [`${key}.radius`, undefined, "missing"];
-    const extent = Math.abs(one.to_deg - one.from_deg);
-    const short = extent * RADIANS * (one.radius ?? 1.0) < LEAST_LENGTH;
-    if (short || extent > 360.0) yield [`${key}.to_deg`, one.to_deg, "arc-angles"];
-    return;
-  }
-  // Of what belongs to an arc, the angles of a whole one do no harm.
-  const angles = [one.from_deg, one.to_deg].every((angle) => angle === 0.0 || angle === 360.0);
-  if (one.radius !== undefined || !angles) yield [`${key}.center`, undefined, "missing"];
-  if (given.points !== undefined) {
-    for (const other of ["from", "to"]) {
-      if (given[other] !== undefined) {
-        yield [`${key}.${other}`, given[other], "not-both", { other: "points" }];
-      }
-    }
-  } else if (from === undefined && to === undefined) {
-    yield [`${key}.points`, undefined, "missing"];
-  } else if (from === undefined || to === undefined) {
-    yield [`${key}.${from === undefined ? "from" : "to"}`, undefined, "missing"];
-  }
-  if (points?.some((point, place) => tooNear(point, points[place + 1]))) {
-    const last = given.points === undefined ? "to" : "points";
-    yield [`${key}.${last}`, given[last], "same-points"];
   }
 }
 
 /** @param n of the stream */
-function* releaseConflicts(scene: Scene, given: Given, n: number): Generator<Wrong> {
-  const { incoming } = scene;
+function* rateConflicts(scene: Scene, given: Given, n: number): Generator<Wrong> {
   const stream = scene.streams[n];
   const path = (key: string) => pathOf(given, "stream", n, key);
-  const { until } = scene.run;
-  if (typeof until === "number" && stream.start >= until) {
-    yield [path("start"), stream.start, "after-end"];
-  }
   if (!Number.isFinite(stream.rate)) yield [path("rate"), stream.given.rate, "form"];
   const size = 2.0 * scene.particles[scene.kinds[n]].radius;
   if (stream.width !== undefined && stream.width < size) {
     yield [path("width"), stream.width, "range", { low: size, high: 1e6 }];
-  }
-  for (const key of ["at", "to", "rate", "bed_height", "speed_spread"]) {
-    if (stream.fill !== undefined && key in stream.given) {
-      yield [path(key), stream.given[key], "not-both", { other: "fill" }];
-    }
-  }
-  if (stream.to !== undefined) {
-    if (stream.at === undefined) yield [path("at"), undefined, "missing"];
-    if ("bed_height" in stream.given) {
-      yield [path("bed_height"), stream.bed_height, "not-both", { other: "to" }];
-    }
-  }
-  if (incoming === null) {
-    if (stream.fill !== undefined) return;
-    if (stream.at === undefined) yield [path("at"), undefined, "missing"];
-    if (stream.velocity === undefined) yield [path("velocity"), undefined, "missing"];
   }
 }

@@ -1,4 +1,4 @@
-// The core in memory, what core/module.py is in Python: `Memory`; and its contact engine, what
+// The core in memory, what `chutelab.core` is in Python: `Memory`; and its contact engine, what
 // engines/contact.py is: `Core`. A machine goes in, knots and events come out.
 
 type Struct = { size: number, fields: Record<string, [number, string, number]> };

@@ -14,14 +14,15 @@ class Engine {
   onChunk: (chunk: Chunk) => void = () => {};
   onLaws: (breaches: Breach[]) => void = () => {};
 
-  constructor(readonly worker: Worker, wasm: ArrayBuffer, layout: object) {
+  /** @param module the core */
+  constructor(readonly worker: Worker, module: WebAssembly.Module, layout: object) {
     worker.onmessage = ({ data }) => {
       if (data.type === "broken") this.fail();
       if (data.type === "chunk" && data.id === this.id) this.onChunk(data);
       if (data.type === "laws" && data.id === this.id) this.onLaws(data.breaches);
     };
     worker.onerror = () => this.fail();
-    worker.postMessage({ type: "load", wasm, layout });
+    worker.postMessage({ type: "load", module, layout });
   }
 
   /** Whether the thread did not start, or broke: no run comes back then. */

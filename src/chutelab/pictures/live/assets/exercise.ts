@@ -12,7 +12,7 @@ import type { Words } from "./words.ts";
 
 /** Signs of verdicts; the words always say it too. */
 const MARKS: Record<Verdict, string> = {
-  blank: "○", right: "✓", mistake: "✗", off: "✗", unread: "?",
+  blank: "○", right: "✓", mistake: "↻", off: "↻", unread: "?",
 };
 
 /** Whether a step asks to explain in words. */

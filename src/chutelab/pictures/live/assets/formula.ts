@@ -1,5 +1,5 @@
-// Formulas of exercises: trees that Python's parser made of them (`exercises/catalogue.py`), and
-// what they know besides an exercise's own names.
+// Formulas of rules and exercises: trees that Python's parser made of them
+// (`scene/conflicts.py`), and what exercises know besides their own names.
 
 import { fixedText } from "./decimal.ts";
 import { separationWithSlip } from "./slip.ts";
@@ -55,6 +55,7 @@ const OPERATIONS: Record<string, (a: number, b: number) => number | boolean> = {
   "<=": (a, b) => a <= b,
   ">": (a, b) => a > b,
   ">=": (a, b) => a >= b,
+  "==": (a, b) => a === b,
 };
 
 /** The value of a formula. */
@@ -69,6 +70,9 @@ function valueOfTree(tree: Tree, scope: Scope): any {
   const of = (part: Tree) => valueOfTree(part, scope);
   switch (kind) {
     case "text": return first;
+    case "not": return !of(first);
+    case "and": return tree.slice(1).every(of);
+    case "or": return tree.slice(1).some(of);
     case "list": return tree.slice(1).map(of);
     case ".": return of(first)[others[0]];
     case "item": return of(first)[of(others[0])];

@@ -128,8 +128,14 @@ class Lab {
     });
   }
 
-  /** Tell of the run once a frame: a crowd sends more often. */
+  /** Tell of the run: at once of one that is over, else once a frame, since a crowd sends more
+   * often. */
   tellSoon() {
+    if (this.recording?.state === "done") this.tell("run");
+    else this.tellOnce();
+  }
+
+  tellOnce() {
     if (this.waiting) return;
     this.waiting = true;
     requestAnimationFrame(() => {

@@ -45,12 +45,13 @@ function bytesOf(text: string) {
 /** @param join makes what only a sandbox has, or only a lesson */
 async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?: object }) {
   const data = JSON.parse(byId("lab").textContent);
+  const core = compiled(bytesOf(data.wasm).buffer).catch(() => null);
+  const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
+  const newThread = () => new Worker(URL.createObjectURL(source));
+  // A thread takes its time to begin.
+  const thread = newThread();
   Object.assign(data, await unpacked(bytesOf(data.packed).buffer).json());
   const words = new Words(data.language, data.strings);
-  const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
-  const wasm = bytesOf(data.wasm).buffer;
-  const newEngine = () => new Engine(
-    new Worker(URL.createObjectURL(source)), wasm, data.layout);
   for (const element of document.querySelectorAll("[data-say]")) {
     element.textContent = words.say((element as HTMLElement).dataset.say ?? "");
   }
@@ -59,15 +60,16 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
     element.setAttribute("aria-label", name);
     if (element.matches("button")) (element as HTMLElement).title = name;
   }
-  try {
-    await startPlan(await compiled(wasm), data.layout);
-  } catch {
+  const module = await core;
+  if (!module) {
     byId("broken").remove();
     byId("fault").textContent = words.say("fault-no-engine");
     byId("fault").hidden = false;
     return;
   }
-  const lab = new Lab(data, newEngine());
+  await startPlan(module, data.layout);
+  const newEngine = (own = newThread()) => new Engine(own, module, data.layout);
+  const lab = new Lab(data, newEngine(thread));
   const stage = new Stage(byId("stage"), lab, words);
   const panels = [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel]
     .map((Panel) => new Panel(byId("panels"), lab, words));

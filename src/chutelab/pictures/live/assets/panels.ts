@@ -73,10 +73,11 @@ function eased(act: () => void) {
   return ask;
 }
 
-/** Draw a panel again at these news, as long as it is open and there is a run to show. */
+/** Draw a panel again at these news, as long as it is seen and there is a run to show. */
 function follow(lab: Lab, panel: HTMLDetailsElement, news: News[], act: () => void) {
   const again = eased(() => {
-    if (panel.open && lab.recording && isFinite(lab.recording.begin)) act();
+    const isSeen = panel.open && !panel.matches(".off");
+    if (isSeen && lab.recording && isFinite(lab.recording.begin)) act();
   });
   for (const one of news) lab.on(one, again);
   panel.addEventListener("toggle", again);

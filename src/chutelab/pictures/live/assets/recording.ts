@@ -35,20 +35,21 @@ class Track {
   dropTips() {
     this.count -= this.tip;
     this.tip = 0;
-    this.turns.length = Math.min(this.turns.length, this.count);
+    // To set a length takes long, even if it is the same.
+    if (this.turns.length > this.count) this.turns.length = this.count;
   }
 
-  /** @param shift s */
-  add(row: Float64Array, shift: number, entries: number[] | null) {
+  /** @param from where the knot's row begins in `knots` @param shift s */
+  add(knots: ArrayLike<number>, from: number, shift: number, entries: number[] | null) {
     if ((this.count + 1) * KNOT_ROW > this.rows.length) {
       const rows = new Float64Array(2 * this.rows.length);
       rows.set(this.rows);
       this.rows = rows;
     }
-    const begin = this.count * KNOT_ROW;
-    this.rows.set(row, begin);
-    this.rows[begin] += shift;
-    if (entries) for (let n = 0; n < 3; n += 1) this.rows[begin + BELT + n] += entries[n];
+    const { rows } = this, begin = this.count * KNOT_ROW;
+    for (let n = 0; n < KNOT_ROW; n += 1) rows[begin + n] = knots[from + n];
+    rows[begin] += shift;
+    if (entries) for (let n = 0; n < 3; n += 1) rows[begin + BELT + n] += entries[n];
     this.count += 1;
   }
 
@@ -112,7 +113,7 @@ class Track {
     this.seen = 0;
     this.near = 0;
     this.tip = 0;
-    this.add(new Float64Array([t, x, y, vx, vy, spin, ...entries, 0]), 0, null);
+    this.add([t, x, y, vx, vy, spin, ...entries, 0], 0, 0, null);
   }
 
   /** Position, velocity and spin; null before the release, and where the track ended after it. */
@@ -259,14 +260,13 @@ class Recording {
     for (const track of this.tracks) track.live = false;
     for (const rows of [knots, tips]) {
       for (let begin = 0; begin < rows.length; begin += KNOT_ROW) {
-        const row = rows.subarray(begin, begin + KNOT_ROW);
-        const { index, entries } = its(row[9]);
+        const { index, entries } = its(rows[begin + 9]);
         const track = this.tracks[index];
         const isTip = rows === tips;
         if (!(isTip && track.live)) track.dropTips();
         track.live = isTip;
-        if (isTip && row[0] + this.shift < track.end) continue;
-        track.add(row, this.shift, entries);
+        if (isTip && rows[begin] + this.shift < track.end) continue;
+        track.add(rows, begin, this.shift, entries);
         if (isTip) track.tip += 1;
       }
     }

@@ -2,6 +2,7 @@
 // `chutelab.scene`, of which a page needs those about what can be edited. `keys.ts` changes keys.
 import { conflictsOf, listOf, misfitsOf, straysOf } from "./checks.ts";
 import type { Form } from "./forms.ts";
+import type { Tree } from "./formula.ts";
 
 export type Point = [number, number];
 /** Keys as a scene file has them */
@@ -20,6 +21,7 @@ export interface Rule {
 /** What Python writes into the page, see `describe.py` */
 export interface Lab {
   tables: Record<string, Record<string, Rule>>; // rules by table and key
+  rules: Record<string, [string[], Tree, string, string?][]>; // contradictions by table
   presets: Record<string, Record<string, number>>; // materials by name
 }
 
@@ -213,7 +215,7 @@ export function resolve(given: Given, lab: Lab): Scene {
     crowded: count > 1 && streams.some((stream) => stream.interact),
     most: lab.tables.stream.count.high ?? Infinity,
   };
-  for (const wrong of conflictsOf(scene, given)) throw new Fault(...wrong);
+  for (const wrong of conflictsOf(scene, given, lab)) throw new Fault(...wrong);
   return scene;
 }
 

@@ -10,7 +10,7 @@ import { Scenery, svg } from "./scenery.ts";
 import { historyOf } from "./stages.ts";
 import { View, boxOf } from "./view.ts";
 import type { Lab } from "./lab.ts";
-import type { Recording, Track } from "./recording.ts";
+import type { Recording } from "./recording.ts";
 import type { Words } from "./words.ts";
 
 /** Tracks that are drawn at most; more are a blot. */
@@ -152,7 +152,8 @@ class Stage {
     const { recording } = this.lab;
     if (recording && !this.fitted && recording.state !== "running") this.fit();
     this.drawTracks();
-    this.paint();
+    // While it plays, the time brings the next picture.
+    if (!this.lab.playing) this.paint();
     for (const draw of this.drawers) draw();
   }
 
@@ -215,10 +216,9 @@ class Stage {
     context.clearRect(0, 0, view.width, view.height);
     this.scenery.turn(t);
     const few = recording.tracks.length <= MOST_TRACKS;
-    const rim = this.colour("ink");
     if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
     const spins = machine.inertia.some((value) => value > 0);
-    context.lineWidth = 1;
+    const marks = new Path2D();
     for (let i = 0; i < recording.tracks.length; i += 1) {
       const state = recording.tracks[i].state(t);
       if (!state || (state.ended && recording.tracks.length > 1)) continue;
@@ -226,8 +226,15 @@ class Stage {
       const r = Math.max(few ? LEAST_FEW : LEAST, (machine.radius[i] ?? 0) * view.scale);
       if (x < -r || x > view.width + r || y < -r || y > view.height + r) continue;
       this.balls.paint(context, i, x, y, r, Math.hypot(state.vx, state.vy));
-      if (spins && r > 3) this.mark(context, recording.tracks[i], t, x, y, r, rim);
+      if (!spins || r <= 3) continue;
+      // A radius shows how it turns.
+      const angle = recording.tracks[i].angle(t);
+      marks.moveTo(x, y);
+      marks.lineTo(x + r * Math.cos(angle), y - r * Math.sin(angle));
     }
+    context.lineWidth = 1;
+    context.strokeStyle = this.colour("ink");
+    context.stroke(marks);
     for (const draw of this.painters) draw(context);
   }
 
@@ -244,19 +251,6 @@ class Stage {
 
   /** To ask for each takes longer than to paint a particle. */
   colours: Map<string, string> = new Map();
-
-  /** A radius that shows how a particle turns. */
-  mark(
-    context: CanvasRenderingContext2D, track: Track, t: number, x: number, y: number, r: number,
-    ink: string,
-  ) {
-    const angle = track.angle(t);
-    context.strokeStyle = ink;
-    context.beginPath();
-    context.moveTo(x, y);
-    context.lineTo(x + r * Math.cos(angle), y - r * Math.sin(angle));
-    context.stroke();
-  }
 
   /** Dots at round times on the first tracks. */
   strobe(context: CanvasRenderingContext2D) {
@@ -326,6 +320,9 @@ class Stage {
 
   /** What the pointer is over. */
   pointed = "";
+
+  /** The frame round several that are chosen, px. */
+  frame: { left: number, right: number, top: number, bottom: number } | null = null;
 
   drawOutline() {
     drawOutline(this);

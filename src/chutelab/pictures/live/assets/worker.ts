@@ -1,6 +1,6 @@
 // The engine's own thread: runs machines, so that the picture never waits for them.
 //
-// In:  {type: "load", wasm, layout}, the core compressed by zlib; {type: "run", id, machine, until}
+// In:  {type: "load", module, layout}, the core compiled; {type: "run", id, machine, until}
 //      begins a run and ends the one before; {type: "until", id, until} lets it go on to a later
 //      time (s).
 // Out: {type: "chunk", id, knots, tips, events, now, state, books, reasons, gained}, where
@@ -10,7 +10,7 @@
 //      {type: "broken"}, where the core cannot be loaded.
 
 import { judge } from "./breaches.ts";
-import { compiled, startCore, type Core, type Layout } from "./core.ts";
+import { startCore, type Core, type Layout } from "./core.ts";
 
 /** ms between two looks at the messages. */
 const TURN = 10;
@@ -86,8 +86,8 @@ function joined(parts: Float64Array[]) {
 
 let ready: Promise<void>;
 
-async function load({ wasm, layout }: { wasm: ArrayBuffer, layout: Layout }) {
-  core = await startCore(await compiled(wasm), layout);
+async function load({ module, layout }: { module: WebAssembly.Module, layout: Layout }) {
+  core = await startCore(module, layout);
 }
 
 addEventListener("message", async ({ data }) => {
@@ -105,7 +105,7 @@ addEventListener("message", async ({ data }) => {
     postMessage({ type: "laws", id: data.id, breaches: judge(core, data.run) });
   } else if (data.type === "run") {
     core.begin(data.machine);
-    job = { id: data.id, until: data.until, steps: 64 };
+    job = { id: data.id, until: data.until, steps: 1 };
     work();
   } else if (data.type === "until" && job && data.id === job.id) {
     job.until = data.until;

@@ -1,0 +1,189 @@
+"""The stream as engineers' methods have it, beside the one that is simulated.
+
+>>> from chutelab.studies.discharge import side_by_side
+>>> found = side_by_side("low-speed", heights=[-0.5])
+>>> round(float(found.lines["booth"][0, 0]), 3)  # its lower edge: adhesion is no slip
+0.824
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isnan, nan, radians, sqrt
+from typing import Any
+
+import numpy as np
+
+from chutelab.engines.simulation import simulate
+from chutelab.results import Recording
+from chutelab.results.stream import QUANTILES
+from chutelab.scene import AnyScene, Scene, from_dict, load, to_dict
+from chutelab.theory.discharge import LEFT_OUT, METHODS, Discharge, DischargeError, Path, discharge
+from chutelab.util.arrays import Floats, Progress
+from chutelab.util.tables import Sheet
+
+HEIGHTS = (0.0, -0.2, -0.4, -0.6, -0.8, -1.0)
+"""Heights above the pulley's axis at which streams are compared, m."""
+
+LOOK = 1e-3
+"""Time between two looks at the simulated paths, s; they are straight between: 1e-6 m."""
+
+EDGES = ("lower", "centre", "upper")
+
+
+@dataclass(frozen=True, eq=False)
+class SideBySide:
+    """Streams by all methods and by simulation.
+
+    Attributes
+    ----------
+    scene : Scene
+        What was simulated: belt and particles of the scene that was asked for, and nothing else.
+    heights : ndarray, (H,)
+        Above the pulley's axis, m.
+    methods : dict
+        The stream of each method that has an answer.
+    lines : dict
+        x (m) of lower edge, centre and upper edge at the heights, (3, H), of each of them and of
+        "simulated"; NaN where it has none. Edges of the simulated stream are half a particle
+        outside the paths of the centres, of which 2, 50 and 98 % lie below.
+    refused : dict
+        Why another method has no answer.
+    recording : Recording
+        The run.
+    """
+
+    scene: Scene
+    heights: Floats
+    methods: dict[str, Discharge]
+    lines: dict[str, Floats]
+    refused: dict[str, str]
+    recording: Recording
+
+    def sheet(self) -> Sheet:
+        """Return a table of the streams at the heights."""
+        rows: list[tuple[str, ...]] = []
+        for name, lines in self.lines.items():
+            rows += [
+                (f"{name}, {edge}", *("-" if isnan(x) else f"{x:.3f}" for x in row))
+                for edge, row in zip(EDGES, lines.tolist(), strict=True)
+                if np.isfinite(row).any()
+            ]
+        heads = ("at y, m", *(f"{height:g}" for height in self.heights))
+        notes = [f"{name}: no answer, {why}" for name, why in self.refused.items()]
+        notes += [self._differs(name) for name in self.methods]
+        notes.append(f"Left out, as their rules are not known well enough: {', '.join(LEFT_OUT)}.")
+        return Sheet("The stream's x, m", heads, tuple(rows), notes=tuple(filter(None, notes)))
+
+    def _differs(self, name: str) -> str:
+        """Tell how far a method's stream is from the simulated one at the lowest height."""
+        off = 1000.0 * (self.lines[name] - self.lines["simulated"])[:, -1]
+        told = [f"{edge} {x:+.1f}" for edge, x in zip(EDGES, off, strict=True) if not isnan(x)]
+        if not told:
+            return ""
+        return f"{name} less simulated, at y = {self.heights[-1]:g} m: {', '.join(told)} mm"
+
+    def as_dict(self) -> dict[str, object]:
+        """Return plain data for JSON."""
+        return {
+            "heights": self.heights.tolist(),
+            "methods": {
+                name: {
+                    "high_speed": found.high_speed,
+                    **{edge: _plain(getattr(found, edge)) for edge in EDGES},
+                }
+                for name, found in self.methods.items()
+            },
+            "x": {
+                name: {e: [None if isnan(x) else x for x in row]
+                       for e, row in zip(EDGES, rows.tolist(), strict=True)}
+                for name, rows in self.lines.items()
+            },
+            "refused": self.refused,
+        }  # fmt: skip
+
+
+def _plain(path: Path | None) -> dict[str, float] | None:
+    if path is None:
+        return None
+    return {"angle_deg": float(np.degrees(path.angle)), "speed": path.speed, "radius": path.radius}
+
+
+def side_by_side(
+    scene: AnyScene, heights: Sequence[float] = HEIGHTS, *, progress: Progress | None = None
+) -> SideBySide:
+    """Compare all methods with a simulation of what the incoming belt throws off, in free flight.
+
+    Plate, surfaces and the outgoing belt are left out of it. The bed is as deep as the layers of
+    the first stream with half a particle below and above.
+
+    Raises
+    ------
+    DischargeError
+        Of a scene without an incoming belt, or whose first stream is not released on it.
+    """
+    whole = load(scene)
+    if (belt := whole.incoming) is None:
+        raise DischargeError("is needed: it is the pulley that the bed leaves", "incoming")
+    stream, own = whole.streams[0], whole.particle
+    if stream.at is not None or own.shape not in ("disk", "sphere"):
+        raise DischargeError("must release disks or spheres on the incoming belt", "stream")
+    tables = to_dict(whole)
+    first = tables["stream"][0] if isinstance(tables.get("stream"), list) else tables.get("stream")
+    fall = sqrt(2.0 * (belt.pulley_radius - min(heights)) / whole.gravity)
+    kept = ("title", "gravity", "material", "incoming", "particle")
+    free: dict[str, Any] = {key: tables[key] for key in kept if key in tables}
+    rides = (belt.length + 4.0 * belt.pulley_radius) / belt.speed
+    last = stream.start + stream.count / whole.rate + rides + 3.0 * fall
+    free["stream"] = first or {}
+    free["run"] = {"until": last, "dt": whole.run.dt}
+    alone = from_dict(free)
+    radius = float(np.max(own.radius))
+    mass = own.mass if own.mass is not None else nan
+    friction = inf if belt.friction == "adhesion" else whole.met(whole.kinds[0], "incoming")[1]
+    heavy = radius > 0.0 and mass > 0.0
+    methods: dict[str, Discharge] = {}
+    lines: dict[str, Floats] = {}
+    refused: dict[str, str] = {}
+    for method in METHODS:
+        try:
+            methods[method] = found = discharge(
+                method,
+                speed=belt.speed,
+                radius=belt.pulley_radius,
+                depth=stream.bed_height + 2.0 * radius,
+                incline=radians(belt.incline_deg),
+                friction=friction,
+                gravity=whole.gravity,
+                sphere=(radius, mass) if heavy else None,
+            )
+        except DischargeError as error:
+            refused[method] = str(error)
+            continue
+        paths = [getattr(found, edge) for edge in EDGES]
+        lines[method] = np.array(
+            [[nan if path is None else path.across(y) for y in heights] for path in paths]
+        )
+    recording = simulate(alone, progress=progress)
+    lines["simulated"] = stream_at(recording, heights)
+    return SideBySide(alone, np.array(heights), methods, lines, refused, recording)
+
+
+def stream_at(recording: Recording, heights: Sequence[float] | Floats) -> Floats:
+    """Return x (m) of lower edge, middle and upper edge of a stream that falls, (3, H)."""
+    begin, end = float(recording.knots["t"].min()), float(recording.knots["t"].max())
+    times = np.arange(begin, end, LOOK)
+    places = np.asarray(recording.at(times)[0])
+    found = np.full((3, len(heights)), nan)
+    for h, height in enumerate(heights):
+        above, below = places[:-1, :, 1] > height, places[1:, :, 1] <= height
+        row, column = np.nonzero(above & below)
+        (x, y), (to, down) = places[row, column].T, places[row + 1, column].T
+        if not len(x):
+            continue
+        across = x + (to - x) * (y - height) / (y - down)
+        half = recording.radius[column] * np.hypot(to - x, y - down) / (y - down)
+        for edge, (side, share) in enumerate(zip((-1.0, 0.0, 1.0), QUANTILES, strict=True)):
+            found[edge, h] = np.quantile(across + side * half, share)
+    return found

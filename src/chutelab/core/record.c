@@ -13,17 +13,6 @@ static void emit(const Knot *state) {
     W.knots[W.knot_count++] = *state;
 }
 
-/* Write the latest state that waits as a knot; if it is the one after a blow, that before, too. */
-static void write_waiting(int i) {
-    Track *track = W.tracks + i;
-    const Knot *wait = waiting(i), *last = wait + track->waits - 1;
-    if (!track->waits) return;
-    if (track->waits > 1 && last[-1].t == last->t) emit(last - 1);
-    emit(last);
-    memcpy(track->from, last, sizeof track->from);
-    track->waits = 0;
-}
-
 /* Whether the cubic from the last knot to a state leads past all that wait: as near in place, velocity and
    entries as a track may be off. In a crowd that is a hop: what lasts hops from step to step, g h2 / 8 high, and
    its track leaves that out; blows and bends that are smaller, of a velocity of g h, are left out with it. */
@@ -55,6 +44,21 @@ static int is_followed(const Track *track, const Knot *wait, const Knot *to, con
         }
     }
     return 1;
+}
+
+/* Write the latest state that waits as a knot; if it is the one after a blow, that before, too, unless a crowd's
+   track may leave the blow out. */
+static void write_waiting(int i) {
+    Track *track = W.tracks + i;
+    const Knot *wait = waiting(i), *last = wait + track->waits - 1;
+    if (!track->waits) return;
+    if (track->waits > 1 && last[-1].t == last->t) {
+        track->waits--;
+        if (!W.interact || !is_followed(track, wait, last, W.disks + i)) emit(last - 1);
+    }
+    emit(last);
+    memcpy(track->from, last, sizeof track->from);
+    track->waits = 0;
 }
 
 /* Forget every second of the states that wait, but the last two: the longer the times between those that are

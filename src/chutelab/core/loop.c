@@ -1,6 +1,5 @@
 /* The run: releases and rides, steps, and how tracks end. */
 
-#include <string.h>
 #include "core.h"
 
 World W;
@@ -321,26 +320,32 @@ static double in_hollows(void) {
 
 /* Note what all disks have together as a step begins. */
 static void note_totals(void) {
-    Total *all = W.totals + W.total_count++;
-    *all = (Total){.t = W.t};
+    Total all = {.t = W.t};
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
+        if (d->mode == WAITING) continue;
         const Track *track = W.tracks + i;
-        double state[5] = {d->x, d->y, d->vx, d->vy, d->spin}, entries[3];
-        int lasts = d->mode == FREE && track->lasted;
-        if (!track->begun) continue;
-        for (int n = 0; n < 3; n++) entries[n] = d->entries[n] - (lasts ? d->ahead[n] : 0);
-        if (lasts) memcpy(state, track->held + 1, sizeof state);
-        if (d->mode == ASLEEP) memcpy(state + 2, &d->ux, 2 * sizeof(double));
-        if (d->mode == RIDING) {
+        const double *place = &d->x, *v = &d->vx, none[3] = {0}, *ahead = none;
+        double state[4], spin = d->spin;
+        if (d->mode == FREE && track->lasted) {
+            place = track->held + 1;
+            v = place + 2;
+            spin = place[4];
+            ahead = d->ahead;
+        } else if (d->mode == ASLEEP) {
+            v = &d->ux;
+        } else if (d->mode == RIDING) {
             /* What the belt has done since the last knot, see `ride_knot`. */
             ride_at(d, W.t, state);
-            entries[0] -= d->mass * (W.gx * (state[0] - track->knot[1]) + W.gy * (state[1] - track->knot[2]));
-        }
-        all->kinetic += 0.5 * (d->mass * (square(state[2]) + square(state[3])) + d->inertia * square(state[4]));
-        all->potential += d->mass * W.g * state[1];
-        for (int n = 0; n < 3; n++) all->entries[n] += entries[n];
+            place = state;
+            v = place + 2;
+            all.entries[0] -= d->mass * (W.gx * (place[0] - track->knot[1]) + W.gy * (place[1] - track->knot[2]));
+        } else if (d->mode == GONE && !track->begun) continue;
+        all.kinetic += 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
+        all.potential += d->mass * W.g * place[1];
+        for (int n = 0; n < 3; n++) all.entries[n] += d->entries[n] - ahead[n];
     }
+    W.totals[W.total_count++] = all;
 }
 
 /* Begin a step: where prescribed paths lead, which disks may meet, which contacts last. A status other

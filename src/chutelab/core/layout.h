@@ -11,7 +11,7 @@
 
 #define MAX_HELD 4 /* surfaces that one disk can lie on at a time; a fifth is met as an impact */
 #define MOST_IDLE 400 /* rounds in a row that take no time: with more of them a particle is stuck */
-#define WAITS 32 /* states of a track at most that wait to become a knot, or be left out */
+#define WAITS 20 /* states of a track at most that wait to become a knot, or be left out */
 #define MAX_NEARBY 12 /* surfaces that are listed for a disk; where there are more, it asks all */
 
 /* What a disk is doing. Free disks move on parabolas; riders and sleepers on a prescribed path. */

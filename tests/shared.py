@@ -1,13 +1,20 @@
-"""What many test files ask for: a command's outcome, and the shipped lessons, read once."""
+"""What many test files ask for: a command's outcome, the shipped lessons, read once, a page."""
 
 from functools import cache
+from html.parser import HTMLParser
 
+import pytest
 from click.testing import CliRunner
 
 from chutelab.classroom.lessons import shipped_lessons
 from chutelab.cli import main
 
 lessons = cache(shipped_lessons)
+
+
+def seeds(few, many):
+    """Return numbers up to `many`, of which all from `few` on are slow."""
+    return [*range(few), *(pytest.param(n, marks=pytest.mark.slow) for n in range(few, many))]
 
 
 def chutelab(*arguments):
@@ -19,3 +26,26 @@ def call(*arguments, code=0):
     assert result.exit_code == code, result.output
     assert "Traceback" not in result.output
     return result
+
+
+class Page(HTMLParser):
+    """The tags of a page with their attributes, its text, and the addresses in it."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.tags, self.text = [], ""
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data):
+        self.text += data
+
+    def told(self, name, tag=""):
+        """Values of an attribute, of all tags or of some."""
+        return [given[name] for one, given in self.tags if name in given and tag in ("", one)]
+
+    @property
+    def addresses(self):
+        return [where for name in ("href", "src", "data-film") for where in self.told(name)]

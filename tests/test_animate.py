@@ -20,7 +20,7 @@ from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
 from chutelab.machine.parts import Thread
-from chutelab.pictures.animation import Moment, Stage, VideoError, animate, film, moments
+from chutelab.pictures.animation import Moment, Stage, animate, film, moments
 from chutelab.pictures.animation import stage as video
 from chutelab.pictures.animation.actors import SIGNS
 from chutelab.pictures.animation.moments import sentence, slowness, span
@@ -836,21 +836,6 @@ def test_video_shows_the_stage_at_its_rate(kind, tmp_path):
     decoded = np.frombuffer(done.stdout, np.uint8).reshape(frames, 180, 320, 3).astype(int)
     for shown, index in ((decoded[0], 0), (decoded[-1], len(shots) - 1)):
         assert np.abs(shown - np.asarray(stage.frame(index))).mean() < 4.0
-
-
-def test_missing_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(video, "find_spec", lambda _name: None)
-    with pytest.raises(VideoError, match=r'pip install "chutelab\[video\]"'):
-        animate(by_hand(), tmp_path / "lesson.mp4")
-    assert not list(tmp_path.iterdir())
-    result = CliRunner().invoke(
-        main, ["run", "perpendicular", "--out", str(tmp_path / "out"), "--format", "webm"]
-    )
-    assert result.exit_code == 2
-    assert 'a film as webm needs what is not installed: pip install "chutelab[video]"' in (
-        result.output
-    )
-    assert not list(tmp_path.iterdir())
 
 
 # The command line

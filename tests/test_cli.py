@@ -4,10 +4,8 @@ import csv
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-from contextlib import contextmanager
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
@@ -359,36 +357,6 @@ def test_no_such_scene_and_a_folder_end_with_2():
     Path("folder").mkdir()
     assert "folder: a directory" in refused("run", "folder")
     assert "Missing argument 'SCENE'" in refused("run")
-
-
-def test_ctrl_c_ends_with_130_and_keeps_in_out_what_was_recorded(monkeypatch):
-    def interrupted(*_arguments, **_options):
-        raise KeyboardInterrupt
-
-    @contextmanager
-    def third_report(*_arguments, **_options):
-        shares = []
-
-        def report(share):
-            shares.append(share)
-            if len(shares) == 3:
-                signal.raise_signal(signal.SIGINT)
-
-        yield report
-
-    with monkeypatch.context() as patched:
-        patched.setattr("chutelab.engines.simulation.judged", interrupted)
-        result = call("run", "perpendicular", "--out", "out", code=130)
-        assert (result.stdout, result.stderr.strip()) == ("", "Interrupted.")
-        assert list(Path().iterdir()) == []
-    monkeypatch.setattr("chutelab.cli.running.progress", third_report)
-    result = call("run", "stream", "--out", "out", "--only", "json,npz", code=130)
-    assert result.stdout == ""
-    assert "what was recorded is written to out" in result.stderr
-    assert json.loads(Path("out/summary.json").read_text("utf-8"))["stopped"]["particles"] > 0
-    assert chutelab.Recording.load("out/recording.npz").count == 200
-    assert call("run", "stream", code=130).stdout == ""
-    assert [path.name for path in Path().iterdir()] == ["out"]
 
 
 def test_a_failure_of_ours_ends_with_1_one_line_and_nothing_written(monkeypatch):

@@ -200,7 +200,12 @@ LIMIT = 20.0
 """s of processor time that no crowd may take."""
 
 
-def check_crowd(seed, count=None):
+@pytest.mark.parametrize(
+    ("seed", "count"),
+    [*((n, 60) for n in range(3)),
+     *(pytest.param(n, None, marks=pytest.mark.slow) for n in range(300))],
+)  # fmt: skip
+def test_crowds_obey_the_laws(seed, count):
     _, machine = crowd(seed, count=count)
     begin = process_time()
 
@@ -214,17 +219,6 @@ def check_crowd(seed, count=None):
     finally:
         faulthandler.cancel_dump_traceback_later()
     assert not faults(recording)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_small_crowds_obey_the_laws(seed):
-    check_crowd(seed, 60)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(300))
-def test_crowds_obey_the_laws(seed):
-    check_crowd(seed)
 
 
 def feeder(count=60):

@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-import sys
 from math import cbrt, cos, pi, radians, sin, sqrt, tan
 from pathlib import Path
 
@@ -345,13 +344,6 @@ def test_bad_questions_are_refused_before_anything_runs(arguments, said, monkeyp
     assert result.exit_code == 2, result.output
     assert said in " ".join(result.output.split())
     assert not list(tmp_path.iterdir())
-
-
-def test_without_scipy_it_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "scipy.optimize", None)
-    result = CliRunner().invoke(main, [*SOLVE, *VARY, *AIM])
-    assert result.exit_code == 2
-    assert 'pip install "chutelab[design]"' in result.output
 
 
 def test_files_of_a_solution(tmp_path):

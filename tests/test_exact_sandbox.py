@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chutelab.engines import contact, exact, reference
+from chutelab.engines import contact, exact, pymunk, reference
 from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
 from machines import bent, face, gated, nominal, of_sizes, scene_of, thrown
@@ -254,7 +254,7 @@ def rolling(built, share, kappa, radius=0.02):
     return of_sizes(built, np.array([radius]), 0.1, np.array([share]), rolling=np.array([kappa]))
 
 
-@pytest.mark.parametrize(("engine", "off"), [(exact, 1e-12), (contact, 1e-3)])
+@pytest.mark.parametrize(("engine", "off"), [(exact, 1e-12), (contact, 1e-3), (pymunk, 1e-7)])
 @pytest.mark.parametrize("share", [0.5, 0.4])
 def test_a_roller_slows_down_and_stops(share, engine, off):
     """m v' = -F and I ω' = F r - κ N r: v' = -κ g/(1 + I/m r²), and what it has becomes heat."""
@@ -267,12 +267,13 @@ def test_a_roller_slows_down_and_stops(share, engine, off):
     end = run.track(0)[-1]
     slower = 0.02 * G / (1.0 + share)
     assert end["position"][0] - x == pytest.approx(speed**2 / (2.0 * slower), rel=off)
-    if engine is exact:
-        assert end["t"] - grip["t"] == pytest.approx(speed / slower, rel=off)
+    if engine is not contact:  # in pymunk it stops at the end of a step
+        late = 0.0 if engine is exact else 1.1e-3
+        assert end["t"] - grip["t"] == pytest.approx(speed / slower, rel=off, abs=late)
     assert (REASONS[run.ended[0]], end["omega"]) == ("settled", pytest.approx(0.0, abs=off**2))
     books = ledger(run)
     assert books.friction_loss == pytest.approx(0.5 * 0.1 * 0.9**2, rel=off)
-    assert books.relative_residual < 1e-12
+    assert books.relative_residual < (1e-11 if engine is pymunk else 1e-12)
 
 
 @pytest.mark.parametrize(("engine", "off"), [(exact, 1e-12), (contact, 1e-4)])

@@ -4,9 +4,9 @@ import gc
 import json
 import re
 from fractions import Fraction
-from html.parser import HTMLParser
 from math import atan, degrees, hypot, isfinite, nan, radians, sqrt, tan
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -221,37 +221,23 @@ def test_nothing_strikes_the_pulley_on_its_way_back(name):
 # Known mistakes
 
 
-def recognised(name, student):
-    """Check every mistake of every question; return their names."""
-    seen = []
-    for number, case in enumerate(draw(EXERCISES[name], student)[1], start=1):
-        assert judge(case, case.right).right
-        for trace in case.mistakes:
-            assert isfinite(trace.number)
-            for digits in (trace.number, float(f"{trace.number:.4g}")):
-                reply = judge(case, digits)
-                assert (reply.verdict, reply.mistake) == (Verdict.MISTAKE, trace.name), (
-                    student, number, trace,
-                )  # fmt: skip
-                assert reply.text == trace.says
-            seen.append(trace.name)
-        known = {mistake.name for mistake in case.question.mistakes}
-        assert len(known) == len(case.question.mistakes) >= 3
-        assert {"sign or direction", "power of ten", "a missing ½"} <= set(seen)
-    return seen
-
-
+@pytest.mark.parametrize("pupils", [6, pytest.param(400, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", NAMES)
-def test_every_mistake_is_recognised_as_itself(name):
-    for i in range(6):
-        recognised(name, f"student {i}")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
-def test_every_mistake_is_recognised_as_itself_for_a_whole_school(name):
-    for i in range(400):
-        recognised(name, f"pupil {i}")
+def test_every_mistake_is_recognised_as_itself(name, pupils):
+    for student in [f"pupil {i}" for i in range(pupils)]:
+        for number, case in enumerate(draw(EXERCISES[name], student)[1], start=1):
+            assert judge(case, case.right).right
+            for trace in case.mistakes:
+                assert isfinite(trace.number)
+                for digits in (trace.number, float(f"{trace.number:.4g}")):
+                    reply = judge(case, digits)
+                    found = reply.verdict, reply.mistake, reply.text
+                    expected = Verdict.MISTAKE, trace.name, trace.says
+                    assert found == expected, (student, number, trace)
+            known = {mistake.name for mistake in case.question.mistakes}
+            assert len(known) == len(case.question.mistakes) >= 3
+            general = {"sign or direction", "power of ten", "a missing ½"}
+            assert number > 1 or general <= {trace.name for trace in case.mistakes}
 
 
 def by_hand():
@@ -483,34 +469,15 @@ def test_progress_says_what_is_done_in_words_and_in_a_picture():
     assert task.progress().rows[1].tries == 2
 
 
-class Balanced(HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.open = []
-
-    def handle_starttag(self, tag, attrs):
-        styles = dict(attrs).get("style", "")
-        assert not re.search(r"background|(?<!-)\bcolor:", styles), styles
-        if tag != "br":
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        pass
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-
 def test_html_is_whole_and_takes_the_colours_of_the_page():
     task = lesson("a-stream", "html")
     for part in (
         task, task.question(1), task.check(1), task.check(1, 7.0), task.hint(1), task.reveal(1),
         task.progress(), task.check(99),
     ):  # fmt: skip
-        parser = Balanced()
-        parser.feed(part._repr_html_())
-        parser.close()
-        assert parser.open == []
+        html = part._repr_html_().replace("<br>", "<br/>")
+        styles = [one.get("style", "") for one in ET.fromstring(f"<p>{html}</p>").iter()]
+        assert not re.search(r"background|(?<!-)\bcolor:", " ".join(styles))
 
 
 # Lessons and their notebooks

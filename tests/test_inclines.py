@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from chutelab.theory import transfer
+from shared import seeds
 
 G = 9.81
 INERTIA = {"disk": 0.5, "sphere": 0.4, "hoop": 1.0}
@@ -103,11 +104,8 @@ def ride(rider, length):
     return None if name == "stands" else (-rider.beta + place / rider.radius, v, rim)
 
 
-SEEDS = [*range(8), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(8, 80))]
-
-
 @pytest.mark.parametrize("kind", ["lump", *INERTIA])
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", seeds(8, 80))
 def test_inclined_conveyor_against_an_ode(seed, kind):
     draw = np.random.default_rng(seed)
     beta = draw.uniform(-0.45, 0.45) * (seed % 4 > 0)

@@ -2,6 +2,7 @@
 
 import json
 import signal
+import sys
 from math import radians
 
 import numpy as np
@@ -15,6 +16,7 @@ from chutelab.machine import build
 from chutelab.results.summary import stopped
 from chutelab.scene import shipped, to_dict
 from chutelab.util.errors import InputError
+from shared import call
 
 PEG = {"center": [0.0, 0.0], "radius": 0.01}
 
@@ -142,3 +144,20 @@ def test_scenes_and_machines_show_themselves_in_a_line():
         )
         < 150
     )
+
+
+@pytest.mark.parametrize(
+    ("library", "words", "extra"),
+    [
+        ("scipy.optimize", "solve slip --vary incoming.speed=1:2 --minimize impact.t", "design"),
+        ("scipy.optimize", "compare slip --data perpendicular-track --fit incoming.speed", "fit"),
+        ("typst", "lesson show 1 --sheet student -o a.pdf", "pdf"),
+        ("imageio_ffmpeg", "run slip --out out --format webm", "video"),
+    ],
+)
+def test_what_a_missing_library_comes_with_is_said(library, words, extra, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, library, None)
+    said = " ".join(call(*words.split(), code=2).output.split())
+    assert f'pip install "chutelab[{extra}]"' in said
+    assert list(tmp_path.iterdir()) == []

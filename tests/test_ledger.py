@@ -8,7 +8,7 @@ from chutelab import machine, scene
 from chutelab.engines import exact
 from chutelab.engines.simulation import choose
 from chutelab.results import ENTRIES
-from chutelab.results.ledger import Ledger, ledger
+from chutelab.results.ledger import ledger
 
 EXACT = [name for name in scene.shipped() if choose(machine.build(scene.load(name))) == "exact"]
 G, R, M = 9.81, 0.0063, 0.008
@@ -70,8 +70,3 @@ def test_a_wrong_end_velocity_moves_the_residual_by_its_kinetic_energy(spins):
     assert false.residual - true.residual == pytest.approx(change, abs=1e-15 * true.turned_over)
     same = {name for name in asdict(true) if getattr(true, name) == getattr(false, name)}
     assert set(asdict(true)) - same == {"kinetic", "residual"}
-
-
-def test_nothing_turned_over_is_no_error():
-    empty = Ledger((0.0, 0.0), (1.0, 1.0), 0.0, 0.0, 0.0, 0.0, 0.0, {}, {})
-    assert empty.relative_residual == 0.0

@@ -12,15 +12,12 @@ from chutelab.classroom.exercises import lesson as exercise
 from chutelab.classroom.exercises.catalogue import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.lessons import find
-from chutelab.classroom.lessons.pages import live_page
 from chutelab.classroom.lessons.reading import scene_of
 from chutelab.classroom.lessons.steps import quantities_in
 from chutelab.engines.simulation import simulate
 from chutelab.results.quantities import measure
-from live.browser import DONE
+from live.browser import DONE, axe
 from shared import lessons
-
-AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
 
 CROWDS = ("a-stream", "the-hopper", "the-heap")
 
@@ -38,22 +35,6 @@ DESK, PHONE = (1366, 768), (390, 844)
 
 FAR = {"mouse": DESK, "touch": PHONE, "keyboard": DESK}
 """By what a lesson is played, and how large the page is then."""
-
-
-@pytest.fixture
-def page_of(opened, tmp_path):
-    """Open the live page of a lesson."""
-
-    def open_(name, language="en", size=DESK, **options):
-        path = tmp_path / f"{name}-{language}.html"
-        live_page(find(name, language), path)
-        assert path.stat().st_size <= 450_000
-        view = {"width": size[0], "height": size[1]}
-        page = opened(path, viewport=view, **options)
-        page.evaluate(DONE)
-        return page
-
-    return open_
 
 
 @dataclass
@@ -410,25 +391,22 @@ def test_the_table_is_a_file_for_spreadsheets(page_of):
     assert re.fullmatch(r"-2,91\d+", first.split(";")[2])
 
 
-@pytest.mark.skipif(not AXE.is_file(), reason="needs npm ci in tests/live")
 @pytest.mark.parametrize(
     ("language", "scheme", "size"),
-    [("en", "light", DESK), ("de", "dark", PHONE), ("de", "light", (844, 390))],
+    [
+        ("en", "light", DESK),
+        ("de", "dark", PHONE),
+        pytest.param("de", "light", (844, 390), marks=pytest.mark.slow),
+    ],
 )
 def test_axe_finds_nothing_in_any_step(page_of, language, scheme, size):
     page = page_of("the-bounce", language, size, color_scheme=scheme)
     lesson = find("the-bounce", language)
     hand = Hand(page, "mouse")
-    axe = AXE.read_text(encoding="utf-8")
 
     def is_clean():
         assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-        page.evaluate(axe)
-        found = page.evaluate(
-            "axe.run().then(({violations}) => violations.map(({id, nodes}) =>"
-            " [id, nodes.map(({html}) => html.slice(0, 200))]))"
-        )
-        assert found == []
+        assert axe(page) == []
         small = page.evaluate("""() => [...document.querySelectorAll("button, summary, select")]
           .filter((one) => one.checkVisibility() && !one.closest(".question")
             && Math.min(one.offsetWidth, one.offsetHeight) < 36)
@@ -439,7 +417,6 @@ def test_axe_finds_nothing_in_any_step(page_of, language, scheme, size):
     page.fill("#student", "Ada")
     page.click("#begin")
     for n in range(len(lesson.steps)):
-        is_clean()
         answered(hand, lesson, "wrong")
         if lesson.steps[n].kind == "note":
             page.evaluate("chutelab.lab.seek(1e9)")

@@ -11,7 +11,7 @@ import chutelab
 from chutelab.pictures.live.page import html
 from chutelab.results import Kind
 from chutelab.scene import load, parse
-from live.browser import DONE
+from live.browser import DONE, spot
 
 PREDICT = """
 [live]
@@ -29,14 +29,6 @@ def value(page, key):
 
 def field(page, label):
     return page.get_by_label(label, exact=False).and_(page.locator("#edit input"))
-
-
-def spot(page, u, v):
-    """Where a share of the picture's free part is on the screen, in whole pixels."""
-    box = page.locator("#stage").bounding_box()
-    free = page.evaluate("chutelab.stage.view.free")
-    across, up = free["right"] - free["left"], free["bottom"] - free["top"]
-    return round(box["x"] + free["left"] + u * across), round(box["y"] + free["top"] + v * up)
 
 
 def world(page, x, y):

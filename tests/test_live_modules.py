@@ -5,7 +5,8 @@ import re
 
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import SAID, data_of
-from chutelab.pictures.live.page import LANGUAGES
+from chutelab.pictures.live.page import LANGUAGES, html
+from chutelab.scene import load
 from chutelab.scene.quantities import REGISTRY
 from live.node import ASSETS
 
@@ -44,3 +45,14 @@ def test_every_word_of_an_exercise_is_in_its_catalogue():
         said = re.findall(r'\b(?:worded\((?:exercise, )?|its\()"([\w-]+)"', text)
         assert said
         assert set(said) <= set(told), name
+
+
+def test_every_colour_that_a_style_names_is_set():
+    """A property that is not set is no colour at all, and what it paints is not seen."""
+    for lesson in (None, {"title": "", "steps": []}):
+        page = html(load("perpendicular"), lesson=lesson)
+        style = re.search("<style>(.*)</style>", page, re.DOTALL)[1]
+        used = set(re.findall(r"var\(--([\w-]+)\)", style))
+        # The share of the time that is computed is set by the page.
+        assert used - {"ready"} <= set(re.findall(r"--([\w-]+):", style))
+        assert len(used) > 30

@@ -112,12 +112,85 @@ def test_curves_are_read_off_and_set_the_time(shown):
     assert 0.35 * end < page.evaluate("chutelab.lab.t") < 0.55 * end
 
 
+def test_no_curve_jumps_at_the_end_what_the_landing_leaves_is_a_dot(shown):
+    """A track that ends with a blow: v_y from -4.277 m/s to 0, which is no line upright."""
+    page = shown("perpendicular")
+    page.locator("#curves").scroll_into_view_if_needed()
+    lines = page.evaluate("""[...document.querySelectorAll(".curve")].map((line) =>
+      [...line.points].map(({ x, y }) => [x, y]))""")
+    dots = page.evaluate("""[...document.querySelectorAll(".curves .last")].map((dot) =>
+      [dot.cx.baseVal.value, dot.cy.baseVal.value])""")
+    assert len(lines) == len(dots) >= 7
+    # x and y go on smoothly into their dots; the velocity is another one after the landing.
+    for line, dot in zip(lines[:2], dots[:2], strict=True):
+        assert line[-1] == pytest.approx(dot, abs=0.6)
+    (vx, vy), (x_dot, y_dot) = (lines[2][-1], lines[3][-1]), dots[2:4]
+    assert abs(vy[1] - y_dot[1]) > 20.0
+    assert abs(vx[1] - x_dot[1]) > 10.0
+    # Of the line that falls through the last tenth of the time each step is small.
+    steps = [abs(b[1] - a[1]) for a, b in zip(lines[3][-16:], lines[3][-15:], strict=False)]
+    assert max(steps) < 3.0
+
+
+@pytest.mark.parametrize("name", ["stream", "hopper"])
+def test_while_a_crowd_runs_no_height_is_below_the_lowest_point(shown, name):
+    """m g y from the lowest point of the run so far, of one and of all: never negative."""
+    page = shown(name, ["stream.count=60"])
+    least = page.evaluate("""async () => {
+      const { lab, panels } = chutelab, frame = () => new Promise(requestAnimationFrame);
+      const curves = panels.find(({ samples }) => samples);
+      let one = Infinity, all = Infinity, low = Infinity;
+      for (let n = 1; n < 12; n += 1) {
+        lab.seek(lab.end);
+        await frame();
+        await frame();
+        curves.draw();
+        one = Math.min(one, ...curves.samples.map(({ potential }) => potential));
+        const { tracks } = lab.recording, index = curves.index;
+        low = Math.min(...tracks[index].rows.filter((_, i) =>
+          i % 10 === 2 && i < 10 * tracks[index].count));
+        all = Math.min(all, tracks[index].lowest - low);
+        lab.engine.allow(0.1 * n);
+      }
+      return [one, all];
+    }""")
+    assert least[0] >= 0.0
+    # Curves may dip a little below the lower of two knots.
+    assert -1e-6 < least[1] <= 0.0
+
+
+def test_the_numbers_of_a_crowd_lead_and_what_is_computed_is_hatched(shown):
+    page = shown("hopper")
+    assert page.locator("#panels > .card:visible").first.get_attribute("id") == "numbers"
+    assert page.locator("#numbers tr:visible").first.get_attribute("data-id") == "released"
+    hatched = """() => [document.querySelector(".scrub").matches(".computing"),
+      Number(document.querySelector(".scrub").style.getPropertyValue("--ready")),
+      chutelab.lab.end / chutelab.lab.horizon]"""
+    page.evaluate("chutelab.lab.tell('time')")
+    on, ready, share = page.evaluate(hatched)
+    assert on
+    assert 0.0 < ready < 1.0
+    assert ready == pytest.approx(share)
+    # Time goes no further than what is computed, wherever one points.
+    page.evaluate("chutelab.lab.seek(chutelab.lab.horizon)")
+    assert page.evaluate("chutelab.lab.t <= chutelab.lab.end")
+    page.evaluate("chutelab.lab.engine.allow(1e6)")
+    page.evaluate("""() => new Promise((done) => {
+      chutelab.lab.on("run", () => chutelab.lab.recording.state === "done" && done());
+    })""")
+    page.evaluate("chutelab.lab.tell('time')")
+    assert page.evaluate(hatched)[:2] == [False, 1.0]
+    assert shown("perpendicular").locator(".computing").count() == 0
+
+
 def test_a_streams_arrivals_fill_up_with_time_and_a_lone_particle_has_none(shown):
     assert shown("perpendicular").locator("#landing").is_hidden()
     page = shown("stream-independent", ["stream.count=60"], language="de")
     result = page.locator("#landing .result")
     playwright.expect(result).to_have_text(re.compile("^Mittelwert von 60: x = 0,4"))
-    times = page.evaluate("chutelab.panels[2].arrivals.map(({ t }) => t)")
+    times = page.evaluate(
+        "chutelab.panels.find(({ arrivals }) => arrivals).arrivals.map(({ t }) => t)"
+    )
     assert len(times) == 60
     page.evaluate("t => chutelab.lab.seek(t)", 0.5 * (times[29] + times[30]))
     playwright.expect(result).to_have_text(re.compile("^Mittelwert von 30:"))

@@ -1,7 +1,5 @@
 """Machines that are built in the page, from nothing: every part, with pointer and keys, saved."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -13,9 +11,7 @@ from chutelab.machine import build
 from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
 from chutelab.pictures.live.page import html
 from chutelab.scene import from_dict, load
-from live.browser import DONE
-
-AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
+from live.browser import DONE, axe, spot
 
 # Of a run that is over: knots of each track, as Python has them.
 TRACKS = """chutelab.lab.recording.tracks.map(({ rows, count }) =>
@@ -49,14 +45,6 @@ def empty(opened, tmp_path):
 
 def given(page):
     return page.evaluate("chutelab.lab.given")
-
-
-def spot(page, u, v):
-    """Where a share of the picture's free part is on the screen, in whole pixels."""
-    box = page.locator("#stage").bounding_box()
-    free = page.evaluate("chutelab.stage.view.free")
-    across, up = free["right"] - free["left"], free["bottom"] - free["top"]
-    return round(box["x"] + free["left"] + u * across), round(box["y"] + free["top"] + v * up)
 
 
 def same_bits(page, folder, until=1.5):
@@ -177,6 +165,94 @@ def test_everything_that_a_part_can_say_has_a_field_and_is_saved(empty, tmp_path
     assert same_bits(page, tmp_path) >= 24
 
 
+def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_path):
+    page = empty()
+    page.click("#begin")
+    page.evaluate(DONE)
+
+    def typed(key, text):
+        field = page.locator(f"[id='field-own-{key}']")
+        field.scroll_into_view_if_needed()
+        field.fill(text)
+        field.press("Enter")
+
+    def more():
+        if page.locator("#chosen .more").get_attribute("open") is None:
+            page.locator("#chosen .more summary").click()
+
+    page.click("#make-material")
+    assert page.inner_text("#chosen h2") == "Material material1"
+    typed("material[0].density", "2100")
+    typed("material[0].restitution_rubber", "0.61")
+    typed("material[0].name", "brick")
+    assert page.inner_text("#chosen h2") == "Material brick"
+    page.evaluate("chutelab.bench.inspector.choose('stream')")
+    more()
+    page.select_option("[id='field-own-particle.material']", "brick")
+    page.click("#make-pair")
+    assert page.inner_text("#chosen h2") == "Pair 1"
+    assert page.locator("[id='field-own-pair[0].between[1]']").input_value() == "incoming"
+    typed("pair[0].restitution", "0.35")
+    # Whatever the pair's partner is, it can be another one.
+    page.evaluate("chutelab.bench.inspector.choose('run')")
+    typed("run.max_time", "12")
+    typed("run.dt", "0.0005")
+    typed("run.until", "0.8")
+    typed("run.until", "settled")
+    assert page.evaluate("chutelab.lab.fault") is None
+    scene = given(page)
+    assert scene["run"] == {"max_time": 12, "dt": 0.0005, "until": "settled"}
+    assert (
+        scene["material"][0] | {"density": 2100, "restitution_rubber": 0.61, "name": "brick"}
+        == (scene["material"][0])
+    )
+    (pair,) = scene["pair"]
+    assert pair["between"][1] == "incoming"
+    assert pair["restitution"] == 0.35
+    assert same_bits(page, tmp_path) > 1
+    # A pair goes by its card; a material that is used cannot, and the page says why.
+    page.evaluate("chutelab.bench.inspector.choose('pair 1')")
+    page.click("#part-delete")
+    assert "pair" not in given(page)
+    page.evaluate("chutelab.bench.inspector.choose('material brick')")
+    page.click("#part-delete")
+    assert page.locator("#fault").is_visible()
+    assert given(page)["material"][0]["name"] == "brick"
+
+
+def test_parts_and_the_card_of_what_is_chosen_take_turns_and_what_is_on_looks_so(shown):
+    page = shown("inclined-40", viewport={"width": 1366, "height": 768})
+    page.evaluate("chutelab.bench.inspector.choose('plate')")
+    page.click("#tool-add")
+    assert page.locator("#parts").is_visible()
+    assert page.locator("#chosen").is_hidden()
+    page.evaluate("chutelab.bench.inspector.choose('plate')")
+    assert page.locator("#parts").is_hidden()
+    # Under the pointer, too, a tool that is on can be told from one that is not.
+    page.click("#tool-tape")
+    ground = "getComputedStyle(document.getElementById('tool-tape')).backgroundColor"
+    under = page.evaluate(ground)
+    page.mouse.move(600, 300)
+    assert under == page.evaluate(ground) == "rgb(0, 100, 157)"
+
+
+def test_the_page_turns_to_the_other_language_as_it_is(shown):
+    page = shown("inclined-40", viewport={"width": 1366, "height": 768})
+    page.evaluate("chutelab.lab.change({ 'plate.angle_deg': 33 })")
+    page.click("#language")
+    page.wait_for_load_state()
+    page.evaluate(DONE)
+    assert page.evaluate("document.documentElement.lang") == "de"
+    assert page.locator("#energy summary").inner_text() == "Energie"
+    assert page.locator("#language").get_attribute("aria-label") == "English"
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 33.0
+    page.click("#language")
+    page.wait_for_load_state()
+    page.evaluate(DONE)
+    assert page.locator("#energy summary").inner_text() == "Energy"
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 33.0
+
+
 def test_a_machine_of_twelve_parts_is_built_by_keyboard_alone(empty, tmp_path):
     page = empty()
 
@@ -264,22 +340,14 @@ def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_
 def test_the_empty_page_and_the_card_are_accessible_and_fingers_hit(empty, size, scheme, touch):
     viewport = {"width": size[0], "height": size[1]}
     page = empty(viewport=viewport, color_scheme=scheme, has_touch=touch, is_mobile=touch)
-    if not AXE.is_file():
-        pytest.skip("needs axe: npm ci --prefix tests/live")
-    page.evaluate(AXE.read_text(encoding="utf-8"))
-
-    def found():
-        told = page.evaluate("() => axe.run()")["violations"]
-        return [(one["id"], [node["html"][:120] for node in one["nodes"]]) for one in told]
-
-    assert found() == []
+    assert axe(page) == []
     page.click("#begin")
     page.evaluate(DONE)
     page.evaluate("chutelab.bench.inspector.choose('incoming')")
     speed = page.locator("#chosen input[type=text]").first
     speed.fill("-3")
     speed.press("Enter")
-    assert found() == []
+    assert axe(page) == []
     assert page.evaluate("document.documentElement.scrollWidth") == size[0]
     card = page.locator("#chosen").bounding_box()
     assert card["x"] >= 0.0

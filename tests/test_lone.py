@@ -191,41 +191,13 @@ def check(engine, seed):
     raise AssertionError(found)
 
 
-@pytest.mark.parametrize("seed", range(16))
-def test_contact_comes_to_what_exact_says(seed):
-    check(contact, seed)
-
-
-@pytest.mark.parametrize("seed", [2, 3, 4, 5, 6, 9, 10, 13])
-def test_pymunk_comes_to_what_exact_says(seed):
-    check(pymunk, seed)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(16, 500))
-def test_contact_comes_to_what_exact_says_everywhere(seed):
-    check(contact, seed)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(500))
-def test_pymunk_comes_to_what_exact_says_everywhere(seed):
-    check(pymunk, seed)
-
-
-def test_a_first_order_error_would_be_seen(monkeypatch):
-    """An engine whose tracks lag by a tenth of a step."""
-    really = contact.run
-
-    def late(machine):
-        recording = really(machine)
-        events = recording.events.copy()
-        events["t"] += 0.1 * machine.dt * (events["kind"] != Kind.RELEASE)
-        return replace(recording, events=events)
-
-    check(contact, 8)
-    monkeypatch.setattr(contact, "run", late)
-    with pytest.raises(AssertionError):
-        check(contact, 8)
-    with pytest.raises(AssertionError):
-        check(contact, 3)
+@pytest.mark.parametrize(
+    ("engine", "seed"),
+    [
+        pytest.param(engine, n, marks=() if n < few else pytest.mark.slow)
+        for engine, few in ((contact, 16), (pymunk, 8))
+        for n in range(500)
+    ],
+)
+def test_a_stepped_engine_comes_to_what_exact_says(engine, seed):
+    check(engine, seed)

@@ -1,6 +1,5 @@
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -512,11 +511,3 @@ def test_refuses_with_words_and_writes_nothing(tmp_path, arguments, said):
     assert result.exit_code == 2
     assert said in result.output
     assert list(tmp_path.iterdir()) == []
-
-
-def test_without_scipy_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "scipy.optimize", None)
-    result = run(*ARGUMENTS, "--fit", "plate.restitution")
-    assert result.exit_code == 2
-    assert 'pip install "chutelab[fit]"' in result.output
-    assert run(*ARGUMENTS).exit_code == 0

@@ -45,14 +45,9 @@ def flown(seed):
         assert before > now if time > 1e-6 else after < now, seed
 
 
-def test_flights_into_chains_and_bowls():
-    for seed in range(120):
-        flown(seed)
-
-
-@pytest.mark.slow
-def test_thousands_of_flights_into_chains_and_bowls():
-    for seed in range(3000):
+@pytest.mark.parametrize("count", [120, pytest.param(3000, marks=pytest.mark.slow)])
+def test_flights_into_chains_and_bowls(count):
+    for seed in range(count):
         flown(seed)
 
 

@@ -9,21 +9,7 @@ from chutelab.classroom.exercises.catalogue import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.pages import live_page
-from live.browser import DONE, to_step
-
-
-@pytest.fixture
-def page_of(opened, tmp_path):
-    """Open the live page of a lesson."""
-
-    def open_(number, language="en", **options):
-        path = tmp_path / f"{number}-{language}.html"
-        live_page(find(number, language), path)
-        page = opened(path, **options)
-        page.evaluate(DONE)
-        return page
-
-    return open_
+from live.browser import to_step
 
 
 def begin(page, student):

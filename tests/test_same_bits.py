@@ -2,14 +2,12 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-import chutelab
 from chutelab.cli import main
 
 HERE = Path(__file__).parent
@@ -117,12 +115,3 @@ def test_every_command_is_compared_or_answers_with_times():
     lines = [line.split() for line in (*EVERY, *ALGEBRA)]
     assert {words[0] for words in lines} | TIMED == main.commands.keys()
     assert {words[1] for words in lines if words[0] == "lesson"} == lesson.keys()
-
-
-def test_no_run_goes_through_lapack():
-    """Nothing from a scene to its recording and pictures asks for it; studies (fits, solve) may."""
-    rooms = Path(chutelab.__file__).parent
-    above = [path for path in rooms.rglob("*.py") if path.relative_to(rooms).parts[0] != "studies"]
-    assert len(above) > 100
-    asks = re.compile(r"linalg|polyfit|lstsq|least_squares")
-    assert [path.name for path in above if asks.search(path.read_text(encoding="utf-8"))] == []

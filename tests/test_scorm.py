@@ -284,6 +284,7 @@ def test_a_lesson_is_left_resumed_and_completed_in_a_platform(platform, name):
 LONG = "ü" + 749 * '\n"'
 
 
+@pytest.mark.slow
 def test_a_long_explanation_and_a_long_name_come_back(platform):
     platform.start("the-bounce")
     name = 100 * "Zoë "

@@ -12,6 +12,7 @@ from scipy.special import ellipk
 from chutelab.engines.simulation import simulate
 from chutelab.scene import from_dict
 from chutelab.theory import belt_power, slide
+from shared import seeds
 
 G = 9.81
 
@@ -67,12 +68,9 @@ def by_ode(
     return name, *y, t
 
 
-SEEDS = [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 120))]
-
-
 @pytest.mark.parametrize("kind", ["lump", "disk", "sphere"])
 @pytest.mark.parametrize("inside", [True, False])
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", seeds(4, 120))
 def test_random_chutes_against_an_ode(seed, inside, kind):
     draw = np.random.default_rng(seed)
     k = {"disk": 0.5, "sphere": 0.4}.get(kind)

@@ -89,11 +89,12 @@ def test_a_conversation_in_german_has_no_english_in_it():
 def test_a_mistake_has_one_name_in_all_languages_and_is_called_by_its_own():
     for name in EXERCISES:
         english, german = lesson(name, "Ada"), lesson(name, "Ada", language="de")
-        for number, case in enumerate(draw(EXERCISES[name], "Ada")[1], start=1):
-            for trace in case.mistakes:
-                said, other = (task.check(number, trace.number) for task in (english, german))
-                assert (other.verdict, other.mistake) == (said.verdict, said.mistake)
-                assert said.called == said.mistake
+        # Of one question each, by turns: all texts are compared below.
+        case = draw(EXERCISES[name], "Ada")[1][len(name) % 4]
+        for trace in case.mistakes:
+            said, other = (task.check(case.number, trace.number) for task in (english, german))
+            assert (other.verdict, other.mistake) == (said.verdict, said.mistake)
+            assert said.called == said.mistake
     sign = lesson("the-parabola", "Ada", language="de")
     reply = sign.check(1, -draw(EXERCISES["the-parabola"], "Ada")[1][0].right)
     assert reply.mistake == "sign or direction"

@@ -1,9 +1,12 @@
 """Pages in a real browser: none of them says anything on the console, or asks for anything."""
 
 import shutil
+from pathlib import Path
 
 import pytest
 
+from chutelab.classroom.lessons import find
+from chutelab.classroom.lessons.pages import live_page
 from chutelab.pictures.live.page import html
 from chutelab.scene import load, parse, to_toml
 
@@ -21,6 +24,31 @@ DONE = """() => new Promise((resolve, reject) => {
   };
   look();
 })"""
+
+
+AXE = Path(__file__).parent / "node_modules" / "axe-core" / "axe.min.js"
+
+
+def axe(page):
+    """Return what axe-core finds wrong with a page as it is now: each rule and where."""
+    if not AXE.is_file():
+        pytest.skip("needs axe: npm ci --prefix tests/live")
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    # It asks for style sheets again, which a file may not, and takes no formula for a text.
+    rules = {"empty-table-header": {"enabled": False}}
+    found = page.evaluate("(how) => axe.run(how)", {"preload": False, "rules": rules})
+    assert len(found["passes"]) > 10
+    return [
+        (one["id"], [node["html"][:200] for node in one["nodes"]]) for one in found["violations"]
+    ]
+
+
+def spot(page, u, v):
+    """Where a share of the picture's free part is on the screen, in whole pixels."""
+    box = page.locator("#stage").bounding_box()
+    free = page.evaluate("chutelab.stage.view.free")
+    across, up = free["right"] - free["left"], free["bottom"] - free["top"]
+    return round(box["x"] + free["left"] + u * across), round(box["y"] + free["top"] + v * up)
 
 
 def to_step(page, kind="numbers"):
@@ -83,3 +111,19 @@ def shown(opened, tmp_path):
         return page
 
     return show
+
+
+@pytest.fixture
+def page_of(opened, tmp_path):
+    """Open the live page of a lesson."""
+
+    def open_(name, language="en", size=(1366, 768), **options):
+        path = tmp_path / f"{name}-{language}.html"
+        live_page(find(name, language), path)
+        assert path.stat().st_size <= 450_000
+        view = {"width": size[0], "height": size[1]}
+        page = opened(path, viewport=view, **options)
+        page.evaluate(DONE)
+        return page
+
+    return open_

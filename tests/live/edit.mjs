@@ -44,7 +44,7 @@ const ASK = {
   }),
   fields: ({ given, name, live }) => {
     const whole = { ...page, live }, resolved = scene.resolve(given, whole);
-    const section = controls.sectionsOf(resolved).find((one) => one.name === name);
+    const section = controls.sectionsOf(resolved, given).find((one) => one.name === name);
     return controls.fieldsOf(whole, given, resolved, section);
   },
   checked: ({ field, text }) => tried(() => ({ value: controls.checked(field, text, say) })),

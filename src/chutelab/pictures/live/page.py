@@ -71,7 +71,7 @@ def html(
     css += _file(f"bundle/{'sandbox' if lesson is None else 'lesson'}.css")
     core = files("chutelab.core")
     facts = describe(scene, partly=partly)
-    strings = json.loads(_file(f"assets/strings/{language}.json"))
+    strings = _strings(language)
     title = strings["new-machine"] if scene is None else scene.title
     if scene is None or "lacks" in facts:
         facts["scene"]["title"] = title
@@ -81,19 +81,24 @@ def html(
     if given := facts["scene"].get("live"):
         # As what is saved from the page will have it.
         facts["scene"]["live"] = {key: live[key] for key in given}
-    # What the page's language has no words for is called as in the registry.
     shown = [row for row in REGISTRY.values() if row.symbol]
+    # What the page's language has no words for is called as in the registry.
+    meanings = {f"number-{row.name}": row.meaning for row in shown}
+    (other,) = {*LANGUAGES} - {language}
     # Packed, for it is long: all but the scene.
     large = {
         **{name: facts.pop(name) for name in ("tables", "rules", "presets")},
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
-        "strings": {
-            **{f"number-{row.name}": row.meaning for row in shown},
-            **strings,
-        },
+        "strings": {**meanings, **strings},
         "quantities": {row.name: {"symbol": row.symbol, "unit": row.unit} for row in shown},
         **({} if exercise is None else {"exercise": exercise}),
         **({} if lesson is None else {"lesson": lesson}),
+        # What is handed out with a lesson is in one language throughout.
+        **(
+            {}
+            if lesson or exercise
+            else {"other": {"language": other, "strings": {**meanings, **_strings(other)}}}
+        ),
     }
     data = {
         **facts,
@@ -147,6 +152,10 @@ def write(
 @cache
 def _file(name: str) -> str:
     return (files("chutelab.pictures.live") / name).read_text(encoding="utf-8")
+
+
+def _strings(language: str) -> dict[str, str]:
+    return json.loads(_file(f"assets/strings/{language}.json"))  # type: ignore[no-any-return]
 
 
 def _packed(content: bytes) -> str:

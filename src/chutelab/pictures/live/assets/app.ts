@@ -3,10 +3,28 @@
 import { Callout } from "./callout.ts";
 import { start } from "./page.ts";
 import { Palette } from "./palette.ts";
+import { html } from "./panels.ts";
 import { Phone } from "./phone.ts";
 import { Prediction } from "./predict.ts";
+import { Tools } from "./tools.ts";
+
+/** A button for the page's other language, in which it opens as it is. */
+function language({ other }: any) {
+  if (!other || !/^(https?|file):$/.test(location.protocol)) return;
+  const name = LANGUAGES[other.language], asked = other.language;
+  const button = html("button", { type: "button", class: "ib", id: "language", lang: asked,
+    title: name, "aria-label": name }, html("b", { "aria-hidden": "true" }, asked.toUpperCase()));
+  button.addEventListener("click", () => {
+    location.assign(`?lang=${asked}${location.hash}`);
+  });
+  document.getElementById("keys")?.before(button);
+}
+
+const LANGUAGES: Record<string, string> = { de: "Deutsch", en: "English" };
 
 start(({ lab, stage, words, bench, inspector, symbols }) => {
+  language(lab.data);
+  const tools = new Tools(lab, stage, words);
   new Callout(inspector, stage, lab, symbols);
   const home = stage.home.parentElement as HTMLElement;
   const palette = bench.free ? new Palette(home, bench, stage, lab, words) : null;
@@ -16,5 +34,5 @@ start(({ lab, stage, words, bench, inspector, symbols }) => {
     const heading = document.querySelector("h1") as HTMLElement, { title } = lab.scene ?? {};
     if (title && heading.textContent !== title) heading.textContent = title;
   });
-  return { palette };
+  return { palette, tools };
 });

@@ -24,6 +24,12 @@ const BODIES = ".belt, .wall, rect.steel", MOST = 200;
 /** Pixels from a body to the line round it, and of radius of a ball there at least. */
 const AROUND = 6, LEAST = 3;
 
+/** Distance of the strands of a belt, in its thickness. */
+const BELT = 4.5;
+
+/** Pixels above the bar that tells the scale, and on its other sides, that are to be free. */
+const SCALE = [38, 14];
+
 /** Pixels from bodies to the frame round several. */
 const FRAME = 12;
 
@@ -61,6 +67,55 @@ function pointsOf({ lab, view, scenery }: Stage): [string, Point[]][] {
       [view.px(x), view.py(y)], [view.px(release.x), view.py(release.y)]]]);
   }
   return found;
+}
+
+/** Surfaces as lines through points, px, with the lower side of belts; what is far outside of the
+ * picture is at its edge. Nothing has to be laid out for it. */
+function surfaceLines({ lab: { machine }, view, scenery }: Stage): Point[][] {
+  if (!machine) return [];
+  const px = (x: number, y: number, down = 0): Point => [
+    Math.min(Math.max(view.px(x), -50), view.width + 50),
+    Math.min(Math.max(view.py(y) + down, -50), view.height + 50),
+  ];
+  const { segments, arcs, pulley } = machine, deep = BELT * scenery.thick;
+  const bend = (x: number, y: number, radius: number, begin: number, extent: number) => {
+    const many = Math.min(24, Math.ceil((radius * extent * view.scale) / 9) + 2);
+    return Array.from({ length: many + 1 }, (_, n) => px(
+      x + radius * Math.cos(begin + (n * extent) / many),
+      y + radius * Math.sin(begin + (n * extent) / many)));
+  };
+  // Round the drive pulley and the one at the other end, and back below.
+  const incoming = ({ radius: r, incline, surface }: NonNullable<typeof pulley>) => {
+    const long = segments.find((one) => one.surface === surface)?.length ?? 0;
+    const [c, s] = [Math.cos(incline), Math.sin(incline)], round = 2 * Math.PI;
+    return [bend(0, 0, r, 0, round), bend(-long * c, -long * s, r, 0, round),
+      [px(r * s, -r * c), px(r * s - long * c, -r * c - long * s)]];
+  };
+  return [
+    ...segments.flatMap(({ x, y, tx, ty, length, speed }) => (speed ? [0, deep] : [0])
+      .map((down) => [px(x, y, down), px(x + tx * length, y + ty * length, down)])),
+    ...arcs.map(({ x, y, radius, begin, extent }) => bend(x, y, radius, begin, extent)),
+    ...(pulley ? incoming(pulley) : []),
+  ];
+}
+
+/** Where the bar that tells the scale meets nothing: from its corner up, then further to the right;
+ * its corner where all is full.
+ * @param long of the bar, px
+ * @param low, left px of its corner from below and from the left */
+function scalePlace(stage: Stage, long: number, [low, left]: Point): Point {
+  const { view, lab } = stage, { recording } = lab, { free } = view;
+  const path = recording ? stage.trackPoints(recording, 4 / view.scale) : [];
+  const there = [...surfaceLines(stage),
+    ...path.map((points) => points.map(({ x, y }) => [view.px(x), view.py(y)] as Point))]
+    .flatMap(along);
+  for (let x = left; x + long < free.right; x += SCALE[0]) {
+    for (let y = view.height - low; y > free.top + SCALE[0]; y -= ALONG) {
+      if (!there.some(([u, v]) => u > x - SCALE[1] && u < x + long + SCALE[1]
+        && v > y - SCALE[0] && v < y + SCALE[1])) return [view.height - y, x];
+    }
+  }
+  return [low, left];
 }
 
 /** Dashes round what is chosen, a line round what is pointed at: below each body its own shape,
@@ -181,4 +236,4 @@ class Callout {
   }
 }
 
-export { Callout, drawOutline, pointsOf };
+export { Callout, drawOutline, pointsOf, scalePlace, surfaceLines };

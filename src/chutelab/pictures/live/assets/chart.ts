@@ -129,6 +129,18 @@ class Chart {
     this.marks.append(svg("polyline", { points: points.join(" "), class: `curve ${kind}` }));
   }
 
+  /** The outline of bars from a place on, each so wide. */
+  bars(from: number, width: number, counts: number[]) {
+    const tenth = (px: number) => px.toFixed(1), base = this.py(0);
+    return `M${tenth(this.px(from))} ${base}${counts.map((count, n) =>
+      `V${tenth(this.py(count))}H${tenth(this.px(from + (n + 1) * width))}`).join("")}V${base}Z`;
+  }
+
+  /** @param kind the class of its line */
+  dot(x: number, y: number, kind: string) {
+    this.marks.append(svg("circle", { cx: this.px(x), cy: this.py(y), r: 3, class: `last ${kind}` }));
+  }
+
   /** A line upright across all of it. */
   point(x: number) {
     const px = this.px(x).toFixed(1);

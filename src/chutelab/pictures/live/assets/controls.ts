@@ -1,7 +1,7 @@
 // Which numbers of a scene can be changed on this page, what holds them now, and how far they go.
 
 import { valueAt } from "./keys.ts";
-import { pathOf } from "./checks.ts";
+import { listOf, pathOf } from "./checks.ts";
 import { Fault, met, type Scene, type Given } from "./scene.ts";
 import type { Form } from "./forms.ts";
 import type { Handle } from "./handles.ts";
@@ -76,7 +76,8 @@ function boundsOf(page: Page, key: string) {
   return { unit: (rule.unit ?? "") as string, low, high };
 }
 
-function sectionsOf(scene: Scene): Section[] {
+/** All that can be chosen; what has no place in the picture has its table's name before its own. */
+function sectionsOf(scene: Scene, given: Given): Section[] {
   const found: Section[] = [{ table: "scene", row: 0, name: "scene" }];
   const add = (table: string, rows: any[]) => rows.forEach((one, row) =>
     found.push({ table, row, name: one.name ?? (row ? `${table}${row + 1}` : table) }));
@@ -87,16 +88,24 @@ function sectionsOf(scene: Scene): Section[] {
   add("stream", scene.streams);
   add("particle", scene.particles);
   add("view", scene.view ? [{}] : []);
+  listOf(given.material).forEach(({ name }, row) =>
+    found.push({ table: "material", row, name: `material ${name}` }));
+  scene.pair.forEach((_, row) => found.push({ table: "pair", row, name: `pair ${row + 1}` }));
+  add("run", [{}]);
   return found;
 }
 
 /** The resolved table of a section. */
-function rowOf(scene: Scene, { table, row }: Section): any {
+function rowOf(scene: Scene, { table, row, name }: Section): any {
   if (table === "scene") return scene;
+  if (table === "material") return scene.materials.get(name.slice(table.length + 1));
   const rows = { plate: scene.plates, stream: scene.streams, particle: scene.particles }[table]
     ?? (scene as any)[table];
   return Array.isArray(rows) ? rows[row] : rows;
 }
+
+/** Tables of what particles meet. */
+const SURFACES = ["incoming", "plate", "outgoing", "conveyor", "surface"];
 
 /** What is first to be changed in any scene, by table. */
 const MAIN: Record<string, string[]> = {
@@ -136,7 +145,7 @@ function fieldsOf(page: Page, given: Given, scene: Scene, section: Section): Fie
   if (section.table === "scene") {
     const isMain = ({ table, row }: Section) => MAIN[table] && row === 0;
     const all = showsFew(page);
-    return sectionsOf(scene).filter((one) => all || isMain(one))
+    return sectionsOf(scene, given).filter((one) => all || isMain(one))
       .flatMap((one) => ownFields(page, given, scene, one).filter(({ name, value }) =>
         (all || MAIN[one.table].includes(name)) && ["number", "string"].includes(typeof value)));
   }
@@ -159,7 +168,10 @@ function ownFields(page: Page, given: Given, scene: Scene, section: Section): Fi
       : given[table] === undefined ? `${table}.${name}` : pathOf(given, table, section.row, name);
     const add = (key: string, value: any, part = 0, of = 1) => {
       if (!mayChange(page, key)) return;
-      const choices = name === "particle" ? scene.particles.map((kind) => String(kind.name))
+      const choices = name === "between" ? scene.particles.flatMap((kind) => kind.name ?? [])
+        .concat(sectionsOf(scene, {}).filter((one) => SURFACES.includes(one.table))
+          .map((one) => one.name))
+        : name === "particle" ? scene.particles.map((kind) => String(kind.name))
         : name === "material" && table === "particle" ? [...scene.materials.keys()]
           : form.type === "boolean" ? [] : form.enum as string[] | undefined;
       if (choices && form.type !== "boolean" && choices.length < 2) return;
@@ -188,6 +200,7 @@ function checked(field: Field, text: string, words: Words): any {
   const forms = formsOf(form), takes = (type: string) => forms.some((one) => one.type === type);
   const isWord = (word: unknown) =>
     forms.some((one) => one.const === word || one.enum?.includes(word));
+  if (isWord(plain)) return plain;
   const sticks = plain.toLowerCase() === words.say("adhesion").toLowerCase();
   if (sticks && isWord("adhesion")) return "adhesion";
   const list = (row: string) => row.trim().split(/\s+/).map((entry) => words.parse(entry));

@@ -141,7 +141,10 @@ class CurvesPanel {
     const samples = this.samples = samplesOf(recording, this.index);
     if (!samples.length) return;
     const times = samples.map(({ t }) => t);
-    const span = rangeOf(times, 0);
+    const span = rangeOf(times, 0), track = recording.tracks[this.index], last = track.count - 1;
+    // Nothing follows the blow with which a track ends: what it leaves are dots.
+    const isBlow = last > 0 && track.at(last - 1, 0) === track.at(last, 0);
+    const until = isBlow ? times.indexOf(span[1]) : times.length;
     DIAGRAMS.forEach(({ unit, lines }, n) => {
       const chart = this.charts[n];
       const shown = lines.filter(({ name }, i) => unit !== "J" || i < 2
@@ -149,7 +152,10 @@ class CurvesPanel {
       const factor = unit === "J" && this.small ? 1000 : 1;
       const curves = shown.map(({ name }) => samples.map((sample) => factor * sample[name]));
       chart.frame(span, rangeOf(curves.flat()), { below: "t / s", beside: factor > 1 ? "mJ" : unit });
-      shown.forEach(({ kind }, i) => chart.line(times, curves[i], kind));
+      shown.forEach(({ kind }, i) => {
+        chart.line(times.slice(0, until), curves[i], kind);
+        if (until < times.length) chart.dot(span[1], curves[i][until], kind);
+      });
       this.legends[n].replaceChildren(...shown.map(({ name, kind }) => html("span", {},
         html("i", { class: `swatch ${kind}` }), `${this.nameOf(name)} `,
         html("b", { "data-of": name }))));

@@ -14,6 +14,9 @@ export type Part = { part: string, letter: string, table: string, places: string
 /** Tables whose rows have names. */
 const NAMED = ["surface", "conveyor", "plate", "stream"];
 
+/** Tables of what is no place, chosen by its table and its name or number. */
+const PLAIN = ["material", "pair"];
+
 /** Keys that are places, or lists of them. */
 const PLACES = ["from", "to", "points", "center", "pivot", "at", "fill"];
 
@@ -28,7 +31,7 @@ const rowsOf = (given: Given, table: string): Given[] =>
 
 /** A name that nothing has yet. */
 function freeName(given: Given, stem: string) {
-  const taken = new Set([...NAMED, "particle"].flatMap((table) =>
+  const taken = new Set([...NAMED, "particle", "material"].flatMap((table) =>
     listOf(given[table]).map(({ name }) => name)));
   let n = 1;
   while (taken.has(`${stem}${n}`)) n += 1;
@@ -103,6 +106,21 @@ function withPart(
   return withRow(kinds, "stream", row);
 }
 
+/** A scene with one more material, as a known one is, or one more pair, of the first things that
+ * can meet.
+ * @param known keys of a material
+ * @param surfaces names */
+function withRowOf(
+  table: "material" | "pair", given: Given, known: Given, surfaces: string[],
+): Given {
+  const kinds = listOf(given.particle ?? {})
+    .map((one) => ({ name: freeName(given, "kind"), ...one }));
+  const row = table === "material" ? { name: freeName(given, table), ...known }
+    : { between: [kinds[0].name, surfaces[0] ?? kinds[0].name], restitution: 0.5, friction: 0.3 };
+  const named = table === "pair" ? { ...given, particle: either(kinds) } : given;
+  return { ...named, [table]: [...listOf(given[table]), row] };
+}
+
 /** Rows of things by name: what a copy is made of. */
 const rowsNamed = (given: Given, names: string[]): [string, Given][] => NAMED.flatMap((table) =>
   listOf(given[table]).filter(({ name }) => names.includes(name))
@@ -155,6 +173,10 @@ function withName(given: Given, key: string, name: string): Given {
   for (const pair of listOf(renamed.pair)) {
     pair.between = pair.between.map((one: string) => (one === old ? name : one));
   }
+  if (key.startsWith("material")) {
+    const kinds = listOf(renamed.particle).filter(({ material }) => material === old);
+    for (const kind of kinds) kind.material = name;
+  }
   if (key.startsWith("particle")) {
     const streams = listOf(renamed.stream).filter(({ particle }) => particle === old);
     for (const stream of streams) stream.particle = name;
@@ -187,6 +209,12 @@ function without(given: Given, ...names: string[]): Given {
     else delete rest[table];
   }
   for (const table of ["incoming", "outgoing"]) if (names.includes(table)) delete rest[table];
+  for (const table of PLAIN) {
+    const rows = listOf(given[table]).filter(({ name }, n) =>
+      !names.includes(`${table} ${name ?? n + 1}`));
+    if (rows.length) rest[table] = rows;
+    else delete rest[table];
+  }
   return rest;
 }
 
@@ -194,4 +222,6 @@ function without(given: Given, ...names: string[]): Given {
 const canGo = (given: Given, name: string) =>
   JSON.stringify(without(given, name)) !== JSON.stringify(given);
 
-export { canGo, endsOf, rowsNamed, surfaceAt, withCopies, withKind, withName, withPart, without };
+export {
+  canGo, endsOf, rowsNamed, surfaceAt, withCopies, withName, withPart, withRowOf, without,
+};

@@ -160,10 +160,7 @@ class Flow {
     for (const { t } of passages) counts[Math.floor(t / step) - from] += 1 / step;
     rate.frame([from * step, (from + bars) * step], [0, Math.max(1, mean, ...counts) * 1.08],
       { below: "t / s", beside: "1/s" });
-    const steps = counts.map((value, n) =>
-      `V${rate.py(value).toFixed(1)}H${rate.px((from + n + 1) * step).toFixed(1)}`).join("");
-    const d = `M${rate.px(from * step).toFixed(1)} ${rate.py(0)}${steps}V${rate.py(0)}`;
-    rate.marks.append(svg("path", { class: "bins", d }));
+    rate.marks.append(svg("path", { class: "bins", d: rate.bars(from * step, step, counts) }));
     if (mean) rate.line([first, last], [mean, mean], "curve-b");
     // From the middle of the line, as far as it reaches.
     const [[ax, ay], [bx, by]] = this.ends, half = 0.5 * Math.hypot(bx - ax, by - ay);
@@ -171,17 +168,16 @@ class Flow {
     const { from: left, width, counts: many } = histogram(places);
     across.frame([left, left + width * many.length], [0, Math.max(1, ...many) * 1.08],
       { below: "mm", beside: "n", whole: true });
-    const bins = many.map((value, n) =>
-      `V${across.py(value).toFixed(1)}H${across.px(left + (n + 1) * width).toFixed(1)}`).join("");
-    across.marks.append(svg("path", { class: "bins filled",
-      d: `M${across.px(left).toFixed(1)} ${across.py(0)}${bins}V${across.py(0)}Z` }));
+    across.marks.append(
+      svg("path", { class: "bins filled", d: across.bars(left, width, many) }));
   }
 
   /** What has passed up to the time that is shown. */
   fill() {
     if (!this.ends.length || !this.lab.recording) return;
     this.rate.point(this.lab.t);
-    this.head.textContent = this.says.join(", ");
+    const [rate, ...more] = this.says;
+    this.head.replaceChildren(html("b", {}, rate), ` ${more.join(", ")}`);
   }
 
   /** In words: how many a second, how many so far, and how many came back. */
@@ -197,4 +193,4 @@ class Flow {
   }
 }
 
-export { Flow, passagesOf };
+export { Flow };

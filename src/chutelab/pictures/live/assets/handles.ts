@@ -311,4 +311,4 @@ const roundTo = (
   value: number, step: number,
 ) => Number((Math.round(value / step) * step).toPrecision(12));
 
-export { ARROW, Handles, bodyOf, isPlace, roundTo, valuesOf };
+export { ARROW, Handles, bodyOf, roundTo, valuesOf };

@@ -1,7 +1,7 @@
 // What can be typed: main numbers of the scene in a panel, and what is chosen in a card beside it.
 
 import { MAIN, checked, fieldsOf, sectionsOf, showsFew, type Field, type Section } from "./controls.ts";
-import { canGo, rowsNamed, withName, without, type Part } from "./edit.ts";
+import { canGo, rowsNamed, withName, withRowOf, without, type Part } from "./edit.ts";
 import { listOf } from "./checks.ts";
 import { card, html, icon, iconButton } from "./panels.ts";
 import { Fault, type Given } from "./scene.ts";
@@ -80,7 +80,7 @@ class Fields {
       if (event.key === "Escape" && this.lab.asked === key) this.giveUp(key);
     });
     const whose = !this.owned || table === "scene" ? "" : `${words.name(owner)}: `;
-    const which = of > 1 ? ` ${(name === "radius" ? "≥≤" : "xy")[part]}` : "";
+    const which = of > 1 ? ` ${(name === "radius" ? "≥≤" : choices ? "12" : "xy")[part]}` : "";
     const label = html("label", { for: id }, `${whose}${words.key(table, name)}${which}`);
     const why = html("div", { class: "why", id: `why-${id}` });
     why.hidden = true;
@@ -174,7 +174,8 @@ class Fields {
       const whole = value === undefined ? key.replace(/(\..*)\[\d+\]$/, "$1") : key;
       if (field.name === "name" && field.value && value) {
         lab.replace(withName(lab.given as Given, key, value));
-        if (!lab.fault && field.table !== "particle") this.renamed(value);
+        const own = field.table === "material" ? `material ${value}` : value;
+        if (!lab.fault && field.table !== "particle") this.renamed(own);
       } else lab.change({ [whole]: value });
     } catch (error) {
       if (!(error instanceof Fault)) throw error;
@@ -202,6 +203,7 @@ class Inspector {
   panel;
   title;
   buttons: Record<string, any> = {};
+  makers;
 
   constructor(home: Element, readonly lab: Lab, readonly words: Words) {
     this.choice = html("select", { "aria-label": words.say("part") });
@@ -210,8 +212,13 @@ class Inspector {
     this.main = new Fields(lab, words, false);
     this.own = new Fields(lab, words, true);
     this.own.renamed = (name) => this.choose(name);
+    this.makers = (["material", "pair"] as const).map((table) => {
+      const button = html("button", { type: "button", id: `make-${table}` }, words.say(`make-${table}`));
+      button.addEventListener("click", () => this.make(table));
+      return button;
+    });
     home.append(card("edit", words.say("values"), html("div", { class: "row" }, this.choice),
-      this.main.home));
+      this.main.home, html("div", { class: "row makers" }, ...this.makers)));
     this.title = html("h2", {});
     const button = (id: string, drawing: string, act: () => void) => {
       this.buttons[id] = iconButton(`part-${id}`, drawing, words.say(id));
@@ -238,6 +245,18 @@ class Inspector {
     this.parts = names;
     this.refresh();
     this.listeners.forEach((listener) => listener());
+  }
+
+  /** Make a material, or what a pair has, and choose it. */
+  make(table: "material" | "pair") {
+    const { lab } = this, { given, machine, scene, data } = lab;
+    if (!given || !scene) return;
+    const known = data.presets[scene.particles[0].material ?? ""] ?? data.presets.gravel;
+    lab.asked = "";
+    lab.replace(withRowOf(table, given, known, machine?.surfaces ?? []));
+    if (lab.fault) return;
+    const rows = listOf(lab.given?.[table]);
+    this.choose(`${table} ${rows.at(-1)?.name ?? rows.length}`);
   }
 
   /** What copies are made by; set by what knows where to put them. */
@@ -272,7 +291,7 @@ class Inspector {
     const { lab, words, choice } = this;
     if (!lab.given || !lab.scene) return;
     const { scene, given, data } = lab;
-    const all = sectionsOf(scene), few = showsFew(data);
+    const all = sectionsOf(scene, given), few = showsFew(data);
     const names = all.map(({ name }) => name);
     this.parts = this.parts.filter((name) => names.includes(name));
     choice.hidden = few || all.length < 2;
@@ -300,6 +319,7 @@ class Inspector {
     this.title.textContent = this.parts.length > 1 ? words.say("parts-chosen", { count: this.parts.length })
       : words.name(this.part);
     if (kind && this.parts.length === 1) this.title.prepend(icon(kind.part));
+    for (const maker of this.makers) maker.hidden = !this.mayDelete;
     this.buttons.delete.hidden = !this.canDelete || !this.mayDelete;
     this.buttons.duplicate.hidden = !this.mayDelete || !rowsNamed(given, this.parts).length;
   }

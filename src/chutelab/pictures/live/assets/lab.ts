@@ -1,6 +1,7 @@
 // The scene as it is changed: its values, its run, its clock. Nothing here draws.
 
 import { runOf } from "./breaches.ts";
+import { roundUp } from "./chart.ts";
 import { indexed, withValues } from "./keys.ts";
 import { build, type Machine } from "./machine.ts";
 import { Recording } from "./recording.ts";
@@ -208,6 +209,16 @@ class Lab {
     if (!recording) return 0;
     return recording.state === "running" && recording.machine.interact
       ? recording.now : Math.max(recording.end, 0);
+  }
+
+  /** s up to which the time may go at most, as far as that is known: of a run that is under way a
+   * round time beyond what is computed. */
+  get horizon() {
+    const { recording, end } = this;
+    if (recording?.state !== "running" || !recording.machine.interact) return end;
+    const { until, endTime } = recording.machine;
+    const last = endTime + recording.shift;
+    return until === "time" ? last : Math.min(last, roundUp(Math.max(2, 1.2 * end)));
   }
 
   get isOver() {

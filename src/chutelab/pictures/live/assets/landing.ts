@@ -41,6 +41,7 @@ function runningMean(values: number[]): { mean: number, error: number }[] {
 class LandingPanel {
   bars;
   means;
+  charts;
   result;
   panel;
 
@@ -48,9 +49,11 @@ class LandingPanel {
     this.bars = new Chart(words, 150);
     this.means = new Chart(words, 130);
     this.result = html("p", { class: "result" });
-    this.panel = card("landing", words.say("landing"),
+    this.charts = html("div", {},
       html("p", { class: "chart-title" }, words.say("landing-histogram")), this.bars.root,
-      html("p", { class: "chart-title" }, words.say("landing-mean")), this.means.root, this.result,
+      html("p", { class: "chart-title" }, words.say("landing-mean")), this.means.root);
+    this.charts.hidden = true;
+    this.panel = card("landing", words.say("landing"), this.charts, this.result,
       html("p", { class: "note" }, words.say("landing-note")));
     this.panel.hidden = true;
     home.append(this.panel);
@@ -75,14 +78,15 @@ class LandingPanel {
     if (this.panel.hidden || !this.panel.open) return;
     this.arrivals = historyOf(this.lab)?.arrivals.list ?? [];
     const places = this.arrivals.map(({ x }) => x);
+    this.charts.hidden = !places.length;
     const all = histogram(places);
     const { from, width, counts } = all;
     this.all = all;
     this.bars.frame([from, from + width * Math.max(1, counts.length)],
       [0, Math.max(1, ...counts) * 1.08], { below: "x / m", beside: "n", whole: true });
-    this.outline = svg("path", { class: "bins", d: this.steps(all) });
     this.filled = svg("path", { class: "bins filled" });
-    this.bars.marks.append(this.outline, this.filled);
+    this.bars.marks.append(
+      svg("path", { class: "bins", d: this.bars.bars(from, width, counts) }), this.filled);
     this.running = runningMean(places);
     const { running } = this;
     const some = running.map((_, i) => i)
@@ -102,13 +106,6 @@ class LandingPanel {
     this.fill();
   }
 
-  steps({ from, width, counts }: Histogram) {
-    const { bars } = this;
-    const tops = counts.map((count, i) =>
-      `V${bars.py(count).toFixed(1)}H${bars.px(from + (i + 1) * width).toFixed(1)}`);
-    return `M${bars.px(from).toFixed(1)} ${bars.py(0)}${tops.join("")}V${bars.py(0)}Z`;
-  }
-
   /** What has arrived up to now. */
   fill() {
     const { arrivals, words, all } = this;
@@ -119,7 +116,7 @@ class LandingPanel {
       const bin = Math.floor(arrivals[n].x / all.width) - Math.round(all.from / all.width);
       counts[bin] += 1;
     }
-    this.filled.setAttribute("d", this.steps({ ...all, counts }));
+    this.filled.setAttribute("d", this.bars.bars(all.from, all.width, counts));
     this.means.point(n || NaN);
     // Before the first one arrives the whole is told.
     const which = n || arrivals.length, { mean, error } = this.running[which - 1];
@@ -133,8 +130,6 @@ class LandingPanel {
   all: Histogram | undefined;
 
   running: { mean: number, error: number }[] = [];
-
-  outline: any;
 
   filled: any;
 }

@@ -5,6 +5,7 @@ import { compiled, unpacked } from "./core.ts";
 import { Engine } from "./engine.ts";
 import { Arrows } from "./arrows.ts";
 import { CurvesPanel } from "./curves.ts";
+import { FEWEST } from "./crowd.ts";
 import { EnergyPanel } from "./energy.ts";
 import { Film } from "./film.ts";
 import { Inspector } from "./inspector.ts";
@@ -16,10 +17,10 @@ import { watchLaws } from "./laws.ts";
 import { LandingPanel } from "./landing.ts";
 import { NumbersPanel } from "./numbers.ts";
 import { startPlan } from "./plan.ts";
+import { Show } from "./show.ts";
 import { Sound } from "./sound.ts";
 import { Stage } from "./stage.ts";
 import { Symbols } from "./symbols.ts";
-import { Tools } from "./tools.ts";
 import { Transport } from "./transport.ts";
 import { Words } from "./words.ts";
 import type { Palette } from "./palette.ts";
@@ -43,7 +44,8 @@ function bytesOf(text: string) {
 }
 
 /** @param join makes what only a sandbox has, or only a lesson */
-async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?: object }) {
+async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?: object,
+  tools?: object }) {
   const data = JSON.parse(byId("lab").textContent);
   const core = compiled(bytesOf(data.wasm).buffer).catch(() => null);
   const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
@@ -51,6 +53,12 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
   // A thread takes its time to begin.
   const thread = newThread();
   Object.assign(data, await unpacked(bytesOf(data.packed).buffer).json());
+  const asked = new URLSearchParams(location.search).get("lang");
+  if (asked && asked === data.other?.language) {
+    const { language, strings } = data;
+    Object.assign(data, data.other, { other: { language, strings } });
+    document.documentElement.lang = asked;
+  }
   const words = new Words(data.language, data.strings);
   for (const element of document.querySelectorAll("[data-say]")) {
     element.textContent = words.say((element as HTMLElement).dataset.say ?? "");
@@ -71,26 +79,29 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
   const newEngine = (own = newThread()) => new Engine(own, module, data.layout);
   const lab = new Lab(data, newEngine(thread));
   const stage = new Stage(byId("stage"), lab, words);
-  const panels = [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel]
+  // Of a crowd its numbers lead, and where it arrives.
+  const crowd = (lab.machine?.releases.length ?? 0) >= FEWEST && !data.lesson;
+  const panels = (crowd ? [NumbersPanel, LandingPanel, EnergyPanel, CurvesPanel]
+    : [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel])
     .map((Panel) => new Panel(byId("panels"), lab, words));
   watchLaws(byId("law"), lab, words);
   new Arrows(stage, words);
   const symbols = new Symbols(stage);
-  const tools = new Tools(byId("stage").parentElement, lab, stage, words, symbols);
+  new Show(lab, stage, words, symbols);
   const inspector = new Inspector(byId("panels"), lab, words);
   const bench = new Bench(byId("bench"), stage, inspector, lab, words);
   new Transport(lab, stage, words);
   new Sound(lab, words);
   new Film(lab, stage, words);
   new Keep(byId("panels"), stage, lab, words);
+  const more = join({ lab, stage, words, bench, inspector, symbols, newEngine });
   for (const panel of document.querySelectorAll("#panels > .card, .tools, .looks, .watch")) {
     const name = panel.matches(".card") ? panel.id : "tools";
     if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
   }
-  const more = join({ lab, stage, words, bench, inspector, symbols, newEngine });
   listenToKeys(bench, more.palette ?? null, lab, words);
   Object.assign(globalThis, {
-    chutelab: { lab, stage, bench, panels, tools, ...more, toml: () => toToml(lab.given as any) },
+    chutelab: { lab, stage, bench, panels, ...more, toml: () => toToml(lab.given as any) },
   });
   byId("broken").remove();
 }

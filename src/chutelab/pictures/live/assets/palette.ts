@@ -31,6 +31,8 @@ const SKETCH = "M0 60H185A35 35 0 0 1 185 130H5M206 95A21 21 0 1 1 164 95A21 21 
 
 class Palette {
   panel;
+  /** What is drawn once the parts are seen. */
+  due: (() => void)[] = [];
   opener;
   tiles: [Part, any][];
   start?: any;
@@ -48,7 +50,6 @@ class Palette {
     this.opener = iconButton("tool-add", "add", words.say("add-part"));
     this.opener.addEventListener("click", () => this.open(this.panel.hidden));
     document.getElementById("tool-select")?.after(this.opener);
-    // What is chosen has its card where the parts were.
     bench.inspector.listeners.push(() => {
       if (bench.inspector.parts.length) this.open(false);
     });
@@ -69,6 +70,9 @@ class Palette {
   }
 
   open(on: boolean) {
+    // What is chosen has its card where the parts are.
+    if (on && this.bench.inspector.parts.length) this.bench.inspector.choose();
+    if (on) this.due.splice(0).forEach((draw) => draw());
     this.panel.hidden = !on;
     this.opener.setAttribute("aria-expanded", String(on));
   }
@@ -115,9 +119,9 @@ class Palette {
     const { words, bench, lab } = this, balls = new Balls(lab, () => "");
     const names = Object.keys(lab.data.presets).filter((name) => balls.isShaded(name));
     const choices = names.map((name) => {
-      const drawn = balls.picture(name), said = words.choice(name);
+      const said = words.choice(name);
       const picture = html("canvas", { width: "44", height: "44", "aria-hidden": "true" });
-      picture.getContext("2d").drawImage(drawn, 0, 0, 44, 44);
+      this.due.push(() => picture.getContext("2d").drawImage(balls.picture(name), 0, 0, 44, 44));
       const button = html("button", { type: "button", "aria-pressed": "false", title: said,
         "aria-label": said }, picture);
       button.addEventListener("click", () => {

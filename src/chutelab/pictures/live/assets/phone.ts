@@ -11,7 +11,7 @@ const NARROW = "(max-width: 719px)";
 /** Of each drawer what lies in it: elsewhere on a wider page. */
 const DRAWERS: Record<string, string> = {
   tape: ".tools, .watch", eye: ".choices",
-  more: "#restart, #back, #forward, #reset, #fit, #tool-zoom-in, #tool-zoom-out, #sound, #film, #full, #keys, #share, #presets",
+  more: "#restart, #back, #forward, #reset, #fit, #tool-zoom-in, #tool-zoom-out, #sound, #film, #full, #language, #keys, #share, #presets",
 };
 
 class Phone {
@@ -66,7 +66,9 @@ class Phone {
       if ((target as Element).closest(".ib")) this.show("");
     });
     this.is.addEventListener("change", () => this.arrange());
-    new MutationObserver(() => this.refresh()).observe(panels.parentElement as Element,
+    new MutationObserver(() => {
+      if (this.is.matches) this.refresh();
+    }).observe(panels.parentElement as Element,
       { subtree: true, attributeFilter: ["hidden", "class"] });
     bench.listeners.push(() => this.mark());
     bench.inspector.listeners.push(() => {

@@ -57,13 +57,24 @@ class Track {
     return this.rows[knot * KNOT_ROW + column];
   }
 
-  /** Lowest knot, m. */
+  /** Lowest place so far, m. */
   get lowest() {
     const sure = this.count - this.tip;
-    for (; this.seen < sure; this.seen += 1) {
-      this.low = Math.min(this.low, this.at(this.seen, Y));
-    }
-    return this.low;
+    for (; this.seen < sure; this.seen += 1) this.low = Math.min(this.low, this.lowAt(this.seen));
+    let low = this.low;
+    for (let n = sure; n < this.count; n += 1) low = Math.min(low, this.lowAt(n));
+    return low;
+  }
+
+  /** Lowest place of a knot and of the curve to it, m: where its slope, a quadratic, is 0. */
+  lowAt(i: number) {
+    const y = this.at(i, Y), h = i ? this.at(i, T) - this.at(i - 1, T) : 0;
+    if (!(h > 0)) return y;
+    const va = this.at(i - 1, VY), vb = this.at(i, VY), mean = (y - this.at(i - 1, Y)) / h;
+    const a = 3 * (va + vb - 2 * mean), b = 3 * mean - 2 * va - vb;
+    const q = -(b + Math.sign(b || 1) * Math.sqrt(Math.max(0, b * b - a * va)));
+    return [q / a, va / q].reduce((low, s) =>
+      (s > 0 && s < 1 ? Math.min(low, this.curve(i - 1, Y, VY, h, s)[0]) : low), y);
   }
 
   /** The lowest of the first so many knots. */

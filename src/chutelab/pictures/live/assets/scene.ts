@@ -312,7 +312,7 @@ function ownValues(
 }
 
 /** Returns the table that a surface is from, by its name, and what it is made of. */
-export function surfaceTable(
+function surfaceTable(
   scene: Scene, name: string,
 ): { home: any, steel: boolean, belt: boolean } {
   if (name === "incoming") return { home: scene.incoming, steel: false, belt: true };

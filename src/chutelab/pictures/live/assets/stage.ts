@@ -1,7 +1,7 @@
 // The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
 
 import { openHandles } from "./controls.ts";
-import { drawOutline } from "./callout.ts";
+import { drawOutline, scalePlace } from "./callout.ts";
 import { endsOf } from "./edit.ts";
 import { ARROW, Handles, bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
 import { html } from "./panels.ts";
@@ -71,6 +71,10 @@ class Stage {
     this.back.append(steel(), ground, this.ghost, this.outline, layer, this.paths, scale);
     this.tip = html("p", { class: "tip", role: "status" });
     home.after(this.tip);
+    new ResizeObserver(([{ borderBoxSize: [{ inlineSize, blockSize }] }]) => {
+      this.tipSize = [inlineSize, blockSize];
+      if (this.held && this.at) this.tell(this.at);
+    }).observe(this.tip);
     this.grips = svg("g", { class: "grips" });
     /** Further layers, of tools, lie below the handles. */
     this.over = svg("g", { class: "over" });
@@ -158,7 +162,8 @@ class Stage {
   }
 
   /** Pixels from below and from the left of the bar that tells the scale. */
-  corner: [number, number] = [20, 24];
+  corner: Point = [20, 24];
+  scaleAt: Point = this.corner;
 
   /** What tools draw anew when the view, the machine or its run has changed. */
   drawers: (() => void)[] = [];
@@ -166,8 +171,11 @@ class Stage {
   rebuild() {
     if (this.view.width < 2) return;
     const { machine, scene } = this.lab;
-    this.scenery.drawGround(...this.corner);
     if (machine) this.scenery.draw(machine, scene);
+    const long = this.view.mesh * this.view.scale;
+    // Under what is dragged it stays.
+    if (!this.held) this.scaleAt = scalePlace(this, long, this.corner);
+    this.scenery.drawGround(...this.scaleAt);
     this.drawTracks();
     this.placeHandles();
     this.paint();
@@ -501,8 +509,13 @@ class Stage {
     return { way: [roundTo(dx, view.snap), roundTo(dy, view.snap)], caught: null };
   }
 
+  /** Width and height of what is told, px; and where it was told. */
+  tipSize: Point = [0, 0];
+  at?: Point;
+
   /** The value that is changed, beside the pointer; or why it cannot be. */
-  tell([px, py]: Point) {
+  tell(at: Point) {
+    const [px, py] = this.at = at;
     const { lab, words, held, view, tip } = this;
     const now = this.handles.find(({ id }) => id === held?.id) ?? bodyOf(this.handles,
       this.parts, 0, 0);
@@ -511,7 +524,8 @@ class Stage {
     tip.replaceChildren(...(lab.fault ? [words.fault(lab.fault)] : [
       html("b", {}, words.values(now.axes)), html("span", {}, words.say("was", { value: this.was })),
     ]));
-    const { offsetWidth: wide, offsetHeight: high } = tip;
+    // To ask for the size now would have all laid out once more.
+    const [wide, high] = this.tipSize;
     // A finger hides what is below it.
     const left = Math.min(px + 22, view.width - wide - 8), over = this.finger ? -high - 40 : 26;
     const top = Math.min(Math.max(py + over, 8), view.height - high - 8);

@@ -1,6 +1,7 @@
 // The paper's symbols in the picture, at what they stand for: angle, speeds, times and lengths of
 // the first particle's transfer.
 
+import { surfaceLines } from "./callout.ts";
 import { historyOf } from "./stages.ts";
 import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
@@ -59,8 +60,8 @@ function placed(wanted: Label[], taken: Space[]): Placed[] {
 const discs = (x: number, y: number, r: number): Space[] => [[1, 0.4], [0.8, 0.7], [0.4, 1]]
   .map(([u, v]) => ({ left: x - u * r, right: x + u * r, top: y - v * r, bottom: y + v * r }));
 
-/** Arcs that labels keep clear of; more are a board of pegs. */
-const MOST_ARCS = 40;
+/** Lines that labels keep clear of; more are a board of pegs. */
+const MOST_LINES = 100;
 
 /** Boxes along a line through points, px. */
 function along(points: [number, number][]): Space[] {
@@ -142,12 +143,9 @@ class Symbols {
 
   /** What the path and the surfaces cover, as far as it is seen. */
   lines(recording: Recording): Space[] {
-    const { view } = this.stage, { segments, arcs, pulley } = recording.machine;
-    const px = (x: number, y: number) => [
-      Math.min(Math.max(view.px(x), -50), view.width + 50),
-      Math.min(Math.max(view.py(y), -50), view.height + 50),
-    ] as [number, number];
-    const path = recording.points(0, 2 / view.scale).map(({ x, y }) => px(x, y));
+    const { view } = this.stage, { pulley } = recording.machine;
+    const path = recording.points(0, 2 / view.scale)
+      .map(({ x, y }) => [view.px(x), view.py(y)] as [number, number]);
     const home = this.stage.front.getBoundingClientRect();
     const speeds = [...this.stage.scenery.layer.querySelectorAll(".on-frame")].map((text) => {
       const { left, right, top, bottom } = text.getBoundingClientRect();
@@ -157,12 +155,8 @@ class Symbols {
     return [
       ...along(path), ...speeds,
       ...(pulley ? discs(view.px(0), view.py(0), pulley.radius * view.scale) : []),
-      ...segments.flatMap(({ x, y, tx, ty, length }) =>
-        along([px(x, y), px(x + tx * length, y + ty * length)])),
-      ...arcs.slice(0, MOST_ARCS).flatMap(({ x, y, radius, begin, extent }) =>
-        along(Array.from({ length: 25 }, (_, n) => px(
-          x + radius * Math.cos(begin + (n * extent) / 24),
-          y + radius * Math.sin(begin + (n * extent) / 24))))),
+      // A board of pegs has no room between them.
+      ...surfaceLines(this.stage).slice(0, MOST_LINES).flatMap(along),
     ];
   }
 

@@ -1,15 +1,13 @@
-// What measures in the picture, flow line, tape, angle, stop watch and tracer, and what the picture
-// shows.
+// What measures in the picture: flow line, tape, angle, stop watch and tracer.
 
 import { roundUp } from "./chart.ts";
 import { Flow } from "./flow.ts";
-import { eased, html, icon, iconButton } from "./panels.ts";
+import { eased, html, iconButton } from "./panels.ts";
 import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
 import type { Handle } from "./handles.ts";
 import type { Lab } from "./lab.ts";
 import type { Track, State } from "./recording.ts";
-import type { Symbols } from "./symbols.ts";
 import type { Words } from "./words.ts";
 
 type Point = [number, number];
@@ -85,18 +83,13 @@ class StopWatch {
 
 class Tools {
   layer;
-  bar;
-  strobe;
   panel;
   flow;
   dial?: any;
   laps?: any;
   starter?: any;
 
-  constructor(
-    home: Element, readonly lab: Lab, readonly stage: Stage, readonly words: Words,
-    symbols: Symbols,
-  ) {
+  constructor(readonly lab: Lab, readonly stage: Stage, readonly words: Words) {
     this.layer = svg("g", { class: "measures", "aria-hidden": "true" });
     stage.over.append(this.layer);
     const bar = html("div", { class: "tools", role: "group", "aria-label": words.say("tools") });
@@ -107,30 +100,13 @@ class Tools {
       button.addEventListener("click", () => this.toggle(name, button));
       bar.append(button);
     }
-    const name = words.say("show"), named = { class: "ib", title: name, "aria-label": name };
-    const head = html("summary", named, icon("eye"));
-    this.bar = html("div", { class: "float choices" });
-    const menu = html("details", { class: "menu looks", id: "show" }, head, this.bar);
-    document.getElementById("views")?.prepend(menu);
-    addEventListener("pointerdown", ({ target }) => {
-      if (!menu.contains(target as Node)) menu.open = false;
-    });
-    const show = stage.show as Record<string, boolean>;
-    this.box("trails", show.trails, (on) => { show.trails = on; });
-    this.strobe = this.box("strobe", show.strobe, (on) => { show.strobe = on; });
-    this.box("velocity-arrows", show.velocity, (on) => { show.velocity = on; });
-    this.box("force-arrows", show.forces, (on) => { show.forces = on; });
-    this.box("symbols", symbols.shown, (on) => { symbols.shown = on; });
-    this.box("grid", true, (on) => { stage.scenery.ground.classList.toggle("off", !on); });
-    this.hues();
     this.panel = this.watchPanel();
-    home.append(this.panel);
+    stage.home.parentElement?.append(this.panel);
     this.flow = new Flow(document.getElementById("panels") as Element, lab, words);
     stage.further.push(() => this.handles());
     stage.drawers.push(() => this.draw());
     const redraw = eased(() => this.draw());
     lab.on("run", () => {
-      this.nameStrobe();
       if (this.on.has("tracer")) stage.placeHandles();
     });
     lab.on("time", () => {
@@ -160,48 +136,6 @@ class Tools {
 
   /** Where the pointer was last, px. */
   pointer: Point = [0, 0];
-
-  box(name: string, on: boolean, act: (on: boolean) => void) {
-    const input = html("input", { type: "checkbox", id: `show-${name}` });
-    input.checked = on;
-    input.addEventListener("change", () => {
-      act(input.checked);
-      this.stage.rebuild();
-    });
-    const text = html("span", {}, this.words.say(name));
-    this.bar.append(html("label", { class: "check" }, input, text));
-    return text;
-  }
-
-  /** What colour a particle has. */
-  hues() {
-    const { stage, words } = this, { balls } = stage;
-    const legend = html("div", { class: "ramp num" });
-    const buttons = (["material", "speed", "kind"] as const).map((hue) => {
-      const button = html("button", { type: "button", id: `hue-${hue}`, "aria-pressed": "false" },
-        words.say(`hue-${hue}`));
-      button.addEventListener("click", () => {
-        balls.hue = hue;
-        balls.measure();
-        for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
-        legend.hidden = hue !== "speed";
-        legend.replaceChildren(html("i"), html("span", {}, "0"),
-          html("span", {}, `${words.plain(0.5 * balls.fastest)}`),
-          html("span", {}, `${words.plain(balls.fastest)} m/s`));
-        stage.paint();
-      });
-      return button;
-    });
-    buttons[0].setAttribute("aria-pressed", "true");
-    legend.hidden = true;
-    const choice = html("div", { class: "seg" }, ...buttons);
-    this.bar.append(html("p", {}, words.say("hue")), choice, legend);
-  }
-
-  nameStrobe() {
-    const { words, stage } = this;
-    this.strobe.textContent = words.say("strobe-every", { step: words.number(stage.strobeStep, 1) });
-  }
 
   toggle(name: string, button: any) {
     const { view } = this.stage, on = !this.on.has(name);

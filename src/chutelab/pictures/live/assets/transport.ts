@@ -60,7 +60,7 @@ class Transport {
       // A pause puts the slider back to the time that is shown.
       const share = Number(this.time.value) / PLACES;
       lab.pause();
-      lab.seek(lab.start + (lab.end - lab.start) * share);
+      lab.seek(lab.start + (lab.horizon - lab.start) * share);
     });
     this.slow = element("slow");
     this.why = element("slow-why");
@@ -119,7 +119,11 @@ class Transport {
 
   refresh() {
     const { lab, words } = this;
-    const span = lab.end - lab.start;
+    const span = lab.horizon - lab.start, track = this.time.parentElement;
+    // What is computed is hatched until all of it is.
+    const ready = span > 0 ? (lab.end - lab.start) / span : 1;
+    track.classList.toggle("computing", ready < 1);
+    track.style.setProperty("--ready", String(ready));
     this.time.value = String(span > 0 ? Math.round(((lab.t - lab.start) / span) * PLACES) : 0);
     const clock = `${words.fixed(lab.t, 3)} s`;
     this.clock.textContent = clock;

@@ -125,8 +125,9 @@ const TURN = Math.PI / 12, NEAR_TURN = Math.PI / 72;
 /** Pixels between two lines of the grid, at least. */
 const MESH = 70;
 
-/** m of belts and walls that are shown beyond all that matters. */
-const BEYOND = 0.35;
+/** m of belts and walls that are shown beyond all that matters; of walls at most this share of the
+ * height that matters. */
+const BEYOND = 0.35, ABOVE = 0.2;
 
 /** What is shown where nothing is yet. */
 const EMPTY: Box = { left: -0.6, bottom: -0.6, right: 0.6, top: 0.4 };
@@ -178,13 +179,20 @@ function boxOf(
   const highest = [...points, ...machine.releases]
     .reduce((top, { y }) => Math.max(top, y), -Infinity);
   const still = machine.segments.filter(({ speed }) => !speed);
-  const ceiling = isFinite(highest) ? highest + BEYOND : Infinity;
+  const lowest = Math.min(...still.flatMap(ends).map(([, y]) => y));
+  // Of a crowd that lies in it little of what is above matters.
+  const above = machine.interact ? Math.min(BEYOND, ABOVE * Math.max(0, highest - lowest)) : BEYOND;
+  const ceiling = isFinite(highest) ? highest + above : Infinity;
   for (const [x, y] of still.flatMap(ends)) widen(x, Math.min(y, ceiling));
   const [left, right] = [box.left - BEYOND, box.right + BEYOND];
   for (const [x, y] of machine.segments.filter(({ speed }) => speed).flatMap(ends)) {
     widen(isFinite(left) ? Math.min(Math.max(x, left), right) : x, y);
   }
   if (!isFinite(box.left)) return EMPTY;
+  // What opens lets something fall.
+  if (machine.segments.some(({ vanishes }) => isFinite(vanishes))) {
+    widen(box.left, box.bottom - FALL * (box.top - box.bottom));
+  }
   const held = { ...box }, room = FALL * Math.max(box.right - box.left, box.top - box.bottom);
   for (const point of points.filter((one) => !inside(one))) {
     widen(Math.min(Math.max(point.x, held.left - room), held.right + room),

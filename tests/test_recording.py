@@ -12,13 +12,14 @@ from scipy.optimize import brentq
 from scipy.special import ellipj
 
 from chutelab import machine, scene
-from chutelab.engines import exact
+from chutelab.engines import contact, exact
 from chutelab.engines.simulation import choose
 from chutelab.machine import Particle
 from chutelab.results import ENTRIES, Kind
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import Recorder
 from chutelab.util.errors import InputError
+from cores import Core
 
 EPS = 2.0**-52
 G = 9.81
@@ -310,3 +311,96 @@ def test_of_several_blows_at_one_instant_the_first_and_the_last_state_are_kept()
     assert found.track(0)["t"].tolist() == [0.1, 0.2, 0.2, 0.3, 0.3]
     assert found.track(0)["velocity"][:, 0].tolist() == [1.0, 1.0, 4.0, 4.0, 5.0]
     assert found.track(1)["t"].tolist() == [0.0, 0.1]
+
+
+DRUM = {
+    "particle": {"radius": 0.005, "mass": 0.002, "spin": True},
+    "surface": [{"name": "drum", "center": [0.0, 0.0], "radius": 0.06, "speed": 0.3,
+                 "friction": 0.5, "restitution": 0.3}],
+    "stream": {"count": 40, "fill": [[-0.035, -0.035], [0.035, 0.035]], "velocity": [0.0, 0.0],
+               "interact": True, "friction": 0.4, "restitution": 0.4},
+    "run": {"until": 0.6},
+}  # fmt: skip
+CROWDS = {
+    "hopper": ("stream.count=80",),
+    "galton": ("stream.count=12",),
+    "stream": ("stream.count=30",),
+    "dominoes": (),
+    "drum": (),
+}
+
+
+def crowded(name, **left_out):
+    """Run a crowd by the contact engine; `left_out`: what tracks may leave out, 0 is nothing."""
+    told = scene.from_dict(DRUM) if name == "drum" else scene.load(name, CROWDS[name])
+    core = Core(machine.build(told))
+    for field, value in left_out.items():
+        setattr(core.world, field, value)
+    return core.run()
+
+
+@pytest.mark.parametrize("name", CROWDS)
+def test_a_track_is_off_by_less_than_a_hop_and_the_run_stays_as_it_is(name):
+    """Beside the same run with a knot before and after each blow, and at each step in contact.
+
+    What lies hops from step to step, g dt²/8 high and g dt/2 fast, and its track leaves that out.
+    """
+    short, full = crowded(name), crowded(name, smooth_x=0.0, smooth_v=0.0, hops=0.0)
+    for array in ("events", "by_surface", "ended", "totals"):
+        assert getattr(short, array).tobytes() == getattr(full, array).tobytes()
+    for one, other in zip(short.ends(), full.ends(), strict=True):
+        assert one.tobytes() == other.tobytes()
+    assert len(short.knots) < 0.6 * len(full.knots)
+    rng = np.random.default_rng(3)
+    times = np.concatenate([full.totals["t"], rng.uniform(*full.totals["t"][[0, -1]], 500)])
+    places, paces = full.at(times)
+    g, dt = short.gravity, short.machine.dt
+    hop = np.maximum(g * dt**2 / 8.0, 1e-4 * short.radius)
+
+    def far(run):
+        off = np.hypot(*np.moveaxis(run.at(times)[0] - places, -1, 0)) / hop
+        return np.nanmax(off)
+
+    assert far(short) <= 4.0
+    assert np.nanmax(np.hypot(*np.moveaxis(short.at(times)[1] - paces, -1, 0))) <= 2.0 * g * dt
+    assert far(crowded(name, hops=30.0)) > 4.0
+
+
+@pytest.mark.parametrize("name", CROWDS)
+def test_the_energy_of_a_crowd_is_that_of_its_steps_and_closes_at_any_time(name):
+    """K + U of all, less that at their releases, less what they got, is 0 at each step."""
+    run = crowded(name)
+    totals, size = run.totals, ledger(run).turned_over
+    first = run.ends()[0]
+    start = sum(run.energies(first, np.flatnonzero(run.released)))
+    start = (start * (first["t"] < totals["t"][:, None])).sum(axis=1)
+    belt, restitution, friction = totals["entries"].T
+    left = totals["kinetic"] + totals["potential"] - start - (belt - restitution - friction)
+    assert np.abs(left).max() <= 1e-12 * size
+    now = run.energy_at(totals["t"][1:])
+    late = ~np.isin(totals["t"][1:], first["t"])
+    for name in ("kinetic", "potential"):
+        assert np.abs(now[name] - totals[name][1:])[late].max() <= 1e-13 * size
+    for name, entry in zip(ENTRIES, (belt, restitution, friction), strict=True):
+        assert np.abs(now[name] - entry[1:])[late].max() <= 1e-13 * size
+    times = np.random.default_rng(4).uniform(0.0, 1.1 * totals["t"][-1], 500)
+    assert np.abs(run.energy_at(times)["residual"]).max() <= 1e-6 * size
+    # Tracks alone, as in a file of before, are less near.
+    tracks = replace(run, totals=totals[:0]).energy_at(times)["residual"]
+    assert np.abs(tracks).max() > 1e-8 * size
+
+
+def test_energy_of_a_crowd_far_from_the_origin_is_counted_from_y_0():
+    """Engines count places from an origin of their own there; potential energy is m g y."""
+    far = scene.from_dict({
+        "particle": {"radius": 0.01, "mass": M},
+        "stream": {"count": 2, "rate": 10.0, "at": [0.0, 1e5], "velocity": [0.0, 0.0],
+                   "interact": True},
+        "run": {"until": 0.3},
+    })  # fmt: skip
+    run = contact.run(machine.build(far))
+    t = run.totals["t"]
+    released = np.array([0.0, 0.1])
+    height = 1e5 - 0.5 * G * np.clip(t[:, None] - released, 0.0, None) ** 2
+    expected = (M * G * height * (released < t[:, None])).sum(axis=1)
+    assert run.totals["potential"] == pytest.approx(expected, rel=1e-12, abs=1e-9)

@@ -127,7 +127,6 @@ static void settle(int i, const Contact *last, double h) {
     d->x -= d->vx * back;
     d->y -= d->vy * back;
     d->t = d->since;
-    if (W.tracks[i].open) knot_held(i);
     W.tracks[i].lasted = 0;
     knot_now(i);
     event_here(SETTLE, i, hop.owner);
@@ -330,7 +329,7 @@ void end_in_contact(int i, int reason) {
     d->vx = s[3];
     d->vy = s[4];
     d->spin = s[5];
-    if (d->t > track->knot[0]) knot_now(i);
+    if (track->lasted > 1) knot_held(i);
     track->lasted = 0;
     if (reason == BY_SETTLING) event_here(SETTLE, i, W.surfaces[d->held[0]].owner);
     finish(i, reason);

@@ -13,7 +13,7 @@
 extern World W;
 
 /* What was too small, so that `run` makes more room. */
-enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_NEAR, FULL_CONTACTS };
+enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS };
 
 /* Contacts are looked for where a gap is below this share of the radius: what lasts stays a
    thousandth of it apart at most, and nothing crosses the rest within a step unseen. */
@@ -147,7 +147,6 @@ int place_is_free(int i, double x, double y, double t);
 void knot_now(int i);
 void knot_after(int i);
 void knot_before(int i, double t, double vx, double vy, double spin);
-void knot_before_blow(int i);
 void flush_track(int i);
 void track_lasting(int i);
 void knot_held(int i);

@@ -169,7 +169,7 @@ void was_moved(int i) {
     if (d->moved != W.shocks) {
         d->moved = W.shocks;
         W.moved[W.moved_count++] = i;
-        knot_before_blow(i);
+        knot_before(i, d->t, d->vx, d->vy, d->spin);
     }
 }
 
@@ -358,7 +358,7 @@ static void end_hop(int i, double t) {
     share_out(&c, u, v, 0, entries, given);
     entries[1] += fall;
     book(d->entries, 0, c.owner, entries);
-    knot_held(i);
+    track->lasted = 0;
 }
 
 /* Whether a disk by itself may meet another surface within a span than k and what it lies on. */

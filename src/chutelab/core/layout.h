@@ -11,6 +11,7 @@
 
 #define MAX_HELD 4 /* surfaces that one disk can lie on at a time; a fifth is met as an impact */
 #define MOST_IDLE 400 /* rounds in a row that take no time: with more of them a particle is stuck */
+#define WAITS 20 /* states of a track at most that wait to become a knot, or be left out */
 #define MAX_NEARBY 12 /* surfaces that are listed for a disk; where there are more, it asks all */
 
 /* What a disk is doing. Free disks move on parabolas; riders and sleepers on a prescribed path. */
@@ -94,24 +95,19 @@ typedef struct {
     int far;                    /* 1 if the step's impulses take it further than was foreseen */
 } Disk;
 
-/* The track of a disk between the knots that are written. */
+/* The track of a disk since the last knot that is written. */
 typedef struct {
-    double knot[6];       /* last knot written: t, x, y, vx, vy, spin */
-    double blow_entries[3]; /* of a knot that is held back */
-    double blow[6], blow_before[3]; /* state and entries before the latest blow, if no knot yet */
-    double bend[3];       /* acceleration foretold from it on, of x, y and spin */
+    double from[9];       /* that knot */
+    double knot[6];       /* latest state that was noted: t, x, y, vx, vy, spin */
     double held[6];       /* latest state in lasting contact, halfway through its impulses */
-    double held_entries[3];
     double after[3];      /* velocity and spin after these impulses */
     double after_entries[3];
     double past[6];       /* the state before `held` */
     double load[3];       /* normal impulse per time of the last three steps, newest first */
     double load_t[3];
-    int bent, open;       /* bend is known; `held` is no knot yet */
+    int begun, waits;     /* it has a first knot; states that wait, see `World.waits` */
     int lasted;           /* steps of this contact since the last blow, 0 in flight */
     int stays;            /* steps on one surface, blows or not */
-    int held_back;        /* `knot` is one after a blow and not written yet */
-    int again;            /* the latest blow may be told together with the one before */
     int ground;           /* surface that `stays` are on: a disk that leaves it may have struck another last */
 } Track;
 
@@ -180,6 +176,10 @@ typedef struct {                                                                
     int disk, other, kind, surface;
 } Event;
 
+/* What all disks of a crowd that were released have together as a step begins: that of those that ended at
+   their ends, and of what lasts in contact halfway through its impulses, as their tracks are. */
+typedef struct { double t, kinetic, potential, entries[3]; } Total; /* s, J */           /* [out] */
+
 typedef struct { int disk, next, ix, iy; } Cell; /* one disk in one cell of the grid */
 
 typedef struct {
@@ -188,9 +188,11 @@ typedef struct {
     Pair *pairs;         /* (kinds, kinds + materials) */
     /* arrays that `prepare` lays out */
     Track *tracks;
+    Knot *waits;         /* (disks, WAITS) states of each since its last knot; of one by itself (1, WAITS) */
     double *books;       /* (owners + 1, 3), J; the last row is the disks' among themselves */
     Knot *knots;
     Event *events;
+    Total *totals;       /* one a step in a crowd */
     Contact *contacts;   /* of this step */
     Contact *earlier;    /* of the step before */
     int *links;          /* (2 contacts) */
@@ -209,7 +211,7 @@ typedef struct {
     /* sizes */
     int disk_count, surface_count, kind_count, owner_count; /* [in] */
     int material_count;
-    int knot_room, event_room, contact_room, near_room, cell_room;
+    int knot_room, event_room, total_room, contact_room, near_room, cell_room;
     int full;            /* what `run` makes room for as it goes on: see `Full` */
     int bucket_count;    /* a power of two */
     int gate_count, end_count, circle_count;
@@ -226,10 +228,11 @@ typedef struct {
     double gx, gy;       /* m/s2 */
     double dt;           /* s; longest step */
     double end_time;     /* s */
-    double smooth_x, smooth_v; /* radii, m/s; by how much a track may leave out what lasts */
+    double smooth_x, smooth_v; /* radii, m/s; by how much a track may be off between two knots ... */
+    double hops;         /* ... if that is not less than so many hops of what lasts */
     double accurate;     /* m/s; changes at which sweeps end */
     /* [out] */
-    int knot_count, event_count, contact_count, near_count, earlier_count;
+    int knot_count, event_count, total_count, contact_count, near_count, earlier_count;
     int impact_count, step_count, solve_count, sweep_count;
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */

@@ -318,11 +318,42 @@ static double in_hollows(void) {
     return most;
 }
 
+/* Note what all disks have together as a step begins. */
+static void note_totals(void) {
+    Total all = {.t = W.t};
+    for (int i = W.low; i < W.high; i++) {
+        const Disk *d = W.disks + i;
+        if (d->mode == WAITING) continue;
+        const Track *track = W.tracks + i;
+        const double *place = &d->x, *v = &d->vx, none[3] = {0}, *ahead = none;
+        double state[4], spin = d->spin;
+        if (d->mode == FREE && track->lasted) {
+            place = track->held + 1;
+            v = place + 2;
+            spin = place[4];
+            ahead = d->ahead;
+        } else if (d->mode == ASLEEP) {
+            v = &d->ux;
+        } else if (d->mode == RIDING) {
+            /* What the belt has done since the last knot, see `ride_knot`. */
+            ride_at(d, W.t, state);
+            place = state;
+            v = place + 2;
+            all.entries[0] -= d->mass * (W.gx * (place[0] - track->knot[1]) + W.gy * (place[1] - track->knot[2]));
+        } else if (d->mode == GONE && !track->begun) continue;
+        all.kinetic += 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
+        all.potential += d->mass * W.g * place[1];
+        for (int n = 0; n < 3; n++) all.entries[n] += d->entries[n] - ahead[n];
+    }
+    W.totals[W.total_count++] = all;
+}
+
 /* Begin a step: where prescribed paths lead, which disks may meet, which contacts last. A status other
    than DONE says what was too small, and nothing has happened yet. */
 static int begin_step(void) {
     int woke;
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
+    if (W.total_count >= W.total_room) return FULL_TOTALS;
     double next = set_gates(W.t), h = W.dt, stride = 0;
     for (int i = W.low; i < W.high && W.g > 0; i++) h = MIN(h, hop_time(W.disks + i, W.g));
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
@@ -384,6 +415,7 @@ static int begin_step(void) {
     for (int i = W.low; i < W.high; i++)
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
     close_step(h);
+    if (W.interact) note_totals();
     return DONE;
 }
 

@@ -212,6 +212,7 @@ int make_room(int full) {
     if (full == FULL_NEAR) make_near_room(2 * W.near_room);
     if (full == FULL_CONTACTS) make_contact_room(2 * W.contact_room);
     if (full == FULL_KNOTS) STRETCH(W.knots, W.knot_count, W.knot_room);
+    if (full == FULL_TOTALS) STRETCH(W.totals, W.total_count, W.total_room);
     if (full == FULL_EVENTS) STRETCH(W.events, W.event_count, W.event_room);
     return has_room();
 }
@@ -223,6 +224,7 @@ static int lay_out_work(void) {
     for (W.bucket_count = 1; crowd && W.bucket_count <= 4 * n + 16;) W.bucket_count *= 2;
     W.cell_room = crowd ? 12 * n + 64 : 1;
     RESERVE(W.tracks, n);
+    RESERVE(W.waits, crowd ? (double)WAITS * n : WAITS);
     RESERVE(W.books, 3.0 * (W.owner_count + 1));
     RESERVE(W.cells, W.cell_room);
     RESERVE(W.heads, W.bucket_count);
@@ -235,7 +237,9 @@ static int lay_out_work(void) {
     RESERVE(W.ends, 2.0 * room);
     W.knot_room = (rides ? 100 : 30) * n + 200;
     W.event_room = 40 * n + 1200;
+    W.total_room = crowd ? 1024 : 1;
     RESERVE(W.knots, W.knot_room);
+    RESERVE(W.totals, W.total_room);
     RESERVE(W.events, W.event_room);
     make_contact_room(8 * n + 16);
     make_near_room(crowd ? 16 * n + 16 : 1);
@@ -282,7 +286,8 @@ EXPORT int prepare(void) {
     W.gy = -W.g;
     W.sweeps = alone ? SWEEPS_ALONE : SWEEPS;
     W.sleeps = !alone;
-    W.smooth_x = alone ? 1e-5 : 1e-4;
+    W.smooth_x = alone ? 2e-7 : 1e-4;
+    W.hops = alone ? 0 : 1;
     W.pace = W.g > 0 ? sqrt(W.g / EARTH) : 1;
     W.smooth_v = 1e-4 * W.pace;
     W.accurate = (alone ? 1e-15 : 3e-4) * W.pace;

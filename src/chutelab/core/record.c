@@ -3,119 +3,139 @@
 #include <string.h>
 #include "core.h"
 
-/* Of what gravity does in two steps: a blow that changes a velocity by less is soft. */
-#define SOFT_BLOW 0.1
+/* A track is kept as states: before and after each blow, and, of what lasts in contact, one a step. A state
+   becomes a knot only where the track bends by more than may be left out, see `is_followed`; those since the
+   last knot wait, until the cubic from there no longer leads past all of them. */
 
-static void emit(int i, const double *state, const double *entries) {
-    Knot *k = W.knots + W.knot_count++;
-    memcpy(&k->t, state, 6 * sizeof(double));
-    memcpy(k->entries, entries, sizeof k->entries);
-    k->disk = i;
+static Knot *waiting(int i) { return W.waits + WAITS * (long)(W.interact ? i : 0); }
+
+static void emit(const Knot *state) {
+    W.knots[W.knot_count++] = *state;
 }
 
-/* Write the knot after a blow that was held back, if there is one. */
-static void let_go(int i) {
-    Track *track = W.tracks + i;
-    if (track->held_back) emit(i, track->knot, track->blow_entries);
-    track->held_back = 0;
+/* Whether the cubic from the last knot to a state leads past all that wait: as near in place, velocity and
+   entries as a track may be off. In a crowd that is a hop: what lasts hops from step to step, g h2 / 8 high, and
+   its track leaves that out; blows and bends that are smaller, of a velocity of g h, are left out with it. */
+static int is_followed(const Track *track, const Knot *wait, const Knot *to, const Disk *d) {
+    const double *from = track->from;
+    double h = to->t - from[0], fall = W.hops * W.g * W.usual, c[2][4];
+    double close = MAX(W.smooth_x * d->radius, 0.125 * fall * W.usual), slow = MAX(W.smooth_v, fall);
+    double little = d->mass * slow * (sqrt(square(from[3]) + square(from[4])) + slow);
+    for (int n = 0; n < 2; n++) {
+        double way = (&to->x)[n] - from[1 + n], first = h * from[3 + n], last = h * (&to->vx)[n];
+        c[n][0] = from[1 + n];
+        c[n][1] = first;
+        c[n][2] = 3 * way - 2 * first - last;
+        c[n][3] = first + last - 2 * way;
+    }
+    for (const Knot *k = wait + track->waits - 1; k >= wait; k--) {
+        /* Off by w at both ends of a time T, it bulges by w T / 4 between them: by no more than it is off. */
+        double then = k < wait + track->waits - 1 ? k[1].t : to->t, before = k > wait ? k[-1].t : from[0];
+        double s = (k->t - from[0]) / h, most = MIN(slow, 4 * close / MAX(then - k->t, k->t - before));
+        for (int n = 0; n < 2; n++) {
+            const double *a = c[n];
+            if (!(fabs(a[0] + s * (a[1] + s * (a[2] + s * a[3])) - (&k->x)[n]) <= close)) return 0;
+            if (!(fabs(a[1] + s * (2 * a[2] + 3 * s * a[3]) - h * (&k->vx)[n]) <= h * most)) return 0;
+        }
+        if (fabs(from[5] + s * (to->spin - from[5]) - k->spin) * d->radius > slow) return 0;
+        for (int n = 0; n < 3 && W.interact; n++) {
+            double entry = from[6 + n] + s * (to->entries[n] - from[6 + n]);
+            if (fabs(entry - k->entries[n]) > little) return 0;
+        }
+    }
+    return 1;
 }
 
-static void write_knot(int i, const double *state, const double *entries) {
+/* Write the latest state that waits as a knot; if it is the one after a blow, that before, too, unless a crowd's
+   track may leave the blow out. */
+static void write_waiting(int i) {
     Track *track = W.tracks + i;
-    let_go(i);
-    emit(i, state, entries);
+    const Knot *wait = waiting(i), *last = wait + track->waits - 1;
+    if (!track->waits) return;
+    if (track->waits > 1 && last[-1].t == last->t) {
+        track->waits--;
+        if (!W.interact || !is_followed(track, wait, last, W.disks + i)) emit(last - 1);
+    }
+    emit(last);
+    memcpy(track->from, last, sizeof track->from);
+    track->waits = 0;
+}
+
+/* Forget every second of the states that wait, but the last two: the longer the times between those that are
+   left, the less `is_followed` allows. */
+static void thin_out(Track *track, Knot *wait) {
+    int left = 0;
+    for (int n = 1; n < track->waits; n++)
+        if (n % 2 || n >= track->waits - 2) wait[left++] = wait[n];
+    track->waits = left;
+}
+
+/* Note a state of a disk: t, x, y, vx, vy, spin. Of several at one instant the first and the last are kept. */
+static void note(int i, const double *state, const double *entries) {
+    Track *track = W.tracks + i;
+    Knot *wait = waiting(i), now = {.disk = i};
+    memcpy(&now.t, state, 6 * sizeof(double));
+    memcpy(now.entries, entries, sizeof now.entries);
     memcpy(track->knot, state, sizeof track->knot);
-    track->bent = track->open = 0;
+    if (!track->begun) {
+        emit(&now);
+        memcpy(track->from, &now, sizeof track->from);
+        track->begun = 1;
+        return;
+    }
+    int count = track->waits, again = count > 1 ? wait[count - 2].t == now.t : track->from[0] == now.t;
+    if (count && again && wait[count - 1].t == now.t) track->waits--;
+    else if (count && wait[count - 1].t < now.t && !is_followed(track, wait, &now, W.disks + i)) write_waiting(i);
+    if (track->waits == WAITS) thin_out(track, wait);
+    wait[track->waits++] = now;
 }
 
 /* Write the state of a disk as it is. */
 void knot_now(int i) {
     Disk *d = W.disks + i;
     double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
-    write_knot(i, state, d->entries);
+    note(i, state, d->entries);
+    write_waiting(i);
 }
 
-/* Write the state in which a path ends, unless it is the last knot anyhow. */
+/* The same of what ends in lasting contact: the state that was noted last, with the entries as they are. */
+void knot_held(int i) {
+    W.tracks[i].waits--;
+    knot_now(i);
+}
+
+/* Note the state in which a path ends, unless it is the last one anyhow. */
 void knot_before(int i, double t, double vx, double vy, double spin) {
     Disk *d = W.disks + i;
     double state[6] = {t, d->x, d->y, vx, vy, spin};
     flush_track(i);
-    if (memcmp(state, W.tracks[i].knot, sizeof state)) write_knot(i, state, d->entries);
+    if (memcmp(state, W.tracks[i].knot, sizeof state)) note(i, state, d->entries);
 }
 
-/* The same before a blow. In a crowd a rattling disk has many of them within a thousandth of a
-   radius: of these, if they are soft, the state before the first and that after the last are told. */
-void knot_before_blow(int i) {
-    const Disk *d = W.disks + i;
-    Track *track = W.tracks + i;
-    double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
-    track->again = track->held_back && d->t - track->knot[0] < W.step
-        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x * d->radius;
-    if (track->again) {
-        memcpy(track->blow, state, sizeof state);
-        memcpy(track->blow_before, d->entries, sizeof track->blow_before);
-    } else knot_before(i, d->t, d->vx, d->vy, d->spin);
-}
-
-/* Note the state after a blow; in a crowd it is held back, since that of the next may replace it. */
+/* Note the state after a blow; that of a disk by itself is a knot. */
 void knot_after(int i) {
     const Disk *d = W.disks + i;
-    Track *track = W.tracks + i;
     double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
-    if (!W.interact) {
-        knot_now(i);
-        return;
-    }
-    if (track->again) {
-        const double *was = track->blow;
-        double change = fabs(d->vx - was[3]) + fabs(d->vy - was[4]) + fabs(d->spin - was[5]) * d->radius;
-        if (change > SOFT_BLOW * W.soft) {
-            let_go(i);
-            emit(i, track->blow, track->blow_before);
-        }
-    }
-    memcpy(track->knot, state, sizeof state);
-    memcpy(track->blow_entries, d->entries, sizeof track->blow_entries);
-    track->bent = track->open = track->again = 0;
-    track->held_back = 1;
+    note(i, state, d->entries);
+    if (!W.interact) write_waiting(i);
 }
 
-/* End the smooth part of a track: the state halfway through the last impulses, and that after. */
+/* End the smooth part of a track: the state halfway through the last impulses is noted, now that after. */
 void flush_track(int i) {
     Track *track = W.tracks + i;
     if (!track->lasted) return;
     double state[6];
     memcpy(state, track->held, sizeof state);
-    if (track->open) write_knot(i, state, track->held_entries);
     memcpy(state + 3, track->after, sizeof track->after);
-    write_knot(i, state, track->after_entries);
+    note(i, state, track->after_entries);
     track->lasted = 0;
-}
-
-static int foretold(const Track *track, const double *state, double radius) {
-    double h = state[0] - track->knot[0], close = W.smooth_x * radius;
-    for (int n = 0; n < 3; n++) {
-        double v = track->knot[3 + n], a = track->bend[n], off = fabs(v + a * h - state[3 + n]);
-        if (off * (n < 2 ? 1 : radius) > W.smooth_v) return 0;
-        /* A cubic whose end velocity is off by so much bulges by a seventh of off h. */
-        if (n < 2 && 0.15 * off * h > close) return 0;
-        if (n < 2 && fabs(track->knot[1 + n] + (v + 0.5 * a * h) * h - state[1 + n]) > close)
-            return 0;
-    }
-    return 1;
-}
-
-static void foretell(Track *track, const double *from, const double *to) {
-    for (int n = 0; n < 3; n++) track->bend[n] = (to[3 + n] - from[3 + n]) / (to[0] - from[0]);
-    track->bent = 1;
 }
 
 /* Note the state of a disk in lasting contact, after the impulses of a step.
 
    In contact a disk hops from step to step; its smooth track goes through the states partway through
    the impulses of each step, halfway if steps are equal. There its velocity has no part of the hop,
-   and its entries are short of what the rest of the impulses does. One is written where constant acceleration from
-   the last knot on no longer foretells the next. */
+   and its entries are short of what the rest of the impulses does. */
 void track_lasting(int i) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
@@ -131,40 +151,19 @@ void track_lasting(int i) {
         state[4] *= longer;
     }
     for (int n = 0; n < 3; n++) entries[n] = d->entries[n] + d->gain[n] - d->ahead[n];
-    if (!track->lasted) {
-        knot_before(i, d->t, d->ux, d->uy, d->uspin);
-        write_knot(i, state, entries);
-    } else {
-        if (!track->bent) foretell(track, track->knot, state);
-        if (!foretold(track, state, d->radius)) {
-            double held[6];
-            memcpy(held, track->held, sizeof held);
-            if (track->open) write_knot(i, held, track->held_entries);
-            foretell(track, held, state);
-        }
-        track->open = 1;
-    }
+    if (!track->lasted) knot_before(i, d->t, d->ux, d->uy, d->uspin);
+    note(i, state, entries);
     track->lasted++;
     memcpy(track->past, track->lasted > 1 ? track->held : state, sizeof track->past);
     memcpy(track->held, state, sizeof state);
-    memcpy(track->held_entries, entries, sizeof entries);
     memcpy(track->after, &d->vx, sizeof track->after);
     for (int n = 0; n < 3; n++) track->after_entries[n] = d->entries[n] + d->gain[n];
-}
-
-/* Write the latest state in lasting contact, which sleep ends. */
-void knot_held(int i) {
-    Track *track = W.tracks + i;
-    double state[6];
-    memcpy(state, track->held, sizeof state);
-    if (track->open) write_knot(i, state, track->held_entries);
-    track->lasted = 0;
 }
 
 /* End a track at its last knot. */
 void finish(int i, int reason) {
     Disk *d = W.disks + i;
-    let_go(i);
+    write_waiting(i);
     d->mode = GONE;
     d->reason = reason;
     d->due = INFINITY;

@@ -97,7 +97,7 @@ void fall_asleep(void) {
         double x = u[0] - s[3], y = u[1] - s[4];
         double entries[3] = {d->mass * (x * u[0] + y * u[1]),
                              0.5 * d->mass * (x * x + y * y) + 0.5 * d->inertia * s[5] * s[5], 0};
-        knot_held(i);
+        track->lasted = 0;
         book(d->entries, 0, W.moved[k], entries);
         d->ux = u[0];
         d->uy = u[1];

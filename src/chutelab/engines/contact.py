@@ -26,7 +26,7 @@ from chutelab.core import (
 )
 from chutelab.machine import Machine, Pieces, hand_over
 from chutelab.results.laws import take
-from chutelab.results.record import REASONS, Record
+from chutelab.results.record import REASONS, TOTAL, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress, unwatched
 
@@ -246,3 +246,5 @@ class Job:
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count
         recorder.gained = world.gained
+        rows = module.array("totals", dtype("Total"), world.total_count)
+        recorder.totals = rows.view(TOTAL).copy()

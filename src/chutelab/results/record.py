@@ -100,6 +100,16 @@ KNOT = np.dtype([
 """
 
 
+TOTAL = np.dtype([("t", "f8"), ("kinetic", "f8"), ("potential", "f8"), ("entries", "f8", 3)])
+"""What all released particles of a crowd have together as a step begins, in SI units.
+
+- ``t``: when, s.
+- ``kinetic``, ``potential``: rotation included; y = 0 is the zero, J. Of those that have ended at
+  their ends, of what lasts in contact halfway through its impulses, as the tracks are.
+- ``entries``: of the energy ledger, J, see `ENTRIES`.
+"""
+
+
 def balance(entries: NDArray[Any]) -> Floats:
     """Return the energy (J) that entries (..., 3) bring: belt work less both losses."""
     return np.asarray(entries[..., 0] - entries[..., 1] - entries[..., 2])
@@ -250,6 +260,9 @@ class Record(Shown):
         Energy (J) that the contact engine's solves made beyond what moving surfaces and the parting
         of overlaps give, summed over all steps: rounding of the energy turned over, or the solver
         is wrong (docs/physics.md, "The law of a solve"). 0 of other engines.
+    totals : ndarray, shape (S,) or (0,), dtype `TOTAL`
+        Energies of all particles together at each step of the contact engine in a crowd: its tracks
+        leave out what is less than a hop, and sums of squares of their velocities are not as near.
     """
 
     machine: Machine
@@ -265,9 +278,10 @@ class Record(Shown):
     angle: Floats = field(default_factory=lambda: np.zeros(0))
     instead: str = ""
     gained: float = 0.0
+    totals: NDArray[Any] = field(default_factory=lambda: np.empty(0, TOTAL))
 
     def __post_init__(self) -> None:
-        for name in ("knots", "offsets", "ended", "events", "by_surface", "angle"):
+        for name in ("knots", "offsets", "ended", "events", "by_surface", "angle", "totals"):
             getattr(self, name).flags.writeable = False
 
     @property
@@ -421,12 +435,13 @@ class Record(Shown):
     def energy_at(self, times: ArrayLike) -> dict[str, Floats]:
         """Return the energy ledger of all released particles up to each time.
 
-        A particle that has ended keeps its last state. Between two knots the entries follow from
-        what goes on there: the restitution loss changes in impacts only, at knots. While a particle
-        slips, the force and so the power of the belt is constant on a face, and the friction loss
-        is what the energy balance asks for, with the residuals of the two knots interpolated
-        linearly. While it is carried without slip, the belt work is. In flight nothing is booked,
-        and what the balance leaves over is the residual.
+        A particle that has ended keeps its last state. Between two knots the entries and the
+        residual go straight from the one to the other, and what the energy balance asks for besides
+        is booked on what goes on there: on the friction loss while a particle slips, where the
+        force and so the power of the belt is constant on a face; else on the belt work while it is
+        driven; else on the restitution loss, which changes between knots in lasting contacts of a
+        crowd only. In flight nothing is booked, and what the balance leaves over is the residual.
+        Where there are `totals` the sums are theirs at the steps, and the same holds between two.
 
         Parameters
         ----------
@@ -440,6 +455,14 @@ class Record(Shown):
             what the balance since each release leaves over. J.
         """
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        found = self._on_tracks(times)
+        if len(self.totals) > 1:
+            within = (times >= self.totals["t"][0]) & (times < self.totals["t"][-1])
+            found[:, within] = self._as_totals(times[within], found[:, within])
+        return dict(zip(("kinetic", "potential", *ENTRIES, "residual"), found, strict=True))
+
+    def _on_tracks(self, times: Floats) -> Floats:
+        """Return what `energy_at` does as the tracks have it, (6, T), J."""
         firsts, lasts = self.ends()
         at_release = np.zeros(self.count)
         particles = np.flatnonzero(self.released)
@@ -457,7 +480,45 @@ class Record(Shown):
             values = self._under_way(particle, left, share, at_release[particle])
             for total, value in zip(out, values, strict=True):
                 np.add.at(total, row, value)
-        return dict(zip(("kinetic", "potential", *ENTRIES, "residual"), out, strict=True))
+        return out
+
+    def _as_totals(self, times: Floats, found: Floats) -> Floats:
+        """Return what tracks have (6, T), J, with what they are off the totals of all steps.
+
+        That goes straight from just after one step to just before the next. What the balance then
+        asks for besides within a step is booked on what goes on there.
+        """
+        t, particles, firsts = self.totals["t"], np.flatnonzero(self.released), self.ends()[0]
+        order = np.argsort(firsts["t"], kind="stable")
+        begun, at_release = firsts["t"][order], np.stack(self.energies(firsts, particles))[:, order]
+        sums = np.concatenate([np.zeros((2, 1)), at_release.cumsum(axis=1)], axis=1)
+        before, after = (
+            sums[:, np.searchsorted(begun, t, side=side)] for side in ("left", "right")
+        )
+        told = np.stack(
+            [self.totals["kinetic"], self.totals["potential"], *self.totals["entries"].T]
+        )
+        residual = told[:2].sum(axis=0) - before.sum(axis=0) - balance(self.totals["entries"])
+        told = np.concatenate([told, residual[None]])
+
+        late = np.searchsorted(t, times, side="right") - 1
+        step, own = np.unique(np.clip(late, 0, len(t) - 2), return_inverse=True)
+        first = told[:, step] - self._on_tracks(t[step])
+        # What is released as a step begins is in its tracks, and not yet in its totals.
+        first[:2] += (after - before)[:, step]
+        last = told[:, step + 1] - self._on_tracks(np.nextafter(t[step + 1], -np.inf))
+        share = ((times - t[step][own]) / (t[step + 1] - t[step])[own]).clip(0.0, 1.0)
+        found = found + first[:, own] + share * (last - first)[:, own]
+
+        belt, restitution, friction = told[2:5, step + 1][:, own] != told[2:5, step][:, own]
+        goes_on = belt | restitution | friction
+        straight = residual[step][own] + share * (residual[step + 1] - residual[step])[own]
+        missing = np.where(goes_on, found[5] - straight, 0.0)
+        found[5] -= missing
+        found[4] -= np.where(friction, missing, 0.0)
+        found[2] += np.where(belt & ~friction, missing, 0.0)
+        found[3] -= np.where(~belt & ~friction, missing, 0.0)
+        return found
 
     def _under_way(
         self, particle: Ints, left: Ints, share: Floats, at_release: Floats
@@ -471,23 +532,20 @@ class Record(Shown):
         potential = body.mass * self.gravity * y
         gain = kinetic + potential - at_release
 
-        (belt_a, restitution_a, friction_a), (belt_b, restitution_b, friction_b) = (
-            knot["entries"].T for knot in (a, b)
-        )
+        entries_a, entries_b = a["entries"].T, b["entries"].T
         residual_a, residual_b = (
             sum(self.energies(knot, particle)) - at_release - balance(knot["entries"])
             for knot in (a, b)
         )
-        slips, driven = friction_a != friction_b, belt_a != belt_b
-        restitution = np.where(share < 1.0, restitution_a, restitution_b)
+        belt, restitution, friction = entries_a + share * (entries_b - entries_a)
         residual = residual_a + share * (residual_b - residual_a)
-        belt = np.where(
-            driven & ~slips,
-            gain + restitution + friction_a - residual,
-            belt_a + share * (belt_b - belt_a),
-        )
-        friction = np.where(slips, belt - restitution + residual - gain, friction_a)
-        residual = np.where(slips | driven, residual, gain - (belt - restitution - friction))
+        # What straight lines leave over belongs to what goes on.
+        missing = gain - (belt - restitution - friction) - residual
+        driven, struck, slips = entries_a != entries_b
+        friction -= np.where(slips, missing, 0.0)
+        belt += np.where(driven & ~slips, missing, 0.0)
+        restitution -= np.where(struck & ~slips & ~driven, missing, 0.0)
+        residual += np.where(slips | driven | struck, 0.0, missing)
         return kinetic, potential, belt, restitution, friction, residual
 
     def energies(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine, moved, origin
-from chutelab.results.record import EVENT, KNOT, REASONS, Kind, Record
+from chutelab.results.record import EVENT, KNOT, REASONS, TOTAL, Kind, Record
 from chutelab.util.arrays import Floats, Ints
 
 
@@ -73,6 +73,7 @@ class Recorder:
         self.ended = np.zeros(count, dtype=np.int8)
         self.contacts = 0
         self.gained = 0.0
+        self.totals = np.empty(0, TOTAL)
         self._knots: list[NDArray[Any]] = []
         self._owners: list[Ints] = []
         self._angles: list[Floats] = []
@@ -217,6 +218,12 @@ class Recorder:
             knots = knots.copy()
             for rows in (knots, events):
                 rows["position"] += self.origin
+            begun = knots["t"][offsets[:-1][sizes > 0]]
+            order = np.argsort(begun, kind="stable")
+            mass = np.broadcast_to(self.machine.particle.mass, count)[sizes > 0][order]
+            lifted = np.concatenate([[0.0], mass.cumsum()]) * self.machine.gravity * self.origin[1]
+            released = np.searchsorted(begun[order], self.totals["t"], side="left")
+            self.totals["potential"] += lifted[released]
         return Record(
             machine=self.machine,
             engine=engine,
@@ -229,6 +236,7 @@ class Recorder:
             contacts=self.contacts,
             angle=angle,
             gained=self.gained,
+            totals=self.totals,
         )
 
 

@@ -20,7 +20,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from chutelab.machine import build
-from chutelab.results.record import ENGINES, ENTRIES, EVENT, KNOT, REASONS, Kind, Record
+from chutelab.results.record import ENGINES, ENTRIES, EVENT, KNOT, REASONS, TOTAL, Kind, Record
 from chutelab.results.sensors import sensed
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
@@ -38,8 +38,12 @@ ARRAYS = {
     "events": EVENT,
     "by_surface": np.dtype("f8"),
     "angle": np.dtype("f8"),
+    "totals": TOTAL,
 }
-"""Arrays of a file and their types; `angle` is left out where it is empty."""
+"""Arrays of a file and their types."""
+
+MAYBE = ("angle", "totals")
+"""Those that are left out where they are empty."""
 
 HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 """Readers of an array's shape and type, by the version of its format."""
@@ -76,7 +80,9 @@ def save(recording: Record, path: str | Path) -> Path:
     path = Path(path)
     header = json.dumps(_about(recording))
     arrays = {
-        name: getattr(recording, name) for name in ARRAYS if name != "angle" or recording.angle.size
+        name: getattr(recording, name)
+        for name in ARRAYS
+        if name not in MAYBE or getattr(recording, name).size
     }
     with whole(path) as unfinished, unfinished.open("wb") as file:
         np.savez_compressed(file, about=np.array(header), **arrays)
@@ -183,7 +189,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     arrays: dict[str, Any] = {
         name: _array(archive, name, room)
         for name in ARRAYS
-        if name != "angle" or "angle.npy" in archive.namelist()
+        if name not in MAYBE or f"{name}.npy" in archive.namelist()
     }
     about.pop("seconds", None)  # earlier files tell how long the run took
     about.setdefault("gained", 0.0)  # ... and not this
@@ -194,13 +200,14 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         raise _UnfitError("the header is of another scene")
     numbers = {"by_surface": arrays["by_surface"], "angle": recording.angle}
     numbers["gained"] = np.asarray(recording.gained, dtype=float)
-    for name, dtype in (("knots", KNOT), ("events", EVENT)):
-        numbers |= {f"{name}.{key}": arrays[name][key] for key in dtype.names or ()}
+    for name in ("knots", "events", "totals"):
+        array = getattr(recording, name)
+        numbers |= {f"{name}.{key}": array[key] for key in array.dtype.names or ()}
     for name, values in numbers.items():
         if not np.all(np.abs(values) < FAR):
             raise _UnfitError(f"{name} has a number that is not finite, or beyond {FAR:g}")
     offsets, knots, events = recording.offsets, recording.knots, recording.events
-    if not (knots.ndim == events.ndim == offsets.ndim == 1):
+    if not (knots.ndim == events.ndim == offsets.ndim == recording.totals.ndim == 1):
         raise _UnfitError("an array has another number of dimensions")
     sizes, surfaces = np.diff(offsets), len(recording.surfaces)
     sound = (

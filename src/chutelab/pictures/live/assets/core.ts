@@ -191,14 +191,16 @@ class Core extends Memory {
     const events: Event[] = this.rows("events", "Event", this.get("event_count"));
     this.set("knot_count", 0);
     this.set("event_count", 0);
+    this.set("total_count", 0);
     return { knots, events };
   }
 
   /** How far those under way have come, as rows of knots; only between steps of a run whose
-   * particles meet. Of what lasts in contact it is the latest state with a balance that closes. A
-   * knot after a blow, which the core holds back while another may follow, comes before it. */
+   * particles meet. Of what lasts in contact it is the latest state with a balance that closes. The
+   * latest state that waits to become a knot comes before it, and of a blow that before it, too. */
   tips() {
     const { Disk, Track } = this.layout.structs, { Mode } = this.layout.enums;
+    const { WAITS } = this.layout.constants;
     const rows: number[] = [];
     const incline = this.get("ride_incline"), now = this.get("t");
     for (let i = 0; i < this.get("disk_count"); i += 1) {
@@ -208,15 +210,13 @@ class Core extends Memory {
         this.doubles.subarray(begin >> 3, (begin >> 3) + many);
       const mode = this.ints[(disk + Disk.fields.mode[0]) >> 2];
       if (mode === Mode.WAITING || mode === Mode.GONE) continue;
-      if (this.ints[(track + Track.fields.held_back[0]) >> 2]) {
-        rows.push(...some(track + Track.fields.knot[0], 6),
-          ...some(track + Track.fields.blow_entries[0], 3), i);
+      const waits = this.ints[(track + Track.fields.waits[0]) >> 2];
+      const wait = (n: number) => this.get("waits") + (i * WAITS + n) * 8 * KNOT_ROW;
+      for (let n = Math.max(0, waits - 2); n < waits; n += 1) {
+        const isLatest = this.doubles[wait(n) >> 3] === this.doubles[wait(waits - 1) >> 3];
+        if (isLatest) rows.push(...some(wait(n), 9), i);
       }
-      if (mode === Mode.FREE && this.ints[(track + Track.fields.lasted[0]) >> 2]) {
-        rows.push(...some(track + Track.fields.held[0], 6),
-          ...some(track + Track.fields.held_entries[0], 3), i);
-        continue;
-      }
+      if (mode === Mode.FREE && this.ints[(track + Track.fields.lasted[0]) >> 2]) continue;
       let state = ["t", "x", "y", "vx", "vy"].map(at);
       if (mode === Mode.RIDING) {
         const rho = at("ride_rho"), v = at("ride_speed");

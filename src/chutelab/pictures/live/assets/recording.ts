@@ -386,9 +386,9 @@ class Recording {
       event.disk === index && event.kind === SEPARATION && event.t <= t);
   }
 
-  /** The energy ledger of one particle; while it slips the balance gives the slip heat, while it is
-   * carried the belt's work, in flight what it leaves over is the residual. In a crowd particles
-   * give energy to each other, and the balance is that of all. */
+  /** The energy ledger of one particle; while it slips the balance gives the slip heat, else while it
+   * is driven the belt's work, else what lasting contacts take, and in flight what it leaves over is
+   * the residual. In a crowd particles give energy to each other, and the balance is that of all. */
   ledgerOf(index: number, t: number): Ledger | null {
     const track = this.tracks[index];
     const state = track.state(t);
@@ -407,13 +407,15 @@ class Recording {
     let [belt, restitution, friction] = track.entries(t);
     const residualAt = (k: number) => energy(track.stateOf(k, false)) - start
       - (track.at(k, BELT) - track.at(k, RESTITUTION) - track.at(k, FRICTION));
-    let residual = residualAt(i);
-    if (!machine.interact) restitution = track.at(i, RESTITUTION);
-    const changes = (column: number) =>
-      !machine.interact && track.at(i, column) !== track.at(j, column);
-    if (changes(FRICTION)) friction = belt - restitution + residual - gain;
-    else if (changes(BELT)) belt = gain + restitution + friction - residual;
-    else residual = gain - (belt - restitution - friction);
+    const h = track.at(j, T) - track.at(i, T), s = h > 0 ? (t - track.at(i, T)) / h : 0;
+    let residual = residualAt(i) + Math.min(s, 1) * (residualAt(j) - residualAt(i));
+    // What straight lines leave over belongs to what goes on.
+    const missing = gain - (belt - restitution - friction) - residual;
+    const changes = (column: number) => track.at(i, column) !== track.at(j, column);
+    if (changes(FRICTION)) friction -= missing;
+    else if (changes(BELT)) belt += missing;
+    else if (changes(RESTITUTION)) restitution -= missing;
+    else residual += missing;
     return {
       start, kinetic: kinetic(state), potential: potential(state), belt_work: belt,
       restitution_loss: restitution, friction_loss: friction, residual,

@@ -430,7 +430,10 @@ def _struck(e: Evidence, events: NDArray[Any]) -> tuple[Ints, Floats, Ints]:
     struck, away = np.zeros(len(events), dtype=int), np.zeros((len(events), 2))
     near = e.bounds.rounding + e.bounds.arcs + e.bounds.late
     for n, piece in enumerate(e.pieces):
-        out = piece.away(events["position"])
+        out, face = piece.away(events["position"]), piece.normal(events["position"])
+        # Beside a face the way is along its normal; of small disks a place tells it roughly.
+        high = (out * face).sum(axis=1)[:, None] * face
+        out = np.where((np.hypot(*(out - high).T) <= e.bounds.rounding)[:, None], high, out)
         off = np.abs(np.hypot(*out.T) - e.radii[events["particle"]])
         off[~piece.there(events["t"], e.dt or 0.0)] = inf
         touched += off <= near

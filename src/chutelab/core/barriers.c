@@ -264,8 +264,10 @@ PAIRED static void measure(const Curve *c, double begin, double size) {
     double deep[2], x[2] = { c->p[0][0], c->p[3][0] }, y[2] = { c->p[0][1], c->p[3][1] };
     for (int n = 0; n < 2; n++) deep[n] = At.radius - distance(b, x[n], y[n]);
     int at = deep[1] > deep[0];
-    int passes = (beside(b, x[0], y[0]) > 0) != (beside(b, x[1], y[1]) > 0)
-        && is_within(b, 0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]), side_margin());
+    double off = beside(b, x[0], y[0]), beyond = beside(b, x[1], y[1]);
+    double share = off / (off - beyond); /* of the way, to where it meets the line or the circle */
+    int passes = (off > 0) != (beyond > 0)
+        && is_within(b, x[0] + share * (x[1] - x[0]), y[0] + share * (y[1] - y[0]), side_margin());
     const double *knot = KNOT(At.knot);
     double t = knot[0] + (begin + size * at) * (knot[L.row] - knot[0]);
     if (!(passes || deep[at] > L.allowed) || !is_there(b, t) || t < b->appears + L.dt) return;

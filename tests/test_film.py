@@ -61,10 +61,10 @@ def test_the_track_is_made_as_the_explanation_says(lesson, film):
     said = sheet(lesson, "student")
     assert "made, not filmed" in said
     # The marks that the worksheet gives: the tops, and the lowest marks beside the bounces.
-    times, tops = (
-        [float(cell) for cell in re.findall(r"\d\.\d+|(?<=\| )0(?= \|)", row)]
-        for row in re.findall(r"^\| \$[ty]\$.*$", said, re.MULTILINE)
+    rows = re.findall(
+        r"^\| (?:release|top|\d\w\w bounce) \| (\S+) \| (\S*) ?\|$", said, re.MULTILINE
     )
+    times, tops = [float(t) for t, _ in rows], [float(y) for _, y in rows if y]
     y = marks[:, 1]
     lows = [i for i in range(1, len(y) - 1) if y[i] < min(y[i - 1], y[i + 1])]
     highs = [i for i in range(1, len(y) - 1) if y[i - 1] < y[i] >= y[i + 1] and y[i] > 0.2]

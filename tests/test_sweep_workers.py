@@ -68,7 +68,7 @@ def test_a_process_that_dies_costs_time_only(tmp_path):
 
 
 def test_processes_that_keep_dying_are_given_up():
-    with pytest.raises(LostWorkersError, match="keep dying"), crew(1) as team:
+    with pytest.raises(LostWorkersError, match="keep dying"), crew(2) as team:
         list(team.results(fatal, [(0, 0)]))
 
 

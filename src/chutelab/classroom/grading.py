@@ -293,7 +293,7 @@ def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
 def _copied(row: Grade, before: Sequence[Grade]) -> Iterator[str]:
     """Say which wrong answers are right for another student's numbers, or the other way round.
 
-    With each goes how likely it is that this happens to one who copied from nobody: that wrong
+    With each goes how likely it is that this happens without copying: that wrong
     answers of the one are right for the numbers of any of the others.
     """
     others = [one for one in before if one.lesson == row.lesson]
@@ -322,7 +322,7 @@ LIKELY: Final = 0.05
 """Chance from which on an answer that is right for another may well be a coincidence."""
 
 DRAWS: Final = 300
-"""Draws of numbers that tell how often an answer is right for somebody."""
+"""Draws of numbers that tell how often an answer is right for another student."""
 
 
 @cache

@@ -379,7 +379,7 @@ def grade(
     a result file can be written so that it does not tell.
 
     An answer that is wrong, but right for another student's numbers, is told, with how likely that
-    is if nobody copied.
+    is without copying.
 
     Ctrl-C, or a crash, keeps the marks so far, in FILE.part.
 

@@ -137,9 +137,10 @@ def _plain(machine: Machine) -> Machine:
         raise UnableError("it integrates one particle")
     kind = int(machine.releases.kind[0])
     parts, wheel = machine.segments, machine.pulley
+    bent = any(len(part.surface) for part in machine.parts[1:])
     for there, what in (
         (machine.outlines[kind] is not None or machine.threads, "disks without strings"),
-        (len(machine.arcs.surface), "straight surfaces, and the drive pulley"),
+        (bent, "straight surfaces, and the drive pulley"),
         (np.isfinite([parts.appears, parts.vanishes]).any(), "surfaces that are always there"),
         (machine.rolling[kind] > 0.0, "disks without rolling friction"),
     ):

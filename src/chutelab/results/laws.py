@@ -119,7 +119,7 @@ def judge(recording: Record) -> tuple[Broken, ...]:
     if not len(found.breaches):
         return ()
     machine = recording.machine
-    pulley = machine.segments.length.shape[-1] + machine.arcs.radius.shape[-1]
+    pulley = sum(part.surface.shape[-1] for part in machine.parts)
     told = []
     for row in found.breaches.tolist():
         t, x, y, amount, bound, which, particles, particle, surface, piece, _ = row

@@ -31,6 +31,8 @@
 /* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
    press harder by as much in each, without end. */
 #define CRAWLS 0.5
+/* Share of its bound up to which friction is not all used: it holds. */
+#define HOLDS 0.999
 
 /* Give a contact the normal impulse that keeps its gap closed; return by how much it changed, m/s. */
 static double press(Contact *c) {
@@ -215,8 +217,8 @@ static double sweep(Contact *list, int count, int sweeps, int plain, double accu
 static int drives(const Contact *c) { return c->j < 0 && c->other[1] != 0; }
 
 /* Stall the drives, for this step, of disks that do not turn and that block them: contacts that change by
-   `least`, m/s, or more, and those that grip without bound and slip by more than `enough` all the same. Return
-   whether there is one. */
+   `least`, m/s, or more, and rough ones that slip by more than `enough` though their friction is not all used.
+   Return whether there is one. */
 static int stall(Contact *list, int count, double least, double enough) {
     int stalled = 0;
     for (int n = 0; n < count; n++) {
@@ -224,7 +226,8 @@ static int stall(Contact *list, int count, double least, double enough) {
         double v[3];
         if (W.disks[c->i].inertia > 0 || !drives(c)) continue;
         relative(c, 0, v);
-        int slips = c->friction > ROUGH && c->impulse[0] > 0 && fabs(v[1] + c->drift) > enough;
+        int holds = c->impulse[0] > 0 && fabs(c->impulse[1]) < HOLDS * c->friction * c->impulse[0];
+        int slips = c->friction > ROUGH && holds && fabs(v[1] + c->drift) > enough;
         if (!slips && c->change < least) continue;
         c->other[1] = c->other[2] = 0;
         stalled = 1;

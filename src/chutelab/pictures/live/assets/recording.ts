@@ -386,10 +386,10 @@ class Recording {
       event.disk === index && event.kind === SEPARATION && event.t <= t);
   }
 
-  /** The energy ledger of one particle; while it slips the balance gives the slip heat, else while
-   * it is driven the belt's work, else what lasting contacts take, and in flight what it leaves over
-   * is the residual. In a crowd particles give energy to each other, and the balance is that of
-   * all. */
+  /** The energy ledger of one particle; while it slips the balance gives the slip heat, else, while
+   * it is driven, the belt's work, else what lasting contacts take, and in flight what it leaves
+   * over is the residual. In a crowd particles give energy to each other, and the balance is that
+   * of all. */
   ledgerOf(index: number, t: number): Ledger | null {
     const track = this.tracks[index];
     const state = track.state(t);

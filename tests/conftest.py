@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import shutil
 import signal
 import subprocess
@@ -24,11 +25,23 @@ settings.register_profile("chutelab", derandomize=True, deadline=None)
 settings.load_profile("chutelab")
 
 
+# Modules and tests stay: no garbage is looked for among them.
+gc.disable()
+
+
 def pytest_collection_finish(session):
     """Leave all modules and tests out of garbage collections: benchmarks ask for many."""
     del session
     gc.collect()
     gc.freeze()
+    gc.enable()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Keep neighbours in one process: what tests of a module share is made once, not in each."""
+    scheduler = importlib.import_module("xdist.scheduler")
+    return scheduler.WorkStealingScheduling(config, log) if config.option.dist == "load" else None
 
 
 # Cells of notebooks, not modules.

@@ -6,10 +6,10 @@ from html.parser import HTMLParser
 import pytest
 from click.testing import CliRunner
 
-from chutelab.classroom.lessons import shipped_lessons
+from chutelab.classroom import lessons as room
 from chutelab.cli import main
 
-lessons = cache(shipped_lessons)
+lessons, find = cache(room.shipped_lessons), cache(room.find)
 
 
 def seeds(few, many):

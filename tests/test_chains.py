@@ -91,8 +91,8 @@ def apart(one, other, times):
     return np.nan_to_num(np.hypot(*off.T))
 
 
-def disagreements(machine, followed, finish):
-    """Return how far contact is from exact at finer and finer steps, m, up to a time; [] if sound.
+def disagreements(machine, followed, finish, run=contact.run):
+    """Return how far a run is from exact at finer and finer steps, m, up to a time; [] if sound.
 
     It falls below `NEAR`, or by the first order at least: to an eighth and a hundredth of the
     radius, or by as much as the step. As blows that a step takes for rest come one by one, that may
@@ -100,7 +100,7 @@ def disagreements(machine, followed, finish):
     """
     times, errors, finer = np.linspace(0.0, finish, PLACES), [], 1
     while True:
-        stepped = contact.run(replace(machine, dt=machine.dt / finer))
+        stepped = run(replace(machine, dt=machine.dt / finer))
         errors.append(float(apart(followed, stepped, times).max()))
         least = min(errors[0] / 8.0, 0.01 * machine.particle.radius)
         if errors[-1] <= max(NEAR, least, 2.0 * errors[0] / finer if finer > 1 else 0.0):

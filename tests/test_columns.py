@@ -30,11 +30,19 @@ def test_a_column_makes_no_energy(seed):
 
 
 @pytest.mark.parametrize(
-    ("seed", "count"), [(8, 120), pytest.param(9, 150, marks=pytest.mark.slow)]
+    ("seed", "count", "until"),
+    [
+        (8, 120, None),
+        pytest.param(9, 150, None, marks=pytest.mark.slow),
+        # Belts press some 300 disks on a floor, wedged as they are.
+        pytest.param(1, 1379, 1.25, marks=pytest.mark.slow),
+    ],
 )
-def test_what_jams_is_not_pressed_into_each_other(seed, count):
+def test_what_jams_is_not_pressed_into_each_other(seed, count, until):
     """By 5 % of the lesser radius, the promise of the engine, at most."""
-    found = run(build(from_dict(column(seed, count))))
+    scene = column(seed, count)
+    scene["run"]["until"] = until or scene["run"]["until"]
+    found = run(build(from_dict(scene)))
     i, j = np.triu_indices(count, 1)
     radii, deepest = np.broadcast_to(found.machine.particle.radius, count), 0.0
     for places in found.at(np.linspace(0.0, found.knots["t"].max(), 60))[0]:
@@ -44,7 +52,8 @@ def test_what_jams_is_not_pressed_into_each_other(seed, count):
     assert laws.judge(found) == ()
 
 
-# A jam presses the lowest disk of column 1 into the floor, and makes energy; the run says so.
+# Up to 1.35 s column 1 keeps the laws, see above. Its whole run of 4.2 s takes more than 400 s of
+# processor time, and whether it keeps them to the end is not known: blows stall its steps.
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "seed",

@@ -1,13 +1,14 @@
 """Discharge methods: each against the balance of forces, written here, and against the engines."""
 
 import json
-from math import cos, pi, radians, sin, sqrt
+from math import cos, inf, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import chutelab
+from chutelab.classroom.lessons import find
 from chutelab.cli import main
 from chutelab.studies.discharge import side_by_side
 from chutelab.theory.discharge import DischargeError, bed_area, discharge, left, loading
@@ -198,3 +199,31 @@ def test_command(tmp_path):
     wrong = run("slip", "--heights", "low")
     assert wrong.exit_code == 2
     assert "--heights" in wrong.stderr
+
+
+def test_the_numbers_that_lesson_12_gives_are_those_of_the_methods():
+    """In mm, 0.3 m below the axis; of Golka, which has no middle, that of its two edges."""
+    lesson = find(12)
+    given = [
+        {c.head: list(c.given) for c in step.columns if c.given}
+        for step in lesson.steps
+        if step.kind == "note"
+    ]
+
+    def across(method, *edges, v=1.2, r=0.315, mu=inf):
+        found = discharge(method, speed=v, radius=r, depth=0.06, friction=mu)
+        return round(1000 * float(np.mean([getattr(found, e).across(-0.3) for e in edges])))
+
+    # Alone, its centre is on a circle of 0.32 m.
+    alone = [across("booth", "lower", r=0.32, mu=mu) for mu in (inf, 0.8, 0.6, 0.4)]
+    held = {
+        "mass point": [across("point", "centre", v=v) for v in (1.2, 1.0)],
+        "CEMA": [across("cema", "centre", v=v) for v in (1.2, 1.0)],
+        "Golka": [across("golka", "lower", "upper", v=v) for v in (1.2, 1.0)],
+    }
+    slips = [across("booth", "centre", mu=mu) for mu in (0.8, 0.6, 0.4)]
+    assert given == [{"Booth": alone}, held, {"Booth": slips}]
+    for language in ("en", "de"):
+        (told,) = [one.then for one in find(12, language).steps if one.kind == "explain"]
+        for number in (held["mass point"][0], held["CEMA"][0], held["Golka"][0], slips[1]):
+            assert f"| {number} |" in told

@@ -15,6 +15,9 @@ import pytest
 from chutelab.results import EVENT, KNOT
 
 ROOT = Path(__file__).resolve().parent.parent
+GALLERY = "perpendicular"
+"""The scene that the gallery begins with."""
+
 NEEDED = ("furo", "latex2mathml", "myst_parser", "numpydoc", "sphinx")
 
 pytestmark = pytest.mark.slow
@@ -166,6 +169,38 @@ def test_a_scene_of_the_gallery_runs_in_its_page(site, opened):
     assert {frame.url for frame in page.frames[1:]} == {"about:blank"}
     play.locator("summary").click()
     play.locator("iframe").content_frame.locator("canvas").first.wait_for()
+
+
+def test_pictures_of_the_gallery_move_on_hover_and_focus_but_not_against_a_readers_will(
+    site, opened
+):
+    films = sorted(path.stem for path in (site / "films").glob("*.gif"))
+    assert films == sorted(path.stem for path in (ROOT / "scenes").glob("*.toml"))
+    assert max(path.stat().st_size for path in (site / "films").glob("*.gif")) < 500_000
+    shown = "document.querySelector('section section img').src.split('/').at(-1)"
+    for motion in ("no-preference", "reduce"):
+        page = opened(site / "docs" / "gallery.html", reduced_motion=motion)
+        moves, still = f"{GALLERY}.gif", f"{GALLERY}.png"
+        picture, link = page.locator("section section img").first, page.locator("a.film").first
+        assert page.evaluate(shown) == still
+        box = picture.bounding_box()
+        picture.hover()
+        assert page.evaluate(shown) == (still if motion == "reduce" else moves)
+        assert picture.bounding_box()["height"] == pytest.approx(box["height"], abs=1.0)
+        page.mouse.move(0, 0)
+        assert page.evaluate(shown) == still
+        # Who presses wants it to move.
+        link.click()
+        assert (page.evaluate(shown), link.inner_text()) == (moves, "Stop the film")
+        link.click()
+        assert (page.evaluate(shown), link.inner_text()) == (still, "Play the film")
+        page.evaluate("document.activeElement.blur()")
+        while not link.evaluate("(one) => one === document.activeElement"):
+            page.keyboard.press("Tab")
+        assert page.evaluate(shown) == (still if motion == "reduce" else moves)
+        page.keyboard.press("Tab")
+        assert page.evaluate(shown) == still
+        page.context.close()
 
 
 def test_the_search_finds_without_a_server(site, opened):

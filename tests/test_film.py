@@ -6,11 +6,12 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from chutelab.classroom.lessons import find, scene_of
+from chutelab.classroom.lessons import scene_of
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.classroom.lessons.texts import without_tex
 from chutelab.engines.simulation import simulate
 from chutelab.studies import measured
+from shared import find
 
 TRUTH = {"surface.table.restitution": 0.8, "gravity": 9.81}
 KEYS = ["gravity", "surface.table.restitution", "t0"]

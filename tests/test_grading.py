@@ -113,10 +113,10 @@ def test_every_solved_notebook_earns_full_marks(name, tmp_path):
     ]
 
 
-def test_what_is_written_in_words_is_collected(tmp_path):
-    given = lesson("the-bounce", "Ada").given
-    checked = f"task.check(1, {given.e * given.v0})"
-    path = saved(tmp_path, "words.ipynb", OPEN.format("Ada"), checked)
+def test_what_is_written_in_words_is_collected(tmp_path, monkeypatch):
+    report = [one(student="Ada", answers={"1": -first_of("Ada")})]
+    monkeypatch.setattr(grading, "run", lambda *_: Ran(report, ""))
+    path = saved(tmp_path, "words.ipynb")
     found = json.loads(path.read_text(encoding="utf-8"))
     (cell,) = [one for one in shipped("the-bounce")["cells"] if one["id"] == "explanation"]
     for added, words in (([], {}), (["\nIt only ", "pushes."], {"explain": "It only pushes."})):
@@ -128,9 +128,14 @@ def test_what_is_written_in_words_is_collected(tmp_path):
 
 
 def first_of(student):
-    """A cell with the right answer to question 1 of lesson 3."""
+    """The right answer to question 1 of lesson 3."""
     given = lesson("the-bounce", student).given
-    return f"task.check(1, {-given.e * given.v0})"
+    return -given.e * given.v0
+
+
+def checked(student):
+    """A cell in which it is checked."""
+    return f"task.check(1, {first_of(student)})"
 
 
 def gone(pid):
@@ -163,7 +168,7 @@ def test_a_class_is_graded_whatever_comes_back(tmp_path, in_own_tmp):
             tmp_path, "broken.ipynb", OPEN.format("Bo").replace("task =", "mine ="), None, 5,
             [1, "x"], "x = '\ud800'", "import nothing_like_that", "this is no Python",
             "%matplotlib inline", "exit()", "import asyncio\nawait asyncio.sleep(0)",
-            f"mine.check(2, 1.0)\n{first_of('Bo')}".replace("task", "mine"),
+            f"mine.check(2, 1.0)\n{checked('Bo')}".replace("task", "mine"),
             "mine.reveal(2)\nmine.check(2, 'one')", "input('and now?')",
         ),
         # Printed praise and a bent check earn nothing.
@@ -176,7 +181,7 @@ def test_a_class_is_graded_whatever_comes_back(tmp_path, in_own_tmp):
             "task.progress = lambda: '4 of 4 done'\n"
             "print('{\"marks\": [1, 1, 1, 1]}')",
         ),
-        saved(tmp_path, "twin.ipynb", OPEN.format(" bo "), first_of("bo")),
+        saved(tmp_path, "twin.ipynb", OPEN.format(" bo "), checked("bo")),
         saved(tmp_path, "unnamed.ipynb", OPEN.format("your name"), "import os; os._exit(1)"),
         saved(tmp_path, "empty.ipynb", "1 + 1"),
         tmp_path / "not-there.ipynb",
@@ -215,12 +220,13 @@ def test_a_class_is_graded_whatever_comes_back(tmp_path, in_own_tmp):
         assert (rows[name].marks, rows[name].out_of) == ((), 0)
 
 
-def test_the_table_marks_working_that_was_shown_and_others_right_answers(tmp_path):
-    cells = [OPEN.format("Ada"), first_of("Ada"), "task.reveal(2)"]
-    saved(tmp_path, "ada.ipynb", *cells)
-    saved(tmp_path, "ben.ipynb", OPEN.format("Ben"), first_of("Ada"))
-    saved(tmp_path, "cora.ipynb", OPEN.format("Cora"), first_of("Dan"))
-    saved(tmp_path, "dan.ipynb", OPEN.format("Dan"), first_of("Dan"))
+def test_the_table_marks_working_that_was_shown_and_others_right_answers(tmp_path, monkeypatch):
+    monkeypatch.setattr(grading, "run", lambda cells, _: Ran(json.loads(cells[0]), ""))
+    for student, whose, revealed in (
+        ("Ada", "Ada", [2]), ("Ben", "Ada", []), ("Cora", "Dan", []), ("Dan", "Dan", []),
+    ):  # fmt: skip
+        report = one(student=student, answers={"1": first_of(whose)}, revealed=revealed)
+        saved(tmp_path, f"{student.lower()}.ipynb", json.dumps([report]))
     reasons = [row.reason for row in grade(sorted(tmp_path.glob("*.ipynb")))]
     assert [reason.partition(" (by chance: ")[0] for reason in reasons] == [
         "",
@@ -235,7 +241,7 @@ def test_the_table_marks_working_that_was_shown_and_others_right_answers(tmp_pat
 
 def test_what_hangs_and_prints_is_stopped_and_marked_for_what_it_had(tmp_path, in_own_tmp):
     flood = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
-    flood += f"{first_of('Di')}\nwhile True: print('x' * 1_000_000)"
+    flood += f"{checked('Di')}\nwhile True: print('x' * 1_000_000)"
     hung = saved(tmp_path, "hung.ipynb", OPEN.format("Di"), flood, "1 / 0")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     [row] = grade([hung], time_limit=2.0)
@@ -262,7 +268,7 @@ def test_a_notebook_ends_with_all_it_started_whatever_it_does_to_its_parent(
         f"os.kill(os.getppid(), signal.{sent})\n"
         "import time; time.sleep(0.5)"
     )
-    bad = saved(tmp_path, "bad.ipynb", OPEN.format("Ed"), first_of("Ed"), start)
+    bad = saved(tmp_path, "bad.ipynb", OPEN.format("Ed"), checked("Ed"), start)
     [row] = grade([bad], time_limit=20.0)
     assert (row.marks, row.reason) == ((1, 0, 0, 0), remark)
     assert gone(int(pids.read_text()))
@@ -293,7 +299,7 @@ def test_a_notebook_ends_with_all_it_started_whatever_it_does_to_its_parent(
     ],
 )
 def test_what_takes_too_much_is_stopped(tmp_path, in_own_tmp, cell, remark):
-    bad = saved(tmp_path, "bad.ipynb", OPEN.format("Gus"), first_of("Gus"), cell)
+    bad = saved(tmp_path, "bad.ipynb", OPEN.format("Gus"), checked("Gus"), cell)
     [row] = grade([bad], time_limit=10.0)
     assert (row.marks, row.reason) == ((1, 0, 0, 0), remark)
 
@@ -438,7 +444,7 @@ def test_whatever_ends_the_grading_keeps_the_marks_so_far(tmp_path, in_own_tmp, 
         f"open({str(pids)!r}, 'w').write(f'{{os.getpid()}} {{os.getppid()}} {{child.pid}}\\n')\n"
         "while True: pass"
     )
-    saved(tmp_path, "1.ipynb", OPEN.format("Kim"), first_of("Kim"))
+    saved(tmp_path, "1.ipynb", OPEN.format("Kim"), checked("Kim"))
     saved(tmp_path, "2.ipynb", OPEN.format("Lee"), hangs)
     with subprocess.Popen(
         [sys.executable, "-m", "chutelab", "lesson", "grade", ".", "--out", "class.csv"],

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from chutelab.classroom.lessons import find, scene_of
+from chutelab.classroom.lessons import scene_of
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.classroom.lessons.texts import without_tex
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind, Recording
 from chutelab.scene import from_dict
+from shared import find
 
 SEEDS = range(10)
 

@@ -128,8 +128,8 @@ OWN = {"core.h": "contact", "exact.h": "exact", "laws.h": "laws", "plan.h": "mac
 }
 """Headers of the core, by what they belong to."""
 
-SHARED = {"layout.h", "memory.h", "trig.h"}
-"""Structs, where arrays lie, sine and cosine: no mechanics."""
+SHARED = {"layout.h", "loads.h", "memory.h", "trig.h"}
+"""Structs, sums of impulses, where arrays lie, sine and cosine: no mechanics."""
 
 
 def test_engines_judge_and_builder_in_the_core_share_no_formula():

@@ -80,9 +80,10 @@ class Rider:
             return "leaves", place, v, rim
         names = [n for n in events if not begun.get(n)]
         watched = [crossing(events[n], -slip if n == "holds" and slip else 0.0) for n in names]
+        # Events are found on polynomials of order 7 between steps, which no tolerance bounds.
         run = solve_ivp(
             rate, (0.0, 60.0), start, events=watched, method="DOP853", rtol=1e-13, atol=1e-14,
-            max_step=0.02,
+            max_step=0.005,
         )  # fmt: skip
         for name, states in zip(names, run.y_events, strict=True):
             if len(states):

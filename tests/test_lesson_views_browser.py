@@ -5,10 +5,9 @@ Each view is also a picture in the test's own folder: `pytest --basetemp=DIR` ke
 
 import pytest
 
-from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.pages import live_page
 from live.browser import DONE
-from shared import lessons
+from shared import find, lessons
 
 DESK, WALL, PHONE = (1366, 768), (1920, 1080), (390, 844)
 

@@ -41,6 +41,37 @@ def world(page, x, y):
     )
 
 
+def test_on_a_phone_buttons_beside_a_value_step_it_within_its_range(shown):
+    phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+    page = shown("inclined-40", ["plate.restitution=0.985"], **phone)
+    page.evaluate("chutelab.bench.inspector.choose('plate')")
+
+    def tap(key, way):
+        name = f"{key}: {way}"
+        page.locator("#chosen").get_by_role("button", name=name, exact=True).tap()
+
+    tap("angle α", "more")
+    assert value(page, "plate.angle_deg") == 41.0
+    for _ in range(2):
+        tap("angle α", "less")
+    assert value(page, "plate.angle_deg") == 39.0
+    tap("distance", "less")
+    assert 0.0 < value(page, "plate.distance") < 0.05
+    # To the next round value, and no further than the last one that is allowed.
+    for wanted in (0.99, 1.0, 1.0):
+        tap("restitution ε", "more")
+        assert value(page, "plate.restitution") == pytest.approx(wanted, abs=0.006)
+    assert value(page, "plate.restitution") == 1.0
+    assert page.locator("#fault").is_hidden()
+    page.click("#undo")
+    assert value(page, "plate.restitution") < 1.0
+    # On a desk a slider does that.
+    page = shown("inclined-40", viewport={"width": 1366, "height": 768})
+    page.evaluate("chutelab.bench.inspector.choose('plate')")
+    assert page.locator("#chosen .step:visible").count() == 0
+    assert page.locator("#chosen input[type=range]:visible").count() == 3
+
+
 def test_numbers_are_typed_and_a_wrong_one_says_why(shown):
     page = shown(language="de")
     angle = field(page, "Prallplatte: Winkel")
@@ -146,6 +177,7 @@ def test_a_tool_stays_and_what_it_drew_is_chosen_moved_copied_and_deleted(shown)
     assert len(value(page, "surface")) == 5
     page.click("#undo")
     assert len(value(page, "surface")) == 7
+    page.click("#menu > summary")
     page.click("#reset")
     assert value(page, "surface") is None
 
@@ -347,6 +379,7 @@ def test_the_address_holds_the_scene_and_one_that_does_not_is_said(shown):
 
 
 def saved(page, name):
+    page.evaluate("document.getElementById('share').open = true")
     with page.expect_download() as waiting:
         page.get_by_role("button", name=name, exact=True).click()
     return waiting.value.suggested_filename, waiting.value.path().read_bytes()

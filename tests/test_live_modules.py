@@ -53,6 +53,6 @@ def test_every_colour_that_a_style_names_is_set():
         page = html(load("perpendicular"), lesson=lesson)
         style = re.search("<style>(.*)</style>", page, re.DOTALL)[1]
         used = set(re.findall(r"var\(--([\w-]+)\)", style))
-        # The share of the time that is computed is set by the page.
-        assert used - {"ready"} <= set(re.findall(r"--([\w-]+):", style))
+        # Shares of sliders and of the time that is computed are set by the page.
+        assert used - {"ready", "at"} <= set(re.findall(r"--([\w-]+):", style))
         assert len(used) > 30

@@ -1,5 +1,6 @@
 """What the live page's panels and tools work out, against formulas and Python's own recordings."""
 
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import sandbox
 from chutelab.engines.contact import run
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
+from chutelab.pictures.live.page import _packed
 from chutelab.results import Kind
 from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
@@ -226,3 +228,14 @@ def test_the_stop_watch_counts_simulated_time_back_too():
     first, second = ask(watches=[acts, [*acts, ["reset", 9.0]]])["watches"]
     assert first == {"reading": 0.5, "laps": [0.5, 0.75]}
     assert second == {"reading": 0, "laps": []}
+
+
+def test_what_is_packed_as_text_is_read_as_it_was_at_every_length():
+    contents = [np.random.default_rng(n).bytes(n) for n in range(60)]
+    texts = [_packed(content) for content in contents]
+    compressed = [zlib.compress(content, 9) for content in contents]
+    assert ask(packed=texts)["packed"] == [list(content) for content in compressed]
+    # Letters that stand for themselves in a script's JSON; 13 bits in two, at most 6 in a last one.
+    assert {*"".join(texts)} <= {chr(code) for code in range(33, 127)} - set('"<\\')
+    for text, content in zip(texts, compressed, strict=True):
+        assert 0 <= 6.5 * len(text) - 8 * len(content) < 7

@@ -53,6 +53,7 @@ def same_bits(page, folder, until=1.5):
     assert page.evaluate("chutelab.lab.fault && chutelab.lab.fault.message") is None
     assert page.evaluate(WHOLE) == "done"
     with page.expect_download() as waiting:
+        page.evaluate("document.getElementById('share').open = true")
         page.get_by_role("button", name="Save as scene").click()
     file = folder / "saved.toml"
     file.write_bytes(waiting.value.path().read_bytes())
@@ -81,7 +82,7 @@ def test_every_part_is_a_row_whose_keys_are_those_of_its_table():
     assert len({part["letter"] for part in PARTS}) == len(PARTS)
     # Every table that places something has its part.
     assert {part["table"] for part in PARTS} == {
-        "conveyor", "incoming", "plate", "surface", "stream"
+        "conveyor", "incoming", "plate", "surface", "stream", "sensor"
     }  # fmt: skip
 
 
@@ -234,6 +235,71 @@ def test_parts_and_the_card_of_what_is_chosen_take_turns_and_what_is_on_looks_so
     under = page.evaluate(ground)
     page.mouse.move(600, 300)
     assert under == page.evaluate(ground) == "rgb(0, 100, 157)"
+
+
+def test_the_menu_has_a_new_machine_the_scene_as_it_was_and_light_and_dark(shown):
+    page = shown("inclined-40", viewport={"width": 1366, "height": 768})
+    ground = "getComputedStyle(document.body).backgroundColor"
+    light, dark = "rgb(243, 246, 248)", "rgb(14, 20, 26)"
+    menu = page.locator("#menu > summary")
+    menu.focus()
+    page.keyboard.press("Enter")
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        system = {"light": light, "dark": dark}[scheme]
+        for choice, colour in (("light", light), ("dark", dark), ("system", system)):
+            page.click(f"#theme-{choice}")
+            assert page.evaluate(ground) == colour
+            assert page.get_attribute(f"#theme-{choice}", "aria-pressed") == "true"
+            # Particles and what is drawn on the canvas have the theme's colours, too.
+            assert page.evaluate("chutelab.stage.colour('stage')") == {
+                light: "#f3f6f8", dark: "#0e141a"}[colour]  # fmt: skip
+        assert axe(page) == []
+    page.click("#theme-light")
+    page.reload()
+    page.evaluate(DONE)
+    assert page.evaluate(ground) == light
+    assert page.locator("#menu[open]").count() == 0
+    page.evaluate("chutelab.lab.change({ 'plate.angle_deg': 33 })")
+    menu.click()
+    page.click("#reset")
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 40.0
+    assert page.locator("#menu[open]").count() == 0
+    menu.click()
+    page.click("#new-machine")
+    assert page.evaluate("chutelab.lab.machine.surfaces") == []
+    page.click("#undo")
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 40.0
+    # Escape closes it and leaves the focus where it was opened.
+    menu.click()
+    page.keyboard.press("Tab")
+    page.keyboard.press("Escape")
+    assert page.locator("#menu[open]").count() == 0
+    assert page.evaluate("document.activeElement.parentElement.id") == "menu"
+
+
+def test_a_link_and_html_to_embed_open_the_machine_as_it_is(shown, opened, tmp_path):
+    page = shown("inclined-40", viewport={"width": 1366, "height": 768}, language="de")
+    page.evaluate("""() => {
+      globalThis.texts = [];
+      const value = { writeText: (text) => texts.push(text) };
+      Object.defineProperty(navigator, "clipboard", { value });
+    }""")
+    title = 'Platte & "Band"'
+    page.evaluate("title => chutelab.lab.change({ 'plate.angle_deg': 33, title })", title)
+    page.click("#share > summary")
+    page.get_by_role("button", name="Link kopieren").click()
+    page.get_by_role("button", name="HTML zum Einbetten kopieren").click()
+    assert page.get_by_text("Es ist in der Zwischenablage.").is_visible()
+    link, html = page.evaluate("texts")
+    assert link.startswith((tmp_path / "page.html").as_uri() + "#")
+    (tmp_path / "blog.html").write_text(f"<!doctype html><title>x</title>{html}", encoding="utf-8")
+    blog = opened(tmp_path / "blog.html")
+    frame = blog.locator("iframe")
+    assert frame.get_attribute("title") == title
+    frame.content_frame.get_by_role("heading", name=title).wait_for()
+    within = frame.element_handle().content_frame()
+    assert within.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 33.0
 
 
 def test_the_page_turns_to_the_other_language_as_it_is(shown):

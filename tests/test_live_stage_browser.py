@@ -204,6 +204,39 @@ def test_one_finger_on_an_empty_place_moves_neither_view_nor_machine(shown):
     assert page.evaluate("JSON.stringify(chutelab.lab.given)") == given
 
 
+def test_the_hand_moves_the_view_by_mouse_finger_and_keys_and_nothing_else(shown):
+    page = shown("inclined-40", viewport={"width": 1366, "height": 768}, has_touch=True)
+    view = "[chutelab.stage.view.x, chutelab.stage.view.y, chutelab.stage.view.scale]"
+    given = page.evaluate("JSON.stringify(chutelab.lab.given)")
+    page.click("#tool-hand")
+    assert page.get_attribute("#tool-hand", "aria-pressed") == "true"
+    assert page.get_attribute("#tool-select", "aria-pressed") == "false"
+    pivot = page.evaluate("chutelab.stage.handles.find(({ id }) => id === 'plate.pivot')")
+    angle = np.radians(40.0)
+    body = pivot["x"] + 0.3 * np.sin(angle), pivot["y"] - 0.3 * np.cos(angle)
+    x, y = page.evaluate(SCREEN, body)
+    before = np.array(page.evaluate(view))
+    drag(page, (x, y), (x + 60, y - 40))
+    after = np.array(page.evaluate(view))
+    assert (before - after)[:2] * after[2] == pytest.approx([60, 40])
+    session = page.context.new_cdp_session(page)
+    for kind, points in (
+        ("touchStart", [(x, y)]), ("touchMove", [(x - 30, y)]), ("touchMove", [(x - 60, y + 40)]),
+        ("touchEnd", []),
+    ):  # fmt: skip
+        places = [{"x": u, "y": v} for u, v in points]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+    assert np.array(page.evaluate(view)) == pytest.approx(before, abs=12 / before[2])
+    assert page.evaluate("JSON.stringify(chutelab.lab.given)") == given
+    assert page.evaluate("chutelab.bench.inspector.parts") == []
+    page.focus("#picture")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("v")
+    assert page.get_attribute("#tool-hand", "aria-pressed") == "false"
+    page.mouse.click(*page.evaluate(SCREEN, body))
+    assert page.evaluate("chutelab.bench.inspector.parts") == ["plate"]
+
+
 def over(*names):
     """Each scene at one of three sizes of the window; all of them at all sizes are slow."""
     sizes = [(1366, 768), (390, 844), (1920, 1080)]
@@ -278,11 +311,77 @@ def test_particles_have_the_colour_of_their_material_or_of_their_speed(shown):
     page.click("#hue-speed")
     page.evaluate("() => new Promise((then) => requestAnimationFrame(then))")
     found = pixel(page, (x, y + 3))
-    most = float(re.findall(r"([\d.]+) m/s", page.inner_text(".ramp"))[0])
-    # 2 m/s on the belt, of eight equal steps up to the largest.
-    step = int(8 * 2.0 / most)
-    colour = page.evaluate(f"chutelab.stage.colour('v{step}')").strip().lstrip("#")
-    assert found == tuple(int(colour[n : n + 2], 16) for n in (0, 2, 4))
+    legend = page.evaluate(LEGEND)
+    assert [text for _, text in legend["texts"]] == ["Speed", "5 m/s", "2.5", "0"]
+    # 2 m/s on the belt, of eight equal steps up to the largest, from below.
+    assert list(found) == legend["colours"][int(8 * 2.0 / 5.0)]
+
+
+LEGEND = """() => {
+  const box = (one) => {
+    const { left, right, top, bottom } = one.getBoundingClientRect();
+    return [left, right, top, bottom];
+  };
+  const layer = document.querySelector(".hues");
+  const bodies = [...document.querySelectorAll("#stage :is(.belt, .wall, rect.steel, .track)")];
+  return {
+    texts: [...layer.querySelectorAll("text")].map((one) => [box(one), one.textContent]),
+    colours: [...layer.querySelectorAll("rect:not(.ring)")].map((one) =>
+      getComputedStyle(one).fill.match(/\\d+/g).map(Number)),
+    boxes: [...layer.querySelectorAll("rect:not(.ring), circle")].map(box),
+    scale: box(document.querySelector(".scale")),
+    bodies: bodies.flatMap((shape) => {
+      const long = shape.getTotalLength(), matrix = shape.getScreenCTM();
+      return Array.from({ length: 201 }, (_, n) => {
+        const { x, y } = shape.getPointAtLength((n * long) / 200).matrixTransform(matrix);
+        return [x, y];
+      });
+    }),
+  };
+}"""
+
+
+@over("inclined-40", "hopper", "mixture")
+def test_the_legend_tells_colours_and_lies_on_nothing(shown, name, size):
+    page = shown(name, viewport={"width": size[0], "height": size[1]}, language="de")
+    kinds = page.evaluate("chutelab.lab.machine.streams.length")
+    assert not page.evaluate(LEGEND)["texts"]
+    for hue in ("speed", "kind"):
+        page.evaluate(f"document.getElementById('hue-{hue}').click()")
+        seen = page.evaluate(LEGEND)
+        if hue == "kind":
+            assert len(seen["texts"]) == len(seen["boxes"]) + 1 == kinds + 1
+        else:
+            assert len(set(map(tuple, seen["colours"]))) == len(seen["boxes"]) == 8
+            most = float(re.findall(r"([\d,]+) m/s", str(seen["texts"]))[0].replace(",", "."))
+            faster, half = page.evaluate(
+                """(most) => {
+                  const { tracks, begin, end } = chutelab.lab.recording, speeds = [];
+                  for (const track of tracks) for (let n = 1; n < 40; n += 1) {
+                    const its = track.state(begin + ((end - begin) * n) / 40);
+                    if (its && !its.ended) speeds.push(Math.hypot(its.vx, its.vy));
+                  }
+                  const share = (part) => speeds.filter((v) => v > part).length / speeds.length;
+                  return [share(most), share(most / 2.5)];
+                }""",
+                most,
+            )
+            # Few are beyond the last colour, and with the next lower round speed more would be.
+            assert faster < 0.04
+            assert half > 0.01
+        boxes = [*seen["boxes"], *[box for box, _ in seen["texts"]]]
+        left, right = min(box[0] for box in boxes), max(box[1] for box in boxes)
+        top, bottom = min(box[2] for box in boxes), max(box[3] for box in boxes)
+        assert not [1 for x, y in seen["bodies"] if left < x < right and top < y < bottom]
+        scale = seen["scale"]
+        assert scale[2] > bottom or scale[1] < left
+        home, free = (
+            page.locator("#stage").bounding_box(),
+            page.evaluate("chutelab.stage.view.free"),
+        )
+        assert left > home["x"] + free["left"]
+        assert right < home["x"] + free["right"]
+        assert top > home["y"] + free["top"]
 
 
 def test_what_is_dragged_leaves_its_place_faint_and_tells_its_value_at_the_pointer(shown):

@@ -14,10 +14,10 @@ from chutelab.classroom.lessons import LessonError, read
 from chutelab.classroom.lessons.building import build_notebook, notebook_of, start
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.classroom.lessons.steps import data_of, html_of
-from chutelab.classroom.words import LANGUAGES, words
 from chutelab.cli import main
 from chutelab.results.quantities import measure
 from chutelab.util.errors import InputError
+from chutelab.util.words import LANGUAGES, words
 from shared import lessons
 
 G = 9.81

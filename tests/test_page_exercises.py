@@ -16,13 +16,13 @@ from chutelab.classroom.exercises.exercise import (
     shown,
 )
 from chutelab.classroom.exercises.judging import judge
-from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.reading import scene_of
-from chutelab.classroom.words import LANGUAGES, words
 from chutelab.engines.simulation import simulate
 from chutelab.scene.quantities import lookup
+from chutelab.util.words import LANGUAGES, words
 from live.node import ask as ask_node
 from live.node import needs_node
+from shared import find
 
 pytestmark = needs_node
 

@@ -7,9 +7,9 @@ import pytest
 from chutelab.classroom.exercises import lesson
 from chutelab.classroom.exercises.catalogue import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
-from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.pages import live_page
 from live.browser import to_step
+from shared import find
 
 
 def begin(page, student):

@@ -10,16 +10,16 @@ from chutelab.classroom.exercises import EXERCISES, Verdict, catalogue, lesson
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import MARKS
 from chutelab.classroom.grading import grade
-from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.pages import live_page
-from chutelab.classroom.words import words
+from chutelab.util.words import words
 from live.browser import DONE, Hand
+from shared import find
 
 STUDENT = "Zoë O'Neil"
 NONSENSE = ["two metres", "", "  ", "NaN", "1/0", "2..5", "<b>1</b>", "9" * 400, "😀", "x = 3"]
 WRITTEN = 'Die Platte nimmt ½ m v² (1 - ε²).\n<b>Not</b> g, \\ or "it".'
 
-QUICK = [("the-bounce", "keyboard", "en", 1)]
+QUICK = [("the-bounce", "mouse", "en", 1)]
 WHOLE = [(name, way, "en", 6) for name in EXERCISES for way in ("mouse", "touch", "keyboard")]
 GERMAN = [("the-bounce", "mouse", "de", 6)]
 

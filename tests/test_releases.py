@@ -47,6 +47,34 @@ def test_a_particle_let_go_from_rest_has_its_spread_forwards():
     assert 0.0 < np.abs(found.velocity[1:, 0]).max() <= 0.3
 
 
+def test_a_fill_with_a_spread_of_speeds_is_a_gas():
+    """Both components are normal, so v² / 2 over their variance is exponential (Maxwell)."""
+    stats = pytest.importorskip("scipy.stats")
+    tables = {
+        "gravity": 0.0,
+        "particle": {"radius": 0.002},
+        "surface": [{"name": "box", "points": [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]],
+                     "restitution": 1.0, "friction": 0.0}],
+        "stream": {"count": 3000, "fill": [[0.01, 0.01], [0.99, 0.99]], "speed_spread": 0.4,
+                   "seed": 3},
+        "run": {"until": 0.5},
+    }  # fmt: skip
+    velocity = build(scene.from_dict(tables)).releases.velocity
+    for component in velocity.T:
+        assert stats.kstest(component / 0.4, "norm").pvalue > 0.01
+    assert abs(np.corrcoef(velocity.T)[0, 1]) < 3.0 / np.sqrt(len(velocity))
+    assert stats.kstest((velocity**2).sum(axis=1) / 0.32, "expon").pvalue > 0.01
+    tables["stream"] |= {"count": 150, "interact": True, "restitution": 1.0, "friction": 0.0}
+    recording = simulate(tables)
+    assert not recording.laws
+    assert recording.contacts > 50
+    kinetic = recording.ledger.kinetic
+    assert kinetic[1] == pytest.approx(kinetic[0], rel=1e-11)
+    # Without it a fill is at rest, as it was.
+    del tables["stream"]["speed_spread"]
+    assert not build(scene.from_dict(tables)).releases.velocity.any()
+
+
 @pytest.mark.parametrize(
     ("changes", "carried"),
     [

@@ -52,7 +52,8 @@ CONTRACT = {
     "incoming": {"speed": 3.0, "pulley_radius": 0.2, "length": 1.0, "incline_deg": 0.0,
      "friction": "adhesion", "restitution": 0.0},
     "plate": {"name": None, "pivot": None, "distance": 0.5, "angle_deg": 0.0, "pivot_height": 0.2,
-     "above": 0.3, "below": None, "restitution": 0.5, "friction": 0.0},
+     "above": 0.3, "below": None, "restitution": 0.5, "friction": 0.0, "shake": None,
+     "travel": None, "turn": 0.0},
     "outgoing": {"speed": 3.0, "drop": 0.5, "drop_from": "impact", "start": -2.0, "length": 6.0,
      "restitution": 0.0, "friction": 0.5},
     "conveyor": (),
@@ -62,7 +63,8 @@ CONTRACT = {
     "stream": {"name": "stream", "particle": None, "count": 1, "rate": 200.0, "width": None,
      "start": 0.0, "bed_height": 0.0, "speed_spread": 0.0, "seed": 0, "at": None, "to": None,
      "fill": None, "velocity": None, "interact": False, "restitution": 0.5, "friction": 0.3},
-    "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001, "align": True},
+    "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001, "align": True,
+     "loads": None},
     "expect": (),
     "view": None,
     "live": {"predict": False, "controls": None, "panels": None, "ranges": {}, "presets": ()},
@@ -255,7 +257,7 @@ def test_the_starter_is_complete_and_valid_and_shows_the_defaults():
     assert said == {
         name: set(table["properties"]) - {"points"} | ({"points"} if name == "particle" else set())
         for name, table in tables.items()
-        if name != "preset"  # in one line of live
+        if name not in ("preset", "shake", "travel")  # in one line
     }
     assert set(everything["expect"][0]) == EXPECT
     complete = sc.from_dict(everything)
@@ -331,7 +333,10 @@ def test_the_schema_describes_every_key_of_the_contract():
     assert set(tables["surface"]["properties"]) == {
         *("name", "from", "to", "points", "center", "radius", "from_deg", "to_deg", "repeat"),
         *("restitution", "friction", "material", "speed", "opens_at", "closes_at"),
+        *("pivot", "shake", "travel", "turn"),
     }
+    assert set(tables["shake"]["properties"]) == {"by", "frequency", "phase_deg"}
+    assert set(tables["travel"]["properties"]) == {"to", "at", "in"}
     assert tables["incoming"]["required"] == ["speed", "pulley_radius"]
     assert tables["plate"]["oneOf"] == [
         {"required": ["distance"]}, {"required": ["name", "pivot"]}

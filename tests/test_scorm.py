@@ -11,10 +11,10 @@ from click.testing import CliRunner
 
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
-from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.pages import package
 from chutelab.cli import main
 from live.browser import to_step
+from shared import find
 
 LIVE = Path(__file__).parent / "live"
 STAND_IN = LIVE / "node_modules" / "scorm-again" / "dist" / "scorm12.min.js"

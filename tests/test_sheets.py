@@ -6,11 +6,11 @@ import pytest
 import typst
 from PIL import Image
 
-from chutelab.classroom.lessons import find, read
+from chutelab.classroom.lessons import read
 from chutelab.classroom.lessons.building import start
 from chutelab.classroom.lessons.sheets import SHEETS, printed, sheet
 from chutelab.classroom.lessons.texts import html_of, parsed, plain, typeset, without_tex
-from shared import Page, chutelab, lessons
+from shared import Page, chutelab, find, lessons
 
 
 def pages(pdf):

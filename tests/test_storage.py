@@ -21,7 +21,9 @@ from chutelab.results import Kind, Recording, storage
 from chutelab.results.storage import RecordingError
 from chutelab.util.files import aside, together, whole
 
-ARRAYS = ("knots", "offsets", "ended", "events", "by_surface", "angle", "totals")
+ARRAYS = (
+    "knots", "offsets", "ended", "events", "by_surface", "angle", "totals", "drives", "impulses",
+)  # fmt: skip
 
 
 @cache

@@ -49,9 +49,10 @@ def test_each_law_is_a_line_with_figure_and_bound():
         "finite numbers", "time goes forward", "none lost", "lasts to the end",
         "no one through", "no one inside", "bounces off something", "released into room",
         "friction of the pair", "rebound of the pair", "energy never rises", "ledger closes",
+        "loads",
     ]  # fmt: skip
     assert all(0.0 <= float(figure) <= float(bound) for _, figure, bound, _ in rows)
-    assert shown.endswith("\nall 12 laws kept\n")
+    assert shown.endswith("\nall 13 laws kept\n")
     assert max(len(line) for line in shown.splitlines()) <= 80
 
 
@@ -70,7 +71,7 @@ def test_a_broken_law_is_told_and_is_exit_code_1(monkeypatch):
     monkeypatch.setitem(LAWS, "ledger closes", lambda e: Verdict(inf, 1e-12, "of it all"))
     shown = call("perpendicular", code=1).stdout
     assert re.search(r"^FAILED  ledger closes +inf +1e-12  of it all *$", shown, re.M)
-    assert shown.endswith("\n1 of 12 laws broken\n")
+    assert shown.endswith("\n1 of 13 laws broken\n")
     told = json.loads(call("perpendicular", "--json", code=1).stdout)
     assert told["broken"] == 1
     (bad,) = (one for one in told["laws"] if not one["holds"])

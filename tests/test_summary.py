@@ -16,12 +16,12 @@ TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
     "impact", "landing", "arrival", "flight", "track", "ended", "fates", "crowd", "stopped",
     "plugged", "waited", "squeezed", "rolling", "steady", "drag", "laws", "instead", "ledger",
-    "sensors", "theory", "theory_as_printed", "error", "accuracy",
+    "sensors", "loads", "theory", "theory_as_printed", "error", "accuracy",
 ]  # fmt: skip
 BEFORE = ["t", "x", "y", "vx", "vy"]
 LEDGER = [
     "kinetic", "potential", "belt_work", "restitution_loss", "friction_loss", "residual",
-    "turned_over", "by_surface", "by_stream",
+    "turned_over", "by_surface", "by_stream", "drive_work",
 ]  # fmt: skip
 THEORY = [
     "phi1_deg", "v1", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3",

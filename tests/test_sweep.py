@@ -100,6 +100,15 @@ slip | | incoming.speed=0.1:1:3 incoming.friction=0:1:3
 slip | particle.spin=true | incoming.speed=0.3,1 incoming.friction=0.2,0.5
 free-fall | stream.count=1 | surface.ramp.opens_at=0.1,0.3,0.6 stream.start=0,0.2
 free-fall | stream.count=1 | gravity=0,9.81 surface.ramp.restitution=0,0.5 surface.floor.speed=-1,1
+free-fall | stream.count=1 | stream.at[0]=-0.1:0.1:3 stream.at[1]=0.2:1:3 surface.ramp.points[1][0]=0.2:0.6:3
+perpendicular | stream.at=[-0.2,0.204] | stream.at[0]=-0.6:0.1:5 stream.at[1]=0.1,0.204,0.3
+perpendicular | stream.velocity=[2.0,0.0] incoming.friction=0.5 | stream.velocity[0]=1:3:3 stream.velocity[1]=0,0.5
+perpendicular | stream.velocity=[2.0,0.0] | stream.velocity[0]=1:3:3 incoming.speed=2,3
+spoon | stream.count=1 | surface.spoon.center[0]=0.9:1.2:4 surface.spoon.center[1]=-0.4,-0.3 surface.spoon.friction=0,0.5
+spoon | stream.count=1 | surface.spoon.radius=0.4:0.6:3 surface.spoon.to_deg=220:300:3 particle.radius=0.002:0.006:3
+rock-box | stream.count=1 stream.interact=false | incoming.speed=1.5:2.5:4 stream.start=0,0.1
+cascade | stream.count=1 stream.interact=false | gravity=5:10:4 incoming.speed=1.5,2
+inclined-conveyor | stream.count=1 | incoming.speed=1.5:2.5:4 incoming.incline_deg=0:15:3
 """  # noqa: E501
 """A scene, what is set, what is varied."""
 

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from chutelab.scene import load
 from chutelab.studies.sweep import COLUMNS, REASON, TEXTS, crew, planned, sweep, sweep_to
-from chutelab.studies.sweep.rows import columns_of, text_of
+from chutelab.studies.sweep.rows import columns_of
 from chutelab.util.errors import InputError
+from chutelab.util.files import csv_columns
 
 
 @pytest.fixture(autouse=True)
@@ -55,7 +56,7 @@ def test_parquet_has_them_too():
 def test_text_gives_rows_back(numbers, words):
     reason = " ".join(words.split())
     columns = {"x": np.array(numbers), REASON: np.array([reason] * len(numbers), dtype=object)}
-    found = columns_of(tuple(columns), text_of(columns))
+    found = columns_of(tuple(columns), csv_columns(columns.values()))
     assert found[REASON].tolist() == [reason] * len(numbers)
     assert np.array_equal(found["x"], columns["x"], equal_nan=True)
     finite = ~np.isnan(columns["x"])

@@ -23,6 +23,7 @@ from pkgutil import walk_packages
 from types import ModuleType
 from typing import Any
 
+from PIL import Image
 from pydantic import BaseModel
 from sphinx.cmd.build import build_main
 from sphinx.pycode import ModuleAnalyzer
@@ -31,6 +32,8 @@ import chutelab
 from chutelab.classroom.lessons import shipped_lessons
 from chutelab.classroom.lessons.pages import LIVE, live_page
 from chutelab.classroom.lessons.sheets import sheet
+from chutelab.engines.simulation import simulate
+from chutelab.pictures.animation import animate
 from chutelab.pictures.live.page import write
 from chutelab.scene import SceneError, about, load
 from chutelab.scene.overrides import schema
@@ -55,6 +58,11 @@ PLAY = """\
 <p><a href="{page}">Play with it in a window of its own</a></p>
 """
 
+
+FILM = """\
+<p><a class="film" href="../films/{name}.gif" data-stop="Stop the film">Play the film</a></p>
+"""
+"""Below a picture of the gallery, which moves while the pointer is on it, see ``site.js``."""
 
 HERO = """\
 <iframe class="hero" src="live/{name}.html" title="{title}"></iframe>
@@ -138,10 +146,16 @@ def readme(pages: Path) -> None:
 
 
 def gallery(pages: Path, extra: Path) -> None:
-    """Make the gallery, with a live page of every scene that can be shown so."""
+    """Make the gallery: a film of every scene, and its live page if it can be shown so."""
     text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
     (extra / "live").mkdir(parents=True)
+    (extra / "films").mkdir()
     for one in about():
+        film(one.name, extra / "films" / f"{one.name}.gif")
+        text = text.replace(
+            f"(gallery/{one.name}.png)\n",
+            f"(gallery/{one.name}.png)\n\n{FILM.format(name=one.name)}",
+        )
         page = extra / "live" / f"{one.name}.html"
         try:
             write(load(one.name), page)
@@ -157,6 +171,14 @@ def gallery(pages: Path, extra: Path) -> None:
             flags=re.MULTILINE | re.DOTALL,
         )
     (pages / "docs" / "gallery.md").write_text(text, encoding="utf-8")
+
+
+def film(name: str, path: Path) -> None:
+    """Film a scene as large as its picture in the gallery, without numbers."""
+    recording = simulate(load(name))
+    with Image.open(ROOT / "docs" / "gallery" / f"{name}.png") as still:
+        width, height = still.size
+    animate(recording, path, fps=10, width=width, height=height, show=("parabola", "trails"))
 
 
 def lessons(pages: Path, extra: Path) -> None:

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from chutelab.classroom.lessons import find
 from chutelab.classroom.lessons.pages import live_page
 from chutelab.pictures.live.page import html
 from chutelab.scene import load, parse, to_toml
+from shared import find
 
 # A page without `eval` cannot be waited for by a condition; a run is shown some frames after it is
 # there, or is as far as it may go.

@@ -4,6 +4,7 @@ import { readFileSync } from "node:fs";
 
 import { core, load, machineOf, recordingOf } from "./run.mjs";
 
+const { bytesOf } = await load("core.js");
 const { groundedLedger, stacks } = await load("energy.js");
 const { Arrivals } = await load("arrival.js");
 const { crowdOf } = await load("crowd.js");
@@ -102,4 +103,5 @@ process.stdout.write(JSON.stringify({
   labels: asked.labels?.map((labels) => placed(labels, []).map(spaceOf)),
   angles: asked.angles?.map((points) => angleBetween(...points)),
   watches: asked.watches?.map(watchOf),
+  packed: asked.packed?.map((text) => [...bytesOf(text)]),
 }));

@@ -25,6 +25,11 @@ def turn(g):
     return acos(u(g))
 
 
+def layer(g, share, speed):
+    """Where a layer at a share of the bed's depth leaves, at a speed, in degrees."""
+    return degrees(acos(speed**2 / (G * (g.R + share * g.cm / 100))))
+
+
 # Lesson 0: heights of the fall and of the rebound, times of flight
 
 
@@ -560,6 +565,28 @@ MISTAKES = {
         "top for centre": lambda g: poured(g, g.h),
         "what is left for what is lost": lambda g: mass(g) * G * g.h / 300,
         "half the height for a third": lambda g: poured(g, g.h / 2),
+    },
+    ("four-formulas", 1): {
+        "angle from the horizontal": lambda g: degrees(asin(u_of_a_point(g))),
+        "square forgotten": lambda g: degrees(acos(g.v0 / sqrt(G * g.R))),
+        "the top layer": lambda g: layer(g, 1.0, g.v0),
+    },
+    ("four-formulas", 2): {
+        "the belt's speed for the middle's": lambda g: layer(g, 0.5, g.v0),
+        "whole depth for half": lambda g: layer(g, 1.0, g.v0 * (1 + g.cm / 100 / g.R)),
+        "two circles": lambda g: layer(g, 0.0, g.v0 * (1 + g.cm / 200 / g.R)),
+        "the lowest layer": lambda g: layer(g, 0.0, g.v0),
+    },
+    ("four-formulas", 3): {
+        "depth of the belt's bed": lambda g: 10 * g.cm,
+        "half the depth in the root": lambda g: 1000 * (sqrt(g.R**2 + g.R * g.cm / 100) - g.R),
+        "radius of the top": lambda g: 1000 * sqrt(g.R**2 + g.R * g.cm / 50),
+        "top speed for all": lambda g: 500 * (sqrt(g.R**2 + g.R * g.cm / 25) - g.R),
+    },
+    ("four-formulas", 4): {
+        "an incline that stands still": lambda g: degrees(atan(g.mu)),
+        "separation for slip": lambda g: layer(g, 0.0, g.v0),
+        "pressed on by going round": lambda g: onset(g, start=-u_of_a_point(g)),
     },
 }
 """By lesson and question: what the mistake is called, and the number that it leads to."""

@@ -117,7 +117,7 @@ def by_name(engine):
 
 def scene_of(tables, name, engine, dt):
     """Validate a scene for an engine and a step; one kind of particles has 4 mm if not told."""
-    run = {**tables.get("run", {})}
+    run = {"loads": 1000.0, **tables.get("run", {})}
     run["engine"] = by_name(engine)
     if dt is not None:
         run["dt"] = dt

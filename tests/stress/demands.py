@@ -17,8 +17,8 @@ STILL = 1e-2
 """m/s that a disk in a pile at rest may still move at: ten times the speed below which a run that
 waits for rest calls itself settled."""
 
-LOOKS = 2000
-"""Times besides those of all knots at which places are looked at."""
+LOOKS, PLACES = 2000, 100_000
+"""Times at which places are looked at, besides those of each one's knots; and places at a time."""
 
 AMPLIFIED = 10.0
 """Factor by which a contact may magnify what rounding did before: the reach of a flight over the
@@ -37,10 +37,18 @@ def ended(e, reasons):
 def inside(e, box):
     """Nobody leaves a box (left, right, bottom, top, m); the figure counts those who do."""
     left, right, bottom, top = box
-    t = e.recording.knots["t"]
-    position, _ = e.recording.at(np.concatenate([t, np.linspace(t.min(), t.max(), LOOKS)]))
-    x, y = np.moveaxis(position, -1, 0)
-    gone = np.flatnonzero(((x < left) | (x > right) | (y < bottom) | (y > top)).any(axis=0))
+
+    def outside(position):
+        x, y = np.moveaxis(position, -1, 0)
+        return (x < left) | (x > right) | (y < bottom) | (y > top)
+
+    knots, count = e.recording.knots, e.recording.count
+    away = np.zeros(count, dtype=bool)
+    away[e.recording.owner[outside(knots["position"])]] = True
+    looks = np.linspace(knots["t"].min(), knots["t"].max(), LOOKS)
+    for some in np.array_split(looks, 1 + LOOKS * count // PLACES):
+        away |= outside(e.recording.at(some)[0]).any(axis=0)
+    gone = np.flatnonzero(away)
     return Verdict(len(gone), 0.0, f"particles: {gone[0]}" if len(gone) else "particles")
 
 

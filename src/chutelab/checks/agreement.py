@@ -36,12 +36,12 @@ ANSWERS: Final = {
 """The answers: how each is found, and what it shares with others."""
 
 BLOWS: Final = {"exact": 1e-12, "dop853": 1e-12, "contact": 1e-10, "pymunk": 1e-9}
-"""Relative error allowed where all contacts are blows, for inputs whose change comes out no larger
-than it went in."""
+"""Relative error allowed where all contacts are blows, and a change of the inputs is not
+magnified."""
 
 STEADY: Final = 1e6
-"""Magnification of a change of the inputs beyond which no order is looked for: what a step leaves
-out, some 1e-7, comes out as another way through the machine."""
+"""Magnification of a change of the inputs beyond which no order is looked for: the error of a step,
+some 1e-7, then sends the particle another way through the machine."""
 
 ORDERS: Final = {"contact": 2.0, "pymunk": 1.0}
 """Order at which the error of a stepped engine vanishes, at least."""
@@ -50,7 +50,8 @@ REFINED: Final = 4.0
 """Ratio of one step to the next of the three that show an order."""
 
 NEARBY: Final = (1.0, 0.85, 0.7)
-"""Shares of a step, the worst of which counts: what an error is may be luck, see `CHANCE`."""
+"""Shares of a step; the largest error counts, since one alone may be small by luck, see
+`CHANCE`."""
 
 CHANCE: Final = {"contact": 0.5, "pymunk": 0.5}
 """By how much the observed order may fall short of `ORDERS`: an error depends on where within a
@@ -101,7 +102,7 @@ def agreement(scene: Scene, max_seconds: float = PATIENCE) -> tuple[Agreement, .
     if not found:
         return tuple(rows)
     base = next(iter(found))
-    # By how much the scene magnifies a change of its inputs; inf if it does something else then.
+    # Magnification of a small change of the inputs; inf if other contacts follow from it.
     try:
         moved = answer(stirred(alone, STIR), base, max_seconds=max_seconds)
         growth = max(1.0, distance(moved, found[base])[0] / STIR)
@@ -172,7 +173,7 @@ def order(errors: list[float], ratio: float, floor: float) -> float:
     if worst[0] <= floor:
         return inf
     last = max(float(worst[-1]), floor)
-    # What is down to rounding before the last step got there sooner.
+    # Steps count up to the first whose error is rounding.
     steps = int(np.argmax(worst <= floor)) if (worst <= floor).any() else len(worst) - 1
     return log(float(worst[0]) / last) / (steps * log(ratio))
 
@@ -300,12 +301,12 @@ def verify(
         expected = told
         if not isinstance(expect.value, str):
             expected = float(expect.value)
-            # What the theory has to say of an expectation that is not its own.
+            # The theory's value of an expectation that comes from elsewhere.
             if isfinite(told):
                 values["theory"] = told
         for engine, simulated in values.items():
             tolerance, size = expect.allowed(engine) or (None, "%")
-            # An entry is measured by itself, but what should be nothing by what was turned over.
+            # Errors of entries are relative to them, that of the residual to what was turned over.
             scale = 0.0
             if quantity == "ledger.residual":
                 scale = ledger(recordings[engine]).turned_over if recordings else nan

@@ -154,7 +154,7 @@ def measure(
     # All engines with the longest step first: it takes the least, if there is not the time for all.
     for method, step in sorted(tasks, key=lambda task: -(task[1] or inf)):
         rows[method, step] = _judged(scene, method, step, search, bounded)
-    # In turn, so that a machine that gets busy is busy for all.
+    # The repeats of all rows take turns: other load on the computer then slows all of them.
     watches = [watch for _, watch in rows.values() if watch is not None]
     for _ in range(repeats):
         for watch in watches:

@@ -3,7 +3,6 @@
 - `lessons`: a question, a worksheet, an exercise, a picture, and scenes to run.
 - `exercises`: exercises that answer back, with each student's own numbers.
 - `book`: what a lesson's notebook calls: its machine, its runs.
-- `words`: what a learner is told, in each language (`strings`, a file a language).
 - `grading`: marks from what students returned, and what a class did.
 - `kernel`: their cells, run in a process of their own, with limits.
 """

@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING, Any
 from chutelab.classroom.lessons.reading import Lesson, beside, find, machine_of, scene_of
 from chutelab.classroom.lessons.steps import FUNCTIONS, Ask, Column, quantities_in
 from chutelab.classroom.lessons.texts import without_tex
-from chutelab.classroom.words import Words, words
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
 from chutelab.results.ledger import ledger
@@ -35,6 +34,7 @@ from chutelab.scene.overrides import Override
 from chutelab.scene.quantities import lookup, whose
 from chutelab.util.errors import InputError
 from chutelab.util.tables import Sheet, Shown, number
+from chutelab.util.words import Words, words
 
 if TYPE_CHECKING:
     from chutelab.pictures.plots.style import Picture

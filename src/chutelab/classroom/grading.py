@@ -35,10 +35,10 @@ from chutelab.classroom.exercises.judging import is_rounded, judge
 from chutelab.classroom.kernel import ForgedError, run
 from chutelab.classroom.lessons.reading import OWN_WORDS
 from chutelab.classroom.lessons.texts import asset
-from chutelab.classroom.words import LANGUAGES, words
 from chutelab.util.errors import InputError, MissingLibraryError, cut, printable, printable_lines
 from chutelab.util.files import csv_lines
 from chutelab.util.versions import too_old
+from chutelab.util.words import LANGUAGES, words
 
 LARGEST: Final = 25 << 20
 """Most bytes of a notebook; one with pictures has a tenth. Parsed, it takes up to 30 times that."""

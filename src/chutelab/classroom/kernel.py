@@ -422,7 +422,7 @@ def _work() -> None:
             _say(pipe, **message)
 
     def hand_over() -> None:
-        # It may be bent by the cells, which is theirs to answer for.
+        # Cells can change this module; what comes of it is judged anew.
         with suppress(Exception), turn:
             found = catalogue.report()
             if last != found:

@@ -57,7 +57,7 @@ class _Output(io.TextIOWrapper):
 
 
 class _Errors(io.TextIOWrapper):
-    """Standard error. If it cannot be written there is nowhere to say so: the exit code is left."""
+    """Standard error. If it cannot be written, only the exit code tells of it."""
 
     def write(self, text: str, /) -> int:
         with suppress(OSError):
@@ -73,7 +73,7 @@ def open_streams() -> None:
     """Make the standard streams safe to write to, whatever they are.
 
     One that is closed becomes the null device: else the next file that is opened gets its number,
-    and what others print. A title in Greek does not fail in a terminal that has no Greek.
+    and with it all output. A title in Greek does not fail in a terminal that has no Greek.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         stream = getattr(sys, name)

@@ -118,8 +118,8 @@ def show(
     from chutelab.classroom.lessons import find, scene_of
     from chutelab.classroom.lessons.sheets import worksheet
     from chutelab.classroom.lessons.texts import plain_of, without_tex
-    from chutelab.classroom.words import words
     from chutelab.util.tables import Sheet
+    from chutelab.util.words import words
 
     found, say = find(lesson or "", language), words(language).say
     if json_:
@@ -177,8 +177,8 @@ def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | N
 def build(lessons: LessonNames = (), *, out: Folder, force: bool, quiet: bool) -> None:
     """Make lesson.gif and exercise.ipynb of each LESSON (default: all shipped), where they changed.
 
-    The notebooks are made of the steps in lesson.toml, notebook.py and the exercise, one for each
-    language that the texts are there in.
+    The notebooks are made of the steps in lesson.toml, notebook.py and the exercise. There is one
+    film and one notebook for each language that the texts are there in: lesson.de.gif is German.
 
     A picture is up to date if it was made from the same scene and settings with the same versions
     of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
@@ -191,7 +191,7 @@ def build(lessons: LessonNames = (), *, out: Folder, force: bool, quiet: bool) -
     from chutelab.classroom.lessons import find
     from chutelab.classroom.lessons.building import build as build_lesson
     from chutelab.classroom.lessons.building import build_notebook, check_inside
-    from chutelab.classroom.words import LANGUAGES
+    from chutelab.util.words import LANGUAGES
 
     for one in _lessons(lessons):
         with (
@@ -201,10 +201,14 @@ def build(lessons: LessonNames = (), *, out: Folder, force: bool, quiet: bool) -
             target = out / one.folder.name if out else None
             if target is not None:
                 check_inside(target)
-            film = build_lesson(one, target, force=force, progress=update)
             told = [find(one.folder, language) for language in LANGUAGES]
+            films = [
+                build_lesson(lesson, target, force=force, progress=update)
+                for lesson in told
+                if lesson.language == "en" or not lesson.untranslated
+            ]
             books = [build_notebook(lesson, target) for lesson in told]
-        for built in (film, *books):
+        for built in (*films, *books):
             if built is not None and not quiet:
                 done = "written" if built.made else "up to date"
                 console.say(f"{built.path}: {done}, {built.size / 1000:.0f} kB")

@@ -211,9 +211,13 @@ Folder = Annotated[Path | None, FolderName()]
 
 
 def loaded_as_told(
-    name: str, overrides: Sequence[str], engine: str | None = None, dt: float | None = None
+    name: str,
+    overrides: Sequence[str],
+    engine: str | None = None,
+    dt: float | None = None,
+    loads: float | None = None,
 ) -> Scene:
-    """Load a scene changed by ``--set``, ``--engine`` and ``--dt``; the title names the changes."""
+    """Load a scene changed by ``--set`` and the options that are keys; the title names changes."""
     from chutelab.scene import load
     from chutelab.scene.overrides import Override
 
@@ -222,6 +226,8 @@ def loaded_as_told(
         settings.append(Override("run.engine", engine, f"--engine {engine}"))
     if dt is not None:
         settings.append(Override("run.dt", dt, f"--dt {dt:.12g}"))
+    if loads is not None:
+        settings.append(Override("run.loads", loads, f"--loads {loads:.12g}"))
     return retitled(load(name, settings), overrides)
 
 

@@ -45,11 +45,18 @@ KINDS = {
     "webm": ("lesson.webm",),
     "strobe": ("strobe.png",),
     "sensors": ("sensors.csv", "sensors.png"),
+    "loads": ("loads.csv", "loads.png"),
 }
 """What ``--only`` takes, and the files it stands for."""
 
+LOADS = 0.01
+"""s; bins of loads where ``--only`` asks for their files and nothing says how long they are."""
+
 FILMS = ("gif", "mp4", "webm")
 """Kinds of the lesson picture; ``--format`` chooses one."""
+
+PICTURED = {*FILMS, "png", "strobe", "sensors"}
+"""Kinds in which something is drawn."""
 
 USUAL = ("png", "gif", "csv", "npz", "json")
 """Kinds that are written without ``--only``."""
@@ -72,11 +79,14 @@ class Output:
     film, and a film that cannot be written here.
 
     --out DIR  Write pictures, tables and the recording into this folder.
-    --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe,sensors; without,
-        the first 5, but no events.csv of more than 100,000 events. May be repeated.
+    --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe,sensors,loads;
+        without, the first 5, but no events.csv of more than 100,000 events. May be repeated.
     --format  With --out: the lesson picture as this instead of a GIF; mp4 and webm need the extra
         chutelab[video].
     --no-energy  With --out: the lesson picture without the energy ledger; the machine is larger.
+    --dark  With --out: pictures and film on a dark ground, for a dark slide or page.
+    --language  With --out: of what pictures and film say; titles and names of the scene stay as
+        they are. [default]
     --details  For experts: engine and steps, errors and residuals down to rounding, in the summary
         and in overlay.png; of a crowd particle 0, too.
     -q, --quiet  Print no summary and no progress bar.
@@ -86,9 +96,11 @@ class Output:
     only: Annotated[Texts, complete_kinds]
     format_: Literal["gif", "mp4", "webm"] | None
     no_energy: bool
+    dark: bool
     details: bool
     json_: bool
     quiet: bool
+    language: Literal["en", "de"] = "en"
     kinds: tuple[str, ...] = field(init=False)  # which of `KINDS`
 
     def __post_init__(self) -> None:
@@ -104,6 +116,11 @@ class Output:
             raise click.UsageError(
                 "--no-energy is for the lesson picture: give --out DIR, with gif."
             )
+        option = "--dark" if self.dark else f"--language {self.language}"
+        looks = self.dark or self.language != "en"
+        if looks and (self.out is None or not PICTURED.intersection(kinds)):
+            pictures = ", ".join(kind for kind in KINDS if kind in PICTURED)
+            raise click.UsageError(f"{option} is for pictures: give --out DIR, with {pictures}.")
         if self.format_ is not None:
             others = set(kinds) - set(FILMS)
             if len(others) == len(kinds):
@@ -129,6 +146,15 @@ class Output:
 
     def write(self, recording: Recording, folder: Path, accuracy: Accuracy | None = None) -> None:
         """Write the files into an existing folder."""
+        if not PICTURED.intersection(self.kinds):
+            self._write(recording, folder, accuracy)
+            return
+        from chutelab.pictures.plots import look
+
+        with look(dark=self.dark, language=self.language):
+            self._write(recording, folder, accuracy)
+
+    def _write(self, recording: Recording, folder: Path, accuracy: Accuracy | None) -> None:
         for kind in self.kinds:
             path = folder / KINDS[kind][0]
             with progress(f"writing {' and '.join(KINDS[kind])}", quiet=self.quiet):
@@ -151,6 +177,11 @@ class Output:
 
                     recording.to_csv(folder, only=["sensors"])
                     sensors(recording).write(folder / "sensors.png")
+                elif kind == "loads":
+                    from chutelab.pictures.plots.figure import loads
+
+                    recording.to_csv(folder, only=["loads"])
+                    loads(recording).write(folder / "loads.png")
                 elif kind == "npz":
                     recording.save(path)
                 else:
@@ -202,12 +233,13 @@ def _report(
     from rich.text import Text
 
     from chutelab.results.summary import facts, sheets
-    from chutelab.studies.accuracy import written
 
     head = Text(recording.title, style="bold")
     head.append(f"\n{facts(recording, details=details)}", style="not bold")
     parts: list[RenderableType] = [head, *sheets(recording, details=details)]
     if accuracy is not None:
+        from chutelab.studies.accuracy import written
+
         what = "relative error" if accuracy.unit == "relative" else "error of places"
         said = "cannot be told"
         if accuracy.reached is not None:
@@ -233,6 +265,7 @@ def run(
     dt: float | None,
     accuracy: str | None,
     max_seconds: Seconds | None,
+    loads: float | None,
     set_: Texts,
     output: Output,
     partial: bool,
@@ -255,6 +288,8 @@ def run(
     --accuracy A  Choose engine and step so that errors are at most this: relative, such as 1e-6, or
         a length, such as 1mm; say what was reached.
     --max-seconds S  End the simulation after S seconds with what is recorded; the summary says so.
+    --loads S  Count what each surface bears, in bins of S seconds: same as --set run.loads=S.
+        Without, --only loads takes 0.01 s.
     --partial  With --out: if the run gets stuck, write what was recorded until then.
     """
     from chutelab.engines.simulation import judged
@@ -276,7 +311,9 @@ def run(
     if max_seconds is not None and not isfinite(max_seconds):
         raise click.UsageError(f"--max-seconds {max_seconds}: a finite number above 0 s.")
     began = perf_counter()
-    loaded = loaded_as_told(scene, set_, engine, dt)
+    loaded = loaded_as_told(scene, set_, engine, dt, loads)
+    if "loads" in output.kinds and loaded.run.loads is None:
+        loaded = loaded_as_told(scene, set_, engine, dt, LOADS)
     if max_seconds is not None:
         # The time limit includes reading the scene.
         max_seconds = max(max_seconds - (perf_counter() - began), 1e-9)

@@ -380,7 +380,7 @@ def stress(scene: SceneName, *, engine: Engine, dt: float | None, set_: Texts, j
     from chutelab.results.recorder import StalledError
     from chutelab.util.tables import Sheet, plain
 
-    loaded = loaded_as_told(scene, set_, engine, dt)
+    loaded = loaded_as_told(scene, set_, engine, dt, loads=1000.0)
     need_judged(loaded)
     try:
         with progress("simulating") as update:

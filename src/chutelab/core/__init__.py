@@ -30,7 +30,7 @@ from chutelab.util.files import whole
 LARGE = 64 * 2**20
 """Bytes beyond which a used memory is let go rather than kept for the next run."""
 
-SUBJECTS = ("Room", "World", "Plan", "Drawing", "Laws", "Exact")
+SUBJECTS = ("Room", "World", "Plan", "Drawing", "Laws", "Exact", "Loads")
 """Structs of layout.h of which the core has one each."""
 
 TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}

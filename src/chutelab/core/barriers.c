@@ -16,6 +16,8 @@
 #define HALVINGS 12
 /* Places of each interval at which it is asked whether a particle has got clear of a gate. */
 #define GATED 64
+/* Share of its radius by which a particle near what moves goes at most from one look to the next. */
+#define STRIDE 0.05
 
 typedef struct { Two p[4]; } Curve;
 
@@ -43,6 +45,52 @@ PAIRED static Box all_apart(void) { return (Box){ both(INFINITY), both(-INFINITY
 
 PAIRED static int apart(const Box *a, const double *piece, double margin) {
     return is_any((a->low >= two_at(piece + 2) + margin) | (a->high <= two_at(piece) - margin));
+}
+
+/* What moves: it shakes, travels and turns about its pivot, see `Mover`. A piece is as written in its own
+   frame, into which places are taken. */
+
+/* Furthest that a piece reaches from the pivot, by its box as written, m. */
+static double reach_of(const Barrier *b, const Mover *m) {
+    double x = MAX(fabs(b->box[0] - m->pivot[0]), fabs(b->box[2] - m->pivot[0]));
+    double y = MAX(fabs(b->box[1] - m->pivot[1]), fabs(b->box[3] - m->pivot[1]));
+    return hypot(x, y);
+}
+
+/* Have the box of a piece hold all that it sweeps. */
+static void sweep(Barrier *b) {
+    const Mover *m = L.movers + b->mover - 1;
+    double reach = reach_of(b, m);
+    for (int k = 0; k < 4; k++) {
+        double way = m->way[k % 2], by = fabs(m->by[k % 2]), side = k < 2 ? -1 : 1;
+        if (m->turn) b->box[k] = m->pivot[k % 2] + side * reach;
+        b->box[k] += side * (by + MAX(side * way, 0));
+    }
+}
+
+/* The largest speed of a point of a piece that moves, m/s, and its largest acceleration, m/s2; of a box that
+   holds what it sweeps. */
+double swiftest(const Barrier *b, double *haste) {
+    *haste = 0;
+    if (!b->mover) return 0;
+    const Mover *m = L.movers + b->mover - 1;
+    double rate = 2 * PI * m->frequency, by = hypot(m->by[0], m->by[1]), way = hypot(m->way[0], m->way[1]);
+    double reach = reach_of(b, m), pace = m->lasts ? 2 * way / m->lasts : 0, turn = fabs(m->turn);
+    *haste = rate * rate * by + (m->lasts ? 2 * pace / m->lasts : 0) + turn * turn * reach;
+    return rate * by + pace + turn * reach;
+}
+
+/* Take a place at t into the frame of a piece. */
+void to_rest(const Barrier *b, double t, double *x, double *y) {
+    if (!b->mover) return;
+    const Mover *m = L.movers + b->mover - 1;
+    double swing = sin(2 * PI * m->frequency * t + m->phase), gone = m->lasts ? (t - m->from) / m->lasts : 0;
+    gone = MIN(MAX(gone, 0), 1);
+    gone = gone > 0.5 ? 1 - 2 * (1 - gone) * (1 - gone) : 2 * gone * gone;
+    double dx = *x - m->pivot[0] - m->by[0] * swing - m->way[0] * gone;
+    double dy = *y - m->pivot[1] - m->by[1] * swing - m->way[1] * gone, c = cos(m->turn * t), s = sin(m->turn * t);
+    *x = m->pivot[0] + c * dx + s * dy;
+    *y = m->pivot[1] - s * dx + c * dy;
 }
 
 /* Pieces: where they are. */
@@ -74,6 +122,7 @@ void shape_barriers(void) {
         }
         grow(b->box, b->end[0], b->end[1]);
         grow(b->box, b->end[2], b->end[3]);
+        if (b->mover) sweep(b);
     }
 }
 
@@ -363,12 +412,59 @@ typedef struct { Curve path; Box box; int knot; } Interval;
 PAIRED static void look_at_all(const Interval *some, int count, const Box *box, Barrier *pieces) {
     int near = 0;
     for (int k = 0; k < L.piece_count; k++) {
-        if (!apart(box, pieces[k].box, At.margin)) pieces[near++].near = k;
+        if (!pieces[k].mover && !apart(box, pieces[k].box, At.margin)) pieces[near++].near = k;
     }
     for (int k = 0; k < near; k++) {
         Barrier *b = pieces + pieces[k].near;
         for (const Interval *now = some; now < some + count; now++) {
             if (!apart(&now->box, b->box, At.margin)) look(&now->path, b, pieces[k].near, now->knot);
+        }
+    }
+}
+
+/* Look at an interval of a track beside a piece that moves, in strides in which the particle cannot come
+   too near, or in which both go by a share of its radius. `spared` is how deep it may be. */
+PAIRED static void look_at_moving(const Interval *now, Barrier *b, int number, double *spared) {
+    const double *knot = KNOT(now->knot);
+    const Two *p = now->path.p;
+    double h = knot[L.row] - knot[0], way = 0, haste, share = 0, before = 0;
+    for (int n = 0; n < 3; n++) way = MAX(way, 3 * hypot(p[n + 1][0] - p[n][0], p[n + 1][1] - p[n][1]));
+    way += h * swiftest(b, &haste);
+    At.number = number;
+    At.deepest = -1;
+    for (int last = 0; !last;) {
+        Two place = place_on(&now->path, share);
+        double t = knot[0] + share * h, x = place[0], y = place[1];
+        to_rest(b, t, &x, &y);
+        double gap = distance(b, x, y), off = beside(b, x, y), depth = At.radius - gap;
+        int there = is_there(b, t) && t >= b->appears + L.dt;
+        if (isnan(*spared)) *spared = b->appears > KNOT(L.offsets[At.particle])[0] ? INFINITY : MAX(depth, 0);
+        if (there && depth <= 0) *spared = 0;
+        int passes = before * off < 0 && fabs(off - before) < At.radius && is_within(b, x, y, side_margin());
+        if (there && *spared < INFINITY && (passes || depth > *spared + L.allowed)) {
+            int at = passes ? -1 : At.deepest;
+            if (passes || at < 0) add_hit(t, place[0], place[1], depth, passes);
+            if (!passes && at < 0) At.deepest = L.hit_count - 1;
+            if (at >= 0 && at < L.hit_room && depth > L.hits[at].depth)
+                L.hits[at] = (Hit){t, place[0], place[1], depth, At.particle, number, 0, 0};
+        }
+        before = there ? off : 0;
+        last = share >= 1;
+        share = MIN(share + MAX(gap - At.margin, STRIDE * At.radius) / way, 1);
+    }
+}
+
+/* Look at all of a track beside what moves. */
+PAIRED static void look_at_movers(int i, Barrier *pieces) {
+    for (int k = 0; k < L.piece_count && L.mover_count; k++) {
+        double spared = NAN;
+        for (int n = L.offsets[i]; n < L.offsets[i + 1] - 1 && pieces[k].mover; n++) {
+            Interval now = { .path = curve_after(KNOT(n)), .knot = n };
+            const Two *p = now.path.p;
+            now.box.low = lesser(lesser(p[0], p[1]), lesser(p[2], p[3]));
+            now.box.high = larger(larger(p[0], p[1]), larger(p[2], p[3]));
+            if (KNOT(n)[0] == KNOT(n)[L.row] || apart(&now.box, pieces[k].box, At.radius)) continue;
+            look_at_moving(&now, pieces + k, k, &spared);
         }
     }
 }
@@ -408,5 +504,6 @@ PAIRED int find_hits(int i) {
         }
     }
     look_at_all(some, count, &box, pieces);
+    look_at_movers(i, pieces);
     return L.hit_count > before;
 }

@@ -16,7 +16,7 @@
    surface there; below 0: it will. 0 where it is none within a step. */
 static double since_passage(const Contact *c, double *way) {
     const Disk *d = W.disks + c->i;
-    const Surface *s = W.surfaces + (-1 - c->j);
+    const Surface *s = surface_at(-1 - c->j, d->t);
     double since = 0, least = INFINITY;
     way[0] = c->ny;
     way[1] = -c->nx;
@@ -93,9 +93,9 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
 /* Whether a disk by itself that grips stays as it is: nothing pulls it along, and on what is round, or
    slows its rolling, it has stopped. */
 static int lies(const Disk *d, const Contact *c, double h) {
-    const Surface *s = W.surfaces + (-1 - c->j);
+    const Surface *s = surface_at(-1 - c->j, d->t);
     double speed = fabs(d->vx + 0.5 * h * W.gx) + fabs(d->vy + 0.5 * h * W.gy);
-    if (s->speed != 0 && c->owner != W.landing) return 0;
+    if (W.stirs || (s->speed != 0 && c->owner != W.landing)) return 0;
     if (bending(s, d->x, d->y, d->radius) != 0 && (speed > STOPPED * W.pace || c->other[1] != 0)) return 0;
     if (c->arm > 0 && fabs(d->spin - c->other[2]) * d->radius > STOPPED * W.pace) return 0;
     /* Its arm may have stopped it for a moment, or holds it. */
@@ -124,6 +124,8 @@ static void settle(int i, const Contact *last, double h) {
     double back = d->t - d->since;
     entries[0] += d->mass * (W.gx * hop.ny - W.gy * hop.nx) * hop.other[1] * back;
     book(d->entries, 0, hop.owner, entries);
+    bear_contact(&hop, 1, d->t, d->t);
+    bear_disk(d, hop.owner, d->mass * W.gx * back, d->mass * W.gy * back, MIN(d->since, d->t), MAX(d->since, d->t));
     d->x -= d->vx * back;
     d->y -= d->vy * back;
     d->t = d->since;
@@ -194,10 +196,16 @@ void close_step(double h) {
         }
         if (c->impulse[0] == 0) continue;
         if (!W.interact && !a->supports) a->held_count = 0;
-        if (!b && a->held_count < MAX_HELD) a->held[a->held_count++] = -1 - c->j;
+        double past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0;
+        if (!b && a->held_count < MAX_HELD) {
+            a->held[a->held_count++] = -1 - c->j;
+            note_force(a, c, past + 0.5 * h);
+        }
+        bear_contact(c, 1, W.t - past, W.t + 0.5 * h);
         relative(c, 1, u);
         relative(c, 0, v);
         book(a->gain, c->two ? b->gain : 0, c->owner, c->entries);
+        if (!b) W.drives[c->owner] += driven(c, 0);
         if (given[0] != 0) book(a->gain, 0, W.ride_owner, given);
         a->ahead[0] += c->given[1];
         for (int k = 0; k < 3; k++) {
@@ -217,8 +225,9 @@ void close_step(double h) {
         /* Halfway through the impulses the hop is left out. */
         double off = fabs(0.5 * (u[0] + v[0])), slip = fabs(v[1] + c->drift);
         double turn = fabs(v[2]) * a->radius, rest = REST * sqrt(W.g * a->radius);
-        int driven = !b && W.surfaces[-1 - c->j].speed != 0 && c->owner != W.landing;
-        if (off > CALM * W.pace || slip > CALM * W.pace || driven || (b && b->mode == RIDING)) {
+        const Surface *s = W.surfaces + (b ? 0 : -1 - c->j);
+        int belt = !b && s->speed != 0 && c->owner != W.landing;
+        if (off > CALM * W.pace || slip > CALM * W.pace || belt || (!b && stirs(s)) || (b && b->mode == RIDING)) {
             a->calm = 0;
             if (b) b->calm = 0;
         }
@@ -247,7 +256,7 @@ void close_step(double h) {
         for (int link = d->links; link >= 0; link = W.links[link]) {
             const Contact *c = W.contacts + link / 2;
             /* What its hop reaches it lies on, too: that is no blow. */
-            if (!W.interact && c->impulse[0] == 0 && c->gap <= 0.125 * W.g * h * h
+            if (!W.interact && c->impulse[0] == 0 && c->gap <= 0.125 * (W.g + W.haste) * h * h
                     && d->held_count < MAX_HELD) d->held[d->held_count++] = -1 - c->j;
             if (c->impulse[0] == 0) continue;
             if (!only || c->owner != only->owner || c->j >= 0) owners++;
@@ -283,7 +292,7 @@ void close_step(double h) {
         track_lasting(i);
         for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
         /* Held in a corner by what is at rest. */
-        if (owners > 1 && !W.interact && W.until == UNTIL_SETTLED && track->lasted > 3) {
+        if (owners > 1 && !W.interact && W.until == UNTIL_SETTLED && track->lasted > 3 && !W.stirs) {
             const double *s = track->held + 3, *p = track->past + 3;
             double most = MAX(fabs(s[0]) + fabs(s[1]), fabs(p[0]) + fabs(p[1]));
             for (int link = d->links; link >= 0; link = W.links[link])
@@ -313,9 +322,11 @@ void take_back(int i) {
             if (W.interact && n > 0) spread(-back, n);
             else W.books[3 * c->owner + n] -= back;
         }
+        if (c->j < 0) W.drives[c->owner] -= driven(c, W.before);
         if (c->i != i) continue;
         W.books[3 * W.ride_owner] -= c->given[1];
         d->entries[0] -= c->given[1];
+        bear_contact(c, W.before - 1, W.t, W.t + 0.5 * W.length);
     }
 }
 
@@ -324,6 +335,10 @@ void end_in_contact(int i, int reason) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
     const double *s = track->held;
+    if (d->held_count)
+        /* In a hollow it is faster than its impulses make it, see `track_lasting`. */
+        bear_disk(d, W.surfaces[d->held[0]].owner, d->mass * (s[3] - d->ux - W.before * (d->vx - d->ux)),
+                  d->mass * (s[4] - d->uy - W.before * (d->vy - d->uy)), d->t, d->t);
     d->x = s[1];
     d->y = s[2];
     d->vx = s[3];

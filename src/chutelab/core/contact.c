@@ -13,8 +13,8 @@
 /* Whether a disk touches the same place of two surfaces: pieces on each other, or the point that they share. */
 static int same_place(const Disk *d, int k, int other) {
     double nx, ny, mx, my;
-    double gap = gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny);
-    double off = gap - gap_to(W.surfaces + other, d->x, d->y, d->radius, &mx, &my);
+    double gap = gap_to(surface_at(k, d->t), d->x, d->y, d->radius, &nx, &ny);
+    double off = gap - gap_to(surface_at(other, d->t), d->x, d->y, d->radius, &mx, &my);
     return fabs(off) <= TOUCHING * d->radius && fabs(nx - mx) + fabs(ny - my) <= TOUCHING;
 }
 
@@ -24,7 +24,7 @@ static int acting(int i, int k) {
     const int *list;
     int count = surfaces_near(i, &list), first = W.surfaces[k].there == THERE ? k : W.surface_count;
     for (int n = 0; n < count && list[n] < first; n++) {
-        const Surface *s = W.surfaces + list[n];
+        const Surface *s = surface_at(list[n], d->t);
         if (list[n] == k || s->there != THERE || !is_near(s, d)) continue;
         if (same_place(d, k, list[n]) && face_at(s, d->x, d->y) == s) first = list[n];
     }
@@ -35,23 +35,33 @@ static int acting(int i, int k) {
 void describe(Contact *c, int i, int j) {
     const Disk *a = W.disks + i;
     const Pair *pair;
-    double r = a->radius, mass = a->inv_mass, turn = a->inv_inertia, rb = 0, reach = r;
+    double r = a->radius, mass = a->inv_mass, turn = a->inv_inertia, rb = 0, reach = r, escapes[2] = {0, 0};
     double spin_mass = turn;
     c->i = i;
     c->j = j;
     c->two = 0;
     c->owner = W.owner_count;
+    c->moved[0] = c->moved[1] = c->moved[2] = 0;
     c->mass[1] = mass + r * r * turn;
     if (j < 0) {
-        const Surface *s = W.surfaces + (-1 - j);
+        const Surface *s = surface_at(-1 - j, a->t);
         int acts = -1 - j;
         c->gap = gap_to(s, a->x, a->y, r, &c->nx, &c->ny);
-        if (c->gap <= TOUCH * r) s = W.surfaces + (acts = acting(i, acts));
+        if (c->gap <= TOUCH * r) s = surface_at(acts = acting(i, acts), a->t);
         pair = surface_pair(a, acts);
         c->owner = s->owner;
         c->other[0] = 0;
         c->other[1] = surface_speed(s, c->nx, c->ny, a->x, a->y, r);
         c->other[2] = s->shape != SEGMENT ? -s->speed / s->radius : 0;
+        if (s->mover >= 0) {
+            double v[3];
+            carried(s, a->x - (r + c->gap) * c->nx, a->y - (r + c->gap) * c->ny, v);
+            c->moved[0] = v[0] * c->nx + v[1] * c->ny;
+            c->moved[1] = v[0] * c->ny - v[1] * c->nx;
+            c->moved[2] = v[2];
+            for (int n = 0; n < 3; n++) c->other[n] += c->moved[n];
+            pulled(s, a, c->nx, c->ny, escapes);
+        }
     } else {
         const Disk *b = W.disks + j;
         double x = a->x - b->x, y = a->y - b->y, d = sqrt(x * x + y * y);
@@ -77,7 +87,7 @@ void describe(Contact *c, int i, int j) {
     for (int n = 0; n < 3; n++) c->light[n] = c->mass[n] > 0 ? 1 / c->mass[n] : 0;
     c->rest = pair->restitution;
     c->share = 1;
-    c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx : 0;
+    c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
     c->gives = c->change = c->turns = 0;
     c->most = INFINITY;
     c->eases = c->mass[0];
@@ -130,7 +140,7 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
                double *given) {
     const double *J = c->impulse;
     double first = 0.5 * (1 - f) * (1 - f), then = 0.5 * (1 - f * f), all = 1 - f;
-    entries[0] = c->j < 0 ? all * (J[1] * c->other[1] + J[2] * c->other[2]) : 0;
+    entries[0] = c->j < 0 ? all * (J[0] * c->other[0] + J[1] * c->other[1] + J[2] * c->other[2]) : 0;
     entries[1] = -J[0] * (first * u[0] + then * v[0]);
     entries[2] = -J[1] * (first * u[1] + then * v[1]) - J[2] * (first * u[2] + then * v[2]);
     given[0] = c->j >= 0 && !c->two ? all * (J[0] * c->other[0] + J[1] * c->other[1]) : 0;
@@ -170,7 +180,7 @@ static double mass_of(const Contact *list, int count) {
 
 /* Kinetic energy of which a disk of a crowd in a hollow, and the `mass` that it carries along, are short halfway
    through this step's impulses, J: velocities turn, so that the mean of those before and after is smaller than
-   they are. What gravity changes is a hop, of which halfway nothing is left. */
+   they are. What gravity changes is a hop, whose velocity is zero halfway. */
 static double lacks(const Contact *c, double mass, const double *u, const double *v) {
     const Disk *d = W.disks + c->i;
     double f = W.before, x = d->ux + f * (d->vx - d->ux), y = d->uy + f * (d->vy - d->uy);
@@ -219,25 +229,31 @@ int is_held(const Disk *d, int k) {
 double pressed_inside(const Disk *d, int surface) {
     double most = 0;
     for (int n = 0; n < 2 * d->held_count; n++) {
-        const Surface *s = W.surfaces + (n % 2 ? surface : d->held[n / 2]);
+        const Surface *s = surface_at(n % 2 ? surface : d->held[n / 2], d->t);
+        double v[2];
         if (s->shape == SEGMENT || s->radius <= d->radius) continue;
         if (square(d->x - s->x) + square(d->y - s->y) >= s->radius * s->radius) continue;
         if (!is_one(d, d->held[n / 2], surface)) continue;
-        most = MAX(most, (d->vx * d->vx + d->vy * d->vy) / (s->radius - d->radius));
+        along_with(s, d, v);
+        most = MAX(most, (v[0] * v[0] + v[1] * v[1]) / (s->radius - d->radius));
     }
     return most;
 }
 
 /* Time in which a disk that slides inside an arc is turned by FLAT, INFINITY on what is not hollow. */
 double turning_time(const Disk *d, const Surface *s) {
-    double bends = -bending(s, d->x, d->y, d->radius) * sqrt(d->vx * d->vx + d->vy * d->vy);
+    double v[2];
+    along_with(s, d, v);
+    double bends = -bending(s, d->x, d->y, d->radius) * sqrt(v[0] * v[0] + v[1] * v[1]);
     return bends > 0 ? FLAT / bends : INFINITY;
 }
 
-/* How hard gravity and the curved way press a disk on a surface, m/s2. */
+/* How hard gravity, the curved way and the surface's motion press a disk on it, m/s2. */
 double press_on(const Disk *d, const Surface *s, double nx, double ny) {
-    double along = d->vx * ny - d->vy * nx;
-    return -(W.gx * nx + W.gy * ny) - along * along * bending(s, d->x, d->y, d->radius);
+    double v[3], pull, up = pulled(s, d, nx, ny, &pull);
+    carried(s, d->x, d->y, v);
+    double along = (d->vx - v[0]) * ny - (d->vy - v[1]) * nx;
+    return up - (W.gx * nx + W.gy * ny) - along * along * bending(s, d->x, d->y, d->radius);
 }
 
 /* Sine of the angle to the surface of the chord on which a disk goes on in a hollow for a time h, to where
@@ -245,15 +261,17 @@ double press_on(const Disk *d, const Surface *s, double nx, double ny) {
    Newton's steps. */
 double chord(const Contact *c, double parted, double h) {
     const Disk *d = W.disks + c->i;
-    const Surface *s = W.surfaces + (-1 - c->j);
-    double bends = -bending(s, d->x, d->y, d->radius), way = sqrt(square(d->vx) + square(d->vy)) * h, out = 0;
+    const Surface *s = surface_at(-1 - c->j, d->t);
+    double v[2];
+    along_with(s, d, v);
+    double bends = -bending(s, d->x, d->y, d->radius), way = sqrt(square(v[0]) + square(v[1])) * h, out = 0;
     if (!(way > 0) || (bends <= 0 && !(pressed_inside(d, -1 - c->j) > 0))) return 0;
     if (bends > 0) {
         double away = square(d->x - s->x) + square(d->y - s->y), to = MAX(away, square(1 / bends));
         if (parted > 0) to = square(sqrt(to) - parted);
         return (away - to + way * way) / (2 * way * sqrt(away));
     }
-    double forth = d->vx * c->ny - d->vy * c->nx > 0 ? way : -way, nx, ny;
+    double forth = v[0] * c->ny - v[1] * c->nx > 0 ? way : -way, nx, ny;
     for (int n = 0; n < 4; n++) {
         double cosine = sqrt(1 - out * out);
         double x = d->x + cosine * forth * c->ny + out * way * c->nx;
@@ -276,9 +294,12 @@ double chord(const Contact *c, double parted, double h) {
    the angles of both chords to the surface. */
 double follow(Contact *c, double past, double out) {
     const Disk *d = W.disks + c->i;
-    double x = d->vx - 0.5 * W.gx * past, y = d->vy - 0.5 * W.gy * past, speed = sqrt(x * x + y * y);
-    double fast = square(d->vx) + square(d->vy), inside = pressed_inside(d, -1 - c->j);
-    double bends = MAX(-bending(W.surfaces + (-1 - c->j), d->x, d->y, d->radius), 0);
+    const Surface *s = surface_at(-1 - c->j, d->t);
+    double v[2];
+    along_with(s, d, v);
+    double x = v[0] - 0.5 * W.gx * past, y = v[1] - 0.5 * W.gy * past, speed = sqrt(x * x + y * y);
+    double fast = square(v[0]) + square(v[1]), inside = pressed_inside(d, -1 - c->j);
+    double bends = MAX(-bending(s, d->x, d->y, d->radius), 0);
     c->turns = MAX(bends, fast > 0 ? inside / fast : 0) * speed * speed;
     if (!(c->turns > 0)) return 1;
     double most = MIN(CHORD * 0.5 * c->turns * W.step / speed, STEEPEST);

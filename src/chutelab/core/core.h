@@ -4,6 +4,7 @@
 #define CORE_H
 #include <math.h>
 #include "layout.h"
+#include "loads.h"
 #include "memory.h"
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
@@ -20,6 +21,9 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 #define TOUCH 5e-3
 /* Overlap, in radii, from which on nothing may sink further, not even by a hop. */
 #define SUNK 1e-2
+/* Share of what is left to the next step otherwise (see SKIP) that is left of an approach there: else it
+   would sink by so much in each step wherever a pile is wedged, and cannot part. */
+#define HARDLY 0.1
 /* Overlap, in radii, of disks that just touch, written with some digits: their places count as free. */
 #define TOUCHING 1e-9
 /* Approach, in radii per step, that is left to the next step instead of an impact at its instant:
@@ -103,6 +107,18 @@ static inline int is_flat(const Surface *s) {
 static inline double hop_time(const Disk *d, double press) {
     return press > 0 ? sqrt(8 * HOP * d->radius / press) : INFINITY;
 }
+/* A surface where it is at t. */
+const Surface *move_to(Surface *s, double t);
+static inline const Surface *surface_at(int k, double t) {
+    Surface *s = W.surfaces + k;
+    return s->mover < 0 || s->posed == t ? s : move_to(s, t);
+}
+/* Whether a surface moves in this step. */
+static inline int stirs(const Surface *s) { return s->mover >= 0 && W.movers[s->mover].stirs; }
+/* Work that the motion of a surface does by a contact's impulses, of which the share f has been given, J. */
+static inline double driven(const Contact *c, double f) {
+    return (1 - f) * (c->impulse[0] * c->moved[0] + c->impulse[1] * c->moved[1] + c->impulse[2] * c->moved[2]);
+}
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
 /* Change of normal velocity that a contact asks for under its impulse, m/s. */
@@ -136,6 +152,20 @@ double meet_surface(const Surface *s, const Disk *d, double span, double *approa
 double meet_disk(double x, double y, double u, double v, double reach, double span, double *approach);
 double free_span(const Disk *d, double least);
 
+/* motion.c */
+void carried(const Surface *s, double x, double y, double *v);
+void along_with(const Surface *s, const Disk *d, double *v);
+double pulled(const Surface *s, const Disk *d, double nx, double ny, double *pull);
+double hastes(const Surface *s, const Disk *d);
+double closing(const Surface *s, const Disk *d, double span);
+double meet_moving(int k, const Disk *d, double span, double *approach);
+double box_span(const Surface *s, const Disk *d);
+double next_turn(double t);
+int stir(double t);
+void box_movers(double t, double h);
+int find_mover(const Surface *s);
+void prepare_mover(Surface *s);
+
 /* grid.c */
 int list_near(double end);
 int enter_again(int i, double end);
@@ -157,6 +187,14 @@ void event_here(int kind, int i, int owner);
 void book(double *first, double *second, int owner, const double *entries);
 void spread(double loss, int k);
 void give_back(const Contact *list, int count);
+
+/* bearing.c */
+void bear_contact(const Contact *c, double share, double from, double to);
+void bear_disk(const Disk *d, int owner, double jx, double jy, double from, double to);
+void bear_ride(int i);
+void note_force(Disk *d, const Contact *c, double span);
+void bear_asleep(const Disk *d, double until, double more);
+void balance_sleepers(void);
 
 /* contact.c */
 void describe(Contact *c, int i, int j);

@@ -32,8 +32,6 @@
 /* Effective mass over m at the rim of a free disk, with I = m r2/2: an impulse moves the contact point 3
    times as much as it would a particle that does not turn. */
 #define DISK_SHARE (1.0 / 3.0)
-/* Way, in `touch`, after which a point has been away from what it touches. */
-#define CLEAR 16.0
 /* Knots and events that a round may write. */
 #define ROUND_KNOTS 400
 #define ROUND_EVENTS 32
@@ -59,6 +57,36 @@ static void write_event(int kind, int surface) {
     E.events[E.event_count++] = (Event){ A.given->release + A.age, A.x, A.y, { A.vx, A.vy, spin },
                                          { A.vx, A.vy, spin }, 0.0, 0.0, E.lone, NONE, kind, surface };
 }
+
+/* Loads are told up to here: in flight there are none. */
+static void tell_here(void) {
+    double now[] = { A.age, A.x, A.y, A.vx, A.vy, A.z };
+    for (int n = 0; n < 6; n++) A.told[n] = now[n];
+}
+
+/* Tell that a surface bore the particle since loads were told last: it gave what changed the velocity, and what
+   gravity would have. It is `depth` (m) below the centre. */
+static void bear_since(int surface, double nx, double ny, double depth) {
+    double span = A.age - A.told[0], mass = A.given->mass, from = A.given->release + A.told[0];
+    if (B.every > 0.0) {
+        Push p = { .owner = surface, .from = from, .to = from + span, .x = A.told[1] - depth * nx,
+                   .y = A.told[2] - depth * ny, .nx = nx, .ny = ny, .jx = mass * (A.vx - A.told[3]),
+                   .jy = mass * (A.vy - A.told[4] + A.given->gravity * span) };
+        if (span > 0.0) {
+            /* The parabola to where the particle is, as fast as it is there. */
+            p.ax = 2.0 * (A.vx - (A.x - A.told[1]) / span) / span;
+            p.ay = 2.0 * (A.vy - (A.y - A.told[2]) / span) / span;
+            p.vx = A.vx - p.ax * span, p.vy = A.vy - p.ay * span;
+        }
+        if (A.turns && A.given->rolling > 0.0)
+            p.couple = A.given->inertia * (A.z - A.told[5]) / A.given->radius
+                - A.given->radius * (p.jx * ny - p.jy * nx);
+        bear(&p);
+    }
+    tell_here();
+}
+
+static void bear_at(const Touch *c) { bear_since(c->surface, c->nx, c->ny, A.given->radius); }
 
 static void book(int surface, double work, double restitution, double friction) {
     double *row = E.books + 3 * (surface + (E.apart ? E.lone * E.surface_count : 0));
@@ -230,6 +258,7 @@ static void blow(const Touch *c, double approach, double rebound, int lands) {
     book(c->surface, mass * push * c->belt + work,
          0.5 * mass * (approach - rebound) * (approach + rebound),
          -0.5 * mass * push * (slip + (slip + change)) + heat);
+    bear_at(c);
     write_knot();
     if (!(approach > NEGLIGIBLE * A.given->pace || push != 0.0 || lands)) return;
     E.contacts++;
@@ -353,6 +382,7 @@ static void last_bounces(int obstacle, int side, double u) {
     go_along(&c, pace + push);
     book(c.surface, mass * push * c.belt + work, 0.5 * mass * u * u,
          -0.5 * mass * push * (2.0 * slip + change) + heat);
+    bear_at(&c);
     write_knot();
 }
 
@@ -417,6 +447,7 @@ static void hold(int on, int side, int other, int other_side) {
     double kinetic = 0.5 * mass * (A.vx * A.vx + A.vy * A.vy + turning);
     A.vx = A.vy = A.z = 0.0;
     book(b.surface, 0.0, kinetic, 0.0);
+    bear_at(&b);
     write_knot();
     int locked = corner_loads(&a, &b, loads);
     int stays = locked || (loads[0] >= -WEIGHTLESS * g && loads[1] >= -WEIGHTLESS * g);
@@ -439,8 +470,16 @@ static void hold(int on, int side, int other, int other_side) {
         const Touch *c = both[n];
         double heat = locked ? 0.0 : mass * grip_of(c) * fabs(c->belt) * MAX(loads[n], 0.0) * time;
         book(c->surface, heat, 0.0, heat);
+        if (locked || B.every == 0.0) continue;
+        double grip = sign_of(c->belt) * grip_of(c), load = mass * loads[n] * time;
+        Push p = { .owner = c->surface, .from = A.given->release + A.age, .to = A.given->release + until,
+                   .x = A.x - A.given->radius * c->nx, .y = A.y - A.given->radius * c->ny, .nx = c->nx, .ny = c->ny,
+                   .jx = load * (c->nx + grip * c->tx), .jy = load * (c->ny + grip * c->ty) };
+        bear(&p);
     }
     A.age = until;
+    if (locked) bear_at(&a);
+    else tell_here();
     write_knot();
     if (!opens) {
         end_track(TIME_IS_OVER);
@@ -504,8 +543,6 @@ static void strike(int obstacle, int side) {
             return;
         }
     }
-    int face, before = touched_before(&face);
-    if (A.point && before != obstacle) A.past = before, A.past_side = face;
     if (stop_jammed(obstacle, side)) return;
     if (A.way >= ON_FACE) {
         /* A blow from elsewhere may leave it on what it slides or rides on. */
@@ -577,9 +614,6 @@ static void move(const Motion *m, double dt) {
     A.age += dt;
     A.x = m->x + dt * (m->vx + half * m->ax), A.y = m->y + dt * (m->vy + half * m->ay);
     A.vx = m->vx + dt * m->ax, A.vy = m->vy + dt * m->ay;
-    if (!A.point) return;
-    double x = m->x + half * (m->vx + 0.5 * half * m->ax), y = m->y + half * (m->vy + 0.5 * half * m->ay);
-    if (MAX(fabs(A.x - x), fabs(A.y - y)) > CLEAR * O.touch) A.past_x = x, A.past_y = y;
 }
 
 /* Time until a gap closes, at once if it is closed; infinite if that was in the past or never is. */
@@ -609,6 +643,7 @@ static void fly(void) {
     int obstacle, side, hits = first_contact(&m, &dt, &obstacle, &side);
     count_idle(dt);
     move(&m, dt);
+    tell_here();
     write_knot();
     if (hits) strike(obstacle, side);
     else if (leaves <= stops) {
@@ -655,6 +690,8 @@ static void carry_round(double start, double pace) {
             double height = rho * cosine(start + turn);
             book(pulley->surface, -A.given->mass * g * (above - height), 0.0, 0.0);
             above = height;
+            double mx = A.x + A.told[1], my = A.y + A.told[2], away = length_of(mx, my);
+            bear_since(pulley->surface, mx / away, my / away, rho - pulley->bend);
             write_knot();
         }
         if (cut) A.age = stop;
@@ -688,6 +725,7 @@ static void carry(void) {
     count_idle(dt);
     move(&m, dt);
     if (incline != 0.0) book(O.all[0].surface, A.given->mass * A.given->gravity * (A.y - height), 0.0, 0.0);
+    bear_since(O.all[0].surface, -up, across, A.y * across - A.x * up - E.wheels[E.family ? E.lone : 0].radius);
     write_knot();
     if (hits) strike(obstacle, side);
     else if (stops < ends) stop_now();
@@ -725,6 +763,9 @@ static void ride(void) {
         A.z = r->z;
         if (n == count) book(c.surface, work, 0.0, heat);
         else A.entries[0] = before[0] + work, A.entries[2] = before[2] + heat;
+        double mx = A.x + A.told[1] - 2.0 * center_x, my = A.y + A.told[2] - 2.0 * center_y;
+        double away = copysign(length_of(mx, my), rho);
+        bear_since(c.surface, mx / away, my / away, A.given->radius);
         write_knot();
         for (int k = 0; k < 3 && n < count; k++) A.entries[k] = before[k];
     }
@@ -800,6 +841,7 @@ static void slide(void) {
     A.z += twist * dt;
     /* What was left at the beginning is some way off now. */
     if (dt > 0.0) A.left = NONE;
+    bear_at(&c);
     write_knot();
     if (hits) strike(obstacle, side);
     else if (rolls && halts <= soonest) end_roll();
@@ -819,7 +861,7 @@ static void begin(void) {
     double inertia = p->inertia, arm = p->mass * p->radius * p->radius;
     A = (Particle){ .given = p, .x = p->position[0], .y = p->position[1], .vx = p->velocity[0],
                     .vy = p->velocity[1], .share = 1.0, .way = p->carried ? RIDES_BELT : FLIES, .on = NONE,
-                    .slip = 1.0, .left = NONE, .joint = NONE, .past = NONE };
+                    .slip = 1.0, .left = NONE, .joint = NONE };
     A.turns = inertia > 0.0;
     if (A.turns) A.share = inertia / (inertia + arm);
     /* That of a disk is not to depend on the rounding of its I. */
@@ -827,7 +869,7 @@ static void begin(void) {
     A.lever = 1.0 / A.share - 1.0;
     fit_obstacles();
     A.point = p->radius <= O.touch;
-    A.past_x = A.x, A.past_y = A.y;
+    tell_here();
     if (!(p->stop > 0.0)) {
         end_track(TIME_IS_OVER);
         return;
@@ -879,6 +921,7 @@ EXPORT int lay_out_exact(void) {
 
 /* Run all particles, for at most so many rounds; returns why it came back, see `enum Course`. */
 int follow_all(int rounds) {
+    if (B.every > 0.0 && !B.bins && !lay_out_bins(E.surface_count)) return NO_MEMORY;
     for (; E.lone < E.lone_count; E.lone++, E.begun = 0) {
         int member = E.family ? E.lone : 0;
         if (E.laid != member + 1) {

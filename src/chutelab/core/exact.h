@@ -6,6 +6,7 @@
 #ifndef EXACT_H
 #define EXACT_H
 #include "layout.h"
+#include "loads.h"
 #include "trig.h"
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
@@ -23,6 +24,8 @@
 #define TOUCH_ULPS 256.0
 /* Sine of the angle at a joint below which one piece simply goes on as the next. */
 #define COLLINEAR 1e-12
+/* Way, in `touch`, after which a point has been away from what it touches. */
+#define CLEAR 16.0
 
 /* What a particle can meet. A disk of radius r touches a face when its centre is r away, and an end
    when the centre is on a circle of radius r about it. An arc of radius R is met from outside on a
@@ -95,6 +98,7 @@ typedef struct {
     double *changes;        /* s; when gates open or shut, ascending */
     int change_count;
     Onward *onward;         /* (changes + 1, tips, 2) before the first change, and after each */
+    Onward *opposite;       /* likewise: what bounds, with a face, the sector beside its end */
     double size;            /* m; the largest coordinate */
     double touch;           /* m; gaps smaller than this are rounding */
 } Obstacles;
@@ -139,10 +143,9 @@ typedef struct {
     double angle;           /* rad; of a ride round a circle ... */
     Bound bounds[2];        /* ... and where it ends, backwards and forwards */
     int point;              /* a disk that touches a face cannot be on its other side, a point could: */
-    int past, past_side;    /* what it touched before, ... */
-    double past_x, past_y;  /* ... and where it last was away from what it touches now */
     int landed, rounds;
     double then;            /* s; its age some rounds ago */
+    double told[6];         /* age, place, velocity and z up to which loads are told */
 } Particle;
 
 extern Particle A;
@@ -166,7 +169,8 @@ int epoch_at(double t);
 int is_shared(int set, int obstacle, int face);
 int has_edge(int set, int obstacle, int edge);
 int is_beside(int circle, int obstacle, int face);
-int is_back(int circle, int other);
+int corner_at(int obstacle, int side, double x, double y);
+int bounds(int corner, int obstacle, int side, int epoch);
 int face_of(int piece, int face);
 
 /* exact_meet.c */

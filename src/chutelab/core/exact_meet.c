@@ -122,13 +122,27 @@ int is_reached(int circle, double x, double y, int epoch) {
     return clear;
 }
 
-static int counts(int circle, double x, double y, double t) {
-    return spans(O.all + circle, x, y) && is_reached(circle, x, y, epoch_at(A.age + t));
-}
-
 static double speed_of(const Motion *m) { return length_of(m->vx, m->vy); }
 static double after_x(const Motion *m, double t) { return m->x + t * (m->vx + 0.5 * t * m->ax); }
 static double after_y(const Motion *m, double t) { return m->y + t * (m->vy + 0.5 * t * m->ay); }
+
+/* The corner in which a point is at a time, of what it is on or leaves; else -1. */
+static int corner_of(const Motion *m, double t) {
+    int from = m->on == NONE ? m->left : m->on, side = m->on == NONE ? m->left_side : m->on_side;
+    return A.point && from != NONE ? corner_at(from, side, after_x(m, t), after_y(m, t)) : NONE;
+}
+
+/* Whether a point cannot meet something at a time, as it is in a corner then that this does not bound. */
+static int is_barred(const Motion *m, int k, int side, double t) {
+    int corner = corner_of(m, t);
+    return corner != NONE && !bounds(corner, k, side, epoch_at(A.age + t));
+}
+
+static int counts(const Motion *m, int circle, double t) {
+    const Obstacle *o = O.all + circle;
+    double x = after_x(m, t) - o->x, y = after_y(m, t) - o->y;
+    return spans(o, x, y) && is_reached(circle, x, y, epoch_at(A.age + t)) && !is_barred(m, circle, 0, t);
+}
 
 typedef struct { double low[2], high[2]; } Box;
 
@@ -157,6 +171,12 @@ static int is_under_belt(int k) {
     return k == 0 || k == O.pulley || k == O.tips[0].circle || k == O.tips[1].circle;
 }
 
+/* Whether a point is in a corner now that something bounds. */
+static int is_bound(const Motion *m, int k, int side) {
+    int corner = corner_of(m, 0.0);
+    return corner != NONE && bounds(corner, k, side, epoch_at(A.age));
+}
+
 /* When a face of a segment is met from a side, at most `until`; else infinite. */
 static double meet_face(const Motion *m, int k, int side, double until) {
     const Obstacle *o = O.all + k;
@@ -167,7 +187,7 @@ static double meet_face(const Motion *m, int k, int side, double until) {
     double fall = side * (m->ax * o->nx + m->ay * o->ny);
     int shared = is_shared(m->joint, k, side < 0), leaving = m->left == k || shared;
     int same = (m->left == k && m->left_side == side) || shared;
-    int touching = fabs(gap) <= O.touch || same, grazing = 0;
+    int beside = is_bound(m, k, side), touching = fabs(gap) <= O.touch || same || beside, grazing = 0;
     if (touching) {
         gap = 0.0;
         grazing = fabs(rate) <= PARALLEL * speed_of(m);
@@ -177,10 +197,7 @@ static double meet_face(const Motion *m, int k, int side, double until) {
     double time = descent(gap, rate, fall);
     if (!(time >= 0.0 && time <= until) || (leaving && !(same && m->order <= 1)) || m->on == k)
         return INFINITY;
-    if (A.point && touching && !same && time == 0.0) {
-        double then = (A.past_x - o->x) * o->nx + (A.past_y - o->y) * o->ny;
-        if (side * (A.past == k ? A.past_side : then) < 0.0) return INFINITY;
-    }
+    if (is_barred(m, k, side, time)) return INFINITY;
     /* How far along the segment the contact is. */
     double over = FOOT * o->length;
     foot += time * (pace + (0.5 * time) * push);
@@ -227,16 +244,18 @@ static double enter(const Motion *m, int k, double until) {
         double sense = sign_of(o->rho), gap[] = { sense * 2.0 * (x * vx + y * vy),
             sense * (vx * vx + vy * vy + (x * m->ax + y * m->ay)),
             sense * (vx * m->ax + vy * m->ay), sense * 0.25 * (m->ax * m->ax + m->ay * m->ay), 0.0 };
-        first = MIN(first, time + (gap[0] < 0.0 ? 0.0 : first_descent(gap, until - time)));
+        double met = time + (gap[0] < 0.0 ? 0.0 : first_descent(gap, until - time));
+        if (met < first && !is_barred(m, k, 0, met)) first = met;
     }
     return first;
 }
 
+/* Whether two circles are in one place: of a point, two faces of an arc, too. */
 static int is_alike(int k, int left) {
     const Obstacle *a = O.all + k, *b = O.all + left;
     double near = ALIKE * O.touch;
     return left >= O.faces && fabs(a->x - b->x) <= near && fabs(a->y - b->y) <= near
-        && fabs(a->rho - b->rho) <= near;
+        && fabs(A.point ? fabs(a->rho) - fabs(b->rho) : a->rho - b->rho) <= near;
 }
 
 /* When a circle is met, before or at `until`; else infinite. */
@@ -252,17 +271,13 @@ static double meet_circle(const Motion *m, int k, double until) {
     for (int n = 0; n < 5; n++) gap[n] *= sense;
     /* Arcs that lie on each other, or on the pulley, are left together. */
     int leaving = m->left == k || (O.arcs && is_alike(k, m->left)) || is_shared(m->joint, k, 0);
-    leaving |= A.point && is_back(k, m->left);
-    int touching = fabs(distance - rho) <= O.touch;
+    int beside = is_bound(m, k, 0), touching = fabs(distance - rho) <= O.touch || beside;
     /* The direction from the centre is as uncertain as the places are, over rho. */
     double uncertain = 2.0 * (PARALLEL * rho + O.touch) * speed_of(m);
     if (touching && fabs(gap[1]) <= uncertain && !leaving) gap[1] = 0.0;
     int closing = touching && gap[1] < 0.0;
-    /* A point behind a circle does not meet it, however near it is. */
-    if (A.point && closing)
-        closing = sense * (length_of(A.past_x - o->x, A.past_y - o->y) - rho) >= -O.touch;
     int order = leaving ? m->order : touching && !closing ? 1 : 0, falls = 0, rises = 0;
-    if (closing && !leaving && counts(k, dx, dy, 0.0)) return 0.0;
+    if (closing && !leaving && counts(m, k, 0.0)) return 0.0;
     for (int n = 0; n < order; n++) {
         for (int c = 0; c < 4; c++) gap[c] = gap[c + 1];
         gap[4] = 0.0;
@@ -275,7 +290,7 @@ static double meet_circle(const Motion *m, int k, double until) {
         descents(gap, until, found);
         for (int n = 3; n >= 0; n--) {
             double s = found[n];
-            if (!isfinite(s) || !counts(k, after_x(m, s) - o->x, after_y(m, s) - o->y, s)) continue;
+            if (!isfinite(s) || !counts(m, k, s)) continue;
             t = s;
         }
         t = polish(m, o, t, order == 0);
@@ -327,6 +342,12 @@ int first_contact(const Motion *m, double *until, int *obstacle, int *side) {
     return 1;
 }
 
+/* Whether a point that rides round a circle cannot meet something at a place: as `is_barred`. */
+static int is_across(int circle, int k, int side, double x, double y, int epoch) {
+    int corner = A.point ? corner_at(circle, 0, x, y) : NONE;
+    return corner != NONE && !bounds(corner, k, side, epoch);
+}
+
 /* Take in one more obstacle of a ride, whose gap falls with phi at the rate `closing` at an angle. */
 static void narrow(Bound *found, double phi, double angle, double closing, Bound what) {
     for (int way = 0; way < 2; way++) {
@@ -358,8 +379,9 @@ void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
             for (int sign = -1; sign <= 1; sign += 2) {
                 double angle = tilt + sign * half, up, across;
                 sin_cos(angle, &up, &across);
-                double foot = (c->x + rho * up - o->x) * o->tx + (c->y + rho * across - o->y) * o->ty;
-                if (foot >= 0.0 && foot <= o->length)
+                double x = c->x + rho * up, y = c->y + rho * across;
+                double foot = (x - o->x) * o->tx + (y - o->y) * o->ty;
+                if (foot >= 0.0 && foot <= o->length && !is_across(circle, k, face, x, y, epoch))
                     narrow(found, phi, angle, facing * sine(angle - tilt), (Bound){ 0.0, k, face, 0, NONE });
             }
         }
@@ -396,6 +418,7 @@ void find_bounds(int circle, int side, double phi, int epoch, Bound *found) {
             sin_cos(angle, &up, &across);
             double away_x = rho * up - x, away_y = rho * across - y;
             if (!spans(o, away_x, away_y) || !is_reached(k, away_x, away_y, epoch)) continue;
+            if (is_across(circle, k, 0, o->x + away_x, o->y + away_y, epoch)) continue;
             narrow(found, phi, angle, -sign_of(o->rho) * facing * sine(angle - tilt),
                    (Bound){ 0.0, k, 0, 0, NONE });
         }

@@ -42,6 +42,7 @@ static void *reserve(double count, int size) {
 
 static Part *parts;
 static int part_count;
+static int points;        /* whether particles are mass points */
 static const Arc **bends; /* those with ends first */
 static int *bend_source;
 static double *xs;        /* of the ends, for sorting */
@@ -51,6 +52,11 @@ static int *next_there;   /* ... and the next of each */
 static Ray *rays, *ring, *flat;
 
 static double extent_of(const Arc *a) { return MIN(a->extent, TURN); }
+
+/* How far a place is along an arc's circle, rad from its first angle. */
+static double turn_of(const Arc *a, double x, double y) {
+    return modulo(angle_of(y - a->center[1], x - a->center[0]) - a->begin, TURN);
+}
 
 static int by_x(const void *one, const void *other) {
     int a = *(const int *)one, b = *(const int *)other;
@@ -127,8 +133,8 @@ static double size_for(const Lone *p) {
     return MAX(O.size, MAX(fabs(p->position[0]), fabs(p->position[1])));
 }
 
-/* Where along a part an end lies inside it and is tangent to it, m; else 0. What the incoming belt
-   carries comes to nothing that begins on it. */
+/* Where along a part an end lies inside it, m, and is tangent to it, which is no matter to a point; else 0.
+   What the incoming belt carries comes to nothing that begins on it. */
 static double begins_on(const Part *p, int s, int n, double near) {
     const Tip *tip = O.tips + n;
     const double *t = p->of->tangent;
@@ -136,7 +142,7 @@ static double begins_on(const Part *p, int s, int n, double near) {
     double dx = tip->x - p->x, dy = tip->y - p->y;
     double foot = dx * t[0] + dy * t[1];
     return fabs(t[0] * dy - t[1] * dx) <= near && foot > near && foot < p->length - near
-            && fabs(t[0] * tip->out[1] - t[1] * tip->out[0]) <= COLLINEAR
+            && (points || fabs(t[0] * tip->out[1] - t[1] * tip->out[0]) <= COLLINEAR)
         ? foot : 0.0;
 }
 
@@ -153,6 +159,53 @@ static int begin_on(int s, double near, double *feet) {
     return count;
 }
 
+/* Half the length of a chord so far off the centre of a circle, m; 0 where it but touches it, else NAN. */
+static double half_chord(double radius, double off, double near) {
+    double depth = radius - fabs(off);
+    return fabs(depth) <= near ? 0.0 : depth < 0.0 ? NAN : sqrt(depth * (radius + fabs(off)));
+}
+
+/* List where a part crosses another one within both, and arcs; return how many places there are. */
+static int cross_at(int s, double near, double *feet) {
+    const Part *p = parts + s;
+    const double *t = p->of->tangent;
+    int count = 0;
+    for (int k = 0; k < part_count; k++) {
+        /* The place is found on one of the two, for both. */
+        const Part *a = parts + MIN(s, k), *b = parts + MAX(s, k);
+        const double *u = a->of->tangent, *v = b->of->tangent;
+        double dx = b->x - a->x, dy = b->y - a->y, sine = u[0] * v[1] - u[1] * v[0];
+        if (k == s || fabs(sine) <= COLLINEAR || (E.wheel_count && k == 0)) continue;
+        double along = (dx * v[1] - dy * v[0]) / sine;
+        double x = a->x + along * u[0], y = a->y + along * u[1];
+        double foot = (x - p->x) * t[0] + (y - p->y) * t[1];
+        const Part *other = parts + k;
+        double there = (x - other->x) * other->of->tangent[0] + (y - other->y) * other->of->tangent[1];
+        if (!(foot > near && foot < p->length - near && there > near && there < other->length - near)) continue;
+        if (feet) feet[count] = foot;
+        count++;
+    }
+    for (int b = 0; b < O.arcs; b++) {
+        const Arc *a = bends[b];
+        double dx = a->center[0] - p->x, dy = a->center[1] - p->y;
+        double middle = dx * t[0] + dy * t[1], off = dx * t[1] - dy * t[0];
+        double half = half_chord(a->radius, off, near);
+        for (int side = -1; side <= 1; side += 2) {
+            double foot = middle + side * half, x = p->x + foot * t[0], y = p->y + foot * t[1];
+            if (!(foot > near && foot < p->length - near && turn_of(a, x, y) <= extent_of(a))) continue;
+            if (feet) feet[count] = foot;
+            count++;
+        }
+    }
+    return count;
+}
+
+/* List where a part is to be cut, if `feet` is given; return how many places there are. */
+static int cuts_of(int s, double near, double *feet) {
+    int count = begin_on(s, near, feet);
+    return points && !(E.wheel_count && s == 0) ? count + cross_at(s, near, feet ? feet + count : 0) : count;
+}
+
 static Part part_of(const Part *whole, double low, double high) {
     const double *t = whole->of->tangent;
     Part p = *whole;
@@ -162,16 +215,17 @@ static Part part_of(const Part *whole, double low, double high) {
     return p;
 }
 
-/* Cut parts where other pieces begin on them: there three join. Returns whether some were. */
+/* Cut parts where other pieces begin on them: there three join. For a point also where they cross: it has no
+   size that tells on which side it is. Returns whether some were. */
 static int cut_parts(double near) {
     int found = 0, count = 0;
-    for (int s = 0; s < part_count; s++) found += begin_on(s, near, 0);
+    for (int s = 0; s < part_count; s++) found += cuts_of(s, near, 0);
     if (!found) return 0;
     double *feet = reserve(found + 1, sizeof *feet);
     Part *cut = reserve(part_count + found, sizeof *cut);
     if (arena_full) return 0;
     for (int s = 0; s < part_count; s++) {
-        int many = begin_on(s, near, feet);
+        int many = cuts_of(s, near, feet);
         double low = 0.0;
         if (!many) cut[count++] = parts[s];
         else {
@@ -183,6 +237,78 @@ static int cut_parts(double near) {
     }
     parts = cut, part_count = count;
     return 1;
+}
+
+/* Note where an arc is to be cut, rad from its first angle, if a place on its circle lies within it. */
+static int note_turn(int b, double x, double y, double near, double *turns, int count) {
+    double extent = extent_of(bends[b]), edge = near / bends[b]->radius, turn = turn_of(bends[b], x, y);
+    if (extent < TURN && !(turn > edge && turn < extent - edge)) return count;
+    if (turns) turns[count] = turn;
+    return count + 1;
+}
+
+/* List where an arc is to be cut for a point, if `turns` is given: where pieces end on it, and where it
+   crosses arcs; return how many places there are. */
+static int cuts_of_bend(int b, double near, double *turns) {
+    const Arc *a = bends[b];
+    int count = 0;
+    for (int n = 0; n < O.tip_count; n++) {
+        double x = O.tips[n].x, y = O.tips[n].y;
+        if (fabs(length_of(x - a->center[0], y - a->center[1]) - a->radius) <= near)
+            count = note_turn(b, x, y, near, turns, count);
+    }
+    for (int k = 0; k < O.arcs; k++) {
+        /* The places are found on one of the two, for both. */
+        const Arc *one = bends[MIN(b, k)], *two = bends[MAX(b, k)];
+        double dx = two->center[0] - one->center[0], dy = two->center[1] - one->center[1];
+        double apart = length_of(dx, dy), sum = one->radius + two->radius;
+        double along = 0.5 * (apart + (one->radius - two->radius) * sum / apart);
+        double half = half_chord(one->radius, along, near);
+        if (isnan(half)) continue;
+        for (int side = -1; side <= 1; side += 2) {
+            double x = one->center[0] + (along * dx - side * half * dy) / apart;
+            double y = one->center[1] + (along * dy + side * half * dx) / apart;
+            if (turn_of(bends[k], x, y) <= extent_of(bends[k])) count = note_turn(b, x, y, near, turns, count);
+        }
+    }
+    return count;
+}
+
+/* Cut arcs where a point would have to be told on which side of what else is there it is. A whole circle is
+   cut opposite, too, as a part of it has two ends. Returns whether some were. */
+static int cut_bends(double near) {
+    int found = 0, count = 0;
+    for (int b = 0; b < O.arcs; b++) found += cuts_of_bend(b, near, 0);
+    if (!found) return 0;
+    double *turns = reserve(found + 3, sizeof *turns);
+    Arc *cut = reserve(O.arcs + 2 * found, sizeof *cut);
+    const Arc **kept = reserve(O.arcs + 2 * found, sizeof *kept);
+    int *source = reserve(O.arcs + 2 * found, sizeof *source);
+    if (arena_full) return 0;
+    int before = O.arcs;
+    for (int whole = 0; whole < 2; whole++)
+        for (int b = 0; b < O.arcs; b++) {
+            int many = cuts_of_bend(b, near, turns);
+            double extent = extent_of(bends[b]), low = 0.0;
+            if ((extent >= TURN && !many) != whole) continue;
+            if (extent >= TURN && many) {
+                turns[many] = modulo(turns[0] + PI, TURN), many++;
+                qsort(turns, many, sizeof *turns, ascending);
+                low = turns[many - 1] - TURN;
+                extent = turns[many - 1], many--;
+            } else
+                qsort(turns, many, sizeof *turns, ascending);
+            turns[many] = extent;
+            for (int n = 0; n <= many; low = turns[n++]) {
+                if (!((turns[n] - low) * bends[b]->radius > near)) continue;
+                cut[count] = *bends[b];
+                if (many) cut[count].begin += low, cut[count].extent = turns[n] - low;
+                kept[count] = cut + count, source[count] = bend_source[b], count++;
+            }
+        }
+    bends = kept, bend_source = source, O.arcs = count, O.bent = 0;
+    for (int b = 0; b < count; b++) O.bent += bends[b]->extent < TURN;
+    return count > before;
 }
 
 /* Make room for the ends of all pieces and find them, sorted by place. */
@@ -459,44 +585,52 @@ static void go_onward(Onward *to, const Ray *r, int face, const Ray *other, int 
         to[2 * tip_of(r) + (face < 0)] = (Onward){ face_of(other->piece, onto), onto, meets };
 }
 
-/* Find what faces go over into at their ends: another face if that is flush, else the circle round the
-   end, whose side is left open, 0. */
+/* Find what bounds a sector with a face at its end, and what the face goes over into there: that if it is
+   flush, else the circle round the end, whose side is left open, 0. */
 static void find_onward(int epoch) {
-    Onward *to = O.onward + epoch * 2 * O.tip_count;
-    for (int n = 0; n < 2 * O.tip_count; n++) to[n] = (Onward){ O.tips[n / 2].circle, 0, 0 };
+    Onward *to = O.onward + epoch * 2 * O.tip_count, *opposite = O.opposite + epoch * 2 * O.tip_count;
+    for (int n = 0; n < 2 * O.tip_count; n++) {
+        to[n] = (Onward){ O.tips[n / 2].circle, 0, 0 };
+        opposite[n] = (Onward){ NONE, 0, 0 };
+    }
     for (int n = 0; n < O.tip_count; n++) {
         if (at_spot[O.tips[n].spot] != n) continue;
         int turns, count = sort_rays(list_rays(n), epoch, &turns);
         for (int k = 0; k < count; k++) {
             double angle = angle_after(k, count, turns);
-            if (!(angle > COLLINEAR && angle <= PI + COLLINEAR)) continue;
             const Ray *right = flat + k, *left = flat + (k + 1) % count;
             int meets = angle < PI - SLIGHT;
+            go_onward(opposite, right, left_of(right), left, -left_of(left), meets);
+            go_onward(opposite, left, -left_of(left), right, left_of(right), meets);
+            if (!(angle > COLLINEAR && angle <= PI + COLLINEAR)) continue;
             go_onward(to, right, left_of(right), left, -left_of(left), meets);
             go_onward(to, left, -left_of(left), right, left_of(right), meets);
         }
     }
 }
 
-/* Find the middles of the halves of ends that join left faces: at an end the piece's left normal, at a
-   joint the sum of both. */
+/* Find the middles of the halves of ends that join left faces: at an end the piece's left normal. At a
+   joint the rim between two pieces is all on one side of both, as wide as it may be, and its middle
+   bisects the angle between them: along the sum of both normals, and of both ways out. */
 static void find_crowns(void) {
     for (int n = 0; n < O.tip_count; n++) {
         if (at_spot[O.tips[n].spot] != n) continue;
-        int first = n, other = NONE, turns, count = sort_rays(list_rays(n), -1, &turns);
+        int first = n, other = NONE, begins = 0, turns, count = sort_rays(list_rays(n), -1, &turns);
         while (first != NONE && O.tips[first].circle == NONE) first = next_there[first];
         if (first == NONE) continue;
         for (int k = 0; k < count; k++) {
             const Ray *one = flat + k, *two = flat + (k + 1) % count;
             if (one == two || angle_after(k, count, turns) < PI - COLLINEAR) continue;
             if (one->end >= THROUGH || two->end >= THROUGH) continue;
-            if (tip_of(one) == first) other = tip_of(two);
-            else if (tip_of(two) == first) other = tip_of(one);
+            if (tip_of(one) == first) other = tip_of(two), begins = 1;
+            else if (tip_of(two) == first) other = tip_of(one), begins = 0;
         }
         const Tip *tip = O.tips + first, *next = other == NONE ? 0 : O.tips + other;
-        double sign = next && other % 2 != first % 2 ? 1.0 : -1.0;
-        for (int k = 0; k < 2; k++)
-            O.all[tip->circle].crown[k] = tip->left[k] + (next ? sign * next->left[k] : 0.0);
+        double sign = next && other % 2 != first % 2 ? 1.0 : -1.0, way = begins == first % 2 ? -1.0 : 1.0;
+        for (int k = 0; k < 2; k++) {
+            double more = next ? sign * next->left[k] + way * (tip->out[k] + next->out[k]) : 0.0;
+            O.all[tip->circle].crown[k] = tip->left[k] + more;
+        }
     }
 }
 
@@ -555,9 +689,10 @@ static void hand_over(int obstacle, int tip, int face, int onto) {
 static void find_handovers(void) {
     for (int n = O.tip_count - 1; n >= 0; n--)
         for (int k = 0; k < 2; k++) {
-            int face = n % 2 ? 1 - k : k, next = O.onward[2 * n + face].obstacle;
+            int face = n % 2 ? 1 - k : k;
+            Onward next = O.onward[2 * n + face];
             if (n / 2 >= O.faces) hand_over(face_of(n / 2, face ? -1 : 1), n, face, 0);
-            if (O.tips[n].rests != NONE && next != NONE) hand_over(next, n, face, 1);
+            if (O.tips[n].rests != NONE && next.obstacle != NONE && !next.meets) hand_over(next.obstacle, n, face, 1);
             if (O.tips[n].circle != NONE) hand_over(O.tips[n].circle, n, face, 1);
         }
 }
@@ -565,6 +700,7 @@ static void find_handovers(void) {
 static int find_joints(void) {
     int tips = O.tip_count, epochs = O.change_count + 1;
     O.onward = reserve(2.0 * tips * epochs, sizeof *O.onward);
+    O.opposite = reserve(2.0 * tips * epochs, sizeof *O.opposite);
     O.members = reserve(16 * tips, sizeof *O.members);
     O.sets = reserve(6 * tips, sizeof *O.sets);
     O.handovers = reserve(6 * tips, sizeof *O.handovers);
@@ -586,6 +722,7 @@ int lay_obstacles(int member) {
     bends = reserve(E.arc_count, sizeof *bends);
     bend_source = reserve(E.arc_count, sizeof *bend_source);
     if (arena_full) return 0;
+    points = !(E.lones[member].radius > 0.0);
     part_count = E.segment_count, O.arcs = E.arc_count, O.bent = 0;
     for (int s = 0; s < part_count; s++) {
         const Segment *g = segments + s;
@@ -603,7 +740,7 @@ int lay_obstacles(int member) {
     do {
         if (!list_tips()) return 0;
         near = JOINT * size_for(E.lones + member);
-    } while (cut_parts(near));
+    } while (cut_parts(near) || (points && cut_bends(near)));
     if (arena_full) return 0;
     int spots = O.tip_count;
     number_spots(near);
@@ -617,7 +754,7 @@ int lay_obstacles(int member) {
     drop_doubles();
     if (!list_changes()) return 0;
     find_rests(near);
-    if (!list_obstacles(E.lones[member].radius > 0.0)) return 0;
+    if (!list_obstacles(!points)) return 0;
     if (E.wheel_count) list_pulley(E.wheels + member);
     return find_joints();
 }
@@ -687,8 +824,6 @@ static int back_of(int circle) {
     return circle < O.first_arc + O.arcs ? circle + O.arcs : circle - O.arcs;
 }
 
-int is_back(int circle, int other) { return other != NONE && back_of(circle) == other; }
-
 /* Whether something touches a circle without being met, as both share a place: they are tangent to each
    other there, and have no other point in common. To a point both faces of a piece are in one place. */
 int is_beside(int circle, int obstacle, int face) {
@@ -705,4 +840,28 @@ int is_beside(int circle, int obstacle, int face) {
         }
     }
     return 0;
+}
+
+/* The corner in which a point is that touches a face, or a circle, at a place: the number of the sector beside
+   it at its end there, 2 tip + face; else -1. */
+int corner_at(int obstacle, int side, double x, double y) {
+    int piece = obstacle, inside = side < 0;
+    if (obstacle >= O.faces) {
+        int bend = obstacle - O.first_arc;
+        inside = bend >= O.arcs;
+        if (inside) bend -= O.arcs;
+        if (bend < 0 || bend >= O.bent) return NONE;
+        piece = O.faces + bend;
+    }
+    for (int tip = 2 * piece; tip < 2 * piece + 2; tip++)
+        if (MAX(fabs(x - O.tips[tip].x), fabs(y - O.tips[tip].y)) <= CLEAR * O.touch) return 2 * tip + inside;
+    return NONE;
+}
+
+/* Whether a face, or a circle, is one of the two that bound the sector of a corner. */
+int bounds(int corner, int obstacle, int side, int epoch) {
+    int face = corner % 2 ? -1 : 1;
+    Onward one = { face_of(corner / 4, face), face, 0 }, two = O.opposite[2 * epoch * O.tip_count + corner];
+    return (one.obstacle == obstacle && (obstacle >= O.faces || one.side == side))
+        || (two.obstacle == obstacle && (obstacle >= O.faces || two.side == side));
 }

@@ -36,12 +36,12 @@ const Surface *face_at(const Surface *s, double x, double y) {
     if (mate_of(s, 0) < 0 && mate_of(s, 1) < 0) return s;
     if (s->shape == CIRCLE) {
         for (int n = 0; n < 2; n++)
-            if (mate_of(s, n) >= 0 && hides(W.surfaces + s->mates[n], s, x, y))
+            if (mate_of(s, n) >= 0 && hides(surface_at(s->mates[n], s->posed), s, x, y))
                 return W.surfaces + s->mates[n];
         return s;
     }
     int end = beyond(s, x - s->x, y - s->y), mate = end ? mate_of(s, end > 0) : -1;
-    const Surface *next = W.surfaces + MAX(mate, 0);
+    const Surface *next = surface_at(MAX(mate, 0), s->posed);
     return mate >= 0 && next->there && !beyond(next, x - next->x, y - next->y) ? next : s;
 }
 
@@ -79,12 +79,14 @@ double gap_to(const Surface *s, double x, double y, double r, double *nx, double
 
    One rule for faces, ends and circles: the surface runs along its left side (a circle: its
    outside) as `speed` says, and against it on the other side. On both faces of a segment that is
-   its velocity; round an end it is that of an end roller, continuous with the face on that side:
-   the sides are those of the tangent where the disk touches. */
+   its velocity; round an end it is that of an end roller, see `find_crown`. */
 double surface_speed(const Surface *s, double nx, double ny, double x, double y, double r) {
-    double side;
-    if (s->shape == SEGMENT) side = ny * s->tx - nx * s->ty;
-    else side = nx * (x - s->x) + ny * (y - s->y) - r;
+    double side, dx = x - s->x, dy = y - s->y;
+    int end = s->shape == CIRCLE ? 0 : beyond(s, dx, dy);
+    const double *crown = s->crown + 2 * (end > 0);
+    if (end) side = nx * crown[0] + ny * crown[1];
+    else if (s->shape == SEGMENT) side = ny * s->tx - nx * s->ty;
+    else side = nx * dx + ny * dy - r;
     return side >= 0 ? s->speed : -s->speed;
 }
 
@@ -218,6 +220,7 @@ static double meet_inside(const Surface *s, const Disk *d, double span, double *
 
 /* Time from d->t until a disk meets a surface, INFINITY if not within the span. */
 double meet_surface(const Surface *s, const Disk *d, double span, double *approach) {
+    if (stirs(s)) return meet_moving((int)(s - W.surfaces), d, span, approach);
     double dx = d->x - s->x, dy = d->y - s->y, r = d->radius;
     double sweep = (sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * span) * span;
     *approach = 0;
@@ -286,12 +289,16 @@ double meet_disk(double x, double y, double u, double v, double reach, double sp
 double free_span(const Disk *d, double least) {
     double span = INFINITY, v = sqrt(d->vx * d->vx + d->vy * d->vy), r = d->radius;
     for (int k = 0; k < W.surface_count && span > least; k++) {
-        const Surface *s = W.surfaces + k;
+        const Surface *s = surface_at(k, d->t);
         double rounds[3][3], dx = d->x - s->x, dy = d->y - s->y;
         int count = 0;
         if (s->opens > d->t) span = MIN(span, s->opens - d->t);
         if (s->closes > d->t) span = MIN(span, s->closes - d->t);
         if (is_spared(s, d)) span = 0;
+        if (stirs(s)) {
+            span = MIN(span, box_span(s, d));
+            continue;
+        }
         if (s->shape == SEGMENT) {
             double off = dy * s->tx - dx * s->ty, side = off >= 0 ? 1 : -1, speed;
             double rate = side * (d->vy * s->tx - d->vx * s->ty);

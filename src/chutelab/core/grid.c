@@ -147,7 +147,7 @@ int surfaces_near(int i, const int **list) {
         zone[3] = d->top + room;
         d->nearby_count = 0;
         for (int k = 0; k < W.surface_count && d->nearby_count <= MAX_NEARBY; k++) {
-            const double *box = W.surfaces[k].box;
+            const double *box = W.surfaces[k].swept;
             if (box[0] >= zone[2] || box[2] <= zone[0] || box[1] >= zone[3] || box[3] <= zone[1]) continue;
             if (d->nearby_count < MAX_NEARBY) W.nearby[i * MAX_NEARBY + d->nearby_count] = k;
             d->nearby_count++;
@@ -161,9 +161,9 @@ int surfaces_near(int i, const int **list) {
 /* Whether a disk released at (x, y) would overlap no other, and no gate that is shut. */
 int place_is_free(int i, double x, double y, double t) {
     double r = W.disks[i].radius, box[4] = {x - r, y - r, x + r, y + r}, nx, ny;
-    for (int k = 0; k < W.surface_count && W.gate_count; k++) {
-        const Surface *s = W.surfaces + k;
-        if (s->gate >= 0 && s->there == THERE && gap_to(s, x, y, r, &nx, &ny) < -TOUCHING * r) return 0;
+    for (int k = 0; k < W.surface_count && (W.gate_count || W.mover_count); k++) {
+        const Surface *s = surface_at(k, t);
+        if ((s->gate >= 0 || s->mover >= 0) && s->there == THERE && gap_to(s, x, y, r, &nx, &ny) < -TOUCHING * r) return 0;
     }
     if (!W.interact) return 1;
     int n = query(i, box);

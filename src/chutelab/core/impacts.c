@@ -61,14 +61,16 @@ double soft_approach(const Disk *d, double radius) {
 
 /* Approach up to which a contact is left to the next step, m/s. What lies on a surface comes back to
    it at the end of each step, as fast as gravity makes it in one, and on the inside of an arc as the
-   curved way does; not what has sunk into it. */
+   curved way does; of what has sunk in hardly anything. */
 double left_over(const Disk *d, int impacts, int surface, double radius, int sunk) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
+    if (surface >= 0 && (W.interact || d->held_count))
+        sunk = gap_to(surface_at(surface, d->t), d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius;
+    if (sunk) least *= HARDLY;
     for (int n = 0; n < d->held_count; n++) {
-        if (!is_one(d, d->held[n], surface)) continue;
-        const Surface *s = W.surfaces + surface;
-        if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius) continue;
-        least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface)) * W.step);
+        if (sunk || !is_one(d, d->held[n], surface)) continue;
+        double haste = hastes(surface_at(surface, d->t), d);
+        least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface) + haste) * W.step);
     }
     /* Surfaces do not give way: with them it grows only if jams do not help. */
     int many = sunk ? STUCK : surface >= 0 ? 2 * JAM : MANY;
@@ -101,7 +103,10 @@ static void foresee_surfaces(int i, double *due, int *partner) {
         double approach;
         int k = list[n];
         if (W.surfaces[k].there != THERE || !is_near(W.surfaces + k, d)) continue;
-        double t = d->t + meet_surface(W.surfaces + k, d, W.step_end - d->t, &approach);
+        const Surface *s = surface_at(k, d->t);
+        if (s->mover >= 0 && !stirs(s) && d->mode == ASLEEP && d->ux == 0 && d->uy == 0) continue;
+        if (stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0)) continue;
+        double t = d->t + meet_surface(s, d, W.step_end - d->t, &approach);
         if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius, 0)) {
             *due = MAX(t, W.now);
             *partner = -1 - k;
@@ -116,7 +121,7 @@ void foresee(int i) {
     int partner = ALARM;
     if (d->mode == WAITING) due = d->waited ? MAX(d->release, W.step_end) : d->release;
     else if (d->mode == RIDING) due = d->ride_to;
-    else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0)))
+    else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)))
         foresee_surfaces(i, &due, &partner);
     if (d->mode == FREE) {
         int n = reachable(i);
@@ -135,7 +140,7 @@ void foresee_all(void) {
         d->due = INFINITY;
         if (d->mode == WAITING) d->due = MAX(d->release, W.now);
         else if (d->mode == RIDING) d->due = d->ride_to;
-        else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0)))
+        else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)))
             foresee_surfaces(i, &d->due, &partner);
         d->partner = partner;
     }
@@ -202,8 +207,10 @@ static void give(Contact *c, double normal) {
     }
     share_out(c, u, v, 0, c->entries, given);
     book(a->entries, c->two ? b->entries : 0, c->owner, c->entries);
+    if (c->j < 0) W.drives[c->owner] += driven(c, 0);
     if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
     give_back(c, 1);
+    bear_contact(c, 1, a->t, a->t);
 }
 
 /* Let a disk lie on a surface from t on. The step of a disk by itself ends here; in a crowd half of
@@ -214,10 +221,11 @@ static void support(int i, int k, double t) {
     Contact c;
     describe(&c, i, -1 - k);
     hold(d, k);
-    double press = press_on(d, W.surfaces + k, c.nx, c.ny), u[3];
+    const Surface *s = surface_at(k, t);
+    double press = press_on(d, s, c.nx, c.ny), u[3];
     if (press <= 0 || !W.interact) return;
-    if (bending(W.surfaces + k, d->x, d->y, d->radius) < 0) W.step_end = MIN(W.step_end, t + hop_time(d, press));
-    double left = W.step_end - t, weight = -(W.gx * c.nx + W.gy * c.ny);
+    if (bending(s, d->x, d->y, d->radius) < 0) W.step_end = MIN(W.step_end, t + hop_time(d, press));
+    double left = W.step_end - t, pull, weight = pulled(s, d, c.nx, c.ny, &pull) - (W.gx * c.nx + W.gy * c.ny);
     double cosine = follow(&c, 0, chord(&c, 0, left)), normal = 0.5 * press * d->mass * left;
     relative(&c, 0, u);
     c.drift = 0.5 * left * c.pull;
@@ -279,18 +287,24 @@ static void jam(Contact *struck, double t) {
         const int *nearby;
         int most = surfaces_near(m, &nearby);
         for (int n = 0; n < most; n++) {
-            const Surface *s = W.surfaces + nearby[n];
+            const Surface *s = surface_at(nearby[n], t);
             if (s->there == THERE && is_near(s, a) && face_at(s, a->x, a->y) == s)
                 add_touching(m, -1 - nearby[n], a->radius, &count);
         }
     }
     for (int n = 0; n < count; n++) {
-        /* No approach afterwards but what would be left to the next step; separating is allowed. */
+        /* No approach afterwards but what would be left to the next step; separating is allowed. What has
+           sunk into a surface gets the hop that gravity will take from it. */
         Contact *c = list + n;
         const Disk *a = W.disks + c->i;
         double u[3], r = c->j >= 0 ? MIN(a->radius, W.disks[c->j].radius) : a->radius;
+        int sunk = c->gap <= -SUNK * r;
         relative(c, 0, u);
-        c->need = -u[0] <= left_over(a, 0, -1 - c->j, r, 0) ? MIN(-u[0], 0) : -u[0];
+        c->need = -u[0] <= left_over(a, 0, -1 - c->j, r, sunk) ? MIN(-u[0], 0) : -u[0];
+        if (sunk && c->j < 0) {
+            double press = press_on(a, W.surfaces + (-1 - c->j), c->nx, c->ny);
+            c->need = -u[0] + 0.5 * MAX(press, 0) * (W.step_end - t);
+        }
     }
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
@@ -311,7 +325,9 @@ static void jam(Contact *struck, double t) {
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
         double given[3] = {c->given[0], 0, 0};
         if (c->j < 0 && c->impulse[0] > 0) hold(a, -1 - c->j);
+        bear_contact(c, 1, t, t);
         book(a->entries, c->two ? b->entries : 0, c->owner, c->entries);
+        if (c->j < 0) W.drives[c->owner] += driven(c, 0);
         if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
         if ((c->i == i && c->j == struck->j) || (c->i == struck->j && c->j == i))
             for (int k = 0; k < 2; k++) struck->impulse[k] = c->impulse[k];
@@ -358,6 +374,8 @@ static void end_hop(int i, double t) {
     share_out(&c, u, v, 0, entries, given);
     entries[1] += fall;
     book(d->entries, 0, c.owner, entries);
+    W.drives[c.owner] += driven(&c, 0);
+    bear_contact(&c, 1, t, t);
     track->lasted = 0;
 }
 
@@ -368,9 +386,9 @@ static int meets_another(int i, int k, double span) {
     const int *list;
     int count = surfaces_near(i, &list);
     for (int n = 0; n < count; n++) {
-        const Surface *s = W.surfaces + list[n];
+        const Surface *s = surface_at(list[n], d->t);
         if (is_one(d, k, list[n]) || is_held(d, list[n]) || !is_near(s, d)) continue;
-        if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) < (speed + W.g * span) * span) return 1;
+        if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) < (speed + W.fastest + W.g * span) * span) return 1;
     }
     return 0;
 }
@@ -380,8 +398,11 @@ static void let_fly(Disk *d) {
     double nx, ny;
     int kept = 0;
     for (int n = 0; n < d->held_count; n++) {
-        gap_to(W.surfaces + d->held[n], d->x, d->y, d->radius, &nx, &ny);
-        if (!flies_off(d, d->held[n], d->vx * nx + d->vy * ny)) d->held[kept++] = d->held[n];
+        double v[3];
+        const Surface *s = surface_at(d->held[n], d->t);
+        gap_to(s, d->x, d->y, d->radius, &nx, &ny);
+        carried(s, d->x, d->y, v);
+        if (!flies_off(d, d->held[n], (d->vx - v[0]) * nx + (d->vy - v[1]) * ny)) d->held[kept++] = d->held[n];
     }
     d->held_count = kept;
 }
@@ -389,7 +410,7 @@ static void let_fly(Disk *d) {
 /* Whether a disk meets a face in line with another surface that it lasts on: it only goes over to it. */
 static int goes_straight_on(const Contact *c) {
     const Disk *d = W.disks + c->i;
-    const Surface *s = W.surfaces + (-1 - c->j);
+    const Surface *s = surface_at(-1 - c->j, d->t);
     if (d->on < 0 || d->on == c->owner || s->shape != SEGMENT) return 0;
     for (int link = d->links; link >= 0; link = W.links[link]) {
         const Contact *last = W.contacts + link / 2;
@@ -421,8 +442,9 @@ static void strike(int i, int j, double t) {
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);
     if (jammed || (c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt)) back = 0;
-    double press = j < 0 ? press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) : 0, later = 0;
-    int rests = j < 0 && back <= press * MIN(W.step, turning_time(a, W.surfaces + (-1 - j)));
+    const Surface *met = j < 0 ? surface_at(-1 - j, t) : 0;
+    double press = met ? press_on(a, met, c.nx, c.ny) : 0, later = 0;
+    int rests = met && back <= press * MIN(W.step, turning_time(a, met));
     /* The bounces that are left out, infinitely many, would have taken so long. */
     if (rests && back > 0 && c.rest < 1) later = 2 * back / (press * (1 - c.rest));
     /* ... unless it meets something before they end: of endless friction each of them is a blow. */
@@ -458,12 +480,13 @@ static int struck_too(const Contact *c, double t, int *j) {
     if (a->mode != FREE || (!W.interact && c->impulse[0] == 0)) return 0;
     advance(a, t);
     if (c->j < 0) {
-        const Surface *s = face_at(W.surfaces + (-1 - c->j), a->x, a->y);
+        const Surface *s = face_at(surface_at(-1 - c->j, t), a->x, a->y);
         int k = (int)(s - W.surfaces);
-        double gap = gap_to(s, a->x, a->y, a->radius, &nx, &ny);
+        double gap = gap_to(s, a->x, a->y, a->radius, &nx, &ny), v[3];
+        carried(s, a->x, a->y, v);
         *j = -1 - k;
         return gap < TOUCH * a->radius
-            && -(a->vx * nx + a->vy * ny) > left_over(a, a->impacts, k, a->radius, 0);
+            && -((a->vx - v[0]) * nx + (a->vy - v[1]) * ny) > left_over(a, a->impacts, k, a->radius, 0);
     }
     if (b->mode != FREE) return 0;
     advance(b, t);
@@ -527,12 +550,13 @@ void shock(int i, int j, double t) {
 void lie_down(int i) {
     Disk *d = W.disks + i;
     for (int k = 0; k < W.surface_count; k++) {
-        const Surface *s = W.surfaces + k;
-        double nx, ny;
+        const Surface *s = surface_at(k, d->t);
+        double nx, ny, v[3];
         if (s->there != THERE || is_spared(s, d) || face_at(s, d->x, d->y) != s || is_held(d, k)) continue;
         if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
         double press = press_on(d, s, nx, ny);
-        if (press <= 0 || fabs(d->vx * nx + d->vy * ny) > press * MIN(W.dt, turning_time(d, s))) continue;
+        carried(s, d->x, d->y, v);
+        if (press <= 0 || fabs((d->vx - v[0]) * nx + (d->vy - v[1]) * ny) > press * MIN(W.dt, turning_time(d, s))) continue;
         d->on = s->owner;
         d->slips = 1;
         support(i, k, d->t);

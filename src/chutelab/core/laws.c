@@ -73,12 +73,13 @@ static double given_back(const double *now) {
 typedef struct { int particles, particle, latest, knot; } Group;
 
 /* What all particles have together, and the largest and least of one; of pieces the largest coordinate and
-   length of straight ones, coordinate and radius of bent ones, and speed. Of particles that do not meet also
+   length of straight ones, coordinate and radius of bent ones, and speed; `reach` is the largest coordinate
+   or length of all that is anywhere, m. Of particles that do not meet also
    what is unexplained at their ends, J, the most that changes of it between two knots, and the least of
    what `given_back` says. */
 static struct {
-    double mass, heaviest, smallest, gravity, size[4], belts;
-    double t, knot_t, place, fastest, lifted, entries[3], residual, change, back;
+    double mass, weight, heaviest, smallest, gravity, size[4], belts;
+    double t, knot_t, place, reach, fastest, lifted, entries[3], residual, change, back;
     Group bad;
     int unreal;
 } All;
@@ -121,11 +122,15 @@ static void weigh_machine(void) {
         *from = MAX(*from, MAX(fabs(b->x), fabs(b->y)));
         *length = MAX(*length, b->length);
         *radius = MAX(*radius, b->radius);
-        All.belts = MAX(All.belts, fabs(b->speed));
+        double haste, swift = swiftest(b, &haste);
+        All.belts = MAX(All.belts, fabs(b->speed) + swift);
+        L.haste = MAX(L.haste, haste);
+        for (int n = 0; n < 4 && b->mover; n++) *start = MAX(*start, fabs(b->box[n]));
     }
     for (int i = 0; i < L.particle_count; i++) {
         const Body *body = L.bodies + i;
         All.mass += body->mass;
+        All.weight += body->mass * body->gravity;
         All.heaviest = MAX(All.heaviest, body->mass);
         All.gravity = MAX(All.gravity, body->gravity);
         All.smallest = i ? MIN(All.smallest, body->radius) : body->radius;
@@ -204,6 +209,7 @@ static int are_finite(void) {
 /* Largest acceleration towards the centre of a bent piece of knots of a particle that are inside, m/s2. */
 static double bent_by(const Barrier *b, double r, int first, int end) {
     double inner = b->radius - r, low = MAX(inner - 0.1 * r, 0), found = 0;
+    if (b->mover) return inner > 0 ? square(L.speed) / inner : 0;
     for (int k = first; k < end && inner > 0; k++) {
         const double *knot = KNOT(k);
         double far = square(knot[1] - b->x) + square(knot[2] - b->y);
@@ -247,10 +253,12 @@ static double lateness(void) {
     if (L.engine == ENGINE_EXACT) return 0;
     if (L.alike) return L.speed * L.dt + SLOP * L.largest;
     if (L.interact) return PRESSED * L.largest;
-    return (2 * All.gravity + L.bent) * square(L.dt);
+    return (2 * (All.gravity + L.haste) + L.bent) * square(L.dt);
 }
 
-/* What numbers may do to the energy, as a share of the energy in play. Contacts round it. In a stepped
+/* What numbers may do to the energy, as a share of the energy in play. Contacts round it; for this the weight
+   of what meets no other is in play at the largest length: a height is as good as the coordinates that it
+   comes from, also where it is small itself, as that of a disk in a hollow hardly wider. In a stepped
    engine each contact moves it, besides, by the weight times `late`, where an overlap is parted: impulses
    themselves are booked to the last bit. */
 static double energy_share(void) {
@@ -269,7 +277,7 @@ static double energy_parted(void) {
     if (L.engine == ENGINE_EXACT) return 0;
     if (!L.interact) {
         double across = 0.5 * square(0.5 * L.bent * L.dt);
-        return All.heaviest * (L.speed * All.gravity * L.dt + across);
+        return All.heaviest * (L.speed * (All.gravity + L.haste) * L.dt + across);
     }
     double allowed = All.mass * All.gravity * L.late;
     if (L.alike) {
@@ -286,8 +294,9 @@ static double energy_parted(void) {
 static void find_allowed(double bent) {
     const double *start = All.size, *length = All.size + 1, *center = All.size + 2, *radius = All.size + 3;
     L.speed = MAX(sqrt(All.fastest), All.belts);
-    L.length = MAX(MAX(L.largest, *start + *length), MAX(All.place, L.speed * All.t));
-    if (*radius) L.length = MAX(L.length, *center + *radius + L.largest);
+    All.reach = MAX(MAX(L.largest, *start + *length), All.place);
+    if (*radius) All.reach = MAX(All.reach, *center + *radius + L.largest);
+    L.length = MAX(All.reach, L.speed * All.t);
     L.rounding = ROUNDINGS * EPS * L.length;
     L.arcs = ON_ARCS * (L.largest + *radius);
     L.bent = bent;
@@ -298,6 +307,7 @@ static void find_allowed(double bent) {
 
 static void find_bounds(void) {
     find_allowed(L.engine == ENGINE_EXACT ? 0 : bent_inside());
+    if (!L.interact) L.energy += All.weight * All.reach;
     L.energy_bound = energy_share();
     L.parted = energy_parted();
     /* m v w, where constant acceleration is as good as the true way but for a velocity w. */
@@ -428,11 +438,13 @@ static double opened(double t) {
         }
         for (int k = 0; k < L.piece_count; k++) {
             const Barrier *b = L.barriers + k;
+            double u = x, v = y;
             if (t < b->appears || t >= b->vanishes) continue;
             if (x < b->box[0] - r || x > b->box[2] + r || y < b->box[1] - r || y > b->box[3] + r) {
                 continue;
             }
-            sum += sum_opened(r - distance(b, x, y), r, step);
+            to_rest(b, t, &u, &v);
+            sum += sum_opened(r - distance(b, u, v), r, step);
         }
     }
     return All.heaviest / (4 * GIVES) * sum;
@@ -558,6 +570,7 @@ EXPORT int lay_out_laws(void) {
     RESERVE(L.bodies, L.particle_count);
     RESERVE(L.barriers, (double)L.piece_count * (L.family ? L.particle_count : 1));
     RESERVE(L.books, 3.0 * L.book_rows);
+    RESERVE(L.movers, L.mover_count);
     RESERVE(L.breaches, BREACHES);
     RESERVE(L.order, crowd ? L.knot_count : 1);
     RESERVE(L.places, crowd ? 2.0 * L.particle_count : 1);
@@ -577,7 +590,7 @@ static void find_track(int i) {
 static void judge_all(void) {
     int again = L.alike;
     L.breach_count = L.hit_count = 0;
-    L.energy = 0;
+    L.energy = L.haste = 0;
     memset(&All, 0, sizeof All);
     shape_barriers();
     weigh_machine();

@@ -39,6 +39,8 @@ void shape_barriers(void);
 double beside(const Barrier *b, double x, double y);
 int is_within(const Barrier *b, double x, double y, double margin);
 double distance(const Barrier *b, double x, double y);
+void to_rest(const Barrier *b, double t, double *x, double *y);
+double swiftest(const Barrier *b, double *haste);
 void place_at(const double *knot, double share, double *x, double *y);
 int find_hits(int particle);
 

@@ -59,6 +59,7 @@ typedef struct {
     double zone[4];             /* the box, and room round it, for which `World.nearby` is right */
     double due;                 /* s; its next event, INFINITY if none is foreseen in this step */
     double since;               /* s; latest impact */
+    double slept;               /* s; since when it is asleep */
     double calm;                /* s; since when nothing at its contacts slips or moves apart */
     double rest;                /* s; the same to the finer bound of falling asleep */
     double entries[3];          /* J; belt work, restitution loss, friction loss so far */
@@ -83,7 +84,8 @@ typedef struct {
     int island;
     int nearby_count;           /* surfaces whose boxes meet its zone; MAX_NEARBY + 1: too many */
     int held_count;
-    int held[MAX_HELD];         /* surfaces it lies on */
+    int held[MAX_HELD];         /* surfaces it lies on ... */
+    double bears[8];            /* N; ... and with which forces they bore it in the latest step, x and y of each */
     int ride_met;               /* surface where a ride ends, or -1 */
     int on;                     /* surface it lasts on by itself, or -1 */
     int slips;                  /* whether it slips there */
@@ -119,6 +121,7 @@ typedef struct {
     double begin, extent;   /* [in] arc: angle of its first end, and from there on, rad */
     double cos_half;        /* arc: cosine of half its angle */
     double end[4];          /* segment and arc: both ends, x and y */
+    double crown[4];        /* ... and to the middle of the half of its rim that goes on from its left side */
     double speed;           /* [in] m/s along the tangent; round a circle or arc clockwise */
     double opens, closes;   /* [in] s; it is there from the one to the other */
     int shape;              /* [in] an arc all round becomes a circle */
@@ -129,8 +132,27 @@ typedef struct {
     double ledges[2];       /* m; how far their ends are apart there */
     int gate;               /* column of `spared` if it comes and goes, else -1 */
     int there;              /* whether it is there in this step; LEAVING: until just now */
-    double box[4];          /* m; left, bottom, right, top */
+    int mover;              /* row of `movers` if it moves, else -1 */
+    double box[4];          /* m; left, bottom, right, top; of all that it sweeps in this step */
+    double swept[4];        /* m; the same of the whole run */
+    double posed;           /* s; of what moves: when its place is as above ... */
+    double still[12];       /* ... and as written: x, y, tx, ty, end, crown */
+    double fastest, haste;  /* m/s, m/s2; bounds on speed and acceleration of its points */
 } Surface;
+
+/* How a surface moves: it shakes, travels and turns about a pivot, all from the run's time. */
+typedef struct {
+    double pivot[2];        /* [in] m; at rest */
+    double by[2], frequency, phase; /* [in] m, Hz, rad; it shakes by so much */
+    double way[2], from, lasts; /* [in] m, s; how far it travels, from then on, for so long; 0: nowhere */
+    double turn;            /* [in] rad/s */
+    double t;               /* s; when it is as follows */
+    double place[2], velocity[2], pull[2]; /* m, m/s, m/s2; of the pivot */
+    double sine, cosine;    /* of the angle that it has turned by */
+    double swing;           /* m/s2; largest acceleration of its pivot */
+    int surface;            /* [in] which moves */
+    int stirs;              /* whether it moves in this step */
+} Mover;
 
 typedef struct { double restitution, friction, rolling; } Pair; /* [in] rolling: arm over radius */
 
@@ -150,6 +172,7 @@ typedef struct {
     double light[3];        /* 1 / mass, 0 where there is none */
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
     double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */
+    double moved[3];        /* the part of it that the motion of a surface gives */
     double eases;           /* kg; impulse for a change of normal velocity, as far as it gives */
     double rest;            /* coefficient of restitution */
     double share;           /* of its friction that acts; below 1 where surfaces wedge a disk */
@@ -186,10 +209,12 @@ typedef struct {
     Disk *disks;
     Surface *surfaces;   /* with room for twice as many: narrow arcs become two */
     Pair *pairs;         /* (kinds, kinds + materials) */
+    Mover *movers;
     /* arrays that `prepare` lays out */
     Track *tracks;
     Knot *waits;         /* (disks, WAITS) states of each since its last knot; of one by itself (1, WAITS) */
     double *books;       /* (owners + 1, 3), J; the last row is the disks' among themselves */
+    double *drives;      /* (owners), J; what of the work in `books` the motion of a surface did */
     Knot *knots;
     Event *events;
     Total *totals;       /* one a step in a crowd */
@@ -210,6 +235,7 @@ typedef struct {
     int *spared;         /* (disks, gates) 1: what shut on this disk, and does not touch it yet */
     /* sizes */
     int disk_count, surface_count, kind_count, owner_count; /* [in] */
+    int mover_count;     /* [in] */
     int material_count;
     int knot_room, event_room, total_room, contact_room, near_room, cell_room;
     int full;            /* what `run` makes room for as it goes on: see `Full` */
@@ -240,6 +266,7 @@ typedef struct {
     /* within the step */
     int low, high;       /* disks that this part of the run is about */
     int phase, cell_count, heap_count, moved_count, wide_count;
+    int stirs;           /* whether something moves in this step */
     int stamp, shocks, jams; /* numbers of the latest query, shock and jam, for marks */
     double t, now, step, step_end, cell;
     double usual;        /* s; the step if nothing slid in a hollow: so long a part of an overlap takes */
@@ -247,6 +274,8 @@ typedef struct {
     double again;        /* what lasts needs so many times the impulses of the step before */
     double before;       /* share of this step's impulses that belongs to the one before */
     double g;            /* m/s2; size of gravity */
+    double haste;        /* m/s2; bound on the acceleration of what moves in this step */
+    double fastest;      /* m/s; bound on the speed of all that moves */
     double pace;         /* sqrt(g / EARTH), 1 without gravity: bounds on speeds grow with it, bounds
                             on times shrink: a film of the run shown faster is a run */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
@@ -304,6 +333,11 @@ typedef struct {
 /* A string from a point to a particle; without a length as long as it has to be at the release. */
 typedef struct { double from[2], length, particle; } StringKeys;
 
+/* How a surface moves; without a pivot about its first point, the centre of an arc, the pivot of a plate. */
+typedef struct {
+    double surface, pivot[2], by[2], frequency, phase_deg, to[2], at, in, turn;
+} MoverKeys;
+
 /* What a run needs beside these tables, for a plan that is run as it is: of the run, of each kind of
    particles, and then restitution and friction of each kind, as `Pair`: with each kind, with each surface. */
 typedef struct { double max_time, until; } RunKeys; /* s; `until` is NaN where it is a word */
@@ -347,9 +381,10 @@ typedef struct {
     double *terms;          /* (term_width) of a plan that is run, behind its row: `RunKeys` and what follows */
     int members, width, term_width; /* [in] */
     int owners;             /* [in] of a plan that is run: how many names its surfaces have */
-    int particles, streams, incoming, plates, outgoing, conveyors, surfaces, strings; /* [in] counts */
+    int particles, streams, incoming, plates, outgoing, conveyors, surfaces, strings, moving; /* [in] counts */
     Segment *segments;      /* [out] (members, segment_count) */
     Arc *arcs;
+    Mover *movers;          /* [out] (moving) of a scene by itself */
     Nominal *nominal;       /* [out] (members) */
     int segment_count, arc_count; /* [out] of each */
     int pad;
@@ -455,6 +490,21 @@ typedef struct {
     double looked, cell;
 } Drawing;
 
+/* What a surface bears in a bin of time: what presses it, what drags it along (n_y, -n_x), n the normal
+   towards a particle, and the whole of both; its moment about the origin; and places by what presses there. */
+typedef struct { double normal, along, x, y, moment, at[2]; } Load; /* N s, N m s; at: N s m */ /* [out] */
+
+#define MOST_BINS 1048576
+
+/* Loads of surfaces, if they are asked for. */
+typedef struct {
+    double every;           /* [in] s; how long a bin is; 0: nothing is counted */
+    Load *bins;             /* [out] (bin_count, owner_count) */
+    int owner_count, bin_count;
+    int used;               /* [out] bins up to the last in which anything is borne */
+    int overflow;           /* [out] there were to be more of them than MOST_BINS, or than memory has room for */
+} Loads;
+
 /* ---- What a run is judged by: a subject of its own, which shares nothing with the engine's. ---- */
 
 /* The laws, in the order in which they are told. */
@@ -492,7 +542,7 @@ typedef struct {
     int surface;            /* [in] which surface it is part of */
     int whole;              /* whether it is bent all round */
     int near;               /* of a list of pieces that may be met */
-    int pad;
+    int mover;              /* [in] number of its mover from 1 on, 0 if it stays where it is */
 } Barrier;
 
 /* A particle as it is told to the laws. */
@@ -526,6 +576,7 @@ typedef struct {
     int *offsets;           /* (particles + 1) first knot of each, and behind the last: [in], or `owned` */
     Body *bodies;           /* [in] (particles) */
     Barrier *barriers;      /* [in] (pieces), of a family (particles, pieces) */
+    Mover *movers;          /* [in] (mover_count), as far as they are told */
     double *books;          /* [in] (book_rows, 3) entries of each surface, J */
     Breach *breaches;       /* (BREACHES) */
     Hit *hits;              /* in the order of particles and knots */
@@ -533,6 +584,7 @@ typedef struct {
     double *places;         /* (particles, 2) there, too */
     /* sizes */
     int particle_count, piece_count, knot_count, row; /* [in] row: doubles from knot to knot */
+    int mover_count;        /* [in] */
     int book_rows, surface_count; /* [in] with the particles' own, which is the last */
     int hit_room;
     /* the run */
@@ -554,9 +606,10 @@ typedef struct {
     double rounding;        /* m; what rounding may do to a length */
     double arcs;            /* m; by which a curve between two knots may leave an arc */
     double bent;            /* m/s2; largest acceleration along the inside of an arc */
+    double haste;           /* m/s2; largest acceleration of what moves */
     double late;            /* m; by which a step may take a disk beyond a surface */
     double allowed;         /* m; how deep a disk may be in a surface */
-    double energy;          /* J; in play */
+    double energy;          /* J; in play, see `energy_share` */
     double energy_bound;    /* what numbers may do to it, as a share of it */
     double parted;          /* J; what parting overlaps may give */
     double untold;          /* J; what a crowd's tracks may leave out between two knots */

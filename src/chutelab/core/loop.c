@@ -33,12 +33,13 @@ static void spare(Disk *d, const Surface *s, double t) {
     double place[4] = {d->x, d->y, 0, 0}, nx, ny, deep = (W.interact ? SUNK : 1e-9) * d->radius;
     if (s->opens != t && (s->opens > t || !is_spared(s, d))) return;
     if (d->mode == RIDING) ride_at(d, t, place);
+    s = surface_at((int)(s - W.surfaces), t);
     *spared_by(s, d) = gap_to(s, place[0], place[1], d->radius, &nx, &ny) < (s->opens == t ? -deep : 0);
 }
 
-/* When the next surface comes or goes, s. */
+/* When the next surface comes or goes, or its travel changes, s. */
 static double next_gate(double t) {
-    double next = INFINITY;
+    double next = next_turn(t);
     for (int k = 0; k < W.surface_count; k++) {
         if (W.surfaces[k].opens > t) next = MIN(next, W.surfaces[k].opens);
         if (W.surfaces[k].closes > t) next = MIN(next, W.surfaces[k].closes);
@@ -51,9 +52,9 @@ static double ride_gap(const Disk *d, double t, int *which) {
     double place[4], nx, ny, least = INFINITY;
     ride_at(d, t, place);
     for (int k = 0; k < W.surface_count; k++) {
-        const Surface *s = W.surfaces + k;
+        const Surface *s = surface_at(k, t);
         if (s->owner == W.ride_owner || t < s->opens || t >= s->closes || is_spared(s, d)) continue;
-        double gap = gap_to(W.surfaces + k, place[0], place[1], d->radius, &nx, &ny);
+        double gap = gap_to(s, place[0], place[1], d->radius, &nx, &ny);
         if (gap < least) {
             least = gap;
             *which = k;
@@ -89,7 +90,7 @@ static void plan_ride(Disk *d, double from) {
             return;
         }
         safe = t;
-        t = MIN(t + MAX(gap, 1e-3 * d->radius) / v, next_gate(t));
+        t = MIN(t + MAX(gap, 1e-3 * d->radius) / (v + W.fastest), next_gate(t));
     }
 }
 
@@ -121,6 +122,7 @@ static void ride_knot(int i, double t) {
     d->vy = place[3];
     d->spin = 0;
     d->t = t;
+    bear_ride(i);
     knot_now(i);
 }
 
@@ -220,6 +222,7 @@ static void stop_all(int reason) {
         } else if (d->mode == ASLEEP) {
             d->vx = d->ux;
             d->vy = d->uy;
+            bear_asleep(d, d->t, 0);
             if (d->t > W.tracks[i].knot[0]) knot_now(i);
             finish(i, BY_TIME);
         } else if (d->mode == RIDING) {
@@ -236,9 +239,9 @@ static void stop_all(int reason) {
     }
 }
 
-/* Whether everything of a crowd has been calm for long enough, and no gate is still to come or go. */
+/* Whether everything of a crowd has been calm for long enough, nothing moves, and no gate is still to come or go. */
 static int has_settled(void) {
-    if (W.gate_count && next_gate(W.t) < INFINITY) return 0;
+    if (W.stirs || next_gate(W.t) < INFINITY) return 0;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode == WAITING || d->mode == RIDING || (d->mode == FREE && d->calm < SETTLED / W.pace)) return 0;
@@ -250,6 +253,9 @@ static int has_settled(void) {
 
 /* Tell which surfaces are there; what sleeps wakes when one comes or goes. Next change, s. */
 static double set_gates(double t) {
+    int stirred = stir(t) && W.step_count > 0;
+    for (int i = W.low; i < W.high && stirred; i++)
+        if (W.disks[i].mode == ASLEEP) wake(i, W.t);
     for (int k = 0; k < W.surface_count; k++) {
         Surface *s = W.surfaces + k;
         int there = t < s->opens || t > s->closes ? ABSENT : t < s->closes ? THERE : LEAVING;
@@ -260,16 +266,24 @@ static double set_gates(double t) {
         for (int i = W.low; i < W.high && s->gate >= 0; i++)
             if (is_live(W.disks + i)) spare(W.disks + i, s, t);
     }
-    return W.gate_count ? next_gate(t) : INFINITY;
+    return W.gate_count || W.mover_count ? next_gate(t) : INFINITY;
 }
 
-/* A sleeper that rides a belt wakes where that ends. */
+/* A sleeper that rides a belt wakes where that ends, and one that something moves against. */
 static void look_ahead(int i) {
     Disk *d = W.disks + i;
+    const int *list;
+    double nx, ny;
+    int count = W.stirs ? surfaces_near(i, &list) : 0;
+    for (int n = 0; n < count; n++) {
+        if (!stirs(W.surfaces + list[n]) || !is_near(W.surfaces + list[n], d)) continue;
+        if (gap_to(surface_at(list[n], W.t), d->x, d->y, d->radius, &nx, &ny) > TOUCH * d->radius) continue;
+        wake(i, W.t);
+        return;
+    }
     if (d->ux == 0 && d->uy == 0) return;
     for (int n = 0; n < d->held_count; n++) {
-        double nx, ny;
-        const Surface *s = W.surfaces + d->held[n];
+        const Surface *s = surface_at(d->held[n], W.t);
         if (gap_to(s, d->x + d->ux * W.step, d->y + d->uy * W.step, d->radius, &nx, &ny)
                 > 0.1 * TOUCH * d->radius
             || bending(s, d->x + d->ux * W.step, d->y + d->uy * W.step, d->radius) != 0) {
@@ -286,7 +300,7 @@ static double hollow_step(const Disk *d, double h) {
     double speed = sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * h, nx, ny;
     if (speed * h <= TURN * W.room) return h;
     for (int k = 0; k < W.surface_count; k++) {
-        const Surface *s = W.surfaces + k;
+        const Surface *s = surface_at(k, d->t);
         double room = s->radius - d->radius;
         if (s->shape == SEGMENT || !(room > 0) || speed * h <= TURN * room) continue;
         if (square(d->x - s->x) + square(d->y - s->y) >= square(s->radius)) continue;
@@ -355,7 +369,7 @@ static int begin_step(void) {
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
     if (W.total_count >= W.total_room) return FULL_TOTALS;
     double next = set_gates(W.t), h = W.dt, stride = 0;
-    for (int i = W.low; i < W.high && W.g > 0; i++) h = MIN(h, hop_time(W.disks + i, W.g));
+    for (int i = W.low; i < W.high && W.g + W.haste > 0; i++) h = MIN(h, hop_time(W.disks + i, W.g + W.haste));
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     W.usual = h;
     set_step(h);
@@ -372,6 +386,7 @@ static int begin_step(void) {
     if (stride > h) W.step_end = W.t + stride < stop ? W.t + stride : stop;
     W.now = W.t;
     h = W.step_end - W.t;
+    box_movers(W.t, h);
     /* Impulses stand for half of the step before and half of this one. */
     double span = W.length_before + W.length;
     W.length_before = W.length;
@@ -492,7 +507,8 @@ static int is_over(void) {
     double next = INFINITY;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
-        if (d->mode == RIDING || d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0))) awake = 1;
+        if (d->mode == RIDING || d->mode == FREE) awake = 1;
+        if (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)) awake = 1;
         if (d->mode == WAITING) next = MIN(next, MAX(d->release, W.t));
     }
     if (awake) return 0;

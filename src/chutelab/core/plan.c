@@ -3,6 +3,7 @@
    The outgoing belt hangs from where the nominal particle meets the plate, and the plate's lower end
    stays above that belt. */
 
+#include <string.h>
 #include "plan.h"
 
 /* m of plate below the pivot where there is no outgoing belt to stop short of. */
@@ -23,6 +24,7 @@ EXPORT int lay_out_plan(void) {
     RESERVE(P.rows, (double)P.members * P.width + P.term_width);
     P.terms = P.rows + P.members * P.width;
     RESERVE(P.nominal, P.members);
+    RESERVE(P.movers, P.moving);
     return has_room();
 }
 
@@ -41,6 +43,7 @@ Tables tables_of(int member) {
     NEXT(conveyors, ConveyorKeys, P.conveyors);
     NEXT(surfaces, SurfaceKeys, P.surfaces);
     NEXT(strings, StringKeys, P.strings);
+    NEXT(movers, MoverKeys, P.moving);
 #undef NEXT
     t.points = row;
     t.particle = t.particles + (int)t.streams->kind;
@@ -187,6 +190,58 @@ static void lay_all(const Tables *t, Nominal *found) {
     }
 }
 
+/* Whether a surface moves. */
+int is_moved(const Tables *t, int surface) {
+    for (int n = 0; n < P.moving; n++)
+        if (t->movers[n].surface == surface) return 1;
+    return 0;
+}
+
+/* Find what a surface moves about, if that is not given: the pivot of a plate, else its first point, or
+   the centre of an arc. */
+static void find_pivot(const Tables *t, int surface, double *pivot) {
+    const double *found = 0, *points = t->points;
+    int next = P.incoming, damps = t->incoming && t->plate;
+    if (damps && surface == next) {
+        pivot[0] = t->incoming->pulley_radius + t->plate->distance;
+        pivot[1] = t->plate->pivot_height;
+        return;
+    }
+    next += damps + (t->incoming && t->outgoing);
+    for (int n = 0; n < P.plates; n++)
+        if (!isnan(t->plates[n].pivot[0]) && surface == next++) found = t->plates[n].pivot;
+    next += P.conveyors;
+    for (int n = 0; n < P.surfaces; n++) {
+        const SurfaceKeys *s = t->surfaces + n;
+        if (surface == next++) found = s->corners ? points : s->center;
+        points += 2 * (int)s->corners;
+    }
+    pivot[0] = found[0];
+    pivot[1] = found[1];
+}
+
+/* Write how surfaces move: keys that are not given are no motion. */
+static void lay_movers(const Tables *t) {
+    for (int n = 0; n < P.moving; n++) {
+        const MoverKeys *k = t->movers + n;
+        Mover *m = P.movers + n;
+        *m = (Mover){ .pivot = { k->pivot[0], k->pivot[1] }, .surface = (int)k->surface };
+        if (isnan(k->pivot[0])) find_pivot(t, m->surface, m->pivot);
+        if (!isnan(k->frequency)) {
+            m->frequency = k->frequency;
+            m->phase = k->phase_deg * RADIANS;
+            memcpy(m->by, k->by, sizeof m->by);
+        }
+        if (!isnan(k->in)) {
+            m->from = k->at;
+            m->lasts = k->in;
+            m->way[0] = k->to[0] - m->pivot[0];
+            m->way[1] = k->to[1] - m->pivot[1];
+        }
+        if (!isnan(k->turn)) m->turn = k->turn * RADIANS;
+    }
+}
+
 /* Lay all surfaces of a member, or count them if there is no place yet. */
 static void build_member(int member) {
     Tables t = tables_of(member);
@@ -202,6 +257,8 @@ EXPORT int build(void) {
     segments = 0;
     arcs = 0;
     build_member(0);
+    Tables first = tables_of(0);
+    lay_movers(&first);
     P.segment_count = segment_count;
     P.arc_count = arc_count;
     RESERVE(P.segments, (double)P.members * segment_count);

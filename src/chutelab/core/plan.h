@@ -27,6 +27,7 @@ typedef struct {
     const ConveyorKeys *conveyors;
     const SurfaceKeys *surfaces;
     const StringKeys *strings;
+    const MoverKeys *movers;
     const double *points;
 } Tables;
 
@@ -39,6 +40,9 @@ int is_on_belt(const Tables *t, int stream);
 void release_point(const Tables *t, int stream, double *place);
 void release_velocity(const Tables *t, int stream, double *velocity);
 void fly_nominal(const Tables *t, Nominal *out);
+
+/* plan.c */
+int is_moved(const Tables *t, int surface);
 
 /* releases.c */
 void lay_out_drawing(void);

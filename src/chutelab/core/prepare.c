@@ -5,6 +5,9 @@
 
 #define PI 3.14159265358979323846
 
+/* rad; directions that differ by less are one. */
+#define ALIKE 1e-9
+
 /* Radii, rad: pieces whose ends are no further apart and whose directions there differ by no more
    are one smooth surface, as one whose points are written with some digits is meant to be. */
 #define JOINED 1e-3
@@ -149,6 +152,7 @@ static void find_mate(int k, int end, double r) {
         const Surface *next = W.surfaces + m;
         if (rank(W.ends[row]) > last) break;
         if (m == k || m >= mate || (next->shape == SEGMENT && s->shape == SEGMENT)) continue;
+        if (next->mover != s->mover) continue;
         at_end(next, W.ends[row] % 2, other, back);
         double off = hypot(other[0] - place[0], other[1] - place[1]);
         if (off > JOINED * r || hypot(back[0] + onward[0], back[1] + onward[1]) > SMOOTH) continue;
@@ -159,6 +163,7 @@ static void find_mate(int k, int end, double r) {
     for (int n = 0; n < W.circle_count; n++) {
         const Surface *next = W.surfaces + W.circles[n];
         double x = place[0] - next->x, y = place[1] - next->y, reach = next->radius + JOINED * r;
+        if (next->mover != s->mover) continue;
         if (fabs(x) > reach || fabs(y) > reach) continue;
         double d = hypot(x, y), off = fabs(d - next->radius);
         if (off > JOINED * r || fabs(x * onward[0] + y * onward[1]) > SMOOTH * d) continue;
@@ -175,6 +180,7 @@ static void share_end(int k, int n, double near, double r) {
     for (int row = first_near(2 * k + n, r, &last); row < W.end_count; row++) {
         const double *other = W.surfaces[W.ends[row] / 2].end + 2 * (W.ends[row] % 2);
         if (rank(W.ends[row]) > last) break;
+        if (W.surfaces[W.ends[row] / 2].mover != W.surfaces[k].mover) continue;
         if (W.ends[row] < first && fabs(end[0] - other[0]) <= near && fabs(end[1] - other[1]) <= near)
             first = W.ends[row];
     }
@@ -183,12 +189,58 @@ static void share_end(int k, int n, double near, double r) {
     end[1] = W.surfaces[first / 2].end[2 * (first % 2) + 1];
 }
 
+/* Curvature of the way out of a piece at an end, 1/m; > 0: to the left. */
+static double curl_of(const Surface *s, int end) {
+    return s->shape == SEGMENT ? 0 : (end ? -1 : 1) / s->radius;
+}
+
+/* Find the middle of the half of an end's rim that goes on from the left side of a piece, of an arc its
+   outside; the other half goes on from the other side. At a free end that is the normal on that side.
+   Where other pieces end, a disk rolls round the end only where the angle between two of them is more than
+   pi: all of that rim goes on from the side that faces it, also where it is wider than a quarter turn, and
+   its middle bisects that angle. */
+static void find_crown(int k, int n, double r) {
+    Surface *s = W.surfaces + k;
+    double place[2], out[2], there[2], back[2], last, least = INFINITY, most = -INFINITY;
+    double sense = (s->shape == SEGMENT) == n ? 1 : -1, lies[2][2], *crown = s->crown + 2 * n;
+    at_end(s, n, place, out);
+    crown[0] = -sense * out[1];
+    crown[1] = sense * out[0];
+    for (int row = first_near(2 * k + n, r, &last); row < W.end_count && rank(W.ends[row]) <= last; row++) {
+        const Surface *next = W.surfaces + W.ends[row] / 2;
+        int end = W.ends[row] % 2;
+        at_end(next, end, there, back);
+        if (W.ends[row] == 2 * k + n || there[0] != place[0] || there[1] != place[1]) continue;
+        if (next->mover != s->mover) continue;
+        double bends = curl_of(next, end) - curl_of(s, n);
+        double turn = atan2(out[0] * back[1] - out[1] * back[0], out[0] * back[0] + out[1] * back[1]);
+        if (fabs(turn) <= ALIKE) {
+            if (fabs(bends) <= ALIKE * fabs(curl_of(s, n))) continue;
+            turn = bends > 0 ? 0 : 2 * PI;
+        } else if (turn < 0) turn += 2 * PI;
+        for (int side = 0; side < 2; side++) {
+            if (side ? turn <= most : turn >= least) continue;
+            lies[side][0] = back[0];
+            lies[side][1] = back[1];
+        }
+        least = MIN(least, turn);
+        most = MAX(most, turn);
+    }
+    int right = least < PI - ALIKE;
+    if (least == INFINITY || (right && most > PI + ALIKE)) return;
+    double way = right ? -1 : 1;
+    const double *other = lies[right];
+    crown[0] += sense * (other[1] - way * (out[0] + other[0]));
+    crown[1] -= sense * (other[0] + way * (out[1] + other[1]));
+}
+
 /* Lay out what the host fills in. */
 EXPORT int lay_out_world(void) {
     W.material_count = W.surface_count;
     RESERVE(W.disks, W.disk_count);
     RESERVE(W.surfaces, 2.0 * W.surface_count);
     RESERVE(W.pairs, (double)W.kind_count * (W.kind_count + W.material_count));
+    RESERVE(W.movers, W.mover_count);
     return has_room();
 }
 
@@ -226,6 +278,7 @@ static int lay_out_work(void) {
     RESERVE(W.tracks, n);
     RESERVE(W.waits, crowd ? (double)WAITS * n : WAITS);
     RESERVE(W.books, 3.0 * (W.owner_count + 1));
+    RESERVE(W.drives, W.owner_count);
     RESERVE(W.cells, W.cell_room);
     RESERVE(W.heads, W.bucket_count);
     RESERVE(W.heap, n);
@@ -266,6 +319,8 @@ EXPORT int prepare(void) {
         Surface *piece = W.surfaces + k;
         derive(piece);
         piece->gate = piece->opens > -INFINITY || piece->closes < INFINITY ? W.gate_count++ : -1;
+        piece->mover = find_mover(piece);
+        memcpy(piece->swept, piece->box, sizeof piece->swept);
         W.everything[k] = k;
     }
     RESERVE(W.spared, (double)W.disk_count * W.gate_count);
@@ -274,13 +329,18 @@ EXPORT int prepare(void) {
     for (int k = 0; k < 2 * W.surface_count; k++)
         if (W.surfaces[k / 2].shape != CIRCLE) share_end(k / 2, k % 2, TOUCHING * least, least);
     for (int k = 0; k < W.surface_count; k++)
-        for (int end = 0; end < 2; end++) find_mate(k, end, least);
+        for (int end = 0; end < 2; end++) {
+            find_mate(k, end, least);
+            if (W.surfaces[k].shape != CIRCLE) find_crown(k, end, least);
+        }
     for (int k = 0; k < 2 * W.surface_count; k++) {
         int mate = W.surfaces[k / 2].mates[k % 2], *of = W.surfaces[MAX(mate, 0)].mates;
         if (W.surfaces[k / 2].shape == CIRCLE || mate < 0 || W.surfaces[mate].shape != CIRCLE) continue;
         W.surfaces[mate].ledges[of[0] >= 0] = W.surfaces[k / 2].ledges[k % 2];
         of[of[0] >= 0] = k / 2;
     }
+    for (int k = 0; k < W.surface_count; k++)
+        if (W.surfaces[k].mover >= 0) prepare_mover(W.surfaces + k);
     W.ledge = INFINITY;
     W.gx = 0;
     W.gy = -W.g;

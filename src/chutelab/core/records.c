@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include "laws.h"
+#include "loads.h"
 
 #define PI 3.14159265358979323846
 
@@ -100,7 +101,8 @@ EXPORT int prepare_to_judge(void) {
     const Surface *pulley = w->pulley < 0 ? 0 : w->surfaces + w->pulley;
     L = (Laws){ .particle_count = w->disk_count, .piece_count = w->surface_count, .pulley = pulley != 0,
                 .engine = ENGINE_CONTACT, .dt = w->dt, .surface_count = w->owner_count + 1,
-                .book_rows = w->owner_count + 1, .interact = w->interact };
+                .book_rows = w->owner_count + 1, .interact = w->interact, .movers = w->movers,
+                .mover_count = w->mover_count };
     if (!lay_out_pieces()) return 0;
     Barrier *b = L.barriers;
     for (int k = 0; k < w->surface_count; k++) {
@@ -110,13 +112,15 @@ EXPORT int prepare_to_judge(void) {
                           .radius = s->radius, .begin = s->begin, .extent = s->extent,
                           .speed = s->speed, .appears = s->opens, .vanishes = s->closes,
                           .surface = s->owner };
+        for (int n = 0; n < w->mover_count; n++)
+            if (w->movers[n].surface == s->owner) own->mover = n + 1;
     }
     for (int i = 0; i < w->disk_count; i++) {
         const Disk *d = w->disks + i;
         L.bodies[i] = (Body){ d->radius, d->mass, d->inertia, w->g };
         L.largest = MAX(L.largest, d->radius);
     }
-    return prepare();
+    return prepare() && (B.every == 0 || lay_out_bins(w->owner_count));
 }
 
 static int judge_world(void) {

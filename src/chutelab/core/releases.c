@@ -89,6 +89,16 @@ static void draw_spread(double vx, double vy) {
     }
 }
 
+/* Draw velocities of a gas: normal in both directions (G. E. P. Box, M. E. Muller, 1958). */
+static void draw_gas(void) {
+    for (int i = 0; i < count && stream->speed_spread > 0.0; i++) {
+        double size = stream->speed_spread * sqrt(-2.0 * log(1.0 - draw_share())), x, y;
+        sin_cos(2.0 * PI * draw_share(), &y, &x);
+        starts[i].velocity[0] += size * x;
+        starts[i].velocity[1] += size * y;
+    }
+}
+
 /* Draw all that is independent of the other particles. */
 static void begin_stream(void) {
     double velocity[2];
@@ -117,6 +127,7 @@ static void begin_stream(void) {
     if (is_fill()) {
         seed_stream(D.stream);
         draw_radii();
+        draw_gas();
         D.found = 0;
         D.looked = 0.0;
     } else if (count > 1 && (meets_others() || spread || is_line())) {
@@ -302,7 +313,7 @@ EXPORT int draw(void) {
         enter_room(&tables);
         for (; D.stream <= P.streams && !D.refusals[D.member].why; D.stream++, D.is_begun = 0)
             if (!(D.stream < P.streams ? draw_stream() : clear_releases())) return PAUSED;
-        box_in(&tables);
+        box_in();
     }
     return DONE;
 }

@@ -18,8 +18,6 @@ double draw_uniform(Generator *g, double low, double high);
 void enter_room(const Tables *t);
 int take_what_is_in_surfaces(Place *places, int count, double radius);
 int clear_releases(void);
-
-/* exits.c */
-void box_in(const Tables *t);
+void box_in(void);
 
 #endif

@@ -1,4 +1,4 @@
-/* Where disks may be released: not in a surface that is there then. */
+/* Where disks may be released, not in a surface that is there then, and where their tracks end. */
 
 #include "releases.h"
 
@@ -150,6 +150,8 @@ static double reach_of_corners(const double *corners, int many, double dx, doubl
 static void clear_release(const Piece *p, int stream, int i, double *deepest, Refusal *refusal) {
     Start *o = D.starts + (long)D.member * D.count + i;
     double x = o->position[0], y = o->position[1], reach = o->radius, point[2];
+    /* What moves is somewhere else by then: the engine has a release wait for it. */
+    if (is_moved(t, p->surface)) return;
     if (!(p->appears <= o->t && o->t < p->vanishes) || !is_beside(p, x, y, o->radius)) return;
     nearest_point(p, x, y, point);
     double dx = x - point[0], dy = y - point[1], distance = length_of(dx, dy);
@@ -203,4 +205,90 @@ int clear_releases(void) {
         }
     }
     return 1;
+}
+
+/* The boxes beyond which particles have left the scene. */
+
+static void hold(double *box, double x, double y) {
+    box[0] = MIN(box[0], x);
+    box[1] = MIN(box[1], y);
+    box[2] = MAX(box[2], x);
+    box[3] = MAX(box[3], y);
+}
+
+static void hold_at(double *box, const Arc *arc, double angle) {
+    double dx, dy;
+    sin_cos(angle, &dy, &dx);
+    hold(box, arc->center[0] + arc->radius * dx, arc->center[1] + arc->radius * dy);
+}
+
+/* The ends of an arc, and where it is level or upright. */
+static void hold_arc(double *box, const Arc *arc) {
+    for (int quarter = 0; quarter < 4; quarter++) {
+        double way = modulo(0.5 * PI * quarter - arc->begin, 2.0 * PI);
+        if (way <= arc->extent) hold_at(box, arc, arc->begin + way);
+    }
+    hold_at(box, arc, arc->begin);
+    hold_at(box, arc, arc->begin + arc->extent);
+}
+
+/* All that a string's end can reach. */
+static void hold_string(double *box, const StringKeys *string, const Start *held) {
+    double x = string->from[0], y = string->from[1], length = string->length;
+    if (isnan(length)) length = length_of(held->position[0] - x, held->position[1] - y);
+    hold(box, x - length, y - length);
+    hold(box, x + length, y + length);
+}
+
+/* Hold all that the pieces of a surface sweep, which are in a box before it moves. */
+static void hold_swept(double *all, double *box, const Mover *m) {
+    double x = MAX(fabs(box[0] - m->pivot[0]), fabs(box[2] - m->pivot[0]));
+    double y = MAX(fabs(box[1] - m->pivot[1]), fabs(box[3] - m->pivot[1])), reach = length_of(x, y);
+    for (int n = 0; n < 4; n++) {
+        double way = m->way[n % 2], by = fabs(m->by[n % 2]);
+        if (m->turn != 0.0) box[n] = m->pivot[n % 2] + (n < 2 ? -reach : reach);
+        box[n] += n < 2 ? MIN(way, 0.0) - by : MAX(way, 0.0) + by;
+    }
+    hold(all, box[0], box[1]);
+    hold(all, box[2], box[3]);
+}
+
+static void hold_segment(double *box, const Segment *s) {
+    hold(box, s->start[0], s->start[1]);
+    hold(box, s->start[0] + s->length * s->tangent[0], s->start[1] + s->length * s->tangent[1]);
+}
+
+/* Give each particle of a member its box. With gravity it has a bottom only: what flies up comes back. What
+   is released below all surfaces, or hangs on a string, has not left. Where particles do not meet, each
+   one's box holds its own release alone, so that it does the same alone and with others. */
+void box_in(void) {
+    double all[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY };
+    Start *first = D.starts + (long)D.member * D.count;
+    for (int n = 0; n < P.segment_count; n++) hold_segment(all, segments + n);
+    for (int n = 0; n < P.arc_count; n++) hold_arc(all, arcs + n);
+    for (const Mover *m = P.movers; m < P.movers + P.moving; m++) {
+        double box[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY };
+        for (int n = 0; n < P.segment_count; n++)
+            if (segments[n].surface == m->surface) hold_segment(box, segments + n);
+        for (int n = 0; n < P.arc_count; n++)
+            if (arcs[n].surface == m->surface) hold_arc(box, arcs + n);
+        hold_swept(all, box, m);
+    }
+    for (int n = 0; n < P.strings; n++)
+        hold_string(all, t->strings + n, first + (int)t->strings[n].particle);
+    if (t->incoming) {
+        double radius = t->incoming->pulley_radius;
+        hold(all, -radius, -radius);
+        hold(all, radius, radius);
+    }
+    for (int i = 0; i < D.count && t->scene->crowded != 0.0; i++)
+        hold(all, first[i].position[0], first[i].position[1]);
+    for (Start *o = first; o < first + D.count; o++) {
+        for (int n = 0; n < 4; n++) o->exit_box[n] = all[n];
+        hold(o->exit_box, o->position[0], o->position[1]);
+        for (int n = 0; n < 4; n++) o->exit_box[n] += n < 2 ? -EXIT_MARGIN : EXIT_MARGIN;
+        if (t->scene->gravity == 0.0) continue;
+        o->exit_box[0] = -INFINITY;
+        o->exit_box[2] = o->exit_box[3] = INFINITY;
+    }
 }

@@ -152,11 +152,13 @@ static int take_up_world(void) {
     w->surface_count = P.segment_count + P.arc_count + P.incoming;
     w->kind_count = P.particles;
     w->owner_count = P.owners;
+    w->mover_count = P.moving;
     w->pulley = P.incoming ? P.segment_count : -1;
     w->ride_incline = P.incoming ? t.incoming->incline_deg * RADIANS : 0.0;
     w->g = t.scene->gravity;
     w->end_time = end_of_run();
     if (!lay_out_world()) return 0;
+    memcpy(w->movers, P.movers, P.moving * sizeof(Mover));
     Surface *to = take_segments(w->surfaces);
     if (P.incoming)
         *to++ = (Surface){ .radius = t.incoming->pulley_radius, .extent = 2.0 * PI, .speed = t.incoming->speed,

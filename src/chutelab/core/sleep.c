@@ -22,6 +22,7 @@ void wake(int i, double t) {
         d->x += d->ux * (t - d->t);
         d->y += d->uy * (t - d->t);
         d->t = t;
+        bear_asleep(d, t, h > 0 ? 0.5 * left : 0);
         d->vx = d->ux;
         d->vy = d->uy;
         d->spin = 0;
@@ -45,7 +46,7 @@ void wake(int i, double t) {
 static int joins(const Contact *c, double *u, int *owner) {
     const Surface *s = W.surfaces + (-1 - c->j);
     double belt = c->other[1], x = belt * c->ny, y = -belt * c->nx;
-    if (s->speed != 0 && s->shape != SEGMENT) return 0;
+    if (stirs(s) || (s->speed != 0 && s->shape != SEGMENT)) return 0;
     /* Nothing has settled that a belt will throw. */
     if (s->speed != 0 && W.until == UNTIL_SETTLED && c->owner != W.landing) return 0;
     if (fabs(W.gx * x + W.gy * y) > 1e-12 * W.g * fabs(belt)) return 0;
@@ -99,6 +100,9 @@ void fall_asleep(void) {
                              0.5 * d->mass * (x * x + y * y) + 0.5 * d->inertia * s[5] * s[5], 0};
         track->lasted = 0;
         book(d->entries, 0, W.moved[k], entries);
+        bear_disk(d, W.moved[k], d->mass * (u[0] - d->ux - W.before * (d->vx - d->ux)),
+                  d->mass * (u[1] - d->uy - W.before * (d->vy - d->uy)), d->t, d->t);
+        d->slept = d->t;
         d->ux = u[0];
         d->uy = u[1];
         d->vx = u[0];
@@ -116,4 +120,5 @@ void fall_asleep(void) {
         d->vx -= 0.5 * W.gx * W.step;
         d->vy -= 0.5 * W.gy * W.step;
     }
+    balance_sleepers();
 }

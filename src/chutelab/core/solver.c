@@ -214,7 +214,7 @@ static double sweep(Contact *list, int count, int sweeps, int plain, double accu
 }
 
 /* Whether a surface that moves drives a disk. */
-static int drives(const Contact *c) { return c->j < 0 && c->other[1] != 0; }
+static int drives(const Contact *c) { return c->j < 0 && c->other[1] - c->moved[1] != 0; }
 
 /* Stall the drives, for this step, of disks that do not turn and that block them: contacts that change by
    `least`, m/s, or more, and rough ones that slip by more than `enough` though their friction is not all used.
@@ -229,7 +229,8 @@ static int stall(Contact *list, int count, double least, double enough) {
         int holds = c->impulse[0] > 0 && fabs(c->impulse[1]) < HOLDS * c->friction * c->impulse[0];
         int slips = c->friction > ROUGH && holds && fabs(v[1] + c->drift) > enough;
         if (!slips && c->change < least) continue;
-        c->other[1] = c->other[2] = 0;
+        c->other[1] = c->moved[1];
+        c->other[2] = c->moved[2];
         stalled = 1;
     }
     return stalled;
@@ -422,7 +423,7 @@ void solve_contacts(void) {
             const Disk *a = W.disks + c->i, *b = W.disks + (c->j >= 0 ? c->j : c->i);
             least = MIN(least, MIN(a->radius, b->radius));
             heaviest = MAX(heaviest, MAX(a->mass, b->mass));
-            driven |= !c->two && c->other[1] != 0;
+            driven |= !c->two && c->other[1] - c->moved[1] != 0;
         }
         /* A drive presses as hard as it must: there no spring would hold, and friction is lowered. */
         for (int n = from; n < to; n++) {

@@ -23,7 +23,7 @@ double gap_later(const Contact *c, double h, double *bends) {
     const Disk *a = W.disks + c->i;
     double x = a->x + (a->vx + 0.5 * W.gx * h) * h, y = a->y + (a->vy + 0.5 * W.gy * h) * h, nx, ny;
     if (c->j < 0) {
-        const Surface *s = W.surfaces + (-1 - c->j), *then = face_at(s, x, y);
+        const Surface *s = surface_at(-1 - c->j, a->t + h), *then = face_at(s, x, y);
         /* From afar it comes to no other piece than the one that the normal is of. */
         if (then != s && c->gap > TOUCH * a->radius) return INFINITY;
         if (bends) *bends = bending(then, x, y, a->radius);
@@ -39,24 +39,27 @@ double gap_later(const Contact *c, double h, double *bends) {
    goes on smoothly, and not so bent that the disk flies on. */
 static double time_on_face(const Contact *c) {
     const Disk *d = W.disks + c->i;
-    const Surface *s = W.surfaces + (-1 - c->j);
-    double x = d->x - s->x, y = d->y - s->y, along, run, length = s->length;
+    const Surface *s = surface_at(-1 - c->j, d->t);
+    double x = d->x - s->x, y = d->y - s->y, along, run, length = s->length, v[3];
+    carried(s, d->x, d->y, v);
+    v[0] = d->vx - v[0];
+    v[1] = d->vy - v[1];
     if (s->shape == CIRCLE) return INFINITY;
     if (s->shape == SEGMENT) {
         along = x * s->tx + y * s->ty;
-        run = d->vx * s->tx + d->vy * s->ty;
+        run = v[0] * s->tx + v[1] * s->ty;
     } else {
         /* Angles; the foot of a disk in contact turns with its centre. */
         double half = acos(s->cos_half), square_away = x * x + y * y;
         if (square_away == 0) return INFINITY;
         along = atan2(s->tx * y - s->ty * x, s->tx * x + s->ty * y) + half;
-        run = (x * d->vy - y * d->vx) / square_away;
+        run = (x * v[1] - y * v[0]) / square_away;
         length = 2 * half;
     }
     if (along < 0 || along > length || run == 0) return INFINITY;
     if (mate_of(s, run > 0) >= 0) {
-        const Surface *next = W.surfaces + s->mates[run > 0];
-        double load = -(W.gx * c->nx + W.gy * c->ny), fast = d->vx * c->ny - d->vy * c->nx;
+        const Surface *next = surface_at(s->mates[run > 0], d->t);
+        double load = -(W.gx * c->nx + W.gy * c->ny), fast = v[0] * c->ny - v[1] * c->nx;
         int round = next->shape != SEGMENT
             && square(d->x - next->x) + square(d->y - next->y) >= square(next->radius);
         if (!round || load > fast * fast / (next->radius + d->radius)) return INFINITY;
@@ -77,7 +80,7 @@ static double closes(const Contact *c, double aim, double h) {
     for (int n = 0; n < 2; n++) {
         double x = d->x + (d->vx + need * c->nx + 0.5 * W.gx * h) * h;
         double y = d->y + (d->vy + need * c->ny + 0.5 * W.gy * h) * h;
-        double gap = gap_to(face_at(W.surfaces + (-1 - c->j), x, y), x, y, d->radius, &nx, &ny);
+        double gap = gap_to(face_at(surface_at(-1 - c->j, d->t + h), x, y), x, y, d->radius, &nx, &ny);
         double slope = nx * c->nx + ny * c->ny;
         if (slope < 0.5) break;
         need += (aim - gap) / (slope * h);
@@ -90,8 +93,9 @@ static int add(int i, int j, double least, double bound, double h) {
     if (W.contact_count >= W.contact_room) return 0;
     Contact *c = W.contacts + W.contact_count;
     const Disk *d = W.disks + i;
-    double u[3], later;
-    if (j < 0 && face_at(W.surfaces + (-1 - j), d->x, d->y) != W.surfaces + (-1 - j)) return 1;
+    double u[3], later, haste = 0;
+    if (j < 0 && face_at(surface_at(-1 - j, d->t), d->x, d->y) != W.surfaces + (-1 - j)) return 1;
+    if (j < 0) haste = 2 * h * hastes(W.surfaces + (-1 - j), d);
     describe(c, i, j);
     /* The next face or pulley that a disk by itself slides on to may be further off. */
     int far = c->gap > TOUCH * least;
@@ -104,7 +108,7 @@ static int add(int i, int j, double least, double bound, double h) {
     if (!W.interact && !W.tracks[i].lasted && flies_off(d, -1 - j, u[0])) return 1;
     /* What has sunk in counts however it moves: else what parts others would press it, or what knocks
        on it in each step. */
-    if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > MAX(W.soft, soft_approach(d, least))))
+    if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > MAX(W.soft + haste, soft_approach(d, least))))
         return 1;
     double aim = MIN(c->gap, 0);
     if (c->gap < -SLOP * least) {
@@ -130,8 +134,10 @@ static int add(int i, int j, double least, double bound, double h) {
        above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
     double floor = -u[0], until = j < 0 ? time_on_face(c) : INFINITY, least_need = floor;
     if (until < h) {
-        double press = press_on(d, W.surfaces + (-1 - j), c->nx, c->ny);
-        double along = d->vx * c->ny - d->vy * c->nx;
+        const Surface *s = surface_at(-1 - j, d->t);
+        double press = press_on(d, s, c->nx, c->ny), v[3];
+        carried(s, d->x, d->y, v);
+        double along = (d->vx - v[0]) * c->ny - (d->vy - v[1]) * c->nx;
         floor += 0.5 * until * MAX(press, 0);
         least_need = press > along * along / d->radius ? floor : -u[0] + until * MAX(press, 0);
     } else least_need = floor;
@@ -165,8 +171,10 @@ static int add(int i, int j, double least, double bound, double h) {
 /* Put a disk where it is when its foot comes to the end of the face that it slides along. Straight on
    it would be inside a hollow face by then, and far above a round one. */
 static void at_the_end(const Contact *c, Disk *d) {
-    const Surface *s = W.surfaces + (-1 - c->j);
-    double nx = c->nx, ny = c->ny, along = d->vx * ny - d->vy * nx;
+    const Surface *s = surface_at(-1 - c->j, d->t);
+    double nx = c->nx, ny = c->ny, v[3];
+    carried(s, d->x, d->y, v);
+    double along = (d->vx - v[0]) * ny - (d->vy - v[1]) * nx;
     double way = s->shape == SEGMENT ? ny * s->tx - nx * s->ty : nx * (d->x - s->x) + ny * (d->y - s->y);
     int last = s->shape == SEGMENT ? along * way > 0 : along * way < 0;
     const double *end = s->end + 2 * last;
@@ -177,8 +185,8 @@ static void at_the_end(const Contact *c, Disk *d) {
     }
     d->x = end[0] + d->radius * nx;
     d->y = end[1] + d->radius * ny;
-    d->vx = along * ny;
-    d->vy = -along * nx;
+    d->vx = v[0] + along * ny;
+    d->vy = v[1] - along * nx;
 }
 
 /* A disk that leaves all surfaces in this step, over the end of a face, is carried until then: it
@@ -203,12 +211,12 @@ static void carry_to_end(int i, int first, double h) {
     const int *list;
     int count = surfaces_near(i, &list);
     for (int n = 0; n < count; n++) {
-        const Surface *s = W.surfaces + list[n];
+        const Surface *s = surface_at(list[n], d->t + h);
         if (is_near(s, d) && gap_to(s, then.x, then.y, d->radius, &nx, &ny)
-                < MIN(0, gap_to(s, d->x, d->y, d->radius, &nx, &ny)))
+                < MIN(0, gap_to(surface_at(list[n], d->t), d->x, d->y, d->radius, &nx, &ny)))
             return;
     }
-    double press = press_on(d, W.surfaces + (-1 - last->j), last->nx, last->ny);
+    double press = press_on(d, surface_at(-1 - last->j, d->t), last->nx, last->ny);
     last->need += 0.5 * MAX(press, 0) * until;
 }
 
@@ -246,6 +254,7 @@ int find_contacts(double h, int *woke) {
             int k = list[n];
             if (!is_near(W.surfaces + k, d)) continue;
             double inside = pressed_inside(d, k), most = MAX(bound, inside ? W.soft + 2 * h * inside : 0);
+            if (d->supports) most += 2 * h * hastes(surface_at(k, d->t), d);
             if (!add(i, -1 - k, d->radius, most, h)) return 0;
         }
         if (W.contact_count > first) carry_to_end(i, first, h);

@@ -26,6 +26,7 @@ from chutelab.core import (
 )
 from chutelab.machine import Machine, Pieces, hand_over
 from chutelab.results.laws import take
+from chutelab.results.loads import gather
 from chutelab.results.record import REASONS, TOTAL, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress, unwatched
@@ -117,6 +118,7 @@ class Job:
             ("landing", machine.landing), ("ride_owner", 0), ("dt", machine.dt),
         ):  # fmt: skip
             setattr(module.world, name, value)
+        module.structs["Loads"].every = machine.loads
         self.begin = "run_world" if machine.is_ahead else "run_and_judge"
         if machine.is_ahead:
             hand_over(module, machine.scene)
@@ -134,6 +136,7 @@ class Job:
             ("pulley", -1 if wheel is None else len(machine.segments.length)),
             ("ride_incline", 0.0 if wheel is None else wheel.incline),
             ("g", machine.gravity), ("end_time", machine.end_time),
+            ("mover_count", len(machine.movers)),
         ):  # fmt: skip
             setattr(module.world, name, value)
         module.work("lay_out_world")
@@ -148,6 +151,9 @@ class Job:
         disks["rides"] = releases.carried
         disks["exit_box"] = releases.exit_box
         module.array("surfaces", dtype("Surface"), len(self.pieces))[:] = self.pieces
+        rows = module.array("movers", dtype("Mover"), len(machine.movers))
+        for row, mover in zip(rows, machine.movers, strict=True):
+            mover.tell(row)
         pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials))
         pairs = pairs.reshape(self.kinds, -1)
         own = pairs[:, : self.kinds]
@@ -244,7 +250,9 @@ class Job:
             late[late == REASONS.index("time")] = REASONS.index("stopped")
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
+        recorder.drives[: self.owners] = module.array("drives", REAL, self.owners)
         recorder.contacts = world.impact_count
         recorder.gained = world.gained
         rows = module.array("totals", dtype("Total"), world.total_count)
         recorder.totals = rows.view(TOTAL).copy()
+        recorder.impulses = gather(module, self.owners)

@@ -27,6 +27,7 @@ from chutelab.core import (
 )
 from chutelab.machine import Machine, hand_over
 from chutelab.results.laws import take
+from chutelab.results.loads import gather
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress, unwatched
@@ -36,7 +37,7 @@ ROUNDS = 500_000
 200,000; one that rattles at 7 ms a period for the default max_time needs 10,000."""
 
 WINDOW = 10_000
-"""Events after which it is asked whether a particle gets on."""
+"""Events between two looks at whether a particle makes progress."""
 
 TICK = 1e-12
 """s over `Machine.pace`; mean time between events below which it does not: the last bounces before
@@ -116,6 +117,7 @@ def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:
     exact.apart, exact.until = apart, UNTIL[machine.until]
     exact.landing, exact.far, exact.is_whole = machine.landing, far, far == 0.0
     exact.most, exact.window, exact.tick = ROUNDS, WINDOW, TICK
+    module.structs["Loads"].every = machine.loads
 
 
 def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
@@ -242,3 +244,4 @@ def collect(module: Module, recorder: Recorder) -> None:
     books = module.array("books", REAL, recorder.by_surface.size, of="Exact")
     recorder.by_surface = books.copy().reshape(recorder.by_surface.shape)
     recorder.contacts = exact.contacts
+    recorder.impulses = gather(module, len(recorder.machine.surfaces))

@@ -142,6 +142,7 @@ def _plain(machine: Machine) -> Machine:
         (machine.outlines[kind] is not None or machine.threads, "disks without strings"),
         (bent, "straight surfaces, and the drive pulley"),
         (np.isfinite([parts.appears, parts.vanishes]).any(), "surfaces that are always there"),
+        (machine.movers, "surfaces that stay where they are"),
         (machine.rolling[kind] > 0.0, "disks without rolling friction"),
     ):
         if there:

@@ -11,6 +11,7 @@ from chutelab.machine import Machine, ahead
 from chutelab.results import Recording, record
 from chutelab.results.recorder import EnoughError, StalledError
 from chutelab.scene import AnyScene, Fault, Overrides, Scene, SceneError, load
+from chutelab.scene.overrides import Override
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import LawWarning
 from chutelab.util.signals import ctrl_c_waits
@@ -40,7 +41,7 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         return wanted
     if any(outline is not None for outline in machine.outlines) or machine.threads:
         return "pymunk"
-    return "contact" if machine.interact else "exact"
+    return "contact" if machine.interact or machine.movers else "exact"
 
 
 def simulate(
@@ -50,6 +51,7 @@ def simulate(
     engine: str | None = None,
     progress: Progress | None = None,
     max_seconds: float | None = None,
+    loads: float | None = None,
 ) -> Recording:
     """Run a scene.
 
@@ -69,6 +71,8 @@ def simulate(
         Wall time, s, after which the run ends with what is recorded: particles that have not ended
         have reason ``"stopped"``, and `results.summary.stopped` says up to when all is there.
         Looked at after each step or so, which of a large crowd may take some tenths of a second.
+    loads : float, optional
+        Count what surfaces bear, in bins of so many seconds: as ``run.loads``; `Recording.loads`.
 
     Returns
     -------
@@ -93,6 +97,8 @@ def simulate(
         For each law that the run breaks, see `Recording.laws`: what, which particle, where, when,
         and what to do.
     """
+    if loads is not None:
+        changes = [changes, Override("run.loads", loads)]
     recording = judged(scene, changes, engine=engine, progress=progress, max_seconds=max_seconds)
     for broken in recording.laws:
         warnings.warn(str(broken), LawWarning, stacklevel=2)
@@ -191,6 +197,10 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
         if machine.threads:
             raise _refused(scene, "string", len(machine.threads), "none, or the pymunk engine")
     if name == "exact":
+        if machine.movers:
+            moving = machine.surfaces[machine.movers[0].surface]
+            allowed = f"contact or pymunk, because {moving} moves: no closed form has its blows"
+            raise _refused(scene, "run.engine", "exact", allowed)
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"
             raise _refused(scene, "run.engine", "exact", allowed)

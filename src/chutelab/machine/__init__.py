@@ -1,6 +1,7 @@
 """A scene resolved to world-frame arrays: what the engines take, and all they take.
 
 - `parts`: `Machine`, its particle and its pulley.
+- `movers`: where surfaces are that move, and how fast.
 - `shapes`: straight and bent pieces of surfaces: nearest point, gap, ends, box, path to draw.
 - `releases`: where, when and how fast each particle starts.
 - `builder`: `build`, from a validated scene, as rows of numbers, to a machine; `ahead`, to one that
@@ -8,6 +9,7 @@
 """
 
 from chutelab.machine.builder import ahead, build, hand_over
+from chutelab.machine.movers import Mover
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
     Caution,
@@ -26,6 +28,7 @@ __all__ = [
     "Arcs",
     "Caution",
     "Machine",
+    "Mover",
     "Particle",
     "Pieces",
     "Pulley",

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core import REAL, Module, borrow, constants, dtype, give_back
+from chutelab.machine.movers import Mover
 from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Thread
 from chutelab.machine.releases import RefusedError, draw
 from chutelab.machine.shapes import KINDS, Pieces
@@ -74,7 +75,21 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
         add("SurfaceKeys", surface, corners=len(surface.points or ()))
     for string in scene.string:
         add("StringKeys", string)
-    return [*found, *chain(*(point for one in scene.surface for point in one.points or ()))]
+    for name, one in scene.movers.items():
+        shake, travel = one.shake, one.travel
+        add(
+            "MoverKeys", one, surface=scene.surfaces.index(name),
+            by=None if shake is None else value(shake, "by"),
+            frequency=None if shake is None else value(shake, "frequency"),
+            phase_deg=None if shake is None else value(shake, "phase_deg"),
+            to=None if travel is None else value(travel, "to"),
+            at=None if travel is None else value(travel, "at"),
+            **{"in": None if travel is None else value(travel, "in_")},
+        )  # fmt: skip
+    return [
+        *found,
+        *chain(*(point for one in scene.surface for point in value(one, "points") or ())),
+    ]
 
 
 def counts(scene: Scene) -> dict[str, int]:
@@ -84,6 +99,7 @@ def counts(scene: Scene) -> dict[str, int]:
         "incoming": scene.incoming is not None, "outgoing": scene.outgoing is not None,
         "plates": len(scene.plates), "conveyors": len(scene.conveyor),
         "surfaces": len(scene.surface), "strings": len(scene.string),
+        "moving": len(scene.movers),
     }  # fmt: skip
 
 
@@ -133,7 +149,7 @@ def hand_over(module: Module, scene: Scene) -> None:
 
 def lay(
     module: Module, scenes: Scene | Family, friction: Numbers
-) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
+) -> tuple[dict[str, NDArray[Any]], NDArray[Any], tuple[Mover, ...]]:
     """Have the core lay the surfaces of a scene, or of all N scenes of a family.
 
     Returns
@@ -142,6 +158,8 @@ def lay(
         For each of `KINDS` rows as that in layout.h, by the part of a machine.
     nominal : ndarray, () or (N,)
         As `Nominal`.
+    movers : tuple of Mover
+        How surfaces move; of a family none does.
     """
     scene, numbers = scenes.scene, row(scenes, friction)
     shape = (len(scenes),) if isinstance(scenes, Family) else ()
@@ -162,11 +180,13 @@ def lay(
         rows = module.array(name, dtype(kind), every * prod(count), of="Plan")
         return rows.copy().reshape((*shape, *count))
 
+    rows = module.array("movers", dtype("Mover"), len(scene.movers), of="Plan")
+    movers = tuple(map(Mover.of, rows))
     parts = {
         f"{kind.lower()}s": found(f"{kind.lower()}s", kind, getattr(plan, f"{kind.lower()}_count"))
         for kind in KINDS
     }
-    return parts, found("nominal", "Nominal")
+    return parts, found("nominal", "Nominal"), movers
 
 
 def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
@@ -198,7 +218,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
     module = borrow()
     try:
-        rows, nominal = lay(module, scenes, grip)
+        rows, nominal, movers = lay(module, scenes, grip)
         warnings = _judged(scenes, nominal)
         releases, radius = draw(module, scenes, watch)
     finally:
@@ -211,7 +231,8 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     until: Any = value(scene.run, "until")
     worded = isinstance(until, str)
     particle = _particle(scenes, releases.kind, radius)
-    bound = releases.t.max().item() + value(scene.run, "max_time")
+    latest: Any = releases.t if family else releases.t.max().item()
+    bound = latest + value(scene.run, "max_time")
     pulley = None
     if belt is not None:
         bounces, grips = zip(*met[0], strict=True)
@@ -252,6 +273,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         rolling=np.array([value(kind, "rolling_friction") for kind in particles]),
         outlines=_outlines(scene),
         threads=() if family else tuple(threads),
+        movers=movers,
         streams=tuple(str(stream.name) for stream in scene.streams),
         engine=scene.run.engine,
         plate_warnings=warnings,
@@ -274,6 +296,7 @@ def ahead(scene: Scene) -> Machine:
         count=scene.count,
         outlines=_outlines(scene),
         **({} if scene.string else {"threads": ()}),
+        **({} if scene.movers else {"movers": ()}),
     )
     return machine
 
@@ -286,21 +309,17 @@ Met = Sequence[Sequence[tuple[Any, Any]]]
 """Restitution and friction of each surface with each kind of particles; numbers or arrays (N,)."""
 
 
-SHARED = ("surface", "appears", "vanishes")
-"""What pieces have alike in all scenes of a family."""
-
-
 def _pieces(kind: type[Pieces], rows: NDArray[Any], met: Met, kinds: int) -> Pieces:
     """Return one kind of pieces of their rows, (S,) or of a family (N, S)."""
     shape = rows.shape[:-1]
     if not rows.size:
-        rows = rows.reshape(-1)  # no piece of a family is none of one scene
+        rows = rows.reshape(-1)  # without pieces there is nothing by scene
     known = [name for name in kind.__dataclass_fields__ if name in (rows.dtype.names or ())]
     own = {name: rows[name] for name in known}
     if rows.ndim > 1:
-        # Those of all members lie side by side; they are there at the same times.
+        # Those of all members lie side by side; they belong to the same surfaces.
         own = {
-            name: array[0].copy() if name in SHARED else array.T.copy().T
+            name: array[0].copy() if name == "surface" else array.T.copy().T
             for name, array in own.items()
         }
     surface = own["surface"].astype(np.int64)

@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chutelab.machine.movers import Mover
 from chutelab.machine.releases import Releases
 from chutelab.machine.shapes import Arcs, Pieces, Segments, crossings
 from chutelab.scene import Scene
@@ -162,6 +163,7 @@ class Machine:
     rolling: Floats  # (K,), rolling friction of a kind on everything: its arm over the radius
     outlines: tuple[Floats | None, ...]  # (K); of boxes and polygons corners (n, 2)
     threads: tuple[Thread, ...]
+    movers: tuple[Mover, ...]
     streams: tuple[str, ...]  # names; `Releases.stream` tells whose a particle is
     engine: str  # what the scene asks for: "auto", "exact", "contact" or "pymunk"
     plate_warnings: tuple[Caution, ...]  # of a nominal particle that misses the plate
@@ -204,10 +206,19 @@ class Machine:
         """
         return np.sqrt(np.where(np.greater(self.gravity, 0.0), self.gravity, EARTH) / EARTH)
 
+    @property
+    def loads(self) -> float:
+        """Width of the bins in which loads on surfaces are counted, s; 0 if they are not."""
+        return 0.0 if self.family is not None else self.scene.run.loads or 0.0
+
     @cached_property
     def count(self) -> int:
         """Number of particles."""
         return len(self.releases.t)
+
+    def mover(self, surface: int) -> Mover | None:
+        """Return what moves a surface, by its index; None if it stays where it is."""
+        return next((mover for mover in self.movers if mover.surface == surface), None)
 
     @property
     def parts(self) -> tuple[Segments, Arcs]:
@@ -216,9 +227,10 @@ class Machine:
 
     @property
     def last_gate(self) -> float:
-        """When a surface comes or goes for the last time, s; -inf if none does."""
+        """When a surface comes, goes or moves for the last time, s; -inf if none does."""
         times = np.concatenate([[p.appears, p.vanishes] for p in self.parts], axis=1)
-        return float(times[np.isfinite(times)].max(initial=-inf))
+        rest = max((mover.rests for mover in self.movers), default=-inf)
+        return max(rest, float(times[np.isfinite(times)].max(initial=-inf)))
 
     @property
     def corners(self) -> Floats:
@@ -292,5 +304,9 @@ def moved(machine: Machine, x: float, y: float) -> Machine:
         threads=tuple(
             replace(thread, anchor=(thread.anchor[0] + x, thread.anchor[1] + y))
             for thread in machine.threads
+        ),
+        movers=tuple(
+            replace(mover, pivot=(mover.pivot[0] + x, mover.pivot[1] + y))
+            for mover in machine.movers
         ),
     )

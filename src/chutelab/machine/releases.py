@@ -220,13 +220,22 @@ def _fault(scenes: Scene | Family, refusal: Any, member: int) -> Fault:
     advice = (
         'incoming.friction = "adhesion" releases every particle at incoming.speed; give a Coulomb'
     )
+
+    def own(key: str) -> Any:
+        """Return what this member has under a key of the stream, points and vectors as lists."""
+        found = scenes.value(stream, key)
+        if found is None:
+            return None
+        numbers = [np.ravel(one) for one in (found if isinstance(found, tuple) else [found])]
+        each = [one[member % len(one)].item() for one in numbers]
+        return each if isinstance(found, tuple) else each[0]
+
     if why == reasons["SPREAD_ADHERES"]:
-        spread = np.ravel(scenes.value(stream, "speed_spread"))
         allowed = f"{advice} coefficient, or speed_spread = 0"
-        return Fault(f"stream{several}.speed_spread", spread[member % len(spread)].item(), allowed)
+        return Fault(f"stream{several}.speed_spread", own("speed_spread"), allowed)
     if why == reasons["VELOCITY_ADHERES"]:
         allowed = f"{advice} coefficient, or leave the velocity out"
-        return Fault(f"stream{several}.velocity", list(stream.velocity or ()), allowed)
+        return Fault(f"stream{several}.velocity", own("velocity"), allowed)
     if why == reasons["BOX_FULL"]:
         fewer = f", or stream{several}.count = {particle} at most" if particle else ""
         allowed = (
@@ -240,4 +249,4 @@ def _fault(scenes: Scene | Family, refusal: Any, member: int) -> Fault:
         f"at least {reach:g} m from {name}: particle {particle} would start"
         f" {refusal['distance']:.6g} m from it, inside; move {key}, or the surface"
     )
-    return Fault(key, stream.at, allowed)
+    return Fault(key, own("at"), allowed)

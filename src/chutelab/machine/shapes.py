@@ -44,7 +44,7 @@ class Pieces(ABC):
         Of the pair with a particle; (K, S) where there are several kinds of particles.
     surface : ndarray, (S,)
         Index of the surface a piece belongs to, into `Machine.surfaces`.
-    appears, vanishes : ndarray, (S,)
+    appears, vanishes : ndarray, (..., S)
         From when to when it is there, s; -inf and inf if always.
     """
 

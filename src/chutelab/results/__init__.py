@@ -8,6 +8,7 @@
   symbols; particle 0 and the theory.
 - `stream`: a stream as a whole: flow, fates, steady power, the envelope of its paths.
 - `laws`: what every run is judged by.
+- `sensors`: what passes lines across a stream; `loads`: what surfaces bear, in bins of time.
 - `summary`: notes, tables, and the JSON object of ``chutelab run --json``.
 - `storage`: recordings as files.
 
@@ -37,6 +38,7 @@ from chutelab.results.record import (
 if TYPE_CHECKING:
     from chutelab.results.laws import Broken
     from chutelab.results.ledger import Ledger
+    from chutelab.results.loads import Load
     from chutelab.theory import Transfer
 
 
@@ -93,6 +95,12 @@ class Recording(Record):
         from chutelab.results.quantities import measure
 
         return measure(self, quantity)
+
+    def loads(self, surface: str, *, every: float | None = None) -> Load:
+        """Return what a surface bears over time, see `results.loads`; needs ``run.loads``."""
+        from chutelab.results.loads import loads
+
+        return loads(self, surface, every)
 
     def summary(self) -> dict[str, Any]:
         """Return what ``chutelab run --json`` prints; see `results.summary.summary`."""

@@ -2,8 +2,9 @@
 
 A particle *arrives* on a surface when it first touches it, or touches what lies on it. What lies on
 a surface at an instant is found from the places of all particles: those that touch it, those that
-touch these, and so on. A particle that has bounced off lies on nothing, so what it meets in the air
-has not arrived. Where particles do not meet each other, to arrive is to touch the surface itself.
+touch these, and so on. A particle that has bounced off lies on nothing: one that it meets in the
+air has not arrived by that. Where particles do not meet each other, to arrive is to touch the
+surface itself.
 
 The fate of a particle is where it is when its track ends, or by which way it has left.
 """
@@ -308,7 +309,7 @@ class Places:
             room = radius + radius[k] + TOUCH * np.minimum(radius, radius[k])
             next_to = (np.hypot(*(places - places[k]).T) <= room) & ~seen
             seen |= next_to
-            # The lowest is looked at first: it is the nearest to the surface.
+            # The lowest one comes first: it is the nearest to the surface.
             near = np.flatnonzero(next_to)
             todo += near[np.argsort(-places[near, 1])].tolist()
         return False

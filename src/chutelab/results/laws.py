@@ -185,10 +185,14 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("interact", machine.interact), ("alike", alike(recording)), ("family", rows.ndim > 1),
         ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
         ("steps", recording.steps), ("unreal", unreal), ("dt", 0.0 if exact else machine.dt),
+        ("mover_count", len(machine.movers)),
         ("gained", recording.gained), ("largest", np.max(machine.particle.radius)),
     ):  # fmt: skip
         setattr(laws, name, value)
     module.work("lay_out_laws")
+    movers = module.array("movers", core.dtype("Mover"), len(machine.movers), of="Laws")
+    for row, mover in zip(movers, machine.movers, strict=True):
+        mover.tell(row)
     module.fill(
         "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
         barriers=rows.reshape(-1), books=books,
@@ -203,7 +207,7 @@ def alike(recording: Record) -> bool:
     """Tell whether all is left to Chipmunk, in steps that are all alike."""
     m = recording.machine
     return recording.engine == "pymunk" and (
-        m.interact or not m.align or len(m.threads) > 0 or not _round(m)
+        m.interact or not m.align or len(m.threads) + len(m.movers) > 0 or not _round(m)
     )
 
 
@@ -240,6 +244,8 @@ def barriers(machine: Machine) -> NDArray[Any]:
         own["appears"], own["vanishes"] = part.appears, part.vanishes
         for name, values in part.told().items():
             own[name] = values
+        for n, mover in enumerate(machine.movers, 1):
+            own["mover"][part.surface == mover.surface] = n
     return rows
 
 

@@ -1,6 +1,7 @@
 """The energy ledger of a recording: where every joule came from and where it went.
 
-(K + U) at the end - (K + U) at the start = belt_work - restitution_loss - friction_loss + residual.
+(K + U) at the end - (K + U) at the start
+= belt_work + drive_work - restitution_loss - friction_loss + residual.
 Every entry is accumulated from impulses and contact-point velocities, none is a remainder; so the
 residual is the numerical error, and is shown as such.
 """
@@ -8,6 +9,7 @@ residual is the numerical error, and is shown as such.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -34,6 +36,9 @@ class Ledger(Shown):
         the kinetic energy; y = 0 is the zero of the potential energy.
     belt_work : float
         Tangential impulse times belt speed: what the drives pay.
+    drive_work : float
+        Impulse times the velocity that the motion of a surface gives to where it acts: what moves
+        it. In the tracks and in `by_stream` it is part of the belt work.
     restitution_loss : float
         Normal part of the losses in impacts.
     friction_loss : float
@@ -44,7 +49,8 @@ class Ledger(Shown):
         Kinetic energy at the start + the sizes of the three entries + the size of the change of
         potential energy.
     by_surface : dict of dict of float
-        The three entries of each surface, and of ``"particles"``.
+        The three entries of each surface, and of ``"particles"``; where surfaces move also
+        ``drive_work``.
     by_stream : dict of dict
         ``kinetic``, ``potential``, the three entries, and ``from_others``, of each stream; empty if
         there is one. The last is what the balance of a stream leaves over: the energy that it got
@@ -60,6 +66,7 @@ class Ledger(Shown):
     turned_over: float
     by_surface: dict[str, dict[str, float]]
     by_stream: dict[str, dict[str, Any]]
+    drive_work: float = 0.0
 
     @property
     def relative_residual(self) -> float:
@@ -83,19 +90,20 @@ class Ledger(Shown):
             rounding = abs(entry) <= share * self.turned_over and not details
             return number(0.0 if rounding else entry)
 
-        total = (self.belt_work, self.restitution_loss, self.friction_loss)
+        names = [*dict.fromkeys(chain.from_iterable(self.by_surface.values()))]
+        total = [getattr(self, name) for name in names]
         moved = (
             f"{name} {told(before, UNSEEN)} -> {told(after, UNSEEN)} J"
             for name, (before, after) in (("kinetic", self.kinetic), ("potential", self.potential))
         )
         rows = [(name, [*entries.values()]) for name, entries in self.by_surface.items()]
         rows += [
-            (f"of {name}", [share[entry] for entry in ENTRIES])
+            (f"of {name}", [share.get(entry, 0.0) for entry in names])
             for name, share in self.by_stream.items()
         ]
         return Sheet(
             "Energy ledger, J",
-            ("", *(name.replace("_", " ") for name in ENTRIES)),
+            ("", *(name.replace("_", " ") for name in names)),
             tuple((name, *map(told, entries)) for name, entries in rows if any(entries)),
             foot=(("total", *map(told, total)),),
             notes=(", ".join(moved), left),
@@ -127,14 +135,18 @@ def ledger(recording: Record) -> Ledger:
         del share["turned_over"]
         share["from_others"] = share.pop("residual")
         by_stream[name] = share
+    by_surface = {
+        name: dict(zip(ENTRIES, row, strict=True))
+        for name, row in zip(recording.surfaces, recording.by_surface.tolist(), strict=True)
+    }
+    for entries, work in zip(by_surface.values(), recording.drives.tolist(), strict=False):
+        entries["belt_work"] -= work
+        entries["drive_work"] = work
+    closed, work = _closed(found), float(recording.drives.sum())
     return Ledger(
-        **_closed(found),
-        by_surface={
-            name: dict(zip(ENTRIES, row, strict=True))
-            for name, row in zip(recording.surfaces, recording.by_surface.tolist(), strict=True)
-        },
-        by_stream=by_stream,
-    )
+        **closed | {"belt_work": closed["belt_work"] - work},
+        by_surface=by_surface, by_stream=by_stream, drive_work=work,
+    )  # fmt: skip
 
 
 def _closed(found: dict[str, Floats]) -> dict[str, Any]:

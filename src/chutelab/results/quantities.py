@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.results.arrival import arrivals, never
 from chutelab.results.ledger import ledger, ledger_of_each
+from chutelab.results.loads import load
 from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
 from chutelab.results.sensors import first_passages, reading
 from chutelab.scene import Scene
@@ -38,6 +39,7 @@ from chutelab.scene.quantities import (
 from chutelab.scene.units import with_unit
 from chutelab.scene.variants import Family
 from chutelab.theory import Transfer, predict, unbounded
+from chutelab.theory.prediction import outside
 from chutelab.util.arrays import Bools, Floats, Numbers
 from chutelab.util.tables import Sheet, Shown, number
 
@@ -293,14 +295,10 @@ def worst(recording: Record) -> Floats:
         return np.array([nan if found is None else found])
     if scene.incoming is None or scene.plate is None:
         return np.full(count, nan)
-    # The equations need a release on the belt, at its speed.
-    belt, start = scene.incoming, recording.offsets[:-1]
-    release = recording.knots[np.where(recording.released, start, 0)]
-    (x, y), (vx, vy) = release["position"].T, release["velocity"].T
+    begins = recording.released
+    for other, _ in outside(family):
+        begins = begins & np.logical_not(other)
     radius, mass = recording.particle.radius, recording.particle.mass
-    begins = recording.released & (y == family.value(belt, "pulley_radius") + radius) & (x <= 0.0)
-    begins &= -family.value(belt, "length") <= x
-    begins &= (vx == family.value(belt, "speed")) & (vy == 0.0)
     left, hit, down = _described(recording, begins)
     simulated = from_events(family, left, hit, down, radius, mass)
     simulated |= until_no_slip(recording, down["t"])
@@ -436,6 +434,14 @@ def measured(recording: Record, name: str) -> Floats:
             return worst(recording)
         case ["sensor", sensor, "count" | "back" | "rate" | "mass_rate" | "depth" as key]:
             return np.array([float(getattr(reading(recording, sensor), key))])
+        case ["loads", surface, part, statistic]:
+            return np.array([getattr(load(recording, surface).part(part), statistic)])
+        case ["ledger", "by_surface", surface, "belt_work" | "drive_work" as entry] if not (
+            recording.family
+        ):
+            return np.array([ledger(recording).by_surface[surface].get(entry, 0.0)])
+        case ["ledger", *_, "drive_work"]:
+            return np.zeros(many)
         case ["ledger", "by_surface", surface, entry]:
             return paid(recording, surface, entry)
         case ["ledger", "power"]:

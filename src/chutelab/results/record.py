@@ -110,6 +110,19 @@ TOTAL = np.dtype([("t", "f8"), ("kinetic", "f8"), ("potential", "f8"), ("entries
 """
 
 
+LOAD = np.dtype([
+    ("normal", "f8"), ("along", "f8"), ("force", "f8", 2), ("moment", "f8"), ("at", "f8", 2)
+])  # fmt: skip
+"""What a surface bears in a bin of time: impulses on it, in SI units.
+
+- ``normal``: what presses it, N s.
+- ``along``: what drags it along (n_y, -n_x), n the normal towards the particle, N s.
+- ``force``: the whole of both, N s.
+- ``moment``: of all that about the origin, N m s.
+- ``at``: places where it is pressed, each times what presses there, N m s.
+"""
+
+
 def balance(entries: NDArray[Any]) -> Floats:
     """Return the energy (J) that entries (..., 3) bring: belt work less both losses."""
     return np.asarray(entries[..., 0] - entries[..., 1] - entries[..., 2])
@@ -263,6 +276,12 @@ class Record(Shown):
     totals : ndarray, shape (S,) or (0,), dtype `TOTAL`
         Energies of all particles together at each step of the contact engine in a crowd: its tracks
         leave out what is less than a hop, and sums of squares of their velocities are not as near.
+    drives : ndarray, shape (len(surfaces),) or (0,)
+        What of the belt work (J) in `by_surface`, in the knots and in `totals` is the work of what
+        moves the surface, see docs/physics.md, "Moving surfaces". Empty where none does.
+    impulses : ndarray, shape (B, len(surfaces) - 1) or (0, 0), dtype `LOAD`
+        What each surface bears in bins of ``run.loads`` seconds from 0 s on, up to the last one in
+        which anything is borne; empty where that is not asked for.
     """
 
     machine: Machine
@@ -279,9 +298,12 @@ class Record(Shown):
     instead: str = ""
     gained: float = 0.0
     totals: NDArray[Any] = field(default_factory=lambda: np.empty(0, TOTAL))
+    drives: Floats = field(default_factory=lambda: np.zeros(0))
+    impulses: NDArray[Any] = field(default_factory=lambda: np.empty((0, 0), LOAD))
 
     def __post_init__(self) -> None:
-        for name in ("knots", "offsets", "ended", "events", "by_surface", "angle", "totals"):
+        arrays = "knots offsets ended events by_surface angle totals drives impulses"
+        for name in arrays.split():
             getattr(self, name).flags.writeable = False
 
     @property
@@ -415,6 +437,30 @@ class Record(Shown):
         _, index = np.unique(events["particle"], return_index=True)
         return events[index]
 
+    def pose(self, name: str, times: ArrayLike) -> Floats:
+        """Return where a surface is that moves: x, y of its pivot, m, and its angle, rad, (T, 3).
+
+        The pivot is that of the scene file; of what has none its first point, or the centre of an
+        arc.
+
+        Parameters
+        ----------
+        name : str
+            A surface that moves.
+        times : array_like, shape (T,)
+            s, in any order.
+
+        Raises
+        ------
+        InputError
+            If no surface of that name moves.
+        """
+        movers = {self.machine.surfaces[mover.surface]: mover for mover in self.machine.movers}
+        if name not in movers:
+            there = f"what moves is {', '.join(movers) or 'nothing'}"
+            raise InputError(did_you_mean(name, list(movers), there), "name", name)
+        return movers[name].pose(np.atleast_1d(times))
+
     def blocks(self, times: Floats) -> Iterator[Cells]:
         """Find the knots before and after every particle's place at times (T,), s: see `Cells`."""
         return blocks(self.knots, self.offsets, times)
@@ -539,7 +585,7 @@ class Record(Shown):
         )
         belt, restitution, friction = entries_a + share * (entries_b - entries_a)
         residual = residual_a + share * (residual_b - residual_a)
-        # What straight lines leave over belongs to what goes on.
+        # The straight lines of the totals leave a rest, which is booked on what goes on.
         missing = gain - (belt - restitution - friction) - residual
         driven, struck, slips = entries_a != entries_b
         friction -= np.where(slips, missing, 0.0)

@@ -6,13 +6,15 @@ end.
 
 from __future__ import annotations
 
+from math import ceil
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine, moved, origin
-from chutelab.results.record import EVENT, KNOT, REASONS, TOTAL, Kind, Record
+from chutelab.results.loads import Bins
+from chutelab.results.record import EVENT, KNOT, LOAD, REASONS, TOTAL, Kind, Record
 from chutelab.util.arrays import Floats, Ints
 
 
@@ -71,9 +73,13 @@ class Recorder:
         self.entries = np.zeros((count, 3))
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
         self.ended = np.zeros(count, dtype=np.int8)
+        self.drives = np.zeros(owners)
         self.contacts = 0
         self.gained = 0.0
         self.totals = np.empty(0, TOTAL)
+        self.impulses = np.empty((0, 0), LOAD)
+        # Of engines that count loads here, if these are asked for.
+        self.bins = Bins(machine) if machine.loads else None
         self._knots: list[NDArray[Any]] = []
         self._owners: list[Ints] = []
         self._angles: list[Floats] = []
@@ -224,6 +230,15 @@ class Recorder:
             lifted = np.concatenate([[0.0], mass.cumsum()]) * self.machine.gravity * self.origin[1]
             released = np.searchsorted(begun[order], self.totals["t"], side="left")
             self.totals["potential"] += lifted[released]
+        if self.impulses.size:
+            (x, y), force = self.origin, self.impulses["force"]
+            self.impulses["moment"] += x * force[..., 1] - y * force[..., 0]
+            self.impulses["at"] += self.impulses["normal"][..., None] * self.origin
+            # Rounding may put something just behind the end of the last track.
+            bins = max(1, ceil(knots["t"].max() / self.machine.loads - 1e-9))
+            self.impulses, beyond = self.impulses[:bins], self.impulses[bins:]
+            for name in LOAD.names or ():
+                self.impulses[name][-1] += beyond[name].sum(axis=0)
         return Record(
             machine=self.machine,
             engine=engine,
@@ -232,11 +247,13 @@ class Recorder:
             ended=ended,
             events=events,
             by_surface=self.by_surface.copy(),
+            drives=self.drives if self.machine.movers else np.zeros(0),
             steps=steps,
             contacts=self.contacts,
             angle=angle,
             gained=self.gained,
             totals=self.totals,
+            impulses=self.impulses,
         )
 
 

@@ -11,7 +11,7 @@ import zipfile
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
 from errno import EINVAL, ESPIPE
-from math import inf, prod
+from math import inf, isnan, prod
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,18 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from chutelab.machine import build
-from chutelab.results.record import ENGINES, ENTRIES, EVENT, KNOT, REASONS, TOTAL, Kind, Record
+from chutelab.results.loads import borne, need_loads
+from chutelab.results.record import (
+    ENGINES,
+    ENTRIES,
+    EVENT,
+    KNOT,
+    LOAD,
+    REASONS,
+    TOTAL,
+    Kind,
+    Record,
+)
 from chutelab.results.sensors import sensed
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
@@ -39,10 +50,12 @@ ARRAYS = {
     "by_surface": np.dtype("f8"),
     "angle": np.dtype("f8"),
     "totals": TOTAL,
+    "drives": np.dtype("f8"),
+    "impulses": LOAD,
 }
 """Arrays of a file and their types."""
 
-MAYBE = ("angle", "totals")
+MAYBE = ("angle", "totals", "drives", "impulses")
 """Those that are left out where they are empty."""
 
 HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
@@ -58,8 +71,8 @@ come to 60, and a file that is made to fill the memory to 1000."""
 FAR = 1e100
 """Bound on every number: energies and distances computed from it stay finite."""
 
-TABLES = ("events", "trajectory", "sensors")
-"""What `to_csv` can write; the last only where it is asked for."""
+TABLES = ("events", "trajectory", "sensors", "loads")
+"""What `to_csv` can write; the last two only where they are asked for."""
 
 COLUMNS = ("t", "particle", "other", "kind", "surface")
 """Fields of an event that events.csv begins with."""
@@ -198,9 +211,11 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     recording = Record(machine=build(scene), instead=instead, **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
         raise _UnfitError("the header is of another scene")
-    numbers = {"by_surface": arrays["by_surface"], "angle": recording.angle}
+    numbers = {
+        "by_surface": arrays["by_surface"], "angle": recording.angle, "drives": recording.drives,
+    }  # fmt: skip
     numbers["gained"] = np.asarray(recording.gained, dtype=float)
-    for name in ("knots", "events", "totals"):
+    for name in ("knots", "events", "totals", "impulses"):
         array = getattr(recording, name)
         numbers |= {f"{name}.{key}": array[key] for key in array.dtype.names or ()}
     for name, values in numbers.items():
@@ -217,8 +232,10 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and not np.any((sizes < 0) | (sizes == 1))
         and recording.angle.shape in ((0,), knots.shape)
         and recording.ended.shape == sizes.shape
+        and (not recording.impulses.size or recording.impulses.shape[1:] == (surfaces - 1,))
         and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
+        and recording.drives.shape == ((surfaces,) if recording.machine.movers else (0,))
         and not np.any((events["surface"] < -1) | (events["surface"] >= surfaces))
         and not np.any((events["particle"] < 0) | (events["particle"] >= len(sizes)))
         and not np.any((events["other"] < -1) | (events["other"] >= len(sizes)))
@@ -240,7 +257,7 @@ def to_csv(
     step: float | None = None,
     only: Collection[str] = TABLES[:2],
 ) -> list[Path]:
-    """Write events.csv, trajectory.csv and sensors.csv, each whole or not at all.
+    """Write events.csv, trajectory.csv, sensors.csv and loads.csv, each whole or not at all.
 
     Parameters
     ----------
@@ -251,7 +268,7 @@ def to_csv(
     step : float, optional
         Interval of the trajectory, s; by default that of `instants`.
     only : collection of str
-        Which of the three; by default the first two.
+        Which of the four; by default the first two.
 
     Raises
     ------
@@ -308,6 +325,8 @@ def _table(recording: Record, name: str, step: float | None) -> Iterator[Sequenc
             )
     if name == "sensors":
         return _passages(recording)
+    if name == "loads":
+        return _loads(recording)
     return _events(recording) if name == "events" else _trajectory(recording, step)
 
 
@@ -362,3 +381,12 @@ def _passages(recording: Record) -> Iterator[Sequence[object]]:
         for t, particle, way, along, place, velocity in sensed(recording, sensor.name).tolist():
             own = float(recording.radius[particle]), float(recording.mass[particle])
             yield sensor.name, t, particle, way, along, *place, *velocity, *own
+
+
+def _loads(recording: Record) -> Iterator[Sequence[object]]:
+    need_loads(recording)
+    yield "surface", "t", "normal", "along", "fx", "fy", "x", "y", "torque"
+    for name, one in borne(recording).items():
+        columns = one.edges, one.normal, one.along, *one.force.T, *one.place.T, one.torque
+        for t, *row in zip(*(column.tolist() for column in columns), strict=False):
+            yield name, t, *(None if isnan(value) else value for value in row)

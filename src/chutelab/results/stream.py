@@ -130,7 +130,7 @@ def _envelope(recording: Record, own: Ints, end: Floats, places: int) -> Envelop
         offset[:, s] = np.quantile(crossed @ normal[s], QUANTILES)
     found = Envelope(middle, normal, offset)
     jumps = np.hypot(*np.moveaxis(np.diff(found.lines, axis=1), 2, 0)).max(axis=0)
-    # Where half of the particles come to lie, the way turns round, and cuts go through the rest.
+    # Where half of the particles have come to lie, the cuts go through them, and lines jump.
     broken = np.flatnonzero(jumps > JUMP * at[1])
     offset[:, broken[0] + 1 if len(broken) else places :] = np.nan
     return found

@@ -18,6 +18,8 @@ from chutelab.machine.releases import Squeeze, squeeze
 from chutelab.results.arrival import CARRIED, arrivals, fates
 from chutelab.results.laws import judge
 from chutelab.results.ledger import Ledger, ledger
+from chutelab.results.loads import sheet as load_sheet
+from chutelab.results.loads import told as loads_told
 from chutelab.results.quantities import column, compare, each, first, predicted, prediction
 from chutelab.results.record import REASONS, Kind, Record
 from chutelab.results.sensors import readings
@@ -291,6 +293,8 @@ def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
     parts.append(replace(balance, title=f"Energy ledger until {ends}, J"))
     if (sensors := sensor_sheet(recording)) is not None:
         parts.append(sensors)
+    if (loads := load_sheet(recording)) is not None:
+        parts.append(loads)
     notes = [str(note) for read, _ in NOTES.values() if (note := read(recording)) is not None]
     if (layered := layers(recording)) is not None:
         notes.insert(
@@ -356,6 +360,7 @@ OTHERS = {
     "instead": ("string", "why another engine ran first, see `Recording.instead`"),
     "ledger": ("object", "where the energy went, see `results.ledger.Ledger`"),
     "sensors": ("object", "what the scene's sensors tell, see `results.sensors.Reading`"),
+    "loads": ("object", "what each surface bears, see `results.loads.Part`, with run.loads"),
     "theory": ("object", "what the closed form predicts of particle 0, and why it stops"),
     "theory_as_printed": ("object", "the same with Eq. (9) as it is printed; null with friction of"
                           " the plate, or where it leans"),
@@ -397,6 +402,7 @@ def summary(recording: Record, accuracy: Mapping[str, Any] | None = None) -> dic
         "instead": recording.instead or None,
         "ledger": ledger(recording),
         "sensors": readings(recording),
+        "loads": loads_told(recording),
         "theory": _theory(prediction(recording)),
         "theory_as_printed": as_printed,
         "error": {**error.errors, "max": error.max},

@@ -332,7 +332,7 @@ def _tables(look: Look) -> Iterator[Fault]:
     if needy and not look.has("incoming"):
         need = "needs" if len(needy) == 1 else "need"
         yield Fault("incoming", MISSING, f"{' and '.join(needy)} {need} the table [incoming]")
-    # A plate without pivot lacks what would tell of which sort it is: it has a fault of its own.
+    # A plate without a pivot may be meant for either sort: what it lacks is another fault.
     damps |= any(not plate.given("pivot") for plate in plates)
     if look.row("outgoing")["drop_from"] == "impact" and not damps:
         text = 'needs the table [plate]; without one write outgoing.drop_from = "top"'
@@ -343,7 +343,7 @@ def _tables(look: Look) -> Iterator[Fault]:
 
 
 def _names(look: Look) -> Iterator[Fault]:
-    """Say which names are there twice, or missing, or lead nowhere."""
+    """Report names that are given twice, that are missing, or that nothing has."""
     surfaces: dict[object, str] = {}
     for table in (*SURFACES, "particle", "stream", "material", "sensor"):
         known = surfaces if table in SURFACES else {}
@@ -445,6 +445,10 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
     if count > MOST_PARTICLES:
         text = f"at most {MOST_PARTICLES} particles in all streams together, not {count}"
         yield max(streams, key=lambda stream: stream["count"]).fault("count", text)
+    for row in (*look.rows("plate"), *look.rows("surface")):
+        keys = [key for key in ("turn", "shake", "travel") if row.given(key) and row[key] != 0.0]
+        if keys and engine == "exact":
+            yield run.fault("engine", f"{row.path(keys[0])} moves it: contact or pymunk has that")
     if look.rows("string") and engine in ("exact", "contact"):
         yield run.fault("engine", "string[0] needs pymunk")
 
@@ -494,6 +498,7 @@ def _expectations(look: Look, streams: Sequence[Row]) -> Iterator[Fault]:
     surfaces = [*filter(look.has, ("incoming", "outgoing")), *["plate"] * look.damps]
     surfaces += [name for table in SURFACES for name in _texts(look.rows(table))]
     surfaces += [f"sensor.{name}" for name in _texts(look.rows("sensor"))]
+    surfaces += ["run.loads"] * look.row("run").given("loads")
     names = [
         name if isinstance(name := stream["name"], str) else stream_name(number)
         for number, stream in enumerate(streams)

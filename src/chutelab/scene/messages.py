@@ -77,7 +77,7 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
         if len(parts) == 1 and parts[0] in LISTS and isinstance(value, Mapping):
             text = f"head it [[{parts[0]}]], with two brackets each: there may be several"
         faults.setdefault(parts, Fault(joined(parts), value, text))
-    # A list whose entries are refused is refused as too short, too.
+    # Pydantic also calls a list too short if it refused its entries.
     broken_lists = {
         parts[:depth]
         for parts in faults

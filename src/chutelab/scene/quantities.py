@@ -148,6 +148,26 @@ def _run(
     return Quantity(name, unit, meaning, of, tuple(needs.split()), "scene", **swept)
 
 
+LOADS: Final = {
+    "normal": ("N", "force that presses SURFACE"),
+    "along": ("N", "force that drags SURFACE along"),
+    "torque": ("N m", "torque on SURFACE about its pivot"),
+}
+"""What a surface bears: unit and meaning."""
+
+PARTS: Final = {"mean": "mean over time", "peak": "largest of a bin", "rms": "root mean square"}
+
+
+def _load(part: str, unit: str, meaning: str, statistic: str) -> Iterator[Quantity]:
+    """Yield the rows of what a surface bears; the pressing of the plate is told by sweeps, too."""
+    said = f"{meaning}, {PARTS[statistic]}"
+    row = Quantity(f"loads.SURFACE.{part}.{statistic}", unit, said, "run", ("run.loads",), "scene")
+    yield row
+    if part == "normal":
+        name, said = (text.replace("SURFACE", "plate") for text in (row.name, said))
+        yield row._replace(name=name, meaning=said, needs=("plate", "run.loads"), columns=ITSELF)
+
+
 REGISTRY: Final = {
     row.name: row
     for row in (
@@ -158,6 +178,12 @@ REGISTRY: Final = {
         Quantity("sensor.SENSOR.rate", "1/s", "particles per time through SENSOR", "run"),
         Quantity("sensor.SENSOR.mass_rate", "kg/s", "mass per time through SENSOR", "run"),
         Quantity("sensor.SENSOR.depth", "m", "depth of the stream at SENSOR", "run"),
+        *(
+            row
+            for part, about in LOADS.items()
+            for statistic in PARTS
+            for row in _load(part, *about, statistic)
+        ),
         Quantity("flight.t", "s", "time of flight from the incoming belt",
                  needs=("incoming",), symbol="t"),
         Quantity("track.t", "s", "time from the release to the end", ending="scene", columns=MEAN),
@@ -189,6 +215,7 @@ REGISTRY: Final = {
         _run("misses", "particles that never arrived", "", needs="outgoing", columns=ITSELF),
         *(_run(f"ended.{why}", f"particles whose track ended: {why}", "") for why in ENDINGS),
         _run("ledger.belt_work", "what the drives of all belts pay", of="total"),
+        _run("ledger.drive_work", "what moves surfaces: their turn, shake and travel"),
         _run("ledger.restitution_loss", "loss of all bounces", of="total", columns=ITSELF),
         _run("ledger.friction_loss", "heat of all slip", of="total"),
         _run("ledger.residual", "energy that the ledger cannot explain: the numerical error",
@@ -203,6 +230,7 @@ REGISTRY: Final = {
         _run("ledger.power", "the outgoing belt's work per particle, times the rate of all the"
              " width", "W", needs="outgoing", columns=ITSELF),
         _run("ledger.by_surface.SURFACE.belt_work", "what the drive of SURFACE pays"),
+        _run("ledger.by_surface.SURFACE.drive_work", "what moves SURFACE"),
         _run("ledger.by_surface.SURFACE.restitution_loss", "loss of the bounces on SURFACE"),
         _run("ledger.by_surface.SURFACE.friction_loss", "heat of the slip on SURFACE"),
         _run("error.max", "largest relative error of particle 0 against the theory", "",
@@ -277,13 +305,13 @@ def _row(name: str, surfaces: Collection[str]) -> Quantity | None:
     row = REGISTRY.get(name)
     if row is None or "SURFACE" in name or "SENSOR" in name:
         parts = name.split(".")
-        place = {"impact": 1, "sensor": 1, "ledger": 2}.get(parts[0], len(parts))
+        place = {"impact": 1, "sensor": 1, "loads": 1, "ledger": 2}.get(parts[0], len(parts))
         any_ = "SENSOR" if parts[0] == "sensor" else "SURFACE"
         surface = parts[place] if place < len(parts) else ""
         row = REGISTRY.get(".".join([*parts[:place], any_, *parts[place + 1 :]]))
         known = f"sensor.{surface}" if parts[0] == "sensor" else surface
         there = known in surfaces or (place == 2 and surface == "particles")
-        if row is None or not there or (place == 1 and surface in NEEDED.values()):
+        if row is None or not there or (parts[0] == "impact" and surface in NEEDED.values()):
             return None
         row = row._replace(name=name, meaning=row.meaning.replace(any_, surface))
     return row if all(table in surfaces for table in row.needs) else None
@@ -309,6 +337,8 @@ def suggestion(name: str, surfaces: Collection[str]) -> str:
     """Say what a quantity is called now, or which one was probably meant, or which there are."""
     if name in FORMER:
         return f"it is called {FORMER[name]} now"
+    if "run.loads" not in surfaces and lookup(name, [*surfaces, "run.loads"]):
+        return "it needs run.loads, how long bins are, such as 0.01 s"
     missing = [table for table in NEEDED.values() if table not in surfaces]
     if row := lookup(name, [*surfaces, *missing]):
         return f"it needs {' and '.join(f'[{table}]' for table in row.needs if table in missing)}"
@@ -316,7 +346,7 @@ def suggestion(name: str, surfaces: Collection[str]) -> str:
     keys = ", ".join([*some, "contacts", "ledger.belt_work"])
     theirs = "phi1_deg to slip_heat, " if {"incoming", "plate"} <= {*surfaces} else ""
     there_are = f"there are {theirs}{keys} and other keys of `chutelab run --json`"
-    # Of a thousand surfaces some will do: looking for likeness takes long.
+    # A search for similar names takes long: of a thousand surfaces only some are looked at.
     known: list[str] = []
     for row in REGISTRY.values():
         statistics = STATISTICS if row.of == "particle" else ()

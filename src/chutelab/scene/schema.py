@@ -299,9 +299,21 @@ class SceneTables(Table):
         return (*tables, *(str(free.name) for free in self.free))
 
     @property
+    def movers(self) -> dict[str, Plate | Surface]:
+        """Surfaces that move, by their names in the ledger."""
+        named: list[tuple[str, Plate | Surface]]
+        named = [(plate.name or "plate", plate) for plate in self.plates]
+        named += [(surface.name, surface) for surface in self.surface]
+        return {name: one for name, one in named if one.turn or one.shake or one.travel}
+
+    @property
     def places(self) -> tuple[str, ...]:
-        """Names of all that quantities are told of: surfaces, and ``sensor.NAME`` of sensors."""
-        return (*self.surfaces, *(f"sensor.{sensor.name}" for sensor in self.sensor))
+        """Names of all that quantities are told of: surfaces, and ``sensor.NAME`` of sensors.
+
+        ``run.loads`` is among them if it is given.
+        """
+        sensors = (f"sensor.{sensor.name}" for sensor in self.sensor)
+        return (*self.surfaces, *sensors, *["run.loads"] * (self.run.loads is not None))
 
     def __repr__(self) -> str:
         names = self.surfaces

@@ -21,6 +21,7 @@ from chutelab.scene.units import (
     Corners,
     Density,
     Duration,
+    Frequency,
     Keys,
     Length,
     Mass,
@@ -39,6 +40,7 @@ from chutelab.scene.units import (
     Switch,
     Table,
     Text,
+    Turn,
     Two,
     Values,
     Whole,
@@ -143,6 +145,22 @@ class Incoming(Table):
     restitution: Share = pair_restitution(0.0, "particle-belt")
 
 
+class Shake(Table):
+    """How a surface shakes: by · sin(2π frequency t + phase), at time t of the run."""
+
+    by: Point = described(..., "Amplitude [x, y]", "m")
+    frequency: Frequency = described(..., "How often, per second", "Hz")
+    phase_deg: Angle = described(0.0, "Phase at t = 0", "degrees")
+
+
+class Travel(Table):
+    """A way of a surface: evenly faster for half of the time, evenly slower for the rest."""
+
+    to: Point = described(..., "Where its pivot comes to rest [x, y]", "m")
+    at: Amount = described(0.0, "When it begins", "s")
+    in_: Duration = described(..., "How long it takes", "s", alias="in")
+
+
 class Plate(Table):
     """A plate that hangs from a pivot: the damping plate, at a distance, or a further one."""
 
@@ -176,6 +194,15 @@ class Plate(Table):
     )
     restitution: Share = pair_restitution(0.5, "particle-plate")
     friction: Amount = pair_friction(0.0, "particle-plate")
+    shake: Shake | None = described(
+        None, "Shaking: { by = [0, 0.002], frequency = 25 }, from its place and back"
+    )
+    travel: Travel | None = described(
+        None, "A way: { to = [x, y], at = 1, in = 0.5 }, on which its pivot comes to rest"
+    )
+    turn: Turn = described(
+        0.0, "Speed at which it turns about its pivot, counterclockwise", "degrees/s"
+    )
 
 
 class Outgoing(Table):
@@ -250,6 +277,21 @@ class Surface(Table):
         None, "When it goes, and what it held falls: a gate", "s"
     )
     closes_at: Coordinate | None = described(None, "When it comes", "s")
+    pivot: Point | None = described(
+        None,
+        "What it turns about, and what travels [x, y]; default: its first point, the centre of an"
+        " arc",
+        "m",
+    )
+    shake: Shake | None = described(
+        None, "Shaking: { by = [0, 0.002], frequency = 25 }, from its place and back"
+    )
+    travel: Travel | None = described(
+        None, "A way: { to = [x, y], at = 1, in = 0.5 }, on which its pivot comes to rest"
+    )
+    turn: Turn = described(
+        0.0, "Speed at which it turns about its pivot, counterclockwise", "degrees/s"
+    )
     repeat: Repeats = described(
         (),
         "Copies [[n, dx, dy], ...]: n of it, each moved on by (dx, dy) m; a second entry repeats"
@@ -309,7 +351,12 @@ class Stream(Resolved):
     bed_height: Amount = described(
         0.0, "Centres spread uniformly over this height above the lowest layer", "m"
     )
-    speed_spread: Amount = described(0.0, "Uniform half-width around the release speed", "m/s")
+    speed_spread: Amount = described(
+        0.0,
+        "Uniform half-width around the release speed; of a fill, a gas: the standard deviation of"
+        " both velocity components, which are normal",
+        "m/s",
+    )
     seed: Whole = described(0, "Seed of the random draws", ge=0, le=2**63 - 1)
     at: Point | None = described(
         None, "Release point [x, y] of the lowest layer; default: on the incoming belt's start", "m"
@@ -371,6 +418,13 @@ class Run(Table):
     )
     align: bool = described(
         True, "Whether the pymunk engine's steps of a lone particle end at contacts, or all last dt"
+    )
+    loads: Number | None = described(
+        None,
+        "Width of the bins of time in which loads on surfaces are counted; default: they are not",
+        "s",
+        ge=1e-5,
+        le=1e3,
     )
 
 

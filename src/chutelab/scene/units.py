@@ -163,7 +163,7 @@ RESERVED_NAMES: Final = ("incoming", "plate", "outgoing", "particles")
 """Names in ledgers and events that a free surface may not take."""
 
 _SIGN: Final = r"""[^\s\x1c-\x1f\x85\ufeff.=\[\]"']"""
-"""Of a name. What is a blank to Python only, or to JavaScript only, is none to either."""
+"""Of a name. A character that is a blank to Python only, or to JavaScript only, is not allowed."""
 
 WORDS: Final = f"{_SIGN}+(?: {_SIGN}+)*"
 NAME: Final = f"^{WORDS}$"
@@ -268,6 +268,9 @@ Density = Annotated[Number, Field(ge=THINNEST, le=LARGEST)]
 Duration = Annotated[Number, Field(ge=BRIEFEST, le=LARGEST)]
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 Angle = Annotated[Number, Field(ge=-720.0, le=720.0)]
+Turn = Annotated[Number, Field(ge=-36_000.0, le=36_000.0)]
+"""degrees/s; 6,000 turns a minute."""
+Frequency = Annotated[Number, Field(ge=1e-6, le=10_000.0)]
 
 
 class Worded:

@@ -219,10 +219,16 @@ def reason(error: SceneError) -> str:
     return "; ".join(str(fault) for fault in error.faults)
 
 
+COORDINATES: Final = ("at", "center", "pivot", "points", "velocity")
+"""Keys of points and vectors, whose entries may differ within a `Family`."""
+
+
 def is_plain(path: str) -> bool:
-    """Tell whether a key holds a number that is no whole one, nor part of a list."""
+    """Tell whether scenes that differ in a key, or a coordinate, are a `Family`: a plain number."""
     parts = parts_of(path)
-    return isinstance(parts[-1], str) and limits_of(rule_at(parts) or {}) is not None
+    key = next(part for part in reversed(parts) if isinstance(part, str))
+    single = isinstance(parts[-1], str) or key in COORDINATES
+    return single and limits_of(rule_at(parts) or {}) is not None
 
 
 def accepted(path: str, values: Floats) -> Bools:
@@ -234,16 +240,27 @@ def accepted(path: str, values: Floats) -> Bools:
     return np.asarray(np.isfinite(values) & (low <= values) & (values <= high) & ~little)
 
 
-def judged_by(scene: Scene, values: Mapping[str, object]) -> set[str]:
-    """Return the keys whose numbers decide whether a scene contradicts itself, others do not.
+class Judge:
+    """Tells which scenes contradict themselves that differ in some keys, each right by itself.
 
-    The scene is taken with some values, by full path; each key by itself must be right.
+    Expectations ask for no number that varies: they are left out.
     """
-    document = plain(to_dict(scene))
-    apply(document, [Override(key, plain_number(value)) for key, value in values.items()])
-    look = Look(document, DEFAULTS)
-    list(conflicts(look))
-    return look.asked
+
+    def __init__(self, scene: Scene) -> None:
+        self._document = plain(to_dict(scene)) | {"expect": []}
+        self.asked: set[str] = set()
+
+    def finds(self, values: Mapping[str, float]) -> bool:
+        """Tell whether the scene with some values, by full path, has a fault.
+
+        Each call takes all keys that vary. `asked` has the keys whose numbers have decided that;
+        others do not.
+        """
+        apply(self._document, [Override(key, value) for key, value in values.items()])
+        look = Look(self._document, DEFAULTS)
+        found = any([*conflicts(look)])
+        self.asked |= look.asked
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,36 +282,52 @@ class Family:
         return len(next(iter(self.columns.values())))
 
     @cached_property
-    def _own(self) -> dict[tuple[int, str], Floats]:
-        """The columns by table and key."""
-        homes = map(self._home, self.columns)
-        return {
-            (id(table), key): numbers
-            for (table, key), numbers in zip(homes, self.columns.values(), strict=True)
-        }
+    def _own(self) -> dict[tuple[int, str], dict[tuple[int, ...], Floats]]:
+        """The columns by table and key, and by where in its list they belong; () without one."""
+        found: dict[tuple[int, str], dict[tuple[int, ...], Floats]] = {}
+        for path, numbers in self.columns.items():
+            table, key, place = self._home(path)
+            found.setdefault((id(table), key), {})[place] = numbers
+        return found
 
-    def _home(self, path: str) -> tuple[Table, str]:
-        """Return the table that a path leads to, and its key there."""
-        *parts, key = parts_of(path)
+    def _home(self, path: str) -> tuple[Table, str, tuple[int, ...]]:
+        """Return the table that a path leads to, its key there, and where in the key's list."""
+        parts, place = list(parts_of(path)), tuple[int, ...]()
+        while isinstance(parts[-1], int):
+            place = (int(parts.pop()), *place)
+        *parts, key = parts
         table: Any = self.scene
         if parts:
             table = getattr(table, EITHER.get(str(parts[0]), str(parts[0])))
         if isinstance(table, tuple):
             table = table[int(parts[1]) if len(parts) > 1 else 0]
-        return table, str(key)
+        return table, str(key), place
 
     def at(self, path: str) -> Any:
-        """Return the plain number at a path, see `is_plain`; an array (N,) if it varies."""
-        return self.value(*self._home(path))
+        """Return the number at a path, see `is_plain`; an array (N,) if it varies."""
+        table, key, place = self._home(path)
+        found = self.value(table, key)
+        for n in place:
+            found = found[n]
+        return found
 
     def value(self, table: Table, key: str) -> Any:
         """Return what a table of `scene` has under a key.
 
-        An array (N,) if that varies, or is a default that follows from what varies.
+        An array (N,) if that varies, or is a default that follows from what varies; of a point or
+        vector one for each coordinate that does.
         """
-        if (id(table), key) in self._own:
-            return self._own[id(table), key]
-        scene = self.scene
+        scene, own = self.scene, self._own.get((id(table), key))
+
+        def laid(entry: Any, *place: int) -> Any:
+            """Return a number, or a list of them, with the columns in their places."""
+            if own and place in own:
+                return own[place]
+            nested = isinstance(entry, tuple)
+            return tuple(laid(e, *place, n) for n, e in enumerate(entry)) if nested else entry
+
+        if own:
+            return laid(getattr(table, key))
         if isinstance(table, Particle) and key == "mass":
             density = scene.density(table, self.value)
             if density is not None:

@@ -33,8 +33,8 @@ from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
 
 SMALLEST, LARGEST_SHARE, LARGEST_LENGTH = 1e-15, 0.5, 1e3
-"""Nothing is more exact than the rounding of a double; more than half of everything off is no
-accuracy; and no machine is larger than a kilometre."""
+"""Bounds of an accuracy: relative, between the rounding of a double and a half; as a length, at
+most a kilometre."""
 
 ALLOWED = (
     "a relative error from 1e-15 to 0.5, such as 1e-6 or 0.1%, or a length from 1e-15 to 1000 m"
@@ -406,7 +406,7 @@ class Search:
 
     def said(self, found: Recording, error: float, which: str, how: str, against: str | None,
              *, chaotic: bool = False) -> Accuracy:  # fmt: skip
-        """Return an error as an `Accuracy`; inf is one that cannot be told."""
+        """Return an error as an `Accuracy`; inf if it is not known."""
         floor = FLOOR * (sizes(found)["place"] if self.wanted.unit == "m" else 1.0)
         reached = max(error, floor)
         return Accuracy(
@@ -455,7 +455,7 @@ class Search:
         return None, f"none: no other answer; not {', nor '.join(passed)}"
 
     def crowd(self, found: Recording) -> Accuracy:
-        """Hold what can be said of a crowd as a whole against another engine's, and stirs of both.
+        """Compare the totals of a crowd with another engine's, and with runs of changed inputs.
 
         A change of the inputs too small to notice moves every particle's way after a few
         collisions, and so, less, the mean: differences smaller than that would be luck.

@@ -400,7 +400,7 @@ def predict(scene: AnyScene, rebound: Rebound = "corrected") -> Transfer:
     from chutelab.scene import load
 
     scene = load(scene)
-    if fault := outside(scene):
+    if fault := next((why for holds, why in outside(scene) if holds), ""):
         return cut(unanswered(), "separation", Reason.OUTSIDE.because(fault))
     found = unbounded(scene, rebound)
     if np.isnan(found.phi1):
@@ -457,7 +457,7 @@ def unbounded(scenes: Scene | Family, rebound: Rebound = "corrected") -> Transfe
 def ride_of(scenes: Scene | Family) -> dict[str, Any]:
     """Return what `transfer` takes, as numbers, of particle 0's ride on the incoming conveyor."""
     value, scene = scenes.value, scenes.scene
-    belt, own, at = scene.incoming, scene.particle, scene.stream.at
+    belt, own, at = scene.incoming, scene.particle, value(scene.stream, "at")
     assert belt is not None
     incline, ride_length = value(belt, "incline_deg") * RADIANS, value(belt, "length")
     if at is not None:
@@ -477,37 +477,42 @@ def ride_of(scenes: Scene | Family) -> dict[str, Any]:
     }
 
 
-def not_carried(scene: Scene) -> str:
-    """Return why particle 0 is not released on the incoming belt, at its speed; "" if it is."""
-    stream, belt = scene.stream, scene.incoming
+def not_carried(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
+    """Yield what tells that particle 0 is not released on the incoming belt, at its speed.
+
+    Conditions, of a family (N,) or one for all, and what to say.
+    """
+    value, belt, stream = scenes.value, scenes.scene.incoming, scenes.scene.stream
     assert belt is not None
-    if stream.fill is not None or stream.to is not None:
-        return "the stream is not released at a point of the incoming belt"
-    sin, cos = sin_cos(belt.incline_deg * RADIANS)
-    x, y = stream.at or (0.0, 0.0)
-    off = y * cos - x * sin - belt.pulley_radius - scene.particle.radius
-    near = abs(off) <= 1e-9 and -belt.length <= x * cos + y * sin <= 0.0  # m
-    if stream.at is not None and not near:
-        return "the release point stream.at is not on the incoming belt"
-    if stream.velocity not in (None, (belt.speed * cos, belt.speed * sin)):
-        return "the release velocity stream.velocity is not the incoming belt's"
-    return ""
+    away = stream.fill is not None or stream.to is not None
+    yield away, "the stream is not released at a point of the incoming belt"
+    sin, cos = sin_cos(value(belt, "incline_deg") * RADIANS)
+    if stream.at is not None:
+        x, y = value(stream, "at")
+        radius = value(belt, "pulley_radius") + value(scenes.scene.particle, "radius")
+        way, off = x * cos + y * sin, y * cos - x * sin - radius
+        near = (np.abs(off) <= 1e-9) & (-value(belt, "length") <= way) & (way <= 0.0)  # m
+        yield ~near, "the release point stream.at is not on the incoming belt"
+    if stream.velocity is not None:
+        u, v = value(stream, "velocity")
+        other = (u != value(belt, "speed") * cos) | (v != value(belt, "speed") * sin)
+        yield other, "the release velocity stream.velocity is not the incoming belt's"
 
 
-def outside(scene: Scene) -> str:
-    """Return what makes the scene another problem than the paper's, "" if nothing does."""
-    own = scene.particle
-    if scene.incoming is None:
-        return "there is no incoming conveyor"
-    if scene.plate is None:
-        return "there is no damping plate"
-    if own.outline:
-        return "it is about disks and spheres"
-    if own.spin and own.rolling_friction > 0.0:
-        return "rolling friction"
-    if any(string.particle == 0 for string in scene.string):
-        return "the particle hangs on a string"
-    return not_carried(scene) or ("particles interact" if scene.crowded else "")
+def outside(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
+    """Yield what makes the scene another problem than the paper's, as `not_carried` does."""
+    scene, own = scenes.scene, scenes.scene.particle
+    yield scene.incoming is None, "there is no incoming conveyor"
+    yield scene.plate is None, "there is no damping plate"
+    yield bool(own.outline), "it is about disks and spheres"
+    rolls = scenes.value(own, "rolling_friction")
+    yield np.logical_and(own.spin, np.greater(rolls, 0.0)), "rolling friction"
+    hangs = any(string.particle == 0 for string in scene.string)
+    yield hangs, "the particle hangs on a string"
+    for name in scene.movers:
+        yield True, f"{name} moves"
+    yield from not_carried(scenes)
+    yield scene.crowded, "particles interact"
 
 
 def hindrance(course: Course) -> tuple[str, str] | None:
@@ -550,7 +555,7 @@ def hindrance(course: Course) -> tuple[str, str] | None:
         again = next(falls, np.inf)
     hops = again < horizon
     index = first_in_flight(flight, obstacles, radius, min(horizon, again))[1]
-    # What is in the way of a flight that misses the plate anyway does not matter.
+    # Obstacles do not matter to a flight that misses the plate anyway.
     stopped = hit or hops or np.isfinite(first_in_flight(flight, plate, radius, horizon)[0])
     if stopped and index >= 0:
         name = obstacles.names[index]

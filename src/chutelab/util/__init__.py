@@ -7,4 +7,5 @@
 - `tables`: tables for people, plain data for JSON, columns as a DataFrame.
 - `trig`: sine, cosine and arc tangent, the same bits everywhere, and as in the core.
 - `versions`: what is installed, and on what figures were measured.
+- `words`: what a learner is told, and what pictures say, in each language (`strings`).
 """

@@ -181,6 +181,8 @@ def printable(text: str) -> str:
     >>> print(printable("\x1b[31m\u202e"), printable("café, 漢字"))
     \x1b[31m\u202e café, 漢字
     """
+    if text.isprintable():
+        return text
     return "".join(
         c
         if c.isprintable() or c in _KEPT

@@ -234,10 +234,36 @@ def write_lines(path: str | Path, texts: Iterable[str], *, errors: str = "strict
 
 
 def csv_text(columns: Mapping[str, Any]) -> str:
-    """Return named columns, arrays of one length, as CSV; NaN is an empty cell."""
-    # Only NaN differs from itself.
-    cells = ([None if x != x else x for x in column.tolist()] for column in columns.values())
-    return "".join(csv_lines([columns, *zip(*cells, strict=True)]))
+    """Return named columns, arrays of one length, as CSV; see `csv_columns`."""
+    return "".join(csv_lines([columns])) + csv_columns(columns.values())
+
+
+def csv_columns(columns: Iterable[Any]) -> str:
+    r"""Return columns, arrays of one length of floats or of objects, as the lines of CSV.
+
+    Numbers have as few digits as give them back, whole ones no point; NaN is an empty cell. What
+    are no floats is written by `csv_lines`.
+
+    >>> import numpy as np
+    >>> csv_columns([np.array([0.1, 2.0, np.nan]), np.array(["a", "=b", "a"], dtype=object)])
+    "0.1,a\n2,'=b\n,a\n"
+    """
+    cells, known = [], dict[bytes, list[str]]()
+    for column in columns:
+        values = column.tolist()
+        if column.dtype.kind != "f":
+            # Behind a cell, as a line of one empty cell is written with quotes.
+            each = {one: next(csv_lines([(None, one)]))[1:-1] for one in dict.fromkeys(values)}
+            cells.append([each[one] for one in values])
+            continue
+        # Several columns may hold the same numbers, and digits take longest.
+        bits = column.tobytes()
+        if bits not in known:
+            # All in one call: one for each number would take as long again.
+            text = f"{values!r}"[1:-1] + ", "
+            known[bits] = text.replace(".0, ", ", ").replace("nan, ", ", ").split(", ")[:-1]
+        cells.append(known[bits])
+    return "".join([f"{line}\n" for line in map(",".join, zip(*cells, strict=True))])
 
 
 def tsv_text(rows: Sequence[object], kind: type, about: Mapping[str, str]) -> str:

@@ -70,11 +70,13 @@ def raised(*, last: bool = False) -> Iterator[None]:
         sys.unraisablehook = ignored
         for number, handler in before.items():
             with suppress(ValueError):
-                signal.signal(number, _end_at_once if last else handler)
+                signal.signal(number, handler)
+                if last:
+                    signal.signal(number, lambda n, _: os._exit(exit_code(None) or 128 + n))
 
 
 _kept: list[int] | None = None
-"""Signals that came during `held`; None where nothing holds them."""
+"""Signals that came during `held`; None outside of it."""
 
 
 @contextmanager
@@ -154,10 +156,6 @@ def _ignored(usual: Callable[[Any], object], about: Any) -> None:
     again = Timer(0.01, signal.raise_signal, [signum])
     again.daemon = True
     again.start()
-
-
-def _end_at_once(signum: int, _frame: object) -> None:
-    os._exit(exit_code(None) or 128 + signum)
 
 
 def exit_code(error: BaseException | None) -> int | None:

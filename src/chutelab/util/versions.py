@@ -102,8 +102,13 @@ def environment() -> dict[str, str]:
     What is not installed is left out; no host, user or path is in it.
     """
     cores = os.cpu_count() or 1
+    processor = platform.processor() or platform.machine()
+    with suppress(OSError):
+        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        if named := re.search(r"^model name[^:\n]*:(.*)", told, re.MULTILINE):
+            processor = " ".join(named[1].split())
     found = {
-        "processor": f"{_processor()}, {cores} core{'s' if cores > 1 else ''}",
+        "processor": f"{processor}, {cores} core{'s' if cores > 1 else ''}",
         "system": platform.system(),
         "python": f"{platform.python_implementation()} {platform.python_version()}",
     }
@@ -114,13 +119,3 @@ def environment() -> dict[str, str]:
 def measured_on(about: Mapping[str, str]) -> str:
     """Return an `environment` as a line of text."""
     return f"measured on {', '.join(f'{key} {value}' for key, value in about.items())}"
-
-
-def _processor() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return " ".join(line.partition(":")[2].split())
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()

@@ -48,13 +48,13 @@ EXIT = REASONS.index("exit")
 
 LEAVE = "if it is meant, leave it; the first contact wins"
 LOOK = "look at the picture (--out DIR --only png) for what turns it away"
-"""What is left to say where no setting is known to help: surfaces that cross, and others."""
+"""Advice where no setting is known to help: of surfaces that cross, and of others."""
 
 SMALL = 0.002
 """m; a smaller radius is beyond what pymunk resolves in SI units."""
 
 MARGIN = 0.01
-"""m to spare beyond what would just do; as a share, of a rate."""
+"""Margin of a recommended setting, m; of a rate as a share."""
 
 MOST_CAUTIONS = 20
 """Surfaces that cross, or miss, that are told one by one; for each some settings are tried."""
@@ -258,7 +258,7 @@ def advice(
             yield _advised(warning, {"particle.radius": SMALL})
         else:
             yield _advised(warning, {"run.engine": "auto"}, after=", for the exact engine")
-    # What passes through a surface goes astray for no other reason.
+    # Where particles may pass through a surface, where they end is not worth a warning.
     if tried.recording is not None and (steps is None or steps.safe):
         yield from _ending(scene, machine, tried.recording)
     if tried.trouble:

@@ -1,6 +1,6 @@
 """What a look at a scene finds: what is built and skipped, what the closed form covers, the cost.
 
-That is told from a trial run, which is cut off after a moment.
+The cost is estimated from a trial run, which is cut off after 1 s.
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ def _span(values: Floats, name: str, unit: str) -> str:
 def skipped(
     scene: Scene, machine: Machine, engine: str, recording: Recording | None
 ) -> Iterator[Part]:
-    """Yield what the scene does without, and why; `recording` is a trial run of it."""
+    """Yield the parts that the scene has not, and why; `recording` is a trial run of it."""
     for table in ("incoming", "plate", "outgoing", "surface"):
         if not getattr(scene, table):
             written = f"[[{table}]]" if table == "surface" else f"[{table}]"
@@ -286,7 +286,7 @@ class Trial:
 
 
 def trial(machine: Machine, engine: str) -> Trial:
-    """Run a machine until it ends, or patience does.
+    """Run a machine until it ends, or its time is up.
 
     Raises a `SceneError` if the engine that the scene asks for cannot run it.
     """
@@ -338,7 +338,7 @@ def _timed(machine: Machine, patience: float) -> Trial:
 
 
 def stepping(machine: Machine, engine: str, tried: Trial) -> Stepping:
-    """Hold the way of a step against what a surface catches.
+    """Compare how far particles go in a step with how far they may for surfaces to stop them.
 
     The contact engine finds every blow at its own instant, as the pymunk engine does for a lone
     particle with aligned steps. Otherwise a contact is seen at the end of a step, and must be

@@ -1,6 +1,6 @@
 """What a law looks at, a run and the numbers in play, how it answers; and the laws on places.
 
-None is beyond a surface or in another particle; and what a blow may do.
+No particle is beyond a surface or in another one; and what a blow may do.
 """
 
 from __future__ import annotations
@@ -361,8 +361,8 @@ def settled_to_stay(e: Evidence) -> Verdict | None:
 
 
 LEAST = 1e-12
-"""Friction that two particles of the pymunk engine have where the scene says 0: Chipmunk's pair is
-a product, and a factor 0 would take it from all pairs."""
+"""Friction of two particles in the pymunk engine where the scene says 0: Chipmunk multiplies the
+values of both shapes, and a factor 0 would be 0 against surfaces too."""
 
 
 def cone(e: Evidence) -> Verdict | None:

@@ -138,7 +138,7 @@ def residual(e: Evidence) -> Verdict | None:
 
 
 def momentum(e: Evidence) -> Verdict | None:
-    """Where nothing is but particles, their contacts leave the momentum of all as it is.
+    """Contacts between particles leave their total momentum as it is.
 
     Without surfaces gravity alone changes it, also of one that has left for good; on frictionless
     surfaces with one normal, the part along them stays. The figure is a share of the sum of all
@@ -167,8 +167,30 @@ def momentum(e: Evidence) -> Verdict | None:
     return Verdict(figure, rounding, "of the sum of m |v|")
 
 
+BORNE = 1e-9
+"""Share of all impulses that loads may be off the change of momentum: rounding, and what is counted
+at a step's end instead of within it."""
+
+
+def loads(e: Evidence) -> Verdict | None:
+    """Surfaces bear what changes the momentum of all particles, less their weight.
+
+    The figure is a share of all impulses on surfaces and all sizes m |v|.
+    """
+    if not e.machine.loads:
+        return None
+    borne = e.recording.impulses["force"]
+    first, last = e.recording.ends()
+    mass = e.masses[e.recording.released, None]
+    given = mass * (last["velocity"] - first["velocity"])
+    given[:, 1] += mass[:, 0] * e.machine.gravity * (last["t"] - first["t"])
+    size = float(np.abs(borne).sum() + (mass * np.abs(first["velocity"])).sum())
+    off = float(np.abs(given.sum(axis=0) + borne.sum(axis=(0, 1))).max())
+    return Verdict(off / size if size else off, BORNE, "of all impulses")
+
+
 def spin(e: Evidence) -> Verdict | None:
-    """Without surfaces and gravity contacts leave the angular momentum of all as it is.
+    """Without surfaces and gravity contacts leave the total angular momentum as it is.
 
     Two disks that overlap by δ feel the impulse at arms that differ from r by δ/2: so the figure, a
     share of the sum of all sizes m (|x - x0| + r) |v|, may be as large as the deepest overlap that
@@ -198,13 +220,14 @@ def spin(e: Evidence) -> Verdict | None:
 
 
 def need_judged(scene: Scene) -> None:
-    """Raise a `SceneError` unless the laws are about a scene: about disks, without strings."""
+    """Raise a `SceneError` unless the laws are about a scene: disks and what stays where it is."""
     allowed = "not judged: the laws are about disks without strings"
     faults = [
         Fault(f"{scene.head('particle', i)}.shape", kind.shape, allowed)
         for i, kind in enumerate(scene.particles)
         if kind.shape not in {"disk", "sphere"}
     ]
+    faults += [Fault("surface", name, "not judged: it moves") for name in scene.movers]
     if scene.string:
         faults.append(Fault("string", None, allowed))
     if faults:
@@ -212,7 +235,7 @@ def need_judged(scene: Scene) -> None:
 
 
 UNSEEN = ("no one through", "no one through another")
-"""What is lost once a disk is on the wrong side of another or of a surface."""
+"""Laws that fail once a disk is on the wrong side of another or of a surface."""
 
 
 def unseen(e: Evidence) -> str:
@@ -250,6 +273,7 @@ LAWS: dict[str, Law] = {
     "energy never rises": energy,
     "ledger closes": residual,
     "momentum": momentum,
+    "loads": loads,
     "angular momentum": spin,
 }
 """Every law by its name in the table."""

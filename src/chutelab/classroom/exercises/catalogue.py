@@ -39,9 +39,9 @@ from chutelab.classroom.exercises.judging import (
     number_of,
     with_unit,
 )
-from chutelab.classroom.words import words
 from chutelab.scene.conflicts import tree
 from chutelab.util.errors import InputError
+from chutelab.util.words import words
 
 OPENED: Final[deque[Task]] = deque(maxlen=64)
 """The tasks of this process in the order they were opened; grading reads the answers here."""

@@ -6,9 +6,9 @@ reply. A formula is a Python expression of the parameters, of other formulas and
 Texts are templates: ``{name}`` stands for a number, and a line break for a space. ``NAME.de.toml``
 has the texts in German, and nothing else: each takes the place of the English one.
 
-Some mistakes any question knows: a sign, a power of ten, radians, ½. A student's own parameters are
-drawn from the name, the same on every machine, and redrawn until every mistake can be told from the
-others.
+A few mistakes are known of every question: a sign, a power of ten, radians, ½. A student's own
+parameters are drawn from the name, the same on every machine, and redrawn until every mistake can
+be told from the others.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 
-from chutelab.classroom.words import words
 from chutelab.scene.conflicts import compiled
 from chutelab.theory import transfer
+from chutelab.util.words import words
 
 DIGITS: Final = 4
 """Significant digits of numbers in texts: more than any tolerance here can tell apart."""

@@ -18,9 +18,9 @@ from typing import Any, Final
 import numpy as np
 
 from chutelab.classroom.exercises.exercise import DIGITS, GRAVITY, ROUNDED, TOLERANCE, Case, shown
-from chutelab.classroom.words import Words, words
 from chutelab.pictures import GREEN, GREY, ORANGE, SKY, VERMILION
 from chutelab.util.tables import Sheet
+from chutelab.util.words import Words, words
 
 WIDTH: Final = 88
 """Columns of a reply in a terminal."""
@@ -250,7 +250,15 @@ def _read(answer: Any, say: Callable[..., str]) -> float | str | None:
         return say("unread-truth", value=bool(answer))
     if isinstance(answer, (str, bytes)):
         text = answer if isinstance(answer, str) else answer.decode("utf-8", "replace")
-        return _of_text(text, say)
+        if not text.strip(" \t\n.?…_-"):
+            return None
+        found = _NUMBER.match(text)
+        if found is None:
+            return say("unread-text", text=text.strip()[:_LONGEST])
+        if found[2].strip():
+            return say("unread-unit")
+        bare = found[1].replace(",", ".").replace("−", "-")[:_LONGEST]
+        return say("unread-quoted", number=bare)
     if isinstance(answer, (complex, np.complexfloating)) and not isinstance(answer, float):
         return say("unread-complex")
     if isinstance(answer, (list, tuple, np.ndarray)):
@@ -268,19 +276,6 @@ def _read(answer: Any, say: Callable[..., str]) -> float | str | None:
     if isnan(value):
         return say("unread-nan")
     return say("unread-divided") if isinf(value) else value
-
-
-def _of_text(text: str, say: Callable[..., str]) -> str | None:
-    """Say what to do about a text: a number in quotes, one with a unit, or words."""
-    if not text.strip(" \t\n.?…_-"):
-        return None
-    found = _NUMBER.match(text)
-    if found is None:
-        return say("unread-text", text=text.strip()[:_LONGEST])
-    if found[2].strip():
-        return say("unread-unit")
-    bare = found[1].replace(",", ".").replace("−", "-")[:_LONGEST]
-    return say("unread-quoted", number=bare)
 
 
 CLOSE: Final = 0.05

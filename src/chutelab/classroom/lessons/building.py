@@ -1,8 +1,8 @@
 """What is made of a lesson: its film and its notebook, and new lessons.
 
-``lesson.gif`` is made anew only if what it is made from has changed; the stamp that tells is kept
-in a comment of the GIF itself. A new lesson comes from the template or is a copy of another: it
-validates and builds at once.
+``lesson.gif``, in another language ``lesson.LANGUAGE.gif``, is made anew only if what it is made
+from has changed; the stamp that tells is kept in a comment of the GIF itself. A new lesson comes
+from the template or is a copy of another: it validates and builds at once.
 
 ``exercise.ipynb`` has the steps, ``exercise.LANGUAGE.ipynb`` has them in another language; the runs
 of tables are made by `classroom.book`. ``notebook.py``, in the percent format, has what only the
@@ -35,6 +35,7 @@ from chutelab.classroom.lessons.reading import (
     OWN_WORDS,
     Lesson,
     LessonError,
+    called_in,
     read,
     scene_of,
     shipped_lessons,
@@ -42,11 +43,11 @@ from chutelab.classroom.lessons.reading import (
     unusable,
 )
 from chutelab.classroom.lessons.sheets import asked, table
-from chutelab.classroom.words import words
 from chutelab.engines.simulation import judged
 from chutelab.scene import Fault, to_dict
 from chutelab.util.files import aside, refuse_other, whole
 from chutelab.util.versions import version_of
+from chutelab.util.words import words
 
 _HERE: Final = Path(__file__).parent
 PICTURE: Final = "lesson.gif"
@@ -80,7 +81,7 @@ def build(
     force: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Built:
-    """Make film and machine picture of a lesson, unless they are up to date.
+    """Make film and machine picture of a lesson, in its language, unless they are up to date.
 
     The same lesson and versions give the same bytes.
 
@@ -100,13 +101,13 @@ def build(
     OSError
         If the file cannot be written.
     """
-    path = (lesson.folder if folder is None else folder) / PICTURE
-    lesson = _in_english(lesson)
+    path = (lesson.folder if folder is None else folder) / called_in(PICTURE, lesson.language)
     wanted = stamp_of(lesson)
-    machine = path.with_name(MACHINE)
+    machine = path.with_name(called_in(MACHINE, lesson.language))
     made = force or comment_of(path) != wanted or not machine.is_file()
     if made:
         from chutelab.pictures.animation import animate, still
+        from chutelab.pictures.plots import look
         from chutelab.pictures.plots.figure import split_velocity
 
         with aside(path.parent, path):
@@ -116,8 +117,11 @@ def build(
         recording = judged(scene, progress=progress)
         settings = lesson.picture.model_dump(exclude={*NO_SETTINGS, "split"})
         path.parent.mkdir(parents=True, exist_ok=True)
-        animate(recording, path, question=lesson.question, predict=True, comment=wanted, **settings)
-        still(recording, machine, width=lesson.picture.width, height=lesson.picture.height)
+        with look(language=lesson.language):
+            animate(
+                recording, path, question=lesson.question, predict=True, comment=wanted, **settings
+            )
+            still(recording, machine, width=lesson.picture.width, height=lesson.picture.height)
         if lesson.picture.split:
             split = path.with_name(SPLIT)
             split_velocity(recording, split)
@@ -148,14 +152,10 @@ def build_notebook(lesson: Lesson, folder: Path | None = None) -> Built:
     return Built(path, path.stat().st_size, made)
 
 
-def _in_english(lesson: Lesson) -> Lesson:
-    """Return a lesson in English, the language of its film."""
-    return lesson if lesson.language == "en" else read(lesson.folder)
-
-
 def is_current(lesson: Lesson) -> bool:
     """Tell whether a lesson's picture was made from its present inputs, with any versions."""
-    found, wanted = comment_of(lesson.folder / PICTURE), stamp_of(lesson)
+    path = lesson.folder / called_in(PICTURE, lesson.language)
+    found, wanted = comment_of(path), stamp_of(lesson)
     return found.split("; ")[:2] == wanted.split("; ")[:2]
 
 
@@ -165,13 +165,15 @@ def stamp_of(lesson: Lesson) -> str:
     That is a hash of the scene that is filmed and of the picture's settings, then the versions of
     all that simulates and draws.
     """
-    lesson = _in_english(lesson)
     scene = to_dict(scene_of(lesson, lesson.picture.scene, lesson.picture.set))
     for hidden in ("expect", "live"):  # neither shows in its picture
         scene.pop(hidden, None)
     # Without defaults, which the version determines.
     settings = lesson.picture.model_dump(exclude_unset=True, exclude=NO_SETTINGS)
-    inputs = {"scene": scene, "picture": settings, "question": lesson.question, "predict": True}
+    inputs = {
+        "scene": scene, "picture": settings, "question": lesson.question, "predict": True,
+        "language": lesson.language,
+    }  # fmt: skip
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=True)
     digest = hashlib.sha256(text.encode("ascii")).hexdigest()[:32]
     versions = ", ".join(f"{name} {version_of(name) or 'unknown'}" for name in LIBRARIES)
@@ -259,7 +261,7 @@ OWN: Final = "notebook.py"
 
 def name_of(language: str) -> str:
     """Return the name of a notebook's file."""
-    return "exercise.ipynb" if language == "en" else f"exercise.{language}.ipynb"
+    return called_in("exercise.ipynb", language)
 
 
 def notebook_of(lesson: Lesson) -> str:

@@ -14,7 +14,6 @@ import shutil
 from base64 import b64encode, urlsafe_b64encode
 from collections.abc import Callable, Mapping, Sequence
 from errno import ENOTDIR
-from functools import partial
 from hashlib import sha256
 from html import escape
 from importlib.metadata import PackageNotFoundError, distribution
@@ -30,6 +29,7 @@ from PIL.GifImagePlugin import GifImageFile
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import data_of, told
 from chutelab.classroom.lessons.building import (
+    MACHINE,
     PICTURE,
     build,
     check_inside,
@@ -37,15 +37,15 @@ from chutelab.classroom.lessons.building import (
     is_current,
     name_of,
 )
-from chutelab.classroom.lessons.reading import Lesson, LessonError, scene_of, unusable
+from chutelab.classroom.lessons.reading import Lesson, LessonError, called_in, scene_of, unusable
 from chutelab.classroom.lessons.sheets import printed, sheet, values_of, worksheet
 from chutelab.classroom.lessons.steps import data_of as data_of_steps
 from chutelab.classroom.lessons.texts import ASSETS, INDEX, asset, html_of, without_tex
-from chutelab.classroom.words import Words, words
 from chutelab.scene import Fault
 from chutelab.util.errors import MissingLibraryError, printable
 from chutelab.util.files import refuse_other, together, whole
 from chutelab.util.versions import own_version
+from chutelab.util.words import LANGUAGES, Words, words
 
 LIVE: Final = "page.html"
 EXPLANATION: Final = "explanation.html"
@@ -96,11 +96,17 @@ def bundle(
         If it cannot be written.
     """
     folder = Path(folder)
-    _check_places(lessons, folder)
-    for name in (INDEX, *_SHARED):
+    names = [INDEX, *_SHARED]
+    for name in names:
         refuse_other(folder / name)
     for lesson in lessons:
-        if (there := folder / lesson.folder.name).exists() and not there.is_dir():
+        there = folder / lesson.folder.name
+        if not there.name or there.name in names:
+            text = "another lesson, or a file of the pages, has the same name; rename the folder"
+            raise unusable(lesson.folder, text)
+        names.append(there.name)
+        check_inside(there)
+        if there.exists() and not there.is_dir():
             raise NotADirectoryError(ENOTDIR, "it is a file, not a folder", str(there))
     with together(folder) as made:
         cards = ""
@@ -123,18 +129,6 @@ def bundle(
     return [folder / file for file in sorted(files)]
 
 
-def _check_places(lessons: Sequence[Lesson], folder: Path) -> None:
-    """Refuse, before anything is made, lessons with one name and links out of the folder."""
-    names = [INDEX, *_SHARED]
-    for lesson in lessons:
-        name = lesson.folder.name
-        if not name or name in names:
-            text = "another lesson, or a file of the pages, has the same name; rename the folder"
-            raise unusable(lesson.folder, text)
-        names.append(name)
-        check_inside(folder / name)
-
-
 def _address(*names: str) -> str:
     """Return a relative address with quoted names: no markup, scheme or query."""
     return "/".join(quote(os.fsencode(name)) for name in names)
@@ -144,12 +138,19 @@ def _lesson(lesson: Lesson, made: Path, before: str, after: str, *, wheel: bool)
     """Make the folder of one of the lessons, with links to its neighbours; return its card."""
     folder = made / lesson.folder.name
     folder.mkdir()
+    others = {
+        called_in(name, one)
+        for one in LANGUAGES
+        for name in (PICTURE, MACHINE)
+        if one != lesson.language
+    }
     for file in files_of(lesson):
-        if not _NOT_GIVEN.fullmatch(file.name):
+        if not _NOT_GIVEN.fullmatch(file.name) and file.name not in others:
             shutil.copyfile(file, folder / file.name)
     if not is_current(lesson):
         build(lesson, folder, force=True)
-    with GifImageFile(folder / PICTURE) as film:
+    film_name = called_in(PICTURE, lesson.language)
+    with GifImageFile(folder / film_name) as film:
         for name, index in ((STILL, 0), (END, film.n_frames - 1)):
             film.seek(index)
             shown = film.convert("RGB").quantize(255)
@@ -184,6 +185,7 @@ def _lesson(lesson: Lesson, made: Path, before: str, after: str, *, wheel: bool)
         "title": heading(lesson),
         "question": escape(lesson.question),
         "about": say("show-about", level=say(f"level-{lesson.level}"), minutes=lesson.minutes),
+        "film": film_name,
         "width": str(width),
         "height": str(height),
     }
@@ -262,7 +264,13 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
         own = [ask.text for one in lesson.steps if one.kind == "explain" for ask in one.asks]
         explain = without_tex(" ".join(own[-1].split())) if own else lesson.question
         exercise = data_of(told(lesson.name, lesson.language), explain=explain)
-    told_lesson = json.loads(_PICTURE.sub(partial(_inlined, lesson), json.dumps(told_lesson)))
+
+    def inlined(found: re.Match[str]) -> str:
+        """Return a picture beside the lesson as an address that holds it: a page is one file."""
+        data = b64encode((lesson.folder / found[0]).read_bytes()).decode("ascii")
+        return f"data:image/png;base64,{data}"
+
+    told_lesson = json.loads(_PICTURE.sub(inlined, json.dumps(told_lesson)))
     return write(
         scene, path, language=lesson.language, home=home, exercise=exercise, lesson=told_lesson
     )
@@ -273,12 +281,6 @@ _FIELD = re.compile(r'<span data-key="([\w.]+)">')
 
 _PICTURE = re.compile(r'(?<= src=\\")[\w.-]+\.png(?=\\")')
 """The file of a picture in a text of a lesson, in JSON."""
-
-
-def _inlined(lesson: Lesson, found: re.Match[str]) -> str:
-    """Return a picture beside a lesson as an address that holds it: a page is one file."""
-    data = b64encode((lesson.folder / found[0]).read_bytes()).decode("ascii")
-    return f"data:image/png;base64,{data}"
 
 
 def heading(lesson: Lesson) -> str:

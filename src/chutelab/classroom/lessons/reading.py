@@ -28,11 +28,11 @@ from chutelab.classroom.lessons.steps import (
     in_language,
     key,
 )
-from chutelab.classroom.words import words
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene.overrides import Override, at_path, joined
 from chutelab.scene.units import Number, Table, Text, Whole
 from chutelab.util.errors import did_you_mean, nearest
+from chutelab.util.words import words
 
 Words = Annotated[Text, AfterValidator(lambda text: " ".join(text.split()))]
 """A text that may be broken into lines anywhere."""
@@ -65,6 +65,9 @@ class Picture(Chosen):
         None, "Pictures a second; default: 25, of a stream 20", "10, 20, 25 or 50"
     )
     width: Whole = key(1280, "Width, pixels", "a whole number from 320 to 3840", ge=320, le=3840)
+    title: Said | None = key(
+        None, "What stands above the film; default: the scene's title", "a text"
+    )
     machine: Said | None = key(None, "What machine.png shows, in words", "a text")
     film: Said | None = key(None, "What lesson.gif shows, in words", "a text")
     split: bool = key(
@@ -302,6 +305,22 @@ def beside(lesson: Lesson, name: str) -> Path | None:
     """Return the file of a lesson that has this name, None if there is none."""
     plain = name.isprintable() and Path(name).name == name
     return lesson.folder / name if plain and (lesson.folder / name).is_file() else None
+
+
+def called_in(name: str, language: str) -> str:
+    """Return what a file is called in a language.
+
+    >>> called_in("lesson.gif", "en"), called_in("lesson.gif", "de")
+    ('lesson.gif', 'lesson.de.gif')
+    """
+    stem, dot, suffix = name.rpartition(".")
+    return name if language == "en" else f"{stem}.{language}{dot}{suffix}"
+
+
+def picture_of(lesson: Lesson, name: str) -> str:
+    """Return the name of a lesson's picture in its language, or in English if that is not made."""
+    said = called_in(name, lesson.language)
+    return name if beside(lesson, said) is None else said
 
 
 def _misfits(lesson: Lesson) -> Iterator[Fault]:

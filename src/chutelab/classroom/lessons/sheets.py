@@ -26,14 +26,14 @@ from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import UNNAMED, told
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import with_unit
-from chutelab.classroom.lessons.reading import Lesson, Page, Teacher, machine_of
+from chutelab.classroom.lessons.reading import Lesson, Page, Teacher, machine_of, picture_of
 from chutelab.classroom.lessons.steps import PLACES, Ask, Step
 from chutelab.classroom.lessons.texts import asset, parsed, parser, typeset
-from chutelab.classroom.words import Words, words
 from chutelab.scene import shipped
 from chutelab.scene.overrides import parts_of, unit_of, value_at
 from chutelab.util.errors import MissingLibraryError
 from chutelab.util.versions import own_version
+from chutelab.util.words import Words, words
 
 SHEETS: Final = ("student", "teacher", "explanation")
 
@@ -47,7 +47,7 @@ def sheet(lesson: Lesson, which: str) -> str:
     title = lesson.title
     if lesson.number is not None:
         title = say("sheet-title", number=lesson.number, title=title)
-    film = f"![{lesson.picture.film or lesson.title}](lesson.gif)"
+    film = f"![{lesson.picture.film or lesson.title}]({picture_of(lesson, 'lesson.gif')})"
     match which:
         case "student":
             parts = [say("sheet-name"), worksheet(lesson)]
@@ -64,7 +64,7 @@ def sheet(lesson: Lesson, which: str) -> str:
 def worksheet(lesson: Lesson) -> str:
     """Return the steps of a lesson as Markdown, and in an appendix the commands for its tables."""
     said = words(lesson.language)
-    shown = f"![{lesson.picture.machine or lesson.title}](machine.png)"
+    shown = f"![{lesson.picture.machine or lesson.title}]({picture_of(lesson, 'machine.png')})"
     parts = [f"**{lesson.question}**", shown, said.say("sheet-page")]
     for n, step in enumerate(lesson.steps, 1):
         parts += [f"## {n}. {said.say(f'step-{step.kind}')}", *asked(lesson, step)]
@@ -233,21 +233,17 @@ def printed(lesson: Lesson, which: str, kind: str) -> bytes:
     if kind == "md":
         return markdown.encode("utf-8")
     tree = SyntaxTreeNode(parser().parse(markdown))
-    asked = _to_be_answered(tree) if which == "student" else []
-    if kind == "html":
-        return _page(lesson, tree, asked).encode("utf-8")
-    return _pdf(lesson, tree, asked, words(lesson.language).say(f"sheet-kind-{which}"))
-
-
-def _to_be_answered(tree: SyntaxTreeNode) -> list[SyntaxTreeNode]:
-    """Return what is to be answered in writing: numbered questions without choices."""
-    return [
+    # In writing: numbered questions without choices.
+    asked = [
         item
         for node in tree.children
-        if node.type == "ordered_list"
+        if which == "student" and node.type == "ordered_list"
         for item in node.children
         if not any(part.type == "bullet_list" for part in item.children)
     ]
+    if kind == "html":
+        return _page(lesson, tree, asked).encode("utf-8")
+    return _pdf(lesson, tree, asked, words(lesson.language).say(f"sheet-kind-{which}"))
 
 
 def _title(tree: SyntaxTreeNode) -> str:

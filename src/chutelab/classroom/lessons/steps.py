@@ -15,12 +15,12 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BeforeValidator, Field
 
 from chutelab.classroom.lessons.texts import parser
-from chutelab.classroom.words import LANGUAGES, Words
 from chutelab.scene import MISSING, Fault, Scene, SceneError
 from chutelab.scene.conflicts import of_quantities, tree
 from chutelab.scene.overrides import value_at
 from chutelab.scene.quantities import lookup, suggestion, whose
 from chutelab.scene.units import Table, Text, Whole
+from chutelab.util.words import LANGUAGES, Words
 
 MOST: Final = 20
 """Most entries of a list: a lesson that needs more is two lessons."""
@@ -253,9 +253,8 @@ def html_of(text: str, *, inline: bool = False) -> str:
     return PLACES.sub(r'<span data-key="\1"></span>', str(made)).strip()
 
 
-def _unbroken(text: str) -> str:
-    """Return a text in which a number keeps its unit beside it."""
-    return re.sub(r"(?<=\d) (?=\S{1,3}(?:[\s,]|$))", "\N{NO-BREAK SPACE}", text)
+BEFORE_UNIT: Final = re.compile(r"(?<=\d) (?=\S{1,3}(?:[\s,]|$))")
+"""A space that keeps a number and its unit on one line of a table."""
 
 
 def data_of(steps: Sequence[Step], controls: tuple[str, ...], said: Words) -> list[dict[str, Any]]:
@@ -292,7 +291,12 @@ def data_of(steps: Sequence[Step], controls: tuple[str, ...], said: Words) -> li
                 for one in step.columns
             ],
             "rows": [
-                {"head": html_of(_unbroken(said.local(one.head)), inline=True), "set": one.set}
+                {
+                    "head": html_of(
+                        BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", said.local(one.head)), inline=True
+                    ),
+                    "set": one.set,
+                }
                 for one in step.rows
             ],
             "free": step.free,

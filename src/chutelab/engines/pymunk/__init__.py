@@ -6,6 +6,7 @@ outside.
 - `world`: the surfaces as a `pymunk.Space`; rides on the belt that holds; tracks.
 - `lone`: one particle whose steps end at its contacts.
 - `shared`: all particles in one Space, in steps that are all alike.
+- `moving`: surfaces that move, as kinematic bodies.
 - `shapes`: their bodies and shapes, chains for arcs, and what Chipmunk is told at a contact.
 """
 
@@ -42,9 +43,9 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     Record
         With `align`, a lone particle's blows to rounding error and its lasting contacts of order 2
         in the step, which is no longer than `dt` and half a radius' way. Particles that meet,
-        boxes, what hangs on strings, and steps that are all alike, of order 1: `dt` times the speed
-        should be less than the radius, or half a box's width, or they overlap by as much, and pass
-        through surfaces.
+        boxes, what hangs on strings, surfaces that move, and steps that are all alike, of order 1:
+        `dt` times the speed should be less than the radius, or half a box's width, or they overlap
+        by as much, and pass through surfaces.
 
     Raises
     ------
@@ -69,7 +70,8 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     world = World(machine)
     try:
         boxes = any(outline is not None for outline in machine.outlines)
-        if machine.interact or not machine.align or boxes or machine.threads:
+        apart = not (machine.interact or boxes or machine.threads or machine.movers)
+        if not (apart and machine.align):
             shared = Shared(machine, world, recorder)
             try:
                 shared.run(report)
@@ -94,4 +96,6 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         pass
     except StalledError as stalled:
         stuck = stalled
+    if recorder.bins is not None:
+        recorder.impulses = recorder.bins.counted()
     return recorder.whole(recorder.finish(engine="pymunk", steps=steps), stuck)

@@ -333,6 +333,9 @@ class Lone:
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
         for contact in pushed:
             self._book(contact, before)
+            normal = contact.normal
+            push = contact.push * normal + contact.rub * Vec2d(normal.y, -normal.x)
+            self._bear(contact, self.x, push)
             lands = contact.face.surface == self.machine.landing and not self.landed
             self.landed |= lands
             kind = Kind.LANDING if lands else Kind.IMPACT
@@ -377,7 +380,7 @@ class Lone:
 
         def change(h: float) -> str:
             """Return what changes in a step, nothing if it can be taken as it is."""
-            # What half of a step twice as long finds goes for the end of this one.
+            # The middle of a step twice as long stands for the end of this one.
             ahead = trial(2.0 * h)
             pushing = {c.face for c in ahead.contacts}
             if not pushing or any(self.world.curved(f, ahead.middle) for f in pushing - rims):
@@ -438,7 +441,7 @@ class Lone:
         self.restitution = {}
         for face, (_, n) in gaps.items():
             into, before = self.v.dot(n), min(self.v.dot(touching[face]), 0.0)
-            # In a hollow, what it moved into the surface by from the start is no bend of the way.
+            # In a hollow the overlap at the start of the step is not part of the bend.
             bends = into > 0.0 or (into < before and face.hollow(middle) > 0.0)
             self.restitution[face] = 1.0 - max(before / into, 0.0) if bends else 0.0
         contacts = self._rolled(middle - h * self.v, self.v, h, self.pull)
@@ -471,6 +474,12 @@ class Lone:
             self._tell(Kind.SLIP if slips else Kind.STICK, surface)
         for contact in end.contacts:
             self._book(contact, motion)
+            normal = contact.normal
+            push = contact.push * normal + contact.rub * Vec2d(normal.y, -normal.x)
+            if len(end.contacts) == 1:
+                # Round a curved surface its velocity is turned besides.
+                push = self.body.mass * (end.v - motion[0] - h * self.pull)
+            self._bear(contact, end.middle, push, h)
         if self.t > self.tracks.t[0]:
             state = np.array([before, (*self.x, *self.v, self.omega)])[:, :, None]
             self.tracks.step(np.array([True]), (self.t - h, self.t), state, entries)
@@ -534,6 +543,14 @@ class Lone:
             kind, self.particle, self.t, self.x, self.v, self.omega, velocity_before=v,
             omega_before=omega, surface=surface, normal_impulse=push, tangential_impulse=rub,
         )  # fmt: skip
+
+    def _bear(self, contact: Contact, x: Vec2d, push: Vec2d, span: float = 0.0) -> None:
+        """Count an impulse (N s) as a load, of a time (s) up to now."""
+        if self.recorder.bins is not None:
+            place, surface = x - self.r * contact.normal, contact.face.surface
+            self.recorder.bins.bear(
+                surface, self.t - span, self.t, place, contact.normal, push, contact.couple
+            )
 
     def _book(self, contact: Contact, before: tuple[Vec2d, float]) -> None:
         """Book an impulse J: J·(u before + u now)/2, u the relative velocity at the contact."""

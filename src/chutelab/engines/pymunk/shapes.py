@@ -185,7 +185,7 @@ class Shapes:
             return [shape]
         if face.speed == 0.0:
             return [shape]
-        # Neighbours in line keep the segment from what is beyond its ends.
+        # With neighbours in line Chipmunk finds no contact beyond the segment's ends.
         a, b = face.ends
         shape.set_neighbors(a - (b - a), b + (b - a))
         assert face.tangent is not None
@@ -240,9 +240,12 @@ class Shapes:
             assert shape.body is not None
             assert isinstance(met, pymunk.Circle)
             normal = -arbiter.normal
-            beyond = self.out[met].dot(shape.body.position - met.offset) > 0.0
+            assert met.body is not None
+            end, out = met.body.local_to_world(met.offset), self.out[met].rotated(met.body.angle)
+            beyond = out.dot(shape.body.position - end) > 0.0
             arbiter.process_collision = beyond
-            arbiter.surface_velocity = face.belt(normal) * Vec2d(normal.y, -normal.x)
+            speed = face.belt(normal.rotated(-met.body.angle))
+            arbiter.surface_velocity = speed * Vec2d(normal.y, -normal.x)
         if (shape, face) in self.shut:
             arbiter.process_collision = False
         if self.table is not None:
@@ -282,14 +285,20 @@ class Shapes:
         hits = {info.shape for shape in shapes for info in self.world.space.shape_query(shape)}
         return {shape for shape in hits if shape is not None and shape.collision_type == PARTICLE}
 
-    def taken(self, i: int, place: Vec2d) -> bool:
-        """Tell whether a particle that is not yet in the Space would overlap another one there."""
+    def taken(self, i: int, place: Vec2d, by: int) -> bool:
+        """Tell whether a particle that is not in the Space yet would overlap something there.
+
+        Another one, or a surface that moves: `by` is their collision type.
+        """
+        moving = {mover.surface for mover in self.machine.movers}
         body, shape = self.bodies[i]
         body.position = place
         touch = SLOP * self.smallest + 2.0 * self.world.hair
         return any(
             point.distance < -touch
             for hit in self.world.space.shape_query(shape)
-            if hit.shape is not None and hit.shape.collision_type == PARTICLE
+            if hit.shape is not None
+            and hit.shape.collision_type == by
+            and (by == PARTICLE or self.world.by_shape[hit.shape].surface in moving)
             for point in hit.contact_point_set.points
         )

@@ -27,9 +27,20 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d, batch
 
+from chutelab.engines.pymunk.moving import Moving
 from chutelab.engines.pymunk.shapes import Shapes
-from chutelab.engines.pymunk.world import Bend, Carriage, Flight, Tracks, World
+from chutelab.engines.pymunk.world import (
+    NONE,
+    PARTICLE,
+    SURFACE,
+    Bend,
+    Carriage,
+    Flight,
+    Tracks,
+    World,
+)
 from chutelab.machine import Machine
+from chutelab.results.loads import Bins
 from chutelab.results.record import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder
 from chutelab.util.arrays import Floats, Ints, Progress
@@ -132,6 +143,8 @@ class Shared:
         about += [(face.surface, face.speed, *(face.tangent or (0.0, 0.0))) for face in faces]
         surface, self.speed, self.tx, self.ty = np.array(about).T
         self.surface = surface.astype(np.int64)
+        # Of all rows at the first end and at the last, x and y.
+        self.crowns = np.array([NONE] * count + [face.crowns for face in faces])
         self.throws = (self.speed != 0.0) & (self.surface != machine.landing)
         self.spin = np.zeros(rows)
         self.spin[count:] = [face.spin for face in faces]
@@ -142,6 +155,11 @@ class Shared:
         for row, face in enumerate(faces, count):
             if isinstance(face, Bend):
                 self.center[:, row] = face.center
+        self.moving: Moving | None = None
+        if machine.movers:
+            self.moving = Moving(machine, world, count, self.center)
+            self.throws[self.moving.rows] = True
+            self.spin += self.moving.turn
         # Of particles that turn: 1/I, and rolling friction's arm over the radius, if any has it.
         self.ease, share = np.zeros((2, rows))
         inertia = np.broadcast_to(p.inertia, count)
@@ -203,6 +221,8 @@ class Shared:
                 break
             t = due if self.t - due < self.h else self.t
             x, v = Vec2d(*starts.position[i].tolist()), Vec2d(*starts.velocity[i].tolist())
+            if self.moving and self.shapes.taken(i, x, SURFACE):
+                continue
             if self.machine.interact and self._taken(i, x, v, max(self.t - t, 0.0)):
                 continue
             self.waiting.remove(i)
@@ -227,7 +247,7 @@ class Shared:
         if not len(others):
             return False
         if self.corners:
-            return self.shapes.taken(i, x + late * v)
+            return self.shapes.taken(i, x + late * v, PARTICLE)
         now = self.state[1, :2, others] - (x + late * v)
         apart = now, now - late * (self.state[1, 2:4, others] - v)
         near = (self.radius[i] * (1.0 - TOUCHING) + self.radius[others]) ** 2
@@ -260,7 +280,7 @@ class Shared:
                     Kind.SEPARATION, i, ride.until, tuple(x), tuple(v), surface=ride.surface
                 )
                 del self.rides[i]
-                # Put in anew, what it is in touch with counts as met for the first time.
+                # A body that is put in anew meets what it touches for the first time.
                 self.world.space.remove(body, shape)
                 body.body_type = pymunk.Body.DYNAMIC
                 body.mass, body.moment = self.world.heft(i)
@@ -280,6 +300,8 @@ class Shared:
             self._tighten()
         if self.arm is not None:
             self._turn()
+        if self.moving is not None:
+            self.moving.put(self.t, self.h)
         space.step(self.h)
         self.steps += 1
         self.clock += 1
@@ -322,16 +344,22 @@ class Shared:
         jx, jy, nx, ny = np.where(straight, 1.0, -1.0) * values[:4] * TOWARDS
         rub = jx * ny - jy * nx
         speed = self.speed[other]
-        side = self.tx[other] * ny - self.ty[other] * nx
+        # As surfaces are written.
+        bx, by = (nx, ny) if self.moving is None else self.moving.back(other, nx, ny)
+        last = (self.tx[other] * bx + self.ty[other] * by > 0.0).astype(int)
+        crown = self.crowns[other, last].T
+        side = crown[0] * bx + crown[1] * by
         if self.bends:
             away = self.state[1, :2].take(one, axis=1) - self.center.take(other, axis=1)
             side = np.where(self.bent[other], away[0] * nx + away[1] * ny, side)
         belt = np.where(side < 0.0, -speed, speed)
         # Of the contact points to each other, before and after: (2, k).
         mine, others = (self.state[:, 2:].take(row, axis=2) for row in (one, other))
+        work = self._carry(one, other, np.stack([nx, ny]), np.stack([jx, jy]), others)
         u, v = mine[:, 0] - others[:, 0], mine[:, 1] - others[:, 1]
         rate = u * nx + v * ny
         slip = u * ny - v * nx
+        arms = -self.radius[one] * np.stack((nx, ny))
         if self.corners:
             # Both levers, from the centres to the point: r × n turns into the rate.
             arms = np.where(straight, values[4:], values[[6, 7, 4, 5]])
@@ -345,7 +373,7 @@ class Shared:
         slip = slip - belt
         # J (u before + u after)/2; then whether the contact is still, and that it is one.
         sums = np.ones((5, len(one)))
-        sums[0], sums[1] = rub * belt, -0.5 * push * (rate[0] + rate[1])
+        sums[0], sums[1] = rub * belt + work, -0.5 * push * (rate[0] + rate[1])
         sums[2] = -0.5 * rub * (slip[0] + slip[1])
         sums[3] = (
             (np.abs(rate[1]) < self.still) & (np.abs(slip[1]) < self.still) & ~self.throws[other]
@@ -370,6 +398,8 @@ class Shared:
         weights = np.concatenate((sums, sums), axis=1)
         added = np.bincount(places.ravel(), weights.ravel(), 5 * rows).reshape(5, rows)
         self.entries += added[:3]
+        if self.recorder.bins is not None:
+            self._bear(self.recorder.bins, one, other, (jx, jy), (nx, ny), arms)
         if self.arm is not None:
             self._brake(one, other, push)
         calm = (added[4] > 0.0) & (added[3] == added[4])
@@ -399,6 +429,36 @@ class Shared:
                 other=np.where(pair, other, -1)[told],
                 normal_impulse=push[told], tangential_impulse=rub[told],
             )  # fmt: skip
+
+    def _carry(self, one: Ints, other: Ints, n: Floats, push: Floats, others: Floats) -> Any:
+        """Have surfaces that move do so in `others`, (2, 3, k); book and return their work, J."""
+        if self.moving is None:
+            return 0.0
+        place = 0.5 * (self.state[0, :2] + self.state[1, :2]).take(one, axis=1)
+        velocity = self.moving.at(other, place - self.radius[one] * n)
+        others[:, :2] += velocity
+        work = np.asarray((push * velocity).sum(axis=0))
+        np.add.at(self.recorder.drives, self.surface[other], work)
+        return work
+
+    def _bear(self, bins: Bins, one: Ints, other: Ints, push: Any, normal: Any, arms: Any) -> None:
+        """Count this step's impulses on surfaces, and on belts by what rides them, as loads."""
+        begin, end = self.t - self.h, self.t
+        middle = 0.5 * (self.state[0, :2] + self.state[1, :2])
+        alone = other >= self.count
+        place = middle[:, one] + arms[:2]
+        (x, y), (nx, ny), (px, py) = (np.asarray(of)[:, alone] for of in (place, normal, push))
+        bins.bear(self.surface[other[alone]], begin, end, (x, y), (nx, ny), (px, py))
+        last, mate, couple = (of[self.couples[1] >= self.count] for of in self.couples)
+        if len(couple):
+            none = np.zeros(2)
+            bins.bear(self.surface[mate], begin, end, middle[:, last], none, none, couple)
+        for k in np.flatnonzero(~alone) if self.rides else ():
+            for row, its, sign in ((one, other, -1.0), (other, one, 1.0)):
+                if (ride := self.rides.get(int(row[k]))) and int(its[k]) not in self.rides:
+                    below, up = ride.foot(end)
+                    pushed = sign * push[0][k], sign * push[1][k]
+                    bins.bear(ride.surface, begin, end, below, up, pushed)
 
     def _touches(self) -> tuple[Any, ...]:
         """Return both bodies' rows, whether they met now, and impulse on A, normal and levers."""
@@ -533,10 +593,11 @@ class Shared:
             for i in np.flatnonzero(self.landed & self.free).tolist():
                 self._end(i, "landed")
         calm = self.inside & (self.calm >= self.lasts)
-        # Nothing has settled that a gate is still to change, or has just changed.
+        # Nothing counts as settled before the last gate has opened or closed, or just after.
         gated = self.t < self.machine.last_gate + self.lasts
         under_way = gated or bool(self.waiting) or bool((self.inside & ~calm).any())
         together = self.machine.interact and under_way
+        together |= gated and self.moving is not None
         if until == "settled" and not together:
             for i in np.flatnonzero(calm).tolist():
                 self._tell_calm(i)

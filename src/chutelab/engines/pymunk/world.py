@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from pymunk import Vec2d
 
 from chutelab.machine import Arcs, Machine, Segments
+from chutelab.results.loads import Bins
 from chutelab.results.record import KNOT
 from chutelab.results.recorder import Recorder
 from chutelab.util.arrays import Bools, Floats
@@ -51,8 +52,15 @@ JOINT = 0.0625
 touches both; by so little that its way there is, whichever way both bend, never deeper in the arc
 than 4 times this: less than the depth at which a step ends because a surface is met."""
 
+ALIKE = 1e-9
+"""Directions (rad), and curvatures as a share, that differ by less are one."""
+
 ARC = 0.025
 """rad between knots round the pulley: ρ Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
+
+
+NONE = (Vec2d.zero(), Vec2d.zero())
+"""Crowns of what has no ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +80,7 @@ class Face:
     appears: float  # from when to when it is there, s
     vanishes: float
     spin: float  # of a wheel, rad/s: what rolls on it rolls as fast as it turns against this
+    crowns: tuple[Vec2d, Vec2d]  # see `World._crown`; at the first end and at the last
 
     @cached_property
     def ends(self) -> tuple[Vec2d, ...]:
@@ -105,7 +114,7 @@ class Face:
 
         It is that of an end roller at the ends: the same on the rim as on the face on that side.
         """
-        if self.tangent is None or self.tangent.cross(normal) >= 0.0:
+        if self.tangent is None or self.crowns[self.tangent.dot(normal) > 0.0].dot(normal) >= 0.0:
             return self.speed
         return -self.speed
 
@@ -281,15 +290,21 @@ class World:
         self.tiny, self.pace = max(TINY, self.rounding / r), float(machine.pace)
         self.by_shape: dict[pymunk.Shape, Face] = {}
         ways = parts.start.tolist(), parts.end.tolist(), parts.tangent.tolist()
-        for n, (start, end, tangent) in enumerate(zip(*ways, strict=True)):
+        for n, (start, end, along) in enumerate(zip(*ways, strict=True)):
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
-            shape = pymunk.Segment(still, start, end, 0.0)
-            self._add(Face(shape, tangent=Vec2d(*tangent), **self._about(parts, n)))
+            shape, tangent = pymunk.Segment(still, start, end, 0.0), Vec2d(*along)
+            about = self._about(parts, n)
+            crowns = (tangent.perpendicular(),) * 2
+            if about["speed"]:
+                crowns = -self._crown(start, -tangent), self._crown(end, tangent)
+            self._add(Face(shape, tangent=tangent, crowns=crowns, **about))
         if wheel is not None:
             turning = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             turning.angular_velocity = -wheel.speed / wheel.radius
             about = self._about(wheel.rim, 0) | {"spin": turning.angular_velocity}
-            self._add(Face(pymunk.Circle(turning, wheel.radius), tangent=None, **about))
+            self._add(
+                Face(pymunk.Circle(turning, wheel.radius), tangent=None, crowns=NONE, **about)
+            )
         sides = [zip(*pair, strict=True) for pair in zip(arcs.ends, arcs.inward, strict=True)]
         for n, (center, *ends) in enumerate(zip(arcs.center.tolist(), *sides, strict=True)):
             self._bend(n, Vec2d(*center), ends, self._about(arcs, n))
@@ -323,49 +338,83 @@ class World:
         circle = pymunk.Circle(body, radius)
         circle.cache_bb()
         base = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-        base.position = center  # feet in one place would be pairs, each with each, in every step
+        base.position = center  # feet in one place would all be pairs in every step
         foot = pymunk.Circle(base, 0.0)
         about["spin"] = -about["speed"] / radius
         if extent >= 2.0 * pi:
-            self._add(Bend(circle, tangent=None, foot=foot, begin=0.0, extent=inf, **about))
+            about |= {"begin": 0.0, "extent": inf}
+            self._add(Bend(circle, tangent=None, foot=foot, crowns=NONE, **about))
             return
         # Of the centre's way there, which bends no more than the sharpest arc.
         more = sqrt(2.0 * JOINT * self.hair * float(arcs.radius.min())) / (radius + self.radius)
         before, after = (more if self._goes_on(end, -inward, more) else 0.0 for end, inward in ends)
         self._add(Bend(
             circle, tangent=None, foot=foot, begin=begin - before, extent=extent + before + after,
-            **about,
+            crowns=NONE, **about,
         ))  # fmt: skip
         # Out of it is along the surface at the first end, against it at the last.
         for (end, inward), way in zip(ends, (1.0, -1.0), strict=True):
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
             point = pymunk.Circle(still, 0.0, end.tolist())
-            self._add(
-                Face(
-                    point,
-                    tangent=Vec2d(*(-inward).tolist()),
-                    **about | {"speed": way * about["speed"]},
-                )
-            )
+            out = Vec2d(*(-inward).tolist())
+            crown = self._crown(end, out, way / radius) if about["speed"] else out.perpendicular()
+            self._add(Face(
+                point, tangent=out, crowns=(crown, crown),
+                **about | {"speed": way * about["speed"]},
+            ))  # fmt: skip
 
     @cached_property
-    def _onward(self) -> tuple[Floats, Floats]:
-        """Ends of all pieces from left to right, (n, 2), m, and the way on into each, (n, 2)."""
+    def _onward(self) -> tuple[Floats, Floats, Floats]:
+        """Ends of all pieces from left to right, (n, 2), m, and the ways on into each.
+
+        These are directions, (n, 2), and curvatures, (n,), 1/m, > 0 to the left.
+        """
         sides = [
-            (end[~part.whole], way[~part.whole])
-            for part in self.machine.parts
-            for end, way in zip(part.ends, part.inward, strict=True)
+            (end, way, turn / part.radius if isinstance(part, Arcs) else np.zeros(len(end)))
+            for part in (each.of(~each.whole) for each in self.machine.parts)
+            for end, way, turn in zip(part.ends, part.inward, (1.0, -1.0), strict=True)
         ]
-        ends, ways = (np.concatenate(each) for each in zip(*sides, strict=True))
+        ends, ways, bends = (np.concatenate(each) for each in zip(*sides, strict=True))
         order = ends[:, 0].argsort(kind="stable")
-        return ends[order], ways[order]
+        return ends[order], ways[order], bends[order]
+
+    def _from(self, end: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the ways on, as of `_onward`, into all pieces that end in a place (m)."""
+        ends, ways, bends = self._onward
+        place = np.asarray(end)
+        low, high = ends[:, 0].searchsorted([place[0] - self.hair, place[0] + 1.01 * self.hair])
+        near = np.hypot(*(ends[low:high] - place).T) <= self.hair
+        return ways[low:high][near], bends[low:high][near]
 
     def _goes_on(self, end: Floats, out: Floats, bend: float) -> bool:
         """Tell whether another piece goes on from an end (m), turning by less than `bend` (rad)."""
-        ends, ways = self._onward
-        low, high = ends[:, 0].searchsorted([end[0] - self.hair, end[0] + 1.01 * self.hair])
-        near = np.hypot(*(ends[low:high] - end).T) <= self.hair
-        return bool((np.hypot(*(ways[low:high] - out)[near].T) <= bend).any())
+        return bool((np.hypot(*(self._from(end)[0] - out).T) <= bend).any())
+
+    def _crown(self, end: ArrayLike, out: Vec2d, bend: float = 0.0) -> Vec2d:
+        """Return the way to the middle of the half of an end's rim that goes on from a left side.
+
+        That is the side of the way out of a piece, which bends by so much (1/m) on the way back. At
+        a free end it is the left normal. Where others end, a disk rolls round the end only in the
+        angle between two pieces that is more than π: all of that rim goes on from the side of
+        either that faces it.
+        """
+        ways, bends = self._from(end)
+        dots, crosses = ways @ -np.array(out), ways[:, 0] * out.y - ways[:, 1] * out.x
+        turns, curls = np.arctan2(crosses, dots), bends - bend
+        alike = np.abs(turns) <= ALIKE
+        turns = np.where(alike, np.where(curls > 0.0, 0.0, 2.0 * pi), turns % (2.0 * pi))
+        others = np.flatnonzero(~alike | (np.abs(curls) > ALIKE * abs(bend)))
+        left = out.perpendicular()
+        if not len(others):
+            return left
+        low, high = others[turns[others].argmin()], others[turns[others].argmax()]
+        if turns[low] >= pi - ALIKE:
+            other, side = -Vec2d(*ways[low].tolist()), 1.0
+        elif turns[high] <= pi + ALIKE:
+            other, side = -Vec2d(*ways[high].tolist()), -1.0
+        else:
+            return left
+        return left - other.perpendicular() - side * (out + other)
 
     def _add(self, face: Face) -> None:
         shape = face.touched
@@ -463,7 +512,8 @@ class Carriage:
         assert machine.pulley is not None
         start, self.incline = machine.releases, machine.pulley.incline
         self.particle, self.surface, self.t = particle, machine.pulley.surface, t
-        self.weight = own(machine.particle.mass, particle) * machine.gravity
+        self.mass, self.g = own(machine.particle.mass, particle), machine.gravity
+        self.weight, self.radius = self.mass * self.g, machine.pulley.radius
         # Along the belt and square to it.
         self.along = Vec2d(cos(self.incline), sin(self.incline))
         self.up = self.along.perpendicular()
@@ -506,10 +556,30 @@ class Carriage:
         round_it = np.linspace(self.top, end, ceil(turn / ARC) + 1).tolist() if turn else []
         for t in (self.t, *round_it, end):
             if t > self.written:
+                if recorder.bins is not None and t > self.t:
+                    self._bear(recorder.bins, max(self.written, self.t), t)
                 x, v = self.at(t - self.t)
                 recorder.book(self.particle, self.surface, self.weight * (x.y - self.height))
                 recorder.knots(self.particle, t, tuple(x), tuple(v), 0.0)
                 self.height, self.written = x.y, t
+
+    def foot(self, t: ArrayLike) -> tuple[Floats, Floats]:
+        """Return where on the belt it lies at times (s), (2, ...) m, and the normal there."""
+        way = self.x + self.speed * (np.asarray(t) - self.t)
+        angle = np.maximum(way, 0.0) / self.rho - self.incline
+        normal, back = np.stack([np.sin(angle), np.cos(angle)]), np.minimum(way, 0.0)
+        return self.radius * normal + np.multiply.outer(self.along, back), normal
+
+    def _bear(self, bins: Bins, begin: float, end: float) -> None:
+        """Count what the belt bears between two times (s)."""
+        times = np.linspace(begin, end, ceil((end - begin) / bins.every) + 1)
+        span = np.diff(times)
+        x, y = self.mass * self.speed * np.diff(self.foot(times)[1])
+        weight = self.mass * self.g * span
+        surfaces = np.full(len(span), self.surface)
+        bins.bear(
+            surfaces, times[:-1], times[1:], *self.foot(times[:-1] + 0.5 * span), (y, weight - x)
+        )
 
 
 class Tracks:

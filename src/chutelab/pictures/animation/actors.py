@@ -20,11 +20,14 @@ from PIL import ImageDraw, ImageFont
 
 from chutelab.machine import Arcs, Machine, Pieces
 from chutelab.pictures.plots import style
+from chutelab.pictures.plots.look import figures, say
 from chutelab.pictures.plots.machinery import (
     LEAST,
     WHITE,
     Bodies,
+    colour_of,
     draw_piece,
+    is_passing,
     motion,
     pieces,
     points_of,
@@ -51,7 +54,7 @@ SHAFT, HEAD = 1.3, 6.0
 """pt; width of an arrow's shaft, and length of its head."""
 
 SEEN = 0.75
-"""Heads that a component must be long to be drawn, beside an arrow that it hardly differs from."""
+"""Least length of a component that is drawn, in heads of an arrow."""
 
 DRAWN, DRAWN_ALL = 300, 3000
 """Particles that are drawn at most, particle 0 included; and where all of them are the picture."""
@@ -167,8 +170,9 @@ def crowd(
     most = DRAWN_ALL if all_of_them else DRAWN
     particles = others[spread(len(others), most - 1)]
     thinned = len(particles) < len(others)
-    of_all = f"{recording.count:,}"
-    said = f"{len(particles) + 1} of {of_all}" if thinned else f"{of_all} particles"
+    count = figures(recording.count, ",")
+    told = say("some", some=len(particles) + 1, count=count)
+    said = told if thinned else say("all", count=count)
     streams, stream = recording.machine.streams, recording.machine.releases.stream
     if len(streams) == 1:
         dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0, "color": style.STREAM}
@@ -217,19 +221,33 @@ def strung(ax: Axes, recording: Recording, times: Floats) -> list[Moving]:
 
 
 def gates(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
-    """Return the pieces that are not always there: each is seen while it is."""
+    """Return the pieces that are not always there, or move: each is seen while and where it is."""
 
     def shown(piece: Pieces) -> Moving:
+        mover = machine.mover(int(piece.surface))
+        if mover is not None:
+            look = {"color": colour_of(machine, piece), "lw": 2.6, "solid_capstyle": "butt"}
+            there, gid = piece.there(times), f"surface {machine.surfaces[piece.surface]}"
+
+            def path(index: int) -> Floats:
+                share = 1.0 if there[index] else np.nan
+                return share * mover.carried(piece.path(), times[index])
+
+            return line(ax, gid, path, **look)
         drawn = draw_piece(ax, machine, piece, animated=True)
         return seen(drawn, piece.there(times))
 
-    return [shown(piece) for piece in pieces(machine) if piece.gate]
+    return [shown(piece) for piece in pieces(machine) if is_passing(machine, piece)]
 
 
 def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
     """Return marks that run with belts, and holes that turn with pulleys and rollers at v/R."""
     spacing = float(np.ptp(ax.get_xlim())) / MARKS
-    driven = [piece for piece in pieces(machine) if piece.speed != 0.0]
+    driven = [
+        piece
+        for piece in pieces(machine)
+        if piece.speed != 0.0 and machine.mover(int(piece.surface)) is None
+    ]
     belts = [piece for piece in driven if not piece.whole]
 
     def marks(index: int) -> Floats:
@@ -319,10 +337,10 @@ def bars(ax: Axes, table: Axes, books: dict[str, Floats]) -> tuple[list[Moving],
     sides = stacks(books)
     highest = float(np.max(sum(sides[0].values())))
     factor, unit = style.scaled(highest, "J")
-    style.dress(ax, title=f"Energy, {unit}")
+    style.dress(ax, title=say("energy", unit=unit))
     ax.grid(visible=False, axis="x")
     ax.set(xlim=(-0.6, 1.6), ylim=(0.0, 1.06 * factor * highest or 1.0))
-    ax.set_xticks([0, 1], ["put in", "is now"], fontsize=style.SMALL)
+    ax.set_xticks([0, 1], [say("put-in"), say("is-now")], fontsize=style.SMALL)
     ax.tick_params(axis="x", length=0)
 
     def block(name: str, left: float, base: Floats, height: Floats) -> Moving:
@@ -341,13 +359,13 @@ def bars(ax: Axes, table: Axes, books: dict[str, Floats]) -> tuple[list[Moving],
     table.set(xlim=(0.0, 1.0), ylim=(len(SIGNS), 0.0))
     writings = []
     for row, name in enumerate(SIGNS):
-        said = [f"{round(factor * value, 1) + 0.0:.1f}" for value in books[name].tolist()]
-        if name == "residual" and set(said) == {"0.0"}:
+        shown = [round(factor * value, 1) + 0.0 for value in books[name].tolist()]
+        if name == "residual" and not any(shown):
             continue
+        said = [figures(value, ".1f") for value in shown]
         table.add_patch(Rectangle((0.0, row + 0.2), 0.05, 0.6, color=style.ENERGY[name]))
-        table.text(0.08, row + BASE, style.ENERGY_LABEL[name], fontsize=style.SMALL)
+        table.text(0.08, row + BASE, say(f"ledger-{name}"), fontsize=style.SMALL)
         right, up = table.transData.transform((1.0, row + BASE))
         place = right, ax.figure.bbox.height - up
-        said = [text.replace("-", "−") for text in said]
         writings.append(Writing(style.SMALL, ax.figure.dpi, *place, "rs", said))
     return moving, writings

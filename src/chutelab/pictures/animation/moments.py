@@ -11,20 +11,18 @@ from numpy.typing import NDArray
 
 from chutelab.machine import Machine
 from chutelab.pictures.plots import Window
+from chutelab.pictures.plots.look import figures, named, say
 from chutelab.pictures.plots.scenery import STRUCK, action, flow, nominal, one_of_many
 from chutelab.pictures.plots.style import quantity
 from chutelab.results import PARTICLES, Kind, Recording
 from chutelab.util.arrays import Bools, Floats, Ints
 
 
-def surface_words(name: str) -> str:
-    """Return how a surface is spoken of."""
-    return {
-        "incoming": "the incoming belt",
-        "outgoing": "the outgoing belt",
-        "plate": "the plate",
-        PARTICLES: "other particles",
-    }.get(name, f"“{name}”")
+def surface_words(called: str, form: str = "surface") -> str:
+    """Return how a surface is spoken of; `form` is "surface", or "on" for what is on it."""
+    if called in ("incoming", "outgoing", "plate", PARTICLES):
+        return say(f"{form}-{called}")
+    return say("surface", name=named(called))
 
 
 def contact_normal(machine: Machine, event: Any) -> Floats:
@@ -32,7 +30,12 @@ def contact_normal(machine: Machine, event: Any) -> Floats:
 
     It comes from where the particle is: a fixed step's velocities have gravity in them, too.
     """
-    position = event["position"]
+    position, velocity = event["position"], event["velocity_before"]
+    mover, back = machine.mover(int(event["surface"])), np.eye(2)
+    if mover is not None:
+        # Where and as the surface is written.
+        position, back = mover.at_rest(position, event["t"]), mover.back(float(event["t"]))
+        velocity = back @ (velocity - mover.velocity(event["t"])[:2])
     own = [piece for piece in machine.pieces if piece.surface == event["surface"]]
     nearest = min(own, key=lambda piece: float(piece.gap(position)))
     radius = np.broadcast_to(machine.particle.radius, machine.count)[event["particle"]]
@@ -40,45 +43,42 @@ def contact_normal(machine: Machine, event: Any) -> Floats:
     gap = float(np.hypot(*away))
     # At an end it is the way from there.
     if gap > 0.5 * radius > 0.0 and abs(away[0] * normal[1] - away[1] * normal[0]) > 1e-9 * gap:
-        return np.asarray(away / gap)
-    return np.asarray(normal if normal @ event["velocity_before"] < 0.0 else -normal)
+        return np.asarray(away / gap @ back)
+    return np.asarray((normal if normal @ velocity < 0.0 else -normal) @ back)
 
 
 def sentence(recording: Recording, event: Any) -> str:
     """Return one or two lines on an event of particle 0."""
     kind = Kind(int(event["kind"]))
-    name = recording.surfaces[event["surface"]] if event["surface"] >= 0 else PARTICLES
-    on = surface_words(name)
-    before, after = (
-        f"{hypot(*event[key]):.3g} m/s" for key in ("velocity_before", "velocity_after")
-    )
+    called = recording.surfaces[event["surface"]] if event["surface"] >= 0 else PARTICLES
     angle = degrees(atan2(*event["position"]))
-    past = f"{abs(angle):.1f}° {'past' if angle > 0.0 else 'before'} the top"
-    past = "at the top" if abs(angle) < 5e-4 else past
-    pulley = f"leaves the drive pulley {past}, at {after}"
+    side = "top" if abs(angle) < 5e-4 else "past-top" if angle > 0.0 else "before-top"
+    told = kind.name.lower()
+    if kind == Kind.SEPARATION and called == "incoming":
+        told = "pulley"
     # The event keeps the velocity of its `particle` only.
-    hits = f"hits particle {int(event['other'])} at {before}"
-    text = {
-        Kind.RELEASE: "is released",
-        Kind.SEPARATION: pulley if name == "incoming" else f"leaves {on} at {after}",
-        Kind.SLIP: f"begins to slip on {on}",
-        Kind.STICK: f"is on {on} without slip",
-        Kind.IMPACT: f"strikes {on} at {before}",
-        Kind.LANDING: f"lands on {on} at {before}",
-        Kind.COLLISION: f"is hit by particle {i}" if (i := int(event["particle"])) else hits,
-        Kind.SETTLE: f"has settled on {on}",
-        Kind.EXIT: "has left the scene",
-    }[kind]
+    by = int(event["particle"])
+    if kind == Kind.COLLISION and by:
+        told = "hit"
+    before, after = (
+        f"{figures(hypot(*event[key]))} m/s" for key in ("velocity_before", "velocity_after")
+    )
+    text = say(
+        f"event-{told}", surface=surface_words(called), on=surface_words(called, "on"),
+        before=before, after=after, other=by or int(event["other"]),
+        where=say(side, angle=figures(abs(angle), ".1f")),
+    )  # fmt: skip
     if kind not in (Kind.IMPACT, Kind.LANDING) or event["normal_impulse"] == 0.0:
         return text
     normal = contact_normal(recording.machine, event)
     into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
     if into > 0.0:
-        text += f", ε = {round(off / into, 3):g}"
+        text = say("event-restitution", said=text, value=figures(round(off / into, 3), "g"))
     events = recording.events
     before_it = events[(events["particle"] == 0) & (events["t"] < event["t"])]
     if kind == Kind.LANDING and list(before_it["kind"][-1:]) == [Kind.SEPARATION]:
-        text += f", after {event['t'] - before_it['t'][-1]:.3f} s of flight"
+        flown = event["t"] - before_it["t"][-1]
+        text = say("event-flight", said=text, time=figures(flown, ".3f"))
     # Booked from the state before to the one after, or, of an engine that steps, in its step.
     track = recording.track(0)
     start, end = (int(np.searchsorted(track["t"], event["t"], side)) for side in ("left", "right"))
@@ -86,26 +86,26 @@ def sentence(recording: Recording, event: Any) -> str:
     entries = track["entries"]
     belt, restitution, friction = entries[after_it] - entries[max(0, min(start, after_it - 1))]
     said = [
-        f"{'+' if value > 0.0 else ''}{quantity(value, 'J')} {what}"
+        say(f"loss-{what}", energy=f"{'+' if value > 0.0 else ''}{quantity(value, 'J')}")
         for value, what in (
-            (-float(restitution), "in the rebound"),
-            (-float(friction), "to friction"),
-            (float(belt), "from the belt"),
+            (-float(restitution), "rebound"),
+            (-float(friction), "friction"),
+            (float(belt), "belt"),
         )
         if abs(value) > 1e-15
     ]
-    return f"{text}\n{', '.join(said) or 'no energy lost'}"
+    return f"{text}\n{', '.join(said) or say('loss-none')}"
 
 
 def going_on(recording: Recording, event: Any, *, flying: bool, still: bool = False) -> str:
     """Return what particle 0 does some time after an event: `flying`, `still`, or in contact."""
     kind = Kind(int(event["kind"]))
     if flying:
-        return "in flight"
+        return say("flying")
     if kind in (Kind.RELEASE, Kind.COLLISION) or event["surface"] < 0:
         return ""
     verb = "lies" if still else "slides" if kind in (*STRUCK, Kind.SLIP) else "rides"
-    return f"{verb} on {surface_words(recording.surfaces[event['surface']])}"
+    return say(verb, on=surface_words(recording.surfaces[event["surface"]], "on"))
 
 
 def in_flight(recording: Recording, times: Floats, near: float) -> Bools:
@@ -133,8 +133,8 @@ none with less than this share of the largest impulse."""
 HOLD_TOTAL, HOLD_LONGEST, TAIL = 300, 130, 120
 """Hundredths of a second: all holds together at most, one of them, and the last picture."""
 
-ASKED, ASK = 300, "Predict: what comes next?"
-"""Hundredths of a second that a film waits for a prediction, and what it says meanwhile."""
+ASKED = 300
+"""Hundredths of a second that a film waits for a prediction."""
 
 EDGE = 0.012
 """Least distance of particle 0 from the window's edges as the film begins, in shares of its larger
@@ -144,7 +144,7 @@ TOLD = 1.2
 """s on the screen, holds not counted, for which the caption tells what happened."""
 
 LASTING = (Kind.STICK, Kind.SETTLE, Kind.EXIT)
-"""Events that the caption tells until another happens: they begin what still goes on."""
+"""Events that begin a motion: the caption tells them until the next event."""
 
 
 @dataclass(frozen=True)
@@ -224,8 +224,11 @@ def film(
     if crowd:
         gates = _gates(recording.machine, times, slow)
         counts = [
-            [f"{n:,} {name}" for n in np.searchsorted(np.sort(when), times, side="right").tolist()]
-            for name, when in flow(recording).items()
+            [
+                say(f"count-{what}", count=figures(n, ","))
+                for n in np.searchsorted(np.sort(when), times, side="right").tolist()
+            ]
+            for what, when in flow(recording).items()
             if len(when)
         ]
         words = [told or ", ".join(said) for told, *said in zip(gates, *counts, strict=True)]
@@ -233,7 +236,7 @@ def film(
         words = _words(recording, own, held, times, slow)
     if ask is not None:
         at = int(np.searchsorted(times, ask))
-        delays[at], words[at] = ASKED, ASK
+        delays[at], words[at] = ASKED, say("ask")
     return tuple(Moment(float(t), int(d), w) for t, d, w in zip(times, delays, words, strict=True))
 
 
@@ -273,10 +276,14 @@ def slowness(length: float) -> float:
     return float(f"{max(m for m in (1, 1.5, 2, 3, 4, 5, 6, 8) if m <= mantissa)}e{power}")
 
 
+def _at(t: float, said: str) -> str:
+    return f"t = {figures(t, '.3f')} s: {said}"
+
+
 def _gates(machine: Machine, times: Floats, slow: float) -> list[str]:
     """Return the caption at each time: for a while which gate opened or closed last."""
     news = {
-        (t, f"t = {t:.3f} s: {surface_words(machine.surfaces[surface])} {what}")
+        (t, _at(t, say(f"event-gate-{what}", surface=surface_words(machine.surfaces[surface]))))
         for parts in machine.parts
         for clock, what in ((parts.appears, "closes"), (parts.vanishes, "opens"))
         for t, surface in zip(clock.tolist(), parts.surface.tolist(), strict=True)
@@ -309,7 +316,7 @@ def _words(
         told[1] = not np.allclose(rode, released, rtol=1e-3, atol=1e-6)
     told[held] = True
     stories = np.flatnonzero(told)
-    lines = [f"t = {own['t'][i]:.3f} s: {sentence(recording, own[i])}" for i in stories]
+    lines = [_at(own["t"][i], sentence(recording, own[i])) for i in stories]
     # Particle 0 comes on the incoming belt if that is the first thing it leaves.
     first = own[struck | (own["kind"] == Kind.SEPARATION)][:1]
     incoming = recording.surface_index("incoming")
@@ -329,7 +336,7 @@ def _words(
                 captions.append(lines[story])
                 continue
         elif carried:
-            captions.append("rides the incoming belt")
+            captions.append(say("carried"))
             continue
         latest = int(np.searchsorted(own["t"], t, side="right")) - 1
         known = latest >= 0 and t <= gone

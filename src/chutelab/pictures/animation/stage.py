@@ -38,6 +38,8 @@ from chutelab.pictures.animation.actors import (
 )
 from chutelab.pictures.animation.moments import Moment, asked, film, slowness, span
 from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_scene, style, window_of
+from chutelab.pictures.plots.look import figures, say
+from chutelab.pictures.plots.panels import path_of_arcs
 from chutelab.pictures.plots.scenery import (
     FINE,
     around,
@@ -179,12 +181,12 @@ class Stage:
         self.figure = Picture(inches, layout.dpi)
         self.canvas = cast(Any, self.figure.canvas)  # its methods are not annotated
         self.view = view = self.figure.add_axes(layout.view)
-        draw_scene(view, recording.machine, layout.window)
+        parts = analytic_of(recording)[0] if "parabola" in shows else ()
+        draw_scene(view, recording.machine, layout.window, clear=path_of_arcs(parts))
         view.set(xticks=[], yticks=[])
         for spine in view.spines.values():
             spine.set_color(style.STEEL_LIGHT)
         _draw_scale(view)
-        parts = analytic_of(recording)[0] if "parabola" in shows else ()
         drawn = len(view.lines)
         draw_analytic(view, parts)
         parabola = view.lines[drawn:]
@@ -203,22 +205,22 @@ class Stage:
             self.moving.insert(0, seen(dashed, times > ask))
         # What the legend names, in its order.
         dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0}
-        handles = [Line2D([], [], **dot, color=style.STRIKE, label="particle 0"), *named]
+        handles = [Line2D([], [], **dot, color=style.STRIKE, label=say("particle-0")), *named]
         if parts:
             # Two dashes; the line's own would not fit.
             dashes: Any = (0, (1.5, 0.85))
             handles.append(
-                Line2D([], [], color=style.ANALYTIC, lw=3.0, ls=dashes, label="analytic")
+                Line2D([], [], color=style.ANALYTIC, lw=3.0, ls=dashes, label=say("analytic"))
             )
         if reach:
             self.moving.append(trail(view, recording, times, reach))
         if "strobe" in shows:
             self.moving.append(strobe(view, recording, times))
-            said = f"every {strobe_step(recording):g} s"
+            said = say("every", step=figures(strobe_step(recording), "g"))
             handles.append(Line2D([], [], **style.RINGS, ms=4.5, label=said))
         if layout.arrow:
             self.moving.append(arrows(view, position, velocity, layout.arrow))
-            handles.append(Line2D([], [], color=style.INK, lw=2.0, label="velocity"))
+            handles.append(Line2D([], [], color=style.INK, lw=2.0, label=say("velocity")))
         _add_legend(view, handles, components=layout.arrow > 0.0)
         self.moving += bodies(view, recording, np.array([0]), times, "disk", style.STRIKE, 0.4)
         self.writings = self._add_text(layout, pace_words(slow), moments)
@@ -227,9 +229,9 @@ class Stage:
             top = layout.view[1] + layout.view[3] - 0.06
             axes = self.figure.add_axes((0.765, 0.43, 0.225, top - 0.43))
             table = self.figure.add_axes((0.73, 0.125, 0.26, 0.245))
-            blocks, figures = bars(axes, table, energies(recording, times))
+            blocks, column = bars(axes, table, energies(recording, times))
             self.moving += blocks
-            self.writings += figures
+            self.writings += column
         self.canvas.draw()
         self._background = self.canvas.copy_from_bbox(self.figure.bbox)
 
@@ -265,7 +267,7 @@ class Stage:
         # particles.
         steps = np.diff([moment.t for moment in moments])
         digits = 2 if len(steps) and np.median(steps) >= 0.01 else 3
-        times = [f"t = {moment.t:.{digits}f} s" for moment in moments]
+        times = [f"t = {figures(moment.t, f'.{digits}f')} s" for moment in moments]
         shown = {said: style.drawable(said) for said in {moment.words for moment in moments}}
         words = [shown[moment.words] for moment in moments]
         left, low, high = 0.02 * layout.width, 1.0 - CAPTION, 1.0 - above
@@ -305,7 +307,7 @@ def _add_legend(ax: Axes, handles: list[Line2D], *, components: bool) -> None:
             xytext=(4.0 + 16.0 * place, 0.0),
             textcoords="offset points",
             fontsize=style.NORMAL,
-            color=colour,
+            color=style.tint(colour, 0.8, style.INK),
             va="center",
             # Placed beside what the legend has placed before.
             zorder=legend.get_zorder() + 1.0,
@@ -328,8 +330,9 @@ def pace_words(slow: float) -> str:
     ('10× slower', 'real time', '2× faster')
     """
     if slow == 1.0:
-        return "real time"
-    return f"{slow:.3g}× slower" if slow > 1.0 else f"{1.0 / slow:.3g}× faster"
+        return say("real-time")
+    pace, times = ("slower", slow) if slow > 1.0 else ("faster", 1.0 / slow)
+    return say(pace, times=figures(times))
 
 
 def _draw_scale(ax: Axes) -> None:
@@ -339,12 +342,12 @@ def _draw_scale(ax: Axes) -> None:
     taken = [text.get_window_extent().padded(2.0) for text in ax.texts]
     lines = [line.get_path().transformed(line.get_transform()) for line in ax.lines]
     (bar,) = ax.plot([], [], color=style.MUTED, linewidth=2.0, solid_capstyle="butt", gid="scale")
-    said = ax.text(0.0, 0.0, f"{length:g} m", ha="center", va="bottom")
+    said = ax.text(0.0, 0.0, f"{figures(length, 'g')} m", ha="center", va="bottom")
     said.set(fontsize=style.SMALL, color=style.MUTED)
     edge = 0.015 * (right - left)
 
     def hides(place: tuple[float, float]) -> int:
-        """Put it there, and return what it would hide: a name counts more than lines."""
+        """Put it there, and return how much it would hide; names count more than lines."""
         x, y = place
         bar.set_data([x, x + length], [y, y])
         said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
@@ -360,26 +363,29 @@ def _draw_scale(ax: Axes) -> None:
 def palette() -> tuple[str, ...]:
     """Return the colours of every GIF: few, since few make a small file.
 
-    White, the greys and the colours with a meaning, unmixed, and the mixtures at which anti-aliased
-    edges between them are read as smooth. Every other colour is shown as the nearest of these.
+    The ground, the greys and the colours with a meaning, unmixed, and the mixtures at which
+    anti-aliased edges between them are read as smooth. Every other colour is shown as the nearest
+    of these.
     """
     hues = [style.TRACK, style.ANALYTIC, style.BELT, style.STRIKE, style.STREAM, PURPLE]
+    flat = [*style.ENERGY.values(), style.WALL]
     edges = [style.tint(hue, share) for share in (0.5, 0.75, 0.25) for hue in hues]
     meeting = [style.tint(one, 0.5, other) for one, other in combinations(hues, 2)]
-    dark = [style.tint(hue, 0.6, "#000000") for hue in hues]
+    dark = [style.tint(hue, 0.6, style.INK) for hue in hues]
     greys = [
-        "#FFFFFF",
-        "#000000",
+        style.GROUND,
+        style.INK,
         style.MUTED,
         style.STEEL,
         style.STEEL_LIGHT,
         style.ENERGY["start"],
         style.BELT_BODY,
         style.CLEAT,
+        style.BELT_NAME,
     ]
     # Where a grey edge would otherwise be shown in a dull colour.
-    greys += ["#303030", "#686868", "#787878", "#D4D4D4"]
-    return tuple(dict.fromkeys([*greys, *hues, *edges, *meeting, *dark]))
+    greys += [style.tint(style.INK, share) for share in (0.81, 0.592, 0.53, 0.17)]
+    return tuple(dict.fromkeys([*greys, *hues, *flat, *edges, *meeting, *dark]))
 
 
 def write_gif(
@@ -508,6 +514,8 @@ def animate(
         the particle comes to the top of the drive pulley, or as it begins.
     comment : str, optional
         A text that a GIF keeps, not shown.
+
+    Colours and language are those of `plots.look`.
 
     Returns
     -------

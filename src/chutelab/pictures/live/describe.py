@@ -15,7 +15,7 @@ from chutelab.scene.units import LARGEST, SHORTEST
 MOST: Final = 100_000
 """Particles that a page has room for: it keeps their tracks, and draws them in each frame."""
 
-LISTS: Final = ("material", "pair", "conveyor", "surface")
+LISTS: Final = ("material", "pair", "conveyor", "surface", "sensor")
 
 EXAMPLES: Final = ("inclined-40", "cascade", "spoon", "hopper", "galton", "free-fall")
 """Scenes that the empty page offers, with the words ``example-NAME`` in its catalogues."""
@@ -47,6 +47,7 @@ PARTS: Final = (
           radius=0.012, repeat=[[6, 0.08, 0.0], [4, 0.04, -0.07]], restitution=0.4),
     _part("gate", "D", "surface", "points points", "opens_at closes_at friction", "opens_at",
           opens_at=1.0),
+    _part("sensor", "S", "sensor", "from to", "name from to"),
 )  # fmt: skip
 """What can be added to a machine, a row each: its word, the key that begins it, its table, the key
 that each point set in the picture is for, those shown first (three of them), those that tell it
@@ -113,6 +114,9 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     if scene.string:
         lacks["string"] = len(scene.string)
         faults.append(Fault("string", None, f"{allowed}, without strings"))
+    for name in scene.movers:
+        faults.append(Fault("surface", name, f"{allowed}, and surfaces that stay where they are"))
+        partly = False
     if partly:
         faults = []
     if scene.count > MOST:
@@ -184,6 +188,8 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             if field.is_required():
                 rule["required"] = True
             if table == "particle" and key in ("size", "points"):
+                continue
+            if key in ("turn", "shake", "travel") or (table, key) == ("surface", "pivot"):
                 continue
             rules[table][key] = rule
     # Mass points, boxes and polygons are for other engines.

@@ -1,7 +1,8 @@
 """Pictures of recordings: `overlay`, `strobe`, and small functions that take and return `Axes`.
 
 ===============  ==================================================================================
-`style`          colours, text sizes, units; a figure that shows itself
+`look`           in which colours all is drawn: the light or the dark ones
+`style`          text sizes, units; a figure that shows itself
 `scenery`        what of a recording is worth drawing: particles, times, part of the world
 `machinery`      machine and particles to scale, with names
 `panels`         tracks, parabola, velocity, ledger; envelope, arrivals, flow, power, losses
@@ -13,6 +14,7 @@ Figures are drawn by Agg through `Figure` objects: no pyplot, no global state.
 """
 
 from chutelab.pictures.plots.figure import overlay, strobe
+from chutelab.pictures.plots.look import look
 from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.panels import (
     Arc,
@@ -49,6 +51,7 @@ __all__ = [
     "draw_tracks",
     "draw_velocity",
     "flight",
+    "look",
     "overlay",
     "strobe",
     "window_of",

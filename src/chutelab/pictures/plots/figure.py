@@ -18,8 +18,10 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.transforms import Bbox
 
+from chutelab.pictures import BLUE, GREEN, ORANGE, VERMILION
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.machinery import HALO, draw_bodies, draw_scene, stream_handles
+from chutelab.pictures.plots.look import figures, say, spoken
+from chutelab.pictures.plots.machinery import draw_bodies, draw_scene, halo, stream_handles
 from chutelab.pictures.plots.panels import (
     Arc,
     analytic_of,
@@ -33,6 +35,7 @@ from chutelab.pictures.plots.panels import (
     draw_residual,
     draw_tracks,
     draw_velocity,
+    path_of_arcs,
 )
 from chutelab.pictures.plots.scenery import (
     as_crowd,
@@ -47,6 +50,7 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Kind, Recording
+from chutelab.results.loads import borne
 from chutelab.results.quantities import prediction as predicted
 from chutelab.results.sensors import flow, readings, sensed
 from chutelab.theory import Transfer
@@ -148,11 +152,12 @@ def overlay(
         columnspacing=1.0,
     )
     figure.headline(0.06, 0.965, recording.title)
-    said = "one particle" if recording.count == 1 else f"{recording.count:,} particles"
+    count = figures(recording.count, ",")
+    said = say("one") if recording.count == 1 else say("all", count=count)
     drawn = len(drawn_tracks(recording))
     if drawn < recording.count:
-        said += f", {drawn} tracks drawn"
-    said = f"engine {recording.engine}, {said}" if details else said
+        said = say("tracks", said=said, count=drawn)
+    said = say("engine", engine=recording.engine, said=said) if details else said
     figure.remark(0.985, 0.965, said, ha="right", va="center")
     figure.write(path)
     return figure
@@ -172,8 +177,8 @@ def draw_view(
     Of a `crowd` the envelope of the paths instead of what particle 0 does. With `bodies` also the
     particles, at the last moment at which half of them or more are there.
     """
-    style.dress(ax, "x, m", "y, m")
-    draw_scene(ax, recording.machine, window_of(recording))
+    style.dress(ax, say("x"), say("y"))
+    draw_scene(ax, recording.machine, window_of(recording), clear=path_of_arcs(parts))
     draw_analytic(ax, parts)
     draw_tracks(ax, recording, marks=not crowd)
     if crowd and not one_of_many(recording):
@@ -183,7 +188,7 @@ def draw_view(
     if bodies:
         t = fullest(recording)
         draw_bodies(ax, recording, t, crowd=crowd)
-        ax.set_xlabel(f"x, m    (particles at t = {t:.3g} s)")
+        ax.set_xlabel(say("x-with-particles", time=figures(t)))
     if len(recording.machine.streams) > 1:
         handles += stream_handles(recording.machine)
     if legend:
@@ -217,16 +222,46 @@ def sensors(recording: Recording) -> Picture:
         found = sensed(recording, name)
         left, right = (figure.add_subplot(len(told), 2, 2 * row + 1 + n) for n in (0, 1))
         edges, counted = flow(found, last / BINS, last)
-        style.dress(left, "time, s", "particles per s", name)
+        style.dress(left, say("time"), say("per-second"), name)
         left.stairs(counted / (last / BINS), edges, fill=True, color=style.STREAM)
-        told_of = f"{one.count} passed, {one.back} back; {number(one.rate)} /s"
-        style.note(left, told_of)
-        style.dress(right, "along the sensor, m", "particles", "")
+        rate = spoken().local(number(one.rate))
+        style.note(left, say("passed", count=one.count, back=one.back, rate=rate))
+        style.dress(right, say("along-sensor"), say("particles"), "")
         right.hist(found["along"][found["way"] > 0], BINS // 2, color=style.STREAM)
-        style.note(right, f"depth {style.quantity(one.depth, 'm')}" if isfinite(one.depth) else "")
+        if isfinite(one.depth):
+            style.note(right, say("depth", depth=style.quantity(one.depth, "m")))
     figure.subplots_adjust(
         left=0.085, right=0.975, hspace=0.6, wspace=0.22,
         top=1.0 - 0.95 / figure.get_figheight(), bottom=0.6 / figure.get_figheight(),
+    )  # fmt: skip
+    return figure
+
+
+def loads(recording: Recording) -> Picture:
+    """Draw for each surface that bears anything its forces over time, and the torque on it."""
+    told = borne(recording)
+    figure = Picture((9.6, 1.4 + 2.6 * max(1, len(told))))
+    figure.headline(0.04, 1.0 - 0.35 / figure.get_figheight(), recording.title)
+    for row, (name, one) in enumerate(told.items()):
+        left, right = (figure.add_subplot(len(told), 2, 2 * row + 1 + n) for n in (0, 1))
+        style.dress(left, "time, s", "force, N", name)
+        left.stairs(one.normal, one.edges, fill=True, color=style.STREAM, label="pressing")
+        left.stairs(one.along, one.edges, color=style.STRIKE, lw=1.2, label="along")
+        mean, peak, _ = one.part("normal")
+        left.axhline(mean, color=style.INK, lw=1.0, ls="--", label="mean pressing")
+        style.note(left, f"mean {style.quantity(mean, 'N')}, peak {style.quantity(peak, 'N')}")
+        if row == 0:
+            top = 1.0 - 0.15 / figure.get_figheight()
+            figure.legend(loc="upper right", bbox_to_anchor=(0.98, top), ncols=3)
+        style.dress(right, "time, s", "torque, N m", "")
+        right.stairs(one.torque, one.edges, color=style.TRACK, lw=1.2)
+        x, y = one.pivot
+        style.note(right, f"about x = {x:.4g} m, y = {y:.4g} m")
+        for ax in (left, right):
+            ax.set_xlim(0.0, float(one.edges[-1]))
+    figure.subplots_adjust(
+        left=0.085, right=0.975, hspace=0.6, wspace=0.24,
+        top=1.0 - 1.05 / figure.get_figheight(), bottom=0.6 / figure.get_figheight(),
     )  # fmt: skip
     return figure
 
@@ -260,22 +295,22 @@ def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, c
         for spine in ax.spines.values():
             spine.set_color(style.STEEL_LIGHT)
         said = ax.annotate(
-            f"{t:.3g} s", (0.0, 1.0), xycoords="axes fraction", xytext=(3.0, -3.0),
+            f"{figures(t)} s", (0.0, 1.0), xycoords="axes fraction", xytext=(3.0, -3.0),
             textcoords="offset points", va="top", gid="moment",
         )  # fmt: skip
-        said.set(fontsize=style.SMALL, path_effects=HALO, zorder=8.0)
+        said.set(fontsize=style.SMALL, path_effects=halo(), zorder=8.0)
 
 
 WIDE = 185
 """Characters of a line of text below the panels."""
 
 ROLES: dict[str, tuple[str, Any]] = {
-    "first": (style.TRACK, "-"),
-    "second": (style.STRIKE, (0, (5, 2))),
-    "third": (style.BELT, (0, (2, 1.4))),
-    "fourth": (style.ANALYTIC, (0, (6, 1.5, 1.2, 1.5))),
-    "plate": (style.INK, "-"),
-    "belt": (style.BELT, "-"),
+    "first": (BLUE, "-"),
+    "second": (VERMILION, (0, (5, 2))),
+    "third": (GREEN, (0, (2, 1.4))),
+    "fourth": (ORANGE, (0, (6, 1.5, 1.2, 1.5))),
+    "plate": ("#000000", "-"),
+    "belt": (GREEN, "-"),
 }
 """Colour and dashes of lines, which so are told apart without colour, too."""
 
@@ -410,9 +445,9 @@ def draw_times(ax: Axes, recording: Recording) -> Axes:
         )
 
     for own, (t, dot) in enumerate(zip(times, dots, strict=True)):
-        said = f"{t + 0.0:.{digits}f}".replace("-", "−")
+        said = figures(t + 0.0, f".{digits}f")
         label = ax.annotate(said, dot, xytext=(0.0, 0.0), textcoords="offset points", gid="time")
-        label.set(fontsize=style.SMALL, color=style.TRACK, path_effects=HALO, zorder=8.0)
+        label.set(fontsize=style.SMALL, color=style.TRACK, path_effects=halo(), zorder=8.0)
         for x, y in SIDES:
             label.xyann = (AWAY * x, AWAY * y)
             label.set_horizontalalignment("left" if x > 0.0 else "right" if x < 0.0 else "center")
@@ -423,12 +458,12 @@ def draw_times(ax: Axes, recording: Recording) -> Axes:
                 break
         else:
             label.remove()
-    note = ax.text(1.0, 1.01, "beside the dots: time, s", ha="right", va="bottom")
+    note = ax.text(1.0, 1.01, say("times-beside"), ha="right", va="bottom")
     note.set(transform=ax.transAxes, fontsize=style.SMALL, color=style.TRACK)
     return ax
 
 
-ALONG, INTO = style.TRACK, style.STRIKE
+ALONG, INTO = BLUE, VERMILION
 """Colours of the component along the surface, and of the one into it."""
 
 LETTERS = 14.0

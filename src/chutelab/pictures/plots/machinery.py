@@ -25,12 +25,16 @@ from matplotlib.transforms import Bbox
 from chutelab.machine import Arcs, Machine, Pieces, Segments
 from chutelab.pictures import BLUE, GREEN, ORANGE, PURPLE
 from chutelab.pictures.plots import style
+from chutelab.pictures.plots.look import figures, named, say
 from chutelab.pictures.plots.scenery import Window, around, places, stays, subset
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats, Ints
 
-HALO = [withStroke(linewidth=3.0, foreground="white")]
-"""Keeps text readable where a line runs behind it."""
+
+def halo() -> list[withStroke]:
+    """Return what keeps text readable where a line runs behind it."""
+    return [withStroke(linewidth=3.0, foreground=style.GROUND)]
+
 
 TWO_LINES = 32.0
 """pt; height of two lines of small text."""
@@ -67,7 +71,7 @@ def thickness(ax: Axes) -> float:
 def draw_volumes(ax: Axes, machine: Machine, points: float) -> None:
     """Draw what lies behind a machine's surfaces, where a length of 1 m is so many pt."""
     thick = thickness(ax) / points
-    own = [piece for piece in machine.pieces if not piece.gate]
+    own = [piece for piece in machine.pieces if not is_passing(machine, piece)]
     for surface in sorted({int(piece.surface) for piece in own}):
         parts = [one for one in own if one.surface == surface]
         flat = [one for one in parts if isinstance(one, Segments)]
@@ -83,8 +87,14 @@ def draw_volumes(ax: Axes, machine: Machine, points: float) -> None:
         if radius:
             _loop(ax, centers, radius, max(radius - 1.15 * thick, 0.4 * radius), thick, points)
         elif flat and (name == "outgoing" or flat[0].speed):
+            # A belt without pulleys of its own: a loop below what it carries.
             for piece in flat:
-                _belt(ax, piece, thick, points)
+                ends, length = piece.path(), float(piece.length)
+                ends = ends[np.argsort(ends[:, 0])]
+                way = (ends[1] - ends[0]) / length
+                turn = min(0.5 * (STRANDS + 1.0) * thick, 0.25 * length)
+                axes = ends + turn * np.array([way[1], -way[0]])
+                _loop(ax, axes, turn, max(turn - 1.6 * thick, 0.3 * turn), thick, points)
         for piece in flat if name in plates(machine) else ():
             # The steel lies on the right of the struck face.
             face, deep = piece.path(), PLATE * thick * piece.normal(piece.at(0.5 * piece.way))
@@ -131,20 +141,14 @@ def _loop(ax: Axes, axes: Floats, radius: float, wheel: float, thick: float, poi
             ax.add_patch(hub)
 
 
-def _belt(ax: Axes, piece: Segments, thick: float, points: float) -> None:
-    """Draw a belt without pulleys of its own: a loop below what it carries."""
-    ends = piece.path()
-    ends = ends[np.argsort(ends[:, 0])]
-    way = (ends[1] - ends[0]) / float(piece.length)
-    down = np.array([way[1], -way[0]])
-    turn = min(0.5 * (STRANDS + 1.0) * thick, 0.25 * float(piece.length))
-    axes = ends + turn * down
-    _loop(ax, axes, turn, max(turn - 1.6 * thick, 0.3 * turn), thick, points)
-
-
 def pieces(machine: Machine) -> tuple[Pieces, ...]:
     """Return all pieces of a machine's surfaces but the drive pulley."""
     return machine.pieces if machine.pulley is None else machine.pieces[:-1]
+
+
+def is_passing(machine: Machine, piece: Pieces) -> bool:
+    """Tell whether a piece is not always there, or not always at its place."""
+    return bool(piece.gate) or machine.mover(int(piece.surface)) is not None
 
 
 def colour_of(machine: Machine, piece: Pieces) -> str:
@@ -152,7 +156,7 @@ def colour_of(machine: Machine, piece: Pieces) -> str:
     name = machine.surfaces[piece.surface]
     if name in ("incoming", "outgoing") or piece.speed != 0.0:
         return style.BELT
-    return style.STRIKE if name in plates(machine) else style.INK
+    return style.STRIKE if name in plates(machine) else style.WALL
 
 
 def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle | Line2D:
@@ -186,12 +190,19 @@ AXIS = 7.0
 
 
 def draw_scene(
-    ax: Axes, machine: Machine, window: Window | None = None, *, small: bool = False
+    ax: Axes,
+    machine: Machine,
+    window: Window | None = None,
+    *,
+    small: bool = False,
+    clear: Floats | None = None,
 ) -> Axes:
     """Draw the machine's surfaces to scale, with their names, but small with thinner lines only.
 
-    What is not always there, a gate, is dashed. The limits of the axes are set to hold the window
-    at equal scales; by default all surfaces.
+    Names keep clear of a path (P, 2), m, that is drawn later.
+
+    What is not always there, a gate, is dashed, and so is what moves, where the scene has it. The
+    limits of the axes are set to hold the window at equal scales; by default all surfaces.
     """
     if window is None:
         ends = machine.corners
@@ -206,7 +217,7 @@ def draw_scene(
     found = pieces(machine)
     for piece in found:
         look: dict[str, Any] = {"linewidth": 1.3} if small and not piece.whole else {}
-        if piece.gate:
+        if is_passing(machine, piece):
             look |= {**GATE, "color": style.tint(colour_of(machine, piece), 0.5)}
         draw_piece(ax, machine, piece, **look)
         driven = piece.whole and piece.speed != 0.0
@@ -214,9 +225,12 @@ def draw_scene(
             ax.plot(*piece.center, "+", color=style.STEEL, ms=AXIS, zorder=1.5)
     if machine.threads:
         anchors = np.array([thread.anchor for thread in machine.threads])
-        ax.plot(*anchors.T, "o", color=style.INK, ms=3.0, zorder=2.0, gid="anchors")
+        ax.plot(*anchors.T, "o", color=style.WALL, ms=3.0, zorder=2.0, gid="anchors")
     if not small:
-        _Names(ax, machine, found, shown).write()
+        names = _Names(ax, machine, found, shown)
+        if clear is not None and len(clear):
+            names.lines.append((Path(ax.transData.transform(clear)), False))
+        names.write()
     return ax
 
 
@@ -281,11 +295,11 @@ class _Names:
         frame, points = self.ax.get_window_extent().padded(-3.0), 72.0 / self.ax.figure.dpi
         for surface, parts in self.parts.items():
             color = colour_of(self.machine, parts[0][0])
-            color = color if color == style.BELT else style.INK
+            color = style.BELT_NAME if color == style.BELT else style.INK
             label = self.ax.annotate(
                 style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
                 xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
-                color=color, path_effects=HALO, zorder=5.0,
+                color=color, path_effects=halo(), zorder=5.0,
             )  # fmt: skip
             best: tuple[int, Spot, Bbox] | None = None
             for spot in self._spots(parts):
@@ -319,28 +333,25 @@ class _Names:
 
     def _said(self, surface: int, piece: Pieces) -> str:
         """Return what is written at a surface, of which a piece is shown."""
-        name, speed = self.machine.surfaces[surface], float(piece.speed)
-        if name in self.plates:
+        called, speed = self.machine.surfaces[surface], float(piece.speed)
+        if called in self.plates:
             x, y = piece.inward[0]
             angle = float(np.degrees(np.arctan2(-x, y))) + 0.0  # no -0
-            values = np.unique(piece.restitution)
-            leans = f"{angle:.3g}°".replace("-", "−")
-            return f"{name}, {leans}\nε = {' / '.join(f'{one:.3g}' for one in values)}"
+            values = [figures(one) for one in np.unique(piece.restitution).tolist()]
+            return f"{named(called)}, {figures(angle)}°\nε = {' / '.join(values)}"
         if isinstance(piece, Segments):
             x, y = piece.tangent * np.sign(speed)
-            moves = f"{abs(speed):.3g} m/s {ARROWS[round(4.0 / pi * np.arctan2(y, x)) % 8]}"
+            moves = f"{figures(abs(speed))} m/s {ARROWS[round(4.0 / pi * np.arctan2(y, x)) % 8]}"
         else:
-            moves = f"{abs(speed):.3g} m/s {'↻' if speed > 0.0 else '↺'}"
-        if name == "incoming":
-            return f"incoming belt, {moves if speed else 'at rest'}"
-        if name == "outgoing":
-            return f"outgoing belt, {moves if speed else 'at rest'}"
+            moves = f"{figures(abs(speed))} m/s {'↻' if speed > 0.0 else '↺'}"
+        if called in ("incoming", "outgoing"):
+            return say(f"belt-{called}", moves=moves if speed else say("at-rest"))
         times = {(t, "closes") for one in self.found if one.surface == surface
                  if (t := one.appears) > -inf}  # fmt: skip
         times |= {(t, "opens") for one in self.found if one.surface == surface
                   if (t := one.vanishes) < inf}  # fmt: skip
-        when = [f"{what} at {t:.4g} s" for t, what in sorted(times)]
-        return ", ".join([name, *([moves] if speed else []), *when])
+        when = [say(what, time=figures(float(t), ".4g")) for t, what in sorted(times)]
+        return ", ".join([named(called), *([moves] if speed else []), *when])
 
     def _spots(self, parts: list[tuple[Pieces, Floats]]) -> Iterator[Spot]:
         """Yield where the name of a surface may stand, the best first."""
@@ -416,13 +427,13 @@ ARROWS = "→↗↑↖←↙↓↘"
 """Which way a straight surface moves, in eighths of a turn."""
 
 
-HUES = (style.STREAM, PURPLE, ORANGE, BLUE, GREEN)
-"""Of streams: orange, that of what is known analytically, as late as may be."""
-
-
 def stream_colours(count: int) -> list[str]:
-    """Return a colour for each stream; from the sixth on they are darker, then they repeat."""
-    every = [*HUES, *(style.tint(hue, 0.6, "#000000") for hue in HUES)]
+    """Return a colour for each stream; the sixth to the tenth are nearer to the ink.
+
+    Orange, that of what is known analytically, comes as late as may be.
+    """
+    hues = (style.STREAM, PURPLE, ORANGE, BLUE, GREEN)
+    every = [*hues, *(style.tint(hue, 0.6, style.INK) for hue in hues)]
     return [every[i % len(every)] for i in range(count)]
 
 
@@ -436,9 +447,15 @@ def stream_handles(machine: Machine) -> list[Line2D]:
     sizes = np.bincount(machine.releases.stream, minlength=len(colours))
     return [
         Line2D(
-            [], [], ls="none", marker="o", ms=6.0, color=color, label=style.plain(name[:LONGEST])
+            [],
+            [],
+            ls="none",
+            marker="o",
+            ms=6.0,
+            color=color,
+            label=style.plain(named(one)[:LONGEST]),
         )
-        for i, (name, color) in enumerate(zip(machine.streams, colours, strict=True))
+        for i, (one, color) in enumerate(zip(machine.streams, colours, strict=True))
         if i or sizes[0] > 1
     ]
 
@@ -483,21 +500,21 @@ class Bodies:
             edge = min(edge, 0.15 * float(sizes.min()))
             if np.ptp(sizes) == 0.0:
                 (self._disks,) = ax.plot(
-                    [], [], ls="none", marker="o", color=color, ms=sizes[0], mew=edge, mec="white",
-                    gid=gid, **look,
+                    [], [], ls="none", marker="o", color=color, ms=sizes[0], mew=edge,
+                    mec=style.GROUND, gid=gid, **look,
                 )  # fmt: skip
             else:
                 inches = sizes / 72.0
                 self._disks = EllipseCollection(
                     inches, inches, np.zeros(len(sizes)), units="inches", offsets=np.empty((0, 2)),
-                    offset_transform=ax.transData, facecolors=color, edgecolors="white",
+                    offset_transform=ax.transData, facecolors=color, edgecolors=style.GROUND,
                     linewidths=edge, gid=gid, **look,
                 )  # fmt: skip
                 ax.add_collection(self._disks, autolim=False)
             self.artists.append(self._disks)
         if len(self._angular):
             self._polygons = PolyCollection(
-                [], facecolors=color, edgecolors="white", linewidths=0.5 * edge,
+                [], facecolors=color, edgecolors=style.GROUND, linewidths=0.5 * edge,
                 gid=f"{gid} turned", **look,
             )  # fmt: skip
             ax.add_collection(self._polygons, autolim=False)

@@ -16,6 +16,7 @@ from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
 from chutelab.pictures.plots import style
+from chutelab.pictures.plots.look import figures, named, say, spoken
 from chutelab.pictures.plots.machinery import stream_colours
 from chutelab.pictures.plots.scenery import (
     FINE,
@@ -39,8 +40,6 @@ from chutelab.results.record import QUANTILES
 from chutelab.results.stream import envelopes, flows
 from chutelab.results.summary import layers
 from chutelab.scene import Scene
-from chutelab.scene.quantities import REGISTRY
-from chutelab.scene.units import with_unit
 from chutelab.theory import Transfer
 from chutelab.theory.prediction import not_carried, ride_of
 from chutelab.theory.slide import separation
@@ -89,7 +88,8 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
     riding = belt.pulley_radius + scene.particle.radius
     if scene.plate is None:
         met = scene.surface or scene.crowded or scene.plates or scene.conveyor
-        if out is None or met or not (g and belt.speed) or not_carried(scene):
+        lies = any(other for other, _ in not_carried(scene))
+        if out is None or met or not (g and belt.speed) or lies:
             return ()
         ride = ride_of(scene)
         ride["ride_radius"] = ride.pop("pulley_radius") + ride.pop("particle_radius")
@@ -171,28 +171,33 @@ def draw_tracks(ax: Axes, recording: Recording, *, marks: bool = True) -> Axes:
     if alike:
         return ax
     path = path_of(recording, 0, fine)
-    ax.plot(*path.T, color=style.TRACK, lw=1.6, zorder=5.0, gid="track", label="track")
+    ax.plot(*path.T, color=style.TRACK, lw=1.6, zorder=5.0, gid="track", label=say("track"))
     if not marks:
         return ax
     dots, _ = nominal(recording, strobe_times(recording))
-    said = f"every {strobe_step(recording):g} s"
+    said = say("every", step=figures(strobe_step(recording), "g"))
     ax.plot(*dots.T, **style.RINGS, ms=5.0, zorder=6.0, gid="strobe", label=said)
     struck = struck_by_nominal(recording)["t"]
     if len(struck):
         track = recording.track(0)["t"]
         where, _ = nominal(recording, np.clip(struck, track[0], track[-1]))
         (cross,) = ax.plot(*where.T, "x", color=style.STRIKE, ms=8.0, mew=2.0, zorder=7.0)
-        cross.set(gid="impacts", label="impact")
+        cross.set(gid="impacts", label=say("impact"))
     return ax
 
 
 def draw_analytic(ax: Axes, parts: tuple[Arc, ...]) -> Axes:
     """Draw the analytic parabola, dashed; draw the track over it."""
     if parts:
-        position, _ = flight(parts, _times_of(parts))
-        dashed = {**style.DASHED, "gid": "analytic", "label": "analytic parabola"}
+        position = path_of_arcs(parts)
+        dashed = {**style.DASHED, "gid": "analytic", "label": say("analytic-parabola")}
         ax.plot(*position.T, **dashed, zorder=4.5)
     return ax
+
+
+def path_of_arcs(parts: tuple[Arc, ...]) -> Floats:
+    """Return the points of the analytic parabola, (P, 2), m; none without arcs."""
+    return flight(parts, _times_of(parts))[0] if parts else np.empty((0, 2))
 
 
 def _times_of(parts: tuple[Arc, ...]) -> Floats:
@@ -207,12 +212,13 @@ def draw_residual(
     `parts` and `start` are of `analytic_of`; without arcs the panel says so. `reason` says why
     there is no analytic parabola, or none to the end.
     """
-    note = shorten(f"; then {reason}", 95, placeholder=" …") if reason else ""
-    style.dress(ax, f"time since separation, s{note}", "distance, m", "Simulated − analytic")
+    then = say("residual-then", reason=reason) if reason else ""
+    axis = say("residual-axis", note=shorten(then, 95, placeholder=" …"))
+    style.dress(ax, axis, say("residual-distance"), say("residual-title"))
     if not parts:
         ax.set_axis_off()
-        why = reason or "particle 0 does not separate from a pulley"
-        said = style.plain(fill(f"no analytic parabola; {why}", 60))
+        why = say("residual-none", reason=reason or say("residual-unseparated"))
+        said = style.plain(fill(why, 60))
         text = ax.text(0.5, 0.5, said, ha="center", va="center")
         text.set(transform=ax.transAxes, fontsize=style.NORMAL, color=style.MUTED)
         return ax
@@ -234,9 +240,9 @@ def draw_residual(
     ax.set_yticks([10.0**k for k in range(bottom, top + 1, (top - bottom + 3) // 4)])
     ax.minorticks_off()
     ax.set_xlim(0.0, parts[-1].end)
-    title = f"Simulated − analytic: at most {style.scientific(largest, 'm')}"
+    title = say("residual-largest", largest=style.scientific(largest, "m"))
     ax.set_title(title, fontsize=style.NORMAL, loc="left", fontweight="bold")
-    style.note(ax, "dotted: spacing of doubles at 1 m")
+    style.note(ax, say("residual-spacing"))
     return ax
 
 
@@ -244,7 +250,7 @@ def draw_velocity(
     ax: Axes, recording: Recording, parts: tuple[Arc, ...] = (), start: float = 0.0
 ) -> Axes:
     """Draw both velocity components of particle 0 over time, over the analytic ones, dashed."""
-    style.dress(ax, "time, s", "velocity, m/s", "Velocity of particle 0")
+    style.dress(ax, say("time"), say("velocity-axis"), say("velocity-title"))
     times = track_times(recording)
     _, velocity = nominal(recording, times)
     if parts:
@@ -254,7 +260,7 @@ def draw_velocity(
         if parts:
             ax.plot(start + clock, known[:, axis], **style.DASHED, gid=f"analytic {name}")
         (line,) = ax.plot(times, velocity[:, axis], color=style.VELOCITY[name], lw=1.6, gid=name)
-        line.set_label(f"$v_{name[1]}$, {label}")
+        line.set_label(f"$v_{name[1]}$, {say(label)}")
     ax.set_xlim(times[0], _beyond(times))
     ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)
     return ax
@@ -289,23 +295,23 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
         times,
         [factor * books[name] for name in names],
         colors=[style.ENERGY[name] for name in names],
-        labels=[style.ENERGY_LABEL[name] for name in names],
+        labels=[say(f"ledger-{name}") for name in names],
         linewidth=0.0,
     )
     (line,) = ax.plot(times, factor * supplied, color=style.INK, lw=1.6, gid="supplied")
-    line.set(linestyle=(0, (4, 1.5)), label="at release + belt work")
+    line.set(linestyle=(0, (4, 1.5)), label=say("supplied"))
     residual = float(books["residual"][-1])
-    title = "Energy ledger"
+    title = say("ledger")
     if details or abs(residual) > SHOWN * np.abs(supplied).max():
-        title += f": residual {style.scientific(residual, 'J')}"
-    style.dress(ax, "time, s", f"energy, {unit}", title)
+        title = say("ledger-with", residual=style.scientific(residual, "J"))
+    style.dress(ax, say("time"), say("energy-axis", unit=unit), title)
     ax.set_xlim(times[0], times[-1])
     ax.set_ylim(bottom=min(0.0, factor * float(supplied.min())))
     return ax
 
 
-EDGES = f"{100 * QUANTILES[0]:.0f} to {100 * QUANTILES[-1]:.0f} % of the paths"
-"""What a legend says of an envelope."""
+EDGES = {"low": f"{100 * QUANTILES[0]:.0f}", "high": f"{100 * QUANTILES[-1]:.0f}"}
+"""Per cent between which most are."""
 
 
 def draw_envelope(ax: Axes, recording: Recording) -> Axes:
@@ -321,22 +327,22 @@ def draw_envelope(ax: Axes, recording: Recording) -> Axes:
         first = name == next(iter(paths))
         right, middle, left = (line[np.isfinite(line).all(axis=1)] for line in paths[name].lines)
         (band,) = ax.fill(*np.concatenate([right, left[::-1]]).T, color=color, alpha=0.4, lw=0.0)
-        band.set(zorder=3.5, gid="envelope", label=EDGES if first else "")
-        dark = style.TRACK if len(colours) == 1 else style.tint(color, 0.6, "#000000")
+        band.set(zorder=3.5, gid="envelope", label=say("envelope", **EDGES) if first else "")
+        dark = style.TRACK if len(colours) == 1 else style.tint(color, 0.6, style.INK)
         (way,) = ax.plot(*middle.T, color=dark, lw=1.6, zorder=5.0, gid="median")
-        way.set_label("median path" if first else "")
+        way.set_label(say("median-path") if first else "")
     return ax
 
 
-def draw_arrivals(ax: Axes, recording: Recording, title: str = "Arrivals") -> Axes:
+def draw_arrivals(ax: Axes, recording: Recording, title: str | None = None) -> Axes:
     """Draw how many particles arrive where on the outgoing belt, with the mean and the spread.
 
     Of a bed, the landings of the lowest and the highest layer are marked.
     """
     found = arrivals(recording)["position"][:, 0]
     found = found[np.isfinite(found)]
-    place = REGISTRY["arrival.x"]
-    style.dress(ax, with_unit(place.meaning, place.unit), "particles", title)
+    title = say("arrivals") if title is None else title
+    style.dress(ax, say("arrival-place"), say("particles"), title)
     if len(found) == 0:
         return ax
     mean, deviation = float(found.mean()), float(found.std())
@@ -345,10 +351,14 @@ def draw_arrivals(ax: Axes, recording: Recording, title: str = "Arrivals") -> Ax
     ax.hist(found, bins=edges, color=style.STREAM)
     ax.axvspan(mean - deviation, mean + deviation, color=style.MUTED, alpha=0.2, gid="spread")
     ax.axvline(mean, color=style.INK, lw=1.6, gid="mean")
-    style.note(ax, f"{mean:.4f} m, spread {style.quantity(deviation, 'm')}")
+    style.note(
+        ax, say("mean-spread", mean=figures(mean, ".4f"), spread=style.quantity(deviation, "m"))
+    )
     if (ends := layers(recording)) is not None:
         for x, layer, dashes in zip(ends, ("lowest", "highest"), ("--", ":"), strict=True):
-            ax.axvline(x, color=style.STRIKE, lw=1.6, ls=dashes, gid=layer, label=f"{layer} layer")
+            ax.axvline(
+                x, color=style.STRIKE, lw=1.6, ls=dashes, gid=layer, label=say(f"layer-{layer}")
+            )
         # Above the bars.
         ax.set_ylim(top=1.25 * ax.get_ylim()[1])
         ax.legend(fontsize=style.SMALL, loc="upper center", ncols=2, framealpha=0.85)
@@ -362,11 +372,11 @@ def draw_flow(ax: Axes, recording: Recording) -> Axes:
     The steeper, the larger the flow; the remark says what arrives, as the summary does.
     Where all are there from the start and none comes or goes: how fast they are.
     """
-    style.dress(ax, "time, s", "particles", "Flow")
+    style.dress(ax, say("time"), say("particles"), say("flow"))
     first, last = recording.ends()
     counted = flow(recording)
     ends = float(first["t"].min()), float(last["t"].max())
-    if not (np.ptp(first["t"]) or len(counted["arrived"]) or len(counted["left the scene"])):
+    if not (np.ptp(first["t"]) or len(counted["arrived"]) or len(counted["left"])):
         return draw_speeds(ax, recording)
     colours = (style.MUTED, style.TRACK, style.STRIKE)
     for (name, times), color in zip(counted.items(), colours, strict=True):
@@ -374,11 +384,11 @@ def draw_flow(ax: Axes, recording: Recording) -> Axes:
             clock = np.concatenate([ends[:1], np.sort(times), ends[1:]])
             count = np.append(np.arange(len(times) + 1), len(times))
             (steps,) = ax.step(clock, count, where="post", color=color, lw=1.6, gid=name)
-            steps.set_label(f"{name} {len(times):,}")
+            steps.set_label(say(f"flow-{name}", count=figures(len(times), ",")))
     slice_, whole = flows(recording)
     if slice_ is not None:
-        said = f"{number(slice_)} t/h arrive, of the slice"
-        style.note(ax, said if whole is None else f"{number(whole)} t/h arrive")
+        key, carried = ("flow-slice", slice_) if whole is None else ("flow-whole", whole)
+        style.note(ax, say(key, flow=spoken().local(number(carried))))
     ax.set(xlim=ends if ends[1] > ends[0] else None, ylim=(0.0, 1.08 * recording.count))
     ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)
     return ax
@@ -390,10 +400,10 @@ def draw_speeds(ax: Axes, recording: Recording) -> Axes:
     times = np.linspace(clock.min(), clock.max(), 200)
     speeds = np.hypot(*np.moveaxis(recording.at(times)[1], 2, 0))
     low, middle, high = np.nanquantile(speeds, QUANTILES, axis=1)
-    style.dress(ax, "time, s", "speed, m/s", "Speed of all")
-    said = f"{100 * QUANTILES[0]:.0f} to {100 * QUANTILES[-1]:.0f} %"
+    style.dress(ax, say("time"), say("speed-axis"), say("speed-title"))
+    said = say("quantiles", **EDGES)
     ax.fill_between(times, low, high, color=style.STREAM, alpha=0.5, lw=0.0, label=said)
-    ax.plot(times, middle, color=style.TRACK, lw=1.6, gid="speed", label="median")
+    ax.plot(times, middle, color=style.TRACK, lw=1.6, gid="speed", label=say("median"))
     ax.set_xlim(times[0], times[-1])
     ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)
     return ax
@@ -406,11 +416,11 @@ def draw_power(ax: Axes, recording: Recording) -> Axes:
     paid = recording.energy_at(times)["belt_work"]
     power = np.diff(paid) / np.diff(times)
     factor, unit = style.scaled(power, "W")
-    style.dress(ax, "time, s", f"power, {unit}", "Belt power")
+    style.dress(ax, say("time"), say("power-axis", unit=unit), say("power-title"))
     ax.stairs(factor * power, times, color=style.BELT, lw=1.6, gid="power")
     ax.axhline(0.0, color=style.MUTED, lw=0.8)
     ax.set_xlim(times[0], times[-1])
-    style.note(ax, f"work {style.quantity(float(paid[-1]), 'J')}")
+    style.note(ax, say("work", work=style.quantity(float(paid[-1]), "J")))
     return ax
 
 
@@ -426,13 +436,13 @@ def draw_losses(ax: Axes, recording: Recording) -> Axes:
     names = names[:MOST_SURFACES]
     losses = np.array([[books[n][key] for n in names] for key in LOSSES]).reshape(2, -1)
     factor, unit = style.scaled(losses, "J")
-    style.dress(ax, f"loss, {unit}", "", "Losses by surface")
+    style.dress(ax, say("loss-axis", unit=unit), "", say("losses"))
     ax.grid(visible=False, axis="y")
     base: Floats = np.zeros(len(names))
     for key, loss in zip(LOSSES, factor * losses, strict=True):
         ax.barh(range(len(names)), loss, left=base, height=0.7, color=style.ENERGY[key], gid=key)
         base = base + loss
-    ax.set_yticks(range(len(names)), [style.plain(name) for name in names])
+    ax.set_yticks(range(len(names)), [style.plain(named(one)) for one in names])
     ax.set_ylim(max(len(names), 2) - 0.4, -0.6)
     return ax
 

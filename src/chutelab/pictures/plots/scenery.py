@@ -194,7 +194,7 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
 
 
 def flow(recording: Recording) -> dict[str, Floats]:
-    """Return when particles are released, have arrived and have left for good, s, by these words.
+    """Return when particles are released, have arrived and have left for good, s.
 
     Of the last two only what any of them does in the end.
     """
@@ -204,7 +204,7 @@ def flow(recording: Recording) -> dict[str, Floats]:
     return {
         "released": first["t"],
         "arrived": come[np.isfinite(come)],
-        "left the scene": last["t"][gone],
+        "left": last["t"][gone],
     }
 
 
@@ -256,6 +256,9 @@ def drawn_tracks(recording: Recording) -> Ints:
     chosen = spread(recording.count, FEW_TRACKS if one_of_many(recording) else STREAM_TRACKS)
     return chosen[recording.released[chosen]]
 
+
+POSES = 61
+"""Times of a run at which it is asked how far what moves reaches."""
 
 NEARBY, FAR = 0.35, 1.0
 """Margins around the action, in shares of its size: within the first, ends of belts are shown;
@@ -362,6 +365,12 @@ def window_of(recording: Recording) -> Window:
     points.append(ends[near.holds(ends) | (still & far.holds(ends))])
     for part in machine.parts[1:]:
         points.append(part.corners[near.holds(part.corners)])
+    times = np.linspace(recording.t[0], recording.t[-1], POSES) if machine.movers else ()
+    for mover in machine.movers:
+        for pieces in machine.parts:
+            own = pieces.of(pieces.surface == mover.surface).corners
+            placed = np.concatenate([mover.carried(own, time) for time in times])
+            points.append(placed[far.holds(placed)])
     points.append(around(np.concatenate(points)).padded(*[NEARBY] * 4).nearest(fall))
     # Names stand left of the pulley and behind the plate.
     left = 0.06 if machine.pulley is None else 0.24

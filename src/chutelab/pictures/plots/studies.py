@@ -20,7 +20,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from chutelab.checks.workprecision import METHODS, Timing
-from chutelab.pictures import BLUE, GREEN, ORANGE, PURPLE, SKY
+from chutelab.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.panels import analytic_of, draw_analytic
@@ -46,8 +46,8 @@ from chutelab.util.arrays import Bools, Floats
 from chutelab.util.tables import many
 from chutelab.util.versions import PACKAGES
 
-BARS = (style.TRACK, style.STREAM)
-KINDS = (style.STREAM, style.ANALYTIC, style.BELT, style.STRIKE, style.STEEL)
+BARS = (BLUE, SKY)
+KINDS = (SKY, ORANGE, GREEN, VERMILION, GREY)
 """Colours of the kinds of outcome; the last one also of all that follow."""
 
 MISSING = "///"
@@ -397,7 +397,7 @@ def measured(found: Residuals, fit: Fit | None = None) -> Picture:
     return figure
 
 
-METHOD_COLOURS = (style.ANALYTIC, style.BELT, style.STRIKE, PURPLE, style.STEEL)
+METHOD_COLOURS = (ORANGE, GREEN, VERMILION, PURPLE, GREY)
 """Of the methods of discharge, in their order."""
 
 METHOD_LINES = ("-", (0, (5.0, 1.5)), "-.", (0, (1.5, 1.0)), (0, (7.0, 1.5, 1.5, 1.5)))

@@ -1,7 +1,7 @@
 """Colours, text sizes and units that every picture, page and notebook shares.
 
-Each colour stands for one thing in every panel. `Picture` is a figure with a headline, which writes
-itself to a file and shows itself in a notebook.
+The colours are those of the look that holds, see `look`. `Picture` is a figure with a headline,
+which writes itself to a file and shows itself in a notebook.
 """
 
 from __future__ import annotations
@@ -18,44 +18,40 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
+from matplotlib.ticker import ScalarFormatter
 from numpy.typing import ArrayLike
 
-from chutelab.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
+from chutelab.pictures.plots.look import colours, spoken
 from chutelab.util.errors import printable
 from chutelab.util.files import whole
 
-INK = "#000000"
-MUTED = "#595959"
-STEEL = GREY
-STEEL_LIGHT = "#E6E6E6"
-BELT_BODY, CLEAT = "#2B3841", "#3CCFA2"
+GROUND: str
+INK: str
+MUTED: str
+STEEL: str
+STEEL_LIGHT: str
+WALL: str
+BELT_BODY: str
+CLEAT: str
+TRACK: str
+ANALYTIC: str
+BELT: str
+BELT_NAME: str
+STRIKE: str
+STREAM: str
+VELOCITY: dict[str, str]
+ENERGY: dict[str, str]
+DASHED: dict[str, Any]
+RINGS: dict[str, Any]
 
-TRACK = BLUE
-ANALYTIC = ORANGE
-BELT = GREEN
-STRIKE = VERMILION
-STREAM = SKY
 
-VELOCITY = {"vx": BLUE, "vy": VERMILION}
+def __getattr__(name: str) -> Any:
+    """Return one of the colours above, of the look that holds, see `look.colours`."""
+    try:
+        return colours()[name]
+    except KeyError:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None
 
-ENERGY = {
-    "start": "#BFBFBF",
-    "kinetic": ORANGE,
-    "potential": SKY,
-    "belt_work": GREEN,
-    "restitution_loss": VERMILION,
-    "friction_loss": PURPLE,
-    "residual": "#000000",
-}
-ENERGY_LABEL = {
-    "start": "energy at release",
-    "kinetic": "kinetic",
-    "potential": "potential",
-    "belt_work": "belt work",
-    "restitution_loss": "restitution loss",
-    "friction_loss": "friction loss",
-    "residual": "residual (error)",
-}
 
 SMALL, NORMAL, LARGE = 9.5, 10.5, 13.0
 """Text sizes, pt; nothing is smaller, so that a projected picture stays readable."""
@@ -89,16 +85,17 @@ def quantity(value: float, unit: str) -> str:
     ('20.2 mJ', '0 J', '−1.50 m/s')
     """
     factor, name = scaled(float(f"{value:.2e}"), unit)
-    shown = f"{factor * value:#.3g}".rstrip(".") if value else "0"
-    return f"{shown} {name}".replace("-", "−")
+    shown = format(factor * value, "#.3g").rstrip(".") if value else "0"
+    return f"{spoken().local(shown)} {name}".replace("-", "−")
 
 
-def tint(colour: str, share: float, ground: str = "#FFFFFF") -> str:
-    """Return a colour mixed with a ground.
+def tint(colour: str, share: float, ground: str | None = None) -> str:
+    """Return a colour mixed with a ground, by default that of the picture.
 
     >>> tint("#0072B2", 0.5), tint("#000000", 0.25)
     ('#80B8D8', '#BFBFBF')
     """
+    ground = colours()["GROUND"] if ground is None else ground
     above, below = bytes.fromhex(colour[1:]), bytes.fromhex(ground[1:])
     mixed = (round(share * a + (1.0 - share) * b) for a, b in zip(above, below, strict=True))
     return "#" + bytes(mixed).hex().upper()
@@ -134,14 +131,29 @@ def plain(text: str) -> str:
     return drawable(text).replace("$", r"\$")
 
 
+class _Local(ScalarFormatter):
+    """Numbers beside ticks in the digits of the language that held as the axes were dressed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._words = spoken()
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return self._words.local(super().__call__(x, pos))
+
+
 def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
     """Give axes the common look, light grid, two spines, readable text; see `plain`."""
     ax.set_xlabel(plain(x), fontsize=NORMAL)
     ax.set_ylabel(plain(y), fontsize=NORMAL)
     if title:
         ax.set_title(plain(title), fontsize=NORMAL, loc="left", fontweight="bold")
-    ax.tick_params(labelsize=SMALL, color=MUTED)
-    ax.grid(visible=True, color=STEEL_LIGHT, linewidth=0.6)
+    now = colours()
+    ax.tick_params(labelsize=SMALL, color=now["MUTED"])
+    ax.grid(visible=True, color=now["STEEL_LIGHT"], linewidth=0.6)
+    if spoken().language != "en":
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.set_major_formatter(_Local())
     ax.set_axisbelow(True)
     for side in ("top", "right"):
         ax.spines[side].set_visible(False)
@@ -150,7 +162,7 @@ def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
 
 def note(ax: Axes, text: str) -> None:
     """Write a remark above axes, at the right."""
-    ax.set_title(plain(text), fontsize=SMALL, loc="right", color=MUTED)
+    ax.set_title(plain(text), fontsize=SMALL, loc="right", color=colours()["MUTED"])
 
 
 def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> None:
@@ -171,13 +183,6 @@ def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> No
         legend = ax.legend(**options, ncols=ncols)
         if legend.get_window_extent().x1 <= ax.get_window_extent().x1:
             return
-
-
-DASHED: dict[str, Any] = {"color": ANALYTIC, "lw": 4.0, "ls": (0, (2.2, 1.1))}
-"""How lines known analytically are drawn, under those that are simulated."""
-
-RINGS: dict[str, Any] = {"ls": "none", "marker": "o", "mfc": "white", "mec": TRACK}
-"""How strobe dots are drawn."""
 
 
 def scientific(value: float, unit: str) -> str:
@@ -212,7 +217,12 @@ class Picture(Figure):
 
     def remark(self, x: float, y: float, text: str, **look: Any) -> None:
         """Write grey text at a place, in shares of the figure; its upper left corner is there."""
-        self.text(x, y, plain(text), **{"fontsize": NORMAL, "color": MUTED, "va": "top", **look})
+        self.text(
+            x,
+            y,
+            plain(text),
+            **{"fontsize": NORMAL, "color": colours()["MUTED"], "va": "top", **look},
+        )
 
     def write(self, path: str | Path | None) -> None:
         """Write the figure, whole or not at all; nothing without a path.

@@ -188,7 +188,7 @@ MOST: Final = 8
 """Keys that may vary at once: beyond, a search over the whole range takes too long to be one."""
 
 INSIDE: Final = 0.3819660112501051
-"""Where in a range it is tried before the search: a share that makes no whole number."""
+"""Share of a range at which the key is tried before the search; no whole number comes of it."""
 
 
 @dataclass(frozen=True)
@@ -275,7 +275,7 @@ class Evaluator:
         table = np.asarray(points, dtype=np.float64)
         values = np.full((len(table), len(self.quantities)), np.nan)
         courses, faults, kinds = np.full((3, len(table)), "", dtype=object)
-        # The run that ends as the scene says comes last: what both runs know is read off that.
+        # The run that ends as the scene says comes last: of what both know, its values stay.
         wanted = {quantity.ending for quantity in self.quantities} - {"any"}
         endings = sorted(wanted, reverse=True) or ["scene"]
         # A family does not count the contacts of each.

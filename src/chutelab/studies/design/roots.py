@@ -42,7 +42,8 @@ MOST_CHANGES: Final = 24
 and what is left stays between two points of the grid."""
 
 SLIVER: Final = 1e-9
-"""Share of the range below which a course is none of its own: a clipped edge, or rounding."""
+"""Share of the range below which a piece with another course is left out: a clipped edge, or
+rounding."""
 
 ROUNDS: Final = 60
 """Halvings that bring any interval down to neighbouring numbers, 2⁻⁵³ of its ends, and some."""
@@ -283,7 +284,7 @@ def minima(found: Scan, function: Function, sign: float = 1.0) -> tuple[Least, .
     step = EVEN * found.size
 
     def rounded(values: Floats) -> Floats:
-        # Without digits in which a level function would have minima of rounding.
+        # Rounded, so that a level function has no minima.
         return sign * (np.round(values / step) * step if step > 0.0 else values)
 
     beyond = {}

@@ -24,7 +24,8 @@ CORRELATED = 0.9
 BENT = 0.2
 """Relative change of the Jacobian over one uncertainty from which on it is no straight line."""
 ALIKE = 0.4
-"""Correlation of neighbouring residuals that is no accident in a film of some tens of points."""
+"""Correlation of neighbouring residuals that chance does not give in a film of some tens of
+points."""
 FEW = 10
 """Points from which on that can be told."""
 FAR = 6.0
@@ -34,9 +35,10 @@ NAMED = 5
 
 
 FAR_CLOSER = 10.0
-"""Times smaller that residuals must be for a t0 to be advised."""
+"""A t0 is advised if it makes the residuals so many times smaller."""
 ASTRAY = 3.0
-"""Sizes of the simulated track that points must lie off it, for their placement to be doubted."""
+"""Distance of the points from the simulated track, in sizes of that, from which on their placement
+is doubted."""
 
 
 def advice(found: Residuals) -> str:

@@ -29,9 +29,9 @@ import numpy as np
 from chutelab.scene import to_dict
 from chutelab.scene.quantities import COLUMNS
 from chutelab.studies.sweep.plan import Plan
-from chutelab.studies.sweep.rows import TEXTS, Columns, columns_of, synced, text_of
+from chutelab.studies.sweep.rows import TEXTS, Columns, columns_of, synced
 from chutelab.util.errors import InputError
-from chutelab.util.files import writing
+from chutelab.util.files import csv_columns, writing
 from chutelab.util.versions import version_of
 
 if sys.platform == "win32":
@@ -175,7 +175,7 @@ class Part:
 
     def add(self, begin: int, columns: Columns) -> None:
         """Add a finished block."""
-        text = text_of(columns)
+        text = csv_columns(columns.values())
         self._file.write(self._line(begin, text))
         self._file.flush()
         self.done[begin] = text, columns

@@ -22,6 +22,7 @@ from chutelab.results.recorder import StalledError
 from chutelab.scene import AnyScene, Scene, SceneError, load
 from chutelab.scene.variants import (
     Family,
+    Judge,
     Quantity,
     Range,
     Varied,
@@ -29,7 +30,6 @@ from chutelab.scene.variants import (
     accepted,
     count_of,
     is_plain,
-    judged_by,
     quantities,
     reason,
     varied,
@@ -83,21 +83,24 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
     values = block.values
     good = np.stack([accepted(*column) for column in zip(block.paths, values.T, strict=True)]).T
     sound = np.asarray(good.all(axis=1))
-    asked = np.full(len(block.paths), not sound.any())
+    asked, judge = np.full(len(block.paths), not sound.any()), Judge(block.scene)
     while True:
         telling = np.where(good & ~asked, 0.0, values)
         _, first, group = np.unique(
             np.hstack([telling, good]), axis=0, return_index=True, return_inverse=True
         )
-        more = asked.copy()
-        for row in first[sound[first]].tolist():
-            by = judged_by(block.scene, block.settings(row))
-            more |= [path in by for path in block.paths]
-        if (more == asked).all():
+        fair = [sound[row] and not judge.finds(block.settings(row)) for row in first.tolist()]
+        # A rule asks for all of a point, of which a coordinate may vary.
+        more = [
+            any(f"{path}[".startswith(f"{key}[") for key in judge.asked) for path in block.paths
+        ]
+        if not np.any(more & ~asked):
             break
-        asked = more
+        asked |= more
     template, wrong = None, dict[int, str]()
     for number, row in enumerate(first.tolist()):
+        if template is not None and fair[number]:
+            continue
         try:
             scene = block.scene.with_values(block.settings(row))
             template = template or scene
@@ -119,20 +122,19 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
         Rows of the block, (N,), and their recording, which breaks no law: of one variant, or of a
         family with a particle for each. Or, as text, why they have none.
     """
-    which, paths = np.arange(len(block.values)), {*block.paths}
+    which = np.arange(len(block.values))
     template = None
-    if not apart and all(map(is_plain, paths)):
+    if not apart and all(map(is_plain, block.paths)):
         template, which, faults = screened(block)
         yield from ((np.array([row]), one_line(why)) for row, why in faults.items())
     stepped = (block.engine or block.scene.run.engine) in ("contact", "pymunk")
+    stepped |= block.scene.run.loads is not None
     stepped |= bool(block.scene.string) or any(kind.outline for kind in block.scene.particles)
-    # Members of a family are released, and have their gates, at the same times.
-    timed = any(path.endswith(("opens_at", "closes_at", "stream.start")) for path in paths)
-    # Whether a release lies on the belt is a matter of the last digits.
-    close = {"particle.radius", "incoming.pulley_radius", "incoming.length"} & paths
-    close = close if block.scene.stream.at is not None else set()
+    stepped |= bool(block.scene.movers) or any(
+        {"turn", "shake", "travel"} & {*path.split(".")} for path in block.paths
+    )
     groups: list[Ints] = []
-    if template is not None and not (stepped or timed or close or template.count > 1):
+    if template is not None and not (stepped or template.count > 1):
 
         def built(some: Ints) -> Machine:
             columns = block.values[some].T.copy()

@@ -16,7 +16,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
-from math import isnan
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,7 +29,7 @@ from chutelab.results.stream import told_fates
 from chutelab.scene.quantities import COLUMNS, FORMER, HEAT, PAID, REGISTRY, lookup
 from chutelab.scene.variants import Quantity
 from chutelab.util.errors import InputError
-from chutelab.util.files import csv_lines, unquoted, whole, write_lines
+from chutelab.util.files import csv_columns, csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, many, number
 from chutelab.util.versions import library
 
@@ -213,7 +212,7 @@ def format_of(path: str | Path) -> str:
 def write(columns: Rows, path: str | Path, form: str) -> Path:
     """Write a table as "csv" or "parquet"."""
     if form == "csv":
-        return write_csv(tuple(columns), [text_of(columns)], path)
+        return write_csv(tuple(columns), [csv_columns(columns.values())], path)
     pa, parquet = library("pyarrow", *PARQUET), library("pyarrow.parquet", *PARQUET)
     table = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
     with whole(path) as unfinished:
@@ -237,20 +236,8 @@ def synced(path: Path) -> None:
                 os.close(handle)
 
 
-def text_of(columns: Rows) -> str:
-    """Return rows as lines of CSV, from which `columns_of` gets every bit back."""
-    cells = [
-        values.tolist()
-        if name in TEXTS
-        # As few digits as give it back, a whole number without a point.
-        else ["" if isnan(x) else repr(x).removesuffix(".0") for x in values.tolist()]
-        for name, values in columns.items()
-    ]
-    return "".join(csv_lines(zip(*cells, strict=True)))
-
-
 def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
-    """Read what `text_of` wrote."""
+    """Read what `csv_columns` wrote."""
     cells = list(zip(*csv.reader(io.StringIO(text, newline="")), strict=True))
     return {
         name: np.array(list(map(unquoted, column)), dtype=object)

@@ -174,9 +174,9 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
 
 @contextmanager
 def _without_ctrl_c() -> Iterator[None]:
-    """Let Ctrl-C wait. Processes that begin meanwhile never get it, not while they import either.
+    """Let Ctrl-C wait. Processes that begin meanwhile never get it, not even while they import.
 
-    It goes to all processes of a terminal, of which the first one tells the others to end.
+    A terminal sends it to all of its processes; here the first one ends the others.
     """
     if sys.platform == "win32":
         yield
@@ -257,9 +257,9 @@ def _check_same_version(client: Any, address: str) -> None:
 def _ask(dask: ModuleType, address: str) -> None:
     """Refuse an address at which no Dask scheduler answers, in time.
 
-    A client waits for ever for a server that accepts a connection and says nothing, and prints a
-    traceback of other faults after 20 s. The thread that asks gives up in time too: as long as it
-    tries again, Dask draws its pauses from the random numbers of `random`, which are the caller's.
+    A client waits for ever for a server that accepts a connection and sends nothing, and prints a
+    traceback of other faults after 20 s. The thread that asks stops in time too: as long as it
+    tries again, Dask draws its pauses from `random`, and so changes the caller's random numbers.
     """
     found: str | Exception = TimeoutError(f"nothing in {PATIENCE:g} s")
 

@@ -1,6 +1,8 @@
 // A page without steps: what it makes of a scene.
 
 import { Callout } from "./callout.ts";
+import { Menu } from "./menu.ts";
+import { SensorsPanel } from "./sensors.ts";
 import { start } from "./page.ts";
 import { Palette } from "./palette.ts";
 import { html } from "./panels.ts";
@@ -24,15 +26,20 @@ const LANGUAGES: Record<string, string> = { de: "Deutsch", en: "English" };
 
 start(({ lab, stage, words, bench, inspector, symbols }) => {
   language(lab.data);
+  const sensors = new SensorsPanel(document.getElementById("panels") as Element, lab, words);
   const tools = new Tools(lab, stage, words);
   new Callout(inspector, stage, lab, symbols);
   const home = stage.home.parentElement as HTMLElement;
+  new Menu(lab, stage, words, bench.free);
   const palette = bench.free ? new Palette(home, bench, stage, lab, words) : null;
   new Phone(bench, palette, words);
   if (lab.data.live?.predict) new Prediction(stage, lab, words);
-  lab.on("scene", () => {
+  const head = () => {
     const heading = document.querySelector("h1") as HTMLElement, { title } = lab.scene ?? {};
     if (title && heading.textContent !== title) heading.textContent = title;
-  });
-  return { palette, tools };
+  };
+  lab.on("scene", head);
+  // The address may have told another scene already.
+  head();
+  return { palette, sensors, tools };
 });

@@ -1,8 +1,9 @@
 // Particles: shaded balls in the colour of their material, or flat discs by kind or by speed.
 
 import type { Lab } from "./lab.ts";
+import type { Recording } from "./recording.ts";
 
-export type Hue = "material" | "kind" | "speed";
+export type Hue = "material" | "kind" | "speed" | "size";
 
 /** Light, middle and dark of a ball, by material; what is of none has that of its stream. */
 const SHADES: Record<string, [string, string, string]> = {
@@ -27,8 +28,12 @@ const STREAMS: [string, string, string][] = [
   ["#a5e6d1", "#009e73", "#005740"],
 ];
 
-/** Steps of colour of the speed. */
+/** Steps of colour of a speed or a size. */
 const STEPS = 8;
+
+/** To tell the speeds of a run: particles and times that are looked at, the share of speeds that
+ * the colours reach to, and by how much longer a run has to be to be looked at again. */
+const SOME = 100, TIMES = 24, MOST = 0.98, LONGER = 1.2;
 
 /** Pixels of radius below which a ball is a flat disc. */
 const SHADED = 2.5;
@@ -40,8 +45,10 @@ const LARGEST = 48, KEPT = 200;
 class Balls {
   hue: Hue = "material";
   pictures: Map<string, HTMLCanvasElement> = new Map();
-  /** m/s that has the last colour. */
-  fastest = 1;
+  /** Where the first colour begins and the last one ends, and the unit of that: m/s, or mm of
+   * radius. */
+  range: [number, number] = [0, 1];
+  unit = "m/s";
 
   constructor(readonly lab: Lab, readonly colour: (name: string) => string) {}
 
@@ -55,18 +62,26 @@ class Balls {
     return SHADES[material] ? material : String((release?.stream ?? 0) % STREAMS.length);
   }
 
-  /** The step of a speed, m/s. */
-  step(speed: number) {
-    return Math.max(0, Math.min(STEPS - 1, Math.floor((STEPS * speed) / this.fastest)));
+  /** Light, middle and dark of a particle. */
+  shades(i: number) {
+    const kind = this.kindOf(i);
+    return SHADES[kind] ?? STREAMS[Number(kind)];
+  }
+
+  /** The step of a speed, m/s, or of a radius, mm. */
+  step(value: number) {
+    const [low, high] = this.range;
+    return Math.max(0, Math.min(STEPS - 1, Math.floor((STEPS * (value - low)) / (high - low))));
   }
 
   /** Paint one at a place, px. @param speed m/s */
   paint(
     context: CanvasRenderingContext2D, i: number, x: number, y: number, r: number, speed: number,
   ) {
-    if (this.hue === "speed" || r < SHADED) {
-      const shades = SHADES[this.kindOf(i)] ?? STREAMS[Number(this.kindOf(i))];
-      context.fillStyle = this.hue === "speed" ? this.colour(`v${this.step(speed)}`) : shades[1];
+    const ramp = this.hue === "speed" || this.hue === "size";
+    if (ramp || r < SHADED) {
+      const value = this.hue === "speed" ? speed : 1e3 * (this.lab.machine?.radius[i] ?? 0);
+      context.fillStyle = ramp ? this.colour(`v${this.step(value)}`) : this.shades(i)[1];
       context.beginPath();
       context.arc(x, y, r, 0, 2 * Math.PI);
       context.fill();
@@ -103,15 +118,43 @@ class Balls {
     return canvas;
   }
 
-  /** A round speed, m/s, that few particles of the run exceed. */
+  /** Of which run speeds were looked at, and from when on they are again, s. */
+  known = { recording: null as Recording | null, now: 0, again: 0 };
+
+  /** Have the colours reach to a round speed that few particles exceed for a short time, or from
+   * the smallest particle to the largest. */
   measure() {
-    let most = 0;
-    for (const { before } of this.lab.recording?.events.slice(0, 2000) ?? []) {
-      most = Math.max(most, Math.hypot(before[0], before[1]));
+    const { recording, machine } = this.lab;
+    if (this.hue === "size" && machine) {
+      const low = machine.radius.reduce((least, r) => Math.min(least, 1e3 * r), Infinity);
+      this.range = [low, machine.radius.reduce((most, r) => Math.max(most, 1e3 * r), 0)];
+      this.unit = "mm";
+      this.known.recording = null;
     }
-    const ten = 10 ** Math.floor(Math.log10(Math.max(most, 1e-3)));
-    this.fastest = ten * ([1, 2, 5, 10].find((n) => n * ten >= most) ?? 10);
+    if (this.hue !== "speed" || !recording || !isFinite(recording.begin)) return;
+    const { tracks, begin, state } = recording;
+    const now = recording.machine.interact && state === "running" ? recording.now : recording.end, { known } = this;
+    if (known.recording === recording && now >= known.now && now < known.again) return;
+    this.known = { recording, now, again: begin + LONGER * (now - begin) };
+    const every = Math.ceil(tracks.length / SOME), speeds: number[] = [];
+    for (let i = 0; i < tracks.length; i += every) {
+      for (let n = 1; n <= TIMES; n += 1) {
+        const its = tracks[i].state(begin + ((now - begin) * n) / TIMES);
+        if (its && !its.ended) speeds.push(Math.hypot(its.vx, its.vy));
+      }
+    }
+    speeds.sort((a, b) => a - b);
+    const most = Math.max(1e-3, speeds[Math.ceil(MOST * (speeds.length - 1))] ?? 0);
+    const ten = 10 ** Math.floor(Math.log10(most));
+    this.range = [0, ten * ([1, 2, 5, 10].find((n) => n * ten >= most) ?? 10)];
+    this.unit = "m/s";
+  }
+
+  /** Whether the particles differ in size. */
+  get hasSizes() {
+    const [first, ...more] = this.lab.machine?.radius ?? [];
+    return more.some((radius) => radius !== first);
   }
 }
 
-export { Balls };
+export { Balls, STEPS };

@@ -105,11 +105,15 @@ class Bench {
       return made;
     };
     const select = button("select", "select", () => this.set(null));
-    this.listeners.push(() => select.setAttribute("aria-pressed", String(!this.mode)));
+    const hand = button("hand", "hand", () => this.set(null, !this.moving));
+    this.listeners.push(() => {
+      select.setAttribute("aria-pressed", String(!this.mode && !this.moving));
+      hand.setAttribute("aria-pressed", String(this.moving));
+    });
     const { view } = stage;
     const middle = (factor: number) =>
       this.zoom(factor, view.px(view.middle[0]), view.py(view.middle[1]));
-    home.prepend(...(this.free ? [select] : []), button("zoom-in", "plus", () => middle(ZOOM)),
+    home.prepend(...(this.free ? [select, hand] : []), button("zoom-in", "plus", () => middle(ZOOM)),
       button("zoom-out", "minus", () => middle(1 / ZOOM)));
     const presets = lab.data.live?.presets ?? [];
     if (!presets.length) return;
@@ -123,13 +127,16 @@ class Bench {
     home.append(menu);
   }
 
-  /** Take a tool, which stays until another is taken; one without points is put at once. */
-  set(mode: Part | null) {
+  /** Take a tool, which stays until another is taken; one without points is put at once.
+   * @param moving whether it is the one that moves the view */
+  set(mode: Part | null, moving = false) {
     this.points = [];
     this.mode = mode?.places.length ? mode : null;
+    this.moving = moving;
+    this.stage.home.classList.toggle("looking", moving);
     this.cursor = null;
     this.stage.home.classList.toggle("drawing", this.mode !== null);
-    if (this.mode) this.inspector.choose();
+    if (this.mode || moving) this.inspector.choose();
     this.listeners.forEach((listener) => listener());
     this.sketch();
     if (mode && !this.mode) this.put(mode, []);
@@ -151,10 +158,11 @@ class Bench {
       this.pressed = this.fingers.size === 1 ? at : null;
       if (this.mode && this.pressed) this.point(at, event.altKey);
       else this.grabbed = this.pressed && this.bodyAt(at, event.pointerType);
-      this.band = this.free && event.shiftKey && !this.mode && !this.nameAt(at) ? at : null;
+      const chooses = this.free && !this.mode && !this.moving;
+      this.band = chooses && event.shiftKey && !this.nameAt(at) ? at : null;
       if (this.band) this.grabbed = null;
       clearTimeout(this.holding);
-      if (event.pointerType === "touch" && this.pressed && this.free && !this.mode) {
+      if (event.pointerType === "touch" && this.pressed && chooses) {
         this.holding = setTimeout(() => this.holdDown(at), HOLD);
       }
     });
@@ -165,11 +173,11 @@ class Bench {
       else if (this.band) this.stretch(at);
       else if (this.grabbed) this.carry(at, event);
       else if (this.fingers.has(event.pointerId)) {
-        const alone = this.fingers.size === 1 && event.pointerType === "touch";
+        const alone = this.fingers.size === 1 && event.pointerType === "touch" && !this.moving;
         // One finger on an empty place scrolls the page.
         if (alone) this.fingers.set(event.pointerId, at);
         else this.look(event.pointerId, at);
-      } else if (event.pointerType === "mouse" && !stage.held) this.hover(at);
+      } else if (event.pointerType === "mouse" && !stage.held && !this.moving) this.hover(at);
     });
     front.addEventListener("pointerup", (event: PointerEvent) => {
       clearTimeout(this.holding);
@@ -177,7 +185,7 @@ class Bench {
       const at = stage.placeOf(event), still = distance(at, this.pressed) < STRAY;
       if (this.band && !still) this.catch(at);
       else if (!this.mode) {
-        if (still) this.pick(at, event.shiftKey);
+        if (still && !this.moving) this.pick(at, event.shiftKey);
       } else if (!still && this.points.length) this.point(at, event.altKey);
       this.pressed = this.grabbed = this.band = null;
     });
@@ -189,7 +197,7 @@ class Bench {
       const at: Place = [touches[0].clientX - box.left, touches[0].clientY - box.top];
       // The page must not scroll away under what is moved.
       const body = !this.mode && this.bodyAt(at, "touch");
-      if (touches.length > 1 || body) event.preventDefault();
+      if (touches.length > 1 || body || this.moving) event.preventDefault();
     }, { passive: false });
     front.addEventListener("pointercancel", (event: PointerEvent) => {
       clearTimeout(this.holding);
@@ -259,7 +267,7 @@ class Bench {
       ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
     };
     const { stage } = this, { view } = stage, step = shiftKey ? 0.1 * KEY : KEY;
-    if (key.toLowerCase() === "h") this.moving = !this.moving;
+    if (key.toLowerCase() === "h") this.set(null, !this.moving);
     else if (key in ways && this.mode) {
       const [x, y] = this.cursor ?? this.points.at(-1) ?? view.middle, [dx, dy] = ways[key];
       const far = shiftKey ? view.snap : roundTo(KEY / view.scale, view.snap) || view.snap;
@@ -298,13 +306,15 @@ class Bench {
       const state = recording?.tracks[i]?.state(t);
       return state && !state.ended && near(state.x, state.y, (machine.radius[i] ?? 0) * view.scale);
     });
-    const name = surfaceAt(machine, view.worldX(px), view.worldY(py), CLICK_REACH / view.scale);
+    const name = surfaceAt(machine, view.worldX(px), view.worldY(py), CLICK_REACH / view.scale,
+      this.lab.scene?.sensor);
     const few = machine.releases.length < MOST_BALLS;
     return ball >= 0 && few ? machine.streams[machine.releases[ball].stream] : name;
   }
 
   /** The body at a place, px, to move it: with a finger only one that is chosen. */
   bodyAt(at: Place, pointer: string) {
+    if (this.moving) return null;
     const { view, handles, frame } = this.stage, { parts } = this.inspector;
     const isIn = frame && at[0] > frame.left && at[0] < frame.right && at[1] > frame.top
       && at[1] < frame.bottom;

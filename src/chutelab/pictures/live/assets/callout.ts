@@ -19,7 +19,7 @@ const OWN = 4000, PATH = 60, OTHER = 30;
 const ALONG = 22;
 
 /** What is drawn of a body at its outside, and points of one of these at most. */
-const BODIES = ".belt, .wall, rect.steel", MOST = 200;
+const BODIES = ".belt, .wall, rect.steel, .gauge", MOST = 200;
 
 /** Pixels from a body to the line round it, and of radius of a ball there at least. */
 const AROUND = 6, LEAST = 3;
@@ -27,8 +27,9 @@ const AROUND = 6, LEAST = 3;
 /** Distance of the strands of a belt, in its thickness. */
 const BELT = 4.5;
 
-/** Pixels above the bar that tells the scale, and on its other sides, that are to be free. */
-const SCALE = [38, 14];
+/** Pixels round a box of the picture, the bar that tells the scale or the legend, that are to be
+ * free; and its steps to the right. */
+const CLEAR = 14, ASIDE = 38;
 
 /** Pixels from bodies to the frame round several. */
 const FRAME = 12;
@@ -71,7 +72,8 @@ function pointsOf({ lab, view, scenery }: Stage): [string, Point[]][] {
 
 /** Surfaces as lines through points, px, with the lower side of belts; what is far outside of the
  * picture is at its edge. Nothing has to be laid out for it. */
-function surfaceLines({ lab: { machine }, view, scenery }: Stage): Point[][] {
+function surfaceLines({ lab, view, scenery }: Stage): Point[][] {
+  const { machine } = lab;
   if (!machine) return [];
   const px = (x: number, y: number, down = 0): Point => [
     Math.min(Math.max(view.px(x), -50), view.width + 50),
@@ -96,26 +98,31 @@ function surfaceLines({ lab: { machine }, view, scenery }: Stage): Point[][] {
       .map((down) => [px(x, y, down), px(x + tx * length, y + ty * length, down)])),
     ...arcs.map(({ x, y, radius, begin, extent }) => bend(x, y, radius, begin, extent)),
     ...(pulley ? incoming(pulley) : []),
+    ...(lab.scene?.sensor ?? []).map(({ from, to }) => [px(...from), px(...to)]),
   ];
 }
 
-/** Where the bar that tells the scale meets nothing: from its corner up, then further to the right;
- * its corner where all is full.
- * @param long of the bar, px
- * @param low, left px of its corner from below and from the left */
-function scalePlace(stage: Stage, long: number, [low, left]: Point): Point {
+/** Where a box meets neither surfaces and tracks nor what is taken: from a corner up, then further
+ * to the right; null where all is full.
+ * @param size width and height, px @param corner its lower left one, px
+ * @returns its lower left corner */
+function freePlace(stage: Stage, size: Point, corner: Point, taken: Stage["covered"] = []) {
+  const [wide, high] = size, [left, bottom] = corner;
   const { view, lab } = stage, { recording } = lab, { free } = view;
   const path = recording ? stage.trackPoints(recording, 4 / view.scale) : [];
   const there = [...surfaceLines(stage),
     ...path.map((points) => points.map(({ x, y }) => [view.px(x), view.py(y)] as Point))]
     .flatMap(along);
-  for (let x = left; x + long < free.right; x += SCALE[0]) {
-    for (let y = view.height - low; y > free.top + SCALE[0]; y -= ALONG) {
-      if (!there.some(([u, v]) => u > x - SCALE[1] && u < x + long + SCALE[1]
-        && v > y - SCALE[0] && v < y + SCALE[1])) return [view.height - y, x];
+  for (let x = left; x + wide < free.right; x += ASIDE) {
+    for (let y = bottom; y - high > free.top + CLEAR; y -= ALONG) {
+      const meets = (u: number, v: number) => u > x - CLEAR && u < x + wide + CLEAR
+        && v > y - high - CLEAR && v < y + CLEAR;
+      const isFree = taken.every((box) => box.left > x + wide + CLEAR || box.right < x - CLEAR
+        || box.top > y + CLEAR || box.bottom < y - high - CLEAR);
+      if (isFree && !there.some(([u, v]) => meets(u, v))) return [x, y] as Point;
     }
   }
-  return [low, left];
+  return null;
 }
 
 /** Dashes round what is chosen, a line round what is pointed at: below each body its own shape,
@@ -236,4 +243,4 @@ class Callout {
   }
 }
 
-export { Callout, drawOutline, pointsOf, scalePlace, surfaceLines };
+export { Callout, drawOutline, freePlace, pointsOf, surfaceLines };

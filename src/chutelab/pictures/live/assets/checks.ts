@@ -9,7 +9,7 @@ import type { Given, Lab, Point, Scene, Rule } from "./scene.ts";
 type Wrong = [string, unknown, string, Record<string, number | string>?];
 
 /** Tables that are always lists, and those that may be one. */
-const LISTS = ["material", "pair", "conveyor", "surface"];
+const LISTS = ["material", "pair", "conveyor", "surface", "sensor"];
 const EITHER = ["particle", "plate", "stream"];
 
 /** Names of surfaces that no free one may take. */
@@ -93,7 +93,7 @@ export function* straysOf(
 ): Generator<Wrong> {
   const surfaces = ["incoming", "plate", "outgoing"].filter((table) => given[table] !== undefined);
   const taken = new Set();
-  for (const table of ["plate", "conveyor", "surface", "particle", "stream", "material"]) {
+  for (const table of ["plate", "conveyor", "surface", "particle", "stream", "material", "sensor"]) {
     const free = ["plate", "conveyor", "surface"].includes(table);
     const own = free ? taken : new Set(table === "particle" ? taken : []);
     const rows = listOf(given[table]);
@@ -210,7 +210,7 @@ function* kindConflicts(scene: Scene, given: Given): Generator<Wrong> {
 function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<Wrong> {
   const tables: Record<string, any[]> = {
     plate: scene.plates, particle: scene.particles, stream: scene.streams,
-    surface: scene.surface, conveyor: scene.conveyor,
+    surface: scene.surface, conveyor: scene.conveyor, sensor: scene.sensor,
   };
   for (const [table, rows] of Object.entries(tables)) {
     for (const [n, row] of rows.entries()) {

@@ -84,7 +84,7 @@ function sectionsOf(scene: Scene, given: Given): Section[] {
   add("incoming", scene.incoming ? [{}] : []);
   add("plate", scene.plates.map(({ pivot, name }) => (pivot ? { name } : {})));
   add("outgoing", scene.outgoing ? [{}] : []);
-  for (const table of ["conveyor", "surface"] as const) add(table, scene[table]);
+  for (const table of ["conveyor", "surface", "sensor"] as const) add(table, scene[table]);
   add("stream", scene.streams);
   add("particle", scene.particles);
   add("view", scene.view ? [{}] : []);

@@ -16,6 +16,27 @@ const GREATEST = 1e300;
 /** Doubles of a knot: t, x, y, vx, vy, spin, three entries of the ledger; and its disk. */
 const KNOT_ROW = 10;
 
+/** What was compressed, of text: 13 bits of two letters, 6 of one that is left, see `page.py`.
+ * What is no such text gives no core, as the engine then says. */
+function bytesOf(text: string) {
+  const letter = (n: number) => {
+    const code = text.charCodeAt(n);
+    return code - 33 - Number(code > 34) - Number(code > 60) - Number(code > 92);
+  };
+  const bytes = new Uint8Array((13 * (text.length >> 1) + 6 * (text.length & 1)) >> 3);
+  let held = 0, bits = 0, at = 0;
+  for (let n = 0; n < text.length; n += 2) {
+    const wide = n + 1 < text.length ? 13 : 6;
+    held = (held << wide) | (wide > 6 ? LETTERS * letter(n) + letter(n + 1) : letter(n));
+    for (bits += wide; bits >= 8; at += 1) bytes[at] = held >> (bits -= 8);
+    held &= (1 << bits) - 1;
+  }
+  return bytes;
+}
+
+/** Letters of packed text. */
+const LETTERS = 91;
+
 /** What was compressed by zlib. */
 const unpacked = (packed: ArrayBuffer) =>
   new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate")));
@@ -267,4 +288,4 @@ function surfaceRows({ segments, arcs, pulley }: Machine, shapes: Record<string,
   return [...flat, ...wheels, ...bent];
 }
 
-export { Core, KNOT_ROW, Memory, compiled, startCore, unpacked };
+export { Core, KNOT_ROW, Memory, bytesOf, compiled, startCore, unpacked };

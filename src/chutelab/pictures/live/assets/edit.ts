@@ -3,7 +3,7 @@
 import { listOf } from "./checks.ts";
 import { valueAt, withValues } from "./keys.ts";
 import type { Machine } from "./machine.ts";
-import type { Given } from "./scene.ts";
+import type { Given, Scene } from "./scene.ts";
 
 type Point = [number, number];
 
@@ -12,7 +12,7 @@ export type Part = { part: string, letter: string, table: string, places: string
   main: string[], needs: string[], row: Given };
 
 /** Tables whose rows have names. */
-const NAMED = ["surface", "conveyor", "plate", "stream"];
+const NAMED = ["surface", "conveyor", "plate", "stream", "sensor"];
 
 /** Tables of what is no place, chosen by its table and its name or number. */
 const PLAIN = ["material", "pair"];
@@ -142,19 +142,28 @@ function withCopies(given: Given, rows: [string, Given][], [dx, dy]: Point): [Gi
   return [all, names];
 }
 
-/** The surface nearest to a place within reach; "" if none is.
+/** The surface or the sensor nearest to a place within reach; "" if none is.
  * @param reach m */
 function surfaceAt(
   { surfaces, segments, arcs, pulley }: Machine, x: number, y: number, reach: number,
+  sensors: Scene["sensor"] = [],
 ) {
   let least = reach, found = "";
-  const take = (far: number, surface: number) => {
-    if (far < least) [least, found] = [far, surfaces[surface]];
+  const near = (far: number, name: string) => {
+    if (far < least) [least, found] = [far, name];
+  };
+  const take = (far: number, surface: number) => near(far, surfaces[surface]);
+  const beside = (from: Point, way: Point, length: number) => {
+    const [u, v] = [x - from[0], y - from[1]];
+    const along = Math.min(length, Math.max(0, u * way[0] + v * way[1]));
+    return Math.hypot(u - along * way[0], v - along * way[1]);
   };
   for (const one of segments) {
-    const [u, v] = [x - one.x, y - one.y];
-    const along = Math.min(one.length, Math.max(0, u * one.tx + v * one.ty));
-    take(Math.hypot(u - along * one.tx, v - along * one.ty), one.surface);
+    take(beside([one.x, one.y], [one.tx, one.ty], one.length), one.surface);
+  }
+  for (const { name, from, to } of sensors) {
+    const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
+    near(beside(from, [(to[0] - from[0]) / length, (to[1] - from[1]) / length], length), name);
   }
   const round = 2 * Math.PI;
   for (const one of arcs) {

@@ -11,11 +11,11 @@ import type { Words } from "./words.ts";
 type Point = [number, number];
 
 /** When a centre passes the line, s; where, m from the line's first end; 1 where it comes from the
- * left of the line, seen from its first end, -1 where it comes from the right. */
-export type Passage = { t: number, at: number, way: number };
+ * left of the line, seen from its first end, -1 where it comes from the right; and m/s. */
+export type Passage = { t: number, at: number, way: number, speed: number };
 
-/** Halvings until the instant of a passage is known to rounding. */
-const HALVINGS = 52;
+/** Halvings until the instant of a passage is known to rounding, as in Python. */
+const HALVINGS = 60;
 
 /** Bars of the flow over time, about, and the least time of one, s. */
 const BARS = 12, SHORTEST = 0.01;
@@ -50,62 +50,33 @@ function passagesOf(track: Track, i: number, [ax, ay]: Point, [bx, by]: Point): 
         if ((height(middle) < 0) === (low < 0)) a = middle;
         else z = middle;
       }
-      const [x] = track.curve(i, X, VX, h, z), [y] = track.curve(i, Y, VY, h, z);
-      const at = (x - ax) * ux + (y - ay) * uy;
-      if (at >= 0 && at <= long) found.push({ t: t + h * z, at, way: low < 0 ? -1 : 1 });
+      const [x, vx] = track.curve(i, X, VX, h, z), [y, vy] = track.curve(i, Y, VY, h, z);
+      const at = (x - ax) * ux + (y - ay) * uy, way = low < 0 ? -1 : 1;
+      if (at >= 0 && at <= long) found.push({ t: t + h * z, at, way, speed: Math.hypot(vx, vy) });
     }
     [from, low] = [to, high];
   }
   return found;
 }
 
-class Flow {
+/** The passages of a run through a line, as it goes on. */
+class Passing {
   ends: Point[] = [];
-  rate;
-  across;
-  panel;
-  head;
-  charts;
   /** Those found so far, in the order of time. */
   passages: Passage[] = [];
   /** Of which tracks, with how many knots of each looked at. */
   tracks: Track[] = [];
   seen: number[] = [];
 
-  constructor(home: Element, readonly lab: Lab, readonly words: Words) {
-    this.rate = new Chart(words, 132);
-    this.across = new Chart(words, 110);
-    this.head = html("p", { class: "result" });
-    this.charts = html("div", { hidden: "" },
-      html("p", { class: "chart-title" }, words.say("flow-rate")), this.rate.root,
-      html("p", { class: "chart-title" }, words.say("flow-across")), this.across.root);
-    this.panel = card("flow", words.say("flow"), this.head, this.charts);
-    this.panel.hidden = true;
-    home.prepend(this.panel);
-    follow(lab, this.panel, ["run"], () => this.draw());
-    follow(lab, this.panel, ["time"], () => this.fill());
-    onWidth(this.rate.root, (width) => {
-      this.rate.width = this.across.width = width;
-      this.draw();
-    });
-  }
-
-  /** Show it with its ends at two places, m, or not at all. */
-  show(ends: Point[]) {
+  /** Between other places, m: count anew. */
+  move(ends: Point[]) {
     this.ends = ends;
-    this.panel.hidden = !ends.length;
-    this.move();
-  }
-
-  /** An end was moved: count anew. */
-  move() {
     this.tracks = [];
-    this.draw();
   }
 
   /** Look at what the run has added. */
-  count() {
-    const { ends: [from, to] } = this, recording = this.lab.recording as Recording;
+  count(recording: Recording) {
+    const { ends: [from, to] } = this;
     if (this.tracks !== recording.tracks) {
       this.tracks = recording.tracks;
       this.seen = this.tracks.map(() => 0);
@@ -131,6 +102,44 @@ class Flow {
       else high = middle;
     }
     return low;
+  }
+}
+
+class Flow extends Passing {
+  rate;
+  across;
+  panel;
+  head;
+  charts;
+
+  constructor(home: Element, readonly lab: Lab, readonly words: Words) {
+    super();
+    this.rate = new Chart(words, 132);
+    this.across = new Chart(words, 110);
+    this.head = html("p", { class: "result" });
+    this.charts = html("div", { hidden: "" },
+      html("p", { class: "chart-title" }, words.say("flow-rate")), this.rate.root,
+      html("p", { class: "chart-title" }, words.say("flow-across")), this.across.root);
+    this.panel = card("flow", words.say("flow"), this.head, this.charts);
+    this.panel.hidden = true;
+    home.prepend(this.panel);
+    follow(lab, this.panel, ["run"], () => this.draw());
+    follow(lab, this.panel, ["time"], () => this.fill());
+    onWidth(this.rate.root, (width) => {
+      this.rate.width = this.across.width = width;
+      this.draw();
+    });
+  }
+
+  /** Show it with its ends at two places, m, or not at all. */
+  show(ends: Point[]) {
+    this.panel.hidden = !ends.length;
+    this.move(ends);
+  }
+
+  move(ends: Point[]) {
+    super.move(ends);
+    this.draw();
   }
 
   /** Width of the bars over time, s. */
@@ -182,7 +191,7 @@ class Flow {
 
   /** In words: how many a second, how many so far, and how many came back. */
   get says() {
-    this.count();
+    this.count(this.lab.recording as Recording);
     const { words, lab: { t } } = this, n = this.until(t);
     const back = this.passages.slice(0, n).reduce((sum, { way }) => sum + Number(way > 0), 0);
     const less = Math.min(back, n - back);
@@ -193,4 +202,4 @@ class Flow {
   }
 }
 
-export { Flow };
+export { Flow, Passing };

@@ -41,6 +41,7 @@ class Handles {
     scene.conveyor.forEach((_, n) => this.conveyor(n));
     scene.surface.forEach((_, n) => this.surface(n));
     scene.streams.forEach((_, n) => this.stream(n));
+    scene.sensor.forEach((_, n) => this.sensor(n));
   }
 
   axis(key: string, value: number, unit: string, part?: number) {
@@ -248,6 +249,16 @@ class Handles {
     }
   }
 
+  sensor(n: number) {
+    const { name, from, to } = this.scene.sensor[n], table = `sensor[${n}]`;
+    const keys = [`${table}.from`, `${table}.to`];
+    this.add(keys[0], name, "begin", "point", from, this.place(keys[0], from), (x, y) => [x, y],
+      undefined, to);
+    this.add(keys[1], name, "end", "point", to, this.place(keys[1], to), (x, y) => [x, y],
+      undefined, from);
+    this.spin(name, [[keys[0], from], [keys[1], to]]);
+  }
+
   stream(n: number) {
     const { streams } = this.scene, stream = streams[n];
     const table = streams.length > 1 ? `stream[${n}]` : "stream";
@@ -280,7 +291,7 @@ const PLACES = ["pivot", "center", "height", "release"], ENDS = ["begin", "end",
 /** Whether a handle is a place of a body of its own. */
 const isPlace = ({ id, what, axes }: Handle) => PLACES.includes(what)
   || (ENDS.includes(what) && axes.every(({ part }) => part !== undefined)
-    && /^(surface|conveyor|stream)/.test(id));
+    && /^(surface|conveyor|stream|sensor)/.test(id));
 
 /** What moves whole bodies by what one is grabbed at, m; null if none has a place of its own. */
 function bodyOf(handles: Handle[], names: string[], x: number, y: number): Handle | null {

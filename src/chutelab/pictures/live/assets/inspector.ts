@@ -1,9 +1,10 @@
 // What can be typed: main numbers of the scene in a panel, and what is chosen in a card beside it.
 
+import { roundUp } from "./chart.ts";
 import { MAIN, checked, fieldsOf, sectionsOf, showsFew, type Field, type Section } from "./controls.ts";
 import { canGo, rowsNamed, withName, withRowOf, without, type Part } from "./edit.ts";
 import { listOf } from "./checks.ts";
-import { card, html, icon, iconButton } from "./panels.ts";
+import { card, html, icon, iconButton, slide } from "./panels.ts";
 import { Fault, type Given } from "./scene.ts";
 import type { Lab } from "./lab.ts";
 import type { Words } from "./words.ts";
@@ -86,21 +87,49 @@ class Fields {
     why.hidden = true;
     const row = html("div", { class: "entry" }, label, html("span", { class: "value" }, input,
       ...(flag || choices ? [] : [html("span", { class: "unit" }, words.unit(unit))])));
-    const slider = this.sliders && typeof field.value === "number" && !choices && (of === 1 || this.owned)
+    const isNumber = typeof field.value === "number" && !choices;
+    if (this.sliders && isNumber) this.steppers(field, row);
+    const slider = this.sliders && isNumber && (of === 1 || this.owned)
       ? this.slider(field, row) : null;
     row.append(why);
     this.entries.set(key, { row, input, why, slider, field });
     return row;
   }
 
-  /** A slider over the range of a number, or of one that has none over twice what it is. */
-  slider({ key, name, low, high, value, table }: Field, row: any) {
+  /** The range of a number, of one that has none up to twice what it is; and a step through it. */
+  rangeOf({ low, high, value, table, name }: Field) {
     const wide = high - low > NARROW, top = wide ? 2 * (Math.abs(value) || 0.5) : high;
     const ten = 10 ** Math.floor(Math.log10(top)), end = Math.ceil(top / ten) * ten;
     const from = wide ? Math.max(low, value < 0 ? -end : 0) : low;
     const to = wide ? Math.min(end, high) : high;
     const whole = this.lab.data.tables[table]?.[name]?.form.type === "integer";
-    const step = whole ? 1 : Number(((to - from) / PLACES).toPrecision(1));
+    return { from, to, whole, step: whole ? 1 : Number(((to - from) / PLACES).toPrecision(1)) };
+  }
+
+  /** Buttons for less and more beside a number, for fingers. */
+  steppers(field: Field, row: any) {
+    const { lab, words } = this, { key, table, name, low, high } = field;
+    const button = (way: number, sign: string) => {
+      const label = `${words.key(table, name)}: ${words.say(way < 0 ? "less" : "greater")}`;
+      const made = html("button", { type: "button", class: "step", "aria-label": label }, sign);
+      made.addEventListener("click", () => {
+        const its = this.entries.get(key)?.field ?? field, { step, whole } = this.rangeOf(its);
+        const by = its.unit === "degrees" || whole ? 1 : roundUp(step);
+        // From between two round values to the next of them.
+        const at = way * Math.floor((way * its.value) / by + 1e-9), next = (at + way) * by;
+        const value = Math.min(high, Math.max(low, Number(next.toPrecision(12))));
+        lab.asked = "";
+        if (value !== its.value) lab.change({ [key]: value });
+      });
+      return made;
+    };
+    row.querySelector(".value").before(button(-1, "−"));
+    row.append(button(1, "+"));
+  }
+
+  /** A slider over the range of a number. */
+  slider(field: Field, row: any) {
+    const { key, name, table } = field, { from, to, step } = this.rangeOf(field);
     const slider = html("input", { type: "range", min: String(from), max: String(to), step: String(step),
       "aria-label": this.words.key(table, name) });
     const move = (done: boolean) => {
@@ -122,7 +151,7 @@ class Fields {
     const refused = lab.asked === field.key && lab.fault !== null && row.contains(this.asking);
     row.classList.toggle("refused", refused);
     why.hidden = !refused;
-    if (slider && typeof field.value === "number") slider.value = String(field.value);
+    if (slider && typeof field.value === "number") slide(slider, field.value);
     if (refused) {
       input.setAttribute("aria-invalid", "true");
       input.setAttribute("aria-describedby", why.id);

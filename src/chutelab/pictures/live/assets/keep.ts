@@ -3,7 +3,7 @@
 import { toToml } from "./keys.ts";
 import { pictureOf } from "./film.ts";
 import { numbersOf } from "./numbers.ts";
-import { card, html } from "./panels.ts";
+import { card, html, menuOf } from "./panels.ts";
 import { predict } from "./prediction.ts";
 import { Fault, type Given, type Scene } from "./scene.ts";
 import { download, fileStem, fromHash, knotRows, toCsv, toHash } from "./share.ts";
@@ -27,9 +27,12 @@ class Keep {
       return made;
     };
     // In a lesson the step says which machine it is.
-    const hasAddress = !lab.data.lesson && /^(https?|file):$/.test(location.protocol);
-    home.append(card("share", words.say("share"), html("div", { class: "row" },
-      ...(hasAddress ? [button("copy-link", () => this.copy())] : []),
+    const { lesson } = lab.data, hasAddress = !lesson && /^(https?|file):$/.test(location.protocol);
+    const head = (id: string) => (lesson ? [] : [html("p", {}, words.say(id))]);
+    const take = hasAddress ? [...head("share-link"), html("div", { class: "row" },
+      button("copy-link", () => this.copy(location.href)),
+      button("copy-embed", () => this.copy(this.frame)))] : [];
+    const files = [...head("share-file"), html("div", { class: "row" },
       button("save-scene", () => {
         const bare = isBare(lab.given as Given);
         this.said.textContent = bare ? words.say("save-needs-ball") : "";
@@ -38,7 +41,12 @@ class Keep {
       button("save-picture", () => this.picture()),
       button("save-knots", () => this.table("knots", knotRows(this.recording)), true),
       button("save-numbers", () => this.table("numbers", this.numbers), true),
-      html("label", {}, this.comma, ` ${words.say("decimal-comma")}`)), this.said));
+      html("label", { class: "check" }, this.comma, ` ${words.say("decimal-comma")}`)), this.said];
+    if (lesson) home.append(card("share", words.say("share"), ...files));
+    else {
+      document.getElementById("keys")?.before(
+        menuOf("share", "share", words.say("share"), ...take, ...files));
+    }
     lab.on("scene", () => this.follow());
     if (lab.data.lesson) return;
     addEventListener("hashchange", () => this.open());
@@ -95,12 +103,23 @@ class Keep {
     if (parent !== window) parent.postMessage({ chutelab: "scene", toml: this.toml }, "*");
   }
 
-  async copy() {
+  /** What shows this machine within another page. */
+  get frame() {
+    const { href, protocol } = location, frame = html("iframe", {
+      // A page beside this one finds it by its name.
+      src: protocol === "file:" ? href.replace(/^[^#]*\//, "") : href,
+      title: this.lab.scene?.title ?? "", width: "100%", height: "640",
+      allow: "fullscreen; clipboard-write",
+    });
+    return frame.outerHTML;
+  }
+
+  async copy(text: string) {
     try {
-      await navigator.clipboard.writeText(location.href);
+      await navigator.clipboard.writeText(text);
       this.said.textContent = this.words.say("copied");
     } catch {
-      prompt(this.words.say("copy-link"), location.href);
+      prompt(this.words.say("share"), text);
     }
   }
 

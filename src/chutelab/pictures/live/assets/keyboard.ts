@@ -3,12 +3,13 @@
 import { html } from "./panels.ts";
 import type { Bench } from "./bench.ts";
 import type { Lab } from "./lab.ts";
+import type { Marks } from "./marks.ts";
 import type { Palette } from "./palette.ts";
 import type { Words } from "./words.ts";
 
 /** What keys do, in words of the catalogue: `help-` and these. */
 const KEYS: [string, string][] = [
-  ["play", "help-space"], ["step", "← →"], ["ends", "Home End"], ["tab", "Tab"],
+  ["play", "help-space"], ["step", "← →"], ["mark", ", ."], ["ends", "Home End"], ["tab", "Tab"],
   ["handle", "← → ↑ ↓"], ["fine", "help-shift"], ["undo", "help-ctrl-z"], ["redo", "help-ctrl-shift-z"],
   ["taken", "help-delete"], ["copy", "help-ctrl-c"], ["duplicate", "help-ctrl-d"],
   ["all", "help-ctrl-a"], ["letter", "E … R"], ["draw", "help-arrows"], ["view", "H"],
@@ -18,7 +19,9 @@ const KEYS: [string, string][] = [
 /** Elements that have a use of their own for keys. */
 const BUSY = "button, input, select, textarea, summary, a, dialog, [role=slider]";
 
-function listenToKeys(bench: Bench, palette: Palette | null, lab: Lab, words: Words) {
+function listenToKeys(
+  bench: Bench, palette: Palette | null, marks: Marks, lab: Lab, words: Words,
+) {
   const click = (id: string) => document.getElementById(id)?.click();
   const close = html("button", { type: "button" }, words.say("close"));
   const dialog = html("dialog", { id: "help", "aria-label": words.say("help") },
@@ -31,20 +34,20 @@ function listenToKeys(bench: Bench, palette: Palette | null, lab: Lab, words: Wo
   document.getElementById("keys")?.addEventListener("click", () => dialog.showModal());
   const always: Record<string, () => void> = {
     "ctrl+z": () => lab.undo(), "ctrl+shift+z": () => lab.redo(), "ctrl+y": () => lab.redo(),
-    Escape: () => (bench.mode ? bench.set(null) : bench.inspector.choose()),
+    Escape: () => (bench.mode || bench.moving ? bench.set(null) : bench.inspector.choose()),
   };
   const calm: Record<string, () => void> = {
     " ": () => click("play"), Home: () => click("restart"), End: () => lab.seek(lab.end),
     ArrowLeft: () => click("back"), ArrowRight: () => click("forward"),
     "+": () => click("tool-zoom-in"), "-": () => click("tool-zoom-out"),
-    "?": () => dialog.showModal(),
+    "?": () => dialog.showModal(), ",": () => marks.jump(-1), ".": () => marks.jump(1),
   };
   // Letters count while the picture has the focus.
   const drawn: Record<string, () => void> = {
     v: () => bench.set(null), "ctrl+c": () => bench.copy(), "ctrl+v": () => bench.paste(),
     "ctrl+d": () => bench.duplicate(), "ctrl+a": () => bench.all(),
   };
-  const onHandles = [" ", "+", "-", "?"];
+  const onHandles = [" ", "+", "-", "?", ",", "."];
   addEventListener("keydown", (event) => {
     if (event.defaultPrevented || dialog.open) return;
     const target = event.target as Element;
@@ -53,7 +56,10 @@ function listenToKeys(bench: Bench, palette: Palette | null, lab: Lab, words: Wo
     const name = ctrl ? `ctrl+${event.shiftKey ? "shift+" : ""}${event.key.toLowerCase()}` : event.key;
     let act = typing && name !== "Escape" ? undefined : always[name];
     const handle = target.matches("[role=slider]"), picture = target.id === "picture";
-    if (!ctrl && (handle ? onHandles.includes(name) : !target.closest(BUSY))) act ??= calm[name];
+    const time = target.closest(".scrub") && [",", "."].includes(name);
+    if (!ctrl && (handle ? onHandles.includes(name) : time || !target.closest(BUSY))) {
+      act ??= calm[name];
+    }
     if (!typing && target.closest("#stage")) {
       act ??= drawn[name];
       const part = ctrl || event.altKey ? undefined : palette?.partOf(name);

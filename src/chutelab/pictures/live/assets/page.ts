@@ -1,7 +1,7 @@
 // What every page has: reads its data, starts the engine's thread, and joins the parts.
 
 import { Bench } from "./bench.ts";
-import { compiled, unpacked } from "./core.ts";
+import { bytesOf, compiled, unpacked } from "./core.ts";
 import { Engine } from "./engine.ts";
 import { Arrows } from "./arrows.ts";
 import { CurvesPanel } from "./curves.ts";
@@ -30,22 +30,9 @@ type Parts = { lab: Lab, stage: Stage, words: Words, bench: Bench, inspector: In
 
 const byId = (id: string): any => document.getElementById(id);
 
-/** What is no base64 gives no core, as the engine then says. @param text base64 */
-function bytesOf(text: string) {
-  let binary = "";
-  try {
-    binary = atob(text);
-  } catch {
-    return new Uint8Array();
-  }
-  const bytes = new Uint8Array(binary.length);
-  for (let i = 0; i < binary.length; i += 1) bytes[i] = binary.charCodeAt(i);
-  return bytes;
-}
-
 /** @param join makes what only a sandbox has, or only a lesson */
 async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?: object,
-  tools?: object }) {
+  sensors?: object, tools?: object }) {
   const data = JSON.parse(byId("lab").textContent);
   const core = compiled(bytesOf(data.wasm).buffer).catch(() => null);
   const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
@@ -90,16 +77,17 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
   new Show(lab, stage, words, symbols);
   const inspector = new Inspector(byId("panels"), lab, words);
   const bench = new Bench(byId("bench"), stage, inspector, lab, words);
-  new Transport(lab, stage, words);
+  const { marks } = new Transport(lab, stage, words);
   new Sound(lab, words);
   new Film(lab, stage, words);
   new Keep(byId("panels"), stage, lab, words);
   const more = join({ lab, stage, words, bench, inspector, symbols, newEngine });
-  for (const panel of document.querySelectorAll("#panels > .card, .tools, .looks, .watch")) {
-    const name = panel.matches(".card") ? panel.id : "tools";
+  for (const panel of document.querySelectorAll(
+    "#panels > .card, #share, .tools, .looks, .watch")) {
+    const name = panel.matches(".card, #share") ? panel.id : "tools";
     if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
   }
-  listenToKeys(bench, more.palette ?? null, lab, words);
+  listenToKeys(bench, more.palette ?? null, marks, lab, words);
   Object.assign(globalThis, {
     chutelab: { lab, stage, bench, panels, ...more, toml: () => toToml(lab.given as any) },
   });

@@ -49,7 +49,7 @@ class Palette {
     home.append(this.panel);
     this.opener = iconButton("tool-add", "add", words.say("add-part"));
     this.opener.addEventListener("click", () => this.open(this.panel.hidden));
-    document.getElementById("tool-select")?.after(this.opener);
+    document.getElementById("tool-hand")?.after(this.opener);
     bench.inspector.listeners.push(() => {
       if (bench.inspector.parts.length) this.open(false);
     });
@@ -159,9 +159,11 @@ class Palette {
     const sketch = svg("svg", {
       viewBox: "-8 -14 620 304", class: "sketch", "aria-hidden": "true" });
     sketch.append(svg("path", { d: SKETCH }));
-    for (const [word, x, y] of [["belt", 70, 101], ["ball", 114, 28], ["plate", 372, 76],
+    for (const [word, x, y] of [["belt", 70, 101], ["ball", 114, 28], ["plate", 346, 76],
       ["second", 317, 272]] as const) {
-      const text = svg("text", { x, y, "text-anchor": "middle" });
+      // Beside the plate there is room on one side only.
+      const anchor = word === "plate" ? "start" : "middle";
+      const text = svg("text", { x, y, "text-anchor": anchor });
       text.textContent = words.say(`sketch-${word}`);
       sketch.append(text);
     }

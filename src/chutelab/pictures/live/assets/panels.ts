@@ -34,6 +34,23 @@ function iconButton(id: string, drawing: string, name: string): HTMLButtonElemen
     icon(drawing));
 }
 
+/** A button of the header that opens what lies in it, until one presses elsewhere. */
+function menuOf(id: string, drawing: string, name: string, ...children: (string | Node)[]) {
+  const head = html("summary", { class: "ib", title: name, "aria-label": name }, icon(drawing));
+  const root = html("details", { class: "menu", id }, head,
+    html("div", { class: "float choices" }, ...children));
+  addEventListener("pointerdown", ({ target }) => {
+    if (!root.contains(target as Node)) root.open = false;
+  });
+  root.addEventListener("keydown", (event: KeyboardEvent) => {
+    if (event.key !== "Escape" || !root.open) return;
+    event.preventDefault();
+    root.open = false;
+    head.focus();
+  });
+  return root;
+}
+
 /** A panel with a title, which can be folded. */
 function card(id: string, title: string, ...children: (string | Node)[]) {
   const head = DRAWINGS[id] ? [icon(DRAWINGS[id])] : [];
@@ -42,15 +59,28 @@ function card(id: string, title: string, ...children: (string | Node)[]) {
   return html("details", { class: "card", id, open: "" }, summary, body);
 }
 
+/** Move a slider; its track is filled up to there. */
+function slide(input: HTMLInputElement, value: number) {
+  const { min, max } = input, text = String(value);
+  if (input.value !== text) input.value = text;
+  const share = (Number(input.value) - Number(min)) / (Number(max) - Number(min));
+  input.style.setProperty("--at", `${(100 * share).toFixed(1)}%`);
+}
+
 /** What takes longer, ms, is done alone in its frame. */
 const HEAVY = 1.5, FRAME = 17;
 
 /** When something heavy may be done next, ms. */
 let alone = 0;
 
+/** ms from one time to the next at which a panel is drawn while the picture plays: what a browser
+ * then lays out and paints takes longer than to change it. */
+const CALM = 80;
+
 /** Do something whenever it is asked for, but if it takes long, later: the last call always
- * counts. */
-function eased(act: () => void) {
+ * counts.
+ * @param calm ms that are to pass at least until it is done again */
+function eased(act: () => void, calm = () => 0) {
   let free = 0, took = 0, waits = false;
   const ask = () => {
     if (waits) return;
@@ -67,7 +97,7 @@ function eased(act: () => void) {
     act();
     const end = performance.now();
     took = end - begin;
-    free = end + SHARE * took;
+    free = end + Math.max(SHARE * took, calm());
     if (took > HEAVY) alone = end + FRAME;
   };
   return ask;
@@ -78,7 +108,7 @@ function follow(lab: Lab, panel: HTMLDetailsElement, news: News[], act: () => vo
   const again = eased(() => {
     const isSeen = panel.open && !panel.matches(".off");
     if (isSeen && lab.recording && isFinite(lab.recording.begin)) act();
-  });
+  }, () => (lab.playing ? CALM : 0));
   for (const one of news) lab.on(one, again);
   panel.addEventListener("toggle", again);
 }
@@ -86,7 +116,7 @@ function follow(lab: Lab, panel: HTMLDetailsElement, news: News[], act: () => vo
 /** What stands before the title of a panel. */
 const DRAWINGS: Record<string, string> = {
   edit: "slow", energy: "sum", numbers: "digits", landing: "bars", curves: "graph", share: "share",
-  flow: "flow",
+  flow: "flow", sensors: "sensor",
 };
 
-export { card, eased, follow, grown, html, icon, iconButton };
+export { card, eased, follow, grown, html, icon, iconButton, menuOf, slide };

@@ -10,8 +10,8 @@ const NARROW = "(max-width: 719px)";
 
 /** Of each drawer what lies in it: elsewhere on a wider page. */
 const DRAWERS: Record<string, string> = {
-  tape: ".tools, .watch", eye: ".choices",
-  more: "#restart, #back, #forward, #reset, #fit, #tool-zoom-in, #tool-zoom-out, #sound, #film, #full, #language, #keys, #share, #presets",
+  tape: ".tools, .watch", eye: "#show .choices",
+  more: "#restart, #back, #forward, #tool-hand, #fit, #tool-zoom-in, #tool-zoom-out, #sound, #film, #full, #language, #keys, #presets",
 };
 
 class Phone {
@@ -59,6 +59,12 @@ class Phone {
         this.lent.push({ node, mark, drawer });
       }
     }
+    const share = document.getElementById("share");
+    if (share) {
+      const mark = document.createComment("");
+      share.before(mark);
+      this.lent.push({ node: share, mark, drawer: document.getElementById("edits") });
+    }
     panels.before(this.tabs, ...Object.values(this.drawers));
     document.body.append(this.dock);
     // What was taken is to be seen in the picture.
@@ -103,7 +109,8 @@ class Phone {
     const { bench, palette, open, buttons } = this;
     const adds = palette !== null && !palette.panel.hidden;
     for (const [id, button] of Object.entries(buttons)) {
-      const on = id === "select" ? !open && !adds && !bench.mode : id === "add" ? adds : id === open;
+      const calm = !open && !adds && !bench.mode && !bench.moving;
+      const on = id === "select" ? calm : id === "add" ? adds : id === open;
       button.setAttribute("aria-pressed", String(on));
     }
   }

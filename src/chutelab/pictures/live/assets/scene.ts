@@ -137,6 +137,7 @@ export interface Scene {
   kinds: number[]; // which of the particles each stream consists of
   crowded: boolean; // whether particles meet
   most: number; // how many particles a page has room for
+  sensor: { name: string, from: Point, to: Point }[]; // lines that count what passes
   view: { from: Point, to: Point } | null; // corners of what is shown
 }
 
@@ -211,7 +212,8 @@ export function resolve(given: Given, lab: Lab): Scene {
     title: given.title ?? lab.tables.scene.title.default,
     gravity: given.gravity ?? lab.tables.scene.gravity.default,
     particles, materials, pair: given.pair ?? [], incoming, plates, outgoing,
-    conveyor: rows("conveyor"), surface, streams, run, kinds, view: given.view ?? null,
+    conveyor: rows("conveyor"), surface, streams, run, kinds, sensor: rows("sensor"),
+    view: given.view ?? null,
     crowded: count > 1 && streams.some((stream) => stream.interact),
     most: lab.tables.stream.count.high ?? Infinity,
   };

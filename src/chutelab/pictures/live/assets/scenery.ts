@@ -78,6 +78,12 @@ class Scenery {
       const isPlate = plates.has(machine.surfaces[line.surface]);
       bodies.push([isPlate ? this.plate(line) : this.wall(line), line]);
     }
+    for (const { name, from, to } of scene?.sensor ?? []) {
+      const element = this.sensor(from, to);
+      element.setAttribute("data-part", name);
+      element.append(Object.assign(svg("title"), { textContent: this.words.name(name) }));
+      this.layer.append(element);
+    }
     for (const [element, { surface, appears, vanishes }] of bodies) {
       element.setAttribute("data-part", machine.surfaces[surface]);
       element.append(Object.assign(svg("title"), {
@@ -115,7 +121,7 @@ class Scenery {
   }
 
   /** Lines at round numbers of metres, and a bar that tells how long one is. */
-  drawGround(bottom: number, left: number) {
+  drawGround(left: number, low: number) {
     const { view, ground } = this, { width, height, scale, mesh: step } = view;
     const lines = (offset: number) => {
       let path = "";
@@ -131,7 +137,7 @@ class Scenery {
       }
       return path;
     };
-    const long = step * scale, y = height - bottom;
+    const long = step * scale, y = low;
     const text = svg("text", { x: left + 0.5 * long, y: y - 8, "text-anchor": "middle" });
     const [value, unit] = step < 0.01 ? [1e3 * step, "mm"] : [step, "m"];
     text.textContent = `${this.words.plain(Number(value.toPrecision(3)))} ${unit}`;
@@ -316,6 +322,20 @@ class Scenery {
       svg("rect", { class: "steel", x: 0, y: face, width: long, height: deep, rx: 1.5 }),
       svg("path", { class: "face", d: `M0 ${face}H${long}`, "stroke-width": 2 * face }),
     );
+    return group;
+  }
+
+  /** A line that counts, with an arrow the way that counts on: to the right of it. */
+  sensor(from: [number, number], to: [number, number]) {
+    const { view } = this, group = svg("g", { class: "part sensor" });
+    const [x, y, u, v] = [view.px(from[0]), view.py(from[1]), view.px(to[0]), view.py(to[1])];
+    const long = Math.hypot(u - x, v - y) || 1, across = [(y - v) / long, (u - x) / long];
+    const [mx, my] = [0.5 * (x + u), 0.5 * (y + v)];
+    const tip = [mx + 16 * across[0], my + 16 * across[1]];
+    const barb = (side: number) => [tip[0] - 6 * across[0] + side * 5 * across[1],
+      tip[1] - 6 * across[1] - side * 5 * across[0]];
+    group.append(svg("path", { class: "gauge", d: `M${x} ${y}L${u} ${v}`, "stroke-width": 3 }),
+      svg("path", { class: "way", d: `M${mx} ${my}L${tip}M${barb(1)}L${tip}L${barb(-1)}` }));
     return group;
   }
 

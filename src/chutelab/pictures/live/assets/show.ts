@@ -1,24 +1,24 @@
 // The menu of what the picture shows, and by what its particles are coloured.
 
-import { html, icon } from "./panels.ts";
+import { html, menuOf } from "./panels.ts";
+import { Legend } from "./legend.ts";
+import type { Hue } from "./balls.ts";
 import type { Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
 import type { Symbols } from "./symbols.ts";
 import type { Words } from "./words.ts";
+
+const HUES: Hue[] = ["material", "speed", "size", "kind"];
 
 class Show {
   bar;
   strobe;
 
   constructor(lab: Lab, readonly stage: Stage, readonly words: Words, symbols: Symbols) {
-    const name = words.say("show"), named = { class: "ib", title: name, "aria-label": name };
-    const head = html("summary", named, icon("eye"));
-    this.bar = html("div", { class: "float choices" });
-    const menu = html("details", { class: "menu looks", id: "show" }, head, this.bar);
+    const menu = menuOf("show", "eye", words.say("show"));
+    menu.classList.add("looks");
+    this.bar = menu.lastElementChild;
     document.getElementById("views")?.prepend(menu);
-    addEventListener("pointerdown", ({ target }) => {
-      if (!menu.contains(target as Node)) menu.open = false;
-    });
     const show = stage.show as Record<string, boolean>;
     this.box("trails", show.trails, (on) => { show.trails = on; });
     this.strobe = this.box("strobe", show.strobe, (on) => { show.strobe = on; });
@@ -27,6 +27,7 @@ class Show {
     this.box("symbols", symbols.shown, (on) => { symbols.shown = on; });
     this.box("grid", true, (on) => { stage.scenery.ground.classList.toggle("off", !on); });
     this.hues();
+    new Legend(stage);
     lab.on("run", () => this.nameStrobe());
   }
 
@@ -42,29 +43,30 @@ class Show {
     return text;
   }
 
-  /** What colour a particle has. */
+  /** What colour a particle has: what the legend says. */
   hues() {
     const { stage, words } = this, { balls } = stage;
-    const legend = html("div", { class: "ramp num" });
-    const buttons = (["material", "speed", "kind"] as const).map((hue) => {
+    const buttons = HUES.map((hue) => {
       const button = html("button", { type: "button", id: `hue-${hue}`, "aria-pressed": "false" },
         words.say(`hue-${hue}`));
-      button.addEventListener("click", () => {
-        balls.hue = hue;
-        balls.measure();
-        for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
-        legend.hidden = hue !== "speed";
-        legend.replaceChildren(html("i"), html("span", {}, "0"),
-          html("span", {}, `${words.plain(0.5 * balls.fastest)}`),
-          html("span", {}, `${words.plain(balls.fastest)} m/s`));
-        stage.paint();
-      });
+      button.addEventListener("click", () => choose(hue));
       return button;
     });
+    const choose = (hue: Hue) => {
+      balls.hue = hue;
+      balls.measure();
+      buttons.forEach((one, n) => one.setAttribute("aria-pressed", String(HUES[n] === hue)));
+      stage.rebuild();
+    };
     buttons[0].setAttribute("aria-pressed", "true");
-    legend.hidden = true;
-    const choice = html("div", { class: "seg" }, ...buttons);
-    this.bar.append(html("p", {}, words.say("hue")), choice, legend);
+    this.bar.append(html("p", {}, words.say("hue")), html("div", { class: "seg" }, ...buttons));
+    const offer = () => {
+      const { hasSizes } = balls;
+      buttons[HUES.indexOf("size")].hidden = !hasSizes;
+      if (balls.hue === "size" && !hasSizes) choose("material");
+    };
+    this.stage.lab.on("scene", offer);
+    offer();
   }
 
   nameStrobe() {

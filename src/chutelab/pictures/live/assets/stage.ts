@@ -1,7 +1,7 @@
 // The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
 
 import { openHandles } from "./controls.ts";
-import { drawOutline, scalePlace } from "./callout.ts";
+import { drawOutline, freePlace } from "./callout.ts";
 import { endsOf } from "./edit.ts";
 import { ARROW, Handles, bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
 import { html } from "./panels.ts";
@@ -27,9 +27,15 @@ type Point = [number, number];
 /** Pixels of radius that a particle has at least, and where there are few, which one looks for. */
 const LEAST = 1.2, LEAST_FEW = 3;
 
+/** Pixels of radius from which on a particle shows how it turns. */
+const SPUN = 8;
+
 /** By how much a line that is drawn may miss the track: pixels, and before there are any, the share
  * of the machine. */
 const FINE = 0.2, FINE_SHARE = 1e-3;
+
+/** Height of the text over the bar that tells the scale, px. */
+const ABOVE = 24;
 
 class Stage {
   view;
@@ -80,10 +86,7 @@ class Stage {
     this.over = svg("g", { class: "over" });
     this.front.append(this.over, this.magnet, this.grips);
     new ResizeObserver(() => this.resize()).observe(home);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      this.colours.clear();
-      this.paint();
-    });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
     lab.on("scene", () => {
       if (JSON.stringify(lab.scene?.view) === this.chosen) this.rebuild();
       else this.fit();
@@ -108,7 +111,7 @@ class Stage {
     // In a lesson it stands above, where no belt is.
     const low = style.getPropertyValue("--scale-at") ? height - 44
       : inset("bottom") + 20;
-    this.corner = [low, inset("left") + 24];
+    this.corner = [inset("left") + 24, height - low];
     const dense = globalThis.devicePixelRatio || 1;
     this.canvas.width = Math.round(width * dense);
     this.canvas.height = Math.round(height * dense);
@@ -155,15 +158,26 @@ class Stage {
   traced() {
     const { recording } = this.lab;
     if (recording && !this.fitted && recording.state !== "running") this.fit();
+    this.balls.measure();
     this.drawTracks();
     // While it plays, the time brings the next picture.
     if (!this.lab.playing) this.paint();
     for (const draw of this.drawers) draw();
   }
 
-  /** Pixels from below and from the left of the bar that tells the scale. */
-  corner: Point = [20, 24];
+  /** The lower left corner of the free part, and of the bar that tells the scale, px; and how long
+   * that is. */
+  corner: Point = [24, 0];
   scaleAt: Point = this.corner;
+  long = 0;
+
+  /** What the bar of the scale covers, with its text, and the legend, px. */
+  get scaleBox() {
+    const [left, bottom] = this.scaleAt;
+    return { left, right: left + this.long, top: bottom - ABOVE, bottom };
+  }
+
+  legend: Stage["frame"] = null;
 
   /** What tools draw anew when the view, the machine or its run has changed. */
   drawers: (() => void)[] = [];
@@ -172,9 +186,9 @@ class Stage {
     if (this.view.width < 2) return;
     const { machine, scene } = this.lab;
     if (machine) this.scenery.draw(machine, scene);
-    const long = this.view.mesh * this.view.scale;
+    this.long = this.view.mesh * this.view.scale;
     // Under what is dragged it stays.
-    if (!this.held) this.scaleAt = scalePlace(this, long, this.corner);
+    if (!this.held) this.scaleAt = freePlace(this, [this.long, ABOVE], this.corner) ?? this.corner;
     this.scenery.drawGround(...this.scaleAt);
     this.drawTracks();
     this.placeHandles();
@@ -213,6 +227,17 @@ class Stage {
     return (this.lab.scene?.kinds.length ?? 0) > 1;
   }
 
+  /** The least radius of a particle, px. */
+  get least() {
+    return (this.lab.recording?.tracks.length ?? 0) <= MOST_TRACKS ? LEAST_FEW : LEAST;
+  }
+
+  /** Whether particles are drawn larger than they are. */
+  get isLarger() {
+    const { machine } = this.lab;
+    return machine?.radius.some((radius) => radius * this.view.scale < this.least) ?? false;
+  }
+
   /** Particles, and what moves. */
   paint() {
     const { lab, view, canvas } = this;
@@ -223,7 +248,7 @@ class Stage {
     context.setTransform(dense, 0, 0, dense, 0, 0);
     context.clearRect(0, 0, view.width, view.height);
     this.scenery.turn(t);
-    const few = recording.tracks.length <= MOST_TRACKS;
+    const { least } = this;
     if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
     const spins = machine.inertia.some((value) => value > 0);
     const marks = new Path2D();
@@ -231,10 +256,10 @@ class Stage {
       const state = recording.tracks[i].state(t);
       if (!state || (state.ended && recording.tracks.length > 1)) continue;
       const x = view.px(state.x), y = view.py(state.y);
-      const r = Math.max(few ? LEAST_FEW : LEAST, (machine.radius[i] ?? 0) * view.scale);
+      const r = Math.max(least, (machine.radius[i] ?? 0) * view.scale);
       if (x < -r || x > view.width + r || y < -r || y > view.height + r) continue;
       this.balls.paint(context, i, x, y, r, Math.hypot(state.vx, state.vy));
-      if (!spins || r <= 3) continue;
+      if (!spins || r < SPUN) continue;
       // A radius shows how it turns.
       const angle = recording.tracks[i].angle(t);
       marks.moveTo(x, y);
@@ -248,6 +273,12 @@ class Stage {
 
   /** Further things that are painted over the particles. */
   painters: ((context: CanvasRenderingContext2D) => void)[] = [];
+
+  /** Light has become dark, or the other way. */
+  recolour() {
+    this.colours.clear();
+    this.paint();
+  }
 
   /** A colour of page.css, of the theme that is on. */
   colour(name: string) {

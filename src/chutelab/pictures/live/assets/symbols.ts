@@ -95,7 +95,8 @@ class Symbols {
     const { free } = view, all = { left: -1e9, right: 1e9, top: -1e9, bottom: 1e9 };
     const taken: Space[] = [
       { ...all, bottom: free.top }, { ...all, top: free.bottom }, { ...all, right: free.left },
-      { ...all, left: free.right }, ...stage.covered, ...this.lines(recording),
+      { ...all, left: free.right }, ...stage.covered, stage.scaleBox,
+      ...(stage.legend ? [stage.legend] : []), ...this.lines(recording),
       ...stage.handles.map(({ x, y }) => {
         const [px, py] = [view.px(x), view.py(y)];
         return { left: px - 9, right: px + 9, top: py - 9, bottom: py + 9 };

@@ -180,7 +180,7 @@ class Tools {
         drag: (px, py) => [this.tidy(px), this.tidy(py)],
         change: ([px, py]) => {
           points[n] = [px, py];
-          if (tool === "flow") this.flow.move();
+          if (tool === "flow") this.flow.move(points);
           this.refresh();
         },
         says: `${this.texts[tool]().join(", ")}; `

@@ -1,5 +1,7 @@
 // Play, pause, step, scrub, and how fast; undo and redo.
 
+import { Marks } from "./marks.ts";
+import { slide } from "./panels.ts";
 import { RATES, type Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
@@ -27,6 +29,7 @@ class Transport {
   then;
   slow;
   why;
+  marks;
 
   constructor(readonly lab: Lab, stage: Stage, readonly words: Words) {
     const element = (id: string) => document.getElementById(id) as any;
@@ -62,6 +65,7 @@ class Transport {
       lab.pause();
       lab.seek(lab.start + (lab.horizon - lab.start) * share);
     });
+    this.marks = new Marks(lab, stage, words);
     this.slow = element("slow");
     this.why = element("slow-why");
     this.why.textContent = words.say("slow-why");
@@ -124,10 +128,11 @@ class Transport {
     const ready = span > 0 ? (lab.end - lab.start) / span : 1;
     track.classList.toggle("computing", ready < 1);
     track.style.setProperty("--ready", String(ready));
-    this.time.value = String(span > 0 ? Math.round(((lab.t - lab.start) / span) * PLACES) : 0);
+    slide(this.time, span > 0 ? Math.round(((lab.t - lab.start) / span) * PLACES) : 0);
     const clock = `${words.fixed(lab.t, 3)} s`;
     this.clock.textContent = clock;
-    this.time.setAttribute("aria-valuetext", clock);
+    // It is heard once it stands.
+    if (!lab.playing) this.time.setAttribute("aria-valuetext", this.marks.saysNow || clock);
     this.playButton.classList.toggle("playing", lab.playing);
     this.playButton.setAttribute("aria-label", words.say(lab.playing ? "pause" : "play"));
     const { undoButton, redoButton } = this, { activeElement } = document;

@@ -1,7 +1,8 @@
-"""Texts for learners in each language: a catalogue of templates, ``strings/LANGUAGE.json``.
+"""Texts in each language: a catalogue of templates, ``strings/LANGUAGE.json``.
 
-A translation is a file. Templates have ``{names}`` for what is filled in; a live page reads the
-same files, in which keys that begin with ``python-`` speak of cells and ``task``, which it has not.
+A translation is a file. Templates have ``{names}`` for what is filled in. Keys that begin with
+``picture-`` stand in films and pictures; an exercise in a live page reads the same files, in which
+keys that begin with ``python-`` speak of cells and ``task``, which it has not.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ STRINGS: Final = Path(__file__).parent / "strings"
 
 LANGUAGES: Final = tuple(sorted((path.stem for path in STRINGS.glob("*.json")), key="en".__ne__))
 """English first."""
+
+
+_MARKS: Final = {".": "decimal-mark", ",": "thousands-mark", "-": "−"}
 
 
 class LanguageError(InputError):
@@ -47,6 +51,15 @@ class Words:
         '0,35'
         """
         return number.replace(".", self.catalogue["decimal-mark"])
+
+    def figures(self, value: float, form: str = "g") -> str:
+        """Return a number, in a form of Python's, in the digits of this language.
+
+        >>> words("de").figures(1234.5, ",.1f"), words("en").figures(-0.25, ".3g")
+        ('1.234,5', '−0.25')
+        """
+        said = {mark: self.catalogue.get(key, key) for mark, key in _MARKS.items()}
+        return "".join(said.get(sign, sign) for sign in format(value, form))
 
     def unit(self, unit: str) -> str:
         """Return a unit as it is written behind a number."""

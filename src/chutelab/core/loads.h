@@ -1,0 +1,24 @@
+/* What surfaces bear in bins of time: sums of impulses, where engines tell of each. No mechanics. */
+
+#ifndef LOADS_H
+#define LOADS_H
+#include "layout.h"
+
+/* What a surface bears in a time. Without acceleration and velocity the place stays; an impulse is spread
+   evenly, at an instant it is all in one bin. */
+typedef struct {
+    int owner;
+    double from, to;        /* s */
+    double x, y, vx, vy, ax, ay; /* of the place on the surface, as the time begins */
+    double nx, ny;          /* unit normal of the surface, towards the particle */
+    double jx, jy, couple;  /* on the particle, N s and N m s */
+} Push;
+
+extern Loads B;
+
+/* Set the first bins apart; 0 if there is no memory. */
+int lay_out_bins(int owners);
+
+void bear(const Push *p);
+
+#endif

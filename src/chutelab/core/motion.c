@@ -1,0 +1,238 @@
+/* Surfaces whose motion is prescribed: where one is at a time, how fast, and when a disk meets it.
+
+   Whoever asks for a surface's place has it put there first, by `surface_at`: disks are at times of
+   their own within a step. Its pivot p shakes and travels, and it turns about that:
+
+       p(t) = p0 + by sin(2 pi f t + phase) + way share(t),    angle(t) = turn t,
+
+   where the share goes from 0 to 1 with an even acceleration up to the middle, and the same
+   against it from there on. */
+
+#include "core.h"
+
+#define PI 3.14159265358979323846
+
+/* Pieces that a span is looked at in, at least: a touch that comes and goes within one is left to the next step. */
+#define STRIDES 8
+/* Newton's steps and halvings to the instant of an impact, to its last bit. */
+#define TO_ROOT 100
+
+static int travels(const Mover *m, double t) { return m->lasts > 0 && t >= m->from && t < m->from + m->lasts; }
+
+static void set_mover(Mover *m, double t) {
+    if (m->t == t) return;
+    double rate = 2 * PI * m->frequency, phase = rate * t + m->phase, s = sin(phase), c = cos(phase);
+    double share = 0, pace = 0, bend = 0, u = m->lasts > 0 ? (t - m->from) / m->lasts : 0;
+    if (travels(m, t)) {
+        int late = u >= 0.5;
+        share = late ? 1 - 2 * (1 - u) * (1 - u) : 2 * u * u;
+        pace = 4 * (late ? 1 - u : u) / m->lasts;
+        bend = (late ? -4 : 4) / (m->lasts * m->lasts);
+    } else if (u > 0.5) share = 1;
+    for (int n = 0; n < 2; n++) {
+        m->place[n] = m->pivot[n] + m->by[n] * s + m->way[n] * share;
+        m->velocity[n] = m->by[n] * rate * c + m->way[n] * pace;
+        m->pull[n] = -m->by[n] * rate * rate * s + m->way[n] * bend;
+    }
+    m->sine = sin(m->turn * t);
+    m->cosine = cos(m->turn * t);
+    m->t = t;
+}
+
+static Mover *mover_of(const Surface *s) {
+    Mover *m = W.movers + s->mover;
+    set_mover(m, s->posed);
+    return m;
+}
+
+/* Put a surface where it is at t. */
+const Surface *move_to(Surface *s, double t) {
+    s->posed = t;
+    const Mover *m = mover_of(s);
+    for (int n = 0; n < 12; n += 2) {
+        int is_vector = n == 2 || n >= 8;
+        double x = s->still[n] - (is_vector ? 0 : m->pivot[0]), y = s->still[n + 1] - (is_vector ? 0 : m->pivot[1]);
+        double *to = n < 4 ? &s->x + n : n < 8 ? s->end + (n - 4) : s->crown + (n - 8);
+        to[0] = m->cosine * x - m->sine * y + (is_vector ? 0 : m->place[0]);
+        to[1] = m->sine * x + m->cosine * y + (is_vector ? 0 : m->place[1]);
+    }
+    return s;
+}
+
+/* Velocity of what moves along with a surface at a place, m/s, and its spin. */
+void carried(const Surface *s, double x, double y, double *v) {
+    v[0] = v[1] = v[2] = 0;
+    if (s->mover < 0) return;
+    const Mover *m = mover_of(s);
+    v[0] = m->velocity[0] - m->turn * (y - m->place[1]);
+    v[1] = m->velocity[1] + m->turn * (x - m->place[0]);
+    v[2] = m->turn;
+}
+
+/* Velocity of a disk in the frame in which its way along a surface bends as the surface does: round the
+   centre of what is bent, which need not turn with it. */
+void along_with(const Surface *s, const Disk *d, double *v) {
+    double frame[3];
+    if (s->shape == SEGMENT) carried(s, d->x, d->y, frame);
+    else carried(s, s->x, s->y, frame);
+    v[0] = d->vx - frame[0];
+    v[1] = d->vy - frame[1];
+}
+
+/* Acceleration by which a surface that moves escapes a disk beside it, m/s2: along the normal, with what
+   its turning does to the disk's way along it; `pull` is that along the tangent (ny, -nx). */
+double pulled(const Surface *s, const Disk *d, double nx, double ny, double *pull) {
+    *pull = 0;
+    if (s->mover < 0) return 0;
+    const Mover *m = mover_of(s);
+    double x = d->x - m->place[0], y = d->y - m->place[1], v[3];
+    double ax = m->pull[0] - m->turn * m->turn * x, ay = m->pull[1] - m->turn * m->turn * y;
+    carried(s, d->x, d->y, v);
+    *pull = ax * ny - ay * nx;
+    return ax * nx + ay * ny + 2 * m->turn * ((d->vx - v[0]) * ny - (d->vy - v[1]) * nx);
+}
+
+/* Bound on the acceleration by which a surface presses or leaves what lies on it, m/s2. */
+double hastes(const Surface *s, const Disk *d) {
+    double v[3];
+    if (!stirs(s)) return 0;
+    carried(s, d->x, d->y, v);
+    return s->haste + 2 * fabs(v[2]) * hypot(d->vx - v[0], d->vy - v[1]);
+}
+
+/* Bound on the speed with which a disk and a surface come nearer to each other within a span, m/s. */
+double closing(const Surface *s, const Disk *d, double span) {
+    double v[3];
+    carried(s, d->x, d->y, v);
+    double way = hypot(d->vx - v[0], d->vy - v[1]);
+    return way * (1 + fabs(v[2]) * span) + (W.g + hastes(s, d)) * span;
+}
+
+/* Gap after a time h, and how fast it closes. */
+static double gap_after(int k, const Disk *d, double h, double *rate) {
+    double x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h, nx, ny, v[3];
+    const Surface *now = surface_at(k, d->t + h);
+    double gap = gap_to(now, x, y, d->radius, &nx, &ny);
+    carried(now, x, y, v);
+    *rate = -(d->vx + W.gx * h - v[0]) * nx - (d->vy + W.gy * h - v[1]) * ny;
+    return gap;
+}
+
+/* Time from d->t until a disk meets a surface that moves, INFINITY if not within the span. It is looked at
+   in strides in which they cannot meet, or a share of the span; between two of which they do,
+   the instant is found by Newton's method with halvings. */
+double meet_moving(int k, const Disk *d, double span, double *approach) {
+    const Surface *s = W.surfaces + k;
+    double most = closing(s, d, span), h = 0, rate, gap = gap_after(k, d, 0, &rate), low = 0;
+    *approach = 0;
+    if (gap > most * span) return INFINITY;
+    if (gap <= 0 && rate > 0) {
+        *approach = rate;
+        return 0;
+    }
+    for (int met = 0; !met;) {
+        if (h >= span) return INFINITY;
+        low = h;
+        h = MIN(h + MAX(gap / most, span / STRIDES), span);
+        double next = gap_after(k, d, h, &rate);
+        met = next <= 0 && (gap > 0 || rate > 0);
+        if (met && gap <= 0) low = h;
+        gap = next;
+    }
+    double high = h;
+    for (int n = 0; n < TO_ROOT && high > low; n++) {
+        double next = rate > 0 ? h + gap / rate : low;
+        if (!(next > low && next < high)) next = 0.5 * (low + high);
+        if (next == low || next == high || fabs(next - h) <= 1e-16 * span) break;
+        gap = gap_after(k, d, h = next, &rate);
+        if (gap > 0) low = h;
+        else high = h;
+    }
+    *approach = rate;
+    double x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h;
+    return face_at(s, x, y) == s ? h : INFINITY;
+}
+
+/* How long a disk that flies alone cannot reach what a surface sweeps, s. */
+double box_span(const Surface *s, const Disk *d) {
+    const double *box = s->swept;
+    double x = MAX(MAX(box[0] - d->x, d->x - box[2]), 0), y = MAX(MAX(box[1] - d->y, d->y - box[3]), 0);
+    double room = hypot(x, y) - d->radius, v = hypot(d->vx, d->vy);
+    if (room <= 0) return 0;
+    if (W.g > 0) return 2 * room / (v + sqrt(v * v + 2 * W.g * room));
+    return v > 0 ? room / v : INFINITY;
+}
+
+/* When the next surface begins to travel, is half-way, or is there, s. */
+double next_turn(double t) {
+    double next = INFINITY;
+    for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++)
+        for (int n = 0; n < 3 && m->lasts > 0; n++) {
+            double then = m->from + 0.5 * n * m->lasts;
+            if (then > t) next = MIN(next, then);
+        }
+    return next;
+}
+
+/* Tell which surfaces move in the step that begins at t; 1 if that has changed. */
+int stir(double t) {
+    int changed = 0;
+    W.haste = W.stirs = 0;
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        int now = m->turn != 0 || travels(m, t) || (m->frequency > 0 && (m->by[0] != 0 || m->by[1] != 0));
+        changed |= now != m->stirs;
+        W.stirs |= m->stirs = now;
+    }
+    for (const Surface *s = W.surfaces; s < W.surfaces + W.surface_count && W.stirs; s++)
+        if (stirs(s)) W.haste = MAX(W.haste, s->haste);
+    return changed;
+}
+
+/* Have the boxes of what moves hold what it sweeps in a step from t on of a length h. */
+void box_movers(double t, double h) {
+    for (Surface *s = W.surfaces; s < W.surfaces + W.surface_count && W.mover_count; s++) {
+        if (s->mover < 0) continue;
+        double more = s->fastest * h;
+        move_to(s, t);
+        for (int n = 0; n < 2; n++) {
+            int round = s->shape != SEGMENT;
+            s->box[n] = (round ? (&s->x)[n] - s->radius : MIN(s->end[n], s->end[2 + n])) - more;
+            s->box[2 + n] = (round ? (&s->x)[n] + s->radius : MAX(s->end[n], s->end[2 + n])) + more;
+        }
+    }
+}
+
+/* Have a box hold all that what is in it sweeps; it reaches so far from the pivot. */
+static void sweep_box(const Mover *m, double reach, double *box) {
+    for (int k = 0; k < 4; k++) {
+        double way = m->way[k % 2], by = fabs(m->by[k % 2]);
+        if (m->turn != 0) box[k] = m->pivot[k % 2] + (k < 2 ? -reach : reach);
+        box[k] += k < 2 ? MIN(way, 0) - by : MAX(way, 0) + by;
+    }
+}
+
+/* The motion of a surface, or -1. */
+int find_mover(const Surface *s) {
+    for (int k = 0; k < W.mover_count; k++)
+        if (W.movers[k].surface == s->owner) return k;
+    return -1;
+}
+
+/* Have a surface begin to move from where it is written. */
+void prepare_mover(Surface *s) {
+    Mover *m = W.movers + s->mover;
+    double x = MAX(fabs(s->box[0] - m->pivot[0]), fabs(s->box[2] - m->pivot[0]));
+    double y = MAX(fabs(s->box[1] - m->pivot[1]), fabs(s->box[3] - m->pivot[1])), reach = hypot(x, y);
+    double rate = 2 * PI * m->frequency, by = hypot(m->by[0], m->by[1]), way = hypot(m->way[0], m->way[1]);
+    double lasts = m->lasts > 0 ? m->lasts : INFINITY;
+    for (int n = 0; n < 4; n++) {
+        s->still[n] = (&s->x)[n];
+        s->still[4 + n] = s->end[n];
+        s->still[8 + n] = s->crown[n];
+    }
+    s->fastest = rate * by + 2 * way / lasts + fabs(m->turn) * reach;
+    s->haste = rate * rate * by + 4 * way / (lasts * lasts) + m->turn * m->turn * reach;
+    W.fastest = MAX(W.fastest, s->fastest);
+    sweep_box(m, reach, s->swept);
+    s->posed = m->t = NAN;
+}

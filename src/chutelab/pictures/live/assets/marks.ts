@@ -1,0 +1,164 @@
+// What happens in a run, as marks on the bar of the time: separations, impacts, landings, gates.
+
+import { onWidth } from "./chart.ts";
+import { FEWEST } from "./crowd.ts";
+import { html, icon } from "./panels.ts";
+import type { Event } from "./core.ts";
+import type { Lab } from "./lab.ts";
+import type { Machine } from "./machine.ts";
+import type { Stage } from "./stage.ts";
+import type { Words } from "./words.ts";
+
+type Happening = { t: number, kind: string, name?: string };
+
+/** Kinds of events of the core that are marked, with their icons. */
+const KINDS: Record<number, string> = {
+  1: "separation", 3: "impact", 4: "landing", 5: "collision", 7: "settle",
+};
+const ICONS: Record<string, string> = {
+  separation: "leave", impact: "hit", landing: "land", collision: "hit", settle: "land",
+  opens: "gate", closes: "gate",
+};
+
+/** Pixels from one mark to the next at least, and happenings that one mark tells at most. */
+const APART = 26, TOLD = 3;
+
+/** Where there is no room for fingers they are ticks that only tell where something happens, and
+ * pixels between these. */
+const FINE = matchMedia("(min-width: 720px) and (pointer: fine)"), TICKS = 5;
+
+/** s by which a time that is shown may miss what happens then. */
+const THEN = 1e-9;
+
+/** When the gates of a machine open and close. */
+function gatesOf({ segments, arcs, surfaces }: Machine): Happening[] {
+  const gates = new Map([...segments, ...arcs].map((one) => [one.surface, one]));
+  return [...gates].flatMap(([surface, { appears, vanishes }]) => {
+    const name = surfaces[surface], closes = appears > 0 && isFinite(appears);
+    return [...(closes ? [{ t: appears, kind: "closes", name }] : []),
+      ...(isFinite(vanishes) ? [{ t: vanishes, kind: "opens", name }] : [])];
+  });
+}
+
+class Marks {
+  root;
+  /** All that happens, and the marks that tell it. */
+  all: Happening[] = [];
+  shown: { button: HTMLElement, first: number, last: number }[] = [];
+  wide = 400;
+  drawn = "";
+  /** Events of the run, how many of them have been read, and what was found in them. */
+  read = { events: [] as Event[], many: 0, found: [] as Happening[], down: false };
+
+  constructor(readonly lab: Lab, readonly stage: Stage, readonly words: Words) {
+    this.root = html("div", { class: "marks", role: "group", "aria-label": words.say("marks") });
+    document.getElementById("time")?.before(this.root);
+    stage.drawers.push(() => this.draw());
+    for (const news of ["time", "play"] as const) lab.on(news, () => this.mark());
+    this.root.addEventListener("keydown", (event: KeyboardEvent) => {
+      const way = ({ ArrowRight: 1, ArrowLeft: -1 } as Record<string, number>)[event.key];
+      const at = this.shown.findIndex(({ button }) => button === document.activeElement);
+      if (!way || !this.shown[at + way]) return;
+      event.preventDefault();
+      this.shown[at + way].button.focus();
+      this.shown[at + way].button.click();
+    });
+    onWidth(this.root, (width) => {
+      this.wide = width;
+      this.draw();
+    });
+  }
+
+  /** By time what happens to the first particle of a few, the first landing of a crowd, and
+   * gates. */
+  get happenings(): Happening[] {
+    const { recording, machine } = this.lab;
+    if (!recording || !machine || !isFinite(recording.begin)) return [];
+    const { events } = recording, { surfaces } = machine;
+    if (this.read.events !== events) {
+      this.read = { events, many: 0, found: gatesOf(machine), down: false };
+    }
+    const { read } = this, isCrowd = machine.releases.length >= FEWEST;
+    for (; read.many < events.length; read.many += 1) {
+      const { t, kind, disk, surface } = events[read.many], said = KINDS[kind];
+      if (!said || (isCrowd ? said !== "landing" || read.down : disk > 0)) continue;
+      read.down ||= said === "landing";
+      read.found.push({ t, kind: said, name: surfaces[surface] });
+    }
+    return [...read.found].sort((a, b) => a.t - b.t);
+  }
+
+  /** What happens, in words. */
+  tell({ t, kind, name = "" }: Happening) {
+    const { words } = this;
+    return `${words.say(`mark-${kind}`, { name: words.name(name) })}, ${words.fixed(t, 3)} s`;
+  }
+
+  draw() {
+    const { lab, root, wide } = this, span = lab.horizon - lab.start;
+    // Nothing of a run that is to be predicted is in the page.
+    this.all = this.stage.blind || !(span > 0) ? [] : this.happenings;
+    const { matches: fine } = FINE, now = JSON.stringify([this.all, lab.start, span, wide, fine]);
+    if (now === this.drawn) return;
+    this.drawn = now;
+    const marks: { at: number, of: Happening[] }[] = [];
+    for (const one of this.all) {
+      const at = (one.t - lab.start) / span, last = marks.at(-1);
+      if (at < 0 || at > 1) continue;
+      if (last && (at - last.at) * wide < (fine ? APART : TICKS)) last.of.push(one);
+      else marks.push({ at, of: [one] });
+    }
+    const had = root.contains(document.activeElement);
+    this.shown = marks.map(({ at, of }) => {
+      const said = of.slice(0, TOLD).map((one) => this.tell(one)).join("; ");
+      const says = of.length > TOLD ? `${said} …` : said;
+      const button = fine ? html("button", { type: "button", "aria-label": says, "data-says": says,
+        class: at > 0.5 ? "late" : "" }, icon(ICONS[of[0].kind])) : html("i");
+      button.style.setProperty("--at", String(at));
+      button.addEventListener("click", () => this.go(of[0].t));
+      return { button, first: of[0].t, last: of[of.length - 1].t };
+    });
+    this.marked = "";
+    root.replaceChildren(...this.shown.map(({ button }) => button));
+    this.mark();
+    if (had) root.querySelector("[tabindex='0']")?.focus();
+  }
+
+  go(t: number) {
+    this.lab.pause();
+    this.lab.seek(t);
+  }
+
+  /** Go to what happens next, or before. */
+  jump(way: number) {
+    const { t } = this.lab, far = (one: Happening) => way * (one.t - t);
+    const there = this.all.filter((one) => far(one) > THEN);
+    if (there.length) this.go(there.reduce((a, b) => (far(b) < far(a) ? b : a)).t);
+  }
+
+  /** Tell what has happened from what is still to come, and what happens now. */
+  mark() {
+    const { lab: { t, playing }, shown } = this;
+    const done = shown.filter(({ first }) => first <= t + THEN).length;
+    const at = !playing && done && t <= shown[done - 1].last + THEN ? done : 0;
+    if (String([done, at]) === this.marked) return;
+    this.marked = String([done, at]);
+    shown.forEach(({ button }, n) => {
+      button.classList.toggle("done", n < done);
+      button.classList.toggle("now", n === at - 1);
+      if (FINE.matches) button.tabIndex = n === Math.max(0, done - 1) ? 0 : -1;
+    });
+  }
+
+  /** What happens at the time that is shown, in words. */
+  get saysNow() {
+    const { t } = this.lab;
+    const now = this.all.filter((one) => Math.abs(one.t - t) < THEN).map((one) => this.tell(one));
+    return now.join("; ");
+  }
+
+  /** How many have happened, and which is shown, as it was told last. */
+  marked = "";
+}
+
+export { Marks };

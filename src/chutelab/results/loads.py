@@ -1,0 +1,289 @@
+"""Loads: what surfaces bear in bins of time, from blows and lasting contacts.
+
+Engines sum impulses, each where and when it acts; forces are these over the width of a bin. They
+are on the surface: `normal` presses it, `along` drags it along (n_y, -n_x), n the normal towards
+the particle: forward on a belt that lies below what it carries.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.core import REAL, Module
+from chutelab.core import number as constant
+from chutelab.machine import Machine
+from chutelab.results.record import LOAD, Record, kept
+from chutelab.util.arrays import Floats
+from chutelab.util.errors import InputError, did_you_mean
+from chutelab.util.tables import Sheet, Shown, number
+
+NONE = np.empty((0, 0), LOAD)
+"""Loads of a run that counted none."""
+
+MOST_BINS: int = constant("MOST_BINS")
+OVERFLOW = f"so long that the run has {MOST_BINS:,} bins or fewer"
+
+MANY = 1000
+"""Calls of `Bins.bear` that are summed up together."""
+
+TOLERANCE = 1e-9
+"""Share of a bin that a width may be off a whole number of bins."""
+
+
+def gather(module: Module, surfaces: int) -> NDArray[np.void]:
+    """Return what the core has counted, of so many surfaces, (bins, surfaces)."""
+    told: Any = module.structs["Loads"]
+    if not told.bins:
+        return NONE
+    if told.overflow:
+        raise InputError(OVERFLOW, "run.loads", told.every)
+    size = told.used * told.owner_count * (LOAD.itemsize // REAL.itemsize)
+    rows = module.array("bins", REAL, size, of="Loads").view(LOAD)
+    return rows.reshape(told.used, told.owner_count)[:, :surfaces].copy()
+
+
+class Bins:
+    """Counts impulses on particles, for engines that are not in the core; as `core/loads.c` does.
+
+    Of a machine that asks for no loads it counts nothing: look at `every` first.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        self.every = machine.loads
+        self.surfaces = len(machine.surfaces)
+        self._sums = np.zeros((0, self.surfaces, 7))
+        self._waiting: list[Floats] = []
+
+    def bear(
+        self, surface: Any, begin: Any, end: Any, place: Any, normal: Any, push: Any,
+        couple: Any = 0.0,
+    ) -> None:  # fmt: skip
+        """Count impulses (N s) on particles, spread evenly over a time (s), no longer than a bin.
+
+        Parameters
+        ----------
+        surface : int or (k,)
+            Which ones bear them.
+        begin, end : float or (k,)
+            When.
+        place, normal, push : (2,) or (2, k)
+            Where on the surface (m), its unit normal, and the impulse on the particle.
+        couple : float or (k,)
+            N m s, on the particle.
+        """
+        rows = np.empty((10, len(surface) if np.ndim(surface) else 1))
+        for row, of in zip(
+            rows, (*place, *normal, *push, couple, begin, end, surface), strict=True
+        ):
+            row[:] = of
+        self._waiting.append(rows)
+        if len(self._waiting) >= MANY:
+            self._count()
+
+    def _count(self) -> None:
+        """Sum up what waits."""
+        x, y, nx, ny, px, py, turn, begin, end, surface = np.concatenate(self._waiting, axis=1)
+        self._waiting.clear()
+        first = np.floor(begin / self.every).astype(np.int64).clip(0)
+        rows, own = max(len(self._sums), int(first.max(initial=0)) + 2), surface.astype(np.int64)
+        if rows > MOST_BINS:
+            raise InputError(OVERFLOW, "run.loads", self.every)
+        # What of it is in the next bin.
+        span = np.where(end > begin, end - begin, inf)
+        late = ((end - (first + 1) * self.every) / span).clip(0.0, 1.0)
+        press, fx, fy = px * nx + py * ny, -px, -py
+        told = [press, fx * ny - fy * nx, fx, fy, x * fy - y * fx - turn, press * x, press * y]
+        sums = np.zeros((rows, self.surfaces, len(told)))
+        sums[: len(self._sums)] = self._sums
+        for bins, share in ((first, 1.0 - late), (first + 1, late)):
+            places = bins * self.surfaces + own
+            for n, of in enumerate(told):
+                added = np.bincount(places, share * of, rows * self.surfaces)
+                sums[..., n] += added.reshape(rows, -1)
+        self._sums = sums
+
+    def counted(self) -> NDArray[np.void]:
+        """Return all that was counted, (bins, surfaces)."""
+        if self._waiting:
+            self._count()
+        used = np.flatnonzero(self._sums.any(axis=(1, 2)))
+        rows = self._sums[: used[-1] + 1 if len(used) else 0]
+        return rows.copy().view(LOAD)[..., 0] if len(rows) else NONE
+
+
+class Part(NamedTuple):
+    """A load in its unit: its mean over time, the largest size of a bin, the root mean square.
+
+    From the first bin in which anything is borne to the last; NaN without one.
+    """
+
+    mean: float
+    peak: float
+    rms: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Load(Shown):
+    """What a surface bears over time.
+
+    Attributes
+    ----------
+    name : str
+        Of the surface.
+    edges : ndarray, shape (T + 1,)
+        Of the bins of time, s.
+    normal, along : ndarray, shape (T,)
+        Mean force in each bin that presses it, and that drags it along (n_y, -n_x), N.
+    force : ndarray, shape (T, 2)
+        The whole of both, N.
+    place : ndarray, shape (T, 2)
+        Where it is pressed, m: the mean of places by what presses there; NaN where nothing does.
+    pivot : (float, float)
+        What torques are about: a plate's pivot, the axis of the drive pulley, an arc's centre; of
+        others the first end, m.
+    torque : ndarray, shape (T,)
+        Of the force about the pivot, counterclockwise, N m.
+    """
+
+    name: str
+    edges: Floats
+    normal: Floats
+    along: Floats
+    force: Floats
+    place: Floats
+    pivot: tuple[float, float]
+    torque: Floats
+
+    def part(self, key: str) -> Part:
+        """Return mean, peak and root mean square of ``normal``, ``along`` or ``torque``."""
+        values = getattr(self, key)
+        borne = np.flatnonzero(self.force.any(axis=1))
+        if not len(borne):
+            return Part(nan, nan, nan)
+        some = values[borne[0] : borne[-1] + 1]
+        return Part(float(some.mean()), float(np.abs(some).max()), float(np.sqrt((some**2).mean())))
+
+    def sheet(self, *, details: bool = False) -> Sheet:
+        """Return mean, peak and root mean square of each."""
+        units = {"normal": "N", "along": "N", "torque": "N m"}
+        rows = tuple(
+            (f"{key}, {unit}", *map(number, self.part(key))) for key, unit in units.items()
+        )
+        return Sheet(f"Loads on {self.name}", ("", "mean", "peak", "rms"), rows)
+
+
+def pivot_of(machine: Machine, surface: int) -> tuple[float, float]:
+    """Return what torques on a surface are about, see `Load`, m."""
+    name, scene = machine.surfaces[surface], machine.scene
+    if machine.pulley is not None and surface == machine.pulley.surface:
+        return 0.0, 0.0
+    for plate in scene.plates:
+        if plate.pivot is not None and plate.name == name:
+            return plate.pivot
+        if plate.pivot is None and name == "plate" and scene.incoming is not None:
+            assert plate.distance is not None
+            assert plate.pivot_height is not None
+            return scene.incoming.pulley_radius + plate.distance, plate.pivot_height
+    arcs, segments = machine.arcs, machine.segments
+    bent, straight = (np.flatnonzero(part.surface == surface) for part in (arcs, segments))
+    x, y = (segments.start[straight[0]] if len(straight) else arcs.center[bent[0]]).tolist()
+    return x, y
+
+
+def need_loads(recording: Record) -> None:
+    """Raise an `InputError` if a recording has no loads."""
+    if not recording.machine.loads:
+        allowed = "a width of bins, such as 0.01 s: this run counted no loads"
+        raise InputError(allowed, "run.loads", None)
+
+
+def loads(recording: Record, name: str, every: float | None = None) -> Load:
+    """Return what a surface bears over time, in bins of ``run.loads`` or a multiple of it.
+
+    Parameters
+    ----------
+    recording : Record
+        Of a run with ``run.loads``.
+    name : str
+        Of the surface.
+    every : float, optional
+        How long a bin is, s.
+
+    Raises
+    ------
+    InputError
+        If the run counted no loads, if there is no such surface, or if the bins do not divide.
+    """
+    need_loads(recording)
+    machine, rows = recording.machine, recording.impulses
+    if name not in machine.surfaces:
+        there = f"the scene has {', '.join(machine.surfaces)}"
+        raise InputError(did_you_mean(name, machine.surfaces, there), "surface", name)
+    width = machine.loads if every is None else every
+    many = round(width / machine.loads) if 0.0 < width < inf else 0
+    if many < 1 or abs(width / machine.loads - many) > TOLERANCE * many:
+        raise InputError(f"{machine.loads:g} s, or a multiple of it", "every", every)
+    surface = machine.surfaces.index(name)
+    first = np.arange(0, len(rows), many)
+    sums = {
+        key: np.add.reduceat(rows[key][:, surface], first, axis=0) / width
+        for key in LOAD.names or ()
+        if len(rows)
+    } or {key: np.zeros((0, *LOAD[key].shape)) for key in LOAD.names or ()}
+    normal, force = sums["normal"], sums["force"]
+    x, y = pivot_of(machine, surface)
+    pressed = normal[:, None] > 0.0
+    return Load(
+        name=name,
+        edges=machine.loads * many * np.arange(len(first) + 1.0),
+        normal=normal,
+        along=sums["along"],
+        force=force,
+        place=np.divide(sums["at"], normal[:, None], out=np.full_like(force, nan), where=pressed),
+        pivot=(x, y),
+        torque=sums["moment"] - x * force[:, 1] + y * force[:, 0],
+    )
+
+
+@kept
+def load(recording: Record, name: str) -> Load:
+    """Return what a surface bears, in the bins that the run counted."""
+    return loads(recording, name)
+
+
+def borne(recording: Record) -> dict[str, Load]:
+    """Return the loads of all surfaces that bear anything, by their names."""
+    if not recording.impulses.size:
+        return {}
+    bear = np.flatnonzero(recording.impulses["force"].any(axis=(0, 2))).tolist()
+    return {name: load(recording, name) for name in np.array(recording.surfaces)[bear].tolist()}
+
+
+def told(recording: Record) -> dict[str, dict[str, dict[str, float]]]:
+    """Return what the JSON of a run has: by surface and part, mean, peak and rms."""
+    parts = ("normal", "along", "torque")
+    return {
+        name: {key: one.part(key)._asdict() for key in parts}
+        for name, one in borne(recording).items()
+    }
+
+
+def sheet(recording: Record) -> Sheet | None:
+    """Return a table of the loads of all surfaces; None without any."""
+    found = borne(recording)
+    if not found:
+        return None
+    heads = ("surface", "normal, N", "peak", "rms", "along, N", "torque, N m", "at x, m", "y, m")
+    rows = []
+    for name, one in found.items():
+        total = np.nansum(one.place * one.normal[:, None], axis=0) / one.normal.sum()
+        numbers = (*one.part("normal"), one.part("along").mean, one.part("torque").mean, *total)
+        rows.append((name, *(number(float(value)) for value in numbers)))
+    width = recording.machine.loads
+    note = f"means over time, from the first to the last load, and peaks in bins of {width:g} s"
+    return Sheet("Loads", heads, tuple(rows), notes=(note,))

@@ -1,0 +1,224 @@
+"""Loads: what surfaces bear, against forces by hand, closed forms, and the momentum of all."""
+
+import csv
+import json
+from math import cos, radians, sin
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import chutelab
+from chutelab.checks.stress import Evidence, laws
+from chutelab.cli import main
+from chutelab.results import Recording
+from chutelab.scene import SceneError
+from chutelab.util.errors import InputError
+
+G = 9.81
+ENGINES = ("exact", "contact", "pymunk")
+
+
+def balance(run):
+    return laws.loads(Evidence(run))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("scene", ["perpendicular", "slip", "two-sizes", "inclined-conveyor"])
+def test_impulses_are_the_change_of_momentum_less_the_weight(scene, engine):
+    verdict = balance(chutelab.simulate(scene, engine=engine, loads=0.01))
+    assert verdict.holds, verdict
+    assert verdict.bound == 1e-9
+
+
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+def test_so_they_are_in_a_crowd_that_rides_collides_and_settles(engine):
+    run = chutelab.simulate("stream", {"stream.count": 60, "run.loads": 0.01}, engine=engine)
+    assert balance(run).holds
+    run.impulses.flags.writeable = True
+    run.impulses["force"][70, 2] += 1e-7
+    assert not balance(run).holds
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_counting_loads_changes_no_bit_of_a_run(engine):
+    with_, without = (
+        chutelab.simulate("slip", engine=engine, loads=loads) for loads in (0.01, None)
+    )
+    for name in ("knots", "events", "by_surface"):
+        assert getattr(with_, name).tobytes() == getattr(without, name).tobytes()
+    assert without.impulses.size == 0
+
+
+def sliding(engine, **run):
+    """15° down, µ = 0.1, from rest: a = g (sin - µ cos)."""
+    a = radians(15.0)
+    ramp = {"name": "ramp", "from": [0.0, 0.0], "to": [2 * cos(a), -2 * sin(a)]}
+    at = [0.1 * cos(a) + 0.01 * sin(a), -0.1 * sin(a) + 0.01 * cos(a)]
+    return chutelab.simulate(
+        {
+            "particle": {"radius": 0.01, "mass": 0.5, "spin": False},
+            "surface": [{**ramp, "restitution": 0.0, "friction": 0.1}],
+            "stream": {"at": at, "velocity": [0.0, 0.0]},
+            "run": {"until": 0.9, "loads": 0.01, **run},
+        },
+        engine=engine,
+    )
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_slides_presses_by_its_weight_and_drags_by_its_friction(engine):
+    a, m = radians(15.0), 0.5
+    load = sliding(engine).loads("ramp", every=0.1)
+    press = m * G * cos(a)
+    assert load.normal[1:-1] == pytest.approx(press, rel=1e-6)
+    assert load.along[1:-1] == pytest.approx(0.1 * press, rel=1e-6)
+    # s = 0.1 m + a t²/2, its mean over a bin from t to t + h; the torque is about the upper end.
+    pace, t, h = G * (sin(a) - 0.1 * cos(a)), load.edges[1:-2], 0.1
+    way = 0.1 + 0.5 * pace * (t * t + t * h + h * h / 3.0)
+    assert np.hypot(*load.place[1:-1].T) == pytest.approx(way, abs=2e-4)
+    assert load.torque[1:-1] == pytest.approx(-press * way, rel=2e-3)
+    assert load.pivot == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_belt_bears_less_where_it_goes_round_the_pulley(engine):
+    """On the pulley N = m (g cos φ - v²/ρ), φ = v (t - 0.5 s) / ρ, and -m g sin φ holds it."""
+    v, rho, m = 0.8, 0.1063, 0.008
+    keys = {"speed": v, "friction": "adhesion", "pulley_radius": 0.1, "length": 0.4}
+    changes = {"incoming": keys, "particle.radius": 0.0063, "run.loads": 0.01}
+    load = chutelab.simulate("slip", changes, engine=engine).loads("incoming")
+    middle = 0.5 * (load.edges[1:] + load.edges[:-1])
+    phi = v * (middle - 0.4 / v) / rho
+    free = np.arccos(v * v / (G * rho))
+    flat, round_it = (middle > 0.01) & (phi < -0.05), (phi > 0.05) & (phi < free - 0.05)
+    assert load.normal[flat] == pytest.approx(m * G, rel=1e-9)
+    assert round_it.sum() > 8
+    assert load.normal[round_it] == pytest.approx(
+        m * (G * np.cos(phi) - v * v / rho)[round_it], abs=2e-3 * m * G
+    )
+    assert load.along[round_it] == pytest.approx((m * G * np.sin(phi))[round_it], abs=2e-3 * m * G)
+    # The drive holds it: about the axis the torque is along times R, clockwise for forward.
+    assert load.torque[round_it] == pytest.approx(
+        -0.1 * load.along[round_it], abs=2e-3 * 0.1 * m * G
+    )
+
+
+def test_a_stream_on_a_15_degree_plate_presses_by_its_flow_times_its_change_of_velocity():
+    """200 a second of 8 g: F = ṁ (1 + ε) v_n, with v_n from the impacts of a lone particle."""
+    keys = {"plate.angle_deg": 15.0, "stream.bed_height": 0.0, "stream.count": 400}
+    run = chutelab.simulate("stream-independent", {**keys, "run.loads": 0.05})
+    hits = run.first(run.select("impact", surface="plate"))
+    lean = radians(15.0)
+    into = hits["velocity_before"] @ [cos(lean), sin(lean)]
+    press = run.mass[0] * run.scene.stream.rate * (1.0 + run.scene.plate.restitution) * into.mean()
+    load = run.loads("plate")
+    full = np.flatnonzero(load.normal)[2:-2]
+    # Twenty to a bin, and one more or less where it begins.
+    assert load.normal[full].mean() == pytest.approx(press, rel=3e-3)
+    assert load.force[full, 0].mean() == pytest.approx(press * cos(lean), rel=3e-3)
+
+
+def disks(at, walls, **stream):
+    """Disks of 10 mm and 0.1 kg that lie on walls without friction, one another's too."""
+    return chutelab.simulate(
+        {
+            "particle": {"radius": 0.01, "mass": 0.1, "spin": False},
+            "surface": [{"restitution": 0.0, "friction": 0.0, **wall} for wall in walls],
+            "stream": [
+                {"at": place, "velocity": [0.0, 0.0], "interact": True, "restitution": 0.0,
+                 "friction": 0.0, **stream}
+                for place in at
+            ],
+            "run": {"until": 2.0, "loads": 0.1},
+        },
+        engine="contact",
+    )  # fmt: skip
+
+
+def test_a_disk_in_a_groove_leans_on_both_walls():
+    """60° and 30° from the ground: N_a sin 60° = N_b sin 30°, N_a cos 60° + N_b cos 30° = m g."""
+    steep = {"name": "steep", "from": [-0.5 * cos(radians(60)), 0.5 * sin(radians(60))],
+             "to": [0.0, 0.0]}  # fmt: skip
+    flat = {"name": "flat", "from": [0.0, 0.0], "to": [0.5 * cos(radians(30)), 0.25]}
+    corner = 0.01 * np.array([[sin(radians(60)), cos(radians(60))],
+                              [-sin(radians(30)), cos(radians(30))]]).sum(axis=0)  # fmt: skip
+    run = disks([corner.tolist()], [steep, flat])
+    assert run.loads("steep").normal[-5:] == pytest.approx(0.1 * G * sin(radians(30)), rel=1e-6)
+    assert run.loads("flat").normal[-5:] == pytest.approx(0.1 * G * sin(radians(60)), rel=1e-6)
+    assert balance(run).holds
+
+
+def test_a_pyramid_of_three_disks_by_hand():
+    """The lower ones are 2.2 r apart, sin θ = 0.55: it presses each by m g/2 (tan θ, 1)."""
+    r, m, lean = 0.01, 0.1, np.arcsin(0.55)
+    floor = [{"name": "left", "from": [-0.021, 0.0], "to": [0.0, 0.0]},
+             {"name": "right", "from": [0.0, 0.0], "to": [0.021, 0.0]}]  # fmt: skip
+    wall = {"name": "wall", "from": [0.021, 0.0], "to": [0.021, 0.1]}
+    back = {"name": "back", "from": [-0.021, 0.0], "to": [-0.021, 0.1]}
+    top = [0.0, r + 2 * r * cos(lean)]
+    run = disks([[-1.1 * r, r], [1.1 * r, r], top], [*floor, wall, back])
+    for name in ("left", "right"):
+        assert run.loads(name).normal[-5:] == pytest.approx(1.5 * m * G, rel=1e-3)
+    for name in ("wall", "back"):
+        push = 0.5 * m * G * np.tan(lean)
+        assert run.loads(name).normal[-5:] == pytest.approx(push, rel=1e-2)
+
+
+def test_a_heap_that_sleeps_presses_by_its_weight():
+    """Also before it sleeps, but for what still moves; and each disk where it lies."""
+    floor = {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "friction": 0.5}
+    at = [[0.02 * n, 0.01] for n in range(-3, 4)] + [[0.02 * n + 0.01, 0.028] for n in range(-3, 3)]
+    run = disks(at, [floor, {"name": "end", "from": [-0.07, 0.0], "to": [-0.07, 0.1]},
+                     {"name": "far", "from": [0.07, 0.0], "to": [0.07, 0.1]}])  # fmt: skip
+    load = run.loads("floor")
+    assert load.normal[-5:] == pytest.approx(13 * 0.1 * G, rel=1e-9)
+    assert load.normal[2:] == pytest.approx(13 * 0.1 * G, rel=1e-2)
+    assert load.place[-5:, 0] == pytest.approx(0.0, abs=1e-4)
+    assert balance(run).holds
+
+
+def test_bins_are_summed_stored_and_refused(tmp_path):
+    run = chutelab.simulate("two-sizes", loads=0.01)
+    fine, wide = run.loads("outgoing"), run.loads("outgoing", every=0.05)
+    sums = np.add.reduceat(fine.normal, np.arange(0, len(fine.normal), 5)) / 5
+    assert wide.normal == pytest.approx(sums)
+    assert wide.edges[1] == pytest.approx(0.05)
+    run.save(tmp_path / "run.npz")
+    loaded = Recording.load(tmp_path / "run.npz")
+    assert loaded.impulses.tobytes() == run.impulses.tobytes()
+    assert loaded.measure("loads.outgoing.normal.peak") == fine.normal.max()
+    assert run.measure("loads.plate.torque.rms") > 0.0
+    with pytest.raises(InputError, match=r"every = 0\.015: 0\.01 s, or a multiple of it"):
+        run.loads("outgoing", every=0.015)
+    with pytest.raises(InputError, match="outgoing"):
+        run.loads("outgoin")
+    with pytest.raises(InputError, match=r"such as 0\.01 s"):
+        chutelab.simulate("two-sizes").loads("outgoing")
+    with pytest.raises(InputError, match="1,048,576 bins or fewer"):
+        chutelab.simulate("perpendicular", {"stream.start": 100.0, "run.loads": 1e-5})
+    expect = {"quantity": "loads.plate.normal.mean", "value": 1.0, "tolerance": 0.1, "source": "-"}
+    with pytest.raises(SceneError, match=r"it needs run\.loads"):
+        chutelab.load("two-sizes", {"expect": [expect]})
+    chutelab.load("two-sizes", {"expect": [expect], "run.loads": 0.01})
+
+
+def test_command_writes_table_and_picture(tmp_path):
+    called = ["run", "perpendicular", "--out", str(tmp_path), "--only", "loads"]
+    result = CliRunner().invoke(main, called)
+    assert result.exit_code == 0, result.output
+    assert "Loads" in result.stdout
+    rows = list(csv.DictReader((tmp_path / "loads.csv").read_text("utf-8").splitlines()))
+    assert {row["surface"] for row in rows} == {"incoming", "plate", "outgoing"}
+    on_plate = [float(row["normal"]) for row in rows if row["surface"] == "plate"]
+    # One impact: m (1 + ε) v = 8 g × 1.5 × 2 m/s in 10 ms.
+    assert max(on_plate) == pytest.approx(0.008 * 1.5 * 2.0 / 0.01)
+    assert (tmp_path / "loads.png").stat().st_size > 5_000
+    told = json.loads(CliRunner().invoke(main, ["run", "slip", "--loads", "0.1", "--json"]).stdout)
+    assert told["loads"]["incoming"]["normal"]["mean"] > 0.0
+
+
+def test_a_sweep_has_loads_of_each_variant():
+    scene = chutelab.load("perpendicular", {"run.loads": 0.01})
+    peaks = chutelab.sweep(scene, {"incoming.speed": [2.0, 3.0]}).columns["loads.plate.normal.peak"]
+    assert peaks == pytest.approx([2.4, 3.6])

@@ -1,0 +1,422 @@
+"""Surfaces that move: shake, travel and turn, in the contact engine and in Pymunk.
+
+Formulas are written here; roots are found by SciPy's `brentq`.
+"""
+
+from dataclasses import replace
+from math import cos, pi, sin, sqrt
+
+import numpy as np
+import pytest
+
+import chutelab
+from chutelab.results.laws import judge
+from chutelab.scene import SceneError
+
+scipy = pytest.importorskip("scipy")
+from scipy.optimize import brentq  # noqa: E402
+
+G, R, M = 9.81, 0.01, 0.008
+
+
+def table(stream=None, particle=None, run=None, more=(), **keys):
+    """A table from -0.5 to 0.5 m, and a disk above it."""
+    own = {"name": "table", "from": [-0.5, 0.0], "to": [0.5, 0.0], **keys}
+    return {
+        "particle": {"radius": R, "mass": M, **(particle or {})},
+        "surface": [own, *more],
+        "stream": {"at": [0.0, R], "velocity": [0.0, 0.0], **(stream or {})},
+        "run": {"until": 1.0, **(run or {})},
+    }
+
+
+def sound(recording):
+    """A run that keeps all laws, and whose ledger closes."""
+    assert not recording.laws
+    ledger = recording.ledger
+    # What is carried from rest to rest turns over nothing in all.
+    rounding = 1e-14 * abs(ledger.potential[0])
+    assert abs(ledger.residual) <= 1e-11 * ledger.turned_over + rounding
+    return recording
+
+
+def bounces(amplitude, frequency, restitution, drop, seconds):
+    scene = table(
+        shake={"by": [0.0, amplitude], "frequency": frequency}, restitution=restitution,
+        stream={"at": [0.0, R + drop]}, run={"until": seconds},
+    )  # fmt: skip
+    recording = sound(chutelab.simulate(scene))
+    return recording, recording.select("impact")
+
+
+def test_a_ball_on_a_shaking_plate_follows_the_map_of_the_bouncing_ball():
+    amplitude, frequency, e = 0.002, 25.0, 0.7
+    _, struck = bounces(amplitude, frequency, e, 0.05, 1.5)
+    w, t, y, v = 2.0 * pi * frequency, 0.0, 0.05, 0.0
+    assert len(struck) > 10
+    for row in struck[:10]:
+
+        def gap(s, t=t, y=y, v=v):
+            return y + v * (s - t) - 0.5 * G * (s - t) ** 2 - amplitude * np.sin(w * s)
+
+        times = np.linspace(t + 1e-7, t + 0.5, 200_001)
+        below = np.argmax(gap(times) < 0.0)
+        at = brentq(gap, times[below - 1], times[below], xtol=1e-15)
+        plate = amplitude * w * cos(w * at)
+        v, y, t = plate - e * (v - G * (at - t) - plate), amplitude * sin(w * at), at
+        # An error grows with each blow: a wrong time is a wrong plate's speed.
+        assert row["t"] == pytest.approx(t, abs=1e-10)
+        assert row["velocity_after"][1] == pytest.approx(v, abs=1e-8)
+
+
+def test_its_period_doubles_where_the_map_says():
+    """A bounce a period is a fixed point of (t, v) -> (t', v'); its multipliers have the product
+    e², and one of them is -1 where  A w² sin(phase) = 2 g (1 + e²) / (1 + e)²."""
+    e, frequency = 0.4, 25.0
+    w = 2.0 * pi * frequency
+    level, fall = pi * (1.0 - e) / (1.0 + e), 2.0 * (1.0 + e * e) / (1.0 + e) ** 2
+    critical = G / w**2 * sqrt(level**2 + fall**2)
+    for share, doubled in ((0.97, False), (1.03, True)):
+        amplitude = share * critical
+        phase = np.degrees(np.arccos(level * G / w**2 / amplitude))
+        scene = table(
+            shake={"by": [0.0, amplitude], "frequency": frequency, "phase_deg": phase},
+            restitution=e,
+            # As it leaves in the fixed point, and a little off.
+            stream={
+                "at": [0.0, R + amplitude * sin(np.radians(phase)) + 1e-9],
+                "velocity": [0.0, 0.5 * G / frequency * 1.0001],
+            },
+            run={"until": 12.0},
+        )  # fmt: skip
+        spans = np.diff(sound(chutelab.simulate(scene)).select("impact")["t"])[-20:] * frequency
+        assert spans.mean() == pytest.approx(1.0, abs=1e-6)
+        assert (np.abs(np.diff(spans)).min() > 0.05) == doubled
+        assert np.abs(spans[2:] - spans[:-2]).max() < 1e-6
+
+
+def test_a_turning_paddle_gives_a_ball_its_point_velocity():
+    """At rest and without gravity: v' = (1 + e) w s along the normal, s from the pivot; the work of
+    the drive is m (1 + e) (w s)², what is lost m (1 - e²) (w s)² / 2."""
+    x, y, e, turn = 0.2, 0.1, 0.6, 120.0
+    w = np.radians(turn)
+    scene = {
+        "gravity": 0.0,
+        "particle": {"radius": R, "mass": M},
+        "surface": [{"name": "paddle", "from": [0, 0], "to": [0.4, 0], "turn": turn,
+                     "restitution": e, "friction": 0.3}],
+        "stream": {"at": [x, y], "velocity": [0, 0]},
+        "run": {"until": 1.0},
+    }  # fmt: skip
+    recording = sound(chutelab.simulate(scene))
+    (blow,) = recording.select("impact")
+    angle = brentq(lambda a: y * cos(a) - x * sin(a) - R, 0.0, 1.5, xtol=1e-15)
+    lever = x * cos(angle) + y * sin(angle)
+    assert blow["t"] == pytest.approx(angle / w, rel=1e-13)
+    speed = (1.0 + e) * w * lever
+    assert blow["velocity_after"] == pytest.approx([-speed * sin(angle), speed * cos(angle)])
+    books = recording.ledger.by_surface["paddle"]
+    assert books["drive_work"] == pytest.approx(M * (1.0 + e) * (w * lever) ** 2, rel=1e-12)
+    assert books["restitution_loss"] == pytest.approx(0.5 * M * (1 - e * e) * (w * lever) ** 2)
+    assert recording.ledger.belt_work == pytest.approx(0.0, abs=1e-18)
+    assert recording.measure("ledger.by_surface.paddle.drive_work") == books["drive_work"]
+
+
+def test_a_travelling_floor_carries_a_disk_unless_it_is_too_fast():
+    """a = 4 d / T²; below µ g nothing slips; above, the disk is a way of µ g (T/2)²/2 behind."""
+    way, lasts = 0.1, 0.4
+    for friction in (0.3, 0.2):
+        scene = table(
+            friction=friction, travel={"to": [way - 0.5, 0.0], "at": 0.1, "in": lasts},
+            run={"dt": 2.5e-4},
+        )  # fmt: skip
+        recording = sound(chutelab.simulate(scene))
+        times = np.linspace(0.0, 0.99, 100)
+        (place, _), pose = recording.at(times), recording.pose("table", times)
+        assert pose[0] == pytest.approx([-0.5, 0.0, 0.0])
+        assert pose[-1] == pytest.approx([way - 0.5, 0.0, 0.0])
+        off = place[:, 0, 0] - (pose[:, 0] + 0.5)
+        if friction * G > 4.0 * way / lasts**2:
+            assert np.abs(off).max() < 1e-12
+        else:
+            middle, _ = recording.at([0.1 + 0.5 * lasts])
+            assert middle[0, 0, 0] == pytest.approx(
+                0.5 * friction * G * (0.5 * lasts) ** 2, abs=1e-5
+            )
+
+
+def slid(amplitude, frequency, friction, end):
+    """Where a disk is that slides on a table that shakes sideways, by pieces of one sign."""
+    w, times = 2.0 * pi * frequency, np.linspace(0.0, end, 200_001)
+    t, x, v, sign = 0.0, 0.0, 0.0, 1.0
+
+    def belt(s):
+        return amplitude * w * cos(w * s)
+
+    while True:
+
+        def slip(s, t=t, v=v, sign=sign):
+            return sign * (belt(s) - v) - friction * G * (s - t)
+
+        later = times[times > t + 1e-6]
+        caught = np.flatnonzero([slip(s) < 0.0 for s in later])
+        until = (
+            brentq(slip, max(later[caught[0]] - 1e-4, t + 1e-7), later[caught[0]])
+            if len(caught)
+            else end
+        )
+        x += v * (until - t) + 0.5 * sign * friction * G * (until - t) ** 2
+        v, t = v + sign * friction * G * (until - t), until
+        if t == end:
+            return x
+        if amplitude * w * w * abs(sin(w * t)) <= friction * G:
+            # It is carried until the table is too hasty again.
+            later = times[times > t]
+            hasty = [amplitude * w * w * abs(sin(w * s)) > friction * G for s in later]
+            if not any(hasty):
+                return x + amplitude * (sin(w * end) - sin(w * t))
+            s = later[int(np.argmax(hasty))]
+            x, v, t = x + amplitude * (sin(w * s) - sin(w * t)), belt(s), s
+        sign = -1.0 if sin(w * (t + 1e-6)) > 0.0 else 1.0
+
+
+def test_sliding_on_a_shaking_table_is_right_to_a_step_squared():
+    amplitude, frequency, friction, end = 0.02, 3.0, 0.3, 0.9
+    exact, hasty = slid(amplitude, frequency, friction, end), amplitude * (2 * pi * frequency) ** 2
+    for dt in (4e-3, 1e-3):
+        scene = table(
+            shake={"by": [amplitude, 0.0], "frequency": frequency}, friction=friction,
+            run={"dt": dt, "until": end},
+        )  # fmt: skip
+        place, _ = sound(chutelab.simulate(scene)).at([end - 1e-9])
+        assert place[0, 0, 0] == pytest.approx(exact, abs=hasty * dt * dt)
+
+
+def test_what_lies_on_a_shaking_table_stays_on_it():
+    amplitude, frequency = 0.005, 5.0
+    w = 2.0 * pi * frequency
+    scene = table(
+        shake={"by": [0.0, amplitude], "frequency": frequency},
+        stream={"velocity": [0.0, amplitude * w]},
+    )
+    recording = sound(chutelab.simulate(scene))
+    times = np.linspace(0.0, 0.99, 300)
+    place, _ = recording.at(times)
+    gap = place[:, 0, 1] - R - recording.pose("table", times)[:, 1]
+    assert np.abs(gap).max() < 1e-8
+
+
+WALLS = (
+    {"name": "left", "from": [-0.1, -0.1], "to": [-0.1, 0.5]},
+    {"name": "right", "from": [0.1, -0.1], "to": [0.1, 0.5]},
+)
+CROWD = {"fill": [[-0.09, 0.011], [0.09, 0.4]], "count": 40, "interact": True, "at": None,
+         "velocity": None}  # fmt: skip
+
+
+def drum(turn):
+    """A polygon of 24 sides that turns round its axis, with a crowd in it."""
+    turns = np.linspace(0.0, 2.0 * pi, 25)
+    points = np.stack([0.15 * np.cos(turns), 0.15 * np.sin(turns)], axis=-1)
+    points[-1] = points[0]
+    return {
+        "particle": {"radius": 0.008, "mass": M, "spin": True},
+        "surface": [{"name": "drum", "points": points.tolist(), "pivot": [0, 0], "turn": turn,
+                     "friction": 0.6}],
+        "stream": {"fill": [[-0.1, -0.1], [0.1, 0.1]], "count": 30, "interact": True},
+        "run": {"until": 2.0},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        table(CROWD, {"spin": True}, more=WALLS, shake={"by": [0.0, 0.002], "frequency": 20.0}),
+        table(CROWD, {"spin": True}, more=WALLS, shake={"by": [0.003, 0.001], "frequency": 10.0}),
+        table(CROWD, more=WALLS, travel={"to": [-0.5, 0.1], "at": 0.4, "in": 0.3}),
+        table(CROWD, more=WALLS, shake={"by": [0.0, 0.001], "frequency": 15.0}, speed=0.3),
+        drum(60.0),
+        drum(-120.0),
+    ],
+    ids=["up", "round", "lift", "belt", "drum", "back"],
+)
+def test_the_work_of_drives_is_energy_and_losses_in_a_crowd(scene):
+    recording = sound(chutelab.simulate(scene))
+    ledger = recording.ledger
+    change = ledger.kinetic[1] - ledger.kinetic[0] + ledger.potential[1] - ledger.potential[0]
+    work = ledger.belt_work + ledger.drive_work
+    given = work - ledger.restitution_loss - ledger.friction_loss
+    assert change == pytest.approx(given, abs=1e-11 * ledger.turned_over)
+    assert sum(one["drive_work"] for one in ledger.by_surface.values() if "drive_work" in one) == (
+        pytest.approx(ledger.drive_work)
+    )
+    if "speed" not in scene["surface"][0]:
+        assert ledger.belt_work == pytest.approx(0.0, abs=1e-12)
+    assert ledger.drive_work > 0.0
+
+
+def test_what_sleeps_wakes_when_its_floor_begins_to_travel():
+    scene = table(
+        CROWD | {"count": 10}, more=WALLS, travel={"to": [-0.5, 0.05], "at": 3.0, "in": 0.5},
+        run={"until": 4.0},
+    )  # fmt: skip
+    recording = sound(chutelab.simulate(scene))
+    (before, *_, after), _ = recording.at([2.9, 3.6])
+    assert after[:, 1].min() == pytest.approx(R + 0.05, abs=1e-4)
+    assert before[:, 1].min() == pytest.approx(R, abs=1e-4)
+
+
+def test_what_moves_against_sleepers_wakes_them():
+    pusher = {"name": "pusher", "from": [-0.09, 0.002], "to": [-0.09, 0.3],
+              "travel": {"to": [0.05, 0.002], "at": 2.5, "in": 2.0}}  # fmt: skip
+    row = {"at": [-0.02, 0.005], "to": [0.02, 0.005], "count": 3, "interact": True}
+    own = {"more": [pusher, WALLS[1]], "run": {"until": 5.0}, "friction": 0.9}
+    scene = table(row, {"radius": 0.005}, **own)
+    recording = sound(chutelab.simulate(scene))
+    place, _ = recording.at([2.4, 4.99])
+    assert np.ptp(place[0, :, 0]) == pytest.approx(0.04, abs=1e-3)
+    assert place[1, :, 0].min() == pytest.approx(0.055, abs=2e-4)
+    # Nothing has settled while something is still to move.
+    assert chutelab.simulate(scene, {"run.until": "settled"}).knots["t"].max() > 4.5
+
+
+def test_a_release_waits_for_what_is_in_its_place():
+    scene = table(
+        stream={"at": [0.0, 0.02]}, travel={"to": [-0.5, -0.3], "at": 0.0, "in": 0.2},
+        **{"from": [-0.5, 0.015], "to": [0.5, 0.015]},
+    )  # fmt: skip
+    recording = sound(chutelab.simulate(scene))
+    # It is clear when the table has gone 5 mm, half of 0.315 m evenly faster: s = 2 d (t/T)².
+    gone = 0.2 * sqrt(0.005 / (2.0 * 0.315))
+    released = float(recording.select("release")["t"][0])
+    assert gone <= released <= gone + 1e-3
+
+
+@pytest.mark.parametrize(
+    ("scene", "bound"),
+    [
+        (table(shake={"by": [0.0, 0.004], "frequency": 8.0}, stream={"at": [0.0, 0.1]},
+               run={"until": 0.25}), 2e-3),
+        (table(travel={"to": [-0.4, 0.2], "at": 0.05, "in": 0.4}, run={"until": 0.5}), 3e-4),
+        (table(turn=25.0, pivot=[0.0, 0.0], friction=0.8, particle={"spin": True},
+               stream={"at": [0.1, R]}, run={"until": 0.3}), 1e-3),
+    ],
+    ids=["shake", "travel", "turn"],
+)  # fmt: skip
+def test_pymunk_with_its_own_bodies_agrees_to_the_order_of_its_step(scene, bound):
+    end = scene["run"]["until"] - 1e-9
+    contact = sound(chutelab.simulate(scene, engine="contact"))
+    pymunk = chutelab.simulate(scene, {"run.dt": 5e-4}, engine="pymunk")
+    assert not pymunk.laws
+    (mine, _), (theirs, _) = contact.at([end]), pymunk.at([end])
+    assert theirs == pytest.approx(mine, abs=bound)
+    scale = contact.ledger.turned_over
+    assert pymunk.ledger.drive_work == pytest.approx(contact.ledger.drive_work, abs=2e-2 * scale)
+
+
+def drawn(seed):
+    """A random machine of three surfaces that move, in a box."""
+    random = np.random.default_rng(seed)
+    surfaces = [
+        {"name": "floor", "from": [-0.4, -0.3], "to": [0.4, -0.3]},
+        {"name": "left", "from": [-0.4, -0.3], "to": [-0.4, 0.5]},
+        {"name": "right", "from": [0.4, -0.3], "to": [0.4, 0.5]},
+    ]
+    for n in range(3):
+        # Apart from each other: what rigid drives squeeze has nowhere to go.
+        x, y = 0.22 * (n - 1), random.uniform(-0.12, 0.05)
+        dx, dy = random.uniform(-0.06, 0.06, 2)
+        motion = {
+            0: {"shake": {"by": random.uniform(-0.01, 0.01, 2).tolist(),
+                          "frequency": random.uniform(1.0, 20.0)}},
+            1: {"turn": random.uniform(-300.0, 300.0)},
+            2: {"travel": {"to": [x + random.uniform(-0.05, 0.05), y + 0.03],
+                           "at": random.uniform(0.0, 0.5), "in": random.uniform(0.1, 0.5)}},
+        }[int(random.integers(3))]  # fmt: skip
+        shape = {"from": [x, y], "to": [x + dx, y + dy]}
+        if random.random() < 0.3:
+            shape = {"center": [x, y], "radius": 0.05, "from_deg": 180.0, "to_deg": 350.0}
+        surfaces.append(
+            {"name": f"mover{n}", "restitution": random.uniform(0.0, 0.9), **shape, **motion}
+        )
+    return {
+        "particle": {"radius": random.uniform(0.006, 0.012), "mass": M,
+                     "spin": bool(random.integers(2))},
+        "surface": surfaces,
+        "stream": {"fill": [[-0.2, 0.18], [0.2, 0.5]], "count": int(random.integers(1, 25)),
+                   "interact": bool(random.integers(2))},
+        "run": {"until": 1.0},
+    }  # fmt: skip
+
+
+def test_a_picture_holds_what_turns_and_a_film_draws_it_where_it_is():
+    from chutelab.pictures.animation.actors import gates
+    from chutelab.pictures.plots.figure import Picture
+    from chutelab.pictures.plots.scenery import window_of
+
+    scene = table(turn=90.0, pivot=[0.0, 0.0], stream={"at": [0.3, 0.45]})
+    recording = chutelab.simulate(scene)
+    window = window_of(recording)
+    assert window.top > 0.5
+    ax = Picture((6.0, 4.0)).add_axes((0.0, 0.0, 1.0, 1.0))
+    ((drawn, show),) = gates(ax, recording.machine, np.array([0.0, 1.0]))
+    show(1)
+    # After 90 degrees it stands upright.
+    assert drawn.get_xydata() == pytest.approx(np.array([[0.0, -0.5], [0.0, 0.5]]), abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_machines_keep_the_laws(seed):
+    sound(chutelab.simulate(drawn(seed)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12, 300))
+def test_more_random_machines_keep_the_laws(seed):
+    sound(chutelab.simulate(drawn(seed)))
+
+
+def test_a_particle_in_or_through_what_moves_breaks_a_law():
+    recording = sound(chutelab.simulate(table(shake={"by": [0.0, 0.02], "frequency": 2.0})))
+    for off, law in ((2e-3, "nothing inside a surface"), (3.0 * R, "nothing through a surface")):
+        knots = recording.knots.copy()
+        late = knots["t"] > 0.5
+        knots["position"][late, 1] -= off
+        broken = judge(replace(recording, knots=knots))
+        assert (law, "table") in [(one.law, one.surface) for one in broken]
+
+
+def test_what_has_no_closed_form_is_refused_by_name():
+    scene = table(turn=10.0)
+    with pytest.raises(SceneError, match=r"surface\[0\].turn moves it: contact or pymunk has that"):
+        chutelab.load(scene, {"run.engine": "exact"})
+    with pytest.raises(SceneError, match="because table moves: no closed form has its blows"):
+        chutelab.simulate(scene, engine="exact")
+    assert chutelab.simulate(scene).engine == "contact"
+    moved = {"plate.shake.by": [0.001, 0.0], "plate.shake.frequency": 20.0}
+    recording = chutelab.simulate("perpendicular", moved)
+    assert recording.engine == "contact"
+    assert recording.prediction.reason.item().endswith("plate moves")
+    with pytest.raises(ValueError, match="did you mean table"):
+        chutelab.simulate(scene).pose("tabel", [0.0])
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"shake": {"by": [0, 0.1]}}, "surface[0].shake.frequency is missing"),
+        ({"shake": {"by": [0, 0.1], "frequency": 0.0}}, "surface[0].shake.frequency = 0.0"),
+        ({"shake": {"by": 3, "frequency": 5.0}}, "surface[0].shake.by = 3"),
+        ({"shake": 3}, "surface[0].shake = 3"),
+        ({"travel": {"to": [0, 0], "at": -1.0, "in": 1.0}}, "surface[0].travel.at = -1.0"),
+        ({"travel": {"to": [0, 0], "in": 0.0}}, "surface[0].travel.in = 0.0"),
+        ({"travel": {"to": [0, 0], "in": 1.0, "for": 2}}, "surface[0].travel.for"),
+        ({"turn": "fast"}, 'surface[0].turn = "fast"'),
+        ({"turn": 1e6}, "surface[0].turn = 1000000.0"),
+        ({"pivot": [0, 0]}, "surface[0].pivot = [0, 0]: is for what moves: give turn or travel"),
+    ],
+)
+def test_bad_input_is_told_with_key_value_and_what_is_allowed(keys, said):
+    with pytest.raises(SceneError) as told:
+        chutelab.load(table(**keys))
+    assert said in str(told.value)

@@ -43,6 +43,7 @@ static double press(Contact *c) {
         y -= b->vy - b->uy;
     }
     double opens = x * c->nx + y * c->ny;
+    if (c->hung) opens += swung_open(c);
     double given = (c->need - c->gives * c->impulse[0] - opens) * c->eases;
     double normal = MAX(c->impulse[0] + MIN(given, (c->most - opens) * c->mass[0]), 0);
     double change[3] = {normal - c->impulse[0], 0, 0};
@@ -166,8 +167,10 @@ static void lessen(Contact *list, int count) {
         none += J[1] * (u[1] + c->drift) + J[2] * u[2] - J[0] * MIN(c->need, c->most);
         all += J[1] * (v[1] + c->drift) + J[2] * v[2] + J[0] * (v[0] - u[0] - asks(c));
     }
+    if (W.swings_too) lean_on_hinges(&none, &all);
     if (!(all > 0)) return;
     double less = none < 0 ? all / (all - none) : 1;
+    if (W.swings_too) lessen_hinges(less);
     for (int n = 0; n < count; n++) {
         for (int k = 0; k < 3; k++) list[n].impulse[k] += more[k] = -less * list[n].impulse[k];
         push(list + n, more);
@@ -177,6 +180,7 @@ static void lessen(Contact *list, int count) {
 /* Start from impulses of the step before, as far as they lower the cost: where contacts have opened,
    what had been pressed between others would throw disks out. */
 static void start_warm(Contact *list, int count) {
+    if (W.swings_too) start_hinges(0);
     for (int n = 0; n < count; n++) push(list + n, list[n].impulse);
     lessen(list, count);
 }
@@ -194,7 +198,7 @@ static double sweep(Contact *list, int count, int sweeps, int plain, double accu
                last one surfaces come last, which do not give way. */
             int to = (sweeps - n) % 2;
             Contact *c = list + (to ? m : count - 1 - m), *last = c;
-            for (many = 1; c->j < 0 && m + many < count; many++, last += to ? 1 : -1)
+            for (many = 1; c->j < 0 && !W.swings_too && m + many < count; many++, last += to ? 1 : -1)
                 if ((to ? last + 1 : last - 1)->i != c->i || (to ? last + 1 : last - 1)->j >= 0) break;
             if (!to) c = last;
             double change = many > 1 ? press_corner(c, many) : press(c);
@@ -205,6 +209,7 @@ static double sweep(Contact *list, int count, int sweeps, int plain, double accu
             if (many > 1) press_corner(c, many);
             worst = MAX(worst, change);
         }
+        if (W.swings_too) worst = MAX(worst, turn_hinges());
         W.sweep_count++;
         if (n == 0) first = worst;
         if (worst <= accurate) return worst;
@@ -308,6 +313,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
             }
             c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
         }
+        if (W.swings_too) start_hinges(1);
         left -= !stalled;
     }
 }
@@ -369,6 +375,12 @@ static void sort_by_islands(void) {
     }
     for (int n = 0; n < W.contact_count; n++)
         if (W.contacts[n].two) parent[island_of(W.contacts[n].i)] = island_of(W.contacts[n].j);
+    /* What touches hinges is one island. */
+    for (int n = 0, hung = -1; n < W.contact_count && W.hinges; n++) {
+        if (!W.contacts[n].hung) continue;
+        if (hung >= 0) parent[island_of(W.contacts[n].i)] = island_of(hung);
+        hung = W.contacts[n].i;
+    }
     /* Of each island a list of its contacts, which begins with its last. */
     for (int n = W.contact_count - 1; n >= 0; n--) {
         int k = island_of(W.contacts[n].i);
@@ -392,7 +404,7 @@ static void sort_by_islands(void) {
 /* Note by how much the step's impulses break their law: the kinetic energy after them, less that
    before, plus that of the change itself, is at most what moving surfaces give and what the contacts
    ask for. What is on its left is summed over disks, what is on its right over contacts. */
-static void check_energy(void) {
+static void check_energy(int solves_hinges) {
     double gained = 0;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
@@ -408,23 +420,29 @@ static void check_energy(void) {
         relative(c, 1, u);
         gained -= J[0] * (u[0] + asks(c)) - J[1] * c->drift + J[2] * c->other[2];
         gained -= c->two ? 0 : J[0] * c->other[0] + J[1] * c->other[1];
+        if (c->hung) gained += hinge_share(c);
     }
+    if (solves_hinges) gained += gained_by_hinges();
     W.gained += MAX(gained, 0);
 }
 
 void solve_contacts(void) {
+    int swings = 0;
     if (W.interact) sort_by_islands();
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0;
         int driven = 0;
+        W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
             const Disk *a = W.disks + c->i, *b = W.disks + (c->j >= 0 ? c->j : c->i);
             least = MIN(least, MIN(a->radius, b->radius));
             heaviest = MAX(heaviest, MAX(a->mass, b->mass));
             driven |= !c->two && c->other[1] - c->moved[1] != 0;
+            W.swings_too |= c->hung > 0;
         }
+        swings |= W.swings_too;
         /* A drive presses as hard as it must: there no spring would hold, and friction is lowered. */
         for (int n = from; n < to; n++) {
             Contact *c = W.contacts + n;
@@ -449,6 +467,7 @@ void solve_contacts(void) {
         if (W.interact) lessen(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);
-    check_energy();
+    W.swings_too = swings;
+    check_energy(swings);
     W.solve_count++;
 }

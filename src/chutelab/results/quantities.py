@@ -436,11 +436,11 @@ def measured(recording: Record, name: str) -> Floats:
             return np.array([float(getattr(reading(recording, sensor), key))])
         case ["loads", surface, part, statistic]:
             return np.array([getattr(load(recording, surface).part(part), statistic)])
-        case ["ledger", "by_surface", surface, "belt_work" | "drive_work" as entry] if not (
+        case ["ledger", "by_surface", surface, entry] if not recording.family:
+            return np.array([ledger(recording).by_surface[surface].get(entry, 0.0)])
+        case ["ledger", *_, "drive_work" | "damper_loss"] | ["ledger", "spring", _] if (
             recording.family
         ):
-            return np.array([ledger(recording).by_surface[surface].get(entry, 0.0)])
-        case ["ledger", *_, "drive_work"]:
             return np.zeros(many)
         case ["ledger", "by_surface", surface, entry]:
             return paid(recording, surface, entry)

@@ -27,7 +27,7 @@ EXPORTS = (
 """What a host can call."""
 
 FLAGS = (
-    "-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O3", "-flto", "-Wall",
+    "-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O3", "-msimd128", "-flto", "-Wall",
     "-Wextra", "-Werror", "-ffp-contract=off", "-fvisibility=hidden",
     *(f"-Wl,--export={name}" for name in EXPORTS), "-Wl,--strip-all",
 )  # fmt: skip

@@ -26,33 +26,20 @@ the chord: by less than this where r < ρ/6."""
 
 @dataclass(frozen=True, eq=False)
 class Releases:
-    """Start of each particle, read-only arrays.
+    """Start of each particle, read-only arrays of N rows."""
 
-    Attributes
-    ----------
-    t : ndarray, (N,)
-        s, ascending.
-    position, velocity : ndarray, (N, 2)
-        m, m/s.
-    carried : ndarray of bool, (N,)
-        Rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation.
-    stream : ndarray of int, (N,)
-        Whose it is: particles of the first stream come first, then those of the next.
-    kind : ndarray of int, (N,)
-        Its row in the machine's tables of pairs; of a family each has a row of its own.
-    exit_box : ndarray, (N, 4)
-        Left, bottom, right and top beyond which it has left the scene, m. With gravity only the
-        bottom is finite: what flies up comes back. What is released below all surfaces, or hangs on
-        a string, has not left: the box holds releases, too. Where particles do not meet it holds
-        each one's own alone, so that a particle does the same alone and with others.
-    """
-
-    t: Floats
+    t: Floats  # s, ascending
+    # (N, 2), m and m/s
     position: Floats
     velocity: Floats
+    # rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation
     carried: Bools
-    stream: Ints
-    kind: Ints
+    stream: Ints  # its number: particles of the first stream come first, then those of the next
+    kind: Ints  # its row in the machine's tables of pairs; of a family each has a row of its own
+    # (N, 4), m: left, bottom, right and top of where it is in the scene. With gravity only the
+    # bottom is finite: what flies up comes back. What is released below all surfaces, or hangs on a
+    # string, has not left: the box holds releases, too. Where particles do not meet it holds each
+    # one's own alone, so that a particle does the same alone and with others
     exit_box: Floats
 
     def __post_init__(self) -> None:

@@ -285,7 +285,7 @@ class Trial:
         return self.recording is not None and not self.trouble and stopped(self.recording) is None
 
 
-def trial(machine: Machine, engine: str) -> Trial:
+def trial_run(machine: Machine, engine: str) -> Trial:
     """Run a machine until it ends, or its time is up.
 
     Raises a `SceneError` if the engine that the scene asks for cannot run it.

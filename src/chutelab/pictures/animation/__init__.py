@@ -42,7 +42,6 @@ from chutelab.pictures.animation.actors import (
 )
 from chutelab.pictures.animation.moments import Moment, asked, film, slowness, span
 from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_scene, style, window_of
-from chutelab.pictures.plots.look import figures, say
 from chutelab.pictures.plots.panels import path_of_arcs
 from chutelab.pictures.plots.scenery import (
     FINE,
@@ -55,7 +54,7 @@ from chutelab.pictures.plots.scenery import (
     strobe_step,
     track_times,
 )
-from chutelab.pictures.plots.style import Picture
+from chutelab.pictures.plots.style import Picture, figures, say
 from chutelab.results import Recording
 from chutelab.util.errors import MissingLibraryError
 from chutelab.util.files import whole
@@ -531,7 +530,7 @@ def animate(
     comment : str, optional
         A text that a GIF keeps, not shown.
 
-    Colours and language are those of `plots.look`.
+    Colours and language are those of `plots.style`.
 
     Returns
     -------

@@ -20,7 +20,6 @@ from PIL import ImageDraw, ImageFont
 
 from chutelab.machine import Arcs, Machine, Pieces
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.look import figures, say
 from chutelab.pictures.plots.machinery import (
     LEAST,
     WHITE,
@@ -44,6 +43,7 @@ from chutelab.pictures.plots.scenery import (
     strobe_times,
     track_times,
 )
+from chutelab.pictures.plots.style import figures, say
 from chutelab.results import Recording
 from chutelab.util.arrays import Bools, Floats, Ints
 

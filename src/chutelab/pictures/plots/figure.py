@@ -20,7 +20,6 @@ from matplotlib.transforms import Bbox
 
 from chutelab.pictures import BLUE, GREEN, ORANGE, VERMILION
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.look import figures, say, spoken
 from chutelab.pictures.plots.machinery import draw_bodies, draw_scene, halo, stream_handles
 from chutelab.pictures.plots.panels import (
     Arc,
@@ -48,7 +47,7 @@ from chutelab.pictures.plots.scenery import (
     strobe_times,
     window_of,
 )
-from chutelab.pictures.plots.style import Picture
+from chutelab.pictures.plots.style import Picture, figures, say, spoken
 from chutelab.results import Kind, Recording
 from chutelab.results.loads import borne
 from chutelab.results.quantities import prediction as predicted

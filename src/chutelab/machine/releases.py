@@ -106,13 +106,13 @@ def squeeze(
         begin, end = top[lag:], np.minimum(leaves[:-lag], leaves[lag:])
         if (begin >= leaves[:-lag]).all():
             break
-        mine, its, reach = rho[:-lag], rho[lag:], radii[:-lag] + radii[lag:]
-        waits_for = np.hypot(belt.speed * (begin - top[:-lag]), mine - its) < reach
+        rho_a, rho_b, reach = rho[:-lag], rho[lag:], radii[:-lag] + radii[lag:]
+        waits_for = np.hypot(belt.speed * (begin - top[:-lag]), rho_a - rho_b) < reach
         angle = belt.speed * np.array(
-            [(now - top[:-lag]) / mine - (now - begin) / its for now in (begin, end)]
+            [(now - top[:-lag]) / rho_a - (now - begin) / rho_b for now in (begin, end)]
         )
         angle = np.where(angle[1] > 0.0, angle.min(axis=0), 0.0)
-        apart = np.hypot(mine - its, 2.0 * np.sqrt(mine * its) * np.sin(0.5 * angle))
+        apart = np.hypot(rho_a - rho_b, 2.0 * np.sqrt(rho_a * rho_b) * np.sin(0.5 * angle))
         found = np.where((begin < end) & ~waits_for, reach - apart, 0.0)
         depth[:-lag] = np.maximum(depth[:-lag], found)
         depth[lag:] = np.maximum(depth[lag:], found)

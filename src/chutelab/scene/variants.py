@@ -104,10 +104,7 @@ def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
 def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
     """Return numbers, with or without unit, in the SI unit, and which that is; "" if none is there.
 
-    Raises
-    ------
-    InputError
-        If one is none; it says `form`, what is allowed.
+    Raises an `InputError` if one is none; it says `form`, what is allowed.
     """
     values, units = [], set()
     for part in parts:

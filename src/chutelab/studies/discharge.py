@@ -104,10 +104,8 @@ def side_by_side(
     Plate, surfaces and the outgoing belt are left out of it. The bed is as deep as the layers of
     the first stream with half a particle below and above.
 
-    Raises
-    ------
-    DischargeError
-        Of a scene without an incoming belt, or whose first stream is not released on it.
+    Raises a `DischargeError` for a scene without an incoming belt, or whose first stream is not
+    released on it.
     """
     whole = load(scene)
     if (belt := whole.incoming) is None:

@@ -170,11 +170,11 @@ def _beyond_walls(scene: Scene, machine: Machine) -> Iterator[Advice]:
         if stream.fill is None:
             continue
         low, high = np.array(stream.fill)
-        mine = starts.position[starts.stream == number]
+        own = starts.position[starts.stream == number]
         parts, blocked = _parts(low, high, ends)
-        column, row = np.clip((mine - low) / (high - low) * CELLS, 0, CELLS - 1).astype(int).T
+        column, row = np.clip((own - low) / (high - low) * CELLS, 0, CELLS - 1).astype(int).T
         counts = np.bincount(parts[row, column], minlength=CELLS * CELLS)
-        outside = len(mine) - counts.max()
+        outside = len(own) - counts.max()
         if not outside:
             continue
         held = counts[parts] > 0
@@ -185,7 +185,7 @@ def _beyond_walls(scene: Scene, machine: Machine) -> Iterator[Advice]:
         }
         path = f"{scene.head('stream', number)}.fill"
         yield Advice(
-            f"{path} reaches through {' and '.join(sorted(names))}: {outside} of {len(mine)}"
+            f"{path} reaches through {' and '.join(sorted(names))}: {outside} of {len(own)}"
             " particles start beyond",
             f"if it is meant, leave it; or a smaller {path}, or fewer particles",
             {},

@@ -122,14 +122,14 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
         times = times[np.abs(share - np.rint(share)) < 1e-6]
     if len(times) > BALANCES:
         times = times[np.linspace(0, len(times) - 1, BALANCES).astype(int)]
-    books = e.recording.energy_at(times)
+    balance = e.recording.energy_at(times)
     first, _ = e.recording.ends()
     index = np.flatnonzero(e.recording.released)
     brought = np.sum(e.recording.energies(first, index), axis=0)
     brought = brought[np.argsort(first["t"], kind="stable")]
     entered = np.searchsorted(np.sort(first["t"]), times, side="right")
     start = np.concatenate([[0.0], np.cumsum(brought)])[entered]
-    gain = books["kinetic"] + books["potential"] - start - books["belt_work"]
+    gain = balance["kinetic"] + balance["potential"] - start - balance["belt_work"]
     rise = gain - np.minimum.accumulate(gain)
     at = int(np.argmax(rise))
     b = e.bounds

@@ -139,9 +139,9 @@ def overlay(
         draw_losses(panels[2], recording)
     else:
         draw_velocity(panels[0], recording, parts, start)
-    books = draw_ledger(panels[1], recording, details=details)
+    drawn_ledger = draw_ledger(panels[1], recording, details=details)
     figure.legend(
-        *books.get_legend_handles_labels(),
+        *drawn_ledger.get_legend_handles_labels(),
         loc="lower center",
         bbox_to_anchor=(0.8075, 0.005),
         ncols=3,

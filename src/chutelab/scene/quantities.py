@@ -317,6 +317,30 @@ def _row(name: str, surfaces: Collection[str]) -> Quantity | None:
     return row if all(table in surfaces for table in row.needs) else None
 
 
+def every(surfaces: Collection[str], count: int) -> Iterator[Quantity]:
+    """Yield all quantities of a scene that are of its whole run, in the order of the registry.
+
+    Of several particles what each has is told by mean and standard deviation.
+
+    >>> [row.name for row in every(["incoming"], 200)][:2]
+    ['separation.t.mean', 'separation.t.spread']
+    """
+    for row in REGISTRY.values():
+        names = [row.name]
+        if "SURFACE" in row.name:
+            names = [row.name.replace("SURFACE", one) for one in surfaces]
+        if "SENSOR" in row.name:
+            sensors = [one for one in surfaces if one.startswith("sensor.")]
+            names = [row.name.replace("sensor.SENSOR", one) for one in sensors]
+        if count > 1 and row.of in ("nominal", "lone"):
+            continue
+        if count > 1 and row.of == "particle":
+            names = [f"{name}.{statistic}" for name in names for statistic in BOTH]
+        for name in names:
+            if found := lookup(name, surfaces):
+                yield found
+
+
 def whose(row: Quantity, count: int) -> str:
     """Say how a name has to tell which of several particles it means; "" if it does.
 

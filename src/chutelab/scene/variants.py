@@ -201,6 +201,34 @@ def count_of(varies: Sequence[Vary], most: float = inf) -> int:
     return total
 
 
+MOST_SEEDS: Final = 1000
+"""Runs of one scene with other seeds; the error of their mean falls with the root of it only."""
+
+
+def reseeded(scene: Scene, number: int) -> Scene:
+    """Return a scene that draws anew: `number` is added to the seed of each stream."""
+    if not number:
+        return scene
+    paths = [f"stream[{n}].seed" for n in range(len(scene.streams))]
+    if len(paths) == 1:
+        paths = ["stream.seed"]
+    seeds = [(stream.seed + number) % 2**63 for stream in scene.streams]
+    return scene.with_values(dict(zip(paths, seeds, strict=True)))
+
+
+def drawn(scene: Scene, repeat: int, keys: Sequence[str] = ()) -> None:
+    """Refuse a number of seeds that there cannot be, or of a scene in which nothing is drawn.
+
+    Raises an `InputError`; `keys` are those that vary.
+    """
+    typed = f"--repeat {repeat}"
+    if not 1 <= repeat <= MOST_SEEDS:
+        raise InputError(f"must be a whole number from 1 to {MOST_SEEDS}", typed)
+    several = scene.count > len(scene.streams) or any(key.endswith("count") for key in keys)
+    if repeat > 1 and not several:
+        raise InputError("nothing is drawn of a lone particle: all seeds give the same", typed)
+
+
 def reason(error: SceneError) -> str:
     """Return the faults of a scene without its file, in one line."""
     return "; ".join(str(fault) for fault in error.faults)

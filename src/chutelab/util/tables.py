@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from html import escape
 from importlib import import_module
-from math import isfinite
+from math import floor, inf, isfinite, log10
 from textwrap import wrap
 from typing import Any
 
@@ -173,6 +173,23 @@ def number(value: float) -> str:
     ('0.298', '-', '0')
     """
     return f"{value + 0.0:.6g}" if isfinite(value) else "-"
+
+
+def plus_minus(value: float, error: float) -> str:
+    """Return a value with its uncertainty, to the digits that mean something.
+
+    >>> plus_minus(0.62134, 0.00213), plus_minus(1.9, 0.0)
+    ('0.6213 ± 0.0021', '1.9 ± 0')
+    """
+    return f"{rounded(value, error)} ± {rounded(error, error)}"
+
+
+def rounded(value: float, error: float) -> str:
+    """Return a value to the second digit of its uncertainty."""
+    if not 0.0 < error < inf:
+        return f"{value:.9g}"
+    digits = max(0, 1 - floor(log10(float(f"{error:.1e}"))))
+    return f"{value:.{digits}f}" if digits < 10 else f"{value:.4g}"
 
 
 def many(count: int, what: str, style: str = "") -> str:

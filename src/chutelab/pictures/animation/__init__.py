@@ -244,7 +244,9 @@ class Stage:
             top = layout.view[1] + layout.view[3] - 0.06
             axes = self.figure.add_axes((0.765, 0.43, 0.225, top - 0.43))
             table = self.figure.add_axes((0.73, 0.125, 0.26, 0.245))
-            blocks, column = bars(axes, table, energies(recording, times))
+            blocks, column = bars(
+                axes, table, energies(recording, times), moves=bool(recording.machine.movers)
+            )
             self.moving += blocks
             self.writings += column
         self.canvas.draw()

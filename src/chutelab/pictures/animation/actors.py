@@ -329,10 +329,13 @@ def stacks(balance: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Flo
     return put_in, {name: np.maximum(-values, 0.0) for name, values in signed.items()}
 
 
-def bars(ax: Axes, table: Axes, balance: dict[str, Floats]) -> tuple[list[Moving], list[Writing]]:
+def bars(
+    ax: Axes, table: Axes, balance: dict[str, Floats], *, moves: bool = False
+) -> tuple[list[Moving], list[Writing]]:
     """Return the blocks of two stacked bars on `ax`, and a column of figures on `table`.
 
-    The ledger is as for `stacks`; the highest bar sets the scale.
+    The ledger is as for `stacks`; the highest bar sets the scale. Where a surface `moves`, what
+    belts and drives do is one block.
     """
     sides = stacks(balance)
     highest = float(np.max(sum(sides[0].values())))
@@ -362,9 +365,10 @@ def bars(ax: Axes, table: Axes, balance: dict[str, Floats]) -> tuple[list[Moving
         shown = [round(factor * value, 1) + 0.0 for value in balance[name].tolist()]
         if name == "residual" and not any(shown):
             continue
+        told = "drives" if moves and name == "belt_work" else name
         said = [figures(value, ".1f") for value in shown]
         table.add_patch(Rectangle((0.0, row + 0.2), 0.05, 0.6, color=style.ENERGY[name]))
-        table.text(0.08, row + BASE, say(f"ledger-{name}"), fontsize=style.SMALL)
+        table.text(0.08, row + BASE, say(f"ledger-{told}"), fontsize=style.SMALL)
         right, up = table.transData.transform((1.0, row + BASE))
         place = right, ax.figure.bbox.height - up
         writings.append(Writing(style.SMALL, ax.figure.dpi, *place, "rs", said))

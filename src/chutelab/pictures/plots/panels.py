@@ -299,7 +299,10 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
         linewidth=0.0,
     )
     (line,) = ax.plot(times, factor * supplied, color=style.INK, lw=1.6, gid="supplied")
-    line.set(linestyle=(0, (4, 1.5)), label=say("supplied"))
+    line.set(
+        linestyle=(0, (4, 1.5)),
+        label=say("supplied-drives" if recording.machine.movers else "supplied"),
+    )
     residual = float(balance["residual"][-1])
     title = say("ledger")
     if details or abs(residual) > SHOWN * np.abs(supplied).max():

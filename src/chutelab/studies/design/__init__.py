@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike
 
 from chutelab.scene import AnyScene, Scene, load
 from chutelab.scene.variants import Varied, refuse_texts
+from chutelab.studies.design import roots
 from chutelab.studies.design.answers import Answer, Goal, Solution
 from chutelab.studies.design.evaluation import (
     Evaluator,
@@ -40,7 +41,7 @@ from chutelab.studies.design.evaluation import (
     value,
 )
 from chutelab.studies.design.evaluation import target as wish
-from chutelab.studies.design.roots import CLOSE, Scan, level, minima, roots, scan
+from chutelab.studies.design.roots import CLOSE, Scan, level, minima
 from chutelab.studies.design.uncertainty import Uncertainty, uncertainty
 from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
@@ -254,7 +255,7 @@ class _Search:
     def scan(self) -> Scan:
         """Return the whole range of the only key."""
         (one,) = self.ranges
-        return scan(self.evaluate, one.low, one.high, self.points)
+        return roots.scan(self.evaluate, one.low, one.high, self.points)
 
     def roots(self) -> Solution:
         """Solve for one key and one target."""
@@ -264,7 +265,7 @@ class _Search:
             left, right = self.evaluate([[x]]).values[0]
             return float(left - right)
 
-        at, everywhere, jumps, nearest = roots(seen, function)
+        at, everywhere, jumps, nearest = roots.roots(seen, function)
         own = one.start if one.start is not None else one.low
         edges = {x for change in seen.changes for x in (change.low, change.high)}
         answers = [self.answer([x], "change" if x in edges else "inside") for x in at]

@@ -18,10 +18,11 @@ from chutelab.cli import console
 from chutelab.cli.console import RefusedError, progress, tell
 from chutelab.cli.options import (
     PICTURES,
-    Count,
     Engine,
     FileName,
     Folder,
+    Jobs,
+    Repeat,
     SceneName,
     Texts,
     beginning,
@@ -161,7 +162,8 @@ def sweep(
     resume: bool,
     plot: Path | None,
     of: Annotated[str, complete_column] = "landing.vx.mean",
-    jobs: Annotated[int, Count(min=0)] = 1,
+    repeat: Repeat = 1,
+    jobs: Jobs = 1,
     scheduler: str | None,
     json_: bool,
     quiet: bool,
@@ -184,6 +186,11 @@ def sweep(
     goes on after it is not in it. With --set run.until=settled it is, as it always is in belt_work
     and slip_heat, of chutelab solve and with --uncertainty.
 
+    With --repeat columns are means over the seeds, NAME.error is the standard error of NAME, and
+    pictures have bars.
+
+    chutelab sweep stream --vary plate.angle_deg=0:40:5 --repeat 12 --jobs 0 --plot angle.png
+
     --vary KEY=FROM:TO:COUNT  A key of the scene and its values, such as plate.angle_deg=0:60:61 or
         incoming.speed=2,4. May be repeated: all combinations are simulated.
     --uncertainty KEY=VALUE±SPREAD  Instead of --vary: what is not exactly known, such as
@@ -197,8 +204,6 @@ def sweep(
     --resume  Go on with an interrupted sweep that was to write this file.
     --plot FILE  Draw one or two varied keys into this file: lines, or a heat map.
     --of COLUMN  What to draw. [default]
-    --jobs N  Spread the work over N processes; 0 is one for each processor.
-    --scheduler ADDRESS  Spread it over a Dask cluster instead.
     --json  Print one JSON object with all columns.
     -q, --quiet  Print no summary and no progress bar.
     """
@@ -220,8 +225,10 @@ def sweep(
     if resume and out is None:
         raise click.UsageError("--resume goes on with the file of --out: give --out too.")
     if uncertainty:
-        if resume or scheduler is not None or jobs != 1:
-            raise click.UsageError("--resume, --jobs and --scheduler go with --vary only.")
+        if resume or scheduler is not None or jobs != 1 or repeat != 1:
+            raise click.UsageError(
+                "--resume, --repeat, --jobs and --scheduler go with --vary only."
+            )
         from chutelab.studies.design.uncertainty import SAMPLES, as_dict
         from chutelab.studies.design.uncertainty import uncertainty as propagate
 
@@ -248,7 +255,10 @@ def sweep(
     check_file("--plot", plot, PICTURES)
     check_file("--out", out)
     try:
-        plan = planned(loaded, variations, sample=sample, design=design, seed=seed, engine=engine)
+        plan = planned(
+            loaded, variations, sample=sample, design=design, seed=seed, engine=engine,
+            repeat=repeat,
+        )  # fmt: skip
         several = sum(len(set(one.values)) > 1 for one in plan.varies)
         if plot is not None and several > 2:
             raise RefusedError(f"--plot draws one or two varied keys, not {several}")

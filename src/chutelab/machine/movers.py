@@ -77,6 +77,15 @@ class Mover:
         x, y = (self.by[n] * swing + self.way[n] * pace for n in (0, 1))
         return np.stack([x, y, np.full_like(t, self.turn)], axis=-1)
 
+    def velocity_at(self, place: ArrayLike, t: float) -> Floats:
+        """Return the velocity, m/s, (2,), of its point that is at `place`, (2,), m, at `t`, s.
+
+        It is that of the pivot and ω x r, r from the pivot to the place.
+        """
+        (x, y, _), (vx, vy, omega) = self.pose(t), self.velocity(t)
+        px, py = np.asarray(place)
+        return np.array([vx - omega * (py - y), vy + omega * (px - x)])
+
     def carried(self, places: ArrayLike, times: ArrayLike) -> Floats:
         """Return where it carries places (..., 2), m, as written, at times (...,), s."""
         pose, off = self.pose(times), np.asarray(places) - np.array(self.pivot)

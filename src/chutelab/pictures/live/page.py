@@ -111,7 +111,7 @@ def html(
         "version": own_version(),
         "language": language,
         "packed": _packed(json.dumps(large, separators=(",", ":")).encode()),
-        "wasm": _packed((core / "core.wasm").read_bytes()),
+        "wasm": _packed((core / "page.wasm").read_bytes()),
     }
     # Within a script element nothing but an end tag must look like one.
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)

@@ -11,7 +11,7 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -30,13 +30,11 @@ from types import ModuleType
 from typing import Any, Final
 
 from chutelab.scene import AnyScene
-from chutelab.scene.quantities import COLUMNS
 from chutelab.scene.variants import Varied
 from chutelab.studies.sweep.part import unfinished
 from chutelab.studies.sweep.plan import Plan, planned, swept
 from chutelab.studies.sweep.rows import (
     REASON,
-    TEXTS,
     Columns,
     Sweep,
     format_of,
@@ -88,7 +86,9 @@ class Crew:
     ) -> None:
         self.executor, self.ahead, self.anew, self.alive = executor, ahead, anew, alive
 
-    def results(self, work: Callable[[Any], Any], jobs: Iterable[Job]) -> Iterator[tuple[int, Any]]:
+    def results(
+        self, work: Callable[[Any], Any], jobs: Iterable[Job]
+    ) -> Generator[tuple[int, Any], None, None]:
         """Yield the number of each job and what came of it, as they are finished.
 
         A `LostWorkersError` if processes keep dying, or a cluster is lost.
@@ -96,9 +96,20 @@ class Crew:
         if self.executor is None:
             yield from ((number, work(job)) for number, job in jobs)
             return
+        running: dict[Future[Any], int] = {}
+        try:
+            yield from self._results(work, jobs, running)
+        finally:
+            for future in running:  # The caller wants no more.
+                future.cancel()
+
+    def _results(
+        self, work: Callable[[Any], Any], jobs: Iterable[Job], running: dict[Future[Any], int]
+    ) -> Iterator[tuple[int, Any]]:
+        """Yield what the executor's processes have done; `running` has what they have not."""
+        assert self.executor is not None
         left, deaths = iter(jobs), 0
         given: dict[int, Any] = {}  # jobs that are not done, by number
-        running: dict[Future[Any], int] = {}
         while True:
             try:
                 for number, job in islice(left, self.ahead - len(running)):
@@ -124,7 +135,8 @@ class Crew:
                     ) from None
                 self.executor.shutdown(wait=False)
                 self.executor = self.anew()
-                left, given, running = chain(list(given.items()), left), {}, {}
+                left, given = chain(list(given.items()), left), {}
+                running.clear()
 
 
 @contextmanager
@@ -300,6 +312,7 @@ def sweep(
     design: str = "lhs",
     seed: int = 0,
     engine: str | None = None,
+    repeat: int = 1,
     jobs: int = 1,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -322,6 +335,9 @@ def sweep(
         Latin hypercube or Sobol points, and the seed.
     engine : {"auto", "exact", "contact", "pymunk"}, optional
         Overrides the scene's ``run.engine``.
+    repeat : int
+        Run each variant with so many seeds, the same for all: columns are means then, and
+        ``NAME.error`` is the standard error of each.
     jobs : int
         Processes to spread the work over; 0 is one for each processor.
     executor : concurrent.futures.Executor, optional
@@ -345,7 +361,10 @@ def sweep(
     >>> swept.columns["landing.vx.mean"]
     array([ 0., -1., -2.])
     """
-    plan = planned(scene, varies, sample=sample, design=design, seed=seed, engine=engine)
+    plan = planned(
+        scene, varies, sample=sample, design=design, seed=seed, engine=engine,
+        repeat=repeat,
+    )  # fmt: skip
     with ExitStack() as stack:
         team = Crew(executor, AHEAD) if executor else stack.enter_context(crew(jobs))
         return swept_by(plan, team, progress=progress)
@@ -385,7 +404,7 @@ def sweep_to(
         result = _gathered(plan, blocks)
         with writing(out):
             if form == "csv":
-                write_csv((*plan.keys, *COLUMNS, *TEXTS), texts, out)
+                write_csv(plan.columns, texts, out)
             else:
                 write(result.columns, out, form)
             synced(out)
@@ -415,4 +434,5 @@ def _gathered(plan: Plan, blocks: Sequence[Columns]) -> Sweep:
         columns=joined(blocks),
         shape=None if plan.samples is not None else tuple(len(v.values) for v in plan.varies),
         settled=plan.scene.run.until == "settled",
+        repeat=plan.repeat,
     )

@@ -206,7 +206,6 @@ class Palette {
     const scenery = new Scenery(view, this.words);
     scenery.draw(machine, scene);
     drawn.append(scenery.layer);
-    drawn.classList.toggle("fine", machine.arcs.length > 40);
     machine.releases.slice(0, MOST_BALLS).forEach(({ x, y, stream, t }, i) => {
       if (t > 0.5) return;
       drawn.append(svg("circle", { cx: view.px(x), cy: view.py(y), class: `kind-${stream % 5}`,

@@ -28,6 +28,10 @@ const STRANDS = 4.5;
 /** Thickness of plates in that of belts. */
 const PLATE = 1.4;
 
+/** Thickness of walls, px: least, most, as a share of the picture's height, and of the smallest
+ * bend's radius, so that there is room between pegs. */
+const WALL = [0.8, 4.5, 0.02, 0.4];
+
 /** Pixels of radius from which on a pulley has spokes; and from one roller to the next. */
 const SPOKED = 9, ROLLERS = 128;
 
@@ -42,6 +46,7 @@ class Scenery {
   ground: any;
   scale: any;
   thick = 6;
+  wide = WALL[1];
 
   constructor(readonly view: View, readonly words: Words) {
     this.ground = svg("g", { class: "ground", "aria-hidden": "true" });
@@ -52,6 +57,9 @@ class Scenery {
   draw(machine: Machine, scene: Scene | undefined) {
     const { height } = this.view, [least, most, share] = THICK;
     this.thick = Math.min(most, Math.max(least, share * height));
+    const bend = machine.arcs.reduce((small, arc) => Math.min(small, arc.radius), Infinity);
+    this.wide = Math.max(WALL[0],
+      Math.min(WALL[1], WALL[2] * height, WALL[3] * bend * this.view.scale));
     this.layer.replaceChildren();
     this.moving = [];
     this.gates = [];
@@ -293,7 +301,7 @@ class Scenery {
   bend(arc: Arc) {
     const group = svg("g", { class: "part" });
     if (arc.speed) group.append(this.band(this.arcPath(arc), arc.speed));
-    else group.append(svg("path", { d: this.arcPath(arc), class: "wall" }));
+    else group.append(this.line(this.arcPath(arc)));
     return group;
   }
 
@@ -342,11 +350,12 @@ class Scenery {
   wall({ x, y, tx, ty, length }: Segment) {
     const { view } = this, group = svg("g", { class: "part" });
     const end = [x + tx * length, y + ty * length];
-    group.append(svg("path", {
-      d: `M${view.px(x)} ${view.py(y)}L${view.px(end[0])} ${view.py(end[1])}`, class: "wall",
-    }));
+    group.append(this.line(`M${view.px(x)} ${view.py(y)}L${view.px(end[0])} ${view.py(end[1])}`));
     return group;
   }
+
+  /** A wall along a path, px. */
+  line = (d: string) => svg("path", { d, class: "wall", "stroke-width": this.wide });
 }
 
 /** The way of a belt round two wheels, clockwise from the left one's top, px. */

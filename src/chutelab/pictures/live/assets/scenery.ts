@@ -35,6 +35,9 @@ const WALL = [0.8, 4.5, 0.02, 0.4];
 /** Pixels of radius from which on a pulley has spokes; and from one roller to the next. */
 const SPOKED = 9, ROLLERS = 128;
 
+/** Where little should move, only the particles do. */
+const CALM = matchMedia("(prefers-reduced-motion: reduce)");
+
 /** What moves with the time that is shown: cleats, or a wheel that turns. */
 type Moving = { element: any, speed: number, x?: number, y?: number, radius?: number };
 type Gate = { element: any, appears: number, vanishes: number };
@@ -113,9 +116,7 @@ class Scenery {
   /** Move what moves to a time, s. */
   turn(t: number) {
     const { scale } = this.view;
-    // Where little should move, only the particles do.
-    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    for (const { element, speed, x, y, radius } of calm ? [] : this.moving) {
+    for (const { element, speed, x, y, radius } of CALM.matches ? [] : this.moving) {
       if (radius === undefined) {
         element.setAttribute("stroke-dashoffset", String(-((speed * t * scale) % PITCH)));
       } else {

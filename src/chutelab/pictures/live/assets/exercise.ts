@@ -57,10 +57,7 @@ class Questions {
   }
 
   button(id: string, text: string, act: () => void, kind: string = "") {
-    const made = html("button", { type: "button", class: kind }, text);
-    if (id) made.id = id;
-    made.addEventListener("click", act);
-    return made;
+    return html("button", { class: kind, ...(id ? { id } : {}), click: act }, text);
   }
 
   /** Have the machine with a student's numbers say what is right. */

@@ -2,7 +2,7 @@
 
 import { Callout } from "./callout.ts";
 import { Menu } from "./menu.ts";
-import { SensorsPanel } from "./sensors.ts";
+import { SensorsPanel } from "./flow.ts";
 import { start } from "./page.ts";
 import { Palette } from "./palette.ts";
 import { html } from "./panels.ts";

@@ -43,9 +43,6 @@ const WALL = [0.8, 4.5, 0.02, 0.4];
 /** Pixels of radius from which on a pulley has spokes; and from one roller to the next. */
 const SPOKED = 9, ROLLERS = 128;
 
-/** Where little should move, only the particles do. */
-const CALM = matchMedia("(prefers-reduced-motion: reduce)");
-
 /** What moves with the time that is shown: cleats, or a wheel that turns. */
 type Moving = { element: any, speed: number, x?: number, y?: number, radius?: number };
 type Gate = { element: any, appears: number, vanishes: number };
@@ -58,6 +55,8 @@ class Scenery {
   scale: any;
   thick = 6;
   wide = WALL[1];
+  /** Where little should move, only the particles do. */
+  calm = matchMedia("(prefers-reduced-motion: reduce)");
 
   constructor(readonly view: View, readonly words: Words) {
     this.ground = svg("g", { class: "ground", "aria-hidden": "true" });
@@ -122,7 +121,7 @@ class Scenery {
   /** Move what moves to a time, s. */
   turn(t: number) {
     const { scale } = this.view;
-    for (const { element, speed, x, y, radius } of CALM.matches ? [] : this.moving) {
+    for (const { element, speed, x, y, radius } of this.calm.matches ? [] : this.moving) {
       if (radius === undefined) {
         element.setAttribute("stroke-dashoffset", String(-((speed * t * scale) % PITCH)));
       } else {

@@ -8,7 +8,8 @@
   symbols; particle 0 and the theory.
 - `stream`: a stream as a whole: flow, fates, steady power, the envelope of its paths.
 - `laws`: what every run is judged by.
-- `sensors`: what passes lines across a stream; `loads`: what surfaces bear, in bins of time.
+- `sensors`: what passes lines across a stream; `loads`: what surfaces bear, in bins of time;
+  `wear`: what strikes and rubs them, piece by piece.
 - `summary`: notes, tables, and the JSON object of ``chutelab run --json``.
 - `storage`: recordings as files.
 
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from chutelab.results.laws import Broken
     from chutelab.results.ledger import Ledger
     from chutelab.results.loads import Load
+    from chutelab.results.wear import Wear
     from chutelab.theory import Transfer
 
 
@@ -101,6 +103,19 @@ class Recording(Record):
         from chutelab.results.loads import loads
 
         return loads(self, surface, every)
+
+    def wear(
+        self,
+        surface: str,
+        pieces: int = 50,
+        *,
+        erosion: float | None = None,
+        abrasion: float | None = None,
+    ) -> Wear:
+        """Return what strikes and rubs a surface, piece by piece; see `results.wear.worn`."""
+        from chutelab.results.wear import worn
+
+        return worn(self, surface, pieces, erosion=erosion, abrasion=abrasion)
 
     def summary(self) -> dict[str, Any]:
         """Return what ``chutelab run --json`` prints; see `results.summary.summary`."""

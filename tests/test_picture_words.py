@@ -9,8 +9,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from chutelab import scene
-from chutelab.classroom.lessons import find
-from chutelab.classroom.lessons.reading import scene_of
+from chutelab.classroom.lessons import find, scene_of
 from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.pictures import plots

@@ -13,7 +13,7 @@ from shared import find
 # A page without `eval` cannot be waited for by a condition; a run is shown some frames after it is
 # there, or is as far as it may go.
 DONE = """() => new Promise((resolve, reject) => {
-  const end = performance.now() + 20000;
+  const end = performance.now() + 120000;
   const under = ({ engine, machine, recording: { state, now, shift } }) =>
     state === "running" && !(machine.interact && now - shift >= engine.until);
   const look = () => {

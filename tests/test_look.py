@@ -12,8 +12,7 @@ from chutelab import scene
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.pictures import plots
-from chutelab.pictures.animation import Stage, animate, film
-from chutelab.pictures.animation.stage import lay_out
+from chutelab.pictures.animation import Stage, animate, film, lay_out
 from chutelab.pictures.plots import look, style
 from chutelab.pictures.plots.figure import sensors
 from chutelab.results import Recording

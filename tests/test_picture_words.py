@@ -14,9 +14,8 @@ from chutelab.classroom.lessons.reading import scene_of
 from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.pictures import plots
-from chutelab.pictures.animation import Stage, film
+from chutelab.pictures.animation import Stage, film, lay_out
 from chutelab.pictures.animation.moments import asked, slowness, span
-from chutelab.pictures.animation.stage import lay_out
 from chutelab.pictures.plots import look
 from chutelab.pictures.plots.figure import sensors
 from chutelab.util.words import STRINGS

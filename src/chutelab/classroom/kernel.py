@@ -91,18 +91,11 @@ class ForgedError(ValueError):
 
 @dataclass(frozen=True)
 class Ran:
-    """What became of a notebook.
+    """What became of a notebook."""
 
-    Attributes
-    ----------
-    tasks
-        What `report` in `classroom.exercises.catalogue` gave, unchecked: student's code ran there.
-    trouble
-        What went wrong, or empty; of errors the first.
-    """
-
+    # what `report` in `classroom.exercises.catalogue` gave, unchecked: student's code ran there
     tasks: object
-    trouble: str
+    trouble: str  # what went wrong, or empty; of errors the first
 
 
 def run(cells: Sequence[str | None], time_limit: float) -> Ran:

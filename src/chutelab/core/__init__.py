@@ -146,10 +146,7 @@ class Module:
     def work(self, name: str) -> None:
         """Call a function that may take more memory; it makes all views of arrays invalid.
 
-        Raises
-        ------
-        MemoryError
-            If there is no more to be had.
+        Raises a `MemoryError` if there is no more to be had.
         """
         done = self.call(name)
         self._look()

@@ -135,12 +135,8 @@ def build(
 def build_notebook(lesson: Lesson, folder: Path | None = None) -> Built:
     """Make the notebook of a lesson, unless it is there already.
 
-    Raises
-    ------
-    LessonError
-        If a cell of the lesson's own belongs to no step.
-    OSError
-        If the file cannot be written.
+    Raises a `LessonError` if a cell of the lesson's own belongs to no step; an `OSError` if the
+    file cannot be written.
     """
     text = notebook_of(lesson)
     path = (lesson.folder if folder is None else folder) / name_of(lesson.language)
@@ -267,10 +263,7 @@ def name_of(language: str) -> str:
 def notebook_of(lesson: Lesson) -> str:
     """Return the text of a lesson's notebook, JSON: its steps, in the lesson's language.
 
-    Raises
-    ------
-    LessonError
-        If a cell of ``notebook.py`` belongs to no step.
+    Raises a `LessonError` if a cell of ``notebook.py`` belongs to no step.
     """
     said = words(lesson.language)
     say, own, exercise = said.say, _own(lesson), EXERCISES.get(lesson.name)

@@ -314,12 +314,8 @@ _PACKED: Final = ("imsmanifest.xml", "index.html", "scorm.js")
 def package(lesson: Lesson, path: str | Path) -> Path:
     """Write the SCORM 1.2 package of a lesson, in its language: a zip file, whole or not at all.
 
-    Raises
-    ------
-    LessonError
-        If the lesson has no live page with an exercise, which is what is in the package.
-    OSError
-        If it cannot be written.
+    Raises a `LessonError` if the lesson has no live page with an exercise, which is what is in the
+    package; an `OSError` if it cannot be written.
     """
     if lesson.page is None or lesson.name not in EXERCISES:
         text = "a package is a live page with an exercise, and it has none"
@@ -372,12 +368,8 @@ def write_wheel(folder: Path) -> Path:
     and of what the installer keeps: no network, no tools for building. The form is that of the
     binary distribution format, PEP 427. The same chutelab gives the same bytes.
 
-    Raises
-    ------
-    MissingLibraryError
-        If chutelab is not installed, so that nothing says what it needs.
-    OSError
-        If it cannot be written.
+    Raises a `MissingLibraryError` if chutelab is not installed, so that nothing says what it needs;
+    an `OSError` if it cannot be written.
     """
     try:
         installed = distribution("chutelab")

@@ -374,10 +374,7 @@ def _machines(lesson: Lesson) -> tuple[Callable[[Mapping[str, Any]], Scene], Map
 def machine_of(lesson: Lesson, step: Step, row: Row | None = None) -> Scene:
     """Load the machine of a step, or of a row of its table.
 
-    Raises
-    ------
-    SceneError
-        With all faults of the scene and the settings.
+    Raises a `SceneError` with all faults of the scene and the settings.
     """
     return _machines(lesson)[0]({**step.set, **(row.set if row else {})})
 

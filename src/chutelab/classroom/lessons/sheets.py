@@ -222,12 +222,8 @@ class PrintError(MissingLibraryError):
 def printed(lesson: Lesson, which: str, kind: str) -> bytes:
     """Return one of the `SHEETS` of a lesson as a file of one of `FORMATS`, in its language.
 
-    Raises
-    ------
-    LessonError
-        If the lesson has no such sheet.
-    PrintError
-        If it is to be a PDF, and the extra that sets it is not installed.
+    Raises a `LessonError` if the lesson has no such sheet; a `PrintError` if it is to be a PDF, and
+    the extra that sets it is not installed.
     """
     markdown = sheet(lesson, which)
     if kind == "md":

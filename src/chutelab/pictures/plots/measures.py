@@ -10,10 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.look import named, say
 from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.scenery import window_of
-from chutelab.pictures.plots.style import Picture
+from chutelab.pictures.plots.style import Picture, named, say
 from chutelab.results import Recording
 from chutelab.results.fields import NAMES, Fields
 from chutelab.results.wear import KEYS, Wear, touched

@@ -20,11 +20,20 @@ from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
 from chutelab.machine.parts import Thread
-from chutelab.pictures.animation import Moment, Stage, animate, film, moments
-from chutelab.pictures.animation import stage as video
+from chutelab.pictures import animation as video
+from chutelab.pictures.animation import (
+    TRAIL,
+    Moment,
+    Stage,
+    animate,
+    film,
+    lay_out,
+    moments,
+    palette,
+    write_gif,
+)
 from chutelab.pictures.animation.actors import SIGNS
 from chutelab.pictures.animation.moments import sentence, slowness, span
-from chutelab.pictures.animation.stage import TRAIL, lay_out, palette, write_gif
 from chutelab.pictures.plots import Window, style, window_of
 from chutelab.results import Kind
 from chutelab.results.recorder import Recorder
@@ -845,7 +854,8 @@ def test_films_and_the_still_can_be_chosen(tmp_path):
     pytest.importorskip("imageio_ffmpeg")
     arguments = ["--only", "json,gif,strobe", "--format", "mp4"]
     files, out = ["lesson.mp4", "strobe.png", "summary.json"], tmp_path / "out"
-    result = CliRunner().invoke(main, ["run", "perpendicular", "--out", str(out), *arguments])
+    short = ["run", "perpendicular", "--set", "run.until=0.2"]
+    result = CliRunner().invoke(main, [*short, "--out", str(out), *arguments])
     assert result.exit_code == 0, result.output
     assert all(name in result.output.partition("wrote into")[2] for name in files)
     assert sorted(path.name for path in out.iterdir()) == files

@@ -365,6 +365,22 @@ def test_a_picture_holds_what_turns_and_a_film_draws_it_where_it_is():
     assert drawn.get_xydata() == pytest.approx(np.array([[0.0, -0.5], [0.0, 0.5]]), abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    "moves", [{"shake": {"by": [0.01, 0.02], "frequency": 5.0}}, {"turn": 60.0}]
+)
+def test_a_film_tells_a_blows_restitution_against_what_moves(moves):
+    from chutelab.pictures.animation.moments import sentence
+
+    scene = table(restitution=0.6, stream={"at": [0.2, 0.45]}, **moves)
+    recording = chutelab.simulate(scene)
+    blows = recording.select("impact")[:2]
+    assert len(blows) == 2
+    for blow in blows:
+        said = sentence(recording, blow)
+        assert "ε = 0.6\n" in said
+        assert "from the drive" in said
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_random_machines_keep_the_laws(seed):
     sound(chutelab.simulate(drawn(seed)))

@@ -58,6 +58,10 @@ SHARED = """
 --json  Print one JSON object instead of tables.
 --language LANGUAGE  Of the texts: en, or de where they are translated; the rest is in English.
     [default]
+--repeat N  Run with N seeds, those of the streams plus 0 to N - 1, the same for all variants: every
+    number is a mean ± its standard error, s / √N.
+--jobs N  Spread the work over N processes; 0 is one for each processor.
+--scheduler ADDRESS  Spread it over a Dask cluster instead.
 -q, --quiet  Print nothing, and show no progress bar.
 """
 """Options of several commands."""
@@ -207,6 +211,8 @@ Texts = tuple[str, ...]
 SceneName = Annotated[str, complete_scene]
 Engine = Literal["auto", "exact", "contact", "pymunk"] | None
 Seconds = Annotated[float, Number(min=0.0, min_open=True)]
+Jobs = Annotated[int, Count(min=0)]
+Repeat = Annotated[int, Count(min=1)]
 Folder = Annotated[Path | None, FolderName()]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import click
 from click.shell_completion import CompletionItem
 
-from chutelab.cli.console import RefusedError, progress, say, show_json
+from chutelab.cli.console import RefusedError, progress, say, show_json, tell
 from chutelab.cli.console import show as show_parts
 from chutelab.cli.options import (
     Engine,
     Folder,
+    Jobs,
+    Repeat,
     SceneName,
     Seconds,
     Texts,
@@ -26,13 +28,14 @@ from chutelab.cli.options import (
     write_json,
 )
 from chutelab.util.errors import InputError
-from chutelab.util.files import writing
+from chutelab.util.files import write_lines, writing
 from chutelab.util.tables import wrapped
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from chutelab.results import Recording
+    from chutelab.scene import Scene
     from chutelab.studies.accuracy import Accuracy, Wanted
 
 KINDS = {
@@ -46,6 +49,7 @@ KINDS = {
     "strobe": ("strobe.png",),
     "sensors": ("sensors.csv", "sensors.png"),
     "loads": ("loads.csv", "loads.png"),
+    "wear": ("wear.csv", "wear.png"),
 }
 """What ``--only`` takes, and the files it stands for."""
 
@@ -55,7 +59,7 @@ LOADS = 0.01
 FILMS = ("gif", "mp4", "webm")
 """Kinds of the lesson picture; ``--format`` chooses one."""
 
-PICTURED = {*FILMS, "png", "strobe", "sensors"}
+PICTURED = {*FILMS, "png", "strobe", "sensors", "loads", "wear"}
 """Kinds in which something is drawn."""
 
 USUAL = ("png", "gif", "csv", "npz", "json")
@@ -79,7 +83,7 @@ class Output:
     film, and a film that cannot be written here.
 
     --out DIR  Write pictures, tables and the recording into this folder.
-    --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe,sensors,loads;
+    --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe,sensors,loads,wear;
         without, the first 5, but no events.csv of more than 100,000 events. May be repeated.
     --format  With --out: the lesson picture as this instead of a GIF; mp4 and webm need the extra
         chutelab[video].
@@ -182,6 +186,11 @@ class Output:
 
                     recording.to_csv(folder, only=["loads"])
                     loads(recording).write(folder / "loads.png")
+                elif kind == "wear":
+                    from chutelab.pictures.plots.measures import wear
+
+                    recording.to_csv(folder, only=["wear"])
+                    wear(recording).write(folder / "wear.png")
                 elif kind == "npz":
                     recording.save(path)
                 else:
@@ -269,6 +278,8 @@ def run(
     set_: Texts,
     output: Output,
     partial: bool,
+    repeat: Repeat | None,
+    jobs: Jobs = 1,
 ) -> None:
     """Simulate SCENE, a scene file or the name of a shipped one, and print a summary.
 
@@ -284,6 +295,12 @@ def run(
     A run that --max-seconds ends counts as a run: its summary and files are of what was recorded,
     particles that had not ended have "stopped" as their end, and the exit code is 0. Ctrl-C ends a
     run the same way: with --out its files are written, and the exit code is 130.
+
+    With --repeat N seeds run, each quantity is told as mean ± standard error, and --out has
+    repeats.csv, a row for each seed, repeats.png and repeats.json. After --max-seconds no further
+    seed begins.
+
+    chutelab run stream --repeat 12 --jobs 0
 
     --accuracy A  Choose engine and step so that errors are at most this: relative, such as 1e-6, or
         a length, such as 1mm; say what was reached.
@@ -304,6 +321,13 @@ def run(
             wanted = parse(accuracy)
         except InputError as error:
             raise click.BadParameter(str(error), param_hint="'--accuracy'") from error
+    if repeat is not None and (partial or accuracy or output.only or output.format_):
+        raise click.UsageError(
+            "--repeat tells many runs by their numbers: --accuracy, --partial, --only and --format"
+            " are for one."
+        )
+    if jobs != 1 and repeat is None:
+        raise click.UsageError("--jobs spreads the runs of --repeat N: give --repeat too.")
     if partial and output.out is None:
         raise click.UsageError("--partial keeps files of --out DIR: give --out too.")
     if max_seconds is not None and accuracy is not None:
@@ -317,6 +341,9 @@ def run(
     if max_seconds is not None:
         # The time limit includes reading the scene.
         max_seconds = max(max_seconds - (perf_counter() - began), 1e-9)
+    if repeat is not None:
+        _repeated(loaded, repeat, jobs, max_seconds, output)
+        return
     reached: Accuracy | None = None
     stuck, interrupted = "", None
     with destination(output.out, output.files) as folder:
@@ -352,6 +379,33 @@ def run(
     if stuck:
         raise click.ClickException(stuck)
     output.end(recording)
+
+
+REPEATED = ("repeats.csv", "repeats.png", "repeats.json")
+
+
+def _repeated(
+    scene: Scene, count: int, jobs: int, max_seconds: float | None, output: Output
+) -> None:
+    """Run a scene with many seeds; exit with 1 if some have no numbers that can be believed."""
+    from chutelab.studies.repeats import repeat
+
+    with destination(output.out, REPEATED) as folder:
+        with progress(f"simulating {count} seeds", quiet=output.quiet, left=True) as update:
+            limit = inf if max_seconds is None else max_seconds
+            found = repeat(scene, count, jobs=jobs, max_seconds=limit, progress=update)
+        if folder is not None:
+            from chutelab.pictures.plots import look
+            from chutelab.pictures.plots.studies import repeats
+
+            write_lines(folder / REPEATED[0], [found.csv()])
+            with look(dark=output.dark, language=output.language):
+                repeats(found).write(folder / REPEATED[1])
+            write_json(found.as_dict(), folder / REPEATED[2])
+    wrote = f"wrote into {output.out}: {', '.join(REPEATED)}" if output.out else ""
+    tell(found.as_dict(), found, as_json=output.json_, quiet=output.quiet, wrote=wrote)
+    if found.faults:
+        click.get_current_context().exit(1)
 
 
 @command("Print the summary of a recording.npz; make its files again.")

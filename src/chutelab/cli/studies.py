@@ -1,4 +1,4 @@
-"""``sweep``, ``solve``, ``compare``, ``discharge``: variants, the right one, film and formulas."""
+"""``sweep``, ``solve``, ``compare``, ``discharge``, ``field``: variants, film, formulas, fields."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ from chutelab.cli.options import (
     Engine,
     FileName,
     Folder,
+    Jobs,
+    Repeat,
     SceneName,
     Texts,
     beginning,
@@ -33,7 +35,7 @@ from chutelab.cli.options import (
     write_json,
 )
 from chutelab.util.errors import InputError
-from chutelab.util.files import write_lines, writing
+from chutelab.util.files import csv_lines, write_lines, writing
 
 if TYPE_CHECKING:
     from chutelab.scene.variants import Vary
@@ -161,7 +163,8 @@ def sweep(
     resume: bool,
     plot: Path | None,
     of: Annotated[str, complete_column] = "landing.vx.mean",
-    jobs: Annotated[int, Count(min=0)] = 1,
+    repeat: Repeat = 1,
+    jobs: Jobs = 1,
     scheduler: str | None,
     json_: bool,
     quiet: bool,
@@ -184,6 +187,11 @@ def sweep(
     goes on after it is not in it. With --set run.until=settled it is, as it always is in belt_work
     and slip_heat, of chutelab solve and with --uncertainty.
 
+    With --repeat columns are means over the seeds, NAME.error is the standard error of NAME, and
+    pictures have bars.
+
+    chutelab sweep stream --vary plate.angle_deg=0:40:5 --repeat 12 --jobs 0 --plot angle.png
+
     --vary KEY=FROM:TO:COUNT  A key of the scene and its values, such as plate.angle_deg=0:60:61 or
         incoming.speed=2,4. May be repeated: all combinations are simulated.
     --uncertainty KEY=VALUE±SPREAD  Instead of --vary: what is not exactly known, such as
@@ -197,8 +205,6 @@ def sweep(
     --resume  Go on with an interrupted sweep that was to write this file.
     --plot FILE  Draw one or two varied keys into this file: lines, or a heat map.
     --of COLUMN  What to draw. [default]
-    --jobs N  Spread the work over N processes; 0 is one for each processor.
-    --scheduler ADDRESS  Spread it over a Dask cluster instead.
     --json  Print one JSON object with all columns.
     -q, --quiet  Print no summary and no progress bar.
     """
@@ -220,8 +226,10 @@ def sweep(
     if resume and out is None:
         raise click.UsageError("--resume goes on with the file of --out: give --out too.")
     if uncertainty:
-        if resume or scheduler is not None or jobs != 1:
-            raise click.UsageError("--resume, --jobs and --scheduler go with --vary only.")
+        if resume or scheduler is not None or jobs != 1 or repeat != 1:
+            raise click.UsageError(
+                "--resume, --repeat, --jobs and --scheduler go with --vary only."
+            )
         from chutelab.studies.design.uncertainty import SAMPLES, as_dict
         from chutelab.studies.design.uncertainty import uncertainty as propagate
 
@@ -248,7 +256,10 @@ def sweep(
     check_file("--plot", plot, PICTURES)
     check_file("--out", out)
     try:
-        plan = planned(loaded, variations, sample=sample, design=design, seed=seed, engine=engine)
+        plan = planned(
+            loaded, variations, sample=sample, design=design, seed=seed, engine=engine,
+            repeat=repeat,
+        )  # fmt: skip
         several = sum(len(set(one.values)) > 1 for one in plan.varies)
         if plot is not None and several > 2:
             raise RefusedError(f"--plot draws one or two varied keys, not {several}")
@@ -529,4 +540,77 @@ def discharge(
             write_json(found.as_dict(), place / names[1])
     wrote = f"wrote into {out}: {', '.join(names)}" if out else ""
     title = Text(found.scene.title, style="bold")
+    tell(found.as_dict(), title, found.sheet(), as_json=json_, wrote=wrote)
+
+
+@command("Tell density, velocity, temperature and stress of a crowd on a grid.")
+def field(
+    scene: SceneName,
+    *,
+    of: Texts,
+    between: str = "",
+    width: float | None,
+    cell: float | None,
+    samples: Annotated[int, Count(1)] = 50,
+    vtk: bool,
+    set_: Texts,
+    engine: Engine,
+    out: Folder,
+    json_: bool,
+) -> None:
+    """Run SCENE, and tell what its particles are as a continuum: fields on a grid.
+
+    Coarse graining: each particle is spread by Lucy's kernel, which ends at its width, and means
+    are taken over a window of time. The table tells the least, mean and largest value of each
+    field; pictures show them on the machine. The fields: density, vx, vy, speed, temperature
+    (granular), pressure, sxx, sxy, syx, syy (stress; compression is negative). Stress is of the
+    fluctuations and of blows; that of lasting contacts is left out, and the table says how much of
+    all impulses these are.
+
+    chutelab field hopper --between 0.6,1 --of speed --of density --out out
+    chutelab field stream --width 4cm --cell 5mm --vtk --out out
+
+    --of FIELD  Which field to draw; default: speed. May be repeated.
+    --between T,T  The window of time, s; default: all of the run.
+    --width M  Where the kernel ends, m; default: three mean diameters.
+    --cell M  Edge of a cell, m; default: a quarter of the width.
+    --samples N  At how many times of the window tracks are looked at. [default]
+    --vtk  With --out: also fields.vti, for ParaView; needs pip install "chutelab[vtk]".
+    --out DIR  Write a picture of each field asked for, and fields.csv, into this folder.
+    """
+    from rich.text import Text
+
+    from chutelab.engines.simulation import simulate
+    from chutelab.results.fields import NAMES, fields, need_vtk
+
+    wanted = dict.fromkeys(of or ("speed",))
+    for name in wanted:
+        if name not in NAMES:
+            raise InputError(f"one of {', '.join(NAMES)}", "--of", name)
+    if (of or vtk) and out is None:
+        raise click.UsageError("--of and --vtk are for files: give --out DIR too.")
+    if vtk:
+        need_vtk()
+    try:
+        window = [float(part) for part in between.split(",")] if between else [None, None]
+        begin, end = window
+    except ValueError:
+        raise InputError("two times such as 0.5,1.2, in s", "--between", between) from None
+    loaded = loaded_as_told(scene, set_, engine)
+    names = [*(f"field-{name}.png" for name in wanted), "fields.csv", *["fields.vti"] * vtk]
+    with destination(out, names) as place:
+        with progress("simulating"):
+            recording = simulate(loaded)
+        with progress("spreading"):
+            found = fields(recording, begin, end, samples=samples, width=width, cell=cell)
+        if place is not None:
+            from chutelab.pictures.plots.measures import field as draw
+
+            for name in wanted:
+                draw(recording, found, name).write(place / f"field-{name}.png")
+            write_lines(place / "fields.csv", csv_lines(found.rows()))
+            if vtk:
+                found.write_vtk(place / "fields.vti")
+    wrote = f"wrote into {out}: {', '.join(names)}" if out else ""
+    title = Text(recording.title, style="bold")
     tell(found.as_dict(), title, found.sheet(), as_json=json_, wrote=wrote)

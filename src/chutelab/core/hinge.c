@@ -358,8 +358,8 @@ void hang_on(Contact *c, const Mover *m, const Disk *d) {
     c->lever[2] = 1;
     c->turning = m->turn;
     for (int n = 0; n < 3; n++) {
-        c->light[n] += square(c->lever[n]) * turn;
-        c->mass[n] = 1 / c->light[n];
+        double light = c->mass[n] > 0 ? 1 / c->mass[n] : 0;
+        c->mass[n] = 1 / (light + square(c->lever[n]) * turn);
     }
 }
 
@@ -400,17 +400,17 @@ double hinge_share(const Contact *c) {
    restitution it might, where the blow itself turns the slip round (T. R. Kane and D. A. Levinson, Dynamics,
    1985, sec. 5.7); so it is no more than what brings the slip to the opposite of what it was. */
 double couple(const Contact *c, double wanted, double slip, double *tangent) {
-    double both = c->lever[0] * c->lever[1] / hinge_of(c)->inertia, normal = wanted / c->light[0];
+    double both = c->lever[0] * c->lever[1] / hinge_of(c)->inertia, normal = wanted * c->mass[0];
     *tangent = 0;
     for (int n = 0; n < ROUNDS; n++) {
         double most = c->friction * normal, free = slip + both * normal;
-        double holds = -free / c->light[1], gives = -(2 * slip + both * normal) / c->light[1];
+        double holds = -free * c->mass[1], gives = -(2 * slip + both * normal) * c->mass[1];
         holds = MIN(MAX(holds, -most), most);
         if (both != 0) holds = MIN(MAX(holds, MIN(gives, 0)), MAX(gives, 0));
         double last = *tangent;
         *tangent = holds;
         if (both == 0 || holds == last) break;
-        normal = MAX((wanted - both * *tangent) / c->light[0], 0);
+        normal = MAX((wanted - both * *tangent) * c->mass[0], 0);
     }
     return normal;
 }

@@ -190,7 +190,7 @@ static void give(Contact *c, double normal) {
     J[0] = normal;
     J[1] = more[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
     if (c->hung) {
-        J[0] = more[0] = couple(c, normal * c->light[0], u[1] + c->drift, J + 1);
+        J[0] = more[0] = couple(c, normal / c->mass[0], u[1] + c->drift, J + 1);
         more[1] = J[1];
     }
     J[2] = 0;

@@ -145,6 +145,15 @@ class Mover:
         turn = self.hinge.at(t)[1] if self.hinge else np.full_like(t, self.turn)
         return np.stack([x, y, turn], axis=-1)
 
+    def velocity_at(self, place: ArrayLike, t: float) -> Floats:
+        """Return the velocity, m/s, (2,), of its point that is at `place`, (2,), m, at `t`, s.
+
+        It is that of the pivot and ω x r, r from the pivot to the place.
+        """
+        (x, y, _), (vx, vy, omega) = self.pose(t), self.velocity(t)
+        px, py = np.asarray(place)
+        return np.array([vx - omega * (py - y), vy + omega * (px - x)])
+
     def carried(self, places: ArrayLike, times: ArrayLike) -> Floats:
         """Return where it carries places (..., 2), m, as written, at times (...,), s."""
         pose, off = self.pose(times), np.asarray(places) - np.array(self.pivot)

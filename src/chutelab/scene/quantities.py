@@ -155,6 +155,14 @@ LOADS: Final = {
 }
 """What a surface bears: unit and meaning."""
 
+WEAR: Final = {
+    "impact": "energy that blows on SURFACE lose along the normal",
+    "sliding": "slip heat on SURFACE",
+    "erosion": "Finnie's m v² f(γ) of blows on SURFACE",
+    "abrasion": "Archard's load times sliding distance on SURFACE",
+}
+"""What wears a surface, see `results.wear`."""
+
 PARTS: Final = {"mean": "mean over time", "peak": "largest of a bin", "rms": "root mean square"}
 
 
@@ -183,6 +191,11 @@ REGISTRY: Final = {
             for part, about in LOADS.items()
             for statistic in PARTS
             for row in _load(part, *about, statistic)
+        ),
+        *(
+            Quantity(f"wear.SURFACE.{part}.{which}", "J", f"{meaning}, {said}", "run", (), "scene")
+            for part, meaning in WEAR.items()
+            for which, said in (("sum", "all of it"), ("peak", "largest of 50 pieces"))
         ),
         Quantity("flight.t", "s", "time of flight from the incoming belt",
                  needs=("incoming",), symbol="t"),
@@ -309,7 +322,9 @@ def _row(name: str, surfaces: Collection[str]) -> Quantity | None:
     row = REGISTRY.get(name)
     if row is None or "SURFACE" in name or "SENSOR" in name:
         parts = name.split(".")
-        place = {"impact": 1, "sensor": 1, "loads": 1, "ledger": 2}.get(parts[0], len(parts))
+        place = {"impact": 1, "sensor": 1, "loads": 1, "wear": 1, "ledger": 2}.get(
+            parts[0], len(parts)
+        )
         any_ = "SENSOR" if parts[0] == "sensor" else "SURFACE"
         surface = parts[place] if place < len(parts) else ""
         row = REGISTRY.get(".".join([*parts[:place], any_, *parts[place + 1 :]]))
@@ -319,6 +334,30 @@ def _row(name: str, surfaces: Collection[str]) -> Quantity | None:
             return None
         row = row._replace(name=name, meaning=row.meaning.replace(any_, surface))
     return row if all(table in surfaces for table in row.needs) else None
+
+
+def every(surfaces: Collection[str], count: int) -> Iterator[Quantity]:
+    """Yield all quantities of a scene that are of its whole run, in the order of the registry.
+
+    Of several particles what each has is told by mean and standard deviation.
+
+    >>> [row.name for row in every(["incoming"], 200)][:2]
+    ['separation.t.mean', 'separation.t.spread']
+    """
+    for row in REGISTRY.values():
+        names = [row.name]
+        if "SURFACE" in row.name:
+            names = [row.name.replace("SURFACE", one) for one in surfaces]
+        if "SENSOR" in row.name:
+            sensors = [one for one in surfaces if one.startswith("sensor.")]
+            names = [row.name.replace("sensor.SENSOR", one) for one in sensors]
+        if count > 1 and row.of in ("nominal", "lone"):
+            continue
+        if count > 1 and row.of == "particle":
+            names = [f"{name}.{statistic}" for name in names for statistic in BOTH]
+        for name in names:
+            if found := lookup(name, surfaces):
+                yield found
 
 
 def whose(row: Quantity, count: int) -> str:

@@ -40,23 +40,13 @@ NUMBERS: Final = "must be a list of numbers, or of texts such as 4 mm"
 
 @dataclass(frozen=True)
 class Vary:
-    """A key of the scene and the values it takes.
+    """A key of the scene and the values it takes."""
 
-    Attributes
-    ----------
-    key : str
-        Full path of the key, such as ``plate.angle_deg`` or ``surface.hood.speed``.
-    values : tuple of float
-        In the order they are gone through; in the key's unit.
-    typed : str
-        What messages call it; by default as on the command line.
-    unit : str
-        The unit that was written with the values, "" for none; `quantity` refuses a wrong one.
-    """
-
-    key: str
-    values: tuple[float, ...]
+    key: str  # full path of the key, such as plate.angle_deg or surface.hood.speed
+    values: tuple[float, ...]  # in the order they are gone through; in the key's unit
+    # what messages call it; by default as on the command line
     typed: str = field(default="", compare=False)
+    # the unit that was written with the values, "" for none; `quantity` refuses a wrong one
     unit: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -114,10 +104,7 @@ def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
 def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
     """Return numbers, with or without unit, in the SI unit, and which that is; "" if none is there.
 
-    Raises
-    ------
-    InputError
-        If one is none; it says `form`, what is allowed.
+    Raises an `InputError` if one is none; it says `form`, what is allowed.
     """
     values, units = [], set()
     for part in parts:
@@ -214,6 +201,34 @@ def count_of(varies: Sequence[Vary], most: float = inf) -> int:
     return total
 
 
+MOST_SEEDS: Final = 1000
+"""Runs of one scene with other seeds; the error of their mean falls with the root of it only."""
+
+
+def reseeded(scene: Scene, number: int) -> Scene:
+    """Return a scene that draws anew: `number` is added to the seed of each stream."""
+    if not number:
+        return scene
+    paths = [f"stream[{n}].seed" for n in range(len(scene.streams))]
+    if len(paths) == 1:
+        paths = ["stream.seed"]
+    seeds = [(stream.seed + number) % 2**63 for stream in scene.streams]
+    return scene.with_values(dict(zip(paths, seeds, strict=True)))
+
+
+def drawn(scene: Scene, repeat: int, keys: Sequence[str] = ()) -> None:
+    """Refuse a number of seeds that there cannot be, or of a scene in which nothing is drawn.
+
+    Raises an `InputError`; `keys` are those that vary.
+    """
+    typed = f"--repeat {repeat}"
+    if not 1 <= repeat <= MOST_SEEDS:
+        raise InputError(f"must be a whole number from 1 to {MOST_SEEDS}", typed)
+    several = scene.count > len(scene.streams) or any(key.endswith("count") for key in keys)
+    if repeat > 1 and not several:
+        raise InputError("nothing is drawn of a lone particle: all seeds give the same", typed)
+
+
 def reason(error: SceneError) -> str:
     """Return the faults of a scene without its file, in one line."""
     return "; ".join(str(fault) for fault in error.faults)
@@ -265,18 +280,10 @@ class Judge:
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """N scenes that differ in plain numbers only: a batch, of which each is a row of numbers.
+    """N scenes that differ in plain numbers only: a batch, of which each is a row of numbers."""
 
-    Attributes
-    ----------
-    scene : Scene
-        One of them, validated: what does not vary is its.
-    columns : mapping of str to ndarray, (N,)
-        The numbers of each key that varies, by its full path.
-    """
-
-    scene: Scene
-    columns: Mapping[str, Floats]
+    scene: Scene  # one of them, validated: what does not vary is its
+    columns: Mapping[str, Floats]  # the numbers of each key that varies, by its full path
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))

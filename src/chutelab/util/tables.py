@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from html import escape
 from importlib import import_module
-from math import isfinite
+from math import floor, inf, isfinite, log10
 from textwrap import wrap
 from typing import Any
 
@@ -31,32 +31,17 @@ STYLES = {"ok": "green", "FAILED": "bold red"}
 
 @dataclass(frozen=True)
 class Sheet:
-    """A table of words and numbers.
+    """A table of words and numbers."""
 
-    Attributes
-    ----------
-    title : str
-        What it shows, with units; "" for none.
-    columns : tuple of str
-        Heads, "" where a column needs none.
-    rows, foot : tuple of tuple of str
-        Cells; those of the foot stand below a line. The first line of a cell of several is bold.
-        A row of one cell is a heading over the rows that follow.
-    texts : int
-        How many columns hold words; the others hold numbers and are set to the right.
-    tail : int
-        How many columns at the end hold words again.
-    notes : tuple of str
-        Sentences below the table.
-    """
-
-    title: str
-    columns: tuple[str, ...]
+    title: str  # what it shows, with units; "" for none
+    columns: tuple[str, ...]  # heads, "" where a column needs none
+    # cells; those of the foot stand below a line. The first line of a cell of several is bold. A
+    # row of one cell is a heading over the rows that follow
     rows: tuple[tuple[str, ...], ...]
     foot: tuple[tuple[str, ...], ...] = ()
-    texts: int = 1
-    tail: int = 0
-    notes: tuple[str, ...] = ()
+    texts: int = 1  # how many columns hold words; the others hold numbers and are set to the right
+    tail: int = 0  # how many columns at the end hold words again
+    notes: tuple[str, ...] = ()  # sentences below the table
 
     def __rich__(self) -> Any:
         """Return what rich prints: title, table and notes, a blank line between the parts."""
@@ -188,6 +173,23 @@ def number(value: float) -> str:
     ('0.298', '-', '0')
     """
     return f"{value + 0.0:.6g}" if isfinite(value) else "-"
+
+
+def plus_minus(value: float, error: float) -> str:
+    """Return a value with its uncertainty, to the digits that mean something.
+
+    >>> plus_minus(0.62134, 0.00213), plus_minus(1.9, 0.0)
+    ('0.6213 ± 0.0021', '1.9 ± 0')
+    """
+    return f"{rounded(value, error)} ± {rounded(error, error)}"
+
+
+def rounded(value: float, error: float) -> str:
+    """Return a value to the second digit of its uncertainty."""
+    if not 0.0 < error < inf:
+        return f"{value:.9g}"
+    digits = max(0, 1 - floor(log10(float(f"{error:.1e}"))))
+    return f"{value:.{digits}f}" if digits < 10 else f"{value:.4g}"
 
 
 def many(count: int, what: str, style: str = "") -> str:

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from chutelab.machine import Machine
 from chutelab.pictures.plots import Window
-from chutelab.pictures.plots.look import figures, named, say
 from chutelab.pictures.plots.scenery import STRUCK, action, flow, nominal, one_of_many
-from chutelab.pictures.plots.style import quantity
+from chutelab.pictures.plots.style import figures, named, quantity, say
 from chutelab.results import PARTICLES, Kind, Recording
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -71,7 +70,14 @@ def sentence(recording: Recording, event: Any) -> str:
     if kind not in (Kind.IMPACT, Kind.LANDING) or event["normal_impulse"] == 0.0:
         return text
     normal = contact_normal(recording.machine, event)
-    into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
+    # Relative to the surface, where it is touched.
+    mover, own = recording.machine.mover(int(event["surface"])), np.zeros(2)
+    if mover is not None:
+        radius = np.broadcast_to(recording.machine.particle.radius, recording.count)[by]
+        own = mover.velocity_at(event["position"] - radius * normal, float(event["t"]))
+    into, off = (
+        abs(float((event[v] - own) @ normal)) for v in ("velocity_before", "velocity_after")
+    )
     if into > 0.0:
         text = say("event-restitution", said=text, value=figures(round(off / into, 3), "g"))
     events = recording.events
@@ -90,7 +96,7 @@ def sentence(recording: Recording, event: Any) -> str:
         for value, what in (
             (-float(restitution), "rebound"),
             (-float(friction), "friction"),
-            (float(belt), "belt"),
+            (float(belt), "belt" if mover is None else "drive"),
         )
         if abs(value) > 1e-15
     ]

@@ -38,12 +38,12 @@ from chutelab.scene.units import symbol, with_unit, write_size
 from chutelab.studies.design import Solution, Uncertainty
 from chutelab.studies.discharge import SideBySide, stream_at
 from chutelab.studies.measured import Fit, Residuals
-from chutelab.studies.measured.result import plus_minus
+from chutelab.studies.repeats import Repeats
 from chutelab.studies.sweep import COLUMNS, REASON, Sweep, no_column
-from chutelab.studies.sweep.rows import RARE
+from chutelab.studies.sweep.rows import ERROR, RARE
 from chutelab.theory.discharge import NAMES
 from chutelab.util.arrays import Bools, Floats
-from chutelab.util.tables import many
+from chutelab.util.tables import many, plus_minus
 from chutelab.util.versions import PACKAGES
 
 BARS = (BLUE, SKY)
@@ -105,6 +105,36 @@ def scan(solution: Solution) -> Picture:
             )  # fmt: skip
     _titles(figure, solution.base.title, solution.asked)
     style.legend_above(ax, 4)
+    return figure
+
+
+def repeats(found: Repeats) -> Picture:
+    """Draw each quantity over seeds: dots are runs, bars the standard error of their mean.
+
+    Quantities that all seeds agree on are left out.
+    """
+    rows = [(row, one) for row, one in found.shown() if one.error > 0.0 and one.mean]
+    figure = Picture((9.0, 1.6 + 0.19 * len(rows)))
+    height = float(figure.get_figheight())
+    ax = figure.add_axes((0.4, 0.6 / height, 0.57, 1.0 - 1.35 / height))
+    style.dress(ax, "away from the mean, % of it", "")
+    for place, (row, one) in enumerate(rows):
+        size = 100.0 / abs(one.mean)
+        values = size * (found.values[row.name] - one.mean)
+        ax.plot(values, np.full(len(values), place), ".", ms=4.0, color=BLUE, alpha=0.45)
+        bar: dict[str, Any] = {
+            "xerr": size * one.error,
+            "fmt": "|",
+            "color": style.INK,
+            "capsize": 3.0,
+        }
+        ax.errorbar(0.0, place, **bar)
+    ax.set_yticks(range(len(rows)), [style.plain(row.name) for row, _ in rows])
+    ax.tick_params(axis="y", labelsize=style.SMALL)
+    ax.set_xscale("symlog", linthresh=1.0)
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    said = f"{len(found)} seeds: dots are runs, bars ± the standard error of the mean"
+    _titles(figure, found.scene.title, said)
     return figure
 
 
@@ -232,7 +262,9 @@ def sweep_figure(swept: Sweep, column: str) -> Picture:
     gone = np.flatnonzero(~np.isfinite(swept.columns[column]))
     reasons = Counter(reason for reason in swept.columns[REASON][gone].tolist() if reason)
     why = "".join(f", most: {reason}" for reason, _ in reasons.most_common(1))
+    seeds = f"bars: ± the standard error of the mean of {swept.repeat} seeds"
     said = f"{len(gone):,} of {len(swept):,} have none{why}" if len(gone) else ""
+    said = "; ".join(filter(None, (seeds if swept.repeat > 1 else "", said)))
     said = shorten(said, 118, placeholder=" …")
     figure.remark(0.03, 0.03, said, fontsize=style.SMALL, va="center")
     return figure
@@ -253,6 +285,7 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
         what = f"Standard deviation of {column.removesuffix('.spread')}"
     scale, unit = style.scaled(swept.columns[column], unit)
     label, z = with_unit(what, unit), scale * swept.columns[column]
+    bars = scale * swept.columns[f"{column}{ERROR}"] if swept.repeat > 1 else None
     counts = [len(np.unique(swept.columns[key])) for key in keys]
     sampled = swept.shape is None
     by_colour = len(keys) == 2 and (sampled or min(counts) > MOST_LINES)
@@ -273,11 +306,13 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
             painted = _draw_heat(ax, first, second, z, swept.columns["impact.count"] == 0.0)
         if known.any():
             bar = ax.figure.colorbar(painted, ax=ax, pad=0.02)
+            if bars is not None and np.isfinite(bars).any():
+                label += f" ± {np.nanmedian(bars):.2g}"
             bar.set_label(label, fontsize=style.NORMAL)
             bar.ax.tick_params(labelsize=style.SMALL)
         return ax
     if sampled:
-        ax.plot(first, z, "o", markersize=3.5, color=style.TRACK, alpha=0.7)
+        ax.errorbar(first, z, bars, fmt="o", ms=3.5, color=style.TRACK, alpha=0.7, capsize=2.5)
     else:
         others = second if len(keys) == 2 else np.zeros(len(z))
         values = np.unique(others)
@@ -285,8 +320,9 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
         for value, shade in zip(values.tolist(), shades, strict=True):
             chosen = np.flatnonzero(others == value)
             chosen = chosen[np.argsort(first[chosen], kind="stable")]
-            ax.plot(
-                first[chosen], z[chosen], color=shade if len(values) > 1 else style.TRACK,
+            ax.errorbar(
+                first[chosen], z[chosen], bars[chosen] if bars is not None else None,
+                capsize=2.5, color=shade if len(values) > 1 else style.TRACK,
                 lw=1.8, marker="o" if len(chosen) <= DOTS else "", ms=4.0, label=f"{value:g}",
             )  # fmt: skip
     if len(keys) == 2:

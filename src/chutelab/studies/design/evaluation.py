@@ -278,8 +278,10 @@ class Evaluator:
         # The run that ends as the scene says comes last: of what both know, its values stay.
         wanted = {quantity.ending for quantity in self.quantities} - {"any"}
         endings = sorted(wanted, reverse=True) or ["scene"]
-        # A family does not count the contacts of each.
-        apart = len(table) < FEWEST or any(one.key == "contacts" for one in self.quantities)
+        # A family does not tell these of each.
+        together = ("contacts", "sensor", "wear")
+        apart = len(table) < FEWEST
+        apart |= any(one.key.split(".")[0] in together for one in self.quantities)
         done = 0.0
         for start, ending in product(range(0, len(table), BLOCK), endings):
             scene = self.scene.with_values(_until(ending))

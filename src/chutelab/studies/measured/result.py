@@ -15,7 +15,7 @@ from chutelab.scene.units import write_size
 from chutelab.studies.measured.track import MeasuredError, Residuals, best_t0, over
 from chutelab.util.arrays import Floats
 from chutelab.util.files import csv_lines
-from chutelab.util.tables import Sheet, Shown, plain
+from chutelab.util.tables import Sheet, Shown, plain, plus_minus, rounded
 
 MAD = 1.4826
 """Standard deviations of a normal distribution in its median absolute deviation."""
@@ -224,23 +224,6 @@ class Fit(Shown):
         )
         title = "Fit, ± one standard deviation"
         return Sheet(title, ("", "value", "", "95 %", "from"), rows, notes=notes)
-
-
-def plus_minus(value: float, error: float) -> str:
-    """Return a value with its uncertainty, to the digits that mean something.
-
-    >>> plus_minus(0.62134, 0.00213), plus_minus(1.9, 0.0)
-    ('0.6213 ± 0.0021', '1.9 ± 0')
-    """
-    return f"{rounded(value, error)} ± {rounded(error, error)}"
-
-
-def rounded(value: float, error: float) -> str:
-    """Return a value to the second digit of its uncertainty."""
-    if not 0.0 < error < np.inf:
-        return f"{value:.9g}"
-    digits = max(0, 1 - int(np.floor(np.log10(float(f"{error:.1e}")))))
-    return f"{value:.{digits}f}"
 
 
 COLUMNS = (

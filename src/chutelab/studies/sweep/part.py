@@ -27,9 +27,8 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 
 from chutelab.scene import to_dict
-from chutelab.scene.quantities import COLUMNS
 from chutelab.studies.sweep.plan import Plan
-from chutelab.studies.sweep.rows import TEXTS, Columns, columns_of, synced
+from chutelab.studies.sweep.rows import Columns, columns_of, synced
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_columns, writing
 from chutelab.util.versions import version_of
@@ -39,7 +38,7 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-FORMAT: Final = 4
+FORMAT: Final = 5
 """Of the file."""
 
 WORDS: Final = {
@@ -49,6 +48,7 @@ WORDS: Final = {
     "vary": "what --vary says",
     "samples": "--sample, --design or --seed",
     "engine": "--engine",
+    "repeat": "--repeat",
 }
 """What a sweep can differ in, for people."""
 
@@ -106,6 +106,7 @@ class Part:
             "vary": [[vary.key, vary.values] for vary in self._plan.varies],
             "samples": None if samples is None else hashlib.sha256(samples.tobytes()).hexdigest(),
             "engine": self._plan.engine,
+            "repeat": self._plan.repeat,
         }
         start = json.dumps(head).encode()[:-1]
         # As long for every process: a resumed sweep writes over it.
@@ -159,7 +160,7 @@ class Part:
             with suppress(ValueError, TypeError, RecursionError, csv.Error):
                 begin, text, _ = json.loads(line)
                 genuine = line == self._line(begin, text) and begin not in self.done
-                columns = columns_of((*plan.keys, *COLUMNS, *TEXTS), text)
+                columns = columns_of(plan.columns, text)
                 given = np.stack([columns[key] for key in plan.keys], axis=1)
                 planned = plan.block(begin, begin + plan.begins.step).values
                 sound = genuine and begin in plan.begins and np.array_equal(given, planned)

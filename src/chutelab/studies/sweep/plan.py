@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -20,6 +20,7 @@ from chutelab.machine import Machine, RefusedError, build
 from chutelab.results import Recording
 from chutelab.results.recorder import StalledError
 from chutelab.scene import AnyScene, Scene, SceneError, load
+from chutelab.scene.quantities import COLUMNS
 from chutelab.scene.variants import (
     Family,
     Judge,
@@ -29,12 +30,14 @@ from chutelab.scene.variants import (
     Vary,
     accepted,
     count_of,
+    drawn,
     is_plain,
     quantities,
     reason,
+    reseeded,
     varied,
 )
-from chutelab.studies.sweep.rows import REASON, Columns, empty, rows
+from chutelab.studies.sweep.rows import ERROR, REASON, TEXTS, Columns, averaged, empty, rows
 from chutelab.util.arrays import Floats, Ints
 from chutelab.util.errors import InputError
 from chutelab.util.versions import library
@@ -66,6 +69,7 @@ class Block:
     paths: tuple[str, ...]  # full paths of the K keys that are, free surfaces by index
     values: Floats  # (n, K); the values of each variant
     engine: str | None = None  # overrides ``run.engine``
+    repeat: int = 1  # seeds that each variant is run with
 
     def settings(self, row: int) -> dict[str, float]:
         """Return the values of one variant by path."""
@@ -187,8 +191,16 @@ def row_of(scene: Scene) -> Columns:
     return empty(1, found) if isinstance(found, str) else rows(found)
 
 
+def seeds_of(block: Block) -> Iterator[Block]:
+    """Yield the block with each of its seeds; all variants have the same ones."""
+    for number in range(block.repeat):
+        yield replace(block, scene=reseeded(block.scene, number), repeat=1)
+
+
 def swept(block: Block, *, apart: bool = False) -> Columns:
-    """Return the rows of a block, see `runs`."""
+    """Return the rows of a block, see `runs`; of several seeds means and their errors."""
+    if block.repeat > 1:
+        return averaged([swept(seed, apart=apart) for seed in seeds_of(block)])
     every = empty(len(block.values))
     for which, found in runs(block, apart=apart):
         own = {REASON: found} if isinstance(found, str) else rows(found, len(which))
@@ -204,32 +216,27 @@ def one_line(why: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A scene and the variants of it, numbered from 0.
+    """A scene and the variants of it, numbered from 0."""
 
-    Attributes
-    ----------
-    scene : Scene
-        What is varied.
-    varies : tuple of Vary
-        Keys, and the values of each in a grid, or the ends of what samples are drawn from.
-    quantities : tuple of Quantity
-        What the K keys are.
-    engine : str or None
-        Overrides ``run.engine``.
-    samples : ndarray, (N, K), or None
-        Values of the keys; None for the grid, in which the last key runs fastest.
-    """
-
-    scene: Scene
+    scene: Scene  # what is varied
+    # keys, and the values of each in a grid, or the ends of what samples are drawn from
     varies: tuple[Vary, ...]
-    quantities: tuple[Quantity, ...]
-    engine: str | None
+    quantities: tuple[Quantity, ...]  # what the K keys are
+    engine: str | None  # overrides run.engine
+    # (N, K) values of the keys; None for the grid, in which the last key runs fastest
     samples: Floats | None
+    repeat: int = 1  # seeds that each variant is run with, the same for all
 
     @property
     def keys(self) -> tuple[str, ...]:
         """The varied keys, as they were written."""
         return tuple(vary.key for vary in self.varies)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns, those of words last."""
+        errors = [f"{name}{ERROR}" for name in COLUMNS if self.repeat > 1]
+        return (*self.keys, *COLUMNS, *errors, *TEXTS)
 
     @property
     def count(self) -> int:
@@ -260,7 +267,7 @@ class Plan:
             values = np.stack([axis[at] for axis, at in zip(axes, places, strict=True)], axis=1)
         paths = tuple(quantity.path for quantity in self.quantities)
         # + 0.0: there is one zero.
-        return Block(self.scene, paths, values + 0.0, self.engine)
+        return Block(self.scene, paths, values + 0.0, self.engine, self.repeat)
 
 
 def planned(
@@ -271,6 +278,7 @@ def planned(
     design: str = "lhs",
     seed: int = 0,
     engine: str | None = None,
+    repeat: int = 1,
 ) -> Plan:
     """Look whether a sweep can be done, before anything runs; takes what `sweep` does.
 
@@ -293,16 +301,18 @@ def planned(
     if len(varying) > MOST_KEYS:
         raise InputError(f"at most {MOST_KEYS} keys can be varied", varying[MOST_KEYS].typed)
     about = quantities(scene, varying)
+    drawn(scene, repeat, [one.path for one in about])
     for vary, one in zip(varying, about, strict=True):
         if one.whole and not all(value.is_integer() for value in vary.values):
             raise InputError(f"{one.path} takes whole numbers only", vary.typed)
     if sample is None:
         count_of(varying, MOST_VARIANTS)
-        return Plan(scene, varying, about, engine, None)
-    return Plan(scene, varying, about, engine, _drawn(varying, about, sample, design, seed))
+        return Plan(scene, varying, about, engine, None, repeat)
+    samples = _samples(varying, about, sample, design, seed)
+    return Plan(scene, varying, about, engine, samples, repeat)
 
 
-def _drawn(
+def _samples(
     varies: Sequence[Vary], about: Sequence[Quantity], count: int, design: str, seed: int
 ) -> Floats:
     """Draw samples, (count, K); whole numbers with both ends, all equally likely."""

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals, fates
@@ -28,6 +28,7 @@ from chutelab.results.quantities import measured
 from chutelab.results.stream import told_fates
 from chutelab.scene.quantities import COLUMNS, FORMER, HEAT, PAID, REGISTRY, lookup
 from chutelab.scene.variants import Quantity
+from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_columns, csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, many, number
@@ -42,6 +43,9 @@ TOUCHES: Final = "touches"
 
 REASON: Final = "reason"
 """The column that says why there are no numbers, or not all; "" otherwise."""
+
+ERROR: Final = ".error"
+"""What the name of a column ends with that is the standard error of the mean over seeds."""
 
 TEXTS: Final = (TOUCHES, REASON)
 """The columns of words, which come last."""
@@ -81,6 +85,47 @@ def empty(count: int, why: str = "") -> Columns:
 def joined(parts: Sequence[Mapping[str, NDArray[Any]]]) -> Columns:
     """Put rows below each other."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def averaged(parts: Sequence[Columns]) -> Columns:
+    """Return the means of rows over seeds, their standard errors, and the words of most seeds.
+
+    A seed without a value does not count; of fewer than two values there is no error. Reasons say
+    of how many seeds they are.
+    """
+    names = [name for name in parts[0] if name not in TEXTS]
+    found = {name: mean_and_error([part[name] for part in parts]) for name in names}
+    columns: Columns = {name: mean for name, (mean, _) in found.items()}
+    columns |= {f"{name}{ERROR}": error for name, (_, error) in found.items()}
+    for name in TEXTS:
+        columns[name] = np.empty(len(parts[0][name]), dtype=object)
+        for row, texts in enumerate(zip(*(part[name] for part in parts), strict=True)):
+            counts = Counter(texts).most_common()
+            if name == TOUCHES or len(counts) == 1:
+                columns[name][row] = counts[0][0]
+            else:
+                columns[name][row] = "; ".join(
+                    f"{count} of {len(texts)} seeds: {why}" for why, count in counts if why
+                )
+    return columns
+
+
+def mean_and_error(values: ArrayLike) -> tuple[Floats, Floats]:
+    """Return the mean over seeds, the first axis, and its standard error s / √n.
+
+    What is NaN does not count; the error of fewer than two values is NaN.
+
+    >>> mean_and_error([[1.0], [2.0], [3.0], [float("nan")]])
+    (array([2.]), array([0.57735027]))
+    """
+    table = np.asarray(values, dtype=np.float64)
+    known = np.isfinite(table)
+    count = known.sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = np.where(known, table, 0.0).sum(axis=0) / count
+        squares = np.where(known, (table - mean) ** 2, 0.0).sum(axis=0)
+        error = np.sqrt(np.where(count > 1, squares, np.nan) / (count - 1) / count)
+    return np.asarray(mean), np.asarray(error)
 
 
 FATES = {
@@ -276,6 +321,9 @@ class Sweep(Shown):
         Values of each key in a grid, whose last key runs fastest; None for samples.
     settled : bool
         Whether all runs go on until nothing slips.
+    repeat : int
+        Seeds that each variant was run with; with several, columns are means, and ``NAME.error``
+        is the standard error of the column ``NAME``.
     """
 
     title: str
@@ -283,6 +331,7 @@ class Sweep(Shown):
     columns: Mapping[str, NDArray[Any]]
     shape: tuple[int, ...] | None
     settled: bool = False
+    repeat: int = 1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", Named(self.columns))
@@ -294,6 +343,7 @@ class Sweep(Shown):
 
     def unit(self, column: str) -> str:
         """Return the unit of a column, "" for a pure number."""
+        column = column.removesuffix(ERROR)
         return self.quantities[column].unit if column in self.quantities else COLUMNS[column].unit
 
     def frame(self) -> Any:
@@ -312,14 +362,25 @@ class Sweep(Shown):
         """Return from where to where each column goes, and why rows have no numbers."""
         rows = []
         for name, values in self.columns.items():
-            if name in TEXTS or not np.isfinite(values).any():
+            if name in TEXTS or name.endswith(ERROR) or not np.isfinite(values).any():
                 continue
             unit = self.unit(name)
             known = values[np.isfinite(values)]
             low, high = float(known.min()), float(known.max())
             if name in self.quantities or low != high or low != 0.0:
-                rows.append((name, unit, number(low), number(high), f"{len(known):,}"))
-        notes = []
+                error: tuple[str, ...] = ("",) if self.repeat > 1 else ()
+                if error and name not in self.quantities:
+                    found = self.columns[f"{name}{ERROR}"]
+                    found = found[np.isfinite(found)]
+                    error = (number(float(f"{np.median(found):.2g}")) if len(found) else "-",)
+                rows.append((name, unit, number(low), number(high), *error, f"{len(known):,}"))
+        notes, errors = [], tuple[str, ...]()
+        if self.repeat > 1:
+            errors = ("± of most",)
+            notes.append(
+                f"Means over {self.repeat} seeds, the same for all variants, and the median of"
+                " their standard errors."
+            )
         if not self.settled and np.any(np.nan_to_num(self.columns[HEAT])):
             notes.append(PARTIAL)
         ways = Counter(way for way in self.columns[TOUCHES].tolist() if way)
@@ -333,7 +394,7 @@ class Sweep(Shown):
             notes.append(f"and {len(reasons) - MOST_REASONS:,} other reasons")
         return Sheet(
             f"{self.title}: {many(len(self), 'variant', ',')}",
-            ("", "", "least", "most", "rows"),
+            ("", "", "least", "most", *errors, "rows"),
             tuple(rows),
             texts=2,
             notes=tuple(notes),

@@ -13,7 +13,7 @@ from time import process_time
 
 import numpy as np
 
-from chutelab.checks.preflight.trial import effort, trial
+from chutelab.checks.preflight.trial import effort, trial_run
 from chutelab.engines.simulation import choose, follow, simulate
 from chutelab.machine import build
 from chutelab.results.recorder import EnoughError, StalledError
@@ -104,7 +104,7 @@ def judged(machines):
     right = told = false = count = 0
     for name, machine in machines:
         count += 1
-        estimate = effort(machine, trial(machine, choose(machine)), 0.0, 0)
+        estimate = effort(machine, trial_run(machine, choose(machine)), 0.0, 0)
         took = measured(machine)
         real, said = max(FLOOR, took or LONGEST), max(FLOOR, estimate.seconds)
         wrong = False

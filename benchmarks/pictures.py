@@ -15,9 +15,8 @@ from time import process_time
 from matplotlib.animation import FuncAnimation, PillowWriter
 
 from chutelab.engines.simulation import simulate
-from chutelab.pictures.animation import Stage, animate, film
+from chutelab.pictures.animation import Stage, animate, film, lay_out
 from chutelab.pictures.animation.moments import span
-from chutelab.pictures.animation.stage import lay_out
 from chutelab.scene import load, shipped
 
 FRAMES, PARTICLES, FPS = 120, 60, 25

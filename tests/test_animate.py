@@ -20,11 +20,20 @@ from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
 from chutelab.machine.parts import Thread
-from chutelab.pictures.animation import Moment, Stage, animate, film, moments
-from chutelab.pictures.animation import stage as video
+from chutelab.pictures import animation as video
+from chutelab.pictures.animation import (
+    TRAIL,
+    Moment,
+    Stage,
+    animate,
+    film,
+    lay_out,
+    moments,
+    palette,
+    write_gif,
+)
 from chutelab.pictures.animation.actors import SIGNS
 from chutelab.pictures.animation.moments import sentence, slowness, span
-from chutelab.pictures.animation.stage import TRAIL, lay_out, palette, write_gif
 from chutelab.pictures.plots import Window, style, window_of
 from chutelab.results import Kind
 from chutelab.results.recorder import Recorder

@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from chutelab.classroom.lessons import LessonError, find, read, scene_of
+from chutelab.classroom.lessons import LessonError, find, machine_of, read, scene_of
 from chutelab.classroom.lessons.building import build, comment_of, is_current, start
-from chutelab.classroom.lessons.reading import machine_of
 from chutelab.classroom.lessons.steps import quantities_in
 from chutelab.machine import build as build_machine
 from chutelab.pictures.live.describe import describe

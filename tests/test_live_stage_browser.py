@@ -1,5 +1,6 @@
 """The picture of the live page: where it lies, what is grabbed in it, what it looks like."""
 
+import math
 import re
 from io import BytesIO
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from chutelab.scene import load
 from live.browser import DONE
 
 playwright = pytest.importorskip(
@@ -533,6 +535,49 @@ def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
             # A line of text is taller than its letters.
             apart = min(right, right2) - max(left, left2), min(bottom, bottom2) - max(top, top2)
             assert not (own or own2) or min(apart) <= 5.0, (text, other, apart)
+
+
+# The calculated flights and the run's path as they are drawn, m.
+DRAWN = """() => {
+  const { view } = chutelab.stage;
+  return [".rail:not(.within)", ".track"].map((kind) => [...document.querySelectorAll(kind)]
+    .map((line) => line.getAttribute("points").split(" ").map((pair) => pair.split(",").map(Number))
+      .map(([x, y]) => [view.worldX(x), view.worldY(y)])));
+}"""
+
+
+def test_the_run_lies_between_two_lines_of_the_calculated_flights(shown):
+    scene = load("perpendicular")
+    page = shown("perpendicular")
+    ((to_plate, to_belt), (track,)) = page.evaluate(DRAWN)
+    v, g, e = scene.incoming.speed, scene.gravity, scene.plates[0].restitution
+    ride = scene.incoming.pulley_radius + scene.particles[0].radius
+    near = 0.2 / page.evaluate("chutelab.stage.view.scale")
+    assert to_plate == [
+        [x, pytest.approx(ride - 0.5 * g * (x / v) ** 2, abs=near)] for x, _ in to_plate
+    ]
+    (wall, height), t2 = to_plate[-1], to_plate[-1][0] / v
+    for x, y in to_belt:
+        t = (wall - x) / (e * v)
+        assert y == pytest.approx(height - g * t2 * t - 0.5 * g * t * t, abs=10 * near)
+    for x, y in track:
+        far = [math.hypot(x - u, y - w) for u, w in [*to_plate, *to_belt]]
+        assert x < 0.0 or min(far) < 0.03
+    # The label of a number that is pointed at tells its value.
+    page.locator("#numbers [data-id=x3] td").first.hover()
+    said = page.locator("#numbers [data-id=x3] td").first.text_content()
+    assert f"x₃ = {said} m" in page.locator(".symbols text").all_text_contents()
+    page.locator("h1").hover()
+    assert "x₃" in page.locator(".symbols text").all_text_contents()
+    # What was put in is where it is now.
+    assert page.locator("#energy .good").text_content().endswith(" mJ: it closes")
+
+
+@pytest.mark.parametrize(("name", "overrides"), [
+    ("hopper", ()), ("perpendicular", ["live.predict=true"])])  # fmt: skip
+def test_no_flight_is_calculated_for_a_crowd_or_before_a_prediction(shown, name, overrides):
+    rails, tracks = shown(name, overrides).evaluate(DRAWN)
+    assert (rails, tracks) == ([], [])
 
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}

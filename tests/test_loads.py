@@ -9,7 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 import chutelab
-from chutelab.checks.stress import Evidence, laws
+from chutelab.checks import stress as laws
+from chutelab.checks.stress import Evidence
 from chutelab.cli import main
 from chutelab.results import Recording
 from chutelab.scene import SceneError

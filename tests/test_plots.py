@@ -154,7 +154,7 @@ def test_a_view_is_what_pictures_show(tmp_path, place):
     assert left <= x0 < x1 <= right
     assert bottom <= y0 < y1 <= top
     # And so does the film, where velocities point out of it.
-    layout = animation.stage.lay_out(recording, width=800, height=450)
+    layout = animation.lay_out(recording, width=800, height=450)
     assert layout.window == Window(x0, x1, y0, y1).fitted(0.675 * 800 / (0.71 * 450))
     assert animate(recording, tmp_path / "some.gif", fps=5).stat().st_size > 1000
 
@@ -253,11 +253,9 @@ def test_an_envelope_ends_where_its_particles_come_to_lie():
 
 
 def test_a_film_of_a_crowd_tells_how_many_come(crowd):
-    layout = animation.stage.lay_out(crowd, width=800, height=450)
+    layout = animation.lay_out(crowd, width=800, height=450)
     assert layout.shows == {"parabola", "trails", "energy"}
-    asked = animation.stage.lay_out(
-        crowd, width=800, height=450, shows=frozenset(("velocity", "trails"))
-    )
+    asked = animation.lay_out(crowd, width=800, height=450, shows=frozenset(("velocity", "trails")))
     assert asked.shows == {"velocity", "trails"}
     shots = animation.moments.film(crowd, 0.5, 1.0, fps=10, slow=1.0, crowd=True)
     first = crowd.select(Kind.LANDING)["t"]

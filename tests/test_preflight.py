@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from chutelab import scene as sc
-from chutelab.checks.preflight import preflight, trial
-from chutelab.checks.preflight.advice import places
+from chutelab.checks.preflight import places, preflight, trial
 from chutelab.engines import pymunk
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build

@@ -66,6 +66,9 @@ def test_the_nearest_point_is_nearer_than_all_others(one, there):
     step, gap = float(one.way) / STEPS, float(one.gap(np.array(there)))
     nearest = one.nearest(np.array(there))
     assert np.hypot(*(nearest - there)) == pytest.approx(gap, abs=1e-13)
+    # So is the point that it is so far along.
+    along = one.at(one.along(np.array(there)))
+    assert np.hypot(*(along - there)) == pytest.approx(gap, abs=1e-12)
     # It is on the piece, and no point of that is nearer.
     off = np.hypot(*(points - nearest).T)
     assert off.min() <= step
@@ -166,6 +169,10 @@ class Ellipses(shapes.Pieces):
         points = self.points()
         gone = np.append(0.0, np.hypot(*np.diff(points, axis=0).T).cumsum())
         return np.stack([np.interp(way, gone, axis) for axis in points.T], axis=-1)
+
+    def along(self, places):
+        gone = np.linspace(0.0, self.way, 721)
+        return gone[((self.at(gone) - places[..., None, :]) ** 2).sum(axis=-1).argmin(axis=-1)]
 
     def path(self):
         return self.points(31)

@@ -352,7 +352,7 @@ def test_a_family_has_the_numbers_that_each_of_its_scenes_has(line):
     ids=lambda value: value[0] if isinstance(value, list) else None,
 )
 def test_what_cannot_be_varied_is_refused_with_what_is_allowed(varies, allowed, monkeypatch):
-    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", None)
+    monkeypatch.setattr("chutelab.studies.sweep.swept", None)
     options = [option for vary in varies for option in ("--vary", vary)]
     result = call("sweep", "perpendicular", *options, "--out", "rows.csv", code=2)
     assert allowed in result.stderr
@@ -379,7 +379,7 @@ def test_what_cannot_be_varied_is_refused_with_what_is_allowed(varies, allowed, 
     ids=" ".join,
 )
 def test_options_that_cannot_be_are_refused_before_anything_runs(options, allowed, monkeypatch):
-    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", None)
+    monkeypatch.setattr("chutelab.studies.sweep.swept", None)
     vary = "plate.angle_deg=0:10" if "--sample" in options else "plate.angle_deg=0,10"
     result = call("sweep", "perpendicular", "--vary", vary, *options, code=2)
     assert allowed in result.stderr

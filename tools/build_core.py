@@ -1,7 +1,10 @@
 """Build the core: C to WebAssembly, and its memory layout to JSON.
 
-    python tools/build_core.py           # writes core.wasm and layout.json beside the C files
+    python tools/build_core.py           # writes the files below beside the C files
     python tools/build_core.py --check   # builds anew and compares the bytes with what is there
+
+core.wasm is what Python runs, page.wasm what a page carries: the same without the engines and the
+batches that only Python has, a quarter less. layout.json says where in memory everything is.
 
 Needs the compiler of the `ziglang` package in the version that `pyproject.toml` pins (the `dev`
 extra): the same version gives the same bytes on every machine.
@@ -26,10 +29,17 @@ EXPORTS = (
 )  # fmt: skip
 """What a host can call."""
 
+PYTHON = (
+    "prepare_to_judge", "run_and_judge", "exact", "lay_out_exact", "follow_and_judge", "run_exact",
+    "run_world", "loads",
+)  # fmt: skip
+"""Of these what no page calls."""
+
+BUILT = {"core.wasm": EXPORTS, "page.wasm": [name for name in EXPORTS if name not in PYTHON]}
+
 FLAGS = (
     "-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O3", "-flto", "-Wall",
-    "-Wextra", "-Werror", "-ffp-contract=off", "-fvisibility=hidden",
-    *(f"-Wl,--export={name}" for name in EXPORTS), "-Wl,--strip-all",
+    "-Wextra", "-Werror", "-ffp-contract=off", "-fvisibility=hidden", "-Wl,--strip-all",
 )  # fmt: skip
 """No fused multiply-add: every engine that runs the file has to round alike."""
 
@@ -94,7 +104,7 @@ def checks(described: Any) -> str:
 
 
 def build(folder: Path) -> None:
-    """Write core.wasm and layout.json into a folder."""
+    """Write both cores and layout.json into a folder."""
     described = layout((CORE / "layout.h").read_text(encoding="utf-8"))
     with tempfile.TemporaryDirectory() as place:
         sources = []
@@ -105,11 +115,20 @@ def build(folder: Path) -> None:
             sources.append(str(small if source.stem in ONCE else source))
         check = Path(place) / "layout.c"
         check.write_text(checks(described), encoding="utf-8")
-        command = [
-            sys.executable, "-m", "ziglang", "cc", *FLAGS, "-I", str(CORE),
-            "-o", str(folder / "core.wasm"), *sources, str(check), "-lm",
+        compilers = [
+            subprocess.Popen(
+                [
+                    sys.executable, "-m", "ziglang", "cc", *FLAGS, "-I", str(CORE),
+                    *(f"-Wl,--export={one}" for one in exports), "-o", str(folder / name),
+                    *sources, str(check), "-lm",
+                ],
+                cwd=CORE,
+            )
+            for name, exports in BUILT.items()
         ]  # fmt: skip
-        subprocess.run(command, check=True, cwd=CORE)
+        codes = [compiler.wait() for compiler in compilers]
+        if any(codes):
+            raise SystemExit(1)
     text = json.dumps(described) + "\n"
     (folder / "layout.json").write_text(text, encoding="utf-8")
 
@@ -120,13 +139,14 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="compare, write nothing")
     if not parser.parse_args().check:
         build(CORE)
-        print(f"{(CORE / 'core.wasm').stat().st_size} bytes")
+        for name in BUILT:
+            print(f"{name}: {(CORE / name).stat().st_size} bytes")
         return 0
     with tempfile.TemporaryDirectory() as folder:
         build(Path(folder))
         old = [
             name
-            for name in ("core.wasm", "layout.json")
+            for name in (*BUILT, "layout.json")
             if (Path(folder) / name).read_bytes() != (CORE / name).read_bytes()
         ]
     if old:

@@ -11,7 +11,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Record:
-    """One method on one case with one value of its parameter; None is what it has not.
+    """One method on one case with one value of its parameter; None where it does not apply.
 
     Attributes
     ----------

@@ -13,7 +13,7 @@ const { resolve } = await load("scene.js");
 
 const home = new URL("../../src/chutelab/core/", import.meta.url);
 const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
-const module = await WebAssembly.compile(readFileSync(new URL("core.wasm", home)));
+const module = await WebAssembly.compile(readFileSync(new URL("page.wasm", home)));
 export const core = await startCore(module, layout);
 await startPlan(module, layout);
 

@@ -11,8 +11,7 @@ from dataclasses import replace
 from functools import cache
 from time import perf_counter
 
-from chutelab.checks.stress import Evidence, judge
-from chutelab.checks.stress.laws import unseen
+from chutelab.checks.stress import Evidence, judge, unseen
 from chutelab.engines.simulation import judged
 from chutelab.scene import SceneError
 from stress.case import PATIENCE, by_name, scene_of, surface, thrown

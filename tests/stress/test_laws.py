@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from chutelab import machine
-from chutelab.checks.stress import Evidence, Verdict, barriers, judge, laws
+from chutelab.checks import stress as laws
+from chutelab.checks.stress import Evidence, Verdict, barriers, judge
 from chutelab.results import Kind
 from stress.case import TRANSFER, merged, scene_of, surface, thrown
 from stress.runs import FLOOR, HOP, PAIR, adder, evidence

@@ -5,7 +5,8 @@ from math import cos, hypot, radians, sin, sqrt
 import numpy as np
 import pytest
 
-from chutelab.checks.stress import barriers, laws
+from chutelab.checks import stress as laws
+from chutelab.checks.stress import barriers
 from chutelab.results import Kind
 from stress.case import merged, surface, thrown
 from stress.runs import FLOOR, HOP, evidence

@@ -20,7 +20,7 @@ from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chutelab.classroom.lessons.reading import Lesson, beside, find, machine_of, scene_of
+from chutelab.classroom.lessons import Lesson, beside, find, machine_of, scene_of
 from chutelab.classroom.lessons.steps import FUNCTIONS, Ask, Column, quantities_in
 from chutelab.classroom.lessons.texts import without_tex
 from chutelab.engines.simulation import simulate
@@ -151,10 +151,7 @@ class Book:
     def run(self, *said: str) -> Runs:
         """Run scenes of the lesson, each as on the command line: "throw.toml --set gravity=1.62".
 
-        Raises
-        ------
-        SceneError
-            With all faults of a scene and its settings.
+        Raises a `SceneError` with all faults of a scene and its settings.
         """
         found: dict[str, Recording] = {}
         for one in said:
@@ -166,20 +163,14 @@ class Book:
     def scene(self, name: str, *settings: str) -> Scene:
         """Load a scene of the lesson, with settings such as "gravity=1.62" laid over it.
 
-        Raises
-        ------
-        SceneError
-            With all faults of the scene and its settings.
+        Raises a `SceneError` with all faults of the scene and its settings.
         """
         return scene_of(self._lesson, name, settings)
 
     def file(self, name: str) -> Path:
         """Return where a file of the lesson is.
 
-        Raises
-        ------
-        InputError
-            If it has none of this name.
+        Raises an `InputError` if it has none of this name.
         """
         if (path := beside(self._lesson, name)) is None:
             raise InputError(f"lesson {self._lesson.name} has no file {name}")
@@ -198,23 +189,20 @@ class Book:
     def predict(self, step: int, predictions: Mapping[int, Any]) -> Sheet:
         """Keep what is predicted in a step, by question; `explain` shows it again."""
         asks = self._lesson.steps[step - 1].asks
-        mine = {
+        kept = {
             without_tex(asks[n - 1].text): (asks[n - 1], said)
             for n, said in predictions.items()
             if said not in (None, "", ...) and 1 <= n <= len(asks)
         }
-        self._expected |= mine
-        rows = tuple((text, str(said)) for text, (_, said) in mine.items())
+        self._expected |= kept
+        rows = tuple((text, str(said)) for text, (_, said) in kept.items())
         say = words(self._lesson.language).say
         return Sheet("", (say("book-expected"), ""), rows, texts=2)
 
     def note(self, step: int) -> Runs:
         """Make the runs of a step's table, and fill it in; they are kept in `noted`.
 
-        Raises
-        ------
-        SceneError
-            With all faults of a scene and its settings.
+        Raises a `SceneError` with all faults of a scene and its settings.
         """
         one, said = self._lesson.steps[step - 1], words(self._lesson.language)
         rows, found = [], {}

@@ -28,12 +28,11 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
-from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import LONGEST_NAME, OPENED, UNNAMED
+from chutelab.classroom.exercises import EXERCISES, LONGEST_NAME, OPENED, UNNAMED
 from chutelab.classroom.exercises.exercise import draw, plain
 from chutelab.classroom.exercises.judging import is_rounded, judge
 from chutelab.classroom.kernel import ForgedError, run
-from chutelab.classroom.lessons.reading import OWN_WORDS
+from chutelab.classroom.lessons import OWN_WORDS
 from chutelab.classroom.lessons.texts import asset
 from chutelab.util.errors import InputError, MissingLibraryError, cut, printable, printable_lines
 from chutelab.util.files import csv_lines
@@ -90,10 +89,7 @@ def code_of(path: Path) -> list[str | None]:
     The JSON is read here and not by nbformat: that refuses a notebook with a cell that has lost its
     metadata or its source, and what was checked in the other cells counts.
 
-    Raises
-    ------
-    ReturnedError
-        If it cannot be read.
+    Raises a `ReturnedError` if it cannot be read.
     """
     found = _content(path, "notebook", LARGEST)
     try:
@@ -107,10 +103,7 @@ def code_of(path: Path) -> list[str | None]:
 def words_of(path: Path) -> dict[str, str]:
     """Return what was written into a notebook's cell for words, as "explain"; {} without any.
 
-    Raises
-    ------
-    ReturnedError
-        If the notebook cannot be read.
+    Raises a `ReturnedError` if the notebook cannot be read.
     """
     found = _content(path, "notebook", LARGEST)
     written = {}
@@ -182,10 +175,7 @@ def _work(found: object) -> Work:
 def result_of(path: Path) -> Work:
     """Return what is in a result file.
 
-    Raises
-    ------
-    ReturnedError
-        If it cannot be read, or has content that no page writes.
+    Raises a `ReturnedError` if it cannot be read, or has content that no page writes.
     """
     found = _content(path, "result file", LARGEST_RESULT)
     match found:
@@ -356,10 +346,8 @@ def write_csv(grades: Iterable[Grade], path: str | Path, *, decimal_comma: bool 
     is whole. It begins with a byte order mark, from which Excel tells that it is UTF-8;
     `decimal_comma` is for an Excel whose numbers have one: cells are then apart by semicolons.
 
-    Raises
-    ------
-    FileExistsError
-        If ``NAME.part`` is there: earlier marks, or a grading that still runs.
+    Raises a `FileExistsError` if ``NAME.part`` is there: earlier marks, or a grading that still
+    runs.
     """
     path = Path(path)
     part = path.with_name(f"{path.name}.part")
@@ -441,10 +429,7 @@ def _marked(file: str, work: Work, reasons: Sequence[str] = ()) -> Grade:
 def _works(reports: object) -> list[Work]:
     """Return what was worked on, each lesson and student once, in the order they were opened.
 
-    Raises
-    ------
-    ForgedError
-        If that is no report of a chutelab: unknown code ran there.
+    Raises a `ForgedError` if that is no report of a chutelab: unknown code ran there.
     """
     if not isinstance(reports, list) or len(reports) > (OPENED.maxlen or 0):
         raise ForgedError("its report is not a list of tasks, or too long a one")

@@ -49,6 +49,7 @@ KINDS = {
     "strobe": ("strobe.png",),
     "sensors": ("sensors.csv", "sensors.png"),
     "loads": ("loads.csv", "loads.png"),
+    "wear": ("wear.csv", "wear.png"),
 }
 """What ``--only`` takes, and the files it stands for."""
 
@@ -58,7 +59,7 @@ LOADS = 0.01
 FILMS = ("gif", "mp4", "webm")
 """Kinds of the lesson picture; ``--format`` chooses one."""
 
-PICTURED = {*FILMS, "png", "strobe", "sensors"}
+PICTURED = {*FILMS, "png", "strobe", "sensors", "loads", "wear"}
 """Kinds in which something is drawn."""
 
 USUAL = ("png", "gif", "csv", "npz", "json")
@@ -82,7 +83,7 @@ class Output:
     film, and a film that cannot be written here.
 
     --out DIR  Write pictures, tables and the recording into this folder.
-    --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe,sensors,loads;
+    --only KINDS  With --out: only some of png,gif,csv,npz,json,mp4,webm,strobe,sensors,loads,wear;
         without, the first 5, but no events.csv of more than 100,000 events. May be repeated.
     --format  With --out: the lesson picture as this instead of a GIF; mp4 and webm need the extra
         chutelab[video].
@@ -185,6 +186,11 @@ class Output:
 
                     recording.to_csv(folder, only=["loads"])
                     loads(recording).write(folder / "loads.png")
+                elif kind == "wear":
+                    from chutelab.pictures.plots.measures import wear
+
+                    recording.to_csv(folder, only=["wear"])
+                    wear(recording).write(folder / "wear.png")
                 elif kind == "npz":
                     recording.save(path)
                 else:

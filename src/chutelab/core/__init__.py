@@ -1,9 +1,10 @@
 """What runs in Python and in the page alike, in C; in Python as WebAssembly, run by wasmtime.
 
 `*.c` are the machine of a scene and its releases, the contact engine, the exact engine, and the
-laws by which every run is judged; built to `core.wasm` by `python tools/build_core.py`. `layout.h`
-says what they share with their host, and is a way in. Here is the core in memory: numbers in,
-numbers out, its arrays as NumPy's. Nothing else in the package knows that it is WebAssembly.
+laws by which every run is judged; built by `python tools/build_core.py` to `core.wasm`, and what
+live pages call of it to `page.wasm`. `layout.h` says what they share with their host, and is a way
+in. Here is the core in memory: numbers in, numbers out, its arrays as NumPy's. Nothing else in the
+package knows that it is WebAssembly.
 """
 
 from __future__ import annotations
@@ -145,10 +146,7 @@ class Module:
     def work(self, name: str) -> None:
         """Call a function that may take more memory; it makes all views of arrays invalid.
 
-        Raises
-        ------
-        MemoryError
-            If there is no more to be had.
+        Raises a `MemoryError` if there is no more to be had.
         """
         done = self.call(name)
         self._look()

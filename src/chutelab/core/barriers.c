@@ -361,6 +361,10 @@ PAIRED static void settle(const Curve *c, double begin, double size, int halving
 /* Look at an interval beside one piece that its box is not clear of. */
 PAIRED static void look(const Curve *c, Barrier *b, int number, int knot) {
     if (is_clear(c, b, At.begin)) return;
+    /* On a rim the coefficients of a long interval are less than the path ever is, of its halves hardly. */
+    Curve half, rest;
+    halve(c->p, half.p, rest.p);
+    if (is_clear(&half, b, At.begin) && is_clear(&rest, b, At.begin)) return;
     At.piece = b;
     At.number = number;
     At.knot = knot;
@@ -488,15 +492,18 @@ PAIRED int find_hits(int i) {
         const double *a = KNOT(k), *b = a + L.row;
         if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) continue;
         Interval *now = some + count++;
-        Curve c = now->path = curve_after(a);
+        const Two *p = now->path.p;
+        now->path = curve_after(a);
         now->knot = k;
-        now->box.low = lesser(lesser(c.p[0], c.p[1]), lesser(c.p[2], c.p[3]));
-        now->box.high = larger(larger(c.p[0], c.p[1]), larger(c.p[2], c.p[3]));
+        now->box.low = lesser(lesser(p[0], p[1]), lesser(p[2], p[3]));
+        now->box.high = larger(larger(p[0], p[1]), larger(p[2], p[3]));
         box.low = lesser(box.low, now->box.low);
         box.high = larger(box.high, now->box.high);
-        if (At.radius == 0 && !first) turn(&last, &c, pieces, k);
-        last = c;
-        first = 0;
+        if (At.radius == 0) {
+            if (!first) turn(&last, &now->path, pieces, k);
+            last = now->path;
+            first = 0;
+        }
         if (count == WIDTH) {
             look_at_all(some, count, &box, pieces);
             box = all_apart();

@@ -159,8 +159,8 @@ PAIRED static int weigh(int i) {
     double weight = mass * L.bodies[i].gravity, begin = gain(i, first), before = begin;
     int is_nip = L.engine == ENGINE_CONTACT && !L.interact, row = L.row;
     /* The largest x and y, change of what is unexplained and energy in play, speed squared; the least that
-       was given back; and all numbers times zero: that is zero if they are finite. */
-    Two place = both(0), energy = both(0), fastest = both(0), back = both(0), zero = both(0);
+       was given back; and the sum of all numbers, which times zero is zero if they are finite. */
+    Two place = both(0), energy = both(0), fastest = both(0), back = both(0), all = both(0);
     Two old = two_at(first + 7);
     for (const double *knot = first; knot <= last; knot += row) {
         Two at = size_of(two_at(knot + 1)), v = two_at(knot + 3), rest = two_at(knot + 5), losses = two_at(knot + 7);
@@ -168,7 +168,7 @@ PAIRED static int weigh(int i) {
         double swift = squares[0] + squares[1], moving = half * swift + turning * square(rest[0]);
         double now = moving + weight * knot[2] - (rest[1] - losses[0] - losses[1]);
         double in_play = works[1] + lost[0] + lost[1] + weight * at[1] + moving;
-        zero += 0 * (two_at(knot) + at + v + rest + losses);
+        all += two_at(knot) + at + (v + rest) + losses;
         if (is_nip) given = both(given[0] + given[1]);
         place = larger(place, at);
         energy = larger(energy, size_of((Two){ now - before, in_play }));
@@ -191,7 +191,7 @@ PAIRED static int weigh(int i) {
         All.change = MAX(All.change, energy[0]);
         All.back = MIN(All.back, MIN(back[0], back[1]));
     }
-    int unreal = is_all(zero == 0) ? 0 : find_unreal(i);
+    int unreal = is_all(0 * all == 0) ? 0 : find_unreal(i);
     All.unreal += unreal;
     return !unreal;
 }

@@ -50,21 +50,11 @@ class Caution:
 
 @dataclass(frozen=True, eq=False)
 class Particle:
-    """The particles of a machine and its recording: numbers if all are alike, else arrays (N,).
+    """The particles of a machine and its recording: numbers if all are alike, else arrays (N,)."""
 
-    Attributes
-    ----------
-    radius : float or ndarray, (N,)
-        r, m; 0 for a mass point; of a box or polygon that of the circle round it.
-    mass : float or ndarray, (N,)
-        m, kg.
-    inertia : float or ndarray, (N,)
-        Moment of inertia about the centre, kg m²; 0 for a particle that does not turn.
-    """
-
-    radius: Any
-    mass: Any
-    inertia: Any
+    radius: Any  # r, m; 0 for a mass point; of a box or polygon that of the circle round it
+    mass: Any  # m, kg
+    inertia: Any  # moment of inertia about the centre, kg m²; 0 for a particle that does not turn
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Particle):

@@ -26,33 +26,20 @@ the chord: by less than this where r < ρ/6."""
 
 @dataclass(frozen=True, eq=False)
 class Releases:
-    """Start of each particle, read-only arrays.
+    """Start of each particle, read-only arrays of N rows."""
 
-    Attributes
-    ----------
-    t : ndarray, (N,)
-        s, ascending.
-    position, velocity : ndarray, (N, 2)
-        m, m/s.
-    carried : ndarray of bool, (N,)
-        Rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation.
-    stream : ndarray of int, (N,)
-        Whose it is: particles of the first stream come first, then those of the next.
-    kind : ndarray of int, (N,)
-        Its row in the machine's tables of pairs; of a family each has a row of its own.
-    exit_box : ndarray, (N, 4)
-        Left, bottom, right and top beyond which it has left the scene, m. With gravity only the
-        bottom is finite: what flies up comes back. What is released below all surfaces, or hangs on
-        a string, has not left: the box holds releases, too. Where particles do not meet it holds
-        each one's own alone, so that a particle does the same alone and with others.
-    """
-
-    t: Floats
+    t: Floats  # s, ascending
+    # (N, 2), m and m/s
     position: Floats
     velocity: Floats
+    # rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation
     carried: Bools
-    stream: Ints
-    kind: Ints
+    stream: Ints  # its number: particles of the first stream come first, then those of the next
+    kind: Ints  # its row in the machine's tables of pairs; of a family each has a row of its own
+    # (N, 4), m: left, bottom, right and top of where it is in the scene. With gravity only the
+    # bottom is finite: what flies up comes back. What is released below all surfaces, or hangs on a
+    # string, has not left: the box holds releases, too. Where particles do not meet it holds each
+    # one's own alone, so that a particle does the same alone and with others
     exit_box: Floats
 
     def __post_init__(self) -> None:
@@ -119,13 +106,13 @@ def squeeze(
         begin, end = top[lag:], np.minimum(leaves[:-lag], leaves[lag:])
         if (begin >= leaves[:-lag]).all():
             break
-        mine, its, reach = rho[:-lag], rho[lag:], radii[:-lag] + radii[lag:]
-        waits_for = np.hypot(belt.speed * (begin - top[:-lag]), mine - its) < reach
+        rho_a, rho_b, reach = rho[:-lag], rho[lag:], radii[:-lag] + radii[lag:]
+        waits_for = np.hypot(belt.speed * (begin - top[:-lag]), rho_a - rho_b) < reach
         angle = belt.speed * np.array(
-            [(now - top[:-lag]) / mine - (now - begin) / its for now in (begin, end)]
+            [(now - top[:-lag]) / rho_a - (now - begin) / rho_b for now in (begin, end)]
         )
         angle = np.where(angle[1] > 0.0, angle.min(axis=0), 0.0)
-        apart = np.hypot(mine - its, 2.0 * np.sqrt(mine * its) * np.sin(0.5 * angle))
+        apart = np.hypot(rho_a - rho_b, 2.0 * np.sqrt(rho_a * rho_b) * np.sin(0.5 * angle))
         found = np.where((begin < end) & ~waits_for, reach - apart, 0.0)
         depth[:-lag] = np.maximum(depth[:-lag], found)
         depth[lag:] = np.maximum(depth[lag:], found)

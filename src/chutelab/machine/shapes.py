@@ -120,6 +120,10 @@ class Pieces(ABC):
         """Return the points of one piece so far (m) along it, where a positive speed leads."""
 
     @abstractmethod
+    def along(self, places: Floats) -> Floats:
+        """Return how far (m) along one piece the points nearest to places are, as `at` has it."""
+
+    @abstractmethod
     def path(self) -> Floats:
         """Return the points (P, 2) through which to draw one piece, m, as `at` has them."""
 
@@ -185,10 +189,12 @@ class Segments(Pieces):
     def corners(self) -> Floats:
         return np.concatenate(self.ends, axis=-2)
 
+    def along(self, places: Floats) -> Floats:
+        way = ((places - self.start) * self.tangent).sum(axis=-1)
+        return np.asarray(way.clip(0.0, self.length))
+
     def away(self, places: Floats) -> Floats:
-        from_start = places - self.start
-        along = (from_start * self.tangent).sum(axis=-1).clip(0.0, self.length)
-        return np.asarray(from_start - along[..., None] * self.tangent)
+        return np.asarray(places - self.start - self.along(places)[..., None] * self.tangent)
 
     def normal(self, places: Floats) -> Floats:
         left = np.stack([-self.tangent[..., 1], self.tangent[..., 0]], axis=-1)
@@ -305,6 +311,13 @@ class Arcs(Pieces):
     def at(self, way: ArrayLike) -> Floats:
         # Clockwise from the last end.
         return self.point(self.begin + self.extent - np.asarray(way) / self.radius)
+
+    def along(self, places: Floats) -> Floats:
+        turned = self._turned(places - self.center)
+        # Beyond both ends the nearer one, 0 the last.
+        nearer_first = turned > 0.5 * self.extent + pi
+        turned = np.where(nearer_first, 0.0, np.minimum(turned, self.extent))
+        return np.asarray(self.radius * (self.extent - turned))
 
     def path(self) -> Floats:
         return self.at(np.linspace(0.0, self.way, 1 + ceil(self.extent / FINE)))

@@ -8,7 +8,8 @@
   symbols; particle 0 and the theory.
 - `stream`: a stream as a whole: flow, fates, steady power, the envelope of its paths.
 - `laws`: what every run is judged by.
-- `sensors`: what passes lines across a stream; `loads`: what surfaces bear, in bins of time.
+- `sensors`: what passes lines across a stream; `loads`: what surfaces bear, in bins of time;
+  `wear`: what strikes and rubs them, piece by piece; `fields`: a crowd as a continuum, on a grid.
 - `summary`: notes, tables, and the JSON object of ``chutelab run --json``.
 - `storage`: recordings as files.
 
@@ -36,9 +37,11 @@ from chutelab.results.record import (
 )
 
 if TYPE_CHECKING:
+    from chutelab.results.fields import Fields
     from chutelab.results.laws import Broken
     from chutelab.results.ledger import Ledger
     from chutelab.results.loads import Load
+    from chutelab.results.wear import Wear
     from chutelab.theory import Transfer
 
 
@@ -101,6 +104,25 @@ class Recording(Record):
         from chutelab.results.loads import loads
 
         return loads(self, surface, every)
+
+    def wear(
+        self,
+        surface: str,
+        pieces: int = 50,
+        *,
+        erosion: float | None = None,
+        abrasion: float | None = None,
+    ) -> Wear:
+        """Return what strikes and rubs a surface, piece by piece; see `results.wear.worn`."""
+        from chutelab.results.wear import worn
+
+        return worn(self, surface, pieces, erosion=erosion, abrasion=abrasion)
+
+    def field(self, begin: float | None = None, end: float | None = None, **options: Any) -> Fields:
+        """Return density, velocity, temperature and stress on a grid; see `results.fields`."""
+        from chutelab.results.fields import fields
+
+        return fields(self, begin, end, **options)
 
     def summary(self) -> dict[str, Any]:
         """Return what ``chutelab run --json`` prints; see `results.summary.summary`."""

@@ -8,14 +8,14 @@ what comes of it; `chutelab stress` has more laws, which take longer.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chutelab import core
 from chutelab.machine import Machine
-from chutelab.results.record import EVENT, Record, kept
+from chutelab.results.record import EVENT, Record
 from chutelab.util.tables import number
 
 FINITE, THROUGH, INSIDE = "finite numbers", "nothing through a surface", "nothing inside a surface"
@@ -90,8 +90,7 @@ class Broken:
         return f"LAW BROKEN, {self.told}; do not trust these numbers; {self.advice}"
 
 
-@dataclass(frozen=True)
-class Findings:
+class Findings(NamedTuple):
     """What the core finds of a run.
 
     Attributes
@@ -110,15 +109,16 @@ class Findings:
     figures: Any
 
 
-@kept
 def judge(recording: Record) -> tuple[Broken, ...]:
     """Judge a run: return the laws that it breaks, each once, in the order of `LAWS`."""
-    if not len(recording.knots):
-        return ()
-    found = examine(recording)
-    if not len(found.breaches):
-        return ()
-    machine = recording.machine
+    if _TOLD not in recording.found:
+        recording.found[_TOLD] = _tell(recording) if len(recording.knots) else ()
+    told: tuple[Broken, ...] = recording.found[_TOLD]
+    return told
+
+
+def _tell(recording: Record) -> tuple[Broken, ...]:
+    found, machine = examine(recording), recording.machine
     pulley = sum(part.surface.shape[-1] for part in machine.parts)
     told = []
     for row in found.breaches.tolist():
@@ -147,8 +147,8 @@ def examine(recording: Record) -> Findings:
 
 _NO_BREACHES, _NO_HITS = np.empty(0, core.dtype("Breach")), np.empty(0, core.dtype("Hit"))
 
-_FOUND = "findings"
-"""Under which a recording keeps them."""
+_FOUND, _TOLD = "findings", "laws"
+"""Under which a recording keeps what the core finds, and what is told of it."""
 
 
 def take(module: core.Module, recording: Record) -> None:
@@ -158,6 +158,8 @@ def take(module: core.Module, recording: Record) -> None:
         return
     figures = type(figures).from_buffer_copy(figures)
     breaches, hits = _NO_BREACHES, _NO_HITS
+    if not figures.breach_count:
+        recording.found[_TOLD] = ()
     if figures.breach_count or figures.hit_count:
         breaches = module.array("breaches", breaches.dtype, figures.breach_count, of="Laws").copy()
         hits = module.array("hits", hits.dtype, figures.hit_count, of="Laws").copy()

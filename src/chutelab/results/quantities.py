@@ -26,6 +26,7 @@ from chutelab.results.ledger import ledger, ledger_of_each
 from chutelab.results.loads import load
 from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
 from chutelab.results.sensors import first_passages, reading
+from chutelab.results.wear import wear
 from chutelab.scene import Scene
 from chutelab.scene.quantities import (
     FIRST,
@@ -436,6 +437,11 @@ def measured(recording: Record, name: str) -> Floats:
             return np.array([float(getattr(reading(recording, sensor), key))])
         case ["loads", surface, part, statistic]:
             return np.array([getattr(load(recording, surface).part(part), statistic)])
+        case ["wear", *_] if recording.family:
+            return np.full(many, nan)
+        case ["wear", surface, part, which]:
+            values = getattr(wear(recording, surface), part)
+            return np.array([float(values.sum() if which == "sum" else values.max())])
         case ["ledger", "by_surface", surface, "belt_work" | "drive_work" as entry] if not (
             recording.family
         ):

@@ -33,6 +33,7 @@ from chutelab.results.record import (
     Record,
 )
 from chutelab.results.sensors import sensed
+from chutelab.results.wear import KEYS, touched
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
@@ -71,8 +72,8 @@ come to 60, and a file that is made to fill the memory to 1000."""
 FAR = 1e100
 """Bound on every number: energies and distances computed from it stay finite."""
 
-TABLES = ("events", "trajectory", "sensors", "loads")
-"""What `to_csv` can write; the last two only where they are asked for."""
+TABLES = ("events", "trajectory", "sensors", "loads", "wear")
+"""What `to_csv` can write; the last three only where they are asked for."""
 
 COLUMNS = ("t", "particle", "other", "kind", "surface")
 """Fields of an event that events.csv begins with."""
@@ -257,7 +258,7 @@ def to_csv(
     step: float | None = None,
     only: Collection[str] = TABLES[:2],
 ) -> list[Path]:
-    """Write events.csv, trajectory.csv, sensors.csv and loads.csv, each whole or not at all.
+    """Write events.csv, trajectory.csv, sensors.csv, loads.csv and wear.csv, each whole or not.
 
     Parameters
     ----------
@@ -268,7 +269,7 @@ def to_csv(
     step : float, optional
         Interval of the trajectory, s; by default that of `instants`.
     only : collection of str
-        Which of the four; by default the first two.
+        Which of the five; by default the first two.
 
     Raises
     ------
@@ -325,8 +326,8 @@ def _table(recording: Record, name: str, step: float | None) -> Iterator[Sequenc
             )
     if name == "sensors":
         return _passages(recording)
-    if name == "loads":
-        return _loads(recording)
+    if name in ("loads", "wear"):
+        return _loads(recording) if name == "loads" else _wear(recording)
     return _events(recording) if name == "events" else _trajectory(recording, step)
 
 
@@ -390,3 +391,16 @@ def _loads(recording: Record) -> Iterator[Sequence[object]]:
         columns = one.edges, one.normal, one.along, *one.force.T, *one.place.T, one.torque
         for t, *row in zip(*(column.tolist() for column in columns), strict=False):
             yield name, t, *(None if isnan(value) else value for value in row)
+
+
+def _wear(recording: Record) -> Iterator[Sequence[object]]:
+    yield "surface", "from", "to", "x", "y", *KEYS
+    for name, one in touched(recording).items():
+        columns = (
+            one.edges[:-1],
+            one.edges[1:],
+            *one.places[:, 1].T,
+            *(getattr(one, key) for key in KEYS),
+        )
+        for row in zip(*(column.tolist() for column in columns), strict=True):
+            yield name, *(None if isnan(value) else value for value in row)

@@ -89,10 +89,7 @@ def tree(formula: str, *, dotted: bool = False) -> Any:
 
     Numbers and truth values stand for themselves, and a text is a name.
 
-    Raises
-    ------
-    ValueError
-        If there is something in it that pages do not know.
+    Raises a `ValueError` if there is something in it that pages do not know.
 
     Examples
     --------

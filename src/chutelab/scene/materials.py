@@ -58,24 +58,13 @@ VALUES: Final = tuple(key for key in Material.model_fields if key != "name")
 
 @dataclass(frozen=True)
 class Preset:
-    """A material that is there by its name.
+    """A material that is there by its name."""
 
-    Attributes
-    ----------
-    material : Material
-        Its numbers.
-    about : str
-        What is meant by the name, in a few words.
-    spread : mapping of str to (float, float)
-        The lowest and the highest that is usual, of each of `VALUES`.
-    sources : mapping of str to tuple of str
-        Where each of `VALUES` and its spread are from.
-    """
-
-    material: Material
-    about: str
+    material: Material  # its numbers
+    about: str  # what is meant by the name, in a few words
+    # the lowest and the highest that is usual, of each of `VALUES`
     spread: Mapping[str, tuple[float, float]]
-    sources: Mapping[str, tuple[str, ...]]
+    sources: Mapping[str, tuple[str, ...]]  # where each of `VALUES` and its spread are from
 
 
 def _presets() -> dict[str, Preset]:

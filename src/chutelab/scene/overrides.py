@@ -253,10 +253,7 @@ def value_of(text: str) -> object:
 def resolved(document: Mapping[str, Any], key: str) -> list[str | int]:
     """Return the parts of a key; a table of which there are several goes by its index then.
 
-    Raises
-    ------
-    InputError
-        If it is no path, or if it is not clear which of several tables is meant.
+    Raises an `InputError` if it is no path, or if it is not clear which of several tables is meant.
 
     Examples
     --------

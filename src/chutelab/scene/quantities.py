@@ -156,6 +156,14 @@ LOADS: Final = {
 }
 """What a surface bears: unit and meaning."""
 
+WEAR: Final = {
+    "impact": "energy that blows on SURFACE lose along the normal",
+    "sliding": "slip heat on SURFACE",
+    "erosion": "Finnie's m v² f(γ) of blows on SURFACE",
+    "abrasion": "Archard's load times sliding distance on SURFACE",
+}
+"""What wears a surface, see `results.wear`."""
+
 PARTS: Final = {"mean": "mean over time", "peak": "largest of a bin", "rms": "root mean square"}
 
 
@@ -184,6 +192,11 @@ REGISTRY: Final = {
             for part, about in LOADS.items()
             for statistic in PARTS
             for row in _load(part, *about, statistic)
+        ),
+        *(
+            Quantity(f"wear.SURFACE.{part}.{which}", "J", f"{meaning}, {said}", "run", (), "scene")
+            for part, meaning in WEAR.items()
+            for which, said in (("sum", "all of it"), ("peak", "largest of 50 pieces"))
         ),
         Quantity("flight.t", "s", "time of flight from the incoming belt",
                  needs=("incoming",), symbol="t"),
@@ -306,7 +319,9 @@ def _row(name: str, surfaces: Collection[str]) -> Quantity | None:
     row = REGISTRY.get(name)
     if row is None or "SURFACE" in name or "SENSOR" in name:
         parts = name.split(".")
-        place = {"impact": 1, "sensor": 1, "loads": 1, "ledger": 2}.get(parts[0], len(parts))
+        place = {"impact": 1, "sensor": 1, "loads": 1, "wear": 1, "ledger": 2}.get(
+            parts[0], len(parts)
+        )
         any_ = "SENSOR" if parts[0] == "sensor" else "SURFACE"
         surface = parts[place] if place < len(parts) else ""
         row = REGISTRY.get(".".join([*parts[:place], any_, *parts[place + 1 :]]))

@@ -77,10 +77,7 @@ SIZE: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d,
 def read_size(text: str) -> tuple[float, str]:
     """Read a size: the number in the SI unit, and that unit.
 
-    Raises
-    ------
-    ValueError
-        If it is no finite number with a unit that is known.
+    Raises a `ValueError` if it is no finite number with a unit that is known.
 
     Examples
     --------

@@ -40,23 +40,13 @@ NUMBERS: Final = "must be a list of numbers, or of texts such as 4 mm"
 
 @dataclass(frozen=True)
 class Vary:
-    """A key of the scene and the values it takes.
+    """A key of the scene and the values it takes."""
 
-    Attributes
-    ----------
-    key : str
-        Full path of the key, such as ``plate.angle_deg`` or ``surface.hood.speed``.
-    values : tuple of float
-        In the order they are gone through; in the key's unit.
-    typed : str
-        What messages call it; by default as on the command line.
-    unit : str
-        The unit that was written with the values, "" for none; `quantity` refuses a wrong one.
-    """
-
-    key: str
-    values: tuple[float, ...]
+    key: str  # full path of the key, such as plate.angle_deg or surface.hood.speed
+    values: tuple[float, ...]  # in the order they are gone through; in the key's unit
+    # what messages call it; by default as on the command line
     typed: str = field(default="", compare=False)
+    # the unit that was written with the values, "" for none; `quantity` refuses a wrong one
     unit: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -114,10 +104,7 @@ def varied(varies: Varied, kind: type[Vary]) -> list[Vary]:
 def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
     """Return numbers, with or without unit, in the SI unit, and which that is; "" if none is there.
 
-    Raises
-    ------
-    InputError
-        If one is none; it says `form`, what is allowed.
+    Raises an `InputError` if one is none; it says `form`, what is allowed.
     """
     values, units = [], set()
     for part in parts:
@@ -293,18 +280,10 @@ class Judge:
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """N scenes that differ in plain numbers only: a batch, of which each is a row of numbers.
+    """N scenes that differ in plain numbers only: a batch, of which each is a row of numbers."""
 
-    Attributes
-    ----------
-    scene : Scene
-        One of them, validated: what does not vary is its.
-    columns : mapping of str to ndarray, (N,)
-        The numbers of each key that varies, by its full path.
-    """
-
-    scene: Scene
-    columns: Mapping[str, Floats]
+    scene: Scene  # one of them, validated: what does not vary is its
+    columns: Mapping[str, Floats]  # the numbers of each key that varies, by its full path
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))

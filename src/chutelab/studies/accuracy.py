@@ -128,9 +128,9 @@ def each(recording: Recording) -> Iterator[Answer]:
 
 
 def _booked(recording: Recording) -> Iterator[Answer]:
-    books = ledger(recording)
+    balance = ledger(recording)
     for entry in ENTRIES:
-        yield Answer(entry.replace("_", " "), "energy", np.array([getattr(books, entry)]))
+        yield Answer(entry.replace("_", " "), "energy", np.array([getattr(balance, entry)]))
 
 
 def together(recording: Recording) -> Iterator[Answer]:

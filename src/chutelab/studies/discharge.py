@@ -34,32 +34,18 @@ EDGES = ("lower", "centre", "upper")
 
 @dataclass(frozen=True, eq=False)
 class SideBySide:
-    """Streams by all methods and by simulation.
+    """Streams by all methods and by simulation."""
 
-    Attributes
-    ----------
-    scene : Scene
-        What was simulated: belt and particles of the scene that was asked for, and nothing else.
-    heights : ndarray, (H,)
-        Above the pulley's axis, m.
-    methods : dict
-        The stream of each method that has an answer.
-    lines : dict
-        x (m) of lower edge, centre and upper edge at the heights, (3, H), of each of them and of
-        "simulated"; NaN where it has none. Edges of the simulated stream are half a particle
-        outside the paths of the centres, of which 2, 50 and 98 % lie below.
-    refused : dict
-        Why another method has no answer.
-    recording : Recording
-        The run.
-    """
-
+    # what was simulated: belt and particles of the scene that was asked for, and nothing else
     scene: Scene
-    heights: Floats
-    methods: dict[str, Discharge]
+    heights: Floats  # (H,), above the pulley's axis, m
+    methods: dict[str, Discharge]  # the stream of each method that has an answer
+    # x (m) of lower edge, centre and upper edge at the heights, (3, H), of each of them and of
+    # "simulated"; NaN where it has none. Edges of the simulated stream are half a particle outside
+    # the paths of the centres, of which 2, 50 and 98 % lie below
     lines: dict[str, Floats]
-    refused: dict[str, str]
-    recording: Recording
+    refused: dict[str, str]  # why another method has no answer
+    recording: Recording  # the run
 
     def sheet(self) -> Sheet:
         """Return a table of the streams at the heights."""
@@ -118,10 +104,8 @@ def side_by_side(
     Plate, surfaces and the outgoing belt are left out of it. The bed is as deep as the layers of
     the first stream with half a particle below and above.
 
-    Raises
-    ------
-    DischargeError
-        Of a scene without an incoming belt, or whose first stream is not released on it.
+    Raises a `DischargeError` for a scene without an incoming belt, or whose first stream is not
+    released on it.
     """
     whole = load(scene)
     if (belt := whole.incoming) is None:

@@ -250,10 +250,8 @@ def left(
     Parameters are u and β where the belt meets the pulley, µ_s, µ_k and s. Booth's solution holds
     with adhesion too, u - s = [(4µ² - 2) cos α - 6 µ sin α]/(1 + 4µ²) + C exp(2µα).
 
-    Raises
-    ------
-    DischargeError
-        If the bed slips back on a belt that rises, or sticks to the belt all round.
+    Raises a `DischargeError` if the bed slips back on a belt that rises, or sticks to the belt all
+    round.
     """
     begin = -incline
     if cos(begin) - u + sticks <= 0.0:

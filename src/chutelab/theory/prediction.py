@@ -48,30 +48,20 @@ place."""
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """Straight and round surfaces, and all their ends.
+    """Straight and round surfaces, and all their ends."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the S straight ones, then of the others.
-    start, tangent, normal, length : ndarray, (S, 2) and (S,)
-        First ends of the straight ones (m), unit vectors along them and to their left, lengths.
-    center, size, begin, extent : ndarray, (C, 2) and (C,)
-        What is round, as `Bend` has it; an end of a surface is a circle of no size.
-    owner : ndarray of int, (C,)
-        To which of the names each of these belongs.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the S straight ones, then of the others
+    # (S, 2): first ends of the straight ones, m, directions along them and to their left; lengths
     start: Floats
     tangent: Floats
     normal: Floats
     length: Floats
+    # (C, ...): what is round, as `Bend` has it; an end of a surface is a circle of no size
     center: Floats
     size: Floats
     begin: Floats
     extent: Floats
-    owner: Ints
+    owner: Ints  # to which of the names each of these belongs
 
     @classmethod
     def of(cls, lines: Sequence[Line], bends: Sequence[Bend] = ()) -> Obstacles:

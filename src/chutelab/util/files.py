@@ -37,10 +37,8 @@ def aside(folder: Path, target: Path | None = None) -> Iterator[Path]:
     To be entered before long work: what cannot be written to is refused at once. KILL and power
     cuts leave it behind; the next one in the same place removes it, see `_remove_left_over`.
 
-    Raises
-    ------
-    OSError
-        One of a file in here, or without a name, has the name of `target`, by default `folder`.
+    Raises an `OSError`; one of a file in here, or without a name, has the name of `target`, by
+    default `folder`.
     """
     made = ""
     try:
@@ -71,10 +69,8 @@ def together(folder: Path) -> Iterator[Path]:
 
     That is made if need be; what else is in it stays. A signal waits until all have moved.
 
-    Raises
-    ------
-    OSError
-        As `aside`, or if something that is no file is where one should go: none is moved then.
+    Raises an `OSError` where `aside` does, or if something that is no file is where one should go:
+    none is moved then.
     """
     with aside(folder) as made:
         yield made

@@ -31,32 +31,17 @@ STYLES = {"ok": "green", "FAILED": "bold red"}
 
 @dataclass(frozen=True)
 class Sheet:
-    """A table of words and numbers.
+    """A table of words and numbers."""
 
-    Attributes
-    ----------
-    title : str
-        What it shows, with units; "" for none.
-    columns : tuple of str
-        Heads, "" where a column needs none.
-    rows, foot : tuple of tuple of str
-        Cells; those of the foot stand below a line. The first line of a cell of several is bold.
-        A row of one cell is a heading over the rows that follow.
-    texts : int
-        How many columns hold words; the others hold numbers and are set to the right.
-    tail : int
-        How many columns at the end hold words again.
-    notes : tuple of str
-        Sentences below the table.
-    """
-
-    title: str
-    columns: tuple[str, ...]
+    title: str  # what it shows, with units; "" for none
+    columns: tuple[str, ...]  # heads, "" where a column needs none
+    # cells; those of the foot stand below a line. The first line of a cell of several is bold. A
+    # row of one cell is a heading over the rows that follow
     rows: tuple[tuple[str, ...], ...]
     foot: tuple[tuple[str, ...], ...] = ()
-    texts: int = 1
-    tail: int = 0
-    notes: tuple[str, ...] = ()
+    texts: int = 1  # how many columns hold words; the others hold numbers and are set to the right
+    tail: int = 0  # how many columns at the end hold words again
+    notes: tuple[str, ...] = ()  # sentences below the table
 
     def __rich__(self) -> Any:
         """Return what rich prints: title, table and notes, a blank line between the parts."""

@@ -33,11 +33,8 @@ def version_of(package: str) -> str | None:
 def library(module: str, what: str, extra: str) -> Any:
     """Return a module of a package that only one of Chutelab's extras brings.
 
-    Raises
-    ------
-    MissingLibraryError
-        Without it, or if it is too old; says `what`, such as "a fit needs SciPy", and what to
-        install.
+    Raises a `MissingLibraryError` without it, or if it is too old; says `what`, such as "a fit
+    needs SciPy", and what to install.
     """
     install = f'pip install "chutelab[{extra}]"'
     if old := too_old(extra):

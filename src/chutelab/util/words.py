@@ -70,10 +70,7 @@ class Words:
 def words(language: str = "en") -> Words:
     """Return what is said in a language, such as "de"; what it has not is said in English.
 
-    Raises
-    ------
-    LanguageError
-        If there is no such language; the message lists those there are.
+    Raises a `LanguageError` if there is no such language; the message lists those there are.
     """
     if language not in LANGUAGES:
         listed = ", ".join(LANGUAGES)

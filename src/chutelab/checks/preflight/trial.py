@@ -174,15 +174,15 @@ MANY = 12
 def built(machine: Machine) -> Iterator[Part]:
     """Yield the parts of a machine, world frame."""
     for index, surface in enumerate(machine.surfaces):
-        mine = [part.of(part.surface == index) for part in machine.parts]
-        count = sum(len(part.surface) for part in mine)
+        own = [part.of(part.surface == index) for part in machine.parts]
+        count = sum(len(part.surface) for part in own)
         if count > MANY:
-            points = np.round(np.concatenate([part.corners for part in mine]), 12) + 0.0
+            points = np.round(np.concatenate([part.corners for part in own]), 12) + 0.0
             (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
             box = f"from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m"
             yield Part(surface, f"{count} pieces, {box}")
             continue
-        for part in mine:
+        for part in own:
             for piece in map(part.of, range(len(part.surface))):
                 said = f", moving at {piece.speed:.6g} m/s" if piece.speed else ""
                 if np.isfinite(piece.appears):
@@ -285,7 +285,7 @@ class Trial:
         return self.recording is not None and not self.trouble and stopped(self.recording) is None
 
 
-def trial(machine: Machine, engine: str) -> Trial:
+def trial_run(machine: Machine, engine: str) -> Trial:
     """Run a machine until it ends, or its time is up.
 
     Raises a `SceneError` if the engine that the scene asks for cannot run it.

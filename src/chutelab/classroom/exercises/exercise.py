@@ -408,10 +408,7 @@ MOST_DRAWS: Final = 1000
 def draw(exercise: Exercise, student: str) -> tuple[Values, tuple[Case, ...]]:
     """Return a student's parameters and the cases of all questions.
 
-    Raises
-    ------
-    RuntimeError
-        If none of `MOST_DRAWS` draws fits: the exercise is badly made.
+    Raises a `RuntimeError` if none of `MOST_DRAWS` draws fits: the exercise is badly made.
     """
     for number in range(MOST_DRAWS):
         cases = attempt(exercise, student, number)

@@ -29,9 +29,8 @@ from typing import Any, Final
 from PIL import Image
 from PIL.GifImagePlugin import GifImageFile
 
-from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import UNNAMED
-from chutelab.classroom.lessons.reading import (
+from chutelab.classroom.exercises import EXERCISES, UNNAMED
+from chutelab.classroom.lessons import (
     OWN_WORDS,
     Lesson,
     LessonError,
@@ -56,10 +55,10 @@ SPLIT: Final = "split.png"
 """The film, the machine before anything has happened, and the velocity at the plate."""
 
 MOST_PIXELS: Final = 3840 * 2160
-"""Most pixels of a picture, as in `reading.Picture`."""
+"""Most pixels of a picture, as in `lessons.Picture`."""
 
 NO_SETTINGS: Final = {"scene", "set", "machine", "film"}
-"""Keys of `reading.Picture` that are no settings of the film: which scene, and its words."""
+"""Keys of `lessons.Picture` that are no settings of the film: which scene, and its words."""
 
 LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
 """Packages whose versions determine the bytes of a picture, besides its inputs."""
@@ -135,12 +134,8 @@ def build(
 def build_notebook(lesson: Lesson, folder: Path | None = None) -> Built:
     """Make the notebook of a lesson, unless it is there already.
 
-    Raises
-    ------
-    LessonError
-        If a cell of the lesson's own belongs to no step.
-    OSError
-        If the file cannot be written.
+    Raises a `LessonError` if a cell of the lesson's own belongs to no step; an `OSError` if the
+    file cannot be written.
     """
     text = notebook_of(lesson)
     path = (lesson.folder if folder is None else folder) / name_of(lesson.language)
@@ -267,10 +262,7 @@ def name_of(language: str) -> str:
 def notebook_of(lesson: Lesson) -> str:
     """Return the text of a lesson's notebook, JSON: its steps, in the lesson's language.
 
-    Raises
-    ------
-    LessonError
-        If a cell of ``notebook.py`` belongs to no step.
+    Raises a `LessonError` if a cell of ``notebook.py`` belongs to no step.
     """
     said = words(lesson.language)
     say, own, exercise = said.say, _own(lesson), EXERCISES.get(lesson.name)

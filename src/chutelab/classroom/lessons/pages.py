@@ -26,8 +26,8 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from PIL.GifImagePlugin import GifImageFile
 
-from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import data_of, told
+from chutelab.classroom.exercises import EXERCISES, data_of, told
+from chutelab.classroom.lessons import Lesson, LessonError, called_in, scene_of, unusable
 from chutelab.classroom.lessons.building import (
     MACHINE,
     PICTURE,
@@ -37,7 +37,6 @@ from chutelab.classroom.lessons.building import (
     is_current,
     name_of,
 )
-from chutelab.classroom.lessons.reading import Lesson, LessonError, called_in, scene_of, unusable
 from chutelab.classroom.lessons.sheets import printed, sheet, values_of, worksheet
 from chutelab.classroom.lessons.steps import data_of as data_of_steps
 from chutelab.classroom.lessons.texts import ASSETS, INDEX, asset, html_of, without_tex
@@ -314,12 +313,8 @@ _PACKED: Final = ("imsmanifest.xml", "index.html", "scorm.js")
 def package(lesson: Lesson, path: str | Path) -> Path:
     """Write the SCORM 1.2 package of a lesson, in its language: a zip file, whole or not at all.
 
-    Raises
-    ------
-    LessonError
-        If the lesson has no live page with an exercise, which is what is in the package.
-    OSError
-        If it cannot be written.
+    Raises a `LessonError` if the lesson has no live page with an exercise, which is what is in the
+    package; an `OSError` if it cannot be written.
     """
     if lesson.page is None or lesson.name not in EXERCISES:
         text = "a package is a live page with an exercise, and it has none"
@@ -372,12 +367,8 @@ def write_wheel(folder: Path) -> Path:
     and of what the installer keeps: no network, no tools for building. The form is that of the
     binary distribution format, PEP 427. The same chutelab gives the same bytes.
 
-    Raises
-    ------
-    MissingLibraryError
-        If chutelab is not installed, so that nothing says what it needs.
-    OSError
-        If it cannot be written.
+    Raises a `MissingLibraryError` if chutelab is not installed, so that nothing says what it needs;
+    an `OSError` if it cannot be written.
     """
     try:
         installed = distribution("chutelab")

@@ -22,11 +22,10 @@ from typing import Final
 from markdown_it.tree import SyntaxTreeNode
 from PIL import Image
 
-from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import UNNAMED, told
+from chutelab.classroom.exercises import EXERCISES, UNNAMED, told
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import with_unit
-from chutelab.classroom.lessons.reading import Lesson, Page, Teacher, machine_of, picture_of
+from chutelab.classroom.lessons import Lesson, Page, Teacher, machine_of, picture_of
 from chutelab.classroom.lessons.steps import PLACES, Ask, Step
 from chutelab.classroom.lessons.texts import asset, parsed, parser, typeset
 from chutelab.scene import shipped
@@ -222,12 +221,8 @@ class PrintError(MissingLibraryError):
 def printed(lesson: Lesson, which: str, kind: str) -> bytes:
     """Return one of the `SHEETS` of a lesson as a file of one of `FORMATS`, in its language.
 
-    Raises
-    ------
-    LessonError
-        If the lesson has no such sheet.
-    PrintError
-        If it is to be a PDF, and the extra that sets it is not installed.
+    Raises a `LessonError` if the lesson has no such sheet; a `PrintError` if it is to be a PDF, and
+    the extra that sets it is not installed.
     """
     markdown = sheet(lesson, which)
     if kind == "md":

@@ -1,22 +1,63 @@
 """The lesson picture: a film of a recording, slowed down, that stops at what matters.
 
-===============  ==================================================================================
-`moments`        which moments are shown, for how long each, and what happened, in words
-`actors`         what moves: particles, arrows, belts, pulley, and the energy bars
-`stage`          the picture, `animate`: GIF, mp4 or webm, and `still`
-===============  ==================================================================================
+A background is drawn once, and what moves on it for each frame. `animate` writes a GIF, or a video
+for those who project from other programs; `still` the machine before it begins. Pillow writes the
+GIF: one fixed palette for all frames, so that no colour can flicker, and of each frame only the
+pixels that changed. Videos, mp4 or webm, go through imageio and its ffmpeg.
+
+- `moments`: which moments are shown, for how long each, and what happened, in words.
+- `actors`: what moves: particles, arrows, belts, pulley, and the energy bars.
 """
 
-from chutelab.pictures.animation.moments import Moment, film
-from chutelab.pictures.animation.stage import (
-    FORMATS,
-    SHOWS,
-    Stage,
-    VideoError,
-    animate,
-    need_video,
-    still,
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from itertools import combinations
+from pathlib import Path
+from textwrap import shorten
+from typing import Any, cast
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+from PIL import Image, ImageDraw
+
+from chutelab.pictures import PURPLE
+from chutelab.pictures.animation.actors import (
+    Writing,
+    arrows,
+    bars,
+    bodies,
+    crowd,
+    drives,
+    gates,
+    seen,
+    strobe,
+    strung,
+    trail,
 )
+from chutelab.pictures.animation.moments import Moment, asked, film, slowness, span
+from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_scene, style, window_of
+from chutelab.pictures.plots.panels import path_of_arcs
+from chutelab.pictures.plots.scenery import (
+    FINE,
+    around,
+    as_crowd,
+    energies,
+    nominal,
+    one_of_many,
+    round_step,
+    strobe_step,
+    track_times,
+)
+from chutelab.pictures.plots.style import Picture, figures, say
+from chutelab.results import Recording
+from chutelab.util.errors import MissingLibraryError
+from chutelab.util.files import whole
 
 __all__ = [
     "FORMATS",
@@ -29,3 +70,528 @@ __all__ = [
     "need_video",
     "still",
 ]
+
+SHOWS = ("parabola", "trails", "strobe", "velocity", "energy")
+"""What a picture can show besides the machine and the particles."""
+
+TRAIL = 0.07
+"""Share of the window's width that the trail of the fastest particle is long."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the picture holds, and where."""
+
+    # pixels
+    width: int
+    height: int
+    # what stands above the scene; the question may be empty
+    title: str
+    question: str
+    shows: frozenset[str]  # some of `SHOWS`
+    # where the scene is: left, bottom, width and height as shares of the picture
+    view: tuple[float, float, float, float]
+    window: Window  # what of the world is shown, of the shape of `view`
+    fastest: float  # m/s; particle 0's highest speed while it is in the window
+
+    def reach(self, share: float, what: str) -> float:
+        """Return the time (s) in which particle 0's highest speed covers a share of the window.
+
+        As much as arrows (in m for 1 m/s) and trails are long; 0 if `what` is not shown.
+        """
+        shown = what in self.shows and self.fastest > 0.0
+        return share * self.window.width / self.fastest if shown else 0.0
+
+    @property
+    def arrow(self) -> float:
+        """Length of the arrow of the velocity for 1 m/s, m; 0: there is none.
+
+        That of the highest speed is a tenth of the picture's width.
+        """
+        return self.reach(0.1, "velocity")
+
+    @property
+    def dpi(self) -> float:
+        """Pixels to the inch: text keeps its share of 8 by 4.5 inches, or more."""
+        return min(self.width / 8.0, self.height / 4.5)
+
+
+def lay_out(
+    recording: Recording,
+    *,
+    width: int,
+    height: int,
+    title: str | None = None,
+    question: str = "",
+    shows: frozenset[str] | None = None,
+    energy: bool = True,
+) -> Layout:
+    """Choose the window such that everything that moves, arrows included, is in the picture.
+
+    It shows all by default, but of a crowd not what particle 0 does.
+
+    Raises a `ValueError` if the picture is too small, or `shows` has an unknown name.
+    """
+    if width < 320 or height < 180:  # text could not be read
+        raise ValueError(f"{width} x {height} pixels: allowed are at least 320 x 180")
+    usual = frozenset(SHOWS if energy else SHOWS[:-1])
+    wanted, shows = shows, usual if shows is None else shows
+    if unknown := sorted(shows - set(SHOWS)):
+        raise ValueError(f"show = {unknown[0]!r}: allowed are {', '.join(SHOWS)}")
+    if one_of_many(recording) or (wanted is None and as_crowd(recording)):
+        shows -= {"strobe", "velocity"}  # of particle 0
+    view = (0.015, 0.135, 0.675 if "energy" in shows else 0.97, 0.65 if question else 0.71)
+    aspect = view[2] * width / (view[3] * height)
+    pulley = recording.machine.pulley
+    window = window_of(recording).fitted(aspect)
+    begin, end = span(recording, window)
+    last = min(end, float(recording.track(0)["t"][-1]))
+    times = track_times(recording, begin, last, fine=FINE * window.width)
+    position, velocity = nominal(recording, times)
+    # What has left it for good shall not make all else small.
+    inside = window.holds(position)
+    position, velocity = position[inside], velocity[inside]
+    fastest = float(np.hypot(*velocity.T).max(initial=0.0))
+    said = recording.title if title is None else title
+    tight = Layout(width, height, said, question, shows, view, window, fastest)
+    corners = [(window.left, window.bottom), (window.right, window.top)]
+    if pulley is not None:
+        # The incoming belt's name stands left of it.
+        corners.append((-pulley.radius - 0.21 * window.width, 0.0))
+    if recording.scene.view is not None:
+        return tight
+    room = 0.015 * window.width
+    tips = position + tight.arrow * velocity
+    grown = around(np.concatenate([corners, tips - room, tips + room]))
+    return replace(tight, window=grown.fitted(aspect))
+
+
+RIGHT, GAP = 0.99, 0.015
+"""Shares of the picture's width: where text ends, and between the clock and how it runs."""
+
+TITLE, LINE, CAPTION = 0.942, 0.065, 0.055
+"""Shares of its height: the title's base line, a line below it, the middle of the caption."""
+
+
+class Stage:
+    """Draws the moments of a film: the background once, and for each moment what moves on it.
+
+    `slow` is seconds on the screen for one second of the recording. The analytic path is there from
+    the first moment on, or after the time `ask`, s. `figure` is the background and `view` the axes
+    of the scene in it; `moving` is what moves, from back to front; `writings` change.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        layout: Layout,
+        moments: tuple[Moment, ...],
+        *,
+        slow: float,
+        ask: float | None = None,
+    ) -> None:
+        times, shows = np.array([moment.t for moment in moments]), layout.shows
+        # A hundredth of a pixel more: the canvas rounds down.
+        inches = (layout.width + 0.01) / layout.dpi, (layout.height + 0.01) / layout.dpi
+        self.figure = Picture(inches, layout.dpi)
+        self.canvas = cast(Any, self.figure.canvas)  # its methods are not annotated
+        self.view = view = self.figure.add_axes(layout.view)
+        parts = analytic_of(recording)[0] if "parabola" in shows else ()
+        draw_scene(view, recording.machine, layout.window, clear=path_of_arcs(parts))
+        view.set(xticks=[], yticks=[])
+        for spine in view.spines.values():
+            spine.set_color(style.STEEL_LIGHT)
+        _draw_scale(view)
+        drawn = len(view.lines)
+        draw_analytic(view, parts)
+        parabola = view.lines[drawn:]
+        position, velocity = nominal(recording, times)
+        reach = layout.reach(TRAIL, "trails")
+        others, named = crowd(view, recording, times, reach)
+        self.moving = [
+            *gates(view, recording.machine, times),
+            *drives(view, recording.machine, times),
+            *strung(view, recording, times),
+            *others,
+        ]
+        for dashed in [] if ask is None else parabola:
+            # Below all that moves.
+            dashed.set_animated(True)
+            self.moving.insert(0, seen(dashed, times > ask))
+        # What the legend names, in its order.
+        dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0}
+        handles = [Line2D([], [], **dot, color=style.STRIKE, label=say("particle-0")), *named]
+        if parts:
+            # Two dashes; the line's own would not fit.
+            dashes: Any = (0, (1.5, 0.85))
+            handles.append(
+                Line2D([], [], color=style.ANALYTIC, lw=3.0, ls=dashes, label=say("analytic"))
+            )
+        if reach:
+            self.moving.append(trail(view, recording, times, reach))
+        if "strobe" in shows:
+            self.moving.append(strobe(view, recording, times))
+            said = say("every", step=figures(strobe_step(recording), "g"))
+            handles.append(Line2D([], [], **style.RINGS, ms=4.5, label=said))
+        if layout.arrow:
+            self.moving.append(arrows(view, position, velocity, layout.arrow))
+            handles.append(Line2D([], [], color=style.INK, lw=2.0, label=say("velocity")))
+        _add_legend(view, handles, components=layout.arrow > 0.0)
+        self.moving += bodies(view, recording, np.array([0]), times, "disk", style.STRIKE, 0.4)
+        self.writings = self._add_text(layout, pace_words(slow), moments)
+        if "energy" in shows:
+            # Above the bars is room for their title, and the clock.
+            top = layout.view[1] + layout.view[3] - 0.06
+            axes = self.figure.add_axes((0.765, 0.43, 0.225, top - 0.43))
+            table = self.figure.add_axes((0.73, 0.125, 0.26, 0.245))
+            blocks, column = bars(
+                axes, table, energies(recording, times), moves=bool(recording.machine.movers)
+            )
+            self.moving += blocks
+            self.writings += column
+        self.canvas.draw()
+        self._background = self.canvas.copy_from_bbox(self.figure.bbox)
+
+    def frame(self, index: int) -> Image.Image:
+        """Return the picture of one moment, RGB."""
+        self.canvas.restore_region(self._background)
+        renderer = self.canvas.get_renderer()
+        for artist, show in self.moving:
+            show(index)
+            artist.draw(renderer)
+        size = self.canvas.get_width_height()
+        shown = Image.frombuffer("RGBA", size, self.canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
+        picture = shown.convert("RGB")
+        draw = ImageDraw.Draw(picture)
+        for writing in self.writings:
+            writing.paint(draw, index)
+        return picture
+
+    def _add_text(self, layout: Layout, pace: str, moments: tuple[Moment, ...]) -> list[Writing]:
+        """Write title, question and pace; return clock and caption, which change."""
+        text = self.figure.text
+        said = [style.plain(" ".join(one.split())) for one in (layout.title, layout.question)]
+        title = text(0.02, TITLE, said[0], fontsize=style.LARGE, fontweight="bold")
+        _shorten(title, RIGHT * layout.width)
+        if layout.question:
+            asked = text(0.02, TITLE - LINE, said[1], fontsize=style.NORMAL)
+            _shorten(asked, RIGHT * layout.width)
+        # Near what moves: the rectangle around all of it is what a frame of the file costs.
+        above = layout.view[1] + layout.view[3] + 0.02
+        slowed = text(RIGHT, above, pace, fontsize=style.NORMAL, ha="right")
+        right = slowed.get_window_extent().x0 - GAP * layout.width
+        # The clock has no digits that change too fast to be read: they would cost as much as all
+        # particles.
+        steps = np.diff([moment.t for moment in moments])
+        digits = 2 if len(steps) and np.median(steps) >= 0.01 else 3
+        times = [f"t = {figures(moment.t, f'.{digits}f')} s" for moment in moments]
+        shown = {said: style.drawable(said) for said in {moment.words for moment in moments}}
+        words = [shown[moment.words] for moment in moments]
+        left, low, high = 0.02 * layout.width, 1.0 - CAPTION, 1.0 - above
+        return [
+            Writing(style.NORMAL, layout.dpi, right, layout.height * high, "rs", times),
+            Writing(style.NORMAL, layout.dpi, left, layout.height * low, "lm", words),
+        ]
+
+
+def _add_legend(ax: Axes, handles: list[Line2D], *, components: bool) -> None:
+    """Name what is drawn above the scene, and last the components of the velocity.
+
+    What does not fit beside the first five is left out, the last first.
+    """
+    while True:
+        legend = ax.legend(
+            handles=handles,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=len(handles),
+            fontsize=style.SMALL,
+            frameon=False,
+            borderaxespad=0.1,
+            borderpad=0.3,
+            handlelength=1.5,
+            columnspacing=0.8,
+            handletextpad=0.3,
+        )
+        if len(handles) <= 5 or legend.get_window_extent().x1 <= ax.get_window_extent().x1:
+            break
+        handles, components = handles[:-1], False
+    for place, (name, colour) in enumerate(style.VELOCITY.items() if components else ()):
+        ax.annotate(
+            f"$v_{name[1]}$",
+            (1.0, 0.5),
+            xycoords=legend.get_texts()[-1],
+            xytext=(4.0 + 16.0 * place, 0.0),
+            textcoords="offset points",
+            fontsize=style.NORMAL,
+            color=style.tint(colour, 0.8, style.INK),
+            va="center",
+            # Placed beside what the legend has placed before.
+            zorder=legend.get_zorder() + 1.0,
+        )
+
+
+def _shorten(text: Text, right: float) -> None:
+    """Cut a text off at the end of a word such that it ends before a column of pixels."""
+    whole = text.get_text()
+    length = len(whole)
+    while text.get_window_extent().x1 > right and length > 1:
+        length -= 1
+        text.set_text(shorten(whole, length, placeholder=" …"))
+
+
+def pace_words(slow: float) -> str:
+    """Return how the film's clock runs.
+
+    >>> pace_words(10.0), pace_words(1.0), pace_words(0.5)
+    ('10× slower', 'real time', '2× faster')
+    """
+    if slow == 1.0:
+        return say("real-time")
+    pace, times = ("slower", slow) if slow > 1.0 else ("faster", 1.0 / slow)
+    return say(pace, times=figures(times))
+
+
+def _draw_scale(ax: Axes) -> None:
+    """Draw a bar of round length in a corner where no name is: the picture has no ticks."""
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    length = round_step(right - left, 6)
+    taken = [text.get_window_extent().padded(2.0) for text in ax.texts]
+    lines = [line.get_path().transformed(line.get_transform()) for line in ax.lines]
+    (bar,) = ax.plot([], [], color=style.MUTED, linewidth=2.0, solid_capstyle="butt", gid="scale")
+    said = ax.text(0.0, 0.0, f"{figures(length, 'g')} m", ha="center", va="bottom")
+    said.set(fontsize=style.SMALL, color=style.MUTED)
+    edge = 0.015 * (right - left)
+
+    def hides(place: tuple[float, float]) -> int:
+        """Put it there, and return how much it would hide; names count more than lines."""
+        x, y = place
+        bar.set_data([x, x + length], [y, y])
+        said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
+        ends = ax.transData.transform([(x, y), (x + length, y)])
+        box = Bbox.union([said.get_window_extent(), Bbox(ends)])
+        crossed = sum(line.intersects_bbox(box, filled=False) for line in lines)
+        return int(100 * box.count_overlaps(taken) + crossed)
+
+    rows = top - 0.08 * (top - bottom), bottom + 0.03 * (top - bottom)
+    hides(min(((x, y) for y in rows for x in (left + edge, right - edge - length)), key=hides))
+
+
+def palette() -> tuple[str, ...]:
+    """Return the colours of every GIF: few, since few make a small file.
+
+    The ground, the greys and the colours with a meaning, unmixed, and the mixtures at which
+    anti-aliased edges between them are read as smooth. Every other colour is shown as the nearest
+    of these.
+    """
+    hues = [style.TRACK, style.ANALYTIC, style.BELT, style.STRIKE, style.STREAM, PURPLE]
+    flat = [*style.ENERGY.values(), style.WALL]
+    edges = [style.tint(hue, share) for share in (0.5, 0.75, 0.25) for hue in hues]
+    meeting = [style.tint(one, 0.5, other) for one, other in combinations(hues, 2)]
+    dark = [style.tint(hue, 0.6, style.INK) for hue in hues]
+    greys = [
+        style.GROUND,
+        style.INK,
+        style.MUTED,
+        style.STEEL,
+        style.STEEL_LIGHT,
+        style.ENERGY["start"],
+        style.BELT_BODY,
+        style.CLEAT,
+        style.BELT_NAME,
+    ]
+    # Where a grey edge would otherwise be shown in a dull colour.
+    greys += [style.tint(style.INK, share) for share in (0.81, 0.592, 0.53, 0.17)]
+    return tuple(dict.fromkeys([*greys, *hues, *flat, *edges, *meeting, *dark]))
+
+
+def write_gif(
+    path: Path, pictures: Iterable[Image.Image], delays: Iterable[int], comment: str = ""
+) -> None:
+    """Write RGB pictures of one size as a GIF that loops for ever.
+
+    Each stays for its delay in hundredths of a second; equal ones in a row become one frame. Pillow
+    keeps a byte for each of their pixels until all are drawn. The comment is kept, not shown.
+    """
+    table = b"".join(bytes.fromhex(colour[1:]) for colour in palette())
+    reference = Image.new("P", (1, 1))
+    reference.putpalette(table)
+    few = (one.quantize(palette=reference, dither=Image.Dither.NONE) for one in pictures)
+    next(few).save(
+        path,
+        format="GIF",
+        save_all=True,
+        append_images=few,
+        duration=[10 * delay for delay in delays],
+        loop=0,
+        # The table ends with a colour that no pixel has: there the last frame stays to be seen.
+        palette=table + bytes(3),
+        transparency=len(table) // 3,
+        disposal=1,
+        optimize=True,
+        comment=comment,
+    )
+
+
+VIDEOS = {
+    "mp4": ("libx264", "-crf 20 -preset medium -movflags +faststart"),
+    "webm": ("libvpx-vp9", "-crf 28 -b:v 0 -deadline realtime -cpu-used 7 -row-mt 1"),
+}
+"""Codec of each kind of video and its options, by the suffix of the file.
+
+Lines and letters stay sharp; the file begins to play before it is all there.
+"""
+
+
+class VideoError(MissingLibraryError):
+    """A video cannot be written, and what to do about it."""
+
+
+def need_video(kind: str) -> None:
+    """Raise a `VideoError` if the extra that writes this kind of film is not installed."""
+    if find_spec("imageio_ffmpeg") is None:
+        raise VideoError(
+            f'a film as {kind} needs what is not installed: pip install "chutelab[video]"'
+        )
+
+
+def write_video(
+    path: Path, kind: str, fps: int, pictures: Iterable[Image.Image], delays: Iterable[int]
+) -> None:
+    """Write pictures, each for a delay in hundredths of a second, as a video of one of `VIDEOS`.
+
+    Raises a `VideoError` if the extra is not installed.
+    """
+    need_video(kind)
+    from imageio.v2 import get_writer
+
+    codec, parameters = VIDEOS[kind]
+    # The same pictures make the same bytes: the encoders' work depends on how many threads share
+    # it, and ffmpeg gives a webm a random number unless told.
+    parameters += " -threads 4 -flags:v +bitexact -fflags +bitexact"
+    options: dict[str, Any] = {
+        "fps": fps, "codec": codec, "quality": None, "pixelformat": "yuv420p",
+        "macro_block_size": 2, "output_params": parameters.split(), "ffmpeg_log_level": "error",
+    }  # fmt: skip
+    with cast(Any, get_writer(path, format="FFMPEG", mode="I", **options)) as video:
+        for picture, delay in zip(pictures, delays, strict=True):
+            for _ in range(max(1, round(delay / (100 // fps)))):
+                video.append_data(np.asarray(picture))
+
+
+FORMATS = ("gif", *VIDEOS)
+"""Files that `animate` writes, by their suffix."""
+
+
+def animate(
+    recording: Recording,
+    path: str | Path,
+    *,
+    fps: int | None = None,
+    width: int = 1280,
+    height: int = 720,
+    slow: float | None = None,
+    title: str | None = None,
+    question: str = "",
+    show: Collection[str] | None = None,
+    energy: bool = True,
+    predict: bool = False,
+    comment: str = "",
+) -> Path:
+    """Write the lesson picture of a recording, a GIF that loops for ever, or a video.
+
+    Parameters
+    ----------
+    recording : Recording
+        From either engine, with at least one knot of particle 0.
+    path : path
+        Where to; written whole or not at all. Its suffix says what: .gif, .mp4 or .webm, the last
+        two with the extra ``chutelab[video]``.
+    fps : int, optional
+        Pictures a second: 25 or 50, or another divisor of 100 below. By default 25; of a stream 20,
+        since much of each picture changes.
+    width, height : int
+        Pixels; even numbers for a video.
+    slow : float, optional
+        Seconds on the screen for one second of the recording; by default a round number that
+        makes the motion take three to five seconds, holds not counted.
+    title : str, optional
+        By default the recording's.
+    question : str, optional
+        A line under the title.
+    show : collection of str, optional
+        Which of `SHOWS` to show: "parabola" (the analytic one, dashed), "trails", "strobe" (dots
+        at round times), "velocity" (of particle 0, an arrow with its components) and "energy"
+        (the ledger as bars; without it the scene is wider). By default all, but of a crowd
+        neither strobe dots nor velocity, and no impact of particle 0 is told.
+    energy : bool, optional
+        Whether `show` has "energy", where it is not given.
+    predict : bool, optional
+        Let viewers predict: the film begins without the analytic parabola, and waits as
+        the particle comes to the top of the drive pulley, or as it begins.
+    comment : str, optional
+        A text that a GIF keeps, not shown.
+
+    Colours and language are those of `plots.style`.
+
+    Returns
+    -------
+    Path
+        Of the file.
+
+    Raises
+    ------
+    ValueError
+        If the suffix, `fps`, `slow`, `show` or the size is not possible.
+    VideoError
+        If a video is asked for and the extra is not installed.
+    OSError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    kind = path.suffix.removeprefix(".").lower()
+    if kind not in FORMATS:
+        allowed = ", ".join(f".{name}" for name in FORMATS)
+        raise ValueError(f"{path.name}: allowed are files that end in {allowed}")
+    if kind in VIDEOS and (width % 2 or height % 2):
+        raise ValueError(f"{width} x {height} pixels: allowed in a video are even numbers")
+    fps = (25 if recording.count == 1 else 20) if fps is None else fps
+    shows = None if show is None else frozenset([show] if isinstance(show, str) else show)
+    layout = lay_out(
+        recording, width=width, height=height, title=title, question=question, shows=shows,
+        energy=energy,
+    )  # fmt: skip
+    begin, end = span(recording, layout.window)
+    pace = slowness(end - begin) if slow is None else slow
+    ask = asked(recording, begin) if predict else None
+    crowd = as_crowd(recording) and "velocity" not in layout.shows
+    moments = film(recording, begin, end, fps=fps, slow=pace, ask=ask, crowd=crowd)
+    stage = Stage(recording, layout, moments, slow=pace, ask=ask)
+    pictures = map(stage.frame, range(len(moments)))
+    delays = [moment.delay for moment in moments]
+    with whole(path) as unfinished:
+        if kind == "gif":
+            write_gif(unfinished, pictures, delays, comment)
+        else:
+            write_video(unfinished, kind, fps, pictures, delays)
+    return path
+
+
+def still(recording: Recording, path: str | Path, *, width: int = 1280, height: int = 720) -> Path:
+    """Write the machine as the film begins, without a path, as a PNG: the scene of the film alone.
+
+    Parameters, result and errors are as of `animate`; width and height are the film's, of which the
+    picture has twice as many pixels: it is for print.
+    """
+    shows = frozenset(("velocity", "energy"))
+    wide, high = 2 * width, 2 * height
+    layout = lay_out(recording, width=wide, height=high, question="?", shows=shows)
+    begin = span(recording, layout.window)[0]
+    stage = Stage(recording, layout, (Moment(begin, 0, ""),), slow=1.0, ask=begin)
+    left, bottom, across, up = layout.view
+    top = 1.0 - bottom - up
+    corners = (left * wide, top * high, (left + across) * wide, (top + up) * high)
+    with whole(Path(path)) as unfinished:
+        picture = stage.frame(0).crop(corners).quantize(64, dither=Image.Dither.NONE)
+        picture.save(unfinished, format="PNG", optimize=True)
+    return Path(path)

@@ -20,7 +20,6 @@ from PIL import ImageDraw, ImageFont
 
 from chutelab.machine import Arcs, Machine, Pieces
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.look import figures, say
 from chutelab.pictures.plots.machinery import (
     LEAST,
     WHITE,
@@ -44,6 +43,7 @@ from chutelab.pictures.plots.scenery import (
     strobe_times,
     track_times,
 )
+from chutelab.pictures.plots.style import figures, say
 from chutelab.results import Recording
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -317,27 +317,27 @@ BASE = 0.78
 """Share of a row above the line that its text stands on."""
 
 
-def stacks(books: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Floats]]:
+def stacks(balance: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """Split a ledger into what was put in and where it is, all values positive.
 
     It is as `plots.scenery.energies` gives it, J, (T,) each. An entry of the other
     sign changes sides: work that a braking belt takes out belongs to where the energy is. Both
     sides add up to the same, see `SIGNS`.
     """
-    signed = {name: sign * books[name] for name, sign in SIGNS.items()}
+    signed = {name: sign * balance[name] for name, sign in SIGNS.items()}
     put_in = {name: np.maximum(values, 0.0) for name, values in signed.items()}
     return put_in, {name: np.maximum(-values, 0.0) for name, values in signed.items()}
 
 
 def bars(
-    ax: Axes, table: Axes, books: dict[str, Floats], *, moves: bool = False
+    ax: Axes, table: Axes, balance: dict[str, Floats], *, moves: bool = False
 ) -> tuple[list[Moving], list[Writing]]:
     """Return the blocks of two stacked bars on `ax`, and a column of figures on `table`.
 
     The ledger is as for `stacks`; the highest bar sets the scale. Where a surface `moves`, what
     belts and drives do is one block.
     """
-    sides = stacks(books)
+    sides = stacks(balance)
     highest = float(np.max(sum(sides[0].values())))
     factor, unit = style.scaled(highest, "J")
     style.dress(ax, title=say("energy", unit=unit))
@@ -354,7 +354,7 @@ def bars(
 
     moving = []
     for left, side in zip((-0.4, 0.6), sides, strict=True):
-        base = np.zeros_like(books["start"])
+        base = np.zeros_like(balance["start"])
         for name, values in side.items():
             moving.append(block(name, left, base, factor * values))
             base = base + factor * values
@@ -362,7 +362,7 @@ def bars(
     table.set(xlim=(0.0, 1.0), ylim=(len(SIGNS), 0.0))
     writings = []
     for row, name in enumerate(SIGNS):
-        shown = [round(factor * value, 1) + 0.0 for value in books[name].tolist()]
+        shown = [round(factor * value, 1) + 0.0 for value in balance[name].tolist()]
         if name == "residual" and not any(shown):
             continue
         told = "drives" if moves and name == "belt_work" else name

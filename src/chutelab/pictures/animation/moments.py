@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from chutelab.machine import Machine
 from chutelab.pictures.plots import Window
-from chutelab.pictures.plots.look import figures, named, say
 from chutelab.pictures.plots.scenery import STRUCK, action, flow, nominal, one_of_many
-from chutelab.pictures.plots.style import quantity
+from chutelab.pictures.plots.style import figures, named, quantity, say
 from chutelab.results import PARTICLES, Kind, Recording
 from chutelab.util.arrays import Bools, Floats, Ints
 

@@ -53,7 +53,7 @@ def html(
     home : tuple of str, optional
         Text and address of a link back, for a page that is one of several.
     exercise : mapping, optional
-        What `chutelab.classroom.exercises.catalogue.data_of` makes of an exercise.
+        What `chutelab.classroom.exercises.data_of` makes of an exercise.
     lesson : mapping, optional
         Title and question of a lesson, and its steps as
         `chutelab.classroom.lessons.steps.data_of` has them.
@@ -111,7 +111,7 @@ def html(
         "version": own_version(),
         "language": language,
         "packed": _packed(json.dumps(large, separators=(",", ":")).encode()),
-        "wasm": _packed((core / "core.wasm").read_bytes()),
+        "wasm": _packed((core / "page.wasm").read_bytes()),
     }
     # Within a script element nothing but an end tag must look like one.
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)

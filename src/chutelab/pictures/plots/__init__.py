@@ -1,8 +1,7 @@
 """Pictures of recordings: `overlay`, `strobe`, and small functions that take and return `Axes`.
 
 ===============  ==================================================================================
-`look`           in which colours all is drawn: the light or the dark ones
-`style`          text sizes, units; a figure that shows itself
+`style`          light or dark colours, language, text sizes, units; a figure that shows itself
 `scenery`        what of a recording is worth drawing: particles, times, part of the world
 `machinery`      machine and particles to scale, with names
 `panels`         tracks, parabola, velocity, ledger; envelope, arrivals, flow, power, losses
@@ -14,7 +13,6 @@ Figures are drawn by Agg through `Figure` objects: no pyplot, no global state.
 """
 
 from chutelab.pictures.plots.figure import overlay, strobe
-from chutelab.pictures.plots.look import look
 from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.panels import (
     Arc,
@@ -33,6 +31,7 @@ from chutelab.pictures.plots.panels import (
     flight,
 )
 from chutelab.pictures.plots.scenery import Window, window_of
+from chutelab.pictures.plots.style import look
 
 __all__ = [
     "Arc",

@@ -20,7 +20,6 @@ from matplotlib.transforms import Bbox
 
 from chutelab.pictures import BLUE, GREEN, ORANGE, VERMILION
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.look import figures, say, spoken
 from chutelab.pictures.plots.machinery import draw_bodies, draw_scene, halo, stream_handles
 from chutelab.pictures.plots.panels import (
     Arc,
@@ -48,7 +47,7 @@ from chutelab.pictures.plots.scenery import (
     strobe_times,
     window_of,
 )
-from chutelab.pictures.plots.style import Picture
+from chutelab.pictures.plots.style import Picture, figures, say, spoken
 from chutelab.results import Kind, Recording
 from chutelab.results.loads import borne
 from chutelab.results.quantities import prediction as predicted
@@ -140,9 +139,9 @@ def overlay(
         draw_losses(panels[2], recording)
     else:
         draw_velocity(panels[0], recording, parts, start)
-    books = draw_ledger(panels[1], recording, details=details)
+    drawn_ledger = draw_ledger(panels[1], recording, details=details)
     figure.legend(
-        *books.get_legend_handles_labels(),
+        *drawn_ledger.get_legend_handles_labels(),
         loc="lower center",
         bbox_to_anchor=(0.8075, 0.005),
         ncols=3,

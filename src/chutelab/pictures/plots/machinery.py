@@ -25,8 +25,8 @@ from matplotlib.transforms import Bbox
 from chutelab.machine import Arcs, Machine, Pieces, Segments
 from chutelab.pictures import BLUE, GREEN, ORANGE, PURPLE
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.look import figures, named, say
 from chutelab.pictures.plots.scenery import Window, around, places, stays, subset
+from chutelab.pictures.plots.style import figures, named, say
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats, Ints
 
@@ -154,9 +154,9 @@ def is_passing(machine: Machine, piece: Pieces) -> bool:
 def colour_of(machine: Machine, piece: Pieces) -> str:
     """Return the colour of a piece: of a belt, or of what stands still."""
     name = machine.surfaces[piece.surface]
-    if name in ("incoming", "outgoing") or piece.speed != 0.0:
-        return style.BELT
-    return style.STRIKE if name in plates(machine) else style.WALL
+    moves = name in ("incoming", "outgoing") or piece.speed != 0.0
+    color: str = style.BELT if moves else style.STRIKE if name in plates(machine) else style.WALL
+    return color
 
 
 def draw_piece(ax: Axes, machine: Machine, piece: Pieces, **look: Any) -> Circle | Line2D:

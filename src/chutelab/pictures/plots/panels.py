@@ -16,7 +16,6 @@ from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.look import figures, named, say, spoken
 from chutelab.pictures.plots.machinery import stream_colours
 from chutelab.pictures.plots.scenery import (
     FINE,
@@ -31,6 +30,7 @@ from chutelab.pictures.plots.scenery import (
     track_times,
     upright,
 )
+from chutelab.pictures.plots.style import figures, named, say, spoken
 from chutelab.results import Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger
@@ -287,13 +287,13 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
     if len(recording.events) <= len(times):
         times = upright(times, recording.events["t"])
     times = np.append(times, _beyond(times))
-    books = energies(recording, times)
-    supplied = books["start"] + books["belt_work"]
+    balance = energies(recording, times)
+    supplied = balance["start"] + balance["belt_work"]
     factor, unit = style.scaled(supplied, "J")
     names = ("kinetic", "potential", "restitution_loss", "friction_loss")
     ax.stackplot(
         times,
-        [factor * books[name] for name in names],
+        [factor * balance[name] for name in names],
         colors=[style.ENERGY[name] for name in names],
         labels=[say(f"ledger-{name}") for name in names],
         linewidth=0.0,
@@ -303,7 +303,7 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
         linestyle=(0, (4, 1.5)),
         label=say("supplied-drives" if recording.machine.movers else "supplied"),
     )
-    residual = float(books["residual"][-1])
+    residual = float(balance["residual"][-1])
     title = say("ledger")
     if details or abs(residual) > SHOWN * np.abs(supplied).max():
         title = say("ledger-with", residual=style.scientific(residual, "J"))
@@ -433,11 +433,11 @@ MOST_SURFACES = 6
 
 def draw_losses(ax: Axes, recording: Recording) -> Axes:
     """Draw the losses by surface, the largest on top: in rebounds and to friction."""
-    books = ledger(recording).by_surface
-    taken = {name: row["restitution_loss"] + row["friction_loss"] for name, row in books.items()}
+    balance = ledger(recording).by_surface
+    taken = {name: row["restitution_loss"] + row["friction_loss"] for name, row in balance.items()}
     names = sorted((name for name in taken if taken[name]), key=lambda name: -abs(taken[name]))
     names = names[:MOST_SURFACES]
-    losses = np.array([[books[n][key] for n in names] for key in LOSSES]).reshape(2, -1)
+    losses = np.array([[balance[n][key] for n in names] for key in LOSSES]).reshape(2, -1)
     factor, unit = style.scaled(losses, "J")
     style.dress(ax, say("loss-axis", unit=unit), "", say("losses"))
     ax.grid(visible=False, axis="y")

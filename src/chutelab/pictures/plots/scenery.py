@@ -171,7 +171,7 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     release of all particles released so far. Potential energy is counted from the lowest point of
     the particles that stay in the scene (of all, if it is negative otherwise).
     """
-    books = recording.energy_at(times)
+    balance = recording.energy_at(times)
     first, _ = recording.ends()
     order, indices = np.argsort(first["t"], kind="stable"), np.flatnonzero(recording.released)
     at_release = np.concatenate(
@@ -185,12 +185,12 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     staying = heights[np.repeat(stays, np.diff(recording.offsets))]
     lowest = float(heights.min(initial=np.inf))
     for zero in (float(staying.min()) if len(staying) else lowest, lowest):
-        lifted = books["potential"] - weight * zero
+        lifted = balance["potential"] - weight * zero
         if (lifted >= 0.0).all():
             break
-    books["potential"] = np.maximum(lifted, 0.0)
-    books["start"] = at_release[released] - weight * zero
-    return books
+    balance["potential"] = np.maximum(lifted, 0.0)
+    balance["start"] = at_release[released] - weight * zero
+    return balance
 
 
 def flow(recording: Recording) -> dict[str, Floats]:

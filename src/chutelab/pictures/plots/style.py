@@ -1,16 +1,20 @@
-"""Colours, text sizes and units that every picture, page and notebook shares.
+"""How pictures look: colours and language for a while, text sizes, units, and figures.
 
-The colours are those of the look that holds, see `look`. `Picture` is a figure with a headline,
-which writes itself to a file and shows itself in a notebook.
+`look` chooses the colours, light or dark, and the language. What draws asks for the colours by
+name, such as ``style.TRACK``, and `say` for its words, and is given those of the look that holds.
+`Picture` is a figure with a headline, which writes itself to a file and shows itself in a notebook.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from io import BytesIO
 from math import floor, log10
 from pathlib import Path
 from textwrap import shorten
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from matplotlib import rc_context
@@ -21,36 +25,115 @@ from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ticker import ScalarFormatter
 from numpy.typing import ArrayLike
 
-from chutelab.pictures.plots.look import colours, spoken
+from chutelab.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from chutelab.util.errors import printable
 from chutelab.util.files import whole
+from chutelab.util.words import Words, words
 
-GROUND: str
-INK: str
-MUTED: str
-STEEL: str
-STEEL_LIGHT: str
-WALL: str
-BELT_BODY: str
-CLEAT: str
-TRACK: str
-ANALYTIC: str
-BELT: str
-BELT_NAME: str
-STRIKE: str
-STREAM: str
-VELOCITY: dict[str, str]
-ENERGY: dict[str, str]
-DASHED: dict[str, Any]
-RINGS: dict[str, Any]
+LOOKS: Final = {
+    "GROUND": ("#FFFFFF", "#0E141A"),
+    "INK": ("#000000", "#EDF2F6"),
+    "MUTED": ("#595959", "#AFBCC7"),
+    "STEEL": (GREY, "#8B99A5"),
+    "STEEL_LIGHT": ("#E6E6E6", "#2A3540"),
+    "WALL": ("#000000", "#93A3B0"),
+    "BELT_BODY": ("#2B3841", "#3B4A56"),
+    "CLEAT": ("#3CCFA2", "#45DBAE"),
+    "TRACK": (BLUE, "#62BAF0"),
+    "ANALYTIC": (ORANGE, "#E6B45A"),
+    "BELT": (GREEN, "#2FC79A"),
+    "BELT_NAME": ("#00805D", "#2FC79A"),
+    "STRIKE": (VERMILION, "#F4843C"),
+    "STREAM": (SKY, "#7A9FB8"),
+    "START": ("#BFBFBF", "#7C858D"),
+}
+"""Colours by name, in the light and in the dark; the dark ones are those of the live page."""
+
+_DARK: ContextVar[bool] = ContextVar("dark", default=False)
+_WORDS: ContextVar[Words] = ContextVar("words")
+
+
+def colours() -> dict[str, Any]:
+    """Return the colours of the look that holds by name, and what is made of them.
+
+    Each stands for one thing in every panel. The ledger has the same hues in the light and in the
+    dark.
+    """
+    base = {name: pair[_DARK.get()] for name, pair in LOOKS.items()}
+    ink, track, strike, analytic = (base[name] for name in ("INK", "TRACK", "STRIKE", "ANALYTIC"))
+    return {
+        **base,
+        "VELOCITY": {"vx": track, "vy": strike},
+        "ENERGY": {
+            "start": base["START"],
+            "kinetic": ORANGE,
+            "potential": SKY,
+            "belt_work": GREEN,
+            "restitution_loss": VERMILION,
+            "friction_loss": PURPLE,
+            "residual": ink,
+        },
+        # How lines known analytically are drawn, under those that are simulated; strobe dots.
+        "DASHED": {"color": analytic, "lw": 4.0, "ls": (0, (2.2, 1.1))},
+        "RINGS": {"ls": "none", "marker": "o", "mfc": base["GROUND"], "mec": track},
+    }
 
 
 def __getattr__(name: str) -> Any:
-    """Return one of the colours above, of the look that holds, see `look.colours`."""
+    """Return one of the colours above, of the look that holds, see `colours`."""
     try:
         return colours()[name]
     except KeyError:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None
+
+
+def say(key: str, /, **values: object) -> str:
+    """Return what pictures say in the language that holds: a template, ``picture-KEY``."""
+    return spoken().say(f"picture-{key}", **values)
+
+
+def spoken() -> Words:
+    """Return the words of the language that holds."""
+    return _WORDS.get(words())
+
+
+def figures(value: float, form: str = ".3g") -> str:
+    """Return a number in the digits of the language that holds."""
+    return spoken().figures(value, form)
+
+
+def named(text: str) -> str:
+    """Return how a surface or a stream is called; most names are the same in every language."""
+    return spoken().catalogue.get(f"picture-name-{text}", text)
+
+
+@contextmanager
+def look(*, dark: bool = False, language: str = "en") -> Iterator[None]:
+    """Draw in the light or the dark colours, and in a language, until the end of the block.
+
+    Titles and names that a scene gives stay as they are.
+
+    Raises
+    ------
+    LanguageError
+        If there is no such language; the message lists those there are.
+    """
+    told, shown = _WORDS.set(words(language)), _DARK.set(dark or _DARK.get())
+    ground, ink, muted = (colours()[name] for name in ("GROUND", "INK", "MUTED"))
+    settings: Any = {
+        **dict.fromkeys(("figure.facecolor", "axes.facecolor"), ground),
+        **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.labelcolor"), ink),
+        **dict.fromkeys(("ytick.labelcolor", "legend.labelcolor"), ink),
+        **dict.fromkeys(
+            ("axes.edgecolor", "xtick.color", "ytick.color", "legend.edgecolor"), muted
+        ),
+    }
+    try:
+        with rc_context(settings if dark else {}):
+            yield
+    finally:
+        _WORDS.reset(told)
+        _DARK.reset(shown)
 
 
 SMALL, NORMAL, LARGE = 9.5, 10.5, 13.0

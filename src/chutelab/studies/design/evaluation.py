@@ -41,9 +41,9 @@ from chutelab.scene.variants import (
     reseeded,
     varied,
 )
+from chutelab.studies.sweep import Crew
 from chutelab.studies.sweep.plan import Block, runs
 from chutelab.studies.sweep.rows import touches
-from chutelab.studies.sweep.sweeping import Crew
 from chutelab.util.arrays import Bools, Floats, Ints, Progress
 from chutelab.util.errors import InputError
 from chutelab.util.versions import library
@@ -327,8 +327,10 @@ class Evaluator:
         # The run that ends as the scene says comes last: of what both know, its values stay.
         wanted = {quantity.ending for quantity in self.quantities} - {"any"}
         endings = sorted(wanted, reverse=True) or ["scene"]
-        # A family does not count the contacts of each.
-        apart = len(table) < FEWEST or any(one.key == "contacts" for one in self.quantities)
+        # A family does not tell these of each.
+        together = ("contacts", "sensor", "wear")
+        apart = len(table) < FEWEST
+        apart |= any(one.key.split(".")[0] in together for one in self.quantities)
         tasks = []
         for start, ending in product(range(0, len(table), self.size), endings):
             rows = slice(start, start + self.size)

@@ -216,30 +216,16 @@ def one_line(why: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A scene and the variants of it, numbered from 0.
+    """A scene and the variants of it, numbered from 0."""
 
-    Attributes
-    ----------
-    scene : Scene
-        What is varied.
-    varies : tuple of Vary
-        Keys, and the values of each in a grid, or the ends of what samples are drawn from.
-    quantities : tuple of Quantity
-        What the K keys are.
-    engine : str or None
-        Overrides ``run.engine``.
-    samples : ndarray, (N, K), or None
-        Values of the keys; None for the grid, in which the last key runs fastest.
-    repeat : int
-        Seeds that each variant is run with, the same for all.
-    """
-
-    scene: Scene
+    scene: Scene  # what is varied
+    # keys, and the values of each in a grid, or the ends of what samples are drawn from
     varies: tuple[Vary, ...]
-    quantities: tuple[Quantity, ...]
-    engine: str | None
+    quantities: tuple[Quantity, ...]  # what the K keys are
+    engine: str | None  # overrides run.engine
+    # (N, K) values of the keys; None for the grid, in which the last key runs fastest
     samples: Floats | None
-    repeat: int = 1
+    repeat: int = 1  # seeds that each variant is run with, the same for all
 
     @property
     def keys(self) -> tuple[str, ...]:

@@ -12,8 +12,8 @@ type Point = [number, number];
 const STEP = 24, OFF = 26;
 
 /** What it costs to cover a point of what is chosen, of a path, and of anything else; a pixel away
- * from what is chosen costs one. */
-const OWN = 4000, PATH = 60, OTHER = 30;
+ * from what is chosen costs one, and one from where it stood these. */
+const OWN = 4000, PATH = 60, OTHER = 30, STAYS = 3;
 
 /** Pixels from one of the points that stand for a line to the next. */
 const ALONG = 22;
@@ -33,9 +33,6 @@ const CLEAR = 14, ASIDE = 38;
 
 /** Pixels from bodies to the frame round several. */
 const FRAME = 12;
-
-/** Width of a line that page.css gives its own, px. */
-const WALL = 4.5;
 
 /** Points along a line through points, those among them. */
 function along(points: Point[]): Point[] {
@@ -113,7 +110,7 @@ function freePlace(stage: Stage, size: Point, corner: Point, taken: Stage["cover
   const there = [...surfaceLines(stage),
     ...path.map((points) => points.map(({ x, y }) => [view.px(x), view.py(y)] as Point))]
     .flatMap(along);
-  for (let x = left; x + wide < free.right; x += ASIDE) {
+  for (let x = left; x + wide + CLEAR < free.right; x += ASIDE) {
     for (let y = bottom; y - high > free.top + CLEAR; y -= ALONG) {
       const meets = (u: number, v: number) => u > x - CLEAR && u < x + wide + CLEAR
         && v > y - high - CLEAR && v < y + CLEAR;
@@ -138,7 +135,7 @@ function drawOutline(stage: Stage) {
     const own = parts.includes(name) ? "chosen" : "pointed";
     const bodies = scenery.drawingsOf(name).flatMap((group) =>
       [...group.querySelectorAll(BODIES)].map((shape) => {
-        const wide = Number(shape.getAttribute("stroke-width") ?? WALL);
+        const wide = Number(shape.getAttribute("stroke-width") ?? 0);
         const copy = shape.cloneNode(false), by = group.getAttribute("transform");
         if (by) copy.setAttribute("transform", by);
         return [copy, wide] as [any, number];
@@ -191,6 +188,9 @@ class Callout {
     if (JSON.stringify(stage.covered) !== before) this.symbols.draw();
   }
 
+  /** Where it stands, px, beside which parts: there it stays as long as it covers nothing. */
+  was = { parts: "", at: [0, 0] as Point };
+
   /** @returns the box that it covers, px */
   find(): Stage["covered"] {
     const { inspector: { panel, parts }, stage, lab, leader } = this, { view } = stage;
@@ -217,15 +217,19 @@ class Callout {
     const count = (points: Point[], x: number, y: number, off: number) =>
       points.filter(([px, py]) => px > x - off && px < x + wide + off
         && py > y - off && py < y + high + off).length;
+    const names = parts.join("\n"), { was } = this;
     const bottom = Math.max(free.top, Math.min(free.bottom, view.height - 8) - high);
     for (let x = free.left + 8; x <= free.right - wide; x += STEP) {
       for (let y = free.top; y <= bottom; y += STEP) {
-        const cost = Math.hypot(x + 0.5 * wide - cx, y + 0.5 * high - cy)
+        const away = names === was.parts
+          ? STAYS * Math.hypot(x - was.at[0], y - was.at[1]) : 0;
+        const cost = Math.hypot(x + 0.5 * wide - cx, y + 0.5 * high - cy) + away
           + OWN * count([...own, ...grips], x, y, OFF) + PATH * count(path, x, y, 8)
           + OTHER * count(other, x, y, 4);
         if (cost < best) [best, at] = [cost, [x, y]];
       }
     }
+    this.was = { parts: names, at };
     const box = stage.home.getBoundingClientRect();
     panel.style.transform = `translate(${box.left + at[0]}px, ${box.top + at[1]}px)`;
     // From the nearest point of what is chosen to the nearest of the card.

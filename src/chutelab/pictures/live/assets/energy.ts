@@ -1,6 +1,6 @@
 // The energy ledger as two bars that close: what was put in, and where it is.
 
-import { card, follow, html } from "./panels.ts";
+import { card, follow, html, icon } from "./panels.ts";
 import type { Lab } from "./lab.ts";
 import type { Recording, Ledger } from "./recording.ts";
 import type { Words } from "./words.ts";
@@ -39,6 +39,7 @@ class EnergyPanel {
   bars;
   cells;
   rows;
+  closes = html("p", { class: "good" });
 
   constructor(home: Element, readonly lab: Lab, readonly words: Words) {
     this.bars = ["put-in", "is-now"].map((id) => html("div", { class: "bar", id }));
@@ -50,7 +51,7 @@ class EnergyPanel {
       html("span", {}, words.say("put-in")), this.bars[0],
       html("span", {}, words.say("is-now")), this.bars[1]);
     const panel = card("energy", words.say("energy"), bars,
-      html("table", {}, html("tbody", {}, ...this.rows)),
+      html("table", {}, html("tbody", {}, ...this.rows)), this.closes,
       html("p", { class: "note" }, words.say("energy-note")));
     home.append(panel);
     lab.on("run", () => { this.longest = 0; });
@@ -74,9 +75,13 @@ class EnergyPanel {
         return part;
       }));
     });
+    const isClosed = Math.abs(ledger.residual) <= TINY_RESIDUAL * size;
+    this.closes.hidden = !isClosed;
+    this.closes.replaceChildren(icon("tick"),
+      this.words.say("energy-closes", { energy: this.words.energy(size) }));
     SIGNS.forEach(([name], n) => {
       this.cells.get(name).textContent = this.words.energy(ledger[name]);
-      this.rows[n].hidden = name === "residual" && Math.abs(ledger[name]) <= TINY_RESIDUAL * size;
+      this.rows[n].hidden = name === "residual" && isClosed;
     });
   }
 }

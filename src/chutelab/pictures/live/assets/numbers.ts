@@ -105,7 +105,7 @@ class NumbersPanel {
       const { symbol, unit } = lab.data.quantities[id];
       return html("tr", { "data-id": id },
         html("th", { scope: "row" }, html("b", {}, symbol),
-          ` ${words.say(`number-${id}`)}, ${words.unit(unit)}`),
+          ` ${words.say(`number-${id}`)},\u00a0${words.unit(unit)}`),
         ...[simulated, analytic].map((value) =>
           html("td", {}, words.number(Math.abs(value) < ROUNDED ? 0 : tidy(value)))));
     }));

@@ -7,6 +7,7 @@ import { ARROW, Handles, bodyOf, roundTo, valuesOf, type Handle } from "./handle
 import { html } from "./panels.ts";
 import { Balls } from "./balls.ts";
 import { Scenery, svg } from "./scenery.ts";
+import { predict } from "./prediction.ts";
 import { historyOf } from "./stages.ts";
 import { View, boxOf } from "./view.ts";
 import type { Lab } from "./lab.ts";
@@ -33,6 +34,9 @@ const SPUN = 8;
 /** By how much a line that is drawn may miss the track: pixels, and before there are any, the share
  * of the machine. */
 const FINE = 0.2, FINE_SHARE = 1e-3;
+
+/** Parts in which a calculated flight is drawn. */
+const FLIGHT = 40;
 
 /** Height of the text over the bar that tells the scale, px. */
 const ABOVE = 24;
@@ -66,8 +70,8 @@ class Stage {
     this.show = { strobe: true, trails: true, velocity: false, forces: false, handles: true };
     this.back = svg("svg", { "aria-hidden": "true" });
     this.canvas = document.createElement("canvas");
-    this.front = svg("svg", { role: "group", tabindex: 0, id: "picture" });
-    this.front.setAttribute("aria-label", words.say("stage"));
+    this.front = svg("svg", { role: "group", tabindex: 0, id: "picture",
+      "aria-label": words.say("stage") });
     this.canvas.setAttribute("aria-hidden", "true");
     home.append(this.back, this.canvas, this.front);
     this.scenery = new Scenery(this.view, words);
@@ -203,11 +207,34 @@ class Stage {
     const { envelopes = [] } = historyOf(this.lab) ?? {};
     for (const { stream, lines } of envelopes) this.drawEnvelope(stream, lines);
     if (envelopes.length) return;
+    // The run is a line within the two of the calculated one, as long as they agree.
+    for (const points of this.calculated) {
+      const line = points.map(([x, y]) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`);
+      this.paths.append(...["rail", "rail within"].map((kind) =>
+        svg("polyline", { points: line.join(" "), class: kind })));
+    }
     for (const points of this.trackPoints(recording, FINE / view.scale)) {
       if (points.length < 2) continue;
       const line = points.map(({ x, y }) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`);
       this.paths.append(svg("polyline", { points: line.join(" "), class: "track" }));
     }
+  }
+
+  /** The calculated flights to the plate and from there to the belt, as far as there are any, m. */
+  get calculated(): Point[][] {
+    const { scene, recording } = this.lab, belt = scene?.incoming;
+    if (!belt || !recording || recording.machine.interact) return [];
+    const { phi1, v1, t2, x2, y2, v3x, t3, y3 } = predict(scene, recording).numbers;
+    const [sin, cos] = [Math.sin(phi1), Math.cos(phi1)], g = scene.gravity;
+    const ride = belt.pulley_radius + recording.machine.radius[0];
+    const [x, y] = [ride * sin, ride * cos];
+    const flight = (px: number, py: number, vx: number, vy: number, time: number): Point[] =>
+      Array.from({ length: time > 0 ? FLIGHT + 1 : 0 }, (_, n) => {
+        const t = (time * n) / FLIGHT;
+        return [px + vx * t, py + (vy - 0.5 * g * t) * t];
+      });
+    return [flight(x, y, v1 * cos, -v1 * sin, t2),
+      flight(x + x2, y - y2, -v3x, 0.5 * g * t3 - y3 / t3, t3)].filter(({ length }) => length);
   }
 
   /** Lines of an envelope: the band between the outer two, and the middle one.
@@ -216,9 +243,9 @@ class Stage {
     const { view } = this;
     const [right, middle, left] = lines.map((line) => line.filter(([x]) => isFinite(x))
       .map(([x, y]) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`));
-    const band = svg("polygon", { points: [...right, ...left.reverse()].join(" "), class: "envelope" });
+    const band = svg("polygon", { points: [...right, ...left.reverse()].join(" "), class: "envelope" },
+      svg("title", {}, this.words.say("envelope")));
     if (this.isMixed) band.style.fill = `var(--kind-${stream % 5})`;
-    band.append(Object.assign(svg("title"), { textContent: this.words.say("envelope") }));
     this.paths.append(band, svg("polyline", { points: middle.join(" "), class: "track" }));
   }
 
@@ -371,8 +398,8 @@ class Stage {
   further: (() => Handle[])[] = [];
 
   newGrip(id: string) {
-    const grip = svg("g", { class: "grip", role: "slider", tabindex: 0, "data-id": id });
-    grip.append(svg("path", { class: "stem" }), svg("circle", { class: "room", r: 20 }),
+    const grip = svg("g", { class: "grip", role: "slider", tabindex: 0, "data-id": id },
+      svg("path", { class: "stem" }), svg("circle", { class: "room", r: 20 }),
       svg("path", { class: "knob" }));
     this.gripOf.set(id, grip);
     return grip;
@@ -600,12 +627,8 @@ class Stage {
 
 /** How plates and wheels shine. */
 function steel() {
-  const shine = svg("linearGradient", { id: "steel", x1: 0, y1: 0, x2: 1, y2: 1 });
-  shine.append(svg("stop", { offset: 0, class: "steel-a" }),
-    svg("stop", { offset: 1, class: "steel-b" }));
-  const found = svg("defs");
-  found.append(shine);
-  return found;
+  return svg("defs", {}, svg("linearGradient", { id: "steel", x1: 0, y1: 0, x2: 1, y2: 1 },
+    svg("stop", { offset: 0, class: "steel-a" }), svg("stop", { offset: 1, class: "steel-b" })));
 }
 
 const KNOBS = {

@@ -9,8 +9,8 @@ import type { Event } from "./core.ts";
 import type { Recording } from "./recording.ts";
 
 /** Its middle, px, and the side of its point that is tried first, rad counterclockwise from the
- * right */
-type Label = { text: string, x: number, y: number, side?: number };
+ * right; one that is asked for may be far away */
+type Label = { text: string, x: number, y: number, side?: number, asked?: boolean };
 /** Where a label stands, and if that is away from its point, the line to it. */
 type Placed = Label & { from?: [number, number] };
 type Space = { left: number, top: number, right: number, bottom: number };
@@ -20,7 +20,7 @@ const TALL = 18, WIDE = 9;
 
 /** A label's distance from its point, px, in the order in which they are tried; and from where on a
  * line leads to it. */
-const AWAY = [15, 24, 34, 46, 60], LED = 30;
+const AWAY = [15, 24, 34, 46, 60], FARTHER = [80, 110, 150, 200], LED = 30;
 
 /** Pixels from one of the boxes to the next that stand for a line, and half the size of one. */
 const ALONG = 9, THIN = 5;
@@ -40,8 +40,8 @@ function spaceOf({ text, x, y }: Label): Space {
  * @param wanted at their points, the most important first */
 function placed(wanted: Label[], taken: Space[]): Placed[] {
   const spaces = [...taken];
-  return wanted.flatMap(({ text, x, y, side = Math.PI / 4 }) => {
-    for (const far of AWAY) {
+  return wanted.flatMap(({ text, x, y, side = Math.PI / 4, asked }) => {
+    for (const far of asked ? [...AWAY, ...FARTHER] : AWAY) {
       for (let n = 0; n < 8; n += 1) {
         // The side that is wanted, then those next to it.
         const turn = (n % 2 ? -1 : 1) * Math.ceil(n / 2), angle = side + (turn * Math.PI) / 4;
@@ -81,9 +81,21 @@ class Symbols {
     this.layer = svg("g", { class: "symbols" });
     stage.back.append(this.layer);
     stage.drawers.push(() => this.draw());
+    addEventListener("pointerover", (event) => this.point(event));
   }
 
   shown = true;
+
+  /** The quantity whose number is pointed at: it comes first, with its value. */
+  pointed = "";
+
+  point({ target }: PointerEvent) {
+    const row = (target as Element).closest?.("#numbers [data-id]") as HTMLElement | null;
+    const id = row?.dataset.id ?? "";
+    if (id === this.pointed) return;
+    this.pointed = id;
+    this.draw();
+  }
 
   draw() {
     const { stage, layer } = this, { recording } = stage.lab;
@@ -134,9 +146,7 @@ class Symbols {
           class: "leader",
         }));
       }
-      const element = svg("text", { x, y: y + 5, "text-anchor": "middle" });
-      element.textContent = text;
-      layer.append(element);
+      layer.append(svg("text", { x, y: y + 5, "text-anchor": "middle" }, text));
     }
   }
 
@@ -161,16 +171,23 @@ class Symbols {
     ];
   }
 
-  symbol(id: string): string {
-    return this.stage.lab.data.quantities[id].symbol;
+  /** Ask for the label of a quantity at a point, px. */
+  want(id: string, x: number, y: number, side: number) {
+    const { lab, words } = this.stage, { symbol, unit } = lab.data.quantities[id];
+    if (id !== this.pointed) {
+      this.wanted.push({ text: symbol, x, y, side });
+      return;
+    }
+    const value = document.querySelector(`#numbers [data-id="${id}"] td`)?.textContent ?? "";
+    const text = `${symbol} = ${value} ${words.unit(unit)}`;
+    this.wanted.unshift({ text, x, y, side, asked: true });
   }
 
   /** @param y m
    * @param way from the point to its label */
   label(id: string, x: number, y: number, way: number[] = [1, 1]) {
     const { view } = this.stage;
-    const side = Math.atan2(way[1], way[0]);
-    this.wanted.push({ text: this.symbol(id), x: view.px(x), y: view.py(y), side });
+    this.want(id, view.px(x), view.py(y), Math.atan2(way[1], way[0]));
   }
 
   dot({ x, y }: { x: number, y: number }) {
@@ -215,10 +232,7 @@ class Symbols {
       : `M${points[n]} ${y}H${x + 4}`));
     this.layer.append(svg("path", { d: ends.join(""), class: "thin" }),
       svg("path", { d: `M${from[0]} ${from[1]}L${to[0]} ${to[1]}`, class: "length" }));
-    this.wanted.push({
-      text: this.symbol(id), x: 0.5 * (from[0] + to[0]), y: 0.5 * (from[1] + to[1]),
-      side: level ? Math.PI : 0,
-    });
+    this.want(id, 0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]), level ? Math.PI : 0);
   }
 }
 

@@ -302,12 +302,8 @@ def judge(case: Case, answer: float, others: Iterable[tuple[str, float]] = ()) -
     """Judge a finite answer.
 
     It is the right one, or a known mistake, or the right one of another student, or two mistakes at
-    once, or off.
-
-    Parameters
-    ----------
-    others
-        Name and right answer to the same question of others; looked at only if need be.
+    once, or off. `others` are name and right answer to the same question of others; they are looked
+    at only if need be.
     """
     said = words(case.numbers.language)
 

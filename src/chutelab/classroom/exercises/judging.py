@@ -75,21 +75,12 @@ def table(rows: Sequence[tuple[str, ...]]) -> str:
 
 @dataclass(frozen=True, repr=False)
 class Reply:
-    """The reply to an answer.
+    """The reply to an answer."""
 
-    Attributes
-    ----------
-    question
-        Its number; 0 if there is no such one.
-    verdict, text
-        The result of judging the answer, and what to tell the student.
-    mistake, called
-        The known mistake that it looks like, or empty: its name in English, and in `language`.
-    """
-
-    question: int
+    question: int  # its number; 0 if there is no such one
     verdict: Verdict
-    text: str
+    text: str  # what to tell the student
+    # the known mistake that it looks like, or empty: its name in English, and in `language`
     mistake: str = ""
     called: str = ""
     language: str = "en"

@@ -41,7 +41,7 @@ from chutelab.classroom.lessons import (
     split,
     unusable,
 )
-from chutelab.classroom.lessons.sheets import asked, table
+from chutelab.classroom.lessons.sheets import asked, table, titled
 from chutelab.engines.simulation import judged
 from chutelab.scene import Fault, to_dict
 from chutelab.util.files import aside, refuse_other, whole
@@ -256,12 +256,9 @@ def notebook_of(lesson: Lesson) -> str:
         cells.append(cell | {"source": source.splitlines(keepends=True)})
 
     text, code = partial(add, "markdown"), partial(add, "code")
-    title = lesson.title
-    if lesson.number is not None:
-        title = say("sheet-title", number=lesson.number, title=title)
     needs = re.search(r"^# needs: *(.*)$", _source(lesson), re.MULTILINE)
     extras = say("notebook-needs", extras=needs[1] if needs else "notebook")
-    text("title", f"# {title}", f"**{lesson.question}**", say("notebook-order"), extras)
+    text("title", f"# {titled(lesson)}", f"**{lesson.question}**", say("notebook-order"), extras)
     shipped = any(one.folder == lesson.folder for one in shipped_lessons())
     name = f'"{lesson.name}"' if shipped else '"."'
     language = "" if lesson.language == "en" else f', language="{lesson.language}"'

@@ -163,7 +163,7 @@ def _lesson(lesson: Lesson, made: Path, before: str, after: str, *, wheel: bool)
     note = f"<p><em>{say('untranslated')}</em></p>\n" if lesson.untranslated else ""
     facts = {
         "folder": _address(lesson.folder.name),
-        "title": heading(lesson),
+        "title": escape(lesson.heading),
         "question": escape(lesson.question),
         "about": say("show-about", level=say(f"level-{lesson.level}"), minutes=lesson.minutes),
         "film": film_name,
@@ -224,7 +224,7 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
             data["text"] = data["text"].replace(place, place + value(key))
     told_lesson = {
         "name": lesson.name,
-        "title": lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}",
+        "title": lesson.heading,
         "question": lesson.question,
         "steps": steps,
     }
@@ -251,13 +251,8 @@ _PICTURE = re.compile(r'(?<= src=\\")[\w.-]+\.png(?=\\")')
 """The file of a picture in a text of a lesson, in JSON."""
 
 
-def heading(lesson: Lesson) -> str:
-    """Return number and title of a lesson, as HTML."""
-    return escape(lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}")
-
-
 def _link(lesson: Lesson, relation: str, form: str) -> str:
-    text = form.format(heading(lesson))
+    text = form.format(escape(lesson.heading))
     return f'<a rel="{relation}" href="../{_address(lesson.folder.name, INDEX)}">{text}</a>'
 
 
@@ -291,7 +286,7 @@ def package(lesson: Lesson, path: str | Path) -> Path:
     values = {
         # An XML name begins with a letter and has no spaces.
         "identifier": "chutelab-" + re.sub(r"[^A-Za-z0-9_.-]", "-", lesson.name),
-        "title": printable(heading(lesson)),
+        "title": printable(escape(lesson.heading)),
         "language": lesson.language,
         "page": LIVE,
         "alone": escape(words(lesson.language).say("scorm-alone")),

@@ -106,11 +106,9 @@ def answers_to(case, rng):
 @pytest.mark.parametrize(
     ("name", "language"),
     [
-        pytest.param(
-            name, language, marks=() if (n % 2 == 0) == (language == "en") else pytest.mark.slow
-        )
+        pytest.param(name, language, marks=() if n % 7 == 3 * m else pytest.mark.slow)
         for n, name in enumerate(NAMES)
-        for language in LANGUAGES
+        for m, language in enumerate(LANGUAGES)
     ],
 )
 def test_it_says_what_python_says(name, language, many, monkeypatch):

@@ -578,7 +578,7 @@ def test_the_run_lies_between_two_lines_of_the_calculated_flights(shown):
 
 
 @pytest.mark.parametrize(("name", "overrides"), [
-    ("hopper", ()), ("perpendicular", ["live.predict=true"])])  # fmt: skip
+    ("hopper", ["stream.count=20"]), ("perpendicular", ["live.predict=true"])])  # fmt: skip
 def test_no_flight_is_calculated_for_a_crowd_or_before_a_prediction(shown, name, overrides):
     rails, tracks = shown(name, overrides).evaluate(DRAWN)
     assert (rails, tracks) == ([], [])

@@ -93,7 +93,7 @@ class ForgedError(ValueError):
 class Ran:
     """What became of a notebook."""
 
-    # what `report` in `classroom.exercises.catalogue` gave, unchecked: student's code ran there
+    # what `report` in `classroom.exercises` gave, unchecked: student's code ran there
     tasks: object
     trouble: str  # what went wrong, or empty; of errors the first
 
@@ -101,19 +101,9 @@ class Ran:
 def run(cells: Sequence[str | None], time_limit: float) -> Ran:
     """Run code cells in order; what raises an error does not keep the rest from running.
 
-    Parameters
-    ----------
-    cells : sequence of str or None
-        None is a cell whose source is no text.
-    time_limit : float
-        s for all of them together, the kernel's start not counted.
-
-    Raises
-    ------
-    ForgedError
-        If the kernel says what no chutelab says.
-    OSError
-        If no process can be started.
+    None is a cell whose source is no text. `time_limit` is in s for all cells together, the
+    kernel's start not counted. Raises a `ForgedError` if the kernel says what no chutelab says; an
+    `OSError` if no process can be started.
     """
     paths = [str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
     # Threads of linear algebra take memory each, more of it the more cores there are.
@@ -393,7 +383,7 @@ def _work() -> None:
     from IPython.core.interactiveshell import InteractiveShell
     from traitlets.config import Config
 
-    from chutelab.classroom.exercises import catalogue
+    from chutelab.classroom import exercises
 
     class Shell(InteractiveShell):
         def enable_gui(self, gui: str | None = None) -> None:
@@ -417,7 +407,7 @@ def _work() -> None:
     def hand_over() -> None:
         # Cells can change this module; what comes of it is judged anew.
         with suppress(Exception), turn:
-            found = catalogue.report()
+            found = exercises.report()
             if last != found:
                 _say(pipe, tasks=found)
                 last[:] = found

@@ -46,7 +46,7 @@ CONTRACT = {
     "title": "machine",
     "gravity": 9.81,
     "particle": {"name": None, "shape": "disk", "radius": 0.0063, "size": None, "points": None,
-     "mass": 0.008, "density": None, "material": None, "spin": False, "rolling_friction": 0.0},
+     "mass": 0.008, "density": None, "material": None, "spin": False, "rolling_friction": 0.0, "restitution_speed": None},
     "material": (),
     "pair": (),
     "incoming": {"speed": 3.0, "pulley_radius": 0.2, "length": 1.0, "incline_deg": 0.0,

@@ -17,6 +17,12 @@ def seeds(few, many):
     return [*range(few), *(pytest.param(n, marks=pytest.mark.slow) for n in range(few, many))]
 
 
+def some(cases, of=3):
+    """Return one case of each `of` as it is, and the others slow."""
+    slow = pytest.mark.slow
+    return [case if n % of == 0 else pytest.param(case, marks=slow) for n, case in enumerate(cases)]
+
+
 def chutelab(*arguments):
     return CliRunner().invoke(main, [str(argument) for argument in arguments])
 

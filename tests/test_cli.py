@@ -700,7 +700,7 @@ def test_help_lists_the_commands():
     text = call("--help").stdout
     commands = re.findall(r"^  ([a-z]+)  ", text.partition("Commands:")[2], re.MULTILINE)
     assert " ".join(commands) == (
-        "run live check show sweep solve compare discharge lesson figure tables scenes "
+        "run live check show sweep solve compare discharge field lesson figure tables scenes "
         "materials quantities new schema verify stress bench"
     )
     assert call("--version").stdout == f"chutelab {chutelab.__version__}\n"

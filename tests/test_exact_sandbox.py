@@ -255,7 +255,7 @@ def rolling(built, share, kappa, radius=0.02):
 
 
 @pytest.mark.parametrize(("engine", "off"), [(exact, 1e-12), (contact, 1e-3), (pymunk, 1e-7)])
-@pytest.mark.parametrize("share", [0.5, 0.4])
+@pytest.mark.parametrize("share", [0.5, pytest.param(0.4, marks=pytest.mark.slow)])
 def test_a_roller_slows_down_and_stops(share, engine, off):
     """m v' = -F and I ω' = F r - κ N r: v' = -κ g/(1 + I/m r²), and what it has becomes heat."""
     floor = face("floor", [-1.0, 0.0], [9.0, 0.0], friction=0.5, restitution=0.0)

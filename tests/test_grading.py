@@ -174,7 +174,7 @@ def test_a_class_is_graded_whatever_comes_back(tmp_path, in_own_tmp):
         # Printed praise and a bent check earn nothing.
         saved(
             tmp_path, "cheat.ipynb", OPEN.format("Cy"),
-            "from chutelab.classroom.exercises.catalogue import Task\n"
+            "from chutelab.classroom.exercises import Task\n"
             "old = Task.check\n"
             "Task.check = lambda self, n, x: (old(self, n, x), print('right'))[0]\n"
             "for n in (1, 2, 3, 4): task.check(n, 123.0)\n"

@@ -28,7 +28,7 @@ from chutelab.pictures.animation.moments import asked, film, slowness, span
 from chutelab.pictures.plots import style
 from chutelab.results.quantities import measure
 from chutelab.util.words import words
-from shared import find, lessons
+from shared import find, lessons, some
 
 NUMBERS = [lesson.number for lesson in lessons()]
 
@@ -113,12 +113,17 @@ def seen(page):
 
 @pytest.fixture(scope="module")
 def web(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("web") / "lessons"
-    bundle(lessons(), folder, wheel=False)
-    return folder
+    made = tmp_path_factory.mktemp("web")
+
+    @cache
+    def of(number):
+        bundle([find(number)], made / str(number), wheel=False)
+        return made / str(number)
+
+    return of
 
 
-@pytest.fixture(params=NUMBERS)
+@pytest.fixture(params=some(NUMBERS, 4))
 def number(request):
     return request.param
 
@@ -151,6 +156,7 @@ def test_a_number_of_the_answer_would_be_found():
 
 def test_no_number_of_the_answer_is_on_the_lessons_page(number, web):
     lesson = find(number)
+    web = web(number)
     page = (web / lesson.folder.name / "index.html").read_text(encoding="utf-8")
     assert lesson.title in page
     assert given_away(number, seen(page)) == set()
@@ -185,9 +191,6 @@ def dashes(frame):
     return int((scene == colour).all(axis=-1).sum())
 
 
-@pytest.mark.parametrize(
-    "number", [pytest.param(n, marks=pytest.mark.slow if n % 4 else ()) for n in NUMBERS]
-)
 def test_a_film_begins_without_the_path_and_waits(number):
     lesson = find(number)
     before, last = first_part(lesson.folder / "lesson.gif")

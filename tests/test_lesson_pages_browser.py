@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from pypdf import PdfReader
 
+from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises import lesson as exercise
-from chutelab.classroom.exercises.catalogue import EXERCISES
 from chutelab.classroom.exercises.exercise import draw
-from chutelab.classroom.lessons.reading import scene_of
+from chutelab.classroom.lessons import scene_of
 from chutelab.classroom.lessons.steps import quantities_in
 from chutelab.engines.simulation import simulate
 from chutelab.results.quantities import measure

@@ -3,8 +3,7 @@
 import json
 import re
 
-from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import SAID, data_of
+from chutelab.classroom.exercises import EXERCISES, SAID, data_of
 from chutelab.pictures.live.page import LANGUAGES, html
 from chutelab.scene import load
 from chutelab.scene.quantities import REGISTRY

@@ -51,8 +51,14 @@ def drawn(recording):
         yield Stage(recording, layout, moments, slow=1.0).figure
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("name", "dark"),
+    [
+        pytest.param(name, dark, marks=pytest.mark.slow if dark is (n > 0) else ())
+        for n, name in enumerate(NAMES)
+        for dark in (False, True)
+    ],
+)
 def test_all_that_is_written_stands_out(name, dark, runs):
     ground = STAGE if dark else (255, 255, 255)
     ground = tuple(value / 255 for value in ground)

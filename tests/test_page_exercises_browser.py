@@ -4,8 +4,7 @@ import json
 
 import pytest
 
-from chutelab.classroom.exercises import lesson
-from chutelab.classroom.exercises.catalogue import EXERCISES
+from chutelab.classroom.exercises import EXERCISES, lesson
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.lessons.pages import live_page
 from live.browser import to_step

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from chutelab.classroom.exercises import EXERCISES, Verdict, catalogue, lesson
+from chutelab.classroom import exercises
+from chutelab.classroom.exercises import EXERCISES, Verdict, lesson
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import MARKS
 from chutelab.classroom.grading import grade
@@ -59,7 +60,7 @@ TO_NUMBERS = """() => {
     [*QUICK, *(pytest.param(*one, marks=pytest.mark.slow) for one in [*WHOLE, *GERMAN])],
 )
 def test_a_lesson_is_played_through(name, way, language, most, opened, tmp_path, monkeypatch):
-    monkeypatch.setattr(catalogue, "OPENED", deque())
+    monkeypatch.setattr(exercises, "OPENED", deque())
     task = lesson(name, STUDENT, language)
     said = words(language)
     _, cases = draw(EXERCISES[name], STUDENT)

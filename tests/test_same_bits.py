@@ -38,6 +38,7 @@ EVERY = [
     " --minimize belt_work --out least",
     "compare perpendicular --data perpendicular-track --out compared",
     "discharge slip --out discharged",
+    "field slip --out fields --vtk",
     "lesson list --json",
     "lesson show 3",
     "lesson build 1 --out built",

@@ -29,7 +29,7 @@ from chutelab.studies.sweep import (
 from chutelab.studies.sweep.plan import row_of
 from chutelab.studies.sweep.plan import swept as swept_block
 from chutelab.util.errors import InputError
-from shared import call
+from shared import call, some
 from typed import planned, sweep
 
 PAID, HEAT = (f"ledger.by_surface.outgoing.{name}" for name in ("belt_work", "friction_loss"))
@@ -113,7 +113,7 @@ inclined-conveyor | stream.count=1 | incoming.speed=1.5:2.5:4 incoming.incline_d
 """A scene, what is set, what is varied."""
 
 
-@pytest.mark.parametrize("line", FAMILIES.strip().splitlines())
+@pytest.mark.parametrize("line", some(FAMILIES.strip().splitlines(), 2))
 def test_rows_of_a_batch_are_those_of_single_runs(line):
     name, settings, varies = (part.split() for part in line.split("|"))
     block = block_of(load(*name, settings), varies)
@@ -352,7 +352,7 @@ def test_a_family_has_the_numbers_that_each_of_its_scenes_has(line):
     ids=lambda value: value[0] if isinstance(value, list) else None,
 )
 def test_what_cannot_be_varied_is_refused_with_what_is_allowed(varies, allowed, monkeypatch):
-    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", None)
+    monkeypatch.setattr("chutelab.studies.sweep.swept", None)
     options = [option for vary in varies for option in ("--vary", vary)]
     result = call("sweep", "perpendicular", *options, "--out", "rows.csv", code=2)
     assert allowed in result.stderr
@@ -379,7 +379,7 @@ def test_what_cannot_be_varied_is_refused_with_what_is_allowed(varies, allowed, 
     ids=" ".join,
 )
 def test_options_that_cannot_be_are_refused_before_anything_runs(options, allowed, monkeypatch):
-    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", None)
+    monkeypatch.setattr("chutelab.studies.sweep.swept", None)
     vary = "plate.angle_deg=0:10" if "--sample" in options else "plate.angle_deg=0,10"
     result = call("sweep", "perpendicular", "--vary", vary, *options, code=2)
     assert allowed in result.stderr

@@ -67,7 +67,7 @@ def test_nothing_is_written_when_a_variant_fails(monkeypatch):
     def broken(*_):
         raise RuntimeError("broken")
 
-    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", broken)
+    monkeypatch.setattr("chutelab.studies.sweep.swept", broken)
     plan = planned(load("perpendicular"), SMALL)
     with crew() as team, pytest.raises(RuntimeError, match="broken"):
         sweep_to(plan, "rows.csv", team)

@@ -49,10 +49,6 @@ def deadly(job):
     return number * number
 
 
-def fatal(_):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
 def test_processes_write_the_same_bytes(stepped):
     plan, whole = stepped
     with crew(2) as team:
@@ -69,7 +65,7 @@ def test_a_process_that_dies_costs_time_only(tmp_path):
 
 def test_processes_that_keep_dying_are_given_up():
     with pytest.raises(LostWorkersError, match="keep dying"), crew(2) as team:
-        list(team.results(fatal, [(0, 0)]))
+        list(team.results(signal.raise_signal, [(0, signal.SIGKILL)]))
 
 
 def test_any_executor_will_do():
@@ -125,7 +121,7 @@ def served(stack, answer):
 @pytest.mark.parametrize("answer", [None, b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\xff" * 4096])
 def test_somebody_else_at_the_port_is_no_scheduler(monkeypatch, capfd, answer):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("chutelab.studies.sweep.sweeping.PATIENCE", 1.0)
+    monkeypatch.setattr("chutelab.studies.sweep.PATIENCE", 1.0)
     with ExitStack() as stack:
         address = f"tcp://127.0.0.1:{served(stack, answer)}"
         refused = swept_at(address)
@@ -146,7 +142,7 @@ def test_somebody_else_at_the_port_is_no_scheduler(monkeypatch, capfd, answer):
 )
 def test_an_address_without_a_scheduler_is_refused(monkeypatch, capfd, address, said):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("chutelab.studies.sweep.sweeping.PATIENCE", 1.0)
+    monkeypatch.setattr("chutelab.studies.sweep.PATIENCE", 1.0)
     before = active_count()
     refused = swept_at(address)
     # A thread that goes on asking would draw random numbers in the midst of other tests.
@@ -167,7 +163,7 @@ LOST = """
 import sys
 import distributed
 from chutelab.cli import main
-from chutelab.studies.sweep import sweeping
+from chutelab.studies import sweep as sweeping
 
 if __name__ == "__main__":
     sweeping.PATIENCE = 2.0

@@ -10,9 +10,9 @@ import pytest
 from click.testing import CliRunner
 
 from chutelab.classroom import exercises as package
+from chutelab.classroom import lessons
 from chutelab.classroom.exercises import EXERCISES, Verdict, lesson
 from chutelab.classroom.exercises.exercise import draw, translated
-from chutelab.classroom.lessons import reading
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.cli import main
 from chutelab.util.errors import InputError
@@ -163,7 +163,7 @@ def test_what_is_not_translated_is_in_english_and_that_is_said(tmp_path, monkeyp
     assert told.questions[1:] == [*english.questions[1:]]
     note = words("de").say("untranslated")
     assert note not in repr(lesson("trust", "Ada", language="de"))
-    monkeypatch.setattr("chutelab.classroom.exercises.catalogue.told", lambda *_: told)
+    monkeypatch.setattr("chutelab.classroom.exercises.told", lambda *_: told)
     task = lesson("trust", "Ada", language="de")
     assert " ".join(note.split()) in " ".join(repr(task).split())
     assert note in task._repr_html_()
@@ -174,7 +174,7 @@ FOLDERS = sorted(path.parent.name for path in LESSONS.glob("*/lesson.toml"))
 
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_a_lesson_says_the_same_in_both_languages(folder):
-    english, german = (reading.read(LESSONS / folder, language) for language in ("en", "de"))
+    english, german = (lessons.read(LESSONS / folder, language) for language in ("en", "de"))
     assert german.untranslated == ()
     assert german.title != english.title
     for which in ("student", "explanation"):
@@ -243,7 +243,7 @@ def test_a_lesson_that_is_not_translated_is_in_english_and_that_is_said(tmp_path
     plan = folder / "lesson.toml"
     text = plan.read_text(encoding="utf-8")
     plan.write_text(text.replace("question = ", "question.en = "), encoding="utf-8")
-    lesson, english = reading.read(folder, "de"), reading.read(folder)
+    lesson, english = lessons.read(folder, "de"), lessons.read(folder)
     assert (lesson.title, lesson.question) == (english.title, english.question)
     assert lesson.untranslated == ("question",)
     note = words("de").say("untranslated")
@@ -252,11 +252,11 @@ def test_a_lesson_that_is_not_translated_is_in_english_and_that_is_said(tmp_path
         assert note in CliRunner().invoke(main, [*args, "--language", "de"]).output
         assert words("en").say("untranslated") not in CliRunner().invoke(main, args).output
     plan.write_text(text.replace("question = ", 'question.de = "Was?"\nquestion.en = '), "utf-8")
-    assert reading.read(folder, "de").question == "Was?"
-    assert reading.read(folder, "de").untranslated == ()
+    assert lessons.read(folder, "de").question == "Was?"
+    assert lessons.read(folder, "de").untranslated == ()
     plan.write_text(text.replace("question = ", "question.de = 3\nquestion.en = "), "utf-8")
-    with pytest.raises(reading.LessonError, match="question"):
-        reading.read(folder, "de")
+    with pytest.raises(lessons.LessonError, match="question"):
+        lessons.read(folder, "de")
 
 
 def test_the_sheets_of_a_translated_lesson_are_german():

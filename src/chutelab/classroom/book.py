@@ -20,7 +20,7 @@ from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chutelab.classroom.lessons.reading import Lesson, beside, find, machine_of, scene_of
+from chutelab.classroom.lessons import Lesson, beside, find, machine_of, scene_of
 from chutelab.classroom.lessons.steps import FUNCTIONS, Ask, Column, quantities_in
 from chutelab.classroom.lessons.texts import without_tex
 from chutelab.engines.simulation import simulate

@@ -28,12 +28,11 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
-from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import LONGEST_NAME, OPENED, UNNAMED
+from chutelab.classroom.exercises import EXERCISES, LONGEST_NAME, OPENED, UNNAMED
 from chutelab.classroom.exercises.exercise import draw, plain
 from chutelab.classroom.exercises.judging import is_rounded, judge
 from chutelab.classroom.kernel import ForgedError, run
-from chutelab.classroom.lessons.reading import OWN_WORDS
+from chutelab.classroom.lessons import OWN_WORDS
 from chutelab.classroom.lessons.texts import asset
 from chutelab.util.errors import InputError, MissingLibraryError, cut, printable, printable_lines
 from chutelab.util.files import csv_lines

@@ -93,7 +93,7 @@ class ForgedError(ValueError):
 class Ran:
     """What became of a notebook."""
 
-    # what `report` in `classroom.exercises.catalogue` gave, unchecked: student's code ran there
+    # what `report` in `classroom.exercises` gave, unchecked: student's code ran there
     tasks: object
     trouble: str  # what went wrong, or empty; of errors the first
 
@@ -393,7 +393,7 @@ def _work() -> None:
     from IPython.core.interactiveshell import InteractiveShell
     from traitlets.config import Config
 
-    from chutelab.classroom.exercises import catalogue
+    from chutelab.classroom import exercises
 
     class Shell(InteractiveShell):
         def enable_gui(self, gui: str | None = None) -> None:
@@ -417,7 +417,7 @@ def _work() -> None:
     def hand_over() -> None:
         # Cells can change this module; what comes of it is judged anew.
         with suppress(Exception), turn:
-            found = catalogue.report()
+            found = exercises.report()
             if last != found:
                 _say(pipe, tasks=found)
                 last[:] = found

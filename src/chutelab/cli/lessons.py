@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 def complete_lesson(begun: str) -> list[CompletionItem]:
     """Offer the names of shipped lessons that begin so, with or without their number."""
-    from chutelab.classroom.lessons.reading import shipped_lessons
+    from chutelab.classroom.lessons import shipped_lessons
 
     found = shipped_lessons()
     titles = {name: one.title for one in found for name in (one.name, one.folder.name)}
@@ -60,7 +60,7 @@ def lesson() -> None:
 @command("List the lessons.", lesson)
 def list_(*, json_: bool) -> None:
     """List the lessons: number, name, level, duration, and the question of each."""
-    from chutelab.classroom.lessons.reading import shipped_lessons
+    from chutelab.classroom.lessons import shipped_lessons
     from chutelab.util.tables import Sheet
 
     found = shipped_lessons()

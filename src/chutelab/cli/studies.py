@@ -1,4 +1,4 @@
-"""``sweep``, ``solve``, ``compare``, ``discharge``: variants, the right one, film and formulas."""
+"""``sweep``, ``solve``, ``compare``, ``discharge``, ``field``: variants, film, formulas, fields."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from chutelab.cli import console
 from chutelab.cli.console import RefusedError, progress, tell
 from chutelab.cli.options import (
     PICTURES,
+    Count,
     Engine,
     FileName,
     Folder,
@@ -34,7 +35,7 @@ from chutelab.cli.options import (
     write_json,
 )
 from chutelab.util.errors import InputError
-from chutelab.util.files import write_lines, writing
+from chutelab.util.files import csv_lines, write_lines, writing
 
 if TYPE_CHECKING:
     from chutelab.scene.variants import Vary
@@ -539,4 +540,77 @@ def discharge(
             write_json(found.as_dict(), place / names[1])
     wrote = f"wrote into {out}: {', '.join(names)}" if out else ""
     title = Text(found.scene.title, style="bold")
+    tell(found.as_dict(), title, found.sheet(), as_json=json_, wrote=wrote)
+
+
+@command("Tell density, velocity, temperature and stress of a crowd on a grid.")
+def field(
+    scene: SceneName,
+    *,
+    of: Texts,
+    between: str = "",
+    width: float | None,
+    cell: float | None,
+    samples: Annotated[int, Count(1)] = 50,
+    vtk: bool,
+    set_: Texts,
+    engine: Engine,
+    out: Folder,
+    json_: bool,
+) -> None:
+    """Run SCENE, and tell what its particles are as a continuum: fields on a grid.
+
+    Coarse graining: each particle is spread by Lucy's kernel, which ends at its width, and means
+    are taken over a window of time. The table tells the least, mean and largest value of each
+    field; pictures show them on the machine. The fields: density, vx, vy, speed, temperature
+    (granular), pressure, sxx, sxy, syx, syy (stress; compression is negative). Stress is of the
+    fluctuations and of blows; that of lasting contacts is left out, and the table says how much of
+    all impulses these are.
+
+    chutelab field hopper --between 0.6,1 --of speed --of density --out out
+    chutelab field stream --width 4cm --cell 5mm --vtk --out out
+
+    --of FIELD  Which field to draw; default: speed. May be repeated.
+    --between T,T  The window of time, s; default: all of the run.
+    --width M  Where the kernel ends, m; default: three mean diameters.
+    --cell M  Edge of a cell, m; default: a quarter of the width.
+    --samples N  At how many times of the window tracks are looked at. [default]
+    --vtk  With --out: also fields.vti, for ParaView; needs pip install "chutelab[vtk]".
+    --out DIR  Write a picture of each field asked for, and fields.csv, into this folder.
+    """
+    from rich.text import Text
+
+    from chutelab.engines.simulation import simulate
+    from chutelab.results.fields import NAMES, fields, need_vtk
+
+    wanted = dict.fromkeys(of or ("speed",))
+    for name in wanted:
+        if name not in NAMES:
+            raise InputError(f"one of {', '.join(NAMES)}", "--of", name)
+    if (of or vtk) and out is None:
+        raise click.UsageError("--of and --vtk are for files: give --out DIR too.")
+    if vtk:
+        need_vtk()
+    try:
+        window = [float(part) for part in between.split(",")] if between else [None, None]
+        begin, end = window
+    except ValueError:
+        raise InputError("two times such as 0.5,1.2, in s", "--between", between) from None
+    loaded = loaded_as_told(scene, set_, engine)
+    names = [*(f"field-{name}.png" for name in wanted), "fields.csv", *["fields.vti"] * vtk]
+    with destination(out, names) as place:
+        with progress("simulating"):
+            recording = simulate(loaded)
+        with progress("spreading"):
+            found = fields(recording, begin, end, samples=samples, width=width, cell=cell)
+        if place is not None:
+            from chutelab.pictures.plots.measures import field as draw
+
+            for name in wanted:
+                draw(recording, found, name).write(place / f"field-{name}.png")
+            write_lines(place / "fields.csv", csv_lines(found.rows()))
+            if vtk:
+                found.write_vtk(place / "fields.vti")
+    wrote = f"wrote into {out}: {', '.join(names)}" if out else ""
+    title = Text(recording.title, style="bold")
     tell(found.as_dict(), title, found.sheet(), as_json=json_, wrote=wrote)

@@ -9,7 +9,7 @@
 - `stream`: a stream as a whole: flow, fates, steady power, the envelope of its paths.
 - `laws`: what every run is judged by.
 - `sensors`: what passes lines across a stream; `loads`: what surfaces bear, in bins of time;
-  `wear`: what strikes and rubs them, piece by piece.
+  `wear`: what strikes and rubs them, piece by piece; `fields`: a crowd as a continuum, on a grid.
 - `summary`: notes, tables, and the JSON object of ``chutelab run --json``.
 - `storage`: recordings as files.
 
@@ -37,6 +37,7 @@ from chutelab.results.record import (
 )
 
 if TYPE_CHECKING:
+    from chutelab.results.fields import Fields
     from chutelab.results.laws import Broken
     from chutelab.results.ledger import Ledger
     from chutelab.results.loads import Load
@@ -116,6 +117,12 @@ class Recording(Record):
         from chutelab.results.wear import worn
 
         return worn(self, surface, pieces, erosion=erosion, abrasion=abrasion)
+
+    def field(self, begin: float | None = None, end: float | None = None, **options: Any) -> Fields:
+        """Return density, velocity, temperature and stress on a grid; see `results.fields`."""
+        from chutelab.results.fields import fields
+
+        return fields(self, begin, end, **options)
 
     def summary(self) -> dict[str, Any]:
         """Return what ``chutelab run --json`` prints; see `results.summary.summary`."""

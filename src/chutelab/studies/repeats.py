@@ -23,9 +23,9 @@ from chutelab.scene import AnyScene, Scene, load
 from chutelab.scene.quantities import Quantity, every
 from chutelab.scene.units import with_unit
 from chutelab.scene.variants import drawn, reseeded
+from chutelab.studies.sweep import Crew, crew
 from chutelab.studies.sweep.plan import alone
 from chutelab.studies.sweep.rows import mean_and_error
-from chutelab.studies.sweep.sweeping import Crew, crew
 from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_text

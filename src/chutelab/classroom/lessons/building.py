@@ -29,9 +29,8 @@ from typing import Any, Final
 from PIL import Image
 from PIL.GifImagePlugin import GifImageFile
 
-from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import UNNAMED
-from chutelab.classroom.lessons.reading import (
+from chutelab.classroom.exercises import EXERCISES, UNNAMED
+from chutelab.classroom.lessons import (
     OWN_WORDS,
     Lesson,
     LessonError,
@@ -56,10 +55,10 @@ SPLIT: Final = "split.png"
 """The film, the machine before anything has happened, and the velocity at the plate."""
 
 MOST_PIXELS: Final = 3840 * 2160
-"""Most pixels of a picture, as in `reading.Picture`."""
+"""Most pixels of a picture, as in `lessons.Picture`."""
 
 NO_SETTINGS: Final = {"scene", "set", "machine", "film"}
-"""Keys of `reading.Picture` that are no settings of the film: which scene, and its words."""
+"""Keys of `lessons.Picture` that are no settings of the film: which scene, and its words."""
 
 LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
 """Packages whose versions determine the bytes of a picture, besides its inputs."""

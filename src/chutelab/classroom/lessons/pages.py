@@ -26,8 +26,8 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from PIL.GifImagePlugin import GifImageFile
 
-from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import data_of, told
+from chutelab.classroom.exercises import EXERCISES, data_of, told
+from chutelab.classroom.lessons import Lesson, LessonError, called_in, scene_of, unusable
 from chutelab.classroom.lessons.building import (
     MACHINE,
     PICTURE,
@@ -37,7 +37,6 @@ from chutelab.classroom.lessons.building import (
     is_current,
     name_of,
 )
-from chutelab.classroom.lessons.reading import Lesson, LessonError, called_in, scene_of, unusable
 from chutelab.classroom.lessons.sheets import printed, sheet, values_of, worksheet
 from chutelab.classroom.lessons.steps import data_of as data_of_steps
 from chutelab.classroom.lessons.texts import ASSETS, INDEX, asset, html_of, without_tex

@@ -22,11 +22,10 @@ from typing import Final
 from markdown_it.tree import SyntaxTreeNode
 from PIL import Image
 
-from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import UNNAMED, told
+from chutelab.classroom.exercises import EXERCISES, UNNAMED, told
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import with_unit
-from chutelab.classroom.lessons.reading import Lesson, Page, Teacher, machine_of, picture_of
+from chutelab.classroom.lessons import Lesson, Page, Teacher, machine_of, picture_of
 from chutelab.classroom.lessons.steps import PLACES, Ask, Step
 from chutelab.classroom.lessons.texts import asset, parsed, parser, typeset
 from chutelab.scene import shipped

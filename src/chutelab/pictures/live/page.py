@@ -53,7 +53,7 @@ def html(
     home : tuple of str, optional
         Text and address of a link back, for a page that is one of several.
     exercise : mapping, optional
-        What `chutelab.classroom.exercises.catalogue.data_of` makes of an exercise.
+        What `chutelab.classroom.exercises.data_of` makes of an exercise.
     lesson : mapping, optional
         Title and question of a lesson, and its steps as
         `chutelab.classroom.lessons.steps.data_of` has them.

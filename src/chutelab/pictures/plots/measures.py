@@ -1,7 +1,8 @@
-"""What is measured of a run, on its machine: wear as bands along the surfaces."""
+"""What is measured of a run, on its machine: wear as bands along the surfaces, and fields."""
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import Final
 
 import numpy as np
@@ -13,6 +14,7 @@ from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.scenery import window_of
 from chutelab.pictures.plots.style import Picture, named, say
 from chutelab.results import Recording
+from chutelab.results.fields import NAMES, Fields
 from chutelab.results.wear import KEYS, Wear, touched
 
 BANDS: Final = ("erosion", "abrasion")
@@ -81,3 +83,29 @@ def draw_wear(ax: Axes, one: Wear) -> Axes:
         ax.stairs(shares, one.edges, color=colour, ls=line, lw=1.5, label=say(f"wear-{key}"))
     ax.set(xlim=(0.0, one.edges[-1]), ylim=(0.0, 1.05))
     return ax
+
+
+THIN: Final = 1e-3
+"""Share of the largest density below which a cell is left empty."""
+
+
+def field(recording: Recording, found: Fields, name: str) -> Picture:
+    """Draw a field in colours on the machine, with its bar; empty where next to nothing is."""
+    figure = Picture((11.0, 7.0))
+    figure.headline(0.04, 0.955, recording.title)
+    figure.remark(0.04, 0.925, fill(found.note, 130), fontsize=style.SMALL)
+    ax = style.dress(figure.add_axes((0.07, 0.09, 0.86, 0.74)), say("x"), say("y"))
+    draw_scene(ax, recording.machine, window_of(recording))
+    edges = [np.append(one - 0.5 * found.cell, one[-1] + 0.5 * found.cell)
+             for one in (found.x, found.y)]  # fmt: skip
+    thin = found.density < THIN * found.density.max()
+    values = np.ma.masked_invalid(np.where(thin, np.nan, found[name])).T
+    signed = bool(values.count()) and values.min() < 0.0 < values.max()
+    reach = float(np.abs(values).max()) if signed else None
+    mesh = ax.pcolormesh(
+        *edges, values, cmap="RdBu_r" if signed else "viridis", rasterized=True, zorder=0.6,
+        vmin=-reach if reach else None, vmax=reach, gid="field",
+    )  # fmt: skip
+    bar = figure.colorbar(mesh, ax=ax, fraction=0.03, pad=0.02)
+    bar.set_label(f"{say(f'field-{name}')}, {NAMES[name]}", fontsize=style.NORMAL)
+    return figure

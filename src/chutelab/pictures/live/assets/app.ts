@@ -2,7 +2,7 @@
 
 import { Callout } from "./callout.ts";
 import { Menu } from "./menu.ts";
-import { SensorsPanel } from "./sensors.ts";
+import { SensorsPanel } from "./flow.ts";
 import { start } from "./page.ts";
 import { Palette } from "./palette.ts";
 import { html } from "./panels.ts";
@@ -14,12 +14,10 @@ import { Tools } from "./tools.ts";
 function language({ other }: any) {
   if (!other || !/^(https?|file):$/.test(location.protocol)) return;
   const name = LANGUAGES[other.language], asked = other.language;
-  const button = html("button", { type: "button", class: "ib", id: "language", lang: asked,
-    title: name, "aria-label": name }, html("b", { "aria-hidden": "true" }, asked.toUpperCase()));
-  button.addEventListener("click", () => {
-    location.assign(`?lang=${asked}${location.hash}`);
-  });
-  document.getElementById("keys")?.before(button);
+  document.getElementById("keys")?.before(html("button", {
+    class: "ib", id: "language", lang: asked, title: name, "aria-label": name,
+    click: () => location.assign(`?lang=${asked}${location.hash}`),
+  }, html("b", { "aria-hidden": "true" }, asked.toUpperCase())));
 }
 
 const LANGUAGES: Record<string, string> = { de: "Deutsch", en: "English" };

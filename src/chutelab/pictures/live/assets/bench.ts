@@ -82,9 +82,8 @@ class Bench {
     inspector.duplicate = () => this.duplicate();
     this.chip = html("div", { class: "float chip", role: "status" });
     this.chip.hidden = true;
-    this.lost = html("button", { type: "button", class: "float lost" }, words.say("fit"));
-    this.lost.hidden = true;
-    this.lost.addEventListener("click", () => document.getElementById("fit")?.click());
+    this.lost = html("button", { class: "float lost", hidden: "",
+      click: () => document.getElementById("fit")?.click() }, words.say("fit"));
     stage.drawers.push(() => { this.lost.hidden ||= !stage.moved; });
     stage.home.after(this.chip, this.lost);
     this.tools(home);
@@ -99,11 +98,8 @@ class Bench {
 
   tools(home: any) {
     const { words, lab, stage } = this;
-    const button = (id: string, drawing: string, act: () => void) => {
-      const made = iconButton(`tool-${id}`, drawing, words.say(id));
-      made.addEventListener("click", act);
-      return made;
-    };
+    const button = (id: string, drawing: string, act: () => void) =>
+      iconButton(`tool-${id}`, drawing, words.say(id), act);
     const select = button("select", "select", () => this.set(null));
     const hand = button("hand", "hand", () => this.set(null, !this.moving));
     this.listeners.push(() => {
@@ -522,19 +518,16 @@ class Bench {
       draft.append(svg("path", { d: path }));
     }
     pixels.forEach(([cx, cy], n) => {
-      const text = svg("text", { x: cx, y: cy + 5, "text-anchor": "middle" });
-      text.textContent = String(n + 1);
-      const set = n < this.points.length ? "set" : "next";
-      draft.append(svg("circle", { cx, cy, r: 13, class: set }), text);
-      text.setAttribute("class", set);
+      const kind = n < this.points.length ? "set" : "next";
+      draft.append(svg("circle", { cx, cy, r: 13, class: kind }),
+        svg("text", { x: cx, y: cy + 5, "text-anchor": "middle", class: kind }, String(n + 1)));
     });
     const count = mode.places.length, now = this.points.length;
     const told = `${mode.part} ${now}`;
     if (told === chip.dataset.told) return;
     chip.dataset.told = told;
-    const done = html("button", { type: "button", id: "done" }, words.say("done"),
+    const done = html("button", { id: "done", click: () => this.set(null) }, words.say("done"),
       html("span", { class: "note" }, " Esc"));
-    done.addEventListener("click", () => this.set(null));
     const pips = html("span", { class: "pips", "aria-hidden": "true" }, ...mode.places.map((_, n) =>
       html("i", { class: n < now ? "on" : "" })));
     const key = mode.places[now], again = count > 1 && key === mode.places[0];

@@ -1,7 +1,10 @@
-// Has the core judge a run by the laws that every run must keep: what results/laws.py is in Python.
+// Has the core judge a run by the laws that every run must keep, and says which it broke: what
+// results/laws.py is in Python.
 
 import { KNOT_ROW, type Core, type Machine } from "./core.ts";
+import type { Lab } from "./lab.ts";
 import type { Recording } from "./recording.ts";
+import type { Words } from "./words.ts";
 
 /** A whole run as the core's laws take it: all knots, and the first of each particle. */
 export type Run = { machine: Machine, knots: Float64Array, offsets: number[], books: number[],
@@ -64,4 +67,27 @@ function barriersOf({ segments, arcs, pulley }: Machine) {
   return [...straight, ...bent];
 }
 
-export { judge, runOf };
+/** What is said of each law, in the order of the core's enum Law. */
+const SAID = ["law-finite", "law-through", "law-inside", "law-energy", "law-losses", "law-ledger"];
+
+/** The line below the picture that says which law is broken. */
+function watchLaws(line: HTMLElement, lab: Lab, words: Words) {
+  lab.on("run", () => {
+    const { recording } = lab, first = recording?.breaches[0];
+    line.hidden = !first;
+    line.textContent = recording && first ? lawSaid(first, recording, words) : "";
+  });
+}
+
+function lawSaid(broken: Breach, { machine }: Recording, words: Words) {
+  const { law, surface, particle, t, x, y } = broken;
+  const where = {
+    name: words.name(machine.surfaces[surface] ?? ""), particle, t: words.number(t),
+    x: words.number(x), y: words.number(y),
+  };
+  // What one particle has got unexplained is no solver's doing.
+  const said = SAID[law] === "law-energy" && particle >= 0 ? "law-ledger" : SAID[law];
+  return words.say("law-broken", { what: words.say(said, where) });
+}
+
+export { SAID, judge, runOf, watchLaws };

@@ -56,11 +56,11 @@ class Chart {
 
   /** @param height px */
   constructor(readonly words: Words, readonly height: number) {
-    this.root = svg("svg", { class: "chart", "aria-hidden": "true" });
     this.grid = svg("g", { class: "chart-grid" });
     this.marks = svg("g");
     this.cursor = svg("path", { class: "chart-cursor" });
-    this.root.append(this.grid, this.marks, this.cursor);
+    this.root = svg("svg", { class: "chart", "aria-hidden": "true" }, this.grid, this.marks,
+      this.cursor);
   }
 
   /** Empty it, and draw axes.
@@ -78,14 +78,9 @@ class Chart {
     this.grid.replaceChildren();
     this.marks.replaceChildren();
     const right = this.width - RIGHT, bottom = height - BOTTOM;
-    const label = (px: number, py: number, text: string,
-      anchor: string) => {
-      const element = svg("text", { x: px, y: py, "text-anchor": anchor });
-      element.textContent = text;
-      this.grid.append(element);
-    };
-    const name = (value: number, all: number[]) =>
-      words.fixed(value, decimals(all));
+    const label = (x1: number, y1: number, text: string, anchor: string) =>
+      this.grid.append(svg("text", { x: x1, y: y1, "text-anchor": anchor }, text));
+    const name = (value: number, all: number[]) => words.fixed(value, decimals(all));
     const across = ticks(...x, Math.max(2, this.width / 64)), up = ticks(...y, height / 24)
       .filter((value) => !whole || Number.isInteger(value));
     for (const value of across) {

@@ -27,6 +27,17 @@ function quantile(sorted: number[], share: number) {
   return sorted.length ? sorted[low] + (at - low) * (sorted[high] - sorted[low]) : NaN;
 }
 
+/** How many of some in the order of time are not after t (s). */
+function countUntil(ordered: { t: number }[], t: number) {
+  let low = 0, high = ordered.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (ordered[middle].t <= t) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
 /** Mass per time of the middle half of those that come at times, t/h; NaN of fewer than `FLOW`.
  * @param coming in the order of time */
 function flowOf(coming: { t: number, mass: number }[]) {
@@ -61,4 +72,4 @@ function crowdOf(
   };
 }
 
-export { FEWEST, QUANTILES, crowdOf, quantile };
+export { FEWEST, QUANTILES, countUntil, crowdOf, quantile };

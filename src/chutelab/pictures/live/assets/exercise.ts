@@ -1,10 +1,15 @@
 // The exercise of a lesson: questions with numbers that come from a name, hints, replies, and the
 // file that is handed in.
 
-import { machineOf, measured } from "./measure.ts";
+import { valueOfTree } from "./formula.ts";
+import { withValues } from "./keys.ts";
+import { build } from "./machine.ts";
 import { html } from "./panels.ts";
+import { resolve, type Given } from "./scene.ts";
 import { download, fileStem } from "./share.ts";
 import { LONGEST_WORDS, Task } from "./task.ts";
+import type { Event } from "./core.ts";
+import type { DrawnNumbers } from "./draw.ts";
 import type { Engine } from "./engine.ts";
 import type { Verdict } from "./judging.ts";
 import type { Lab } from "./lab.ts";
@@ -18,6 +23,53 @@ const MARKS: Record<Verdict, string> = {
 /** Whether a step asks to explain in words. */
 const isInWords = ({ kind, asks }: { kind: string, asks: { choices: string[] }[] }) =>
   kind === "explain" && asks.some(({ choices }) => !choices.length);
+
+/** Events that formulas read off, by their kind in the core. */
+const READ_OFF: Record<number, string> = {
+  1: "separation", 3: "impact", 4: "landing",
+};
+
+/** The page's scene with the numbers of an exercise's machine. */
+function machineOf(scene: Given, numbers: DrawnNumbers): Given {
+  const values = Object.entries(numbers.exercise.machine)
+    .map(([key, tree]) => [key, numbers.of(tree)]);
+  return withValues(scene, Object.fromEntries(values));
+}
+
+/** What a run tells, by the names of quantities: first events, and energies (J) by surface. */
+function toldByRun(events: Event[], books: number[][], surfaces: string[]) {
+  const by_surface = Object.fromEntries(surfaces.map((name, row) => {
+    const [belt_work, restitution_loss, friction_loss] = books[row];
+    return [name, { belt_work, restitution_loss, friction_loss }];
+  }));
+  const told: Record<string, object> = { ledger: { by_surface } };
+  for (const { kind, t, x, y, before: [vx, vy], after: [vx_after, vy_after] } of events) {
+    if (kind in READ_OFF) told[READ_OFF[kind]] ??= { t, x, y, vx, vy, vx_after, vy_after };
+  }
+  return told;
+}
+
+/** The right answers as the machine gives them, by question from 0 on; none where no machine does.
+ * @param page its data @param engine that nothing else uses */
+function measured(
+  scene: Given, page: any, numbers: DrawnNumbers, engine: Engine,
+): Promise<Map<number, number>> {
+  const machine = build(resolve(machineOf(scene, numbers), page));
+  const events: Event[] = [];
+  return new Promise((done) => {
+    engine.run(machine, Infinity, ({ events: more, state, books }) => {
+      events.push(...more);
+      if (state === "running") return;
+      const found: Map<number, number> = new Map();
+      const told = books ? toldByRun(events, books, machine.surfaces) : {};
+      numbers.exercise.questions.forEach((question, n) => {
+        if (!question.measured || state !== "done") return;
+        found.set(n, valueOfTree(question.measured, (name) => told[name] ?? numbers.get(name)));
+      });
+      done(found);
+    });
+  });
+}
 
 class Questions {
   root;
@@ -57,10 +109,7 @@ class Questions {
   }
 
   button(id: string, text: string, act: () => void, kind: string = "") {
-    const made = html("button", { type: "button", class: kind }, text);
-    if (id) made.id = id;
-    made.addEventListener("click", act);
-    return made;
+    return html("button", { class: kind, ...(id ? { id } : {}), click: act }, text);
   }
 
   /** Have the machine with a student's numbers say what is right. */

@@ -2,8 +2,7 @@
 // (`scene/conflicts.py`), and what exercises know besides their own names.
 
 import { fixedText } from "./decimal.ts";
-import { separationWithSlip } from "./slip.ts";
-import { transfer } from "./transfer.ts";
+import { separationWithSlip, transfer } from "./transfer.ts";
 
 export type Tree = string | number | boolean | any[];
 /** The value of a name; undefined if it has none */

@@ -111,8 +111,7 @@ class Fields {
     const { lab, words } = this, { key, table, name, low, high } = field;
     const button = (way: number, sign: string) => {
       const label = `${words.key(table, name)}: ${words.say(way < 0 ? "less" : "greater")}`;
-      const made = html("button", { type: "button", class: "step", "aria-label": label }, sign);
-      made.addEventListener("click", () => {
+      const click = () => {
         const its = this.entries.get(key)?.field ?? field, { step, whole } = this.rangeOf(its);
         const by = its.unit === "degrees" || whole ? 1 : roundUp(step);
         // From between two round values to the next of them.
@@ -120,8 +119,8 @@ class Fields {
         const value = Math.min(high, Math.max(low, Number(next.toPrecision(12))));
         lab.asked = "";
         if (value !== its.value) lab.change({ [key]: value });
-      });
-      return made;
+      };
+      return html("button", { class: "step", "aria-label": label, click }, sign);
     };
     row.querySelector(".value").before(button(-1, "−"));
     row.append(button(1, "+"));
@@ -156,11 +155,10 @@ class Fields {
       input.setAttribute("aria-invalid", "true");
       input.setAttribute("aria-describedby", why.id);
       const was = this.text(field) || "–";
-      const back = html("button", { type: "button" }, words.say("back-to", { value: was }));
-      back.addEventListener("click", () => this.giveUp(field.key));
-      const role = { role: "alert" };
       const said = words.why(lab.fault as Fault, field.key);
-      why.replaceChildren(icon("stop"), html("p", role, `${said} ${words.say("still", { value: was })}`), back);
+      why.replaceChildren(icon("stop"),
+        html("p", { role: "alert" }, `${said} ${words.say("still", { value: was })}`),
+        html("button", { click: () => this.giveUp(field.key) }, words.say("back-to", { value: was })));
       return;
     }
     input.removeAttribute("aria-invalid");
@@ -241,19 +239,13 @@ class Inspector {
     this.main = new Fields(lab, words, false);
     this.own = new Fields(lab, words, true);
     this.own.renamed = (name) => this.choose(name);
-    this.makers = (["material", "pair"] as const).map((table) => {
-      const button = html("button", { type: "button", id: `make-${table}` }, words.say(`make-${table}`));
-      button.addEventListener("click", () => this.make(table));
-      return button;
-    });
+    this.makers = (["material", "pair"] as const).map((table) => html("button",
+      { id: `make-${table}`, click: () => this.make(table) }, words.say(`make-${table}`)));
     home.append(card("edit", words.say("values"), html("div", { class: "row" }, this.choice),
       this.main.home, html("div", { class: "row makers" }, ...this.makers)));
     this.title = html("h2", {});
-    const button = (id: string, drawing: string, act: () => void) => {
-      this.buttons[id] = iconButton(`part-${id}`, drawing, words.say(id));
-      this.buttons[id].addEventListener("click", act);
-      return this.buttons[id];
-    };
+    const button = (id: string, drawing: string, act: () => void) =>
+      (this.buttons[id] = iconButton(`part-${id}`, drawing, words.say(id), act));
     this.panel = html("section", { class: "float chosen-card", id: "chosen", "aria-label": words.say("chosen") },
       html("div", { class: "head" }, this.title, button("duplicate", "copy", () => this.duplicate()),
         button("delete", "bin", () => this.takeAway()),

@@ -21,11 +21,8 @@ class Keep {
     this.comma = html("input", { type: "checkbox", id: "comma" });
     this.comma.checked = words.comma;
     this.said = html("p", { class: "note", role: "status" });
-    const button = (id: string, act: () => void, reveals = false) => {
-      const made = html("button", { type: "button", class: reveals ? "reveals" : "" }, words.say(id));
-      made.addEventListener("click", act);
-      return made;
-    };
+    const button = (id: string, click: () => void, reveals = false) =>
+      html("button", { class: reveals ? "reveals" : "", click }, words.say(id));
     // In a lesson the step says which machine it is.
     const { lesson } = lab.data, hasAddress = !lesson && /^(https?|file):$/.test(location.protocol);
     const head = (id: string) => (lesson ? [] : [html("p", {}, words.say(id))]);

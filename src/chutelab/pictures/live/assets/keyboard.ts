@@ -23,13 +23,11 @@ function listenToKeys(
   bench: Bench, palette: Palette | null, marks: Marks, lab: Lab, words: Words,
 ) {
   const click = (id: string) => document.getElementById(id)?.click();
-  const close = html("button", { type: "button" }, words.say("close"));
-  const dialog = html("dialog", { id: "help", "aria-label": words.say("help") },
+  const dialog: HTMLDialogElement = html("dialog", { id: "help", "aria-label": words.say("help") },
     html("h2", {}, words.say("help")),
     html("dl", {}, ...KEYS.flatMap(([id, key]) => [
       html("dt", {}, words.say(key)), html("dd", {}, words.say(`help-${id}`)),
-    ])), close);
-  close.addEventListener("click", () => dialog.close());
+    ])), html("button", { click: () => dialog.close() }, words.say("close")));
   document.body.append(dialog);
   document.getElementById("keys")?.addEventListener("click", () => dialog.showModal());
   const always: Record<string, () => void> = {

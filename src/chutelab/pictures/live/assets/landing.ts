@@ -2,6 +2,7 @@
 // first n with its error.
 
 import { Chart, onWidth, rangeOf, roundUp } from "./chart.ts";
+import { countUntil } from "./crowd.ts";
 import { card, follow, html } from "./panels.ts";
 import { svg } from "./scenery.ts";
 import { historyOf } from "./stages.ts";
@@ -110,11 +111,9 @@ class LandingPanel {
   fill() {
     const { arrivals, words, all } = this;
     if (this.panel.hidden || !all || !arrivals.length) return;
-    let n = 0;
-    const counts = all.counts.map(() => 0);
-    for (; n < arrivals.length && arrivals[n].t <= this.lab.t; n += 1) {
-      const bin = Math.floor(arrivals[n].x / all.width) - Math.round(all.from / all.width);
-      counts[bin] += 1;
+    const counts = all.counts.map(() => 0), n = countUntil(arrivals, this.lab.t);
+    for (const { x } of arrivals.slice(0, n)) {
+      counts[Math.floor(x / all.width) - Math.round(all.from / all.width)] += 1;
     }
     this.filled.setAttribute("d", this.bars.bars(all.from, all.width, counts));
     this.means.point(n || NaN);

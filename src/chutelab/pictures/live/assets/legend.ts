@@ -110,9 +110,7 @@ class Legend {
   }
 
   write(x: number, y: number, text: string, kind = "") {
-    const element = svg("text", { x, y, class: kind });
-    element.textContent = text;
-    this.layer.append(element);
+    this.layer.append(svg("text", { x, y, class: kind }, text));
   }
 }
 

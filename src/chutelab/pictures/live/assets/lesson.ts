@@ -101,11 +101,8 @@ class Lesson {
     title.parentElement?.after(this.nav);
     new ResizeObserver(() => this.fitSteps()).observe(this.nav);
     this.page = html("div", { class: "page" });
-    const button = (id: string, act: () => void, kind = "") => {
-      const made = html("button", { type: "button", id, class: kind }, words.say(id));
-      made.addEventListener("click", act);
-      return made;
-    };
+    const button = (id: string, click: () => void, kind = "") =>
+      html("button", { id, class: kind, click }, words.say(id));
     this.back = button("step-back", () => this.go(this.kept.at - 1));
     this.skip = button("skip", () => {
       this.commit();
@@ -122,11 +119,10 @@ class Lesson {
     this.slot = html("span", { class: "slot" });
     document.querySelector(".transport")?.append(this.slot);
     document.querySelector(".transport")?.before(this.values.root);
-    this.who = iconButton("somebody-else", "who", words.say("somebody-else"));
-    this.who.addEventListener("click", () => this.leave());
-    const print = iconButton("print", "print", words.say("print"));
-    print.addEventListener("click", () => globalThis.print());
-    document.getElementById("views")?.append(print, this.who);
+    this.who = iconButton("somebody-else", "who", words.say("somebody-else"), () => this.leave());
+    const print = () => globalThis.print();
+    document.getElementById("views")?.append(
+      iconButton("print", "print", words.say("print"), print), this.who);
     printed(this);
     lab.mayPlay = () => this.mayPlay();
     for (const news of ["scene", "run", "time"] as const) lab.on(news, () => this.look());
@@ -174,14 +170,11 @@ class Lesson {
     this.kept = { at: 0, done: [], said: {}, runs: {} };
     this.setMachine({}, []);
     this.curtain.set(true);
-    const name = html("input", { type: "text", id: "student", maxlength: String(LONGEST_NAME),
-      autocomplete: "off", spellcheck: "false", "aria-describedby": "student-note" });
-    const begin = () => this.begin(name.value);
-    name.addEventListener("keydown", (event: KeyboardEvent) => {
-      if (event.key === "Enter") begin();
-    });
-    const go = html("button", { type: "button", id: "begin", class: "main" }, words.say("lesson-begin"));
-    go.addEventListener("click", begin);
+    const click = () => this.begin(name.value);
+    const name = html("input", { type: "text", id: "student", maxlength: LONGEST_NAME,
+      autocomplete: "off", spellcheck: "false", "aria-describedby": "student-note",
+      keydown: ({ key }: KeyboardEvent) => key === "Enter" && click() });
+    const go = html("button", { id: "begin", class: "main", click }, words.say("lesson-begin"));
     this.page.replaceChildren(
       html("h2", { tabindex: "-1" }, lesson.title), html("p", { class: "ask" }, lesson.question),
       html("label", { for: "student" }, html("b", {}, words.say("exercise-name"))),
@@ -307,12 +300,11 @@ class Lesson {
       ...this.exercise());
     this.list.replaceChildren(...steps.map(({ kind }, k) => {
       const done = kept.done.includes(k);
-      const button = html("button", { type: "button" }, html("b", {}, done && k !== n
+      const button = html("button", { click: () => this.go(k) }, html("b", {}, done && k !== n
         ? icon("tick") : String(k + 1)), html("span", {}, words.say(`step-${kind}`)));
       button.disabled = k > this.reach;
       if (k === n) button.setAttribute("aria-current", "step");
       if (done) button.append(html("span", { class: "hidden" }, `, ${words.say("step-done")}`));
-      button.addEventListener("click", () => this.go(k));
       return html("li", { class: done ? "done" : "" }, button);
     }));
     this.fitSteps();
@@ -388,8 +380,7 @@ class Lesson {
   /** The button that ends the writing of words, before the explanation is shown. */
   ready({ kind, asks, then }: Step): Node[] {
     if (kind !== "explain" || !asks.length || !then) return [];
-    const button = html("button", { type: "button", id: "written" }, this.words.say("written"));
-    button.addEventListener("click", () => {
+    const click = () => {
       if (!this.isAnswered) {
         this.page.querySelector(".ask textarea, .choice input")?.focus();
         return;
@@ -397,8 +388,8 @@ class Lesson {
       this.kept.done.push(this.kept.at);
       this.look();
       this.keep();
-    });
-    return [button];
+    };
+    return [html("button", { id: "written", click }, this.words.say("written"))];
   }
 
   /** How many questions of the lesson are answered in words. */
@@ -422,10 +413,9 @@ class Lesson {
       if (ask.choices.length) {
         return html("fieldset", { class: "choice" }, html("legend", {}, ...question),
           ...ask.choices.map((text, value) => {
-            const input = html("input", { type: "radio", name });
+            const input = html("input", { type: "radio", name, change: () => say(value) });
             input.checked = kept.said[id] === value;
             input.disabled = !isOpen;
-            input.addEventListener("change", () => say(value));
             return html("label", {}, input, html("span", {}, ...grown(text)));
           }), reply);
       }
@@ -446,17 +436,17 @@ class Lesson {
         sketch.isOpen = isOpen;
         sketch.draw();
         this.tools.push(sketch);
-        const clear = html("button", { type: "button", class: "quiet" }, words.say("sketch-clear"));
-        clear.addEventListener("click", () => sketch.clear());
+        const clear = html("button", { class: "quiet", click: () => sketch.clear() },
+          words.say("sketch-clear"));
         clear.hidden = !isOpen;
         return html("div", { class: "ask" }, ...question,
           html("p", { class: "said" }, words.say("sketch-how"), " ",
             html("span", { class: "note", id: "sketch-keys" }, words.say("sketch-keys"))), clear, reply);
       }
-      const field = html("textarea", { id: name, rows: "4",
-        maxlength: String(Math.floor(LONGEST_WORDS / this.fields)) });
+      const field = html("textarea", { id: name, rows: 4,
+        maxlength: Math.floor(LONGEST_WORDS / this.fields),
+        input: () => say(field.value.trim() ? field.value : undefined) });
       field.value = typeof kept.said[id] === "string" ? kept.said[id] : "";
-      field.addEventListener("input", () => say(field.value.trim() ? field.value : undefined));
       return html("div", { class: "ask" }, html("label", { for: name }, ...question), field, reply);
     });
   }
@@ -482,9 +472,8 @@ class Lesson {
     const { task, lab, words, step } = this;
     if (step.kind !== "numbers" || !lab.data.exercise) return [];
     if (!task) {
-      const ask = html("button", { type: "button", class: "main" }, words.say("name-first"));
-      ask.addEventListener("click", () => this.leave());
-      return [html("p", {}, words.say("name-note")), ask];
+      return [html("p", {}, words.say("name-note")),
+        html("button", { class: "main", click: () => this.leave() }, words.say("name-first"))];
     }
     return [new Questions(lab, words, task, this.newEngine, () => {
       this.look();

@@ -112,10 +112,10 @@ class Marks {
     this.shown = marks.map(({ at, of }) => {
       const said = of.slice(0, TOLD).map((one) => this.tell(one)).join("; ");
       const says = of.length > TOLD ? `${said} …` : said;
-      const button = fine ? html("button", { type: "button", "aria-label": says, "data-says": says,
-        class: at > 0.5 ? "late" : "" }, icon(ICONS[of[0].kind])) : html("i");
+      const button = fine ? html("button", { "aria-label": says, "data-says": says,
+        class: at > 0.5 ? "late" : "", click: () => this.go(of[0].t) }, icon(ICONS[of[0].kind]))
+        : html("i");
       button.style.setProperty("--at", String(at));
-      button.addEventListener("click", () => this.go(of[0].t));
       return { button, first: of[0].t, last: of[of.length - 1].t };
     });
     this.marked = "";

@@ -52,10 +52,8 @@ class Menu {
   }
 
   button(id: string, drawing: string, act: () => void) {
-    const made = html("button", { type: "button", id }, ...(drawing ? [icon(drawing)] : []),
+    return html("button", { id, click: act }, ...(drawing ? [icon(drawing)] : []),
       html("span", {}, this.words.say(id)));
-    made.addEventListener("click", act);
-    return made;
   }
 
   /** An empty machine, which can be undone. */

@@ -1,6 +1,7 @@
 // What every page has: reads its data, starts the engine's thread, and joins the parts.
 
 import { Bench } from "./bench.ts";
+import { watchLaws } from "./breaches.ts";
 import { bytesOf, compiled, unpacked } from "./core.ts";
 import { Engine } from "./engine.ts";
 import { Arrows } from "./arrows.ts";
@@ -13,7 +14,6 @@ import { Keep } from "./keep.ts";
 import { listenToKeys } from "./keyboard.ts";
 import { toToml } from "./keys.ts";
 import { Lab } from "./lab.ts";
-import { watchLaws } from "./laws.ts";
 import { LandingPanel } from "./landing.ts";
 import { NumbersPanel } from "./numbers.ts";
 import { startPlan } from "./plan.ts";

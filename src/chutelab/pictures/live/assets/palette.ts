@@ -47,8 +47,8 @@ class Palette {
       html("h2", {}, name, html("small", {}, words.say("letter-key"))),
       html("div", { class: "grid" }, ...this.tiles.map(([, tile]) => tile)), this.materials());
     home.append(this.panel);
-    this.opener = iconButton("tool-add", "add", words.say("add-part"));
-    this.opener.addEventListener("click", () => this.open(this.panel.hidden));
+    this.opener = iconButton("tool-add", "add", words.say("add-part"), () =>
+      this.open(this.panel.hidden));
     document.getElementById("tool-hand")?.after(this.opener);
     bench.inspector.listeners.push(() => {
       if (bench.inspector.parts.length) this.open(false);
@@ -86,7 +86,7 @@ class Palette {
    * finger or a key it lies in the middle. */
   tile(part: Part) {
     const { words, bench, stage } = this;
-    const tile = html("button", { type: "button", class: "tile", "aria-pressed": "false",
+    const tile = html("button", { class: "tile", "aria-pressed": "false",
       id: `part-${part.part}`, "aria-keyshortcuts": part.letter }, icon(part.part),
     html("span", {}, words.say(`part-${part.part}`)), html("kbd", { "aria-hidden": "true" }, part.letter));
     let from: [number, number] | null = null, dropped = false, pointer = "";
@@ -122,14 +122,13 @@ class Palette {
       const said = words.choice(name);
       const picture = html("canvas", { width: "44", height: "44", "aria-hidden": "true" });
       this.due.push(() => picture.getContext("2d").drawImage(balls.picture(name), 0, 0, 44, 44));
-      const button = html("button", { type: "button", "aria-pressed": "false", title: said,
-        "aria-label": said }, picture);
-      button.addEventListener("click", () => {
+      const click = () => {
         bench.material = bench.material === name ? "" : name;
         choices.forEach((one, n) =>
           one.setAttribute("aria-pressed", String(names[n] === bench.material)));
-      });
-      return button;
+      };
+      return html("button", { "aria-pressed": "false", title: said, "aria-label": said, click },
+        picture);
     });
     return html("div", { class: "materials", role: "group", "aria-label": words.say("ball-of") },
       html("p", {}, words.say("ball-of")), html("div", {}, ...choices));
@@ -141,38 +140,26 @@ class Palette {
     if (data.lacks) {
       const what = Object.entries(data.lacks).map(([kind, count]) =>
         words.say(`lack-${kind}`, { count: count as number })).join(", ");
-      const close = html("button", { type: "button" }, words.say("close"));
       const note = html("aside", { class: "float lacks", id: "lacks" }, icon("stop"), html("div", {},
         html("p", {}, words.say("lacks", { what })),
         html("p", { class: "note" }, words.say("lacks-run"), " ",
-          html("code", {}, `chutelab run ${data.source}`))), close);
-      close.addEventListener("click", () => note.remove());
+          html("code", {}, `chutelab run ${data.source}`))),
+      html("button", { click: () => note.remove() }, words.say("close")));
       home.append(note);
       return undefined;
     }
-    const begin = html("button", { type: "button", class: "main", id: "begin" }, icon("belt"),
+    const click = () => this.show({ title: lab.first.title, ...FIRST });
+    const begin = html("button", { class: "main", id: "begin", click }, icon("belt"),
       words.say("begin"));
-    begin.addEventListener("click", () => {
-      const { title } = lab.first;
-      this.show({ title, ...FIRST });
-    });
-    const sketch = svg("svg", {
-      viewBox: "-8 -14 620 304", class: "sketch", "aria-hidden": "true" });
-    sketch.append(svg("path", { d: SKETCH }));
-    for (const [word, x, y] of [["belt", 70, 101], ["ball", 114, 28], ["plate", 346, 76],
-      ["second", 317, 272]] as const) {
+    const named = ([["belt", 70, 101], ["ball", 114, 28], ["plate", 346, 76],
+      ["second", 317, 272]] as const).map(([word, x, y]) => svg("text", {
       // Beside the plate there is room on one side only.
-      const anchor = word === "plate" ? "start" : "middle";
-      const text = svg("text", { x, y, "text-anchor": anchor });
-      text.textContent = words.say(`sketch-${word}`);
-      sketch.append(text);
-    }
-    const examples = Object.entries<Given>(data.examples).map(([name, given]) => {
-      const button = html("button", { type: "button", class: "example", id: `example-${name}` },
-        this.picture(given), html("span", {}, words.say(`example-${name}`)));
-      button.addEventListener("click", () => this.show(given));
-      return button;
-    });
+      x, y, "text-anchor": word === "plate" ? "start" : "middle" }, words.say(`sketch-${word}`)));
+    const sketch = svg("svg", { viewBox: "-8 -14 620 304", class: "sketch", "aria-hidden": "true" },
+      svg("path", { d: SKETCH }), ...named);
+    const examples = Object.entries<Given>(data.examples).map(([name, given]) => html("button",
+      { class: "example", id: `example-${name}`, click: () => this.show(given) },
+      this.picture(given), html("span", {}, words.say(`example-${name}`))));
     const start = [
       html("section", { class: "hello", "aria-label": words.say("build") },
         html("h2", {}, words.say("build")), html("p", { class: "note" },

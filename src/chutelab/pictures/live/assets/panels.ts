@@ -1,19 +1,15 @@
 // What every panel beside the picture is made of: elements, a card, and when it is drawn again.
 
-import { svg } from "./scenery.ts";
+import { filled, svg } from "./scenery.ts";
 import type { Lab, News } from "./lab.ts";
 
 /** Of the time that passes, panels take at most one part in so many. */
 const SHARE = 12;
 
-function html(
-  name: string, attributes: Record<string, string> = {}, ...children: (string | Node)[]
-): any {
-  const element = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-  element.append(...children);
-  return element;
-}
+const html = (
+  name: string, attributes: Record<string, unknown> = {}, ...children: (string | Node)[]
+): any => filled(document.createElement(name),
+  { ...(name === "button" ? { type: "button" } : {}), ...attributes }, children);
 
 /** The nodes of a text that Python made of Markdown, where markup of its own is only text. */
 function grown(markup: string): Node[] {
@@ -23,15 +19,14 @@ function grown(markup: string): Node[] {
 
 /** A drawing of the page's sprite, see page.html. */
 function icon(name: string) {
-  const drawn = svg("svg", { class: "i", "aria-hidden": "true" });
-  drawn.append(svg("use", { href: `#i-${name}` }));
-  return drawn;
+  return svg("svg", { class: "i", "aria-hidden": "true" }, svg("use", { href: `#i-${name}` }));
 }
 
 /** A button with a drawing, and a name for those who point at it or hear it. */
-function iconButton(id: string, drawing: string, name: string): HTMLButtonElement {
-  return html("button", { type: "button", class: "ib", id, title: name, "aria-label": name },
-    icon(drawing));
+function iconButton(
+  id: string, drawing: string, name: string, click: () => void,
+): HTMLButtonElement {
+  return html("button", { class: "ib", id, title: name, "aria-label": name, click }, icon(drawing));
 }
 
 /** A button of the header that opens what lies in it, until one presses elsewhere. */

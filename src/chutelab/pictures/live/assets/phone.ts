@@ -31,11 +31,9 @@ class Phone {
     this.tabs = html("nav", { class: "tabs", "aria-label": words.say("values") });
     this.dock = html("nav", { class: "dock", "aria-label": words.say("tools") });
     const button = (id: string, drawing: string, act: () => void) => {
-      const made = html("button", { type: "button", id: `dock-${id}` }, icon(drawing),
+      this.buttons[id] = html("button", { id: `dock-${id}`, click: act }, icon(drawing),
         html("span", {}, words.say(`dock-${id}`)));
-      made.addEventListener("click", act);
-      this.buttons[id] = made;
-      this.dock.append(made);
+      this.dock.append(this.buttons[id]);
     };
     if (bench.free) {
       button("select", "select", () => {
@@ -136,11 +134,8 @@ class Phone {
     const told = JSON.stringify([names, titles]);
     if (told !== this.told) {
       this.told = told;
-      this.tabs.replaceChildren(...names.map((name, n) => {
-        const tab = html("button", { type: "button", "data-of": name }, titles[n]);
-        tab.addEventListener("click", () => this.choose(name));
-        return tab;
-      }));
+      this.tabs.replaceChildren(...names.map((name, n) => html("button",
+        { "data-of": name, click: () => this.choose(name) }, titles[n])));
     }
     for (const tab of this.tabs.children) {
       tab.setAttribute("aria-pressed", String(tab.dataset.of === on));

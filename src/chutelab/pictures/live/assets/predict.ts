@@ -67,11 +67,10 @@ class Flag {
     readonly stage: Stage, readonly lab: Lab, readonly words: Words, public what: string,
     readonly changed: () => void, note = "",
   ) {
-    this.grip = svg("g", { class: "guess", role: "slider", tabindex: 0 });
-    this.grip.append(svg("circle", { class: "room", r: 22, cy: -14 }),
-      svg("path", { class: "pole", d: "M0 0V-40" }), svg("path", { d: "M0 -41H25L19 -33L25 -25H0Z" }),
-      svg("circle", { class: "foot", r: 4.5 }));
-    this.grip.setAttribute("aria-label", words.say("mark"));
+    this.grip = svg("g", { class: "guess", role: "slider", tabindex: 0,
+      "aria-label": words.say("mark") }, svg("circle", { class: "room", r: 22, cy: -14 }),
+    svg("path", { class: "pole", d: "M0 0V-40" }), svg("path", { d: "M0 -41H25L19 -33L25 -25H0Z" }),
+    svg("circle", { class: "foot", r: 4.5 }));
     if (note) this.grip.setAttribute("aria-describedby", note);
     this.line = svg("path", { class: "miss" });
     stage.over.append(this.line, this.grip);
@@ -198,10 +197,9 @@ class Sketch {
   ) {
     this.tip = points[points.length - 1] ?? stage.view.middle;
     this.line = svg("path", { class: "sketch" });
-    this.pen = svg("g", { class: "guess pen", role: "slider", tabindex: 0 });
-    this.pen.append(svg("circle", { class: "room", r: 20 }), svg("circle", { class: "foot", r: 6 }));
-    this.pen.setAttribute("aria-label", words.say("sketch"));
-    this.pen.setAttribute("aria-describedby", "sketch-keys");
+    this.pen = svg("g", { class: "guess pen", role: "slider", tabindex: 0,
+      "aria-label": words.say("sketch"), "aria-describedby": "sketch-keys" },
+    svg("circle", { class: "room", r: 20 }), svg("circle", { class: "foot", r: 6 }));
     stage.over.append(this.line, this.pen);
     this.drawer = () => this.draw();
     stage.drawers.push(this.drawer);

@@ -68,20 +68,18 @@ class Runs {
     readonly noted: Noted[], readonly changed: () => void, readonly newEngine: () => Engine,
     readonly label: () => string,
   ) {
-    this.button = html("button", { type: "button", class: "main", id: "note" }, icon("note"),
-      html("span", { class: "long" }, words.say("note-run")),
-      html("span", { class: "short" }, words.say("step-note")));
-    this.button.addEventListener("click", () => {
+    const click = () => {
       this.asked = Boolean(this.reason);
       this.note();
-    });
+    };
+    this.button = html("button", { class: "main", id: "note", "aria-describedby": "note-wait", click },
+      icon("note"), html("span", { class: "long" }, words.say("note-run")),
+      html("span", { class: "short" }, words.say("step-note")));
     this.wait = html("p", { class: "note", id: "note-wait", role: "status" });
-    this.button.setAttribute("aria-describedby", "note-wait");
     this.body = html("tbody");
     const head = wanted.columns.map(({ head: name, unit }) =>
       html("th", { scope: "col" }, ...grown(name), unit ? `, ${words.unit(unit)}` : ""));
-    const csv = html("button", { type: "button", class: "quiet" }, words.say("csv"));
-    csv.addEventListener("click", () => this.save());
+    const csv = html("button", { class: "quiet", click: () => this.save() }, words.say("csv"));
     this.root = html("div", { class: "runs-of" }, html("div", { class: "wide", tabindex: "0",
       role: "region", "aria-label": words.say("my-runs") },
     html("table", { class: "runs" }, html("caption", { class: "hidden" }, words.say("my-runs")),
@@ -215,11 +213,9 @@ class Runs {
       const row = rows[n], one = noted[n];
       const badge = html("span", { class: "badge", "aria-hidden": "true" }, String(n + 1));
       const named = row ? grown(row.head) : [one?.head ?? words.say("own-run")];
-      let head;
-      if (row && !this.isByHand) {
-        head = html("button", { type: "button", class: "set" }, badge, html("span", {}, ...named));
-        head.addEventListener("click", () => this.set(row));
-      } else head = html("span", {}, badge, ...named);
+      const head = row && !this.isByHand ? html("button", { class: "set",
+        click: () => this.set(row) }, badge, html("span", {}, ...named))
+        : html("span", {}, badge, ...named);
       const cells = columns.map(({ value, given, head: name }, k) => {
         if (given[n] !== undefined && given[n] !== "") {
           const said = given[n];
@@ -280,9 +276,8 @@ class Runs {
       const at = seen.reduce((best, one) => (far(one) >= far(best) ? one : best), seen[0]);
       if (!at) continue;
       taken.push(at);
-      const number = svg("text", { x: at[0], y: at[1] + 5, "text-anchor": "middle" });
-      number.textContent = String(n + 1);
-      this.numbers.append(svg("circle", { cx: at[0], cy: at[1], r: 10 }), number);
+      this.numbers.append(svg("circle", { cx: at[0], cy: at[1], r: 10 }),
+        svg("text", { x: at[0], y: at[1] + 5, "text-anchor": "middle" }, String(n + 1)));
     }
   }
 

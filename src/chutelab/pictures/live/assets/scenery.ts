@@ -10,11 +10,19 @@ import type { Words } from "./words.ts";
 
 const SVG = "http://www.w3.org/2000/svg";
 
-function svg(name: string, attributes: Record<string, unknown> = {}): any {
-  const element = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+/** An element with its attributes, what it does by the names of events, and what is in it. */
+function filled(element: any, attributes: Record<string, unknown>, children: (string | Node)[]) {
+  for (const [key, value] of Object.entries(attributes)) {
+    if (typeof value === "function") element.addEventListener(key, value);
+    else element.setAttribute(key, String(value));
+  }
+  element.append(...children);
   return element;
 }
+
+const svg = (
+  name: string, attributes: Record<string, unknown> = {}, ...children: (string | Node)[]
+): any => filled(document.createElementNS(SVG, name), attributes, children);
 
 /** Pixels from one cleat of a belt to the next, and of a cleat. */
 const PITCH = 24, CLEAT = 5;
@@ -47,6 +55,8 @@ class Scenery {
   scale: any;
   thick = 6;
   wide = WALL[1];
+  /** Where little should move, only the particles do. */
+  calm = matchMedia("(prefers-reduced-motion: reduce)");
 
   constructor(readonly view: View, readonly words: Words) {
     this.ground = svg("g", { class: "ground", "aria-hidden": "true" });
@@ -89,14 +99,12 @@ class Scenery {
     for (const { name, from, to } of scene?.sensor ?? []) {
       const element = this.sensor(from, to);
       element.setAttribute("data-part", name);
-      element.append(Object.assign(svg("title"), { textContent: this.words.name(name) }));
+      element.append(svg("title", {}, this.words.name(name)));
       this.layer.append(element);
     }
     for (const [element, { surface, appears, vanishes }] of bodies) {
       element.setAttribute("data-part", machine.surfaces[surface]);
-      element.append(Object.assign(svg("title"), {
-        textContent: this.words.name(machine.surfaces[surface]),
-      }));
+      element.append(svg("title", {}, this.words.name(machine.surfaces[surface])));
       if (isFinite(appears) || isFinite(vanishes)) {
         element.classList.add("gate");
         this.gates.push({ element, appears, vanishes });
@@ -113,9 +121,7 @@ class Scenery {
   /** Move what moves to a time, s. */
   turn(t: number) {
     const { scale } = this.view;
-    // Where little should move, only the particles do.
-    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    for (const { element, speed, x, y, radius } of calm ? [] : this.moving) {
+    for (const { element, speed, x, y, radius } of this.calm.matches ? [] : this.moving) {
       if (radius === undefined) {
         element.setAttribute("stroke-dashoffset", String(-((speed * t * scale) % PITCH)));
       } else {
@@ -146,9 +152,9 @@ class Scenery {
       return path;
     };
     const long = step * scale, y = low;
-    const text = svg("text", { x: left + 0.5 * long, y: y - 8, "text-anchor": "middle" });
     const [value, unit] = step < 0.01 ? [1e3 * step, "mm"] : [step, "m"];
-    text.textContent = `${this.words.plain(Number(value.toPrecision(3)))} ${unit}`;
+    const text = svg("text", { x: left + 0.5 * long, y: y - 8, "text-anchor": "middle" },
+      `${this.words.plain(Number(value.toPrecision(3)))} ${unit}`);
     ground.replaceChildren(
       svg("path", { d: lines(0.5), class: "minor" }), svg("path", { d: lines(0), class: "major" }));
     const bar = `M${left} ${y - 5}v10m0-5h${long}m0-5v10`;
@@ -363,4 +369,4 @@ const stadium = (left: number, right: number, y: number, r: number) =>
   `M${left} ${y - r}H${right}A${r} ${r} 0 0 1 ${right} ${y + r}H${left}`
   + `A${r} ${r} 0 0 1 ${left} ${y - r}`;
 
-export { Scenery, svg };
+export { Scenery, filled, svg };

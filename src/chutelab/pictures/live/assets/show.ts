@@ -46,12 +46,9 @@ class Show {
   /** What colour a particle has: what the legend says. */
   hues() {
     const { stage, words } = this, { balls } = stage;
-    const buttons = HUES.map((hue) => {
-      const button = html("button", { type: "button", id: `hue-${hue}`, "aria-pressed": "false" },
-        words.say(`hue-${hue}`));
-      button.addEventListener("click", () => choose(hue));
-      return button;
-    });
+    const buttons = HUES.map((hue) => html("button",
+      { id: `hue-${hue}`, "aria-pressed": "false", click: () => choose(hue) },
+      words.say(`hue-${hue}`)));
     const choose = (hue: Hue) => {
       balls.hue = hue;
       balls.measure();

@@ -70,8 +70,8 @@ class Stage {
     this.show = { strobe: true, trails: true, velocity: false, forces: false, handles: true };
     this.back = svg("svg", { "aria-hidden": "true" });
     this.canvas = document.createElement("canvas");
-    this.front = svg("svg", { role: "group", tabindex: 0, id: "picture" });
-    this.front.setAttribute("aria-label", words.say("stage"));
+    this.front = svg("svg", { role: "group", tabindex: 0, id: "picture",
+      "aria-label": words.say("stage") });
     this.canvas.setAttribute("aria-hidden", "true");
     home.append(this.back, this.canvas, this.front);
     this.scenery = new Scenery(this.view, words);
@@ -243,9 +243,9 @@ class Stage {
     const { view } = this;
     const [right, middle, left] = lines.map((line) => line.filter(([x]) => isFinite(x))
       .map(([x, y]) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`));
-    const band = svg("polygon", { points: [...right, ...left.reverse()].join(" "), class: "envelope" });
+    const band = svg("polygon", { points: [...right, ...left.reverse()].join(" "), class: "envelope" },
+      svg("title", {}, this.words.say("envelope")));
     if (this.isMixed) band.style.fill = `var(--kind-${stream % 5})`;
-    band.append(Object.assign(svg("title"), { textContent: this.words.say("envelope") }));
     this.paths.append(band, svg("polyline", { points: middle.join(" "), class: "track" }));
   }
 
@@ -398,8 +398,8 @@ class Stage {
   further: (() => Handle[])[] = [];
 
   newGrip(id: string) {
-    const grip = svg("g", { class: "grip", role: "slider", tabindex: 0, "data-id": id });
-    grip.append(svg("path", { class: "stem" }), svg("circle", { class: "room", r: 20 }),
+    const grip = svg("g", { class: "grip", role: "slider", tabindex: 0, "data-id": id },
+      svg("path", { class: "stem" }), svg("circle", { class: "room", r: 20 }),
       svg("path", { class: "knob" }));
     this.gripOf.set(id, grip);
     return grip;
@@ -627,12 +627,8 @@ class Stage {
 
 /** How plates and wheels shine. */
 function steel() {
-  const shine = svg("linearGradient", { id: "steel", x1: 0, y1: 0, x2: 1, y2: 1 });
-  shine.append(svg("stop", { offset: 0, class: "steel-a" }),
-    svg("stop", { offset: 1, class: "steel-b" }));
-  const found = svg("defs");
-  found.append(shine);
-  return found;
+  return svg("defs", {}, svg("linearGradient", { id: "steel", x1: 0, y1: 0, x2: 1, y2: 1 },
+    svg("stop", { offset: 0, class: "steel-a" }), svg("stop", { offset: 1, class: "steel-b" })));
 }
 
 const KNOBS = {

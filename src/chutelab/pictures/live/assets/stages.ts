@@ -1,7 +1,7 @@
 // What has happened to each particle, kept as the events of a run come in.
 
 import { Arrivals } from "./arrival.ts";
-import { FEWEST } from "./crowd.ts";
+import { FEWEST, countUntil } from "./crowd.ts";
 import { envelopesOf, type Envelope } from "./envelope.ts";
 import type { Event } from "./core.ts";
 import type { Lab } from "./lab.ts";
@@ -98,18 +98,8 @@ class RunHistory {
   }
 
   /** Impacts after one time, up to another. @param to s */
-  blowsBetween(from: number, to: number) {
-    const { blows } = this;
-    let low = 0, high = blows.length;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (blows[middle].t > from) high = middle;
-      else low = middle + 1;
-    }
-    let end = low;
-    while (end < blows.length && blows[end].t <= to) end += 1;
-    return blows.slice(low, end);
-  }
+  blowsBetween = (from: number, to: number) =>
+    this.blows.slice(countUntil(this.blows, from), countUntil(this.blows, to));
 }
 
 let latest: RunHistory | undefined;

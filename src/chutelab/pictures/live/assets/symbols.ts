@@ -146,9 +146,7 @@ class Symbols {
           class: "leader",
         }));
       }
-      const element = svg("text", { x, y: y + 5, "text-anchor": "middle" });
-      element.textContent = text;
-      layer.append(element);
+      layer.append(svg("text", { x, y: y + 5, "text-anchor": "middle" }, text));
     }
   }
 

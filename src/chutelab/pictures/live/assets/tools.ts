@@ -95,9 +95,9 @@ class Tools {
     const bar = html("div", { class: "tools", role: "group", "aria-label": words.say("tools") });
     document.getElementById("fit")?.after(bar);
     for (const name of ["flow", "tape", "protractor", "watch", "tracer"] as const) {
-      const button = iconButton(`tool-${name}`, name, words.say(`name-${name}`));
+      const button = iconButton(`tool-${name}`, name, words.say(`name-${name}`), () =>
+        this.toggle(name, button));
       button.setAttribute("aria-pressed", "false");
-      button.addEventListener("click", () => this.toggle(name, button));
       bar.append(button);
     }
     this.panel = this.watchPanel();
@@ -317,12 +317,8 @@ class Tools {
   write([x, y]: Point, lines: string[]) {
     const { view } = this.stage, right = x < view.width - 150;
     const top = Math.min(Math.max(y + 22, 22), view.height - 18 * lines.length + 8);
-    lines.forEach((line, n) => {
-      const element = svg("text", { x: right ? x + 14 : x - 14, y: top + 18 * n,
-        "text-anchor": right ? "start" : "end" });
-      element.textContent = line;
-      this.layer.append(element);
-    });
+    lines.forEach((line, n) => this.layer.append(svg("text", { x: right ? x + 14 : x - 14,
+      y: top + 18 * n, "text-anchor": right ? "start" : "end" }, line)));
   }
 
   watchPanel() {
@@ -330,12 +326,11 @@ class Tools {
     this.dial = html("output", { class: "dial" });
     this.laps = html("ol", { class: "laps", "aria-label": words.say("watch-laps") });
     const button = (id: string, act: () => void) => {
-      const element = html("button", { type: "button", id }, words.say(id));
-      element.addEventListener("click", () => {
+      const click = () => {
         act();
         this.readWatch();
-      });
-      return element;
+      };
+      return html("button", { id, click }, words.say(id));
     };
     this.starter = button("watch-start", () => watch.toggle(lab.t));
     const named = { class: "watch", role: "group", "aria-label": words.say("name-watch") };

@@ -1,0 +1,378 @@
+"""Fields of a crowd on a grid: density, velocity, granular temperature and stress.
+
+Coarse graining after I. Goldhirsch, Granular Matter 12 (2010) 239-252: each particle is spread by
+Lucy's kernel, w(d) = 5/(π c²) (1 + 3 d/c) (1 - d/c)³ for d < c, which ends at its width c; in two
+dimensions, of the slice that is simulated. On the grid the weights of a particle are made to sum
+up to 1, so no mass is lost to rounding of the grid. Means over a window of time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from math import ceil, inf, nan
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from chutelab.results.record import Kind, Record, hermite
+from chutelab.util.arrays import Floats, Ints
+from chutelab.util.errors import InputError, MissingLibraryError
+from chutelab.util.files import whole
+from chutelab.util.tables import Sheet, Shown, number
+
+SAMPLES: Final = 50
+"""Times in the window at which tracks are looked at."""
+
+WIDE: Final = 3.0
+"""Width of the kernel in mean diameters, where none is asked for."""
+
+FINE: Final = 4
+"""Cells to the width of the kernel, where nothing else is asked for."""
+
+MOST_CELLS: Final = 1_000_000
+
+CHUNK: Final = 500_000
+"""Weights that are computed at once."""
+
+NODES: Final = 3
+"""Of Gauss's rule for the integral of the kernel along a branch, a third of its width: to 1e-4."""
+
+NAMES: Final = {
+    "density": "kg/m²", "vx": "m/s", "vy": "m/s", "speed": "m/s", "temperature": "m²/s²",
+    "pressure": "N/m", "sxx": "N/m", "sxy": "N/m", "syx": "N/m", "syy": "N/m",
+}  # fmt: skip
+"""What there is on the grid, and its unit."""
+
+
+def need_vtk() -> None:
+    """Raise a `MissingLibraryError` if no VTK file can be written."""
+    if find_spec("pyevtk") is None:
+        raise MissingLibraryError('a VTK file needs: pip install "chutelab[vtk]"')
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fields(Shown):
+    """Fields on a grid of square cells; their values are those at the middles.
+
+    Attributes
+    ----------
+    x, y : ndarray, shape (X,), (Y,)
+        Middles of the cells, m.
+    cell, width : float
+        Edge of a cell, and width c of the kernel, m.
+    window : (float, float)
+        Times over which means are taken, s.
+    density : ndarray, shape (X, Y)
+        ρ, of the slice, kg/m².
+    velocity : ndarray, shape (2, X, Y)
+        V, mean momentum over mean density, m/s; NaN where there is nothing.
+    temperature : ndarray, shape (X, Y)
+        Half the mean square of what velocities are off V, m²/s²; NaN where there is nothing.
+    kinetic : ndarray, shape (2, 2, X, Y)
+        Kinetic stress, -Σ m w v' v', N/m; negative is compression.
+    contact : ndarray, shape (2, 2, X, Y)
+        Of blows, -Σ J b ∫ w over the window's length: J on a particle, b to its centre from that of
+        the other or from where it meets a surface, N/m.
+    traction : ndarray, shape (2, X, Y)
+        What surfaces give by blows, Σ J w at the contact over the window's length, N/m².
+    lasting : float
+        Share of the impulses on particles that lasting contacts gave in the window. The recording
+        has these of each particle, not of each pair: contact stress and traction leave them out.
+    """
+
+    x: Floats
+    y: Floats
+    cell: float
+    width: float
+    window: tuple[float, float]
+    density: Floats
+    velocity: Floats
+    temperature: Floats
+    kinetic: Floats
+    contact: Floats
+    traction: Floats
+    lasting: float
+
+    def __getitem__(self, name: str) -> Floats:
+        """Return one of `NAMES`, (X, Y); stress is kinetic and contact stress together."""
+        if name not in NAMES:
+            raise InputError(f"one of {', '.join(NAMES)}", "field", name)
+        stress = self.kinetic + self.contact
+        if name[0] == "s" and name[1:] != "peed":
+            row, column = ("xy".index(axis) for axis in name[1:])
+            return np.asarray(stress[row, column])
+        match name:
+            case "vx" | "vy":
+                return np.asarray(self.velocity["xy".index(name[1])])
+            case "speed":
+                return np.asarray(np.hypot(*self.velocity))
+            case "pressure":
+                return np.asarray(-0.5 * (stress[0, 0] + stress[1, 1]))
+        return np.asarray(getattr(self, name))
+
+    @property
+    def mass(self) -> float:
+        """The integral of the density, kg: the mean mass of what is inside."""
+        return float(self.density.sum()) * self.cell**2
+
+    @property
+    def note(self) -> str:
+        """What was averaged how, and what is left out."""
+        begin, end = self.window
+        said = (
+            f"Lucy's kernel, width {number(self.width)} m, on cells of {number(self.cell)} m; mean"
+            f" from {number(begin)} to {number(end)} s"
+        )
+        if self.lasting > 0.0:
+            said += (
+                f"; lasting contacts, {100.0 * self.lasting:.0f} % of all impulses there, are not"
+                " in the stress: recordings do not have them by pairs"
+            )
+        return said
+
+    def sheet(self, *, details: bool = False) -> Sheet:
+        """Return least, mean and largest of each field where there is anything."""
+        some, rows = self.density > 0.0, []
+        for name, unit in NAMES.items():
+            values = self[name][some]
+            if len(values):
+                told = (number(float(of(values))) for of in (np.min, np.mean, np.max))
+                rows.append((f"{name}, {unit}", *told))
+        return Sheet("Fields", ("", "least", "mean", "largest"), tuple(rows), notes=(self.note,))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON: how it was made, and least, mean and largest of each."""
+        some = self.density > 0.0
+        told = {
+            name: [float(of(self[name][some])) for of in (np.min, np.mean, np.max)]
+            for name in NAMES
+            if some.any()
+        }
+        return {
+            "window": list(self.window), "kernel": "Lucy", "width": self.width, "cell": self.cell,
+            "mass": self.mass, "lasting": self.lasting, "fields": told,
+        }  # fmt: skip
+
+    def rows(self) -> Iterator[Sequence[object]]:
+        """Yield the rows of a table, a cell each, the names of its columns first."""
+        yield "x", "y", *NAMES
+        columns = [self[name].ravel().tolist() for name in NAMES]
+        places = np.stack(np.meshgrid(self.x, self.y, indexing="ij"), axis=-1).reshape(-1, 2)
+        for place, *values in zip(places.tolist(), *columns, strict=True):
+            yield *place, *(None if value != value else value for value in values)
+
+    def write_vtk(self, path: str | Path) -> None:
+        """Write an image of VTK, such as ParaView opens, with the fields of the cells.
+
+        Raises
+        ------
+        MissingLibraryError
+            Without the extra ``chutelab[vtk]``.
+        """
+        need_vtk()
+        from pyevtk.hl import imageToVTK
+
+        def cells(values: Floats) -> Floats:
+            return np.asfortranarray(values[:, :, None])
+
+        data: dict[str, Any] = {name: cells(self[name]) for name in NAMES}
+        vx, vy = data.pop("vx"), data.pop("vy")
+        data["velocity"] = (vx, vy, np.zeros_like(vx))
+        corner = (float(self.x[0]) - 0.5 * self.cell, float(self.y[0]) - 0.5 * self.cell, 0.0)
+        with whole(path) as unfinished:
+            made = imageToVTK(
+                str(unfinished.with_suffix("")), corner, (self.cell,) * 3, cellData=data
+            )
+            Path(made).replace(unfinished)
+
+
+class _Grid:
+    """Square cells over a box, and the kernel that spreads over them."""
+
+    def __init__(self, low: Floats, high: Floats, cell: float, width: float) -> None:
+        many = np.maximum(1.0, np.ceil((high - low) / cell * (1.0 - 1e-12)))
+        if not many.prod() <= MOST_CELLS:
+            allowed = f"so large that the box has {MOST_CELLS:,} cells or fewer"
+            raise InputError(allowed, "cell", cell)
+        self.low, self.cell, self.width = low, cell, width
+        self.shape = int(many[0]), int(many[1])
+        reach = ceil(width / cell) + 1
+        steps = np.arange(-reach, reach + 1)
+        self.stencil = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+
+    def add(self, sums: Floats, places: Floats, values: Floats) -> None:
+        """Add values (K, c), spread about places (c, 2), m, to sums (K, X, Y)."""
+        flat = sums.reshape(len(sums), -1)
+        size = max(1, CHUNK // len(self.stencil))
+        for begin in range(0, len(places), size):
+            some = places[begin : begin + size]
+            index = np.floor((some - self.low) / self.cell).astype(np.int64)[:, None] + self.stencil
+            off = self.low + (index + 0.5) * self.cell - some[:, None]
+            far = np.sqrt((off * off).sum(axis=-1)) / self.width
+            weight = (1.0 + 3.0 * far) * (1.0 - far).clip(min=0.0) ** 3
+            weight /= weight.sum(axis=1, keepdims=True) * self.cell**2
+            own, near = np.nonzero((far < 1.0) & ((index >= 0) & (index < self.shape)).all(axis=-1))
+            cell = index[own, near] @ np.array([self.shape[1], 1])
+            share = weight[own, near]
+            for row, value in zip(flat, values[:, begin : begin + size], strict=True):
+                row += np.bincount(cell, share * value[own], len(row))
+
+
+def fields(
+    recording: Record,
+    begin: float | None = None,
+    end: float | None = None,
+    *,
+    samples: int = SAMPLES,
+    width: float | None = None,
+    cell: float | None = None,
+    box: Sequence[Sequence[float]] | None = None,
+) -> Fields:
+    """Return the fields of a recording, means over a window of time.
+
+    Parameters
+    ----------
+    recording : Record
+        A run of one scene.
+    begin, end : float, optional
+        The window, s; by default all of the run.
+    samples : int
+        At how many even times tracks are looked at.
+    width : float, optional
+        Where the kernel ends, m; by default three mean diameters.
+    cell : float, optional
+        Edge of a cell, m; by default a quarter of the width.
+    box : ((x, y), (x, y)), optional
+        Two corners of what the grid covers, m; by default all places of the window.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range, or nothing is there in the window.
+    """
+    if recording.family is not None:
+        raise InputError("of a single scene, not of a family", "recording", recording.title)
+    last = float(recording.knots["t"].max(initial=0.0))
+    begin, end = 0.0 if begin is None else begin, last if end is None else end
+    if not 0.0 <= begin < end <= last * (1.0 + 1e-12):
+        allowed = f"two times from 0 to {last:g} s, the second one later"
+        raise InputError(allowed, "window", [begin, end])
+    if samples < 1:
+        raise InputError("a whole number above 0", "samples", samples)
+    if width is None:
+        width = 2.0 * WIDE * float(np.mean(recording.radius))
+    cell = width / FINE if cell is None else cell
+    if not 0.0 < width < inf:
+        raise InputError("a finite number above 0 m", "width", width)
+    if not 0.0 < cell <= 0.5 * width:
+        raise InputError(
+            f"a number above 0, half of the width of {width:g} m at most", "cell", cell
+        )
+    # The middles of even parts of the window.
+    times = begin + (end - begin) * (np.arange(samples) + 0.5) / samples
+    found = recording.at(times)
+    row, particle = np.nonzero(np.isfinite(found.position[..., 0]))
+    places, velocity = found.position[row, particle], found.velocity[row, particle]
+    if not len(places):
+        raise InputError("a window in which there are particles", "window", [begin, end])
+    if box is None:
+        low, high = places.min(axis=0) - width - cell, places.max(axis=0) + width + cell
+    else:
+        corners = np.asarray(box, dtype=np.float64)
+        if (
+            corners.shape != (2, 2)
+            or not np.isfinite(corners).all()
+            or not np.ptp(corners, axis=0).all()
+        ):
+            raise InputError("two corners ((x, y), (x, y)) of a box, m", "box", box)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+    grid = _Grid(low, high, cell, width)
+    mass = recording.mass[particle] / samples
+    vx, vy = velocity.T
+    sums = np.zeros((6, *grid.shape))
+    grid.add(sums, places, mass * np.stack([np.ones_like(vx), vx, vy, vx * vx, vx * vy, vy * vy]))
+    density, momentum = sums[0], sums[1:3]
+    some = density > 0.0
+    mean = np.divide(momentum, density, out=np.full_like(momentum, nan), where=some)
+    flow = np.stack([sums[3:5], sums[4:6]])
+    kinetic = np.where(some, mean[:, None] * momentum[None] - flow, 0.0)
+    heat = (-0.5 * (kinetic[0, 0] + kinetic[1, 1])).clip(min=0.0)
+    contact, traction = np.zeros((2, 2, *grid.shape)), np.zeros((2, *grid.shape))
+    blows = _blows(recording, begin, end, grid, contact, traction)
+    return Fields(
+        x=grid.low[0] + (np.arange(grid.shape[0]) + 0.5) * cell,
+        y=grid.low[1] + (np.arange(grid.shape[1]) + 0.5) * cell,
+        cell=cell,
+        width=width,
+        window=(begin, end),
+        density=density,
+        velocity=mean,
+        temperature=np.divide(heat, density, out=np.full_like(heat, nan), where=some),
+        kinetic=kinetic,
+        contact=contact / (end - begin),
+        traction=traction / (end - begin),
+        lasting=_lasting(recording, begin, end, blows),
+    )
+
+
+def _blows(
+    recording: Record, begin: float, end: float, grid: _Grid, contact: Floats, traction: Floats
+) -> float:
+    """Add what blows give to the sums; return the sum of the impulses on particles, N s."""
+    some = recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
+    some = some[(some["t"] >= begin) & (some["t"] < end)]
+    pair = some["other"] >= 0
+    own, other = some["particle"], some["other"]
+    center, radius = some["position"], recording.radius[own]
+    change = recording.mass[own][:, None] * (some["velocity_after"] - some["velocity_before"])
+    # m Δv = J_n n + J_t (n_y, -n_x): as complex numbers n (J_n - i J_t).
+    push = some["normal_impulse"] - 1j * some["tangential_impulse"]
+    turned = np.divide(change[:, 0] + 1j * change[:, 1], push, out=np.ones_like(push),
+                       where=push != 0.0)  # fmt: skip
+    normal = np.stack([turned.real, turned.imag], axis=-1)
+    normal /= np.hypot(*normal.T)[:, None]
+    branch = radius[:, None] * normal
+    branch[pair] = center[pair] - _places(recording, other[pair], some["t"][pair])
+    normal[pair] = branch[pair] / np.hypot(*branch[pair].T)[:, None]
+    impulse = some["normal_impulse"][:, None] * normal
+    impulse += some["tangential_impulse"][:, None] * np.stack(
+        [normal[:, 1], -normal[:, 0]], axis=-1
+    )
+    stress = -(impulse[:, :, None] * branch[:, None]).reshape(-1, 4).T
+    flat = contact.reshape(4, *grid.shape)
+    for node, weight in zip(*np.polynomial.legendre.leggauss(NODES), strict=True):
+        grid.add(flat, center - 0.5 * (1.0 + node) * branch, 0.5 * weight * stress)
+    grid.add(traction, (center - branch)[~pair], impulse[~pair].T)
+    return float((np.hypot(*impulse.T) * np.where(pair, 2.0, 1.0)).sum())
+
+
+def _lasting(recording: Record, begin: float, end: float, blows: float) -> float:
+    """Return the share of the impulses on particles that lasting contacts gave, 0 to 1."""
+    knots, owner = recording.knots, recording.owner
+    h = np.diff(knots["t"])
+    within = (np.minimum(knots["t"][1:], end) - np.maximum(knots["t"][:-1], begin)).clip(min=0.0)
+    left = np.flatnonzero((owner[1:] == owner[:-1]) & (within > 0.0))
+    given = np.diff(knots["velocity"], axis=0)[left]
+    given[:, 1] += recording.gravity * h[left]
+    sizes = np.hypot(*given.T)
+    # Flights give and take rounding.
+    fast = np.hypot(*knots["velocity"][left].T) + recording.gravity * h[left]
+    borne = recording.mass[owner[left]] * np.where(sizes > 1e-9 * fast, sizes, 0.0)
+    lasting = float((borne * within[left] / h[left]).sum())
+    return lasting / (lasting + blows) if lasting > 0.0 else 0.0
+
+
+def _places(recording: Record, particle: Ints, times: Floats) -> Floats:
+    """Return where particles are, each at a time of its own, (c, 2), m."""
+    t, offsets = recording.knots["t"], recording.offsets
+    left, right = offsets[particle], offsets[particle + 1] - 1
+    while np.any(right - left > 1):
+        middle = (left + right) // 2
+        passed = t[middle] <= times
+        left, right = np.where(passed, middle, left), np.where(passed, right, middle)
+    h = t[left + 1] - t[left]
+    share = np.divide(times - t[left], h, out=np.ones_like(h), where=h > 0.0).clip(0.0, 1.0)
+    return np.stack([hermite(recording.knots, left, share, axis)[0] for axis in (0, 1)], axis=-1)

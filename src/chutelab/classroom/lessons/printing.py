@@ -100,6 +100,8 @@ def pdf(
         options = ", ".join(f"{name}: {_text(text)}" for name, text in said.items())
         options += f", dense: {str(dense).lower()}"
         body = _blocks(tree.children, asked)
+        if dense and not asked:
+            look += "\n#let blank = []\n"
         source = place / "sheet.typ"
         source.write_text(f"{look}\n#show: sheet.with({options})\n{body}", encoding="utf-8")
         # With Typst's own fonts and no date, the file is the same everywhere.

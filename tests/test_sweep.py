@@ -29,7 +29,7 @@ from chutelab.studies.sweep import (
 from chutelab.studies.sweep.plan import row_of
 from chutelab.studies.sweep.plan import swept as swept_block
 from chutelab.util.errors import InputError
-from shared import call
+from shared import call, some
 from typed import planned, sweep
 
 PAID, HEAT = (f"ledger.by_surface.outgoing.{name}" for name in ("belt_work", "friction_loss"))
@@ -113,7 +113,7 @@ inclined-conveyor | stream.count=1 | incoming.speed=1.5:2.5:4 incoming.incline_d
 """A scene, what is set, what is varied."""
 
 
-@pytest.mark.parametrize("line", FAMILIES.strip().splitlines())
+@pytest.mark.parametrize("line", some(FAMILIES.strip().splitlines(), 2))
 def test_rows_of_a_batch_are_those_of_single_runs(line):
     name, settings, varies = (part.split() for part in line.split("|"))
     block = block_of(load(*name, settings), varies)

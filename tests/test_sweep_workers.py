@@ -49,10 +49,6 @@ def deadly(job):
     return number * number
 
 
-def fatal(_):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
 def test_processes_write_the_same_bytes(stepped):
     plan, whole = stepped
     with crew(2) as team:
@@ -69,7 +65,7 @@ def test_a_process_that_dies_costs_time_only(tmp_path):
 
 def test_processes_that_keep_dying_are_given_up():
     with pytest.raises(LostWorkersError, match="keep dying"), crew(2) as team:
-        list(team.results(fatal, [(0, 0)]))
+        list(team.results(signal.raise_signal, [(0, signal.SIGKILL)]))
 
 
 def test_any_executor_will_do():

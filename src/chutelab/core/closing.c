@@ -9,8 +9,6 @@
 #define CALM 1e-3
 /* m/s; of a disk by itself: what is left of a speed that has come to nothing. */
 #define STOPPED 1e-9
-/* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
-#define REST 2.5e-3
 
 /* How long ago the foot of a disk passed the end at which it comes on to a surface, s, and the direction of the
    surface there; below 0: it will. 0 where it is none within a step. */

@@ -84,13 +84,11 @@ void describe(Contact *c, int i, int j) {
     c->mass[0] = 1 / mass;
     c->mass[1] = 1 / c->mass[1];
     c->mass[2] = spin_mass > 0 ? 1 / spin_mass : 0;
-    for (int n = 0; n < 3; n++) c->light[n] = c->mass[n] > 0 ? 1 / c->mass[n] : 0;
     c->rest = pair->restitution;
     c->share = 1;
     c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
-    c->gives = c->change = c->turns = 0;
+    c->gives = c->turns = 0;
     c->most = INFINITY;
-    c->eases = c->mass[0];
     c->friction = pair->friction;
     c->arm = pair->rolling * reach;
 }

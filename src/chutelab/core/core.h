@@ -52,6 +52,8 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 #define TOUCHES 8
 /* Sweeps that a jam may take: what they leave open rattles on, and is the next jam after a few impacts. */
 #define JAM_SWEEPS 2000
+/* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
+#define REST 2.5e-3
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */
 #define GRAZE 1e-6
 /* Friction, 76 degrees, that takes all slip in any blow; where sweeps diverge it is lowered from here. */
@@ -226,6 +228,17 @@ void was_moved(int i);
 double gap_later(const Contact *c, double h, double *bends);
 double time_unloaded(const double *load, const double *t);
 int find_contacts(double h, int *woke);
+
+/* rows.c */
+void set_rows(Contact *list, int count);
+void take_rows(Contact *list, int count);
+void begin_anew(void);
+double sweep_rows(int sweeps, int plain, double accurate);
+void lessen(void);
+void keep_bounds(void);
+void drop_noise(void);
+double left_open(void);
+double slip_of(const SolverRow *row);
 
 /* solver.c */
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,

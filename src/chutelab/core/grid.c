@@ -99,13 +99,14 @@ int list_near(double end) {
     /* With cells of 1.5 boxes most boxes touch two to four of them. */
     W.cell = live ? 1.5 * extent / live : 1;
     memset(W.heads, 0xff, (unsigned long)W.bucket_count * sizeof(int));
+    /* What follows a prescribed path meets free disks only: it is entered first, and asks for no others. */
+    for (int i = W.low; i < W.high; i++)
+        if (is_live(W.disks + i) && W.disks[i].mode != FREE) enter(i);
     for (int i = W.low; i < W.high; i++) {
-        Disk *d = W.disks + i;
-        if (!is_live(d)) continue;
+        const Disk *d = W.disks + i;
+        if (d->mode != FREE) continue;
         int n = query(i, &d->left);
         for (int k = 0; k < n; k++) {
-            Disk *o = W.disks + W.found[k];
-            if (d->mode != FREE && o->mode != FREE) continue;
             if (W.near_count >= W.near_room) return 0;
             W.near[2 * W.near_count] = W.found[k];
             W.near[2 * W.near_count++ + 1] = i;

@@ -95,6 +95,7 @@ typedef struct {
     int waited;                 /* [out] 1 if its place was taken when it was due */
     int wide;                   /* 1 if it is asked by all in this step, see grid.c */
     int far;                    /* 1 if the step's impulses take it further than was foreseen */
+    int body;               /* its row of `World.solver_bodies`, if that is of this disk */
 } Disk;
 
 /* The track of a disk since the last knot that is written. */
@@ -166,17 +167,12 @@ typedef struct {
     double pull;            /* m/s2; by which gravity makes it slip on a surface */
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
-    double swept[3];        /* the impulse two sweeps ago, see `hasten` */
-    double course[3];       /* where it is heading to, see `hasten` */
     double mass[3];         /* what the contact feels of masses and inertias, in the same order */
-    double light[3];        /* 1 / mass, 0 where there is none */
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
     double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */
     double moved[3];        /* the part of it that the motion of a surface gives */
-    double eases;           /* kg; impulse for a change of normal velocity, as far as it gives */
     double rest;            /* coefficient of restitution */
     double share;           /* of its friction that acts; below 1 where surfaces wedge a disk */
-    double change;          /* m/s; by which the last sweep changed its slip */
     double entries[3], later[3]; /* J; what its impulses do to the ledger, and what the part of them
                                     does that belongs to this step; see `account` */
     double given[2];        /* J; the same for the belt that carries the partner */
@@ -190,6 +186,34 @@ typedef struct {
     int next;               /* of the contacts of disk i in the step before */
     int leaves;             /* it parts in this step */
 } Contact;
+
+/* What the impulses of a solve change of a disk, and what one of 1 N s does to it. The first of all is of
+   what does not give way. */
+typedef struct {
+    double x, y, rim;       /* m/s; change of velocity, and of spin times radius */
+    double mass;            /* 1/kg */
+    double turn, twist;     /* 1/kg, 1/(kg m); of the rim by an impulse on it, and by a couple */
+    double bend;            /* 1/m; 1 / radius */
+    int disk, used;         /* whose; which colours its rows have */
+} SolverBody;
+
+/* A contact as sweeps see it: what they change, and what they ask for. */
+typedef struct {
+    double normal[2], tangent[2]; /* unit vectors towards the first body, in m/s of normal and slip for x and y */
+    double free[2];         /* m/s; normal velocity less what the gap needs, and slip, without impulses */
+    double mass[2], light[2]; /* kg; what the contact feels, and 1 / that */
+    double impulse[2];      /* N s; normal, tangential */
+    double swept[2], course[2]; /* N s; the impulse two sweeps ago, and the step from there: see `hasten` */
+    double gives, eases, more; /* as `gives`, kg for a change where it gives, `most` less `need` of the contact */
+    double rough;           /* coefficient of friction that acts */
+    double arm, spin;       /* m, rad/s; of rolling friction, and how fast it rolls without impulses */
+    double roll_mass, roll_light; /* kg m2, and what makes m/s of a moment */
+    double moment, roll_swept, roll_course; /* N m s; as impulse, swept and course */
+    double change;          /* m/s; by which the last sweep changed its slip */
+    int a, b;               /* bodies */
+    int from;               /* which contact of the list it is */
+    int pad;
+} SolverRow;
 
 typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; } Knot;       /* [out] */
 
@@ -220,6 +244,8 @@ typedef struct {
     Total *totals;       /* one a step in a crowd */
     Contact *contacts;   /* of this step */
     Contact *earlier;    /* of the step before */
+    SolverRow *rows;     /* (contacts) of those that are solved together */
+    SolverBody *solver_bodies; /* (disks + 1) ... and their disks */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
     Cell *cells;

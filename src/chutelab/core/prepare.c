@@ -256,6 +256,7 @@ static void make_contact_room(int room) {
     RESERVE(W.contacts, room);
     RESERVE(W.earlier, room);
     RESERVE(W.links, 2.0 * room);
+    RESERVE(W.rows, room);
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 
@@ -276,6 +277,7 @@ static int lay_out_work(void) {
     for (W.bucket_count = 1; crowd && W.bucket_count <= 4 * n + 16;) W.bucket_count *= 2;
     W.cell_room = crowd ? 12 * n + 64 : 1;
     RESERVE(W.tracks, n);
+    RESERVE(W.solver_bodies, n + 1.0);
     RESERVE(W.waits, crowd ? (double)WAITS * n : WAITS);
     RESERVE(W.books, 3.0 * (W.owner_count + 1));
     RESERVE(W.drives, W.owner_count);
@@ -351,5 +353,7 @@ EXPORT int prepare(void) {
     W.pace = W.g > 0 ? sqrt(W.g / EARTH) : 1;
     W.smooth_v = 1e-4 * W.pace;
     W.accurate = (alone ? 1e-15 : 3e-4) * W.pace;
+    /* What is nearly at rest is not to be kept awake by what sweeps leave. */
+    if (!alone && W.g > 0) W.accurate = 0.1 * REST * sqrt(W.g * least);
     return 1;
 }

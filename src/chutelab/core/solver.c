@@ -12,18 +12,12 @@
 #define FOLLOWS 0.01
 /* Times that friction is lowered, to a quarter and at last to nothing. */
 #define TRIES 4
-/* Sine of the angle between surfaces that count as one: of less nothing is left by rounding. */
-#define PARALLEL 1e-7
 /* Contacts; an island of fewer is swept so many times as often where its gaps need it: disks that
    moving surfaces draw into a wedge take up to thousands of sweeps, or sink into each other. */
 #define SMALL 500
 #define MOST_ROUNDS 50
 /* Sweeps before they are hastened: most solves need no more. */
 #define PLAIN 6
-/* Of momentum. */
-#define NOISE 1e-11
-/* Times the first change: sweeps whose changes grow so far never end. */
-#define DIVERGES 1e3
 /* Radii by which a gap may be off where the way bends; times its last change up to which it is solved
    for once more. */
 #define FINE 1e-8
@@ -34,185 +28,6 @@
 /* Share of its bound up to which friction is not all used: it holds. */
 #define HOLDS 0.999
 
-/* Give a contact the normal impulse that keeps its gap closed; return by how much it changed, m/s. */
-static double press(Contact *c) {
-    const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-    double x = a->vx - a->ux, y = a->vy - a->uy;
-    if (c->two) {
-        x -= b->vx - b->ux;
-        y -= b->vy - b->uy;
-    }
-    double opens = x * c->nx + y * c->ny;
-    double given = (c->need - c->gives * c->impulse[0] - opens) * c->eases;
-    double normal = MAX(c->impulse[0] + MIN(given, (c->most - opens) * c->mass[0]), 0);
-    double change[3] = {normal - c->impulse[0], 0, 0};
-    if (change[0] != 0) push(c, change);
-    c->impulse[0] = normal;
-    return fabs(change[0]) * c->light[0];
-}
-
-/* How far a change of velocity (x, y) is from keeping all gaps closed, m/s. */
-static double violation(const Contact *list, int count, double x, double y) {
-    double worst = 0;
-    for (int n = 0; n < count; n++)
-        worst = MAX(worst, asks(list + n) - x * list[n].nx - y * list[n].ny);
-    return worst;
-}
-
-/* The same for all surfaces that one disk touches, at once: in a narrow wedge impulses one by one
-   would take a thousand sweeps. The change of velocity becomes the one nearest to what it is without
-   them that keeps all gaps closed: itself, or on the bound of one surface, or of two. */
-static double press_corner(Contact *list, int count) {
-    Disk *d = W.disks + list->i;
-    double x = d->vx - d->ux, y = d->vy - d->uy, m = d->inv_mass;
-    double best[2] = {0, 0}, rounding = 1e-15 * (fabs(x) + fabs(y)), changed = 0;
-    int at[2] = {0, 0};
-    for (int n = 0; n < count; n++) {
-        x -= list[n].impulse[0] * m * list[n].nx;
-        y -= list[n].impulse[0] * m * list[n].ny;
-    }
-    double least = violation(list, count, x, y);
-    for (int i = 0; i < count && least > rounding; i++) {
-        const Contact *c = list + i;
-        double one = asks(c) - x * c->nx - y * c->ny;
-        double left = violation(list, count, x + one * c->nx, y + one * c->ny);
-        if (one <= 0 || left >= least) continue;
-        least = left;
-        best[0] = one; best[1] = 0;
-        at[0] = at[1] = i;
-    }
-    for (int i = 0; i < count && least > rounding; i++)
-        for (int j = 0; j < i && least > rounding; j++) {
-            const Contact *c = list + i, *o = list + j;
-            double cosine = c->nx * o->nx + c->ny * o->ny, sine = c->nx * o->ny - c->ny * o->nx;
-            double one = asks(c) - x * c->nx - y * c->ny, two = asks(o) - x * o->nx - y * o->ny;
-            if (fabs(sine) < PARALLEL) continue;
-            double first = (one - cosine * two) / (sine * sine), then = (two - cosine * one) / (sine * sine);
-            double left = violation(list, count, x + first * c->nx + then * o->nx,
-                                    y + first * c->ny + then * o->ny);
-            if (first < 0 || then < 0 || left >= least) continue;
-            least = left;
-            best[0] = first; best[1] = then;
-            at[0] = i; at[1] = j;
-        }
-    for (int n = 0; n < count; n++) {
-        double normal = (n == at[0] ? best[0] : 0) + (n == at[1] && at[1] != at[0] ? best[1] : 0);
-        double change[3] = {normal / m - list[n].impulse[0], 0, 0};
-        push(list + n, change);
-        list[n].impulse[0] = normal / m;
-        changed = MAX(changed, fabs(change[0]) * m);
-    }
-    return changed;
-}
-
-/* The most that a contact allows of friction, N s, or of rolling friction, N m s, as it is pressed. */
-static double bound(const Contact *c, int rolling) {
-    double rough = c->share < 1 ? c->share * MIN(c->friction, ROUGH) : c->friction;
-    return (rolling ? c->share * c->arm : rough) * c->impulse[0];
-}
-
-/* Give a contact the friction that stops its slip and its rolling, as far as it is pressed. */
-static double rub(Contact *c) {
-    double *J = c->impulse, v[3], change[3] = {0, 0, 0};
-    double most = bound(c, 0), arm = bound(c, 1);
-    relative(c, 0, v);
-    change[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most) - J[1];
-    change[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -arm), arm) - J[2];
-    if (change[1] == 0 && change[2] == 0) return 0;
-    push(c, change);
-    J[1] += change[1];
-    J[2] += change[2];
-    return MAX(fabs(change[1]) * c->light[1], fabs(change[2]) * c->light[2] * W.disks[c->i].radius);
-}
-
-/* Hasten the sweeps of a crowd: go on where they are heading to, by nonlinear conjugate gradients, of
-   which two sweeps, to and fro, are the gradient (Silcowitz-Hansen, Niebe and Erleben, The Visual
-   Computer 26, 2010). A pile of 2,000 takes half as many. `size` is the square of the gradient
-   before, in J, or -1 at first; returns that of this one. */
-static double hasten(Contact *list, int count, double size) {
-    double now = 0;
-    for (int n = 0; n < count && size >= 0; n++)
-        for (int k = 0; k < 3; k++)
-            now += square(list[n].impulse[k] - list[n].swept[k]) * list[n].light[k];
-    double go = now < size ? now / size : 0;
-    for (int n = 0; n < count; n++) {
-        Contact *c = list + n;
-        double more[3] = {0, 0, 0};
-        for (int k = 0; k < 3; k++) {
-            if (go > 0) more[k] = go * c->course[k];
-            c->course[k] = size >= 0 ? more[k] + c->impulse[k] - c->swept[k] : 0;
-            c->impulse[k] += more[k];
-            c->swept[k] = c->impulse[k];
-        }
-        if (go > 0) push(c, more);
-    }
-    return now;
-}
-
-/* Take the share of all impulses at which the cost is least. The cost of impulses J, whose changes of
-   velocity are W J, is 1/2 J W J + J q: what sweeps make least, one contact after the other. W J + q is
-   how far the velocities are from what the contacts ask for; see docs/physics.md. Along J its slope goes
-   straight from `none` to `all`; where what an overlap asks for bends it goes below that, and the share
-   is a little less. Where sweeps end, the impulses do no work so on the velocities that they leave,
-   however far the sweeps had come: W J + q times J is at most 0. */
-static void lessen(Contact *list, int count) {
-    double none = 0, all = 0, u[3], v[3], more[3];
-    for (int n = 0; n < count; n++) {
-        const Contact *c = list + n;
-        const double *J = c->impulse;
-        if (J[0] == 0 && J[1] == 0 && J[2] == 0) continue;
-        relative(c, 1, u);
-        relative(c, 0, v);
-        none += J[1] * (u[1] + c->drift) + J[2] * u[2] - J[0] * MIN(c->need, c->most);
-        all += J[1] * (v[1] + c->drift) + J[2] * v[2] + J[0] * (v[0] - u[0] - asks(c));
-    }
-    if (!(all > 0)) return;
-    double less = none < 0 ? all / (all - none) : 1;
-    for (int n = 0; n < count; n++) {
-        for (int k = 0; k < 3; k++) list[n].impulse[k] += more[k] = -less * list[n].impulse[k];
-        push(list + n, more);
-    }
-}
-
-/* Start from impulses of the step before, as far as they lower the cost: where contacts have opened,
-   what had been pressed between others would throw disks out. */
-static void start_warm(Contact *list, int count) {
-    for (int n = 0; n < count; n++) push(list + n, list[n].impulse);
-    lessen(list, count);
-}
-
-/* Sweep over contacts, those of one disk with surfaces as one, until no relative velocity changes by
-   more than `accurate`; the first `plain` ones are not hastened. Return by how much one changed in the
-   last sweep, or INFINITY if the sweeps diverge. */
-static double sweep(Contact *list, int count, int sweeps, int plain, double accurate) {
-    double first = 0, worst = 0, size = 0;
-    for (int n = 0; n < sweeps; n++) {
-        if (n >= plain && (n - plain) % 2 == 0) size = hasten(list, count, n == plain ? -1 : size);
-        worst = 0;
-        for (int m = 0, many; m < count; m += many) {
-            /* To and fro, so that what one end of a pile does reaches the other in one sweep; in the
-               last one surfaces come last, which do not give way. */
-            int to = (sweeps - n) % 2;
-            Contact *c = list + (to ? m : count - 1 - m), *last = c;
-            for (many = 1; c->j < 0 && m + many < count; many++, last += to ? 1 : -1)
-                if ((to ? last + 1 : last - 1)->i != c->i || (to ? last + 1 : last - 1)->j >= 0) break;
-            if (!to) c = last;
-            double change = many > 1 ? press_corner(c, many) : press(c);
-            for (int k = 0; k < many; k++) {
-                c[k].change = rub(c + k);
-                change = MAX(change, c[k].change);
-            }
-            if (many > 1) press_corner(c, many);
-            worst = MAX(worst, change);
-        }
-        W.sweep_count++;
-        if (n == 0) first = worst;
-        if (worst <= accurate) return worst;
-        if (!(worst <= DIVERGES * (first + W.soft + W.skip * W.disks[list->i].radius))) return INFINITY;
-    }
-    return worst;
-}
-
 /* Whether a surface that moves drives a disk. */
 static int drives(const Contact *c) { return c->j < 0 && c->other[1] - c->moved[1] != 0; }
 
@@ -221,14 +36,14 @@ static int drives(const Contact *c) { return c->j < 0 && c->other[1] - c->moved[
    Return whether there is one. */
 static int stall(Contact *list, int count, double least, double enough) {
     int stalled = 0;
-    for (int n = 0; n < count; n++) {
-        Contact *c = list + n;
-        double v[3];
+    for (SolverRow *r = W.rows; r < W.rows + count; r++) {
+        Contact *c = list + r->from;
         if (W.disks[c->i].inertia > 0 || !drives(c)) continue;
-        relative(c, 0, v);
-        int holds = c->impulse[0] > 0 && fabs(c->impulse[1]) < HOLDS * c->friction * c->impulse[0];
-        int slips = c->friction > ROUGH && holds && fabs(v[1] + c->drift) > enough;
-        if (!slips && c->change < least) continue;
+        int holds = r->impulse[0] > 0 && fabs(r->impulse[1]) < HOLDS * c->friction * r->impulse[0];
+        int slips = c->friction > ROUGH && holds && fabs(slip_of(r)) > enough;
+        if (!slips && r->change < least) continue;
+        r->free[1] += c->other[1] - c->moved[1];
+        r->spin += c->other[2] - c->moved[2];
         c->other[1] = c->moved[1];
         c->other[2] = c->moved[2];
         stalled = 1;
@@ -236,18 +51,14 @@ static int stall(Contact *list, int count, double least, double enough) {
     return stalled;
 }
 
-/* Take back friction beyond what contacts allow: sweeps that did not come to an end have pressed less
-   since. */
-static void keep_bounds(Contact *list, int count) {
-    for (int n = 0; n < count; n++) {
-        Contact *c = list + n;
-        double more[3] = {0, 0, 0};
-        for (int k = 1; k < 3; k++) {
-            double most = bound(c, k == 2);
-            more[k] = MIN(MAX(c->impulse[k], -most), most) - c->impulse[k];
-            c->impulse[k] += more[k];
-        }
-        if (more[1] != 0 || more[2] != 0) push(c, more);
+/* Lower the friction, to a share of it, of rows that the last sweep changed by `least` m/s or more. */
+static void ease_friction(Contact *list, int count, double least, double by) {
+    for (SolverRow *r = W.rows; r < W.rows + count; r++) {
+        Contact *c = list + r->from;
+        if (r->change < least) continue;
+        c->share *= by;
+        r->rough = c->share * MIN(c->friction, ROUGH);
+        r->arm = c->share * c->arm;
     }
 }
 
@@ -258,31 +69,33 @@ static void keep_bounds(Contact *list, int count) {
    there it is lowered until they have one. Gaps tell nothing of that where a drive presses: it presses
    harder in each sweep, so there the changes have to end, too. A disk that cannot turn is held where
    friction locks, and would slip away from a lower one: it stalls the drive, for this step, and so does
-   one that others block on a belt that grips without bound, which never slips. */
+   one that others block on a belt that grips without bound, which never slips.
+
+   They begin with the impulses of the step before, as far as these lower the cost: where contacts have
+   opened, what had been pressed between others would throw disks out. */
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough) {
     double first = INFINITY;
+    int driven = 0;
+    for (int n = 0; n < count; n++) {
+        const Contact *c = list + n;
+        driven |= drives(c);
+        /* What may have to stall tells so by how it changes, sweep by sweep. */
+        if (drives(c) && c->friction > ROUGH && W.disks[c->i].inertia == 0) plain = sweeps;
+    }
+    set_rows(list, count);
+    lessen();
     for (int left = TRIES, more = rounds;;) {
-        double change = sweep(list, count, sweeps, plain, accurate), worst = change;
+        double change = sweep_rows(sweeps, plain, accurate), worst = change;
         int ended = change <= accurate;
-        if (!ended) keep_bounds(list, count);
-        if (!ended || W.interact) lessen(list, count);
+        if (!ended) keep_bounds();
+        if (!ended || W.interact) lessen();
         if (left == 0) break;
-        int stalled = change < INFINITY && stall(list, count, INFINITY, enough);
+        int stalled = driven && change < INFINITY && stall(list, count, INFINITY, enough);
         if (!stalled) {
             if (ended && more < 2) break;
             if (ended) accurate *= 0.1;
-            if (change < INFINITY) {
-                worst = 0;
-                for (int n = 0; n < count; n++) {
-                    const Contact *c = list + n;
-                    double u[3], v[3];
-                    relative(c, 1, u);
-                    relative(c, 0, v);
-                    worst = MAX(worst, asks(c) - v[0] + u[0]);
-                    if (drives(c)) worst = MAX(worst, change);
-                }
-            }
+            if (change < INFINITY) worst = driven ? MAX(left_open(), change) : left_open();
             if (worst <= enough) break;
             if (change < INFINITY && more > 1) {
                 if (more-- == rounds) first = change;
@@ -290,26 +103,19 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
             }
             if (more == 1 && change < CRAWLS * first) break;
             worst = 0;
-            for (int n = 0; n < count; n++) worst = MAX(worst, list[n].change);
-            stalled = stall(list, count, FOLLOWS * worst, INFINITY);
+            for (int n = 0; n < count; n++) worst = MAX(worst, W.rows[n].change);
+            stalled = driven && stall(list, count, FOLLOWS * worst, INFINITY);
         }
         more = rounds;
-        for (int n = 0; n < count; n++) {
-            Contact *c = list + n;
-            Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-            if (!stalled && c->change >= FOLLOWS * worst) c->share = left > 1 ? 0.25 * c->share : 0;
-            a->vx = a->ux;
-            a->vy = a->uy;
-            a->spin = a->uspin;
-            if (c->two) {
-                b->vx = b->ux;
-                b->vy = b->uy;
-                b->spin = b->uspin;
-            }
-            c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+        if (!stalled) {
+            ease_friction(list, count, FOLLOWS * worst, left > 1 ? 0.25 : 0);
+            left--;
         }
-        left -= !stalled;
+        begin_anew();
     }
+    drop_noise();
+    if (W.interact) lessen();
+    take_rows(list, count);
 }
 
 /* What the impulses of a step change of a gap at its end, m, but for the straight way along its normal:
@@ -426,27 +232,11 @@ void solve_contacts(void) {
             driven |= !c->two && c->other[1] - c->moved[1] != 0;
         }
         /* A drive presses as hard as it must: there no spring would hold, and friction is lowered. */
-        for (int n = from; n < to; n++) {
-            Contact *c = W.contacts + n;
-            if (c->gives == 0) continue;
-            c->gives *= driven ? 0 : 1 / heaviest;
-            c->eases = 1 / (c->light[0] + c->gives);
-        }
-        start_warm(list, to - from);
+        for (int n = from; n < to; n++) W.contacts[n].gives *= driven ? 0 : 1 / heaviest;
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,
                            PLAIN, W.accurate, W.skip * least);
         else solve_alone(list, to - from);
-        for (int n = from; n < to; n++) {
-            /* Rounding does not press; with endless friction even that would pull. */
-            Contact *c = W.contacts + n;
-            const Disk *a = W.disks + c->i;
-            if (c->impulse[0] >= NOISE * c->mass[0] * (fabs(a->vx) + fabs(a->vy))) continue;
-            for (int k = 0; k < 3; k++) c->impulse[k] = -c->impulse[k];
-            push(c, c->impulse);
-            c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
-        }
-        if (W.interact) lessen(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);
     check_energy();

@@ -461,6 +461,8 @@ def measured(recording: Record, name: str) -> Floats:
             return np.array([getattr(ledger(recording), entry)])
         case [*event, "count"]:
             return count(np.isfinite(each(recording, ".".join([*event, "t"]))))
+        case [*event, "share"]:
+            return count(np.isfinite(each(recording, ".".join([*event, "t"])))) / count(own)
         case [*quantity, statistic] if statistic in _STATISTICS:
             values = each(recording, ".".join(quantity))
             if shape[1] == 1:

@@ -117,10 +117,11 @@ def _event(event: str) -> Iterator[Quantity]:
         ("vx_after", "m/s", "forward velocity just after {}", {}),
         ("vy_after", "m/s", "upward velocity just after {}", {}),
         ("count", "", f"particles that {verb}", {"impact": ITSELF}),
+        ("share", "", f"share of the particles that {verb}", {}),
     ):
         once = event in ("separation", "arrival", "sensor.SENSOR")
         if not (key.endswith("_after") and once) and (event, key) != ("sensor.SENSOR", "count"):
-            of: Of = "stream" if key == "count" else "particle"
+            of: Of = "stream" if key in ("count", "share") else "particle"
             columns = swept.get(event, ())
             yield Quantity(
                 f"{event}.{key}", unit, text.format(what), of, needs, columns=columns,

@@ -1,0 +1,371 @@
+/* Contacts that are solved together as rows of numbers, and sweeps over them: projected Gauss-Seidel
+   with momentum.
+
+   A row's matrix (normal, tangent) = ((nx, ny), (ny, -nx)) is its own inverse: it makes normal velocity
+   and slip of a velocity, and a change of velocity of a normal and a tangential impulse. */
+
+#include <wasm_simd128.h>
+#include "core.h"
+
+/* Sine of the angle between surfaces that count as one: of less nothing is left by rounding. */
+#define PARALLEL 1e-7
+/* Times the first change: sweeps whose changes grow so far never end. */
+#define DIVERGES 1e3
+/* Of momentum. */
+#define NOISE 1e-11
+/* Rows between disks from which on they are swept colour by colour: those of one colour share no disk, so
+   that the processor need not wait for one to begin with the next. A disk among equal ones has six. */
+#define LARGE 200
+#define COLOURS 12
+/* m/s; what a contact is free to open with that asks for nothing: finite, so that it can be multiplied by 0. */
+#define ANY 1e100
+
+typedef v128_t Two;
+
+/* The rows: those between disks, and from `pairs` on those on what does not give way. */
+static int pairs, rows, bodies;
+
+/* A choice between doubles is a jump in what is made of WebAssembly, between vectors it is not. */
+static inline double least(double a, double b) {
+    return wasm_f64x2_extract_lane(wasm_f64x2_pmin(wasm_f64x2_splat(b), wasm_f64x2_splat(a)), 0);
+}
+static inline double most(double a, double b) {
+    return wasm_f64x2_extract_lane(wasm_f64x2_pmax(wasm_f64x2_splat(b), wasm_f64x2_splat(a)), 0);
+}
+static inline Two two(const double *from) { return wasm_v128_load(from); }
+static inline Two times(double a, Two v) { return wasm_f64x2_mul(wasm_f64x2_splat(a), v); }
+static inline Two plus(Two a, Two b) { return wasm_f64x2_add(a, b); }
+static inline Two minus(Two a, Two b) { return wasm_f64x2_sub(a, b); }
+static inline double first(Two v) { return wasm_f64x2_extract_lane(v, 0); }
+static inline double second(Two v) { return wasm_f64x2_extract_lane(v, 1); }
+/* Of a velocity normal velocity and slip, of impulses their vector. */
+static inline Two turned(const SolverRow *c, Two v) {
+    return plus(times(first(v), two(c->normal)), times(second(v), two(c->tangent)));
+}
+
+/* Normal velocity less what is asked for, and slip, with the impulses so far. */
+static inline Two moves(const SolverRow *c) {
+    const SolverBody *a = W.solver_bodies + c->a, *b = W.solver_bodies + c->b;
+    Two v = plus(turned(c, minus(two(&a->x), two(&b->x))), two(c->free));
+    return plus(v, wasm_f64x2_make(0, a->rim + b->rim));
+}
+
+double slip_of(const SolverRow *row) { return second(moves(row)); }
+
+static inline double rolls(const SolverRow *c) {
+    const SolverBody *a = W.solver_bodies + c->a, *b = W.solver_bodies + c->b;
+    return a->rim * a->bend - b->rim * b->bend + c->spin;
+}
+
+/* How far the normal velocity is above what the gap asks for under its impulse. */
+static inline double above(const SolverRow *c, double opens) {
+    return most(opens + c->gives * c->impulse[0], opens - c->more);
+}
+
+static inline void push_row(const SolverRow *c, Two impulse, double moment) {
+    SolverBody *a = W.solver_bodies + c->a, *b = W.solver_bodies + c->b;
+    Two v = turned(c, impulse);
+    double along = second(impulse);
+    wasm_v128_store(&a->x, plus(two(&a->x), times(a->mass, v)));
+    a->rim += a->turn * along + a->twist * moment;
+    wasm_v128_store(&b->x, minus(two(&b->x), times(b->mass, v)));
+    b->rim += b->turn * along - b->twist * moment;
+}
+
+static int body_of(int i) {
+    Disk *d = W.disks + i;
+    SolverBody *b = W.solver_bodies + d->body;
+    if (d->body > 0 && d->body < bodies && b->disk == i) return d->body;
+    d->body = bodies;
+    W.solver_bodies[bodies] = (SolverBody){.mass = d->inv_mass, .turn = square(d->radius) * d->inv_inertia,
+                              .twist = d->radius * d->inv_inertia, .bend = 1 / d->radius, .disk = i};
+    return bodies++;
+}
+
+/* Make rows of contacts, whose disks have got no impulses yet, and give them those that they begin with. */
+void set_rows(Contact *list, int count) {
+    int begin[COLOURS + 2] = {0}, many = 0;
+    W.solver_bodies[0] = (SolverBody){.disk = -1};
+    bodies = 1;
+    for (int n = 0; n < count; n++) many += list[n].two;
+    for (int n = 0; n < count; n++) {
+        Contact *c = list + n;
+        SolverBody *a = W.solver_bodies + body_of(c->i), *b = W.solver_bodies + (c->two ? body_of(c->j) : 0);
+        int colour = c->two ? 0 : COLOURS;
+        if (c->two && many >= LARGE) {
+            while (colour < COLOURS - 1 && (a->used | b->used) >> colour & 1) colour++;
+            a->used |= 1 << colour;
+            b->used |= 1 << colour;
+        }
+        c->next = colour;
+        begin[colour + 1]++;
+    }
+    for (int k = 0; k <= COLOURS; k++) begin[k + 1] += begin[k];
+    pairs = begin[COLOURS];
+    rows = count;
+    for (int n = 0; n < count; n++) {
+        const Contact *c = list + n;
+        SolverRow *r = W.rows + begin[c->next]++;
+        double u[3];
+        relative(c, 1, u);
+        r->normal[0] = c->nx;
+        r->normal[1] = r->tangent[0] = c->ny;
+        r->tangent[1] = -c->nx;
+        r->free[0] = MIN(-c->need, ANY);
+        r->free[1] = u[1] + c->drift;
+        for (int k = 0; k < 2; k++) {
+            r->mass[k] = c->mass[k];
+            r->light[k] = 1 / c->mass[k];
+            r->impulse[k] = c->impulse[k];
+        }
+        r->gives = c->gives;
+        r->eases = 1 / (r->light[0] + c->gives);
+        r->more = c->most + r->free[0];
+        r->rough = c->share < 1 ? c->share * MIN(c->friction, ROUGH) : c->friction;
+        r->arm = c->share * c->arm;
+        r->spin = u[2];
+        r->roll_mass = c->mass[2];
+        r->roll_light = c->mass[2] > 0 ? W.disks[c->i].radius / c->mass[2] : 0;
+        r->moment = c->impulse[2];
+        r->change = 0;
+        r->a = W.disks[c->i].body;
+        r->b = c->two ? W.disks[c->j].body : 0;
+        r->from = n;
+        push_row(r, two(r->impulse), r->moment);
+    }
+}
+
+/* Give contacts their impulses, and disks what these make of their velocities. */
+void take_rows(Contact *list, int count) {
+    for (int n = 0; n < count; n++) {
+        const SolverRow *r = W.rows + n;
+        double *J = list[r->from].impulse;
+        J[0] = r->impulse[0];
+        J[1] = r->impulse[1];
+        J[2] = r->moment;
+    }
+    for (const SolverBody *b = W.solver_bodies + 1; b < W.solver_bodies + bodies; b++) {
+        Disk *d = W.disks + b->disk;
+        d->vx = d->ux + b->x;
+        d->vy = d->uy + b->y;
+        if (b->turn > 0) d->spin = d->uspin + b->rim * b->bend;
+    }
+}
+
+/* Have all rows so much of their impulses. */
+static void scale(double by) {
+    for (SolverBody *b = W.solver_bodies; b < W.solver_bodies + bodies; b++) b->x = b->y = b->rim = 0;
+    for (SolverRow *r = W.rows; r < W.rows + rows; r++) {
+        wasm_v128_store(r->impulse, times(by, two(r->impulse)));
+        r->moment *= by;
+        push_row(r, two(r->impulse), r->moment);
+    }
+}
+
+void begin_anew(void) { scale(0); }
+
+/* Give a row the normal impulse that keeps its gap closed, unless it has that from a corner, and the
+   friction that stops slip and rolling, as far as it is pressed. Return by how much they changed, m/s. */
+static inline Two give(SolverRow *c, int in_corner) {
+    Two J = two(c->impulse), v = moves(c);
+    double r = first(v), normal = c->impulse[0], moment = 0;
+    if (!in_corner) {
+        double given = least((c->more - r) * c->mass[0], -(r + c->gives * normal) * c->eases);
+        normal = most(normal + given, 0);
+    }
+    double bound = c->rough * normal;
+    double along = least(most(c->impulse[1] - c->mass[1] * second(v), -bound), bound);
+    Two to = wasm_f64x2_make(normal, along), change = minus(to, J);
+    Two speed = wasm_f64x2_mul(wasm_f64x2_abs(change), two(c->light));
+    c->change = second(speed);
+    if (c->arm > 0) {
+        double arm = c->arm * normal;
+        moment = least(most(c->moment - c->roll_mass * rolls(c), -arm), arm) - c->moment;
+        c->moment += moment;
+        c->change = most(c->change, fabs(moment) * c->roll_light);
+        speed = wasm_f64x2_make(first(speed), c->change);
+    }
+    wasm_v128_store(c->impulse, to);
+    push_row(c, change, moment);
+    return speed;
+}
+
+/* How far a change of velocity (x, y) is from keeping all gaps closed, m/s. */
+static double violation(const SolverRow *list, int count, double x, double y) {
+    double worst = 0;
+    for (const SolverRow *c = list; c < list + count; c++)
+        worst = most(worst, -above(c, x * c->normal[0] + y * c->normal[1] + c->free[0]));
+    return worst;
+}
+
+/* What a row asks for at a change of velocity (x, y), m/s. */
+static double asks_at(const SolverRow *c, double x, double y) {
+    return -above(c, x * c->normal[0] + y * c->normal[1] + c->free[0]);
+}
+
+/* The same for all that a disk touches and that does not give way, at once: in a narrow wedge impulses one by one
+   would take a thousand sweeps. The change of velocity becomes the one nearest to what it is without
+   them that keeps all gaps closed: itself, or on the bound of one surface, or of two. */
+static double press_corner(SolverRow *list, int count) {
+    SolverBody *d = W.solver_bodies + list->a;
+    double x = d->x, y = d->y, m = d->mass, best[2] = {0, 0}, changed = 0;
+    double rounding = 1e-15 * (fabs(x) + fabs(y));
+    int at[2] = {0, 0};
+    for (int n = 0; n < count; n++) {
+        x -= list[n].impulse[0] * m * list[n].normal[0];
+        y -= list[n].impulse[0] * m * list[n].normal[1];
+    }
+    double last = violation(list, count, x, y);
+    for (int i = 0; i < count && last > rounding; i++) {
+        const SolverRow *c = list + i;
+        double one = asks_at(c, x, y);
+        double left = violation(list, count, x + one * c->normal[0], y + one * c->normal[1]);
+        if (one <= 0 || left >= last) continue;
+        last = left;
+        best[0] = one; best[1] = 0;
+        at[0] = at[1] = i;
+    }
+    for (int i = 0; i < count && last > rounding; i++)
+        for (int j = 0; j < i && last > rounding; j++) {
+            const SolverRow *c = list + i, *o = list + j;
+            double cosine = c->normal[0] * o->normal[0] + c->normal[1] * o->normal[1];
+            double sine = c->normal[0] * o->normal[1] - c->normal[1] * o->normal[0];
+            double one = asks_at(c, x, y), then = asks_at(o, x, y);
+            if (fabs(sine) < PARALLEL) continue;
+            double by = (one - cosine * then) / (sine * sine), more = (then - cosine * one) / (sine * sine);
+            double left = violation(list, count, x + by * c->normal[0] + more * o->normal[0],
+                                    y + by * c->normal[1] + more * o->normal[1]);
+            if (by < 0 || more < 0 || left >= last) continue;
+            last = left;
+            best[0] = by; best[1] = more;
+            at[0] = i; at[1] = j;
+        }
+    for (int n = 0; n < count; n++) {
+        double normal = (n == at[0] ? best[0] : 0) + (n == at[1] && at[1] != at[0] ? best[1] : 0);
+        double change = normal / m - list[n].impulse[0];
+        push_row(list + n, wasm_f64x2_make(change, 0), 0);
+        list[n].impulse[0] = normal / m;
+        changed = most(changed, fabs(change) * m);
+    }
+    return changed;
+}
+
+/* Hasten the sweeps: go on where two of them, to and fro, lead to, by Nesterov's momentum, which begins anew
+   where it leads away from there (O'Donoghue and Candes, Found. Comput. Math. 15, 2015). `age` is how
+   often it went on; returns the next. */
+static int hasten(int age) {
+    double along = 0;
+    for (const SolverRow *c = W.rows; c < W.rows + rows && age > 1; c++) {
+        Two went = wasm_f64x2_mul(minus(two(c->impulse), two(c->swept)), two(c->course));
+        went = wasm_f64x2_mul(went, two(c->light));
+        along += first(went) + second(went);
+        if (c->arm > 0) along += (c->moment - c->roll_swept) * c->roll_course * c->roll_light;
+    }
+    if (along < 0) age = 1;
+    double go = age > 1 ? (age - 1) / (age + 2.0) : 0;
+    for (SolverRow *c = W.rows; c < W.rows + rows; c++) {
+        Two more = wasm_f64x2_splat(0), J = two(c->impulse);
+        double moment = 0;
+        if (age > 0) {
+            more = times(go, plus(minus(J, two(c->swept)), two(c->course)));
+            moment = go * (c->moment - c->roll_swept + c->roll_course);
+        }
+        wasm_v128_store(c->course, more);
+        wasm_v128_store(c->impulse, plus(J, more));
+        wasm_v128_store(c->swept, two(c->impulse));
+        c->moment += moment;
+        c->roll_course = moment;
+        c->roll_swept = c->moment;
+        if (go > 0) push_row(c, more, moment);
+    }
+    return age + 1;
+}
+
+/* Sweep over the rows, those of one disk with what does not give way as one, until no relative velocity
+   changes by more than `accurate`; the first `plain` ones are not hastened. Return by how much one changed
+   in the last sweep, or INFINITY if the sweeps diverge. */
+double sweep_rows(int sweeps, int plain, double accurate) {
+    double begins = 0, worst = 0, radius = 1 / W.solver_bodies[1].bend;
+    int age = 0;
+    for (int n = 0; n < sweeps; n++) {
+        Two change = wasm_f64x2_splat(0);
+        /* To and fro, so that what one end of a pile does reaches the other in one sweep; in the last one
+           what does not give way comes last. */
+        int to = (sweeps - n) % 2;
+        worst = 0;
+        if (n >= plain && (n - plain) % 2 == 0) age = hasten(n == plain ? 0 : age);
+        if (to)
+            for (int m = 0; m < pairs; m++) change = wasm_f64x2_pmax(change, give(W.rows + m, 0));
+        for (int m = pairs, many; m < rows; m += many) {
+            SolverRow *c = W.rows + (to ? m : rows - 1 - (m - pairs));
+            for (many = 1; m + many < rows && c[to ? many : -many].a == c->a;) many++;
+            if (!to) c -= many - 1;
+            if (many == 1) {
+                change = wasm_f64x2_pmax(change, give(c, 0));
+                continue;
+            }
+            worst = most(worst, press_corner(c, many));
+            for (int k = 0; k < many; k++) change = wasm_f64x2_pmax(change, give(c + k, 1));
+            press_corner(c, many);
+        }
+        if (!to)
+            for (int m = pairs - 1; m >= 0; m--) change = wasm_f64x2_pmax(change, give(W.rows + m, 0));
+        worst = MAX(worst, MAX(first(change), second(change)));
+        W.sweep_count++;
+        if (n == 0) begins = worst;
+        if (worst <= accurate) return worst;
+        if (!(worst <= DIVERGES * (begins + W.soft + W.skip * radius))) return INFINITY;
+    }
+    return worst;
+}
+
+/* Take the share of all impulses at which the cost is least. The cost of impulses J, whose changes of
+   velocity are W J, is 1/2 J W J + J q: what sweeps make least, one contact after the other. W J + q is
+   how far the velocities are from what the contacts ask for; see docs/physics.md. Along J its slope goes
+   straight from `none` to `all`; where what an overlap asks for bends it goes below that, and the share
+   is a little less. Where sweeps end, the impulses do no work so on the velocities that they leave,
+   however far the sweeps had come: W J + q times J is at most 0. */
+void lessen(void) {
+    double none = 0, all = 0;
+    for (const SolverRow *c = W.rows; c < W.rows + rows; c++) {
+        Two v = moves(c);
+        none += c->impulse[0] * most(c->free[0], c->free[0] - c->more) + c->impulse[1] * c->free[1];
+        all += c->impulse[0] * above(c, first(v)) + c->impulse[1] * second(v);
+        if (c->arm == 0) continue;
+        none += c->moment * c->spin;
+        all += c->moment * rolls(c);
+    }
+    if (all > 0) scale(none < 0 ? 1 - all / (all - none) : 0);
+}
+
+/* Take back friction beyond what contacts allow: sweeps that did not come to an end have pressed less
+   since. */
+void keep_bounds(void) {
+    for (SolverRow *c = W.rows; c < W.rows + rows; c++) {
+        double bound = c->rough * c->impulse[0], arm = c->arm * c->impulse[0];
+        double along = MIN(MAX(c->impulse[1], -bound), bound) - c->impulse[1];
+        double moment = MIN(MAX(c->moment, -arm), arm) - c->moment;
+        if (along == 0 && moment == 0) continue;
+        c->impulse[1] += along;
+        c->moment += moment;
+        push_row(c, wasm_f64x2_make(0, along), moment);
+    }
+}
+
+/* Take back what rounding presses; with endless friction even that would pull. */
+void drop_noise(void) {
+    for (SolverRow *c = W.rows; c < W.rows + rows; c++) {
+        const SolverBody *a = W.solver_bodies + c->a;
+        const Disk *d = W.disks + a->disk;
+        if (c->impulse[0] >= NOISE * c->mass[0] * (fabs(d->ux + a->x) + fabs(d->uy + a->y))) continue;
+        push_row(c, minus(wasm_f64x2_splat(0), two(c->impulse)), -c->moment);
+        c->impulse[0] = c->impulse[1] = c->moment = 0;
+    }
+}
+
+/* By how much gaps close faster than they are asked to, at most, m/s. */
+double left_open(void) {
+    double worst = 0;
+    for (const SolverRow *c = W.rows; c < W.rows + rows; c++) worst = most(worst, -above(c, first(moves(c))));
+    return worst;
+}

@@ -401,7 +401,11 @@ def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_
 
 @pytest.mark.parametrize(
     ("size", "scheme", "touch"),
-    [((1366, 768), "dark", False), ((390, 844), "light", True), ((800, 1100), "dark", True)],
+    [
+        ((1366, 768), "dark", False),
+        ((390, 844), "light", True),
+        pytest.param((800, 1100), "dark", True, marks=pytest.mark.slow),
+    ],
 )
 def test_the_empty_page_and_the_card_are_accessible_and_fingers_hit(empty, size, scheme, touch):
     viewport = {"width": size[0], "height": size[1]}

@@ -93,14 +93,17 @@ class Hand:
         self.page, self.by = page, by
 
     def to(self, locator):
-        """Go to an element by Tab, and by an arrow within a group."""
+        """Go to an element by Tab, back or on, and by an arrow within a group."""
         if self.by != "keyboard":
             locator.focus()
             return
         for _ in range(400):
             key = locator.evaluate("""(one) => {
               const at = document.activeElement;
-              return one === at ? "" : one.name && one.name === at.name ? "ArrowDown" : "Tab";
+              if (one === at) return "";
+              if (one.name && one.name === at.name) return "ArrowDown";
+              const behind = one.compareDocumentPosition(at) & Node.DOCUMENT_POSITION_FOLLOWING;
+              return behind ? "Shift+Tab" : "Tab";
             }""")
             if not key:
                 return

@@ -5,7 +5,7 @@ the shipped lessons, found by number, by name or by folder.
 
 - `steps`: what is asked in each step, what may be changed, which runs a table wants.
 - `texts`: a lesson's Markdown as HTML and for a terminal, and its formulas.
-- `sheets`: the student's sheet, the teacher's and the explanation: Markdown, HTML, PDF.
+- `sheets`: the student's sheet, the teacher's and the explanation; `printing`: HTML, PDF.
 - `building`: ``lesson.gif``, ``exercise.ipynb``, a new lesson from a template.
 - `pages`: all lessons as web pages, and packages for learning platforms.
 
@@ -177,6 +177,11 @@ class Lesson(Table):
     def number(self) -> int | None:
         """The number its folder begins with; None for one that has none."""
         return split(self._folder)[0]
+
+    @property
+    def heading(self) -> str:
+        """Number and title."""
+        return self.title if self.number is None else f"{self.number}. {self.title}"
 
     @property
     def columns(self) -> dict[str, Column]:

@@ -210,6 +210,30 @@ def exercise_answers(name):
     return [one.right for one in draw(EXERCISES[name], "Ada")[1]]
 
 
+def test_on_the_projector_hands_are_counted_and_the_run_is_shown(page_of):
+    page = page_of("the-parabola", size=(1920, 1080))
+    page.locator("#begin").click()
+    assert not page.locator(".vote").first.is_visible()
+    page.evaluate("document.documentElement.requestFullscreen = async () => {}")
+    page.locator("#full").click()
+    votes = page.locator(".choice").first.locator(".vote")
+    for n, hands in enumerate((1, 3, 0)):
+        for _ in range(hands):
+            votes.nth(n).locator("button").last.click()
+    votes.first.locator("button").first.click()
+    votes.nth(2).locator("button").first.click()
+    votes.first.locator("button").last.click()
+    assert votes.locator("output").all_text_contents() == ["1", "3", "0"]
+    widths = votes.locator("i").evaluate_all("(all) => all.map((one) => one.offsetWidth)")
+    assert widths[1] == pytest.approx(3 * widths[0], abs=2)
+    assert widths[2] == 0
+    assert axe(page) == []
+    page.locator("#play").click()
+    assert page.evaluate("chutelab.lesson.kept.done") == [0]
+    assert page.evaluate("chutelab.lesson.kept.said") == {}
+    assert page.locator(".track").count() == 1
+
+
 def test_what_was_done_is_kept_for_its_pupil_only(page_of):
     page = page_of("the-bounce")
     hand = Hand(page, "mouse")

@@ -58,7 +58,7 @@ def sunk(e):
     _, last = e.recording.ends()
     position = last["position"]
     deepest, of = 0.0, "r"
-    for piece, name in zip(e.pieces, e.machine.names, strict=True):
+    for piece, name in zip(e.machine.pieces, e.machine.names, strict=True):
         gap = piece.gap(position, r)
         i = int(np.argmin(gap))
         if -gap[i] > deepest:

@@ -222,23 +222,13 @@ class Grade:
 def grade(paths: Iterable[str | Path], time_limit: float = 60.0) -> Iterator[Grade]:
     """Mark what students returned, one after the other. This runs the code of notebooks.
 
-    Parameters
-    ----------
-    paths
-        Notebooks, and result files of lessons' live pages (``*.json``).
-    time_limit
-        s for each notebook. One that hangs is stopped, and marked for what it had answered by then.
+    Yields a row per path, notebook or result file of a lesson's live page (``*.json``), in their
+    order, each when it is done; a file that cannot be read, run or marked has its reason. A
+    notebook that hangs is stopped after `time_limit`, s, and marked for what it had answered by
+    then.
 
-    Returns
-    -------
-    iterator of Grade
-        One per path, in their order, each when it is done; a file that cannot be read, run or
-        marked has its reason.
-
-    Raises
-    ------
-    MissingLibraryError
-        For notebooks, without IPython and psutil, which the extra ``notebook`` brings.
+    Raises a `MissingLibraryError` for notebooks, without IPython and psutil, which the extra
+    ``notebook`` brings.
     """
     files = list(map(str, paths))
     if not all(is_result(Path(file)) for file in files):

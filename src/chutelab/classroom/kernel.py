@@ -101,19 +101,9 @@ class Ran:
 def run(cells: Sequence[str | None], time_limit: float) -> Ran:
     """Run code cells in order; what raises an error does not keep the rest from running.
 
-    Parameters
-    ----------
-    cells : sequence of str or None
-        None is a cell whose source is no text.
-    time_limit : float
-        s for all of them together, the kernel's start not counted.
-
-    Raises
-    ------
-    ForgedError
-        If the kernel says what no chutelab says.
-    OSError
-        If no process can be started.
+    None is a cell whose source is no text. `time_limit` is in s for all cells together, the
+    kernel's start not counted. Raises a `ForgedError` if the kernel says what no chutelab says; an
+    `OSError` if no process can be started.
     """
     paths = [str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
     # Threads of linear algebra take memory each, more of it the more cores there are.

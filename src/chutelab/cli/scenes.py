@@ -390,7 +390,7 @@ def stress(scene: SceneName, *, engine: Engine, dt: float | None, set_: Texts, j
     run = Evidence(recording)
     found = judge(run)
     broken = sum(one.broken for one in found)
-    about = {"scene": scene, "title": recording.title, "engine": run.engine, "dt": run.dt}
+    about = {"scene": scene, "title": recording.title, "engine": recording.engine, "dt": run.dt}
     laws = [{"law": one.law, **plain(one), "holds": one.holds} for one in found]
     rows = []
     for one in found:
@@ -398,7 +398,7 @@ def stress(scene: SceneName, *, engine: Engine, dt: float | None, set_: Texts, j
         said = "; not promised: ".join(filter(None, [one.detail, one.unpromised]))
         rows.append((kept, one.law, f"{one.figure:.2g}", f"{one.bound:.2g}", said))
     steps = "" if run.dt is None else f", steps of {run.dt:.4g} s"
-    title = f"{recording.title}\nengine {run.engine}{steps}"
+    title = f"{recording.title}\nengine {recording.engine}{steps}"
     table = Sheet(title, ("", "law", "figure", "bound", ""), tuple(rows), texts=2, tail=1)
     unpromised = sum(bool(one.unpromised) for one in found)
     verdict = f"all {len(found)} laws kept"

@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -25,6 +26,7 @@ from chutelab.cli.options import (
     Jobs,
     Repeat,
     SceneName,
+    Seconds,
     Texts,
     beginning,
     check_file,
@@ -105,6 +107,22 @@ def targets(texts: Sequence[str]) -> list[tuple[str, str]]:
     """Read what ``--target`` takes, QUANTITY=VALUE; raises an `InputError`."""
     form = "must be QUANTITY=VALUE, such as landing.x=1.2 or landing.vx=outgoing.speed"
     return [_halves(text, f"--target {text}", form) for text in texts]
+
+
+def limits(texts: Sequence[str]) -> dict[str, tuple[str | None, str | None]]:
+    """Read what ``--subject-to`` takes, QUANTITY>=VALUE or <=; raises an `InputError`."""
+    found: dict[str, tuple[str | None, str | None]] = {}
+    for text in texts:
+        match = re.fullmatch(r"\s*([^<>=]+?)\s*([<>])=?\s*([^<>=]+?)\s*", text)
+        if match is None:
+            form = "must be QUANTITY>=VALUE or QUANTITY<=VALUE, such as arrival.share>=0.95"
+            raise InputError(form, f"--subject-to {text}")
+        name, sense, value = match.groups()
+        least, most = found.get(name, (None, None))
+        if (least if sense == ">" else most) is not None:
+            raise InputError(f"{name} has such a limit already", f"--subject-to {text}")
+        found[name] = (value, most) if sense == ">" else (least, value)
+    return found
 
 
 def uncertain(texts: Sequence[str]) -> list[Given]:
@@ -311,8 +329,14 @@ def solve(
     target: Texts,
     minimize: str | None,
     maximize: str | None,
-    points: int = 181,
+    subject_to: Texts,
+    repeat: Repeat | None,
+    deviations: float = 0.0,
+    points: int | None,
     seed: int = 0,
+    jobs: Jobs = 1,
+    scheduler: str | None,
+    max_seconds: Seconds | None,
     set_: Texts,
     out: Folder,
     json_: bool,
@@ -335,14 +359,33 @@ def solve(
     exit code is 1 if there is no solution; the nearest thing to one is shown then. It needs pip
     install "chutelab[design]".
 
+    A target and something to minimize together ask for the best of all solutions; --subject-to
+    limits other quantities.
+
+    chutelab solve inclined-20 --vary plate.angle_deg=0:60 \
+        --vary incoming.speed=1:3 --target landing.vx=1 --minimize landing.t
+    chutelab solve stream --vary plate.angle_deg=0:40 --maximize arrival.vx.mean \
+        --subject-to "arrival.share>=0.95" --jobs 0
+
+    Where particles meet, each variant is run with 8 seeds, the same for all, and the answer has
+    its standard error: no more digits are given than chance leaves. One solution is told then. With
+    --max-seconds, or Ctrl-C, the search ends with what is known.
+
     --vary KEY=FROM:TO  A key of the scene and the range to search, such as plate.angle_deg=0:80.
         May be repeated. [required]
     --target QUANTITY=VALUE  What should be: VALUE is a number, with or without unit, a key of the
         scene or another quantity. May be repeated with as many --vary.
     --minimize QUANTITY  Make this as small as possible.
     --maximize QUANTITY  Make this as large as possible.
-    --points N  With one --vary: how many values to look at first. [default]
-    --seed N  With several: of the random draws of the search. [default]
+    --subject-to LIMIT  QUANTITY>=VALUE or QUANTITY<=VALUE, such as "arrival.share>=0.95": what an
+        answer has to keep. May be repeated.
+    --repeat N  Run each variant with N seeds; default: 8 where particles meet, else 1.
+    --deviations K  With several seeds: minimize the mean plus K standard deviations of one run, or
+        maximize the mean less as many. [default]
+    --points N  With one --vary: how many values to look at first; default: 181. With several seeds:
+        variants at most; default: 96.
+    --seed N  With several --vary or seeds: of the random draws of the search. [default]
+    --max-seconds S  End the search after S seconds with what is known.
     --out DIR  Write the overlay at the answer, the scene there, a picture of the search and its
         numbers into this folder.
     -q, --quiet  Print no answer and no progress bar.
@@ -353,28 +396,43 @@ def solve(
     from chutelab.scene import to_toml
     from chutelab.studies import design
     from chutelab.studies.design.answers import as_dict
+    from chutelab.studies.sweep import crew
 
-    if len([goal for goal in (target, minimize, maximize) if goal]) != 1:
-        raise click.UsageError("Give one of --target, --minimize and --maximize.")
+    if (minimize and maximize) or not (target or minimize or maximize):
+        raise click.UsageError(
+            "Give --target, --minimize or --maximize, or --target and one of the others."
+        )
+    if scheduler is not None and jobs != 1:
+        raise click.UsageError("--jobs and --scheduler: give one of them.")
     loaded = loaded_as_told(scene, set_)
-    written = []
+    written, interrupted = [], None
     with destination(out, SOLVED) as place:
-        with progress("searching", quiet=quiet) as meter:
+        with ExitStack() as meter_and_team:
+            meter = meter_and_team.enter_context(progress("searching", quiet=quiet))
+            team = meter_and_team.enter_context(crew(jobs, scheduler))
             search = partial(design.solve, target=targets(target))
-            if minimize:
-                search = partial(design.minimize, quantity=minimize)
-            if maximize:
-                search = partial(design.maximize, quantity=maximize)
-            found = search(
-                loaded, varied(vary, ranges=True), points=points, seed=seed, progress=meter
-            )
+            if target:
+                search = partial(search, minimize=minimize, maximize=maximize)
+            elif minimize or maximize:
+                kind = design.minimize if minimize else design.maximize
+                search = partial(kind, quantity=str(minimize or maximize))
+            try:
+                found = search(
+                    loaded, varied(vary, ranges=True), subject_to=limits(subject_to),
+                    repeat=repeat, deviations=deviations, points=points, seed=seed, team=team,
+                    max_seconds=inf if max_seconds is None else max_seconds, progress=meter,
+                )  # fmt: skip
+            except KeyboardInterrupt as error:
+                if not hasattr(error, "solution"):
+                    raise
+                found, interrupted = error.solution, error
         if place is not None:
             from chutelab.pictures.plots import overlay
             from chutelab.pictures.plots.studies import scan
 
             with progress("drawing", quiet=quiet):
                 write_json(as_dict(found), place / "solve.json")
-                if found.scan is not None:
+                if found.scan is not None or found.outcomes is not None:
                     scan(found).write(place / "scan.png")
                 if found.solved or found.nearest:
                     values = zip(found.ranges, found.answer.values, strict=True)
@@ -389,6 +447,8 @@ def solve(
     title = Text(found.base.title, style="bold")
     wrote = f"\nwrote into {out}: {', '.join(written)}" if out else ""
     tell(as_dict(found), title, *found.sheets(), as_json=json_, quiet=quiet, wrote=wrote)
+    if interrupted is not None:
+        raise interrupted
     if not found.solved:
         click.get_current_context().exit(1)
 

@@ -24,7 +24,7 @@ from chutelab.core import (
     dtype,
     give_back,
 )
-from chutelab.machine import Machine, Pieces, hand_over
+from chutelab.machine import SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather
 from chutelab.results.record import REASONS, TOTAL, Record
@@ -251,6 +251,12 @@ class Job:
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.drives[: self.owners] = module.array("drives", REAL, self.owners)
+        if world.hinges:
+            for row in module.array("movers", dtype("Mover"), world.mover_count):
+                work = row["worked"], row["stopped"], row["damped"]
+                recorder.hinge_work[row["surface"]] = work
+            swings = module.array("swings", dtype("Swing"), world.swing_count).view(SWING)
+            recorder.swings = swings[np.argsort(swings["surface"], kind="stable")]
         recorder.contacts = world.impact_count
         recorder.gained = world.gained
         rows = module.array("totals", dtype("Total"), world.total_count)

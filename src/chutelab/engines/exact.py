@@ -59,31 +59,16 @@ class CornerError(RuntimeError):
 
 
 def run(machine: Machine, progress: Progress | None = None, *, apart: bool = False) -> Record:
-    """Run a machine whose particles do not interact.
+    """Run a machine whose particles do not interact; the same machine gives the same bits.
 
-    Parameters
-    ----------
-    machine : Machine
-        From `chutelab.machine.build`.
-    progress : callable, optional
-        Called with the share of particles that have ended, now and then; may end the run.
-    apart : bool
-        Keep the books of the particles apart: `Record.by_surface` is (N, S, 3) then.
+    Events are right to rounding error. `progress` is called now and then with the share of
+    particles that have ended, and may end the run. With `apart`, `Record.by_surface` is (N, S, 3):
+    an entry for each particle.
 
-    Returns
-    -------
-    Record
-        Events to rounding error; bit-identical for the same machine.
-
-    Raises
-    ------
-    ValueError
-        If the particles interact, or some but not all are points.
-    CornerError
-        If a spinning disk is held between surfaces of which one moves.
-    StalledError
-        If a particle has event after event without progress; its track ends there, and the
-        recording has those of all others.
+    Raises a `ValueError` if the particles interact, or some but not all are points; a `CornerError`
+    if a spinning disk is held between surfaces of which one moves; a `StalledError` if a particle
+    has event after event without progress: its track ends there, and the recording has those of all
+    others.
     """
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")

@@ -22,17 +22,7 @@ ENGINES = ("auto", *record.ENGINES)
 def choose(machine: Machine, engine: str | None = None) -> str:
     """Return the engine that runs first: exact, unless the scene needs or asks for another.
 
-    Parameters
-    ----------
-    machine : Machine
-        The scene, resolved.
-    engine : {"auto", "exact", "contact", "pymunk"}, optional
-        Overrides the scene's ``run.engine``.
-
-    Raises
-    ------
-    ValueError
-        If there is no engine of that name.
+    `engine` overrides the scene's ``run.engine``. Raises a `ValueError` if there is no such engine.
     """
     wanted = machine.engine if engine is None else engine
     if wanted not in ENGINES:

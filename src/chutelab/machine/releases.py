@@ -73,17 +73,10 @@ def squeeze(
 ) -> Squeeze | None:
     """Return which particles ride into others; None if none does.
 
-    A ride that something ends early counts as if it went on. Two that would be in each other on the
-    belt already do not count: one of them waits.
-
-    Parameters
-    ----------
-    scene : Scene
-        What is released, and where.
-    t, position : ndarray, (N,) and (N, 2)
-        When and where riders are released, s and m: planned, or of a run.
-    radius : float or ndarray, (N,), optional
-        Of the riders, m; by default that of the first kind of particles.
+    Riders are released at `t` (N,), s, and `position` (N, 2), m: planned, or of a run. Their radii,
+    m, are by default that of the first kind of particles. A ride that something ends early counts
+    as if it went on. Two that would be in each other on the belt already do not count: one of them
+    waits.
     """
     belt = scene.incoming
     if belt is None or not len(t) or not isinstance(belt.friction, str):
@@ -139,31 +132,17 @@ class RefusedError(SceneError):
 def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases, Floats | None]:
     """Have the core draw the releases of a scene; the same scene and seed give the same numbers.
 
-    Of a family each scene has one particle. Particles that meet start where no other of their
-    stream is, as far as the bed has room: an engine lets the others wait until their place is free.
-    None starts in a surface: one that is in it by rounding is moved out.
+    They are of all streams, one after the other, drawn in a module in which the scene's surfaces
+    are laid, see `machine.builder.lay`; of a family each scene has one particle. Also returned are
+    the radii, (N,), m, or None if all particles are alike. `watch` is called now and then; what it
+    raises ends the drawing.
 
-    Parameters
-    ----------
-    module : Module
-        In which the scene's surfaces are laid, see `machine.builder.lay`.
-    scenes : Scene or Family
-        What is released.
-    watch : callable
-        Called now and then; what it raises ends the drawing.
+    Particles that meet start where no other of their stream is, as far as the bed has room: an
+    engine lets the others wait until their place is free. None starts in a surface: one that is in
+    it by rounding is moved out.
 
-    Returns
-    -------
-    releases : Releases
-        Of all streams, one after the other.
-    radius : ndarray, (N,), or None
-        Radii, m; None if all particles are alike.
-
-    Raises
-    ------
-    RefusedError
-        If a box has not room for all, a particle would start inside a surface, or a belt that grips
-        by adhesion does not allow its speed.
+    Raises a `RefusedError` if a box has not room for all, a particle would start inside a surface,
+    or a belt that grips by adhesion does not allow its speed.
     """
     scene, family = scenes.scene, isinstance(scenes, Family)
     counts = [stream.count for stream in scene.streams]

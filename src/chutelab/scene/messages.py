@@ -155,12 +155,7 @@ def _keys(table: Sequence[str | int]) -> list[str]:
 def live_faults(document: Mapping[str, Any], live: Live) -> Iterator[Fault]:
     """Yield the keys of ``[live]`` that a scene has not, and the values that a key cannot have.
 
-    Parameters
-    ----------
-    document
-        The tables of the scene, which are valid.
-    live
-        Its table ``[live]``.
+    `document` is the scene's tables, which are valid.
     """
     for i, key in enumerate(live.controls or ()):
         if said := _refused(document, key):
@@ -199,13 +194,9 @@ def live_faults(document: Mapping[str, Any], live: Live) -> Iterator[Fault]:
 def live_of(scene: SceneTables, document: Mapping[str, Any]) -> dict[str, Any]:
     """Return ``[live]`` for a page: defaults filled in, and every key by index, not by name.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    document
-        Its tables as the page has them. If they measure the drop to the outgoing belt from
-        elsewhere than the scene, so do the drops that are returned: the belt is where it was meant.
+    `document` is the scene's tables as the page has them. If they measure the drop to the outgoing
+    belt from elsewhere than the scene, so do the drops that are returned: the belt is where it was
+    meant.
     """
     live, out = scene.live, scene.outgoing
     lower = 0.0 if out is None else document["outgoing"]["drop"] - out.drop

@@ -117,10 +117,11 @@ def _event(event: str) -> Iterator[Quantity]:
         ("vx_after", "m/s", "forward velocity just after {}", {}),
         ("vy_after", "m/s", "upward velocity just after {}", {}),
         ("count", "", f"particles that {verb}", {"impact": ITSELF}),
+        ("share", "", f"share of the particles that {verb}", {}),
     ):
         once = event in ("separation", "arrival", "sensor.SENSOR")
         if not (key.endswith("_after") and once) and (event, key) != ("sensor.SENSOR", "count"):
-            of: Of = "stream" if key == "count" else "particle"
+            of: Of = "stream" if key in ("count", "share") else "particle"
             columns = swept.get(event, ())
             yield Quantity(
                 f"{event}.{key}", unit, text.format(what), of, needs, columns=columns,
@@ -228,9 +229,12 @@ REGISTRY: Final = {
         _run("misses", "particles that never arrived", "", needs="outgoing", columns=ITSELF),
         *(_run(f"ended.{why}", f"particles whose track ended: {why}", "") for why in ENDINGS),
         _run("ledger.belt_work", "what the drives of all belts pay", of="total"),
-        _run("ledger.drive_work", "what moves surfaces: their turn, shake and travel"),
+        _run("ledger.drive_work", "what moves surfaces: their turn, shake and travel, and motors"),
         _run("ledger.restitution_loss", "loss of all bounces", of="total", columns=ITSELF),
         _run("ledger.friction_loss", "heat of all slip", of="total"),
+        _run("ledger.damper_loss", "loss in the dampers of hinges"),
+        _run("ledger.spring.start", "energy in the springs of hinges at the start"),
+        _run("ledger.spring.end", "energy in the springs of hinges at the end"),
         _run("ledger.residual", "energy that the ledger cannot explain: the numerical error",
              columns=ITSELF),
         _run("ledger.turned_over", "energy turned over, which the residual is measured by"),
@@ -244,6 +248,7 @@ REGISTRY: Final = {
              " width", "W", needs="outgoing", columns=ITSELF),
         _run("ledger.by_surface.SURFACE.belt_work", "what the drive of SURFACE pays"),
         _run("ledger.by_surface.SURFACE.drive_work", "what moves SURFACE"),
+        _run("ledger.by_surface.SURFACE.damper_loss", "loss in the damper of SURFACE"),
         _run("ledger.by_surface.SURFACE.restitution_loss", "loss of the bounces on SURFACE"),
         _run("ledger.by_surface.SURFACE.friction_loss", "heat of the slip on SURFACE"),
         _run("error.max", "largest relative error of particle 0 against the theory", "",

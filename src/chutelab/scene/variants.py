@@ -122,24 +122,13 @@ def numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, .
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a varied key is.
+    """What a varied key is."""
 
-    Attributes
-    ----------
-    path : str
-        The key as messages have it; free surfaces by index.
-    label : str
-        Its definition, up to the first semicolon or colon; of a free surface, after its name.
-    unit : str
-        "" for a pure number; "degrees" for angles.
-    whole : bool
-        Whether it takes whole numbers only.
-    """
-
-    path: str
+    path: str  # the key as messages have it; free surfaces by index
+    # its definition, up to the first semicolon or colon; of a free surface, after its name
     label: str
-    unit: str
-    whole: bool = False
+    unit: str  # "" for a pure number; "degrees" for angles
+    whole: bool = False  # whether it takes whole numbers only
 
 
 def quantity(scene: Scene, vary: Vary) -> Quantity:

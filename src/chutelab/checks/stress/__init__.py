@@ -93,7 +93,7 @@ def energy(e: Evidence) -> Verdict | None:
     """
     if not e.bounds.energy:
         return None
-    if e.crowd:
+    if e.machine.interact:
         return _energy_of_crowd(e)
     knots, offsets = e.recording.knots, e.recording.offsets
     total = np.sum(e.energies, axis=0) - knots["entries"][:, 0]
@@ -153,7 +153,7 @@ def momentum(e: Evidence) -> Verdict | None:
     sizes m |v|.
     """
     m = e.machine
-    if not e.crowd or not all(isinstance(piece, Segments) for piece in e.pieces):
+    if not e.machine.interact or not all(isinstance(piece, Segments) for piece in e.machine.pieces):
         return None
     along = np.eye(2)
     if len(m.segments.length):
@@ -205,7 +205,7 @@ def spin(e: Evidence) -> Verdict | None:
     was found is of the radius.
     """
     m = e.machine
-    if not e.crowd or e.pieces or m.gravity > 0.0:
+    if not e.machine.interact or e.machine.pieces or m.gravity > 0.0:
         return None
     first, last = e.recording.ends()
     middle = last["position"].mean(axis=0)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core import number
-from chutelab.machine import Machine, Pieces
+from chutelab.machine import Machine
 from chutelab.results import Kind, Recording
 from chutelab.results.laws import Findings, alike, examine, inner_radius
 from chutelab.util.arrays import Floats, Ints
@@ -52,29 +52,14 @@ class Evidence:
         return self.recording.machine
 
     @property
-    def engine(self) -> str:
-        """Engine that ran."""
-        return self.recording.engine
-
-    @property
     def dt(self) -> float | None:
         """Its step, s; None for the exact engine."""
-        return None if self.engine == "exact" else self.machine.dt
-
-    @property
-    def crowd(self) -> bool:
-        """Whether particles meet each other."""
-        return self.machine.interact
+        return None if self.recording.engine == "exact" else self.machine.dt
 
     @property
     def alike(self) -> bool:
         """Whether all is left to Chipmunk, in steps that are all alike."""
         return alike(self.recording)
-
-    @property
-    def pieces(self) -> tuple[Pieces, ...]:
-        """All pieces of its surfaces."""
-        return self.machine.pieces
 
     @cached_property
     def radii(self) -> Floats:
@@ -154,7 +139,7 @@ COLLISIONS = 300
 
 def no_one_through(e: Evidence) -> Verdict | None:
     """No centre passes a surface between its ends; the figure counts the passages."""
-    if not e.pieces or not len(e.recording.knots):
+    if not e.machine.pieces or not len(e.recording.knots):
         return None
     found = e.found.hits[e.found.hits["passes"] == 1]
     return Verdict(len(found), 0.0, _first(e, "particle {} through {} at t = {:.6g} s", found))
@@ -165,7 +150,7 @@ def depth(e: Evidence) -> Verdict | None:
 
     It is 0 where all are proven to be no deeper. What overlapped at the release may go on doing so.
     """
-    if not e.pieces or not len(e.recording.knots):
+    if not e.machine.pieces or not len(e.recording.knots):
         return None
     found = e.found.hits[np.argsort(-e.found.hits["depth"], kind="stable")]
     deepest = float(found["depth"].max(initial=0.0))
@@ -183,7 +168,7 @@ def _first(e: Evidence, said: str, found: NDArray[Any]) -> str:
 
 def overlap(e: Evidence) -> Verdict | None:
     """No two disks overlap by more than they approach in a step; the figure is in m."""
-    if not e.crowd:
+    if not e.machine.interact:
         return None
     found = []
     for now in np.concatenate([_instants(e), _some(e, Kind.COLLISION)["t"]]):
@@ -202,7 +187,7 @@ def pressed(e: Evidence) -> Verdict | None:
     over several steps, a fifth in a millisecond, so it promises nothing on how long: there the
     bound is that of `overlap`.
     """
-    if not e.crowd or e.dt is None:
+    if not e.machine.interact or e.dt is None:
         return None
     found = []
     for now, (i, j), before, after in _pairs(e, e.dt):
@@ -210,7 +195,7 @@ def pressed(e: Evidence) -> Verdict | None:
         deep = (e.radii[i] + e.radii[j] - apart) / np.minimum(e.radii[i], e.radii[j])
         at = int(np.argmax(deep))
         found.append((deep[at], f"particles {i[at]} and {j[at]} at t = {now:.6g} s"))
-    bound = PRESSED if e.engine == "contact" else 2.0 * e.bounds.late / e.radii.min()
+    bound = PRESSED if e.recording.engine == "contact" else 2.0 * e.bounds.late / e.radii.min()
     return worst(found, bound, "r")
 
 
@@ -220,7 +205,7 @@ def no_one_through_another(e: Evidence) -> Verdict | None:
     Slow are two that come nearer by less than the smaller radius in a step: an engine sees them in
     touch before they are inside. They pass where the centre of the smaller gets into the other.
     """
-    if not e.crowd or e.dt is None:
+    if not e.machine.interact or e.dt is None:
         return None
     passed: dict[tuple[int, int], str] = {}
     for now, pairs, before, after in _pairs(e, e.dt):
@@ -293,7 +278,7 @@ def on_something(e: Evidence) -> Verdict | None:
     events = events[(events["surface"] >= 0) & (events["surface"] < len(surfaces))]
     if len(events):
         off = np.full((len(surfaces), len(events)), inf)
-        for piece in e.pieces:
+        for piece in e.machine.pieces:
             gap = np.abs(piece.gap(events["position"], e.radii[events["particle"]]))
             there = piece.there(events["t"], late)
             row = off[piece.surface]
@@ -312,22 +297,22 @@ def on_something(e: Evidence) -> Verdict | None:
     if not found:
         return None
     b = e.bounds
-    return worst(found, b.rounding + b.arcs + (2.0 if e.crowd else 1.0) * b.late, "m")
+    return worst(found, b.rounding + b.arcs + (2.0 if e.machine.interact else 1.0) * b.late, "m")
 
 
 def released_free(e: Evidence) -> Verdict | None:
     """No particle is released inside another or a surface; the figure is how deep, m."""
     releases = e.recording.select(Kind.RELEASE)
-    if not (e.crowd or len(e.machine.surfaces)) or not len(releases):
+    if not (e.machine.interact or len(e.machine.surfaces)) or not len(releases):
         return None
     found = []
-    for piece, name in zip(e.pieces, e.machine.names, strict=True):
+    for piece, name in zip(e.machine.pieces, e.machine.names, strict=True):
         there = releases[piece.there(releases["t"])]
         if len(there):
             gap = piece.gap(there["position"], e.radii[there["particle"]])
             at = int(np.argmin(gap))
             found.append((-gap[at], f"particle {there['particle'][at]} in {name}"))
-    for event in _some(e, Kind.RELEASE) if e.crowd else ():
+    for event in _some(e, Kind.RELEASE) if e.machine.interact else ():
         (place,), _ = e.recording.at([event["t"]])
         apart = np.nan_to_num(np.hypot(*(place - event["position"]).T), nan=inf)
         deep = e.radii[event["particle"]] + e.radii - apart
@@ -352,7 +337,7 @@ def settled_to_stay(e: Evidence) -> Verdict | None:
     last = e.recording.knots[e.recording.offsets[settled + 1] - 1]
     near = e.bounds.rounding + ON_ARCS * e.radius + e.bounds.late
     thrown: dict[int, str] = {}
-    for piece, name in zip(e.pieces, e.machine.names, strict=True):
+    for piece, name in zip(e.machine.pieces, e.machine.names, strict=True):
         if piece.speed != 0.0 and piece.surface != m.landing:
             on = piece.gap(last["position"], e.radii[settled]) < near
             for i in settled[on & piece.there(last["t"])].tolist():
@@ -375,7 +360,7 @@ def cone(e: Evidence) -> Verdict | None:
         return None
     kinds = e.machine.releases.kind
     friction = e.machine.pair_friction[kinds[events["particle"]], kinds[events["other"]]]
-    if e.engine == "pymunk":
+    if e.recording.engine == "pymunk":
         friction = np.maximum(friction, LEAST)
     alone = np.flatnonzero(events["other"] < 0)
     struck, _, _ = _struck(e, events[alone])
@@ -396,7 +381,7 @@ def rebound(e: Evidence) -> Verdict | None:
     be measured by. The figure is how far off it is, as a share of the largest speed.
     """
     events = e.recording.select(Kind.IMPACT, Kind.LANDING)
-    if e.alike or e.crowd or not e.radii.all():
+    if e.alike or e.machine.interact or not e.radii.all():
         return None
     struck, away, touched = _struck(e, events)
     events, struck, away = (of[touched == 1] for of in (events, struck, away))
@@ -409,7 +394,7 @@ def rebound(e: Evidence) -> Verdict | None:
     rounding, pull = ROUNDINGS * EPS, e.machine.gravity * (e.dt or 0.0) / e.bounds.speed
     stays = (np.abs(after) <= rounding * e.bounds.speed) & (due <= pull * e.bounds.speed)
     off = np.where(stays, 0.0, np.abs(after - due)) / e.bounds.speed
-    return _verdict(events, off, "of v", pull if e.engine == "pymunk" else 0.0)
+    return _verdict(events, off, "of v", pull if e.recording.engine == "pymunk" else 0.0)
 
 
 def _verdict(events: NDArray[Any], off: Floats, unit: str, more: float = 0.0) -> Verdict:
@@ -429,7 +414,7 @@ def _struck(e: Evidence, events: NDArray[Any]) -> tuple[Ints, Floats, Ints]:
     best, touched = np.full(len(events), inf), np.zeros(len(events), dtype=int)
     struck, away = np.zeros(len(events), dtype=int), np.zeros((len(events), 2))
     near = e.bounds.rounding + e.bounds.arcs + e.bounds.late
-    for n, piece in enumerate(e.pieces):
+    for n, piece in enumerate(e.machine.pieces):
         out, face = piece.away(events["position"]), piece.normal(events["position"])
         # Beside a face the way is along its normal; of small disks a place tells it roughly.
         high = (out * face).sum(axis=1)[:, None] * face
@@ -446,6 +431,6 @@ def _of_pieces(e: Evidence, events: NDArray[Any], struck: Ints, name: str) -> Fl
     """Return what pieces have with the particles that strike them, (c,)."""
     count = len(e.machine.pair_friction)
     # A row for each piece, a column for each kind of particles.
-    values = np.array([np.broadcast_to(getattr(piece, name), count) for piece in e.pieces])
+    values = np.array([np.broadcast_to(getattr(piece, name), count) for piece in e.machine.pieces])
     kinds = e.machine.releases.kind[events["particle"]]
     return np.asarray(values.reshape(-1, count)[struck, kinds])

@@ -386,14 +386,9 @@ SAID: Final = (
 
 
 def data_of(exercise: Exercise, explain: str = "") -> dict[str, Any]:
-    """Return an exercise as plain data for JSON, in its language.
+    """Return an exercise as plain data for JSON, in its language, which is the page's.
 
-    Parameters
-    ----------
-    exercise
-        In the language of the page.
-    explain
-        What students are to explain in their own words; "" for nothing.
+    `explain` is what students are to explain in their own words; "" for nothing.
     """
     said = words(exercise.language)
     return {

@@ -75,21 +75,12 @@ def table(rows: Sequence[tuple[str, ...]]) -> str:
 
 @dataclass(frozen=True, repr=False)
 class Reply:
-    """The reply to an answer.
+    """The reply to an answer."""
 
-    Attributes
-    ----------
-    question
-        Its number; 0 if there is no such one.
-    verdict, text
-        The result of judging the answer, and what to tell the student.
-    mistake, called
-        The known mistake that it looks like, or empty: its name in English, and in `language`.
-    """
-
-    question: int
+    question: int  # its number; 0 if there is no such one
     verdict: Verdict
-    text: str
+    text: str  # what to tell the student
+    # the known mistake that it looks like, or empty: its name in English, and in `language`
     mistake: str = ""
     called: str = ""
     language: str = "en"
@@ -302,12 +293,8 @@ def judge(case: Case, answer: float, others: Iterable[tuple[str, float]] = ()) -
     """Judge a finite answer.
 
     It is the right one, or a known mistake, or the right one of another student, or two mistakes at
-    once, or off.
-
-    Parameters
-    ----------
-    others
-        Name and right answer to the same question of others; looked at only if need be.
+    once, or off. `others` are name and right answer to the same question of others; they are looked
+    at only if need be.
     """
     said = words(case.numbers.language)
 

@@ -179,6 +179,11 @@ class Lesson(Table):
         return split(self._folder)[0]
 
     @property
+    def heading(self) -> str:
+        """Number and title."""
+        return self.title if self.number is None else f"{self.number}. {self.title}"
+
+    @property
     def columns(self) -> dict[str, Column]:
         """What its tables tell of a run, by formulas."""
         return {one.value: one for step in self.steps for one in step.columns if one.value}

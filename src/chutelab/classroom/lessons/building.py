@@ -41,7 +41,7 @@ from chutelab.classroom.lessons import (
     split,
     unusable,
 )
-from chutelab.classroom.lessons.sheets import asked, table
+from chutelab.classroom.lessons.sheets import asked, table, titled
 from chutelab.engines.simulation import judged
 from chutelab.scene import Fault, to_dict
 from chutelab.util.files import aside, refuse_other, whole
@@ -82,23 +82,11 @@ def build(
 ) -> Built:
     """Make film and machine picture of a lesson, in its language, unless they are up to date.
 
-    The same lesson and versions give the same bytes.
+    The same lesson and versions give the same bytes. They go into `folder`, made if need be, by
+    default the lesson's own; with `force` they are made in any case. `progress` is called with the
+    share of the simulation that is done, 0 to 1.
 
-    Parameters
-    ----------
-    folder
-        Where to write it (made if need be); default: the lesson's own folder.
-    force
-        Make them even if they are.
-    progress
-        Called with the share of the simulation that is done, 0 to 1.
-
-    Raises
-    ------
-    SceneError
-        If the scene cannot be run.
-    OSError
-        If the file cannot be written.
+    Raises a `SceneError` if the scene cannot be run; an `OSError` if the file cannot be written.
     """
     path = (lesson.folder if folder is None else folder) / called_in(PICTURE, lesson.language)
     wanted = stamp_of(lesson)
@@ -196,19 +184,11 @@ _MOST: Final = 60
 def start(path: str | Path, model: Lesson | None = None) -> Path:
     """Make the folder of a new lesson, whole or not at all.
 
-    Parameters
-    ----------
-    path
-        The folder; its name is the lesson's: lower-case letters, digits and hyphens.
-    model
-        A lesson to copy with all its files; by default there is a template.
+    The folder's name is the lesson's: lower-case letters, digits and hyphens. `model` is a lesson
+    to copy with all its files; by default there is a template.
 
-    Raises
-    ------
-    LessonError
-        If the name will not do, or something is there already: nothing is overwritten.
-    OSError
-        If it cannot be written.
+    Raises a `LessonError` if the name will not do, or something is there already: nothing is
+    overwritten; an `OSError` if it cannot be written.
     """
     path = Path(path)
     if not _NAME.fullmatch(path.name) or len(path.name) > _MOST:
@@ -276,12 +256,9 @@ def notebook_of(lesson: Lesson) -> str:
         cells.append(cell | {"source": source.splitlines(keepends=True)})
 
     text, code = partial(add, "markdown"), partial(add, "code")
-    title = lesson.title
-    if lesson.number is not None:
-        title = say("sheet-title", number=lesson.number, title=title)
     needs = re.search(r"^# needs: *(.*)$", _source(lesson), re.MULTILINE)
     extras = say("notebook-needs", extras=needs[1] if needs else "notebook")
-    text("title", f"# {title}", f"**{lesson.question}**", say("notebook-order"), extras)
+    text("title", f"# {titled(lesson)}", f"**{lesson.question}**", say("notebook-order"), extras)
     shipped = any(one.folder == lesson.folder for one in shipped_lessons())
     name = f'"{lesson.name}"' if shipped else '"."'
     language = "" if lesson.language == "en" else f', language="{lesson.language}"'

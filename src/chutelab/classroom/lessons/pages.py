@@ -67,32 +67,14 @@ def bundle(
 ) -> list[Path]:
     """Write web pages into a folder: an index of the lessons, and a folder with a page for each.
 
-    Everything is made aside first; files that are there already are replaced, others stay.
+    Everything is made aside first; files that are there already are replaced, others stay. The
+    index has the lessons in the order given. With `wheel` the wheel of this chutelab is put in, and
+    how to install from it. `progress` is called with the share that is done, 0 to 1. Returns the
+    files written.
 
-    Parameters
-    ----------
-    lessons
-        In the order of the index.
-    folder
-        Made if need be.
-    progress
-        Called with the share that is done, 0 to 1.
-    wheel
-        Put the wheel of this chutelab in, and how to install from it.
-
-    Returns
-    -------
-    list of Path
-        The files written.
-
-    Raises
-    ------
-    InputError
-        If a lesson's scene cannot be run, or shown as a live page.
-    MissingLibraryError
-        If chutelab is not installed, so that there is no wheel.
-    OSError
-        If it cannot be written.
+    Raises an `InputError` if a lesson's scene cannot be run, or shown as a live page; a
+    `MissingLibraryError` if chutelab is not installed, so that there is no wheel; an `OSError` if
+    it cannot be written.
     """
     folder = Path(folder)
     names = [INDEX, *_SHARED]
@@ -181,7 +163,7 @@ def _lesson(lesson: Lesson, made: Path, before: str, after: str, *, wheel: bool)
     note = f"<p><em>{say('untranslated')}</em></p>\n" if lesson.untranslated else ""
     facts = {
         "folder": _address(lesson.folder.name),
-        "title": heading(lesson),
+        "title": escape(lesson.heading),
         "question": escape(lesson.question),
         "about": say("show-about", level=say(f"level-{lesson.level}"), minutes=lesson.minutes),
         "film": film_name,
@@ -214,30 +196,17 @@ def _lesson(lesson: Lesson, made: Path, before: str, after: str, *, wheel: bool)
 def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = None) -> int:
     """Write the live page of a lesson with its exercise, in its language; return the size in bytes.
 
-    In a frame it tells the page around it, by ``postMessage``, ``{chutelab: "ready", lesson}``. A
-    page that answers ``{chutelab: "begin", student, suspend_data}``, "" for the first time, names
-    the student and keeps the state: after each change it is told ``{chutelab: "progress",
-    lesson, student, done, total, score, status, suspend_data, result}``, with a score of 100 for
-    all, the status "incomplete" or "completed", at most 4000 characters of data to go on from, and
-    the result as `chutelab.classroom.grading` takes it.
+    A file that is there is replaced; `home` is text and address of a link back. In a frame the page
+    tells the page around it, by ``postMessage``, ``{chutelab: "ready", lesson}``. A page that
+    answers ``{chutelab: "begin", student, suspend_data}``, "" for the first time, names the student
+    and keeps the state: after each change it is told ``{chutelab: "progress", lesson, student,
+    done, total, score, status, suspend_data, result}``, with a score of 100 for all, the status
+    "incomplete" or "completed", at most 4000 characters of data to go on from, and the result as
+    `chutelab.classroom.grading` takes it.
 
-    Parameters
-    ----------
-    lesson
-        One with a table ``[page]``.
-    path
-        A file; one that is there is replaced.
-    home
-        Text and address of a link back.
-
-    Raises
-    ------
-    LessonError
-        If the lesson says of no page what it is to offer.
-    InputError
-        If its scene cannot be shown as a live page.
-    OSError
-        If the page cannot be written.
+    Raises a `LessonError` if the lesson has no table ``[page]``, which says what the page offers;
+    an `InputError` if its scene cannot be shown as a live page; an `OSError` if the page cannot be
+    written.
     """
     from chutelab.pictures.live.page import write
 
@@ -255,7 +224,7 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
             data["text"] = data["text"].replace(place, place + value(key))
     told_lesson = {
         "name": lesson.name,
-        "title": lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}",
+        "title": lesson.heading,
         "question": lesson.question,
         "steps": steps,
     }
@@ -282,13 +251,8 @@ _PICTURE = re.compile(r'(?<= src=\\")[\w.-]+\.png(?=\\")')
 """The file of a picture in a text of a lesson, in JSON."""
 
 
-def heading(lesson: Lesson) -> str:
-    """Return number and title of a lesson, as HTML."""
-    return escape(lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}")
-
-
 def _link(lesson: Lesson, relation: str, form: str) -> str:
-    text = form.format(heading(lesson))
+    text = form.format(escape(lesson.heading))
     return f'<a rel="{relation}" href="../{_address(lesson.folder.name, INDEX)}">{text}</a>'
 
 
@@ -322,7 +286,7 @@ def package(lesson: Lesson, path: str | Path) -> Path:
     values = {
         # An XML name begins with a letter and has no spaces.
         "identifier": "chutelab-" + re.sub(r"[^A-Za-z0-9_.-]", "-", lesson.name),
-        "title": printable(heading(lesson)),
+        "title": printable(escape(lesson.heading)),
         "language": lesson.language,
         "page": LIVE,
         "alone": escape(words(lesson.language).say("scorm-alone")),

@@ -42,10 +42,7 @@ def sheet(lesson: Lesson, which: str) -> str:
 
     The student's sheet asks, and has no number of the answer on it.
     """
-    say = words(lesson.language).say
-    title = lesson.title
-    if lesson.number is not None:
-        title = say("sheet-title", number=lesson.number, title=title)
+    say, title = words(lesson.language).say, titled(lesson)
     film = f"![{lesson.picture.film or lesson.title}]({picture_of(lesson, 'lesson.gif')})"
     match which:
         case "student":
@@ -58,6 +55,13 @@ def sheet(lesson: Lesson, which: str) -> str:
     if lesson.untranslated:
         parts.insert(0, f"*{say('untranslated')}*")
     return "\n\n".join([f"# {title}", *(part.strip() for part in parts if part)]) + "\n"
+
+
+def titled(lesson: Lesson) -> str:
+    """Return what stands above a lesson's sheets and its notebook."""
+    number, title = lesson.number, lesson.title
+    say = words(lesson.language).say
+    return title if number is None else say("sheet-title", number=number, title=title)
 
 
 def worksheet(lesson: Lesson) -> str:

@@ -180,14 +180,8 @@ def faults_of(
     """Yield what cannot be done on the page of the steps.
 
     That is a key that cannot be changed there, a value out of its range, a quantity that the
-    machine has not, and lists that do not fit together.
-
-    Parameters
-    ----------
-    machine
-        Loads the machine with keys changed, or raises a `SceneError`.
-    live
-        What the page offers: ``controls`` and ``ranges``.
+    machine has not, and lists that do not fit together. `machine` loads the machine with keys
+    changed, or raises a `SceneError`; `live` has what the page offers, ``controls`` and ``ranges``.
     """
     controls, ranges = tuple(live.get("controls", ())), live.get("ranges", {})
     for n, step in enumerate(steps):

@@ -31,28 +31,15 @@ LOOK, SLICE = 64, 0.05
 def run(machine: Machine, progress: Progress | None = None) -> Record:
     """Run a machine in Pymunk.
 
-    Parameters
-    ----------
-    machine : Machine
-        From `chutelab.machine.build`; the radius must be more than 0.
-    progress : callable, optional
-        Called now and then with the share of the run that is done; may end the run.
+    `progress` is called now and then with the share of the run that is done, and may end the run.
+    With `align`, a lone particle's blows are right to rounding error, its lasting contacts of order
+    2 in the step, which is no longer than `dt` and half a radius' way. Particles that meet, boxes,
+    what hangs on strings, surfaces that move, and steps that are all alike, are of order 1: `dt`
+    times the speed should be less than the radius, or half a box's width, or they overlap by as
+    much, and pass through surfaces.
 
-    Returns
-    -------
-    Record
-        With `align`, a lone particle's blows to rounding error and its lasting contacts of order 2
-        in the step, which is no longer than `dt` and half a radius' way. Particles that meet,
-        boxes, what hangs on strings, surfaces that move, and steps that are all alike, of order 1:
-        `dt` times the speed should be less than the radius, or half a box's width, or they overlap
-        by as much, and pass through surfaces.
-
-    Raises
-    ------
-    ValueError
-        If the particle has no radius.
-    StalledError
-        If a lone particle goes on without getting on; it has the recording so far.
+    Raises a `ValueError` if a particle has no radius; a `StalledError`, which has the recording so
+    far, if a lone particle goes on without getting on.
     """
     if np.min(machine.particle.radius) <= 0.0:
         raise ValueError("particle.radius = 0: pymunk needs disks with a radius above 0 m")

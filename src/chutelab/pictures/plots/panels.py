@@ -49,23 +49,13 @@ from chutelab.util.tables import number
 
 @dataclass(frozen=True)
 class Arc:
-    """Free flight between two times, SI units, world frame.
+    """Free flight between two times, world frame."""
 
-    Attributes
-    ----------
-    begin, end : float
-        s, on the clock that starts at separation.
-    position, velocity : tuple of float
-        m and m/s, at `begin`.
-    gravity : float
-        m/s², pointing down.
-    """
-
-    begin: float
+    begin: float  # s, on the clock that starts at separation; so is `end`
     end: float
-    position: tuple[float, float]
-    velocity: tuple[float, float]
-    gravity: float
+    position: tuple[float, float]  # m, at `begin`
+    velocity: tuple[float, float]  # m/s, at `begin`
+    gravity: float  # m/s², pointing down
 
     def at(self, times: ArrayLike) -> tuple[Floats, Floats]:
         """Return positions and velocities, (T, 2) each, at times (T,) since separation."""

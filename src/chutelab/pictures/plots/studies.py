@@ -40,7 +40,7 @@ from chutelab.studies.discharge import SideBySide, stream_at
 from chutelab.studies.measured import Fit, Residuals
 from chutelab.studies.repeats import Repeats
 from chutelab.studies.sweep import COLUMNS, REASON, Sweep, no_column
-from chutelab.studies.sweep.rows import ERROR, RARE
+from chutelab.studies.sweep.rows import ERROR, RARE, mean_and_error
 from chutelab.theory.discharge import NAMES
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.tables import many, plus_minus
@@ -61,6 +61,8 @@ def scan(solution: Solution) -> Picture:
     varied.
     """
     found = solution.scan
+    if solution.outcomes is not None:
+        return _searched(solution)
     if found is None:
         raise ValueError("several keys were varied: there is no line to draw")
     figure = Picture((9.0, 5.6))
@@ -105,6 +107,43 @@ def scan(solution: Solution) -> Picture:
             )  # fmt: skip
     _titles(figure, solution.base.title, solution.asked)
     style.legend_above(ax, 4)
+    return figure
+
+
+def _searched(solution: Solution) -> Picture:
+    """Draw the variants of a search with seeds: numbers with bars over one key, a map of two."""
+    points, seeds = solution.variants, solution.outcomes
+    assert points is not None
+    assert seeds is not None
+    mean, error = mean_and_error(np.moveaxis(seeds, 1, 0))
+    figure = Picture((9.0, 5.6))
+    ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
+    name, unit = solution.quantities[0], solution.units[0]
+    factor, said = style.scaled(mean[:, :1], unit)
+    keys = [with_unit(one.key, one.unit) for one in solution.ranges[:2]]
+    label = with_unit(name, said)
+    style.dress(ax, keys[0], keys[1] if len(keys) > 1 else label)
+    best = solution.answer if solution.solved or solution.nearest else None
+    if len(keys) > 1:
+        known = ax.scatter(points[:, 0], points[:, 1], c=factor * mean[:, 0], cmap=COLORS, s=22.0)
+        figure.colorbar(known, ax=ax, pad=0.02).set_label(label, fontsize=style.NORMAL)
+    else:
+        look: dict[str, Any] = {"fmt": "o", "ms": 4.0, "color": style.TRACK, "capsize": 2.5}
+        ax.errorbar(points[:, 0], factor * mean[:, 0], factor * error[:, 0], **look)
+        if best is not None and best.wanted:
+            ax.axhline(factor * best.wanted[0], color=style.ANALYTIC, ls="--", label="target")
+    if best is not None and best.errors:
+        up = best.values[1] if len(keys) > 1 else factor * best.found[0]
+        size = best.errors[1] if len(keys) > 1 else factor * best.found_errors[0]
+        text = "answer" if solution.solved else "nearest"
+        look = {"fmt": "o" if solution.solved else "X", "ms": 8.0, "color": style.STRIKE}
+        look |= {"capsize": 4.0, "zorder": 6.0, "label": text}
+        ax.errorbar(best.values[0], up, size, best.errors[0], **look)
+        ax.set_title(
+            ", ".join(map(plus_minus, best.values, best.errors)), fontsize=style.NORMAL, loc="left"
+        )
+        ax.legend(loc="best", fontsize=style.SMALL)
+    _titles(figure, solution.base.title, solution.asked)
     return figure
 
 

@@ -12,6 +12,7 @@ piece by piece; several keys by a global search with a seed, and a polish.
 
 - `evaluation`: what can be aimed at and varied, the one place where variants are run, and slopes.
 - `roots`: one key: smooth pieces, all roots, all minima.
+- `noisy`: streams, whose numbers differ from seed to seed.
 - `answers`: a `Solution`, in numbers and in words.
 - `uncertainty`: how uncertain inputs spread, and which of them matters: an `Uncertainty`.
 """
@@ -19,21 +20,24 @@ piece by piece; several keys by a global search with a seed, and a polish.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
-from math import isfinite
-from typing import Any, Final
+from math import inf, isfinite
+from time import monotonic
+from typing import Any, Final, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.scene import AnyScene, Scene, load
-from chutelab.scene.variants import Varied, refuse_texts
+from chutelab.scene.variants import Varied, drawn, refuse_texts
 from chutelab.studies.design import roots
 from chutelab.studies.design.answers import Answer, Goal, Solution
 from chutelab.studies.design.evaluation import (
     Evaluator,
     Quantity,
     Span,
+    Stopped,
     measured,
     ranges,
     scipy,
@@ -41,15 +45,19 @@ from chutelab.studies.design.evaluation import (
     value,
 )
 from chutelab.studies.design.evaluation import target as wish
+from chutelab.studies.design.noisy import Found, Wishes, search, spreads_of
 from chutelab.studies.design.roots import CLOSE, Scan, level, minima
 from chutelab.studies.design.uncertainty import Uncertainty, uncertainty
+from chutelab.studies.sweep import Crew, crew
 from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
 from chutelab.util.errors import InputError as DesignError
+from chutelab.util.tables import rounded
 
 __all__ = [
     "Answer",
     "DesignError",
+    "How",
     "Solution",
     "Uncertainty",
     "maximize",
@@ -116,6 +124,71 @@ def least(
     return scaled(searched.x), float(searched.fun)
 
 
+def constrained(
+    columns: Callable[[Floats], Floats], wishes: Wishes, ranges: Sequence[Span], seed: int
+) -> tuple[Floats, float]:
+    """Return where wishes come true that are more than one, (K,), and by how much they do not.
+
+    `columns` takes points (N, K) and gives what `Wishes.columns` does. A global search with
+    penalties is polished by sequential quadratic programming.
+    """
+    optimize = scipy("optimize")
+    low, high = np.array([(one.low, one.high) for one in ranges]).T
+
+    def scaled(shares: Floats) -> Floats:
+        return np.asarray(np.clip(low + shares * (high - low), low, high))
+
+    spread = scipy("stats.qmc").Sobol(len(ranges), seed=seed).random_base2(6)
+    sizes = spreads_of(columns(scaled(spread)))
+
+    def merit(shares: Floats) -> Floats:
+        found = wishes.merit(columns(scaled(np.atleast_2d(shares.T))), sizes)
+        return np.where(np.isfinite(found), found, NOWHERE)
+
+    searched = optimize.differential_evolution(
+        merit, [(0.0, 1.0)] * len(ranges), seed=seed, popsize=POPULATION, maxiter=GENERATIONS,
+        tol=1e-8, atol=1e-12, init="sobol", polish=False, vectorized=True, updating="deferred",
+    )  # fmt: skip
+    if searched.fun >= NOWHERE:
+        return searched.x, np.nan
+    count = len(wishes.targets)
+
+    def part(start: int, stop: int) -> Callable[[Floats], Floats]:
+        def of(shares: Floats) -> Floats:
+            found = columns(scaled(shares[np.newaxis]))[0] / sizes
+            return np.asarray(np.nan_to_num(found[start:stop], nan=NOWHERE))
+
+        return of
+
+    rules = [{"type": "eq", "fun": part(0, count)}] * bool(count)
+    rules += [{"type": "ineq", "fun": part(count, count + len(wishes.limits))}] * bool(
+        wishes.limits
+    )
+    least_of = part(-2, -1)
+    polished = optimize.minimize(
+        lambda shares: float(least_of(shares)[0]) if wishes.objective is not None else 0.0,
+        searched.x, method="SLSQP", bounds=[(0.0, 1.0)] * len(ranges), constraints=rules,
+        options={"ftol": 1e-14, "eps": 1e-7, "maxiter": 200},
+    )  # fmt: skip
+    # What is kept to a rounding is kept; of two points that do, the lower one counts.
+    tried = np.stack([np.clip(polished.x, 0.0, 1.0), searched.x])
+    found = columns(scaled(tried))
+    missed = wishes.missed(found, sizes).max(axis=-1)
+    best = int(np.argmin(np.where(missed <= KEPT, wishes.merit(found, sizes), np.inf)))
+    if missed[best] > KEPT:
+        best = int(np.argmin(np.nan_to_num(missed, nan=np.inf)))
+    return scaled(tried[best]), float(missed[best])
+
+
+KEPT: Final = 1e-6
+"""Miss of a target or limit, in its spread over the range, that is none."""
+
+REPEAT: Final = 8
+"""Seeds of a search among streams whose particles meet."""
+
+NOISY_POINTS: Final = 96
+"""Variants of such a search, at most."""
+
 POINTS: Final = 181
 """Of the scan over one key: a quarter of a second, and half a degree of a plate's angles."""
 
@@ -126,14 +199,52 @@ MORE: Final = 400
 """Variants beyond the scan that a search over one key runs, about; for the progress."""
 
 
+class How(TypedDict, total=False):
+    """How `solve`, `minimize` and `maximize` search.
+
+    Attributes
+    ----------
+    subject_to : mapping
+        Limits of quantities: ``{"arrival.share": (0.95, None)}``, least and most.
+    repeat : int
+        Seeds that each variant is run with; default: `REPEAT` where particles meet, else 1. With
+        several, quantities are means, and the answer has its error.
+    deviations : float
+        What is least or largest is the mean, worsened by so many standard deviations of one run.
+    points : int
+        With one key and one seed: how many values are looked at first, `POINTS`. Two solutions
+        between neighbours are found only if the quantity bends visibly between them. With several
+        seeds: variants at most, `NOISY_POINTS`.
+    seed : int
+        Of the draws of the search, with several keys or seeds.
+    jobs, team : int, Crew
+        Processes to spread the runs over, 0 is one for each processor; or who does the work, see
+        `chutelab.studies.sweep.crew`.
+    max_seconds : float
+        After this time the search ends with what is known.
+    progress : callable
+        Called with the share that is done, 0 to 1.
+    """
+
+    subject_to: Mapping[str, tuple[float | str | None, float | str | None]]
+    repeat: int | None
+    deviations: float
+    points: int | None
+    seed: int
+    jobs: int
+    team: Crew | None
+    max_seconds: float
+    progress: Progress | None
+
+
 def solve(
     scene: AnyScene,
     vary: Varied,
     target: Mapping[str, float | str] | Sequence[tuple[str, float | str]],
     *,
-    points: int = POINTS,
-    seed: int = 0,
-    progress: Progress | None = None,
+    minimize: str | None = None,
+    maximize: str | None = None,
+    **how: Unpack[How],
 ) -> Solution:
     """Find the values of some keys for which a quantity is what it should be.
 
@@ -146,18 +257,16 @@ def solve(
     target : mapping, or sequence of pairs
         ``{QUANTITY: VALUE}``: a quantity of the run, and the number, key of the scene or quantity
         that it is to equal. With several keys there may be several targets, up to one a key.
-    points : int
-        With one key: how many values are looked at first. Two solutions between neighbours are
-        found only if the quantity bends visibly between them.
-    seed : int
-        With several keys: of the global search.
-    progress : callable, optional
-        Called with the share that is done, 0 to 1.
+    minimize, maximize : str, optional
+        Of all solutions, the one where this quantity is least or largest; with more keys than
+        targets.
+    **how
+        See `How`.
 
     Returns
     -------
     Solution
-        All solutions, with one key. With several keys, one.
+        All solutions, with one key and one seed. Else one, with several seeds with its error.
 
     Raises
     ------
@@ -166,7 +275,9 @@ def solve(
     SceneError
         If the scene itself cannot be run.
     ImportError
-        Without SciPy.
+        Without SciPy; of several seeds without scikit-learn.
+    KeyboardInterrupt
+        With the `Solution` that is known so far as its ``solution``, if any variant has run.
 
     Examples
     --------
@@ -183,47 +294,63 @@ def solve(
     last = "--target {}={}".format(*pairs[-1])
     if len({left.key for left, _ in wishes}) < len(wishes):
         raise InputError("this quantity has a target already", last)
-    what = ", ".join(f"{left.name} = {right.name}" for left, right in wishes)
-    sides = [side for wanted in wishes for side in wanted]
-    search = _Search("solve", what, sides, scene, vary, points, seed, progress)
-    keys = len(search.ranges)
-    if len(wishes) > keys:
-        raise InputError(f"{len(wishes)} targets need as many keys to vary, {keys} given", last)
-    return search.roots() if keys == 1 else search.system(len(wishes))
+    if minimize and maximize:
+        raise InputError("minimize and maximize: give one of them", f"--maximize {maximize}")
+    search = _Search(
+        scene, vary, wishes, minimize or maximize, "maximize" if maximize else "minimize", how
+    )
+    keys, spare = len(search.ranges), bool(minimize or maximize)
+    if len(wishes) + spare > keys:
+        more = f" and something to {search.goal}" if spare else ""
+        raise InputError(
+            f"{len(wishes)} targets{more} need as many keys to vary, {keys} given", last
+        )
+    return search.answered()
 
 
-def minimize(
-    scene: AnyScene,
-    vary: Varied,
-    quantity: str,
-    *,
-    points: int = POINTS,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> Solution:
+def minimize(scene: AnyScene, vary: Varied, quantity: str, **how: Unpack[How]) -> Solution:
     """Find the values of some keys for which a quantity is least.
 
     Parameters, result and errors are those of `solve`, with a quantity such as ``belt_work`` or
     ``landing.t`` for the target.
     """
-    scene = load(scene)
-    wanted = [measured(scene, quantity, f"--minimize {quantity}")]
-    return _Search("minimize", quantity, wanted, scene, vary, points, seed, progress).extremum()
+    return _Search(load(scene), vary, (), quantity, "minimize", how).answered()
 
 
-def maximize(
-    scene: AnyScene,
-    vary: Varied,
-    quantity: str,
-    *,
-    points: int = POINTS,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> Solution:
+def maximize(scene: AnyScene, vary: Varied, quantity: str, **how: Unpack[How]) -> Solution:
     """Find the values of some keys for which a quantity is largest; see `minimize`."""
-    scene = load(scene)
-    wanted = [measured(scene, quantity, f"--maximize {quantity}")]
-    return _Search("maximize", quantity, wanted, scene, vary, points, seed, progress).extremum()
+    return _Search(load(scene), vary, (), quantity, "maximize", how).answered()
+
+
+ELSEWHERE: Final = 0.5
+"""Share of likely answers that are elsewhere from which on that is told."""
+
+
+def _limits(
+    scene: Scene,
+    given: Mapping[str, tuple[float | str | None, float | str | None]],
+    quantities: list[Quantity],
+) -> tuple[tuple[tuple[int, float], ...], list[str]]:
+    """Read limits: where each is among the quantities, which gain them, and in words."""
+    found: list[tuple[int, float]] = []
+    said = []
+    for name, ends in given.items():
+        for end, sense, sign in zip(ends, (">=", "<="), (1.0, -1.0), strict=True):
+            if end is None:
+                continue
+            left, right = wish(scene, name, end, f"--subject-to {name}{sense}{end}")
+            if right.source != "number":
+                raise InputError("a limit is a number", f"--subject-to {name}{sense}{end}")
+            n = len(quantities)
+            if found and quantities[-1] == left:
+                n -= 1
+            else:
+                quantities.append(left)
+            found.append((n if sign > 0.0 else ~n, right.number))
+            said.append(f"{left.name} {sense} {right.name}")
+    if given and not found:
+        raise InputError("give a least or a largest value", f"--subject-to {next(iter(given))}")
+    return tuple(found), said
 
 
 class _Search:
@@ -231,26 +358,179 @@ class _Search:
 
     def __init__(
         self,
-        goal: Goal,
-        what: str,
-        quantities: Sequence[Quantity],
         scene: Scene,
         vary: Varied,
-        points: int,
-        seed: int,
-        progress: Progress | None,
+        targets: Sequence[tuple[Quantity, Quantity]],
+        objective: str | None,
+        best: Literal["minimize", "maximize"],
+        how: How,
     ) -> None:
-        if not FEWEST <= points <= MOST:
-            raise InputError(f"must be from {FEWEST} to {MOST}", f"--points {points}")
-        if seed < 0:
-            raise InputError("must be a whole number from 0", f"--seed {seed}")
-        self.goal, self.what, self.points, self.seed = goal, what, points, seed
+        self.goal: Goal = "solve" if objective is None else best
+        self.targets, self.how, self.seed = len(targets), how, how.get("seed", 0)
+        self.what = ", ".join(f"{left.name} = {right.name}" for left, right in targets)
+        quantities = [side for wanted in targets for side in wanted]
+        if objective is not None:
+            quantities.append(measured(scene, objective, f"--{best} {objective}"))
+        limits, said = _limits(scene, how.get("subject_to") or {}, quantities)
+        self.deviations = how.get("deviations", 0.0)
+        self.wishes = Wishes(
+            tuple((2 * n, 2 * n + 1) for n in range(len(targets))),
+            limits,
+            2 * len(targets) if objective is not None else None,
+            -1.0 if best == "maximize" else 1.0,
+            self.deviations,
+        )
+        rest = ", ".join(filter(None, (self.what if objective else "", *said)))
+        if objective is not None:
+            worse = f" {'-' if best == 'maximize' else '+'} {self.deviations:g} s"
+            self.what = f"{objective}{worse if self.deviations else ''}"
+        self.what += f", with {rest}" if rest else ""
+        meets = any(stream.interact for stream in scene.streams) and scene.count > 1
+        self.repeat = how.get("repeat") or (REPEAT if meets else 1)
+        drawn(scene, self.repeat)
+        if self.deviations and self.repeat == 1:
+            said_of = f"--deviations {self.deviations:g}"
+            raise InputError("one run has none: give --repeat N too, from 3", said_of)
+        if not 0.0 <= self.deviations <= 100.0:
+            raise InputError("must be from 0 to 100", f"--deviations {self.deviations:g}")
+        if self.deviations and objective is None:
+            said_of = f"--deviations {self.deviations:g}"
+            raise InputError("it is of what is least or largest: give --minimize", said_of)
+        self.points = how.get("points") or (NOISY_POINTS if self.repeat > 1 else POINTS)
+        if not FEWEST <= self.points <= MOST:
+            raise InputError(f"must be from {FEWEST} to {MOST}", f"--points {self.points}")
+        if self.seed < 0:
+            raise InputError("must be a whole number from 0", f"--seed {self.seed}")
         self.ranges = ranges(scene, vary)
         scipy("optimize")
         keys = [one.key for one in self.ranges]
-        runs = points + MORE if len(keys) == 1 else 800 * len(keys)
-        # Of targets both sides, one after the other.
-        self.evaluate = Evaluator(scene, keys, quantities, progress, runs)
+        runs = self.points + MORE if len(keys) == 1 else 800 * len(keys)
+        if self.repeat > 1:
+            runs = self.points * self.repeat
+        self.evaluate = Evaluator(scene, keys, quantities, how.get("progress"), runs)
+
+    @property
+    def shown(self) -> list[int]:
+        """Which quantities are told: of targets the left sides."""
+        rest = range(2 * self.targets, len(self.evaluate.quantities))
+        return [*range(0, 2 * self.targets, 2), *rest]
+
+    def answered(self) -> Solution:
+        """Search, as long as there is time."""
+        limit = self.how.get("max_seconds", inf)
+        self.evaluate.ends = monotonic() + limit
+        team = self.how.get("team")
+        with nullcontext(team) if team is not None else crew(self.how.get("jobs", 1)) as workers:
+            self.evaluate.team = workers
+            try:
+                if self.repeat > 1:
+                    return self.noisy()
+                if self.wishes.limits or (self.targets and self.goal != "solve"):
+                    return self.limited()
+                if self.goal != "solve":
+                    return self.extremum()
+                return self.roots() if len(self.ranges) == 1 else self.system(self.targets)
+            except Stopped:
+                return self.known(f"stopped after {limit:g} s")
+            except KeyboardInterrupt as interrupt:
+                if self.evaluate.seen:
+                    interrupt.solution = self.known("interrupted")  # type: ignore[attr-defined]
+                raise
+
+    def known(self, why: str) -> Solution:
+        """Return the best of what a search has seen that did not come to its end."""
+        if not self.evaluate.seen:
+            return self.solution([], [f"Not finished: {why}; no variant has run."])
+        points, values = (np.concatenate(part) for part in zip(*self.evaluate.seen, strict=True))
+        columns = self.wishes.columns(values[:, np.newaxis])
+        merit = self.wishes.merit(columns, spreads_of(columns))
+        best = int(np.argmin(merit))
+        note = f"Not finished: {why}; of {len(points)} variants this one is the nearest."
+        if not isfinite(merit[best]):
+            return self.solution([], [note])
+        found, wanted = self.told(values[best])
+        near = Answer(tuple(points[best].tolist()), found, wanted, "not looked at")
+        return self.solution([], [note], nearest=near)
+
+    def told(self, values: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return what an answer has of the quantities, (M,): those that are told, and what for."""
+        numbers = values.tolist()
+        return (
+            tuple(numbers[n] for n in self.shown),
+            tuple(numbers[n] for n in range(1, 2 * self.targets, 2)),
+        )
+
+    def noisy(self) -> Solution:
+        """Search among variants with several seeds each."""
+        found = search(self.evaluate, self.wishes, self.ranges, self.repeat, self.points, self.seed)
+        notes, stopped = [], self.evaluate.stopped
+        if stopped is not None:
+            why = "interrupted" if isinstance(stopped, KeyboardInterrupt) else "time was up"
+            notes.append(f"Not finished: {why} after {len(found.points)} variants.")
+        answers, near = [], None
+        if len(found.points) and np.isfinite(found.error).all():
+            answer = self.rounded(found)
+            columns = self.wishes.columns(found.values)
+            there = np.array([[mean for mean, _ in found.quantities]])
+            here = self.wishes.columns(there)
+            missed = self.wishes.missed(here, spreads_of(columns))
+            room = 2.0 * np.array([error for _, error in found.quantities])
+            slack = [room[left] + room[right] for left, right in self.wishes.targets]
+            slack += [room[n if n >= 0 else ~n] for n, _ in self.wishes.limits]
+            allowed = np.array([*slack, 0.0]) / spreads_of(columns)[[*range(len(slack)), -1]]
+            answers = [answer] if np.all(missed <= allowed + KEPT) else []
+            near = None if answers else answer
+        notes.append(
+            f"± is the standard error over {self.repeat} seeds, the same for all variants: the"
+            " search gives no more digits than that. --repeat with more seeds makes it smaller."
+        )
+        if found.elsewhere > ELSEWHERE:
+            notes.append(
+                "Other places may be as good: a narrower range, or more seeds, tells them apart."
+            )
+        solution = self.solution(
+            answers, notes, nearest=near, variants=found.points, outcomes=found.values
+        )
+        if isinstance(stopped, KeyboardInterrupt):
+            stopped.solution = solution  # type: ignore[attr-defined]
+            raise stopped
+        return solution
+
+    def rounded(self, found: Found) -> Answer:
+        """Return an answer whose numbers have the digits that their errors leave."""
+        numbers = [
+            (float(rounded(value, error)), error)
+            for value, error in (
+                *zip(found.at.tolist(), found.error.tolist(), strict=True),
+                *(found.quantities[n] for n in self.shown),
+            )
+        ]
+        values, errors = zip(*numbers, strict=True)
+        keys = len(self.ranges)
+        ends = [
+            min(value - one.low, one.high - value) <= error
+            for value, error, one in zip(values, errors, self.ranges, strict=False)
+        ]
+        inside = [
+            min(max(v, one.low), one.high) for v, one in zip(values, self.ranges, strict=False)
+        ]
+        _, wanted = self.told(np.array([mean for mean, _ in found.quantities]))
+        return Answer(
+            tuple(inside), values[keys:], wanted, "",
+            "end" if self.goal != "solve" and any(ends) else "inside",
+            errors=errors[:keys], found_errors=errors[keys:],
+        )  # fmt: skip
+
+    def limited(self) -> Solution:
+        """Search with limits, or for the best of all solutions; one seed."""
+        at, missed = constrained(
+            lambda points: self.wishes.columns(self.evaluate(points).values[:, np.newaxis]),
+            self.wishes, self.ranges, self.seed,
+        )  # fmt: skip
+        if not isfinite(missed):
+            return self.solution([])
+        answer = self.answer(at, "inside" if self.goal == "solve" else self.place(at))
+        return self.solution([answer]) if missed <= KEPT else self.solution([], nearest=answer)
 
     def scan(self) -> Scan:
         """Return the whole range of the only key."""
@@ -310,10 +590,7 @@ class _Search:
                 lambda points: sign * self.evaluate(points).values, self.ranges, self.seed,
                 squares=False,
             )  # fmt: skip
-            low, high = np.array([(one.low, one.high) for one in self.ranges]).T
-            at_end = np.minimum(at - low, high - at) <= 1e-9 * (high - low)
-            place = "end" if at_end.any() else "inside"
-            return self.solution([self.answer(at, place)] if isfinite(value) else [])
+            return self.solution([self.answer(at, self.place(at))] if isfinite(value) else [])
         seen = self.scan()
         lows = minima(seen, lambda x: float(self.evaluate([[x]]).values[0, 0]), sign)
         answers = [self.answer([low.at], low.place, slopes=low is lows[0]) for low in lows]
@@ -322,20 +599,21 @@ class _Search:
         note = f"{self.what} is the same over the whole range: it does not depend on it."
         return self.solution([replace(answers[0], place="inside")], [note], scan=seen)
 
+    def place(self, at: Floats) -> str:
+        """Tell whether a point (K,) is at an "end" of a range."""
+        low, high = np.array([(one.low, one.high) for one in self.ranges]).T
+        return "end" if np.any(np.minimum(at - low, high - at) <= 1e-9 * (high - low)) else "inside"
+
     def answer(self, at: ArrayLike, place: str = "inside", *, slopes: bool = True) -> Answer:
         """Return what is found at a point (K,)."""
         point = np.asarray(at, dtype=np.float64)
         outcome = self.evaluate(point[np.newaxis])
-        values = outcome.values[0].tolist()
-        every = 2 if self.goal == "solve" else 1
-        columns = range(0, len(values), every)
         return Answer(
             tuple(point.tolist()),
-            tuple(values[::every]),
-            tuple(values[1::2]),
+            *self.told(outcome.values[0]),
             outcome.courses[0],
             place,
-            sensitivities(self.evaluate, self.ranges, point, columns) if slopes else (),
+            sensitivities(self.evaluate, self.ranges, point, self.shown) if slopes else (),
         )
 
     def solution(
@@ -359,7 +637,7 @@ class _Search:
         spans = [
             f"{one.key} from {one.low:g} to {one.high:g} {one.unit}".rstrip() for one in self.ranges
         ]
-        wanted = quantities[:: 2 if self.goal == "solve" else 1]
+        wanted = [quantities[n] for n in self.shown]
         return Solution(
             asked=", ".join([f"{verb} {self.what}", *spans]),
             goal=self.goal,

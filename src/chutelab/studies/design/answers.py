@@ -20,7 +20,7 @@ from chutelab.scene.units import symbol, with_unit, write_size
 from chutelab.studies.design.evaluation import NO_RUN, Sensitivity, Span
 from chutelab.studies.design.roots import Change, Scan
 from chutelab.util.arrays import Floats
-from chutelab.util.tables import Sheet, Shown, frame, plain
+from chutelab.util.tables import Sheet, Shown, frame, plain, plus_minus
 
 DIGITS: Final = 10
 """Significant digits in which an answer is shown; it has more."""
@@ -38,7 +38,8 @@ class Answer:
     values : tuple of float
         Of the varied keys, in their order.
     found : tuple of float
-        The quantities asked for: the left sides of the targets, or what is least or largest.
+        The quantities asked for: the left sides of the targets, what is least or largest, and what
+        is limited.
     wanted : tuple of float
         The right sides of the targets; empty without targets.
     course : str
@@ -47,6 +48,8 @@ class Answer:
         "inside" the range, at an "end" of it, or at a "change" of the course.
     sensitivities : tuple of Sensitivity
         What each key does to each quantity here; empty for further answers of no interest.
+    errors, found_errors : tuple of float
+        Of several seeds, the standard errors of `values` and `found`; else empty.
     """
 
     values: tuple[float, ...]
@@ -55,11 +58,13 @@ class Answer:
     course: str
     place: str = "inside"
     sensitivities: tuple[Sensitivity, ...] = ()
+    errors: tuple[float, ...] = ()
+    found_errors: tuple[float, ...] = ()
 
     @property
     def off(self) -> tuple[float, ...]:
         """By how much the targets are missed."""
-        return tuple(f - w for f, w in zip(self.found, self.wanted, strict=True))
+        return tuple(f - w for f, w in zip(self.found, self.wanted, strict=False))
 
     def told(self, quantity: str, value: float) -> float:
         """Return a quantity as tables have it: 0 if it is rounding, by what it is 1 % away."""
@@ -83,7 +88,9 @@ class Solution(Shown):
     answers : tuple of Answer
         All solutions in order of the key, or all minima, the least first; empty if there is none.
     runs, seed : int
-        How many variants were run; of the search over several keys.
+        How many variants were run, each seed counted; of the search over several keys.
+    variants : ndarray, (N, K), and outcomes : ndarray, (N, S, M), or None
+        Of several seeds, the variants that were run, and all quantities of each seed.
     notes : tuple of str
         What else to know.
     base : Scene
@@ -115,6 +122,8 @@ class Solution(Shown):
     everywhere: tuple[tuple[float, float], ...] = ()
     jumps: tuple[Change, ...] = ()
     best: int = 0
+    variants: Floats | None = None
+    outcomes: Floats | None = None
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -186,7 +195,10 @@ class Solution(Shown):
             elif len(self.answers) > 1:
                 head += f" {i + 1}"
             found = map(answer.told, self.quantities, answer.found)
-            numbers = (f"{value:.{DIGITS}g}" for value in (*answer.values, *found))
+            numbers: Iterator[str] = (f"{value:.{DIGITS}g}" for value in (*answer.values, *found))
+            if answer.errors:
+                errors = (*answer.errors, *answer.found_errors)
+                numbers = map(plus_minus, (*answer.values, *answer.found), errors)
             rows.append((head, *numbers, answer.course))
         columns = ("", *keys, *names, "touches")
         return Sheet(self.asked, columns, tuple(rows), notes=tuple(remarks(self)))
@@ -230,7 +242,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         return {
             "values": dict(zip((r.key for r in solution.ranges), one.values, strict=True)),
             "found": dict(zip(solution.quantities, one.found, strict=True)),
-            **some(one, "wanted", "course", "place"),
+            **some(one, "wanted", "course", "place", "errors", "found_errors"),
             "sensitivities": [some(each, *about) for each in one.sensitivities],
         }
 
@@ -284,10 +296,16 @@ def remarks(solution: Solution) -> Iterator[str]:
         )
     if not count and solution.nearest is not None:
         near = solution.nearest
-        numbers = zip(solution.quantities, solution.units, near.found, near.wanted, strict=True)
+        numbers = zip(solution.quantities, solution.units, near.found, near.wanted, strict=False)
         parts = [
             f"{name} = {_size(found, unit)} instead of {_size(wanted, unit)}"
             for name, unit, found, wanted in numbers
+        ]
+        parts = parts or [
+            f"{name} = {_size(found, unit)}"
+            for name, unit, found in zip(
+                solution.quantities, solution.units, near.found, strict=True
+            )
         ]
         yield f"No solution in the range. Nearest to one: {', '.join(parts)}."
     elif not count and solution.goal == "solve":

@@ -11,15 +11,18 @@ quantity depends on each key: its slope, and what one per cent of the key does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import groupby, product
-from math import nan
+from math import inf, nan
+from operator import itemgetter
+from time import monotonic
 from typing import Any, Final, Literal, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from chutelab.engines.simulation import simulate
 from chutelab.results import REASONS, Kind, Recording
@@ -28,10 +31,20 @@ from chutelab.scene import MISSING, AnyScene, Scene, SceneError, load
 from chutelab.scene.overrides import value_at
 from chutelab.scene.quantities import Ending, lookup, suggestion, whose
 from chutelab.scene.units import read_size
-from chutelab.scene.variants import Range, Varied, Vary, is_plain, quantity, reason, varied
+from chutelab.scene.variants import (
+    Range,
+    Varied,
+    Vary,
+    is_plain,
+    quantity,
+    reason,
+    reseeded,
+    varied,
+)
+from chutelab.studies.sweep import Crew
 from chutelab.studies.sweep.plan import Block, runs
 from chutelab.studies.sweep.rows import touches
-from chutelab.util.arrays import Floats, Progress
+from chutelab.util.arrays import Bools, Floats, Ints, Progress
 from chutelab.util.errors import InputError
 from chutelab.util.versions import library
 
@@ -140,12 +153,14 @@ def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
     return Quantity(name, row.unit, name, ending=row.ending)
 
 
-def target(scene: Scene, name: str, value: float | str) -> tuple[Quantity, Quantity]:
+def target(
+    scene: Scene, name: str, value: float | str, typed: str = ""
+) -> tuple[Quantity, Quantity]:
     """Return a quantity, and the number, key of the scene or quantity that it is to equal.
 
     Raises an `InputError` if one of them is unknown, or their units differ.
     """
-    typed = f"--target {name}={value}"
+    typed = typed or f"--target {name}={value}"
     left = measured(scene, name, typed)
     try:
         number, unit = read_size(value) if isinstance(value, str) else (value, "")
@@ -258,6 +273,34 @@ class Outcomes(NamedTuple):
     touches: list[str]
 
 
+class Stopped(Exception):  # noqa: N818 - no fault: time is up
+    """A search ends before its end; what it has seen is in `Evaluator.seen`."""
+
+
+class Task(NamedTuple):
+    """Variants to be run in one go; can be sent to another process."""
+
+    rows: slice  # which of the points they are
+    block: Block
+    quantities: Sequence[Quantity]
+    apart: bool
+
+
+def carried_out(task: Task) -> list[tuple[Ints, Floats, list[str], str, NDArray[Any]]]:
+    """Run the variants of a task: rows, values, courses, why there is no run, and touches."""
+    found = []
+    for which, one in runs(task.block, apart=task.apart):
+        rows, nothing = task.rows.start + which, np.full((len(which), len(task.quantities)), np.nan)
+        if isinstance(one, str):
+            none = np.full(len(which), NO_RUN, dtype=object)
+            found.append((rows, nothing, [NO_RUN] * len(which), one, none))
+            continue
+        for column, wanted in enumerate(task.quantities):
+            nothing[:, column] = wanted.of(one)
+        found.append((rows, nothing, courses_of(one)[: len(rows)], "", touches(one, len(rows))))
+    return found
+
+
 @dataclass
 class Evaluator:
     """Runs variants of a scene, whose `keys` (full paths) vary, and counts them."""
@@ -268,7 +311,13 @@ class Evaluator:
     # called now and then with the share that is done of the `expected` variants
     progress: Progress | None = None
     expected: int = 0
+    team: Crew = field(default_factory=Crew)
+    ends: float = inf  # `monotonic` at which it raises a `Stopped`
     runs: int = field(default=0, init=False)
+    # the points (N, K) and values (N, M) of each call that is done
+    seen: list[tuple[Floats, Floats]] = field(default_factory=list, init=False)
+    stopped: Stopped | KeyboardInterrupt | None = field(default=None, init=False)
+    ran: Bools = field(default_factory=lambda: np.empty(0, dtype=bool), init=False)
 
     def __call__(self, points: ArrayLike) -> Outcomes:
         """Run the variants at points, shape (N, K), K values of the keys each."""
@@ -282,27 +331,67 @@ class Evaluator:
         together = ("contacts", "sensor", "wear")
         apart = len(table) < FEWEST
         apart |= any(one.key.split(".")[0] in together for one in self.quantities)
-        done = 0.0
-        for start, ending in product(range(0, len(table), BLOCK), endings):
-            scene = self.scene.with_values(_until(ending))
-            block = Block(scene, tuple(self.keys), table[start : start + BLOCK])
-            for which, found in runs(block, apart=apart):
-                rows = start + which
-                if isinstance(found, str):
-                    faults[rows] = found
-                else:
-                    courses[rows] = courses_of(found)[: len(rows)]
-                    kinds[rows] = touches(found, len(rows))
-                    for column, one in enumerate(self.quantities):
-                        if one.ending in ("any", ending):
-                            values[rows, column] = one.of(found)
-                done += len(rows) / len(endings)
-                if self.progress is not None and self.expected:
-                    self.progress(min((self.runs + done) / self.expected, 1.0))
+        tasks = []
+        for start, ending in product(range(0, len(table), self.size), endings):
+            rows = slice(start, start + self.size)
+            block = Block(self.scene.with_values(_until(ending)), tuple(self.keys), table[rows])
+            tasks.append((ending, Task(rows, block, self.quantities, apart)))
+        results = self.results([task for _, task in tasks])
+        for number, found in sorted(results, key=itemgetter(0)):
+            ending = tasks[number][0]
+            own = [n for n, one in enumerate(self.quantities) if one.ending in ("any", ending)]
+            for rows, some, ways, fault, touched in found:
+                values[np.ix_(rows, own)] = some[:, own]
+                faults[rows], courses[rows], kinds[rows] = fault or faults[rows], ways, touched
         values[faults != ""] = np.nan
         courses[faults != ""] = kinds[faults != ""] = NO_RUN
         self.runs += len(table)
+        self.seen.append((table, values))
         return Outcomes(values, courses.tolist(), faults.tolist(), kinds.tolist())
+
+    @property
+    def size(self) -> int:
+        """Variants of a task: one where each may take long and others could do it meanwhile."""
+        return BLOCK if self.scene.count == 1 else 1
+
+    def seeds(self, points: Floats, count: int) -> Floats:
+        """Run variants at points (N, K) with `count` seeds, the same for all; values (N, S, M).
+
+        If time is up or Ctrl-C is pressed, `stopped` has that, and `ran`, (N,), which were done.
+        """
+        wanted = {quantity.ending for quantity in self.quantities} - {"any"}
+        scene = self.scene.with_values(_until("settled" if "settled" in wanted else "scene"))
+        seeded = [reseeded(scene, number) for number in range(count)]
+        places = list(product(range(len(points)), range(count)))
+        tasks = [
+            Task(
+                slice(0, 1), Block(seeded[s], tuple(self.keys), points[[n]]), self.quantities, True
+            )
+            for n, s in places
+        ]
+        values = np.full((len(points), count, len(self.quantities)), np.nan)
+        left = np.full(len(points), count)
+        try:
+            for number, ((_, some, *_),) in self.results(tasks):
+                values[places[number]] = some[0]
+                left[places[number][0]] -= 1
+        except (Stopped, KeyboardInterrupt) as stopped:
+            self.stopped = stopped
+        self.ran = left == 0
+        self.runs += len(tasks) - int(left.sum())
+        return values
+
+    def results(self, tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+        """Yield the number of each task and what came of it; raises a `Stopped` if time is up."""
+        variants = sum(len(task.block.values) for task in tasks)
+        with closing(self.team.results(carried_out, enumerate(tasks))) as results:
+            for done, found in enumerate(results, 1):
+                yield found
+                if monotonic() >= self.ends:
+                    raise Stopped
+                if self.progress is not None and self.expected:
+                    share = self.runs + variants * done / len(tasks)
+                    self.progress(min(share / self.expected, 1.0))
 
 
 def _until(ending: str) -> dict[str, str]:

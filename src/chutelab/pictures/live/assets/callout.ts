@@ -110,7 +110,7 @@ function freePlace(stage: Stage, size: Point, corner: Point, taken: Stage["cover
   const there = [...surfaceLines(stage),
     ...path.map((points) => points.map(({ x, y }) => [view.px(x), view.py(y)] as Point))]
     .flatMap(along);
-  for (let x = left; x + wide + CLEAR < free.right; x += ASIDE) {
+  for (let x = left; x + wide < free.right; x += ASIDE) {
     for (let y = bottom; y - high > free.top + CLEAR; y -= ALONG) {
       const meets = (u: number, v: number) => u > x - CLEAR && u < x + wide + CLEAR
         && v > y - high - CLEAR && v < y + CLEAR;

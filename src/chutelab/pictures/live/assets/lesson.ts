@@ -36,6 +36,30 @@ const MOST_KEPT = 4000;
 /** What is nearer than that is right, m. */
 const NEAR = 0.05;
 
+/** Hands of a class for each of some choices, which a teacher counts on the projector, with bars as
+ * long as their shares. Nothing of it is kept. */
+function votesOf(choices: string[], words: Words): HTMLElement[] {
+  const counts = choices.map(() => 0);
+  const rows = choices.map((choice, n) => {
+    const text = grown(choice).map((one) => one.textContent).join("");
+    const step = (by: number, sign: string, name: string) => html("button", {
+      "aria-label": `${text}: ${words.say(name)}`,
+      click: () => {
+        counts[n] = Math.max(0, counts[n] + by);
+        tell();
+      },
+    }, sign);
+    return html("div", { class: "vote" }, step(-1, "−", "less"), html("output", {}, "0"),
+      step(1, "+", "greater"), html("span", { class: "bar" }, html("i")));
+  });
+  const tell = () => rows.forEach((row, n) => {
+    const all = counts.reduce((sum, count) => sum + count, 0);
+    row.querySelector("output").textContent = String(counts[n]);
+    row.querySelector("i").style.width = `${(100 * counts[n]) / Math.max(1, all)}%`;
+  });
+  return rows;
+}
+
 /** What this browser keeps between two visits, if it does. */
 function store(which: "localStorage" | "sessionStorage"): Storage | null {
   try {
@@ -126,6 +150,7 @@ class Lesson {
     printed(this);
     lab.mayPlay = () => this.mayPlay();
     for (const news of ["scene", "run", "time"] as const) lab.on(news, () => this.look());
+    document.getElementById("full")?.addEventListener("click", () => this.look());
     stage.drawers.push(() => this.runs?.drawPaths());
     const again = store("sessionStorage")?.getItem(this.place("now"));
     if (again) this.begin(again);
@@ -411,12 +436,14 @@ class Lesson {
       };
       const question = [html("span", { class: "q" }, ...grown(ask.text))];
       if (ask.choices.length) {
+        const votes = this.step.kind === "predict" ? votesOf(ask.choices, words) : [];
         return html("fieldset", { class: "choice" }, html("legend", {}, ...question),
-          ...ask.choices.map((text, value) => {
+          ...ask.choices.flatMap((text, value) => {
             const input = html("input", { type: "radio", name, change: () => say(value) });
             input.checked = kept.said[id] === value;
             input.disabled = !isOpen;
-            return html("label", {}, input, html("span", {}, ...grown(text)));
+            return [html("label", {}, input, html("span", {}, ...grown(text))),
+              ...votes.slice(value, value + 1)];
           }), reply);
       }
       if (ask.mark) {
@@ -481,6 +508,11 @@ class Lesson {
     }).root];
   }
 
+  /** Whether the run may be seen: on the projector it is the class that answers. */
+  get isReady() {
+    return this.isAnswered || document.documentElement.matches(".projector");
+  }
+
   /** Whether all that a step asks is answered. */
   get isAnswered() {
     const { at, said } = this.kept;
@@ -489,7 +521,7 @@ class Lesson {
 
   mayPlay() {
     if (!this.curtain.hides) return true;
-    if (this.sheet.classList.contains("start") || !this.isAnswered) {
+    if (this.sheet.classList.contains("start") || !this.isReady) {
       this.sheet.classList.add("wanted");
       (this.page.querySelector("#student, .choice:not(:has(:checked)) input, textarea")
         ?? this.flag?.grip)?.focus();
@@ -536,7 +568,7 @@ class Lesson {
     }
     this.list.children[at]?.classList.toggle("done", isDone);
     this.next.hidden = at === this.lesson.steps.length - 1;
-    this.next.disabled = waits && !this.isAnswered;
+    this.next.disabled = waits && !this.isReady;
     this.skip.hidden = !this.next.disabled || !asks.length;
     if (this.seen && !waits) this.compare();
     this.tellReplies();
@@ -545,7 +577,7 @@ class Lesson {
     if (place && tells && !place.hasChildNodes()) place.append(...grown(then));
     const early = this.runs?.asked && this.runs.reason;
     const wish = early || (kind !== "predict" || (!waits && this.seen) ? ""
-      : waits ? this.isAnswered ? "predict-play" : "predict-first" : "predict-watch");
+      : waits ? this.isReady ? "predict-play" : "predict-first" : "predict-watch");
     const hint = document.getElementById("guess") as HTMLElement;
     const said = wish ? words.say(wish) : "";
     hint.hidden = !said;

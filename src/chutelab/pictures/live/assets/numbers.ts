@@ -72,9 +72,9 @@ class NumbersPanel {
 
   constructor(home: Element, readonly lab: Lab, readonly words: Words) {
     this.body = html("tbody");
-    this.simulated = html("th", { scope: "col" });
+    this.simulated = html("th", { scope: "col", class: "of-run" });
     const head = html("thead", {}, html("tr", {}, html("td"), this.simulated,
-      html("th", { scope: "col" }, words.say("analytic"))));
+      html("th", { scope: "col", class: "of-rail" }, words.say("analytic"))));
     this.reason = html("p", { class: "note" });
     this.lone = html("div", {}, html("table", {}, head, this.body), this.reason);
     this.crowd = html("tbody");

@@ -35,9 +35,6 @@ const SPUN = 8;
  * of the machine. */
 const FINE = 0.2, FINE_SHARE = 1e-3;
 
-/** Parts in which a calculated flight is drawn. */
-const FLIGHT = 40;
-
 /** Height of the text over the bar that tells the scale, px. */
 const ABOVE = 24;
 
@@ -208,11 +205,9 @@ class Stage {
     for (const { stream, lines } of envelopes) this.drawEnvelope(stream, lines);
     if (envelopes.length) return;
     // The run is a line within the two of the calculated one, as long as they agree.
-    for (const points of this.calculated) {
-      const line = points.map(([x, y]) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`);
-      this.paths.append(...["rail", "rail within"].map((kind) =>
-        svg("polyline", { points: line.join(" "), class: kind })));
-    }
+    const at = ([x, y]: Point) => `${view.px(x).toFixed(1)} ${view.py(y).toFixed(1)}`;
+    const d = this.calculated.map(([from, bend, to]) => `M${at(from)}Q${at(bend)} ${at(to)}`).join("");
+    if (d) this.paths.append(svg("path", { d, class: "rail" }), svg("path", { d, class: "rail within" }));
     for (const points of this.trackPoints(recording, FINE / view.scale)) {
       if (points.length < 2) continue;
       const line = points.map(({ x, y }) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`);
@@ -220,21 +215,19 @@ class Stage {
     }
   }
 
-  /** The calculated flights to the plate and from there to the belt, as far as there are any, m. */
-  get calculated(): Point[][] {
+  /** The calculated flights to the plate and from there to the belt, m: where each begins and ends,
+   * and between them where the tangents there meet, which is all that a parabola is. */
+  get calculated(): [Point, Point, Point][] {
     const { scene, recording } = this.lab, belt = scene?.incoming;
     if (!belt || !recording || recording.machine.interact) return [];
     const { phi1, v1, t2, x2, y2, v3x, t3, y3 } = predict(scene, recording).numbers;
-    const [sin, cos] = [Math.sin(phi1), Math.cos(phi1)], g = scene.gravity;
-    const ride = belt.pulley_radius + recording.machine.radius[0];
-    const [x, y] = [ride * sin, ride * cos];
-    const flight = (px: number, py: number, vx: number, vy: number, time: number): Point[] =>
-      Array.from({ length: time > 0 ? FLIGHT + 1 : 0 }, (_, n) => {
-        const t = (time * n) / FLIGHT;
-        return [px + vx * t, py + (vy - 0.5 * g * t) * t];
-      });
-    return [flight(x, y, v1 * cos, -v1 * sin, t2),
-      flight(x + x2, y - y2, -v3x, 0.5 * g * t3 - y3 / t3, t3)].filter(({ length }) => length);
+    const ride = belt.pulley_radius + recording.machine.radius[0], half = 0.5 * v1 * t2;
+    const [x, y] = [ride * Math.sin(phi1), ride * Math.cos(phi1)], [u, v] = [x + x2, y - y2];
+    const down = 0.5 * y3 - 0.25 * scene.gravity * t3 * t3;
+    const flights: [Point, Point, Point][] = [
+      [[x, y], [x + half * Math.cos(phi1), y - half * Math.sin(phi1)], [u, v]],
+      [[u, v], [u - 0.5 * v3x * t3, v - down], [u - v3x * t3, v - y3]]];
+    return flights.filter((flight) => flight.flat().every(isFinite));
   }
 
   /** Lines of an envelope: the band between the outer two, and the middle one.

@@ -1,0 +1,296 @@
+"""A search for functions that chance has a part in: streams, other with each seed.
+
+Each variant is run with some seeds, the same for all. A Gaussian process is fitted to each number
+that the question asks about (scikit-learn: its regression takes the noise of the means, and it is
+kept well). The next variants are where random draws of what the fit leaves open have their answer
+(Thompson sampling): these are spread over the range as long as little is known, and gather at the
+answer. The error of the answer is how far the answers of such draws differ, and of means over seeds
+that are drawn anew (bootstrap), which sees the error that all variants have in common.
+
+What else was looked at: `scikit-optimize` is archived, `noisyopt` dates from 2017; `Py-BOBYQA`,
+`cma`, Optuna and `bayesian-optimization` search for the minimum of one function, without an error
+of its place, and targets and limits are three functions or more; BoTorch brings PyTorch.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from chutelab.studies.design.evaluation import Evaluator, Span, scipy
+from chutelab.studies.sweep.rows import mean_and_error
+from chutelab.util.arrays import Floats
+from chutelab.util.versions import library
+
+PENALTY: Final = 10.0
+"""What missing a target or a limit by its own spread over the range counts, in spreads of what is
+to be least: more than it can gain."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What is asked of the quantities of a variant, M numbers of each of S seeds.
+
+    Attributes
+    ----------
+    targets : tuple of (int, int)
+        Quantities that are to be equal in the mean.
+    limits : tuple of (int, float)
+        Quantities whose mean is to be at least a number; negative: ``~index`` at most.
+    objective : int or None
+        What is to be least.
+    sign, deviations : float
+        1 for what is to be least, -1 for most; standard deviations of one run that are added.
+    """
+
+    targets: tuple[tuple[int, int], ...] = ()
+    limits: tuple[tuple[int, float], ...] = ()
+    objective: int | None = None
+    sign: float = 1.0
+    deviations: float = 0.0
+
+    def columns(self, values: Floats) -> Floats:
+        """Return what is judged, (..., C), of values (..., S, M).
+
+        Differences of targets, by how much limits are kept, and what is to be least; the last
+        column is the share of seeds with all quantities, less a half.
+        """
+        seeds = np.moveaxis(values, -2, 0)
+        mean, error = mean_and_error(seeds)
+        found = [mean[..., left] - mean[..., right] for left, right in self.targets]
+        for n, limit in self.limits:
+            found.append(mean[..., n] - limit if n >= 0 else limit - mean[..., ~n])
+        if self.objective is not None:
+            best = self.sign * mean[..., self.objective]
+            if self.deviations:
+                count = np.isfinite(seeds[..., self.objective]).sum(axis=0)
+                best = best + self.deviations * np.sqrt(count) * error[..., self.objective]
+            found.append(best)
+        found.append(np.isfinite(values).all(axis=-1).mean(axis=-1) - 0.5)
+        return np.stack(found, axis=-1)
+
+    def missed(self, columns: Floats, sizes: Floats) -> Floats:
+        """Return by how much each target and limit is missed, (..., T + L + 1), in `sizes`."""
+        off = columns / sizes
+        count = len(self.targets)
+        kept = [*range(count, count + len(self.limits)), -1]
+        return np.concatenate([np.abs(off[..., :count]), np.maximum(0.0, -off[..., kept])], axis=-1)
+
+    def merit(self, columns: Floats, sizes: Floats) -> Floats:
+        """Return what is least at the answer, (...); infinite where there is no number."""
+        missed = self.missed(columns, sizes)
+        if self.objective is None:
+            found = np.sum(missed**2, axis=-1)
+        else:
+            found = columns[..., -2] / sizes[-2] + PENALTY * np.sum(missed, axis=-1)
+        return np.where(np.isfinite(found), found, np.inf)
+
+
+def spreads_of(columns: Floats) -> Floats:
+    """Return the spread of each column over some variants, (C,); 1 of what is always the same."""
+    finite = np.isfinite(columns)
+    found = np.array(
+        [
+            one[known].std() if known.any() else 0.0
+            for one, known in zip(columns.T, finite.T, strict=True)
+        ]
+    )
+    return np.where(
+        found > 1e-12 * np.max(np.abs(np.where(finite, columns, 0.0)), axis=0), found, 1.0
+    )
+
+
+DRAWS: Final = 64
+"""Draws of what is not known, and of seeds, that errors are told from."""
+
+CLOUD: Final = 400
+"""Points among which the answer of a draw is looked for."""
+
+FIRST: Final = 8
+"""Variants a key that are spread over the range first."""
+
+BATCH: Final = 6
+"""Variants that are run next, together."""
+
+ENOUGH: Final = 0.0025
+"""Error of the answer, as a share of each range, at which the search ends."""
+
+ZOOMS: Final = 10
+"""Clouds, each about the best of the one before."""
+
+
+class Found(NamedTuple):
+    """Where the answer is, (K,), its error, and the variants (N, K) with values (N, S, M)."""
+
+    at: Floats
+    error: Floats
+    points: Floats
+    values: Floats
+    elsewhere: float  # share of draws whose answer is somewhere else
+    quantities: Sequence[tuple[float, float]]  # each there, in the mean over seeds, and its error
+
+
+class Fit:
+    """What variants at `shares` of the ranges, (N, K), with values (N, S, M), say of all others."""
+
+    def __init__(
+        self, shares: Floats, values: Floats, wishes: Wishes, random: np.random.Generator
+    ) -> None:
+        self.wishes, self.random, self.seeds, self.done = wishes, random, values.shape[1], False
+        columns = wishes.columns(values)
+        self.sizes = spreads_of(columns)
+        self.redrawn = random.integers(self.seeds, size=(DRAWS, self.seeds))
+        again = np.stack([wishes.columns(values[:, one]) for one in self.redrawn])
+        self.models = [
+            Model(shares, columns[:, n], again[..., n], self.seeds) for n in range(columns.shape[1])
+        ]
+
+    def of_means(self, values: Floats) -> tuple[Floats, Floats]:
+        """Return the means of a quantity (N, S) over seeds, (N,), and over redrawn ones."""
+        mean, _ = mean_and_error(values.T)
+        return mean, mean_and_error(np.moveaxis(values[:, self.redrawn], -1, 0))[0].T
+
+    def merit(self, of: Sequence[Floats]) -> Floats:
+        """Return the merit of places, (..., P), whose columns are given one by one."""
+        return self.wishes.merit(np.stack(of, axis=-1), self.sizes)
+
+    def best(self, keys: int) -> tuple[Floats, Floats, Floats]:
+        """Return where the answer is, its error and where all of the range is likely, (n, K)."""
+        few = sqrt(self.seeds / (self.seeds - 1)) if self.seeds > 1 else 1.0
+        everywhere = self.random.random((CLOUD, keys))
+        centre = everywhere[
+            np.argmin(self.merit([model.mean(everywhere) for model in self.models]))
+        ]
+        # The cloud is to be twice as wide as the answers in it lie apart, in each direction.
+        shape, error = np.diag(np.full(keys, 0.25**2)), np.ones(keys)
+        for _ in range(ZOOMS):
+            steps = self.random.standard_normal((CLOUD, keys)) @ np.linalg.cholesky(shape).T
+            cloud = np.clip(centre + steps, 0.0, 1.0)
+            cloud[0] = centre
+            centre = cloud[np.argmin(self.merit([model.mean(cloud) for model in self.models]))]
+            known, seeds = (
+                cloud[np.argmin(self.merit(of), axis=-1)] - centre
+                for of in (
+                    [model.draws(cloud, DRAWS, self.random) for model in self.models],
+                    [model.redrawn(cloud) for model in self.models],
+                )
+            )
+            parts = [np.sqrt(np.mean(one**2, axis=0)) for one in (known, few * seeds)]
+            error = np.maximum(*parts)
+            apart = np.concatenate([known, few * seeds])
+            shape = 0.06 * shape + 4.0 * apart.T @ apart / len(apart)
+            shape[np.diag_indices_from(shape)] += 1e-14
+        wide = np.concatenate([everywhere, cloud])
+        open_ = [model.draws(wide, DRAWS, self.random) for model in self.models]
+        # More variants do not help where the error is that of the seeds.
+        self.done = bool(np.all((error <= ENOUGH) | (parts[0] <= 0.5 * parts[1])))
+        return centre, error, wide[np.argmin(self.merit(open_), axis=-1)]
+
+
+class Model:
+    """A Gaussian process through one column, (N,), and the same of redrawn seeds, (B, N)."""
+
+    def __init__(self, shares: Floats, column: Floats, again: Floats, seeds: int) -> None:
+        known = np.isfinite(column) & np.isfinite(again).all(axis=0)
+        self.level = float(column[known].mean()) if known.any() else np.nan
+        self.size = float(column[known].std()) if known.any() else 0.0
+        self.fitted: Any = None
+        if known.sum() < 2 or self.size <= 1e-12 * float(np.max(np.abs(column[known]))):
+            return
+        process = library(
+            "sklearn.gaussian_process", "Searches of streams need scikit-learn", "design"
+        )
+        kernels = process.kernels
+        y, redrawn = ((one - self.level) / self.size for one in (column[known], again[:, known]))
+        # What all variants have in common is no noise of the fit, but an error of it.
+        own = redrawn - y
+        own = own - own.mean(axis=1, keepdims=True)
+        noise = float(np.mean(own**2)) * (seeds / (seeds - 1) if seeds > 1 else 1.0)
+        self.noise = max(noise, 1e-8)
+        shape = kernels.Matern(np.full(shares.shape[1], 0.5), (0.05, 20.0), nu=2.5)
+        self.fitted = process.GaussianProcessRegressor(
+            kernels.ConstantKernel(1.0, (0.05, 400.0)) * shape, alpha=self.noise
+        )
+        with warnings.catch_warnings():
+            # A length at its bound says that the column does not depend on the key.
+            warnings.simplefilter("ignore")
+            self.fitted.fit(shares[known], y)
+        self.redrawn_weights = scipy("linalg").cho_solve((self.fitted.L_, True), redrawn.T)
+
+    def mean(self, places: Floats) -> Floats:
+        """Return what is most likely at places (P, K), (P,)."""
+        if self.fitted is None:
+            return np.full(len(places), self.level)
+        return np.asarray(self.level + self.size * self.fitted.predict(places))
+
+    def draws(self, places: Floats, count: int, random: np.random.Generator) -> Floats:
+        """Return functions that are as likely, at places (P, K): (count, P)."""
+        if self.fitted is None:
+            return np.full((count, len(places)), self.level)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of variances below 0 by rounding
+            mean, spread = self.fitted.predict(places, return_cov=True)
+        spread[np.diag_indices_from(spread)] += 1e-8
+        root = np.linalg.cholesky(spread)
+        found = mean + random.standard_normal((count, len(places))) @ root.T
+        return np.asarray(self.level + self.size * found)
+
+    def redrawn(self, places: Floats) -> Floats:
+        """Return the fit through each redrawn set of seeds, (B, P)."""
+        if self.fitted is None:
+            return np.full((DRAWS, len(places)), self.level)
+        found = self.fitted.kernel_(places, self.fitted.X_train_) @ self.redrawn_weights
+        return np.asarray(self.level + self.size * found.T)
+
+    def at(self, place: Floats) -> tuple[float, float]:
+        """Return the number at a place (K,), and its error."""
+        if self.fitted is None:
+            return self.level, 0.0
+        mean, error = self.fitted.predict(place[np.newaxis], return_std=True)
+        seeds = self.redrawn(place[np.newaxis]).std()
+        return self.level + self.size * float(mean[0]), max(
+            self.size * float(error[0]), float(seeds)
+        )
+
+
+def search(
+    evaluate: Evaluator,
+    wishes: Wishes,
+    ranges: Sequence[Span],
+    seeds: int,
+    most: int,
+    seed: int,
+) -> Found:
+    """Return where the wishes come true, after at most `most` variants or when time is up."""
+    library("sklearn.gaussian_process", "Searches of streams need scikit-learn", "design")
+    random, keys = np.random.default_rng(seed), len(ranges)
+    low, width = np.array([(one.low, one.width) for one in ranges]).T
+    high = low + width
+    power = max(3, (min(FIRST * keys, most) - 1).bit_length())
+    nexts = scipy("stats.qmc").Sobol(keys, seed=random).random_base2(power)[:most]
+    shares, values = np.empty((0, keys)), np.empty((0, seeds, len(evaluate.quantities)))
+    while True:
+        new = evaluate.seeds(np.clip(low + nexts * width, low, high), seeds)
+        # If time was up, some have not run.
+        ran = evaluate.ran
+        shares = np.concatenate([shares, nexts[ran]])
+        values = np.concatenate([values, new[ran]])
+        if not len(shares):
+            nothing = np.full(keys, np.nan)
+            return Found(nothing, nothing, shares, values, 0.0, [])
+        fit = Fit(shares, values, wishes, random)
+        at, error, open_ = fit.best(keys)
+        if evaluate.stopped or len(shares) >= most or fit.done:
+            break
+        nexts = open_[: min(BATCH, most - len(shares))]
+    apart = np.any(np.abs(open_ - at) > 5.0 * error + 0.02, axis=1)
+    points = np.clip(low + shares * width, low, high)
+    reports = [
+        Model(shares, *fit.of_means(values[..., n]), seeds).at(at) for n in range(values.shape[2])
+    ]
+    return Found(low + at * width, error * width, points, values, float(apart.mean()), reports)

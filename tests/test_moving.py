@@ -429,7 +429,10 @@ def test_what_has_no_closed_form_is_refused_by_name():
         ({"travel": {"to": [0, 0], "in": 1.0, "for": 2}}, "surface[0].travel.for"),
         ({"turn": "fast"}, 'surface[0].turn = "fast"'),
         ({"turn": 1e6}, "surface[0].turn = 1000000.0"),
-        ({"pivot": [0, 0]}, "surface[0].pivot = [0, 0]: is for what moves: give turn or travel"),
+        (
+            {"pivot": [0, 0]},
+            "surface[0].pivot = [0, 0]: is for what moves: give turn, travel or hinge",
+        ),
     ],
 )
 def test_bad_input_is_told_with_key_value_and_what_is_allowed(keys, said):

@@ -31,6 +31,8 @@ AUTO = {
     "rock-box": "contact",
     "galton": "contact",
     "mixture": "contact",
+    "damper-plate": "contact",
+    "see-saw": "contact",
     "cradle": "pymunk",
     "dominoes": "pymunk",
 }

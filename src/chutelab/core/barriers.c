@@ -63,7 +63,7 @@ static void sweep(Barrier *b) {
     double reach = reach_of(b, m);
     for (int k = 0; k < 4; k++) {
         double way = m->way[k % 2], by = fabs(m->by[k % 2]), side = k < 2 ? -1 : 1;
-        if (m->turn) b->box[k] = m->pivot[k % 2] + side * reach;
+        if (m->turn || m->inertia > 0) b->box[k] = m->pivot[k % 2] + side * reach;
         b->box[k] += side * (by + MAX(side * way, 0));
     }
 }
@@ -76,8 +76,24 @@ double swiftest(const Barrier *b, double *haste) {
     const Mover *m = L.movers + b->mover - 1;
     double rate = 2 * PI * m->frequency, by = hypot(m->by[0], m->by[1]), way = hypot(m->way[0], m->way[1]);
     double reach = reach_of(b, m), pace = m->lasts ? 2 * way / m->lasts : 0, turn = fabs(m->turn);
+    if (m->inertia > 0)
+        for (int n = m->first; n <= m->last; n++) turn = MAX(turn, fabs(L.swings[n].rate));
     *haste = rate * rate * by + (m->lasts ? 2 * pace / m->lasts : 0) + turn * turn * reach;
     return rate * by + pace + turn * reach;
+}
+
+/* The angle of a hinge at t: between two of its states a cubic, as tracks are. */
+static double swung_by(const Mover *m, double t) {
+    const Swing *all = L.swings;
+    int low = m->first, high = m->last;
+    while (high - low > 1) {
+        int middle = (low + high) / 2;
+        if (all[middle].t <= t) low = middle;
+        else high = middle;
+    }
+    const Swing *a = all + low, *b = all + high;
+    double h = b->t - a->t, s = h > 0 ? MIN(MAX((t - a->t) / h, 0), 1) : 0, gone = b->angle - a->angle;
+    return a->angle + s * (h * a->rate + s * ((3 * gone - h * (2 * a->rate + b->rate)) + s * (h * (a->rate + b->rate) - 2 * gone)));
 }
 
 /* Take a place at t into the frame of a piece. */
@@ -88,7 +104,8 @@ void to_rest(const Barrier *b, double t, double *x, double *y) {
     gone = MIN(MAX(gone, 0), 1);
     gone = gone > 0.5 ? 1 - 2 * (1 - gone) * (1 - gone) : 2 * gone * gone;
     double dx = *x - m->pivot[0] - m->by[0] * swing - m->way[0] * gone;
-    double dy = *y - m->pivot[1] - m->by[1] * swing - m->way[1] * gone, c = cos(m->turn * t), s = sin(m->turn * t);
+    double dy = *y - m->pivot[1] - m->by[1] * swing - m->way[1] * gone;
+    double angle = m->inertia > 0 ? swung_by(m, t) : m->turn * t, c = cos(angle), s = sin(angle);
     *x = m->pivot[0] + c * dx + s * dy;
     *y = m->pivot[1] - s * dx + c * dy;
 }

@@ -39,7 +39,7 @@ void describe(Contact *c, int i, int j) {
     double spin_mass = turn;
     c->i = i;
     c->j = j;
-    c->two = 0;
+    c->two = c->hung = 0;
     c->owner = W.owner_count;
     c->moved[0] = c->moved[1] = c->moved[2] = 0;
     c->mass[1] = mass + r * r * turn;
@@ -84,6 +84,7 @@ void describe(Contact *c, int i, int j) {
     c->mass[0] = 1 / mass;
     c->mass[1] = 1 / c->mass[1];
     c->mass[2] = spin_mass > 0 ? 1 / spin_mass : 0;
+    if (j < 0 && is_hung(-1 - j)) hang_on(c, W.movers + W.surfaces[-1 - j].mover, a);
     c->rest = pair->restitution;
     c->share = 1;
     c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
@@ -106,6 +107,7 @@ void relative(const Contact *c, int earlier, double *out) {
         out[1] += c->other[1] - (v[0] * c->ny - v[1] * c->nx) + b->radius * v[2];
         out[2] -= v[2];
     }
+    if (c->hung) swing_away(c, earlier, out);
 }
 
 /* The root of the island of a disk, in `W.queue`. */
@@ -128,6 +130,7 @@ void push(const Contact *c, const double *J) {
         b->vy -= y * b->inv_mass;
         b->spin += (b->radius * J[1] - J[2]) * b->inv_inertia;
     }
+    if (c->hung) push_hinge(c, J);
 }
 
 /* Ledger entries of a contact's impulses, which changed its relative velocities from u to v: an
@@ -143,6 +146,7 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
     entries[2] = -J[1] * (first * u[1] + then * v[1]) - J[2] * (first * u[2] + then * v[2]);
     given[0] = c->j >= 0 && !c->two ? all * (J[0] * c->other[0] + J[1] * c->other[1]) : 0;
     given[1] = given[2] = 0;
+    if (c->hung) entries[0] += swung(c, f);
 }
 
 /* Share what is lost in contacts that were solved together: of a crowd only the sum is known. In a chain

@@ -14,7 +14,7 @@
 extern World W;
 
 /* What was too small, so that `run` makes more room. */
-enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS };
+enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS, FULL_SWINGS };
 
 /* Contacts are looked for where a gap is below this share of the radius: what lasts stays a
    thousandth of it apart at most, and nothing crosses the rest within a step unseen. */
@@ -115,11 +115,15 @@ static inline const Surface *surface_at(int k, double t) {
     Surface *s = W.surfaces + k;
     return s->mover < 0 || s->posed == t ? s : move_to(s, t);
 }
+/* Whether a surface hangs on a hinge. */
+static inline int is_hung(int k) { return W.surfaces[k].mover >= 0 && W.movers[W.surfaces[k].mover].inertia > 0; }
 /* Whether a surface moves in this step. */
 static inline int stirs(const Surface *s) { return s->mover >= 0 && W.movers[s->mover].stirs; }
+double swung(const Contact *c, double f);
 /* Work that the motion of a surface does by a contact's impulses, of which the share f has been given, J. */
 static inline double driven(const Contact *c, double f) {
-    return (1 - f) * (c->impulse[0] * c->moved[0] + c->impulse[1] * c->moved[1] + c->impulse[2] * c->moved[2]);
+    double still = (1 - f) * (c->impulse[0] * c->moved[0] + c->impulse[1] * c->moved[1] + c->impulse[2] * c->moved[2]);
+    return c->hung ? still + swung(c, f) : still;
 }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
@@ -164,9 +168,39 @@ double meet_moving(int k, const Disk *d, double span, double *approach);
 double box_span(const Surface *s, const Disk *d);
 double next_turn(double t);
 int stir(double t);
+void box_around(Surface *s, double more);
 void box_movers(double t, double h);
 int find_mover(const Surface *s);
 void prepare_mover(Surface *s);
+
+/* hinge.c */
+void set_hinge(Mover *m, double t);
+void prepare_hinge(Mover *m);
+double hinge_step(double h);
+void bound_hinges(double t, double h);
+void begin_hinges(double t, double h);
+double turn_hinges(void);
+void start_hinges(int back);
+void lean_on_hinges(double *none, double *all);
+void lessen_hinges(double less);
+double gained_by_hinges(void);
+void leave_hinges(double t);
+double meet_stops(double t, double end);
+void end_hinges(double t);
+void finish_hinges(double t);
+void hang_on(Contact *c, const Mover *m, const Disk *d);
+void swing_away(const Contact *c, int earlier, double *out);
+double swung_open(const Contact *c);
+void push_hinge(const Contact *c, const double *J);
+double hinge_share(const Contact *c);
+double couple(const Contact *c, double wanted, double slip, double *tangent);
+void strike_hinge(int mover, double t);
+void leave_struck(int mover);
+void stop_hinges(double t);
+void go_on(void);
+
+/* hung.c */
+void sweep_hung(Contact *list, int count, int sweeps, double enough);
 
 /* grid.c */
 int list_near(double end);

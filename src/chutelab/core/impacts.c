@@ -189,6 +189,10 @@ static void give(Contact *c, double normal) {
     relative(c, 0, u);
     J[0] = normal;
     J[1] = more[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
+    if (c->hung) {
+        J[0] = more[0] = couple(c, normal / c->mass[0], u[1] + c->drift, J + 1);
+        more[1] = J[1];
+    }
     J[2] = 0;
     push(c, more);
     relative(c, 0, v);
@@ -211,6 +215,7 @@ static void give(Contact *c, double normal) {
     if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
     give_back(c, 1);
     bear_contact(c, 1, a->t, a->t);
+    if (c->hung) leave_struck(c->hung - 1);
 }
 
 /* Let a disk lie on a surface from t on. The step of a disk by itself ends here; in a crowd half of
@@ -219,6 +224,7 @@ static void give(Contact *c, double normal) {
 static void support(int i, int k, double t) {
     Disk *d = W.disks + i;
     Contact c;
+    if (is_hung(k)) strike_hinge(W.surfaces[k].mover, t);
     describe(&c, i, -1 - k);
     hold(d, k);
     const Surface *s = surface_at(k, t);
@@ -256,6 +262,7 @@ static int add_touching(int i, int j, double radius, int *count) {
 static void jam(Contact *struck, double t) {
     int i = struck->i, count = 0, last = i, found, reached = 0;
     Contact *list = W.earlier;
+    if (W.hinges) stop_hinges(t);
     W.jams++;
     W.disks[i].jam = W.jams;
     W.disks[i].jam_next = -1;
@@ -308,6 +315,8 @@ static void jam(Contact *struck, double t) {
     }
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
+    W.swings_too = 0;
+    for (int n = 0; n < count; n++) W.swings_too |= list[n].hung > 0;
     /* Not hastened at first: then what rattles may never be as calm as it must be. */
     sweep_contacts(list, count, 0, JAM_SWEEPS, W.sweeps, 0.1 * left, left);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
@@ -332,6 +341,7 @@ static void jam(Contact *struck, double t) {
         if ((c->i == i && c->j == struck->j) || (c->i == struck->j && c->j == i))
             for (int k = 0; k < 2; k++) struck->impulse[k] = c->impulse[k];
     }
+    if (W.hinges) go_on();
     give_back(list, count);
 }
 
@@ -420,6 +430,22 @@ static int goes_straight_on(const Contact *c) {
     return 0;
 }
 
+/* Whether a disk by itself, which does not turn, rattles at a belt that gives it as much at each blow: where a
+   wedge narrows there is no end of them, nor of the belt's work. */
+static int is_driven(int i, double approach) {
+    const Disk *d = W.disks + i;
+    double nx, ny;
+    const int *list;
+    if (W.interact || d->inertia > 0 || approach < SLOW * W.g * W.dt) return 0;
+    int count = surfaces_near(i, &list);
+    for (int n = 0; n < count; n++) {
+        const Surface *s = surface_at(list[n], d->t);
+        if (s->speed == 0 || s->there != THERE || !is_near(s, d)) continue;
+        if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) < d->radius) return 1;
+    }
+    return 0;
+}
+
 /* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, by Newton's restitution
    and Coulomb's friction. */
 static void strike(int i, int j, double t) {
@@ -432,6 +458,7 @@ static void strike(int i, int j, double t) {
     int impacts = j >= 0 ? MAX(a->impacts, b->impacts) : a->impacts;
     Contact c;
     double u[3];
+    if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);
     describe(&c, i, j);
     c.drift = 0;
     was_moved(i);
@@ -441,6 +468,10 @@ static void strike(int i, int j, double t) {
     double back = -c.rest * u[0];
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);
+    if (jammed && c.rest > 0 && is_driven(i, -u[0])) {
+        a->impacts = STALL + 1;
+        jammed = 0;
+    }
     if (jammed || (c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt)) back = 0;
     const Surface *met = j < 0 ? surface_at(-1 - j, t) : 0;
     double press = met ? press_on(a, met, c.nx, c.ny) : 0, later = 0;

@@ -571,6 +571,7 @@ EXPORT int lay_out_laws(void) {
     RESERVE(L.barriers, (double)L.piece_count * (L.family ? L.particle_count : 1));
     RESERVE(L.books, 3.0 * L.book_rows);
     RESERVE(L.movers, L.mover_count);
+    RESERVE(L.swings, L.swing_count);
     RESERVE(L.breaches, BREACHES);
     RESERVE(L.order, crowd ? L.knot_count : 1);
     RESERVE(L.places, crowd ? 2.0 * L.particle_count : 1);

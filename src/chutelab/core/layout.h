@@ -139,21 +139,46 @@ typedef struct {
     double posed;           /* s; of what moves: when its place is as above ... */
     double still[12];       /* ... and as written: x, y, tx, ty, end, crown */
     double fastest, haste;  /* m/s, m/s2; bounds on speed and acceleration of its points */
+    double reach;           /* m; how far it is from what it turns about, at most */
 } Surface;
 
-/* How a surface moves: it shakes, travels and turns about a pivot, all from the run's time. */
+#define TERMS 15 /* of the series that the angle of a hinge follows */
+
+/* How a surface moves: it shakes, travels and turns about a pivot, all from the run's time; or it hangs on a
+   hinge there. */
 typedef struct {
     double pivot[2];        /* [in] m; at rest */
     double by[2], frequency, phase; /* [in] m, Hz, rad; it shakes by so much */
     double way[2], from, lasts; /* [in] m, s; how far it travels, from then on, for so long; 0: nowhere */
-    double turn;            /* [in] rad/s */
+    double turn;            /* [in] rad/s; of a hinge, as it is at t */
+    double inertia, mass;   /* [in] kg m2, kg; about its hinge, 0 without one; 0 without a weight */
+    double gyration;        /* [in] m; root of the mean square distance from there */
+    double moment[2];       /* [in] kg m; its mass times its centre's place from the hinge, as written */
+    double spring, rest, damper; /* [in] N m/rad, rad, N m s/rad */
+    double stops[2];        /* [in] rad; between which it turns */
+    double motor[2];        /* [in] rad/s, N m; speed, and the most that it turns with */
+    double worked, stopped, damped; /* [out] J; work of its motor, losses at its stops and in its damper */
     double t;               /* s; when it is as follows */
     double place[2], velocity[2], pull[2]; /* m, m/s, m/s2; of the pivot */
     double sine, cosine;    /* of the angle that it has turned by */
+    double hastens;         /* rad/s2; how its speed changes */
     double swing;           /* m/s2; largest acceleration of its pivot */
+    /* of a hinge */
+    double since, angle, rate; /* s, rad, rad/s; as its path begins ... */
+    double path[TERMS];     /* ... and the angle from then on, a power of time each */
+    double before;          /* rad/s; before the step's impulses */
+    double impulse[3];      /* N m s; of its stops, and of its motor ... */
+    double need[2], most;   /* rad/s, N m s; ... the least change that the stops ask for, and a bound */
+    double drift;           /* rad/s; what springs and weight make of its speed by the middle of the step */
     int surface;            /* [in] which moves */
     int stirs;              /* whether it moves in this step */
+    int solved;             /* its impulses are of a step that begins now */
+    int struck;             /* stop that it meets as the step ends: 1, 2, or 0 */
+    int first, last;        /* [in] of the laws: its first and last state in their `swings` */
 } Mover;
+
+/* The state of a hinge: halfway through the impulses of a step, and before a blow. */
+typedef struct { double t, angle, rate; int surface, pad; } Swing; /* s, rad, rad/s */ /* [out] */
 
 typedef struct { double restitution, friction, rolling; } Pair; /* [in] rolling: arm over radius */
 
@@ -171,6 +196,8 @@ typedef struct {
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
     double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */
     double moved[3];        /* the part of it that the motion of a surface gives */
+    double lever[3];        /* m, m, 1; its share in the speed of a hinge, which was ... */
+    double turning;         /* ... so much then, rad/s */
     double rest;            /* coefficient of restitution */
     double share;           /* of its friction that acts; below 1 where surfaces wedge a disk */
     double entries[3], later[3]; /* J; what its impulses do to the ledger, and what the part of them
@@ -185,6 +212,8 @@ typedef struct {
     int island;             /* a disk by which it is known */
     int next;               /* of the contacts of disk i in the step before */
     int leaves;             /* it parts in this step */
+    int hung;               /* number of the hinge that feels the impulse from 1 on, or 0 */
+    int pad;
 } Contact;
 
 /* What the impulses of a solve change of a disk, and what one of 1 N s does to it. The first of all is of
@@ -242,6 +271,7 @@ typedef struct {
     Knot *knots;
     Event *events;
     Total *totals;       /* one a step in a crowd */
+    Swing *swings;
     Contact *contacts;   /* of this step */
     Contact *earlier;    /* of the step before */
     SolverRow *rows;     /* (contacts) of those that are solved together */
@@ -263,7 +293,7 @@ typedef struct {
     int disk_count, surface_count, kind_count, owner_count; /* [in] */
     int mover_count;     /* [in] */
     int material_count;
-    int knot_room, event_room, total_room, contact_room, near_room, cell_room;
+    int knot_room, event_room, total_room, contact_room, near_room, cell_room, swing_room;
     int full;            /* what `run` makes room for as it goes on: see `Full` */
     int bucket_count;    /* a power of two */
     int gate_count, end_count, circle_count;
@@ -284,7 +314,7 @@ typedef struct {
     double hops;         /* ... if that is not less than so many hops of what lasts */
     double accurate;     /* m/s; changes at which sweeps end */
     /* [out] */
-    int knot_count, event_count, total_count, contact_count, near_count, earlier_count;
+    int knot_count, event_count, total_count, contact_count, near_count, earlier_count, swing_count;
     int impact_count, step_count, solve_count, sweep_count;
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */
@@ -293,6 +323,8 @@ typedef struct {
     int low, high;       /* disks that this part of the run is about */
     int phase, cell_count, heap_count, moved_count, wide_count;
     int stirs;           /* whether something moves in this step */
+    int hinges;          /* how many there are */
+    int swings_too;      /* contacts that are solved act on hinges */
     int stamp, shocks, jams; /* numbers of the latest query, shock and jam, for marks */
     double t, now, step, step_end, cell;
     double usual;        /* s; the step if nothing slid in a hollow: so long a part of an overlap takes */
@@ -362,6 +394,7 @@ typedef struct { double from[2], length, particle; } StringKeys;
 /* How a surface moves; without a pivot about its first point, the centre of an arc, the pivot of a plate. */
 typedef struct {
     double surface, pivot[2], by[2], frequency, phase_deg, to[2], at, in, turn;
+    double hangs, mass, inertia, spring, rest_deg, damper, stops_deg[2], speed_deg, torque;
 } MoverKeys;
 
 /* What a run needs beside these tables, for a plan that is run as it is: of the run, of each kind of
@@ -603,6 +636,7 @@ typedef struct {
     Body *bodies;           /* [in] (particles) */
     Barrier *barriers;      /* [in] (pieces), of a family (particles, pieces) */
     Mover *movers;          /* [in] (mover_count), as far as they are told */
+    Swing *swings;          /* [in] of all hinges, each one's in the order of time */
     double *books;          /* [in] (book_rows, 3) entries of each surface, J */
     Breach *breaches;       /* (BREACHES) */
     Hit *hits;              /* in the order of particles and knots */
@@ -610,7 +644,7 @@ typedef struct {
     double *places;         /* (particles, 2) there, too */
     /* sizes */
     int particle_count, piece_count, knot_count, row; /* [in] row: doubles from knot to knot */
-    int mover_count;        /* [in] */
+    int mover_count, swing_count; /* [in] */
     int book_rows, surface_count; /* [in] with the particles' own, which is the last */
     int hit_room;
     /* the run */

@@ -237,6 +237,7 @@ static void stop_all(int reason) {
             d->reason = BY_SETTLING;
         }
     }
+    if (W.hinges) finish_hinges(W.t);
 }
 
 /* Whether everything of a crowd has been calm for long enough, nothing moves, and no gate is still to come or go. */
@@ -368,9 +369,11 @@ static int begin_step(void) {
     int woke;
     if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
     if (W.total_count >= W.total_room) return FULL_TOTALS;
+    if (W.hinges && W.swing_count + 4 * W.mover_count > W.swing_room) return FULL_SWINGS;
     double next = set_gates(W.t), h = W.dt, stride = 0;
     for (int i = W.low; i < W.high && W.g + W.haste > 0; i++) h = MIN(h, hop_time(W.disks + i, W.g + W.haste));
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
+    if (W.hinges) h = hinge_step(h);
     W.usual = h;
     set_step(h);
     if (!W.interact) W.ledge = ledge_in(W.disks + W.low, h);
@@ -387,6 +390,7 @@ static int begin_step(void) {
     W.now = W.t;
     h = W.step_end - W.t;
     box_movers(W.t, h);
+    if (W.hinges) bound_hinges(W.t, h);
     /* Impulses stand for half of the step before and half of this one. */
     double span = W.length_before + W.length;
     W.length_before = W.length;
@@ -425,11 +429,18 @@ static int begin_step(void) {
         }
     } while (woke);
     W.length = h;
+    if (W.hinges) begin_hinges(W.t, h);
+    W.swings_too = 0;
     if (W.contact_count) solve_contacts();
     /* A fast belt may have thrown a disk further than its list of neighbours foresaw. */
     for (int i = W.low; i < W.high; i++)
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
     close_step(h);
+    if (W.hinges) {
+        leave_hinges(W.t);
+        W.step_end = meet_stops(W.t, W.step_end);
+        bound_hinges(W.t, W.step_end - W.t);
+    }
     if (W.interact) note_totals();
     return DONE;
 }
@@ -446,11 +457,6 @@ static int go_through(void) {
         if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
         if (W.event_count + SHOCKS * W.contact_count + 64 > W.event_room)
             return FULL_EVENTS;
-        if (d->impacts > STALL) {
-            W.stalled = i;
-            W.now = t;
-            return STALLED;
-        }
         if (j >= 0 && W.disks[j].changes != d->partner_changes) {
             W.now = MAX(W.now, MIN(t, W.step_end));
             foresee(i);
@@ -463,7 +469,9 @@ static int go_through(void) {
                 return DONE;
             }
             shock(i, j, t);
-            continue;
+            if (d->impacts <= STALL) continue;
+            W.stalled = i;
+            return STALLED;
         }
         if (d->mode == WAITING) {
             if (release(i, t)) enter_again(i, W.step_end);
@@ -487,6 +495,7 @@ static void end_step(void) {
             d->t = W.step_end;
         }
     }
+    if (W.hinges) end_hinges(W.step_end);
     W.length = W.step_end - W.t;
     W.t = W.step_end;
     W.step_count++;
@@ -508,9 +517,12 @@ static int is_over(void) {
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode == RIDING || d->mode == FREE) awake = 1;
+        if (W.hinges && d->mode == WAITING && d->release < W.end_time) awake = 1;
         if (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0 || W.stirs)) awake = 1;
         if (d->mode == WAITING) next = MIN(next, MAX(d->release, W.t));
     }
+    /* Hinges go on to a time that is given, else as long as disks do. */
+    if (W.hinges) return !awake && W.until != UNTIL_TIME;
     if (awake) return 0;
     next = MIN(next, next_gate(W.t));
     int asleep = 0;
@@ -542,6 +554,7 @@ static int begin_part(void) {
         d->on = -1;
         W.t = MIN(W.t, d->release);
     }
+    if (W.hinges) W.t = MIN(W.t, 0);
     W.room = INFINITY;
     for (int k = 0; k < W.surface_count; k++) {
         double room = W.surfaces[k].radius - W.disks[W.low].radius;

@@ -21,6 +21,10 @@ static int travels(const Mover *m, double t) { return m->lasts > 0 && t >= m->fr
 
 static void set_mover(Mover *m, double t) {
     if (m->t == t) return;
+    if (m->inertia > 0) {
+        set_hinge(m, t);
+        return;
+    }
     double rate = 2 * PI * m->frequency, phase = rate * t + m->phase, s = sin(phase), c = cos(phase);
     double share = 0, pace = 0, bend = 0, u = m->lasts > 0 ? (t - m->from) / m->lasts : 0;
     if (travels(m, t)) {
@@ -86,7 +90,8 @@ double pulled(const Surface *s, const Disk *d, double nx, double ny, double *pul
     if (s->mover < 0) return 0;
     const Mover *m = mover_of(s);
     double x = d->x - m->place[0], y = d->y - m->place[1], v[3];
-    double ax = m->pull[0] - m->turn * m->turn * x, ay = m->pull[1] - m->turn * m->turn * y;
+    double ax = m->pull[0] - m->turn * m->turn * x - m->hastens * y;
+    double ay = m->pull[1] - m->turn * m->turn * y + m->hastens * x;
     carried(s, d->x, d->y, v);
     *pull = ax * ny - ay * nx;
     return ax * nx + ay * ny + 2 * m->turn * ((d->vx - v[0]) * ny - (d->vy - v[1]) * nx);
@@ -179,7 +184,7 @@ int stir(double t) {
     int changed = 0;
     W.haste = W.stirs = 0;
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
-        int now = m->turn != 0 || travels(m, t) || (m->frequency > 0 && (m->by[0] != 0 || m->by[1] != 0));
+        int now = m->inertia > 0 || m->turn != 0 || travels(m, t) || (m->frequency > 0 && (m->by[0] != 0 || m->by[1] != 0));
         changed |= now != m->stirs;
         W.stirs |= m->stirs = now;
     }
@@ -188,17 +193,21 @@ int stir(double t) {
     return changed;
 }
 
+/* Have the box of a surface hold it where it is, and more round it, m. */
+void box_around(Surface *s, double more) {
+    for (int n = 0; n < 2; n++) {
+        int round = s->shape != SEGMENT;
+        s->box[n] = (round ? (&s->x)[n] - s->radius : MIN(s->end[n], s->end[2 + n])) - more;
+        s->box[2 + n] = (round ? (&s->x)[n] + s->radius : MAX(s->end[n], s->end[2 + n])) + more;
+    }
+}
+
 /* Have the boxes of what moves hold what it sweeps in a step from t on of a length h. */
 void box_movers(double t, double h) {
     for (Surface *s = W.surfaces; s < W.surfaces + W.surface_count && W.mover_count; s++) {
         if (s->mover < 0) continue;
-        double more = s->fastest * h;
         move_to(s, t);
-        for (int n = 0; n < 2; n++) {
-            int round = s->shape != SEGMENT;
-            s->box[n] = (round ? (&s->x)[n] - s->radius : MIN(s->end[n], s->end[2 + n])) - more;
-            s->box[2 + n] = (round ? (&s->x)[n] + s->radius : MAX(s->end[n], s->end[2 + n])) + more;
-        }
+        box_around(s, s->fastest * h);
     }
 }
 
@@ -206,7 +215,7 @@ void box_movers(double t, double h) {
 static void sweep_box(const Mover *m, double reach, double *box) {
     for (int k = 0; k < 4; k++) {
         double way = m->way[k % 2], by = fabs(m->by[k % 2]);
-        if (m->turn != 0) box[k] = m->pivot[k % 2] + (k < 2 ? -reach : reach);
+        if (m->turn != 0 || m->inertia > 0) box[k] = m->pivot[k % 2] + (k < 2 ? -reach : reach);
         box[k] += k < 2 ? MIN(way, 0) - by : MAX(way, 0) + by;
     }
 }
@@ -230,6 +239,7 @@ void prepare_mover(Surface *s) {
         s->still[4 + n] = s->end[n];
         s->still[8 + n] = s->crown[n];
     }
+    s->reach = reach;
     s->fastest = rate * by + 2 * way / lasts + fabs(m->turn) * reach;
     s->haste = rate * rate * by + 4 * way / (lasts * lasts) + m->turn * m->turn * reach;
     W.fastest = MAX(W.fastest, s->fastest);

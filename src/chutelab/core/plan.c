@@ -220,6 +220,46 @@ static void find_pivot(const Tables *t, int surface, double *pivot) {
     pivot[1] = found[1];
 }
 
+/* Add what a piece of a length, even along it, adds to length, place and their squares, from a pivot; its middle
+   is at (x, y), its own mean square distance from there `wide`. */
+static void weigh_piece(const Mover *m, double length, double x, double y, double wide, double *sums) {
+    x -= m->pivot[0];
+    y -= m->pivot[1];
+    sums[0] += length;
+    sums[1] += length * x;
+    sums[2] += length * y;
+    sums[3] += length * (x * x + y * y + wide);
+}
+
+/* Have a surface hang on a hinge. A mass lies evenly along it; where an inertia alone is given, it has no weight. */
+static void lay_hinge(const MoverKeys *k, Mover *m) {
+    double sums[4] = { 0.0, 0.0, 0.0, 0.0 };
+    for (const Segment *s = P.segments; s < P.segments + P.segment_count; s++) {
+        double half = 0.5 * s->length;
+        if (s->surface != m->surface) continue;
+        weigh_piece(m, s->length, s->start[0] + half * s->tangent[0], s->start[1] + half * s->tangent[1],
+                    half * half / 3.0, sums);
+    }
+    for (const Arc *a = P.arcs; a < P.arcs + P.arc_count; a++) {
+        double half = 0.5 * a->extent, middle = a->begin + half, mean = a->radius * sine(half) / half;
+        if (a->surface != m->surface) continue;
+        weigh_piece(m, a->extent * a->radius, a->center[0] + mean * cosine(middle), a->center[1] + mean * sine(middle),
+                    a->radius * a->radius - mean * mean, sums);
+    }
+    double mass = m->mass = isnan(k->mass) ? 0.0 : k->mass;
+    m->inertia = isnan(k->inertia) ? mass * sums[3] / sums[0] : k->inertia;
+    m->gyration = sqrt(sums[3] / sums[0]);
+    for (int n = 0; n < 2; n++) m->moment[n] = mass * sums[1 + n] / sums[0];
+    m->spring = isnan(k->spring) ? 0.0 : k->spring;
+    m->damper = isnan(k->damper) ? 0.0 : k->damper;
+    m->rest = isnan(k->rest_deg) ? 0.0 : k->rest_deg * RADIANS;
+    m->stops[0] = isnan(k->stops_deg[0]) ? -INFINITY : k->stops_deg[0] * RADIANS;
+    m->stops[1] = isnan(k->stops_deg[1]) ? INFINITY : k->stops_deg[1] * RADIANS;
+    if (isnan(k->torque)) return;
+    m->motor[0] = k->speed_deg * RADIANS;
+    m->motor[1] = k->torque;
+}
+
 /* Write how surfaces move: keys that are not given are no motion. */
 static void lay_movers(const Tables *t) {
     for (int n = 0; n < P.moving; n++) {
@@ -239,6 +279,7 @@ static void lay_movers(const Tables *t) {
             m->way[1] = k->to[1] - m->pivot[1];
         }
         if (!isnan(k->turn)) m->turn = k->turn * RADIANS;
+        if (k->hangs == 1.0) lay_hinge(k, m);
     }
 }
 
@@ -257,8 +298,6 @@ EXPORT int build(void) {
     segments = 0;
     arcs = 0;
     build_member(0);
-    Tables first = tables_of(0);
-    lay_movers(&first);
     P.segment_count = segment_count;
     P.arc_count = arc_count;
     RESERVE(P.segments, (double)P.members * segment_count);
@@ -268,6 +307,8 @@ EXPORT int build(void) {
         arcs = P.arcs + (long)member * P.arc_count;
         build_member(member);
     }
+    Tables first = tables_of(0);
+    lay_movers(&first);
     lay_out_drawing();
     return has_room();
 }

@@ -265,6 +265,7 @@ int make_room(int full) {
     if (full == FULL_NEAR) make_near_room(2 * W.near_room);
     if (full == FULL_CONTACTS) make_contact_room(2 * W.contact_room);
     if (full == FULL_KNOTS) STRETCH(W.knots, W.knot_count, W.knot_room);
+    if (full == FULL_SWINGS) STRETCH(W.swings, W.swing_count, W.swing_room);
     if (full == FULL_TOTALS) STRETCH(W.totals, W.total_count, W.total_room);
     if (full == FULL_EVENTS) STRETCH(W.events, W.event_count, W.event_room);
     return has_room();
@@ -293,6 +294,8 @@ static int lay_out_work(void) {
     W.knot_room = (rides ? 100 : 30) * n + 200;
     W.event_room = 40 * n + 1200;
     W.total_room = crowd ? 1024 : 1;
+    W.swing_room = W.hinges ? 1024 + 8 * W.mover_count : 0;
+    RESERVE(W.swings, W.swing_room);
     RESERVE(W.knots, W.knot_room);
     RESERVE(W.totals, W.total_room);
     RESERVE(W.events, W.event_room);
@@ -303,6 +306,10 @@ static int lay_out_work(void) {
 
 /* The host has filled in what is marked [in]: fill in what follows. */
 EXPORT int prepare(void) {
+    W.hinges = 0;
+    for (int k = 0; k < W.mover_count; k++) W.hinges += W.movers[k].inertia > 0;
+    /* What hangs gives what one disk gives it to another. */
+    if (W.hinges) W.interact = 1;
     if (!lay_out_work()) return 0;
     double least = INFINITY, most = 0, s = sin(W.ride_incline), c = cos(W.ride_incline);
     int alone = !W.interact;
@@ -355,5 +362,7 @@ EXPORT int prepare(void) {
     W.accurate = (alone ? 1e-15 : 3e-4) * W.pace;
     /* What is nearly at rest is not to be kept awake by what sweeps leave. */
     if (!alone && W.g > 0) W.accurate = 0.1 * REST * sqrt(W.g * least);
+    for (int k = 0; k < W.mover_count; k++)
+        if (W.movers[k].inertia > 0) prepare_hinge(W.movers + k);
     return 1;
 }

@@ -246,7 +246,7 @@ static void hold_swept(double *all, double *box, const Mover *m) {
     double y = MAX(fabs(box[1] - m->pivot[1]), fabs(box[3] - m->pivot[1])), reach = length_of(x, y);
     for (int n = 0; n < 4; n++) {
         double way = m->way[n % 2], by = fabs(m->by[n % 2]);
-        if (m->turn != 0.0) box[n] = m->pivot[n % 2] + (n < 2 ? -reach : reach);
+        if (m->turn != 0.0 || m->inertia > 0.0) box[n] = m->pivot[n % 2] + (n < 2 ? -reach : reach);
         box[n] += n < 2 ? MIN(way, 0.0) - by : MAX(way, 0.0) + by;
     }
     hold(all, box[0], box[1]);

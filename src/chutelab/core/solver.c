@@ -77,6 +77,10 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
                     double enough) {
     double first = INFINITY;
     int driven = 0;
+    if (W.swings_too) {
+        sweep_hung(list, count, MAX(rounds, 1) * sweeps, enough);
+        return;
+    }
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         driven |= drives(c);
@@ -175,6 +179,12 @@ static void sort_by_islands(void) {
     }
     for (int n = 0; n < W.contact_count; n++)
         if (W.contacts[n].two) parent[island_of(W.contacts[n].i)] = island_of(W.contacts[n].j);
+    /* What touches hinges is one island. */
+    for (int n = 0, hung = -1; n < W.contact_count && W.hinges; n++) {
+        if (!W.contacts[n].hung) continue;
+        if (hung >= 0) parent[island_of(W.contacts[n].i)] = island_of(hung);
+        hung = W.contacts[n].i;
+    }
     /* Of each island a list of its contacts, which begins with its last. */
     for (int n = W.contact_count - 1; n >= 0; n--) {
         int k = island_of(W.contacts[n].i);
@@ -214,23 +224,29 @@ static void check_energy(void) {
         relative(c, 1, u);
         gained -= J[0] * (u[0] + asks(c)) - J[1] * c->drift + J[2] * c->other[2];
         gained -= c->two ? 0 : J[0] * c->other[0] + J[1] * c->other[1];
+        if (c->hung) gained += hinge_share(c);
     }
+    if (W.swings_too) gained += gained_by_hinges();
     W.gained += MAX(gained, 0);
 }
 
 void solve_contacts(void) {
+    int swings = 0;
     if (W.interact) sort_by_islands();
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0;
         int driven = 0;
+        W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
             const Disk *a = W.disks + c->i, *b = W.disks + (c->j >= 0 ? c->j : c->i);
             least = MIN(least, MIN(a->radius, b->radius));
             heaviest = MAX(heaviest, MAX(a->mass, b->mass));
             driven |= !c->two && c->other[1] - c->moved[1] != 0;
+            W.swings_too |= c->hung > 0;
         }
+        swings |= W.swings_too;
         /* A drive presses as hard as it must: there no spring would hold, and friction is lowered. */
         for (int n = from; n < to; n++) W.contacts[n].gives *= driven ? 0 : 1 / heaviest;
         if (W.interact)
@@ -239,6 +255,7 @@ void solve_contacts(void) {
         else solve_alone(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);
+    W.swings_too = swings;
     check_energy();
     W.solve_count++;
 }

@@ -24,7 +24,7 @@ from chutelab.core import (
     dtype,
     give_back,
 )
-from chutelab.machine import Machine, Pieces, hand_over
+from chutelab.machine import SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather
 from chutelab.results.record import REASONS, TOTAL, Record
@@ -185,7 +185,10 @@ class Job:
             return None
         world = self.module.world
         disk = self.module.array("disks", dtype("Disk"), self.machine.count)[world.stalled]
-        reason = "too many impacts in one step; make run.dt shorter, or lower the restitution there"
+        reason = (
+            "too many impacts in one step; make run.dt shorter, move the surfaces there apart, or"
+            " lower their restitution or speed"
+        )
         return StalledError(world.stalled, world.now, (float(disk["x"]), float(disk["y"])), reason)
 
     def stop(self) -> Status:
@@ -251,6 +254,12 @@ class Job:
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.drives[: self.owners] = module.array("drives", REAL, self.owners)
+        if world.hinges:
+            for row in module.array("movers", dtype("Mover"), world.mover_count):
+                work = row["worked"], row["stopped"], row["damped"]
+                recorder.hinge_work[row["surface"]] = work
+            swings = module.array("swings", dtype("Swing"), world.swing_count).view(SWING)
+            recorder.swings = swings[np.argsort(swings["surface"], kind="stable")]
         recorder.contacts = world.impact_count
         recorder.gained = world.gained
         rows = module.array("totals", dtype("Total"), world.total_count)

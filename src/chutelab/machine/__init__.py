@@ -9,7 +9,7 @@
 """
 
 from chutelab.machine.builder import ahead, build, hand_over
-from chutelab.machine.movers import Mover
+from chutelab.machine.movers import SWING, Mover
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
     Caution,
@@ -25,6 +25,7 @@ from chutelab.machine.shapes import Arcs, Pieces, Segments
 
 __all__ = [
     "DRIVE_PULLEY",
+    "SWING",
     "Arcs",
     "Caution",
     "Machine",

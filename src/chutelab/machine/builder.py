@@ -76,7 +76,8 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
     for string in scene.string:
         add("StringKeys", string)
     for name, one in scene.movers.items():
-        shake, travel = one.shake, one.travel
+        shake, travel, motor = one.shake, one.travel, one.motor
+        place = {} if one.hinge in (None, "pivot") else {"pivot": value(one, "hinge")}
         add(
             "MoverKeys", one, surface=scene.surfaces.index(name),
             by=None if shake is None else value(shake, "by"),
@@ -85,6 +86,10 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
             to=None if travel is None else value(travel, "to"),
             at=None if travel is None else value(travel, "at"),
             **{"in": None if travel is None else value(travel, "in_")},
+            hangs=one.hinge is not None,
+            speed_deg=None if motor is None else value(motor, "speed_deg"),
+            torque=None if motor is None else value(motor, "torque"),
+            **place,
         )  # fmt: skip
     return [
         *found,
@@ -219,6 +224,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     module = borrow()
     try:
         rows, nominal, movers = lay(module, scenes, grip)
+        _weigh_hinges(scene, movers)
         warnings = _judged(scenes, nominal)
         releases, radius = draw(module, scenes, watch)
     finally:
@@ -282,6 +288,9 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
 
 def ahead(scene: Scene) -> Machine:
     """Return the machine of a scene, which is built when more of it is asked for than its keys."""
+    if scene.hinges:
+        # Whether they can be is known once they are weighed.
+        return build(scene)
     until, names, machine = scene.run.until, scene.surfaces, object.__new__(Machine)
     vars(machine).update(
         build=build,
@@ -361,6 +370,29 @@ def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Part
     cube = square * size
     mass, inertia = np.array(masses)[kind], np.array(inertias)[kind]
     return Particle(radius, mass * cube, inertia * (cube * square))
+
+
+SWIFTEST = 1e5
+"""rad/s; shortest times of hinges are at least 1 over it: steps have to be shorter."""
+
+
+def _weigh_hinges(scene: Scene, movers: tuple[Mover, ...]) -> None:
+    """Raise if what hangs on a hinge has an inertia that no mass has, or is too stiff to be run."""
+    for mover in movers:
+        if (hinge := mover.hinge) is None:
+            continue
+        name = scene.surfaces[mover.surface]
+        least = hypot(*hinge.moment) ** 2 / hinge.mass if hinge.mass > 0.0 else 0.0
+        stiff = max(hinge.spring / SWIFTEST**2, hinge.damper / SWIFTEST)
+        if hinge.inertia < (1.0 - 1e-9) * least:
+            text = f"at least {least:.6g} kg m2, mass times the square of its centre's distance"
+            fault = Fault(f"{name}.inertia", hinge.inertia, text)
+        elif hinge.inertia < stiff:
+            text = f"at least {stiff:.6g} kg m2 with this spring and damper"
+            fault = Fault(f"{name}.inertia", hinge.inertia, f"{text}: it swings in less than 10 us")
+        else:
+            continue
+        raise RefusedError(scene.source, {0: fault})
 
 
 def _judged(scenes: Scene | Family, nominal: NDArray[Any]) -> tuple[Caution, ...]:

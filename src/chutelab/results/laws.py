@@ -184,10 +184,11 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("knot_count", len(recording.knots)),
         ("row", recording.knots.dtype.itemsize // 8), ("book_rows", len(books) // 3),
         ("surface_count", len(recording.surfaces)), ("engine", _ENGINES.index(recording.engine)),
-        ("interact", machine.interact), ("alike", alike(recording)), ("family", rows.ndim > 1),
+        ("interact", machine.interact or len(recording.swings) > 0),
+        ("alike", alike(recording)), ("family", rows.ndim > 1),
         ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
         ("steps", recording.steps), ("unreal", unreal), ("dt", 0.0 if exact else machine.dt),
-        ("mover_count", len(machine.movers)),
+        ("mover_count", len(machine.movers)), ("swing_count", len(recording.swings)),
         ("gained", recording.gained), ("largest", np.max(machine.particle.radius)),
     ):  # fmt: skip
         setattr(laws, name, value)
@@ -195,9 +196,12 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     movers = module.array("movers", core.dtype("Mover"), len(machine.movers), of="Laws")
     for row, mover in zip(movers, machine.movers, strict=True):
         mover.tell(row)
+        own = np.flatnonzero(recording.swings["surface"] == mover.surface)
+        row["first"], row["last"] = (own[0], own[-1]) if len(own) else (0, 0)
     module.fill(
         "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
         barriers=rows.reshape(-1), books=books,
+        **({"swings": recording.swings} if len(recording.swings) else {}),
     )  # fmt: skip
 
 

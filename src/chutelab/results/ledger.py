@@ -1,7 +1,9 @@
 """The energy ledger of a recording: where every joule came from and where it went.
 
 (K + U) at the end - (K + U) at the start
-= belt_work + drive_work - restitution_loss - friction_loss + residual.
+= belt_work + drive_work - restitution_loss - friction_loss + residual,
+with the energy in springs in U, and what dampers take among the losses, where something hangs on a
+hinge.
 Every entry is accumulated from impulses and contact-point velocities, none is a remainder; so the
 residual is the numerical error, and is shown as such.
 """
@@ -27,7 +29,7 @@ UNSEEN = 5e-6
 
 @dataclass(frozen=True, repr=False)
 class Ledger(Shown):
-    """Energies of all particles together, J.
+    """Energies of all particles together, and of what hangs on hinges, J.
 
     Attributes
     ----------
@@ -38,7 +40,13 @@ class Ledger(Shown):
         Tangential impulse times belt speed: what the drives pay.
     drive_work : float
         Impulse times the velocity that the motion of a surface gives to where it acts: what moves
-        it. In the tracks and in `by_stream` it is part of the belt work.
+        it; of what hangs on a hinge the work of its motor. In the tracks and in `by_stream` it is
+        part of the belt work, of a hinge all that it gives to particles.
+    spring : tuple of float
+        Energies in the springs of hinges at the start and at the end. Of what hangs on hinges
+        kinetic and potential energies are counted, too, the latter with y = 0 at the hinge.
+    damper_loss : float
+        What the dampers of hinges take.
     restitution_loss : float
         Normal part of the losses in impacts.
     friction_loss : float
@@ -67,6 +75,8 @@ class Ledger(Shown):
     by_surface: dict[str, dict[str, float]]
     by_stream: dict[str, dict[str, Any]]
     drive_work: float = 0.0
+    spring: tuple[float, float] = (0.0, 0.0)
+    damper_loss: float = 0.0
 
     @property
     def relative_residual(self) -> float:
@@ -96,7 +106,10 @@ class Ledger(Shown):
             f"{name} {told(before, UNSEEN)} -> {told(after, UNSEEN)} J"
             for name, (before, after) in (("kinetic", self.kinetic), ("potential", self.potential))
         )
-        rows = [(name, [*entries.values()]) for name, entries in self.by_surface.items()]
+        rows = [
+            (name, [entries.get(entry, 0.0) for entry in names])
+            for name, entries in self.by_surface.items()
+        ]
         rows += [
             (f"of {name}", [share.get(entry, 0.0) for entry in names])
             for name, share in self.by_stream.items()
@@ -143,10 +156,40 @@ def ledger(recording: Record) -> Ledger:
         entries["belt_work"] -= work
         entries["drive_work"] = work
     closed, work = _closed(found), float(recording.drives.sum())
+    closed["belt_work"] -= work
     return Ledger(
-        **closed | {"belt_work": closed["belt_work"] - work},
-        by_surface=by_surface, by_stream=by_stream, drive_work=work,
+        **_hung(recording, by_surface, closed | {"drive_work": work}),
+        by_surface=by_surface, by_stream=by_stream,
     )  # fmt: skip
+
+
+def _hung(
+    recording: Record, by_surface: dict[str, dict[str, float]], closed: dict[str, Any]
+) -> dict[str, Any]:
+    """Add to a ledger what hangs on hinges: its energies, its drive, and what it loses."""
+    for mover in recording.machine.movers:
+        if mover.hinge is None:
+            continue
+        entries = by_surface[recording.surfaces[mover.surface]]
+        worked, stopped, damped = recording.hinge_work[mover.surface].tolist()
+        states, given = mover.hinge.states[[0, -1]], entries["drive_work"]
+        kinetic, lifted, spring = mover.hinge.energies(
+            states["angle"], states["rate"], recording.gravity
+        )
+        energies = {"kinetic": kinetic, "potential": lifted, "spring": spring}
+        for name, ends in energies.items():
+            before = closed.get(name, (0.0, 0.0))
+            closed[name] = (before[0] + float(ends[0]), before[1] + float(ends[1]))
+        entries |= {"drive_work": worked, "damper_loss": damped}
+        entries["restitution_loss"] += stopped
+        closed["drive_work"] += worked - given
+        closed["restitution_loss"] += stopped
+        closed["damper_loss"] = closed.get("damper_loss", 0.0) + damped
+        gained = float(sum(ends[1] - ends[0] for ends in energies.values()))
+        closed["residual"] += gained + given - worked + stopped + damped
+        sizes = worked, stopped, damped, lifted[1] - lifted[0], spring[1] - spring[0]
+        closed["turned_over"] += float(sum(map(abs, sizes)) + kinetic[0])
+    return closed
 
 
 def _closed(found: dict[str, Floats]) -> dict[str, Any]:

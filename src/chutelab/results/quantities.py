@@ -442,11 +442,11 @@ def measured(recording: Record, name: str) -> Floats:
         case ["wear", surface, part, which]:
             values = getattr(wear(recording, surface), part)
             return np.array([float(values.sum() if which == "sum" else values.max())])
-        case ["ledger", "by_surface", surface, "belt_work" | "drive_work" as entry] if not (
+        case ["ledger", "by_surface", surface, entry] if not recording.family:
+            return np.array([ledger(recording).by_surface[surface].get(entry, 0.0)])
+        case ["ledger", *_, "drive_work" | "damper_loss"] | ["ledger", "spring", _] if (
             recording.family
         ):
-            return np.array([ledger(recording).by_surface[surface].get(entry, 0.0)])
-        case ["ledger", *_, "drive_work"]:
             return np.zeros(many)
         case ["ledger", "by_surface", surface, entry]:
             return paid(recording, surface, entry)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property, wraps
 from inspect import signature
@@ -20,7 +20,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine import Machine, Particle
+from chutelab.machine import SWING, Machine, Particle
 from chutelab.scene import Scene, quantities
 from chutelab.scene.variants import Family
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -282,6 +282,11 @@ class Record(Shown):
     impulses : ndarray, shape (B, len(surfaces) - 1) or (0, 0), dtype `LOAD`
         What each surface bears in bins of ``run.loads`` seconds from 0 s on, up to the last one in
         which anything is borne; empty where that is not asked for.
+    swings : ndarray, shape (K,) or (0,), dtype `SWING`
+        States of what hangs on hinges, surface by surface, each one's in the order of time.
+    hinge_work : ndarray, shape (len(surfaces), 3) or (0, 3)
+        J; of what hangs on hinges the work of its motor, and losses at its stops and in its damper.
+        Empty where nothing does.
     """
 
     machine: Machine
@@ -300,11 +305,16 @@ class Record(Shown):
     totals: NDArray[Any] = field(default_factory=lambda: np.empty(0, TOTAL))
     drives: Floats = field(default_factory=lambda: np.zeros(0))
     impulses: NDArray[Any] = field(default_factory=lambda: np.empty((0, 0), LOAD))
+    swings: NDArray[Any] = field(default_factory=lambda: np.empty(0, SWING))
+    hinge_work: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
-        arrays = "knots offsets ended events by_surface angle totals drives impulses"
-        for name in arrays.split():
+        arrays = "knots offsets ended events by_surface angle totals drives impulses swings"
+        for name in (*arrays.split(), "hinge_work"):
             getattr(self, name).flags.writeable = False
+        if len(self.swings):
+            movers = (mover.swung(self.swings) for mover in self.machine.movers)
+            object.__setattr__(self, "machine", replace(self.machine, movers=tuple(movers)))
 
     @property
     def scene(self) -> Scene:

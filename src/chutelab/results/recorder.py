@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine import Machine, moved, origin
+from chutelab.machine import SWING, Machine, moved, origin
 from chutelab.results.loads import Bins
 from chutelab.results.record import EVENT, KNOT, LOAD, REASONS, TOTAL, Kind, Record
 from chutelab.util.arrays import Floats, Ints
@@ -74,6 +74,8 @@ class Recorder:
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
         self.ended = np.zeros(count, dtype=np.int8)
         self.drives = np.zeros(owners)
+        self.swings = np.empty(0, SWING)
+        self.hinge_work = np.zeros((owners, 3))
         self.contacts = 0
         self.gained = 0.0
         self.totals = np.empty(0, TOTAL)
@@ -248,6 +250,8 @@ class Recorder:
             events=events,
             by_surface=self.by_surface.copy(),
             drives=self.drives if self.machine.movers else np.zeros(0),
+            swings=self.swings,
+            hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 3)),
             steps=steps,
             contacts=self.contacts,
             angle=angle,

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from chutelab.machine import build
+from chutelab.machine import SWING, build
 from chutelab.results.loads import borne, need_loads
 from chutelab.results.record import (
     ENGINES,
@@ -53,10 +53,12 @@ ARRAYS = {
     "totals": TOTAL,
     "drives": np.dtype("f8"),
     "impulses": LOAD,
+    "swings": SWING,
+    "hinge_work": np.dtype("f8"),
 }
 """Arrays of a file and their types."""
 
-MAYBE = ("angle", "totals", "drives", "impulses")
+MAYBE = ("angle", "totals", "drives", "impulses", "swings", "hinge_work")
 """Those that are left out where they are empty."""
 
 HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
@@ -216,7 +218,8 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         "by_surface": arrays["by_surface"], "angle": recording.angle, "drives": recording.drives,
     }  # fmt: skip
     numbers["gained"] = np.asarray(recording.gained, dtype=float)
-    for name in ("knots", "events", "totals", "impulses"):
+    numbers["hinge_work"] = recording.hinge_work
+    for name in ("knots", "events", "totals", "impulses", "swings"):
         array = getattr(recording, name)
         numbers |= {f"{name}.{key}": array[key] for key in array.dtype.names or ()}
     for name, values in numbers.items():
@@ -237,6 +240,14 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
         and recording.drives.shape == ((surfaces,) if recording.machine.movers else (0,))
+        and recording.hinge_work.shape == ((surfaces if len(recording.swings) else 0), 3)
+        and recording.swings.ndim == 1
+        and all(
+            mover.hinge is None or len(mover.hinge.states) for mover in recording.machine.movers
+        )
+        and not np.any(
+            np.diff(recording.swings["t"])[np.diff(recording.swings["surface"]) == 0] < 0.0
+        )
         and not np.any((events["surface"] < -1) | (events["surface"] >= surfaces))
         and not np.any((events["particle"] < 0) | (events["particle"] >= len(sizes)))
         and not np.any((events["other"] < -1) | (events["other"] >= len(sizes)))

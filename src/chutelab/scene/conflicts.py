@@ -51,6 +51,14 @@ EITHER: Final = {"particle": "particles", "plate": "plates", "stream": "streams"
 ALWAYS: Final = ("particle", "stream", "run")
 """Tables that a scene has without writing them."""
 
+MOTIONS: Final = ("turn", "shake", "travel")
+"""Keys by which the motion of a surface is prescribed."""
+
+HINGED: Final = (
+    "hinge", "mass", "inertia", "spring", "rest_deg", "damper", "stops_deg", "motor",
+)  # fmt: skip
+"""Keys of a surface that hangs on a hinge."""
+
 NO_MACHINE: Final = ("sensor", "expect", "view", "live")
 """Tables that say nothing of the machine."""
 
@@ -443,9 +451,13 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
         text = f"at most {MOST_PARTICLES} particles in all streams together, not {count}"
         yield max(streams, key=lambda stream: stream["count"]).fault("count", text)
     for row in (*look.rows("plate"), *look.rows("surface")):
-        keys = [key for key in ("turn", "shake", "travel") if row.given(key) and row[key] != 0.0]
+        motions = (*MOTIONS, "hinge")
+        keys = [key for key in motions if row.given(key) and row[key] != 0.0]
         if keys and engine == "exact":
             yield run.fault("engine", f"{row.path(keys[0])} moves it: contact or pymunk has that")
+        if row.given("hinge") and count > 1 and not meet:
+            text = f"the hinge {row.path('hinge')} couples particles: several of them have to meet"
+            yield streams[0].fault("interact", text)
     if look.rows("string") and engine in ("exact", "contact"):
         yield run.fault("engine", "string[0] needs pymunk")
 

@@ -304,7 +304,14 @@ class SceneTables(Table):
         named: list[tuple[str, Plate | Surface]]
         named = [(plate.name or "plate", plate) for plate in self.plates]
         named += [(surface.name, surface) for surface in self.surface]
-        return {name: one for name, one in named if one.turn or one.shake or one.travel}
+        return {
+            name: one for name, one in named if one.turn or one.shake or one.travel or one.hinge
+        }
+
+    @property
+    def hinges(self) -> bool:
+        """Whether something hangs on a hinge."""
+        return any(one.hinge for one in self.movers.values())
 
     @property
     def places(self) -> tuple[str, ...]:

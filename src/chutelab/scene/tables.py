@@ -22,6 +22,7 @@ from chutelab.scene.units import (
     Density,
     Duration,
     Frequency,
+    Inertia,
     Keys,
     Length,
     Mass,
@@ -37,9 +38,11 @@ from chutelab.scene.units import (
     Share,
     Size,
     Speed,
+    Stops,
     Switch,
     Table,
     Text,
+    Torque,
     Turn,
     Two,
     Values,
@@ -161,6 +164,36 @@ class Travel(Table):
     in_: Duration = described(..., "How long it takes", "s", alias="in")
 
 
+class Motor(Table):
+    """What turns a hinge: as fast as this, as far as its torque is enough."""
+
+    speed_deg: Turn = described(..., "Speed that it turns at, counterclockwise", "degrees/s")
+    torque: Torque = described(..., "The most that it turns with", "N m")
+
+
+HINGE: Any = described(
+    None,
+    'It hangs free on a hinge: there [x, y], or at its "pivot"; needs a mass or an inertia',
+    "m",
+)
+HELD: Any = described(None, "Of what hangs on a hinge: its mass, which lies evenly along it", "kg")
+INERTIA: Any = described(
+    None, "... its inertia about the hinge; default: by its mass; without a mass it has no weight",
+    "kg m2",
+)  # fmt: skip
+SPRING: Any = described(0.0, "... stiffness of a spring that turns it to rest_deg", "N m/rad")
+REST: Any = described(
+    0.0, "... angle at which its spring is at rest, from where it is written", "degrees"
+)
+DAMPER: Any = described(0.0, "... torque of a damper for each rad/s", "N m s/rad")
+STOPS: Any = described(
+    None,
+    "... between which angles [least, greatest] it turns; a stop gives nothing back",
+    "degrees",
+)
+MOTOR: Any = described(None, "... a motor: { speed_deg = 180, torque = 2 }")
+
+
 class Plate(Table):
     """A plate that hangs from a pivot: the damping plate, at a distance, or a further one."""
 
@@ -203,6 +236,14 @@ class Plate(Table):
     turn: Turn = described(
         0.0, "Speed at which it turns about its pivot, counterclockwise", "degrees/s"
     )
+    hinge: Point | Literal["pivot"] | None = HINGE
+    mass: Mass | None = HELD
+    inertia: Inertia | None = INERTIA
+    spring: Amount = SPRING
+    rest_deg: Angle = REST
+    damper: Amount = DAMPER
+    stops_deg: Stops | None = STOPS
+    motor: Motor | None = MOTOR
 
 
 class Outgoing(Table):
@@ -292,6 +333,14 @@ class Surface(Table):
     turn: Turn = described(
         0.0, "Speed at which it turns about its pivot, counterclockwise", "degrees/s"
     )
+    hinge: Point | Literal["pivot"] | None = HINGE
+    mass: Mass | None = HELD
+    inertia: Inertia | None = INERTIA
+    spring: Amount = SPRING
+    rest_deg: Angle = REST
+    damper: Amount = DAMPER
+    stops_deg: Stops | None = STOPS
+    motor: Motor | None = MOTOR
     repeat: Repeats = described(
         (),
         "Copies [[n, dx, dy], ...]: n of it, each moved on by (dx, dy) m; a second entry repeats"

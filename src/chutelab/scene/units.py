@@ -267,6 +267,13 @@ Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 Angle = Annotated[Number, Field(ge=-720.0, le=720.0)]
 Turn = Annotated[Number, Field(ge=-36_000.0, le=36_000.0)]
 """degrees/s; 6,000 turns a minute."""
+Stops = Annotated[
+    tuple[Angle, Angle],
+    _must(lambda stops: stops[0] <= 0.0 <= stops[1] and stops[0] < stops[1],
+          "[least, greatest], degrees, round the 0 where it begins"),
+]  # fmt: skip
+Inertia = Annotated[Number, Field(ge=1e-9, le=LARGEST)]
+Torque = Annotated[Number, Field(gt=0.0, le=LARGEST)]
 Frequency = Annotated[Number, Field(ge=1e-6, le=10_000.0)]
 
 

@@ -1,4 +1,4 @@
-"""Surfaces that move, as kinematic bodies: Chipmunk is told where they are, and how fast."""
+"""Surfaces that move: kinematic bodies, which are told where; what hangs by its own joints."""
 
 from __future__ import annotations
 
@@ -9,6 +9,59 @@ from pymunk import Vec2d
 from chutelab.engines.pymunk.world import Face, World
 from chutelab.machine import Machine, Mover
 from chutelab.util.arrays import Floats, Ints
+
+
+class Hanging:
+    """What hangs on a hinge: a body a face, which pivots there; all of a surface turn together.
+
+    Like a particle's place its angle in the Space is half a step behind, and is read so. Chipmunk
+    tells of a joint's impulse its size only: a stop pushes inwards, a motor towards its speed.
+    """
+
+    def __init__(self, space: pymunk.Space, mover: Mover, bodies: list[pymunk.Body]) -> None:
+        hinge, still, many = mover.hinge, space.static_body, len(bodies)
+        assert hinge is not None
+        self.hinge, self.surface, self.body = hinge, mover.surface, bodies[0]
+        x, y = hinge.moment
+        pivot, weighs = Vec2d(*mover.pivot), hinge.mass > 0.0
+        # What has no weight has its mass at the hinge, where it does nothing.
+        mass = hinge.mass if weighs else hinge.inertia / hinge.gyration**2
+        middle = Vec2d(x, y) / mass if weighs else Vec2d.zero()
+        for body in bodies:
+            body.body_type = pymunk.Body.DYNAMIC
+            body.mass = mass / many
+            body.moment = (hinge.inertia - mass * middle.dot(middle) * weighs) / many
+            body.center_of_gravity = pivot + middle - body.position
+            joints: list[pymunk.Constraint] = [pymunk.PivotJoint(still, body, pivot)]
+            if body is not self.body:
+                joints.append(pymunk.GearJoint(self.body, body, 0.0, 1.0))
+            for joint in joints:
+                joint.error_bias = 0.0
+                space.add(joint)
+        self.stop = pymunk.RotaryLimitJoint(still, self.body, *np.clip(hinge.stops, -1e9, 1e9))
+        self.stop.error_bias = 0.0
+        self.motor = pymunk.SimpleMotor(self.body, still, hinge.motor[0])
+        self.motor.max_force = hinge.motor[1]
+        spring = pymunk.DampedRotarySpring(self.body, still, hinge.rest, hinge.spring, hinge.damper)
+        space.add(self.stop, spring, *[self.motor] * (hinge.motor[1] > 0.0))
+        self.before, self.work = 0.0, np.zeros(3)
+        self.states = [(0.0, 0.0, 0.0, mover.surface, 0)]
+
+    @property
+    def rate(self) -> float:
+        """How fast it turns, rad/s."""
+        return float(self.body.angular_velocity)
+
+    def step(self, t: float, h: float) -> None:
+        """Note its state after a step that ended at a time (s), and what acted on it."""
+        rate, mean = self.rate, 0.5 * (self.rate + self.before)
+        inwards = -1.0 if self.body.angle > 0.5 * sum(np.clip(self.hinge.stops, -1e9, 1e9)) else 1.0
+        turns = 1.0 if self.hinge.motor[0] > mean else -1.0
+        if self.hinge.motor[1] > 0.0:
+            self.work[0] += turns * self.motor.impulse * mean
+        self.work[1] -= inwards * self.stop.impulse * mean
+        self.work[2] += self.hinge.damper * h * mean * mean
+        self.states.append((t, self.body.angle + 0.5 * h * rate, rate, self.surface, 0))
 
 
 class Moving:
@@ -29,23 +82,36 @@ class Moving:
             body, mover = face.shape.body, movers.get(face.surface)
             if mover is None or body is None:
                 continue
-            body.body_type = pymunk.Body.KINEMATIC
+            if mover.hinge is None:
+                body.body_type = pymunk.Body.KINEMATIC
             # As written it is here; its shapes are counted from there.
             shapes = [shape for shape, its in world.by_shape.items() if its is face]
             links = [shape for shape in shapes if isinstance(shape, pymunk.Segment)]
             self.faces.append((face, body, mover, body.position, links))
             rows.append(row)
         self.rows = np.array(rows, dtype=np.int64)
+        self.hanging: dict[int, Hanging] = {}
+        # Bodies that are free would meet each other.
+        for shape in world.by_shape if machine.scene.hinges else ():
+            shape.filter = pymunk.ShapeFilter(group=2)
+        for surface, mover in movers.items():
+            if mover.hinge is not None:
+                bodies = [body for face, body, *_ in self.faces if face.surface == surface]
+                self.hanging[surface] = Hanging(world.space, mover, bodies)
         size = first + len(world.faces)
         self.place, self.velocity = np.zeros((2, 2, size))
-        self.turn = np.zeros(size)
-        self.turn[self.rows] = [mover.turn for _, _, mover, _, _ in self.faces]
+        # Before a step and after it.
+        self.turn = np.zeros((2, size))
+        self.turn[:, self.rows] = [mover.turn for _, _, mover, _, _ in self.faces]
         self.angle, self.center = np.zeros(size), center
 
     def put(self, t: float, h: float) -> None:
         """Place all for a step that begins at a time (s)."""
         for row, one in zip(self.rows, self.faces, strict=True):
             face, body, mover, written, links = one
+            if mover.hinge is not None:
+                self.hanging[face.surface].before = self.turn[0, row] = body.angular_velocity
+                continue
             x, y, angle = mover.pose(t + 0.5 * h).tolist()
             vx, vy, turn = mover.velocity(t + h).tolist()
             place = Vec2d(*mover.carried(written, t + 0.5 * h).tolist())
@@ -58,10 +124,26 @@ class Moving:
             self.place[:, row], self.velocity[:, row] = (x, y), (vx, vy)
             self.center[:, row] = place
             self.angle[row] = angle
-            for link in links if face.speed else ():
-                along = (link.b - link.a).normalized().rotated(angle)
-                back = -1.0 if face.tangent is None else 1.0
-                link.surface_velocity = back * face.speed * along
+            self._run(face, links, angle)
+
+    def _run(self, face: Face, links: list[pymunk.Segment], angle: float) -> None:
+        """Have a belt run along its surface at an angle (rad)."""
+        for link in links if face.speed else ():
+            along = (link.b - link.a).normalized().rotated(angle)
+            back = -1.0 if face.tangent is None else 1.0
+            link.surface_velocity = back * face.speed * along
+
+    def swing(self, t: float, h: float) -> None:
+        """Note what hangs on hinges after a step that ended at a time (s)."""
+        for one in self.hanging.values():
+            one.step(t, h)
+        for row, (face, body, mover, written, links) in zip(self.rows, self.faces, strict=True):
+            if mover.hinge is None:
+                continue
+            turned = Vec2d(*(written - mover.pivot)).rotated(body.angle)
+            self.place[:, row], self.center[:, row] = mover.pivot, mover.pivot + turned
+            self.angle[row], self.turn[1, row] = body.angle, body.angular_velocity
+            self._run(face, links, body.angle)
 
     def back(self, rows: Ints, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Return directions (k,) at bodies, by their rows, as they are where these are at rest."""
@@ -69,7 +151,10 @@ class Moving:
         return c * x + s * y, c * y - s * x
 
     def at(self, rows: Ints, places: Floats) -> Floats:
-        """Return the velocity (m/s) at places (2, k), m, of bodies (k,) by their rows."""
+        """Return velocities (m/s) at places (2, k), m, of bodies (k,) by their rows.
+
+        Before the step and after it, (2, 2, k).
+        """
         x, y = places - self.place[:, rows]
-        turn = self.turn[rows]
-        return np.asarray(self.velocity[:, rows] + np.stack([-turn * y, turn * x]))
+        turn = self.turn[:, rows]
+        return np.asarray(self.velocity[:, rows] + np.stack([-turn * y, turn * x], axis=1))

@@ -39,7 +39,7 @@ from chutelab.engines.pymunk.world import (
     Tracks,
     World,
 )
-from chutelab.machine import Machine
+from chutelab.machine import SWING, Machine
 from chutelab.results.loads import Bins
 from chutelab.results.record import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder
@@ -125,6 +125,8 @@ class Shared:
         self.pull = Vec2d(0.0, -self.g)
         # A whole number of steps ends the run.
         self.t = self.begin = float(starts.t.min())
+        if any(mover.hinge for mover in machine.movers):
+            self.t = self.begin = min(self.begin, 0.0)
         span = machine.end_time - self.begin
         self.most = ceil(span / machine.dt - 1e-9)
         self.h, self.steps, self.clock = span / max(self.most, 1), 0, 0
@@ -159,7 +161,7 @@ class Shared:
         if machine.movers:
             self.moving = Moving(machine, world, count, self.center)
             self.throws[self.moving.rows] = True
-            self.spin += self.moving.turn
+            self.spin += self.moving.turn[1]
         # Of particles that turn: 1/I, and rolling friction's arm over the radius, if any has it.
         self.ease, share = np.zeros((2, rows))
         inertia = np.broadcast_to(p.inertia, count)
@@ -184,8 +186,10 @@ class Shared:
     def run(self, report: Progress) -> None:
         """Run to the end."""
         reason, enough = "time", None
-        while self.clock < self.most and (self.waiting or self.inside.any()):
-            if not self.inside.any():
+        # What hangs swings on to a time that is given.
+        on = bool(self.moving and self.moving.hanging) and self.machine.until == "time"
+        while self.clock < self.most and (on or self.waiting or self.inside.any()):
+            if not self.inside.any() and not (self.moving and self.moving.hanging):
                 # Nothing to step until the next release.
                 due = float(self.machine.releases.t[self.waiting[0]])
                 clock = min(int((due - self.begin) / self.h), self.most - 1)
@@ -205,6 +209,10 @@ class Shared:
         for i in np.flatnonzero(self.inside).tolist():
             self._tell_calm(i)
             self._end(i, reason)
+        for one in self.moving.hanging.values() if self.moving else ():
+            states = np.array(one.states, SWING)
+            self.recorder.swings = np.concatenate([self.recorder.swings, states])
+            self.recorder.hinge_work[one.surface] = one.work
         faces = slice(self.count, None)
         np.add.at(self.recorder.by_surface, self.surface[faces], self.entries.T[faces])
         if enough is not None:
@@ -323,6 +331,8 @@ class Shared:
         after[:, rows] = told
         after[:2] += (0.5 * self.h) * after[2:4]
         after[:, self.count :] = 0.0
+        if self.moving is not None:
+            self.moving.swing(self.t, self.h)
         self._contacts()
         if self.strings:
             self._pulled()
@@ -437,7 +447,7 @@ class Shared:
         place = 0.5 * (self.state[0, :2] + self.state[1, :2]).take(one, axis=1)
         velocity = self.moving.at(other, place - self.radius[one] * n)
         others[:, :2] += velocity
-        work = np.asarray((push * velocity).sum(axis=0))
+        work = np.asarray((push * velocity.mean(axis=0)).sum(axis=0))
         np.add.at(self.recorder.drives, self.surface[other], work)
         return work
 
@@ -566,7 +576,7 @@ class Shared:
         for i in np.flatnonzero(over & (self.pushes >= STAY)):
             t, x, y, vx, vy, omega = self.left[:, i].tolist()
             self.recorder.events(Kind.SEPARATION, i, t, (x, y), (vx, vy), omega, surface=self.on[i])
-        self.pushes[over] = 0
+        self.pushes[over], self.on[over] = 0, -1
         self.pushes[particles] += 1
         self.on[particles] = surface
         self.left[0, particles], self.left[1:, particles] = self.t, self.state[1][:, particles]

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
-from chutelab.scene.conflicts import EITHER, RULES, tree
+from chutelab.scene.conflicts import EITHER, HINGED, MOTIONS, RULES, tree
 from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
@@ -189,7 +189,8 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
                 rule["required"] = True
             if table == "particle" and key in ("size", "points"):
                 continue
-            if key in ("turn", "shake", "travel") or (table, key) == ("surface", "pivot"):
+            moves = table in ("plate", "surface") and key in (*MOTIONS, *HINGED)
+            if moves or (table, key) == ("surface", "pivot"):
                 continue
             rules[table][key] = rule
     # Mass points, boxes and polygons are for other engines.

@@ -1,0 +1,419 @@
+/* Surfaces that hang on a hinge: one degree of freedom each, with a weight, a spring, a damper, stops and a
+   motor.
+
+   Between impulses the angle follows
+
+       I angle'' = -spring (angle - rest) - damper angle' + weight's moment,
+
+   as a series of powers of the time: to rounding, since steps are short beside all of its times. What acts
+   by impulses, once a step, are contacts that last, stops and the motor; they are solved together. A blow
+   ends the step, so that all paths begin anew with the hinge's. */
+
+#include "core.h"
+
+/* Of the shortest of its times: that long is a step at most. */
+#define SHARE 0.5
+/* rad; so near to a stop it lies against it. */
+#define AGAINST 1e-7
+/* Of the step: a stop that is met later than that is met at its end. */
+#define LATE 1e-6
+/* Sweeps over stop and motor of hinges that nothing touches. */
+#define ALONE 50
+/* Rounds to blow and friction of a contact that feel each other. */
+#define ROUNDS 8
+
+static Mover *hinge_of(const Contact *c) { return W.movers + c->hung - 1; }
+
+static int is_hinge(const Mover *m) { return m->inertia > 0; }
+
+/* Moment of the weight at an angle of 0, and a quarter turn further, N m. */
+static void weigh(const Mover *m, double *now, double *ahead) {
+    *now = m->moment[0] * W.gy - m->moment[1] * W.gx;
+    *ahead = -m->moment[0] * W.gx - m->moment[1] * W.gy;
+}
+
+/* Lay the path from `since` on. */
+static void lay_path(Mover *m) {
+    double s[TERMS], c[TERMS], now, ahead, *a = m->path;
+    weigh(m, &now, &ahead);
+    a[0] = m->angle;
+    a[1] = m->rate;
+    s[0] = sin(m->angle);
+    c[0] = cos(m->angle);
+    for (int k = 0; k + 2 < TERMS; k++) {
+        double moment = now * c[k] + ahead * s[k] - m->spring * a[k] - m->damper * (k + 1) * a[k + 1];
+        if (k == 0) moment += m->spring * m->rest;
+        a[k + 2] = moment / (m->inertia * (k + 1) * (k + 2));
+        s[k + 1] = c[k + 1] = 0;
+        for (int j = 0; j <= k; j++) {
+            s[k + 1] += (j + 1) * a[j + 1] * c[k - j] / (k + 1);
+            c[k + 1] -= (j + 1) * a[j + 1] * s[k - j] / (k + 1);
+        }
+    }
+    m->t = NAN;
+}
+
+/* Angle, its rate and how that changes, a time h after the path began. */
+static void follow_path(const Mover *m, double h, double *angle, double *rate, double *change) {
+    const double *a = m->path;
+    *angle = *rate = *change = 0;
+    for (int k = TERMS - 1; k >= 0; k--) {
+        *angle = *angle * h + a[k];
+        if (k > 0) *rate = *rate * h + k * a[k];
+        if (k > 1) *change = *change * h + k * (k - 1) * a[k];
+    }
+}
+
+/* Put a hinge where it is at t. */
+void set_hinge(Mover *m, double t) {
+    double angle;
+    follow_path(m, t - m->since, &angle, &m->turn, &m->hastens);
+    m->sine = sin(angle);
+    m->cosine = cos(angle);
+    for (int n = 0; n < 2; n++) {
+        m->place[n] = m->pivot[n];
+        m->velocity[n] = m->pull[n] = 0;
+    }
+    m->t = t;
+}
+
+/* Have a hinge go its path up to t, and begin a new one; its damper takes the integral of damper rate^2. */
+static void bring(Mover *m, double t) {
+    double h = t - m->since, lost = 0, change, power;
+    const double *a = m->path;
+    if (!(h > 0)) return;
+    for (int k = 1; k < TERMS && m->damper > 0; k++) {
+        power = 1;
+        for (int n = 1; n < k; n++) power *= h;
+        for (int j = 1; j < TERMS; j++, power *= h) lost += k * a[k] * j * a[j] * power * h / (k + j - 1);
+    }
+    m->damped += m->damper * lost;
+    follow_path(m, h, &m->angle, &m->rate, &change);
+    m->since = t;
+    lay_path(m);
+}
+
+static void note(const Mover *m, double t, double rate) {
+    W.swings[W.swing_count++] = (Swing){ t, m->angle, rate, m->surface, 0 };
+}
+
+/* Have a hinge begin to hang as it is written. */
+void prepare_hinge(Mover *m) {
+    m->since = m->angle = m->rate = m->worked = m->stopped = m->damped = 0;
+    m->impulse[0] = m->impulse[1] = m->impulse[2] = 0;
+    m->stirs = m->solved = m->struck = 0;
+    lay_path(m);
+    note(m, 0, 0);
+}
+
+/* Longest step that the paths of all hinges allow, s. */
+double hinge_step(double h) {
+    for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        double weight = W.g * hypot(m->moment[0], m->moment[1]);
+        double fast = MAX(sqrt((m->spring + weight) / m->inertia), MAX(m->damper / m->inertia, fabs(m->rate)));
+        if (fast * h > SHARE) h = SHARE / fast;
+    }
+    return h;
+}
+
+/* Bounds on speed and acceleration of what hangs on hinges in a step of a length h, and boxes that hold what it
+   sweeps. */
+void bound_hinges(double t, double h) {
+    for (Surface *s = W.surfaces; s < W.surfaces + W.surface_count; s++) {
+        if (s->mover < 0 || !is_hinge(W.movers + s->mover)) continue;
+        const Mover *m = W.movers + s->mover;
+        double rate = 0, change = 0, power = 1;
+        for (int k = 1; k < TERMS; k++, power *= h) {
+            rate += k * fabs(m->path[k]) * power;
+            if (k + 1 < TERMS) change += k * (k + 1) * fabs(m->path[k + 1]) * power;
+        }
+        s->fastest = s->reach * rate;
+        s->haste = s->reach * (change + rate * rate);
+        W.fastest = MAX(W.fastest, s->fastest);
+        W.haste = MAX(W.haste, s->haste);
+        double more = s->fastest * h;
+        move_to(s, t);
+        box_around(s, more);
+    }
+}
+
+/* Begin a step of a length h at t: what stops and motors ask for. */
+void begin_hinges(double t, double h) {
+    double share = W.again;
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        double angle, rate, change;
+        if (!is_hinge(m)) continue;
+        bring(m, t);
+        m->before = m->rate;
+        m->drift = m->path[2] * h;
+        m->most = 0.5 * (W.length_before + h) * m->motor[1];
+        follow_path(m, h, &angle, &rate, &change);
+        for (int n = 0; n < 2; n++) {
+            int touches = n ? m->angle >= m->stops[1] - AGAINST : m->angle <= m->stops[0] + AGAINST;
+            m->need[n] = touches ? (m->stops[n] - angle) / h : n ? INFINITY : -INFINITY;
+            m->impulse[n] *= touches ? share : 0;
+        }
+        m->impulse[2] = MIN(MAX(share * m->impulse[2], -m->most), m->most);
+    }
+}
+
+/* Of the work of a hinge's impulse J what is left when the share f of it has been given, J. */
+static double work(const Mover *m, double J, double f) {
+    return 0.5 * J * ((1 - f) * (1 - f) * m->before + (1 - f * f) * m->rate);
+}
+
+/* Book the work of motors, and what stops take, of the impulses behind the share f; with a sign. */
+static void book_hinge(Mover *m, double f, double sign) {
+    m->worked += sign * work(m, m->impulse[2], f);
+    m->stopped -= sign * work(m, m->impulse[0] + m->impulse[1], f);
+}
+
+/* Have a hinge be where it is at t, when it is struck: the step ends there. */
+void strike_hinge(int mover, double t) {
+    Mover *m = W.movers + mover;
+    bring(m, t);
+    if (m->solved) note(m, t, m->rate);
+    m->solved = 0;
+    m->before = m->rate;
+    W.step_end = MIN(W.step_end, t);
+}
+
+/* What stops ask for within a step, at one instant t: motors have no time to act. */
+void stop_hinges(double t) {
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        strike_hinge((int)(m - W.movers), t);
+        m->drift = m->most = 0;
+        for (int n = 0; n < 3; n++) m->impulse[n] = 0;
+        m->need[0] = m->angle <= m->stops[0] + AGAINST ? -m->rate : -INFINITY;
+        m->need[1] = m->angle >= m->stops[1] - AGAINST ? -m->rate : INFINITY;
+    }
+}
+
+/* Book what stops took at that instant, and let paths begin. */
+void go_on(void) {
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        book_hinge(m, 0, 1);
+        lay_path(m);
+    }
+}
+
+/* Sweep over stops and motors of all hinges; return by how much a speed changed, rad/s. */
+double turn_hinges(void) {
+    double worst = 0;
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        double was = m->rate, *J = m->impulse, given;
+        if (m->most > 0) {
+            given = J[2] + m->inertia * (m->motor[0] - m->rate - m->drift);
+            given = MIN(MAX(given, -m->most), m->most) - J[2];
+            J[2] += given;
+            m->rate += given / m->inertia;
+        }
+        for (int n = 0; n < 2; n++) {
+            if (fabs(m->need[n]) == INFINITY) continue;
+            given = m->inertia * (m->need[n] - (m->rate - m->before));
+            given = n ? MIN(J[1] + given, 0) - J[1] : MAX(J[0] + given, 0) - J[0];
+            J[n] += given;
+            m->rate += given / m->inertia;
+        }
+        worst = MAX(worst, fabs(m->rate - was));
+    }
+    return worst;
+}
+
+/* Give hinges the impulses with which the sweeps begin, or take them back. */
+void start_hinges(int back) {
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        m->rate = m->before;
+        for (int n = 0; n < 3; n++) {
+            if (back) m->impulse[n] = 0;
+            m->rate += m->impulse[n] / m->inertia;
+        }
+    }
+}
+
+/* What stops and motors add to the slope of the cost along all impulses, see `lessen`. */
+void lean_on_hinges(double *none, double *all) {
+    for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        const double *J = m->impulse, at = m->drift - m->motor[0];
+        *none += J[2] * (m->before + at);
+        *all += J[2] * (m->rate + at);
+        for (int n = 0; n < 2; n++) {
+            if (J[n] == 0) continue;
+            *none -= J[n] * m->need[n];
+            *all += J[n] * (m->rate - m->before - m->need[n]);
+        }
+    }
+}
+
+/* Lessen the impulses of stops and motors by a share. */
+void lessen_hinges(double less) {
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++)
+        for (int n = 0; n < 3 && is_hinge(m); n++) {
+            m->rate -= less * m->impulse[n] / m->inertia;
+            m->impulse[n] -= less * m->impulse[n];
+        }
+}
+
+/* What hinges add to the left of the law of energy of a solve, see `check_energy`. */
+double gained_by_hinges(void) {
+    double gained = 0;
+    for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        const double *J = m->impulse;
+        gained += m->inertia * (m->rate - m->before) * m->rate - J[2] * (m->motor[0] - m->drift);
+        for (int n = 0; n < 2; n++)
+            if (J[n] != 0) gained -= J[n] * (m->before + m->need[n]);
+    }
+    return gained;
+}
+
+/* Solve stops and motors where no contact acts on hinges; book them, and let the paths of the step begin.
+   A stop that is met within it ends it. */
+void leave_hinges(double t) {
+    for (int n = 0; n < ALONE && !W.swings_too; n++) {
+        if (n == 0) start_hinges(0);
+        if (turn_hinges() == 0) break;
+    }
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        book_hinge(m, 0, 1);
+        note(m, t, m->before + W.before * (m->rate - m->before));
+        m->solved = 1;
+        m->struck = 0;
+        lay_path(m);
+    }
+}
+
+/* When the first hinge meets a stop in the step from t on, s, or its end: that ends the step, so that blows
+   of stops are at the ends of steps. */
+double meet_stops(double t, double end) {
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        for (int n = 0; n < 2; n++) {
+            double side = n ? 1 : -1, stop = m->stops[n], h = end - t, angle, rate, change;
+            follow_path(m, h, &angle, &rate, &change);
+            if (fabs(stop) == INFINITY || side * (angle - stop) <= 0) continue;
+            if (side * (m->angle - stop) >= -AGAINST) continue;
+            double low = 0, high = h;
+            for (int k = 0; k < 200 && high > low; k++) {
+                double next = side * rate > 0 ? h - (angle - stop) / rate : low;
+                if (!(next > low && next < high)) next = 0.5 * (low + high);
+                if (next == low || next == high || next == h) break;
+                follow_path(m, h = next, &angle, &rate, &change);
+                if (side * (angle - stop) < 0) low = h;
+                else high = h;
+            }
+            if (high > (1 - LATE) * (end - t)) high = end - t;
+            for (Mover *o = W.movers; t + high < end && o < m; o++) o->struck = 0;
+            m->struck = n + 1;
+            end = high < end - t ? t + high : end;
+        }
+    }
+    return end;
+}
+
+/* End a step at t: blows of stops, which give nothing back. */
+void end_hinges(double t) {
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        double side = m->struck == 2 ? 1 : -1;
+        bring(m, t);
+        m->solved = 0;
+        if (!m->struck || side * m->rate <= 0) continue;
+        if (side * (m->angle - m->stops[m->struck - 1]) < -AGAINST) continue;
+        note(m, t, m->rate);
+        m->stopped += 0.5 * m->inertia * square(m->rate);
+        m->rate = 0;
+        lay_path(m);
+    }
+}
+
+/* End the run at t: what was solved last lasts for the share of its impulses that belongs to the step before. */
+void finish_hinges(double t) {
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!is_hinge(m)) continue;
+        bring(m, t);
+        if (m->solved) {
+            book_hinge(m, W.before, -1);
+            m->rate = m->before + W.before * (m->rate - m->before);
+        }
+        m->solved = 0;
+        note(m, t, m->rate);
+    }
+}
+
+/* What a contact with a hinge feels of it. */
+void hang_on(Contact *c, const Mover *m, const Disk *d) {
+    double turn = 1 / m->inertia, deep = d->radius + c->gap;
+    double x = d->x - deep * c->nx - m->place[0], y = d->y - deep * c->ny - m->place[1];
+    c->hung = (int)(m - W.movers) + 1;
+    c->lever[0] = x * c->ny - y * c->nx;
+    c->lever[1] = -(x * c->nx + y * c->ny);
+    c->lever[2] = 1;
+    c->turning = m->turn;
+    for (int n = 0; n < 3; n++) {
+        double light = c->mass[n] > 0 ? 1 / c->mass[n] : 0;
+        c->mass[n] = 1 / (light + square(c->lever[n]) * turn);
+    }
+}
+
+/* By how much a hinge has changed a relative velocity since a contact was described. */
+void swing_away(const Contact *c, int earlier, double *out) {
+    const Mover *m = hinge_of(c);
+    double more = (earlier ? m->before : m->rate) - c->turning;
+    for (int n = 0; n < 3; n++) out[n] -= c->lever[n] * more;
+}
+
+/* The same of the change of its normal velocity in this step. */
+double swung_open(const Contact *c) {
+    const Mover *m = hinge_of(c);
+    return -c->lever[0] * (m->rate - m->before);
+}
+
+/* Give the hinge of a contact the opposite of its impulse. */
+void push_hinge(const Contact *c, const double *J) {
+    Mover *m = hinge_of(c);
+    m->rate -= (J[0] * c->lever[0] + J[1] * c->lever[1] + J[2]) / m->inertia;
+}
+
+/* Work of a contact's impulses behind the share f by what its hinge has changed its speed since, J. */
+double swung(const Contact *c, double f) {
+    const Mover *m = hinge_of(c);
+    const double *J = c->impulse, along = J[0] * c->lever[0] + J[1] * c->lever[1] + J[2];
+    return work(m, along, f) - (1 - f) * along * c->turning;
+}
+
+/* Velocity of the hinge's point that is not counted in the law of energy of a solve. */
+double hinge_share(const Contact *c) {
+    const double *J = c->impulse;
+    return (J[0] * c->lever[0] + J[1] * c->lever[1] + J[2]) * c->turning;
+}
+
+/* The normal impulse that changes the normal velocity by so much, and the friction with it, of a contact with a
+   hinge, whose impulses feel each other; `slip` is that before. Friction never gives energy: with Newton's
+   restitution it might, where the blow itself turns the slip round (T. R. Kane and D. A. Levinson, Dynamics,
+   1985, sec. 5.7); so it is no more than what brings the slip to the opposite of what it was. */
+double couple(const Contact *c, double wanted, double slip, double *tangent) {
+    double both = c->lever[0] * c->lever[1] / hinge_of(c)->inertia, normal = wanted * c->mass[0];
+    *tangent = 0;
+    for (int n = 0; n < ROUNDS; n++) {
+        double most = c->friction * normal, free = slip + both * normal;
+        double holds = -free * c->mass[1], gives = -(2 * slip + both * normal) * c->mass[1];
+        holds = MIN(MAX(holds, -most), most);
+        if (both != 0) holds = MIN(MAX(holds, MIN(gives, 0)), MAX(gives, 0));
+        double last = *tangent;
+        *tangent = holds;
+        if (both == 0 || holds == last) break;
+        normal = MAX((wanted - both * *tangent) * c->mass[0], 0);
+    }
+    return normal;
+}
+
+/* A path begins where a blow has changed the speed of a hinge. */
+void leave_struck(int mover) { lay_path(W.movers + mover); }

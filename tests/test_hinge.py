@@ -1,0 +1,354 @@
+"""What hangs on a hinge: springs, dampers, stops and motors, and what strikes it and lies on it.
+
+Formulas are written here; quadratures, roots and one ODE are SciPy's.
+"""
+
+from dataclasses import replace
+from math import cos, exp, pi, sin, sqrt
+
+import numpy as np
+import pytest
+
+import chutelab
+from chutelab.results.laws import judge
+from chutelab.scene import SceneError
+
+pytest.importorskip("scipy")
+from scipy.integrate import quad, solve_ivp
+from scipy.special import ellipk
+
+G, R, M = 9.81, 0.01, 0.008
+
+
+def machine(stream=None, particle=None, run=None, more=(), gravity=G, **keys):
+    """A lever from its hinge in the origin to the right, and a disk far away."""
+    own = {"name": "lever", "from": [0.0, 0.0], "to": [0.5, 0.0], "hinge": [0.0, 0.0], **keys}
+    return {
+        "gravity": gravity,
+        "particle": {"radius": R, "mass": M, **(particle or {})},
+        "surface": [{k: v for k, v in own.items() if v is not None}, *more],
+        "stream": stream or {"at": [5.0, 5.0], "velocity": [0.0, 0.0]},
+        "run": {"until": 1.0, **(run or {})},
+    }
+
+
+def sound(recording):
+    """A run that keeps all laws, and whose ledger closes."""
+    assert not recording.laws
+    ledger = recording.ledger
+    change = sum(b - a for a, b in (ledger.kinetic, ledger.potential, ledger.spring))
+    losses = ledger.restitution_loss + ledger.friction_loss + ledger.damper_loss
+    given = ledger.belt_work + ledger.drive_work - losses
+    # In balance nothing is turned over, and heights are rounded.
+    assert change == pytest.approx(given, abs=1e-11 * ledger.turned_over + 1e-16)
+    assert abs(ledger.residual) <= 1e-11 * ledger.turned_over + 1e-16
+    return recording
+
+
+def run(*args, **keys):
+    return sound(chutelab.simulate(machine(*args, **keys)))
+
+
+def test_a_physical_pendulum_has_the_period_of_the_elliptic_integral():
+    """A bar let go level: T = 4 K(sin²(a/2)) sqrt(I / m g d), a = 90°; energy to rounding."""
+    recording = run(mass=1.3, run={"until": 3.0})
+    inertia, off = 1.3 * 0.5**2 / 3.0, 0.25
+    period = 4.0 * ellipk(sin(pi / 4.0) ** 2) * sqrt(inertia / (1.3 * G * off))
+    turned = recording.pose("lever", [0.25 * period, 0.5 * period, period, 2.0 * period])[:, 2]
+    assert turned == pytest.approx([-pi / 2.0, -pi, 0.0, 0.0], abs=1e-9)
+    states = recording.swings
+    energy = 0.5 * inertia * states["rate"] ** 2 + 1.3 * G * off * np.sin(states["angle"])
+    assert np.abs(energy).max() < 1e-13
+
+
+def test_a_ball_against_a_sprung_plate_is_momentum_about_the_hinge_then_a_damped_swing():
+    """J = (1 + e) v / (1/m + l²/I); then w/w_d exp(-d t) sin(w_d t)."""
+    inertia, spring, damper, e, v, lever = 0.01, 2.0, 0.02, 0.6, 3.0, 0.3
+    keys = {"to": [0.0, -0.4], "inertia": inertia, "spring": spring, "damper": damper}
+    stream = {"at": [-0.3, -lever], "velocity": [v, 0.0]}
+    recording = run(stream, gravity=0.0, restitution=e, friction=0.4, **keys)
+    (blow,) = recording.select("impact")
+    impulse = (1.0 + e) * v / (1.0 / M + lever**2 / inertia)
+    begin = (0.3 - R) / v
+    assert blow["t"] == pytest.approx(begin, rel=1e-13)
+    assert blow["velocity_after"] == pytest.approx([v - impulse / M, 0.0], abs=1e-13)
+    rate, decay = impulse * lever / inertia, 0.5 * damper / inertia
+    swift = sqrt(spring / inertia - decay**2)
+    times = np.linspace(0.01, 0.9, 40)
+    expected = [rate / swift * exp(-decay * t) * sin(swift * t) for t in times]
+    assert recording.pose("lever", begin + times)[:, 2] == pytest.approx(expected, abs=1e-10)
+    ledger = recording.ledger
+    reduced = 1.0 / (1.0 / M + lever**2 / inertia)
+    assert ledger.restitution_loss == pytest.approx(0.5 * reduced * v**2 * (1.0 - e**2))
+    left = ledger.spring[1] + ledger.kinetic[1] - 0.5 * M * (v - impulse / M) ** 2
+    assert ledger.damper_loss == pytest.approx(0.5 * inertia * rate**2 - left)
+    assert recording.measure("ledger.damper_loss") == ledger.damper_loss
+    assert recording.measure("ledger.spring.end") == ledger.spring[1] > 0.0
+
+
+def test_a_motor_turns_with_its_torque_up_to_its_speed():
+    """Work = torque times angle; then it holds its speed, and pays what the damper takes."""
+    inertia, torque, speed = 0.1, 0.2, 2.0 * pi
+    motor = {"speed_deg": np.degrees(speed), "torque": torque}
+    keys = {"gravity": 0.0, "inertia": inertia, "motor": motor}
+    recording = run(**keys)
+    assert recording.pose("lever", [1.0])[0, 2] == pytest.approx(0.5 * torque / inertia)
+    assert recording.ledger.drive_work == pytest.approx(torque * 0.5 * torque / inertia)
+    assert recording.measure("ledger.by_surface.lever.drive_work") == recording.ledger.drive_work
+    recording = run(**keys, damper=0.01, run={"until": 8.0})
+    (_, late), (_, end) = recording.pose("lever", [7.0, 8.0])[:, 1:]
+    assert end - late == pytest.approx(speed, rel=1e-6)
+    # Against dw/dt = (T - c w) / I up to its speed, then c w² for the rest.
+    reach = -inertia / 0.01 * np.log(1.0 - 0.01 * speed / torque)
+    swept = (torque * reach - inertia * speed) / 0.01
+    work = torque * swept + 0.01 * speed**2 * (8.0 - reach)
+    assert recording.ledger.drive_work == pytest.approx(work, rel=2e-3)
+
+
+def test_a_stop_takes_what_comes_to_it():
+    """A bar that falls from level by 30° has made kinetic energy of m g d sin 30°: all is lost."""
+    recording = run(mass=1.3, stops_deg=[-30.0, 5.0])
+    lost = 1.3 * G * 0.25 * 0.5
+    assert recording.ledger.by_surface["lever"]["restitution_loss"] == pytest.approx(lost)
+    assert recording.pose("lever", [0.99])[0, 2] == pytest.approx(-pi / 6.0, abs=1e-7)
+    inertia = 1.3 * 0.5**2 / 3.0
+    speeds = 2.0 * 1.3 * G * 0.25 / inertia
+    # t = ∫ da / sqrt(speeds sin a), with a = s².
+    found, _ = quad(lambda s: 2.0 / sqrt(speeds * np.sinc(s * s / pi)), 0.0, sqrt(pi / 6.0))
+    blow = recording.swings["t"][np.abs(recording.swings["rate"]).argmax()]
+    assert blow == pytest.approx(found, abs=1e-9)
+
+
+def balls(left, right, **more):
+    """Two balls on a see-saw, at so many m to its left and right, of which the one is heavier."""
+    each = {"velocity": [0.0, 0.0], "interact": True}
+    return machine(
+        **{"from": [-0.3, 0.0], "to": [0.3, 0.0], "mass": 0.1, "friction": 2.0},
+        **more,
+    ) | {
+        "particle": [{"name": "light", "radius": R, "mass": M},
+                     {"name": "heavy", "radius": R, "mass": 2.0 * M}],
+        "stream": [{"name": "a", "at": [-left, R], "particle": "light", **each},
+                   {"name": "b", "at": [right, R], "particle": "heavy", **each}],
+    }  # fmt: skip
+
+
+def test_a_see_saw_in_balance_stays_so():
+    """m l = M L: it stays."""
+    recording = sound(chutelab.simulate(balls(0.2, 0.1)))
+    assert np.abs(recording.swings["angle"]).max() < 1e-9
+
+
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+def test_a_see_saw_turns_as_its_equation_says(engine):
+    """(I + sum m l²) a = -sum m l (g cos + R w²), to the order of the step squared.
+
+    A disk that does not turn rolls on what turns below it: l = l0 + R angle.
+    """
+    left, right, end = 0.2, 0.15, 0.3
+
+    def rates(_, y):
+        places = ((M, R * y[0] - left), (2.0 * M, R * y[0] + right))
+        moment = -sum(m * x * (G * cos(y[0]) + R * y[1] ** 2) for m, x in places)
+        return y[1], moment / (0.1 * 0.6**2 / 12.0 + sum(m * x * x for m, x in places))
+
+    exact = solve_ivp(rates, (0.0, end), (0.0, 0.0), method="DOP853", rtol=1e-12, atol=1e-14).y[
+        0, -1
+    ]
+    off = {}
+    for dt in (2e-3, 1e-3):
+        recording = chutelab.simulate(
+            balls(left, right), {"run.dt": dt, "run.until": end}, engine=engine
+        )
+        assert not recording.laws
+        off[dt] = abs(recording.pose("lever", [end])[0, 2] - exact)
+    assert off[1e-3] < (1e-6 if engine == "contact" else 1e-4)
+    if engine == "contact":
+        sound(recording)
+        assert off[1e-3] < 0.35 * off[2e-3]
+
+
+def test_the_power_of_a_drums_motor_is_what_its_crowd_loses():
+    turns = np.linspace(0.0, 2.0 * pi, 17)
+    points = np.stack([0.15 * np.cos(turns), 0.15 * np.sin(turns)], axis=-1)
+    points[-1] = points[0]
+    scene = machine(
+        {"fill": [[-0.1, -0.1], [0.1, 0.1]], "count": 20, "interact": True},
+        {"radius": 0.01, "spin": True}, {"until": 4.0},
+        **{"from": None, "to": None, "points": points.tolist(), "mass": 0.5, "friction": 0.6},
+        motor={"speed_deg": 90.0, "torque": 0.5},
+    )  # fmt: skip
+    recording = sound(chutelab.simulate(scene))
+    ledger = recording.ledger
+    kept = sum(b - a for a, b in (ledger.kinetic, ledger.potential))
+    losses = ledger.restitution_loss + ledger.friction_loss
+    assert ledger.drive_work == pytest.approx(losses + kept, rel=1e-9)
+    turned = recording.pose("lever", [2.0, 4.0])[:, 2]
+    assert np.diff(turned)[0] == pytest.approx(pi, rel=2e-2)
+
+
+def drawn(seed):
+    """A random machine of three surfaces on hinges, in a box."""
+    random = np.random.default_rng(seed)
+    surfaces = [
+        {"name": "floor", "from": [-0.4, -0.3], "to": [0.4, -0.3]},
+        {"name": "left", "from": [-0.4, -0.3], "to": [-0.4, 0.5]},
+        {"name": "right", "from": [0.4, -0.3], "to": [0.4, 0.5]},
+    ]
+    for n in range(3):
+        x, y = 0.22 * (n - 1), random.uniform(-0.12, 0.05)
+        dx, dy = random.uniform(-0.09, 0.09, 2)
+        own = {"from": [x - dx, y - dy], "to": [x + dx, y + dy]}
+        if random.random() < 0.25:
+            own = {"center": [x, y], "radius": 0.05, "from_deg": 180.0, "to_deg": 350.0}
+        own["hinge"] = (np.array([x, y]) + random.uniform(-0.02, 0.02, 2)).tolist()
+        if random.random() < 0.7:
+            own["mass"] = 10.0 ** random.uniform(-2.0, 0.5)
+        else:
+            own["inertia"] = 10.0 ** random.uniform(-4.0, -2.0)
+        if random.random() < 0.6:
+            own |= {"spring": 10.0 ** random.uniform(-2, 1), "rest_deg": random.uniform(-20, 20)}
+        if random.random() < 0.5:
+            own["damper"] = 10.0 ** random.uniform(-4.0, -1.0)
+        if random.random() < 0.5:
+            own["stops_deg"] = [-random.uniform(0.0, 40.0), random.uniform(1.0, 40.0)]
+        if random.random() < 0.4:
+            torque = 10.0 ** random.uniform(-3.0, 0.0)
+            own["motor"] = {"speed_deg": random.uniform(-300.0, 300.0), "torque": torque}
+        if random.random() < 0.2:
+            own["speed"] = random.uniform(-1.0, 1.0)
+        pair = {"restitution": random.uniform(0.0, 0.9), "friction": random.uniform(0.0, 1.0)}
+        surfaces.append({"name": f"hung{n}", **own, **pair})
+    return {
+        "particle": {"radius": random.uniform(0.006, 0.012), "mass": M,
+                     "spin": bool(random.integers(2))},
+        "surface": surfaces,
+        "stream": {"fill": [[-0.2, 0.18], [0.2, 0.5]], "count": int(random.integers(1, 25)),
+                   "interact": True},
+        "run": {"until": 1.0},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_machines_keep_the_laws(seed):
+    sound(chutelab.simulate(drawn(seed), engine="contact"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12, 300))
+def test_more_random_machines_keep_the_laws(seed):
+    sound(chutelab.simulate(drawn(seed), engine="contact"))
+
+
+def test_a_pair_of_blow_and_friction_that_feel_each_other_gives_no_energy():
+    """A pivot off the line of the plate couples them; with e = 1, too, nothing is gained."""
+    for x, y in np.random.default_rng(4).uniform(-0.3, 0.3, (40, 2)):
+        stream = {"at": [0.25, 0.3], "velocity": [3.0 * x / 0.3, -2.0]}
+        keys = {"inertia": 1e-4, "restitution": 1.0, "friction": 1.5, "gravity": 0.0}
+        recording = run(stream, hinge=[0.2 + x, y], **keys)
+        assert recording.ledger.friction_loss >= -1e-15
+        assert recording.ledger.restitution_loss == pytest.approx(0.0, abs=1e-15)
+
+
+def test_pymunk_with_its_own_joints_agrees_to_the_order_of_its_step():
+    keys = {"to": [0.0, -0.4], "mass": 0.2, "spring": 2.0, "damper": 0.02, "restitution": 0.6,
+            "stops_deg": [-60.0, 8.0]}  # fmt: skip
+    scene = machine({"at": [-0.3, -0.2], "velocity": [3.0, 0.0]}, **keys, run={"until": 0.4})
+    contact = sound(chutelab.simulate(scene, engine="contact"))
+    times, off = np.linspace(0.02, 0.39, 30), {}
+    for dt in (1e-3, 2.5e-4):
+        pymunk = chutelab.simulate(scene, {"run.dt": dt}, engine="pymunk")
+        assert not pymunk.laws
+        off[dt] = np.abs(pymunk.pose("lever", times) - contact.pose("lever", times)).max()
+        assert abs(pymunk.ledger.residual) < 30.0 * dt * pymunk.ledger.turned_over
+    assert off[2.5e-4] < 0.5 * off[1e-3] < 0.02
+    for name in ("restitution_loss", "damper_loss"):
+        assert getattr(pymunk.ledger, name) == pytest.approx(
+            getattr(contact.ledger, name), rel=0.02
+        )
+
+
+def test_a_recording_keeps_how_it_swung(tmp_path):
+    recording = run(mass=1.0)
+    again = chutelab.Recording.load(recording.save(tmp_path / "a.npz"))
+    times = np.linspace(-0.1, 1.1, 7)
+    assert np.array_equal(again.pose("lever", times), recording.pose("lever", times))
+    assert again.ledger == recording.ledger
+    mover = recording.machine.movers[0]
+    h = 1e-6
+    rate = (mover.pose(times + h)[:, 2] - mover.pose(times - h)[:, 2]) / (2.0 * h)
+    inside = slice(1, -1)
+    assert mover.velocity(times)[inside, 2] == pytest.approx(rate[inside], abs=1e-6)
+
+
+def test_a_particle_inside_what_hangs_breaks_a_law():
+    scene = machine({"at": [0.2, R], "velocity": [0.0, 0.0]}, inertia=0.1, spring=5.0, damper=0.5)
+    recording = sound(chutelab.simulate(scene))
+    swings = recording.swings.copy()
+    swings["angle"] += 0.05 * (swings["t"] > 0.3)
+    spoilt = replace(recording, swings=swings)
+    assert "lever" in {one.surface for one in judge(spoilt)}
+
+
+def test_a_film_draws_it_where_it_is():
+    from chutelab.pictures.animation.actors import gates
+    from chutelab.pictures.plots.figure import Picture
+
+    recording = run(mass=1.0)
+    ax = Picture((6.0, 4.0)).add_axes((0.0, 0.0, 1.0, 1.0))
+    ((line, show),) = gates(ax, recording.machine, np.array([0.0, 0.4]))
+    show(1)
+    angle = recording.pose("lever", [0.4])[0, 2]
+    expected = [[0.0, 0.0], [0.5 * cos(angle), 0.5 * sin(angle)]]
+    assert line.get_xydata() == pytest.approx(np.array(expected), abs=1e-12)
+
+
+def test_the_damping_plate_may_hang():
+    changes = {"plate.hinge": "pivot", "plate.inertia": 2e-3, "plate.spring": 0.5}
+    recording = sound(chutelab.simulate("perpendicular", changes))
+    assert recording.engine == "contact"
+    assert recording.prediction.reason.item().endswith("plate moves")
+    with pytest.raises(SceneError, match=r"plate.hinge moves it: contact or pymunk has that"):
+        chutelab.load("perpendicular", {**changes, "run.engine": "exact"})
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"mass": None}, "surface[0].mass is missing: kg, or inertia, kg m2"),
+        ({"hinge": None, "spring": 1.0}, "surface[0].mass = 1.0: is for what hangs on a hinge"),
+        ({"hinge": "end"}, 'surface[0].hinge = "end"'),
+        ({"turn": 3.0}, "surface[0].hinge = [0.0, 0.0]: is for what hangs free"),
+        ({"pivot": [0, 0]}, "surface[0].pivot = [0, 0]: give either this, with hinge"),
+        ({"spring": -1.0}, "surface[0].spring = -1.0"),
+        ({"damper": "a"}, 'surface[0].damper = "a"'),
+        ({"stops_deg": [5, 20]}, "surface[0].stops_deg = [5, 20]"),
+        ({"stops_deg": [-5]}, "surface[0].stops_deg"),
+        ({"motor": {"torque": 1.0}}, "surface[0].motor.speed_deg is missing"),
+        ({"motor": {"speed_deg": 1.0, "torque": 0.0}}, "surface[0].motor.torque = 0.0"),
+        ({"motor": {"speed_deg": 1.0, "torque": 1.0, "power": 2}}, "surface[0].motor.power"),
+        ({"inertia": 1e-12}, "surface[0].inertia = 1e-12"),
+    ],
+)
+def test_bad_input_is_told_with_key_value_and_what_is_allowed(keys, said):
+    with pytest.raises(SceneError) as told:
+        chutelab.load(machine(**{"mass": 1.0, **keys}))
+    assert said in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"mass": 1.0, "inertia": 0.01}, "at least 0.0625 kg m2, mass times the square"),
+        ({"inertia": 1e-6, "spring": 1e6}, "at least 0.0001 kg m2 with this spring"),
+    ],
+)
+def test_an_inertia_that_cannot_be_is_refused(keys, said):
+    with pytest.raises(ValueError, match=said):
+        chutelab.simulate(machine(**keys))
+
+
+def test_several_particles_that_do_not_meet_are_refused():
+    scene = machine({"fill": [[0.1, 0.1], [0.3, 0.3]], "count": 3}, mass=1.0)
+    with pytest.raises(SceneError, match="couples particles: several of them have to meet"):
+        chutelab.load(scene)

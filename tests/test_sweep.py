@@ -3,6 +3,7 @@
 import json
 from math import sqrt
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
@@ -146,6 +147,20 @@ def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
     assert np.isfinite(swept.columns["landing.x.mean"]).sum() > 100
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("scene", "key", "low", "high"), [
+    (load("spoon", "stream.count=1"), "surface.spoon.center[0]", 1.0, 1.1),
+    (load("slip"), "incoming.friction", 0.3, 0.9),
+])  # fmt: skip
+def test_ten_thousand_variants_of_a_lone_scene_take_two_seconds(scene, key, low, high):
+    """Of one processor; 0.4 to 0.6 s were measured."""
+    values = np.linspace(low, high, 10_000)
+    begun = process_time()
+    found = sweep(scene, {key: values})
+    assert process_time() - begun < 2.0
+    assert np.isfinite(found.columns["landing.x.mean"]).mean() > 0.9
+
+
 def test_surfaces_may_join_in_some_variants_only():
     scene = parse(JOINED)
     block = block_of(scene, ["outgoing.drop=0.3,0.5,0.6", "surface.ramp.friction=0:0.4:3"])
@@ -198,8 +213,8 @@ max_time = 2.0
 def test_what_the_exact_engine_does_not_have_runs_with_the_one_that_has(what):
     """On a string 0.3 m long it never comes to a floor 0.7 m below; a box turns as it bounces."""
     floor = '[[surface]]\nname = "floor"\nfrom = [-2.0, -0.2]\nto = [2.0, -0.2]\n'
-    start = "[stream]\nat = [0.3, 0.5]\nvelocity = [0.0, 0.0]\n[run]\nuntil = 1.0\n"
-    block = block_of(parse(what + floor + start), ["gravity=5,9.81"])
+    start = "[stream]\nat = [0.3, 0.5]\nvelocity = [0.0, 0.0]\n[run]\nuntil = 0.5\n"
+    block = block_of(parse(what + floor + start), ["gravity=8,9.81"])
     found = swept_block(block)
     assert_same(found, swept_block(block, apart=True))
     assert set(found[TOUCHES]) == {"nothing" if "string" in what else "floor"}

@@ -457,11 +457,6 @@ static int go_through(void) {
         if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
         if (W.event_count + SHOCKS * W.contact_count + 64 > W.event_room)
             return FULL_EVENTS;
-        if (d->impacts > STALL) {
-            W.stalled = i;
-            W.now = t;
-            return STALLED;
-        }
         if (j >= 0 && W.disks[j].changes != d->partner_changes) {
             W.now = MAX(W.now, MIN(t, W.step_end));
             foresee(i);
@@ -474,7 +469,9 @@ static int go_through(void) {
                 return DONE;
             }
             shock(i, j, t);
-            continue;
+            if (d->impacts <= STALL) continue;
+            W.stalled = i;
+            return STALLED;
         }
         if (d->mode == WAITING) {
             if (release(i, t)) enter_again(i, W.step_end);

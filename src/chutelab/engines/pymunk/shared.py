@@ -577,7 +577,7 @@ class Shared:
         for i in np.flatnonzero(over & (self.pushes >= STAY)):
             t, x, y, vx, vy, omega = self.left[:, i].tolist()
             self.recorder.events(Kind.SEPARATION, i, t, (x, y), (vx, vy), omega, surface=self.on[i])
-        self.pushes[over] = 0
+        self.pushes[over], self.on[over] = 0, -1
         self.pushes[particles] += 1
         self.on[particles] = surface
         self.left[0, particles], self.left[1:, particles] = self.t, self.state[1][:, particles]

@@ -700,8 +700,8 @@ def test_help_lists_the_commands():
     text = call("--help").stdout
     commands = re.findall(r"^  ([a-z]+)  ", text.partition("Commands:")[2], re.MULTILINE)
     assert " ".join(commands) == (
-        "run live check show sweep solve compare discharge field lesson figure tables scenes "
-        "materials quantities new schema verify stress bench"
+        "run live check show sweep solve compare discharge field report lesson figure tables "
+        "scenes materials quantities new schema verify stress bench"
     )
     assert call("--version").stdout == f"chutelab {chutelab.__version__}\n"
     schema = json.loads(call("schema").stdout)

@@ -3,7 +3,7 @@
 ============  =====================================================================================
 `console`     the command ``chutelab`` itself, what commands print, and what becomes of errors
 `options`     options from signatures and docstrings; scenes with overrides; files of ``--out``
-`running`     ``run``, ``show``, ``live``
+`running`     ``run``, ``show``, ``report``, ``live``
 `studies`     ``sweep``, ``solve``, ``compare``, ``discharge``, ``field``
 `scenes`      ``scenes``, ``materials``, ``quantities``, ``schema``, ``new``, ``tables``,
               ``figure``, ``check``, ``verify``, ``stress``, ``bench``

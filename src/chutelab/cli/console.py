@@ -212,9 +212,9 @@ class RefusedError(click.ClickException):
 
 
 ORDER = [
-    "run", "live", "check", "show", "sweep", "solve", "compare", "discharge", "field", "lesson",
-    "figure", "tables", "scenes", "materials", "quantities", "new", "schema", "verify", "stress",
-    "bench",
+    "run", "live", "check", "show", "sweep", "solve", "compare", "discharge", "field", "report",
+    "lesson", "figure", "tables", "scenes", "materials", "quantities", "new", "schema", "verify",
+    "stress", "bench",
 ]  # fmt: skip
 """The commands as help lists them."""
 

@@ -1,4 +1,4 @@
-"""``run``, ``show`` and ``live``: one scene simulated, a saved recording, a live page."""
+"""``run``, ``show``, ``report``, ``live``: one scene simulated, a recording, a report, a page."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from click.shell_completion import CompletionItem
 from chutelab.cli.console import RefusedError, progress, say, show_json, tell
 from chutelab.cli.console import show as show_parts
 from chutelab.cli.options import (
+    Count,
     Engine,
+    FileName,
     Folder,
     Jobs,
     Repeat,
@@ -483,3 +485,54 @@ def live(
     if not quiet:
         done = "opened" if out is None else "wrote"
         say(f"{done} {path}, {size / 1000:.0f} kB")
+
+
+@command("Write a report on a scene: two to four pages for a client, or a lab report's skeleton.")
+def report(
+    scene: SceneName,
+    *,
+    set_: Texts,
+    engine: Engine,
+    out: Annotated[Path, FileName(path_type=Path)],
+    view: Literal["engineer", "teacher"] = "engineer",
+    repeat: Annotated[int, Count(1, 1000)] = 1,
+    quiet: bool,
+) -> None:
+    """Run SCENE and write a report: FILE.pdf or FILE.html, and its tables as CSV beside it.
+
+    The engineer's view: the machine to scale, inputs with their sources, assumptions and what they
+    leave out, results, the stream's envelope, loads, power beside ISO 5048 and DIN 22101, wear,
+    sensitivities, and how to make it again. The teacher's view: the skeleton of a lab report, with
+    empty boxes for the student. Tables go to FILE-tables/.
+
+    chutelab report inclined-40 -o report.pdf
+    chutelab report stream --repeat 5 -o report.html
+    chutelab report perpendicular --view teacher -o lab.pdf
+
+    -o, --out, --output FILE  The file to write, .pdf or .html; a PDF needs pip install
+        "chutelab[pdf]". [required]
+    --view VIEW  For whom: engineer or teacher. [default]
+    --repeat N  Results as mean ± standard error over N seeds. [default]
+    -q, --quiet  Print nothing.
+    """
+    import shlex
+
+    from chutelab.classroom import report as reports
+
+    check_file("-o", out, (".pdf", ".html"))
+    reports.check(out)
+    loaded = loaded_as_told(scene, set_)
+    options = [
+        *(f"--set {shlex.quote(one)}" for one in set_),
+        *[f"--engine {engine}"] * bool(engine),
+    ]
+    options += [f"--view {view}"] * (view != "engineer") + [f"--repeat {repeat}"] * (repeat > 1)
+    again = " ".join(["chutelab report", shlex.quote(scene), *options, f"-o {out.name}"])
+    with progress("simulating", quiet=quiet):
+        made = reports.report(loaded, view=view, runs=repeat, engine=engine, command=again)
+    with progress("writing", quiet=quiet), writing(str(out)):
+        files = made.write(out)
+    if not quiet:
+        say(f"wrote {out}, and {len(files) - 1} tables into {out.stem}-tables")
+    if made.recording.laws:
+        click.get_current_context().exit(1)

@@ -501,7 +501,14 @@ static int stop_jammed(int obstacle, int side) {
     /* Faces that lie on each other make no corner. */
     Touch one = touch_of(before, face), two = touch_of(obstacle, side);
     if (!(fabs(cross(one.nx, one.ny, two.nx, two.ny)) > OPPOSED)) return 0;
-    hold(before, face, obstacle, side);
+    /* What rebounds between belts, and does not turn, gets as much at each blow: their work has no bound. */
+    int rebounds = one.restitution > 0.0 || two.restitution > 0.0, moves = one.belt != 0.0 || two.belt != 0.0;
+    if (!slow && !A.turns && rebounds && moves) {
+        E.passed = 0.0;
+        course = DRIVEN;
+    } else {
+        hold(before, face, obstacle, side);
+    }
     return 1;
 }
 

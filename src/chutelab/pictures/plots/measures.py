@@ -15,29 +15,35 @@ from chutelab.pictures.plots.scenery import window_of
 from chutelab.pictures.plots.style import Picture, named, say
 from chutelab.results import Recording
 from chutelab.results.fields import NAMES, Fields
+from chutelab.results.loads import pivot_of
 from chutelab.results.wear import KEYS, Wear, touched
 
 BANDS: Final = ("erosion", "abrasion")
 """What bands show, a picture each."""
 
 
-def wear(recording: Recording) -> Picture:
+def wear(recording: Recording, *, curves: bool = True) -> Picture:
     """Draw where surfaces wear: bands on the machine, and each surface's four measures along it.
 
     Bands are shares of the largest piece of all surfaces, curves of the largest of their surface.
+    Without `curves` there are the bands alone.
     """
     told = touched(recording)
     rows = max(1, len(told))
-    figure = Picture((11.0, 5.9 + 2.0 * rows))
+    figure = Picture((11.0, 5.9 + 2.0 * rows if curves else 3.6))
     high = figure.get_figheight()
-    figure.headline(0.04, 1.0 - 0.35 / high, recording.title)
+    if curves:
+        figure.headline(0.04, 1.0 - 0.35 / high, recording.title)
     above = figure.add_gridspec(
-        1, 2, left=0.07, right=0.95, top=1.0 - 1.0 / high, bottom=1.0 - 4.6 / high, wspace=0.26
-    )
+        1, 2, left=0.07, right=0.95, wspace=0.26,
+        top=1.0 - (1.0 if curves else 0.4) / high, bottom=1.0 - 4.6 / high if curves else 0.16,
+    )  # fmt: skip
     for n, key in enumerate(BANDS):
         ax = style.dress(figure.add_subplot(above[n]), say("x"), say("y"), say(f"wear-{key}"))
         draw_scene(ax, recording.machine, window_of(recording))
         draw_band(ax, told, key)
+    if not curves:
+        return figure
     below = figure.add_gridspec(
         rows, 1, left=0.07, right=0.95, top=1.0 - 5.75 / high, bottom=0.55 / high, hspace=0.9
     )
@@ -108,4 +114,41 @@ def field(recording: Recording, found: Fields, name: str) -> Picture:
     )  # fmt: skip
     bar = figure.colorbar(mesh, ax=ax, fraction=0.03, pad=0.02)
     bar.set_label(f"{say(f'field-{name}')}, {NAMES[name]}", fontsize=style.NORMAL)
+    return figure
+
+
+def drawing(recording: Recording) -> Picture:
+    """Draw the machine to scale with the names of its parts and its main lengths.
+
+    These are how far the first plate's pivot is from the pulley's axis and the outgoing belt below
+    the pulley's top; of another machine its width and height, if all of it is in the picture.
+    """
+    figure = Picture((11.0, 4.0))
+    ax = style.dress(figure.add_axes((0.07, 0.14, 0.9, 0.82)), say("x"), say("y"))
+    machine = recording.machine
+    draw_scene(ax, machine, window_of(recording))
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    low, high = machine.corners.min(axis=0), machine.corners.max(axis=0)
+    names, wheel = machine.surfaces, machine.pulley
+    if wheel is not None:
+        low[1], high[1] = high[1], wheel.radius
+        if "plate" in names:
+            low[0], high[0] = 0.0, pivot_of(machine, names.index("plate"))[0]
+        if "outgoing" in names:
+            low[1] = pivot_of(machine, names.index("outgoing"))[1]
+    x, y = left - 0.03 * (right - left), bottom - 0.09 * (top - bottom)
+    ax.set(xlim=(x - 0.03 * (right - left), right), ylim=(y - 0.04 * (top - bottom), top))
+    for begin, end, seen in (
+        ((low[0], y), (high[0], y), left <= low[0] < high[0] <= right),
+        ((x, low[1]), (x, high[1]), bottom <= low[1] < high[1] <= top),
+    ):
+        if not seen:
+            continue
+        ax.annotate("", begin, end, arrowprops={"arrowstyle": "<->", "color": style.MUTED})
+        ax.annotate(
+            style.quantity(float(np.hypot(*np.subtract(end, begin))), "m"),
+            tuple(0.5 * np.add(begin, end)), (0.0, 5.0), textcoords="offset points", ha="center",
+            rotation=0 if begin[1] == end[1] else 90, fontsize=style.SMALL, color=style.MUTED,
+            gid="dimension",
+        )  # fmt: skip
     return figure

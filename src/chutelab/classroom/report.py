@@ -1,0 +1,455 @@
+"""A report on a scene for those who have to decide or to learn: what was put in, what came out.
+
+The engineer's view has all of it: drawing, inputs with their sources, assumptions and what they
+leave out, results, envelope, loads, power beside ISO 5048 and DIN 22101, wear, sensitivities, and
+how to make it again. The teacher's view is the skeleton of a lab report, with empty boxes. It is
+written as Markdown with pictures, and printed as lessons are. Its numbers are the registry's.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final, Literal
+
+import numpy as np
+from markdown_it.tree import SyntaxTreeNode
+
+from chutelab.classroom.lessons.printing import need_typst, pdf, web_page
+from chutelab.classroom.lessons.texts import parser
+from chutelab.engines.simulation import judged, simulate
+from chutelab.pictures.plots import overlay
+from chutelab.pictures.plots.figure import loads as draw_loads
+from chutelab.pictures.plots.measures import drawing
+from chutelab.pictures.plots.measures import wear as draw_wear
+from chutelab.results import Recording
+from chutelab.results.loads import sheet as load_sheet
+from chutelab.results.quantities import compare, measure
+from chutelab.results.stream import crowd
+from chutelab.results.summary import NOTES, air_drag, facts
+from chutelab.results.wear import KEYS, touched
+from chutelab.scene import AnyScene, Overrides, Scene, load, to_dict
+from chutelab.scene.materials import PRESETS
+from chutelab.scene.overrides import Override, parts_of, unit_of
+from chutelab.scene.quantities import lookup
+from chutelab.studies.repeats import Repeats, repeat
+from chutelab.theory.discharge import loading
+from chutelab.util.files import csv_lines, whole, write_lines
+from chutelab.util.tables import Sheet, number, plus_minus
+from chutelab.util.versions import own_version
+
+View = Literal["engineer", "teacher"]
+
+LOADS: Final = 0.01
+"""s; bins of loads where the scene does not say."""
+
+MOST: Final = 26
+"""Rows of the table of inputs, at most; the scene file has the rest."""
+
+BUDGET: Final = 30.0
+"""s of computing for sensitivities, at most."""
+
+CHANGED: Final = 0.01
+"""Share by which a key is changed, up and down, for its sensitivity; angles by so many radians."""
+
+TURNED: Final = (
+    "incoming.speed", "incoming.pulley_radius", "plate.angle_deg", "plate.restitution",
+    "plate.distance", "outgoing.speed", "outgoing.drop", "outgoing.friction", "particle.radius",
+)  # fmt: skip
+"""Keys whose sensitivities are told, where the scene gives them."""
+
+TOLD: Final = (
+    "landing.x", "landing.vx", "landing.vy", "impact.t", "ledger.power", "power",
+    "ledger.restitution_loss", "ledger.friction_loss", "loads.plate.normal.peak",
+    "loads.plate.normal.mean", "loads.outgoing.normal.mean", "misses",
+)  # fmt: skip
+"""What results, sensitivities and the skeleton are of, where the scene has it."""
+
+
+@dataclass
+class Report:
+    """A report: its Markdown, its tables, and its pictures by their names."""
+
+    scene: Scene
+    recording: Recording
+    repeats: Repeats | None
+    view: View
+    command: str
+    parts: list[str] = field(default_factory=list)
+    tables: dict[str, Sheet] = field(default_factory=dict)
+    pictures: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def markdown(self) -> str:
+        """The whole text; pictures are files of their names, with .png."""
+        return "\n\n".join(self.parts) + "\n"
+
+    def add(self, title: str, *parts: str) -> None:
+        """Add a section, if there is anything in it."""
+        if said := [part for part in parts if part]:
+            self.parts += [f"## {title}", *said]
+
+    def table(self, name: str, sheet: Sheet) -> str:
+        """Keep a table, and return it as Markdown with its notes."""
+        if not sheet.rows:
+            return ""
+        self.tables[name] = sheet
+        width = len(sheet.columns)
+        lines = [sheet.columns, ("---",) * width, *sheet.rows, *sheet.foot]
+        # Only what a student fills in is empty, and has room.
+        empty = "" if name == "values" else "–"
+        made = "\n".join(
+            f"| {' | '.join(_cell(one) or empty * bool(n) for one in _filled(row, width))} |"
+            for n, row in enumerate(lines)
+        )
+        said = " ".join(f"{_plain(note[0].upper() + note[1:])}." for note in sheet.notes)
+        return f"{made}\n\n{said}".rstrip()
+
+    def picture(self, name: str, figure: Any, said: str) -> str:
+        """Keep a picture, and return what shows it."""
+        self.pictures[name] = figure
+        return f"![{said}]({name}.png)"
+
+    def write(self, path: Path) -> list[Path]:
+        """Write the report, .pdf or .html, and its tables as CSV into a folder beside it."""
+        with TemporaryDirectory() as made:
+            folder = Path(made)
+            for name, figure in self.pictures.items():
+                figure.savefig(folder / f"{name}.png", dpi=150)
+            tree = SyntaxTreeNode(parser().parse(self.markdown))
+            asked = [
+                item
+                for node in tree.children
+                if self.view == "teacher" and node.type == "ordered_list"
+                for item in node.children
+            ]
+            if path.suffix.lower() == ".pdf":
+                kind = "Lab report" if self.view == "teacher" else "Report"
+                content = pdf(tree, folder, asked, kind=kind, dense=True)
+            else:
+                content = web_page(tree, folder, asked).encode("utf-8")
+        with whole(path) as unfinished:
+            unfinished.write_bytes(content)
+        home = path.with_name(f"{path.stem}-tables")
+        home.mkdir(exist_ok=True)
+        return [
+            path,
+            *(
+                write_lines(home / f"{name}.csv", csv_lines([one.columns, *one.rows, *one.foot]))
+                for name, one in self.tables.items()
+            ),
+        ]
+
+
+def _filled(row: tuple[str, ...], width: int) -> tuple[str, ...]:
+    return (*row, *[""] * (width - len(row)))
+
+
+def _cell(text: str) -> str:
+    return _plain(text.replace("\n", ", ")).replace("|", "/")
+
+
+def _plain(text: str) -> str:
+    """Return a text without what Markdown would take for markup."""
+    return re.sub(r"([\\`*_$\[\]<>#])", r"\\\1", text.rstrip("."))
+
+
+def report(
+    scene: AnyScene,
+    changes: Overrides = (),
+    *,
+    view: View = "engineer",
+    runs: int = 1,
+    engine: str | None = None,
+    command: str = "",
+) -> Report:
+    """Run a scene and report on it.
+
+    Parameters
+    ----------
+    scene, changes
+        As `chutelab.simulate` takes them; loads are counted in bins of 0.01 s unless it says.
+    view : {"engineer", "teacher"}
+        The whole report, or the skeleton of a lab report.
+    runs : int
+        With how many seeds results are told as mean ± standard error; 1 for the scene's own alone.
+    engine : str, optional
+        Overrides ``run.engine``.
+    command : str
+        What makes the report again, as it stands in it.
+    """
+    loaded = load(scene, changes)
+    if loaded.run.loads is None:
+        loaded = load(loaded, [Override("run.loads", LOADS)])
+    recording = judged(loaded, engine=engine)
+    repeats = repeat(loaded, runs) if runs > 1 else None
+    made = Report(loaded, recording, repeats, view, command)
+    made.parts.append(f"# {_plain(loaded.title)}")
+    (_for_students if view == "teacher" else _for_engineers)(made)
+    return made
+
+
+def _for_engineers(made: Report) -> None:
+    recording, many = made.recording, made.recording.count > 1
+    said = facts(recording, details=True).split(", computed in")[0].replace("\n", "; ")
+    made.parts.append(f"Simulated with chutelab {own_version()}: {_plain(said)}.")
+    if recording.laws:
+        broken = "; ".join(str(law) for law in recording.laws)
+        made.parts.append(f"**The run breaks laws; do not use its numbers:** {_plain(broken)}.")
+    made.add("The machine", made.picture("machine", drawing(recording), "The machine, to scale"))
+    made.add("Inputs", made.table("inputs", inputs(made.scene)), _materials(made))
+    made.add("Assumptions, and what is left out", "\n".join(f"- {one}" for one in left_out(made)))
+    together, balance = crowd(recording), made.table("ledger", recording.ledger.sheet())
+    made.add("Results", made.table("results", results(made)), balance)
+    made.add("Sensitivity", made.table("sensitivity", sensitivities(made)))
+    if together is None:
+        made.add("Beside the theory", made.table("theory", compare(recording).sheet()))
+    else:
+        figure = made.picture("stream", overlay(recording), "Envelope, flow and energies")
+        made.add("The stream", made.table("crowd", together.sheet()), figure)
+    if (borne := load_sheet(recording)) is not None:
+        shown = made.picture("loads", draw_loads(recording), "Loads over time") if many else ""
+        made.add("Loads", made.table("loads", borne), shown)
+    if (paid := power(recording)) is not None:
+        made.add("Power at the loading point", made.table("power", paid))
+    shown = made.picture("wear", draw_wear(recording, curves=many), "Where it wears")
+    made.add("Wear", made.table("wear", wear(recording)), shown)
+    made.add("How to make it again", _again(made))
+
+
+def _for_students(made: Report) -> None:
+    recording, scene = made.recording, made.scene
+    made.parts.append("Name: ______________________  Class: ____________  Date: ____________")
+    made.add("The machine", made.picture("machine", drawing(recording), "The machine, to scale"))
+    made.add("What is given", made.table("inputs", inputs(scene)))
+    made.add("Question and hypothesis", "1. What do you want to find out?\n2. What do you expect,"
+             " and why?")  # fmt: skip
+    made.add("Procedure", "1. What do you change, what do you keep, and what do you measure?")
+    rows = tuple(
+        (f"{name}, {unit}", "", "", "", "") for name, _, unit, _ in _values(recording) if unit
+    )
+    heads = ("quantity", "expected", "calculated", "simulated", "measured")
+    told = "; ".join(
+        f"{_plain(name)}: {said}" for name, said, unit, _ in _values(recording) if unit
+    )
+    made.add("Values", made.table("values", Sheet("", heads, rows)), told)
+    made.add("Evaluation", "1. How far are calculated and measured values apart, in percent?\n"
+             "2. What does the energy ledger say: where did the energy go?")  # fmt: skip
+    made.add("Errors", "1. Which errors has your measurement, and how large is each?\n"
+             "2. What does the model leave out?")  # fmt: skip
+    made.add("Conclusion", "1. What is the answer to your question?")
+
+
+def inputs(scene: Scene) -> Sheet:
+    """Return what the scene file gives, key by key, with unit and where it is from."""
+    rows = []
+    for key, value in _leaves(to_dict(scene)):
+        if key.split(".")[0].split("[")[0] in ("title", "expect", "live", "view", "sensor"):
+            continue
+        if key == "run.loads":
+            continue
+        unit = unit_of(parts_of(key))
+        said = str(value) if not isinstance(value, float) else number(value)
+        rows.append((key, said, unit, "scene file"))
+    given = {row[0] for row in rows}
+    for key, value, unit in (
+        ("gravity", scene.gravity, "m/s²"),
+        ("particle.radius", scene.particle.radius, "m"),
+        ("particle.mass", scene.particle.mass, "kg"),
+    ):
+        if key not in given and isinstance(value, float):
+            rows.append((key, number(value), unit, "default"))
+    notes: tuple[str, ...] = (
+        "Values of the scene file have no stated spread unless a row says so",
+    )
+    if len(rows) > MOST:
+        notes = (f"{len(rows) - MOST} more are in the scene file", *notes)
+    return Sheet("", ("key", "value", "unit", "source"), tuple(rows[:MOST]), texts=4, notes=notes)
+
+
+def _leaves(tables: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the keys of nested tables with their values; places and ranges are values."""
+    if isinstance(tables, Mapping):
+        for key, value in tables.items():
+            yield from _leaves(value, f"{path}.{key}" if path else str(key))
+    elif isinstance(tables, list | tuple) and any(isinstance(one, Mapping) for one in tables):
+        for n, one in enumerate(tables):
+            yield from _leaves(one, f"{path}[{n}]")
+    else:
+        yield path, tables
+
+
+def _materials(made: Report) -> str:
+    """Return a table of the presets that are used, with spread and source."""
+    rows = []
+    for name in dict.fromkeys(kind.material for kind in made.scene.particles):
+        preset = PRESETS.get(str(name))
+        for key, spread in preset.spread.items() if preset else ():
+            low, high = (number(value) for value in spread)
+            value = number(getattr(preset.material, key)) if preset else ""
+            source = "; ".join(preset.sources[key]) if preset else ""
+            rows.append((f"{name}: {key}", value, f"{low} to {high}", source))
+    heads = ("material", "value", "spread", "source")
+    return made.table("materials", Sheet("", heads, tuple(rows), texts=4))
+
+
+def left_out(made: Report) -> list[str]:
+    """Return what is assumed and left out, with its size where it is known."""
+    recording, scene = made.recording, made.scene
+    share = recording.ledger.relative_residual
+    said = [
+        "Two dimensions: a slice one particle thick; nothing moves across the width.",
+        "Bodies are rigid; restitution does not depend on speed; Coulomb friction, no cohesion"
+        " between particles.",
+        f"Numerical error: {100.0 * share:.2g} % of the energy turned over is unexplained by the"
+        f" ledger; engine {recording.engine}.",
+    ]
+    if (drag := air_drag(recording)) is not None:
+        said.append(f"{_plain(str(drag)[0].upper() + str(drag)[1:])}.")
+    if scene.streams[0].width is not None:
+        said.append(f"What is told per width is of {number(scene.slices())} slices.")
+    if made.repeats is None and recording.count > 1:
+        said.append("One seed: results have no error bars; ask for several seeds.")
+    for key, (read, _) in NOTES.items():
+        note = read(recording)
+        if note is not None and key not in ("drag",):
+            said.append(f"{_plain(str(note)[0].upper() + str(note)[1:])}.")
+    return said
+
+
+def _values(recording: Recording) -> Iterator[tuple[str, str, str, float]]:
+    """Yield name, meaning, unit and value of `TOLD`, of a stream its mean."""
+    for name in TOLD:
+        for one in (name, f"{name}.mean"):
+            row = lookup(one, recording.scene.places, recording.machine.streams)
+            if row is None:
+                continue
+            try:
+                value = measure(recording, one)
+            except KeyError:
+                continue
+            if isfinite(value):
+                yield one, row.meaning, row.unit, value
+                break
+
+
+def results(made: Report) -> Sheet:
+    """Return the main quantities; with several seeds as mean ± standard error."""
+    rows = []
+    for name, meaning, unit, value in _values(made.recording):
+        said = number(value)
+        if made.repeats is not None and name in made.repeats.values:
+            mean = made.repeats[name]
+            said = plus_minus(mean.mean, mean.error) if mean.runs > 1 else said
+        if not (made.recording.count == 1 and name.startswith(("loads", "misses"))):
+            rows.append((name, meaning, said, unit))
+    seeds = len(made.repeats) if made.repeats is not None else 1
+    notes = (f"Means over {seeds} seeds ± their standard errors",) if seeds > 1 else ()
+    return Sheet("", ("quantity", "what it is", "value", "unit"), tuple(rows), texts=2, tail=1,
+                 notes=notes)  # fmt: skip
+
+
+def power(recording: Recording) -> Sheet | None:
+    """Return force, acceleration length and power of the outgoing belt; None without one."""
+    scene = recording.scene
+    belt = scene.outgoing
+    if belt is None or not belt.speed:
+        return None
+    suffix = ".mean" if recording.count > 1 else ""
+    speed = measure(recording, f"arrival.vx{suffix}")
+    friction = float(scene.met(scene.kinds[0], "outgoing")[1])
+    if not (isfinite(speed) and 0.0 < friction < np.inf):
+        return None
+    flow = float(np.mean(recording.mass)) * float(recording.machine.scenes.rate)
+    found = loading(
+        mass_rate=flow, belt_speed=belt.speed, speed=speed, friction=friction,
+        gravity=recording.gravity,
+    )  # fmt: skip
+    simulated = measure(recording, "ledger.power")
+    rows = (
+        ("mass flow ṁ, all the width", number(flow), "kg/s"),
+        ("speed along the belt on arrival, v₀", number(speed), "m/s"),
+        ("belt speed v", number(belt.speed), "m/s"),
+        ("force F = ṁ (v - v₀), ISO 5048, DIN 22101", number(found.force), "N"),
+        ("acceleration length (v² - v₀²) / (2 g µ)", number(found.length), "m"),
+        ("power F v", number(found.power), "W"),
+        ("power of the drive, simulated, until the run ends", number(simulated), "W"),
+    )
+    note = (
+        "The formulas bring loads to the belt's speed; what rolls, or a run that ends at the"
+        " landing, takes less"
+    )
+    return Sheet("", ("", "value", "unit"), rows, tail=1, notes=(note,))
+
+
+def wear(recording: Recording) -> Sheet:
+    """Return sums of wear of each surface, and where the most of it is."""
+    rows = []
+    for name, one in touched(recording).items():
+        sums = [float(getattr(one, key).sum()) for key in KEYS]
+        x, y = one.places[int(np.argmax(one.impact + one.sliding)), 1]
+        rows.append((name, *map(number, (*sums, float(x), float(y)))))
+    heads = ("surface", "blows, J", "sliding, J", "Finnie, J", "Archard, J", "most at x, m", "y, m")
+    note = "Relative: multiply by k (m³/J) and by K/H (1/Pa) of the pair of materials for volumes"
+    return Sheet("", heads, tuple(rows), notes=(note,))
+
+
+def sensitivities(made: Report) -> Sheet:
+    """Return by how much results change when a key is changed by 1 %, or an angle by 0.57°."""
+    scene, base = made.scene, list(_values(made.recording))[:5]
+    given = dict(_leaves(to_dict(scene)))
+    keys = [key for key in TURNED if isinstance(given.get(key), int | float)]
+    cost = made.recording.seconds
+    keys = keys[: int(BUDGET / (2.0 * cost))] if cost > 0.0 else keys
+    rows = []
+    for key in keys:
+        value = float(given[key])
+        step = np.degrees(CHANGED) if key.endswith("_deg") else CHANGED * abs(value)
+        changed = []
+        for sign in (-1.0, 1.0):
+            try:
+                run = simulate(scene.with_values({key: value + sign * step}))
+            except ValueError:
+                break
+            changed.append({name: found for name, _, _, found in _values(run)})
+        if step > 0.0 and len(changed) == 2:
+            low, high = changed
+            told = [
+                _changed(low[name], high[name]) if name in low and name in high else "–"
+                for name, *_ in base
+            ]
+            rows.append((f"{key} + {number(step)}", *told))
+    heads = ("", *(f"{name}, {unit}" if unit else name for name, _, unit, _ in base))
+    notes: list[str] = []
+    if rows:
+        notes = ["Half the difference between the key changed up and down by as much"]
+        if made.recording.count > 1:
+            notes.append("Same seed: grains meet otherwise in each run, which is noise in it")
+    return Sheet("", heads, tuple(rows), notes=tuple(notes))
+
+
+def _changed(low: float, high: float) -> str:
+    """Return half of a difference, without rounding."""
+    half = 0.5 * (high - low)
+    return f"{half:.3g}" if abs(half) > 1e-9 * max(abs(low), abs(high)) else "0"
+
+
+def _again(made: Report) -> str:
+    """Return versions and command."""
+    python = f"{sys.version_info.major}.{sys.version_info.minor}"
+    command = f"`{made.command}`; " if made.command else ""
+    return (
+        f"{command}chutelab {own_version()}, Python {python}, NumPy {np.__version__}. The same"
+        " scene, seed and engine give the same bits. All tables are beside this report as CSV."
+    )
+
+
+def check(path: Path) -> None:
+    """Raise a `PrintError` if a report cannot be written there."""
+    if path.suffix.lower() == ".pdf":
+        need_typst()

@@ -323,6 +323,7 @@ typedef struct {
     int low, high;       /* disks that this part of the run is about */
     int phase, cell_count, heap_count, moved_count, wide_count;
     int stirs;           /* whether something moves in this step */
+    int passes;          /* some kinds pass through each other: their restitution is below 0 */
     int hinges;          /* how many there are */
     int swings_too;      /* contacts that are solved act on hinges */
     int stamp, shocks, jams; /* numbers of the latest query, shock and jam, for marks */

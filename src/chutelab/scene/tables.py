@@ -125,6 +125,7 @@ class Pair(Table):
     between: Two = described(..., "Two kinds of particles by name, or one and a surface")
     restitution: Share | None = pair_restitution(None, "of these two")
     friction: Amount | None = pair_friction(None, "of these two")
+    meet: Switch = described(True, "Whether two kinds meet; if not, they pass through each other")
 
 
 class Incoming(Table):

@@ -251,7 +251,8 @@ class Shared:
 
     def _taken(self, i: int, x: Vec2d, v: Vec2d, late: float) -> bool:
         """Tell whether the place where a particle starts is taken, now or when it was due."""
-        others = np.flatnonzero(self.inside)
+        kinds = self.machine.releases.kind
+        others = np.flatnonzero(self.inside & (self.machine.pair_restitution[kinds[i]][kinds] >= 0))
         if not len(others):
             return False
         if self.corners:

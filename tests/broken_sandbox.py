@@ -123,6 +123,18 @@ BY_HAND = [
      "particle[2].points", "3 to 32 points"),
     # materials and pairs
     ("machine", {"material[0].density": GONE}, "material[0].density", "is missing"),
+    # what hangs on a hinge, and what does not meet
+    ("machine", {"plate[1].spring": 1.0}, "plate[1].spring", "is for what hangs on a hinge"),
+    ("machine", {"plate[1].hinge": "pivot"}, "plate[1].mass", "kg, or inertia, kg m2"),
+    ("machine", {"plate[1].hinge": "middle", "plate[1].mass": 1.0}, "plate[1].hinge", "pivot"),
+    ("machine", {"plate[1].hinge": [1.0], "plate[1].mass": 1.0}, "plate[1].hinge", "[x, y]"),
+    ("machine", {"surface[0].hinge": "pivot", "surface[0].mass": 0.0}, "surface[0].mass", "1e-"),
+    ("machine", {"surface[0].hinge": "pivot", "surface[0].mass": 1.0, "surface[0].turn": 5.0},
+     "surface[0].hinge", "turn, shake and travel"),
+    ("machine", {"pair[1].meet": False}, "pair[1].friction", "is of what meets"),
+    ("machine", {"pair[0].meet": False, "pair[0].restitution": GONE}, "pair[0].meet",
+     "two kinds of particles"),
+    ("machine", {"pair[1].meet": "no"}, "pair[1].meet", "true or false"),
     ("machine", {"pair[0].between": ["small"]}, "pair[0].between", "two names"),
     ("machine", {"pair[0].between": ["small", "big", "gate"]}, "pair[0].between", "two names"),
     ("machine", {"pair[0].between": GONE}, "pair[0].between", "is missing"),

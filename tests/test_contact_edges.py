@@ -9,6 +9,7 @@ from chutelab.engines import contact, exact
 from chutelab.engines.contact import run
 from chutelab.results import Kind
 from chutelab.results.laws import judge
+from chutelab.results.recorder import StalledError
 from machines import bent, face, scene_of, thrown
 
 G = 9.81
@@ -241,3 +242,35 @@ def test_of_two_faces_on_each_other_the_first_in_the_file_acts(engine, ways, fri
     off = 1e-12 if engine is exact else G * abs(np.diff(frictions)[0]) * machine.dt
     np.testing.assert_allclose(left, speed * along, rtol=0, atol=off)
     assert recording.by_surface[1].any() == (begins > start)
+
+
+@pytest.mark.parametrize("engine", [exact, contact])
+def test_what_belts_drive_to_and_fro_without_end_is_told(engine):
+    """Two fast belts meet in a wedge into which they throw a disk that does not turn.
+
+    Each round of four blows is like the one before in a wedge that is narrower: it takes a constant
+    share less of time, so that infinitely many take a finite one, and gives as much work. The sum
+    has no bound, so no engine has an answer.
+    """
+    machine = scene_of(
+        particle={"radius": 0.004, "spin": False},
+        surface=[
+            face("up", (-0.5, -1.0), (0.6, 1.0), speed=100.0, friction=1e6, restitution=0.999),
+            face("down", (-0.35, 0.3), (0.75, -0.4), speed=100.0, friction=0.6, restitution=0.999),
+        ],
+        stream={"at": [0.0, -0.02], "velocity": [1.7, -0.3]},
+        run={"until": 1.0},
+    )  # fmt: skip
+    with pytest.raises(StalledError) as told:
+        engine.run(machine)
+    recording = told.value.recording
+    at = recording.select(Kind.IMPACT)["t"][20:2021:4]
+    after = np.flatnonzero(np.diff(recording.knots["t"]) == 0.0) + 1
+    work, rounds = np.diff(recording.knots["entries"][after, 0][20:2021:4]), np.diff(at)
+    shares = rounds[1:] / rounds[:-1]
+    assert np.abs(work / work[0] - 1.0).max() < 1e-5
+    assert np.abs(shares / shares[0] - 1.0).max() < 1e-5
+    end = at[0] + rounds[0] / (1.0 - shares[0])
+    # Exact goes on until rounding ends it, contact says so where a step has too many blows.
+    assert told.value.t == pytest.approx(end, abs={exact: 1e-4, contact: 6e-3}[engine])
+    assert told.value.t < end + 1e-4

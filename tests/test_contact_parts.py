@@ -6,11 +6,13 @@ from math import acos, atan, cos, hypot, pi, radians, sin, sqrt
 import numpy as np
 import pytest
 
+import chutelab
 from chutelab.engines import contact, exact
 from chutelab.engines.contact import run
 from chutelab.results import Kind
 from chutelab.results.laws import LOSSES, judge
 from chutelab.results.ledger import ledger
+from chutelab.scene import SceneError
 from cores import Core
 from crowds import hollow
 from machines import bent, face, gated, of_sizes, scene_of, thrown
@@ -508,3 +510,53 @@ def test_in_a_blow_rolling_friction_takes_what_its_arm_allows(share, rolling, fr
     heat = track[np.searchsorted(track["t"], event["t"], side="right") - 1]["entries"][2]
     assert heat == pytest.approx(before - after, rel=1e-9, abs=1e-12)
     assert residual(recording) < 1e-12
+
+
+def passing(meet):
+    """Two balls that run into each other on a floor, of two kinds; and a third, as the first."""
+    each = {"interact": True, "velocity": [0.0, 0.0], "restitution": 1.0, "friction": 0.0}
+    return {
+        "particle": [{"name": "a", "radius": 0.01, "mass": 0.008},
+                     {"name": "b", "radius": 0.02, "mass": 0.02}],
+        "pair": [{"between": ["a", "b"], "meet": meet}],
+        "surface": [{"name": "floor", "from": [-2.0, 0.0], "to": [2.0, 0.0], "friction": 0.0}],
+        "stream": [{"name": "s", "particle": "a", **each, "at": [-0.2, 0.01],
+                    "velocity": [1.0, 0.0]},
+                   {"name": "t", "particle": "b", **each, "at": [0.0, 0.02]},
+                   {"name": "u", "particle": "a", **each, "at": [0.2, 0.01]}],
+        "run": {"until": 0.5},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+def test_two_kinds_pass_through_each_other_and_the_others_meet(engine):
+    """The first hands all of its speed on to the third, as if nothing were between them."""
+    recording = chutelab.simulate(passing(False), engine=engine)
+    assert not recording.laws
+    assert [{e["particle"], e["other"]} for e in recording.select("collision")] == [{0, 2}]
+    (first, between, last) = recording.at([0.49])[1][0]
+    assert last == pytest.approx([1.0, 0.0], abs=1e-2)
+    assert np.abs([first, between]).max() < 1e-2
+    stopped = chutelab.simulate(passing(True), engine=engine)
+    assert {0, 1} in [{e["particle"], e["other"]} for e in stopped.select("collision")]
+
+
+def test_what_passes_wakes_nothing_and_waits_for_nothing():
+    """One lies in the place of the other, which is released there at once, and both sleep on."""
+    scene = passing(False)
+    first, other, _ = scene["stream"]
+    late = {"at": [0.0, 0.01], "velocity": [0.0, 0.0], "start": 0.4}
+    scene["stream"] = [other, first | late]
+    recording = chutelab.simulate(scene | {"run": {"until": 1.0}})
+    assert recording.select("release")["t"].tolist() == pytest.approx([0.0, 0.4])
+    assert not len(recording.select("collision"))
+
+
+def test_a_pair_that_does_not_meet_has_no_restitution_and_is_of_two_kinds():
+    spoilt = passing(False)
+    spoilt["pair"] = [{"between": ["a", "b"], "meet": False, "restitution": 0.5}]
+    with pytest.raises(SceneError, match=r"pair\[0\].restitution = 0.5: is of what meets"):
+        chutelab.load(spoilt)
+    spoilt["pair"] = [{"between": ["a", "floor"], "meet": False}]
+    with pytest.raises(SceneError, match=r"pair\[0\].meet = false: true with a surface"):
+        chutelab.load(spoilt)

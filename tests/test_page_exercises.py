@@ -12,7 +12,7 @@ from chutelab.classroom.exercises.exercise import (
     Case,
     Numbers,
     draw,
-    plain,
+    normalized,
     shown,
 )
 from chutelab.classroom.exercises.judging import judge
@@ -127,7 +127,7 @@ def test_it_says_what_python_says(name, language, many, monkeypatch):
         answers = [[case.number, value] for case in cases for value in answers_to(case, rng)]
         foreign = [
             (other, draw(exercise, other)[1])
-            for other in ("your name", *others) if plain(other) != plain(student)
+            for other in ("your name", *others) if normalized(other) != normalized(student)
         ]  # fmt: skip
         answers += [
             [n, float(f"{case.right:.4g}")]

@@ -9,7 +9,7 @@ from PIL import Image
 from chutelab.classroom.lessons import read
 from chutelab.classroom.lessons.building import start
 from chutelab.classroom.lessons.sheets import SHEETS, printed, sheet
-from chutelab.classroom.lessons.texts import html_of, parsed, plain, typeset, without_tex
+from chutelab.classroom.lessons.texts import as_text, html_of, parsed, typeset, without_tex
 from shared import Page, chutelab, find, lessons
 
 
@@ -104,7 +104,7 @@ def test_every_sheet_is_a_pdf_of_a_few_pages(number, which):
     ],
 )
 def test_formulas_are_written_in_characters_and_for_print(tex, characters, set_as):
-    assert plain(parsed(tex)) == characters
+    assert as_text(parsed(tex)) == characters
     assert typeset(parsed(tex)) == set_as
 
 
@@ -113,7 +113,7 @@ def test_formulas_are_written_in_characters_and_for_print(tex, characters, set_a
     ["{", "}", "_", "^^", "a_", r"\frac{a", r"\sqrt", "x_{", r"\unknown{x}", "#panic()", "\\", "'"],
 )
 def test_no_formula_is_too_broken_to_be_shown(tex):
-    plain(parsed(tex))
+    as_text(parsed(tex))
     typst.compile(f"${typeset(parsed(tex))} x$".encode(), format="pdf")
 
 

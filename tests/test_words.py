@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from chutelab.classroom import exercises as package
 from chutelab.classroom import lessons
-from chutelab.classroom.exercises import EXERCISES, Verdict, lesson
+from chutelab.classroom.exercises import EXERCISES, Verdict, lesson, told
 from chutelab.classroom.exercises.exercise import draw, translated
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.cli import main
@@ -53,16 +53,11 @@ def test_a_reply_says_not_yet_and_never_wrong():
         said = catalogue(language)
         assert (said["verdict-right"], said["verdict-off"]) == (right, later)
         replies = [text for key, text in said.items() if re.match("verdict|off|reply|besides", key)]
-        replies += [one.called for name in EXERCISES for one in mistakes_of(name, language)]
+        for name in EXERCISES:
+            for case in draw(told(name, language), "Ada")[1]:
+                replies += [mistake.called for mistake in case.mistakes]
         for text in replies:
             assert not re.search(r"(?i)\b(wrong|invalid|falsch\w*|ungültig)\b", text), text
-
-
-def mistakes_of(name, language):
-    """What a pupil's mistakes are called."""
-    task = lesson(name, "Ada", language=language)
-    for number, case in enumerate(draw(EXERCISES[name], "Ada")[1], start=1):
-        yield from (task.check(number, trace.number) for trace in case.mistakes)
 
 
 def test_an_unknown_language_is_told_which_there_are():

@@ -62,7 +62,7 @@ step things happen. Over two ratios of 4, half an order is a factor of 4 between
 class Agreement:
     """One quantity in two answers."""
 
-    pair: str  # which two; one, of an answer that is left out
+    pair: tuple[str, ...]  # which two; one, of an answer that is left out
     quantity: str  # what is compared; or why nothing is
     # relative difference, or the order at which it vanishes; None if nothing is compared
     difference: float | None = None
@@ -98,7 +98,7 @@ def agreement(scene: Scene, max_seconds: float = PATIENCE) -> tuple[Agreement, .
         try:
             found[name] = answer(alone, name, max_seconds=max_seconds)
         except UNABLE as error:
-            rows.append(Agreement(name, f"left out: {because(error)}"))
+            rows.append(Agreement((name,), f"left out: {because(error)}"))
     if not found:
         return tuple(rows)
     base = next(iter(found))
@@ -125,17 +125,17 @@ def agreement(scene: Scene, max_seconds: float = PATIENCE) -> tuple[Agreement, .
         compared = compare(recording)
         if compared.max is not None:
             what = "largest relative error"
-            rows.append(Agreement(f"{name}, theory", what, compared.max, allowed))
+            rows.append(Agreement((name, "theory"), what, compared.max, allowed))
         elif name == base:
-            rows.append(Agreement(f"{name}, theory", compared.reason))
+            rows.append(Agreement((name, "theory"), compared.reason))
         if name != base:
             if name in ORDERS and allowed is None and STEADY < growth < inf:
                 what = f"a change of the inputs comes out {growth:.0e} times as large"
-                rows.append(Agreement(f"{name}, {base}", what))
+                rows.append(Agreement((name, base), what))
                 continue
             rows.append(_with_base(alone, name, recording, found[base], allowed, max_seconds))
     if not isfinite(growth):
-        rows.append(Agreement(base, f"a change of the inputs by {STIR:g} changes what happens"))
+        rows.append(Agreement((base,), f"a change of the inputs by {STIR:g} changes what happens"))
     return tuple(rows)
 
 
@@ -143,7 +143,7 @@ def _with_base(
     scene: Scene, name: str, recording: Recording, base: Recording, allowed: float | None,
     max_seconds: float,
 ) -> Agreement:  # fmt: skip
-    pair = f"{name}, {base.engine}"
+    pair = (name, base.engine)
     error, which = distance(recording, base)
     if allowed is None and error <= BLOWS.get(name, 0.0):
         allowed = BLOWS[name]  # no worse than where there is no step to go wrong by
@@ -244,7 +244,7 @@ class Verification:
         left_out = tuple(f"{engine} is left out: {why}" for engine, why in self.skipped.items())
         pairs, notes = [], []
         for one in self.agreements:
-            said = f"{one.pair.replace(', ', ' - ')}: {one.quantity}"
+            said = f"{' - '.join(one.pair)}: {one.quantity}"
             form = ".1f" if one.least else ".1e"
             difference, tolerance = (
                 "-" if x is None else f"{x:{form}}" for x in (one.difference, one.tolerance)

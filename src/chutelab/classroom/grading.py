@@ -29,7 +29,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
 from chutelab.classroom.exercises import EXERCISES, LONGEST_NAME, OPENED, UNNAMED
-from chutelab.classroom.exercises.exercise import draw, plain
+from chutelab.classroom.exercises.exercise import draw, normalized
 from chutelab.classroom.exercises.judging import is_rounded, judge
 from chutelab.classroom.kernel import ForgedError, run
 from chutelab.classroom.lessons import OWN_WORDS
@@ -259,7 +259,7 @@ def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
             reason=printable(row.reason),
             words={printable(key): printable_lines(text) for key, text in row.words.items()},
         )
-        entry = (row.lesson, plain(row.student))
+        entry = (row.lesson, normalized(row.student))
         if row.lesson and entry in first:
             same = printable(f"same lesson and student as {first[entry]}")
             row = replace(row, reason="; ".join(filter(None, [row.reason, same])))
@@ -398,7 +398,7 @@ def _marked(file: str, work: Work, reasons: Sequence[str] = ()) -> Grade:
     _, cases = draw(EXERCISES[work.lesson], work.student)
     replies = [judge(cases[n - 1], answer) for n, answer in sorted(work.answers.items())]
     right = {reply.question for reply in replies if reply.right}
-    if plain(work.student) == UNNAMED:
+    if normalized(work.student) == UNNAMED:
         reasons = [*reasons, f"the name was left at {UNNAMED!r}"]
     return Grade(
         file=file,
@@ -429,7 +429,7 @@ def _works(reports: object) -> list[Work]:
             work = _work(one)
         except ValueError as error:
             raise ForgedError(f"its report is not from chutelab: {error}") from None
-        first = works.setdefault((work.lesson, plain(work.student)), work)
+        first = works.setdefault((work.lesson, normalized(work.student)), work)
         first.answers |= work.answers
         first.tries |= work.tries
         first.hints |= work.hints
@@ -462,7 +462,7 @@ def _lesson(name: str, rows: list[Grade]) -> Iterator[str]:
     exercise = EXERCISES[name]
     files: dict[str, list[Grade]] = {}
     for row in rows:
-        files.setdefault(plain(row.student), []).append(row)
+        files.setdefault(normalized(row.student), []).append(row)
     shared = {name: found for name, found in files.items() if len(found) > 1}
     handed = "1 student" if len(files) == 1 else f"{len(files)} students"
     handed += f", {len(rows)} files" if shared else ""
@@ -488,7 +488,7 @@ def _lesson(name: str, rows: list[Grade]) -> Iterator[str]:
             yield f"| {number} | {_literal(mistake)} | {many} |"
     yield ""
     for row in rows:
-        which = f", {_literal(row.file)}" if plain(row.student) in shared else ""
+        which = f", {_literal(row.file)}" if normalized(row.student) in shared else ""
         for key, text in row.words.items():
             yield from (f"**{_literal(row.student)}** ({_literal(key)}{which}):", "")
             for line in text.splitlines():
@@ -524,7 +524,7 @@ def page(grades: Iterable[Grade]) -> str:
         lines = "".join(
             f"<tr><th scope=row>{escape(row.student)}<td>{row.total}"
             f"{''.join(_cell(row, n) for n in range(1, row.out_of + 1))}<td>{escape(row.reason)}"
-            for row in sorted(of_lesson, key=lambda row: plain(row.student))
+            for row in sorted(of_lesson, key=lambda row: normalized(row.student))
         )
         parts.append(
             f"<h2>{exercise.number}. {escape(exercise.title)}</h2>\n<table><thead><tr>"

@@ -341,10 +341,7 @@ def verify(
             "scene": name,
             "title": loaded[name].title,
             "expectations": [{**plain(row), "holds": row.holds} for row in answer.findings],
-            "agreement": [
-                {**plain(row), "pair": row.pair.split(", "), "holds": row.holds}
-                for row in answer.agreements
-            ],
+            "agreement": [{**plain(row), "holds": row.holds} for row in answer.agreements],
             "skipped": answer.skipped,
         }
         for name, answer in found.items()

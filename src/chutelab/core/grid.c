@@ -48,6 +48,11 @@ static void enter(int i) {
         }
 }
 
+/* Whether two disks meet at all. */
+static int meet(int i, int j) {
+    return !W.passes || pair_of(W.disks[i].kind, W.disks[j].kind)->restitution >= 0;
+}
+
 static int overlaps(const Disk *a, const double *box) {
     return a->left < box[2] && a->right > box[0] && a->bottom < box[3] && a->top > box[1];
 }
@@ -107,6 +112,7 @@ int list_near(double end) {
         if (d->mode != FREE) continue;
         int n = query(i, &d->left);
         for (int k = 0; k < n; k++) {
+            if (!meet(i, W.found[k])) continue;
             if (W.near_count >= W.near_room) return 0;
             W.near[2 * W.near_count] = W.found[k];
             W.near[2 * W.near_count++ + 1] = i;
@@ -131,7 +137,13 @@ int enter_again(int i, double end) {
 }
 
 /* Put the disks that disk i may meet in what is left of the step into `W.found`. */
-int reachable(int i) { return W.interact ? query(i, &W.disks[i].left) : 0; }
+int reachable(int i) {
+    int n = W.interact ? query(i, &W.disks[i].left) : 0, kept = 0;
+    if (!W.passes) return n;
+    for (int k = 0; k < n; k++)
+        if (meet(i, W.found[k])) W.found[kept++] = W.found[k];
+    return kept;
+}
 
 /* List the surfaces that a disk may reach in this step, and maybe some more, ascending. They are looked
    for again when it leaves its zone only: of a hundred pegs a disk is near three. */
@@ -171,7 +183,7 @@ int place_is_free(int i, double x, double y, double t) {
     for (int k = 0; k < n; k++) {
         Disk o = W.disks[W.found[k]];
         advance(&o, t);
-        if (square(o.x - x) + square(o.y - y) < square(o.radius + (1 - TOUCHING) * r)) return 0;
+        if (meet(i, W.found[k]) && square(o.x - x) + square(o.y - y) < square(o.radius + (1 - TOUCHING) * r)) return 0;
     }
     return 1;
 }

@@ -306,7 +306,9 @@ static int lay_out_work(void) {
 
 /* The host has filled in what is marked [in]: fill in what follows. */
 EXPORT int prepare(void) {
-    W.hinges = 0;
+    W.passes = W.hinges = 0;
+    for (int i = 0; i < W.kind_count * W.kind_count; i++)
+        W.passes |= pair_of(i / W.kind_count, i % W.kind_count)->restitution < 0;
     for (int k = 0; k < W.mover_count; k++) W.hinges += W.movers[k].inertia > 0;
     /* What hangs gives what one disk gives it to another. */
     if (W.hinges) W.interact = 1;

@@ -185,7 +185,10 @@ class Job:
             return None
         world = self.module.world
         disk = self.module.array("disks", dtype("Disk"), self.machine.count)[world.stalled]
-        reason = "too many impacts in one step; make run.dt shorter, or lower the restitution there"
+        reason = (
+            "too many impacts in one step; make run.dt shorter, move the surfaces there apart, or"
+            " lower their restitution or speed"
+        )
         return StalledError(world.stalled, world.now, (float(disk["x"]), float(disk["y"])), reason)
 
     def stop(self) -> Status:

@@ -199,8 +199,9 @@ def stuck(course: int, passed: float) -> str:
             " touch where it is, and join their ends or move them apart"
         )
     if course == COURSE["DRIVEN"]:
+        took = f"{WINDOW} events took {passed:.2g} s" if passed else "its blows never end"
         return (
-            f"{WINDOW} events took {passed:.2g} s: it is driven to and fro in a narrow place;"
+            f"{took}: it is driven to and fro in a narrow place;"
             " move the surfaces there apart, or lower their restitution"
         )
     if course == COURSE["TOO_LONG"]:

@@ -31,6 +31,9 @@ from chutelab.util.trig import RADIANS, hypot
 WORDS = {"adhesion": inf, "impact": 0.0, "top": 1.0}
 """Numbers of what keys may say in words; `drop_from` as in layout.h."""
 
+PASSES = -1.0
+"""Restitution of two kinds that pass through each other; `meet` of the core's grid.c."""
+
 WORD = 2**32
 """Seeds are handed over as two numbers below it."""
 
@@ -130,6 +133,8 @@ def told(scene: Scene) -> Told:
                 bounces, grips = meeting(kind, other)
                 # Adhesion is friction without a bound.
                 grips = inf if isinstance(grips, str) else grips
+                if not isinstance(other, str) and scene.passes(kind, other):
+                    bounces = PASSES
                 rolls = 0.0 if isinstance(other, str) else rolling[other]
                 terms += bounces, grips, max(rolling[kind], rolls)
         grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
@@ -255,6 +260,8 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     if not family:
         every = range(len(particles))
         pairs = np.array([[meeting(a, b) for b in every] for a in every])
+        through = [[scene.passes(a, b) for b in every] for a in every]
+        pairs[..., 0] = np.where(through, PASSES, pairs[..., 0])
     threads = []
     for string in scene.string:
         x, y = releases.position[string.particle].tolist()

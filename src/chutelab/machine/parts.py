@@ -148,7 +148,7 @@ class Machine:
     dt: float  # s; step of lasting contacts (contact), longest step (pymunk)
     align: bool  # whether the pymunk engine's steps of a lone particle end at contacts
     interact: bool  # whether particles meet each other
-    pair_restitution: Floats  # (K, K), of two particles by their kinds, see `Releases.kind`
+    pair_restitution: Floats  # (K, K), of two particles by their kinds; below 0: they never meet
     pair_friction: Floats
     rolling: Floats  # (K,), rolling friction of a kind on everything: its arm over the radius
     outlines: tuple[Floats | None, ...]  # (K); of boxes and polygons corners (n, 2)

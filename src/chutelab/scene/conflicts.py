@@ -401,6 +401,8 @@ def _pairs(look: Look) -> Iterator[Fault]:
         if not any(name in kinds for name in between):
             text = f"one of them must be the name of a [[particle]]; {_there_are(kinds)}"
             yield Fault(pair.path("between"), list(between), text)
+        elif pair["meet"] is False and not all(name in kinds for name in between):
+            yield pair.fault("meet", "true with a surface: it is for two kinds of particles")
         for place, name in enumerate(between):
             if name not in anything:
                 allowed = did_you_mean(str(name), anything, _there_are(anything))

@@ -195,6 +195,11 @@ class SceneTables(Table):
         """Return restitution and friction of a kind of particles and another, see `meetings`."""
         return self.meetings()(kind, other)
 
+    def passes(self, kind: int, other: int) -> bool:
+        """Tell whether two kinds pass through each other."""
+        names = {self.particles[kind].name, self.particles[other].name}
+        return any(not pair.meet and set(pair.between) == names for pair in self.pair)
+
     def meetings(self, value: Reader = getattr) -> Callable[[int, int | str], tuple[float, float]]:
         """Return what tells restitution and friction of a kind and another kind, or a surface.
 

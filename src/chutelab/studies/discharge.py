@@ -19,9 +19,9 @@ from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
 from chutelab.results.record import QUANTILES
 from chutelab.scene import AnyScene, Scene, from_dict, load, to_dict
-from chutelab.theory.discharge import LEFT_OUT, METHODS, Discharge, DischargeError, Path, discharge
+from chutelab.theory.discharge import LEFT_OUT, METHODS, Discharge, DischargeError, discharge
 from chutelab.util.arrays import Floats, Progress
-from chutelab.util.tables import Sheet
+from chutelab.util.tables import Sheet, plain
 
 HEIGHTS = (0.0, -0.2, -0.4, -0.6, -0.8, -1.0)
 """Heights above the pulley's axis at which streams are compared, m."""
@@ -58,42 +58,38 @@ class SideBySide:
             ]
         heads = ("at y, m", *(f"{height:g}" for height in self.heights))
         notes = [f"{name}: no answer, {why}" for name, why in self.refused.items()]
-        notes += [self._differs(name) for name in self.methods]
+        for name in self.methods:
+            off = 1000.0 * (self.lines[name] - self.lines["simulated"])[:, -1]
+            told = [f"{edge} {x:+.1f}" for edge, x in zip(EDGES, off, strict=True) if not isnan(x)]
+            at = f"{name} less simulated, at y = {self.heights[-1]:g} m"
+            notes += [f"{at}: {', '.join(told)} mm"] if told else []
         notes.append(f"Left out, as their rules are not known well enough: {', '.join(LEFT_OUT)}.")
-        return Sheet("The stream's x, m", heads, tuple(rows), notes=tuple(filter(None, notes)))
-
-    def _differs(self, name: str) -> str:
-        """Tell how far a method's stream is from the simulated one at the lowest height."""
-        off = 1000.0 * (self.lines[name] - self.lines["simulated"])[:, -1]
-        told = [f"{edge} {x:+.1f}" for edge, x in zip(EDGES, off, strict=True) if not isnan(x)]
-        if not told:
-            return ""
-        return f"{name} less simulated, at y = {self.heights[-1]:g} m: {', '.join(told)} mm"
+        return Sheet("The stream's x, m", heads, tuple(rows), notes=tuple(notes))
 
     def as_dict(self) -> dict[str, object]:
         """Return plain data for JSON."""
-        return {
-            "heights": self.heights.tolist(),
+        told = {
+            "heights": self.heights,
             "methods": {
                 name: {
                     "high_speed": found.high_speed,
-                    **{edge: _plain(getattr(found, edge)) for edge in EDGES},
+                    **{
+                        edge: path
+                        and {
+                            "angle_deg": np.degrees(path.angle),
+                            "speed": path.speed,
+                            "radius": path.radius,
+                        }
+                        for edge in EDGES
+                        for path in [getattr(found, edge)]
+                    },
                 }
                 for name, found in self.methods.items()
             },
-            "x": {
-                name: {e: [None if isnan(x) else x for x in row]
-                       for e, row in zip(EDGES, rows.tolist(), strict=True)}
-                for name, rows in self.lines.items()
-            },
+            "x": {name: dict(zip(EDGES, rows, strict=True)) for name, rows in self.lines.items()},
             "refused": self.refused,
-        }  # fmt: skip
-
-
-def _plain(path: Path | None) -> dict[str, float] | None:
-    if path is None:
-        return None
-    return {"angle_deg": float(np.degrees(path.angle)), "speed": path.speed, "radius": path.radius}
+        }
+        return dict(plain(told))
 
 
 def side_by_side(

@@ -69,12 +69,17 @@ class Drag:
     arrives: bool
 
     def __str__(self) -> str:
+        return f"air drag, left out, would be {self.effect}"
+
+    @property
+    def effect(self) -> str:
+        """How large it is, and what it would change, in words."""
         share = f"{100.0 * self.share_of_weight:.2g} % of the weight"
         if self.share_of_weight >= 1.0:
             share = f"{self.share_of_weight:.3g} times the weight"
         if isnan(self.share_of_weight):
             share = f"a deceleration of {self.slowing:.2g} m/s²"
-        said = f"air drag, left out, would be {share} at {self.speed:.3g} m/s"
+        said = f"{share} at {self.speed:.3g} m/s"
         if not self.arrives:
             said += ", and air would keep particle 0 from getting there"
         elif abs(self.landing_shift) >= 1e-6:  # m; not NaN either

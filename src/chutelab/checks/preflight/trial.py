@@ -250,7 +250,7 @@ def skipped(
         yield Part("what follows", 'the first touch of the outgoing belt: run.until = "landed"')
     air = drag(scene, predict(scene), 0.0) if recording is None else air_drag(recording)
     if air is not None:
-        yield Part("air", str(air).replace("air drag, left out, would be", "its drag would be"))
+        yield Part("air", f"its drag would be {air.effect}")
 
 
 PATIENCE = 1.0

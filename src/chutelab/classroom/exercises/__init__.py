@@ -41,7 +41,7 @@ from chutelab.classroom.exercises.exercise import (
     Question,
     Values,
     draw,
-    plain,
+    normalized,
     read,
     translated,
 )
@@ -52,7 +52,7 @@ from chutelab.classroom.exercises.judging import (
     Standing,
     Verdict,
     number_of,
-    with_unit,
+    number_with_unit,
 )
 from chutelab.scene.conflicts import tree
 from chutelab.util.errors import InputError
@@ -188,7 +188,7 @@ class Task:
         asked = case.question
         lines = [case.numbers.text(line) for line in asked.working.splitlines()]
         said = words(self.language)
-        right = said.say("answer", answer=with_unit(case.right, asked.unit, said))
+        right = said.say("answer", answer=number_with_unit(case.right, asked.unit, said))
         text = "\n".join([*lines, right, said.say("source", source=asked.source)])
         title = said.say("working-title", number=case.number)
         return Passage(case.number, title, text, asked.unit)
@@ -214,7 +214,7 @@ class Task:
         """Return the title, the rows of numbers, and the story."""
         exercise, said = _exercise(self), words(self.language)
         rows = [
-            (one.symbol, with_unit(self.given[one.name], one.unit, said), one.meaning)
+            (one.symbol, number_with_unit(self.given[one.name], one.unit, said), one.meaning)
             for one in exercise.parameters
         ]
         story = _case(self, 1).numbers.text(exercise.story)
@@ -255,11 +255,11 @@ def _case(task: Task, number: int, given: Values | None = None) -> Case:
 
 def _of_others(task: Task, number: int) -> Iterator[tuple[str, float]]:
     """Yield the right answers for the other names of this process's tasks, and for no name."""
-    given = {plain(UNNAMED): (UNNAMED, _unnamed(task.lesson))}
+    given = {normalized(UNNAMED): (UNNAMED, _unnamed(task.lesson))}
     for one in list(OPENED):  # another thread may be opening one
         if one.lesson == task.lesson:
-            given.setdefault(plain(one.student), (one.student, one.given))
-    given.pop(plain(task.student), None)
+            given.setdefault(normalized(one.student), (one.student, one.given))
+    given.pop(normalized(task.student), None)
     for name, values in given.values():
         yield name, _case(task, number, values).right
 

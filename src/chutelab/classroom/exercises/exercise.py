@@ -372,10 +372,10 @@ class Case:
         return all(abs(a - b) > TOLERANCE * (abs(a) + abs(b)) for a, b in combinations(numbers, 2))
 
 
-def plain(student: str) -> str:
+def normalized(student: str) -> str:
     """Return a name in lower case, with single spaces and in one Unicode form, first name first.
 
-    >>> plain("  Ada  LOVELACE "), plain("Berg, Mia")
+    >>> normalized("  Ada  LOVELACE "), normalized("Berg, Mia")
     ('ada lovelace', 'mia berg')
     """
     last, comma, first = unicodedata.normalize("NFKC", student).casefold().partition(",")
@@ -388,7 +388,7 @@ def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] |
     """Return the cases of one draw, or None if it does not fit, or some mistake is not clear."""
     drawn = {}
     for parameter in exercise.parameters:
-        key = "\n".join((exercise.name, plain(student), parameter.name, str(number)))
+        key = "\n".join((exercise.name, normalized(student), parameter.name, str(number)))
         random = int.from_bytes(sha256(key.encode("utf-8", "replace")).digest()[:8])
         drawn[parameter.name] = float(parameter.values[random % len(parameter.values)])
     numbers = Numbers(drawn, exercise.formulas, language=exercise.language)

@@ -302,7 +302,7 @@ def judge(case: Case, answer: float, others: Iterable[tuple[str, float]] = ()) -
         return Reply(case.number, verdict, text, name, called, said.language)
 
     if is_close(answer, case.right):
-        found = with_unit(answer, case.question.unit, said)
+        found = number_with_unit(answer, case.question.unit, said)
         text = said.say("right", answer=found, percent=f"{100 * TOLERANCE:g}")
         return reply(Verdict.RIGHT, text)
     for trace in case.mistakes:
@@ -320,7 +320,7 @@ def judge(case: Case, answer: float, others: Iterable[tuple[str, float]] = ()) -
     return reply(Verdict.OFF, _distance(case, answer, said))
 
 
-def with_unit(number: float, unit: str, said: Words) -> str:
+def number_with_unit(number: float, unit: str, said: Words) -> str:
     """Return a number with its unit, as texts show it."""
     return f"{said.local(shown(number))} {said.unit(unit)}".strip()
 

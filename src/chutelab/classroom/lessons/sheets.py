@@ -17,7 +17,7 @@ from markdown_it.tree import SyntaxTreeNode
 
 from chutelab.classroom.exercises import EXERCISES, UNNAMED, told
 from chutelab.classroom.exercises.exercise import draw
-from chutelab.classroom.exercises.judging import with_unit
+from chutelab.classroom.exercises.judging import number_with_unit
 from chutelab.classroom.lessons import Lesson, Page, Teacher, machine_of, picture_of
 from chutelab.classroom.lessons.printing import pdf, web_page
 from chutelab.classroom.lessons.steps import PLACES, Ask, Step
@@ -98,7 +98,7 @@ def asked(lesson: Lesson, step: Step) -> Iterator[str]:
 def values_of(lesson: Lesson, step: Step) -> Callable[[str], str]:
     """Return what says the value that a key has in a step's machine, with its unit."""
     scene, said = machine_of(lesson, step), words(lesson.language)
-    return lambda key: with_unit(value_at(scene, key), unit_of(parts_of(key)), said)
+    return lambda key: number_with_unit(value_at(scene, key), unit_of(parts_of(key)), said)
 
 
 def with_values(lesson: Lesson, step: Step, text: str) -> str:
@@ -190,14 +190,14 @@ def _of_exercise(lesson: Lesson, said: Words) -> dict[str, str]:
     for case in cases:
         asked, text = case.question, case.numbers.text
         way = "; ".join(map(text, asked.working.strip().splitlines()))
-        answer = say("answer", answer=with_unit(case.right, asked.unit, said))
+        answer = say("answer", answer=number_with_unit(case.right, asked.unit, said))
         lines.append(f"{case.number}. *{asked.title}*: {way}. {answer}.")
         rows += [
             f"| {case.number} | {known.called or known.name} | {text(known.says)} |"
             for known in asked.mistakes
         ]
     numbers = "; ".join(
-        f"{one.symbol} = {with_unit(given[one.name], one.unit, said)}"
+        f"{one.symbol} = {number_with_unit(given[one.name], one.unit, said)}"
         for one in exercise.parameters
     )
     shipped = say("sheet-shipped", name=UNNAMED, numbers=numbers)

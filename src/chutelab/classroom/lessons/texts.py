@@ -92,10 +92,10 @@ def _part(token: re.Match[str], tokens: Iterator[re.Match[str]]) -> Part:
     return Part(token[1], arguments=[_one(tokens) for _ in range(count)])
 
 
-def plain(row: list[Part]) -> str:
+def as_text(row: list[Part]) -> str:
     r"""Return a formula in plain characters; a name that is not known stays.
 
-    >>> plain(parsed(r"v_2' = v_0 \sqrt{1 - \varepsilon^2}, \frac{1}{2} v_x \sin^2\varphi"))
+    >>> as_text(parsed(r"v_2' = v_0 \sqrt{1 - \varepsilon^2}, \frac{1}{2} v_x \sin^2\varphi"))
     "v2' = v0 √(1 - ε²), ½ v_x sin² φ"
     """
     written = re.sub(r" +", " ", "".join(map(_plain, row)))
@@ -103,7 +103,7 @@ def plain(row: list[Part]) -> str:
 
 
 def _plain(part: Part) -> str:
-    inside = [plain(argument) for argument in part.arguments]
+    inside = [as_text(argument) for argument in part.arguments]
     match part.name:
         case "":
             said = part.text
@@ -118,7 +118,7 @@ def _plain(part: Part) -> str:
             said = f"{inside[0]}\N{COMBINING DOT ABOVE}"
         case name:
             said = name if name in FUNCTIONS else SYMBOLS.get(name, f"\\{name}")
-    below, above = plain(part.below), plain(part.above)
+    below, above = as_text(part.below), as_text(part.above)
     if below:
         said += below if below[0].isdigit() else f"_{below}"
     said += "'" * part.primes
@@ -252,6 +252,6 @@ def without_tex(markdown: str) -> str:
 
     def written(found: re.Match[str]) -> str:
         code, display, inline = found.groups()
-        return str(code) if code else plain(parsed(display or inline))
+        return str(code) if code else as_text(parsed(display or inline))
 
     return _FORMULA.sub(written, markdown)

@@ -131,6 +131,15 @@ class Shapes:
             shape.collision_type = PARTICLE
         if not self.machine.interact:
             shape.filter = pymunk.ShapeFilter(group=1)
+        elif (self.machine.pair_restitution < 0.0).any():
+            # Bit 0 is of all kinds that meet every other, and of surfaces like all bits.
+            through = self.machine.pair_restitution < 0.0
+            bits = {kind: n for n, kind in enumerate(np.flatnonzero(through.any(axis=0)), 1)}
+            kind = self.machine.releases.kind[i]
+            apart = sum(1 << bits[other] for other in np.flatnonzero(through[kind]))
+            shape.filter = pymunk.ShapeFilter(
+                categories=1 << bits.get(kind, 0), mask=pymunk.ShapeFilter.ALL_MASKS() ^ apart
+            )
         return body, shape
 
     @staticmethod
@@ -149,7 +158,7 @@ class Shapes:
         Where none are, pairs have theirs from `table`, (2, K, K + F), at each contact.
         """
         m, kinds = self.machine, self.machine.releases.kind
-        values = np.array([m.pair_restitution, np.minimum(m.pair_friction, GRIP)])
+        values = np.array([m.pair_restitution.clip(0.0), np.minimum(m.pair_friction, GRIP)])
         own, self.grip = (sqrt(max(value, SMALLEST)) for value in values[:, 0, 0].tolist())
         self.own, self.table = own, None
         for _, shape in self.bodies:

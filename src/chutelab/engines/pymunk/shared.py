@@ -251,7 +251,8 @@ class Shared:
 
     def _taken(self, i: int, x: Vec2d, v: Vec2d, late: float) -> bool:
         """Tell whether the place where a particle starts is taken, now or when it was due."""
-        others = np.flatnonzero(self.inside)
+        kinds = self.machine.releases.kind
+        others = np.flatnonzero(self.inside & (self.machine.pair_restitution[kinds[i]][kinds] >= 0))
         if not len(others):
             return False
         if self.corners:
@@ -576,7 +577,7 @@ class Shared:
         for i in np.flatnonzero(over & (self.pushes >= STAY)):
             t, x, y, vx, vy, omega = self.left[:, i].tolist()
             self.recorder.events(Kind.SEPARATION, i, t, (x, y), (vx, vy), omega, surface=self.on[i])
-        self.pushes[over] = 0
+        self.pushes[over], self.on[over] = 0, -1
         self.pushes[particles] += 1
         self.on[particles] = surface
         self.left[0, particles], self.left[1:, particles] = self.t, self.state[1][:, particles]

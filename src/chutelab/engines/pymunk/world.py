@@ -347,7 +347,11 @@ class World:
             return
         # Of the centre's way there, which bends no more than the sharpest arc.
         more = sqrt(2.0 * JOINT * self.hair * float(arcs.radius.min())) / (radius + self.radius)
-        before, after = (more if self._goes_on(end, -inward, more) else 0.0 for end, inward in ends)
+        # Where another piece goes on from the end, turning by less than that.
+        before, after = (
+            more if (np.hypot(*(self._from(end)[0] + inward).T) <= more).any() else 0.0
+            for end, inward in ends
+        )
         self._add(Bend(
             circle, tangent=None, foot=foot, begin=begin - before, extent=extent + before + after,
             crowns=NONE, **about,
@@ -385,10 +389,6 @@ class World:
         low, high = ends[:, 0].searchsorted([place[0] - self.hair, place[0] + 1.01 * self.hair])
         near = np.hypot(*(ends[low:high] - place).T) <= self.hair
         return ways[low:high][near], bends[low:high][near]
-
-    def _goes_on(self, end: Floats, out: Floats, bend: float) -> bool:
-        """Tell whether another piece goes on from an end (m), turning by less than `bend` (rad)."""
-        return bool((np.hypot(*(self._from(end)[0] - out).T) <= bend).any())
 
     def _crown(self, end: ArrayLike, out: Vec2d, bend: float = 0.0) -> Vec2d:
         """Return the way to the middle of the half of an end's rim that goes on from a left side.

@@ -114,6 +114,10 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     if scene.string:
         lacks["string"] = len(scene.string)
         faults.append(Fault("string", None, f"{allowed}, without strings"))
+    for n, pair in enumerate(scene.pair):
+        if not pair.meet:
+            faults.append(Fault(f"pair[{n}].meet", False, f"true; {allowed}, which all meet"))
+            partly = False
     for name in scene.movers:
         faults.append(Fault("surface", name, f"{allowed}, and surfaces that stay where they are"))
         partly = False
@@ -190,7 +194,7 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             if table == "particle" and key in ("size", "points"):
                 continue
             moves = table in ("plate", "surface") and key in (*MOTIONS, *HINGED)
-            if moves or (table, key) == ("surface", "pivot"):
+            if moves or (table, key) == ("pair", "meet") or (table, key) == ("surface", "pivot"):
                 continue
             rules[table][key] = rule
     # Mass points, boxes and polygons are for other engines.

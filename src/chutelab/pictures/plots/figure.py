@@ -214,12 +214,10 @@ BINS = 40
 def sensors(recording: Recording) -> Picture:
     """Draw for each sensor of the scene the flow through it over time, and where it passes."""
     told = readings(recording)
-    figure = Picture((9.6, 1.2 + 2.6 * max(1, len(told))))
-    figure.headline(0.04, 1.0 - 0.35 / figure.get_figheight(), recording.title)
+    figure, pairs = in_pairs(recording, len(told))
     last = float(recording.knots["t"].max(initial=1e-9))
-    for row, (name, one) in enumerate(told.items()):
+    for (name, one), (left, right) in zip(told.items(), pairs, strict=True):
         found = sensed(recording, name)
-        left, right = (figure.add_subplot(len(told), 2, 2 * row + 1 + n) for n in (0, 1))
         edges, counted = flow(found, last / BINS, last)
         style.dress(left, say("time"), say("per-second"), name)
         left.stairs(counted / (last / BINS), edges, fill=True, color=style.STREAM)
@@ -229,27 +227,35 @@ def sensors(recording: Recording) -> Picture:
         right.hist(found["along"][found["way"] > 0], BINS // 2, color=style.STREAM)
         if isfinite(one.depth):
             style.note(right, say("depth", depth=style.quantity(one.depth, "m")))
-    figure.subplots_adjust(
-        left=0.085, right=0.975, hspace=0.6, wspace=0.22,
-        top=1.0 - 0.95 / figure.get_figheight(), bottom=0.6 / figure.get_figheight(),
-    )  # fmt: skip
     return figure
+
+
+def in_pairs(recording: Recording, rows: int) -> tuple[Picture, list[tuple[Axes, Axes]]]:
+    """Return a figure with the recording's title, and two axes beside each other in each row."""
+    high = 1.4 + 2.6 * max(1, rows)
+    figure = Picture((9.6, high))
+    figure.headline(0.04, 1.0 - 0.35 / high, recording.title)
+    grid = figure.add_gridspec(
+        max(1, rows), 2, left=0.085, right=0.975, top=1.0 - 1.05 / high, bottom=0.6 / high,
+        hspace=0.6, wspace=0.24,
+    )  # fmt: skip
+    return figure, [
+        (figure.add_subplot(grid[row, 0]), figure.add_subplot(grid[row, 1])) for row in range(rows)
+    ]
 
 
 def loads(recording: Recording) -> Picture:
     """Draw for each surface that bears anything its forces over time, and the torque on it."""
     told = borne(recording)
-    figure = Picture((9.6, 1.4 + 2.6 * max(1, len(told))))
-    figure.headline(0.04, 1.0 - 0.35 / figure.get_figheight(), recording.title)
-    for row, (name, one) in enumerate(told.items()):
-        left, right = (figure.add_subplot(len(told), 2, 2 * row + 1 + n) for n in (0, 1))
+    figure, pairs = in_pairs(recording, len(told))
+    for (name, one), (left, right) in zip(told.items(), pairs, strict=True):
         style.dress(left, "time, s", "force, N", name)
         left.stairs(one.normal, one.edges, fill=True, color=style.STREAM, label="pressing")
         left.stairs(one.along, one.edges, color=style.STRIKE, lw=1.2, label="along")
         mean, peak, *_ = one.part("normal")
         left.axhline(mean, color=style.INK, lw=1.0, ls="--", label="mean pressing")
         style.note(left, f"mean {style.quantity(mean, 'N')}, peak {style.quantity(peak, 'N')}")
-        if row == 0:
+        if not figure.legends:
             top = 1.0 - 0.15 / figure.get_figheight()
             figure.legend(loc="upper right", bbox_to_anchor=(0.98, top), ncols=3)
         style.dress(right, "time, s", "torque, N m", "")
@@ -258,10 +264,6 @@ def loads(recording: Recording) -> Picture:
         style.note(right, f"about x = {x:.4g} m, y = {y:.4g} m")
         for ax in (left, right):
             ax.set_xlim(0.0, float(one.edges[-1]))
-    figure.subplots_adjust(
-        left=0.085, right=0.975, hspace=0.6, wspace=0.24,
-        top=1.0 - 1.05 / figure.get_figheight(), bottom=0.6 / figure.get_figheight(),
-    )  # fmt: skip
     return figure
 
 

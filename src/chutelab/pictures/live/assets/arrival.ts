@@ -203,7 +203,10 @@ const arrivalOf = (
 ): Arrival => ({ t, x, y, vx: before[0], vy: before[1] });
 
 /** Distance of a point from a straight piece, m. */
-function gapToSegment({ x, y, tx, ty, length }: Segment, px: number, py: number) {
+function gapToSegment(
+  { x, y, tx, ty, length }: Pick<Segment, "x" | "y" | "tx" | "ty" | "length">, px: number,
+  py: number,
+) {
   const [u, v] = [px - x, py - y], along = Math.min(Math.max(u * tx + v * ty, 0), length);
   return Math.hypot(u - along * tx, v - along * ty);
 }
@@ -218,4 +221,4 @@ function gapToArc({ x, y, radius, begin, extent }: Arc, px: number, py: number) 
     Math.hypot(u - radius * Math.cos(angle), v - radius * Math.sin(angle))));
 }
 
-export { Arrivals };
+export { Arrivals, gapToArc, gapToSegment };

@@ -7,6 +7,8 @@ import type { Stage } from "./stage.ts";
 import type { Symbols } from "./symbols.ts";
 
 type Point = [number, number];
+/** What is told of by its name: points */
+type Named = [string, Point[]];
 
 /** Pixels from one place that is tried to the next, and that the card keeps off its part. */
 const STEP = 24, OFF = 26;
@@ -45,38 +47,26 @@ function along(points: Point[]): Point[] {
 }
 
 /** Points along what is drawn of a machine, and where its balls start and are, px, by name. */
-function pointsOf({ lab, view, scenery }: Stage): [string, Point[]][] {
-  const { machine, recording, t } = lab;
-  if (!machine) return [];
-  const found: [string, Point[]][] = [];
-  for (const group of scenery.layer.children) {
-    for (const shape of group.querySelectorAll(BODIES)) {
-      const long = shape.getTotalLength(), many = Math.min(MOST, Math.ceil(long / ALONG));
-      const { a, b, c, d, e, f } = shape.getCTM() ?? new DOMMatrix();
-      found.push([group.getAttribute("data-part"), Array.from({ length: many + 1 }, (_, n) => {
-        const { x, y } = shape.getPointAtLength((n / many) * long);
-        return [a * x + c * y + e, b * x + d * y + f] as Point;
-      })]);
-    }
-  }
-  for (const [i, release] of machine.releases.slice(0, MOST).entries()) {
+function pointsOf(stage: Stage): Named[] {
+  const { view, lab: { machine, recording, t } } = stage;
+  const balls = machine?.releases.slice(0, MOST).map((release, i): Named => {
     const { x, y } = recording?.tracks[i]?.state(t) ?? release;
-    found.push([machine.streams[release.stream], [
-      [view.px(x), view.py(y)], [view.px(release.x), view.py(release.y)]]]);
-  }
-  return found;
+    return [machine.streams[release.stream], [
+      [view.px(x), view.py(y)], [view.px(release.x), view.py(release.y)]]];
+  });
+  return [...surfaceLines(stage).map(([name, line]): Named => [name, along(line)]), ...balls ?? []];
 }
 
-/** Surfaces as lines through points, px, with the lower side of belts; what is far outside of the
- * picture is at its edge. Nothing has to be laid out for it. */
-function surfaceLines({ lab, view, scenery }: Stage): Point[][] {
+/** Surfaces and sensors as lines through points, px, by name, with the lower side of belts; what is
+ * far outside of the picture is at its edge. Nothing has to be laid out for it. */
+function surfaceLines({ lab, view, scenery }: Stage): Named[] {
   const { machine } = lab;
   if (!machine) return [];
   const px = (x: number, y: number, down = 0): Point => [
     Math.min(Math.max(view.px(x), -50), view.width + 50),
     Math.min(Math.max(view.py(y) + down, -50), view.height + 50),
   ];
-  const { segments, arcs, pulley } = machine, deep = BELT * scenery.thick;
+  const { segments, arcs, pulley, surfaces } = machine, deep = BELT * scenery.thick;
   const bend = (x: number, y: number, radius: number, begin: number, extent: number) => {
     const many = Math.min(24, Math.ceil((radius * extent * view.scale) / 9) + 2);
     return Array.from({ length: many + 1 }, (_, n) => px(
@@ -91,11 +81,14 @@ function surfaceLines({ lab, view, scenery }: Stage): Point[][] {
       [px(r * s, -r * c), px(r * s - long * c, -r * c - long * s)]];
   };
   return [
-    ...segments.flatMap(({ x, y, tx, ty, length, speed }) => (speed ? [0, deep] : [0])
-      .map((down) => [px(x, y, down), px(x + tx * length, y + ty * length, down)])),
-    ...arcs.map(({ x, y, radius, begin, extent }) => bend(x, y, radius, begin, extent)),
-    ...(pulley ? incoming(pulley) : []),
-    ...(lab.scene?.sensor ?? []).map(({ from, to }) => [px(...from), px(...to)]),
+    ...segments.flatMap(({ x, y, tx, ty, length, speed, surface }) => (speed ? [0, deep] : [0])
+      .map((down): Named => [surfaces[surface],
+        [px(x, y, down), px(x + tx * length, y + ty * length, down)]])),
+    ...arcs.map(({ x, y, radius, begin, extent, surface }): Named =>
+      [surfaces[surface], bend(x, y, radius, begin, extent)]),
+    ...(pulley ? incoming(pulley).map((line): Named => [surfaces[pulley.surface], line]) : []),
+    ...(lab.scene?.sensor ?? []).map(({ name, from, to }): Named =>
+      [name, [px(...from), px(...to)]]),
   ];
 }
 
@@ -107,7 +100,7 @@ function freePlace(stage: Stage, size: Point, corner: Point, taken: Stage["cover
   const [wide, high] = size, [left, bottom] = corner;
   const { view, lab } = stage, { recording } = lab, { free } = view;
   const path = recording ? stage.trackPoints(recording, 4 / view.scale) : [];
-  const there = [...surfaceLines(stage),
+  const there = [...surfaceLines(stage).map(([, line]) => line),
     ...path.map((points) => points.map(({ x, y }) => [view.px(x), view.py(y)] as Point))]
     .flatMap(along);
   for (let x = left; x + wide < free.right; x += ASIDE) {

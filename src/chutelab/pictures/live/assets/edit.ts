@@ -1,5 +1,6 @@
 // Parts added, copied and taken away: each a scene made of another.
 
+import { gapToArc, gapToSegment } from "./arrival.ts";
 import { listOf } from "./checks.ts";
 import { valueAt, withValues } from "./keys.ts";
 import type { Machine } from "./machine.ts";
@@ -148,31 +149,19 @@ function surfaceAt(
   { surfaces, segments, arcs, pulley }: Machine, x: number, y: number, reach: number,
   sensors: Scene["sensor"] = [],
 ) {
-  let least = reach, found = "";
-  const near = (far: number, name: string) => {
-    if (far < least) [least, found] = [far, name];
-  };
-  const take = (far: number, surface: number) => near(far, surfaces[surface]);
-  const beside = (from: Point, way: Point, length: number) => {
-    const [u, v] = [x - from[0], y - from[1]];
-    const along = Math.min(length, Math.max(0, u * way[0] + v * way[1]));
-    return Math.hypot(u - along * way[0], v - along * way[1]);
-  };
-  for (const one of segments) {
-    take(beside([one.x, one.y], [one.tx, one.ty], one.length), one.surface);
-  }
-  for (const { name, from, to } of sensors) {
-    const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
-    near(beside(from, [(to[0] - from[0]) / length, (to[1] - from[1]) / length], length), name);
-  }
-  const round = 2 * Math.PI;
-  for (const one of arcs) {
-    const [u, v] = [x - one.x, y - one.y], turn = Math.atan2(v, u) - one.begin;
-    if (turn - round * Math.floor(turn / round) > one.extent) continue;
-    take(Math.abs(Math.hypot(u, v) - one.radius), one.surface);
-  }
-  if (pulley) take(Math.max(0, Math.hypot(x, y) - pulley.radius), pulley.surface);
-  return found;
+  const gauges = sensors.map(({ name, from: [u, v], to }): [string, number] => {
+    const length = Math.hypot(to[0] - u, to[1] - v);
+    const [tx, ty] = [(to[0] - u) / length, (to[1] - v) / length];
+    return [name, gapToSegment({ x: u, y: v, tx, ty, length }, x, y)];
+  });
+  const all: [string, number][] = [
+    ...segments.map((one): [string, number] => [surfaces[one.surface], gapToSegment(one, x, y)]),
+    ...gauges,
+    ...arcs.map((one): [string, number] => [surfaces[one.surface], gapToArc(one, x, y)]),
+    ...(pulley ? [[surfaces[pulley.surface],
+      Math.max(0, Math.hypot(x, y) - pulley.radius)] as [string, number]] : []),
+  ];
+  return all.reduce((best, one) => (one[1] < best[1] ? one : best), ["", reach])[0];
 }
 
 /** A scene with another name of a thing, wherever it is meant.

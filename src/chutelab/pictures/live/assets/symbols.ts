@@ -167,7 +167,7 @@ class Symbols {
       ...along(path), ...speeds,
       ...(pulley ? discs(view.px(0), view.py(0), pulley.radius * view.scale) : []),
       // A board of pegs has no room between them.
-      ...surfaceLines(this.stage).slice(0, MOST_LINES).flatMap(along),
+      ...surfaceLines(this.stage).slice(0, MOST_LINES).flatMap(([, line]) => along(line)),
     ];
   }
 

@@ -306,6 +306,22 @@ def test_stream_presses_nobody_and_loses_no_joule():
     assert {REASONS[k] for k in recording.ended} == {"settled"}
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [0.18, 0.2, 0.25, 0.3])
+def test_boxes_are_asleep_within_four_seconds(width):
+    """A row that is jammed between the walls rattles in its place: it keeps nothing awake."""
+    walls = {"name": "box", "points": [[-width, 3.0], [-width, 0.0], [width, 0.0], [width, 3.0]]}
+    poured = scene.from_dict({
+        "particle": {"radius": 0.004, "mass": 0.0021},
+        "surface": [{**walls, "restitution": 0.5, "friction": 0.3}],
+        "stream": {"count": 1000, "rate": 1000.0, "at": [-0.8 * width, 1.0],
+                   "velocity": [2.0, 0.0], "bed_height": 0.1, "interact": True},
+        "run": {"until": "settled", "max_time": 4.0},
+    })  # fmt: skip
+    recording = run(build(poured))
+    assert {REASONS[k] for k in recording.ended} == {"settled"}
+
+
 @pytest.mark.parametrize("friction", [0.2, 0.5])
 def test_nobody_settles_on_the_belt_that_throws(friction):
     # At the belt's speed on the incoming belt it has no slip, and will still be thrown off.

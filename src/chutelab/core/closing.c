@@ -156,6 +156,20 @@ static void tell_separation(int i) {
     write_event(SEPARATION, i, -1, track->ground, t, &then.x, &then.vx, &then.vx, 0, 0);
 }
 
+/* Begin the rest of a disk anew if it moves: something at its contacts does, or it has none, and it has come
+   further from where its rest began than at the speed that counts as none. */
+static void settle_down(Disk *d, double h) {
+    double most = REST * sqrt(W.g * d->radius) * CALM_DOWN / W.pace;
+    double x = d->x - d->anchor[0], y = d->y - d->anchor[1], turn = d->anchor[2];
+    int stays = x * x + y * y <= most * most && fabs(turn) <= most, moves = d->stirred || !d->supports;
+    d->stirred = 0;
+    if (d->rest > h && (!moves || stays)) return;
+    if (d->rest > h) d->rest = 0;
+    d->anchor[0] = d->x;
+    d->anchor[1] = d->y;
+    d->anchor[2] = 0;
+}
+
 /* After the solve: entries, supports, timers, tracks. */
 void close_step(double h) {
     /* The share of the impulses that belongs to the step before; of a new contact, none. */
@@ -174,6 +188,7 @@ void close_step(double h) {
         if (d->mode == FREE) {
             d->calm += h;
             d->rest += h;
+            d->anchor[2] += h * d->radius * d->spin;
         }
     }
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
@@ -230,8 +245,10 @@ void close_step(double h) {
             if (b) b->calm = 0;
         }
         if (off > rest || slip > rest || turn > rest || (b && b->mode == RIDING)) {
-            a->rest = 0;
-            if (b) b->rest = 0;
+            a->stirred = 1;
+            if (b) b->stirred = 1;
+            /* What something drives is not at rest, even if it stays where it is. */
+            if (b ? b->mode == RIDING : c->other[1] != 0 || stirs(s)) a->rest = 0;
         }
     }
     give_back(W.contacts, W.contact_count);
@@ -240,8 +257,9 @@ void close_step(double h) {
         Track *track = W.tracks + i;
         d->ends = -1;
         if (d->mode != FREE) continue;
+        settle_down(d, h);
         if (!d->supports) {
-            d->calm = d->rest = 0;
+            d->calm = 0;
             if (track->stays >= (W.interact ? LASTS : 3)) tell_separation(i);
             if (track->lasted || track->stays) d->on = -1;
             track->stays = 0;

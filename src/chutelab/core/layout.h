@@ -61,7 +61,10 @@ typedef struct {
     double since;               /* s; latest impact */
     double slept;               /* s; since when it is asleep */
     double calm;                /* s; since when nothing at its contacts slips or moves apart */
-    double rest;                /* s; the same to the finer bound of falling asleep */
+    double rest;                /* s; since when it is at rest: the same to the finer bound of falling asleep,
+                                   or it stays where it is, however it rattles there */
+    double anchor[3];           /* m; where its rest began: x, y, and how far its rim has turned since */
+    int stirred;                /* whether something slips or moves apart at its contacts in this step */
     double entries[3];          /* J; belt work, restitution loss, friction loss so far */
     double gain[3];             /* J; what this step's lasting contacts add to them */
     double ahead[3];            /* J; the second half of it */

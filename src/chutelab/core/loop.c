@@ -510,8 +510,8 @@ static void end_step(void) {
     }
 }
 
-/* Whether all of this part of the run have ended, or nothing can happen any more. */
-static int is_over(void) {
+/* Whether all of this part of the run have ended, or nothing can happen any more, and why it ends then. */
+static int is_over(int *reason) {
     int awake = 0;
     double next = INFINITY;
     for (int i = W.low; i < W.high; i++) {
@@ -524,6 +524,10 @@ static int is_over(void) {
     /* Hinges go on to a time that is given, else as long as disks do. */
     if (W.hinges) return !awake && W.until != UNTIL_TIME;
     if (awake) return 0;
+    if (W.interact && W.until == UNTIL_SETTLED && has_settled()) {
+        *reason = BY_SETTLING;
+        return 1;
+    }
     next = MIN(next, next_gate(W.t));
     int asleep = 0;
     for (int i = W.low; i < W.high; i++) asleep |= W.disks[i].mode == ASLEEP;
@@ -608,8 +612,9 @@ static int run_on(int steps) {
                 if (W.disks[i].mode == RIDING) knots += ride_knots(W.disks + i);
             if (W.knot_count + knots > W.knot_room) return FULL_KNOTS;
             if (W.event_count + 4 * count + 64 > W.event_room) return FULL_EVENTS;
-            if (is_over()) {
-                stop_all(BY_TIME);
+            int reason = BY_TIME;
+            if (is_over(&reason)) {
+                stop_all(reason);
                 W.phase = PART;
                 continue;
             }

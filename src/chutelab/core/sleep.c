@@ -3,8 +3,6 @@
 
 #include "core.h"
 
-/* s on Earth; so long an island has to be at rest. */
-#define CALM_DOWN 0.1
 /* m/s on Earth; surfaces whose velocities differ by less move alike. */
 #define ALIKE 1e-12
 
@@ -84,6 +82,12 @@ void fall_asleep(void) {
         int k = island_of(c->i);
         if (c->impulse[0] == 0 || c->two) continue;
         if (c->j >= 0 || !joins(c, &W.tracks[k].past[4], W.moved + k)) W.found[k]++;
+    }
+    /* What rattles in its place would wake those next to it: they wait until it touches something. */
+    for (int n = 0; n < 2 * W.near_count; n++) {
+        const Disk *d = W.disks + W.near[n];
+        if (d->mode == FREE && !d->supports && d->rest >= CALM_DOWN / W.pace)
+            W.found[island_of(W.near[n ^ 1])]++;
     }
     for (int i = W.low; i < W.high; i++) {
         int k = island_of(i);

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import chutelab
 from chutelab.checks import stress as laws
+from chutelab.checks.agreement import verify
 from chutelab.checks.stress import Evidence
 from chutelab.cli import main
 from chutelab.results import Recording
@@ -223,3 +224,68 @@ def test_a_sweep_has_loads_of_each_variant():
     scene = chutelab.load("perpendicular", {"run.loads": 0.01})
     peaks = chutelab.sweep(scene, {"incoming.speed": [2.0, 3.0]}).columns["loads.plate.normal.peak"]
     assert peaks == pytest.approx([2.4, 3.6])
+
+
+def test_the_end_is_the_last_bin_that_the_run_filled():
+    """What slides off presses no more at the end; what rests presses by its weight."""
+    load = sliding("contact").loads("ramp")
+    assert load.part("normal").end == load.normal[load.filled - 1]
+    assert load.part("normal").end == pytest.approx(0.5 * G * cos(radians(15.0)), rel=1e-6)
+    gone = sliding("exact", until=1.8).loads("ramp")
+    assert gone.part("normal").end == 0.0
+
+
+def test_verify_holds_a_load_to_what_is_expected():
+    expect = {"quantity": "loads.plate.normal.peak", "value": 2.4, "tolerance": 1e-9, "source": "-"}
+    found = verify(chutelab.load("perpendicular", {"expect": [expect], "run.loads": 0.01}))
+    assert [one.holds for one in found.findings] == [True] * len(found.findings)
+
+
+@pytest.mark.slow
+def test_a_silo_follows_janssen_once_its_floor_gives_way():
+    """F = γ B²/(2 µ K) (1 - exp(-2 µ K z/B)), so F/W = (1 - e^-x)/x with x = 2 µ K z/B.
+
+    Until the floor goes down by 4 mm friction at the walls may point either way, and the floor
+    bears more. K is fitted to three depths of three seeds each.
+    """
+    width, mu = 0.05, 0.4
+    depths, shares = [], []
+    for count in (50, 100, 200):
+        for seed in range(3):
+            half, top = 0.5 * width, 1.6 * count * 0.006**2 * 1.05 / width + 0.03
+            wall = {"restitution": 0.0, "friction": mu}
+            surfaces = [
+                {"name": "left", "from": [-half, -0.05], "to": [-half, top + 0.1]},
+                {"name": "right", "from": [half, -0.05], "to": [half, top + 0.1]},
+                {"name": "floor", "from": [-half, 0.0], "to": [half, 0.0],
+                 "travel": {"to": [-half, -0.004], "at": 0.6, "in": 0.6}},
+            ]  # fmt: skip
+            fill = [[-half + 0.004, 0.004], [half - 0.004, top]]
+            run = chutelab.simulate(
+                {"particle": {"radius": [0.0025, 0.0035], "density": 2500, "spin": True},
+                 "surface": [{**one, **wall} for one in surfaces],
+                 "stream": {"count": count, "fill": fill, "interact": True, "seed": seed, **wall},
+                 "run": {"until": 1.5, "loads": 0.05}},
+                engine="contact",
+            )  # fmt: skip
+            weight = run.mass.sum() * G
+            end = run.measure("loads.floor.normal.end")
+            assert run.loads("floor").normal[10] > 1.05 * end
+            shares.append(end / weight)
+            depths.append(run.at([1.49]).position[0, :, 1].max() + 0.007)
+    z, share = np.array(depths), np.array(shares)
+
+    def law(k):
+        x = 2.0 * mu * k * z / width
+        return (1.0 - np.exp(-x)) / x
+
+    tried = np.linspace(0.1, 2.0, 1901)
+    k = tried[np.argmin([((law(one) - share) ** 2).sum() for one in tried])]
+    slope = (law(k + 1e-4) - law(k - 1e-4)) / 2e-4
+    scatter = np.sqrt(((law(k) - share) ** 2).sum() / (len(z) - 1))
+    error = scatter / np.sqrt((slope**2).sum())
+    assert 0.5 < k < 1.0
+    assert error < 0.1
+    assert scatter < 0.1
+    # A column that leaned on no wall would press by all of its weight.
+    assert share[-3:].max() < 0.6

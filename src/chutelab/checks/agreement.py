@@ -313,7 +313,7 @@ def verify(
             if quantity == "ledger.residual":
                 scale = ledger(recordings[engine]).turned_over if recordings else nan
             elif row.unit and not quantity.startswith("ledger."):
-                scale = scales(scene, prediction)[row.kind]
+                scale = scales(scene, prediction).get(row.kind, 0.0)
             off = abs(simulated - expected)
             if size == "%":
                 one, other = simulated, expected

@@ -10,6 +10,8 @@
 /* Contacts in a row that take no time after which a particle has come to rest in its corner. An elastic
    particle leaves a wedge of angle beta after pi/beta of them. */
 #define COLLAPSE (MOST_IDLE / 2)
+/* Restitution from which on they are no rest there: 40 of them take half of what does not slip. */
+#define LASTING 0.9914
 /* Share of its age that an event of a particle must take to count as progress. */
 #define ROUNDING (4.0 * ULP)
 /* Share of the speeds involved below which a slip is rounding. */
@@ -501,9 +503,10 @@ static int stop_jammed(int obstacle, int side) {
     /* Faces that lie on each other make no corner. */
     Touch one = touch_of(before, face), two = touch_of(obstacle, side);
     if (!(fabs(cross(one.nx, one.ny, two.nx, two.ny)) > OPPOSED)) return 0;
-    /* What rebounds between belts, and does not turn, gets as much at each blow: their work has no bound. */
-    int rebounds = one.restitution > 0.0 || two.restitution > 0.0, moves = one.belt != 0.0 || two.belt != 0.0;
-    if (!slow && !A.turns && rebounds && moves) {
+    /* What hardly loses anything in a blow, and does not turn, gets as much of belts at each: their work has
+       no bound. */
+    double best = MAX(one.restitution, two.restitution);
+    if (!slow && !A.turns && best > LASTING && (one.belt != 0.0 || two.belt != 0.0)) {
         E.passed = 0.0;
         course = DRIVEN;
     } else {

@@ -3,6 +3,9 @@
 #include <string.h>
 #include "core.h"
 
+/* Restitution at which JAM blows take half of what does not slip: a disk of more is not jammed by them. */
+#define LASTING 0.9914
+
 /* ------------------------------------------------------------------ the next event of each disk */
 
 static int sooner(int i, int j) {
@@ -431,8 +434,8 @@ static int goes_straight_on(const Contact *c) {
     return 0;
 }
 
-/* Whether a disk by itself, which does not turn, rattles at a belt that gives it as much at each blow: where a
-   wedge narrows there is no end of them, nor of the belt's work. */
+/* Whether a disk by itself, which does not turn and hardly loses anything in a blow, rattles at a belt: where a
+   wedge narrows there is no end of blows, nor of the belt's work. */
 static int is_driven(int i, double approach) {
     const Disk *d = W.disks + i;
     double nx, ny;
@@ -471,7 +474,7 @@ static void strike(int i, int j, double t) {
     double back = -c.rest * u[0];
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);
-    if (jammed && c.rest > 0 && is_driven(i, -u[0])) {
+    if (jammed && c.rest > LASTING && is_driven(i, -u[0])) {
         a->impacts = STALL + 1;
         jammed = 0;
     }

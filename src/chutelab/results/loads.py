@@ -119,12 +119,14 @@ class Bins:
 class Part(NamedTuple):
     """A load in its unit: its mean over time, the largest size of a bin, the root mean square.
 
-    From the first bin in which anything is borne to the last; NaN without one.
+    From the first bin in which anything is borne to the last; NaN without one. The end is the mean
+    in the last bin that the run filled.
     """
 
     mean: float
     peak: float
     rms: float
+    end: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,6 +150,8 @@ class Load(Shown):
         others the first end, m.
     torque : ndarray, shape (T,)
         Of the force about the pivot, counterclockwise, N m.
+    filled : int
+        How many bins the run went through; later ones than T are without load.
     """
 
     name: str
@@ -158,23 +162,27 @@ class Load(Shown):
     place: Floats
     pivot: tuple[float, float]
     torque: Floats
+    filled: int
 
     def part(self, key: str) -> Part:
-        """Return mean, peak and root mean square of ``normal``, ``along`` or ``torque``."""
+        """Return mean, peak, rms and end of ``normal``, ``along`` or ``torque``."""
         values = getattr(self, key)
         borne = np.flatnonzero(self.force.any(axis=1))
         if not len(borne):
-            return Part(nan, nan, nan)
-        some = values[borne[0] : borne[-1] + 1]
-        return Part(float(some.mean()), float(np.abs(some).max()), float(np.sqrt((some**2).mean())))
+            return Part(nan, nan, nan, nan)
+        some, last = values[borne[0] : borne[-1] + 1], self.filled - 1
+        return Part(
+            float(some.mean()), float(np.abs(some).max()), float(np.sqrt((some**2).mean())),
+            float(values[last]) if 0 <= last < len(values) else 0.0 if last >= 0 else nan,
+        )  # fmt: skip
 
     def sheet(self, *, details: bool = False) -> Sheet:
-        """Return mean, peak and root mean square of each."""
+        """Return mean, peak, root mean square and end of each."""
         units = {"normal": "N", "along": "N", "torque": "N m"}
         rows = tuple(
             (f"{key}, {unit}", *map(number, self.part(key))) for key, unit in units.items()
         )
-        return Sheet(f"Loads on {self.name}", ("", "mean", "peak", "rms"), rows)
+        return Sheet(f"Loads on {self.name}", ("", "mean", "peak", "rms", "end"), rows)
 
 
 def pivot_of(machine: Machine, surface: int) -> tuple[float, float]:
@@ -247,6 +255,7 @@ def loads(recording: Record, name: str, every: float | None = None) -> Load:
         place=np.divide(sums["at"], normal[:, None], out=np.full_like(force, nan), where=pressed),
         pivot=(x, y),
         torque=sums["moment"] - x * force[:, 1] + y * force[:, 0],
+        filled=int(float(recording.knots["t"].max(initial=0.0)) / width + TOLERANCE),
     )
 
 
@@ -265,7 +274,7 @@ def borne(recording: Record) -> dict[str, Load]:
 
 
 def told(recording: Record) -> dict[str, dict[str, dict[str, float]]]:
-    """Return what the JSON of a run has: by surface and part, mean, peak and rms."""
+    """Return what the JSON of a run has: by surface and part, mean, peak, rms and end."""
     parts = ("normal", "along", "torque")
     return {
         name: {key: one.part(key)._asdict() for key in parts}
@@ -282,7 +291,7 @@ def sheet(recording: Record) -> Sheet | None:
     rows = []
     for name, one in found.items():
         total = np.nansum(one.place * one.normal[:, None], axis=0) / one.normal.sum()
-        numbers = (*one.part("normal"), one.part("along").mean, one.part("torque").mean, *total)
+        numbers = (*one.part("normal")[:3], one.part("along").mean, one.part("torque").mean, *total)
         rows.append((name, *(number(float(value)) for value in numbers)))
     width = recording.machine.loads
     note = f"means over time, from the first to the last load, and peaks in bins of {width:g} s"

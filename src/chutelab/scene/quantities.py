@@ -63,8 +63,8 @@ class Quantity(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Its kind, which chooses what its errors are measured by: lengths by a length."""
-        return KINDS[self.unit]
+        """Its kind, which chooses what its errors are measured by: lengths by a length; or ""."""
+        return KINDS.get(self.unit, "")
 
 
 KINDS: Final = {
@@ -164,7 +164,12 @@ WEAR: Final = {
 }
 """What wears a surface, see `results.wear`."""
 
-PARTS: Final = {"mean": "mean over time", "peak": "largest of a bin", "rms": "root mean square"}
+PARTS: Final = {
+    "mean": "mean over time",
+    "peak": "largest of a bin",
+    "rms": "root mean square",
+    "end": "mean of the last bin that the run filled",
+}
 
 
 def _load(part: str, unit: str, meaning: str, statistic: str) -> Iterator[Quantity]:
@@ -172,7 +177,7 @@ def _load(part: str, unit: str, meaning: str, statistic: str) -> Iterator[Quanti
     said = f"{meaning}, {PARTS[statistic]}"
     row = Quantity(f"loads.SURFACE.{part}.{statistic}", unit, said, "run", ("run.loads",), "scene")
     yield row
-    if part == "normal":
+    if part == "normal" and statistic != "end":
         name, said = (text.replace("SURFACE", "plate") for text in (row.name, said))
         yield row._replace(name=name, meaning=said, needs=("plate", "run.loads"), columns=ITSELF)
 

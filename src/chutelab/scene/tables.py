@@ -184,6 +184,13 @@ class Motor(Table):
     torque: Torque = described(..., "The most that it turns with", "N m")
 
 
+SHAKE: Any = described(
+    None, "Shaking: { by = [0, 0.002], frequency = 25 }, from its place and back"
+)
+TRAVEL: Any = described(
+    None, "A way: { to = [x, y], at = 1, in = 0.5 }, on which its pivot comes to rest"
+)
+TURN: Any = described(0.0, "Speed at which it turns about its pivot, counterclockwise", "degrees/s")
 HINGE: Any = described(
     None,
     'It hangs free on a hinge: there [x, y], or at its "pivot"; needs a mass or an inertia',
@@ -240,15 +247,9 @@ class Plate(Table):
     )
     restitution: Share = pair_restitution(0.5, "particle-plate")
     friction: Amount = pair_friction(0.0, "particle-plate")
-    shake: Shake | None = described(
-        None, "Shaking: { by = [0, 0.002], frequency = 25 }, from its place and back"
-    )
-    travel: Travel | None = described(
-        None, "A way: { to = [x, y], at = 1, in = 0.5 }, on which its pivot comes to rest"
-    )
-    turn: Turn = described(
-        0.0, "Speed at which it turns about its pivot, counterclockwise", "degrees/s"
-    )
+    shake: Shake | None = SHAKE
+    travel: Travel | None = TRAVEL
+    turn: Turn = TURN
     hinge: Point | Literal["pivot"] | None = HINGE
     mass: Mass | None = HELD
     inertia: Inertia | None = INERTIA
@@ -337,15 +338,9 @@ class Surface(Table):
         " arc",
         "m",
     )
-    shake: Shake | None = described(
-        None, "Shaking: { by = [0, 0.002], frequency = 25 }, from its place and back"
-    )
-    travel: Travel | None = described(
-        None, "A way: { to = [x, y], at = 1, in = 0.5 }, on which its pivot comes to rest"
-    )
-    turn: Turn = described(
-        0.0, "Speed at which it turns about its pivot, counterclockwise", "degrees/s"
-    )
+    shake: Shake | None = SHAKE
+    travel: Travel | None = TRAVEL
+    turn: Turn = TURN
     hinge: Point | Literal["pivot"] | None = HINGE
     mass: Mass | None = HELD
     inertia: Inertia | None = INERTIA

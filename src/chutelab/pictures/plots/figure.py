@@ -252,7 +252,7 @@ def loads(recording: Recording) -> Picture:
         style.dress(left, "time, s", "force, N", name)
         left.stairs(one.normal, one.edges, fill=True, color=style.STREAM, label="pressing")
         left.stairs(one.along, one.edges, color=style.STRIKE, lw=1.2, label="along")
-        mean, peak, _ = one.part("normal")
+        mean, peak, *_ = one.part("normal")
         left.axhline(mean, color=style.INK, lw=1.0, ls="--", label="mean pressing")
         style.note(left, f"mean {style.quantity(mean, 'N')}, peak {style.quantity(peak, 'N')}")
         if not figure.legends:

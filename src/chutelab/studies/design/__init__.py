@@ -79,6 +79,21 @@ GENERATIONS: Final = 60
 SIMPLEX: Final = {"xatol": 1e-12, "fatol": 1e-15, "maxiter": 600, "adaptive": True}
 
 
+def within(ranges: Sequence[Span], shares: Floats) -> Floats:
+    """Return points (N, K) of ranges at shares of their widths."""
+    low, high = np.array([(one.low, one.high) for one in ranges]).T
+    # low + share * width may pass the end by a rounding, which a scene would refuse.
+    return np.asarray(np.clip(low + shares * (high - low), low, high))
+
+
+def global_least(function: Callable[[Floats], Floats], keys: int, seed: int) -> Any:
+    """Search all of a unit cube for the least value of a function of columns, (K, N) to (N,)."""
+    return scipy("optimize").differential_evolution(
+        function, [(0.0, 1.0)] * keys, seed=seed, popsize=POPULATION, maxiter=GENERATIONS,
+        tol=1e-8, atol=1e-12, init="sobol", polish=False, vectorized=True, updating="deferred",
+    )  # fmt: skip
+
+
 def least(
     function: Callable[[Floats], Floats], ranges: Sequence[Span], seed: int, *, squares: bool
 ) -> tuple[Floats, float]:
@@ -89,21 +104,16 @@ def least(
     which gets to the last digits.
     """
     optimize = scipy("optimize")
-    low, high = np.array([(one.low, one.high) for one in ranges]).T
 
     def scaled(shares: Floats) -> Floats:
-        # low + share * width may pass the end by a rounding, which a scene would refuse.
-        return np.asarray(np.clip(low + shares * (high - low), low, high))
+        return within(ranges, shares)
 
     def values(columns: Floats) -> Floats:
         found = function(scaled(np.atleast_2d(columns.T)))
         found = np.sum(found**2, axis=1) if squares else found[:, 0]
         return np.where(np.isfinite(found), found, NOWHERE)
 
-    searched = optimize.differential_evolution(
-        values, [(0.0, 1.0)] * len(ranges), seed=seed, popsize=POPULATION, maxiter=GENERATIONS,
-        tol=1e-8, atol=1e-12, init="sobol", polish=False, vectorized=True, updating="deferred",
-    )  # fmt: skip
+    searched = global_least(values, len(ranges), seed)
     if searched.fun >= NOWHERE:
         return searched.x, np.nan
     if squares:
@@ -133,10 +143,9 @@ def constrained(
     penalties is polished by sequential quadratic programming.
     """
     optimize = scipy("optimize")
-    low, high = np.array([(one.low, one.high) for one in ranges]).T
 
     def scaled(shares: Floats) -> Floats:
-        return np.asarray(np.clip(low + shares * (high - low), low, high))
+        return within(ranges, shares)
 
     spread = scipy("stats.qmc").Sobol(len(ranges), seed=seed).random_base2(6)
     sizes = spreads_of(columns(scaled(spread)))
@@ -145,10 +154,7 @@ def constrained(
         found = wishes.merit(columns(scaled(np.atleast_2d(shares.T))), sizes)
         return np.where(np.isfinite(found), found, NOWHERE)
 
-    searched = optimize.differential_evolution(
-        merit, [(0.0, 1.0)] * len(ranges), seed=seed, popsize=POPULATION, maxiter=GENERATIONS,
-        tol=1e-8, atol=1e-12, init="sobol", polish=False, vectorized=True, updating="deferred",
-    )  # fmt: skip
+    searched = global_least(merit, len(ranges), seed)
     if searched.fun >= NOWHERE:
         return searched.x, np.nan
     count = len(wishes.targets)

@@ -45,7 +45,7 @@ def mixed(seed, *, turning=True, count=40, end=1.5):
     spin = np.where(share > 0.0, rng.normal(0.0, 5.0, count), 0.0)
     machine = of_sizes(
         machine, radius, mass, share, rng.integers(0, 2, count), pair_restitution=REST,
-        pair_friction=RUB, rolling=np.zeros(2),
+        pair_friction=RUB, rolling=np.zeros(2), falls=np.zeros(2),
     )  # fmt: skip
     core = Core(machine)
     core.disks["spin"] = spin

@@ -183,7 +183,7 @@ def kinds(machine, kind, radius, mass, restitution, friction=0.0):
             friction=np.tile(parts.friction, (count, 1)),
         ),
         pair_restitution=restitution, pair_friction=np.full((count, count), friction),
-        rolling=np.zeros(count), outlines=(None,) * count,
+        rolling=np.zeros(count), falls=np.zeros(count), outlines=(None,) * count,
     )  # fmt: skip
 
 

@@ -85,7 +85,7 @@ void describe(Contact *c, int i, int j) {
     c->mass[1] = 1 / c->mass[1];
     c->mass[2] = spin_mass > 0 ? 1 / spin_mass : 0;
     if (j < 0 && is_hung(-1 - j)) hang_on(c, W.movers + W.surfaces[-1 - j].mover, a);
-    c->rest = pair->restitution;
+    c->rest = pair->restitution, c->falls = pair->falls;
     c->share = 1;
     c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
     c->gives = c->turns = 0;

@@ -150,7 +150,7 @@ static Touch touch_of(int obstacle, int side) {
     normal_at(o, side, &c.nx, &c.ny);
     c.tx = c.ny, c.ty = -c.nx;
     if (!side) side = rim_side(o, c.nx, c.ny);
-    c.belt = side * o->speed, c.friction = pair->friction, c.restitution = pair->restitution;
+    c.belt = side * o->speed, c.friction = pair->friction, c.restitution = pair->restitution, c.falls = pair->falls;
     c.surface = o->surface, c.obstacle = obstacle;
     return c;
 }
@@ -542,6 +542,8 @@ static void strike(int obstacle, int side) {
     Touch c = touch_of(obstacle, side);
     double approach = MAX(-(A.vx * c.nx + A.vy * c.ny), 0.0);
     int soft = approach <= NEGLIGIBLE * A.given->pace;
+    /* A contact that yields: above 1 / falls the restitution goes with v^(-1/4). */
+    if (c.falls * approach > 1.0) c.restitution /= sqrt(sqrt(c.falls * approach));
     if (soft) c.restitution = 0.0;
     double rebound = c.restitution * approach;
     int lands = c.surface == E.landing && !A.landed;

@@ -154,7 +154,7 @@ extern Particle A;
 typedef struct {
     double nx, ny, tx, ty;
     double belt;            /* m/s; speed of the surface along the tangent */
-    double friction, restitution;
+    double friction, restitution, falls;
     int surface, obstacle;
 } Touch;
 

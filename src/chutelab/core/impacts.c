@@ -469,6 +469,8 @@ static void strike(int i, int j, double t) {
     if (c.two) was_moved(j);
     relative(&c, 0, u);
     if (u[0] >= 0) return;
+    /* Contacts that yield: above 1 / falls the restitution goes with v^(-1/4). */
+    if (c.falls * -u[0] > 1) c.rest /= sqrt(sqrt(c.falls * -u[0]));
     double back = -c.rest * u[0];
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);

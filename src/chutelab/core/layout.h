@@ -183,7 +183,9 @@ typedef struct {
 /* The state of a hinge: halfway through the impulses of a step, and before a blow. */
 typedef struct { double t, angle, rate; int surface, pad; } Swing; /* s, rad, rad/s */ /* [out] */
 
-typedef struct { double restitution, friction, rolling; } Pair; /* [in] rolling: arm over radius */
+typedef struct { double restitution, friction, rolling, falls; } Pair; /* [in] rolling: arm over radius;
+                                        falls: 1 over the speed up to which restitution
+                                        is that, s/m; 0 for all */
 
 /* A contact of disk i with disk j, or with surface k as j = -1 - k. Its tangent is (ny, -nx). */
 typedef struct {
@@ -201,7 +203,7 @@ typedef struct {
     double moved[3];        /* the part of it that the motion of a surface gives */
     double lever[3];        /* m, m, 1; its share in the speed of a hinge, which was ... */
     double turning;         /* ... so much then, rad/s */
-    double rest;            /* coefficient of restitution */
+    double rest, falls;     /* coefficient of restitution, and how it falls with speed, s/m: see `Pair` */
     double share;           /* of its friction that acts; below 1 where surfaces wedge a disk */
     double entries[3], later[3]; /* J; what its impulses do to the ledger, and what the part of them
                                     does that belongs to this step; see `account` */

@@ -144,6 +144,8 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
             own[field] = getattr(wheel, field)
         materials["restitution"][:, -1] = wheel.restitution
         materials["friction"][:, -1] = wheel.friction
+    falls = machine.falls[machine.releases.kind[0]] if family else machine.falls
+    materials["falls"] = np.broadcast_to(falls, kinds)[:, None]
     lones, releases = rows("lones", "Lone", count), machine.releases
     lones["release"], lones["stop"] = releases.t, machine.end_time - releases.t
     lones["position"], lones["velocity"] = releases.position, releases.velocity

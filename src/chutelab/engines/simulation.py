@@ -202,6 +202,11 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
             if "exact" in (engine, scene.run.engine):
                 raise _refused(scene, "run.engine", "exact", str(error)) from error
             name = "contact"
+    for n, kind in enumerate(scene.particles):
+        if name == "pymunk" and kind.falls:
+            allowed = "left out with the pymunk engine: Chipmunk's restitution is one number"
+            key = f"{scene.head('particle', n)}.restitution_speed"
+            raise _refused(scene, key, kind.restitution_speed, allowed)
     if any(scene.particles[kind].radius == 0.0 for kind in scene.kinds):
         raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
     if name == "contact":

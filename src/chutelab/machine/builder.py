@@ -124,6 +124,7 @@ def told(scene: Scene) -> Told:
         names, kinds, meeting = scene.surfaces, range(len(scene.particles)), scene.meetings()
         masses, inertias = bodies(scene)
         rolling = [kind.rolling_friction for kind in scene.particles]
+        falls = [kind.falls for kind in scene.particles]
         until = scene.run.until
         terms = [scene.run.max_time, nan if isinstance(until, str) else until]
         for kind in kinds:
@@ -135,8 +136,8 @@ def told(scene: Scene) -> Told:
                 grips = inf if isinstance(grips, str) else grips
                 if not isinstance(other, str) and scene.passes(kind, other):
                     bounces = PASSES
-                rolls = 0.0 if isinstance(other, str) else rolling[other]
-                terms += bounces, grips, max(rolling[kind], rolls)
+                two = (kind,) if isinstance(other, str) else (kind, other)
+                terms += bounces, grips, max(rolling[k] for k in two), max(falls[k] for k in two)
         grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
         line = row(scene, grip)
         sizes = {
@@ -284,6 +285,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         pair_restitution=pairs[..., 0],
         pair_friction=pairs[..., 1],
         rolling=np.array([value(kind, "rolling_friction") for kind in particles]),
+        falls=1.0 / np.array([_speed(value(kind, "restitution_speed")) for kind in particles]),
         outlines=_outlines(scene),
         threads=() if family else tuple(threads),
         movers=movers,
@@ -291,6 +293,11 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         engine=scene.run.engine,
         plate_warnings=warnings,
     )
+
+
+def _speed(given: Any) -> Any:
+    """Return a speed that may not be given; infinite then."""
+    return inf if given is None else given
 
 
 def ahead(scene: Scene) -> Machine:

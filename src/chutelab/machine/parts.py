@@ -155,6 +155,7 @@ class Machine:
     threads: tuple[Thread, ...]
     movers: tuple[Mover, ...]
     streams: tuple[str, ...]  # names; `Releases.stream` tells whose a particle is
+    falls: Floats  # (K,), s/m: 1 over the speed up to which a kind's restitution is what it is
     engine: str  # what the scene asks for: "auto", "exact", "contact" or "pymunk"
     plate_warnings: tuple[Caution, ...]  # of a nominal particle that misses the plate
 

@@ -28,6 +28,7 @@ from chutelab.scene.units import (
     Mass,
     Name,
     Number,
+    Pace,
     Point,
     Polyline,
     Radius,
@@ -90,6 +91,17 @@ class Particle(Resolved):
     rolling_friction: Amount = described(
         0.0, "Rolling friction on everything, as the arm of the load over the radius; needs spin"
     )
+    restitution_speed: Pace | None = described(
+        None,
+        "Speed of approach up to which restitution is as it is given; above, the contact yields and"
+        " restitution falls as speed^(-1/4). Without it is the same at all speeds",
+        "m/s",
+    )
+
+    @property
+    def falls(self) -> float:
+        """1 over `restitution_speed`, s/m; 0 without."""
+        return 0.0 if self.restitution_speed is None else 1.0 / self.restitution_speed
 
     @property
     def outline(self) -> tuple[tuple[float, float], ...]:

@@ -313,6 +313,7 @@ class OrLeast:
         return {**handler(schema), "not": between}
 
 
+Pace = Annotated[Number, Field(ge=SLOWEST, le=LARGEST)]
 Gravity = Annotated[Amount, OrLeast(WEAKEST)]
 Speed = Annotated[Amount, OrLeast(SLOWEST)]
 

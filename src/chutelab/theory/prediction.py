@@ -497,6 +497,8 @@ def outside(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
     yield bool(own.outline), "it is about disks and spheres"
     rolls = scenes.value(own, "rolling_friction")
     yield np.logical_and(own.spin, np.greater(rolls, 0.0)), "rolling friction"
+    yields = scenes.value(own, "restitution_speed") is not None
+    yield yields, "the restitution falls with speed"
     hangs = any(string.particle == 0 for string in scene.string)
     yield hangs, "the particle hangs on a string"
     for name in scene.movers:

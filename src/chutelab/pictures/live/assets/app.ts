@@ -2,7 +2,7 @@
 
 import { Callout } from "./callout.ts";
 import { Menu } from "./menu.ts";
-import { SensorsPanel } from "./flow.ts";
+import { Flow, SensorsPanel } from "./flow.ts";
 import { start } from "./page.ts";
 import { Palette } from "./palette.ts";
 import { html } from "./panels.ts";
@@ -24,8 +24,9 @@ const LANGUAGES: Record<string, string> = { de: "Deutsch", en: "English" };
 
 start(({ lab, stage, words, bench, inspector, symbols }) => {
   language(lab.data);
-  const sensors = new SensorsPanel(document.getElementById("panels") as Element, lab, words);
-  const tools = new Tools(lab, stage, words);
+  const panels = document.getElementById("panels") as Element;
+  const sensors = new SensorsPanel(panels, lab, words);
+  const tools = new Tools(lab, stage, words, new Flow(panels, lab, words));
   new Callout(inspector, stage, lab, symbols);
   const home = stage.home.parentElement as HTMLElement;
   new Menu(lab, stage, words, bench.free);

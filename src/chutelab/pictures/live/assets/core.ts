@@ -151,7 +151,7 @@ class Core extends Memory {
   begin(machine: Machine) {
     this.machine = machine;
     this.forget();
-    const { releases, rolling, pulley } = machine, kinds = rolling.length;
+    const { releases, rolling, falls, pulley } = machine, kinds = rolling.length;
     const rows = surfaceRows(machine, this.layout.enums.Shape);
     this.setAll("World", {
       disk_count: releases.length, surface_count: rows.length, kind_count: kinds,
@@ -165,13 +165,17 @@ class Core extends Memory {
     rows.forEach(({ restitution, friction, ...row }, k) => {
       this.fill("surfaces", "Surface", k, row);
       for (let kind = 0; kind < kinds; kind += 1) {
-        this.pair(kind, kinds + k, restitution[kind], friction[kind], rolling[kind]);
+        this.pair(
+          kind, kinds + k, restitution[kind], friction[kind], rolling[kind], falls[kind],
+        );
       }
     });
     for (let a = 0; a < kinds; a += 1) {
       for (let b = 0; b < kinds; b += 1) {
         const [e, mu] = [machine.pairRestitution[a][b], machine.pairFriction[a][b]];
-        this.pair(a, b, e, mu, Math.max(rolling[a], rolling[b]));
+        this.pair(
+          a, b, e, mu, Math.max(rolling[a], rolling[b]), Math.max(falls[a], falls[b]),
+        );
       }
     }
     releases.forEach((one, i) => {
@@ -185,9 +189,12 @@ class Core extends Memory {
     this.work("prepare");
   }
 
-  pair(kind: number, column: number, restitution: number, friction: number, rolling: number) {
+  pair(
+    kind: number, column: number, restitution: number, friction: number, rolling: number,
+    falls: number,
+  ) {
     const columns = this.get("kind_count") + this.get("material_count");
-    const row = { restitution, friction: Math.min(friction, GREATEST), rolling };
+    const row = { restitution, friction: Math.min(friction, GREATEST), rolling, falls };
     this.fill("pairs", "Pair", kind * columns + column, row);
   }
 

@@ -62,6 +62,7 @@ export interface Machine {
   pairRestitution: number[][]; // of two kinds
   pairFriction: number[][];
   rolling: number[]; // by kind
+  falls: number[]; // s/m; 1 over the speed up to which restitution is what it is
 }
 
 /**
@@ -112,6 +113,7 @@ export function build(scene: Scene): Machine {
     pairRestitution: pairs.map((row) => row.map(([restitution]) => restitution)),
     pairFriction: pairs.map((row) => row.map(([, friction]) => friction)),
     rolling: particles.map((kind) => kind.rolling_friction),
+    falls: particles.map(({ restitution_speed: v }) => v === undefined ? 0.0 : 1.0 / v),
   };
 }
 

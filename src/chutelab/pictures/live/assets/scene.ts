@@ -35,6 +35,7 @@ interface Particle {
   material?: string;
   spin: boolean;
   rolling_friction: number;
+  restitution_speed?: number; // above it restitution falls; without it never does
   given: Given; // the keys that were written
 }
 

@@ -1,9 +1,9 @@
 // What measures in the picture: flow line, tape, angle, stop watch and tracer.
 
 import { roundUp } from "./chart.ts";
-import { Flow } from "./flow.ts";
 import { eased, html, iconButton } from "./panels.ts";
 import { svg } from "./scenery.ts";
+import type { Flow } from "./flow.ts";
 import type { Stage } from "./stage.ts";
 import type { Handle } from "./handles.ts";
 import type { Lab } from "./lab.ts";
@@ -84,17 +84,19 @@ class StopWatch {
 class Tools {
   layer;
   panel;
-  flow;
   dial?: any;
   laps?: any;
   starter?: any;
 
-  constructor(readonly lab: Lab, readonly stage: Stage, readonly words: Words) {
+  /** @param flow the line that counts; a lesson has none */
+  constructor(
+    readonly lab: Lab, readonly stage: Stage, readonly words: Words, readonly flow?: Flow,
+  ) {
     this.layer = svg("g", { class: "measures", "aria-hidden": "true" });
     stage.over.append(this.layer);
     const bar = html("div", { class: "tools", role: "group", "aria-label": words.say("tools") });
     document.getElementById("fit")?.after(bar);
-    for (const name of ["flow", "tape", "protractor", "watch", "tracer"] as const) {
+    for (const name of [...(flow ? ["flow"] : []), "tape", "protractor", "watch", "tracer"]) {
       const button = iconButton(`tool-${name}`, name, words.say(`name-${name}`), () =>
         this.toggle(name, button));
       button.setAttribute("aria-pressed", "false");
@@ -102,7 +104,6 @@ class Tools {
     }
     this.panel = this.watchPanel();
     stage.home.parentElement?.append(this.panel);
-    this.flow = new Flow(document.getElementById("panels") as Element, lab, words);
     stage.further.push(() => this.handles());
     stage.drawers.push(() => this.draw());
     const redraw = eased(() => this.draw());
@@ -148,7 +149,7 @@ class Tools {
     const [x, y] = view.middle;
     const at = (dx: number, dy: number) =>
       [this.tidy(x + dx * size), this.tidy(y + dy * size)] as Point;
-    if (name === "flow") this.flow.show(on ? [at(-1, -0.5), at(1, -0.5)] : []);
+    if (name === "flow") this.flow?.show(on ? [at(-1, -0.5), at(1, -0.5)] : []);
     if (name === "tape") this.tape = [at(-1, -0.5), at(1, -0.5)];
     if (name === "protractor") this.protractor = [at(-1, -0.5), at(1, -0.5), at(0, 0.7)];
     if (name === "watch") this.panel.hidden = !on;
@@ -180,14 +181,14 @@ class Tools {
         drag: (px, py) => [this.tidy(px), this.tidy(py)],
         change: ([px, py]) => {
           points[n] = [px, py];
-          if (tool === "flow") this.flow.move(points);
+          if (tool === "flow") this.flow?.move(points);
           this.refresh();
         },
         says: `${this.texts[tool]().join(", ")}; `
           + `x = ${this.words.fixed(x, 3)} m, y = ${this.words.fixed(y, 3)} m`,
       }));
     };
-    if (this.on.has("flow")) point("flow", this.flow.ends, ["first", "second"]);
+    if (this.flow && this.on.has("flow")) point("flow", this.flow.ends, ["first", "second"]);
     if (this.on.has("tape")) point("tape", this.tape, ["first", "second"]);
     if (this.on.has("protractor")) point("protractor", this.protractor, ["vertex", "first", "second"]);
     const tracer = this.on.has("tracer") && this.tracerHandle();
@@ -257,7 +258,8 @@ class Tools {
 
   /** What a tool says, by its name. */
   texts: Record<string, () => string[]> = {
-    flow: () => this.flow.says, tape: () => this.tapeTexts(), protractor: () => [this.angleText()],
+    flow: () => this.flow?.says ?? [], tape: () => this.tapeTexts(),
+    protractor: () => [this.angleText()],
   };
 
   tapeTexts() {
@@ -281,7 +283,7 @@ class Tools {
     const { layer, lab } = this, { view } = this.stage;
     const at = ([x, y]: Point) => [view.px(x), view.py(y)] as Point;
     layer.replaceChildren();
-    if (this.on.has("flow")) {
+    if (this.flow && this.on.has("flow")) {
       const [[x, y], [u, v]] = this.flow.ends.map(at);
       layer.append(svg("path", { d: `M${x} ${y}L${u} ${v}`, class: "tape" }));
       this.write(x > u ? [x, y - 20] : [u, v - 20], this.flow.says);

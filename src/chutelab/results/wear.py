@@ -3,7 +3,8 @@
 Blows are taken from the events, with the velocity relative to the surface; what lasting contacts
 lose is the ledger's entry of the surface less that of its blows, laid along the tracks that touch
 it in proportion to what each loses and how fast it slips there. So the sums over the pieces are the
-ledger's. Where one particle leans on several surfaces or rubs on others, that share is an estimate.
+ledger's; where several blows fall on one instant, one of them may give what another takes. Where
+one particle leans on several surfaces or rubs on others, that share is an estimate.
 """
 
 from __future__ import annotations

@@ -26,7 +26,10 @@ from chutelab.studies.accuracy import (
 )
 from chutelab.util.errors import InputError
 
-LONE = [name for name in sc.shipped() if sc.load(name).count == 1]
+LONE = [
+    name for name, scene in ((name, sc.load(name)) for name in sc.shipped())
+    if scene.count == 1 and not scene.movers
+]  # fmt: skip
 
 
 def difference(one, other, unit="relative"):

@@ -46,7 +46,7 @@ def flow(recording):
     return 0.5 * recording.count / (last - first)
 
 
-def test_disks_run_as_fast_to_the_end_and_the_summary_says_when_quarters_fell_out(tmp_path):
+def test_the_summary_says_when_quarters_fell_out(tmp_path):
     told = ["run", str(find(10).folder / "slot.toml"), "--out", str(tmp_path), "--only", "npz"]
     said = " ".join(CliRunner().invoke(main, told).output.split())
     emptied = Recording.load(tmp_path / "recording.npz")
@@ -60,11 +60,23 @@ def test_disks_run_as_fast_to_the_end_and_the_summary_says_when_quarters_fell_ou
     ends = np.sort(emptied.select(Kind.EXIT)["t"])
     assert times == pytest.approx([*quarters(emptied), ends[-1]], abs=5.001e-4)
     assert "fell out" not in CliRunner().invoke(main, ["run", "free-fall"]).output
-    first, half, last = quarters(emptied)
-    # A tank of water, whose level falls by as much, would take (√¾ - √½) / (√½ - √¼) for them.
+
+
+@pytest.mark.slow
+def test_disks_run_as_fast_to_the_end():
+    """A tank of water, whose level falls by as much, would take (√¾ - √½) / (√½ - √¼) for it.
+
+    That is the time of the third quarter over that of the second. Of one bin it scatters by 0.17.
+    """
+    times = [
+        quarters(simulate(scene_of(find(10), "slot.toml", (f"stream.seed={seed}",))))
+        for seed in range(1, 9)
+    ]
+    shares = np.array([(last - half) / (half - first) for first, half, last in times])
+    error = shares.std(ddof=1) / len(shares) ** 0.5
+    assert shares.mean() == pytest.approx(1.0, abs=3.0 * error)
     water = (0.5**0.5 - 0.25**0.5) / (0.75**0.5 - 0.5**0.5)
-    assert water > 1.3
-    assert (last - half) / (half - first) < 1.2
+    assert shares.mean() + 3.0 * error < water
 
 
 @pytest.mark.slow

@@ -39,6 +39,7 @@ EVERY = [
     "compare perpendicular --data perpendicular-track --out compared",
     "discharge slip --out discharged",
     "field slip --out fields --vtk",
+    "report perpendicular -o report.html",
     "lesson list --json",
     "lesson show 3",
     "lesson build 1 --out built",

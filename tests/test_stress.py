@@ -167,6 +167,8 @@ def started(folder, *arguments, **environment):
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": SOURCES, **environment},
+        # Tests that nohup starts would hand on that HUP is ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
     )
 
 

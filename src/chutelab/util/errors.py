@@ -28,9 +28,10 @@ def nearest(key: str, known: Iterable[str]) -> list[str]:
     >>> nearest("pivot", ["pivot_height", "above"])
     ['pivot_height']
     """
-    # As like as they are without their unit: angel is angle_deg.
-    names = {name.removesuffix("_deg"): name for name in known}
-    near = difflib.get_close_matches(key.removesuffix("_deg"), names, n=1, cutoff=0.55)
+    known = list(known)
+    # With their unit or without: angel is angle_deg.
+    names = {name.removesuffix("_deg"): name for name in known} | {name: name for name in known}
+    near = difflib.get_close_matches(key, names, n=1, cutoff=0.55)
     return [names[name] for name in near]
 
 

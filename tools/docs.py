@@ -283,13 +283,18 @@ def scene_keys(pages: Path, extra: Path) -> None:
     """Make the page of all keys of a scene, and the schema beside it."""
     told = schema()
     (extra / "scene.schema.json").write_text(json.dumps(told), encoding="utf-8")
-    said, heads = [KEYS], {"Preset": "live.presets"}
+    order = list(told["properties"])
+    said, heads = [KEYS], dict[str, str]()
     for name, key in told["properties"].items():
         for kind in re.findall(r"#/\$defs/(\w+)", json.dumps(key)):
             heads[kind] = name
+    # Tables in tables: the first that has them names them.
+    for outer, table in sorted(told["$defs"].items(), key=lambda one: one[0] not in heads):
+        for name, key in table.get("properties", {}).items():
+            for kind in re.findall(r"#/\$defs/(\w+)", json.dumps(key)):
+                heads.setdefault(kind, f"{heads[outer]}.{name}")
     tables = sorted(
-        told["$defs"].items(),
-        key=lambda one: list(told["properties"]).index(heads[one[0]].partition(".")[0]),
+        told["$defs"].items(), key=lambda one: order.index(heads[one[0]].partition(".")[0])
     )
     for kind, table in (("", told), *tables):
         head = f"`[{heads[kind]}]`" if kind else "Of the scene itself"

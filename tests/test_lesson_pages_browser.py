@@ -19,6 +19,8 @@ from chutelab.results.quantities import measure
 from live.browser import DONE, Hand, axe
 from shared import find, lessons
 
+expect = pytest.importorskip("playwright.sync_api").expect
+
 WAYS = [("mouse", "right"), ("touch", "wrong"), ("keyboard", "odd")]
 QUICK = ("the-bounce", "mouse"), ("landing", "touch"), ("the-parabola", "keyboard")
 PLAYED = [
@@ -107,7 +109,7 @@ def test_it_is_played_through(page_of, name, by, kind):
     hand.press(page.locator("#begin"))
     for n, step in enumerate(lesson.steps):
         assert step_of(page) == n
-        assert page.locator("[aria-current=step]").count() == 1
+        expect(page.locator("[aria-current=step]")).to_have_count(1)
         # Only what the step allows can be changed.
         live = page.evaluate("chutelab.lab.data.live.controls")
         assert len(live) == len(step.open(tuple(lesson.page.live.get("controls", ()))))
@@ -115,7 +117,7 @@ def test_it_is_played_through(page_of, name, by, kind):
             text = told(page)
             for secret in secrets(lesson, step):
                 assert secret not in text, secret
-            assert page.locator(".track, .noted, #energy, #numbers, #curves").count() == 0
+            expect(page.locator(".track, .noted, #energy, #numbers, #curves")).to_have_count(0)
             if step.asks:
                 hand.press(page.locator("#play"))
                 assert not page.evaluate("chutelab.lab.playing")
@@ -231,7 +233,7 @@ def test_on_the_projector_hands_are_counted_and_the_run_is_shown(page_of):
     page.locator("#play").click()
     assert page.evaluate("chutelab.lesson.kept.done") == [0]
     assert page.evaluate("chutelab.lesson.kept.said") == {}
-    assert page.locator(".track").count() == 1
+    expect(page.locator(".track")).to_have_count(1)
 
 
 def test_what_was_done_is_kept_for_its_pupil_only(page_of):
@@ -257,7 +259,7 @@ def test_what_was_done_is_kept_for_its_pupil_only(page_of):
     assert page.locator("#student").input_value() == ""
     hand.write(page.locator("#student"), "Ada")
     hand.press(page.locator("#begin"))
-    assert page.locator("input:checked, .noted, .sketch[d^=M]").count() == 0
+    expect(page.locator("input:checked, .noted, .sketch[d^=M]")).to_have_count(0)
     assert step_of(page) == 0
     page.evaluate("sessionStorage.clear()")
     page.reload()
@@ -316,7 +318,7 @@ def test_a_number_in_the_text_is_dragged_typed_and_moved_by_keys(page_of):
         field = page.locator(".values input[type=text]").last
         field.fill(odd)
         field.press("Enter")
-        assert page.locator(".values .why:visible").count() == 1
+        expect(page.locator(".values .why:visible")).to_have_count(1)
         assert field.get_attribute("aria-invalid") == "true"
         assert value() == pytest.approx(0.695)
         field.press("Escape")

@@ -8,6 +8,8 @@ from chutelab.results import Kind
 from chutelab.scene import load
 from live.browser import axe
 
+expect = pytest.importorskip("playwright.sync_api").expect
+
 SCENES = ("perpendicular", "inclined-40", "spoon", "cascade", "inclined-conveyor")
 
 # Takes hold of random handles, as a pointer would, and waits until the run is there.
@@ -157,4 +159,4 @@ def test_names_from_scenes_never_become_markup(shown, tmp_path):
     )
     page = shown(file)
     assert page.evaluate("document.title") == evil
-    assert page.locator("img").count() == 0
+    expect(page.locator("img")).to_have_count(0)

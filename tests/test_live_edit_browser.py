@@ -13,6 +13,8 @@ from chutelab.results import Kind
 from chutelab.scene import load, parse
 from live.browser import DONE, spot
 
+expect = pytest.importorskip("playwright.sync_api").expect
+
 PREDICT = """
 [live]
 predict = true
@@ -68,8 +70,8 @@ def test_on_a_phone_buttons_beside_a_value_step_it_within_its_range(shown):
     # On a desk a slider does that.
     page = shown("inclined-40", viewport={"width": 1366, "height": 768})
     page.evaluate("chutelab.bench.inspector.choose('plate')")
-    assert page.locator("#chosen .step:visible").count() == 0
-    assert page.locator("#chosen input[type=range]:visible").count() == 3
+    expect(page.locator("#chosen .step:visible")).to_have_count(0)
+    expect(page.locator("#chosen input[type=range]:visible")).to_have_count(3)
 
 
 def test_numbers_are_typed_and_a_wrong_one_says_why(shown):
@@ -91,7 +93,7 @@ def test_numbers_are_typed_and_a_wrong_one_says_why(shown):
         assert angle.input_value() == typed
         assert value(page, "plate.angle_deg") == 12.5
     page.get_by_role("button", name="Zurück zu 12,5").click()
-    assert page.locator(".why:visible").count() == 0
+    expect(page.locator(".why:visible")).to_have_count(0)
     assert angle.input_value() == "12,5"
     distance = field(page, "Prallplatte: Abstand")
     distance.fill("-0,2")
@@ -99,7 +101,7 @@ def test_numbers_are_typed_and_a_wrong_one_says_why(shown):
     assert "zwischen 1e−9 und" in page.inner_text(".why:visible")
     distance.fill("0,4")
     distance.press("Enter")
-    assert page.locator(".why:visible").count() == 0
+    expect(page.locator(".why:visible")).to_have_count(0)
     assert value(page, "plate.distance") == 0.4
     page.locator("h1").click()
     page.keyboard.press("Control+z")
@@ -336,14 +338,14 @@ ranges = { "plate.angle_deg" = [20, 60] }
     page = shown("inclined-40", more=live)
     grips = page.evaluate("chutelab.stage.handles.flatMap(({ axes }) => axes.map((a) => a.key))")
     assert set(grips) == {"plate.angle_deg"}
-    assert page.locator("#tool-add, #parts").count() == 0
+    expect(page.locator("#tool-add, #parts")).to_have_count(0)
     panels = page.evaluate(
         "[...document.querySelectorAll('#panels > .card')].filter((e) => e.offsetHeight)"
         ".map((e) => e.id)"
     )
     assert panels == ["numbers", "edit"]
     assert page.locator(".tools").is_hidden()
-    assert page.locator("#edit input").count() == 1
+    expect(page.locator("#edit input")).to_have_count(1)
     angle = page.locator("#edit input")
     angle.fill("61")
     angle.press("Enter")

@@ -226,13 +226,13 @@ def test_marks_on_the_time_tell_what_happens_and_lead_there(shown):
     # On a phone they are ticks beside no finger's way; of what is to be predicted there are none.
     phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True}
     page = shown("inclined-40", language="de", **phone)
-    assert page.locator(".marks i").count() == 3
-    assert page.locator(".marks button").count() == 0
+    playwright.expect(page.locator(".marks i")).to_have_count(3)
+    playwright.expect(page.locator(".marks button")).to_have_count(0)
     page.focus("#time")
     page.keyboard.press(".")
     assert said_by(page, "#time") == f"verlässt das Band, {times[0]:.3f} s".replace(".", ",")
     page = shown("inclined-40", more="\n[live]\npredict = true\n")
-    assert page.locator(".marks > *").count() == 0
+    playwright.expect(page.locator(".marks > *")).to_have_count(0)
 
 
 def test_a_streams_arrivals_fill_up_with_time_and_a_lone_particle_has_none(shown):
@@ -251,7 +251,8 @@ def test_a_streams_arrivals_fill_up_with_time_and_a_lone_particle_has_none(shown
     playwright.expect(crowd).to_contain_text(
         re.compile("Ort der Ankunft, Mittelwert ± Streuung\\s*0,4")
     )
-    assert page.locator("#stage .envelope").count() == page.locator("#stage .track").count() == 1
+    playwright.expect(page.locator("#stage .envelope")).to_have_count(1)
+    playwright.expect(page.locator("#stage .track")).to_have_count(1)
     # Particle 0 on request.
     table = page.locator("#numbers table:not(.crowd)")
     assert table.is_hidden()
@@ -424,7 +425,7 @@ def test_sensors_tell_what_python_tells_of_the_same_run(shown):
     assert [one.name for one in parse(page.evaluate("chutelab.toml()")).sensor][2] == "sensor1"
     page.evaluate("chutelab.bench.inspector.choose('sensor1')")
     page.keyboard.press("Delete")
-    assert page.locator("#sensors tr[data-id]").count() == 2
+    playwright.expect(page.locator("#sensors tr[data-id]")).to_have_count(2)
 
 
 def sensed_times(scene):

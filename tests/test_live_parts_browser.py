@@ -13,6 +13,8 @@ from chutelab.pictures.live.page import html
 from chutelab.scene import from_dict, load
 from live.browser import DONE, axe, spot
 
+expect = pytest.importorskip("playwright.sync_api").expect
+
 # Of a run that is over: knots of each track, as Python has them.
 TRACKS = """chutelab.lab.recording.tracks.map(({ rows, count }) =>
   Array.from({ length: count }, (_, n) => Array.from(rows.slice(10 * n, 10 * n + 5))))"""
@@ -259,12 +261,12 @@ def test_the_menu_has_a_new_machine_the_scene_as_it_was_and_light_and_dark(shown
     page.reload()
     page.evaluate(DONE)
     assert page.evaluate(ground) == light
-    assert page.locator("#menu[open]").count() == 0
+    expect(page.locator("#menu[open]")).to_have_count(0)
     page.evaluate("chutelab.lab.change({ 'plate.angle_deg': 33 })")
     menu.click()
     page.click("#reset")
     assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 40.0
-    assert page.locator("#menu[open]").count() == 0
+    expect(page.locator("#menu[open]")).to_have_count(0)
     menu.click()
     page.click("#new-machine")
     assert page.evaluate("chutelab.lab.machine.surfaces") == []
@@ -274,7 +276,7 @@ def test_the_menu_has_a_new_machine_the_scene_as_it_was_and_light_and_dark(shown
     menu.click()
     page.keyboard.press("Tab")
     page.keyboard.press("Escape")
-    assert page.locator("#menu[open]").count() == 0
+    expect(page.locator("#menu[open]")).to_have_count(0)
     assert page.evaluate("document.activeElement.parentElement.id") == "menu"
 
 
@@ -396,7 +398,7 @@ def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_
     assert [one["particle"] for one in left["stream"]] == ["ball"]
     assert page.evaluate("chutelab.lab.recording.tracks.length") == 1
     page.get_by_role("button", name="Close").click()
-    assert page.locator("#lacks").count() == 0
+    expect(page.locator("#lacks")).to_have_count(0)
 
 
 @pytest.mark.parametrize(

@@ -391,7 +391,7 @@ def test_what_is_dragged_leaves_its_place_faint_and_tells_its_value_at_the_point
     pivot = page.evaluate("chutelab.stage.handles.find(({ id }) => id === 'plate.pivot')")
     angle = np.radians(40.0)
     # Idle there are no handles; the plate is clicked where it is none.
-    assert page.locator(".grip.own").count() == 0
+    playwright.expect(page.locator(".grip.own")).to_have_count(0)
     x, y = page.evaluate(
         SCREEN, [pivot["x"] + 0.3 * np.sin(angle), pivot["y"] - 0.3 * np.cos(angle)]
     )
@@ -409,7 +409,7 @@ def test_what_is_dragged_leaves_its_place_faint_and_tells_its_value_at_the_point
     page.evaluate("() => new Promise((then) => setTimeout(then, 60))")
     tip = page.locator(".tip")
     assert tip.inner_text().split("\n") == ["angle α = 60.0°", "was 40.0°"]
-    assert page.locator(".ghost .steel").count() == 1
+    playwright.expect(page.locator(".ghost .steel")).to_have_count(1)
     assert not page.locator("#chosen").is_visible()
     # With Alt it is as exact as the pointer.
     page.keyboard.down("Alt")
@@ -419,7 +419,7 @@ def test_what_is_dragged_leaves_its_place_faint_and_tells_its_value_at_the_point
     page.keyboard.up("Alt")
     assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == pytest.approx(60.8, abs=0.5)
     assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") != 60.0
-    assert page.locator(".ghost > *").count() == 0
+    playwright.expect(page.locator(".ghost > *")).to_have_count(0)
     assert page.locator("#chosen").is_visible()
     page.click("#undo")
     assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 40.0
@@ -615,7 +615,7 @@ def test_on_a_phone_one_card_or_drawer_lies_under_the_picture(shown, name, size)
         assert page.evaluate("document.documentElement.scrollWidth") == size[0]
         play, bar = page.locator(".transport").bounding_box(), dock.bounding_box()
         assert bar["y"] + bar["height"] == pytest.approx(size[1], abs=1)
-        assert page.locator(sheet).count() == 1
+        playwright.expect(page.locator(sheet)).to_have_count(1)
         box = page.locator(sheet).bounding_box()
         assert play["y"] + play["height"] - 1 <= box["y"]
         assert box["y"] + box["height"] <= bar["y"] + 1
@@ -629,7 +629,7 @@ def test_on_a_phone_one_card_or_drawer_lies_under_the_picture(shown, name, size)
     for tab in page.locator(".tabs button").all():
         tab.click()
         assert page.locator(f"#{tab.get_attribute('data-of')}").is_visible()
-        assert page.locator("#panels > .card:visible").count() == 1
+        playwright.expect(page.locator("#panels > .card:visible")).to_have_count(1)
         look()
     for tool, seen in (("add", "#part-belt"), ("tape", "#tool-tape"), ("eye", "#show-grid"),
                        ("more", "#keys")):  # fmt: skip
@@ -640,7 +640,7 @@ def test_on_a_phone_one_card_or_drawer_lies_under_the_picture(shown, name, size)
     # What is taken leaves the picture to be measured in; what is chosen has its card.
     page.click("#dock-tape")
     page.click("#tool-tape")
-    assert page.locator(".measures .tape").count() == 1
+    playwright.expect(page.locator(".measures .tape")).to_have_count(1)
     assert page.locator(".tabs").is_visible()
     page.evaluate("chutelab.bench.inspector.choose(chutelab.lab.machine.surfaces[0])")
     assert page.locator("#chosen").is_visible()

@@ -10,6 +10,8 @@ from chutelab.classroom.lessons.pages import live_page
 from live.browser import to_step
 from shared import find
 
+expect = pytest.importorskip("playwright.sync_api").expect
+
 
 def begin(page, student):
     """Begin with a name, and go to the questions."""
@@ -132,7 +134,7 @@ def test_what_was_kept_in_a_bad_way_is_left_out(page_of):
       localStorage.setItem("chutelab/the-bounce/odd", "{");
     }""")
     begin(page, "Ada")
-    assert page.locator(".mark.right").count() == 0
+    expect(page.locator(".mark.right")).to_have_count(0)
     assert "3 hints" in page.locator('[data-question="1"]').inner_text()
     # No mistake: looked up among the numbers of all who have been here.
     assert says(page, 1, "0")[0] == "off"

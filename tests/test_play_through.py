@@ -16,6 +16,8 @@ from chutelab.util.words import words
 from live.browser import DONE, Hand
 from shared import find
 
+expect = pytest.importorskip("playwright.sync_api").expect
+
 STUDENT = "Zoë O'Neil"
 NONSENSE = ["two metres", "", "  ", "NaN", "1/0", "2..5", "<b>1</b>", "9" * 400, "😀", "x = 3"]
 WRITTEN = 'Die Platte nimmt ½ m v² (1 - ε²).\n<b>Not</b> g, \\ or "it".'
@@ -71,7 +73,7 @@ def test_a_lesson_is_played_through(name, way, language, most, opened, tmp_path,
     page = opened(path, viewport=view, has_touch=touches, is_mobile=touches)
     page.evaluate(DONE)
     hand = Hand(page, way)
-    assert page.locator(".question").count() == 0
+    expect(page.locator(".question")).to_have_count(0)
     hand.write(page.locator("#student"), STUDENT)
     hand.press(page.locator("#begin"))
     page.evaluate(TO_NUMBERS)

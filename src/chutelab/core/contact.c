@@ -90,6 +90,7 @@ void describe(Contact *c, int i, int j) {
     c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
     c->gives = c->turns = 0;
     c->most = INFINITY;
+    c->parts = 0;
     c->friction = pair->friction;
     c->arm = pair->rolling * reach;
 }

@@ -129,9 +129,9 @@ static inline double driven(const Contact *c, double f) {
 }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
-/* Change of normal velocity that a contact asks for under its impulse, m/s. */
-static inline double asks(const Contact *c) {
-    return MIN(c->need - c->gives * c->impulse[0], c->most);
+/* Change of normal velocity that a contact asks for under a normal impulse, m/s. */
+static inline double asks(const Contact *c, double impulse) {
+    return MAX(MIN(c->need - c->gives * impulse, c->most), c->need - c->parts);
 }
 
 /* Move a disk along its parabola. */

@@ -18,7 +18,8 @@ static double press(Contact *c) {
     relative(c, 1, u);
     relative(c, 0, v);
     double opens = v[0] - u[0], given = (c->need - c->gives * c->impulse[0] - opens) / (1 / c->mass[0] + c->gives);
-    change[0] = MAX(c->impulse[0] + MIN(given, (c->most - opens) * c->mass[0]), 0) - c->impulse[0];
+    given = MAX(MIN(given, (c->most - opens) * c->mass[0]), (c->need - c->parts - opens) * c->mass[0]);
+    change[0] = MAX(c->impulse[0] + given, 0) - c->impulse[0];
     if (change[0] != 0) push(c, change);
     c->impulse[0] += change[0];
     return fabs(change[0]) / c->mass[0];
@@ -54,8 +55,8 @@ static void lessen_all(Contact *list, int count) {
         if (J[0] == 0 && J[1] == 0 && J[2] == 0) continue;
         relative(c, 1, u);
         relative(c, 0, v);
-        none += J[1] * (u[1] + c->drift) + J[2] * u[2] - J[0] * MIN(c->need, c->most);
-        all += J[1] * (v[1] + c->drift) + J[2] * v[2] + J[0] * (v[0] - u[0] - asks(c));
+        none += J[1] * (u[1] + c->drift) + J[2] * u[2] - J[0] * asks(c, 0);
+        all += J[1] * (v[1] + c->drift) + J[2] * v[2] + J[0] * (v[0] - u[0] - asks(c, J[0]));
     }
     lean_on_hinges(&none, &all);
     if (!(all > 0)) return;

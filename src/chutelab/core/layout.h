@@ -194,6 +194,7 @@ typedef struct {
     double need;            /* m/s; least change of normal velocity that keeps the gap closed ... */
     double gives;           /* ... and by how much less for each N s of its normal impulse, 1/kg ... */
     double most;            /* ... but by no more than that, m/s */
+    double parts;           /* the part of it that opens an overlap, m/s: all that it may do without if driven */
     double pull;            /* m/s2; by which gravity makes it slip on a surface */
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
@@ -238,7 +239,7 @@ typedef struct {
     double mass[2], light[2]; /* kg; what the contact feels, and 1 / that */
     double impulse[2];      /* N s; normal, tangential */
     double swept[2], course[2]; /* N s; the impulse two sweeps ago, and the step from there: see `hasten` */
-    double gives, eases, more; /* as `gives`, kg for a change where it gives, `most` less `need` of the contact */
+    double gives, eases, more, parts; /* as those of the contact; kg for a change where it gives, `most` less `need` */
     double rough;           /* coefficient of friction that acts */
     double arm, spin;       /* m, rad/s; of rolling friction, and how fast it rolls without impulses */
     double roll_mass, roll_light; /* kg m2, and what makes m/s of a moment */

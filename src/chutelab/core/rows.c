@@ -17,6 +17,8 @@
    that the processor need not wait for one to begin with the next. A disk among equal ones has six. */
 #define LARGE 200
 #define COLOURS 12
+/* Of an interval, to where it ends in rounding. */
+#define HALVINGS 50
 /* m/s; what a contact is free to open with that asks for nothing: finite, so that it can be multiplied by 0. */
 #define ANY 1e100
 
@@ -57,9 +59,9 @@ static inline double rolls(const SolverRow *c) {
     return a->rim * a->bend - b->rim * b->bend + c->spin;
 }
 
-/* How far the normal velocity is above what the gap asks for under its impulse. */
-static inline double above(const SolverRow *c, double opens) {
-    return most(opens + c->gives * c->impulse[0], opens - c->more);
+/* How far the normal velocity is above what the gap asks for under a normal impulse. */
+static inline double above(const SolverRow *c, double opens, double impulse) {
+    return least(most(opens + c->gives * impulse, opens - c->more), opens + c->parts);
 }
 
 static inline void push_row(const SolverRow *c, Two impulse, double moment) {
@@ -121,6 +123,7 @@ void set_rows(Contact *list, int count) {
         r->gives = c->gives;
         r->eases = 1 / (r->light[0] + c->gives);
         r->more = c->most + r->free[0];
+        r->parts = c->parts;
         r->rough = c->share < 1 ? c->share * MIN(c->friction, ROUGH) : c->friction;
         r->arm = c->share * c->arm;
         r->spin = u[2];
@@ -171,7 +174,7 @@ static inline Two give(SolverRow *c, int in_corner) {
     double r = first(v), normal = c->impulse[0], moment = 0;
     if (!in_corner) {
         double given = least((c->more - r) * c->mass[0], -(r + c->gives * normal) * c->eases);
-        normal = most(normal + given, 0);
+        normal = most(normal + most(given, -(r + c->parts) * c->mass[0]), 0);
     }
     double bound = c->rough * normal;
     double along = least(most(c->impulse[1] - c->mass[1] * second(v), -bound), bound);
@@ -194,13 +197,13 @@ static inline Two give(SolverRow *c, int in_corner) {
 static double violation(const SolverRow *list, int count, double x, double y) {
     double worst = 0;
     for (const SolverRow *c = list; c < list + count; c++)
-        worst = most(worst, -above(c, x * c->normal[0] + y * c->normal[1] + c->free[0]));
+        worst = most(worst, -above(c, x * c->normal[0] + y * c->normal[1] + c->free[0], c->impulse[0]));
     return worst;
 }
 
 /* What a row asks for at a change of velocity (x, y), m/s. */
 static double asks_at(const SolverRow *c, double x, double y) {
-    return -above(c, x * c->normal[0] + y * c->normal[1] + c->free[0]);
+    return -above(c, x * c->normal[0] + y * c->normal[1] + c->free[0], c->impulse[0]);
 }
 
 /* The same for all that a disk touches and that does not give way, at once: in a narrow wedge impulses one by one
@@ -319,23 +322,36 @@ double sweep_rows(int sweeps, int plain, double accurate) {
     return worst;
 }
 
-/* Take the share of all impulses at which the cost is least. The cost of impulses J, whose changes of
-   velocity are W J, is 1/2 J W J + J q: what sweeps make least, one contact after the other. W J + q is
-   how far the velocities are from what the contacts ask for; see docs/physics.md. Along J its slope goes
-   straight from `none` to `all`; where what an overlap asks for bends it goes below that, and the share
-   is a little less. Where sweeps end, the impulses do no work so on the velocities that they leave,
-   however far the sweeps had come: W J + q times J is at most 0. */
-void lessen(void) {
-    double none = 0, all = 0;
+/* Slope of the cost along all impulses J, at a share of them. The cost is 1/2 J W J + J q, W J their changes
+   of velocity: what sweeps make least, one contact after the other. W J + q is how far the velocities are
+   from what the contacts ask for; see docs/physics.md. */
+static double slope(double share) {
+    double sum = 0;
     for (const SolverRow *c = W.rows; c < W.rows + rows; c++) {
-        Two v = moves(c);
-        none += c->impulse[0] * most(c->free[0], c->free[0] - c->more) + c->impulse[1] * c->free[1];
-        all += c->impulse[0] * above(c, first(v)) + c->impulse[1] * second(v);
-        if (c->arm == 0) continue;
-        none += c->moment * c->spin;
-        all += c->moment * rolls(c);
+        Two v = plus(two(c->free), times(share, minus(moves(c), two(c->free))));
+        sum += c->impulse[0] * above(c, first(v), share * c->impulse[0]) + c->impulse[1] * second(v);
+        if (c->arm > 0) sum += c->moment * (c->spin + share * (rolls(c) - c->spin));
     }
-    if (all > 0) scale(none < 0 ? 1 - all / (all - none) : 0);
+    return sum;
+}
+
+/* Take the share of all impulses at which the cost is least. The slope grows with it: straight from `none` to
+   `all`, below that where what an overlap asks for ends at its most, above where it ends at what keeps it as
+   deep: there the share is halved in on. Where sweeps end, the impulses do no work so on the velocities
+   that they leave, however far the sweeps had come: W J + q times J is at most 0. */
+void lessen(void) {
+    double none = slope(0), all = slope(1), share, less = 0;
+    if (!(all > 0)) return;
+    share = none < 0 ? none / (none - all) : 0;
+    if (slope(share) > EPS * all) {
+        for (int n = 0; n < HALVINGS; n++) {
+            double middle = 0.5 * (less + share);
+            if (slope(middle) > 0) share = middle;
+            else less = middle;
+        }
+        share = less;
+    }
+    scale(share);
 }
 
 /* Take back friction beyond what contacts allow: sweeps that did not come to an end have pressed less
@@ -366,6 +382,6 @@ void drop_noise(void) {
 /* By how much gaps close faster than they are asked to, at most, m/s. */
 double left_open(void) {
     double worst = 0;
-    for (const SolverRow *c = W.rows; c < W.rows + rows; c++) worst = most(worst, -above(c, first(moves(c))));
+    for (const SolverRow *c = W.rows; c < W.rows + rows; c++) worst = most(worst, -above(c, first(moves(c)), c->impulse[0]));
     return worst;
 }

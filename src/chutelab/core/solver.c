@@ -222,7 +222,7 @@ static void check_energy(void) {
         double u[3];
         if (J[0] == 0) continue;
         relative(c, 1, u);
-        gained -= J[0] * (u[0] + asks(c)) - J[1] * c->drift + J[2] * c->other[2];
+        gained -= J[0] * (u[0] + asks(c, J[0])) - J[1] * c->drift + J[2] * c->other[2];
         gained -= c->two ? 0 : J[0] * c->other[0] + J[1] * c->other[1];
         if (c->hung) gained += hinge_share(c);
     }
@@ -247,8 +247,12 @@ void solve_contacts(void) {
             W.swings_too |= c->hung > 0;
         }
         swings |= W.swings_too;
-        /* A drive presses as hard as it must: there no spring would hold, and friction is lowered. */
-        for (int n = from; n < to; n++) W.contacts[n].gives *= driven ? 0 : 1 / heaviest;
+        /* A drive presses as hard as it must: there no spring would hold, so that it gives no more than
+           what parts, and friction is lowered. */
+        for (int n = from; n < to; n++) {
+            W.contacts[n].gives /= heaviest;
+            if (!driven) W.contacts[n].parts = INFINITY;
+        }
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,
                            PLAIN, W.accurate, W.skip * least);

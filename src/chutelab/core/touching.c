@@ -110,7 +110,7 @@ static int add(int i, int j, double least, double bound, double h) {
        on it in each step. */
     if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > MAX(W.soft + haste, soft_approach(d, least))))
         return 1;
-    double aim = MIN(c->gap, 0);
+    double aim = MIN(c->gap, 0), closed = aim;
     if (c->gap < -SLOP * least) {
         /* A shorter step parts less, with the same speed: else it would give so much more energy. */
         double share = MIN(h / W.usual, 1), part = share * MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
@@ -121,6 +121,7 @@ static int add(int i, int j, double least, double bound, double h) {
         }
     }
     c->need = (aim - later) / h;
+    c->parts = (aim - closed) / h;
     c->drift = 0.5 * h * c->pull;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     int lasted = 0;
@@ -152,7 +153,7 @@ static int add(int i, int j, double least, double bound, double h) {
     int alone = d->supports <= 1 || gone;
     c->leaves = pressed && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
     if (c->leaves || gone) {
-        c->gives = 0;
+        c->gives = c->parts = 0;
         c->most = INFINITY;
     }
     if (c->leaves) {
@@ -161,7 +162,7 @@ static int add(int i, int j, double least, double bound, double h) {
     } else if (gone) c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     else if (pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
     if (j < 0 && W.interact && !gone && !c->leaves) {
-        follow(c, lasted ? W.length_before : 0, chord(c, aim - MIN(c->gap, 0), h));
+        follow(c, lasted ? W.length_before : 0, chord(c, aim - closed, h));
         if (c->turns > 0) c->need = closes(c, aim, h);
     }
     W.contact_count++;

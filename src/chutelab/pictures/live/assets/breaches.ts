@@ -8,7 +8,7 @@ import type { Words } from "./words.ts";
 
 /** A whole run as the core's laws take it: all knots, and the first of each particle. */
 export type Run = { machine: Machine, knots: Float64Array, offsets: number[], books: number[],
-  gained: number, contacts: number, steps: number, unreal: number };
+  gained: number, unsolved: number, contacts: number, steps: number, unreal: number };
 
 /** A law that is broken: by which particle first, when (s) and where (m), and beside what; -1 of
  * particle or surface if it is about all together. */
@@ -16,7 +16,8 @@ export type Breach = { law: number, particle: number, surface: number, t: number
   y: number };
 
 /** What the laws ask of a recording of a run that is over. */
-function runOf({ machine, tracks, events, books, gained, contacts, steps }: Recording): Run {
+function runOf(recording: Recording): Run {
+  const { machine, tracks, events, books, gained, unsolved, contacts, steps } = recording;
   const offsets = [0];
   for (const { count } of tracks) offsets.push(offsets[offsets.length - 1] + count);
   const knots = new Float64Array(offsets[tracks.length] * KNOT_ROW);
@@ -25,7 +26,8 @@ function runOf({ machine, tracks, events, books, gained, contacts, steps }: Reco
   });
   const unreal = events.flatMap(({ t, x, y, before, after, normal, tangent }) =>
     [t, x, y, ...before, ...after, normal, tangent]).filter((value) => !isFinite(value)).length;
-  return { machine, knots, offsets, books: (books ?? []).flat(), gained, contacts, steps, unreal };
+  return { machine, knots, offsets, books: (books ?? []).flat(), gained, unsolved, contacts,
+    steps, unreal };
 }
 
 /** The laws that a run breaks, in the order in which they are told. What the core has in memory
@@ -68,7 +70,8 @@ function barriersOf({ segments, arcs, pulley }: Machine) {
 }
 
 /** What is said of each law, in the order of the core's enum Law. */
-const SAID = ["law-finite", "law-through", "law-inside", "law-energy", "law-losses", "law-ledger"];
+const SAID = ["law-finite", "law-through", "law-inside", "law-energy", "law-losses", "law-ledger",
+  "law-solved"];
 
 /** The line below the picture that says which law is broken. */
 function watchLaws(line: HTMLElement, lab: Lab, words: Words) {

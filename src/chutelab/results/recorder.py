@@ -77,7 +77,7 @@ class Recorder:
         self.swings = np.empty(0, SWING)
         self.hinge_work = np.zeros((owners, 3))
         self.contacts = 0
-        self.gained = 0.0
+        self.gained = self.air_loss = 0.0
         self.totals = np.empty(0, TOTAL)
         self.impulses = np.empty((0, 0), LOAD)
         # Of engines that count loads here, if these are asked for.
@@ -256,6 +256,7 @@ class Recorder:
             contacts=self.contacts,
             angle=angle,
             gained=self.gained,
+            air_loss=self.air_loss,
             totals=self.totals,
             impulses=self.impulses,
         )

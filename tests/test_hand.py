@@ -101,11 +101,10 @@ def test_a_push_along_a_floor_is_opposed_by_its_friction():
     assert ledger.friction_loss == pytest.approx(ledger.push_work, rel=1e-9)
 
 
-def test_pushes_of_a_crowd_close_the_ledger():
-    run, draw = (
-        chutelab.start("heap", {"stream.count": 40, "run.until": 0.8}),
-        np.random.default_rng(1),
-    )
+@pytest.mark.parametrize("air", [0.0, 1.2])
+def test_pushes_of_a_crowd_close_the_ledger(air):
+    run = chutelab.start("heap", {"stream.count": 40, "run.until": 0.6, "air_density": air})
+    draw = np.random.default_rng(1)
     while not run.done:
         for particle in range(40):
             run.push(particle, 0.1 * draw.normal(size=2))

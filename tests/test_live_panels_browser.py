@@ -176,9 +176,9 @@ def test_the_numbers_of_a_crowd_lead_and_what_is_computed_is_hatched(shown):
     # Time goes no further than what is computed, wherever one points.
     page.evaluate("chutelab.lab.seek(chutelab.lab.horizon)")
     assert page.evaluate("chutelab.lab.t <= chutelab.lab.end")
-    page.evaluate("chutelab.lab.engine.allow(1e6)")
     page.evaluate("""() => new Promise((done) => {
       chutelab.lab.on("run", () => chutelab.lab.recording.state === "done" && done());
+      chutelab.lab.engine.allow(1e6);
     })""")
     page.evaluate("chutelab.lab.tell('time')")
     assert page.evaluate(hatched)[:2] == [False, 1.0]

@@ -134,7 +134,7 @@ def test_no_curve_jumps_at_the_end_what_the_landing_leaves_is_a_dot(shown):
     assert max(steps) < 3.0
 
 
-@pytest.mark.parametrize("name", ["stream", "hopper"])
+@pytest.mark.parametrize("name", ["hopper", pytest.param("stream", marks=pytest.mark.slow)])
 def test_while_a_crowd_runs_no_height_is_below_the_lowest_point(shown, name):
     """m g y from the lowest point of the run so far, of one and of all: never negative."""
     page = shown(name, ["stream.count=60"])

@@ -98,8 +98,9 @@ class Hand:
         if self.by != "keyboard":
             locator.focus()
             return
+        element = locator.element_handle()
         for _ in range(400):
-            key = locator.evaluate("""(one) => {
+            key = element.evaluate("""(one) => {
               const at = document.activeElement;
               if (one === at) return "";
               if (one.name && one.name === at.name) return "ArrowDown";
@@ -229,14 +230,13 @@ def opened(browser, idle):
 
     heard = {"console": hear, "pageerror": fail, "request": asked}
 
-    def open_(path, address="", viewport=(1366, 620), color_scheme="light",
+    def open_(path, address="", viewport=None, color_scheme="light",
               reduced_motion="no-preference", **options):  # fmt: skip
         of = idle[tuple(sorted(options.items()))]
         page = of.pop() if of else browser.new_context(**options).new_page()
         pages.append((page, of))
         page.set_default_timeout(10_000)
-        size = viewport if isinstance(viewport, dict) else dict(zip(("width", "height"), viewport))
-        page.set_viewport_size(size)
+        page.set_viewport_size(viewport or {"width": 1366, "height": 620})
         page.emulate_media(color_scheme=color_scheme, reduced_motion=reduced_motion)
         for event, listener in heard.items():
             page.on(event, listener)

@@ -162,8 +162,8 @@ class Core extends Memory {
       mover_count: machine.movers.length,
       until: this.layout.enums.Until[`UNTIL_${machine.until.toUpperCase()}`],
       landing: machine.landing, ride_owner: 0, pulley: pulley ? machine.segments.length : -1,
-      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity, dt: machine.dt,
-      end_time: machine.endTime,
+      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity, air: machine.air,
+      dt: machine.dt, end_time: machine.endTime,
     });
     this.work("lay_out_world");
     machine.movers.forEach((mover, k) => this.fill("movers", "Mover", k, mover));

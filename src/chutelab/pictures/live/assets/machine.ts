@@ -46,6 +46,7 @@ interface Pulley {
 export interface Machine {
   surfaces: string[]; // names
   gravity: number;
+  air: number; // kg/m³, density of still air; 0 without
   landing: number; // index of the outgoing belt, -1 without one
   until: "landed" | "settled" | "time";
   endTime: number; // s
@@ -97,6 +98,7 @@ export function build(scene: Scene): Machine {
   return {
     surfaces: names,
     gravity: scene.gravity,
+    air: scene.air_density,
     landing: names.indexOf("outgoing"),
     until: typeof run.until === "string" ? run.until : "time",
     endTime: typeof run.until === "string" ? bound : Math.min(bound, run.until),

@@ -127,6 +127,7 @@ function outsideOf(scene: Scene, belt: Incoming) {
   const own = scene.particles[scene.kinds[0]];
   if (belt.friction !== "adhesion") return "belt-friction";
   if (own.spin && own.rolling_friction > 0.0) return "rolling-friction";
+  if (scene.air_density > 0.0) return "air";
   if (own.restitution_speed !== undefined) return "falling-restitution";
   if (stream.fill !== undefined || stream.to !== undefined) return "no-point";
   const [sin, cos] = sinCos(belt.incline_deg * RADIANS);

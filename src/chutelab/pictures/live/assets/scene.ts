@@ -141,6 +141,7 @@ interface Outgoing {
 export interface Scene {
   title: string;
   gravity: number;
+  air_density: number;
   particles: Particle[];
   materials: Map<string, Record<string, number>>; // numbers by name, presets too
   pair: { between: [string, string], restitution?: number, friction?: number }[];
@@ -232,6 +233,7 @@ export function resolve(given: Given, lab: Lab): Scene {
   const scene: Scene = {
     title: given.title ?? lab.tables.scene.title.default,
     gravity: given.gravity ?? lab.tables.scene.gravity.default,
+    air_density: given.air_density ?? lab.tables.scene.air_density.default,
     particles, materials, pair: given.pair ?? [], incoming, plates, outgoing,
     conveyor: rows("conveyor"), surface, streams, run, kinds, sensor: rows("sensor"),
     view: given.view ?? null,

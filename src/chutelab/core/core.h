@@ -217,6 +217,7 @@ void knot_after(int i);
 void knot_before(int i, double t, double vx, double vy, double spin);
 void flush_track(int i);
 void track_lasting(int i);
+void track_flying(int i);
 void knot_held(int i);
 void finish(int i, int reason);
 void write_event(int kind, int i, int other, int owner, double t, const double *place,
@@ -225,6 +226,10 @@ void event_here(int kind, int i, int owner);
 void book(double *first, double *second, int owner, const double *entries);
 void spread(double loss, int k);
 void give_back(const Contact *list, int count);
+
+/* air.c */
+void slow_down(int i, double t);
+void begin_in_air(int i, double middle);
 
 /* bearing.c */
 void bear_contact(const Contact *c, double share, double from, double to);

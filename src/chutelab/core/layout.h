@@ -48,6 +48,7 @@ typedef struct {
     double radius, mass;        /* [in] radius > 0 */
     double inertia;             /* [in] kg m2; 0: it does not turn */
     double inv_mass, inv_inertia; /* 1/kg, 1/(kg m2); 0 for one that does not turn */
+    double aired;               /* s; until when air has slowed it down, see air.c */
     double release;             /* [in] s; it waits from then on until its place is free */
     double ride_x;              /* m along the belt from where that meets the pulley, where a ride by
                                    adhesion begins, <= 0 ... */
@@ -314,6 +315,7 @@ typedef struct {
     int sweeps;          /* of the contact solver, at most */
     int sleeps;          /* whether islands may fall asleep */
     double gx, gy;       /* m/s2 */
+    double air;          /* [in] kg/m3; density of still air, 0 without */
     double dt;           /* s; longest step */
     double end_time;     /* s */
     double smooth_x, smooth_v; /* radii, m/s; by how much a track may be off between two knots ... */
@@ -324,6 +326,7 @@ typedef struct {
     int impact_count, step_count, solve_count, sweep_count;
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */
+    double air_loss;     /* J; what air has taken */
     double gained;       /* J; by which solves broke their law of energy, see `check_energy` */
     /* within the step */
     int low, high;       /* disks that this part of the run is about */
@@ -357,6 +360,7 @@ enum DropFrom { FROM_IMPACT, FROM_TOP };
 
 typedef struct {
     double gravity;
+    double air_density;     /* kg/m3; of still air */
     double crowded;         /* whether particles meet each other */
 } SceneKeys;
 

@@ -135,7 +135,7 @@ class Job:
             ("kind_count", self.kinds), ("owner_count", self.owners),
             ("pulley", -1 if wheel is None else len(machine.segments.length)),
             ("ride_incline", 0.0 if wheel is None else wheel.incline),
-            ("g", machine.gravity), ("end_time", machine.end_time),
+            ("g", machine.gravity), ("air", machine.air), ("end_time", machine.end_time),
             ("mover_count", len(machine.movers)),
         ):  # fmt: skip
             setattr(module.world, name, value)
@@ -263,7 +263,7 @@ class Job:
             swings = module.array("swings", dtype("Swing"), world.swing_count).view(SWING)
             recorder.swings = swings[np.argsort(swings["surface"], kind="stable")]
         recorder.contacts = world.impact_count
-        recorder.gained = world.gained
+        recorder.gained, recorder.air_loss = world.gained, world.air_loss
         rows = module.array("totals", dtype("Total"), world.total_count)
         recorder.totals = rows.view(TOTAL).copy()
         recorder.impulses = gather(module, self.owners)

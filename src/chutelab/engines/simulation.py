@@ -7,6 +7,8 @@ from dataclasses import replace
 from math import inf
 from time import perf_counter
 
+import numpy as np
+
 from chutelab.machine import Machine, ahead
 from chutelab.results import Recording, record
 from chutelab.results.recorder import EnoughError, StalledError
@@ -31,7 +33,7 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         return wanted
     if any(outline is not None for outline in machine.outlines) or machine.threads:
         return "pymunk"
-    return "contact" if machine.interact or machine.movers else "exact"
+    return "contact" if machine.interact or machine.movers or np.any(machine.air) else "exact"
 
 
 def simulate(
@@ -194,6 +196,9 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"
             raise _refused(scene, "run.engine", "exact", allowed)
+        if machine.air:
+            allowed = "0 with the exact engine: it has no closed form for a flight in air"
+            raise _refused(scene, "air_density", machine.air, allowed)
         from chutelab.engines.exact import CornerError, run
 
         try:
@@ -207,6 +212,9 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
             allowed = "left out with the pymunk engine: Chipmunk's restitution is one number"
             key = f"{scene.head('particle', n)}.restitution_speed"
             raise _refused(scene, key, kind.restitution_speed, allowed)
+    if name == "pymunk" and machine.air and any(one is not None for one in machine.outlines):
+        allowed = "0 with boxes and polygons: drag is that of a sphere"
+        raise _refused(scene, "air_density", machine.air, allowed)
     if any(scene.particles[kind].radius == 0.0 for kind in scene.kinds):
         raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
     if name == "contact":

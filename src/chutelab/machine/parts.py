@@ -137,6 +137,7 @@ class Machine:
     scenes: Scene | Family  # what it was built from
     surfaces: tuple[str, ...]  # names; several segments, or one and the pulley, may share one
     gravity: float  # m/s², pointing down
+    air: float  # kg/m³, density of still air; 0 without
     particle: Particle
     segments: Segments  # all straight surfaces; the incoming belt is the first if there is one
     arcs: Arcs
@@ -146,7 +147,7 @@ class Machine:
     until: Literal["landed", "settled", "time"]  # when a particle's track ends
     end_time: float  # s; no track goes on after it
     dt: float  # s; step of lasting contacts (contact), longest step (pymunk)
-    align: bool  # whether the pymunk engine's steps of a lone particle end at contacts
+    align: bool  # whether the pymunk engine's steps of a lone particle end at contacts; not in air
     interact: bool  # whether particles meet each other
     pair_restitution: Floats  # (K, K), of two particles by their kinds; below 0: they never meet
     pair_friction: Floats

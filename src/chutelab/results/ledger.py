@@ -26,6 +26,9 @@ ROUNDING = 1e-12
 UNSEEN = 5e-6
 """Share of the energy turned over that is shown as 0.000 %; a heap at rest trembles with less."""
 
+AIR = "still air"
+"""Its row among the surfaces of a ledger; no surface may have a name with a space."""
+
 
 @dataclass(frozen=True, repr=False)
 class Ledger(Shown):
@@ -50,15 +53,17 @@ class Ledger(Shown):
     restitution_loss : float
         Normal part of the losses in impacts.
     friction_loss : float
-        Slip heat.
+        Slip heat, and with air what that takes.
+    air_loss : float
+        What of it air takes.
     residual : float
         What the balance leaves over: the numerical error.
     turned_over : float
         Kinetic energy at the start + the sizes of the three entries + the size of the change of
         potential energy.
     by_surface : dict of dict of float
-        The three entries of each surface, and of ``"particles"``; where surfaces move also
-        ``drive_work``.
+        The three entries of each surface, of ``"particles"``, and with air of ``"still air"``;
+        where surfaces move also ``drive_work``.
     by_stream : dict of dict
         ``kinetic``, ``potential``, the three entries, and ``from_others``, of each stream; empty if
         there is one. The last is what the balance of a stream leaves over: the energy that it got
@@ -77,6 +82,7 @@ class Ledger(Shown):
     drive_work: float = 0.0
     spring: tuple[float, float] = (0.0, 0.0)
     damper_loss: float = 0.0
+    air_loss: float = 0.0
 
     @property
     def relative_residual(self) -> float:
@@ -155,11 +161,13 @@ def ledger(recording: Record) -> Ledger:
     for entries, work in zip(by_surface.values(), recording.drives.tolist(), strict=False):
         entries["belt_work"] -= work
         entries["drive_work"] = work
+    if recording.scene.air_density:
+        by_surface[AIR] = dict(zip(ENTRIES, (0.0, 0.0, recording.air_loss), strict=True))
     closed, work = _closed(found), float(recording.drives.sum())
     closed["belt_work"] -= work
     return Ledger(
         **_hung(recording, by_surface, closed | {"drive_work": work}),
-        by_surface=by_surface, by_stream=by_stream,
+        by_surface=by_surface, by_stream=by_stream, air_loss=recording.air_loss,
     )  # fmt: skip
 
 

@@ -237,6 +237,7 @@ REGISTRY: Final = {
         _run("ledger.drive_work", "what moves surfaces: their turn, shake and travel, and motors"),
         _run("ledger.restitution_loss", "loss of all bounces", of="total", columns=ITSELF),
         _run("ledger.friction_loss", "heat of all slip", of="total"),
+        _run("ledger.air_loss", "what of the friction's heat air takes"),
         _run("ledger.damper_loss", "loss in the dampers of hinges"),
         _run("ledger.spring.start", "energy in the springs of hinges at the start"),
         _run("ledger.spring.end", "energy in the springs of hinges at the end"),

@@ -77,7 +77,7 @@ class Recorder:
         self.swings = np.empty(0, SWING)
         self.hinge_work = np.zeros((owners, 3))
         self.contacts = 0
-        self.gained = 0.0
+        self.gained = self.air_loss = 0.0
         self.totals, self.unsolved = np.empty(0, TOTAL), np.empty(0)
         self.impulses = np.empty((0, 0), LOAD)
         # Of engines that count loads here, if these are asked for.
@@ -253,13 +253,14 @@ class Recorder:
             ended=ended,
             events=events,
             by_surface=self.by_surface.copy(),
-            drives=self.drives if self.machine.movers else np.zeros(0),
+            drives=self.drives if self.machine.movers or len(self.swings) else np.zeros(0),
             swings=self.swings,
             hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 3)),
             steps=steps,
             contacts=self.contacts,
             angle=angle,
             gained=self.gained,
+            air_loss=self.air_loss,
             totals=self.totals,
             unsolved=self.unsolved,
             impulses=self.impulses,

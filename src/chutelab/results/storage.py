@@ -187,6 +187,7 @@ def _about(recording: Record) -> dict[str, Any]:
         "contacts": recording.contacts,
         **({"instead": recording.instead} if recording.instead else {}),
         "gained": recording.gained,
+        **({"air_loss": recording.air_loss} if recording.scene.air_density else {}),
     }
 
 
@@ -211,6 +212,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     about.pop("seconds", None)  # earlier files tell how long the run took
     about.setdefault("gained", 0.0)  # ... and not this
     told = {name: about[name] for name in ("engine", "steps", "contacts", "gained")}
+    told["air_loss"] = about.get("air_loss", 0.0)
     instead = str(about.get("instead", ""))
     recording = Record(machine=build(scene), instead=instead, **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
@@ -219,7 +221,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         "by_surface": arrays["by_surface"], "angle": recording.angle, "drives": recording.drives,
         "unsolved": recording.unsolved,
     }  # fmt: skip
-    numbers["gained"] = np.asarray(recording.gained, dtype=float)
+    numbers["gained"] = np.array([recording.gained, recording.air_loss], dtype=float)
     numbers["hinge_work"] = recording.hinge_work
     for name in ("knots", "events", "totals", "impulses", "swings"):
         array = getattr(recording, name)

@@ -23,7 +23,7 @@ from chutelab.util.files import aside, together, whole
 
 ARRAYS = (
     "knots", "offsets", "ended", "events", "by_surface", "angle", "totals", "drives", "impulses",
-    "swings", "hinge_work",
+    "swings", "hinge_work", "triggered",
 )  # fmt: skip
 
 

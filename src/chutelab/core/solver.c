@@ -220,10 +220,14 @@ static void check_energy(void) {
         const Contact *c = W.contacts + n;
         const double *J = c->impulse;
         double u[3];
-        if (J[0] == 0) continue;
+        if (J[0] == 0 && c->clings == 0) continue;
         relative(c, 1, u);
         gained -= J[0] * (u[0] + asks(c, J[0])) - J[1] * c->drift + J[2] * c->other[2];
-        gained -= c->two ? 0 : J[0] * c->other[0] + J[1] * c->other[1];
+        gained -= c->two ? 0 : pressed(c) * c->other[0] + J[1] * c->other[1];
+        if (c->clings > 0) {
+            relative(c, 0, u);
+            gained += c->clings * u[0];
+        }
         if (c->hung) gained += hinge_share(c);
     }
     if (W.swings_too) gained += gained_by_hinges();

@@ -33,7 +33,8 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         return wanted
     if any(outline is not None for outline in machine.outlines) or machine.threads:
         return "pymunk"
-    return "contact" if machine.interact or machine.movers or np.any(machine.air) else "exact"
+    stepped = machine.interact or machine.movers or np.any(machine.air) or machine.scene.clings
+    return "contact" if stepped else "exact"
 
 
 def simulate(
@@ -196,6 +197,8 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"
             raise _refused(scene, "run.engine", "exact", allowed)
+        if scene.clings:
+            raise _refused(scene, "run.engine", "exact", "contact, because a pair has cohesion")
         if machine.air:
             allowed = "0 with the exact engine: it has no closed form for a flight in air"
             raise _refused(scene, "air_density", machine.air, allowed)
@@ -212,6 +215,10 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
             allowed = "left out with the pymunk engine: Chipmunk's restitution is one number"
             key = f"{scene.head('particle', n)}.restitution_speed"
             raise _refused(scene, key, kind.restitution_speed, allowed)
+    for n, pair in enumerate(scene.pair):
+        if pair.cohesion and (name == "pymunk" or scene.hinges):
+            what = "the pymunk engine" if name == "pymunk" else "what hangs on hinges"
+            raise _refused(scene, f"pair[{n}].cohesion", pair.cohesion, f"0 with {what}")
     if name == "pymunk" and machine.air and any(one is not None for one in machine.outlines):
         allowed = "0 with boxes and polygons: drag is that of a sphere"
         raise _refused(scene, "air_density", machine.air, allowed)

@@ -15,6 +15,9 @@ from chutelab.scene.units import LARGEST, SHORTEST
 MOST: Final = 100_000
 """Particles that a page has room for: it keeps their tracks, and draws them in each frame."""
 
+ABSENT: Final = (("pair", "meet"), ("pair", "cohesion"), ("surface", "pivot"))
+"""Keys that pages do not have."""
+
 LISTS: Final = ("material", "pair", "conveyor", "surface", "sensor")
 
 EXAMPLES: Final = ("inclined-40", "cascade", "spoon", "hopper", "galton", "free-fall")
@@ -118,6 +121,10 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         if not pair.meet:
             faults.append(Fault(f"pair[{n}].meet", False, f"true; {allowed}, which all meet"))
             partly = False
+        if pair.cohesion:
+            fault = Fault(f"pair[{n}].cohesion", pair.cohesion, f"0; {allowed}, which do not cling")
+            faults.append(fault)
+            partly = False
     for name in scene.movers:
         faults.append(Fault("surface", name, f"{allowed}, and surfaces that stay where they are"))
         partly = False
@@ -194,7 +201,7 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             if table == "particle" and key in ("size", "points"):
                 continue
             moves = table in ("plate", "surface") and key in (*MOTIONS, *HINGED)
-            if moves or (table, key) == ("pair", "meet") or (table, key) == ("surface", "pivot"):
+            if moves or (table, key) in ABSENT:
                 continue
             rules[table][key] = rule
     # Mass points, boxes and polygons are for other engines.

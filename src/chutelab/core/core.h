@@ -148,6 +148,7 @@ static inline void advance(Disk *d, double t) {
     d->y += (d->vy + 0.5 * W.gy * h) * h;
     d->vx += W.gx * h;
     d->vy += W.gy * h;
+    d->turned += d->spin * h;
     d->t = t;
 }
 
@@ -210,6 +211,11 @@ void go_on(void);
 
 /* hung.c */
 void sweep_hung(Contact *list, int count, int sweeps, double enough);
+
+/* hand.c */
+void kick_disks(double h);
+double pushed(const Disk *d, double f);
+double steered_to(const Mover *m, double t);
 
 /* grid.c */
 int list_near(double end);
@@ -304,5 +310,6 @@ void fall_asleep(void);
 
 /* prepare.c */
 int make_room(int full);
+void join_surfaces(void);
 
 #endif

@@ -71,6 +71,9 @@ typedef struct {
     double ahead[3];            /* J; the second half of it */
     double lacks;               /* J; kinetic energy that the mean velocity of this step's impulses lacks
                                    in a hollow, see `account` */
+    double force[2], pushed[2]; /* N; by which it is pushed by hand, in this step and in the one before ... */
+    double kick[2];             /* m/s; ... and what that changes of its velocity in this step */
+    double turned;              /* rad; since its release */
     int kind;                   /* [in] row of the table of pairs */
     int rides;                  /* [in] the incoming belt carries it by adhesion */
     int goes_on;                /* [in] it was under way before: released wherever others are */
@@ -171,6 +174,7 @@ typedef struct {
     double since, angle, rate; /* s, rad, rad/s; as its path begins ... */
     double path[TERMS];     /* ... and the angle from then on, a power of time each */
     double before;          /* rad/s; before the step's impulses */
+    double until;           /* s; up to which it turns, by hand, at `rate` from `angle` on */
     double impulse[3];      /* N m s; of its stops, and of its motor ... */
     double need[2], most;   /* rad/s, N m s; ... the least change that the stops ask for, and a bound */
     double drift;           /* rad/s; what springs and weight make of its speed by the middle of the step */
@@ -179,6 +183,8 @@ typedef struct {
     int solved;             /* its impulses are of a step that begins now */
     int struck;             /* stop that it meets as the step ends: 1, 2, or 0 */
     int first, last;        /* [in] of the laws: its first and last state in their `swings` */
+    int steered;            /* [in] it is turned by hand */
+    int pad;
 } Mover;
 
 /* The state of a hinge: halfway through the impulses of a step, and before a blow. */
@@ -308,6 +314,7 @@ typedef struct {
     /* the run */
     int interact;        /* disks meet each other */
     int is_whole;        /* [in] all knots and events are still there: the host took none */
+    int pushes;          /* something has been pushed by hand */
     int until;
     int landing;         /* owner that a disk lands on, or -1 */
     int ride_owner;      /* owner that rides are on */
@@ -319,6 +326,7 @@ typedef struct {
     double air;          /* [in] kg/m3; density of still air, 0 without */
     double dt;           /* s; longest step */
     double end_time;     /* s */
+    double pause;        /* [in] s; `run` comes back with the first step that ends then; 0: it goes on */
     double smooth_x, smooth_v; /* radii, m/s; by how much a track may be off between two knots ... */
     double hops;         /* ... if that is not less than so many hops of what lasts */
     double accurate;     /* m/s; changes at which sweeps end */

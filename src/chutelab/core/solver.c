@@ -213,7 +213,7 @@ static void check_energy(void) {
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
-        double x = d->vx - d->ux, y = d->vy - d->uy, w = d->spin - d->uspin;
+        double x = d->vx - d->ux - d->kick[0], y = d->vy - d->uy - d->kick[1], w = d->spin - d->uspin;
         gained += d->mass * (x * d->vx + y * d->vy) + d->inertia * w * d->spin;
     }
     for (int n = 0; n < W.contact_count; n++) {

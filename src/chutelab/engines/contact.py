@@ -257,10 +257,11 @@ class Job:
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.drives[: self.owners] = module.array("drives", REAL, self.owners)
-        if world.hinges:
+        if world.swing_count:
             for row in module.array("movers", dtype("Mover"), world.mover_count):
                 work = row["worked"], row["stopped"], row["damped"]
-                recorder.hinge_work[row["surface"]] = work
+                by_hand = recorder.drives[row["surface"]], 0.0, 0.0
+                recorder.hinge_work[row["surface"]] = by_hand if row["steered"] else work
             swings = module.array("swings", dtype("Swing"), world.swing_count).view(SWING)
             recorder.swings = swings[np.argsort(swings["surface"], kind="stable")]
         recorder.contacts = world.impact_count

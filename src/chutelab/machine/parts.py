@@ -213,6 +213,16 @@ class Machine:
         """Return what moves a surface, by its index; None if it stays where it is."""
         return next((mover for mover in self.movers if mover.surface == surface), None)
 
+    def steered(self, surface: int) -> Mover:
+        """Return what moves a plate, by its index, that is turned by hand about its pivot."""
+        named = {plate.name or "plate": plate for plate in self.scene.plates}
+        plate, belt = named[self.surfaces[surface]], self.scene.incoming
+        pivot = plate.pivot
+        if pivot is None:
+            assert belt is not None
+            pivot = belt.pulley_radius + plate.distance, plate.pivot_height
+        return Mover.steered(surface, pivot)
+
     @property
     def parts(self) -> tuple[Segments, Arcs]:
         """All surfaces but the drive pulley, a kind of piece each."""

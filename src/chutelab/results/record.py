@@ -316,8 +316,10 @@ class Record(Shown):
         for name in (*arrays.split(), "hinge_work"):
             getattr(self, name).flags.writeable = False
         if len(self.swings):
-            movers = (mover.swung(self.swings) for mover in self.machine.movers)
-            object.__setattr__(self, "machine", replace(self.machine, movers=tuple(movers)))
+            by_hand = np.setdiff1d(self.swings["surface"], [m.surface for m in self.machine.movers])
+            movers = *self.machine.movers, *map(self.machine.steered, by_hand.tolist())
+            swung = tuple(mover.swung(self.swings) for mover in movers)
+            object.__setattr__(self, "machine", replace(self.machine, movers=swung))
 
     @property
     def scene(self) -> Scene:

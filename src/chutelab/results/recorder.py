@@ -248,7 +248,7 @@ class Recorder:
             ended=ended,
             events=events,
             by_surface=self.by_surface.copy(),
-            drives=self.drives if self.machine.movers else np.zeros(0),
+            drives=self.drives if self.machine.movers or len(self.swings) else np.zeros(0),
             swings=self.swings,
             hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 3)),
             steps=steps,

@@ -7,7 +7,7 @@
 import type { Event } from "./core.ts";
 import type { Segment } from "./machine.ts";
 import type { Recording } from "./recording.ts";
-import { met, slices, type Incoming, type Plate, type Scene } from "./scene.ts";
+import { met, moversOf, slices, type Incoming, type Plate, type Scene } from "./scene.ts";
 import {
   because, cutFrom, transfer, unanswered, type Reason, type Stage, type Transfer,
 } from "./transfer.ts";
@@ -141,5 +141,6 @@ function outsideOf(scene: Scene, belt: Incoming) {
     const [vx, vy] = stream.velocity;
     if (vx !== belt.speed * cos || vy !== belt.speed * sin) return "other-velocity";
   }
+  if (moversOf(scene).length) return "moves";
   return scene.crowded ? "interact" : "";
 }

@@ -268,7 +268,7 @@ typedef struct {                                                                
 
 /* What all disks of a crowd that were released have together as a step begins: that of those that ended at
    their ends, and of what lasts in contact halfway through its impulses, as their tracks are. */
-typedef struct { double t, kinetic, potential, entries[3]; } Total; /* s, J */           /* [out] */
+typedef struct { double t, kinetic, potential, entries[3], unsolved; } Total; /* s, J, radii */ /* [out] */
 
 typedef struct { int disk, next, ix, iy; } Cell; /* one disk in one cell of the grid */
 
@@ -336,7 +336,9 @@ typedef struct {
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */
     double air_loss;     /* J; what air has taken */
-    double gained;       /* J; by which solves broke their law of energy, see `check_energy` */
+    double gained;       /* J; by which solves broke their law of energy, see `check_solve` */
+    double unsolved;     /* radii; the most overlap that the solve of this step leaves beyond what it asks for */
+    double unsolved_most; /* ... and of all steps so far */
     /* within the step */
     int low, high;       /* disks that this part of the run is about */
     int phase, cell_count, heap_count, moved_count, wide_count;
@@ -587,7 +589,7 @@ typedef struct {
 /* ---- What a run is judged by: a subject of its own, which shares nothing with the engine's. ---- */
 
 /* The laws, in the order in which they are told. */
-enum Law { LAW_FINITE, LAW_THROUGH, LAW_INSIDE, LAW_ENERGY, LAW_LOSSES, LAW_LEDGER, LAW_STEP };
+enum Law { LAW_FINITE, LAW_THROUGH, LAW_INSIDE, LAW_ENERGY, LAW_LOSSES, LAW_LEDGER, LAW_SOLVED, LAW_STEP };
 
 enum Engine { ENGINE_EXACT, ENGINE_CONTACT, ENGINE_PYMUNK };
 
@@ -605,7 +607,7 @@ enum Engine { ENGINE_EXACT, ENGINE_CONTACT, ENGINE_PYMUNK };
    contract. */
 #define ON_ARCS 1e-9
 /* Breaches that are told at most: of losses there may be two. */
-#define BREACHES 8
+#define BREACHES 9
 
 /* A piece of a surface as it is told to the laws. */
 typedef struct {
@@ -678,6 +680,7 @@ typedef struct {
     int unreal;             /* [in] numbers that are not finite, beside knots and books */
     double dt;              /* [in] s; step, 0 of the exact engine */
     double gained;          /* [in] J; by which solves broke their law of energy */
+    double unsolved;        /* [in] radii; the most overlap that the solve of a step left beyond what it asked for */
     double largest;         /* [in] m; radius of the largest particle, with its corners */
     /* [out] */
     int breach_count, hit_count;

@@ -340,7 +340,7 @@ static double in_hollows(void) {
 
 /* Note what all disks have together as a step begins. */
 static void note_totals(void) {
-    Total all = {.t = W.t};
+    Total all = {.t = W.t, .unsolved = W.unsolved};
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode == WAITING) continue;
@@ -438,7 +438,9 @@ static int begin_step(void) {
     if (W.pushes) kick_disks(h);
     if (W.hinges) begin_hinges(W.t, h);
     W.swings_too = 0;
+    W.unsolved = 0;
     if (W.contact_count) solve_contacts();
+    W.unsolved_most = MAX(W.unsolved_most, W.unsolved);
     /* A fast belt may have thrown a disk further than its list of neighbours foresaw. */
     for (int i = W.low; i < W.high; i++)
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);

@@ -27,7 +27,7 @@ from chutelab.core import (
 from chutelab.machine import SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather
-from chutelab.results.record import REASONS, TOTAL, Record
+from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress, unwatched
 
@@ -267,5 +267,5 @@ class Job:
         recorder.contacts = world.impact_count
         recorder.gained, recorder.air_loss = world.gained, world.air_loss
         rows = module.array("totals", dtype("Total"), world.total_count)
-        recorder.totals = rows.view(TOTAL).copy()
+        recorder.take_totals(rows)
         recorder.impulses = gather(module, self.owners)

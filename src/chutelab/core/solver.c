@@ -220,23 +220,15 @@ static void check_solve(void) {
     for (int n = 0; n < W.contact_count; n++) {
         const Contact *c = W.contacts + n;
         const double *J = c->impulse;
-<<<<<<< HEAD
-        double u[3];
-        if (J[0] == 0 && c->clings == 0) continue;
-=======
         double u[3], v[3], radius = W.disks[c->i].radius;
         if (c->j >= 0) radius = MIN(radius, W.disks[c->j].radius);
->>>>>>> main
         relative(c, 1, u);
         relative(c, 0, v);
         W.unsolved = MAX(W.unsolved, h * (u[0] + asks(c, J[0]) - v[0]) / radius);
-        if (J[0] == 0) continue;
+        if (J[0] == 0 && c->clings == 0) continue;
+        gained += c->clings * v[0];
         gained -= J[0] * (u[0] + asks(c, J[0])) - J[1] * c->drift + J[2] * c->other[2];
         gained -= c->two ? 0 : pressed(c) * c->other[0] + J[1] * c->other[1];
-        if (c->clings > 0) {
-            relative(c, 0, u);
-            gained += c->clings * u[0];
-        }
         if (c->hung) gained += hinge_share(c);
     }
     if (W.swings_too) gained += gained_by_hinges();

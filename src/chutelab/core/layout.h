@@ -190,9 +190,9 @@ typedef struct {
 /* The state of a hinge: halfway through the impulses of a step, and before a blow. */
 typedef struct { double t, angle, rate; int surface, pad; } Swing; /* s, rad, rad/s */ /* [out] */
 
-typedef struct { double restitution, friction, rolling, falls; } Pair; /* [in] rolling: arm over radius;
+typedef struct { double restitution, friction, rolling, falls, cohesion; } Pair; /* [in] rolling: arm over radius;
                                         falls: 1 over the speed up to which restitution
-                                        is that, s/m; 0 for all */
+                                        is that, s/m; 0 for all; cohesion: N */
 
 /* A contact of disk i with disk j, or with surface k as j = -1 - k. Its tangent is (ny, -nx). */
 typedef struct {
@@ -205,6 +205,7 @@ typedef struct {
     double pull;            /* m/s2; by which gravity makes it slip on a surface */
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
+    double clings;          /* N s; of cohesion, which pulls: the normal impulse is so much less */
     double mass[3];         /* what the contact feels of masses and inertias, in the same order */
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
     double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */

@@ -160,12 +160,13 @@ class Job:
         own["restitution"], own["friction"] = machine.pair_restitution, machine.pair_friction
         own["rolling"] = np.maximum.outer(machine.rolling, machine.rolling)
         own["falls"] = np.maximum.outer(machine.falls, machine.falls)
-        first = self.kinds
+        own["cohesion"], first = machine.cohesion[:, : self.kinds], self.kinds
         for part in parts(machine).values():
             others = pairs[:, first : (first := first + len(part.surface))]
             others["restitution"], others["friction"] = part.restitution, part.friction
             others["rolling"] = machine.rolling[:, None]
             others["falls"] = machine.falls[:, None]
+            others["cohesion"] = machine.cohesion[:, self.kinds + part.surface]
         np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
         module.work("prepare_to_judge")
 

@@ -138,6 +138,7 @@ def told(scene: Scene) -> Told:
                     bounces = PASSES
                 two = (kind,) if isinstance(other, str) else (kind, other)
                 terms += bounces, grips, max(rolling[k] for k in two), max(falls[k] for k in two)
+                terms.append(scene.cohesion(kind, other))
         grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
         line = row(scene, grip)
         sizes = {
@@ -258,8 +259,8 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         )
     # Particles of a family never meet.
     pairs = np.zeros((1, 1, 2))
+    every = range(len(particles))
     if not family:
-        every = range(len(particles))
         pairs = np.array([[meeting(a, b) for b in every] for a in every])
         through = [[scene.passes(a, b) for b in every] for a in every]
         pairs[..., 0] = np.where(through, PASSES, pairs[..., 0])
@@ -287,6 +288,9 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         pair_friction=pairs[..., 1],
         rolling=np.array([value(kind, "rolling_friction") for kind in particles]),
         falls=1.0 / np.array([_speed(value(kind, "restitution_speed")) for kind in particles]),
+        cohesion=np.array(
+            [[scene.cohesion(a, b) for b in (*every, *names)] for a in every], dtype=float
+        ),
         outlines=_outlines(scene),
         threads=() if family else tuple(threads),
         movers=movers,

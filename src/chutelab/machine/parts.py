@@ -152,6 +152,7 @@ class Machine:
     pair_restitution: Floats  # (K, K), of two particles by their kinds; below 0: they never meet
     pair_friction: Floats
     rolling: Floats  # (K,), rolling friction of a kind on everything: its arm over the radius
+    cohesion: Floats  # (K, K + S), N; pulls a kind to another, and to a surface
     outlines: tuple[Floats | None, ...]  # (K); of boxes and polygons corners (n, 2)
     threads: tuple[Thread, ...]
     movers: tuple[Mover, ...]

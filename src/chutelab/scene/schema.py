@@ -207,6 +207,17 @@ class SceneTables(Table):
         names = {self.particles[kind].name, self.particles[other].name}
         return any(not pair.meet and set(pair.between) == names for pair in self.pair)
 
+    @property
+    def clings(self) -> bool:
+        """Whether any two pull at each other."""
+        return any(pair.cohesion > 0.0 for pair in self.pair)
+
+    def cohesion(self, kind: int, other: int | str) -> float:
+        """Return the force (N) that it takes to pull a kind off another, or off a surface."""
+        name = other if isinstance(other, str) else self.particles[other].name
+        names = {self.particles[kind].name, name}
+        return next((pair.cohesion for pair in self.pair if {*pair.between} == names), 0.0)
+
     def meetings(self, value: Reader = getattr) -> Callable[[int, int | str], tuple[float, float]]:
         """Return what tells restitution and friction of a kind and another kind, or a surface.
 

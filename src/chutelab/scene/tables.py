@@ -137,6 +137,9 @@ class Pair(Table):
     between: Two = described(..., "Two kinds of particles by name, or one and a surface")
     restitution: Share | None = pair_restitution(None, "of these two")
     friction: Amount | None = pair_friction(None, "of these two")
+    cohesion: Amount = described(
+        0.0, "Force that it takes to pull them off each other where they touch", "N"
+    )
     meet: Switch = described(True, "Whether two kinds meet; if not, they pass through each other")
 
 

@@ -476,8 +476,8 @@ def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_
 @pytest.mark.parametrize(
     ("size", "scheme", "touch"),
     [
-        ((1366, 768), "dark", False),
         ((390, 844), "light", True),
+        pytest.param((1366, 768), "dark", False, marks=pytest.mark.slow),
         pytest.param((800, 1100), "dark", True, marks=pytest.mark.slow),
     ],
 )

@@ -23,6 +23,7 @@ LEDGER = [
     "kinetic", "potential", "belt_work", "restitution_loss", "friction_loss", "residual",
     "turned_over", "by_surface", "by_stream", "drive_work",
     "spring", "damper_loss", "air_loss",
+    "push_work",
 ]  # fmt: skip
 THEORY = [
     "phi1_deg", "v1", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3",

@@ -112,7 +112,7 @@ static void settle(int i, const Contact *last, double h) {
     double u[3], v[3], entries[3], given[3], jx = 0.5 * h * d->mass * W.gx, jy = 0.5 * h * d->mass * W.gy;
     hop.impulse[0] = jx * hop.nx + jy * hop.ny;
     hop.impulse[1] = jx * hop.ny - jy * hop.nx;
-    hop.impulse[2] = 0;
+    hop.impulse[2] = hop.clings = 0;
     for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
     relative(&hop, 0, u);
     d->vx += jx / d->mass;
@@ -190,6 +190,11 @@ void close_step(double h) {
             d->rest += h;
             d->anchor[2] += h * d->radius * d->spin;
         }
+        if (W.pushes && (d->kick[0] != 0 || d->kick[1] != 0)) {
+            d->calm = d->rest = 0;
+            d->ahead[0] = pushed(d, W.before);
+            book(d->gain, 0, W.owner_count, (double[]){pushed(d, 0), 0, 0});
+        }
     }
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         while (to < W.contact_count && (!W.interact || W.contacts[to].island == W.contacts[from].island)) to++;
@@ -207,7 +212,7 @@ void close_step(double h) {
             W.links[2 * n + 1] = b->links;
             b->links = 2 * n + 1;
         }
-        if (c->impulse[0] == 0) continue;
+        if (c->impulse[0] == 0 && c->clings == 0) continue;
         if (!W.interact && !a->supports) a->held_count = 0;
         double past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0;
         if (!b && a->held_count < MAX_HELD) {
@@ -264,6 +269,11 @@ void close_step(double h) {
             if (track->lasted || track->stays) d->on = -1;
             track->stays = 0;
             flush_track(i);
+            if (d->kick[0] != 0 || d->kick[1] != 0) {
+                knot_before(i, d->t, d->ux, d->uy, d->uspin);
+                d->entries[0] += d->gain[0];
+                knot_after(i);
+            }
             continue;
         }
         const Contact *only = 0;
@@ -274,7 +284,7 @@ void close_step(double h) {
             /* What its hop reaches it lies on, too: that is no blow. */
             if (!W.interact && c->impulse[0] == 0 && c->gap <= 0.125 * (W.g + W.haste) * h * h
                     && d->held_count < MAX_HELD) d->held[d->held_count++] = -1 - c->j;
-            if (c->impulse[0] == 0) continue;
+            if (c->impulse[0] == 0 && c->clings == 0) continue;
             if (!only || c->owner != only->owner || c->j >= 0) owners++;
             if (!only || c->impulse[0] > only->impulse[0]) only = c;
         }
@@ -329,6 +339,9 @@ void close_step(double h) {
 /* Take back what the second half of this step's impulses did to the ledger by disk i. */
 void take_back(int i) {
     Disk *d = W.disks + i;
+    double given = W.pushes ? pushed(d, W.before) : 0;
+    d->entries[0] -= given;
+    W.books[3 * W.owner_count] -= given;
     for (int link = d->links; link >= 0; link = W.links[link]) {
         const Contact *c = W.contacts + link / 2;
         for (int n = 0; n < 3; n++) {

@@ -147,7 +147,7 @@ void begin_hinges(double t, double h) {
         bring(m, t);
         m->before = m->rate;
         m->drift = m->path[2] * h;
-        m->most = 0.5 * (W.length_before + h) * m->motor[1];
+        m->most = t >= m->begins ? 0.5 * (W.length_before + h) * m->motor[1] : 0;
         follow_path(m, h, &angle, &rate, &change);
         for (int n = 0; n < 2; n++) {
             int touches = n ? m->angle >= m->stops[1] - AGAINST : m->angle <= m->stops[0] + AGAINST;
@@ -260,7 +260,7 @@ void lessen_hinges(double less) {
         }
 }
 
-/* What hinges add to the left of the law of energy of a solve, see `check_energy`. */
+/* What hinges add to the left of the law of energy of a solve, see `check_solve`. */
 double gained_by_hinges(void) {
     double gained = 0;
     for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++) {

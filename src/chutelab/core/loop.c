@@ -173,6 +173,7 @@ static int release(int i, double t) {
     else {
         take_off(i);
         lie_down(i);
+        for (int n = 0; n < 2 && W.pushes; n++) d->pushed[n] = 2 * (W.step_end - t) / W.length * d->force[n];
     }
     return 1;
 }
@@ -339,7 +340,7 @@ static double in_hollows(void) {
 
 /* Note what all disks have together as a step begins. */
 static void note_totals(void) {
-    Total all = {.t = W.t};
+    Total all = {.t = W.t, .unsolved = W.unsolved};
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode == WAITING) continue;
@@ -434,9 +435,12 @@ static int begin_step(void) {
         }
     } while (woke);
     W.length = h;
+    if (W.pushes) kick_disks(h);
     if (W.hinges) begin_hinges(W.t, h);
     W.swings_too = 0;
+    W.unsolved = 0;
     if (W.contact_count) solve_contacts();
+    W.unsolved_most = MAX(W.unsolved_most, W.unsolved);
     /* A fast belt may have thrown a disk further than its list of neighbours foresaw. */
     for (int i = W.low; i < W.high; i++)
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
@@ -540,6 +544,7 @@ static int is_over(int *reason) {
     int asleep = 0;
     for (int i = W.low; i < W.high; i++) asleep |= W.disks[i].mode == ASLEEP;
     if (next >= W.end_time || next == INFINITY) next = W.end_time;
+    if (W.pause > 0) next = MIN(next, MAX(W.pause, W.t));
     if (asleep || next < W.end_time) {
         for (int i = W.low; i < W.high; i++)
             if (W.disks[i].mode == ASLEEP) W.disks[i].t = next;
@@ -626,7 +631,7 @@ static int run_on(int steps) {
                 W.phase = PART;
                 continue;
             }
-            if (steps-- <= 0) return PAUSED;
+            if (steps-- <= 0 || (W.pause > 0 && W.t >= W.pause)) return PAUSED;
             if ((status = begin_step()) != DONE) return status;
             int settled = W.interact && W.until == UNTIL_SETTLED && has_settled();
             if (settled || W.t >= W.end_time) {

@@ -241,6 +241,7 @@ EXPORT int lay_out_world(void) {
     RESERVE(W.surfaces, 2.0 * W.surface_count);
     RESERVE(W.pairs, (double)W.kind_count * (W.kind_count + W.material_count));
     RESERVE(W.movers, W.mover_count);
+    RESERVE(W.triggers, W.trigger_count);
     return has_room();
 }
 
@@ -304,6 +305,27 @@ static int lay_out_work(void) {
     return has_room();
 }
 
+/* Find which surface goes on where another one ends; what moves only with its own. */
+void join_surfaces(void) {
+    double least = INFINITY;
+    for (int i = 0; i < W.disk_count; i++) least = MIN(least, W.disks[i].radius);
+    for (int k = 0; k < W.surface_count; k++) W.surfaces[k].mover = find_mover(W.surfaces + k);
+    sort_ends();
+    for (int k = 0; k < 2 * W.surface_count; k++)
+        if (W.surfaces[k / 2].shape != CIRCLE) share_end(k / 2, k % 2, TOUCHING * least, least);
+    for (int k = 0; k < W.surface_count; k++)
+        for (int end = 0; end < 2; end++) {
+            find_mate(k, end, least);
+            if (W.surfaces[k].shape != CIRCLE) find_crown(k, end, least);
+        }
+    for (int k = 0; k < 2 * W.surface_count; k++) {
+        int mate = W.surfaces[k / 2].mates[k % 2], *of = W.surfaces[MAX(mate, 0)].mates;
+        if (W.surfaces[k / 2].shape == CIRCLE || mate < 0 || W.surfaces[mate].shape != CIRCLE) continue;
+        W.surfaces[mate].ledges[of[0] >= 0] = W.surfaces[k / 2].ledges[k % 2];
+        of[of[0] >= 0] = k / 2;
+    }
+}
+
 /* The host has filled in what is marked [in]: fill in what follows. */
 EXPORT int prepare(void) {
     W.passes = W.hinges = 0;
@@ -311,7 +333,12 @@ EXPORT int prepare(void) {
         W.passes |= pair_of(i / W.kind_count, i % W.kind_count)->restitution < 0;
     for (int k = 0; k < W.mover_count; k++) W.hinges += W.movers[k].inertia > 0;
     /* What hangs gives what one disk gives it to another. */
-    if (W.hinges) W.interact = 1;
+    if (W.hinges || W.trigger_count) W.interact = 1;
+    for (int k = 0; k < W.trigger_count; k++) W.triggers[k].t = INFINITY;
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!m->inertia) m->rate = m->turn;
+        m->begins = is_triggered(m->surface, STARTS) ? INFINITY : 0;
+    }
     if (!lay_out_work()) return 0;
     double least = INFINITY, most = 0, s = sin(W.ride_incline), c = cos(W.ride_incline);
     int alone = !W.interact;
@@ -329,27 +356,14 @@ EXPORT int prepare(void) {
     for (int k = 0; k < W.surface_count; k++) {
         Surface *piece = W.surfaces + k;
         derive(piece);
-        piece->gate = piece->opens > -INFINITY || piece->closes < INFINITY ? W.gate_count++ : -1;
-        piece->mover = find_mover(piece);
+        int goes = piece->closes < INFINITY || is_triggered(piece->owner, GOES);
+        piece->gate = piece->opens > -INFINITY || goes ? W.gate_count++ : -1;
         memcpy(piece->swept, piece->box, sizeof piece->swept);
         W.everything[k] = k;
     }
     RESERVE(W.spared, (double)W.disk_count * W.gate_count);
     if (!has_room()) return 0;
-    sort_ends();
-    for (int k = 0; k < 2 * W.surface_count; k++)
-        if (W.surfaces[k / 2].shape != CIRCLE) share_end(k / 2, k % 2, TOUCHING * least, least);
-    for (int k = 0; k < W.surface_count; k++)
-        for (int end = 0; end < 2; end++) {
-            find_mate(k, end, least);
-            if (W.surfaces[k].shape != CIRCLE) find_crown(k, end, least);
-        }
-    for (int k = 0; k < 2 * W.surface_count; k++) {
-        int mate = W.surfaces[k / 2].mates[k % 2], *of = W.surfaces[MAX(mate, 0)].mates;
-        if (W.surfaces[k / 2].shape == CIRCLE || mate < 0 || W.surfaces[mate].shape != CIRCLE) continue;
-        W.surfaces[mate].ledges[of[0] >= 0] = W.surfaces[k / 2].ledges[k % 2];
-        of[of[0] >= 0] = k / 2;
-    }
+    join_surfaces();
     for (int k = 0; k < W.surface_count; k++)
         if (W.surfaces[k].mover >= 0) prepare_mover(W.surfaces + k);
     W.ledge = INFINITY;

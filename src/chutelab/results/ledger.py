@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.results.record import ENTRIES, Record, balance, kept
+from chutelab.results.record import ENTRIES, PARTICLES, Record, balance, kept
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
 
@@ -50,6 +50,9 @@ class Ledger(Shown):
         kinetic and potential energies are counted, too, the latter with y = 0 at the hinge.
     damper_loss : float
         What the dampers of hinges take.
+    push_work : float
+        Work of forces on particles by hand, see `chutelab.start`. In the tracks and in `by_stream`
+        it is part of the belt work.
     restitution_loss : float
         Normal part of the losses in impacts.
     friction_loss : float
@@ -83,6 +86,7 @@ class Ledger(Shown):
     spring: tuple[float, float] = (0.0, 0.0)
     damper_loss: float = 0.0
     air_loss: float = 0.0
+    push_work: float = 0.0
 
     @property
     def relative_residual(self) -> float:
@@ -165,6 +169,9 @@ def ledger(recording: Record) -> Ledger:
         by_surface[AIR] = dict(zip(ENTRIES, (0.0, 0.0, recording.air_loss), strict=True))
     closed, work = _closed(found), float(recording.drives.sum())
     closed["belt_work"] -= work
+    if pushed := by_surface[PARTICLES]["belt_work"]:
+        by_surface[PARTICLES] |= {"belt_work": 0.0, "push_work": pushed}
+        closed |= {"belt_work": closed["belt_work"] - pushed, "push_work": pushed}
     return Ledger(
         **_hung(recording, by_surface, closed | {"drive_work": work}),
         by_surface=by_surface, by_stream=by_stream, air_loss=recording.air_loss,
@@ -188,7 +195,7 @@ def _hung(
         for name, ends in energies.items():
             before = closed.get(name, (0.0, 0.0))
             closed[name] = (before[0] + float(ends[0]), before[1] + float(ends[1]))
-        entries |= {"drive_work": worked, "damper_loss": damped}
+        entries |= {"drive_work": worked} | ({} if mover.hinge.steered else {"damper_loss": damped})
         entries["restitution_loss"] += stopped
         closed["drive_work"] += worked - given
         closed["restitution_loss"] += stopped

@@ -278,6 +278,9 @@ class Record(Shown):
     totals : ndarray, shape (S,) or (0,), dtype `TOTAL`
         Energies of all particles together at each step of the contact engine in a crowd: its tracks
         leave out what is less than a hop, and sums of squares of their velocities are not as near.
+    unsolved : ndarray, shape (S,) or (0,)
+        How well each of these steps was solved: the most overlap, in radii, that its solve leaves
+        beyond what it asks for. Solves end when that is small, or after so many sweeps.
     drives : ndarray, shape (len(surfaces),) or (0,)
         What of the belt work (J) in `by_surface`, in the knots and in `totals` is the work of what
         moves the surface, see docs/physics.md, "Moving surfaces". Empty where none does.
@@ -289,6 +292,8 @@ class Record(Shown):
     hinge_work : ndarray, shape (len(surfaces), 3) or (0, 3)
         J; of what hangs on hinges the work of its motor, and losses at its stops and in its damper.
         Empty where nothing does.
+    triggered : ndarray, shape (len(machine.triggers),)
+        When what waits for a touch came, went, or began to move, s; inf of what still waits.
     """
 
     machine: Machine
@@ -306,18 +311,24 @@ class Record(Shown):
     gained: float = 0.0
     air_loss: float = 0.0
     totals: NDArray[Any] = field(default_factory=lambda: np.empty(0, TOTAL))
+    unsolved: Floats = field(default_factory=lambda: np.empty(0))
     drives: Floats = field(default_factory=lambda: np.zeros(0))
     impulses: NDArray[Any] = field(default_factory=lambda: np.empty((0, 0), LOAD))
     swings: NDArray[Any] = field(default_factory=lambda: np.empty(0, SWING))
     hinge_work: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    triggered: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        arrays = "knots offsets ended events by_surface angle totals drives impulses swings"
-        for name in (*arrays.split(), "hinge_work"):
+        arrays = "knots offsets ended events by_surface angle totals unsolved drives impulses"
+        for name in (*arrays.split(), "swings", "hinge_work", "triggered"):
             getattr(self, name).flags.writeable = False
+        if len(self.triggered):
+            object.__setattr__(self, "machine", self.machine.when(self.triggered))
         if len(self.swings):
-            movers = (mover.swung(self.swings) for mover in self.machine.movers)
-            object.__setattr__(self, "machine", replace(self.machine, movers=tuple(movers)))
+            by_hand = np.setdiff1d(self.swings["surface"], [m.surface for m in self.machine.movers])
+            movers = *self.machine.movers, *map(self.machine.steered, by_hand.tolist())
+            swung = tuple(mover.swung(self.swings) for mover in movers)
+            object.__setattr__(self, "machine", replace(self.machine, movers=swung))
 
     @property
     def scene(self) -> Scene:

@@ -76,9 +76,10 @@ class Recorder:
         self.drives = np.zeros(owners)
         self.swings = np.empty(0, SWING)
         self.hinge_work = np.zeros((owners, 3))
+        self.triggered = np.full(len(machine.triggers), np.inf)
         self.contacts = 0
         self.gained = self.air_loss = 0.0
-        self.totals = np.empty(0, TOTAL)
+        self.totals, self.unsolved = np.empty(0, TOTAL), np.empty(0)
         self.impulses = np.empty((0, 0), LOAD)
         # Of engines that count loads here, if these are asked for.
         self.bins = Bins(machine) if machine.loads else None
@@ -135,6 +136,11 @@ class Recorder:
         for when in ("before", "after"):
             events[f"omega_{when}"] = rows[when][:, 2]
         self._events.append(events)
+
+    def take_totals(self, rows: NDArray[Any]) -> None:
+        """Take what the core has of all steps, dtype ``Total``."""
+        self.totals = _items(rows, "t", TOTAL.itemsize).copy().view(TOTAL)
+        self.unsolved = rows["unsolved"].copy()
 
     def book(
         self,
@@ -248,8 +254,9 @@ class Recorder:
             ended=ended,
             events=events,
             by_surface=self.by_surface.copy(),
-            drives=self.drives if self.machine.movers else np.zeros(0),
+            drives=self.drives if self.machine.movers or len(self.swings) else np.zeros(0),
             swings=self.swings,
+            triggered=self.triggered,
             hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 3)),
             steps=steps,
             contacts=self.contacts,
@@ -257,6 +264,7 @@ class Recorder:
             gained=self.gained,
             air_loss=self.air_loss,
             totals=self.totals,
+            unsolved=self.unsolved,
             impulses=self.impulses,
         )
 

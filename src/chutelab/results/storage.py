@@ -51,14 +51,18 @@ ARRAYS = {
     "by_surface": np.dtype("f8"),
     "angle": np.dtype("f8"),
     "totals": TOTAL,
+    "unsolved": np.dtype("f8"),
     "drives": np.dtype("f8"),
     "impulses": LOAD,
     "swings": SWING,
     "hinge_work": np.dtype("f8"),
+    "triggered": np.dtype("f8"),
 }
 """Arrays of a file and their types."""
 
-MAYBE = ("angle", "totals", "drives", "impulses", "swings", "hinge_work")
+MAYBE = (
+    "angle", "totals", "unsolved", "drives", "impulses", "swings", "hinge_work", "triggered",
+)  # fmt: skip
 """Those that are left out where they are empty."""
 
 HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
@@ -218,6 +222,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         raise _UnfitError("the header is of another scene")
     numbers = {
         "by_surface": arrays["by_surface"], "angle": recording.angle, "drives": recording.drives,
+        "unsolved": recording.unsolved,
     }  # fmt: skip
     numbers["gained"] = np.array([recording.gained, recording.air_loss], dtype=float)
     numbers["hinge_work"] = recording.hinge_work
@@ -238,11 +243,14 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and not np.any((sizes < 0) | (sizes == 1))
         and recording.angle.shape in ((0,), knots.shape)
         and recording.ended.shape == sizes.shape
+        and recording.unsolved.shape in ((0,), recording.totals.shape)
         and (not recording.impulses.size or recording.impulses.shape[1:] == (surfaces - 1,))
         and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
         and recording.drives.shape == ((surfaces,) if recording.machine.movers else (0,))
         and recording.hinge_work.shape == ((surfaces if len(recording.swings) else 0), 3)
+        and recording.triggered.shape == (len(recording.machine.triggers),)
+        and not np.any(np.isnan(recording.triggered))
         and recording.swings.ndim == 1
         and all(
             mover.hinge is None or len(mover.hinge.states) for mover in recording.machine.movers

@@ -235,6 +235,7 @@ REGISTRY: Final = {
         *(_run(f"ended.{why}", f"particles whose track ended: {why}", "") for why in ENDINGS),
         _run("ledger.belt_work", "what the drives of all belts pay", of="total"),
         _run("ledger.drive_work", "what moves surfaces: their turn, shake and travel, and motors"),
+        _run("ledger.push_work", "what forces on particles do by hand"),
         _run("ledger.restitution_loss", "loss of all bounces", of="total", columns=ITSELF),
         _run("ledger.friction_loss", "heat of all slip", of="total"),
         _run("ledger.air_loss", "what of the friction's heat air takes"),

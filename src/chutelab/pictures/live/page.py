@@ -6,7 +6,7 @@ import json
 import zlib
 from base64 import b64encode
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from html import escape
 from importlib.resources import files
@@ -171,6 +171,7 @@ def _strings(language: str) -> dict[str, str]:
     return said | {f"title-{own}": title for own, title in titles}
 
 
+@lru_cache(8)
 def _packed(content: bytes) -> str:
     """Return it compressed, as text: two of 91 letters for 13 bits, and one for at most the last 6.
 

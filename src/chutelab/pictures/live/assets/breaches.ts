@@ -9,7 +9,8 @@ import type { Words } from "./words.ts";
 
 /** A whole run as the core's laws take it: all knots, and the first of each particle. */
 export type Run = { machine: Machine, knots: Float64Array, offsets: number[], books: number[],
-  swings: Map<number, Swings>, gained: number, contacts: number, steps: number, unreal: number };
+  swings: Map<number, Swings>, gained: number, unsolved: number, contacts: number, steps: number,
+  unreal: number };
 
 /** A law that is broken: by which particle first, when (s) and where (m), and beside what; -1 of
  * particle or surface if it is about all together. */
@@ -18,7 +19,7 @@ export type Breach = { law: number, particle: number, surface: number, t: number
 
 /** What the laws ask of a recording of a run that is over. */
 function runOf(recording: Recording): Run {
-  const { machine, tracks, events, books, swings, gained, contacts, steps } = recording;
+  const { machine, tracks, events, books, swings, gained, unsolved, contacts, steps } = recording;
   const offsets = [0];
   for (const { count } of tracks) offsets.push(offsets[offsets.length - 1] + count);
   const knots = new Float64Array(offsets[tracks.length] * KNOT_ROW);
@@ -28,7 +29,8 @@ function runOf(recording: Recording): Run {
   const unreal = events.flatMap(({ t, x, y, before, after, normal, tangent }) =>
     [t, x, y, ...before, ...after, normal, tangent]).filter((value) => !isFinite(value)).length;
   return {
-    machine, knots, offsets, books: (books ?? []).flat(), swings, gained, contacts, steps, unreal,
+    machine, knots, offsets, books: (books ?? []).flat(), swings, gained, unsolved,
+    contacts, steps, unreal,
   };
 }
 
@@ -83,7 +85,8 @@ function barriersOf({ segments, arcs, pulley, movers }: Machine) {
 }
 
 /** What is said of each law, in the order of the core's enum Law. */
-const SAID = ["law-finite", "law-through", "law-inside", "law-energy", "law-losses", "law-ledger"];
+const SAID = ["law-finite", "law-through", "law-inside", "law-energy", "law-losses", "law-ledger",
+  "law-solved"];
 
 /** The line below the picture that says which law is broken. */
 function watchLaws(line: HTMLElement, lab: Lab, words: Words) {

@@ -254,6 +254,7 @@ class Recording {
   books: number[][] | null = null;
   /** By which the engine's solves broke their law of energy, J. */
   gained = 0;
+  unsolved = 0;
   /** Impacts and steps so far. */
   contacts = 0;
   steps = 0;
@@ -273,13 +274,16 @@ class Recording {
   }
 
   add({
-    knots, tips, events, swings, now, state, books = null, gained = 0, contacts = 0, steps = 0,
+    knots, tips, events, swings, now, state, books = null, gained = 0, unsolved = 0,
+    contacts = 0, steps = 0,
   }: {
     knots: Float64Array, tips: Float64Array, events: Event[], swings: number[], now: number,
     state: string,
-    books?: number[][] | null, gained?: number, contacts?: number, steps?: number,
+    books?: number[][] | null, gained?: number, unsolved?: number, contacts?: number,
+    steps?: number,
   }) {
     this.gained = gained;
+    this.unsolved = unsolved;
     this.contacts = contacts;
     this.steps = steps;
     this.books = this.renamed ? null : books;

@@ -82,7 +82,13 @@ def test_where_blows_make_energy_a_law_tells(with_fault):
 
 
 @pytest.mark.parametrize(
-    ("engine", "e"), [("contact", 0.0), ("contact", 0.4), ("contact", 1.0), ("pymunk", 0.4)]
+    ("engine", "e"),
+    [
+        ("contact", 0.0),
+        ("contact", 0.4),
+        ("contact", 1.0),
+        pytest.param("pymunk", 0.4, marks=pytest.mark.slow),
+    ],
 )
 def test_one_of_two_disks_may_leave_faster_than_both_came(engine, e):
     """Both have the speed V = 1: why in a column a disk may be faster than a free fall.

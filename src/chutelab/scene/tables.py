@@ -137,6 +137,9 @@ class Pair(Table):
     between: Two = described(..., "Two kinds of particles by name, or one and a surface")
     restitution: Share | None = pair_restitution(None, "of these two")
     friction: Amount | None = pair_friction(None, "of these two")
+    cohesion: Amount = described(
+        0.0, "Force that it takes to pull them off each other where they touch", "N"
+    )
     meet: Switch = described(True, "Whether two kinds meet; if not, they pass through each other")
 
 
@@ -177,6 +180,12 @@ class Travel(Table):
     in_: Duration = described(..., "How long it takes", "s", alias="in")
 
 
+class When(Table):
+    """What something waits for."""
+
+    touched: Name = described(..., "A surface: when the first particle touches it")
+
+
 class Motor(Table):
     """What turns a hinge: as fast as this, as far as its torque is enough."""
 
@@ -212,6 +221,10 @@ STOPS: Any = described(
     "degrees",
 )
 MOTOR: Any = described(None, "... a motor: { speed_deg = 180, torque = 2 }")
+STARTS: Any = described(
+    None,
+    'When its motion or its motor begins: { touched = "bell" }, a surface; default: at once',
+)
 
 
 class Plate(Table):
@@ -258,6 +271,7 @@ class Plate(Table):
     damper: Amount = DAMPER
     stops_deg: Stops | None = STOPS
     motor: Motor | None = MOTOR
+    starts_when: When | None = STARTS
 
 
 class Outgoing(Table):
@@ -332,6 +346,12 @@ class Surface(Table):
         None, "When it goes, and what it held falls: a gate", "s"
     )
     closes_at: Coordinate | None = described(None, "When it comes", "s")
+    opens_when: When | None = described(
+        None, 'It goes when another surface is touched: { touched = "bell" }'
+    )
+    closes_when: When | None = described(
+        None, 'It comes when another surface is touched: { touched = "bell" }'
+    )
     pivot: Point | None = described(
         None,
         "What it turns about, and what travels [x, y]; default: its first point, the centre of an"
@@ -349,6 +369,7 @@ class Surface(Table):
     damper: Amount = DAMPER
     stops_deg: Stops | None = STOPS
     motor: Motor | None = MOTOR
+    starts_when: When | None = STARTS
     repeat: Repeats = described(
         (),
         "Copies [[n, dx, dy], ...]: n of it, each moved on by (dx, dy) m; a second entry repeats"

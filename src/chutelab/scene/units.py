@@ -58,7 +58,7 @@ _PREFIXES: Final = {"n": 1e-9, "µ": 1e-6, "u": 1e-6, "m": 1e-3, "c": 1e-2, "": 
 UNITS: Final = {
     **{f"{prefix}m": ("m", size) for prefix, size in _PREFIXES.items()},
     **{f"{prefix}m/s": ("m/s", size) for prefix, size in _PREFIXES.items()},
-    **{f"{prefix}{unit}": (unit, size) for unit in "sJW" for prefix, size in _PREFIXES.items()},
+    **{f"{prefix}{unit}": (unit, size) for unit in "sJWN" for prefix, size in _PREFIXES.items()},
     **{f"{prefix}g": ("kg", 1e-3 * size) for prefix, size in _PREFIXES.items()},
     **dict.fromkeys(("m/s²", "m/s^2"), ("m/s²", 1.0)),
     "degrees": ("degrees", 1.0),

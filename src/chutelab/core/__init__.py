@@ -186,6 +186,13 @@ class Module:
         rows: NDArray[Any] = self._bytes[begin : begin + kind.itemsize * count].view(kind)
         return rows
 
+    def take_events(self, of: str = "World") -> NDArray[Any]:
+        """Return all events as the bytes of rows of `results.EVENT`, and make room for others."""
+        struct = self.structs[of]
+        size: int = self.call("pack_events", struct.events, struct.event_count)
+        struct.event_count = 0
+        return self._bytes[struct.events : struct.events + size].copy()
+
     def fill(self, of: str, **arrays: NDArray[Any]) -> None:
         """Copy arrays, flat and contiguous, to where the fields of a struct point."""
         for name, array in arrays.items():

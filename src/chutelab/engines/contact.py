@@ -227,10 +227,11 @@ class Job:
     def drain(self) -> None:
         """Take what was written, so that there is room for more."""
         world, module = self.module.world, self.module
-        for what, kept in (("knot", self.knots), ("event", self.events)):
-            if count := getattr(world, f"{what}_count"):
-                kept.append(module.array(f"{what}s", dtype(what.title()), count).copy())
-                setattr(world, f"{what}_count", 0)
+        if world.knot_count:
+            self.knots.append(module.array("knots", dtype("Knot"), world.knot_count).copy())
+            world.knot_count = 0
+        if world.event_count:
+            self.events.append(module.take_events())
 
     def share(self) -> float:
         """Return the share of the run that is done."""

@@ -218,8 +218,7 @@ def drain(module: Module, recorder: Recorder) -> None:
         recorder.take_knots(module.array("knots", dtype("Knot"), exact.knot_count, of="Exact"))
         exact.knot_count = 0
     if exact.event_count:
-        recorder.take_events(module.array("events", dtype("Event"), exact.event_count, of="Exact"))
-        exact.event_count = 0
+        recorder.take_events(module.take_events("Exact"))
 
 
 def collect(module: Module, recorder: Recorder) -> None:

@@ -123,19 +123,9 @@ class Recorder:
         own = _items(rows, "t", KNOT.itemsize).copy().view(KNOT)
         self.add(rows["disk"].astype(np.int64), own)
 
-    def take_events(self, rows: NDArray[Any]) -> None:
-        """Add events as the core writes them, dtype ``Event``."""
-        events = np.empty(len(rows), EVENT)
-        for name, source, size in (
-            ("t", "t", 8), ("particle", "disk", 8), ("position", "x", 16),
-            ("velocity_before", "before", 16), ("velocity_after", "after", 16),
-            ("normal_impulse", "normal", 16),
-        ):  # fmt: skip
-            _items(events, name, size)[:] = _items(rows, source, size)
-        events["kind"], events["surface"] = rows["kind"], rows["surface"]
-        for when in ("before", "after"):
-            events[f"omega_{when}"] = rows[when][:, 2]
-        self._events.append(events)
+    def take_events(self, packed: NDArray[np.uint8]) -> None:
+        """Add events as the core hands them over: the bytes of rows of `EVENT`."""
+        self._events.append(packed.view(EVENT))
 
     def take_totals(self, rows: NDArray[Any]) -> None:
         """Take what the core has of all steps, dtype ``Total``."""

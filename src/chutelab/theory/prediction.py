@@ -83,7 +83,7 @@ class Obstacles:
         size, begin, extent, owner = table[:, 2:].T
         return cls(
             (*(line[0] for line in lines), *(bend[0] for bend in bends)),
-            ends[:, 0], tangent, np.stack([-tangent[:, 1], tangent[:, 0]], axis=1), length,
+            ends[:, 0], tangent, tangent[:, ::-1] * np.array([-1.0, 1.0]), length,
             table[:, :2], size, begin, extent, owner.astype(np.int64),
         )  # fmt: skip
 
@@ -553,8 +553,8 @@ def hindrance(course: Course) -> tuple[str, str] | None:
     flight = course.separation
     foot = float((course.impact - course.pivot) @ course.up)
     hit = low <= foot <= high  # false for NaN: the line is not met
-    plate = Obstacles.of(course.lines[:1])
     obstacles = Obstacles.of(course.lines[1:] if hit else course.lines, course.bends)
+    plate = obstacles if hit else Obstacles.of(course.lines[:1])
     horizon = float(found.t2) if hit else flight.horizon(plate, radius)
     # Thrown up slowly, it may come down on the pulley again. Faster, it would only seem to at once,
     # by rounding: it starts on the circle.
@@ -594,8 +594,10 @@ def hindrance(course: Course) -> tuple[str, str] | None:
     pulley: Bend = ("pulley", (0.0, 0.0), course.belt.pulley_radius, 0.0, WHOLE)
     # The outgoing belt is not among them: no part of it, ends included, is met above its level.
     bends = [*course.bends, pulley]
-    around = Obstacles.of(course.lines, bends)
-    horizon = float(found.t3) if lands else flight.horizon(around, radius)
+    if lands:
+        horizon = float(found.t3)
+    else:
+        horizon = flight.horizon(Obstacles.of(course.lines, bends), radius)
     again, pressing = np.inf, -flight.gravity * sin_cos(course.angle)[0]
     if pressing > 0.0:
         # Gravity takes it back to a plate that leans away: to its face, where it is now, or an end.

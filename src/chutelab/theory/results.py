@@ -176,7 +176,8 @@ class Answers:
     def require(self, rules: dict[str, Bools]) -> None:
         """Object to parameters that break a rule; NaN never holds."""
         for rule, holds in rules.items():
-            self.fail(~holds, Reason.OUTSIDE.because(f"{rule} is required"))
+            if not holds.all():
+                self.fail(~holds, Reason.OUTSIDE.because(f"{rule} is required"))
 
     def keep(self, **values: Floats) -> None:
         """Store results of a stage where nothing has gone wrong up to now."""

@@ -217,6 +217,10 @@ void kick_disks(double h);
 double pushed(const Disk *d, double f);
 double steered_to(const Mover *m, double t);
 
+/* trigger.c */
+int is_triggered(int owner, int doing);
+void touch(int owner, double t);
+
 /* grid.c */
 int list_near(double end);
 int enter_again(int i, double end);

@@ -33,8 +33,8 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         return wanted
     if any(outline is not None for outline in machine.outlines) or machine.threads:
         return "pymunk"
-    stepped = machine.interact or machine.movers or np.any(machine.air) or machine.scene.clings
-    return "contact" if stepped else "exact"
+    stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
+    return "contact" if stepped or machine.scene.clings else "exact"
 
 
 def simulate(
@@ -210,6 +210,10 @@ def must_fit(machine: Machine, name: str) -> None:
         if machine.threads:
             raise refused(scene, "string", len(machine.threads), "none, or the pymunk engine")
     if name == "exact":
+        if machine.triggers:
+            waits = machine.surfaces[machine.triggers[0].surface]
+            allowed = f"contact or pymunk, because {waits} waits until something is touched"
+            raise refused(scene, "run.engine", "exact", allowed)
         if machine.movers:
             moving = machine.surfaces[machine.movers[0].surface]
             allowed = f"contact or pymunk, because {moving} moves: no closed form has its blows"

@@ -332,6 +332,18 @@ class SceneTables(Table):
         }
 
     @property
+    def triggers(self) -> tuple[tuple[str, str, str], ...]:
+        """What waits for a touch: a surface, what it then does, and which one is to be touched."""
+        named: list[tuple[str, Any]] = [(one.name or "plate", one) for one in self.plates]
+        named += [(one.name, one) for one in self.surface]
+        return tuple(
+            (name, doing, when.touched)
+            for name, one in named
+            for doing in ("opens", "closes", "starts")
+            if (when := getattr(one, f"{doing}_when", None)) is not None
+        )
+
+    @property
     def hinges(self) -> bool:
         """Whether something hangs on a hinge."""
         return any(one.hinge for one in self.movers.values())

@@ -180,6 +180,12 @@ class Travel(Table):
     in_: Duration = described(..., "How long it takes", "s", alias="in")
 
 
+class When(Table):
+    """What something waits for."""
+
+    touched: Name = described(..., "A surface: when the first particle touches it")
+
+
 class Motor(Table):
     """What turns a hinge: as fast as this, as far as its torque is enough."""
 
@@ -215,6 +221,10 @@ STOPS: Any = described(
     "degrees",
 )
 MOTOR: Any = described(None, "... a motor: { speed_deg = 180, torque = 2 }")
+STARTS: Any = described(
+    None,
+    'When its motion or its motor begins: { touched = "bell" }, a surface; default: at once',
+)
 
 
 class Plate(Table):
@@ -261,6 +271,7 @@ class Plate(Table):
     damper: Amount = DAMPER
     stops_deg: Stops | None = STOPS
     motor: Motor | None = MOTOR
+    starts_when: When | None = STARTS
 
 
 class Outgoing(Table):
@@ -335,6 +346,12 @@ class Surface(Table):
         None, "When it goes, and what it held falls: a gate", "s"
     )
     closes_at: Coordinate | None = described(None, "When it comes", "s")
+    opens_when: When | None = described(
+        None, 'It goes when another surface is touched: { touched = "bell" }'
+    )
+    closes_when: When | None = described(
+        None, 'It comes when another surface is touched: { touched = "bell" }'
+    )
     pivot: Point | None = described(
         None,
         "What it turns about, and what travels [x, y]; default: its first point, the centre of an"
@@ -352,6 +369,7 @@ class Surface(Table):
     damper: Amount = DAMPER
     stops_deg: Stops | None = STOPS
     motor: Motor | None = MOTOR
+    starts_when: When | None = STARTS
     repeat: Repeats = described(
         (),
         "Copies [[n, dx, dy], ...]: n of it, each moved on by (dx, dy) m; a second entry repeats"

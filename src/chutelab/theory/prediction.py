@@ -519,6 +519,8 @@ def outside(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
     yield hangs, "the particle hangs on a string"
     for name in scene.movers:
         yield True, f"{name} moves"
+    for name, *_ in scene.triggers:
+        yield True, f"{name} waits until something is touched"
     yield from not_carried(scenes)
     yield scene.crowded, "particles interact"
 

@@ -13,7 +13,7 @@ import wasmtime
 from hypothesis import settings
 
 from chutelab import core as module
-from live.browser import browser, opened, page_of, shown  # noqa: F401
+from live.browser import browser, idle, opened, page_of, shown  # noqa: F401
 
 ROOT = Path(__file__).parents[1]
 

@@ -18,9 +18,12 @@ def seeds(few, many):
 
 
 def some(cases, of=3):
-    """Return one case of each `of` as it is, and the others slow."""
-    slow = pytest.mark.slow
-    return [case if n % of == 0 else pytest.param(case, marks=slow) for n, case in enumerate(cases)]
+    """Return one case of each `of` as it is, and the others slow; a tuple is a case of several."""
+    rows = [case if isinstance(case, tuple) else (case,) for case in cases]
+    return [
+        pytest.param(*row, marks=() if n % of == 0 else pytest.mark.slow)
+        for n, row in enumerate(rows)
+    ]
 
 
 def chutelab(*arguments):

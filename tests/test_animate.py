@@ -759,7 +759,10 @@ def test_without_the_energy_the_machine_is_larger(runs):
     assert large.view[2] > 1.4 * small.view[2]
 
 
-@pytest.mark.parametrize(("name", "delay"), [("perpendicular", 40), ("stream", 50)])
+@pytest.mark.parametrize(
+    ("name", "delay"),
+    [("perpendicular", 40), pytest.param("stream", 50, marks=pytest.mark.slow)],
+)
 def test_a_film_is_small_and_a_streams_has_fewer_pictures_a_second(name, delay, tmp_path):
     few = scene.load(name, overrides=["stream.count=4"] if name == "stream" else ())
     path = animate(simulate(few), tmp_path / "lesson.gif")

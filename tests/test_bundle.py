@@ -102,7 +102,7 @@ def test_a_bundle_without_the_wheel_says_nothing_of_it(tmp_path):
         assert "#get" not in page.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
 def test_pages_of_a_bundle_can_be_read_by_everybody(web, opened, scheme):
     for name in ("index.html", "02-letting-go/index.html"):
         page = opened(web / name, color_scheme=scheme)

@@ -12,6 +12,7 @@ import pytest
 
 from chutelab.core import Status, constants
 from chutelab.results import Kind
+from chutelab.results.laws import SOLVED, judge
 from cores import Core, modes
 from machines import boxed, face, of_sizes, scene_of, thrown
 
@@ -281,3 +282,35 @@ def test_a_compiled_core_that_is_kept_costs_only_time(tmp_path):
     for one in kept[:-1]:
         assert one.read_bytes() == good
         assert not one.stat().st_mode & 0o022
+
+
+# How well a step is solved
+
+
+@pytest.mark.parametrize("sweeps", [1, 3, 100])
+def test_what_a_solve_leaves_is_by_how_much_overlaps_grow_in_its_step(sweeps):
+    # Ten disks on each other. They fall for a step; the next one is asked to leave overlaps, which
+    # are below 0.1 % of the radius, as they are: what it leaves is by how much one grows.
+    r, n = 0.01, 10
+    machine = crowd_scene(particle={"radius": r}, stream={"count": n}, surface=[FLOOR])
+    core = Core(thrown(machine, [(0.0, r + 2.0 * r * k) for k in range(n)], np.zeros((n, 2))))
+    core.world.sweeps = sweeps
+
+    def overlaps():
+        return 2.0 * r - np.diff(np.concatenate([[-r], np.sort(core.disks["y"])]))
+
+    core.step()
+    before = overlaps()
+    core.step()
+    grown = (overlaps() - before).max() / r
+    core.step()
+    assert core.recording().unsolved[1] == pytest.approx(grown, abs=1e-12)
+    assert (grown > 1e-4) == (sweeps < 100)
+
+
+def test_a_step_that_is_not_solved_breaks_a_law():
+    recording = mixed(0)[0].run()
+    assert judge(recording) == ()
+    left = recording.unsolved.copy()
+    left[3] = 0.11
+    assert [broken.law for broken in judge(replace(recording, unsolved=left))] == [SOLVED]

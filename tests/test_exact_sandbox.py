@@ -230,7 +230,7 @@ def test_an_arc_that_opens_lets_go_of_what_rides_in_it():
     np.testing.assert_allclose(end, velocity - [0.0, G * 0.3], atol=1e-11)
 
 
-@pytest.mark.parametrize("engine", [exact, contact])
+@pytest.mark.parametrize("engine", [exact, pytest.param(contact, marks=pytest.mark.slow)])
 def test_gates_across_the_way_of_a_carried_particle(engine):
     """A bar beside the pulley, in the way at 30°: passed before it is there, else struck."""
     built = inclined(10.0, 0.8, "adhesion")
@@ -254,7 +254,10 @@ def rolling(built, share, kappa, radius=0.02):
     return of_sizes(built, np.array([radius]), 0.1, np.array([share]), rolling=np.array([kappa]))
 
 
-@pytest.mark.parametrize(("engine", "off"), [(exact, 1e-12), (contact, 1e-3), (pymunk, 1e-7)])
+@pytest.mark.parametrize(
+    ("engine", "off"),
+    [(exact, 1e-12), (contact, 1e-3), pytest.param(pymunk, 1e-7, marks=pytest.mark.slow)],
+)
 @pytest.mark.parametrize("share", [0.5, pytest.param(0.4, marks=pytest.mark.slow)])
 def test_a_roller_slows_down_and_stops(share, engine, off):
     """m v' = -F and I ω' = F r - κ N r: v' = -κ g/(1 + I/m r²), and what it has becomes heat."""

@@ -123,7 +123,7 @@ def web(tmp_path_factory):
     return of
 
 
-@pytest.fixture(params=some(NUMBERS, 4))
+@pytest.fixture(params=some(NUMBERS, 7))
 def number(request):
     return request.param
 

@@ -11,7 +11,7 @@ from shared import find, lessons
 
 DESK, WALL, PHONE = (1366, 768), (1920, 1080), (390, 844)
 
-QUICK = [("trust", DESK, "light", "en"), ("letting-go", PHONE, "dark", "de")]
+QUICK = [("letting-go", PHONE, "dark", "de")]
 WHOLE = [
     (one.name, size, scheme, language)
     for one in lessons()

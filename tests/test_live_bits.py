@@ -14,6 +14,7 @@ from chutelab.theory import Reason, predict, transfer
 from chutelab.theory.prediction import unbounded
 from chutelab.theory.results import STAGES
 from live.node import ask, needs_node, plain
+from test_live_core import MOVING
 
 pytestmark = needs_node
 
@@ -335,6 +336,8 @@ def test_what_is_taken_from_an_address_is_refused_where_python_refuses_it(count)
     """Any text may be there: it must never do more than be refused."""
     rng = np.random.default_rng(99)
     seeds = [sandbox.tables(seed) for seed in range(20)]
+    moving = {**THROWN, "run": {"until": 1.0}}
+    seeds += [{**moving, "surface": [{**WALL, **keys}]} for keys in MOVING]
     documents = [spoilt(rng, seeds[n % len(seeds)]) for n in range(count)]
     refused = 0
     for document, found in zip(documents, in_node(documents), strict=True):

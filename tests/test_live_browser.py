@@ -66,7 +66,7 @@ def lands_as_in_python(page, file, seed, count):
 @pytest.mark.parametrize(
     ("scenes", "each"),
     [
-        pytest.param(SCENES[1:4], 3, id="few"),
+        pytest.param(SCENES[1:3], 3, id="few"),
         pytest.param(SCENES, 40, id="200", marks=pytest.mark.slow),
     ],
 )
@@ -113,8 +113,11 @@ def test_a_stream_goes_on_under_the_hands_and_its_ledger_closes(shown):
 
 @pytest.mark.parametrize(
     ("name", "size", "scheme"),
-    [("stream", (1366, 620), "dark"), ("spoon", (360, 740), "light")],
-)  # fmt: skip
+    [
+        ("stream", (1366, 620), "dark"),
+        pytest.param("spoon", (360, 740), "light", marks=pytest.mark.slow),
+    ],
+)
 def test_axe_finds_nothing(shown, name, size, scheme):
     viewport = {"width": size[0], "height": size[1]}
     page = shown(name, ["stream.count=5"], viewport=viewport, color_scheme=scheme)

@@ -21,11 +21,23 @@ SCENES = [
     ("slip", "particle.shape=sphere", "particle.spin=true"),
     *(("stream", "stream.count=20", f"stream.seed={seed}") for seed in (2**32, 2**53 - 1)),
 ]  # fmt: skip
+BALL = {"stream": {"at": [0.0, 0.3], "velocity": [0.1, 0.0]}, "run": {"until": 1.2}}
+LINE = {"name": "line", "from": [-0.2, 0.0], "to": [0.3, 0.0], "restitution": 0.6}
+HANGS = {"hinge": "pivot", "mass": 0.1, "friction": 0.5}
+MOVING = [
+    {"shake": {"by": [0.001, 0.004], "frequency": 12.5, "phase_deg": 30.0}, "speed": 0.5},
+    {"turn": -40.0, "pivot": [0.1, -0.05]}, {"travel": {"to": [-0.3, 0.1], "in": 0.6}},
+    {"turn": 20.0, "shake": {"by": [0.01, 0.0], "frequency": 3.0}, "closes_at": 0.05},
+    {**HANGS, "spring": 2.0, "rest_deg": 5.0, "damper": 0.01},
+    {**HANGS, "stops_deg": [-30.0, 15.0]}, {**HANGS, "hinge": [0.05, 0.0], "inertia": 0.5},
+    {**HANGS, "motor": {"speed_deg": 120.0, "torque": 0.3}},
+]  # fmt: skip
 MANY = [("stream", "stream.count=60"), ("hopper", "stream.count=150")]
 
 
 def same_runs(scenes):
     told = [page_scene(scene) for scene in scenes]
+    swung = 0
     lab = describe(load("perpendicular"))
     answers = ask("core.mjs", {"lab": lab, "scenes": [given for given, _ in told]})
     for (given, scene), answer in zip(told, answers, strict=True):
@@ -42,13 +54,34 @@ def same_runs(scenes):
         events = np.concatenate(job.events)
         assert [event["t"] for event in answer["events"]] == events["t"].tolist(), given
         assert [event["kind"] for event in answer["events"]] == events["kind"].tolist(), given
+        states = job.module.array("swings", module.dtype("Swing"), job.module.world.swing_count)
+        swings = np.array(answer["swings"]).reshape(-1, 4)
+        for n, name in enumerate(("t", "angle", "rate", "surface")):
+            assert np.array_equal(swings[:, n], states[name]), given
+        swung += len(states)
         books = job.module.array("books", engine.REAL, 3 * (job.owners + 1)).reshape(-1, 3)
         assert np.array_equal(np.array(answer["books"]), books), given
+    return swung
 
 
 @pytest.mark.parametrize("scenes", [SCENES, pytest.param(MANY, marks=pytest.mark.slow)])
 def test_the_pages_host_runs_every_kind_of_scene_as_python_does(scenes):
     same_runs([load(name, overrides) for name, *overrides in scenes])
+
+
+def test_what_moves_does_so_as_in_python():
+    kinds = {"particle": [{"name": "a"}, {"name": "b", "radius": [0.005, 0.01], "spin": True}]}
+    two = [
+        {**BALL["stream"], "particle": "a", "interact": True},
+        {"fill": [[-0.1, 0.2], [0.1, 0.28]], "count": 6, "particle": "b", "interact": True},
+    ]
+    crowd = {**BALL, **kinds, "stream": two}
+    arc = {"name": "bowl", "center": [0.0, 0.2], "radius": 0.2, "from_deg": 200, "to_deg": 340}
+    scenes = [
+        from_dict({**base, "surface": [{**shape, **keys}]})
+        for base in (BALL, crowd) for shape in (LINE, arc) for keys in MOVING
+    ]  # fmt: skip
+    assert same_runs([load("see-saw"), load("damper-plate"), *scenes]) > 1000
 
 
 @pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.slow)])

@@ -184,7 +184,7 @@ def test_numbers_have_their_range_and_controls_limit_them():
     )
     assert [field["key"] for field in free] == [
         "plate.distance", "plate.angle_deg", "plate.pivot_height", "plate.above",
-        "plate.below", "plate.restitution", "plate.friction",
+        "plate.below", "plate.restitution", "plate.friction", "plate.motion",
     ]  # fmt: skip
     angle = free[1]
     assert (angle["value"], angle["unit"]) == (40.0, "degrees")

@@ -134,7 +134,7 @@ def test_no_curve_jumps_at_the_end_what_the_landing_leaves_is_a_dot(shown):
     assert max(steps) < 3.0
 
 
-@pytest.mark.parametrize("name", ["stream", "hopper"])
+@pytest.mark.parametrize("name", ["hopper", pytest.param("stream", marks=pytest.mark.slow)])
 def test_while_a_crowd_runs_no_height_is_below_the_lowest_point(shown, name):
     """m g y from the lowest point of the run so far, of one and of all: never negative."""
     page = shown(name, ["stream.count=60"])
@@ -176,9 +176,9 @@ def test_the_numbers_of_a_crowd_lead_and_what_is_computed_is_hatched(shown):
     # Time goes no further than what is computed, wherever one points.
     page.evaluate("chutelab.lab.seek(chutelab.lab.horizon)")
     assert page.evaluate("chutelab.lab.t <= chutelab.lab.end")
-    page.evaluate("chutelab.lab.engine.allow(1e6)")
     page.evaluate("""() => new Promise((done) => {
       chutelab.lab.on("run", () => chutelab.lab.recording.state === "done" && done());
+      chutelab.lab.engine.allow(1e6);
     })""")
     page.evaluate("chutelab.lab.tell('time')")
     assert page.evaluate(hatched)[:2] == [False, 1.0]

@@ -11,6 +11,7 @@ from chutelab.machine import build
 from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
 from chutelab.pictures.live.page import html
 from chutelab.scene import from_dict, load
+from chutelab.scene.conflicts import HINGED, MOTIONS
 from live.browser import DONE, axe, spot
 
 expect = pytest.importorskip("playwright.sync_api").expect
@@ -77,10 +78,11 @@ def test_every_part_is_a_row_whose_keys_are_those_of_its_table():
     for part in PARTS:
         rules = tables[part["table"]]
         points = {"center", "radius", "from_deg", "to_deg"} if "arc" in part["places"] else set()
+        nested = {f"{key}.{one}" for key, rule in rules.items() for one in rule.get("parts", ())}
         keys = {*part["row"], *part["needs"], *points, *part["places"]} - {"arc"}
-        assert keys <= set(rules), part["part"]
-        mains = {key.rpartition(".")[2] for key in part["main"]}
-        assert mains <= {*rules, *tables["particle"]}, part["part"]
+        assert keys <= {*rules, *nested}, part["part"]
+        mains = {key.removeprefix("particle.") for key in part["main"]}
+        assert mains <= {*rules, *nested, *tables["particle"]}, part["part"]
     assert len({part["letter"] for part in PARTS}) == len(PARTS)
     # Every table that places something has its part.
     assert {part["table"] for part in PARTS} == {
@@ -129,11 +131,12 @@ def test_everything_that_a_part_can_say_has_a_field_and_is_saved(empty, tmp_path
         }
     tables = {name: set(rules) for name, rules in describe(None)["tables"].items()}
     arc = {"center", "radius", "from_deg", "to_deg"}
-    straight = tables["surface"] - arc - {"from", "to"}
-    bent = tables["surface"] - {"from", "to", "points"}
+    moves = {*MOTIONS, *HINGED}
+    still = tables["surface"] - moves - {"pivot"} | {"motion"}
+    straight, bent = still - arc - {"from", "to"}, still - {"from", "to", "points"}
     assert keys["incoming"] == tables["incoming"]
     assert keys["belt1"] == tables["conveyor"]
-    assert keys["plate1"] == tables["plate"] - {"distance", "pivot_height"}
+    assert keys["plate1"] == tables["plate"] - moves - {"distance", "pivot_height"} | {"motion"}
     assert keys["line1"] == keys["gate1"] == straight
     assert keys["arc1"] == keys["pegs1"] == bent
     # It has a line already, on which it is released: no box, and no height of a bed.
@@ -166,6 +169,75 @@ def test_everything_that_a_part_can_say_has_a_field_and_is_saved(empty, tmp_path
     assert (stream["rate"], kind["material"], kind["radius"]) == ("0.4 t/h", "wood", [0.008, 0.012])
     typed("stream[0].count", "12")
     assert same_bits(page, tmp_path) >= 24
+
+
+def test_a_line_moves_in_each_way_by_its_card_and_runs_to_the_same_bits(empty, tmp_path):
+    """All keys of each motion have a field; those of another motion are gone."""
+    page = empty()
+    page.click("#part-ball")
+    page.mouse.click(*spot(page, 0.52, 0.3))
+    page.click("#part-line")
+    for share in ((0.4, 0.5), (0.62, 0.55)):
+        page.mouse.click(*spot(page, *share))
+    page.keyboard.press("Escape")
+    page.evaluate("chutelab.bench.inspector.choose('line1')")
+    page.locator("#chosen .more summary").click()
+
+    def typed(key, text):
+        page.locator(f"[id='field-own-surface[0].{key}']").fill(text)
+        page.locator(f"[id='field-own-surface[0].{key}']").press("Enter")
+
+    def fields():
+        found = page.evaluate("chutelab.bench.inspector.own.entries.keys().toArray()")
+        return {one.partition("].")[2].partition("[")[0] for one in found}
+
+    still = fields()
+    wanted = {
+        "turns": ({"turn", "pivot"}, {"turn": "-45"}),
+        "shakes": ({"turn", "shake.by", "shake.frequency", "shake.phase_deg"},
+                   {"shake.frequency": "8"}),
+        "travels": ({"turn", "pivot", "travel.to", "travel.at", "travel.in"},
+                    {"travel.in": "0.7"}),
+        "hinge": ({"pivot", *HINGED}, {"spring": "0.8", "damper": "0.02", "stops_deg": "-40 60"}),
+    }  # fmt: skip
+    for motion, (keys, texts) in wanted.items():
+        page.select_option("[id='field-own-surface[0].motion']", motion)
+        assert fields() == still | keys, motion
+        for key, text in texts.items():
+            typed(key, text)
+        assert page.evaluate("chutelab.lab.fault") is None
+        assert same_bits(page, tmp_path) > 1
+    assert "shake" not in given(page)["surface"][0]
+    # A motor, by its switch and its slider, turns what hangs there.
+    page.locator("[id='field-own-surface[0].motor']").check()
+    assert fields() >= {"motor.speed_deg", "motor.torque"}
+    slider = page.get_by_label("motor's speed", exact=True).and_(page.locator("[type=range]"))
+    slider.fill("150")
+    assert given(page)["surface"][0]["motor"] == {"speed_deg": 150, "torque": 1}
+    assert same_bits(page, tmp_path) > 1
+    assert page.evaluate("chutelab.lab.recording.breaches") == []
+    # The drawing is where the core has it: at the angle of the swing then.
+    for t in (0.0, 0.4, 1.1):
+        page.evaluate(f"chutelab.lab.seek({t})")
+        angle = page.evaluate("[...chutelab.lab.recording.swings.values()][0].at(chutelab.lab.t)")
+        shown = page.locator("[data-part=line1]").get_attribute("transform")
+        assert float(shown.split("rotate(")[1].split()[0]) == pytest.approx(-np.degrees(angle))
+    assert abs(angle) > 0.1
+    # Dragged by its body, its hinge goes along, however far it has turned.
+    page.keyboard.press("Escape")
+    before = given(page)["surface"][0]["points"]
+    middle = page.evaluate("""() => {
+      const { stage: { view, posed } } = chutelab, [{ ends: [x, y, u, v] }] = posed.segments;
+      const { left, top } = document.getElementById("stage").getBoundingClientRect();
+      return [left + view.px(0.7 * u + 0.3 * x), top + view.py(0.7 * v + 0.3 * y)];
+    }""")
+    page.mouse.move(*middle)
+    page.mouse.down()
+    page.mouse.move(middle[0] + 30, middle[1] + 10, steps=4)
+    page.mouse.up()
+    moved = np.subtract(given(page)["surface"][0]["points"], before)
+    assert moved[0] == pytest.approx(moved[1])
+    assert moved[0][0] > 0.0
 
 
 def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_path):
@@ -404,8 +476,8 @@ def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_
 @pytest.mark.parametrize(
     ("size", "scheme", "touch"),
     [
-        ((1366, 768), "dark", False),
         ((390, 844), "light", True),
+        pytest.param((1366, 768), "dark", False, marks=pytest.mark.slow),
         pytest.param((800, 1100), "dark", True, marks=pytest.mark.slow),
     ],
 )

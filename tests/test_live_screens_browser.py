@@ -15,7 +15,7 @@ from live.browser import DONE
 
 SIZES = {"wide": [(1366, 768), (1920, 1080)], "phone": [(390, 844)]}
 
-SAMPLE = {("wide", "perpendicular"), ("phone", "spoon"), ("wide", "stream"), ("phone", "mixture")}
+SAMPLE = {("wide", "perpendicular"), ("phone", "mixture")}
 """Those that are looked at in every run of the tests; all of them are slow."""
 
 # Show a time in the middle of the run, or of what is computed of it.

@@ -10,6 +10,7 @@ from PIL import Image
 
 from chutelab.scene import load
 from live.browser import DONE
+from shared import some
 
 playwright = pytest.importorskip(
     "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
@@ -239,20 +240,20 @@ def test_the_hand_moves_the_view_by_mouse_finger_and_keys_and_nothing_else(shown
     assert page.evaluate("chutelab.bench.inspector.parts") == ["plate"]
 
 
-def over(*names):
-    """Each scene at one of three sizes of the window; all of them at all sizes are slow."""
+def over(*names, quick=(0, 1)):
+    """Scenes at three sizes of the window; all but some, each at another size, are slow."""
     sizes = [(1366, 768), (390, 844), (1920, 1080)]
     return pytest.mark.parametrize(
         ("name", "size"),
         [
-            pytest.param(name, size, marks=() if n % 3 == k else pytest.mark.slow)
+            pytest.param(name, size, marks=() if n == k in quick else pytest.mark.slow)
             for n, name in enumerate(names)
             for k, size in enumerate(sizes)
         ],
     )
 
 
-@over("perpendicular", "galton", "cascade", "spoon", "inclined-40")
+@over("inclined-40", "galton", "cascade", "spoon", "perpendicular")
 def test_the_machine_is_fitted_into_what_the_cards_leave_free(shown, name, size):
     page = shown(name, viewport={"width": size[0], "height": size[1]})
     free = page.evaluate("chutelab.stage.view.free")
@@ -343,7 +344,7 @@ LEGEND = """() => {
 }"""
 
 
-@over("inclined-40", "hopper", "mixture")
+@over("inclined-40", "hopper", "mixture", quick=(0, 2))
 def test_the_legend_tells_colours_and_lies_on_nothing(shown, name, size):
     page = shown(name, viewport={"width": size[0], "height": size[1]}, language="de")
     kinds = page.evaluate("chutelab.lab.machine.streams.length")
@@ -522,7 +523,7 @@ LABELS = """() => {
 }"""
 
 
-@over("perpendicular", "inclined-20", "inclined-60", "inclined-conveyor", "low-speed", "cascade")
+@over("perpendicular", "inclined-60", "inclined-20", "inclined-conveyor", "low-speed", "cascade")
 def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
     page = shown(name, viewport={"width": size[0], "height": size[1]})
     found, free = page.evaluate(LABELS), page.evaluate("chutelab.stage.view.free")
@@ -599,7 +600,9 @@ SMALL = """() => [...document.querySelectorAll(
   .filter(([, width, height]) => width > 0 && (width < 43.9 || height < 43.9))"""
 
 
-@pytest.mark.parametrize(("name", "size"), [("perpendicular", (390, 844)), ("stream", (320, 568))])
+@pytest.mark.parametrize(
+    ("name", "size"), some([("stream", (320, 568)), ("perpendicular", (390, 844))])
+)
 def test_on_a_phone_one_card_or_drawer_lies_under_the_picture(shown, name, size):
     phone = PHONE | {"viewport": {"width": size[0], "height": size[1]}}
     page = shown(name, **phone)

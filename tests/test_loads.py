@@ -33,7 +33,7 @@ def test_impulses_are_the_change_of_momentum_less_the_weight(scene, engine):
     assert verdict.bound == 1e-9
 
 
-@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+@pytest.mark.parametrize("engine", ["contact", pytest.param("pymunk", marks=pytest.mark.slow)])
 def test_so_they_are_in_a_crowd_that_rides_collides_and_settles(engine):
     run = chutelab.simulate("stream", {"stream.count": 60, "run.loads": 0.01}, engine=engine)
     assert balance(run).holds

@@ -59,7 +59,7 @@ CASES = {
     "case",
     [
         "grips, slips, leaves",
-        "rolls",
+        pytest.param("rolls", marks=pytest.mark.slow),
         pytest.param("slips at once", marks=pytest.mark.slow),
         pytest.param("no friction", marks=pytest.mark.slow),
     ],

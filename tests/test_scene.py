@@ -45,6 +45,7 @@ speed = 1
 CONTRACT = {
     "title": "machine",
     "gravity": 9.81,
+    "air_density": 0.0,
     "particle": {"name": None, "shape": "disk", "radius": 0.0063, "size": None, "points": None,
      "mass": 0.008, "density": None, "material": None, "spin": False, "rolling_friction": 0.0,
      "restitution_speed": None},

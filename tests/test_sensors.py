@@ -83,15 +83,16 @@ def test_rates_depth_and_residence(stream):
 
 
 def test_width_kinds_and_sizes_are_told():
-    wide = chutelab.simulate("stream", {"sensor": [GATE], "stream.width": 0.63})
+    wide = chutelab.simulate("stream", {"sensor": [GATE], "stream.width": 0.63, "stream.count": 60})
     one = reading(wide, "gate")
     assert one.whole_rate == pytest.approx(3.6 * one.mass_rate * 0.63 / (2 * 0.0063))
     mixed = {"name": "across", "from": [-2.0, -0.2], "to": [2.0, -0.2]}
-    run = chutelab.simulate("mixture", {"sensor": [mixed]})
+    run = chutelab.simulate("mixture", {"sensor": [mixed], "run.until": 3.0})
     one, found = reading(run, "across"), passages(run, mixed["from"], mixed["to"])
     assert sum(one.kinds.values()) == one.count == (found["way"] == 1).sum()
     assert len(one.kinds) == len(run.scene.particles)
     sizes = {"particle.radius": [0.004, 0.008], "particle.density": 2500.0, "particle.mass": None}
+    sizes["stream.count"] = 60
     large = chutelab.simulate("stream", {"sensor": [GATE], **sizes, "incoming.friction": 0.6})
     one = passages(large, GATE["from"], GATE["to"])
     sizes = large.radius[one["particle"]]

@@ -73,7 +73,9 @@ CASES = [(opening, *tip) for opening in (1.0, 89.0) for tip in tips(opening)]
 CASES += [(0.0, *tip) for tip in tips(0.0) if "arc" in tip[0] or tip[0] == "bent alike"]
 
 
-@pytest.mark.parametrize("engine", [*ENGINES, "crowd", "pymunk crowd"])
+@pytest.mark.parametrize(
+    "engine", [*ENGINES, "crowd", pytest.param("pymunk crowd", marks=pytest.mark.slow)]
+)
 def test_a_disk_on_the_tip_is_driven_the_way_that_the_rim_runs(engine):
     """Head on, with normal n, it takes J_t = m SPEED where the rim runs to, along (n_y, -n_x)."""
     for opening, name, rows in CASES:

@@ -72,6 +72,7 @@ def test_a_spoon_spares_the_belt_and_loses_less_in_blows_than_a_flat_chute_of_it
     assert blows[0] < 0.8 * blows[1] < 0.8 * blows[2]
 
 
+@pytest.mark.slow
 def test_the_last_ball_of_the_cradle_rises_as_high_as_the_first_was():
     recording = run("cradle")
     first, middle, last = (recording.track(n)["position"][:, 1] for n in (0, 2, 4))
@@ -124,6 +125,7 @@ def struck(rate, count, last, *, h=0.048, d=0.008, pitch=0.025, steps=300):
     return np.array(times)
 
 
+@pytest.mark.slow
 def test_dominoes_fall_in_order_at_the_speed_of_van_leeuwens_wave():
     recording = run("dominoes")
     tracks = [recording.track(n) for n in range(20)]

@@ -22,8 +22,8 @@ from chutelab.results.storage import RecordingError
 from chutelab.util.files import aside, together, whole
 
 ARRAYS = (
-    "knots", "offsets", "ended", "events", "by_surface", "angle", "totals", "drives", "impulses",
-    "swings", "hinge_work",
+    "knots", "offsets", "ended", "events", "by_surface", "angle", "totals", "unsolved", "drives",
+    "impulses", "swings", "hinge_work",
 )  # fmt: skip
 
 

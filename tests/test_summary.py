@@ -22,7 +22,8 @@ BEFORE = ["t", "x", "y", "vx", "vy"]
 LEDGER = [
     "kinetic", "potential", "belt_work", "restitution_loss", "friction_loss", "residual",
     "turned_over", "by_surface", "by_stream", "drive_work",
-    "spring", "damper_loss",
+    "spring", "damper_loss", "air_loss",
+    "push_work",
 ]  # fmt: skip
 THEORY = [
     "phi1_deg", "v1", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3",
@@ -58,7 +59,7 @@ def test_the_keys_are_those_of_the_contract(name, overrides):
     assert list(found["ledger"]["by_surface"]) == list(recording.surfaces)
     for entries in found["ledger"]["by_surface"].values():
         assert list(entries)[:3] == ["belt_work", "restitution_loss", "friction_loss"]
-        assert set(list(entries)[3:]) <= {"drive_work", "damper_loss"}
+        assert set(list(entries)[3:]) <= {"drive_work", "damper_loss", "air_loss"}
     assert list(found["theory"]) == THEORY
     assert found["error"].keys() - {"max"} == compare(recording).errors.keys()
     assert found["format"] == 1

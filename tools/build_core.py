@@ -25,13 +25,13 @@ EXPORTS = (
     "room", "world", "lay_out_world", "prepare", "prepare_to_judge", "run", "run_and_judge", "plan",
     "lay_out_plan", "build", "drawing", "draw", "exact", "lay_out_exact", "follow_and_judge",
     "run_exact", "run_world", "loads", "laws", "lay_out_laws", "judge", "sine", "cosine",
-    "angle_of", "angle_of_cosine",
+    "angle_of", "angle_of_cosine", "push_disk", "steer",
 )  # fmt: skip
 """What a host can call."""
 
 PYTHON = (
     "prepare_to_judge", "run_and_judge", "exact", "lay_out_exact", "follow_and_judge", "run_exact",
-    "run_world", "loads",
+    "run_world", "loads", "push_disk", "steer",
 )  # fmt: skip
 """Of these what no page calls."""
 
@@ -45,7 +45,8 @@ FLAGS = (
 round as doubles do."""
 
 ONCE = (
-    "exact", "exact_pieces", "loads", "nominal", "plan", "prepare", "random", "releases", "room",
+    "exact", "exact_pieces", "hand", "loads", "nominal", "plan", "prepare", "random",
+    "releases", "room",
 )  # fmt: skip
 """Files that a run passes through once, or once an event: they are compiled for size, which leaves
 the page room and costs no time that can be measured."""

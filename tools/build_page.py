@@ -19,6 +19,7 @@ LIVE = ROOT / "src" / "chutelab" / "pictures" / "live"
 BUNDLE = LIVE / "bundle"
 SOURCES = {
     "app.ts": "app.js", "lessonpage.ts": "lessonpage.js", "worker.ts": "worker.js",
+    "boot.ts": "boot.js",
     "page.css": "page.css", "lesson.css": "lesson.css", "sandbox.css": "sandbox.css",
 }  # fmt: skip
 """What is built, and what is made of it."""

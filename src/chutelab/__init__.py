@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     from chutelab import theory as theory
     from chutelab.classroom import exercises as exercises
+    from chutelab.engines.hand import start as start
     from chutelab.engines.simulation import simulate as simulate
     from chutelab.pictures.animation import animate as animate
     from chutelab.pictures.live import live as live
@@ -68,7 +69,7 @@ _HOME = {
     "live": "pictures.live:live", "load": "scene:load", "measure": "results.quantities:measure",
     "measured": "studies.measured", "overlay": "pictures.plots:overlay", "scenes": "scene:shipped",
     "simulate": "engines.simulation:simulate", "solve": "studies.design:solve",
-    "sweep": "studies.sweep:sweep", "theory": "theory",
+    "start": "engines.hand:start", "sweep": "studies.sweep:sweep", "theory": "theory",
 }  # fmt: skip
 """Where each name is: a module, or what is in one."""
 

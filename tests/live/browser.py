@@ -1,6 +1,7 @@
 """Pages in a real browser: none of them says anything on the console, or asks for anything."""
 
 import shutil
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -97,8 +98,9 @@ class Hand:
         if self.by != "keyboard":
             locator.focus()
             return
+        element = locator.element_handle()
         for _ in range(400):
-            key = locator.evaluate("""(one) => {
+            key = element.evaluate("""(one) => {
               const at = document.activeElement;
               if (one === at) return "";
               if (one.name && one.name === at.name) return "ArrowDown";
@@ -202,29 +204,59 @@ def browser():
         opened.close()
 
 
+@pytest.fixture(scope="session")
+def idle():
+    """Pages that no test has at present, by what a context has for good."""
+    return defaultdict(list)
+
+
 @pytest.fixture
-def opened(browser):
-    """Open a file, each in a context of its own."""
-    contexts, said = [], []
+def opened(browser, idle):
+    """Open a file in a page that knows nothing of those before it.
 
-    def asked(url):
-        if not url.startswith(("file:", "blob:")):
-            said.append(url)
+    A page of its own for each test would take Chromium three times as long.
+    """
+    pages, said = [], []
 
-    def open_(path, address="", **options):
-        context = browser.new_context(**{"viewport": {"width": 1366, "height": 620}, **options})
-        contexts.append(context)
-        page = context.new_page()
+    def hear(message):
+        said.append(message.text)
+
+    def fail(error):
+        said.append(str(error))
+
+    def asked(request):
+        if not request.url.startswith(("file:", "blob:", "about:")):
+            said.append(request.url)
+
+    heard = {"console": hear, "pageerror": fail, "request": asked}
+
+    def open_(path, address="", viewport=None, color_scheme="light",
+              reduced_motion="no-preference", **options):  # fmt: skip
+        of = idle[tuple(sorted(options.items()))]
+        page = of.pop() if of else browser.new_context(**options).new_page()
+        pages.append((page, of))
         page.set_default_timeout(10_000)
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: asked(request.url))
+        page.set_viewport_size(viewport or {"width": 1366, "height": 620})
+        page.emulate_media(color_scheme=color_scheme, reduced_motion=reduced_motion)
+        for event, listener in heard.items():
+            page.on(event, listener)
         page.goto(path.as_uri() + address)
         return page
 
     yield open_
-    for context in contexts:
-        context.close()
+    for page, of in pages:
+        if page.is_closed():
+            continue
+        for other in page.context.pages:
+            if other is not page:
+                other.close()
+        page.mouse.move(0, 0)
+        page.evaluate("localStorage.clear(), sessionStorage.clear()")
+        page.goto("about:blank")
+        page.emulate_media(media="null")
+        for event, listener in heard.items():
+            page.remove_listener(event, listener)
+        of.append(page)
     assert said == [], said
 
 

@@ -1,5 +1,5 @@
 // Runs scenes in node by the page's own host of the core: {lab, scenes} on stdin, on stdout a list
-// of {state, knots (rows of ten numbers), events, books, toml}.
+// of {state, knots (rows of ten numbers), events, swings (rows of four), books, toml}.
 import { readFileSync } from "node:fs";
 
 import { core, load, machineOf } from "./run.mjs";
@@ -9,14 +9,15 @@ const { toToml } = await load("keys.js");
 const { lab, scenes } = JSON.parse(readFileSync(0, "utf8"));
 const answers = scenes.map((given) => {
   core.begin(machineOf(given, lab));
-  const knots = [], events = [];
+  const knots = [], events = [], swings = [];
   let state = "running";
   while (state === "running") {
     state = core.proceed(50);
     const taken = core.take();
     knots.push(...taken.knots);
     events.push(...taken.events);
+    swings.push(...taken.swings);
   }
-  return { state, knots, events, books: core.books(), toml: toToml(given) };
+  return { state, knots, events, swings, books: core.books(), toml: toToml(given) };
 });
 process.stdout.write(JSON.stringify(answers));

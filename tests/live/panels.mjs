@@ -38,6 +38,7 @@ const FAULTS = {
     else set(last, VX, (vx) => 1.1 * vx + 0.1);
   },
   "law-losses": ({ set, last }) => set(last, FRICTION, -1),
+  "law-solved": ({ recording }) => { recording.unsolved = 0.11; },
   "law-ledger": ({ set, last }) => set(last, VX, (vx) => 1.1 * vx + 0.1),
 };
 

@@ -171,6 +171,15 @@ class Module:
         """Bytes of its memory."""
         return len(self._bytes)
 
+    def snapshot(self) -> NDArray[Any]:
+        """Return a copy of its memory, for `restore`."""
+        return self._bytes.copy()
+
+    def restore(self, kept: NDArray[Any]) -> None:
+        """Have its memory be as it was; what it has grown by since is empty."""
+        self._bytes[: len(kept)] = kept
+        self._bytes[len(kept) :] = 0
+
     def array(self, name: str, kind: np.dtype[Any], count: int, of: str = "World") -> NDArray[Any]:
         """Return a view of the array that a field points to, good until `work` or `run`."""
         begin: int = getattr(self.structs[of], name)

@@ -57,13 +57,16 @@ static double reach_of(const Barrier *b, const Mover *m) {
     return hypot(x, y);
 }
 
+/* Whether states of a run tell where it is. */
+static int is_swung(const Mover *m) { return m->inertia > 0 || m->steered; }
+
 /* Have the box of a piece hold all that it sweeps. */
 static void sweep(Barrier *b) {
     const Mover *m = L.movers + b->mover - 1;
     double reach = reach_of(b, m);
     for (int k = 0; k < 4; k++) {
         double way = m->way[k % 2], by = fabs(m->by[k % 2]), side = k < 2 ? -1 : 1;
-        if (m->turn || m->inertia > 0) b->box[k] = m->pivot[k % 2] + side * reach;
+        if (m->turn || is_swung(m)) b->box[k] = m->pivot[k % 2] + side * reach;
         b->box[k] += side * (by + MAX(side * way, 0));
     }
 }
@@ -76,7 +79,7 @@ double swiftest(const Barrier *b, double *haste) {
     const Mover *m = L.movers + b->mover - 1;
     double rate = 2 * PI * m->frequency, by = hypot(m->by[0], m->by[1]), way = hypot(m->way[0], m->way[1]);
     double reach = reach_of(b, m), pace = m->lasts ? 2 * way / m->lasts : 0, turn = fabs(m->turn);
-    if (m->inertia > 0)
+    if (is_swung(m))
         for (int n = m->first; n <= m->last; n++) turn = MAX(turn, fabs(L.swings[n].rate));
     *haste = rate * rate * by + (m->lasts ? 2 * pace / m->lasts : 0) + turn * turn * reach;
     return rate * by + pace + turn * reach;
@@ -105,7 +108,7 @@ void to_rest(const Barrier *b, double t, double *x, double *y) {
     gone = gone > 0.5 ? 1 - 2 * (1 - gone) * (1 - gone) : 2 * gone * gone;
     double dx = *x - m->pivot[0] - m->by[0] * swing - m->way[0] * gone;
     double dy = *y - m->pivot[1] - m->by[1] * swing - m->way[1] * gone;
-    double angle = m->inertia > 0 ? swung_by(m, t) : m->turn * t, c = cos(angle), s = sin(angle);
+    double angle = is_swung(m) ? swung_by(m, t) : m->turn * t, c = cos(angle), s = sin(angle);
     *x = m->pivot[0] + c * dx + s * dy;
     *y = m->pivot[1] - s * dx + c * dy;
 }

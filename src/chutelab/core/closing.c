@@ -190,6 +190,11 @@ void close_step(double h) {
             d->rest += h;
             d->anchor[2] += h * d->radius * d->spin;
         }
+        if (W.pushes && (d->kick[0] != 0 || d->kick[1] != 0)) {
+            d->calm = d->rest = 0;
+            d->ahead[0] = pushed(d, W.before);
+            book(d->gain, 0, W.owner_count, (double[]){pushed(d, 0), 0, 0});
+        }
     }
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         while (to < W.contact_count && (!W.interact || W.contacts[to].island == W.contacts[from].island)) to++;
@@ -264,6 +269,11 @@ void close_step(double h) {
             if (track->lasted || track->stays) d->on = -1;
             track->stays = 0;
             flush_track(i);
+            if (d->kick[0] != 0 || d->kick[1] != 0) {
+                knot_before(i, d->t, d->ux, d->uy, d->uspin);
+                d->entries[0] += d->gain[0];
+                knot_after(i);
+            }
             continue;
         }
         const Contact *only = 0;
@@ -329,6 +339,9 @@ void close_step(double h) {
 /* Take back what the second half of this step's impulses did to the ledger by disk i. */
 void take_back(int i) {
     Disk *d = W.disks + i;
+    double given = W.pushes ? pushed(d, W.before) : 0;
+    d->entries[0] -= given;
+    W.books[3 * W.owner_count] -= given;
     for (int link = d->links; link >= 0; link = W.links[link]) {
         const Contact *c = W.contacts + link / 2;
         for (int n = 0; n < 3; n++) {

@@ -141,6 +141,7 @@ static inline void advance(Disk *d, double t) {
     d->y += (d->vy + 0.5 * W.gy * h) * h;
     d->vx += W.gx * h;
     d->vy += W.gy * h;
+    d->turned += d->spin * h;
     d->t = t;
 }
 
@@ -204,6 +205,11 @@ void go_on(void);
 /* hung.c */
 void sweep_hung(Contact *list, int count, int sweeps, double enough);
 
+/* hand.c */
+void kick_disks(double h);
+double pushed(const Disk *d, double f);
+double steered_to(const Mover *m, double t);
+
 /* grid.c */
 int list_near(double end);
 int enter_again(int i, double end);
@@ -217,6 +223,7 @@ void knot_after(int i);
 void knot_before(int i, double t, double vx, double vy, double spin);
 void flush_track(int i);
 void track_lasting(int i);
+void track_flying(int i);
 void knot_held(int i);
 void finish(int i, int reason);
 void write_event(int kind, int i, int other, int owner, double t, const double *place,
@@ -225,6 +232,10 @@ void event_here(int kind, int i, int owner);
 void book(double *first, double *second, int owner, const double *entries);
 void spread(double loss, int k);
 void give_back(const Contact *list, int count);
+
+/* air.c */
+void slow_down(int i, double t);
+void begin_in_air(int i, double middle);
 
 /* bearing.c */
 void bear_contact(const Contact *c, double share, double from, double to);
@@ -292,5 +303,6 @@ void fall_asleep(void);
 
 /* prepare.c */
 int make_room(int full);
+void join_surfaces(void);
 
 #endif

@@ -260,7 +260,7 @@ void lessen_hinges(double less) {
         }
 }
 
-/* What hinges add to the left of the law of energy of a solve, see `check_energy`. */
+/* What hinges add to the left of the law of energy of a solve, see `check_solve`. */
 double gained_by_hinges(void) {
     double gained = 0;
     for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++) {

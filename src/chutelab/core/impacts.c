@@ -457,6 +457,7 @@ static void strike(int i, int j, double t) {
     if (a->mode == ASLEEP) wake(i, t);
     if (j >= 0 && b->mode == ASLEEP) wake(j, t);
     advance(a, t);
+    if (!W.interact) slow_down(i, t);
     if (j >= 0) advance(b, t);
     else if (a->impacts < FEW) end_hop(i, t);
     int impacts = j >= 0 ? MAX(a->impacts, b->impacts) : a->impacts;

@@ -32,6 +32,8 @@ Laws L;
 #define BULGE 1e-5
 /* Share of the energy turned over that the contact engine may misbook in a crowd: its promise. */
 #define BOOKED 1e-9
+/* Overlap, in radii, that the contact engine may leave in a step beyond what it asks of a solve. */
+#define UNSOLVED 0.1
 /* Share of the radius by which a track of the pymunk engine may be off between two knots. */
 #define LEAVES_OUT 1e-4
 /* Share of the radius by which the pymunk engine's disks are larger, and so their levers. */
@@ -530,6 +532,7 @@ static void judge_books(double bound) {
     }
     if (low < -most) tell(LAW_LOSSES, low, -most)->surface = surface;
     if (fabs(residual) > bound) tell(LAW_LEDGER, fabs(residual), bound);
+    if (L.interact && L.unsolved > UNSOLVED) tell(LAW_SOLVED, L.unsolved, UNSOLVED);
 }
 
 /* Where Chipmunk looks for contacts at the ends of steps only, none may go past one in a step. What flies

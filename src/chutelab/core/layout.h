@@ -48,6 +48,7 @@ typedef struct {
     double radius, mass;        /* [in] radius > 0 */
     double inertia;             /* [in] kg m2; 0: it does not turn */
     double inv_mass, inv_inertia; /* 1/kg, 1/(kg m2); 0 for one that does not turn */
+    double aired;               /* s; until when air has slowed it down, see air.c */
     double release;             /* [in] s; it waits from then on until its place is free */
     double ride_x;              /* m along the belt from where that meets the pulley, where a ride by
                                    adhesion begins, <= 0 ... */
@@ -70,6 +71,9 @@ typedef struct {
     double ahead[3];            /* J; the second half of it */
     double lacks;               /* J; kinetic energy that the mean velocity of this step's impulses lacks
                                    in a hollow, see `account` */
+    double force[2], pushed[2]; /* N; by which it is pushed by hand, in this step and in the one before ... */
+    double kick[2];             /* m/s; ... and what that changes of its velocity in this step */
+    double turned;              /* rad; since its release */
     int kind;                   /* [in] row of the table of pairs */
     int rides;                  /* [in] the incoming belt carries it by adhesion */
     int goes_on;                /* [in] it was under way before: released wherever others are */
@@ -170,6 +174,7 @@ typedef struct {
     double since, angle, rate; /* s, rad, rad/s; as its path begins ... */
     double path[TERMS];     /* ... and the angle from then on, a power of time each */
     double before;          /* rad/s; before the step's impulses */
+    double until;           /* s; up to which it turns, by hand, at `rate` from `angle` on */
     double impulse[3];      /* N m s; of its stops, and of its motor ... */
     double need[2], most;   /* rad/s, N m s; ... the least change that the stops ask for, and a bound */
     double drift;           /* rad/s; what springs and weight make of its speed by the middle of the step */
@@ -178,6 +183,8 @@ typedef struct {
     int solved;             /* its impulses are of a step that begins now */
     int struck;             /* stop that it meets as the step ends: 1, 2, or 0 */
     int first, last;        /* [in] of the laws: its first and last state in their `swings` */
+    int steered;            /* [in] it is turned by hand */
+    int pad;
 } Mover;
 
 /* The state of a hinge: halfway through the impulses of a step, and before a blow. */
@@ -260,7 +267,7 @@ typedef struct {                                                                
 
 /* What all disks of a crowd that were released have together as a step begins: that of those that ended at
    their ends, and of what lasts in contact halfway through its impulses, as their tracks are. */
-typedef struct { double t, kinetic, potential, entries[3]; } Total; /* s, J */           /* [out] */
+typedef struct { double t, kinetic, potential, entries[3], unsolved; } Total; /* s, J, radii */ /* [out] */
 
 typedef struct { int disk, next, ix, iy; } Cell; /* one disk in one cell of the grid */
 
@@ -306,6 +313,7 @@ typedef struct {
     /* the run */
     int interact;        /* disks meet each other */
     int is_whole;        /* [in] all knots and events are still there: the host took none */
+    int pushes;          /* something has been pushed by hand */
     int until;
     int landing;         /* owner that a disk lands on, or -1 */
     int ride_owner;      /* owner that rides are on */
@@ -314,8 +322,10 @@ typedef struct {
     int sweeps;          /* of the contact solver, at most */
     int sleeps;          /* whether islands may fall asleep */
     double gx, gy;       /* m/s2 */
+    double air;          /* [in] kg/m3; density of still air, 0 without */
     double dt;           /* s; longest step */
     double end_time;     /* s */
+    double pause;        /* [in] s; `run` comes back with the first step that ends then; 0: it goes on */
     double smooth_x, smooth_v; /* radii, m/s; by how much a track may be off between two knots ... */
     double hops;         /* ... if that is not less than so many hops of what lasts */
     double accurate;     /* m/s; changes at which sweeps end */
@@ -324,7 +334,10 @@ typedef struct {
     int impact_count, step_count, solve_count, sweep_count;
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */
-    double gained;       /* J; by which solves broke their law of energy, see `check_energy` */
+    double air_loss;     /* J; what air has taken */
+    double gained;       /* J; by which solves broke their law of energy, see `check_solve` */
+    double unsolved;     /* radii; the most overlap that the solve of this step leaves beyond what it asks for */
+    double unsolved_most; /* ... and of all steps so far */
     /* within the step */
     int low, high;       /* disks that this part of the run is about */
     int phase, cell_count, heap_count, moved_count, wide_count;
@@ -357,6 +370,7 @@ enum DropFrom { FROM_IMPACT, FROM_TOP };
 
 typedef struct {
     double gravity;
+    double air_density;     /* kg/m3; of still air */
     double crowded;         /* whether particles meet each other */
 } SceneKeys;
 
@@ -574,7 +588,7 @@ typedef struct {
 /* ---- What a run is judged by: a subject of its own, which shares nothing with the engine's. ---- */
 
 /* The laws, in the order in which they are told. */
-enum Law { LAW_FINITE, LAW_THROUGH, LAW_INSIDE, LAW_ENERGY, LAW_LOSSES, LAW_LEDGER, LAW_STEP };
+enum Law { LAW_FINITE, LAW_THROUGH, LAW_INSIDE, LAW_ENERGY, LAW_LOSSES, LAW_LEDGER, LAW_SOLVED, LAW_STEP };
 
 enum Engine { ENGINE_EXACT, ENGINE_CONTACT, ENGINE_PYMUNK };
 
@@ -592,7 +606,7 @@ enum Engine { ENGINE_EXACT, ENGINE_CONTACT, ENGINE_PYMUNK };
    contract. */
 #define ON_ARCS 1e-9
 /* Breaches that are told at most: of losses there may be two. */
-#define BREACHES 8
+#define BREACHES 9
 
 /* A piece of a surface as it is told to the laws. */
 typedef struct {
@@ -665,6 +679,7 @@ typedef struct {
     int unreal;             /* [in] numbers that are not finite, beside knots and books */
     double dt;              /* [in] s; step, 0 of the exact engine */
     double gained;          /* [in] J; by which solves broke their law of energy */
+    double unsolved;        /* [in] radii; the most overlap that the solve of a step left beyond what it asked for */
     double largest;         /* [in] m; radius of the largest particle, with its corners */
     /* [out] */
     int breach_count, hit_count;

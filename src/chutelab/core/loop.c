@@ -147,6 +147,8 @@ static void take_off(int i) {
     Disk *d = W.disks + i;
     d->mode = FREE;
     d->changes++;
+    d->aired = d->t;
+    slow_down(i, 0.5 * (d->t + MAX(W.step_end, d->t)));
     d->ux = d->vx;
     d->uy = d->vy;
     d->uspin = d->spin;
@@ -171,6 +173,7 @@ static int release(int i, double t) {
     else {
         take_off(i);
         lie_down(i);
+        for (int n = 0; n < 2 && W.pushes; n++) d->pushed[n] = 2 * (W.step_end - t) / W.length * d->force[n];
     }
     return 1;
 }
@@ -203,6 +206,7 @@ static void leave(int i, double end) {
     if (first > h) return;
     flush_track(i);
     advance(d, MIN(d->t + first, end));
+    slow_down(i, d->t);
     knot_now(i);
     event_here(EXIT, i, -1);
     finish(i, BY_EXIT);
@@ -217,6 +221,7 @@ static void stop_all(int reason) {
         if (d->mode == FREE && d->supports && W.tracks[i].lasted) end_in_contact(i, BY_TIME);
         else if (d->mode == FREE) {
             flush_track(i);
+            slow_down(i, d->t);
             if (d->t > W.tracks[i].knot[0]) knot_now(i);
             finish(i, BY_TIME);
         } else if (d->mode == ASLEEP) {
@@ -335,7 +340,7 @@ static double in_hollows(void) {
 
 /* Note what all disks have together as a step begins. */
 static void note_totals(void) {
-    Total all = {.t = W.t};
+    Total all = {.t = W.t, .unsolved = W.unsolved};
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode == WAITING) continue;
@@ -384,7 +389,7 @@ static int begin_step(void) {
     if (stop - W.t < (1 + 1e-9) * h) h = stop - W.t;
     else if (stop - W.t < 2 * h) h = 0.5 * (stop - W.t);
     W.step_end = stop - W.t <= h ? stop : W.t + h;
-    if (!W.interact && W.disks[W.low].mode == FREE && !W.disks[W.low].supports)
+    if (!W.interact && W.disks[W.low].mode == FREE && !W.disks[W.low].supports && W.air == 0)
         stride = MIN(free_span(W.disks + W.low, h), stop - W.t);
     if (stride > h) W.step_end = W.t + stride < stop ? W.t + stride : stop;
     W.now = W.t;
@@ -406,6 +411,7 @@ static int begin_step(void) {
                 d->spin = 0;
             }
             if (d->mode == FREE) {
+                if (W.air > 0) begin_in_air(i, W.t + 0.5 * h);
                 d->ux = d->vx;
                 d->uy = d->vy;
                 d->uspin = d->spin;
@@ -429,9 +435,12 @@ static int begin_step(void) {
         }
     } while (woke);
     W.length = h;
+    if (W.pushes) kick_disks(h);
     if (W.hinges) begin_hinges(W.t, h);
     W.swings_too = 0;
+    W.unsolved = 0;
     if (W.contact_count) solve_contacts();
+    W.unsolved_most = MAX(W.unsolved_most, W.unsolved);
     /* A fast belt may have thrown a disk further than its list of neighbours foresaw. */
     for (int i = W.low; i < W.high; i++)
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
@@ -486,13 +495,16 @@ static void end_step(void) {
         Disk *d = W.disks + i;
         if (!is_live(d)) continue;
         if (d->mode != RIDING) leave(i, W.step_end);
-        if (d->mode == FREE) advance(d, W.step_end);
+        if (d->mode == FREE) {
+            advance(d, W.step_end);
+            slow_down(i, W.step_end);
+        }
         else if (d->mode == ASLEEP) {
             d->x += d->ux * (W.step_end - W.t);
             d->y += d->uy * (W.step_end - W.t);
             d->vx = d->ux;
             d->vy = d->uy;
-            d->t = W.step_end;
+            d->t = d->aired = W.step_end;
         }
     }
     if (W.hinges) end_hinges(W.step_end);
@@ -532,6 +544,7 @@ static int is_over(int *reason) {
     int asleep = 0;
     for (int i = W.low; i < W.high; i++) asleep |= W.disks[i].mode == ASLEEP;
     if (next >= W.end_time || next == INFINITY) next = W.end_time;
+    if (W.pause > 0) next = MIN(next, MAX(W.pause, W.t));
     if (asleep || next < W.end_time) {
         for (int i = W.low; i < W.high; i++)
             if (W.disks[i].mode == ASLEEP) W.disks[i].t = next;
@@ -618,7 +631,7 @@ static int run_on(int steps) {
                 W.phase = PART;
                 continue;
             }
-            if (steps-- <= 0) return PAUSED;
+            if (steps-- <= 0 || (W.pause > 0 && W.t >= W.pause)) return PAUSED;
             if ((status = begin_step()) != DONE) return status;
             int settled = W.interact && W.until == UNTIL_SETTLED && has_settled();
             if (settled || W.t >= W.end_time) {

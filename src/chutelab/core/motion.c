@@ -38,8 +38,10 @@ static void set_mover(Mover *m, double t) {
         m->velocity[n] = m->by[n] * rate * c + m->way[n] * pace;
         m->pull[n] = -m->by[n] * rate * rate * s + m->way[n] * bend;
     }
-    m->sine = sin(m->turn * t);
-    m->cosine = cos(m->turn * t);
+    if (m->steered) m->turn = t < m->until ? m->rate : 0;
+    double angle = m->steered ? steered_to(m, t) : m->turn * t;
+    m->sine = sin(angle);
+    m->cosine = cos(angle);
     m->t = t;
 }
 
@@ -176,6 +178,8 @@ double next_turn(double t) {
             double then = m->from + 0.5 * n * m->lasts;
             if (then > t) next = MIN(next, then);
         }
+    for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++)
+        if (m->steered && m->until > t) next = MIN(next, m->until);
     return next;
 }
 
@@ -184,7 +188,8 @@ int stir(double t) {
     int changed = 0;
     W.haste = W.stirs = 0;
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
-        int now = m->inertia > 0 || m->turn != 0 || travels(m, t) || (m->frequency > 0 && (m->by[0] != 0 || m->by[1] != 0));
+        int now = m->inertia > 0 || (m->steered ? t < m->until : m->turn != 0) || travels(m, t)
+            || (m->frequency > 0 && (m->by[0] != 0 || m->by[1] != 0));
         changed |= now != m->stirs;
         W.stirs |= m->stirs = now;
     }
@@ -215,7 +220,7 @@ void box_movers(double t, double h) {
 static void sweep_box(const Mover *m, double reach, double *box) {
     for (int k = 0; k < 4; k++) {
         double way = m->way[k % 2], by = fabs(m->by[k % 2]);
-        if (m->turn != 0 || m->inertia > 0) box[k] = m->pivot[k % 2] + (k < 2 ? -reach : reach);
+        if (m->turn != 0 || m->inertia > 0 || m->steered) box[k] = m->pivot[k % 2] + (k < 2 ? -reach : reach);
         box[k] += k < 2 ? MIN(way, 0) - by : MAX(way, 0) + by;
     }
 }

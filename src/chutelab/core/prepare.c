@@ -304,6 +304,27 @@ static int lay_out_work(void) {
     return has_room();
 }
 
+/* Find which surface goes on where another one ends; what moves only with its own. */
+void join_surfaces(void) {
+    double least = INFINITY;
+    for (int i = 0; i < W.disk_count; i++) least = MIN(least, W.disks[i].radius);
+    for (int k = 0; k < W.surface_count; k++) W.surfaces[k].mover = find_mover(W.surfaces + k);
+    sort_ends();
+    for (int k = 0; k < 2 * W.surface_count; k++)
+        if (W.surfaces[k / 2].shape != CIRCLE) share_end(k / 2, k % 2, TOUCHING * least, least);
+    for (int k = 0; k < W.surface_count; k++)
+        for (int end = 0; end < 2; end++) {
+            find_mate(k, end, least);
+            if (W.surfaces[k].shape != CIRCLE) find_crown(k, end, least);
+        }
+    for (int k = 0; k < 2 * W.surface_count; k++) {
+        int mate = W.surfaces[k / 2].mates[k % 2], *of = W.surfaces[MAX(mate, 0)].mates;
+        if (W.surfaces[k / 2].shape == CIRCLE || mate < 0 || W.surfaces[mate].shape != CIRCLE) continue;
+        W.surfaces[mate].ledges[of[0] >= 0] = W.surfaces[k / 2].ledges[k % 2];
+        of[of[0] >= 0] = k / 2;
+    }
+}
+
 /* The host has filled in what is marked [in]: fill in what follows. */
 EXPORT int prepare(void) {
     W.passes = W.hinges = 0;
@@ -330,26 +351,12 @@ EXPORT int prepare(void) {
         Surface *piece = W.surfaces + k;
         derive(piece);
         piece->gate = piece->opens > -INFINITY || piece->closes < INFINITY ? W.gate_count++ : -1;
-        piece->mover = find_mover(piece);
         memcpy(piece->swept, piece->box, sizeof piece->swept);
         W.everything[k] = k;
     }
     RESERVE(W.spared, (double)W.disk_count * W.gate_count);
     if (!has_room()) return 0;
-    sort_ends();
-    for (int k = 0; k < 2 * W.surface_count; k++)
-        if (W.surfaces[k / 2].shape != CIRCLE) share_end(k / 2, k % 2, TOUCHING * least, least);
-    for (int k = 0; k < W.surface_count; k++)
-        for (int end = 0; end < 2; end++) {
-            find_mate(k, end, least);
-            if (W.surfaces[k].shape != CIRCLE) find_crown(k, end, least);
-        }
-    for (int k = 0; k < 2 * W.surface_count; k++) {
-        int mate = W.surfaces[k / 2].mates[k % 2], *of = W.surfaces[MAX(mate, 0)].mates;
-        if (W.surfaces[k / 2].shape == CIRCLE || mate < 0 || W.surfaces[mate].shape != CIRCLE) continue;
-        W.surfaces[mate].ledges[of[0] >= 0] = W.surfaces[k / 2].ledges[k % 2];
-        of[of[0] >= 0] = k / 2;
-    }
+    join_surfaces();
     for (int k = 0; k < W.surface_count; k++)
         if (W.surfaces[k].mover >= 0) prepare_mover(W.surfaces + k);
     W.ledge = INFINITY;

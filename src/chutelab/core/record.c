@@ -160,6 +160,13 @@ void track_lasting(int i) {
     for (int n = 0; n < 3; n++) track->after_entries[n] = d->entries[n] + d->gain[n];
 }
 
+/* Note the state of a disk that flies in air, where that bends its path. */
+void track_flying(int i) {
+    const Disk *d = W.disks + i;
+    double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
+    if (memcmp(state, W.tracks[i].knot, sizeof state)) note(i, state, d->entries);
+}
+
 /* End a track at its last knot. */
 void finish(int i, int reason) {
     Disk *d = W.disks + i;

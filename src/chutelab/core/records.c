@@ -130,6 +130,7 @@ static int judge_world(void) {
     L.contacts = w->impact_count;
     L.steps = w->step_count;
     L.gained = w->gained;
+    L.unsolved = w->unsolved_most;
     take_events(w->events, w->event_count);
     take_knots(w->knots, w->knot_count);
     return end_up();

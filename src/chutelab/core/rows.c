@@ -120,9 +120,15 @@ void set_rows(Contact *list, int count) {
             r->light[k] = 1 / c->mass[k];
             r->impulse[k] = c->impulse[k];
         }
+        if (W.pushes) {
+            const Disk *a = W.disks + c->i, *b = W.disks + c->j;
+            double x = a->kick[0] - (c->two ? b->kick[0] : 0), y = a->kick[1] - (c->two ? b->kick[1] : 0);
+            r->free[0] += x * c->nx + y * c->ny;
+            r->free[1] += x * c->ny - y * c->nx;
+        }
         r->gives = c->gives;
         r->eases = 1 / (r->light[0] + c->gives);
-        r->more = c->most + r->free[0];
+        r->more = c->most + MIN(-c->need, ANY);
         r->parts = c->parts;
         r->rough = c->share < 1 ? c->share * MIN(c->friction, ROUGH) : c->friction;
         r->arm = c->share * c->arm;
@@ -149,8 +155,8 @@ void take_rows(Contact *list, int count) {
     }
     for (const SolverBody *b = W.solver_bodies + 1; b < W.solver_bodies + bodies; b++) {
         Disk *d = W.disks + b->disk;
-        d->vx = d->ux + b->x;
-        d->vy = d->uy + b->y;
+        d->vx = d->ux + d->kick[0] + b->x;
+        d->vy = d->uy + d->kick[1] + b->y;
         if (b->turn > 0) d->spin = d->uspin + b->rim * b->bend;
     }
 }

@@ -205,23 +205,27 @@ static void sort_by_islands(void) {
     W.earlier = c;
 }
 
-/* Note by how much the step's impulses break their law: the kinetic energy after them, less that
+/* Note how far the step's impulses are from solving it: the overlap, in radii, that they leave beyond what is
+   asked for, and by how much they break the law of energy: the kinetic energy after them, less that
    before, plus that of the change itself, is at most what moving surfaces give and what the contacts
    ask for. What is on its left is summed over disks, what is on its right over contacts. */
-static void check_energy(void) {
-    double gained = 0;
+static void check_solve(void) {
+    double gained = 0, h = W.step_end - W.t;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
-        double x = d->vx - d->ux, y = d->vy - d->uy, w = d->spin - d->uspin;
+        double x = d->vx - d->ux - d->kick[0], y = d->vy - d->uy - d->kick[1], w = d->spin - d->uspin;
         gained += d->mass * (x * d->vx + y * d->vy) + d->inertia * w * d->spin;
     }
     for (int n = 0; n < W.contact_count; n++) {
         const Contact *c = W.contacts + n;
         const double *J = c->impulse;
-        double u[3];
-        if (J[0] == 0) continue;
+        double u[3], v[3], radius = W.disks[c->i].radius;
+        if (c->j >= 0) radius = MIN(radius, W.disks[c->j].radius);
         relative(c, 1, u);
+        relative(c, 0, v);
+        W.unsolved = MAX(W.unsolved, h * (u[0] + asks(c, J[0]) - v[0]) / radius);
+        if (J[0] == 0) continue;
         gained -= J[0] * (u[0] + asks(c, J[0])) - J[1] * c->drift + J[2] * c->other[2];
         gained -= c->two ? 0 : J[0] * c->other[0] + J[1] * c->other[1];
         if (c->hung) gained += hinge_share(c);
@@ -260,6 +264,6 @@ void solve_contacts(void) {
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);
     W.swings_too = swings;
-    check_energy();
+    check_solve();
     W.solve_count++;
 }

@@ -5,4 +5,5 @@
 - `pymunk`: the same scene by Pymunk as it is, the check from outside.
 - `reference`: one particle by SciPy's DOP853, the witness of `chutelab.studies.accuracy`.
 - `simulation`: `simulate`, which chooses.
+- `hand`: `start`, a run that goes on step by step.
 """

@@ -27,7 +27,7 @@ from chutelab.core import (
 from chutelab.machine import SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather
-from chutelab.results.record import REASONS, TOTAL, Record
+from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress, unwatched
 
@@ -135,7 +135,7 @@ class Job:
             ("kind_count", self.kinds), ("owner_count", self.owners),
             ("pulley", -1 if wheel is None else len(machine.segments.length)),
             ("ride_incline", 0.0 if wheel is None else wheel.incline),
-            ("g", machine.gravity), ("end_time", machine.end_time),
+            ("g", machine.gravity), ("air", machine.air), ("end_time", machine.end_time),
             ("mover_count", len(machine.movers)),
         ):  # fmt: skip
             setattr(module.world, name, value)
@@ -256,14 +256,15 @@ class Job:
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.drives[: self.owners] = module.array("drives", REAL, self.owners)
-        if world.hinges:
+        if world.swing_count:
             for row in module.array("movers", dtype("Mover"), world.mover_count):
                 work = row["worked"], row["stopped"], row["damped"]
-                recorder.hinge_work[row["surface"]] = work
+                by_hand = recorder.drives[row["surface"]], 0.0, 0.0
+                recorder.hinge_work[row["surface"]] = by_hand if row["steered"] else work
             swings = module.array("swings", dtype("Swing"), world.swing_count).view(SWING)
             recorder.swings = swings[np.argsort(swings["surface"], kind="stable")]
         recorder.contacts = world.impact_count
-        recorder.gained = world.gained
+        recorder.gained, recorder.air_loss = world.gained, world.air_loss
         rows = module.array("totals", dtype("Total"), world.total_count)
-        recorder.totals = rows.view(TOTAL).copy()
+        recorder.take_totals(rows)
         recorder.impulses = gather(module, self.owners)

@@ -7,6 +7,8 @@ from dataclasses import replace
 from math import inf
 from time import perf_counter
 
+import numpy as np
+
 from chutelab.machine import Machine, ahead
 from chutelab.results import Recording, record
 from chutelab.results.recorder import EnoughError, StalledError
@@ -31,7 +33,7 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         return wanted
     if any(outline is not None for outline in machine.outlines) or machine.threads:
         return "pymunk"
-    return "contact" if machine.interact or machine.movers else "exact"
+    return "contact" if machine.interact or machine.movers or np.any(machine.air) else "exact"
 
 
 def simulate(
@@ -143,7 +145,7 @@ def judged(
             most = counts.index(max(counts))
             key = f"{scene.head('stream', most)}.count"
             allowed = "fewer, or more seconds: those allowed were over before all had a place to"
-            raise _refused(scene, key, counts[most], f"{allowed} start") from None
+            raise refused(scene, key, counts[most], f"{allowed} start") from None
         if (engine or machine.engine) == "auto" and not cut and recording.laws:
             recording = _instead(machine, recording, watched)
     # In place: a copy would be judged anew.
@@ -176,39 +178,18 @@ def _instead(machine: Machine, broken: Recording, progress: Progress | None) -> 
 
 def follow(machine: Machine, engine: str | None, progress: Progress | None) -> Recording:
     """Run a machine with the engine that is asked for, or the one it needs; see `simulate`."""
-    scene = machine.scene
     name = choose(machine, engine)
-    if name in ("exact", "contact"):
-        for n, outline in enumerate(machine.outlines):
-            if outline is not None:
-                key, shape = f"{scene.head('particle', n)}.shape", scene.particles[n].shape
-                allowed = f'a disk or sphere with run.engine = "{name}"; the pymunk engine has it'
-                raise _refused(scene, key, shape, allowed)
-        if machine.threads:
-            raise _refused(scene, "string", len(machine.threads), "none, or the pymunk engine")
+    must_fit(machine, name)
     if name == "exact":
-        if machine.movers:
-            moving = machine.surfaces[machine.movers[0].surface]
-            allowed = f"contact or pymunk, because {moving} moves: no closed form has its blows"
-            raise _refused(scene, "run.engine", "exact", allowed)
-        if machine.interact:
-            allowed = "contact or pymunk, because stream.interact = true"
-            raise _refused(scene, "run.engine", "exact", allowed)
         from chutelab.engines.exact import CornerError, run
 
         try:
             return Recording.of(run(machine, progress))
         except CornerError as error:
-            if "exact" in (engine, scene.run.engine):
-                raise _refused(scene, "run.engine", "exact", str(error)) from error
+            if "exact" in (engine, machine.scene.run.engine):
+                raise refused(machine.scene, "run.engine", "exact", str(error)) from error
             name = "contact"
-    for n, kind in enumerate(scene.particles):
-        if name == "pymunk" and kind.falls:
-            allowed = "left out with the pymunk engine: Chipmunk's restitution is one number"
-            key = f"{scene.head('particle', n)}.restitution_speed"
-            raise _refused(scene, key, kind.restitution_speed, allowed)
-    if any(scene.particles[kind].radius == 0.0 for kind in scene.kinds):
-        raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
+            must_fit(machine, name)
     if name == "contact":
         from chutelab.engines.contact import run as stepped
     else:
@@ -216,5 +197,41 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
     return Recording.of(stepped(machine, progress))
 
 
-def _refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:
+def must_fit(machine: Machine, name: str) -> None:
+    """Raise a `SceneError` if an engine does not have what a machine needs."""
+    scene = machine.scene
+    if name in ("exact", "contact"):
+        for n, outline in enumerate(machine.outlines):
+            if outline is not None:
+                key, shape = f"{scene.head('particle', n)}.shape", scene.particles[n].shape
+                allowed = f'a disk or sphere with run.engine = "{name}"; the pymunk engine has it'
+                raise refused(scene, key, shape, allowed)
+        if machine.threads:
+            raise refused(scene, "string", len(machine.threads), "none, or the pymunk engine")
+    if name == "exact":
+        if machine.movers:
+            moving = machine.surfaces[machine.movers[0].surface]
+            allowed = f"contact or pymunk, because {moving} moves: no closed form has its blows"
+            raise refused(scene, "run.engine", "exact", allowed)
+        if machine.interact:
+            allowed = "contact or pymunk, because stream.interact = true"
+            raise refused(scene, "run.engine", "exact", allowed)
+        if machine.air:
+            allowed = "0 with the exact engine: it has no closed form for a flight in air"
+            raise refused(scene, "air_density", machine.air, allowed)
+        return
+    for n, kind in enumerate(scene.particles):
+        if name == "pymunk" and kind.falls:
+            allowed = "left out with the pymunk engine: Chipmunk's restitution is one number"
+            key = f"{scene.head('particle', n)}.restitution_speed"
+            raise refused(scene, key, kind.restitution_speed, allowed)
+    if name == "pymunk" and machine.air and any(one is not None for one in machine.outlines):
+        allowed = "0 with boxes and polygons: drag is that of a sphere"
+        raise refused(scene, "air_density", machine.air, allowed)
+    if any(scene.particles[kind].radius == 0.0 for kind in scene.kinds):
+        raise refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
+
+
+def refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:
+    """Return the error that says what of a scene cannot be run."""
     return SceneError(scene.source, [Fault(key, value, allowed)])

@@ -8,7 +8,7 @@
   the core builds as it runs.
 """
 
-from chutelab.machine.builder import ahead, build, hand_over
+from chutelab.machine.builder import PASSES, ahead, build, hand_over
 from chutelab.machine.movers import SWING, Mover
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
@@ -25,6 +25,7 @@ from chutelab.machine.shapes import Arcs, Pieces, Segments
 
 __all__ = [
     "DRIVE_PULLEY",
+    "PASSES",
     "SWING",
     "Arcs",
     "Caution",

@@ -38,6 +38,7 @@ class Hinge:
     motor: tuple[float, float]  # rad/s and N m; 0 without
     mass: float = 0.0  # kg; 0 without a weight
     gyration: float = 1.0  # m; root of the mean square distance from the hinge
+    steered: bool = False  # it is turned by hand, and nothing else acts on it
     states: NDArray[Any] = field(default_factory=lambda: np.zeros(1, SWING))  # (k,) of `SWING`
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
@@ -90,6 +91,13 @@ class Mover:
             found: dict[str, Any] = {name: tuple(row[name].tolist()) for name in pairs}
             told["hinge"] = Hinge(**found | {name: float(row[name]) for name in ones})
         return cls(surface=int(row["surface"]), start=float(row["from"]), **told)
+
+    @classmethod
+    def steered(cls, surface: int, pivot: tuple[float, float]) -> Self:
+        """Return that of a plate which is turned by hand."""
+        none = (0.0, 0.0)
+        hinge = Hinge(0.0, none, 0.0, 0.0, 0.0, (-inf, inf), none, steered=True)
+        return cls(surface, pivot, none, 0.0, 0.0, none, 0.0, 0.0, 0.0, hinge)
 
     def swung(self, swings: NDArray[Any]) -> Mover:
         """Return it with the states, (k,) of `SWING`, in which it is found among them."""

@@ -137,6 +137,7 @@ class Machine:
     scenes: Scene | Family  # what it was built from
     surfaces: tuple[str, ...]  # names; several segments, or one and the pulley, may share one
     gravity: float  # m/s², pointing down
+    air: float  # kg/m³, density of still air; 0 without
     particle: Particle
     segments: Segments  # all straight surfaces; the incoming belt is the first if there is one
     arcs: Arcs
@@ -146,7 +147,7 @@ class Machine:
     until: Literal["landed", "settled", "time"]  # when a particle's track ends
     end_time: float  # s; no track goes on after it
     dt: float  # s; step of lasting contacts (contact), longest step (pymunk)
-    align: bool  # whether the pymunk engine's steps of a lone particle end at contacts
+    align: bool  # whether the pymunk engine's steps of a lone particle end at contacts; not in air
     interact: bool  # whether particles meet each other
     pair_restitution: Floats  # (K, K), of two particles by their kinds; below 0: they never meet
     pair_friction: Floats
@@ -210,6 +211,16 @@ class Machine:
     def mover(self, surface: int) -> Mover | None:
         """Return what moves a surface, by its index; None if it stays where it is."""
         return next((mover for mover in self.movers if mover.surface == surface), None)
+
+    def steered(self, surface: int) -> Mover:
+        """Return what moves a plate, by its index, that is turned by hand about its pivot."""
+        named = {plate.name or "plate": plate for plate in self.scene.plates}
+        plate, belt = named[self.surfaces[surface]], self.scene.incoming
+        pivot = plate.pivot
+        if pivot is None:
+            assert belt is not None
+            pivot = belt.pulley_radius + plate.distance, plate.pivot_height
+        return Mover.steered(surface, pivot)
 
     @property
     def parts(self) -> tuple[Segments, Arcs]:

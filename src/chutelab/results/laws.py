@@ -20,12 +20,12 @@ from chutelab.util.tables import number
 
 FINITE, THROUGH, INSIDE = "finite numbers", "nothing through a surface", "nothing inside a surface"
 ENERGY, LOSSES, LEDGER = "energy rises only by drives", "no loss is negative", "the ledger closes"
-STEP = "speed times step below the radius"
+SOLVED, STEP = "each step is solved", "speed times step below the radius"
 
-LAWS = (FINITE, THROUGH, INSIDE, ENERGY, LOSSES, LEDGER, STEP)
+LAWS = (FINITE, THROUGH, INSIDE, ENERGY, LOSSES, LEDGER, SOLVED, STEP)
 """Their names, in the order in which they are told, and in that of the core's enum Law."""
 
-UNITS = {FINITE: "", THROUGH: "", INSIDE: "m", STEP: "m"}
+UNITS = {FINITE: "", THROUGH: "", INSIDE: "m", SOLVED: "radii", STEP: "m"}
 """Units of what is found; of the others J."""
 
 INTEGER = np.dtype("<i4")
@@ -58,7 +58,7 @@ class Broken:
     amount, bound : float
         What was found, and what it must not exceed, in `unit`.
     unit : str
-        m, J, or "" of a count.
+        m, J, radii, or "" of a count.
     advice : str
         What to do.
     """
@@ -184,12 +184,13 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("knot_count", len(recording.knots)),
         ("row", recording.knots.dtype.itemsize // 8), ("book_rows", len(books) // 3),
         ("surface_count", len(recording.surfaces)), ("engine", _ENGINES.index(recording.engine)),
-        ("interact", machine.interact or len(recording.swings) > 0),
+        ("interact", machine.interact or len(recording.swings) + len(recording.totals) > 0),
         ("alike", alike(recording)), ("family", rows.ndim > 1),
         ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
         ("steps", recording.steps), ("unreal", unreal), ("dt", 0.0 if exact else machine.dt),
         ("mover_count", len(machine.movers)), ("swing_count", len(recording.swings)),
-        ("gained", recording.gained), ("largest", np.max(machine.particle.radius)),
+        ("gained", recording.gained), ("unsolved", recording.unsolved.max(initial=0.0)),
+        ("largest", np.max(machine.particle.radius)),
     ):  # fmt: skip
         setattr(laws, name, value)
     module.work("lay_out_laws")

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.results.record import ENTRIES, Record, balance, kept
+from chutelab.results.record import ENTRIES, PARTICLES, Record, balance, kept
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
 
@@ -25,6 +25,9 @@ ROUNDING = 1e-12
 
 UNSEEN = 5e-6
 """Share of the energy turned over that is shown as 0.000 %; a heap at rest trembles with less."""
+
+AIR = "still air"
+"""Its row among the surfaces of a ledger; no surface may have a name with a space."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -47,18 +50,23 @@ class Ledger(Shown):
         kinetic and potential energies are counted, too, the latter with y = 0 at the hinge.
     damper_loss : float
         What the dampers of hinges take.
+    push_work : float
+        Work of forces on particles by hand, see `chutelab.start`. In the tracks and in `by_stream`
+        it is part of the belt work.
     restitution_loss : float
         Normal part of the losses in impacts.
     friction_loss : float
-        Slip heat.
+        Slip heat, and with air what that takes.
+    air_loss : float
+        What of it air takes.
     residual : float
         What the balance leaves over: the numerical error.
     turned_over : float
         Kinetic energy at the start + the sizes of the three entries + the size of the change of
         potential energy.
     by_surface : dict of dict of float
-        The three entries of each surface, and of ``"particles"``; where surfaces move also
-        ``drive_work``.
+        The three entries of each surface, of ``"particles"``, and with air of ``"still air"``;
+        where surfaces move also ``drive_work``.
     by_stream : dict of dict
         ``kinetic``, ``potential``, the three entries, and ``from_others``, of each stream; empty if
         there is one. The last is what the balance of a stream leaves over: the energy that it got
@@ -77,6 +85,8 @@ class Ledger(Shown):
     drive_work: float = 0.0
     spring: tuple[float, float] = (0.0, 0.0)
     damper_loss: float = 0.0
+    air_loss: float = 0.0
+    push_work: float = 0.0
 
     @property
     def relative_residual(self) -> float:
@@ -155,11 +165,16 @@ def ledger(recording: Record) -> Ledger:
     for entries, work in zip(by_surface.values(), recording.drives.tolist(), strict=False):
         entries["belt_work"] -= work
         entries["drive_work"] = work
+    if recording.scene.air_density:
+        by_surface[AIR] = dict(zip(ENTRIES, (0.0, 0.0, recording.air_loss), strict=True))
     closed, work = _closed(found), float(recording.drives.sum())
     closed["belt_work"] -= work
+    if pushed := by_surface[PARTICLES]["belt_work"]:
+        by_surface[PARTICLES] |= {"belt_work": 0.0, "push_work": pushed}
+        closed |= {"belt_work": closed["belt_work"] - pushed, "push_work": pushed}
     return Ledger(
         **_hung(recording, by_surface, closed | {"drive_work": work}),
-        by_surface=by_surface, by_stream=by_stream,
+        by_surface=by_surface, by_stream=by_stream, air_loss=recording.air_loss,
     )  # fmt: skip
 
 
@@ -180,7 +195,7 @@ def _hung(
         for name, ends in energies.items():
             before = closed.get(name, (0.0, 0.0))
             closed[name] = (before[0] + float(ends[0]), before[1] + float(ends[1]))
-        entries |= {"drive_work": worked, "damper_loss": damped}
+        entries |= {"drive_work": worked} | ({} if mover.hinge.steered else {"damper_loss": damped})
         entries["restitution_loss"] += stopped
         closed["drive_work"] += worked - given
         closed["restitution_loss"] += stopped

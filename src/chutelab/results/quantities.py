@@ -444,7 +444,9 @@ def measured(recording: Record, name: str) -> Floats:
             return np.array([float(values.sum() if which == "sum" else values.max())])
         case ["ledger", "by_surface", surface, entry] if not recording.family:
             return np.array([ledger(recording).by_surface[surface].get(entry, 0.0)])
-        case ["ledger", *_, "drive_work" | "damper_loss"] | ["ledger", "spring", _] if (
+        case ["ledger", "spring", _] if recording.family:
+            return np.zeros(many)
+        case ["ledger", *_, "drive_work" | "push_work" | "damper_loss" | "air_loss"] if (
             recording.family
         ):
             return np.zeros(many)

@@ -273,9 +273,14 @@ class Record(Shown):
         Energy (J) that the contact engine's solves made beyond what moving surfaces and the parting
         of overlaps give, summed over all steps: rounding of the energy turned over, or the solver
         is wrong (docs/physics.md, "The law of a solve"). 0 of other engines.
+    air_loss : float
+        What air takes of all particles, J; in the tracks it is part of the friction loss.
     totals : ndarray, shape (S,) or (0,), dtype `TOTAL`
         Energies of all particles together at each step of the contact engine in a crowd: its tracks
         leave out what is less than a hop, and sums of squares of their velocities are not as near.
+    unsolved : ndarray, shape (S,) or (0,)
+        How well each of these steps was solved: the most overlap, in radii, that its solve leaves
+        beyond what it asks for. Solves end when that is small, or after so many sweeps.
     drives : ndarray, shape (len(surfaces),) or (0,)
         What of the belt work (J) in `by_surface`, in the knots and in `totals` is the work of what
         moves the surface, see docs/physics.md, "Moving surfaces". Empty where none does.
@@ -302,19 +307,23 @@ class Record(Shown):
     angle: Floats = field(default_factory=lambda: np.zeros(0))
     instead: str = ""
     gained: float = 0.0
+    air_loss: float = 0.0
     totals: NDArray[Any] = field(default_factory=lambda: np.empty(0, TOTAL))
+    unsolved: Floats = field(default_factory=lambda: np.empty(0))
     drives: Floats = field(default_factory=lambda: np.zeros(0))
     impulses: NDArray[Any] = field(default_factory=lambda: np.empty((0, 0), LOAD))
     swings: NDArray[Any] = field(default_factory=lambda: np.empty(0, SWING))
     hinge_work: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
-        arrays = "knots offsets ended events by_surface angle totals drives impulses swings"
-        for name in (*arrays.split(), "hinge_work"):
+        arrays = "knots offsets ended events by_surface angle totals unsolved drives impulses"
+        for name in (*arrays.split(), "swings", "hinge_work"):
             getattr(self, name).flags.writeable = False
         if len(self.swings):
-            movers = (mover.swung(self.swings) for mover in self.machine.movers)
-            object.__setattr__(self, "machine", replace(self.machine, movers=tuple(movers)))
+            by_hand = np.setdiff1d(self.swings["surface"], [m.surface for m in self.machine.movers])
+            movers = *self.machine.movers, *map(self.machine.steered, by_hand.tolist())
+            swung = tuple(mover.swung(self.swings) for mover in movers)
+            object.__setattr__(self, "machine", replace(self.machine, movers=swung))
 
     @property
     def scene(self) -> Scene:

@@ -77,8 +77,8 @@ class Recorder:
         self.swings = np.empty(0, SWING)
         self.hinge_work = np.zeros((owners, 3))
         self.contacts = 0
-        self.gained = 0.0
-        self.totals = np.empty(0, TOTAL)
+        self.gained = self.air_loss = 0.0
+        self.totals, self.unsolved = np.empty(0, TOTAL), np.empty(0)
         self.impulses = np.empty((0, 0), LOAD)
         # Of engines that count loads here, if these are asked for.
         self.bins = Bins(machine) if machine.loads else None
@@ -119,23 +119,27 @@ class Recorder:
 
     def take_knots(self, rows: NDArray[Any]) -> None:
         """Add knots as the core writes them, dtype ``Knot``: a particle's in the order of time."""
-        numbers = rows.view("<f8").reshape(len(rows), -1)
-        own = numbers[:, : KNOT.itemsize // 8].copy().view(KNOT)[:, 0]
+        own = _items(rows, "t", KNOT.itemsize).copy().view(KNOT)
         self.add(rows["disk"].astype(np.int64), own)
 
     def take_events(self, rows: NDArray[Any]) -> None:
         """Add events as the core writes them, dtype ``Event``."""
         events = np.empty(len(rows), EVENT)
-        for name, source in (
-            ("t", "t"), ("particle", "disk"), ("other", "other"), ("kind", "kind"),
-            ("surface", "surface"), ("normal_impulse", "normal"), ("tangential_impulse", "tangent"),
+        for name, source, size in (
+            ("t", "t", 8), ("particle", "disk", 8), ("position", "x", 16),
+            ("velocity_before", "before", 16), ("velocity_after", "after", 16),
+            ("normal_impulse", "normal", 16),
         ):  # fmt: skip
-            events[name] = rows[source]
-        events["position"][:, 0], events["position"][:, 1] = rows["x"], rows["y"]
+            _items(events, name, size)[:] = _items(rows, source, size)
+        events["kind"], events["surface"] = rows["kind"], rows["surface"]
         for when in ("before", "after"):
-            events[f"velocity_{when}"] = rows[when][:, :2]
             events[f"omega_{when}"] = rows[when][:, 2]
         self._events.append(events)
+
+    def take_totals(self, rows: NDArray[Any]) -> None:
+        """Take what the core has of all steps, dtype ``Total``."""
+        self.totals = _items(rows, "t", TOTAL.itemsize).copy().view(TOTAL)
+        self.unsolved = rows["unsolved"].copy()
 
     def book(
         self,
@@ -249,16 +253,24 @@ class Recorder:
             ended=ended,
             events=events,
             by_surface=self.by_surface.copy(),
-            drives=self.drives if self.machine.movers else np.zeros(0),
+            drives=self.drives if self.machine.movers or len(self.swings) else np.zeros(0),
             swings=self.swings,
             hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 3)),
             steps=steps,
             contacts=self.contacts,
             angle=angle,
             gained=self.gained,
+            air_loss=self.air_loss,
             totals=self.totals,
+            unsolved=self.unsolved,
             impulses=self.impulses,
         )
+
+
+def _items(rows: NDArray[Any], name: str, size: int) -> NDArray[Any]:
+    """Return a field and what follows it, so many bytes in all, as items that are copied whole."""
+    begin = rows.dtype.fields[name][1]  # type: ignore[index]
+    return np.ndarray(len(rows), f"V{size}", rows, begin, rows.strides)
 
 
 def _joined(chunks: list[NDArray[Any]], dtype: np.dtype[Any]) -> NDArray[Any]:

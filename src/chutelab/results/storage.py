@@ -51,6 +51,7 @@ ARRAYS = {
     "by_surface": np.dtype("f8"),
     "angle": np.dtype("f8"),
     "totals": TOTAL,
+    "unsolved": np.dtype("f8"),
     "drives": np.dtype("f8"),
     "impulses": LOAD,
     "swings": SWING,
@@ -58,7 +59,7 @@ ARRAYS = {
 }
 """Arrays of a file and their types."""
 
-MAYBE = ("angle", "totals", "drives", "impulses", "swings", "hinge_work")
+MAYBE = ("angle", "totals", "unsolved", "drives", "impulses", "swings", "hinge_work")
 """Those that are left out where they are empty."""
 
 HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
@@ -186,6 +187,7 @@ def _about(recording: Record) -> dict[str, Any]:
         "contacts": recording.contacts,
         **({"instead": recording.instead} if recording.instead else {}),
         "gained": recording.gained,
+        **({"air_loss": recording.air_loss} if recording.scene.air_density else {}),
     }
 
 
@@ -210,14 +212,16 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     about.pop("seconds", None)  # earlier files tell how long the run took
     about.setdefault("gained", 0.0)  # ... and not this
     told = {name: about[name] for name in ("engine", "steps", "contacts", "gained")}
+    told["air_loss"] = about.get("air_loss", 0.0)
     instead = str(about.get("instead", ""))
     recording = Record(machine=build(scene), instead=instead, **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
         raise _UnfitError("the header is of another scene")
     numbers = {
         "by_surface": arrays["by_surface"], "angle": recording.angle, "drives": recording.drives,
+        "unsolved": recording.unsolved,
     }  # fmt: skip
-    numbers["gained"] = np.asarray(recording.gained, dtype=float)
+    numbers["gained"] = np.array([recording.gained, recording.air_loss], dtype=float)
     numbers["hinge_work"] = recording.hinge_work
     for name in ("knots", "events", "totals", "impulses", "swings"):
         array = getattr(recording, name)
@@ -236,6 +240,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and not np.any((sizes < 0) | (sizes == 1))
         and recording.angle.shape in ((0,), knots.shape)
         and recording.ended.shape == sizes.shape
+        and recording.unsolved.shape in ((0,), recording.totals.shape)
         and (not recording.impulses.size or recording.impulses.shape[1:] == (surfaces - 1,))
         and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
         and recording.by_surface.shape == (surfaces, len(ENTRIES))

@@ -159,7 +159,12 @@ def plugged(recording: Record) -> Plug | None:
 
 
 def air_drag(recording: Record) -> Drag | None:
-    """Return what air drag would do, by the fastest moment of a recording; None for mass points."""
+    """Return what air drag would do, by the fastest moment of a recording.
+
+    None for mass points, and of a run that has it.
+    """
+    if recording.scene.air_density:
+        return None
     speeds = np.hypot(*recording.knots["velocity"].T)
     if not len(speeds):
         return drag(recording.scene, prediction(recording), 0.0)

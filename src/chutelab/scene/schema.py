@@ -31,6 +31,7 @@ from chutelab.scene.units import (
     MOST_EXPECTATIONS,
     MOST_KINDS,
     MOST_SURFACES,
+    Amount,
     Gravity,
     Table,
     Text,
@@ -91,6 +92,12 @@ class SceneTables(Table):
 
     title: Text = described("Untitled scene", "What the scene is called", max_length=200)
     gravity: Gravity = described(9.81, "Gravity g, downward", "m/s²")
+    air_density: Amount = described(
+        0.0,
+        "Density of still air, which slows particles down as spheres of their radius"
+        " (Schiller and Naumann); 0 is without",
+        "kg/m³",
+    )
     particles: Annotated[tuple[Particle, ...], BeforeValidator(_one_or_several)] = _several(
         (Particle(),), alias="particle", min_length=1, max_length=MOST_KINDS
     )

@@ -26,7 +26,7 @@ AIR_DENSITY = 1.2
 AIR_VISCOSITY = 1.8e-5
 """Pa s, there."""
 
-STEPS = 64
+STEPS = 24
 """Fourth-order steps of a flight; what they miss is 1e-7 of what drag does."""
 
 MOST_STEPS = 20_000

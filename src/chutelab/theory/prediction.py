@@ -92,6 +92,15 @@ class Obstacles:
         """Corners of boxes round all that is round, ends too, (2C, 2), m."""
         return np.concatenate([self.center - self.size[:, None], self.center + self.size[:, None]])
 
+    def near(self, low: Floats, high: Floats, radius: float) -> bool:
+        """Tell whether one may be closer than a radius (m) to a box with two corners (2,)."""
+        ends = self.center[: 2 * len(self.start)].reshape(2, -1, 2)
+        round_, size = self.center[ends.shape[1] * 2 :], self.size[ends.shape[1] * 2 :, None]
+        lower = np.concatenate([ends.min(axis=0), round_ - size])
+        upper = np.concatenate([ends.max(axis=0), round_ + size])
+        room = 1.001 * radius + ROUNDING * (np.abs(lower) + np.abs(upper))
+        return bool(((lower - room <= high) & (upper + room >= low)).all(axis=1).any())
+
     def on_face(self, points: Floats) -> Bools:
         """Tell whether the feet of points (S, 2) are on the straight surfaces."""
         foot = np.sum((points - self.start) * self.tangent, axis=1)
@@ -186,6 +195,11 @@ def first_in_flight(
     flight: Flight, obstacles: Obstacles, radius: float, horizon: float
 ) -> tuple[float, int]:
     """Return when and with what the disk first collides up to `horizon`; (inf, -1)."""
+    turn = flight.velocity[1] / flight.gravity if flight.gravity > 0.0 else 0.0
+    places = flight.at(np.array([0.0, horizon, min(max(turn, 0.0), horizon)]))
+    low, high = places.min(axis=0), places.max(axis=0)
+    if not obstacles.near(low, high, radius):
+        return np.inf, -1
     start, normal = obstacles.start, obstacles.normal
     center, size = obstacles.center, obstacles.size
     height = np.sum((flight.position - start) * normal, axis=1)
@@ -209,10 +223,8 @@ def first_in_flight(
         met &= obstacles.on_face(flight.at(np.where(met, t, 0.0)))
         faces = np.minimum(faces, np.where(met, t, np.inf))
     # Circles that the box of the flight comes near.
-    turn = flight.velocity[1] / flight.gravity if flight.gravity > 0.0 else 0.0
-    places = flight.at(np.array([0.0, horizon, np.clip(turn, 0.0, horizon)]))
     room = 1.001 * (size + radius)[:, None]
-    near = (center >= places.min(axis=0) - room) & (center <= places.max(axis=0) + room)
+    near = (center >= low - room) & (center <= high + room)
     along &= np.abs(np.abs(height) - radius) <= off
     ends = (size == 0.0) & np.isin(obstacles.owner, np.flatnonzero(along))
     for index in np.flatnonzero(near.all(axis=1) & ~ends) if horizon > 0.0 else ():
@@ -234,6 +246,8 @@ def first_on_pulley(
     The centre's path has radius Rc (m) round the origin and goes from the angle `begin` from the
     top to `last` (rad); the angle returned is counted from `begin`.
     """
+    if not obstacles.near(np.full(2, -ride_radius), np.full(2, ride_radius), radius):
+        return np.inf, -1
 
     def turned(lean: Floats, cosine: Floats, on_it: Callable[[Floats], Bools]) -> Floats:
         """Return how far from `begin` it is to the first of the angles lean ± acos; inf if none."""
@@ -499,6 +513,7 @@ def outside(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
     yield np.logical_and(own.spin, np.greater(rolls, 0.0)), "rolling friction"
     yields = scenes.value(own, "restitution_speed") is not None
     yield yields, "the restitution falls with speed"
+    yield np.greater(scenes.value(scene, "air_density"), 0.0), "air slows the particle down"
     hangs = any(string.particle == 0 for string in scene.string)
     yield hangs, "the particle hangs on a string"
     for name in scene.movers:

@@ -244,6 +244,9 @@ def csv_columns(columns: Iterable[Any]) -> str:
     >>> csv_columns([np.array([0.1, 2.0, np.nan]), np.array(["a", "=b", "a"], dtype=object)])
     "0.1,a\n2,'=b\n,a\n"
     """
+    # Here, as it takes a while: it writes shortest digits in a seventh of the time of `repr`.
+    from pydantic_core import to_json
+
     cells, known = [], dict[bytes, list[str]]()
     for column in columns:
         values = column.tolist()
@@ -255,9 +258,8 @@ def csv_columns(columns: Iterable[Any]) -> str:
         # Several columns may hold the same numbers, and digits take longest.
         bits = column.tobytes()
         if bits not in known:
-            # All in one call: one for each number would take as long again.
-            text = f"{values!r}"[1:-1] + ", "
-            known[bits] = text.replace(".0, ", ", ").replace("nan, ", ", ").split(", ")[:-1]
+            text = to_json(values).decode()[1:-1].replace("Infinity", "inf") + ","
+            known[bits] = text.replace(".0,", ",").replace("NaN,", ",").split(",")[:-1]
         cells.append(known[bits])
     return "".join([f"{line}\n" for line in map(",".join, zip(*cells, strict=True))])
 

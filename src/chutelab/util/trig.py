@@ -62,7 +62,27 @@ def sin_cos(angle: Any) -> tuple[Any, Any]:
     >>> float(sin_cos(0.5 * np.pi)[1])
     6.123233995736766e-17
     """
+    if isinstance(angle, float):
+        # The same in a twentieth of the time.
+        if not abs(angle) <= LARGEST_ANGLE:
+            return np.float64(np.nan), np.float64(np.nan)
+        sine, cosine, turns = _within_a_quarter(float(angle))
+        turned = (sine, cosine, -sine, -cosine, sine)
+        quarter = int(turns) & 3
+        return np.float64(turned[quarter]), np.float64(turned[quarter + 1])
     angle = np.where(np.abs(angle) <= LARGEST_ANGLE, angle, np.nan)[()]
+    sine, cosine, turns = _within_a_quarter(angle)
+    quarter = turns - 4.0 * np.floor(0.25 * turns)
+    odd = (quarter == 1.0) | (quarter == 3.0)
+    up, across = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
+    return (
+        np.where(quarter >= 2.0, -up, up)[()],
+        np.where((quarter == 1.0) | (quarter == 2.0), -across, across)[()],
+    )
+
+
+def _within_a_quarter(angle: Any) -> tuple[Any, Any, Any]:
+    """Return sine and cosine of what is left of an angle less quarter turns, and how many."""
     turns = (angle * _QUARTERS + _ROUND) - _ROUND
     # The rest, as the sum of x and a tail, without its first digits cancelling away.
     first = angle - turns * _PART1
@@ -80,14 +100,7 @@ def sin_cos(angle: Any) -> tuple[Any, Any]:
     r = z * (_C1 + z * (_C2 + z * _C3)) + w * w * (_C4 + z * (_C5 + z * _C6))
     half = 0.5 * z
     one = 1.0 - half
-    cosine = one + (((1.0 - one) - half) + (z * r - x * tail))
-    quarter = turns - 4.0 * np.floor(0.25 * turns)
-    odd = (quarter == 1.0) | (quarter == 3.0)
-    up, across = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
-    return (
-        np.where(quarter >= 2.0, -up, up)[()],
-        np.where((quarter == 1.0) | (quarter == 2.0), -across, across)[()],
-    )
+    return sine, one + (((1.0 - one) - half) + (z * r - x * tail)), turns
 
 
 def atan2(y: Any, x: Any) -> Any:

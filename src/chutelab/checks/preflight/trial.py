@@ -248,6 +248,8 @@ def skipped(
         yield Part("flights", "only contacts that last are stepped, blows have their own instants")
     if machine.until == "landed":
         yield Part("what follows", 'the first touch of the outgoing belt: run.until = "landed"')
+    if scene.air_density:
+        return
     air = drag(scene, predict(scene), 0.0) if recording is None else air_drag(recording)
     if air is not None:
         yield Part("air", f"its drag would be {air.effect}")

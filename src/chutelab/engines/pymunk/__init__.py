@@ -34,9 +34,9 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     `progress` is called now and then with the share of the run that is done, and may end the run.
     With `align`, a lone particle's blows are right to rounding error, its lasting contacts of order
     2 in the step, which is no longer than `dt` and half a radius' way. Particles that meet, boxes,
-    what hangs on strings, surfaces that move, and steps that are all alike, are of order 1: `dt`
-    times the speed should be less than the radius, or half a box's width, or they overlap by as
-    much, and pass through surfaces.
+    what hangs on strings, surfaces that move, air, and steps that are all alike, are of order 1:
+    `dt` times the speed should be less than the radius, or half a box's width, or they overlap by
+    as much, and pass through surfaces.
 
     Raises a `ValueError` if a particle has no radius; a `StalledError`, which has the recording so
     far, if a lone particle goes on without getting on.

@@ -11,7 +11,7 @@ particle lies by 2 √(2 h/g)/(1 - ε) too early, some 1e-6 s.
 from __future__ import annotations
 
 from functools import cache
-from math import ceil, copysign, inf
+from math import copysign, inf
 from operator import itemgetter
 from typing import Any, NamedTuple
 
@@ -73,9 +73,6 @@ They take 2 to 8 s. A ride round 1/1000 of the radius at 1 m/s needs a third of 
 
 TICK = 1e-12
 """s, over `Machine.pace`; what is closer to each other is at one instant."""
-
-OFTEN = 1000
-"""Steps of a flight between two reports of progress; they take 2 ms."""
 
 TURNS = 200
 """Blows at one instant, one surface after the other, before all are solved together."""
@@ -298,19 +295,12 @@ class Lone:
             met = self.world.meets(path, face, span, face in touching)
             if met < span:
                 span, reason = met, ""
-        count = ceil(span / self.dt)
-        if count:
-            h, self.restitution, begin, v = span / count, {}, self.t, self.v
-            self._step(self.x, self.v + 0.5 * h * self.pull, self.omega, h, self.pull)
-            for taken in range(1, count):
-                if taken % OFTEN == 0:
-                    self.t, self.x = begin + taken * h, self.body.position
-                    self.v = v + taken * h * self.pull
-                    self._look()
-                self.world.space.step(h)
-            self.steps += count - 1
-            self.t = begin + span
-            self.x, self.v = self.body.position, v + span * self.pull
+        if span > 0.0:
+            # Exact, so one step is enough.
+            self.restitution = {}
+            self._step(self.x, self.v + 0.5 * span * self.pull, self.omega, span, self.pull)
+            self.t += span
+            self.x, self.v = self.body.position, self.v + span * self.pull
         if reason:
             self._end(reason, Kind.EXIT if reason == "exit" else None)
         else:

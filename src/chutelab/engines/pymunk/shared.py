@@ -58,6 +58,9 @@ friction hops for some steps at a time; the ride ends with its last push."""
 CALM, STILL = 0.1, 1e-3
 """s over `Machine.pace`, and m/s times that: slower for that long, a particle has settled."""
 
+VISCOSITY = 1.8e-5
+"""Pa s; of air at 20 °C."""
+
 _BODY = (
     batch.BodyFields.BODY_ID
     | batch.BodyFields.POSITION
@@ -311,6 +314,12 @@ class Shared:
             self._turn()
         if self.moving is not None:
             self.moving.put(self.t, self.h)
+        if self.machine.air:
+            self._slow_down()
+            for i in np.flatnonzero(self.free).tolist():
+                body, v = self.bodies[i][0], Vec2d(*self.state[1, 2:4, i].tolist())
+                body.position += 0.5 * self.h * (body.velocity - v)
+                body.velocity = v
         space.step(self.h)
         self.steps += 1
         self.clock += 1
@@ -337,6 +346,8 @@ class Shared:
         self._contacts()
         if self.strings:
             self._pulled()
+        if self.machine.air:
+            self._slow_down()
         self.tracks.step(self.free, (t, self.t), self.state[..., : self.count], entries, turned)
         self._endings(t, entries)
 
@@ -440,6 +451,27 @@ class Shared:
                 other=np.where(pair, other, -1)[told],
                 normal_impulse=push[told], tangential_impulse=rub[told],
             )  # fmt: skip
+
+    def _slow_down(self) -> None:
+        """Have air slow all that are free down for half a step, as spheres; book what it takes."""
+        air, p = self.machine.air, self.machine.particle
+
+        def relief(speed: Floats) -> Any:
+            # Schiller and Naumann (1933); deceleration over speed, 1/s.
+            reynolds = 2.0 * p.radius * speed * air / VISCOSITY
+            coefficient = np.where(
+                reynolds < 1000.0, 24.0 * (1.0 + 0.15 * reynolds**0.687), 0.44 * reynolds
+            )
+            return coefficient * np.pi * p.radius * VISCOSITY / (4.0 * p.mass)
+
+        v = self.state[1, 2:4, : self.count]
+        speed = np.hypot(*v)
+        middle = speed * np.exp(-0.25 * self.h * relief(speed))
+        left = np.where(self.free, np.exp(-0.5 * self.h * relief(middle)), 1.0)
+        lost = 0.5 * p.mass * (v**2 * (1.0 - left**2)).sum(axis=0)
+        v *= left
+        self.entries[2, : self.count] += lost
+        self.recorder.air_loss += float(lost.sum())
 
     def _carry(self, one: Ints, other: Ints, n: Floats, push: Floats, others: Floats) -> Any:
         """Have surfaces that move do so in `others`, (2, 3, k); book and return their work, J."""

@@ -399,6 +399,8 @@ class World:
         either that faces it.
         """
         ways, bends = self._from(end)
+        if len(ways) == 1:
+            return out.perpendicular()
         dots, crosses = ways @ -np.array(out), ways[:, 0] * out.y - ways[:, 1] * out.x
         turns, curls = np.arctan2(crosses, dots), bends - bend
         alike = np.abs(turns) <= ALIKE

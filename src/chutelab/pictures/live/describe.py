@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
-from chutelab.scene.conflicts import EITHER, HINGED, MOTIONS, RULES, tree
+from chutelab.scene.conflicts import EITHER, RULES, tree
 from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
@@ -47,6 +47,14 @@ PARTS: Final = (
           radius=0.012, repeat=[[6, 0.08, 0.0], [4, 0.04, -0.07]], restitution=0.4),
     _part("gate", "D", "surface", "points points", "opens_at closes_at friction", "opens_at",
           opens_at=1.0),
+    _part("flap", "F", "surface", "points points", "spring damper mass", "hinge",
+          hinge="pivot", mass=0.2, spring=0.5, damper=0.01),
+    _part("rotor", "M", "surface", "points points", "motor.speed_deg motor.torque mass",
+          "hinge motor", hinge="pivot", mass=0.2, motor={"speed_deg": 90.0, "torque": 1.0}),
+    _part("shaker", "K", "surface", "points points", "shake.by shake.frequency friction", "shake",
+          shake={"by": [0.0, 0.003], "frequency": 15.0}),
+    _part("pusher", "T", "surface", "points points travel.to", "travel.at travel.in friction",
+          "travel", travel={"at": 0.5, "in": 1.0}),
     _part("sensor", "S", "sensor", "from to", "name from to"),
 )  # fmt: skip
 """What can be added to a machine, a row each: its word, the key that begins it, its table, the key
@@ -72,7 +80,8 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     dict
         ``scene``: its keys as its file has them, with a seed beyond 2**53 as text; ``stream`` is []
         where there is none. ``tables``: of each key of each table (those outside of tables under
-        ``scene``) default, unit, low and high, its form as JSON Schema, and whether it is required.
+        ``scene``) default, unit, low and high, its form as JSON Schema, and whether it is required;
+        of a table in a table the same of its ``parts``.
         ``rules``: what contradicts what within a row of a table, by tables: keys, condition, id of
         a text, and the other key in it.
         ``presets``: the numbers of each material. ``parts``: see `PARTS`. Of an empty machine
@@ -118,9 +127,6 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         if not pair.meet:
             faults.append(Fault(f"pair[{n}].meet", False, f"true; {allowed}, which all meet"))
             partly = False
-    for name in scene.movers:
-        faults.append(Fault("surface", name, f"{allowed}, and surfaces that stay where they are"))
-        partly = False
     if partly:
         faults = []
     if scene.count > MOST:
@@ -191,10 +197,7 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             rule = _rule([table, 0, key] if several else [table, key])
             if field.is_required():
                 rule["required"] = True
-            if table == "particle" and key in ("size", "points"):
-                continue
-            moves = table in ("plate", "surface") and key in (*MOTIONS, *HINGED)
-            if moves or (table, key) == ("pair", "meet") or (table, key) == ("surface", "pivot"):
+            if (table, key) in (("particle", "size"), ("particle", "points"), ("pair", "meet")):
                 continue
             rules[table][key] = rule
     # Mass points, boxes and polygons are for other engines.
@@ -220,6 +223,11 @@ def _rule(path: list[str | int]) -> dict[str, Any]:
     if limits is not None:
         found["low"], found["high"] = limits
     found["form"] = _form(rule)
+    if needs := rule.get("required"):
+        found["form"] = {"type": "object"}
+        found["parts"] = {
+            key: _rule([*path, key]) | {"required": key in needs} for key in rule["properties"]
+        }
     return found
 
 

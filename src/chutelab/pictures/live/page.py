@@ -90,8 +90,11 @@ def html(
     # What the page's language has no words for is called as in the registry.
     meanings = {f"number-{row.name}": row.meaning for row in shown}
     (other,) = {*LANGUAGES} - {language}
-    # Packed, for it is long: all but the scene.
+    # Packed, for it is long: all but the scene; the script, too, which boot.ts puts into the page.
+    script = _file(f"bundle/{'app' if lesson is None else 'lessonpage'}.js")
     large = {
+        "script": script,
+        "worker": _file("bundle/worker.js"),
         **{name: facts.pop(name) for name in ("tables", "rules", "presets")},
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
         "strings": {**meanings, **strings},
@@ -115,7 +118,7 @@ def html(
     }
     # Within a script element nothing but an end tag must look like one.
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
-    script = _file(f"bundle/{'app' if lesson is None else 'lessonpage'}.js")
+    boot = _file("bundle/boot.js")
     return Template(_file("assets/page.html")).substitute(
         language=language,
         title=escape(title),
@@ -124,9 +127,9 @@ def html(
         home=f'<a class="home" href="{escape(home[1])}">{escape(home[0])}</a>' if home else "",
         css=css,
         css_hash=_hash(css),
-        script=script,
+        boot=boot,
+        boot_hash=_hash(boot),
         script_hash=_hash(script),
-        worker=_file("bundle/worker.js"),
         data=text.replace("<", "\\u003c"),
     )
 

@@ -105,6 +105,8 @@ def spreads_of(columns: Floats) -> Floats:
     )
 
 
+NEEDS: Final = "Searches of streams need scikit-learn"
+
 DRAWS: Final = 64
 """Draws of what is not known, and of seeds, that errors are told from."""
 
@@ -202,9 +204,7 @@ class Model:
         self.fitted: Any = None
         if known.sum() < 2 or self.size <= 1e-12 * float(np.max(np.abs(column[known]))):
             return
-        process = library(
-            "sklearn.gaussian_process", "Searches of streams need scikit-learn", "design"
-        )
+        process = library("sklearn.gaussian_process", NEEDS, "design")
         kernels = process.kernels
         y, redrawn = ((one - self.level) / self.size for one in (column[known], again[:, known]))
         # What all variants have in common is no noise of the fit, but an error of it.
@@ -267,30 +267,33 @@ def search(
     seed: int,
 ) -> Found:
     """Return where the wishes come true, after at most `most` variants or when time is up."""
-    library("sklearn.gaussian_process", "Searches of streams need scikit-learn", "design")
+    library("sklearn.gaussian_process", NEEDS, "design")
     random, keys = np.random.default_rng(seed), len(ranges)
     low, width = np.array([(one.low, one.width) for one in ranges]).T
     high = low + width
     power = max(3, (min(FIRST * keys, most) - 1).bit_length())
     nexts = scipy("stats.qmc").Sobol(keys, seed=random).random_base2(power)[:most]
     shares, values = np.empty((0, keys)), np.empty((0, seeds, len(evaluate.quantities)))
-    while True:
-        new = evaluate.seeds(np.clip(low + nexts * width, low, high), seeds)
-        # If time was up, some have not run.
-        ran = evaluate.ran
-        shares = np.concatenate([shares, nexts[ran]])
-        values = np.concatenate([values, new[ran]])
-        if not len(shares):
-            nothing = np.full(keys, np.nan)
-            return Found(nothing, nothing, shares, values, 0.0, [])
-        fit = Fit(shares, values, wishes, random)
-        at, error, open_ = fit.best(keys)
-        if evaluate.stopped or len(shares) >= most or fit.done:
-            break
-        nexts = open_[: min(BATCH, most - len(shares))]
-    apart = np.any(np.abs(open_ - at) > 5.0 * error + 0.02, axis=1)
-    points = np.clip(low + shares * width, low, high)
-    reports = [
-        Model(shares, *fit.of_means(values[..., n]), seeds).at(at) for n in range(values.shape[2])
-    ]
+    # On matrices of some hundred rows threads only wait for each other: ten times as long.
+    with library("threadpoolctl", NEEDS, "design").threadpool_limits(1):
+        while True:
+            new = evaluate.seeds(np.clip(low + nexts * width, low, high), seeds)
+            # If time was up, some have not run.
+            ran = evaluate.ran
+            shares = np.concatenate([shares, nexts[ran]])
+            values = np.concatenate([values, new[ran]])
+            if not len(shares):
+                nothing = np.full(keys, np.nan)
+                return Found(nothing, nothing, shares, values, 0.0, [])
+            fit = Fit(shares, values, wishes, random)
+            at, error, open_ = fit.best(keys)
+            if evaluate.stopped or len(shares) >= most or fit.done:
+                break
+            nexts = open_[: min(BATCH, most - len(shares))]
+        apart = np.any(np.abs(open_ - at) > 5.0 * error + 0.02, axis=1)
+        points = np.clip(low + shares * width, low, high)
+        reports = [
+            Model(shares, *fit.of_means(values[..., n]), seeds).at(at)
+            for n in range(values.shape[2])
+        ]
     return Found(low + at * width, error * width, points, values, float(apart.mean()), reports)

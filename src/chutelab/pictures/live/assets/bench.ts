@@ -80,6 +80,7 @@ class Bench {
     this.free = mayDraw(lab.data);
     inspector.mayDelete = this.free;
     inspector.duplicate = () => this.duplicate();
+    inspector.own.unit = () => stage.view.unit;
     this.chip = html("div", { class: "float chip", role: "status" });
     this.chip.hidden = true;
     this.lost = html("button", { class: "float lost", hidden: "",
@@ -302,8 +303,8 @@ class Bench {
       const state = recording?.tracks[i]?.state(t);
       return state && !state.ended && near(state.x, state.y, (machine.radius[i] ?? 0) * view.scale);
     });
-    const name = surfaceAt(machine, view.worldX(px), view.worldY(py), CLICK_REACH / view.scale,
-      this.lab.scene?.sensor);
+    const name = surfaceAt(this.stage.posed ?? machine, view.worldX(px), view.worldY(py),
+      CLICK_REACH / view.scale, this.lab.scene?.sensor);
     const few = machine.releases.length < MOST_BALLS;
     return ball >= 0 && few ? machine.streams[machine.releases[ball].stream] : name;
   }

@@ -3,12 +3,14 @@
 
 import { KNOT_ROW, type Core, type Machine } from "./core.ts";
 import type { Lab } from "./lab.ts";
+import type { Swings } from "./motion.ts";
 import type { Recording } from "./recording.ts";
 import type { Words } from "./words.ts";
 
 /** A whole run as the core's laws take it: all knots, and the first of each particle. */
 export type Run = { machine: Machine, knots: Float64Array, offsets: number[], books: number[],
-  gained: number, contacts: number, steps: number, unreal: number };
+  swings: Map<number, Swings>, gained: number, unsolved: number, contacts: number, steps: number,
+  unreal: number };
 
 /** A law that is broken: by which particle first, when (s) and where (m), and beside what; -1 of
  * particle or surface if it is about all together. */
@@ -16,7 +18,8 @@ export type Breach = { law: number, particle: number, surface: number, t: number
   y: number };
 
 /** What the laws ask of a recording of a run that is over. */
-function runOf({ machine, tracks, events, books, gained, contacts, steps }: Recording): Run {
+function runOf(recording: Recording): Run {
+  const { machine, tracks, events, books, swings, gained, unsolved, contacts, steps } = recording;
   const offsets = [0];
   for (const { count } of tracks) offsets.push(offsets[offsets.length - 1] + count);
   const knots = new Float64Array(offsets[tracks.length] * KNOT_ROW);
@@ -25,20 +28,26 @@ function runOf({ machine, tracks, events, books, gained, contacts, steps }: Reco
   });
   const unreal = events.flatMap(({ t, x, y, before, after, normal, tangent }) =>
     [t, x, y, ...before, ...after, normal, tangent]).filter((value) => !isFinite(value)).length;
-  return { machine, knots, offsets, books: (books ?? []).flat(), gained, contacts, steps, unreal };
+  return {
+    machine, knots, offsets, books: (books ?? []).flat(), swings, gained, unsolved,
+    contacts, steps, unreal,
+  };
 }
 
 /** The laws that a run breaks, in the order in which they are told. What the core has in memory
  * stays as it is. */
-function judge(core: Core, { machine, knots, offsets, books, ...run }: Run): Breach[] {
+function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: Run): Breach[] {
   const { gravity, interact, dt, pulley, radius, mass, inertia } = machine;
   const { enums } = core.layout, end = core.get("end", "Room");
-  const pieces = barriersOf(machine), count = radius.length;
+  const pieces = barriersOf(machine), count = radius.length, { movers } = machine;
+  const states = movers.flatMap(({ surface }) => (swings.get(surface)?.rows ?? [])
+    .map(([t, angle, rate]) => ({ t, angle, rate, surface })));
   core.reset("Laws");
   core.setAll("Laws", {
     particle_count: count, piece_count: pieces.length, knot_count: offsets[count], row: KNOT_ROW,
     book_rows: books.length / 3, surface_count: machine.surfaces.length + 1,
-    engine: enums.Engine.ENGINE_CONTACT, interact: Number(interact), pulley: Number(!!pulley),
+    engine: enums.Engine.ENGINE_CONTACT, interact: Number(interact || states.length > 0),
+    mover_count: movers.length, swing_count: states.length, pulley: Number(!!pulley),
     dt, largest: radius.reduce((most, own) => Math.max(most, own), 0), ...run,
   });
   core.work("lay_out_laws");
@@ -49,6 +58,13 @@ function judge(core: Core, { machine, knots, offsets, books, ...run }: Run): Bre
     const body = { radius: own, mass: mass[i], inertia: inertia[i], gravity };
     core.fill("bodies", "Body", i, body, "Laws");
   });
+  states.forEach((row, n) => core.fill("swings", "Swing", n, row, "Laws"));
+  movers.forEach((mover, k) => {
+    const of = states.map(({ surface }) => surface);
+    const [first, last] = [of.indexOf(mover.surface), of.lastIndexOf(mover.surface)]
+      .map((n) => Math.max(0, n));
+    core.fill("movers", "Mover", k, { ...mover, first, last }, "Laws");
+  });
   pieces.forEach((row, k) => core.fill("barriers", "Barrier", k, row, "Laws"));
   core.work("judge");
   core.set("end", end, "Room");
@@ -56,7 +72,7 @@ function judge(core: Core, { machine, knots, offsets, books, ...run }: Run): Bre
 }
 
 /** All pieces of surfaces as the core's laws take them: straight ones, bent ones, the pulley. */
-function barriersOf({ segments, arcs, pulley }: Machine) {
+function barriersOf({ segments, arcs, pulley, movers }: Machine) {
   const wheel = { x: 0, y: 0, begin: 0, extent: Infinity, appears: -Infinity, vanishes: Infinity };
   const straight = segments.map(
     ({ x, y, tx, ty, length, speed, surface, appears, vanishes }) =>
@@ -64,11 +80,13 @@ function barriersOf({ segments, arcs, pulley }: Machine) {
   const bent = [...arcs, ...(pulley ? [{ ...wheel, ...pulley }] : [])].map(
     ({ x, y, radius, begin, extent, speed, surface, appears, vanishes }) =>
       ({ x, y, radius, begin, extent, speed, surface, appears, vanishes }));
-  return [...straight, ...bent];
+  return [...straight, ...bent].map((row) =>
+    ({ ...row, mover: movers.findIndex(({ surface }) => surface === row.surface) + 1 }));
 }
 
 /** What is said of each law, in the order of the core's enum Law. */
-const SAID = ["law-finite", "law-through", "law-inside", "law-energy", "law-losses", "law-ledger"];
+const SAID = ["law-finite", "law-through", "law-inside", "law-energy", "law-losses", "law-ledger",
+  "law-solved"];
 
 /** The line below the picture that says which law is broken. */
 function watchLaws(line: HTMLElement, lab: Lab, words: Words) {

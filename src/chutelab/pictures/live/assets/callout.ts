@@ -59,8 +59,7 @@ function pointsOf(stage: Stage): Named[] {
 
 /** Surfaces and sensors as lines through points, px, by name, with the lower side of belts; what is
  * far outside of the picture is at its edge. Nothing has to be laid out for it. */
-function surfaceLines({ lab, view, scenery }: Stage): Named[] {
-  const { machine } = lab;
+function surfaceLines({ lab, view, scenery, posed: machine }: Stage): Named[] {
   if (!machine) return [];
   const px = (x: number, y: number, down = 0): Point => [
     Math.min(Math.max(view.px(x), -50), view.width + 50),
@@ -129,7 +128,10 @@ function drawOutline(stage: Stage) {
     const bodies = scenery.drawingsOf(name).flatMap((group) =>
       [...group.querySelectorAll(BODIES)].map((shape) => {
         const wide = Number(shape.getAttribute("stroke-width") ?? 0);
-        const copy = shape.cloneNode(false), by = group.getAttribute("transform");
+        // What moves is changed where it is written: that is what stays outlined.
+        const copy = shape.cloneNode(false), body = shape.closest(".part") as Element;
+        const by = [...own === "pointed" && group !== body ? [group] : [], body]
+          .map((one) => one.getAttribute("transform") ?? "").join(" ").trim();
         if (by) copy.setAttribute("transform", by);
         return [copy, wide] as [any, number];
       }));
@@ -169,6 +171,8 @@ class Callout {
   ) {
     stage.over.append(this.leader);
     inspector.listeners.push(() => this.place());
+    // With more of its fields it is higher.
+    inspector.panel.addEventListener("toggle", () => this.place(), true);
     stage.drawers.push(() => this.place());
   }
 

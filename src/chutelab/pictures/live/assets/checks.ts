@@ -3,7 +3,7 @@
 import { fits, type Form } from "./forms.ts";
 import { valueOfTree } from "./formula.ts";
 import { RADIANS } from "./trig.ts";
-import type { Given, Lab, Point, Scene, Rule } from "./scene.ts";
+import { moversOf, type Given, type Lab, type Point, type Scene, type Rule } from "./scene.ts";
 
 /** What a `Fault` says: key, value, id of a text, and its words. */
 type Wrong = [string, unknown, string, Record<string, number | string>?];
@@ -47,14 +47,10 @@ export function* misfitsOf(given: Given, lab: Lab): Generator<Wrong> {
       yield [table, value, "form"];
     }
   }
-  yield* misfitsOfTable(given, lab.tables.scene, (key) => key);
+  yield* misfitsOfTable(given, lab.tables.scene, (key) => key, Object.keys(given));
   for (const [table, rules] of Object.entries(lab.tables)) {
     if (table === "scene" || FOREIGN.includes(table)) continue;
     for (const [n, row] of listOf(given[table]).entries()) {
-      const unknown = Object.keys(row).find((key) => !Object.hasOwn(rules, key));
-      if (unknown !== undefined) {
-        yield [pathOf(given, table, n, unknown), row[unknown], "unknown-key"];
-      }
       yield* misfitsOfTable(row, rules, (key) => pathOf(given, table, n, key));
     }
   }
@@ -62,12 +58,18 @@ export function* misfitsOf(given: Given, lab: Lab): Generator<Wrong> {
 
 function* misfitsOfTable(
   row: Given, rules: Record<string, Rule>, path: (key: string) => string,
+  known: string[] = Object.keys(rules),
 ): Generator<Wrong> {
-  for (const [key, { form, low, high, required }] of Object.entries(rules)) {
+  const unknown = Object.keys(row).find((key) => !known.includes(key));
+  if (unknown !== undefined) yield [path(unknown), row[unknown], "unknown-key"];
+  for (const [key, { form, low, high, required, parts }] of Object.entries(rules)) {
     const value = row[key];
     if (value === undefined) {
       if (required) yield [path(key), value, "missing"];
-    } else if (!fits(value, form)) {
+    } else if (parts && isTable(value)) {
+      yield* misfitsOfTable(value, parts, (name) => `${path(key)}.${name}`);
+    } else if (parts) yield [path(key), value, "form"];
+    else if (!fits(value, form)) {
       const number = typeof value === "number" && low !== undefined && high !== undefined;
       const least = leastOf(form);
       if (number && least !== undefined) {
@@ -136,6 +138,7 @@ export function* conflictsOf(scene: Scene, given: Given, lab: Lab): Generator<Wr
   yield* kindConflicts(scene, given);
   yield* contradictions(scene, given, lab);
   yield* pieceConflicts(scene);
+  yield* motionConflicts(scene, given);
   for (const n of scene.streams.keys()) yield* rateConflicts(scene, given, n);
   const counts = scene.streams.map(({ count }) => count);
   const most = scene.most;
@@ -192,6 +195,25 @@ function* pieceConflicts(
       const key = repeat.length ? "repeat" : "points";
       yield [`surface[${n}].${key}`, one[key], "too-many", { high: MOST_PIECES }];
       return;
+    }
+  }
+}
+
+/** Yields what cannot hang on a hinge, and what no engine can run that was asked for. */
+function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
+  const { streams, crowded, run } = scene, movers = moversOf(scene);
+  const count = streams.reduce((sum, stream) => sum + stream.count, 0);
+  if (run.engine === "exact" && (movers.length || crowded)) {
+    yield ["run.engine", run.engine, "not-exact"];
+  }
+  for (const [, { hinge, stops_deg: stops, given: row }] of movers) {
+    const table = scene.surface.some((one) => one.given === row) ? "surface" : "plate";
+    const n = listOf(given[table]).indexOf(row);
+    if (hinge && count > 1 && !crowded) {
+      yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "hinge-meet"];
+    }
+    if (stops && !(stops[0] <= 0 && stops[1] >= 0 && stops[0] < stops[1])) {
+      yield [pathOf(given, table, n, "stops_deg"), stops, "stops"];
     }
   }
 }

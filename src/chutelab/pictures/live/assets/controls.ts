@@ -1,8 +1,9 @@
 // Which numbers of a scene can be changed on this page, what holds them now, and how far they go.
 
+import { motionOf } from "./edit.ts";
 import { valueAt } from "./keys.ts";
 import { listOf, pathOf } from "./checks.ts";
-import { Fault, met, type Scene, type Given } from "./scene.ts";
+import { Fault, met, ruleOf, type Scene, type Given, type Rule } from "./scene.ts";
 import type { Form } from "./forms.ts";
 import type { Handle } from "./handles.ts";
 import type { Words } from "./words.ts";
@@ -61,19 +62,18 @@ function openHandles(handles: Handle[], page: Page) {
   });
 }
 
-/** Table and name of a key: `["surface", "from"]` of `surface[2].from[0]`. */
+/** Where the rule of a key is: `surface.from` of `surface[2].from[0]`. */
 function homeOf(key: string) {
-  const [table, name] = key.replace(/\[\d+\]/g, "").split(".");
-  return name === undefined ? ["scene", table] : [table, name];
+  const plain = key.replace(/\[\d+\]/g, "");
+  return plain.includes(".") ? plain : `scene.${plain}`;
 }
 
 /** Unit and range of a key. */
 function boundsOf(page: Page, key: string) {
-  const [table, name] = homeOf(key);
-  const rule = page.tables[table]?.[name] ?? {};
+  const rule = ruleOf(page.tables, homeOf(key));
   const own = Object.entries(page.live?.ranges ?? {}).find(([one]) => isPartOf(key, one));
-  const [low, high] = own?.[1] ?? [rule.low ?? -Infinity, rule.high ?? Infinity];
-  return { unit: (rule.unit ?? "") as string, low, high };
+  const [low, high] = own?.[1] ?? [rule?.low ?? -Infinity, rule?.high ?? Infinity];
+  return { unit: rule?.unit ?? "", low, high };
 }
 
 /** All that can be chosen; what has no place in the picture has its table's name before its own. */
@@ -115,13 +115,28 @@ const MAIN: Record<string, string[]> = {
   particle: ["radius", "mass"],
 };
 
+/** Keys of what hangs on a hinge. */
+const HINGED = ["hinge", "mass", "inertia", "spring", "rest_deg", "damper", "stops_deg", "motor"];
+
+/** Keys of a motion that say nothing while it moves otherwise. */
+function still({ given }: any, table: string): string[] {
+  const motion = motionOf(given);
+  return [...(motion === "hinge" ? ["turn"] : HINGED), ...(given.shake ? [] : ["shake"]),
+    ...(given.travel ? [] : ["travel"]), ...(motion === "still" ? ["turn"] : []),
+    ...(table === "surface" && (["still", "shakes"].includes(motion) || Array.isArray(given.hinge))
+      ? ["pivot"] : [])];
+}
+
 /** Keys that say nothing as the others are. */
 function idle({ incoming }: Scene, table: string, row: any): string[] {
+  const moves = table === "surface" || table === "plate" ? still(row, table) : [];
   if (table === "surface") {
-    return row.center ? ["from", "to", "points"]
-      : ["center", "radius", "from_deg", "to_deg", ...(row.given.from ? ["points"] : ["from", "to"])];
+    return [...moves, ...row.center ? ["from", "to", "points"]
+      : ["center", "radius", "from_deg", "to_deg", ...(row.given.from ? ["points"] : ["from", "to"])]];
   }
-  if (table === "plate") return row.pivot ? ["distance", "pivot_height"] : ["name", "pivot"];
+  if (table === "plate") {
+    return [...moves, ...row.pivot ? ["distance", "pivot_height"] : ["name", "pivot"]];
+  }
   if (table === "stream") {
     return [...(row.count === 1 ? ["rate", "width", "bed_height", "speed_spread", "seed"] : []),
       ...(row.interact ? [] : ["restitution", "friction"]), ...(row.to ? ["bed_height"] : []),
@@ -134,7 +149,9 @@ function idle({ incoming }: Scene, table: string, row: any): string[] {
 
 function valueOf(scene: Scene, section: Section, key: string) {
   const which = ["restitution", "friction"].indexOf(key), row = rowOf(scene, section);
-  if (which < 0 || ["stream", "material", "pair"].includes(section.table)) return row[key];
+  if (which < 0 || ["stream", "material", "pair"].includes(section.table)) {
+    return key.split(".").reduce((found, part) => found?.[part], row);
+  }
   // It may be the material's.
   const value = met(scene, 0, section.name)[which];
   return value === Infinity ? "adhesion" : value;
@@ -161,11 +178,8 @@ const isNested = (form: Form) => formsOf(form).some(({ prefixItems, items }) =>
 function ownFields(page: Page, given: Given, scene: Scene, section: Section): Field[] {
   const { table } = section, silent = idle(scene, table, rowOf(scene, section));
   const fields: Field[] = [];
-  for (const [name, rule] of Object.entries(page.tables[table] ?? {})) {
+  const take = (name: string, rule: Rule, path: string) => {
     const { form, required = false } = rule;
-    if (silent.includes(name) || table === "view" && !rule.unit) continue;
-    const path = table === "scene" ? name
-      : given[table] === undefined ? `${table}.${name}` : pathOf(given, table, section.row, name);
     const add = (key: string, value: any, part = 0, of = 1) => {
       if (!mayChange(page, key)) return;
       const choices = name === "between" ? scene.particles.flatMap((kind) => kind.name ?? [])
@@ -181,12 +195,36 @@ function ownFields(page: Page, given: Given, scene: Scene, section: Section): Fi
         free: !required && (rule.default === undefined || name === "repeat") && of === 1,
       });
     };
+    // Whether there is a motor; shaking and travelling are chosen among the motions.
+    if (name === "motor") {
+      fields.push({ key: path, table, owner: section.name, name, part: 0, of: 1, unit: "", low: NaN,
+        high: NaN, value: Boolean(valueAt(given, path)), form: { type: "boolean" }, free: false,
+        choices: [] });
+    }
+    if (rule.parts) {
+      if (!valueAt(given, path)) return;
+      for (const [part, own] of Object.entries(rule.parts)) {
+        take(`${name}.${part}`, own, `${path}.${part}`);
+      }
+      return;
+    }
     const written = valueAt(given, path);
     const value = written ?? valueOf(scene, section, name);
     if (Array.isArray(value) && value.length && !isNested(form)) {
       value.forEach((entry, n) => add(`${path}[${n}]`, entry, n, value.length));
     } else add(path, typeof written === "string" || Array.isArray(written) ? written
       : valueOf(scene, section, name));
+  };
+  const pathTo = (name: string) => (table === "scene" ? name
+    : given[table] === undefined ? `${table}.${name}` : pathOf(given, table, section.row, name));
+  for (const [name, rule] of Object.entries(page.tables[table] ?? {})) {
+    if (silent.includes(name) || table === "view" && !rule.unit) continue;
+    take(name, rule, pathTo(name));
+  }
+  if (page.tables[table]?.turn && mayDraw(page)) {
+    fields.push({ key: pathTo("motion"), table, owner: section.name, name: "motion", part: 0, of: 1,
+      unit: "", low: NaN, high: NaN, value: motionOf(rowOf(scene, section).given),
+      form: { type: "string" }, free: false, choices: MOTIONS });
   }
   return fields;
 }
@@ -224,5 +262,8 @@ function numberIn({ key, low, high, form }: Field, value: number) {
   if (whole && !Number.isInteger(value)) throw new Fault(key, value, "whole");
   return value;
 }
+
+/** How a plate or a surface can move. */
+const MOTIONS = ["still", "turns", "shakes", "travels", "hinge"];
 
 export { MAIN, boundsOf, checked, fieldsOf, mayDraw, openHandles, sectionsOf, showsFew };

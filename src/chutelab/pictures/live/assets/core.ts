@@ -133,6 +133,8 @@ class Memory {
 /** One run at a time: `begin` lays a machine out, `proceed` runs on, `take` hands over. */
 class Core extends Memory {
   machine: Machine | null = null;
+  /** States of hinges that have been taken. */
+  swung = 0;
 
   /** Fill in fields of one row of an array. */
   fill(name: string, struct: string, row: number, values: Record<string, number | number[]>,
@@ -150,18 +152,21 @@ class Core extends Memory {
   /** Lay out a machine: the run is at its beginning then. */
   begin(machine: Machine) {
     this.machine = machine;
+    this.swung = 0;
     this.forget();
     const { releases, rolling, falls, pulley } = machine, kinds = rolling.length;
     const rows = surfaceRows(machine, this.layout.enums.Shape);
     this.setAll("World", {
       disk_count: releases.length, surface_count: rows.length, kind_count: kinds,
       owner_count: machine.surfaces.length, interact: Number(machine.interact),
+      mover_count: machine.movers.length,
       until: this.layout.enums.Until[`UNTIL_${machine.until.toUpperCase()}`],
       landing: machine.landing, ride_owner: 0, pulley: pulley ? machine.segments.length : -1,
-      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity, dt: machine.dt,
-      end_time: machine.endTime,
+      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity, air: machine.air,
+      dt: machine.dt, end_time: machine.endTime,
     });
     this.work("lay_out_world");
+    machine.movers.forEach((mover, k) => this.fill("movers", "Mover", k, mover));
     rows.forEach(({ restitution, friction, ...row }, k) => {
       this.fill("surfaces", "Surface", k, row);
       for (let kind = 0; kind < kinds; kind += 1) {
@@ -208,7 +213,7 @@ class Core extends Memory {
   }
 
   /** Take the knots, `KNOT_ROW` doubles each, and the events that have been written. */
-  take(): { knots: Float64Array, events: Event[] } {
+  take(): { knots: Float64Array, events: Event[], swings: number[] } {
     const count = this.get("knot_count");
     const first = this.get("knots") >> 3;
     const knots = this.doubles.slice(first, first + count * KNOT_ROW);
@@ -220,7 +225,19 @@ class Core extends Memory {
     this.set("knot_count", 0);
     this.set("event_count", 0);
     this.set("total_count", 0);
-    return { knots, events };
+    return { knots, events, swings: this.takeSwings() };
+  }
+
+  /** States of hinges that were not taken yet, `SWING_ROW` numbers each; the core keeps all. */
+  takeSwings(): number[] {
+    const count = this.get("swing_count"), begin = this.get("swings"), rows: number[] = [];
+    const { size, fields } = this.layout.structs.Swing;
+    for (; this.swung < count; this.swung += 1) {
+      const at = begin + this.swung * size;
+      rows.push(...this.doubles.subarray(at >> 3, (at >> 3) + 3),
+        this.ints[(at + fields.surface[0]) >> 2]);
+    }
+    return rows;
   }
 
   /** How far those under way have come, as rows of knots; only between steps of a run whose

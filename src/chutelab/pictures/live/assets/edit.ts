@@ -19,7 +19,7 @@ const NAMED = ["surface", "conveyor", "plate", "stream", "sensor"];
 const PLAIN = ["material", "pair"];
 
 /** Keys that are places, or lists of them. */
-const PLACES = ["from", "to", "points", "center", "pivot", "at", "fill"];
+const PLACES = ["from", "to", "points", "center", "pivot", "at", "fill", "hinge"];
 
 /** Radius of a ball in a picture one metre high, m. */
 const BALL = 0.02;
@@ -92,14 +92,16 @@ function withPart(
   const row: Given = part.table === "incoming" ? {} : { name: freeName(given, part.part) };
   part.places.forEach((key, n) => {
     if (key === "points") row.points = [...(row.points ?? []), points[n]];
-    else if (key !== "arc") row[key] = points[n];
+    else if (key !== "arc" && !key.includes(".")) row[key] = points[n];
   });
   if (part.places[0] === "arc") Object.assign(row, arcOf(points[0], points[1], points[2]));
   for (const [key, value] of Object.entries(part.row)) {
     row[key] = key === "repeat"
       ? value.map(([n, x, y]: number[]) => [n, roundOff(x * unit, 6), roundOff(y * unit, 6)])
-      : rules[key]?.unit === "m" ? roundOff(value * unit, 6) : structuredClone(value);
+      : rules[key]?.unit === "m" && typeof value === "number" ? roundOff(value * unit, 6)
+        : structuredClone(value);
   }
+  if (row.travel) row.travel.to = points[part.places.indexOf("travel.to")];
   if (part.table !== "stream") return withRow(given, part.table, row);
   const [kinds, kind] = withKind(given, material, BALL * unit);
   if (kind) row.particle = kind;
@@ -136,7 +138,8 @@ function withCopies(given: Given, rows: [string, Given][], [dx, dy]: Point): [Gi
   const all = rows.reduce((scene, [table, row]) => {
     const name = freeName(scene, row.name.replace(/\d+$/, ""));
     const copy: Given = { ...structuredClone(row), name };
-    for (const key of PLACES) if (copy[key]) copy[key] = moved(copy[key]);
+    for (const key of PLACES) if (Array.isArray(copy[key])) copy[key] = moved(copy[key]);
+    if (copy.travel) copy.travel.to = moved(copy.travel.to);
     names.push(name);
     return withRow(scene, table, copy);
   }, given);
@@ -216,10 +219,37 @@ function without(given: Given, ...names: string[]): Given {
   return rest;
 }
 
+/** How a row of a plate or a surface moves. */
+const motionOf = ({ turn, shake, travel, hinge }: Given) => (hinge ? "hinge" : travel ? "travels"
+  : shake ? "shakes" : turn ? "turns" : "still");
+
+/** Keys of motions. */
+const MOVES = ["turn", "shake", "travel", "hinge", "mass", "inertia", "spring", "rest_deg",
+  "damper", "stops_deg", "motor"];
+
+/** A scene in which a part moves otherwise, by the motion's usual numbers.
+ * @param path of its row
+ * @param pivot what it turns about, m
+ * @param unit m that are large in the picture */
+function withMotion(
+  given: Given, path: string, motion: string, [x, y]: Point, unit: number,
+): Given {
+  const begun: Record<string, Given> = {
+    turns: { turn: 90 }, shakes: { shake: { by: [0, 0.003], frequency: 15 } },
+    travels: { travel: { to: [roundOff(x, 4), roundOff(y + 0.3 * unit, 4)], at: 0.5, in: 1 } },
+    hinge: { hinge: "pivot", mass: 0.2 },
+  };
+  const { pivot, ...rest } = valueAt(given, path);
+  const row: Given = path.startsWith("plate") && pivot ? { ...rest, pivot } : rest;
+  for (const key of MOVES) delete row[key];
+  return withValues(given, { [path]: { ...row, ...begun[motion] } });
+}
+
 /** Whether `without` takes something away. */
 const canGo = (given: Given, name: string) =>
   JSON.stringify(without(given, name)) !== JSON.stringify(given);
 
 export {
-  canGo, endsOf, rowsNamed, surfaceAt, withCopies, withName, withPart, withRowOf, without,
+  canGo, endsOf, motionOf, rowsNamed, surfaceAt, withCopies, withMotion, withName, withPart,
+  withRowOf, without,
 };

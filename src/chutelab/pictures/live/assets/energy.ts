@@ -15,6 +15,9 @@ const SIGNS: Entry[] = [
 /** A residual below this part of the whole is rounding, and not shown. */
 const TINY_RESIDUAL = 1e-12;
 
+/** J; what reads as 0. */
+const UNSEEN = 5e-13;
+
 /** What was put in, and where it is: an entry of the other sign changes sides. A residual that is
  * only rounding is in neither. */
 function stacks(ledger: Ledger) {
@@ -54,7 +57,13 @@ class EnergyPanel {
       html("table", {}, html("tbody", {}, ...this.rows)), this.closes,
       html("p", { class: "note" }, words.say("energy-note")));
     home.append(panel);
-    lab.on("run", () => { this.longest = 0; });
+    // What moves gives energy as belts do.
+    const given = this.rows[1].firstChild.lastChild;
+    lab.on("run", () => {
+      this.longest = 0;
+      const drives = lab.machine?.movers.length;
+      given.textContent = words.say(drives ? "energy-drives" : "energy-belt_work");
+    });
     follow(lab, panel, ["time", "run"], () => this.refresh());
   }
 
@@ -75,7 +84,7 @@ class EnergyPanel {
         return part;
       }));
     });
-    const isClosed = Math.abs(ledger.residual) <= TINY_RESIDUAL * size;
+    const isClosed = Math.abs(ledger.residual) <= Math.max(UNSEEN, TINY_RESIDUAL * size);
     this.closes.hidden = !isClosed;
     this.closes.replaceChildren(icon("tick"),
       this.words.say("energy-closes", { energy: this.words.energy(size) }));

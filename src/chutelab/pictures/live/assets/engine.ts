@@ -5,8 +5,8 @@ import type { Event } from "./core.ts";
 import type { Machine } from "./machine.ts";
 
 type Chunk = { type: "chunk", id: number, knots: Float64Array, tips: Float64Array,
-  events: Event[], now: number, state: string, books: number[][] | null,
-  reasons: number[] | null, gained: number, contacts: number, steps: number };
+  events: Event[], swings: number[], now: number, state: string, books: number[][] | null,
+  reasons: number[] | null, gained: number, unsolved: number, contacts: number, steps: number };
 
 class Engine {
   id = 0;

@@ -1,7 +1,7 @@
 // What can be taken hold of: where it is, which keys of the scene it moves, and how far.
 
 import type { Machine } from "./machine.ts";
-import type { Scene } from "./scene.ts";
+import { ruleOf, type Moves, type Point, type Scene } from "./scene.ts";
 
 /** A number of the scene; `part` of one that is a point */
 type Axis = { key: string, part?: number, value: number, unit: string, step: number,
@@ -46,10 +46,9 @@ class Handles {
 
   axis(key: string, value: number, unit: string, part?: number) {
     const plain = key.replace(/\[\d+\]/, "");
-    const [table, name] = plain.split(".");
-    const rule = this.lab.tables[table]?.[name] ?? {};
+    const rule = ruleOf(this.lab.tables, plain);
     const [low, high] = this.lab.live?.ranges?.[key] ?? this.lab.live?.ranges?.[plain]
-      ?? [rule.low ?? -Infinity, rule.high ?? Infinity];
+      ?? [rule?.low ?? -Infinity, rule?.high ?? Infinity];
     return { key, part, value, unit, step: STEPS[unit], low, high };
   }
 
@@ -180,7 +179,20 @@ class Handles {
           this.axis(`${table}.below`, below, "m")], (px, py) => turned(px, py, -1));
       this.turning(name, [x, y], [x - below * up[0], y - below * up[1]], plate.angle_deg,
         `${table}.angle_deg`, (value) => ({ [`${table}.angle_deg`]: value }));
+      this.motion({ ...plate, pivot: undefined }, table, name);
     });
+  }
+
+  /** Places that belong to how something moves. */
+  motion({ pivot, hinge, travel }: { pivot?: Point } & Moves, table: string, name: string) {
+    const places: [string, string, Point | "pivot" | undefined][] = [
+      ["hinge", "hinge", hinge], ["travel.to", "goal", travel?.to],
+      ["pivot", "pivot", table.startsWith("surface") ? pivot : undefined]];
+    for (const [key, what, at] of places) {
+      if (!Array.isArray(at)) continue;
+      this.add(`${table}.${key}`, name, what, "point", at, this.place(`${table}.${key}`, at),
+        (x, y) => [x, y]);
+    }
   }
 
   conveyor(n: number) {
@@ -201,6 +213,7 @@ class Handles {
 
   surface(n: number) {
     const row = this.scene.surface[n], table = `surface[${n}]`;
+    this.motion(row, table, row.name);
     if (row.center) {
       const [x, y] = row.center, radius = row.radius;
       const at = (degrees: number) => [
@@ -286,7 +299,7 @@ class Handles {
 }
 
 /** What places a body, by the name of the handle. */
-const PLACES = ["pivot", "center", "height", "release"], ENDS = ["begin", "end", "corner"];
+const PLACES = ["pivot", "center", "height", "release", "hinge", "goal"], ENDS = ["begin", "end", "corner"];
 
 /** Whether a handle is a place of a body of its own. */
 const isPlace = ({ id, what, axes }: Handle) => PLACES.includes(what)

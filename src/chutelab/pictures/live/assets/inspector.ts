@@ -2,7 +2,9 @@
 
 import { roundUp } from "./chart.ts";
 import { MAIN, checked, fieldsOf, sectionsOf, showsFew, type Field, type Section } from "./controls.ts";
-import { canGo, rowsNamed, withName, withRowOf, without, type Part } from "./edit.ts";
+import {
+  canGo, rowsNamed, withMotion, withName, withRowOf, without, type Part,
+} from "./edit.ts";
 import { listOf } from "./checks.ts";
 import { card, html, icon, iconButton, slide } from "./panels.ts";
 import { Fault, type Given } from "./scene.ts";
@@ -11,6 +13,9 @@ import type { Words } from "./words.ts";
 
 /** Places of a slider, and a range that is narrow enough for one. */
 const PLACES = 100, NARROW = 400;
+
+/** What is first to be changed of a plate on a hinge. */
+const HUNG = ["spring", "damper", "angle_deg"];
 
 /** Fields that are not under "More". */
 const FIRST = 3;
@@ -81,7 +86,7 @@ class Fields {
       if (event.key === "Escape" && this.lab.asked === key) this.giveUp(key);
     });
     const whose = !this.owned || table === "scene" ? "" : `${words.name(owner)}: `;
-    const which = of > 1 ? ` ${(name === "radius" ? "≥≤" : choices ? "12" : "xy")[part]}` : "";
+    const which = of > 1 ? ` ${(["radius", "stops_deg"].includes(name) ? "≥≤" : choices ? "12" : "xy")[part]}` : "";
     const label = html("label", { for: id }, `${whose}${words.key(table, name)}${which}`);
     const why = html("div", { class: "why", id: `why-${id}` });
     why.hidden = true;
@@ -181,6 +186,9 @@ class Fields {
   /** Told of the new name of what is shown. */
   renamed: (name: string) => void = () => {};
 
+  /** m that are large in the picture; set by what knows it. */
+  unit = () => 1;
+
   /** The field in which something was typed. */
   asking: any = null;
 
@@ -203,6 +211,14 @@ class Fields {
         lab.replace(withName(lab.given as Given, key, value));
         const own = field.table === "material" ? `material ${value}` : value;
         if (!lab.fault && field.table !== "particle") this.renamed(own);
+      } else if (field.name === "motion") {
+        const path = key.replace(/\.motion$/, ""), { machine } = lab;
+        const own = machine?.surfaces.indexOf(field.owner);
+        const { ends: [x, y] } = machine?.segments.find(({ surface }) => surface === own)
+          ?? { ends: [0, 0] };
+        lab.replace(withMotion(lab.given as Given, path, value, [x, y], this.unit()));
+      } else if (field.name === "motor") {
+        lab.change({ [key]: value ? { speed_deg: 90, torque: 1 } : undefined });
       } else lab.change({ [whole]: value });
     } catch (error) {
       if (!(error instanceof Fault)) throw error;
@@ -329,7 +345,9 @@ class Inspector {
     const grain = all.filter(({ table }) => table === "particle")[stream];
     const fields = !section || this.parts.length > 1 ? []
       : [section, ...(grain ? [grain] : [])].flatMap((one) => fieldsOf(data, given, scene, one));
-    const order = (kind?.main ?? MAIN[section?.table ?? ""] ?? []).filter((key) =>
+    const hangs = section?.table === "plate" && scene.plates[section.row].hinge;
+    const main = hangs ? HUNG : kind?.main ?? MAIN[section?.table ?? ""] ?? [];
+    const order = main.filter((key) =>
       fields.some(({ table, name }) => key === name || key === `${table}.${name}`)).slice(0, FIRST);
     const place = ({ table, name }: Field) =>
       Math.max(order.indexOf(name), order.indexOf(`${table}.${name}`));

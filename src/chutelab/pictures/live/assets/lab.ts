@@ -86,7 +86,9 @@ class Lab {
         }
       }
       // In a lesson a run is one machine's from its beginning, so that it can be noted.
-      const goesOn = !this.data.lesson && this.machine?.interact && machine.interact && this.t > 0;
+      // What moves does so by the run's time, which a change does not begin anew.
+      const goesOn = !this.data.lesson && this.machine?.interact && machine.interact && this.t > 0
+        && !machine.movers.length && !this.machine.movers.length;
       const before = this.given;
       this.given = given;
       this.scene = scene;

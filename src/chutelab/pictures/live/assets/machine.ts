@@ -1,8 +1,8 @@
 // `build`: a scene as a machine, the same numbers as those of Python's `chutelab.machine`, to the
 // last bit: the core lays the surfaces and draws the releases.
-import { lay } from "./plan.ts";
+import { lay, type Mover } from "./plan.ts";
 import { draw, type Release } from "./releases.ts";
-import { met, type Scene } from "./scene.ts";
+import { Fault, met, type Scene } from "./scene.ts";
 import { RADIANS } from "./trig.ts";
 
 export interface Segment {
@@ -46,6 +46,7 @@ interface Pulley {
 export interface Machine {
   surfaces: string[]; // names
   gravity: number;
+  air: number; // kg/m³, density of still air; 0 without
   landing: number; // index of the outgoing belt, -1 without one
   until: "landed" | "settled" | "time";
   endTime: number; // s
@@ -53,6 +54,7 @@ export interface Machine {
   interact: boolean;
   segments: Segment[];
   arcs: Arc[];
+  movers: Mover[];
   pulley: Pulley | null;
   streams: string[]; // what tells them apart: names, or which of those without
   releases: Release[];
@@ -78,7 +80,8 @@ export function build(scene: Scene): Machine {
       restitution: pairs.map(([bounce]) => bounce), friction: pairs.map(([, grip]) => grip),
     };
   });
-  const laid = lay(scene);
+  const laid = lay(scene, names);
+  for (const mover of laid.movers) weigh(mover, names[mover.surface]);
   const segments: Segment[] = laid.segments.map(({ start, end, tangent, ...own }) => ({
     ...own, x: start[0], y: start[1], tx: tangent[0], ty: tangent[1], ends: [...start, ...end],
     ...values[own.surface],
@@ -95,6 +98,7 @@ export function build(scene: Scene): Machine {
   return {
     surfaces: names,
     gravity: scene.gravity,
+    air: scene.air_density,
     landing: names.indexOf("outgoing"),
     until: typeof run.until === "string" ? run.until : "time",
     endTime: typeof run.until === "string" ? bound : Math.min(bound, run.until),
@@ -102,6 +106,7 @@ export function build(scene: Scene): Machine {
     interact: scene.crowded,
     segments,
     arcs,
+    movers: laid.movers,
     pulley: belt === null ? null : {
       radius: belt.pulley_radius, speed: belt.speed, incline: belt.incline_deg * RADIANS,
       surface: 0, ...values[0],
@@ -115,6 +120,21 @@ export function build(scene: Scene): Machine {
     rolling: particles.map((kind) => kind.rolling_friction),
     falls: particles.map(({ restitution_speed: v }) => v === undefined ? 0.0 : 1.0 / v),
   };
+}
+
+/** rad/s; shortest times of hinges are at least 1 over it: steps have to be shorter. */
+const SWIFTEST = 1e5;
+
+/**
+ * @throws {Fault} if what hangs on a hinge has an inertia that no mass has, or is too stiff
+ */
+function weigh({ inertia, mass, moment: [x, y], spring, damper }: Mover, name: string) {
+  if (!inertia) return;
+  const least = mass > 0 ? (x * x + y * y) / mass : 0;
+  const stiff = Math.max(spring / SWIFTEST ** 2, damper / SWIFTEST);
+  const key = `${name}.inertia`;
+  if (inertia < (1 - 1e-9) * least) throw new Fault(key, inertia, "least-inertia", { least });
+  if (inertia < stiff) throw new Fault(key, inertia, "stiff", { least: stiff });
 }
 
 /** Returns the names of all surfaces, in the order of the ledger. */

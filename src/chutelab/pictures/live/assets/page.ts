@@ -2,7 +2,6 @@
 
 import { Bench } from "./bench.ts";
 import { watchLaws } from "./breaches.ts";
-import { bytesOf, compiled, unpacked } from "./core.ts";
 import { Engine } from "./engine.ts";
 import { Arrows } from "./arrows.ts";
 import { CurvesPanel } from "./curves.ts";
@@ -33,13 +32,7 @@ const byId = (id: string): any => document.getElementById(id);
 /** @param join makes what only a sandbox has, or only a lesson */
 async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?: object,
   sensors?: object, tools?: object }) {
-  const data = JSON.parse(byId("lab").textContent);
-  const core = compiled(bytesOf(data.wasm).buffer).catch(() => null);
-  const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
-  const newThread = () => new Worker(URL.createObjectURL(source));
-  // A thread takes its time to begin.
-  const thread = newThread();
-  Object.assign(data, await unpacked(bytesOf(data.packed).buffer).json());
+  const { data, core, newThread, thread } = (globalThis as any).booted;
   const asked = new URLSearchParams(location.search).get("lang");
   if (asked && asked === data.other?.language) {
     const { language, strings } = data;

@@ -2,11 +2,15 @@
 // `machine/rows.py` is in Python.
 
 import { Memory, type Layout } from "./core.ts";
-import { Fault, met, type Point, type Scene } from "./scene.ts";
+import { Fault, met, moversOf, type Point, type Scene } from "./scene.ts";
 import { useCore } from "./trig.ts";
 
 type Segment = { start: Point, end: Point, tangent: Point, length: number, speed: number,
   appears: number, vanishes: number, surface: number };
+/** How a surface moves, as `Mover` of layout.h */
+export type Mover = { surface: number, pivot: Point, by: Point, frequency: number, phase: number,
+  way: Point, from: number, lasts: number, turn: number, inertia: number, mass: number,
+  moment: Point, spring: number, damper: number, stops: Point, motor: Point };
 type Arc = { center: Point, radius: number, begin: number, extent: number, speed: number,
   appears: number, vanishes: number, surface: number };
 
@@ -39,8 +43,9 @@ function numbersOf(struct: string, table: any) {
 /** Returns the lower 32 bits of a seed, and the others. */
 const wordsOf = (seed: bigint) => [Number(seed & 0xffffffffn), Number(seed >> 32n)];
 
-/** Returns all numbers of a scene. */
-function rowOf(scene: Scene): number[] {
+/** Returns all numbers of a scene.
+ * @param names of the surfaces */
+function rowOf(scene: Scene, names: string[]): number[] {
   const { incoming, outgoing, surface } = scene;
   const [kind] = scene.kinds, all = (struct: string, tables: object[]) =>
     tables.flatMap((table) => numbersOf(struct, table));
@@ -61,6 +66,11 @@ function rowOf(scene: Scene): number[] {
     ...all("OutgoingKeys", outgoing ? [outgoing] : []),
     ...all("ConveyorKeys", scene.conveyor),
     ...all("SurfaceKeys", surface.map((one) => ({ ...one, corners: one.points?.length ?? 0 }))),
+    ...all("MoverKeys", moversOf(scene).map(([name, { hinge, shake, travel, motor, ...one }]) => ({
+      ...one, phase_deg: 0, ...shake, to: travel?.to, at: travel?.at, in: travel?.in, ...motor,
+      surface: names.indexOf(name), pivot: hinge && hinge !== "pivot" ? hinge : one.pivot,
+      hangs: hinge !== undefined,
+    }))),
     ...surface.flatMap(({ points }) => (points ?? []).flat()),
   ];
 }
@@ -69,14 +79,17 @@ function rowOf(scene: Scene): number[] {
  * Has the core lay the surfaces of a scene.
  * @throws {Fault} if the plate has no length
  */
-export function lay(scene: Scene): { segments: Segment[], arcs: Arc[] } {
-  const row = rowOf(scene);
+export function lay(scene: Scene, names: string[]): {
+  segments: Segment[], arcs: Arc[], movers: Mover[],
+} {
+  const row = rowOf(scene, names), moving = moversOf(scene).length;
   core.forget();
   core.setAll("Plan", {
     members: 1, width: row.length, particles: scene.particles.length,
     streams: scene.streams.length, incoming: Number(scene.incoming !== null),
     plates: scene.plates.length, outgoing: Number(scene.outgoing !== null),
     conveyors: scene.conveyor.length, surfaces: scene.surface.length,
+    moving,
   });
   core.work("lay_out_plan");
   core.doubles.set(row, core.get("rows", "Plan") >> 3);
@@ -89,5 +102,6 @@ export function lay(scene: Scene): { segments: Segment[], arcs: Arc[] } {
   return {
     segments: core.rows("segments", "Segment", core.get("segment_count", "Plan"), "Plan"),
     arcs: core.rows("arcs", "Arc", core.get("arc_count", "Plan"), "Plan"),
+    movers: core.rows("movers", "Mover", moving, "Plan"),
   };
 }

@@ -3,6 +3,7 @@
 
 import type { Breach } from "./breaches.ts";
 import { KNOT_ROW, type Machine, type Event } from "./core.ts";
+import { SWING_ROW, Swings, posed } from "./motion.ts";
 
 export type State = { x: number, y: number, vx: number, vy: number, spin: number, ended: boolean };
 export type Ledger = { start: number, kinetic: number, potential: number, belt_work: number,
@@ -248,21 +249,36 @@ class Recording {
   books: number[][] | null = null;
   /** By which the engine's solves broke their law of energy, J. */
   gained = 0;
+  unsolved = 0;
   /** Impacts and steps so far. */
   contacts = 0;
   steps = 0;
+  /** States of what hangs on hinges, by surfaces. */
+  swings: Map<number, Swings> = new Map();
   /** The laws that it breaks, once it is over and has been judged. */
   breaches: Breach[] = [];
 
   constructor(public machine: Machine) {
     this.tracks = machine.releases.map(() => new Track());
+    for (const { surface } of machine.movers) this.swings.set(surface, new Swings());
   }
 
-  add({ knots, tips, events, now, state, books = null, gained = 0, contacts = 0, steps = 0 }: {
-    knots: Float64Array, tips: Float64Array, events: Event[], now: number, state: string,
-    books?: number[][] | null, gained?: number, contacts?: number, steps?: number,
+  /** The machine as it is at a time, s. */
+  posed(t: number) {
+    return posed(this.machine, t, this.swings);
+  }
+
+  add({
+    knots, tips, events, swings, now, state, books = null, gained = 0, unsolved = 0,
+    contacts = 0, steps = 0,
+  }: {
+    knots: Float64Array, tips: Float64Array, events: Event[], swings: number[], now: number,
+    state: string,
+    books?: number[][] | null, gained?: number, unsolved?: number, contacts?: number,
+    steps?: number,
   }) {
     this.gained = gained;
+    this.unsolved = unsolved;
     this.contacts = contacts;
     this.steps = steps;
     this.books = this.renamed ? null : books;
@@ -287,6 +303,9 @@ class Recording {
       if (goesOn && event.kind === RELEASE && event.t === 0) continue;
       const other = event.other >= 0 ? its(event.other).index : event.other;
       this.events.push({ ...event, t: event.t + this.shift, disk: index, other });
+    }
+    for (let n = 0; n < swings.length; n += SWING_ROW) {
+      this.swings.get(swings[n + 3])?.rows.push(swings.slice(n, n + 3));
     }
     this.measure();
     this.state = state;
@@ -413,7 +432,8 @@ class Recording {
     // What straight lines leave over belongs to what goes on.
     const missing = gain - (belt - restitution - friction) - residual;
     const changes = (column: number) => track.at(i, column) !== track.at(j, column);
-    if (changes(FRICTION)) friction -= missing;
+    if (machine.movers.length && changes(BELT)) belt += missing;
+    else if (changes(FRICTION)) friction -= missing;
     else if (changes(BELT)) belt += missing;
     else if (changes(RESTITUTION)) restitution -= missing;
     else residual += missing;

@@ -16,6 +16,7 @@ export interface Rule {
   low?: number;
   high?: number;
   form: Form;
+  parts?: Record<string, Rule>; // of a table in it
 }
 
 /** What Python writes into the page, see `describe.py` */
@@ -59,7 +60,21 @@ interface Stream {
   given: Given;
 }
 
-export interface Plate {
+/** How a plate or a surface moves: at most one of `hinge` and the three before it */
+export interface Moves {
+  turn: number; // degrees/s
+  shake?: { by: Point, frequency: number, phase_deg: number };
+  travel?: { to: Point, at: number, in: number };
+  hinge?: Point | "pivot";
+  mass?: number;
+  inertia?: number;
+  spring: number;
+  damper: number;
+  stops_deg?: Point;
+  motor?: { speed_deg: number, torque: number };
+}
+
+export interface Plate extends Moves {
   name?: string;
   pivot?: Point;
   distance: number;
@@ -72,8 +87,9 @@ export interface Plate {
   given: Given;
 }
 
-export interface Surface {
+export interface Surface extends Moves {
   name: string;
+  pivot?: Point;
   points?: Point[]; // of a straight one
   center?: Point; // of an arc
   radius: number;
@@ -125,6 +141,7 @@ interface Outgoing {
 export interface Scene {
   title: string;
   gravity: number;
+  air_density: number;
   particles: Particle[];
   materials: Map<string, Record<string, number>>; // numbers by name, presets too
   pair: { between: [string, string], restitution?: number, friction?: number }[];
@@ -134,7 +151,8 @@ export interface Scene {
   conveyor: Conveyor[];
   surface: Surface[];
   streams: Stream[];
-  run: { until: "landed" | "settled" | number, max_time: number, dt: number };
+  run: { until: "landed" | "settled" | number, max_time: number, dt: number,
+    engine: string };
   kinds: number[]; // which of the particles each stream consists of
   crowded: boolean; // whether particles meet
   most: number; // how many particles a page has room for
@@ -165,11 +183,14 @@ export class Fault extends Error {
 export function resolve(given: Given, lab: Lab): Scene {
   for (const wrong of misfitsOf(given, lab)) throw new Fault(...wrong);
   const filled = (table: string, row: Given) => {
-    const values: Given = {};
-    for (const [key, rule] of Object.entries(lab.tables[table])) {
-      if (rule.default !== undefined) values[key] = rule.default;
-    }
-    return { ...values, ...row, given: row } as any;
+    const fill = (rules: Record<string, Rule>, own: Given, into: Given) => {
+      for (const [key, rule] of Object.entries(rules)) {
+        const value = own[key] ?? rule.default;
+        if (value !== undefined) into[key] = rule.parts ? fill(rule.parts, value, {}) : value;
+      }
+      return into;
+    };
+    return fill(lab.tables[table], row, { given: row }) as any;
   };
   const rows = (table: string) => {
     return listOf(given[table]).map((row) => filled(table, row));
@@ -212,6 +233,7 @@ export function resolve(given: Given, lab: Lab): Scene {
   const scene: Scene = {
     title: given.title ?? lab.tables.scene.title.default,
     gravity: given.gravity ?? lab.tables.scene.gravity.default,
+    air_density: given.air_density ?? lab.tables.scene.air_density.default,
     particles, materials, pair: given.pair ?? [], incoming, plates, outgoing,
     conveyor: rows("conveyor"), surface, streams, run, kinds, sensor: rows("sensor"),
     view: given.view ?? null,
@@ -220,6 +242,22 @@ export function resolve(given: Given, lab: Lab): Scene {
   };
   for (const wrong of conflictsOf(scene, given, lab)) throw new Fault(...wrong);
   return scene;
+}
+
+/** Returns the rule of a key by its path without numbers, such as `surface.shake.by`. */
+export function ruleOf(tables: Lab["tables"], path: string): Rule | undefined {
+  const [table, name, part] = path.split(".");
+  const rule = tables[table]?.[name];
+  return part === undefined ? rule : rule?.parts?.[part];
+}
+
+/** Returns what moves, and the names of these surfaces. */
+export function moversOf({ plates, surface }: Scene): [string, (Plate | Surface)][] {
+  const named: [string, Plate | Surface][] = [
+    ...plates.map((one): [string, Plate] => [(one.pivot && one.name) || "plate", one]),
+    ...surface.map((one): [string, Surface] => [one.name, one]),
+  ];
+  return named.filter(([, { turn, shake, travel, hinge }]) => turn || shake || travel || hinge);
 }
 
 /** Fills in the mean radius of particles, and the mass that goes with that. */

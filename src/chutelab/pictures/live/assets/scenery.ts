@@ -3,6 +3,8 @@
 // Bodies have volume. The surface that particles meet is the outer edge of a belt and the coloured
 // face of a plate; what is drawn of their thickness lies on the other side.
 
+import { carried, poseOf, type Swings } from "./motion.ts";
+import type { Mover } from "./plan.ts";
 import type { Arc, Machine, Segment } from "./machine.ts";
 import type { Scene } from "./scene.ts";
 import type { View } from "./view.ts";
@@ -45,11 +47,14 @@ const SPOKED = 9, ROLLERS = 128;
 
 /** What moves with the time that is shown: cleats, or a wheel that turns. */
 type Moving = { element: any, speed: number, x?: number, y?: number, radius?: number };
+/** Drawings of a part that moves itself. */
+type Carried = { elements: any[], mover: Mover };
 type Gate = { element: any, appears: number, vanishes: number };
 
 class Scenery {
   moving: Moving[] = [];
   gates: Gate[] = [];
+  carried: Carried[] = [];
   layer: any;
   ground: any;
   scale: any;
@@ -73,6 +78,7 @@ class Scenery {
     this.layer.replaceChildren();
     this.moving = [];
     this.gates = [];
+    this.carried = machine.movers.map((mover) => ({ elements: [], mover }));
     const bodies: [any, Segment | Arc][] = [];
     const plates = new Set(scene?.plates.map(({ name }) => name ?? "plate") ?? []);
     const round = (arc: Arc) => arc.extent >= 2 * Math.PI && arc.speed !== 0;
@@ -102,7 +108,10 @@ class Scenery {
       element.append(svg("title", {}, this.words.name(name)));
       this.layer.append(element);
     }
-    for (const [element, { surface, appears, vanishes }] of bodies) {
+    for (const [body, { surface, appears, vanishes }] of bodies) {
+      const moves = this.carried.find(({ mover }) => mover.surface === surface);
+      const element = moves ? svg("g", {}, body) : body;
+      moves?.elements.push(element);
       element.setAttribute("data-part", machine.surfaces[surface]);
       element.append(svg("title", {}, this.words.name(machine.surfaces[surface])));
       if (isFinite(appears) || isFinite(vanishes)) {
@@ -111,6 +120,58 @@ class Scenery {
       }
       this.layer.append(element);
     }
+    for (const { mover } of this.carried) {
+      const row = [...scene?.plates ?? [], ...scene?.surface ?? []]
+        .find(({ name }) => (name ?? "plate") === machine.surfaces[mover.surface]);
+      this.layer.append(this.motion(mover, machine, row?.travel?.to));
+    }
+  }
+
+  /** How something moves: what it turns about, with a spring, a motor and stops, or its way. */
+  motion(mover: Mover, { segments, arcs }: Machine, goal?: [number, number]) {
+    const { view } = this, group = svg("g", { class: "motion" });
+    const { pivot, by, frequency, way, lasts, turn, inertia, spring, stops, motor } = mover;
+    const at = ([x, y]: [number, number]) => [view.px(x), view.py(y)];
+    const own = [...segments.filter(({ surface }) => surface === mover.surface)
+      .flatMap(({ ends: [x, y, u, v] }): [number, number][] => [[x, y], [u, v]]),
+    ...arcs.filter(({ surface }) => surface === mover.surface)
+      .map(({ x, y }): [number, number] => [x, y])];
+    const far = ([x, y]: [number, number]) => Math.hypot(x - pivot[0], y - pivot[1]);
+    const tip = own.reduce((best, one) => (far(one) > far(best) ? one : best), own[0] ?? pivot);
+    const [px, py] = at(pivot), draw = (d: string, kind: string) =>
+      group.append(svg("path", { d, class: kind }));
+    const arrow = (from: number[], to: number[]) => {
+      const long = Math.hypot(to[0] - from[0], to[1] - from[1]) || 1;
+      const [u, v] = [(to[0] - from[0]) / long, (to[1] - from[1]) / long];
+      draw(`M${from}L${to}m${-6 * u - 4 * v} ${-6 * v + 4 * u}L${to}`
+        + `l${-6 * u + 4 * v} ${-6 * v - 4 * u}`, "way");
+    };
+    const speed = inertia ? motor[1] && motor[0] : turn;
+    if (speed) {
+      const side = Math.sign(speed), end = [px - 15 * side, py + 4];
+      draw(`M${px + 15 * side} ${py + 4}A15.5 15.5 0 1 ${speed > 0 ? 0 : 1} ${end}`, "way");
+      arrow([end[0] - side, end[1] - 4], end);
+    }
+    if (inertia && spring) {
+      const turns = Array.from({ length: 37 }, (_, n) => [
+        px + (2 + 0.28 * n) * Math.cos(n / 2.2), py - (2 + 0.28 * n) * Math.sin(n / 2.2)]);
+      draw(`M${turns.join("L")}`, "spring");
+    }
+    if (inertia) {
+      for (const angle of stops.filter(isFinite)) {
+        draw(`M${px} ${py}L${at(carried({ x: pivot[0], y: pivot[1], turn: angle }, mover, tip))}`,
+          "limit");
+      }
+    }
+    if (inertia || turn) group.append(svg("circle", { cx: px, cy: py, r: 4.5, class: "bolt" }));
+    if (lasts && goal) arrow([px, py], at([pivot[0] + way[0], pivot[1] + way[1]]));
+    if (frequency) {
+      const [x, y] = at([0.5 * (pivot[0] + tip[0]), 0.5 * (pivot[1] + tip[1])]);
+      const size = Math.hypot(...by) || 1, [u, v] = [by[0] / size, -by[1] / size];
+      const long = Math.max(14, size * view.scale) + 6;
+      for (const sign of [1, -1]) arrow([x, y], [x + sign * long * u, y + sign * long * v]);
+    }
+    return group;
   }
 
   /** The drawings of a part. */
@@ -118,9 +179,16 @@ class Scenery {
     return [...this.layer.children].filter((one) => one.getAttribute("data-part") === name);
   }
 
-  /** Move what moves to a time, s. */
-  turn(t: number) {
-    const { scale } = this.view;
+  /** Move what moves to a time, s.
+   * @param swings of hinges, by surfaces */
+  turn(t: number, swings?: Map<number, Swings>) {
+    const { view, view: { scale } } = this;
+    for (const { elements, mover } of this.carried) {
+      const pose = poseOf(mover, t, swings?.get(mover.surface)), { pivot: [x, y] } = mover;
+      const way = `translate(${(pose.x - x) * scale} ${(y - pose.y) * scale}) rotate(${
+        (-pose.turn * 180) / Math.PI} ${view.px(x)} ${view.py(y)})`;
+      for (const element of elements) element.setAttribute("transform", way);
+    }
     for (const { element, speed, x, y, radius } of this.calm.matches ? [] : this.moving) {
       if (radius === undefined) {
         element.setAttribute("stroke-dashoffset", String(-((speed * t * scale) % PITCH)));

@@ -35,6 +35,9 @@ const SPUN = 8;
  * of the machine. */
 const FINE = 0.2, FINE_SHARE = 1e-3;
 
+/** Instants at which is looked how far what moves goes. */
+const POSES = 64;
+
 /** Height of the text over the bar that tells the scale, px. */
 const ABOVE = 24;
 
@@ -139,11 +142,32 @@ class Stage {
     if (chosen) {
       const [[left, bottom], [right, top]] = [chosen.from, chosen.to];
       this.view.fit({ left, bottom, right, top }, 0);
-    } else this.view.fit(boxOf(machine, points, this.lab.data.live?.predict));
+    } else this.view.fit(boxOf(machine, points, this.lab.data.live?.predict, this.swept));
     this.chosen = JSON.stringify(chosen);
     this.fitted = points.length > 0;
     this.moved = false;
     this.rebuild();
+  }
+
+  /** The machine as it is at the time that is shown. */
+  get posed() {
+    const { machine, recording, t } = this.lab;
+    return machine && (recording?.machine === machine ? recording.posed(t) : machine);
+  }
+
+  /** Places that ends of what moves go through, as far as the run has come, m. */
+  get swept(): Point[] {
+    const { machine, recording } = this.lab;
+    if (!machine?.movers.length || !recording) return [];
+    const moves = new Set(machine.movers.map(({ surface }) => surface));
+    const end = isFinite(recording.end) ? recording.end : 0;
+    return Array.from({ length: POSES + 1 }, (_, n) => recording.posed((end * n) / POSES))
+      .flatMap(({ segments, arcs }) => [
+        ...segments.filter(({ surface }) => moves.has(surface))
+          .flatMap(({ ends: [x, y, u, v] }): Point[] => [[x, y], [u, v]]),
+        ...arcs.filter(({ surface }) => moves.has(surface))
+          .flatMap(({ x, y, radius: r }): Point[] => [[x - r, y - r], [x + r, y + r]]),
+      ]);
   }
 
   /** `[view]` of the scene that is shown, as text. */
@@ -267,7 +291,7 @@ class Stage {
     const dense = globalThis.devicePixelRatio || 1;
     context.setTransform(dense, 0, 0, dense, 0, 0);
     context.clearRect(0, 0, view.width, view.height);
-    this.scenery.turn(t);
+    this.scenery.turn(t, recording.swings);
     const { least } = this;
     if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
     const spins = machine.inertia.some((value) => value > 0);

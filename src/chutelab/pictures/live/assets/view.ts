@@ -137,9 +137,11 @@ const FALL = 0.35;
 
 /** What is shown of a machine at first: its tracks and all that they can meet, but only so much of
  * belts and walls, which may be long, and of the fall of what leaves the scene.
- * @param ride whether all of the way on the incoming belt is shown, however long */
+ * @param ride whether all of the way on the incoming belt is shown, however long
+ * @param swept places that what moves goes through, m */
 function boxOf(
   machine: Machine, points: { x: number, y: number }[], ride: boolean = false,
+  swept: Point[] = [],
 ): Box {
   const box = { left: Infinity, bottom: Infinity, right: -Infinity, top: -Infinity };
   const widen = (x: number, y: number, r = 0) => {
@@ -188,6 +190,7 @@ function boxOf(
   for (const [x, y] of machine.segments.filter(({ speed }) => speed).flatMap(ends)) {
     widen(isFinite(left) ? Math.min(Math.max(x, left), right) : x, y);
   }
+  for (const place of swept) widen(...place);
   if (!isFinite(box.left)) return EMPTY;
   // What opens lets something fall.
   if (machine.segments.some(({ vanishes }) => isFinite(vanishes))) {

@@ -34,7 +34,7 @@ class Words {
 
   /** Why a scene cannot be. */
   fault({ key, text, words: found }: Fault) {
-    const [path, name] = key.replace(/(?<=\..*)\[\d+\]/g, "").split(".");
+    const [path, ...rest] = key.replace(/(?<=\..*)\[\d+\]/g, "").split("."), name = rest.join(".");
     const [table, row] = path.split(/\[|\]/);
     const part = `${this.name(table)}${row ? ` ${Number(row) + 1}` : ""}`;
     const where = name ? `${part}, ${this.key(table, name)}`
@@ -118,7 +118,7 @@ class Words {
     const seen = axes.filter(({ step }) => step).slice(0, 2);
     const places = seen.every(({ part }) => part !== undefined);
     return seen.map((axis, n) => {
-      const [table, name] = axis.key.replace(/\[\d+\]/g, "").split(".");
+      const [table, ...rest] = axis.key.replace(/\[\d+\]/g, "").split("."), name = rest.join(".");
       const what = places ? `${axis.unit === "m/s" ? "v" : ""}${"xy"[n]}` : this.key(table, name);
       return bare ? this.value(axis) : `${what} = ${this.value(axis)}`;
     }).join(bare ? ", " : "\n");

@@ -3,9 +3,10 @@
 // In:  {type: "load", module, layout}, the core compiled; {type: "run", id, machine, until}
 //      begins a run and ends the one before; {type: "until", id, until} lets it go on to a later
 //      time (s).
-// Out: {type: "chunk", id, knots, tips, events, now, state, books, reasons, gained}, where
-//      state is "running", "done", "stalled" or "failed"; books and reasons come with the end;
-//      gained is the energy by which solves broke their law so far, J.
+// Out: {type: "chunk", id, knots, tips, events, swings, now, state, books, reasons, gained,
+//      unsolved}, where state is "running", "done", "stalled" or "failed"; books and reasons come
+//      at the end; gained is the energy by which solves broke their law so far, J, and unsolved
+//      the most overlap that one left, radii.
 //      {type: "laws", id, breaches}, in answer to {type: "judge", id, run}.
 //      {type: "broken"}, where the core cannot be loaded.
 
@@ -43,7 +44,7 @@ function work() {
   if (!job || isAhead(job)) return;
   const began = performance.now();
   const knots = [];
-  const events = [];
+  const events = [], swings: number[] = [];
   let state: "running" | "done" | "stalled" | "failed" = "running";
   try {
     while (state === "running" && !isAhead(job)) {
@@ -52,6 +53,7 @@ function work() {
       const taken = core.take();
       knots.push(taken.knots);
       events.push(...taken.events);
+      swings.push(...taken.swings);
       const now = performance.now();
       const quick = now - before < 1;
       job.steps = quick ? Math.min(2 * job.steps, MOST_STEPS) : Math.max(1, job.steps >> 1);
@@ -64,10 +66,10 @@ function work() {
   const all = joined(knots);
   const tips = over || !core.machine?.interact ? new Float64Array() : core.tips();
   postMessage({
-    type: "chunk", id: job.id, knots: all, tips, events, now: core.get("t"), state,
+    type: "chunk", id: job.id, knots: all, tips, events, swings, now: core.get("t"), state,
     books: over ? core.books() : null, reasons: over ? core.reasons() : null,
-    gained: core.get("gained"), contacts: core.get("impact_count"),
-    steps: core.get("step_count"),
+    gained: core.get("gained"), unsolved: core.get("unsolved_most"),
+    contacts: core.get("impact_count"), steps: core.get("step_count"),
   }, { transfer: [all.buffer, tips.buffer] });
   if (over) job = null;
   else schedule();

@@ -1,0 +1,81 @@
+/* What is done by hand between two steps: disks are pushed, plates are turned.
+
+   A push is a force. Once a step it gives an impulse for half of the step before and half of this one, beside
+   those of the contacts: so it is of second order, and its work is that impulse times the mean of the velocities
+   before and after all of them. A plate turns at an even rate up to a time, at which a step ends. */
+
+#include "core.h"
+
+/* Push a disk by a force until it is pushed anew. What sleeps wakes; what the incoming belt carries is not moved. */
+EXPORT void push_disk(int i, double x, double y) {
+    Disk *d = W.disks + i;
+    W.pushes |= x != 0 || y != 0;
+    if (d->mode == ASLEEP) wake(i, W.t);
+    d->force[0] = x;
+    d->force[1] = y;
+}
+
+/* Give disks what pushes change of their velocities in a step of a length h. */
+void kick_disks(double h) {
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        for (int n = 0; n < 2; n++) {
+            int free = d->mode == FREE;
+            d->kick[n] = free ? 0.5 * d->inv_mass * (W.length_before * d->pushed[n] + h * d->force[n]) : 0;
+            d->pushed[n] = free ? d->force[n] : 0;
+            (&d->vx)[n] += d->kick[n];
+        }
+    }
+}
+
+/* Work of the push of a step on a disk, of which the share f has been given, J. */
+double pushed(const Disk *d, double f) {
+    double before = d->kick[0] * d->ux + d->kick[1] * d->uy, after = d->kick[0] * d->vx + d->kick[1] * d->vy;
+    return 0.5 * d->mass * ((1 - f) * (1 - f) * before + (1 - f * f) * after);
+}
+
+/* Turn a plate, which does not move by itself, to an angle from where it is written, at an even rate up to a
+   time after now; 0 if there is no memory. */
+EXPORT int steer(int owner, double x, double y, double angle, double until) {
+    Mover *m = W.movers;
+    while (m < W.movers + W.mover_count && m->surface != owner) m++;
+    int is_new = m == W.movers + W.mover_count;
+    if (is_new) {
+        Mover *old = W.movers;
+        RESERVE(W.movers, W.mover_count + 1.0);
+        if (!has_room()) return 0;
+        for (int k = 0; k < W.mover_count; k++) W.movers[k] = old[k];
+        m = W.movers + W.mover_count++;
+        *m = (Mover){ .pivot = { x, y }, .surface = owner, .steered = 1, .t = NAN };
+    }
+    while (W.swing_count + 4 * (W.mover_count + 1) > W.swing_room) {
+        if (W.swing_room == 0) RESERVE(W.swings, W.swing_room = 1024);
+        else if (!STRETCH(W.swings, W.swing_count, W.swing_room)) return 0;
+        if (!has_room()) return 0;
+    }
+    double now = steered_to(m, W.t);
+    m->angle = now;
+    m->since = W.t;
+    m->until = until;
+    m->rate = (angle - now) / (until - W.t);
+    m->t = NAN;
+    if (is_new) join_surfaces();
+    for (Surface *s = W.surfaces; s < W.surfaces + W.surface_count; s++) {
+        if (s->owner != owner) continue;
+        if (is_new) prepare_mover(s);
+        s->posed = NAN;
+        s->fastest = s->reach * fabs(m->rate);
+        s->haste = s->reach * m->rate * m->rate;
+        W.fastest = MAX(W.fastest, s->fastest);
+    }
+    W.swings[W.swing_count++] = (Swing){ W.t, now, 0, owner, 0 };
+    W.swings[W.swing_count++] = (Swing){ W.t, now, m->rate, owner, 0 };
+    W.swings[W.swing_count++] = (Swing){ until, angle, m->rate, owner, 0 };
+    W.swings[W.swing_count++] = (Swing){ until, angle, 0, owner, 0 };
+    return 1;
+}
+
+/* The angle of a plate that is turned by hand, rad. */
+double steered_to(const Mover *m, double t) {
+    return m->angle + m->rate * MAX(MIN(t, m->until) - m->since, 0);
+}

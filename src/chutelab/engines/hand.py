@@ -1,0 +1,263 @@
+"""A run by hand: step by step, with pushes, plates that are turned, and speeds that are changed.
+
+`start` begins one, on the contact engine, whose core steps anyway: what is only stepped is bit for
+bit what `chutelab.simulate` gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.core import Status, borrow, constants, dtype
+from chutelab.engines.contact import MOST_STEPS, Job, pieces
+from chutelab.engines.simulation import must_fit, refused
+from chutelab.machine import PASSES, build
+from chutelab.results import Recording
+from chutelab.results.recorder import Recorder, StalledError
+from chutelab.scene import AnyScene, Overrides, load
+from chutelab.util.arrays import Floats
+from chutelab.util.errors import InputError
+from chutelab.util.trig import RADIANS
+
+SET = "plate.angle_deg, the speed of a belt, or the speed_deg and torque of a motor"
+"""What can be set while a run goes on."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A lasting contact in the latest step of the engine."""
+
+    particle: int
+    other: int  # the other particle, -1 if it is a surface
+    surface: str  # its name, "" if it is a particle
+    normal: tuple[float, float]  # unit vector towards the particle
+    pressed: float  # N; by which it is pressed off along the normal
+    rubbed: float  # N; friction on it along (n_y, -n_x)
+
+
+def start(scene: AnyScene, changes: Overrides = ()) -> Run:
+    """Begin a run that goes on step by step.
+
+    Parameters
+    ----------
+    scene : Scene, str, path or mapping
+        As that of `chutelab.simulate`.
+    changes : mapping, str, or several
+        Laid over it.
+
+    Returns
+    -------
+    Run
+        On the contact engine, whatever the scene asks for; all particles go on together.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be loaded, or the contact engine cannot run it.
+
+    Examples
+    --------
+    >>> run = start("perpendicular")
+    >>> run.step(0.1)
+    >>> run.positions.shape
+    (1, 2)
+    """
+    return Run(load(scene, changes))
+
+
+class Run:
+    """A run by hand, see `start`.
+
+    Attributes
+    ----------
+    t : float
+        How far it is, s. The engine's steps are its own, so that the same scene has the same bits:
+        a `step` ends with the first of them that ends no earlier than it is to.
+    done : bool
+        Whether the run has ended, as ``run.until`` says: it goes on no further.
+    """
+
+    def __init__(self, scene: Any) -> None:
+        machine = build(scene)
+        must_fit(machine, "contact")
+        if not machine.interact:
+            passing = np.full_like(machine.pair_restitution, PASSES)
+            machine = replace(machine, interact=True, pair_restitution=passing)
+        self.scene, self.t, self.done = scene, 0.0, False
+        self._machine, self._due = machine, 0.0
+        self._module, recorder = borrow(), Recorder(machine)
+        self._origin, self._near = np.array(recorder.origin), recorder.near
+        self._job = Job(self._module, self._near, whole=not any(recorder.origin))
+        self._angles: dict[int, float] = {}
+        self._pushed: set[int] = set()
+        self._proceed(0)
+
+    def _proceed(self, steps: int) -> None:
+        status = self._job.proceed(steps)
+        while status is Status.FULL:
+            status = self._job.proceed(steps)
+        self.done = self.done or status in (Status.DONE, Status.STALLED)
+        self.t = float(self._module.world.t)
+        if status is Status.STALLED:
+            world = self._module.world
+            x, y = self._disks[world.stalled][["x", "y"]].tolist()
+            place = x + self._origin[0], y + self._origin[1]
+            raise StalledError(world.stalled, world.now, place, "too many impacts in one step")
+
+    @property
+    def _disks(self) -> NDArray[Any]:
+        return self._module.array("disks", dtype("Disk"), self._machine.count)
+
+    @property
+    def _under_way(self) -> NDArray[Any]:
+        return ~np.isin(self._disks["mode"], [_MODES["WAITING"], _MODES["GONE"]])
+
+    def step(self, seconds: float) -> None:
+        """Go on by so many seconds, more than 0; less if the run ends earlier."""
+        if not (isfinite(seconds) and seconds > 0.0):
+            raise InputError("a finite number above 0 s", "seconds", seconds)
+        module = self._module
+        self._due = max(self._due, self.t) + seconds
+        for surface, angle in self._angles.items():
+            x, y = np.array(self._machine.steered(surface).pivot) - self._origin
+            if not self.done and not module.call("steer", surface, x, y, angle, self._due):
+                raise MemoryError("the core gets no more memory")
+        # Rounding of a sum of steps is no step; where a plate stops, one ends.
+        module.world.pause = self._due if self._angles else self._due * (1.0 - 1e-12)
+        self._angles.clear()
+        while not self.done and module.world.t < module.world.pause:
+            self._proceed(MOST_STEPS)
+        for i in self._pushed:
+            module.call("push_disk", i, 0.0, 0.0)
+        self._pushed.clear()
+
+    def push(self, particle: int, force: Sequence[float]) -> None:
+        """Push a particle with a force (x, y), N, at its centre during the next `step`.
+
+        What the incoming belt carries by adhesion is not moved, nor what is not under way.
+        """
+        if not 0 <= particle < self._machine.count:
+            raise InputError(f"0 to {self._machine.count - 1}", "particle", particle)
+        if len(force) != 2 or not all(map(isfinite, force)):
+            raise InputError("two finite numbers, N", "force", force)
+        self._module.call("push_disk", particle, *map(float, force))
+        self._pushed.add(particle)
+
+    def set(self, key: str, value: Any) -> None:
+        """Change a key of the scene from here on.
+
+        The angle of a plate, to which it turns at an even rate during the next `step`, as a drive
+        would turn it; the speed of a belt; speed and torque of a motor.
+
+        Raises
+        ------
+        SceneError
+            If the key cannot have that value, or cannot be set while a run goes on.
+        """
+        old, new = self.scene, load(self.scene, {key: value})
+        module, last, first = self._module, key.split(".")[-1], self._machine.scene.plates
+        turned = {
+            plate.name or "plate": plate.angle_deg - first[n].angle_deg
+            for n, plate in enumerate(new.plates)
+            if plate.angle_deg != old.plates[n].angle_deg
+        }
+        carried = new.incoming != old.incoming and bool(self._disks["rides"].any())
+        if turned and not turned.keys() & old.movers.keys():
+            for name, angle in turned.items():
+                self._angles[old.surfaces.index(name)] = angle * RADIANS
+        elif last in ("speed_deg", "torque"):
+            rows = module.array("movers", dtype("Mover"), module.world.mover_count)
+            for mover in build(new).movers:
+                if mover.hinge is not None:
+                    rows["motor"][rows["surface"] == mover.surface] = mover.hinge.motor
+        elif last == "speed" and new.streams == old.streams and not carried:
+            rows = module.array("surfaces", dtype("Surface"), module.world.surface_count)
+            rows["speed"] = pieces(build(new))["speed"][rows["material"]]
+            for particle in {*range(self._machine.count)} - self._pushed:
+                module.call("push_disk", particle, 0.0, 0.0)
+        elif new != old:
+            raise refused(old, key, value, f"left as it is while the run goes on: {SET} can be set")
+        self.scene = new
+
+    @property
+    def positions(self) -> Floats:
+        """Where the centres are, (N, 2), m; NaN of what is not under way."""
+        x, y, _, _ = self._moved()
+        return np.asarray(np.stack([x, y], axis=-1) + self._origin)
+
+    @property
+    def velocities(self) -> Floats:
+        """How fast the centres are, (N, 2), m/s; NaN of what is not under way.
+
+        Of what lies on something it is that of the middle of the engine's last step.
+        """
+        _, _, vx, vy = self._moved()
+        return np.stack([vx, vy], axis=-1)
+
+    def _moved(self) -> tuple[Floats, Floats, Floats, Floats]:
+        disks, world = self._disks, self._module.world
+        h, on = world.t - disks["t"], self._under_way
+        half = np.where((disks["supports"] > 0) & (disks["mode"] == _MODES["FREE"]), 0.5, 0.0)
+        fell, light = h - half * world.length, np.where(half > 0.0, 0.0, disks["inv_mass"])
+        found = []
+        for n, name in enumerate("xy"):
+            pull, v = (world.gx, world.gy)[n], disks[f"v{name}"]
+            # Of a push the second half of the last step is still to come.
+            late = 0.5 * world.length * light * disks["pushed"][:, n]
+            found.append(np.where(on, disks[name] + (v + 0.5 * pull * h) * h, np.nan))
+            found.append(np.where(on, v + pull * fell + late, np.nan))
+        x, vx, y, vy = found
+        return x, y, vx, vy
+
+    @property
+    def angles(self) -> Floats:
+        """How far particles have turned since their releases, (N,), rad; NaN if not under way."""
+        return np.where(self._under_way, self._disks["turned"], np.nan)
+
+    @property
+    def contacts(self) -> list[Touch]:
+        """What touched what in the latest step, with which forces; not what is asleep."""
+        module, names = self._module, self._machine.surfaces
+        world, found = module.world, list[Touch]()
+        rows = module.array("earlier", dtype("Contact"), world.earlier_count)
+        span = 0.5 * (world.length_before + world.length)
+        for row in rows[rows["impulse"][:, 0] > 0.0]:
+            pressed, rubbed, _ = (row["impulse"] / span).tolist()
+            i, j, normal = (
+                int(row["i"]),
+                max(int(row["j"]), -1),
+                (row["nx"].item(), row["ny"].item()),
+            )
+            name = names[row["owner"]] if j < 0 else ""
+            found.append(Touch(i, j, name, normal, pressed, rubbed))
+        return found
+
+    def pose(self, surface: str) -> Floats:
+        """Return where a surface is that moves: x, y of its pivot, m, and its angle, rad, (3,)."""
+        pose: Floats = self.recording.pose(surface, self.t)[0]
+        return pose
+
+    @property
+    def recording(self) -> Recording:
+        """The run so far; what has not ended has the reason ``"stopped"``."""
+        module, job, kept = self._module, copy(self._job), self._module.snapshot()
+        job.knots, job.events = [*job.knots], [*job.events]
+        recorder = Recorder(self._machine)
+        try:
+            module.world.pause = 0.0
+            if not self.done:
+                job.stop()
+            job.write(recorder)
+            return Recording.of(recorder.finish(engine="contact", steps=module.world.step_count))
+        finally:
+            module.restore(kept)
+
+
+_MODES = constants("Mode")

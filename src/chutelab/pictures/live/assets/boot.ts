@@ -1,0 +1,24 @@
+// What a page begins with: unpacks the rest of its data and its script, and starts both threads'
+// work meanwhile. The script runs in the page as text whose hash the page's policy allows.
+
+import { bytesOf, compiled, unpacked } from "./core.ts";
+
+const textOf = (id: string) => document.getElementById(id)?.textContent ?? "";
+
+/** @returns the page's data, the core, and what makes threads, of which the first has begun */
+async function boot() {
+  const data = JSON.parse(textOf("lab"));
+  const core = compiled(bytesOf(data.wasm).buffer).catch(() => null);
+  const { script, worker, ...more } = await unpacked(bytesOf(data.packed).buffer).json();
+  const source = new Blob([worker], { type: "text/javascript" });
+  const newThread = () => new Worker(URL.createObjectURL(source));
+  Object.assign(globalThis, {
+    booted: { data: Object.assign(data, more), core, newThread, thread: newThread() },
+  });
+  const element = document.createElement("script");
+  element.type = "module";
+  element.textContent = script;
+  document.body.append(element);
+}
+
+boot();

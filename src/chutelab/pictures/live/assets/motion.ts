@@ -1,0 +1,78 @@
+// Where what moves is: what `machine/movers.py` is in Python. The core has its own.
+
+import type { Arc, Machine, Segment } from "./machine.ts";
+import type { Mover } from "./plan.ts";
+import type { Point } from "./scene.ts";
+
+/** Of the pivot, m, and how far it has turned, rad */
+export type Pose = { x: number, y: number, turn: number };
+/** States of hinges as the core tells them: t (s), angle (rad), rate (rad/s), surface. */
+export const SWING_ROW = 4;
+
+/** The states of a hinge: cubics between them. */
+class Swings {
+  rows: number[][] = [];
+
+  /** Angle at a time, rad. */
+  at(t: number) {
+    const { rows } = this;
+    let low = 0, high = rows.length - 1;
+    if (high < 0) return 0;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (rows[middle][0] <= t) low = middle;
+      else high = middle;
+    }
+    const [from, a, va] = rows[low], [to, b, vb] = rows[high], h = to - from;
+    const s = h > 0 ? Math.min(1, Math.max(0, (t - from) / h)) : 1;
+    const gone = b - a, [first, last] = [h * va, h * vb];
+    return a + s * (first + s * ((3 * gone - 2 * first - last) + s * (first + last - 2 * gone)));
+  }
+}
+
+/** Where a mover is at a time, s. It travels with an even acceleration up to the middle, and the
+ * same against it from there on. */
+function poseOf(mover: Mover, t: number, swings?: Swings): Pose {
+  const { pivot, by, frequency, phase, way, from, lasts, turn, inertia } = mover;
+  const swing = Math.sin(2 * Math.PI * frequency * t + phase);
+  const u = lasts ? Math.min(1, Math.max(0, (t - from) / lasts)) : 0;
+  const share = u < 0.5 ? 2 * u * u : 1 - 2 * (1 - u) * (1 - u);
+  const [x, y] = [0, 1].map((n) => pivot[n] + by[n] * swing + way[n] * share);
+  return { x, y, turn: inertia ? swings?.at(t) ?? 0 : turn * t };
+}
+
+/** Where a pose carries a place, m, as written. */
+function carried({ x, y, turn }: Pose, { pivot }: Mover, [px, py]: Point): Point {
+  const [c, s, u, v] = [Math.cos(turn), Math.sin(turn), px - pivot[0], py - pivot[1]];
+  return [x + c * u - s * v, y + s * u + c * v];
+}
+
+const onSegment = (one: Segment, mover: Mover, pose: Pose): Segment => {
+  const [x, y, u, v] = one.ends, begin = carried(pose, mover, [x, y]);
+  const [c, s] = [Math.cos(pose.turn), Math.sin(pose.turn)];
+  return { ...one, x: begin[0], y: begin[1], tx: c * one.tx - s * one.ty,
+    ty: s * one.tx + c * one.ty, ends: [...begin, ...carried(pose, mover, [u, v])] };
+};
+
+const onArc = (one: Arc, mover: Mover, pose: Pose): Arc => {
+  const [x, y] = carried(pose, mover, [one.x, one.y]);
+  return { ...one, x, y, begin: one.begin + pose.turn };
+};
+
+/** A machine as it is at a time, s; one in which nothing moves is itself.
+ * @param swings of hinges, by their surfaces */
+function posed(machine: Machine, t: number, swings?: Map<number, Swings>): Machine {
+  if (!machine.movers.length) return machine;
+  const movers = new Map(machine.movers.map((one) =>
+    [one.surface, [one, poseOf(one, t, swings?.get(one.surface))] as const]));
+  const placed = <T extends { surface: number }>(
+    all: T[], on: (one: T, mover: Mover, pose: Pose) => T,
+  ) => all.map((one) => {
+      const found = movers.get(one.surface);
+      return found ? on(one, ...found) : one;
+    });
+  return { ...machine, segments: placed(machine.segments, onSegment),
+    arcs: placed(machine.arcs, onArc) };
+}
+
+export { Swings, carried, poseOf, posed };

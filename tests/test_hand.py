@@ -1,0 +1,237 @@
+"""Runs by hand: steps, pushes, plates that are turned, belts and motors whose speeds are set."""
+
+import re
+from math import cos, inf, nan, radians, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import chutelab
+from chutelab.results import Recording
+from chutelab.scene import SceneError
+from chutelab.util.errors import InputError
+
+G, R, M, MU = 9.81, 0.02, 0.1, 0.3
+
+FLOOR = {"name": "floor", "from": [-1.0, 0.0], "to": [3.0, 0.0], "friction": MU, "restitution": 0.0}
+
+
+def scene(at=(0.0, 1.0), surface=(), stream=None, **keys):
+    return {
+        "particle": {"radius": R, "mass": M, "spin": False},
+        "surface": list(surface),
+        "stream": {"at": list(at), "velocity": [0.0, 0.0], **(stream or {})},
+        "run": {"until": 1.0},
+        **keys,
+    }
+
+
+def closes(recording):
+    """Keeps all laws; what is in motion at the end is what was given and not lost."""
+    ledger = recording.ledger
+    assert not recording.laws
+    change = sum(b - a for a, b in (ledger.kinetic, ledger.potential, ledger.spring))
+    given = ledger.belt_work + ledger.drive_work + ledger.push_work
+    given -= ledger.restitution_loss + ledger.friction_loss + ledger.damper_loss
+    assert change == pytest.approx(given, abs=1e-11 * ledger.turned_over)
+    assert abs(ledger.residual) <= 1e-11 * ledger.turned_over
+    return ledger
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("heap", {"stream.count": 30, "run.until": 0.8}),
+        ("hopper", {"stream.count": 30, "run.until": 0.6}),
+        ("see-saw", {"run.until": 0.6}),
+    ],
+)
+def test_what_is_only_stepped_has_the_bits_of_a_run(name, changes):
+    expected = chutelab.simulate(name, changes, engine="contact")
+    run = chutelab.start(name, changes)
+    for seconds in (0.013, 0.2, 0.0307):
+        run.step(seconds)
+        # To look at a run does not change it.
+        assert run.recording.ended_by("stopped").any() or run.done
+    while not run.done:
+        run.step(0.1)
+    for field in ("knots", "events", "by_surface", "swings", "totals"):
+        assert getattr(run.recording, field).tobytes() == getattr(expected, field).tobytes()
+
+
+def test_a_push_is_a_force_and_its_work_is_force_times_way():
+    """In flight v = F/m t and s = F/2m t²; W = F s, to second order in the step."""
+    run, force, span = chutelab.start(scene(gravity=0.0)), (0.7, -0.4), 0.4
+    way = [0.5 * f / M * span**2 for f in force]
+    for _ in range(20):
+        run.push(0, force)
+        run.step(span / 20)
+    assert run.t == pytest.approx(span, abs=1e-12)
+    assert run.positions[0] - [0.0, 1.0] == pytest.approx(way, abs=1e-5)
+    assert run.velocities[0] == pytest.approx([f / M * span for f in force], rel=1e-12)
+    run.step(0.1)
+    ledger = closes(run.recording)
+    kinetic = 0.5 * M * sum((f / M * span) ** 2 for f in force)
+    assert ledger.push_work == pytest.approx(kinetic, rel=1e-12)
+    assert ledger.push_work == pytest.approx(np.dot(force, way), rel=1e-12)
+    assert run.recording.measure("ledger.push_work") == ledger.push_work
+
+
+def test_a_push_along_a_floor_is_opposed_by_its_friction():
+    """m a = F_x - mu (m g - F_y); on the floor N = m g - F_y; work F_x s."""
+    push, span = (0.5, -0.2), 0.4
+    run = chutelab.start(scene((0.0, R), [FLOOR]))
+    run.step(0.05)
+    for _ in range(20):
+        run.push(0, push)
+        run.step(span / 20)
+    normal = M * G - push[1]
+    slip = (push[0] - MU * normal) / M * span
+    (touch,) = run.contacts
+    assert (touch.surface, touch.other, touch.normal) == ("floor", -1, (0.0, 1.0))
+    assert touch.pressed == pytest.approx(normal, rel=1e-9)
+    assert touch.rubbed == pytest.approx(-MU * normal, rel=1e-9)
+    assert run.velocities[0] == pytest.approx([slip, 0.0], rel=1e-2, abs=1e-12)
+    run.step(1.0)
+    ledger = closes(run.recording)
+    # It slides 1/2 v t, and on by v²/(2 mu g): all that is given is heat.
+    stops = 0.5 * slip * span
+    assert ledger.push_work == pytest.approx(push[0] * stops, rel=1e-2)
+    assert ledger.friction_loss == pytest.approx(ledger.push_work, rel=1e-9)
+
+
+@pytest.mark.parametrize("air", [0.0, 1.2])
+def test_pushes_of_a_crowd_close_the_ledger(air):
+    run = chutelab.start("heap", {"stream.count": 40, "run.until": 0.6, "air_density": air})
+    draw = np.random.default_rng(1)
+    while not run.done:
+        for particle in range(40):
+            run.push(particle, 0.1 * draw.normal(size=2))
+        run.step(0.01)
+    assert closes(run.recording).push_work > 0.1
+
+
+def test_a_plate_that_is_turned_strikes_as_a_paddle_does():
+    """v' = V + e (V - v) with V = w r where it strikes; the drive's work is J V."""
+    e, away, rate = 0.5, 0.3, radians(20.0) / 0.2
+    plate = {
+        "name": "paddle",
+        "pivot": [0.0, 0.0],
+        "angle_deg": 0.0,
+        "above": 0.0,
+        "below": 0.5,
+        "restitution": e,
+    }
+    # It hangs down, and turns counterclockwise: to the right.
+    stream = {"at": [R + 0.02, -away], "velocity": [0.0, 0.0]}
+    run = chutelab.start(scene(plate={**plate, "friction": 0.0}, stream=stream, gravity=0.0))
+    run.set("plate.angle_deg", 20.0)
+    run.step(0.2)
+    assert run.pose("paddle") == pytest.approx([0.0, 0.0, radians(20.0)])
+    run.step(0.2)
+    assert run.pose("paddle")[2] == pytest.approx(radians(20.0))
+    (blow,) = run.recording.select("impact")
+    x, y = blow["position"]
+    turned = rate * blow["t"]
+    normal, foot = (cos(turned), sin(turned)), x * sin(turned) - y * cos(turned)
+    impulse = M * (1.0 + e) * rate * foot
+    assert blow["velocity_after"] == pytest.approx(np.array(normal) * impulse / M, rel=1e-9)
+    ledger = closes(run.recording)
+    assert ledger.drive_work == pytest.approx(impulse * rate * foot, rel=1e-9)
+    assert ledger.by_surface["paddle"]["drive_work"] == pytest.approx(ledger.drive_work)
+
+
+def test_belts_and_motors_are_set():
+    """A disk that grips a belt goes with it; a motor is as fast as it is told to be."""
+    belt = {**FLOOR, "speed": 0.5, "friction": 0.8}
+    run = chutelab.start(scene((0.0, R), [belt]))
+    run.step(0.4)
+    run.set("surface.floor.speed", 1.0)
+    assert run.velocities[0] == pytest.approx([0.5, 0.0], abs=1e-9)
+    run.step(0.4)
+    assert run.velocities[0] == pytest.approx([1.0, 0.0], abs=1e-9)
+    closes(run.recording)
+    motor = {"speed_deg": 90.0, "torque": 5.0}
+    arm = {
+        "name": "arm",
+        "from": [0.0, 0.0],
+        "to": [0.3, 0.0],
+        "hinge": [0.0, 0.0],
+        "inertia": 0.01,
+    }
+    run = chutelab.start(scene((3.0, 3.0), [{**arm, "motor": motor}], gravity=0.0))
+    run.step(0.2)
+    run.set("surface.arm.motor.speed_deg", -45.0)
+    run.step(0.2)
+    run.step(0.2)
+    turned = run.recording.pose("arm", [0.1, 0.2, 0.4, 0.6])[:, 2]
+    # Its torque brakes it first: by 1/2 dw² / (T / I) more.
+    braking = 0.5 * radians(135.0) ** 2 / (5.0 / 0.01)
+    expected = [radians(9.0), radians(-9.0) + braking, radians(-9.0)]
+    assert np.diff(turned) == pytest.approx(expected, abs=1.5e-3)
+    closes(run.recording)
+
+
+def test_a_run_that_was_steered_is_saved(tmp_path):
+    run = chutelab.start("perpendicular", {"run.until": 0.6})
+    while not run.done:
+        run.set("plate.angle_deg", 10.0 * sin(5.0 * run.t))
+        run.step(0.02)
+    recording = run.recording
+    loaded = Recording.load(recording.save(tmp_path / "run.npz"))
+    assert loaded.pose("plate", [0.3]).tobytes() == recording.pose("plate", [0.3]).tobytes()
+    assert not loaded.laws
+    assert loaded.ledger == recording.ledger
+
+
+def test_lone_particles_go_on_together_and_do_not_meet():
+    stream = {"at": [0.0, 1.0], "velocity": [0.0, 0.0], "count": 3, "start": 0.0, "rate": 100.0}
+    run = chutelab.start(scene(stream=stream))
+    run.step(0.015)
+    x, y = run.positions.T
+    assert y[:2] == pytest.approx([1.0 - 0.5 * G * 0.015**2, 1.0 - 0.5 * G * 0.005**2], abs=1e-15)
+    assert np.isnan([x[2], y[2], run.angles[2]]).all()
+    assert run.angles[0] == 0.0
+    assert len(run.contacts) == 0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "what"),
+    [
+        ("plate.friction", 0.3, "can be set"),
+        ("particle.radius", 0.01, "can be set"),
+        ("incoming.speed", 3.0, "can be set"),
+        ("plate.angle_deg", 120.0, "90"),
+        ("plate.angel_deg", 20.0, "angle_deg"),
+        ("plate.angle_deg", "steep", "number"),
+    ],
+)
+def test_what_cannot_be_set_is_told(key, value, what):
+    run = chutelab.start("perpendicular")
+    with pytest.raises(SceneError, match=what):
+        run.set(key, value)
+    run.step(0.01)
+
+
+def test_bad_calls_are_told():
+    run = chutelab.start("perpendicular")
+    for seconds in (0.0, -1.0, nan, inf):
+        with pytest.raises(InputError, match="above 0 s"):
+            run.step(seconds)
+    for particle, force in ((1, (0.0, 0.0)), (-1, (0.0, 0.0)), (0, (nan, 0.0)), (0, (1.0,))):
+        with pytest.raises(InputError):
+            run.push(particle, force)
+    with pytest.raises(SceneError, match=r"particle\.radius"):
+        chutelab.start("perpendicular", {"particle.radius": 0.0})
+
+
+def test_the_example_of_the_docs_lands_particles_at_the_mark():
+    text = (Path(__file__).parents[1] / "docs" / "engineers.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    found = {}
+    exec(example, found)
+    places = found["landings"]["position"][:, 0]
+    assert abs(places[0] - 0.4) > 0.1
+    assert places[-10:] == pytest.approx(0.4, abs=2e-5)
+    closes(found["run"].recording)

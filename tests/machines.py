@@ -51,6 +51,23 @@ def scene_of(**tables):
     return build(from_dict(document))
 
 
+def in_a_box(random, surfaces):
+    """Return a scene of particles that fall on to surfaces, all of them in a box without a lid."""
+    box = [
+        {"name": "floor", "from": [-0.4, -0.3], "to": [0.4, -0.3]},
+        {"name": "left", "from": [-0.4, -0.3], "to": [-0.4, 0.5]},
+        {"name": "right", "from": [0.4, -0.3], "to": [0.4, 0.5]},
+    ]
+    return {
+        "particle": {"radius": random.uniform(0.006, 0.012), "mass": 0.008,
+                     "spin": bool(random.integers(2))},
+        "surface": [*box, *surfaces],
+        "stream": {"fill": [[-0.2, 0.18], [0.2, 0.5]], "count": int(random.integers(1, 25)),
+                   "interact": True},
+        "run": {"until": 1.0},
+    }  # fmt: skip
+
+
 def nominal(scene):
     """Return where free flight of the nominal particle begins, its velocity, and where it hits."""
     found = lay(Module(), scene, scene.met(scene.kinds[0], "incoming")[1])[1]

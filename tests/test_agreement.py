@@ -251,6 +251,13 @@ def test_a_wrong_formula_is_caught_from_outside(file, text, wrong, with_fault):
     caught("landed")
 
 
+@pytest.mark.slow
+def test_a_wrong_formula_of_the_contact_engine_is_wrong_in_no_other(with_fault):
+    with_fault("impacts.c", "-c.rest * u[0]", "(1.0 + 1e-6) * -c.rest * u[0]")
+    failed = {row.pair for row in agreement(scene.load("perpendicular")) if not row.holds}
+    assert failed == {("contact", "theory"), ("contact", "exact")}
+
+
 def heavier_core(job, module, machine, *, honest=Job.__init__, **more):
     honest(job, module, replace(machine, gravity=machine.gravity * (1.0 + WRONG)), **more)
 

@@ -47,6 +47,7 @@ def mixed(seed, *, turning=True, count=40, end=1.5):
     machine = of_sizes(
         machine, radius, mass, share, rng.integers(0, 2, count), pair_restitution=REST,
         pair_friction=RUB, rolling=np.zeros(2), falls=np.zeros(2),
+        cohesion=np.zeros((2, 2 + len(machine.surfaces))),
     )  # fmt: skip
     core = Core(machine)
     core.disks["spin"] = spin

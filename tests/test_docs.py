@@ -153,14 +153,14 @@ COLOURS = """() => ["color", "backgroundColor"].map(
 
 
 def test_every_page_opens_on_a_phone_in_the_dark(site, opened):
+    page = opened(site / "index.html", viewport={"width": 360, "height": 740}, color_scheme="dark")
     for path in pages(site):
-        page = opened(path, viewport={"width": 360, "height": 740}, color_scheme="dark")
+        page.goto(path.as_uri())
         assert page.evaluate("document.documentElement.scrollWidth") == 360, path
         assert page.evaluate(CUT_OFF) == [], path
         ink, paper = page.evaluate(COLOURS)
         assert sum(ink) > 3 * 150, path
         assert sum(paper) < 3 * 60, path
-        page.context.close()
 
 
 def test_a_scene_of_the_gallery_runs_in_its_page(site, opened):
@@ -200,7 +200,6 @@ def test_pictures_of_the_gallery_move_on_hover_and_focus_but_not_against_a_reade
         assert page.evaluate(shown) == (still if motion == "reduce" else moves)
         page.keyboard.press("Tab")
         assert page.evaluate(shown) == still
-        page.context.close()
 
 
 def test_the_search_finds_without_a_server(site, opened):

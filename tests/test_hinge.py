@@ -12,6 +12,7 @@ import pytest
 import chutelab
 from chutelab.results.laws import judge
 from chutelab.scene import SceneError
+from machines import in_a_box
 
 pytest.importorskip("scipy")
 from scipy.integrate import quad, solve_ivp
@@ -190,11 +191,7 @@ def test_the_power_of_a_drums_motor_is_what_its_crowd_loses():
 def drawn(seed):
     """A random machine of three surfaces on hinges, in a box."""
     random = np.random.default_rng(seed)
-    surfaces = [
-        {"name": "floor", "from": [-0.4, -0.3], "to": [0.4, -0.3]},
-        {"name": "left", "from": [-0.4, -0.3], "to": [-0.4, 0.5]},
-        {"name": "right", "from": [0.4, -0.3], "to": [0.4, 0.5]},
-    ]
+    surfaces = []
     for n in range(3):
         x, y = 0.22 * (n - 1), random.uniform(-0.12, 0.05)
         dx, dy = random.uniform(-0.09, 0.09, 2)
@@ -219,14 +216,7 @@ def drawn(seed):
             own["speed"] = random.uniform(-1.0, 1.0)
         pair = {"restitution": random.uniform(0.0, 0.9), "friction": random.uniform(0.0, 1.0)}
         surfaces.append({"name": f"hung{n}", **own, **pair})
-    return {
-        "particle": {"radius": random.uniform(0.006, 0.012), "mass": M,
-                     "spin": bool(random.integers(2))},
-        "surface": surfaces,
-        "stream": {"fill": [[-0.2, 0.18], [0.2, 0.5]], "count": int(random.integers(1, 25)),
-                   "interact": True},
-        "run": {"until": 1.0},
-    }  # fmt: skip
+    return in_a_box(random, surfaces)
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -12,6 +12,7 @@ import pytest
 import chutelab
 from chutelab.results.laws import judge
 from chutelab.scene import SceneError
+from machines import in_a_box
 
 scipy = pytest.importorskip("scipy")
 from scipy.optimize import brentq  # noqa: E402
@@ -317,11 +318,7 @@ def test_pymunk_with_its_own_bodies_agrees_to_the_order_of_its_step(scene, bound
 def drawn(seed):
     """A random machine of three surfaces that move, in a box."""
     random = np.random.default_rng(seed)
-    surfaces = [
-        {"name": "floor", "from": [-0.4, -0.3], "to": [0.4, -0.3]},
-        {"name": "left", "from": [-0.4, -0.3], "to": [-0.4, 0.5]},
-        {"name": "right", "from": [0.4, -0.3], "to": [0.4, 0.5]},
-    ]
+    surfaces = []
     for n in range(3):
         # Apart from each other: what rigid drives squeeze has nowhere to go.
         x, y = 0.22 * (n - 1), random.uniform(-0.12, 0.05)
@@ -339,14 +336,9 @@ def drawn(seed):
         surfaces.append(
             {"name": f"mover{n}", "restitution": random.uniform(0.0, 0.9), **shape, **motion}
         )
-    return {
-        "particle": {"radius": random.uniform(0.006, 0.012), "mass": M,
-                     "spin": bool(random.integers(2))},
-        "surface": surfaces,
-        "stream": {"fill": [[-0.2, 0.18], [0.2, 0.5]], "count": int(random.integers(1, 25)),
-                   "interact": bool(random.integers(2))},
-        "run": {"until": 1.0},
-    }  # fmt: skip
+    scene = in_a_box(random, surfaces)
+    scene["stream"]["interact"] = bool(random.integers(2))
+    return scene
 
 
 def test_a_picture_holds_what_turns_and_a_film_draws_it_where_it_is():

@@ -56,7 +56,8 @@ CONTRACT = {
     "plate": {"name": None, "pivot": None, "distance": 0.5, "angle_deg": 0.0, "pivot_height": 0.2,
      "above": 0.3, "below": None, "restitution": 0.5, "friction": 0.0, "shake": None,
      "travel": None, "turn": 0.0, "hinge": None, "mass": None, "inertia": None, "spring": 0.0,
-     "rest_deg": 0.0, "damper": 0.0, "stops_deg": None, "motor": None},
+     "rest_deg": 0.0, "damper": 0.0, "stops_deg": None, "motor": None,
+     "starts_when": None},
     "outgoing": {"speed": 3.0, "drop": 0.5, "drop_from": "impact", "start": -2.0, "length": 6.0,
      "restitution": 0.0, "friction": 0.5},
     "conveyor": (),
@@ -193,10 +194,12 @@ def test_a_key_takes_the_values_of_its_range_and_no_others(line):
 # The shipped scenes.
 
 SHIPPED = (
-    "belt-landing", "cascade", "cradle", "damper-plate", "dominoes", "free-fall", "galton",
-    "heap", "hopper", "inclined-20", "inclined-40", "inclined-60", "inclined-conveyor",
+    "belt-landing", "cascade", "coal-transfer", "cradle", "damper-plate", "dominoes", "feeder",
+    "free-fall", "galton", "heap", "hopper", "inclined-20", "inclined-40", "inclined-60",
+    "inclined-conveyor",
     "low-speed", "mixture",
-    "perpendicular", "perpendicular-fast", "rock-box", "see-saw", "slip", "spoon", "stream",
+    "perpendicular", "perpendicular-fast", "rock-box", "see-saw", "silo", "slip", "spoon",
+    "stream",
     "stream-independent", "two-sizes",
 )  # fmt: skip
 
@@ -261,7 +264,7 @@ def test_the_starter_is_complete_and_valid_and_shows_the_defaults():
     assert said == {
         name: set(table["properties"]) - {"points"} | ({"points"} if name == "particle" else set())
         for name, table in tables.items()
-        if name not in ("preset", "shake", "travel", "motor")  # in one line
+        if name not in ("preset", "shake", "travel", "motor", "when")  # in one line
     }
     assert set(everything["expect"][0]) == EXPECT
     complete = sc.from_dict(everything)
@@ -337,6 +340,7 @@ def test_the_schema_describes_every_key_of_the_contract():
     assert set(tables["surface"]["properties"]) == {
         *("name", "from", "to", "points", "center", "radius", "from_deg", "to_deg", "repeat"),
         *("restitution", "friction", "material", "speed", "opens_at", "closes_at"),
+        *("opens_when", "closes_when", "starts_when"),
         *("pivot", "shake", "travel", "turn", "hinge", "mass", "inertia", "spring", "rest_deg"),
         *("damper", "stops_deg", "motor"),
     }

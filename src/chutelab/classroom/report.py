@@ -304,8 +304,13 @@ def left_out(made: Report) -> list[str]:
     share = recording.ledger.relative_residual
     said = [
         "Two dimensions: a slice one particle thick; nothing moves across the width.",
-        "Bodies are rigid; restitution does not depend on speed; Coulomb friction, no cohesion"
-        " between particles.",
+        "Bodies are rigid, with Coulomb friction."
+        + (
+            ""
+            if any(kind.falls for kind in scene.particles)
+            else " Restitution is the same at all speeds."
+        )
+        + ("" if scene.clings else " Nothing clings."),
         f"Numerical error: {100.0 * share:.2g} % of the energy turned over is unexplained by the"
         f" ledger; engine {recording.engine}.",
     ]

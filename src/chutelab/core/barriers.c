@@ -103,12 +103,14 @@ static double swung_by(const Mover *m, double t) {
 void to_rest(const Barrier *b, double t, double *x, double *y) {
     if (!b->mover) return;
     const Mover *m = L.movers + b->mover - 1;
+    double now = t;
+    t = MAX(t - m->begins, 0);
     double swing = sin(2 * PI * m->frequency * t + m->phase), gone = m->lasts ? (t - m->from) / m->lasts : 0;
     gone = MIN(MAX(gone, 0), 1);
     gone = gone > 0.5 ? 1 - 2 * (1 - gone) * (1 - gone) : 2 * gone * gone;
     double dx = *x - m->pivot[0] - m->by[0] * swing - m->way[0] * gone;
     double dy = *y - m->pivot[1] - m->by[1] * swing - m->way[1] * gone;
-    double angle = is_swung(m) ? swung_by(m, t) : m->turn * t, c = cos(angle), s = sin(angle);
+    double angle = is_swung(m) ? swung_by(m, now) : m->turn * t, c = cos(angle), s = sin(angle);
     *x = m->pivot[0] + c * dx + s * dy;
     *y = m->pivot[1] - s * dx + c * dy;
 }

@@ -20,8 +20,8 @@ void bear_contact(const Contact *c, double share, double from, double to) {
     if (B.every == 0 || c->two) return;
     Push p = c->j < 0 ? at_foot(a, c->owner, a->radius, c->nx, c->ny, from, to)
                       : on_belt(W.disks + c->j, from, to);
-    p.jx = share * (c->impulse[0] * c->nx + c->impulse[1] * c->ny);
-    p.jy = share * (c->impulse[0] * c->ny - c->impulse[1] * c->nx);
+    p.jx = share * (pressed(c) * c->nx + c->impulse[1] * c->ny);
+    p.jy = share * (pressed(c) * c->ny - c->impulse[1] * c->nx);
     p.couple = share * c->impulse[2];
     bear(&p);
 }
@@ -58,8 +58,8 @@ void bear_ride(int i) {
 /* Note the force by which a surface that is pressed bore a disk in a step; it is the last of `held`. */
 void note_force(Disk *d, const Contact *c, double span) {
     double *force = d->bears + 2 * (d->held_count - 1);
-    force[0] = (c->impulse[0] * c->nx + c->impulse[1] * c->ny) / span;
-    force[1] = (c->impulse[0] * c->ny - c->impulse[1] * c->nx) / span;
+    force[0] = (pressed(c) * c->nx + c->impulse[1] * c->ny) / span;
+    force[1] = (pressed(c) * c->ny - c->impulse[1] * c->nx) / span;
 }
 
 /* Tell of what surfaces gave a sleeper since it fell asleep, and for some time more at the end. */

@@ -112,7 +112,7 @@ static void settle(int i, const Contact *last, double h) {
     double u[3], v[3], entries[3], given[3], jx = 0.5 * h * d->mass * W.gx, jy = 0.5 * h * d->mass * W.gy;
     hop.impulse[0] = jx * hop.nx + jy * hop.ny;
     hop.impulse[1] = jx * hop.ny - jy * hop.nx;
-    hop.impulse[2] = 0;
+    hop.impulse[2] = hop.clings = 0;
     for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
     relative(&hop, 0, u);
     d->vx += jx / d->mass;
@@ -212,7 +212,7 @@ void close_step(double h) {
             W.links[2 * n + 1] = b->links;
             b->links = 2 * n + 1;
         }
-        if (c->impulse[0] == 0) continue;
+        if (c->impulse[0] == 0 && c->clings == 0) continue;
         if (!W.interact && !a->supports) a->held_count = 0;
         double past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0;
         if (!b && a->held_count < MAX_HELD) {
@@ -284,7 +284,7 @@ void close_step(double h) {
             /* What its hop reaches it lies on, too: that is no blow. */
             if (!W.interact && c->impulse[0] == 0 && c->gap <= 0.125 * (W.g + W.haste) * h * h
                     && d->held_count < MAX_HELD) d->held[d->held_count++] = -1 - c->j;
-            if (c->impulse[0] == 0) continue;
+            if (c->impulse[0] == 0 && c->clings == 0) continue;
             if (!only || c->owner != only->owner || c->j >= 0) owners++;
             if (!only || c->impulse[0] > only->impulse[0]) only = c;
         }

@@ -87,6 +87,7 @@ void describe(Contact *c, int i, int j) {
     if (j < 0 && is_hung(-1 - j)) hang_on(c, W.movers + W.surfaces[-1 - j].mover, a);
     c->rest = pair->restitution, c->falls = pair->falls;
     c->share = 1;
+    c->clings = 0;
     c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx - escapes[0] : 0;
     c->gives = c->turns = 0;
     c->most = INFINITY;
@@ -140,7 +141,7 @@ void push(const Contact *c, const double *J) {
    partner, if that is a rider. */
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given) {
-    const double *J = c->impulse;
+    const double J[3] = {pressed(c), c->impulse[1], c->impulse[2]};
     double first = 0.5 * (1 - f) * (1 - f), then = 0.5 * (1 - f * f), all = 1 - f;
     entries[0] = c->j < 0 ? all * (J[0] * c->other[0] + J[1] * c->other[1] + J[2] * c->other[2]) : 0;
     entries[1] = -J[0] * (first * u[0] + then * v[0]);

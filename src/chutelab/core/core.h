@@ -77,6 +77,11 @@ static inline const Pair *pair_of(int kind, int other) {
 static inline const Pair *surface_pair(const Disk *d, int k) {
     return pair_of(d->kind, W.kind_count + W.surfaces[k].material);
 }
+/* Cohesion of disk i with disk j, or with surface k as j = -1 - k, N. */
+static inline double cohesion_of(int i, int j) {
+    const Disk *d = W.disks + i;
+    return (j < 0 ? surface_pair(d, -1 - j) : pair_of(d->kind, W.disks[j].kind))->cohesion;
+}
 /* Whether a gate shut on a disk that is not clear of it yet. */
 static inline int *spared_by(const Surface *s, const Disk *d) {
     return W.spared + (d - W.disks) * W.gate_count + s->gate;
@@ -121,10 +126,12 @@ static inline const Surface *surface_at(int k, double t) {
 static inline int is_hung(int k) { return W.surfaces[k].mover >= 0 && W.movers[W.surfaces[k].mover].inertia > 0; }
 /* Whether a surface moves in this step. */
 static inline int stirs(const Surface *s) { return s->mover >= 0 && W.movers[s->mover].stirs; }
+/* Normal impulse of a contact, with what cohesion pulls, N s. */
+static inline double pressed(const Contact *c) { return c->impulse[0] - c->clings; }
 double swung(const Contact *c, double f);
 /* Work that the motion of a surface does by a contact's impulses, of which the share f has been given, J. */
 static inline double driven(const Contact *c, double f) {
-    double still = (1 - f) * (c->impulse[0] * c->moved[0] + c->impulse[1] * c->moved[1] + c->impulse[2] * c->moved[2]);
+    double still = (1 - f) * (pressed(c) * c->moved[0] + c->impulse[1] * c->moved[1] + c->impulse[2] * c->moved[2]);
     return c->hung ? still + swung(c, f) : still;
 }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
@@ -209,6 +216,10 @@ void sweep_hung(Contact *list, int count, int sweeps, double enough);
 void kick_disks(double h);
 double pushed(const Disk *d, double f);
 double steered_to(const Mover *m, double t);
+
+/* trigger.c */
+int is_triggered(int owner, int doing);
+void touch(int owner, double t);
 
 /* grid.c */
 int list_near(double end);

@@ -147,7 +147,7 @@ void begin_hinges(double t, double h) {
         bring(m, t);
         m->before = m->rate;
         m->drift = m->path[2] * h;
-        m->most = 0.5 * (W.length_before + h) * m->motor[1];
+        m->most = t >= m->begins ? 0.5 * (W.length_before + h) * m->motor[1] : 0;
         follow_path(m, h, &angle, &rate, &change);
         for (int n = 0; n < 2; n++) {
             int touches = n ? m->angle >= m->stops[1] - AGAINST : m->angle <= m->stops[0] + AGAINST;

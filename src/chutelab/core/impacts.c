@@ -378,6 +378,7 @@ static void end_hop(int i, double t) {
     c.impulse[0] = jx * c.nx + jy * c.ny;
     c.impulse[1] = jx * c.ny - jy * c.nx;
     c.impulse[2] = d->inertia * (to[2] - d->spin) - d->radius * c.impulse[1];
+    c.clings = 0;
     double fall = d->mass * (W.gx * (x - d->x) + W.gy * (y - d->y));
     d->x = x;
     d->y = y;
@@ -472,7 +473,12 @@ static void strike(int i, int j, double t) {
     if (u[0] >= 0) return;
     /* Contacts that yield: above 1 / falls the restitution goes with v^(-1/4). */
     if (c.falls * -u[0] > 1) c.rest /= sqrt(sqrt(c.falls * -u[0]));
-    double back = -c.rest * u[0];
+    double back = -c.rest * u[0], cohesion = cohesion_of(i, j);
+    /* To be pulled off takes the force times its range. */
+    if (cohesion > 0) {
+        double range = TOUCH * (j < 0 ? a->radius : MIN(a->radius, b->radius));
+        back = sqrt(MAX(square(back) - 2 * cohesion * range / c.mass[0], 0));
+    }
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);
     if (jammed && c.rest > LASTING && is_driven(i, -u[0])) {

@@ -174,6 +174,7 @@ typedef struct {
     double since, angle, rate; /* s, rad, rad/s; as its path begins ... */
     double path[TERMS];     /* ... and the angle from then on, a power of time each */
     double before;          /* rad/s; before the step's impulses */
+    double begins;          /* [in] s; from when on it moves: its times are counted from there */
     double until;           /* s; up to which it turns, by hand, at `rate` from `angle` on */
     double impulse[3];      /* N m s; of its stops, and of its motor ... */
     double need[2], most;   /* rad/s, N m s; ... the least change that the stops ask for, and a bound */
@@ -190,9 +191,18 @@ typedef struct {
 /* The state of a hinge: halfway through the impulses of a step, and before a blow. */
 typedef struct { double t, angle, rate; int surface, pad; } Swing; /* s, rad, rad/s */ /* [out] */
 
-typedef struct { double restitution, friction, rolling, falls; } Pair; /* [in] rolling: arm over radius;
+/* What comes, goes or begins to move when a surface is touched for the first time. */
+enum Doing { GOES, COMES, STARTS };
+
+typedef struct {
+    double t;               /* [out] s; when that was, INFINITY before */
+    int surface, doing;     /* [in] owner, and what it does ... */
+    int by, pad;            /* [in] ... when this owner is touched */
+} Trigger;
+
+typedef struct { double restitution, friction, rolling, falls, cohesion; } Pair; /* [in] rolling: arm over radius;
                                         falls: 1 over the speed up to which restitution
-                                        is that, s/m; 0 for all */
+                                        is that, s/m; 0 for all; cohesion: N */
 
 /* A contact of disk i with disk j, or with surface k as j = -1 - k. Its tangent is (ny, -nx). */
 typedef struct {
@@ -205,6 +215,7 @@ typedef struct {
     double pull;            /* m/s2; by which gravity makes it slip on a surface */
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
+    double clings;          /* N s; of cohesion, which pulls: the normal impulse is so much less */
     double mass[3];         /* what the contact feels of masses and inertias, in the same order */
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
     double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */
@@ -276,6 +287,7 @@ typedef struct {
     Surface *surfaces;   /* with room for twice as many: narrow arcs become two */
     Pair *pairs;         /* (kinds, kinds + materials) */
     Mover *movers;
+    Trigger *triggers;
     /* arrays that `prepare` lays out */
     Track *tracks;
     Knot *waits;         /* (disks, WAITS) states of each since its last knot; of one by itself (1, WAITS) */
@@ -305,6 +317,7 @@ typedef struct {
     /* sizes */
     int disk_count, surface_count, kind_count, owner_count; /* [in] */
     int mover_count;     /* [in] */
+    int trigger_count;   /* [in] */
     int material_count;
     int knot_room, event_room, total_room, contact_room, near_room, cell_room, swing_room;
     int full;            /* what `run` makes room for as it goes on: see `Full` */

@@ -17,7 +17,10 @@
 /* Newton's steps and halvings to the instant of an impact, to its last bit. */
 #define TO_ROOT 100
 
-static int travels(const Mover *m, double t) { return m->lasts > 0 && t >= m->from && t < m->from + m->lasts; }
+static int travels(const Mover *m, double t) {
+    double from = m->begins + m->from;
+    return m->lasts > 0 && t >= from && t < from + m->lasts;
+}
 
 static void set_mover(Mover *m, double t) {
     if (m->t == t) return;
@@ -25,8 +28,10 @@ static void set_mover(Mover *m, double t) {
         set_hinge(m, t);
         return;
     }
-    double rate = 2 * PI * m->frequency, phase = rate * t + m->phase, s = sin(phase), c = cos(phase);
-    double share = 0, pace = 0, bend = 0, u = m->lasts > 0 ? (t - m->from) / m->lasts : 0;
+    int moves = t >= m->begins;
+    double since = MAX(t - m->begins, 0);
+    double rate = 2 * PI * m->frequency, phase = rate * since + m->phase, s = sin(phase), c = cos(phase);
+    double share = 0, pace = 0, bend = 0, u = m->lasts > 0 ? (since - m->from) / m->lasts : 0;
     if (travels(m, t)) {
         int late = u >= 0.5;
         share = late ? 1 - 2 * (1 - u) * (1 - u) : 2 * u * u;
@@ -35,11 +40,11 @@ static void set_mover(Mover *m, double t) {
     } else if (u > 0.5) share = 1;
     for (int n = 0; n < 2; n++) {
         m->place[n] = m->pivot[n] + m->by[n] * s + m->way[n] * share;
-        m->velocity[n] = m->by[n] * rate * c + m->way[n] * pace;
-        m->pull[n] = -m->by[n] * rate * rate * s + m->way[n] * bend;
+        m->velocity[n] = moves ? m->by[n] * rate * c + m->way[n] * pace : 0;
+        m->pull[n] = moves ? -m->by[n] * rate * rate * s + m->way[n] * bend : 0;
     }
-    if (m->steered) m->turn = t < m->until ? m->rate : 0;
-    double angle = m->steered ? steered_to(m, t) : m->turn * t;
+    m->turn = moves && (!m->steered || t < m->until) ? m->rate : 0;
+    double angle = m->steered ? steered_to(m, t) : m->rate * since;
     m->sine = sin(angle);
     m->cosine = cos(angle);
     m->t = t;
@@ -175,11 +180,11 @@ double next_turn(double t) {
     double next = INFINITY;
     for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++)
         for (int n = 0; n < 3 && m->lasts > 0; n++) {
-            double then = m->from + 0.5 * n * m->lasts;
+            double then = m->begins + m->from + 0.5 * n * m->lasts;
             if (then > t) next = MIN(next, then);
         }
     for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++)
-        if (m->steered && m->until > t) next = MIN(next, m->until);
+        if ((m->steered ? m->until : m->begins) > t) next = MIN(next, m->steered ? m->until : m->begins);
     return next;
 }
 
@@ -188,8 +193,8 @@ int stir(double t) {
     int changed = 0;
     W.haste = W.stirs = 0;
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
-        int now = m->inertia > 0 || (m->steered ? t < m->until : m->turn != 0) || travels(m, t)
-            || (m->frequency > 0 && (m->by[0] != 0 || m->by[1] != 0));
+        int goes_on = m->rate != 0 || (m->frequency > 0 && (m->by[0] != 0 || m->by[1] != 0));
+        int now = m->inertia > 0 || (m->steered ? t < m->until : t >= m->begins && goes_on) || travels(m, t);
         changed |= now != m->stirs;
         W.stirs |= m->stirs = now;
     }

@@ -241,6 +241,7 @@ EXPORT int lay_out_world(void) {
     RESERVE(W.surfaces, 2.0 * W.surface_count);
     RESERVE(W.pairs, (double)W.kind_count * (W.kind_count + W.material_count));
     RESERVE(W.movers, W.mover_count);
+    RESERVE(W.triggers, W.trigger_count);
     return has_room();
 }
 
@@ -332,7 +333,12 @@ EXPORT int prepare(void) {
         W.passes |= pair_of(i / W.kind_count, i % W.kind_count)->restitution < 0;
     for (int k = 0; k < W.mover_count; k++) W.hinges += W.movers[k].inertia > 0;
     /* What hangs gives what one disk gives it to another. */
-    if (W.hinges) W.interact = 1;
+    if (W.hinges || W.trigger_count) W.interact = 1;
+    for (int k = 0; k < W.trigger_count; k++) W.triggers[k].t = INFINITY;
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (!m->inertia) m->rate = m->turn;
+        m->begins = is_triggered(m->surface, STARTS) ? INFINITY : 0;
+    }
     if (!lay_out_work()) return 0;
     double least = INFINITY, most = 0, s = sin(W.ride_incline), c = cos(W.ride_incline);
     int alone = !W.interact;
@@ -350,7 +356,8 @@ EXPORT int prepare(void) {
     for (int k = 0; k < W.surface_count; k++) {
         Surface *piece = W.surfaces + k;
         derive(piece);
-        piece->gate = piece->opens > -INFINITY || piece->closes < INFINITY ? W.gate_count++ : -1;
+        int goes = piece->closes < INFINITY || is_triggered(piece->owner, GOES);
+        piece->gate = piece->opens > -INFINITY || goes ? W.gate_count++ : -1;
         memcpy(piece->swept, piece->box, sizeof piece->swept);
         W.everything[k] = k;
     }

@@ -182,6 +182,7 @@ void finish(int i, int reason) {
 void write_event(int kind, int i, int other, int owner, double t, const double *place,
                  const double *before, const double *after, double normal, double tangent) {
     Event *e = W.events + W.event_count++;
+    if (W.trigger_count && owner >= 0 && kind != RELEASE && kind != SEPARATION && kind != EXIT) touch(owner, t);
     e->t = t;
     e->x = place[0];
     e->y = place[1];

@@ -24,8 +24,8 @@
 
 typedef v128_t Two;
 
-/* The rows: those between disks, and from `pairs` on those on what does not give way. */
-static int pairs, rows, bodies;
+/* The rows: those between disks, and from `pairs` on those on what does not give way. `clings`: cohesion pulls in one. */
+static int pairs, rows, bodies, clings;
 
 /* A choice between doubles is a jump in what is made of WebAssembly, between vectors it is not. */
 static inline double least(double a, double b) {
@@ -84,11 +84,29 @@ static int body_of(int i) {
     return bodies++;
 }
 
-/* Make rows of contacts, whose disks have got no impulses yet, and give them those that they begin with. */
+/* Have all rows so much of their impulses. */
+static void scale(double by) {
+    for (SolverBody *b = W.solver_bodies; b < W.solver_bodies + bodies; b++) b->x = b->y = b->rim = 0;
+    for (SolverRow *r = W.rows; r < W.rows + rows; r++) {
+        wasm_v128_store(r->impulse, times(by, two(r->impulse)));
+        r->moment *= by;
+        push_row(r, two(r->impulse), r->moment);
+    }
+}
+
+/* Have cohesion pull at the bodies of all rows. */
+static void cling(const Contact *list) {
+    for (const SolverRow *r = W.rows; clings && r < W.rows + rows; r++)
+        push_row(r, wasm_f64x2_make(-list[r->from].clings, 0), 0);
+}
+
+/* Make rows of contacts, whose disks have got no impulses yet, and give them those that they begin with. What
+   cohesion pulls is no row's to choose: it is in the velocities that these begin with. */
 void set_rows(Contact *list, int count) {
     int begin[COLOURS + 2] = {0}, many = 0;
     W.solver_bodies[0] = (SolverBody){.disk = -1};
     bodies = 1;
+    clings = 0;
     for (int n = 0; n < count; n++) many += list[n].two;
     for (int n = 0; n < count; n++) {
         Contact *c = list + n;
@@ -140,8 +158,17 @@ void set_rows(Contact *list, int count) {
         r->a = W.disks[c->i].body;
         r->b = c->two ? W.disks[c->j].body : 0;
         r->from = n;
-        push_row(r, two(r->impulse), r->moment);
+        clings |= c->clings > 0;
+        if (!clings) push_row(r, two(r->impulse), r->moment);
     }
+    if (!clings) return;
+    for (SolverBody *b = W.solver_bodies; b < W.solver_bodies + bodies; b++) b->x = b->y = b->rim = 0;
+    cling(list);
+    for (SolverRow *r = W.rows; r < W.rows + rows; r++) {
+        Two free = moves(r);
+        wasm_v128_store(r->free, free);
+    }
+    scale(1);
 }
 
 /* Give contacts their impulses, and disks what these make of their velocities. */
@@ -153,21 +180,12 @@ void take_rows(Contact *list, int count) {
         J[1] = r->impulse[1];
         J[2] = r->moment;
     }
+    cling(list);
     for (const SolverBody *b = W.solver_bodies + 1; b < W.solver_bodies + bodies; b++) {
         Disk *d = W.disks + b->disk;
         d->vx = d->ux + d->kick[0] + b->x;
         d->vy = d->uy + d->kick[1] + b->y;
         if (b->turn > 0) d->spin = d->uspin + b->rim * b->bend;
-    }
-}
-
-/* Have all rows so much of their impulses. */
-static void scale(double by) {
-    for (SolverBody *b = W.solver_bodies; b < W.solver_bodies + bodies; b++) b->x = b->y = b->rim = 0;
-    for (SolverRow *r = W.rows; r < W.rows + rows; r++) {
-        wasm_v128_store(r->impulse, times(by, two(r->impulse)));
-        r->moment *= by;
-        push_row(r, two(r->impulse), r->moment);
     }
 }
 

@@ -225,9 +225,10 @@ static void check_solve(void) {
         relative(c, 1, u);
         relative(c, 0, v);
         W.unsolved = MAX(W.unsolved, h * (u[0] + asks(c, J[0]) - v[0]) / radius);
-        if (J[0] == 0) continue;
+        if (J[0] == 0 && c->clings == 0) continue;
+        gained += c->clings * v[0];
         gained -= J[0] * (u[0] + asks(c, J[0])) - J[1] * c->drift + J[2] * c->other[2];
-        gained -= c->two ? 0 : J[0] * c->other[0] + J[1] * c->other[1];
+        gained -= c->two ? 0 : pressed(c) * c->other[0] + J[1] * c->other[1];
         if (c->hung) gained += hinge_share(c);
     }
     if (W.swings_too) gained += gained_by_hinges();

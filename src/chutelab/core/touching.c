@@ -108,9 +108,20 @@ static int add(int i, int j, double least, double bound, double h) {
     if (!W.interact && !W.tracks[i].lasted && flies_off(d, -1 - j, u[0])) return 1;
     /* What has sunk in counts however it moves: else what parts others would press it, or what knocks
        on it in each step. */
-    if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > MAX(W.soft + haste, soft_approach(d, least))))
-        return 1;
-    double aim = MIN(c->gap, 0), closed = aim;
+    double cohesion = cohesion_of(i, j);
+    const Contact *last = 0;
+    for (int k = d->before; k >= 0; k = W.earlier[k].next)
+        if (goes_on(W.earlier[k].j, j)) last = W.earlier + k;
+    /* N s; what cohesion has held since the step before: of a new contact, what it would have held since the
+       latest blow or release. */
+    double parts = MAX(W.soft + haste, soft_approach(d, least)), since = d->since;
+    if (j >= 0) since = MAX(since, W.disks[j].since);
+    double past = last ? 0.5 * W.length_before : MIN(MAX(W.t - since, 0), W.length_before), held = cohesion * past;
+    if (cohesion > 0) parts = last ? INFINITY : MAX(parts, held / c->mass[0]);
+    if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > parts)) return 1;
+    /* Cohesion holds a gap that opens as it is; it never closes one. */
+    double aim = cohesion > 0 ? MIN(MAX(later, 0), c->gap) : 0, closed;
+    closed = aim = MIN(c->gap, aim);
     if (c->gap < -SLOP * least) {
         /* A shorter step parts less, with the same speed: else it would give so much more energy. */
         double share = MIN(h / W.usual, 1), part = share * MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
@@ -124,13 +135,8 @@ static int add(int i, int j, double least, double bound, double h) {
     c->parts = (aim - closed) / h;
     c->drift = 0.5 * h * c->pull;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
-    int lasted = 0;
-    for (int k = d->before; k >= 0; k = W.earlier[k].next) {
-        if (!goes_on(W.earlier[k].j, j)) continue;
-        lasted = 1;
-        for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
-    }
-    int pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
+    for (int n = 0; n < 3 && last; n++) c->impulse[n] = W.again * last->impulse[n];
+    int was_pressed = c->impulse[0] > 0 || is_held(d, -1 - j);
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
        above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
     double floor = -u[0], until = j < 0 ? time_on_face(c) : INFINITY, least_need = floor;
@@ -143,7 +149,8 @@ static int add(int i, int j, double least, double bound, double h) {
         least_need = press > along * along / d->radius ? floor : -u[0] + until * MAX(press, 0);
     } else least_need = floor;
     int gone = j < 0 && W.surfaces[-1 - j].there == LEAVING, ends = until < h || gone;
-    if (gone && !pressed) return 1;
+    if (gone && !was_pressed) return 1;
+    if (!gone) c->clings = held + 0.5 * cohesion * h;
     if (gone) c->need = -INFINITY;
     /* A load that wears off leaves nothing to stop; friction goes on as long as the load does, not to
        the middle of the step. */
@@ -151,7 +158,7 @@ static int add(int i, int j, double least, double bound, double h) {
     double wears = W.interact || ends ? INFINITY : time_unloaded(track->load, track->load_t) - W.t;
     /* In a corner the other surface may press it on this one. */
     int alone = d->supports <= 1 || gone;
-    c->leaves = pressed && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
+    c->leaves = was_pressed && cohesion == 0 && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
     if (c->leaves || gone) {
         c->gives = c->parts = 0;
         c->most = INFINITY;
@@ -160,9 +167,9 @@ static int add(int i, int j, double least, double bound, double h) {
         c->need = floor;
         c->drift = (until < h ? until : 0) * c->pull;
     } else if (gone) c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
-    else if (pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
+    else if (was_pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
     if (j < 0 && W.interact && !gone && !c->leaves) {
-        follow(c, lasted ? W.length_before : 0, chord(c, aim - closed, h));
+        follow(c, last ? W.length_before : 0, chord(c, aim - closed, h));
         if (c->turns > 0) c->need = closes(c, aim, h);
     }
     W.contact_count++;

@@ -136,7 +136,7 @@ class Job:
             ("pulley", -1 if wheel is None else len(machine.segments.length)),
             ("ride_incline", 0.0 if wheel is None else wheel.incline),
             ("g", machine.gravity), ("air", machine.air), ("end_time", machine.end_time),
-            ("mover_count", len(machine.movers)),
+            ("mover_count", len(machine.movers)), ("trigger_count", len(machine.triggers)),
         ):  # fmt: skip
             setattr(module.world, name, value)
         module.work("lay_out_world")
@@ -154,18 +154,24 @@ class Job:
         rows = module.array("movers", dtype("Mover"), len(machine.movers))
         for row, mover in zip(rows, machine.movers, strict=True):
             mover.tell(row)
+        doings = constants("Doing")
+        rows = module.array("triggers", dtype("Trigger"), len(machine.triggers))
+        for row, one in zip(rows, machine.triggers, strict=True):
+            doing = doings[{"opens": "GOES", "closes": "COMES", "starts": "STARTS"}[one.doing]]
+            row["surface"], row["doing"], row["by"] = one.surface, doing, one.by
         pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials))
         pairs = pairs.reshape(self.kinds, -1)
         own = pairs[:, : self.kinds]
         own["restitution"], own["friction"] = machine.pair_restitution, machine.pair_friction
         own["rolling"] = np.maximum.outer(machine.rolling, machine.rolling)
         own["falls"] = np.maximum.outer(machine.falls, machine.falls)
-        first = self.kinds
+        own["cohesion"], first = machine.cohesion[:, : self.kinds], self.kinds
         for part in parts(machine).values():
             others = pairs[:, first : (first := first + len(part.surface))]
             others["restitution"], others["friction"] = part.restitution, part.friction
             others["rolling"] = machine.rolling[:, None]
             others["falls"] = machine.falls[:, None]
+            others["cohesion"] = machine.cohesion[:, self.kinds + part.surface]
         np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
         module.work("prepare_to_judge")
 
@@ -263,6 +269,8 @@ class Job:
                 recorder.hinge_work[row["surface"]] = by_hand if row["steered"] else work
             swings = module.array("swings", dtype("Swing"), world.swing_count).view(SWING)
             recorder.swings = swings[np.argsort(swings["surface"], kind="stable")]
+        triggers = module.array("triggers", dtype("Trigger"), world.trigger_count)
+        recorder.triggered = triggers["t"].copy()
         recorder.contacts = world.impact_count
         recorder.gained, recorder.air_loss = world.gained, world.air_loss
         rows = module.array("totals", dtype("Total"), world.total_count)

@@ -144,6 +144,8 @@ def _plain(machine: Machine) -> Machine:
         (np.isfinite([parts.appears, parts.vanishes]).any(), "surfaces that are always there"),
         (machine.movers, "surfaces that stay where they are"),
         (machine.rolling[kind] > 0.0, "disks without rolling friction"),
+        (machine.air > 0.0, "flights without air"),
+        (machine.scene.clings, "surfaces without cohesion"),
         (machine.falls[kind] > 0.0, "restitution that is the same at all speeds"),
     ):
         if there:

@@ -33,7 +33,8 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         return wanted
     if any(outline is not None for outline in machine.outlines) or machine.threads:
         return "pymunk"
-    return "contact" if machine.interact or machine.movers or np.any(machine.air) else "exact"
+    stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
+    return "contact" if stepped or machine.scene.clings else "exact"
 
 
 def simulate(
@@ -209,6 +210,10 @@ def must_fit(machine: Machine, name: str) -> None:
         if machine.threads:
             raise refused(scene, "string", len(machine.threads), "none, or the pymunk engine")
     if name == "exact":
+        if machine.triggers:
+            waits = machine.surfaces[machine.triggers[0].surface]
+            allowed = f"contact or pymunk, because {waits} waits until something is touched"
+            raise refused(scene, "run.engine", "exact", allowed)
         if machine.movers:
             moving = machine.surfaces[machine.movers[0].surface]
             allowed = f"contact or pymunk, because {moving} moves: no closed form has its blows"
@@ -216,6 +221,8 @@ def must_fit(machine: Machine, name: str) -> None:
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"
             raise refused(scene, "run.engine", "exact", allowed)
+        if scene.clings:
+            raise refused(scene, "run.engine", "exact", "contact, because a pair has cohesion")
         if machine.air:
             allowed = "0 with the exact engine: it has no closed form for a flight in air"
             raise refused(scene, "air_density", machine.air, allowed)
@@ -225,6 +232,10 @@ def must_fit(machine: Machine, name: str) -> None:
             allowed = "left out with the pymunk engine: Chipmunk's restitution is one number"
             key = f"{scene.head('particle', n)}.restitution_speed"
             raise refused(scene, key, kind.restitution_speed, allowed)
+    for n, pair in enumerate(scene.pair):
+        if pair.cohesion and (name == "pymunk" or scene.hinges):
+            what = "the pymunk engine" if name == "pymunk" else "what hangs on hinges"
+            raise refused(scene, f"pair[{n}].cohesion", pair.cohesion, f"0 with {what}")
     if name == "pymunk" and machine.air and any(one is not None for one in machine.outlines):
         allowed = "0 with boxes and polygons: drag is that of a sphere"
         raise refused(scene, "air_density", machine.air, allowed)

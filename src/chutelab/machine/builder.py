@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from chutelab.core import REAL, Module, borrow, constants, dtype, give_back
 from chutelab.machine.movers import Mover
-from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Thread
+from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Thread, Trigger
 from chutelab.machine.releases import RefusedError, draw
 from chutelab.machine.shapes import KINDS, Pieces
 from chutelab.scene import Fault, Plate, Scene
@@ -138,6 +138,7 @@ def told(scene: Scene) -> Told:
                     bounces = PASSES
                 two = (kind,) if isinstance(other, str) else (kind, other)
                 terms += bounces, grips, max(rolling[k] for k in two), max(falls[k] for k in two)
+                terms.append(scene.cohesion(kind, other))
         grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
         line = row(scene, grip)
         sizes = {
@@ -258,8 +259,8 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         )
     # Particles of a family never meet.
     pairs = np.zeros((1, 1, 2))
+    every = range(len(particles))
     if not family:
-        every = range(len(particles))
         pairs = np.array([[meeting(a, b) for b in every] for a in every])
         through = [[scene.passes(a, b) for b in every] for a in every]
         pairs[..., 0] = np.where(through, PASSES, pairs[..., 0])
@@ -268,7 +269,10 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         x, y = releases.position[string.particle].tolist()
         reach = float(hypot(x - string.from_[0], y - string.from_[1]))
         threads.append(Thread(string.from_, string.particle, string.length or reach))
-    return Machine(
+    triggers = tuple(
+        Trigger(names.index(name), doing, names.index(by)) for name, doing, by in scene.triggers
+    )
+    machine = Machine(
         scenes=scenes,
         surfaces=names,
         gravity=value(scene, "gravity"),
@@ -287,13 +291,18 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         pair_friction=pairs[..., 1],
         rolling=np.array([value(kind, "rolling_friction") for kind in particles]),
         falls=1.0 / np.array([_speed(value(kind, "restitution_speed")) for kind in particles]),
+        cohesion=np.array(
+            [[scene.cohesion(a, b) for b in (*every, *names)] for a in every], dtype=float
+        ),
         outlines=_outlines(scene),
         threads=() if family else tuple(threads),
         movers=movers,
+        triggers=triggers,
         streams=tuple(str(stream.name) for stream in scene.streams),
         engine=scene.run.engine,
         plate_warnings=warnings,
     )
+    return machine.when(np.full(len(triggers), inf)) if triggers else machine
 
 
 def _speed(given: Any) -> Any:
@@ -303,8 +312,8 @@ def _speed(given: Any) -> Any:
 
 def ahead(scene: Scene) -> Machine:
     """Return the machine of a scene, which is built when more of it is asked for than its keys."""
-    if scene.hinges:
-        # Whether they can be is known once they are weighed.
+    if scene.hinges or scene.triggers:
+        # Whether hinges can be is known once they are weighed.
         return build(scene)
     until, names, machine = scene.run.until, scene.surfaces, object.__new__(Machine)
     vars(machine).update(
@@ -322,6 +331,7 @@ def ahead(scene: Scene) -> Machine:
         outlines=_outlines(scene),
         **({} if scene.string else {"threads": ()}),
         **({} if scene.movers else {"movers": ()}),
+        triggers=(),
     )
     return machine
 

@@ -79,6 +79,7 @@ class Mover:
     lasts: float  # ... and for so long, 0 if it does not
     turn: float  # rad/s, counterclockwise
     hinge: Hinge | None = None  # what it hangs on; then nothing else moves it
+    begins: float = 0.0  # s; from when on it moves, and its times are counted
 
     @classmethod
     def of(cls, row: Any) -> Self:
@@ -110,7 +111,7 @@ class Mover:
     def rests(self) -> float:
         """From when on it is at rest for good, s; inf if never."""
         endless = self.hinge or self.turn or (self.frequency and any(self.by))
-        return inf if endless else self.start + self.lasts
+        return inf if endless else self.begins + self.start + self.lasts
 
     def back(self, t: float) -> Floats:
         """Return the matrix, (2, 2), that turns directions at a time (s) back to rest."""
@@ -133,16 +134,18 @@ class Mover:
         Of times (T,) it is (T, 3). It travels with an even acceleration up to the middle, and the
         same against it from there on.
         """
-        t = np.asarray(times, dtype=np.float64)
+        now = np.asarray(times, dtype=np.float64)
+        t = np.maximum(now - self.begins, 0.0)
         swing = np.sin(2.0 * pi * self.frequency * t + self.phase)
         u = ((t - self.start) / self.lasts).clip(0.0, 1.0) if self.lasts else np.zeros_like(t)
         share = np.where(u < 0.5, 2.0 * u * u, 1.0 - 2.0 * (1.0 - u) ** 2)
         x, y = (self.pivot[n] + self.by[n] * swing + self.way[n] * share for n in (0, 1))
-        return np.stack([x, y, self.hinge.at(t)[0] if self.hinge else self.turn * t], axis=-1)
+        return np.stack([x, y, self.hinge.at(now)[0] if self.hinge else self.turn * t], axis=-1)
 
     def velocity(self, times: ArrayLike) -> Floats:
         """Return the rates of what `pose` does: m/s, m/s and rad/s, (T, 3) of times (T,), s."""
-        t = np.asarray(times, dtype=np.float64)
+        now = np.asarray(times, dtype=np.float64)
+        t, moves = np.maximum(now - self.begins, 0.0), now >= self.begins
         rate = 2.0 * pi * self.frequency
         swing = rate * np.cos(rate * t + self.phase)
         pace = np.zeros_like(t)
@@ -150,8 +153,8 @@ class Mover:
             u = (t - self.start) / self.lasts
             pace = 4.0 * np.minimum(u, 1.0 - u).clip(0.0) / self.lasts
         x, y = (self.by[n] * swing + self.way[n] * pace for n in (0, 1))
-        turn = self.hinge.at(t)[1] if self.hinge else np.full_like(t, self.turn)
-        return np.stack([x, y, turn], axis=-1)
+        turn = self.hinge.at(now)[1] if self.hinge else moves * self.turn
+        return np.stack([moves * x, moves * y, turn], axis=-1)
 
     def velocity_at(self, place: ArrayLike, t: float) -> Floats:
         """Return the velocity, m/s, (2,), of its point that is at `place`, (2,), m, at `t`, s.

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, inf, isnan, log2, nan, pi
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -119,6 +119,14 @@ class Thread:
     length: float  # m
 
 
+class Trigger(NamedTuple):
+    """What a surface does when another one is touched for the first time."""
+
+    surface: int  # index into `Machine.surfaces`
+    doing: str  # opens, closes or starts
+    by: int  # which surface is to be touched
+
+
 EARTH = 9.81
 """m/s²; gravity for which engines' bounds on speeds and times are written, see `Machine.pace`."""
 
@@ -152,9 +160,11 @@ class Machine:
     pair_restitution: Floats  # (K, K), of two particles by their kinds; below 0: they never meet
     pair_friction: Floats
     rolling: Floats  # (K,), rolling friction of a kind on everything: its arm over the radius
+    cohesion: Floats  # (K, K + S), N; pulls a kind to another, and to a surface
     outlines: tuple[Floats | None, ...]  # (K); of boxes and polygons corners (n, 2)
     threads: tuple[Thread, ...]
     movers: tuple[Mover, ...]
+    triggers: tuple[Trigger, ...]
     streams: tuple[str, ...]  # names; `Releases.stream` tells whose a particle is
     falls: Floats  # (K,), s/m: 1 over the speed up to which a kind's restitution is what it is
     engine: str  # what the scene asks for: "auto", "exact", "contact" or "pymunk"
@@ -211,6 +221,20 @@ class Machine:
     def mover(self, surface: int) -> Mover | None:
         """Return what moves a surface, by its index; None if it stays where it is."""
         return next((mover for mover in self.movers if mover.surface == surface), None)
+
+    def when(self, times: Floats) -> Machine:
+        """Return it with the times at which its triggers acted, s; inf of what still waits."""
+        parts: dict[str, Any] = {"segments": self.segments, "arcs": self.arcs}
+        movers = list(self.movers)
+        for (surface, doing, _), t in zip(self.triggers, times.tolist(), strict=True):
+            if doing == "starts":
+                movers = [replace(m, begins=t) if m.surface == surface else m for m in movers]
+                continue
+            clock = "vanishes" if doing == "opens" else "appears"
+            for name, part in parts.items():
+                own = np.where(part.surface == surface, t, getattr(part, clock))
+                parts[name] = replace(part, **{clock: own})
+        return replace(self, movers=tuple(movers), **parts)
 
     def steered(self, surface: int) -> Mover:
         """Return what moves a plate, by its index, that is turned by hand about its pivot."""

@@ -292,6 +292,8 @@ class Record(Shown):
     hinge_work : ndarray, shape (len(surfaces), 3) or (0, 3)
         J; of what hangs on hinges the work of its motor, and losses at its stops and in its damper.
         Empty where nothing does.
+    triggered : ndarray, shape (len(machine.triggers),)
+        When what waits for a touch came, went, or began to move, s; inf of what still waits.
     """
 
     machine: Machine
@@ -314,11 +316,14 @@ class Record(Shown):
     impulses: NDArray[Any] = field(default_factory=lambda: np.empty((0, 0), LOAD))
     swings: NDArray[Any] = field(default_factory=lambda: np.empty(0, SWING))
     hinge_work: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    triggered: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         arrays = "knots offsets ended events by_surface angle totals unsolved drives impulses"
-        for name in (*arrays.split(), "swings", "hinge_work"):
+        for name in (*arrays.split(), "swings", "hinge_work", "triggered"):
             getattr(self, name).flags.writeable = False
+        if len(self.triggered):
+            object.__setattr__(self, "machine", self.machine.when(self.triggered))
         if len(self.swings):
             by_hand = np.setdiff1d(self.swings["surface"], [m.surface for m in self.machine.movers])
             movers = *self.machine.movers, *map(self.machine.steered, by_hand.tolist())

@@ -76,6 +76,7 @@ class Recorder:
         self.drives = np.zeros(owners)
         self.swings = np.empty(0, SWING)
         self.hinge_work = np.zeros((owners, 3))
+        self.triggered = np.full(len(machine.triggers), np.inf)
         self.contacts = 0
         self.gained = self.air_loss = 0.0
         self.totals, self.unsolved = np.empty(0, TOTAL), np.empty(0)
@@ -225,7 +226,10 @@ class Recorder:
         t = events["t"]
         if count > 1 or np.count_nonzero(t[1:] < t[:-1]):
             # At one time by particle, then as they came.
-            events = events.take(np.lexsort((events["particle"].copy(), t.copy())))
+            t, particle = t.copy(), events["particle"].copy()
+            in_turn = not np.count_nonzero(particle[1:] < particle[:-1])
+            order = t.argsort(kind="stable") if in_turn else np.lexsort((particle, t))
+            events = events.take(order)
         if any(self.origin):
             knots = knots.copy()
             for rows in (knots, events):
@@ -255,6 +259,7 @@ class Recorder:
             by_surface=self.by_surface.copy(),
             drives=self.drives if self.machine.movers or len(self.swings) else np.zeros(0),
             swings=self.swings,
+            triggered=self.triggered,
             hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 3)),
             steps=steps,
             contacts=self.contacts,

@@ -56,10 +56,13 @@ ARRAYS = {
     "impulses": LOAD,
     "swings": SWING,
     "hinge_work": np.dtype("f8"),
+    "triggered": np.dtype("f8"),
 }
 """Arrays of a file and their types."""
 
-MAYBE = ("angle", "totals", "unsolved", "drives", "impulses", "swings", "hinge_work")
+MAYBE = (
+    "angle", "totals", "unsolved", "drives", "impulses", "swings", "hinge_work", "triggered",
+)  # fmt: skip
 """Those that are left out where they are empty."""
 
 HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
@@ -246,6 +249,8 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
         and recording.drives.shape == ((surfaces,) if recording.machine.movers else (0,))
         and recording.hinge_work.shape == ((surfaces if len(recording.swings) else 0), 3)
+        and recording.triggered.shape == (len(recording.machine.triggers),)
+        and not np.any(np.isnan(recording.triggered))
         and recording.swings.ndim == 1
         and all(
             mover.hinge is None or len(mover.hinge.states) for mover in recording.machine.movers

@@ -59,6 +59,9 @@ HINGED: Final = (
 )  # fmt: skip
 """Keys of a surface that hangs on a hinge."""
 
+WAITS = ("opens_when", "closes_when", "starts_when")
+"""Keys of what waits until another surface is touched."""
+
 NO_MACHINE: Final = ("sensor", "expect", "view", "live")
 """Tables that say nothing of the machine."""
 
@@ -308,6 +311,7 @@ def conflicts(look: Look) -> Iterator[Fault]:
     yield from _tables(look)
     yield from _names(look)
     yield from _pairs(look)
+    yield from _waits(look)
     for kind in kinds:
         yield from _mass(look, kind)
     yield from _engine(look, kinds, streams)
@@ -410,6 +414,20 @@ def _pairs(look: Look) -> Iterator[Fault]:
                 yield Fault(path, name, f"no such kind or surface; {allowed}")
 
 
+def _waits(look: Look) -> Iterator[Fault]:
+    """Say if something waits until a surface is touched that is not there."""
+    if not all(map(look.sound, SURFACES)):
+        return
+    there = [*filter(look.has, ("incoming", "plate", "outgoing"))]
+    there += dict.fromkeys(name for table in SURFACES for name in _texts(look.rows(table)))
+    for row in (*look.rows("plate"), *look.rows("surface")):
+        for key in filter(row.given, WAITS):
+            name = row[key].get("touched") if isinstance(row[key], dict) else None
+            if isinstance(name, str) and name not in there:
+                allowed = f"no such surface; {did_you_mean(name, there, _there_are(there))}"
+                yield Fault(row.path(f"{key}.touched"), name, allowed)
+
+
 def _mass(look: Look, kind: Row) -> Iterator[Fault]:
     """Say if the density of a kind of round particles gives too small a mass."""
     radius = kind["radius"]
@@ -457,6 +475,12 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
         keys = [key for key in motions if row.given(key) and row[key] != 0.0]
         if keys and engine == "exact":
             yield run.fault("engine", f"{row.path(keys[0])} moves it: contact or pymunk has that")
+        waits = next((key for key in WAITS if row.given(key)), "")
+        if waits and engine == "exact":
+            yield run.fault("engine", f"{row.path(waits)} needs contact or pymunk")
+        if waits and count > 1 and not meet:
+            text = f"{row.path(waits)} couples particles: several of them have to meet"
+            yield streams[0].fault("interact", text)
         if row.given("hinge") and count > 1 and not meet:
             text = f"the hinge {row.path('hinge')} couples particles: several of them have to meet"
             yield streams[0].fault("interact", text)

@@ -207,6 +207,17 @@ class SceneTables(Table):
         names = {self.particles[kind].name, self.particles[other].name}
         return any(not pair.meet and set(pair.between) == names for pair in self.pair)
 
+    @property
+    def clings(self) -> bool:
+        """Whether any two pull at each other."""
+        return any(pair.cohesion > 0.0 for pair in self.pair)
+
+    def cohesion(self, kind: int, other: int | str) -> float:
+        """Return the force (N) that it takes to pull a kind off another, or off a surface."""
+        name = other if isinstance(other, str) else self.particles[other].name
+        names = {self.particles[kind].name, name}
+        return next((pair.cohesion for pair in self.pair if {*pair.between} == names), 0.0)
+
     def meetings(self, value: Reader = getattr) -> Callable[[int, int | str], tuple[float, float]]:
         """Return what tells restitution and friction of a kind and another kind, or a surface.
 
@@ -319,6 +330,18 @@ class SceneTables(Table):
         return {
             name: one for name, one in named if one.turn or one.shake or one.travel or one.hinge
         }
+
+    @property
+    def triggers(self) -> tuple[tuple[str, str, str], ...]:
+        """What waits for a touch: a surface, what it then does, and which one is to be touched."""
+        named: list[tuple[str, Any]] = [(one.name or "plate", one) for one in self.plates]
+        named += [(one.name, one) for one in self.surface]
+        return tuple(
+            (name, doing, when.touched)
+            for name, one in named
+            for doing in ("opens", "closes", "starts")
+            if (when := getattr(one, f"{doing}_when", None)) is not None
+        )
 
     @property
     def hinges(self) -> bool:

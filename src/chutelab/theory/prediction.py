@@ -513,11 +513,14 @@ def outside(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
     yield np.logical_and(own.spin, np.greater(rolls, 0.0)), "rolling friction"
     yields = scenes.value(own, "restitution_speed") is not None
     yield yields, "the restitution falls with speed"
+    yield scene.clings, "the particle clings to what it touches"
     yield np.greater(scenes.value(scene, "air_density"), 0.0), "air slows the particle down"
     hangs = any(string.particle == 0 for string in scene.string)
     yield hangs, "the particle hangs on a string"
     for name in scene.movers:
         yield True, f"{name} moves"
+    for name, *_ in scene.triggers:
+        yield True, f"{name} waits until something is touched"
     yield from not_carried(scenes)
     yield scene.crowded, "particles interact"
 

@@ -58,6 +58,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     try:
         boxes = any(outline is not None for outline in machine.outlines)
         apart = not (machine.interact or boxes or machine.threads or machine.movers)
+        apart = apart and not machine.triggers
         if not (apart and machine.align):
             shared = Shared(machine, world, recorder)
             try:

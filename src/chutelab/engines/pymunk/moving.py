@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pymunk
 from pymunk import Vec2d
@@ -41,7 +43,7 @@ class Hanging:
         self.stop = pymunk.RotaryLimitJoint(still, self.body, *np.clip(hinge.stops, -1e9, 1e9))
         self.stop.error_bias = 0.0
         self.motor = pymunk.SimpleMotor(self.body, still, hinge.motor[0])
-        self.motor.max_force = hinge.motor[1]
+        self.motor.max_force = hinge.motor[1] if mover.begins == 0.0 else 0.0
         spring = pymunk.DampedRotarySpring(self.body, still, hinge.rest, hinge.spring, hinge.damper)
         space.add(self.stop, spring, *[self.motor] * (hinge.motor[1] > 0.0))
         self.before, self.work = 0.0, np.zeros(3)
@@ -102,8 +104,18 @@ class Moving:
         self.place, self.velocity = np.zeros((2, 2, size))
         # Before a step and after it.
         self.turn = np.zeros((2, size))
-        self.turn[:, self.rows] = [mover.turn for _, _, mover, _, _ in self.faces]
+        self.turn[:, self.rows] = [mover.velocity(0.0)[2] for _, _, mover, _, _ in self.faces]
         self.angle, self.center = np.zeros(size), center
+
+    def start(self, surface: int, t: float) -> None:
+        """Have a surface begin to move, or its motor, at a time (s)."""
+        for k, (face, body, mover, written, links) in enumerate(self.faces):
+            if face.surface == surface:
+                self.faces[k] = face, body, replace(mover, begins=t), written, links
+                self.turn[:, self.rows[k]] = mover.turn
+        if surface in self.hanging:
+            hanging = self.hanging[surface]
+            hanging.motor.max_force = hanging.hinge.motor[1]
 
     def put(self, t: float, h: float) -> None:
         """Place all for a step that begins at a time (s)."""

@@ -88,6 +88,7 @@ class Shapes:
         self.gates: dict[Face, list[pymunk.Shape]] = {}
         # Gates that are there, and particles that a gate shut on, with the gate.
         self.up, self.shut = set[Face](), set[tuple[pymunk.Shape, Face]]()
+        waits = {one.surface for one in machine.triggers if one.doing != "starts"}
         for face in world.faces:
             parts = self._shapes(face)
             for shape in parts:
@@ -95,7 +96,7 @@ class Shapes:
                 shape.elasticity = face.restitution / self.own
                 shape.friction = face.friction / self.grip
             new = [shape for shape in parts if shape is not face.touched]
-            if face.appears > -inf or face.vanishes < inf:
+            if face.surface in waits or face.appears > -inf or face.vanishes < inf:
                 self.gates[face] = parts
                 if len(new) < len(parts):
                     space.remove(face.touched)

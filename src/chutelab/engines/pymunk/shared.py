@@ -351,6 +351,20 @@ class Shared:
         self.tracks.step(self.free, (t, self.t), self.state[..., : self.count], entries, turned)
         self._endings(t, entries)
 
+    def _touched(self, surfaces: set[int]) -> None:
+        """Have what waits for a touch do what it is to do, after a step in which these were."""
+        for k, (surface, doing, by) in enumerate(self.machine.triggers):
+            if by not in surfaces or self.recorder.triggered[k] < inf:
+                continue
+            self.recorder.triggered[k] = self.t
+            if doing == "starts":
+                assert self.moving is not None
+                self.moving.start(surface, self.t)
+            for face in self.shapes.gates if doing != "starts" else ():
+                if face.surface == surface:
+                    clock = "vanishes" if doing == "opens" else "appears"
+                    object.__setattr__(face, clock, self.t)
+
     def _contacts(self) -> None:
         """Book what pushes, and tell blows, landings and which particle rides what."""
         a, b, first, values = self._touches()
@@ -404,6 +418,8 @@ class Shared:
             rolls = self.radius[one] * np.abs(mine[1, 2] - others[1, 2] - self.spin[other])
             sums[3] *= (self.arm[one] == 0.0) | (rolls < self.still)
         pair = other < self.count
+        if self.machine.triggers:
+            self._touched({*self.surface[other[~pair]].tolist()})
         self.recorder.by_surface[-1] += sums[:3] @ pair
         for k in np.flatnonzero(pair) if self.rides else ():
             for row, motion, sign in ((one, mine, -0.5), (other, others, 0.5)):
@@ -432,8 +448,8 @@ class Shared:
         if self.bends:
             # From one link of a chain to the next is no blow.
             contact = one * rows + other
-            first &= ~np.isin(contact, self.before)
-            self.before = contact
+            first &= np.append(self.before, -1)[self.before.searchsorted(contact)] != contact
+            self.before = contact  # sorted, as `order` has them
         told = np.flatnonzero(lands | first & (rate[0] < -self.g * self.h))
         if self.corners and len(told):
             # Of all points of a contact one event.

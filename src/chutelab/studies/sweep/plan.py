@@ -134,8 +134,8 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
     stepped = (block.engine or block.scene.run.engine) in ("contact", "pymunk")
     stepped |= block.scene.run.loads is not None
     stepped |= bool(block.scene.string) or any(kind.outline for kind in block.scene.particles)
-    stepped |= block.scene.air_density > 0.0 or "air_density" in block.paths
-    stepped |= bool(block.scene.movers) or any(
+    stepped |= block.scene.clings or block.scene.air_density > 0.0 or "air_density" in block.paths
+    stepped |= bool(block.scene.movers or block.scene.triggers) or any(
         {"turn", "shake", "travel"} & {*path.split(".")} for path in block.paths
     )
     groups: list[Ints] = []

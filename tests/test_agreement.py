@@ -144,7 +144,7 @@ def test_where_all_contacts_are_blows_the_engines_agree_to_what_each_promises():
 
 
 def test_where_contacts_last_a_stepped_engine_converges():
-    rows = rows_of("slip", "incoming.length=0.1")
+    rows = rows_of("slip", "incoming.length=0.1", "run.dt=0.002")
     for name, least in (("contact", 1.5), ("pymunk", 0.5)):
         row = rows[f"{name}, exact"]
         assert (row.least, row.tolerance, row.holds) == (True, least, True)

@@ -30,7 +30,8 @@ from chutelab.util.errors import about_comma
 class Table(BaseModel):
     """What all tables share: frozen, and unknown keys refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    # A table's validator is built where it is first needed; most are within that of a whole scene.
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     def _fill(self, key: str, value: object) -> None:
         # A default that depends on another key: not counted among the keys that were set, so that
@@ -61,6 +62,7 @@ UNITS: Final = {
     **{f"{prefix}{unit}": (unit, size) for unit in "sJWN" for prefix, size in _PREFIXES.items()},
     **{f"{prefix}g": ("kg", 1e-3 * size) for prefix, size in _PREFIXES.items()},
     **dict.fromkeys(("m/s²", "m/s^2"), ("m/s²", 1.0)),
+    **{unit: (unit, 1.0) for unit in ("1/s", "kg/s", "t/h")},
     "degrees": ("degrees", 1.0),
     "deg": ("degrees", 1.0),
     "°": ("degrees", 1.0),

@@ -148,6 +148,7 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
             advice = _advice(recording, law, figures)
             told.append(Broken(law, 0, -1, t, (nan, nan), name, amount, bound, unit, advice))
 
+    load = float(np.broadcast_to(recording.machine.particle.mass, recording.count).sum())
     for mover in recording.machine.movers:
         hinge, surface = mover.hinge, mover.surface
         if hinge is None or hinge.steered:
@@ -157,26 +158,26 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
         parts = np.stack(hinge.energies(angle, rate, recording.gravity))
         energy = parts.sum(axis=0)
         given = float(recording.drives[surface])
-        play = (
-            float(np.abs(parts).sum(axis=0).max())
-            + abs(worked)
-            + abs(given)
-            + abs(stopped)
-            + abs(damped)
-        )
+        play = float(np.abs(parts).sum(axis=0).max())
+        play += sum(map(abs, (worked, given, stopped, damped)))
         off = energy[-1] - energy[0] - (worked - given - stopped - damped)
         must(LEDGER, surface, abs(off), CLOSES * play + EPS)
-        must(LOSSES, surface, -min(stopped, damped), CLOSES * play + EPS)
         # Cubics between states, squared, by Gauss's rule of three points.
         h = np.diff(t)[:, None]
         share = np.array([0.5 - sqrt(0.15), 0.5, 0.5 + sqrt(0.15)])
         rates = hinge.at(t[:-1, None] + h * share)[1]
         lost = hinge.damper * float((h * rates**2 @ np.array([5.0, 8.0, 5.0]) / 18.0).sum())
         way = hinge.motor[1] * float(np.abs(np.diff(angle)).sum())
-        # rad/s; by which it hops in a step.
+        # rad/s; by which it hops in a step, with what lies on it.
         moments = hinge.motor[1] + hinge.spring * np.abs(angle - hinge.rest).max()
-        moments += recording.gravity * hypot(*hinge.moment) + hinge.damper * np.abs(rate).max()
-        hop, lasts = float(moments) * recording.machine.dt / hinge.inertia, float(t[-1] - t[0])
+        moments += recording.gravity * (hypot(*hinge.moment) + 2.0 * hinge.gyration * load)
+        moments += hinge.damper * np.abs(rate).max()
+        hop = 2.0 * float(moments) * recording.machine.dt / hinge.inertia
+        lasts = float(t[-1] - t[0])
+        must(
+            LOSSES, surface, -min(stopped, damped),
+            0.5 * hinge.inertia * hop**2 + CLOSES * play + EPS,
+        )  # fmt: skip
         must(
             ENERGY, surface, abs(damped - lost),
             HOPS * max(damped, lost) + hinge.damper * hop**2 * lasts + CLOSES * play + EPS,

@@ -29,7 +29,7 @@ GROUPS = {
     "Streams": ("stream", "stream-independent", "rock-box", "spoon"),
     "Bins, heaps, screens": ("hopper", "heap", "mixture", "galton"),
     "Further machines": ("inclined-conveyor", "cascade", "free-fall"),
-    "What moves": ("damper-plate", "see-saw"),
+    "What moves": ("damper-plate", "see-saw", "flap-gate"),
     "Toys": ("dominoes", "cradle"),
 }
 """The scenes by what one comes for."""

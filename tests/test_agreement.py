@@ -144,7 +144,7 @@ def test_where_all_contacts_are_blows_the_engines_agree_to_what_each_promises():
 
 
 def test_where_contacts_last_a_stepped_engine_converges():
-    rows = rows_of("slip", "incoming.length=0.1")
+    rows = rows_of("slip", "incoming.length=0.1", "run.dt=0.002")
     for name, least in (("contact", 1.5), ("pymunk", 0.5)):
         row = rows[f"{name}, exact"]
         assert (row.least, row.tolerance, row.holds) == (True, least, True)
@@ -249,6 +249,13 @@ def test_a_wrong_number_is_caught_from_outside(wrong, until, monkeypatch):
 def test_a_wrong_formula_is_caught_from_outside(file, text, wrong, with_fault):
     with_fault(file, text, wrong)
     caught("landed")
+
+
+@pytest.mark.slow
+def test_a_wrong_formula_of_the_contact_engine_is_wrong_in_no_other(with_fault):
+    with_fault("impacts.c", "-c.rest * u[0]", "(1.0 + 1e-6) * -c.rest * u[0]")
+    failed = {row.pair for row in agreement(scene.load("perpendicular")) if not row.holds}
+    assert failed == {("contact", "theory"), ("contact", "exact")}
 
 
 def heavier_core(job, module, machine, *, honest=Job.__init__, **more):

@@ -338,11 +338,13 @@ def by_looking(e):
     """Tell whether some place on a path, of 400 between each two knots, is in a surface."""
     knots = e.recording.knots
     own = np.diff(e.recording.owner) == 0
+    parts = [*e.machine.parts, *([e.machine.pulley.rim] if e.machine.pulley else [])]
+    pieces = [part.of(n) for part in parts for n in range(part.surface.size)]
     left = np.flatnonzero(own & (np.diff(knots["t"]) > 0.0))
     for share in np.linspace(0.0, 1.0, 401):
         shares = np.full(len(left), share)
         place = np.stack([hermite(knots, left, shares, axis)[0] for axis in (0, 1)], axis=-1)
-        for piece in e.pieces:
+        for piece in pieces:
             gap = piece.gap(place, e.radii[e.recording.owner[left]])
             if (gap[piece.there(knots["t"][left])] < -e.bounds.allowed).any():
                 return True

@@ -15,6 +15,7 @@ from chutelab.classroom.exercises import EXERCISES, Verdict, lesson, told
 from chutelab.classroom.exercises.exercise import draw, translated
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.cli import main
+from chutelab.scene import load, shipped
 from chutelab.util.errors import InputError
 from chutelab.util.words import LANGUAGES, STRINGS, LanguageError, words
 
@@ -276,3 +277,10 @@ def test_pages_of_lessons_are_german_around_what_is_translated(tmp_path):
     assert "Zurück zur Lektion" in live
     prose = re.sub(r"<code.*?</code>|<pre.*?</pre>|<math.*?</math>|<[^>]*>", " ", page, flags=re.S)
     assert not re.findall(r"\b(?:the|and|with|when|lessons)\b", prose)
+
+
+def test_shipped_scenes_have_a_title_in_each_language():
+    for name in shipped():
+        assert words().say(f"title-{name}") == load(name).title
+    german = words("de").titles()
+    assert all(german[title] != title for title in german)

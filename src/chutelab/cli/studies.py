@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import logging
 import re
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -284,6 +283,8 @@ def sweep(
         what = f"{plan.count:,} variants"
         with ExitStack() as stack:
             if scheduler:
+                import logging
+
                 # Dask logs tracebacks; one message here says what failed.
                 stack.callback(logging.disable, logging.root.manager.disable)
                 logging.disable()

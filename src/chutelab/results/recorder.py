@@ -226,7 +226,10 @@ class Recorder:
         t = events["t"]
         if count > 1 or np.count_nonzero(t[1:] < t[:-1]):
             # At one time by particle, then as they came.
-            events = events.take(np.lexsort((events["particle"].copy(), t.copy())))
+            t, particle = t.copy(), events["particle"].copy()
+            in_turn = not np.count_nonzero(particle[1:] < particle[:-1])
+            order = t.argsort(kind="stable") if in_turn else np.lexsort((particle, t))
+            events = events.take(order)
         if any(self.origin):
             knots = knots.copy()
             for rows in (knots, events):

@@ -193,46 +193,52 @@ class Motor(Table):
     torque: Torque = described(..., "The most that it turns with", "N m")
 
 
-SHAKE: Any = described(
-    None, "Shaking: { by = [0, 0.002], frequency = 25 }, from its place and back"
-)
-TRAVEL: Any = described(
-    None, "A way: { to = [x, y], at = 1, in = 0.5 }, on which its pivot comes to rest"
-)
-TURN: Any = described(0.0, "Speed at which it turns about its pivot, counterclockwise", "degrees/s")
-HINGE: Any = described(
-    None,
-    'It hangs free on a hinge: there [x, y], or at its "pivot"; needs a mass or an inertia',
-    "m",
-)
-HELD: Any = described(None, "Of what hangs on a hinge: its mass, which lies evenly along it", "kg")
-INERTIA: Any = described(
-    None, "... its inertia about the hinge; default: by its mass; without a mass it has no weight",
-    "kg m2",
-)  # fmt: skip
-SPRING: Any = described(0.0, "... stiffness of a spring that turns it to rest_deg", "N m/rad")
-REST: Any = described(
-    0.0, "... angle at which its spring is at rest, from where it is written", "degrees"
-)
-DAMPER: Any = described(0.0, "... torque of a damper for each rad/s", "N m s/rad")
-STOPS: Any = described(
-    None,
-    "... between which angles [least, greatest] it turns; a stop gives nothing back",
-    "degrees",
-)
-MOTOR: Any = described(None, "... a motor: { speed_deg = 180, torque = 2 }")
-STARTS: Any = described(
-    None,
-    'When its motion or its motor begins: { touched = "bell" }, a surface; default: at once',
-)
+class Moving(Table):
+    """How a surface moves, or hangs on a hinge."""
 
-
-class Plate(Table):
-    """A plate that hangs from a pivot: the damping plate, at a distance, or a further one."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"oneOf": [{"required": ["distance"]}, {"required": ["name", "pivot"]}]}
+    shake: Shake | None = described(
+        None, "Shaking: { by = [0, 0.002], frequency = 25 }, from its place and back"
     )
+    travel: Travel | None = described(
+        None, "A way: { to = [x, y], at = 1, in = 0.5 }, on which its pivot comes to rest"
+    )
+    turn: Turn = described(
+        0.0, "Speed at which it turns about its pivot, counterclockwise", "degrees/s"
+    )
+    hinge: Point | Literal["pivot"] | None = described(
+        None,
+        'It hangs free on a hinge: there [x, y], or at its "pivot"; needs a mass or an inertia',
+        "m",
+    )
+    mass: Mass | None = described(
+        None, "Of what hangs on a hinge: its mass, which lies evenly along it", "kg"
+    )
+    inertia: Inertia | None = described(
+        None,
+        "... its inertia about the hinge; default: by its mass; without a mass it has no weight",
+        "kg m2",
+    )
+    spring: Amount = described(
+        0.0, "... stiffness of a spring that turns it to rest_deg", "N m/rad"
+    )
+    rest_deg: Angle = described(
+        0.0, "... angle at which its spring is at rest, from where it is written", "degrees"
+    )
+    damper: Amount = described(0.0, "... torque of a damper for each rad/s", "N m s/rad")
+    stops_deg: Stops | None = described(
+        None,
+        "... between which angles [least, greatest] it turns; a stop gives nothing back",
+        "degrees",
+    )
+    motor: Motor | None = described(None, "... a motor: { speed_deg = 180, torque = 2 }")
+    starts_when: When | None = described(
+        None,
+        'When its motion or its motor begins: { touched = "bell" }, a surface; default: at once',
+    )
+
+
+class StillPlate(Table):
+    """The keys of a plate but those of its motion, which come behind them."""
 
     name: Name | None = described(None, "Name of a further plate, for events and the ledger")
     pivot: Point | None = described(None, "Of a further plate: its pivot [x, y]", "m")
@@ -260,18 +266,14 @@ class Plate(Table):
     )
     restitution: Share = pair_restitution(0.5, "particle-plate")
     friction: Amount = pair_friction(0.0, "particle-plate")
-    shake: Shake | None = SHAKE
-    travel: Travel | None = TRAVEL
-    turn: Turn = TURN
-    hinge: Point | Literal["pivot"] | None = HINGE
-    mass: Mass | None = HELD
-    inertia: Inertia | None = INERTIA
-    spring: Amount = SPRING
-    rest_deg: Angle = REST
-    damper: Amount = DAMPER
-    stops_deg: Stops | None = STOPS
-    motor: Motor | None = MOTOR
-    starts_when: When | None = STARTS
+
+
+class Plate(Moving, StillPlate):
+    """A plate that hangs from a pivot: the damping plate, at a distance, or a further one."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["distance"]}, {"required": ["name", "pivot"]}]}
+    )
 
 
 class Outgoing(Table):
@@ -306,23 +308,8 @@ class Conveyor(Table):
     friction: Amount = pair_friction(0.5, "particle-belt")
 
 
-class Surface(Table):
-    """A free surface, two-sided and without thickness: a chute, a hood, a floor, a peg, a gate.
-
-    Straight, given by ``from`` and ``to`` or by ``points``; or an arc, by ``center`` and
-    ``radius``. The attribute `points`, ((x, y), ...), always has the answer of a straight one, and
-    `from_` and `to` are empty once it does; of an arc it is empty.
-    """
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "oneOf": [
-                {"required": ["from", "to"]},
-                {"required": ["points"]},
-                {"required": ["center", "radius"]},
-            ]
-        }
-    )
+class StillSurface(Table):
+    """The keys of a surface but those of its motion, which come behind them, and its copies."""
 
     name: Name = described(..., "Unique name, for events and the ledger")
     from_: Point | None = described(None, "First end [x, y]", "m", alias="from")
@@ -358,18 +345,26 @@ class Surface(Table):
         " arc",
         "m",
     )
-    shake: Shake | None = SHAKE
-    travel: Travel | None = TRAVEL
-    turn: Turn = TURN
-    hinge: Point | Literal["pivot"] | None = HINGE
-    mass: Mass | None = HELD
-    inertia: Inertia | None = INERTIA
-    spring: Amount = SPRING
-    rest_deg: Angle = REST
-    damper: Amount = DAMPER
-    stops_deg: Stops | None = STOPS
-    motor: Motor | None = MOTOR
-    starts_when: When | None = STARTS
+
+
+class Surface(Moving, StillSurface):
+    """A free surface, two-sided and without thickness: a chute, a hood, a floor, a peg, a gate.
+
+    Straight, given by ``from`` and ``to`` or by ``points``; or an arc, by ``center`` and
+    ``radius``. The attribute `points`, ((x, y), ...), always has the answer of a straight one, and
+    `from_` and `to` are empty once it does; of an arc it is empty.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [
+                {"required": ["from", "to"]},
+                {"required": ["points"]},
+                {"required": ["center", "radius"]},
+            ]
+        }
+    )
+
     repeat: Repeats = described(
         (),
         "Copies [[n, dx, dy], ...]: n of it, each moved on by (dx, dy) m; a second entry repeats"

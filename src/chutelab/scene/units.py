@@ -30,7 +30,8 @@ from chutelab.util.errors import about_comma
 class Table(BaseModel):
     """What all tables share: frozen, and unknown keys refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    # A table's validator is built where it is first needed; most are within that of a whole scene.
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     def _fill(self, key: str, value: object) -> None:
         # A default that depends on another key: not counted among the keys that were set, so that

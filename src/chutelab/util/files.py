@@ -8,8 +8,6 @@ from __future__ import annotations
 import csv
 import os
 import re
-import shutil
-import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -40,6 +38,9 @@ def aside(folder: Path, target: Path | None = None) -> Iterator[Path]:
     Raises an `OSError`; one of a file in here, or without a name, has the name of `target`, by
     default `folder`.
     """
+    import shutil
+    import tempfile
+
     made = ""
     try:
         anchor = next((path for path in (folder, *folder.parents) if path.exists()), folder)

@@ -62,6 +62,9 @@ def sin_cos(angle: Any) -> tuple[Any, Any]:
     >>> float(sin_cos(0.5 * np.pi)[1])
     6.123233995736766e-17
     """
+    if isinstance(angle, np.ndarray) and angle.size == 1:
+        sine, cosine = sin_cos(float(angle.item()))
+        return np.full(angle.shape, sine)[()], np.full(angle.shape, cosine)[()]
     if isinstance(angle, float):
         # The same in a twentieth of the time.
         if not abs(angle) <= LARGEST_ANGLE:

@@ -61,6 +61,15 @@ class Words:
         said = {mark: self.catalogue.get(key, key) for mark, key in _MARKS.items()}
         return "".join(said.get(sign, sign) for sign in format(value, form))
 
+    def titles(self) -> dict[str, str]:
+        """Return the titles of the shipped scenes in this language, by those that they have.
+
+        >>> words("de").titles()["A see-saw"]
+        'Eine Wippe'
+        """
+        own = {key: text for key, text in words().catalogue.items() if key.startswith("title-")}
+        return {text: self.catalogue[key] for key, text in own.items()}
+
     def unit(self, unit: str) -> str:
         """Return a unit as it is written behind a number."""
         return self.catalogue.get(f"unit-{unit}", unit)

@@ -203,7 +203,7 @@ PARTS_OF: Final[dict[str, type[Table]]] = {
 
 def shipped_lessons(language: str = "en") -> list[Lesson]:
     """Return the shipped lessons in the order of their numbers."""
-    return [read(folder, language) for folder in _folders()]
+    return [read(folder, language) for folder in shipped_folders()]
 
 
 PLAN: Final = "lesson.toml"
@@ -440,7 +440,7 @@ def find(wanted: str | int | Path, language: str = "en") -> Lesson:
         If there is none; it suggests shipped lessons. Or with the faults of the lesson.
     """
     said = str(wanted).strip().rstrip("/")
-    folders = _folders()
+    folders = shipped_folders()
     for folder in folders:
         number, name = split(folder)
         if said.lower() in (name, folder.name) or (said.isdecimal() and int(said) == number):
@@ -457,7 +457,7 @@ def find(wanted: str | int | Path, language: str = "en") -> Lesson:
     raise unusable(said or '""', text)
 
 
-def _folders() -> list[Path]:
+def shipped_folders() -> list[Path]:
     """Return the folders of the shipped lessons, which lie beside those of the scenes."""
     scene = next(iter(shipped().values()), None)
     found = scene.parent.parent.glob(f"lessons/*-*/{PLAN}") if scene else ()

@@ -37,7 +37,7 @@ from chutelab.classroom.lessons import (
     called_in,
     read,
     scene_of,
-    shipped_lessons,
+    shipped_folders,
     split,
     unusable,
 )
@@ -259,7 +259,7 @@ def notebook_of(lesson: Lesson) -> str:
     needs = re.search(r"^# needs: *(.*)$", _source(lesson), re.MULTILINE)
     extras = say("notebook-needs", extras=needs[1] if needs else "notebook")
     text("title", f"# {titled(lesson)}", f"**{lesson.question}**", say("notebook-order"), extras)
-    shipped = any(one.folder == lesson.folder for one in shipped_lessons())
+    shipped = lesson.folder in [folder.resolve() for folder in shipped_folders()]
     name = f'"{lesson.name}"' if shipped else '"."'
     language = "" if lesson.language == "en" else f', language="{lesson.language}"'
     opened = f"from chutelab.classroom.book import Book\n\nbook = Book({name}{language})"

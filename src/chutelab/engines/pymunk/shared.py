@@ -448,8 +448,8 @@ class Shared:
         if self.bends:
             # From one link of a chain to the next is no blow.
             contact = one * rows + other
-            first &= ~np.isin(contact, self.before)
-            self.before = contact
+            first &= np.append(self.before, -1)[self.before.searchsorted(contact)] != contact
+            self.before = contact  # sorted, as `order` has them
         told = np.flatnonzero(lands | first & (rate[0] < -self.g * self.h))
         if self.corners and len(told):
             # Of all points of a contact one event.

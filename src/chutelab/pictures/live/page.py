@@ -24,6 +24,7 @@ from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.tables import Live
 from chutelab.util.files import whole
 from chutelab.util.versions import own_version
+from chutelab.util.words import words
 
 LANGUAGES = ("en", "de")
 
@@ -78,6 +79,7 @@ def html(
     facts = describe(scene, partly=partly)
     strings = _strings(language)
     title = strings["new-machine"] if scene is None else scene.title
+    shown_title = strings.get(f"title-{title}", title)
     if scene is None or "lacks" in facts:
         facts["scene"]["title"] = title
         live = Live().model_dump()
@@ -121,7 +123,7 @@ def html(
     boot = _file("bundle/boot.js")
     return Template(_file("assets/page.html")).substitute(
         language=language,
-        title=escape(title),
+        title=escape(shown_title),
         version=escape(own_version()),
         broken=escape(strings["broken-page"]),
         home=f'<a class="home" href="{escape(home[1])}">{escape(home[0])}</a>' if home else "",
@@ -163,7 +165,10 @@ def _file(name: str) -> str:
 
 
 def _strings(language: str) -> dict[str, str]:
-    return json.loads(_file(f"assets/strings/{language}.json"))  # type: ignore[no-any-return]
+    """Return all texts of a page; titles of scenes by what they are in the scene."""
+    titles = words(language).titles().items() if language != "en" else ()
+    said: dict[str, str] = json.loads(_file(f"assets/strings/{language}.json"))
+    return said | {f"title-{own}": title for own, title in titles}
 
 
 @lru_cache(8)

@@ -35,7 +35,8 @@ start(({ lab, stage, words, bench, inspector, symbols }) => {
   if (lab.data.live?.predict) new Prediction(stage, lab, words);
   const head = () => {
     const heading = document.querySelector("h1") as HTMLElement, { title } = lab.scene ?? {};
-    if (title && heading.textContent !== title) heading.textContent = title;
+    const said = words.title(title ?? "");
+    if (said && heading.textContent !== said) document.title = heading.textContent = said;
   };
   lab.on("scene", head);
   // The address may have told another scene already.

@@ -1,6 +1,6 @@
 // What shows that something is chosen: dashes round it, and a card beside it, in the best place.
 
-import { svg } from "./scenery.ts";
+import { PLATE, svg } from "./scenery.ts";
 import type { Inspector } from "./inspector.ts";
 import type { Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
@@ -77,12 +77,18 @@ function surfaceLines({ lab, view, scenery, posed: machine }: Stage): Named[] {
     const long = segments.find((one) => one.surface === surface)?.length ?? 0;
     const [c, s] = [Math.cos(incline), Math.sin(incline)], round = 2 * Math.PI;
     return [bend(0, 0, r, 0, round), bend(-long * c, -long * s, r, 0, round),
+      [px(0, 0), px(-long * c, -long * s)],
       [px(r * s, -r * c), px(r * s - long * c, -r * c - long * s)]];
   };
+  // Plates are steel behind their faces.
+  const plates = new Set(lab.scene?.plates.map(({ name }) => name ?? "plate"));
+  const steel = (PLATE * scenery.thick) / view.scale;
   return [
-    ...segments.flatMap(({ x, y, tx, ty, length, speed, surface }) => (speed ? [0, deep] : [0])
-      .map((down): Named => [surfaces[surface],
-        [px(x, y, down), px(x + tx * length, y + ty * length, down)]])),
+    ...segments.flatMap(({ x, y, tx, ty, length, speed, surface }) =>
+      (speed ? [0, 0.5 * deep, deep] : [0]).flatMap((down) =>
+        (plates.has(surfaces[surface]) ? [0, steel] : [0]).map((back): Named =>
+          [surfaces[surface], [px(x + back * ty, y - back * tx, down),
+            px(x + back * ty + tx * length, y - back * tx + ty * length, down)]]))),
     ...arcs.map(({ x, y, radius, begin, extent, surface }): Named =>
       [surfaces[surface], bend(x, y, radius, begin, extent)]),
     ...(pulley ? incoming(pulley).map((line): Named => [surfaces[pulley.surface], line]) : []),

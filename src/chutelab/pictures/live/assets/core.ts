@@ -19,10 +19,9 @@ const KNOT_ROW = 10;
 /** What was compressed, of text: 13 bits of two letters, 6 of one that is left, see `page.py`.
  * What is no such text gives no core, as the engine then says. */
 function bytesOf(text: string) {
-  const letter = (n: number) => {
-    const code = text.charCodeAt(n);
-    return code - 33 - Number(code > 34) - Number(code > 60) - Number(code > 92);
-  };
+  const values = Array.from({ length: 128 }, (_, code) =>
+    code - 33 - Number(code > 34) - Number(code > 60) - Number(code > 92));
+  const letter = (n: number) => values[text.charCodeAt(n) & 127];
   const bytes = new Uint8Array((13 * (text.length >> 1) + 6 * (text.length & 1)) >> 3);
   let held = 0, bits = 0, at = 0;
   for (let n = 0; n < text.length; n += 2) {

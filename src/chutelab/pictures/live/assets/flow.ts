@@ -52,7 +52,8 @@ function passagesOf(track: Track, i: number, [ax, ay]: Point, [bx, by]: Point): 
         if ((height(middle) < 0) === (low < 0)) a = middle;
         else z = middle;
       }
-      const [x, vx] = track.curve(i, X, VX, h, z), [y, vy] = track.curve(i, Y, VY, h, z);
+      const [x, y] = [track.placeOn(i, X, VX, h, z), track.placeOn(i, Y, VY, h, z)];
+      const [vx, vy] = [track.paceOn(i, X, VX, h, z), track.paceOn(i, Y, VY, h, z)];
       const at = (x - ax) * ux + (y - ay) * uy, way = low < 0 ? -1 : 1;
       if (at >= 0 && at <= long) found.push({ t: t + h * z, at, way, speed: Math.hypot(vx, vy) });
     }

@@ -133,7 +133,8 @@ class Lab {
       recording.add(chunk);
       this.tellSoon();
       // After a change a track may well lie where a surface is now.
-      if (recording.state === "done" && !recording.renamed) this.judge(recording);
+      // What is dragged is judged where it is let go.
+      if (recording.state === "done" && !recording.renamed && !this.before) this.judge(recording);
     });
   }
 
@@ -181,6 +182,8 @@ class Lab {
     if (this.before && this.before !== this.given) {
       this.past = [...this.past, this.before].slice(-MOST_UNDO);
       this.future = [];
+      const { recording } = this;
+      if (recording?.state === "done" && !recording.renamed) this.judge(recording);
     }
     this.before = undefined;
     this.tell("scene");

@@ -59,7 +59,12 @@ function slide(input: HTMLInputElement, value: number) {
   const { min, max } = input, text = String(value);
   if (input.value !== text) input.value = text;
   const share = (Number(input.value) - Number(min)) / (Number(max) - Number(min));
-  input.style.setProperty("--at", `${(100 * share).toFixed(1)}%`);
+  style(input, "--at", `${(100 * share).toFixed(1)}%`);
+}
+
+/** Set a property of style; one that is so already is no work for the browser. */
+function style(element: HTMLElement, name: string, value: string) {
+  if (element.style.getPropertyValue(name) !== value) element.style.setProperty(name, value);
 }
 
 /** What takes longer, ms, is done alone in its frame. */
@@ -68,8 +73,8 @@ const HEAVY = 1.5, FRAME = 17;
 /** When something heavy may be done next, ms. */
 let alone = 0;
 
-/** ms from one time to the next at which a panel is drawn while the picture plays: what a browser
- * then lays out and paints takes longer than to change it. */
+/** ms from one time to the next at which a panel is drawn while the picture plays, or something is
+ * dragged: what a browser then lays out and paints takes longer than to change it. */
 const CALM = 80;
 
 /** Do something whenever it is asked for, but if it takes long, later: the last call always
@@ -103,7 +108,7 @@ function follow(lab: Lab, panel: HTMLDetailsElement, news: News[], act: () => vo
   const again = eased(() => {
     const isSeen = panel.open && !panel.matches(".off");
     if (isSeen && lab.recording && isFinite(lab.recording.begin)) act();
-  }, () => (lab.playing ? CALM : 0));
+  }, () => (lab.playing || lab.before ? CALM : 0));
   for (const one of news) lab.on(one, again);
   panel.addEventListener("toggle", again);
 }
@@ -114,4 +119,4 @@ const DRAWINGS: Record<string, string> = {
   flow: "flow", sensors: "sensor",
 };
 
-export { card, eased, follow, grown, html, icon, iconButton, menuOf, slide };
+export { card, eased, follow, grown, html, icon, iconButton, menuOf, slide, style };

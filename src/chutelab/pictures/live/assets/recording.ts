@@ -75,7 +75,7 @@ class Track {
     const a = 3 * (va + vb - 2 * mean), b = 3 * mean - 2 * va - vb;
     const q = -(b + Math.sign(b || 1) * Math.sqrt(Math.max(0, b * b - a * va)));
     return [q / a, va / q].reduce((low, s) =>
-      (s > 0 && s < 1 ? Math.min(low, this.curve(i - 1, Y, VY, h, s)[0]) : low), y);
+      (s > 0 && s < 1 ? Math.min(low, this.placeOn(i - 1, Y, VY, h, s)) : low), y);
   }
 
   /** The lowest of the first so many knots. */
@@ -136,10 +136,11 @@ class Track {
     const i = this.knotBefore(t);
     const h = this.at(i + 1, T) - this.at(i, T);
     const s = (t - this.at(i, T)) / h;
-    const [x, vx] = this.curve(i, X, VX, h, s);
-    const [y, vy] = this.curve(i, Y, VY, h, s);
     const spin = this.at(i, SPIN) * (1 - s) + this.at(i + 1, SPIN) * s;
-    return { x, y, vx, vy, spin, ended: false };
+    return {
+      x: this.placeOn(i, X, VX, h, s), y: this.placeOn(i, Y, VY, h, s),
+      vx: this.paceOn(i, X, VX, h, s), vy: this.paceOn(i, Y, VY, h, s), spin, ended: false,
+    };
   }
 
   /** Place and velocity just before a time at which it is under way: before a blow, if one is
@@ -153,8 +154,8 @@ class Track {
       const [x, y, vx, vy] = [X, Y, VX, VY].map((column) => this.at(i + 1, column));
       return { x, y, vx, vy };
     }
-    const [x, vx] = this.curve(i, X, VX, h, s), [y, vy] = this.curve(i, Y, VY, h, s);
-    return { x, y, vx, vy };
+    const [x, y] = [this.placeOn(i, X, VX, h, s), this.placeOn(i, Y, VY, h, s)];
+    return { x, y, vx: this.paceOn(i, X, VX, h, s), vy: this.paceOn(i, Y, VY, h, s) };
   }
 
   stateOf(i: number, ended: boolean): State {
@@ -164,14 +165,18 @@ class Track {
     };
   }
 
-  /** A coordinate and its velocity at the share s of the time h between two knots. */
-  curve(i: number, place: number, pace: number, h: number, s: number) {
+  /** A coordinate at the share s of the time h between two knots. */
+  placeOn(i: number, place: number, pace: number, h: number, s: number) {
     const a = this.at(i, place), va = this.at(i, pace), vb = this.at(i + 1, pace);
     const dx = this.at(i + 1, place) - a;
-    const where = a
-      + s * (h * va + s * (3 * dx - h * (2 * va + vb) + s * (h * (va + vb) - 2 * dx)));
-    const slope = dx / h;
-    return [where, va + s * (2 * (3 * slope - 2 * va - vb) + 3 * s * (va + vb - 2 * slope))];
+    return a + s * (h * va + s * (3 * dx - h * (2 * va + vb) + s * (h * (va + vb) - 2 * dx)));
+  }
+
+  /** Its velocity there. */
+  paceOn(i: number, place: number, pace: number, h: number, s: number) {
+    const va = this.at(i, pace), vb = this.at(i + 1, pace);
+    const slope = (this.at(i + 1, place) - this.at(i, place)) / h;
+    return va + s * (2 * (3 * slope - 2 * va - vb) + 3 * s * (va + vb - 2 * slope));
   }
 
   /** Points from a knot to the next, both among them: straight lines between them miss the track
@@ -189,7 +194,7 @@ class Track {
     const parts = h > 0 ? Math.min(Math.ceil(Math.sqrt(bent / 8 / fine)), MOST_CHORDS) : 1;
     const points = [{ t, x: this.at(i, X), y: this.at(i, Y) }];
     for (let n = 1; n < parts; n += 1) {
-      const [x] = this.curve(i, X, VX, h, n / parts), [y] = this.curve(i, Y, VY, h, n / parts);
+      const s = n / parts, x = this.placeOn(i, X, VX, h, s), y = this.placeOn(i, Y, VY, h, s);
       points.push({ t: t + (h * n) / parts, x, y });
     }
     points.push({ t: t + h, x: this.at(i + 1, X), y: this.at(i + 1, Y) });

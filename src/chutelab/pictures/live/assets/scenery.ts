@@ -437,4 +437,4 @@ const stadium = (left: number, right: number, y: number, r: number) =>
   `M${left} ${y - r}H${right}A${r} ${r} 0 0 1 ${right} ${y + r}H${left}`
   + `A${r} ${r} 0 0 1 ${left} ${y - r}`;
 
-export { Scenery, filled, svg };
+export { PLATE, Scenery, filled, svg };

@@ -203,6 +203,8 @@ class Stage {
   }
 
   legend: Stage["frame"] = null;
+  /** Boxes of the labels that stand in the picture, px. */
+  labels: { left: number, right: number, top: number, bottom: number }[] = [];
 
   /** What tools draw anew when the view, the machine or its run has changed. */
   drawers: (() => void)[] = [];
@@ -254,12 +256,19 @@ class Stage {
     return flights.filter((flight) => flight.flat().every(isFinite));
   }
 
-  /** Lines of an envelope: the band between the outer two, and the middle one.
+  /** Lines of an envelope: the band between the outer two, and the middle one. Where the way turns
+   * sharply, as at its end where half have come to lie, cuts across it cross each other: of these
+   * only the first is drawn.
    * @param lines m */
   drawEnvelope(stream: number, lines: [number, number][][]) {
-    const { view } = this;
-    const [right, middle, left] = lines.map((line) => line.filter(([x]) => isFinite(x))
-      .map(([x, y]) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`));
+    const { view } = this, cuts: Point[][] = [];
+    for (const n of lines[0].keys()) {
+      const cut = lines.map((line) => line[n]), last = cuts.at(-1);
+      const folds = last && cross(last[0], last[2], cut[0], cut[2]);
+      if (!folds && cut.every(([x]) => isFinite(x))) cuts.push(cut);
+    }
+    const [right, middle, left] = lines.map((_, q) => cuts.map((cut) =>
+      `${view.px(cut[q][0]).toFixed(1)},${view.py(cut[q][1]).toFixed(1)}`));
     const band = svg("polygon", { points: [...right, ...left.reverse()].join(" "), class: "envelope" },
       svg("title", {}, this.words.say("envelope")));
     if (this.isMixed) band.style.fill = `var(--kind-${stream % 5})`;
@@ -640,6 +649,13 @@ class Stage {
     this.lab.change(valuesOf({ ...handle, axes }, kept));
     return true;
   }
+}
+
+/** Whether two straight lines from point to point cross. */
+function cross(a: Point, b: Point, c: Point, d: Point) {
+  const side = ([px, py]: Point, [qx, qy]: Point, [x, y]: Point) =>
+    Math.sign((qx - px) * (y - py) - (qy - py) * (x - px));
+  return side(a, b, c) !== side(a, b, d) && side(c, d, a) !== side(c, d, b);
 }
 
 /** How plates and wheels shine. */

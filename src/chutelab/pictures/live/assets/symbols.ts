@@ -6,11 +6,12 @@ import { historyOf } from "./stages.ts";
 import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
 import type { Event } from "./core.ts";
-import type { Recording } from "./recording.ts";
 
 /** Its middle, px, and the side of its point that is tried first, rad counterclockwise from the
- * right; one that is asked for may be far away */
-type Label = { text: string, x: number, y: number, side?: number, asked?: boolean };
+ * right; one that is asked for may be far away. Its text is the longest of its rows, and `drawn` is
+ * what is drawn with it */
+type Label = { text: string, x: number, y: number, side?: number, asked?: boolean,
+  rows?: number, id?: string, drawn?: Element[] };
 /** Where a label stands, and if that is away from its point, the line to it. */
 type Placed = Label & { from?: [number, number] };
 type Space = { left: number, top: number, right: number, bottom: number };
@@ -31,21 +32,27 @@ const LEAST_ANGLE = 0.03;
 const overlap = (a: Space, b: Space) =>
   a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
 
-function spaceOf({ text, x, y }: Label): Space {
-  const half = 0.5 * WIDE * text.length + 1;
-  return { left: x - half, right: x + half, top: y - 0.5 * TALL, bottom: y + 0.5 * TALL };
+function spaceOf({ text, x, y, rows = 1 }: Label): Space {
+  const half = 0.5 * WIDE * text.length + 1, high = 0.5 * TALL * rows;
+  return { left: x - half, right: x + half, top: y - high, bottom: y + high };
 }
 
 /** Labels near their points, each where nothing is yet; what has no place is left out.
- * @param wanted at their points, the most important first */
-function placed(wanted: Label[], taken: Space[]): Placed[] {
+ * @param wanted at their points, the most important first
+ * @param most that are placed */
+function placed(wanted: Label[], taken: Space[], most = Infinity): Placed[] {
   const spaces = [...taken];
-  return wanted.flatMap(({ text, x, y, side = Math.PI / 4, asked }) => {
+  return wanted.flatMap((label) => {
+    const { text, x, y, side = Math.PI / 4, asked, rows = 1 } = label;
+    // Of a block the nearest edge is as far away as a letter's.
+    const [wide, high] = rows > 1 ? [0.5 * WIDE * text.length, 0.5 * TALL * (rows - 1)] : [0, 0];
+    if (spaces.length - taken.length >= most) return [];
     for (const far of asked ? [...AWAY, ...FARTHER] : AWAY) {
       for (let n = 0; n < 8; n += 1) {
         // The side that is wanted, then those next to it.
         const turn = (n % 2 ? -1 : 1) * Math.ceil(n / 2), angle = side + (turn * Math.PI) / 4;
-        const at = { text, x: x + far * Math.cos(angle), y: y - far * Math.sin(angle) };
+        const [c, s] = [Math.cos(angle), Math.sin(angle)];
+        const at = { ...label, x: x + (far + wide) * c, y: y - (far + high) * s };
         const space = spaceOf(at);
         if (spaces.some((other) => overlap(other, space))) continue;
         spaces.push(space);
@@ -74,6 +81,37 @@ function along(points: [number, number][]): Space[] {
   });
 }
 
+/** Labels in the picture at most, and which come first. */
+const MOST_LABELS = 6, ORDER = ["phi1_deg", "v1", "v2", "v2r", "x3", "v3", "d3", "y3", "t2", "t3"];
+
+/** What labels keep clear of: cards, the scale, the legend, handles, speeds on belts, the path of a
+ * lone particle and the surfaces, as far as they are seen. */
+function takenBy(stage: Stage): Space[] {
+  const { view, view: { free }, lab: { recording, machine } } = stage;
+  const all = { left: -1e9, right: 1e9, top: -1e9, bottom: 1e9 };
+  const path = recording && !recording.machine.interact ? recording.points(0, 2 / view.scale)
+    .map(({ x, y }) => [view.px(x), view.py(y)] as [number, number]) : [];
+  const home = stage.front.getBoundingClientRect();
+  const speeds = [...stage.scenery.layer.querySelectorAll(".on-frame")].map((text) => {
+    const { left, right, top, bottom } = text.getBoundingClientRect();
+    return { left: left - home.left, right: right - home.left, top: top - home.top,
+      bottom: bottom - home.top };
+  });
+  return [
+    { ...all, bottom: free.top }, { ...all, top: free.bottom }, { ...all, right: free.left },
+    { ...all, left: free.right }, ...stage.covered, stage.scaleBox,
+    ...(stage.legend ? [stage.legend] : []), ...along(path), ...speeds,
+    ...(machine?.pulley
+      ? discs(view.px(0), view.py(0), machine.pulley.radius * view.scale) : []),
+    // A board of pegs has no room between them.
+    ...surfaceLines(stage).slice(0, MOST_LINES).flatMap(([, line]) => along(line)),
+    ...stage.handles.map(({ x, y }) => {
+      const [px, py] = [view.px(x), view.py(y)];
+      return { left: px - 9, right: px + 9, top: py - 9, bottom: py + 9 };
+    }),
+  ];
+}
+
 class Symbols {
   layer;
 
@@ -100,20 +138,11 @@ class Symbols {
   draw() {
     const { stage, layer } = this, { recording } = stage.lab;
     layer.replaceChildren();
+    stage.labels = [];
     if (!this.shown || stage.blind || stage.held || !recording) return;
     if (recording.machine.interact) return;
     const { left, hit, down } = historyOf(stage.lab)?.stages[0] ?? {}, { view } = stage;
     this.wanted = [];
-    const { free } = view, all = { left: -1e9, right: 1e9, top: -1e9, bottom: 1e9 };
-    const taken: Space[] = [
-      { ...all, bottom: free.top }, { ...all, top: free.bottom }, { ...all, right: free.left },
-      { ...all, left: free.right }, ...stage.covered, stage.scaleBox,
-      ...(stage.legend ? [stage.legend] : []), ...this.lines(recording),
-      ...stage.handles.map(({ x, y }) => {
-        const [px, py] = [view.px(x), view.py(y)];
-        return { left: px - 9, right: px + 9, top: py - 9, bottom: py + 9 };
-      }),
-    ];
     if (left) this.separation(left);
     if (hit) {
       this.dot(hit);
@@ -138,7 +167,12 @@ class Symbols {
       this.dot(down);
       this.label("v3", down.x, down.y, [-1, 1]);
     }
-    for (const { text, x, y, from } of placed(this.wanted, taken)) {
+    const rank = ({ asked, id = "" }: Label) => (asked ? -1 : ORDER.indexOf(id));
+    this.wanted.sort((a, b) => rank(a) - rank(b));
+    const found = placed(this.wanted, takenBy(stage), MOST_LABELS);
+    stage.labels = found.map(spaceOf);
+    for (const { text, x, y, from, drawn = [] } of found) {
+      layer.append(...drawn);
       if (from) {
         const far = Math.hypot(x - from[0], y - from[1]), share = 1 - 13 / far;
         layer.append(svg("path", {
@@ -152,35 +186,17 @@ class Symbols {
 
   wanted: Label[] = [];
 
-  /** What the path and the surfaces cover, as far as it is seen. */
-  lines(recording: Recording): Space[] {
-    const { view } = this.stage, { pulley } = recording.machine;
-    const path = recording.points(0, 2 / view.scale)
-      .map(({ x, y }) => [view.px(x), view.py(y)] as [number, number]);
-    const home = this.stage.front.getBoundingClientRect();
-    const speeds = [...this.stage.scenery.layer.querySelectorAll(".on-frame")].map((text) => {
-      const { left, right, top, bottom } = text.getBoundingClientRect();
-      return { left: left - home.left, right: right - home.left, top: top - home.top,
-        bottom: bottom - home.top };
-    });
-    return [
-      ...along(path), ...speeds,
-      ...(pulley ? discs(view.px(0), view.py(0), pulley.radius * view.scale) : []),
-      // A board of pegs has no room between them.
-      ...surfaceLines(this.stage).slice(0, MOST_LINES).flatMap(([, line]) => along(line)),
-    ];
-  }
-
-  /** Ask for the label of a quantity at a point, px. */
-  want(id: string, x: number, y: number, side: number) {
+  /** Ask for the label of a quantity at a point, px.
+   * @param drawn what is drawn with it */
+  want(id: string, x: number, y: number, side: number, drawn: Element[] = []) {
     const { lab, words } = this.stage, { symbol, unit } = lab.data.quantities[id];
     if (id !== this.pointed) {
-      this.wanted.push({ text: symbol, x, y, side });
+      this.wanted.push({ text: symbol, x, y, side, id, drawn });
       return;
     }
     const value = document.querySelector(`#numbers [data-id="${id}"] td`)?.textContent ?? "";
     const text = `${symbol} = ${value} ${words.unit(unit)}`;
-    this.wanted.unshift({ text, x, y, side, asked: true });
+    this.wanted.unshift({ text, x, y, side, asked: true, drawn });
   }
 
   /** @param y m
@@ -202,7 +218,8 @@ class Symbols {
     this.dot(left);
     this.label("v1", left.x, left.y);
     if (angle < LEAST_ANGLE) {
-      this.wanted.push({ text: "φ₁ = 0", x: view.px(left.x), y: view.py(left.y) });
+      const [x, y] = [view.px(left.x), view.py(left.y)];
+      this.wanted.push({ text: "φ₁ = 0", x, y, id: "phi1_deg" });
       return;
     }
     const r = 0.6 * far, [x, y] = [view.px(0), view.py(0)];
@@ -230,10 +247,10 @@ class Symbols {
     if (Math.hypot(to[0] - from[0], to[1] - from[1]) < 6) return;
     const ends = [from, to].map(([x, y], n) => (level ? `M${x} ${points[n]}V${y + 4}`
       : `M${points[n]} ${y}H${x + 4}`));
-    this.layer.append(svg("path", { d: ends.join(""), class: "thin" }),
-      svg("path", { d: `M${from[0]} ${from[1]}L${to[0]} ${to[1]}`, class: "length" }));
-    this.want(id, 0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]), level ? Math.PI : 0);
+    const drawn = [svg("path", { d: ends.join(""), class: "thin" }),
+      svg("path", { d: `M${from[0]} ${from[1]}L${to[0]} ${to[1]}`, class: "length" })];
+    this.want(id, 0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]), level ? Math.PI : 0, drawn);
   }
 }
 
-export { Symbols, placed, spaceOf };
+export { Symbols, placed, spaceOf, takenBy };

@@ -3,6 +3,7 @@
 import { roundUp } from "./chart.ts";
 import { eased, html, iconButton } from "./panels.ts";
 import { svg } from "./scenery.ts";
+import { placed, takenBy } from "./symbols.ts";
 import type { Flow } from "./flow.ts";
 import type { Stage } from "./stage.ts";
 import type { Handle } from "./handles.ts";
@@ -286,13 +287,13 @@ class Tools {
     if (this.flow && this.on.has("flow")) {
       const [[x, y], [u, v]] = this.flow.ends.map(at);
       layer.append(svg("path", { d: `M${x} ${y}L${u} ${v}`, class: "tape" }));
-      this.write(x > u ? [x, y - 20] : [u, v - 20], this.flow.says);
+      this.write("flow", x > u ? [x, y] : [u, v], this.flow.says);
     }
     if (this.on.has("tape")) {
       const [[x, y], [u, v]] = this.tape.map(at);
       layer.append(svg("path", { d: `M${x} ${y}L${u} ${v}`, class: "tape" }),
         svg("path", { d: `M${x} ${y}H${u}V${v}`, class: "thin" }));
-      this.write([0.5 * (x + u), 0.5 * (y + v)], this.tapeTexts());
+      this.write("tape", [0.5 * (x + u), 0.5 * (y + v)], this.tapeTexts());
     }
     if (this.on.has("protractor")) {
       const [[x, y], [ax, ay], [bx, by]] = this.protractor.map(at);
@@ -304,23 +305,37 @@ class Tools {
         `${x + r * Math.cos(angle)} ${y + r * Math.sin(angle)}`);
       layer.append(svg("path", { d: `M${ax} ${ay}L${x} ${y}L${bx} ${by}`, class: "tape" }),
         svg("path", { d: `M${arc[0]}A${r} ${r} 0 0 ${sweep} ${arc[1]}`, class: "tape" }));
-      this.write([x, y], [this.angleText()]);
+      this.write("protractor", [x, y], [this.angleText()]);
     }
     const track = this.on.has("tracer") && lab.recording?.tracks[this.traced.index];
     if (track && track.count) {
       const t = Math.min(track.end, Math.max(track.begin, this.traced.t));
       const state = track.state(t) as State;
-      this.write(at([state.x, state.y]), this.tracerTexts(t, state));
+      this.write("tracer", at([state.x, state.y]), this.tracerTexts(t, state));
     }
   }
 
-  /** Lines of text beside a place, on the side where there is room.
+  /** Where texts stand, px, by tools, and for what: there they stay while only the time goes on. */
+  spots: Map<string, { of: string, at: Point }> = new Map();
+
+  /** Lines of text near a place, where nothing else is, or else beside it.
    * @param place px */
-  write([x, y]: Point, lines: string[]) {
-    const { view } = this.stage, right = x < view.width - 150;
-    const top = Math.min(Math.max(y + 22, 22), view.height - 18 * lines.length + 8);
-    lines.forEach((line, n) => this.layer.append(svg("text", { x: right ? x + 14 : x - 14,
-      y: top + 18 * n, "text-anchor": right ? "start" : "end" }, line)));
+  write(tool: string, [x, y]: Point, lines: string[]) {
+    const { stage, lab } = this, { view } = stage, rows = lines.length;
+    const long = Math.ceil(Math.max(...lines.map((line) => line.length)) / 4) * 4;
+    const of = JSON.stringify([x, y, rows, long, view.scale, view.width, view.height, lab.given]);
+    const known = this.spots.get(tool);
+    if (known?.of !== of || stage.held) {
+      const wanted = { text: "0".repeat(long), x, y, rows, asked: true, side: -0.25 * Math.PI };
+      const [found] = placed([wanted], [...takenBy(stage), ...stage.labels]);
+      const beside = x < view.width - 150 ? 1 : -1;
+      const at: Point = found ? [found.x, found.y]
+        : [x + beside * (5 * long + 14), Math.min(Math.max(y + 22, 22), view.height - 18 * rows)];
+      this.spots.set(tool, { of, at });
+    }
+    const [cx, cy] = this.spots.get(tool)?.at as Point;
+    lines.forEach((line, n) => this.layer.append(svg("text", { x: cx,
+      y: cy + 18 * (n - 0.5 * (rows - 1)) + 5, "text-anchor": "middle" }, line)));
   }
 
   watchPanel() {

@@ -1,7 +1,7 @@
 // Play, pause, step, scrub, and how fast; undo and redo.
 
 import { Marks } from "./marks.ts";
-import { slide } from "./panels.ts";
+import { slide, style } from "./panels.ts";
 import { RATES, type Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
@@ -127,14 +127,15 @@ class Transport {
     // What is computed is hatched until all of it is.
     const ready = span > 0 ? (lab.end - lab.start) / span : 1;
     track.classList.toggle("computing", ready < 1);
-    track.style.setProperty("--ready", String(ready));
+    style(track, "--ready", ready.toFixed(3));
     slide(this.time, span > 0 ? Math.round(((lab.t - lab.start) / span) * PLACES) : 0);
     const clock = `${words.fixed(lab.t, 3)} s`;
     this.clock.textContent = clock;
     // It is heard once it stands.
     if (!lab.playing) this.time.setAttribute("aria-valuetext", this.marks.saysNow || clock);
     this.playButton.classList.toggle("playing", lab.playing);
-    this.playButton.setAttribute("aria-label", words.say(lab.playing ? "pause" : "play"));
+    const says = words.say(lab.playing ? "pause" : "play");
+    if (this.playButton.ariaLabel !== says) this.playButton.ariaLabel = says;
     const { undoButton, redoButton } = this, { activeElement } = document;
     undoButton.disabled = !lab.past.length;
     redoButton.disabled = !lab.future.length;

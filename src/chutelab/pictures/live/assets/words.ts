@@ -18,6 +18,11 @@ class Words {
     return text.replace(/\{(\w+)\}/g, (whole, name) => String(values[name] ?? whole));
   }
 
+  /** The title of a scene: those that are shipped have one in each language. */
+  title(title: string) {
+    return this.catalogue[`title-${title}`] ?? title;
+  }
+
   /** A surface or stream by its name: ours are translated, a scene's own stand as they are. */
   name(name: string) {
     const [, stem, number] = /^([a-z]+)(\d+)$/.exec(name)

@@ -8,13 +8,15 @@ from chutelab import core as module
 from chutelab.engines import contact as engine
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
+from chutelab.results.loads import gather
 from chutelab.scene import from_dict, load, parse
 from live.node import ask, needs_node, page_scene
 
 pytestmark = needs_node
 
 SCENES = [
-    ("perpendicular",), ("inclined-40",), ("stream", "stream.count=30"), ("slip",), ("spoon",),
+    ("perpendicular", "run.loads=0.01"), ("hopper", "stream.count=30", "run.loads=0.05"),
+    ("inclined-40",), ("stream", "stream.count=30"), ("slip",), ("spoon",),
     ("cascade",), ("two-sizes",), ("hopper", "stream.count=40"), ("inclined-conveyor",),
     ("perpendicular", "incoming.friction=0.5", "run.until=settled"),
     ("belt-landing",), ("free-fall",), ("low-speed",), ("mixture", "stream.fines.count=30"),
@@ -59,6 +61,8 @@ def same_runs(scenes):
         for n, name in enumerate(("t", "angle", "rate", "surface")):
             assert np.array_equal(swings[:, n], states[name]), given
         swung += len(states)
+        loads = gather(job.module, job.owners)
+        assert answer["loads"] == loads.view("<f8").ravel().tolist(), given
         books = job.module.array("books", engine.REAL, 3 * (job.owners + 1)).reshape(-1, 3)
         assert np.array_equal(np.array(answer["books"]), books), given
     return swung

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import chutelab
+from chutelab.results.loads import borne
 from chutelab.results.sensors import readings, sensed
 from chutelab.scene import load, parse, to_toml
 
@@ -382,8 +383,41 @@ to = [-0.05, 0.3]
 """
 
 
+def test_loads_are_those_of_python_with_arrows_where_they_press(shown):
+    options = ["stream.count=40", "run.until=1.2", "run.loads=0.02"]
+    page = shown("hopper", options, viewport={"width": 1366, "height": 768}, language="de")
+    page.evaluate("chutelab.lab.engine.allow(1e9)")
+    wait(page, "chutelab.lab.recording.state === 'done'")
+    recording = chutelab.simulate(load("hopper", options), engine="contact")
+    told = borne(recording)
+    assert len(told) >= 3
+    page.evaluate("chutelab.lab.seek(0.61)")
+    found = {one["name"]: one for one in page.evaluate("chutelab.loads.loads")}
+    assert found.keys() == told.keys()
+    for name, one in told.items():
+        part, its = one.part("normal"), found[name]
+        assert its["mean"] == pytest.approx(part.mean, rel=1e-12)
+        assert its["peak"] == pytest.approx(part.peak, rel=1e-12)
+        pressed = one.normal[30] if len(one.normal) > 30 else 0.0
+        assert its["now"] == pytest.approx(pressed, rel=1e-12)
+        if pressed > 0.0:
+            assert its["force"] == pytest.approx(one.force[30].tolist(), rel=1e-12)
+            assert its["place"] == pytest.approx(one.place[30].tolist(), rel=1e-9)
+    playwright.expect(page.locator("#loads tr[data-id]")).to_have_count(len(told))
+    # The menu has them counted in any scene, and no more; the run is the same.
+    knots = "chutelab.lab.recording.tracks.map(({ count, end }) => [count, end])"
+    before = page.evaluate(knots)
+    page.click("#show > summary")
+    page.uncheck("#show-loads")
+    playwright.expect(page.locator("#loads")).to_be_hidden()
+    page.evaluate("chutelab.lab.engine.allow(1e9)")
+    wait(page, "chutelab.lab.recording.state === 'done'")
+    assert page.evaluate(knots) == before
+    assert page.evaluate("chutelab.loads.loads") == []
+
+
 def test_sensors_tell_what_python_tells_of_the_same_run(shown):
-    options = ["stream.count=60", "run.until=1.2", "surface.gate.opens_at=0.1"]
+    options = ["stream.count=60", "run.until=1.2", "surface.gate.opens_at=0.1", "stream.width=0.5"]
     page = shown("hopper", options, more=SENSORS, viewport={"width": 1366, "height": 768})
     page.evaluate("chutelab.lab.allow(1e9)")
     wait(page, "chutelab.lab.recording.state !== 'running'")
@@ -397,7 +431,12 @@ def test_sensors_tell_what_python_tells_of_the_same_run(shown):
     for name, its in page.evaluate("chutelab.sensors.readings"):
         wanted = told[name]
         assert (its["count"], its["back"]) == (wanted.count, wanted.back)
-        for ours, theirs in ((its["rate"], wanted.rate), (its["speed"], wanted.speed["mean"])):
+        quantiles = [wanted.speed[one] for one in ("q02", "q50", "q98")]
+        for ours, theirs in zip(
+            [its["rate"], its["speed"], *its["speeds"], its["flow"], its["whole"]],
+            [wanted.rate, wanted.speed["mean"], *quantiles, wanted.mass_rate, wanted.whole_rate],
+            strict=True,
+        ):
             assert ours == pytest.approx(theirs, rel=1e-12, nan_ok=True)
     row = page.locator("#sensors tr[data-id=slot] td")
     playwright.expect(row.first).to_have_text(str(told["slot"].count))

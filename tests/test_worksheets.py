@@ -140,6 +140,7 @@ def angle(v, radius):
     return degrees(acos(min(1.0, v * v / (G * radius))))
 
 
+@cache
 def slipping(mu, u0):
     """Separation of a particle that slips on the pulley, radians, and the onset of its slip.
 
@@ -151,7 +152,7 @@ def slipping(mu, u0):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if sin(middle) < mu * (cos(middle) - u0) else (low, middle)
     onset = phi = low
-    u, step = u0, 1e-5
+    u, step = u0, 1e-4
 
     def rate(phi, u):
         return 2.0 * sin(phi) - 2.0 * mu * (cos(phi) - u)
@@ -243,6 +244,7 @@ def rise(e, printed=False):
     return 500.0 * 0.008 * (vx**2 + 4.0)
 
 
+@cache
 def ease(k, mu=0.5):
     """Separation, degrees, of a body with I = k m r² on the pulley of `slip`: rolls, then slips.
 
@@ -263,7 +265,7 @@ def ease(k, mu=0.5):
 
 
 def drag(r, m):
-    """Drag of a sphere in `perpendicular`, air of 1.2 kg/m³ and 1.8e-5 Pa s, in steps of 10 µs.
+    """Drag of a sphere in `perpendicular`, air of 1.2 kg/m³ and 1.8e-5 Pa s, in steps of 0.1 ms.
 
     Share of the weight at the landing (without drag), and mm farther forward. c_w is that of
     Schiller and Naumann: 24/Re (1 + 0.15 Re^0.687) up to Re = 1000, 0.44 beyond.
@@ -275,7 +277,7 @@ def drag(r, m):
         return 0.5 * c_w * 1.2 * pi * r**2 / m
 
     def fly(x, y, vx, vy, air, done):
-        h = 1e-5
+        h = 1e-4
         while not done(x, y):
             last = x, y, vx, vy
             k = air * per(hypot(vx, vy)) * hypot(vx, vy)
@@ -287,7 +289,7 @@ def drag(r, m):
 
     def lands(air, bottom=None):
         (x0, *_), (x, y, vx, vy) = fly(0.0, 0.0, 2.0, 0.0, air, lambda x, y: x >= X2)
-        y += (X2 - x) / (x - x0) * (vy * 1e-5)
+        y += (X2 - x) / (x - x0) * (vy * 1e-4)
         # The belt lies half a metre below the impact without drag.
         bottom = y - 0.5 if bottom is None else bottom
         (x0, y0, *_), (x, y, vx, vy) = fly(X2, y, -0.5 * vx, vy, air, lambda x, y: y <= bottom)

@@ -18,6 +18,7 @@ const answers = scenes.map((given) => {
     events.push(...taken.events);
     swings.push(...taken.swings);
   }
-  return { state, knots, events, swings, books: core.books(), toml: toToml(given) };
+  const loads = [...core.takeLoads(true).rows];
+  return { state, knots, events, swings, loads, books: core.books(), toml: toToml(given) };
 });
 process.stdout.write(JSON.stringify(answers));

@@ -9,7 +9,7 @@ Loads B;
 
 EXPORT Loads *loads(void) { return &B; }
 
-int lay_out_bins(int owners) {
+EXPORT int lay_out_bins(int owners) {
     B.owner_count = owners;
     B.bin_count = FIRST;
     RESERVE(B.bins, (double)B.bin_count * owners);

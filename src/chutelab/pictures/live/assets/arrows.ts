@@ -125,4 +125,4 @@ function drawArrows(context: CanvasRenderingContext2D, arrows: Arrow[], ink: str
   context.fill();
 }
 
-export { Arrows, contactForce };
+export { Arrows, contactForce, drawArrows };

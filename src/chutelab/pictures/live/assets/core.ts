@@ -16,6 +16,10 @@ const GREATEST = 1e300;
 /** Doubles of a knot: t, x, y, vx, vy, spin, three entries of the ledger; and its disk. */
 const KNOT_ROW = 10;
 
+/** Numbers of a bin of a surface: impulses that press it, along it, of both in x and y, their
+ * moment (N s, N m s), and places by what presses there (N s m). */
+const LOAD_ROW = 7;
+
 /** What was compressed, of text: 13 bits of two letters, 6 of one that is left, see `page.py`.
  * What is no such text gives no core, as the engine then says. */
 function bytesOf(text: string) {
@@ -62,9 +66,10 @@ class Memory {
   constructor(instance: WebAssembly.Instance, readonly layout: Layout) {
     this.exports = instance.exports;
     this.exports._initialize();
-    const { room, world, plan, drawing, laws } = this.exports;
+    const { room, world, plan, drawing, laws, loads } = this.exports;
     this.subjects = {
       Room: room(), World: world(), Plan: plan(), Drawing: drawing(), Laws: laws(),
+      Loads: loads(),
     };
     this.look();
   }
@@ -134,6 +139,8 @@ class Core extends Memory {
   machine: Machine | null = null;
   /** States of hinges that have been taken. */
   swung = 0;
+  /** Bins of loads that have been taken. */
+  borne = 0;
 
   /** Fill in fields of one row of an array. */
   fill(name: string, struct: string, row: number, values: Record<string, number | number[]>,
@@ -151,7 +158,7 @@ class Core extends Memory {
   /** Lay out a machine: the run is at its beginning then. */
   begin(machine: Machine) {
     this.machine = machine;
-    this.swung = 0;
+    this.swung = this.borne = 0;
     this.forget();
     const { releases, rolling, falls, pulley } = machine, kinds = rolling.length;
     const rows = surfaceRows(machine, this.layout.enums.Shape);
@@ -191,6 +198,8 @@ class Core extends Memory {
       });
     });
     this.work("prepare");
+    this.set("every", machine.loads, "Loads");
+    if (machine.loads) this.work("lay_out_bins", machine.surfaces.length);
   }
 
   pair(
@@ -237,6 +246,18 @@ class Core extends Memory {
         this.ints[(at + fields.surface[0]) >> 2]);
     }
     return rows;
+  }
+
+  /** Loads of surfaces, `LOAD_ROW` numbers each, in bins from one on: the latest, or at the end
+   * all, since what has slept is told of when it wakes. */
+  takeLoads(over: boolean): { from: number, rows: Float64Array } {
+    const used = this.get("used", "Loads"), wide = this.get("owner_count", "Loads") * LOAD_ROW;
+    const { interact, dt, loads } = this.machine as Machine;
+    const late = loads ? Math.ceil((4 * dt) / loads) + 2 : 0;
+    const from = over || !interact ? 0 : Math.max(0, this.borne - late);
+    const begin = this.get("bins", "Loads") >> 3;
+    this.borne = used;
+    return { from, rows: this.doubles.slice(begin + from * wide, begin + used * wide) };
   }
 
   /** How far those under way have come, as rows of knots; only between steps of a run whose
@@ -311,4 +332,4 @@ function surfaceRows({ segments, arcs, pulley }: Machine, shapes: Record<string,
   return [...flat, ...wheels, ...bent];
 }
 
-export { Core, KNOT_ROW, Memory, bytesOf, compiled, startCore, unpacked };
+export { Core, KNOT_ROW, LOAD_ROW, Memory, bytesOf, compiled, startCore, unpacked };

@@ -6,7 +6,8 @@ import type { Machine } from "./machine.ts";
 
 type Chunk = { type: "chunk", id: number, knots: Float64Array, tips: Float64Array,
   events: Event[], swings: number[], now: number, state: string, books: number[][] | null,
-  reasons: number[] | null, gained: number, unsolved: number, contacts: number, steps: number };
+  reasons: number[] | null, gained: number, unsolved: number, contacts: number, steps: number,
+  loads: { from: number, rows: Float64Array } };
 
 class Engine {
   id = 0;

@@ -2,11 +2,12 @@
 // across it, and how fast.
 
 import { Chart, onWidth, roundUp } from "./chart.ts";
-import { countUntil } from "./crowd.ts";
+import { QUANTILES, countUntil, quantile } from "./crowd.ts";
 import { histogram } from "./landing.ts";
 import { card, follow, html } from "./panels.ts";
 import { svg } from "./scenery.ts";
 import type { Lab } from "./lab.ts";
+import { slices } from "./scene.ts";
 import type { Recording, Track } from "./recording.ts";
 import type { Words } from "./words.ts";
 
@@ -14,7 +15,7 @@ type Point = [number, number];
 
 /** When a centre passes the line, s; where, m from the line's first end; 1 where it comes from the
  * left of the line, seen from its first end, -1 where it comes from the right; and m/s. */
-export type Passage = { t: number, at: number, way: number, speed: number };
+export type Passage = { t: number, at: number, way: number, speed: number, disk: number };
 
 /** Halvings until the instant of a passage is known to rounding, as in Python. */
 const HALVINGS = 60;
@@ -27,7 +28,9 @@ const X = 1, Y = 2, VX = 3, VY = 4;
 
 /** The passages of a track between two of its knots, its curve cut where its distance from the line
  * is largest or smallest: in each part it grows or falls throughout. */
-function passagesOf(track: Track, i: number, [ax, ay]: Point, [bx, by]: Point): Passage[] {
+function passagesOf(
+  track: Track, disk: number, i: number, [ax, ay]: Point, [bx, by]: Point,
+): Passage[] {
   const long = Math.hypot(bx - ax, by - ay), [ux, uy] = [(bx - ax) / long, (by - ay) / long];
   const t = track.at(i, 0), h = track.at(i + 1, 0) - t;
   if (!(h > 0 && long > 0)) return [];
@@ -55,7 +58,8 @@ function passagesOf(track: Track, i: number, [ax, ay]: Point, [bx, by]: Point): 
       const [x, y] = [track.placeOn(i, X, VX, h, z), track.placeOn(i, Y, VY, h, z)];
       const [vx, vy] = [track.paceOn(i, X, VX, h, z), track.paceOn(i, Y, VY, h, z)];
       const at = (x - ax) * ux + (y - ay) * uy, way = low < 0 ? -1 : 1;
-      if (at >= 0 && at <= long) found.push({ t: t + h * z, at, way, speed: Math.hypot(vx, vy) });
+      const speed = Math.hypot(vx, vy);
+      if (at >= 0 && at <= long) found.push({ t: t + h * z, at, way, speed, disk });
     }
     [from, low] = [to, high];
   }
@@ -89,7 +93,7 @@ class Passing {
     this.tracks.forEach((track, n) => {
       const sure = track.count - track.tip - 1;
       for (; this.seen[n] < sure; this.seen[n] += 1) {
-        more.push(...passagesOf(track, this.seen[n], from, to));
+        more.push(...passagesOf(track, n, this.seen[n], from, to));
       }
     });
     if (more.length) this.passages = [...this.passages, ...more].sort((a, b) => a.t - b.t);
@@ -196,28 +200,38 @@ class Flow extends Passing {
   }
 }
 
-/** Passages the way that counts on, and back; 1/s, and m/s. NaN where it is not known */
-export type Reading = { count: number, back: number, rate: number, speed: number };
+/** Passages the way that counts on, and back; 1/s, m/s and its quantiles, kg/s, and t/h of all the
+ * width of the material. NaN where it is not known */
+export type Reading = { count: number, back: number, rate: number, speed: number,
+  speeds: number[], flow: number, whole: number };
 
-/** What passages tell, as Python's `reading`: a rate is from the first of them to the last. */
-function readingOf(passages: Passage[]): Reading {
+/** What passages tell, as Python's `reading`: a rate is from the first of them to the last.
+ * @param mass of each particle, kg
+ * @param slices how many the material is wide; NaN if that is not said */
+function readingOf(passages: Passage[], mass: number[], slices: number): Reading {
   const on = passages.filter(({ way }) => way > 0), count = on.length;
   const span = count > 1 ? on[count - 1].t - on[0].t : 0;
+  const brought = on.slice(1).reduce((sum, { disk }) => sum + mass[disk], 0);
+  const speeds = on.map(({ speed }) => speed).sort((a, b) => a - b);
+  const flow = span ? brought / span : NaN;
   return {
     count, back: passages.length - count, rate: span ? (count - 1) / span : NaN,
     speed: on.reduce((sum, { speed }) => sum + speed, 0) / count,
+    speeds: QUANTILES.map((share) => quantile(speeds, share)), flow, whole: 3.6 * flow * slices,
   };
 }
 
 class SensorsPanel {
   body = html("tbody");
   panel;
+  flowHead;
   /** By name. */
   counts: Map<string, Passing> = new Map();
 
   constructor(home: Element, readonly lab: Lab, readonly words: Words) {
-    const heads = ["count", "rate", "speed"].map((id) => html("th", { scope: "col" },
+    const heads = ["count", "rate", "flow", "speed"].map((id) => html("th", { scope: "col" },
       words.say(`sensor-${id}`)));
+    this.flowHead = heads[2];
     this.panel = card("sensors", words.say("sensors"), html("table", { class: "sensors" },
       html("thead", {}, html("tr", {}, html("td"), ...heads)), this.body),
     html("p", { class: "note" }, words.say("sensors-note")));
@@ -240,20 +254,29 @@ class SensorsPanel {
 
   /** What each tells up to the time that is shown. */
   get readings(): [string, Reading][] {
-    const { recording, t } = this.lab;
+    const { recording, scene, t } = this.lab, [stream] = scene?.streams ?? [];
+    const wide = scene && stream?.width !== undefined
+      ? slices(stream, scene.particles[scene.kinds[0]]) : NaN;
+    const { machine: { mass } } = recording as Recording;
     return [...this.counts].map(([name, its]) => {
       its.count(recording as Recording);
-      return [name, readingOf(its.passages.slice(0, its.until(t)))];
+      return [name, readingOf(its.passages.slice(0, its.until(t)), mass, wide)];
     });
   }
 
   draw() {
     const { words } = this;
-    this.body.replaceChildren(...this.readings.map(([name, { count, back, rate, speed }]) => {
+    const { readings } = this;
+    // Without a width it is the slice's, as of a crowd's numbers.
+    const isWhole = readings.some(([, { whole }]) => isFinite(whole));
+    this.flowHead.textContent = words.say(isWhole ? "sensor-whole" : "sensor-flow");
+    this.body.replaceChildren(...readings.map(([name, one]) => {
+      const { count, back, rate, speeds, flow, whole } = one;
       const many = back ? words.say("sensor-back", { count, back }) : String(count);
       return html("tr", { "data-id": name }, html("th", { scope: "row" }, words.name(name)),
         html("td", {}, many), html("td", {}, words.number(rate, 3)),
-        html("td", {}, words.number(speed, 3)));
+        html("td", {}, words.number(isWhole ? whole : 3.6 * flow, 3)),
+        html("td", {}, speeds.map((one) => words.number(one, 2)).join(" / ")));
     }));
   }
 }

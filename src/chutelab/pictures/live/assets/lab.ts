@@ -43,6 +43,9 @@ class Lab {
   t = 0;
   playing = false;
   rate = 1;
+  /** Length of a bin of the loads of surfaces, s, where the scene says none; 0: none are counted.
+   */
+  loads = 0;
   fault: Fault | null = null;
   /** The key whose field says what is wrong; "" where the page says it. */
   asked = "";
@@ -79,6 +82,7 @@ class Lab {
     try {
       const scene = resolve(isBare(given) ? { ...given, stream: NOWHERE } : given, this.data);
       const machine = build(scene);
+      machine.loads ||= this.loads;
       if (isBare(given)) {
         scene.streams = [];
         for (const key of ["releases", "radius", "mass", "inertia", "streams"] as const) {

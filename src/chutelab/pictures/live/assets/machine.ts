@@ -52,6 +52,7 @@ export interface Machine {
   endTime: number; // s
   dt: number; // s
   interact: boolean;
+  loads: number; // s; how long a bin of the loads of surfaces is, 0 if they are not counted
   segments: Segment[];
   arcs: Arc[];
   movers: Mover[];
@@ -104,6 +105,7 @@ export function build(scene: Scene): Machine {
     endTime: typeof run.until === "string" ? bound : Math.min(bound, run.until),
     dt: run.dt,
     interact: scene.crowded,
+    loads: run.loads ?? 0,
     segments,
     arcs,
     movers: laid.movers,

@@ -14,6 +14,7 @@ import { listenToKeys } from "./keyboard.ts";
 import { toToml } from "./keys.ts";
 import { Lab } from "./lab.ts";
 import { LandingPanel } from "./landing.ts";
+import { LoadsPanel } from "./loads.ts";
 import { NumbersPanel } from "./numbers.ts";
 import { startPlan } from "./plan.ts";
 import { Show } from "./show.ts";
@@ -67,7 +68,8 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
   watchLaws(byId("law"), lab, words);
   new Arrows(stage, words);
   const symbols = new Symbols(stage);
-  new Show(lab, stage, words, symbols);
+  const loads = data.lesson ? undefined : new LoadsPanel(byId("panels"), lab, stage, words);
+  new Show(lab, stage, words, symbols, loads);
   const inspector = new Inspector(byId("panels"), lab, words);
   const bench = new Bench(byId("bench"), stage, inspector, lab, words);
   const { marks } = new Transport(lab, stage, words);
@@ -82,7 +84,7 @@ async function start(join: (parts: Parts) => { palette?: Palette | null, lesson?
   }
   listenToKeys(bench, more.palette ?? null, marks, lab, words);
   Object.assign(globalThis, {
-    chutelab: { lab, stage, bench, panels, ...more, toml: () => toToml(lab.given as any) },
+    chutelab: { lab, stage, bench, panels, loads, ...more, toml: () => toToml(lab.given as any) },
   });
   byId("broken").remove();
 }

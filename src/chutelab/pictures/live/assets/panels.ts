@@ -116,7 +116,7 @@ function follow(lab: Lab, panel: HTMLDetailsElement, news: News[], act: () => vo
 /** What stands before the title of a panel. */
 const DRAWINGS: Record<string, string> = {
   edit: "slow", energy: "sum", numbers: "digits", landing: "bars", curves: "graph", share: "share",
-  flow: "flow", sensors: "sensor",
+  flow: "flow", loads: "land", sensors: "sensor",
 };
 
 export { card, eased, follow, grown, html, icon, iconButton, menuOf, slide, style };

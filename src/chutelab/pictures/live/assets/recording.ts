@@ -2,7 +2,7 @@
 // Between the engine's knots a track is the cubic Hermite curve, as in Python's recordings.
 
 import type { Breach } from "./breaches.ts";
-import { KNOT_ROW, type Machine, type Event } from "./core.ts";
+import { KNOT_ROW, LOAD_ROW, type Machine, type Event } from "./core.ts";
 import { SWING_ROW, Swings, posed } from "./motion.ts";
 
 export type State = { x: number, y: number, vx: number, vy: number, spin: number, ended: boolean };
@@ -260,6 +260,8 @@ class Recording {
   steps = 0;
   /** States of what hangs on hinges, by surfaces. */
   swings: Map<number, Swings> = new Map();
+  /** What surfaces bear, `LOAD_ROW` numbers each, bin by bin. */
+  loads = new Float64Array();
   /** The laws that it breaks, once it is over and has been judged. */
   breaches: Breach[] = [];
 
@@ -275,12 +277,12 @@ class Recording {
 
   add({
     knots, tips, events, swings, now, state, books = null, gained = 0, unsolved = 0,
-    contacts = 0, steps = 0,
+    contacts = 0, steps = 0, loads,
   }: {
     knots: Float64Array, tips: Float64Array, events: Event[], swings: number[], now: number,
     state: string,
     books?: number[][] | null, gained?: number, unsolved?: number, contacts?: number,
-    steps?: number,
+    steps?: number, loads?: { from: number, rows: Float64Array },
   }) {
     this.gained = gained;
     this.unsolved = unsolved;
@@ -312,9 +314,19 @@ class Recording {
     for (let n = 0; n < swings.length; n += SWING_ROW) {
       this.swings.get(swings[n + 3])?.rows.push(swings.slice(n, n + 3));
     }
+    if (loads?.rows.length) this.bear(loads.from, loads.rows);
     this.measure();
     this.state = state;
     this.now = state === "running" ? now + this.shift : Math.max(this.end, now + this.shift);
+  }
+
+  /** Take in loads, in bins from one on. */
+  bear(from: number, rows: Float64Array) {
+    const at = from * this.machine.surfaces.length * LOAD_ROW;
+    const loads = new Float64Array(at + rows.length);
+    loads.set(this.loads.subarray(0, at));
+    loads.set(rows, at);
+    this.loads = loads;
   }
 
   /** When the last track ends, and the first begins, s. */
@@ -374,6 +386,7 @@ class Recording {
     this.machine = machine;
     this.renamed = renamed;
     this.shift = t;
+    this.loads = new Float64Array();
     this.books = null;
     this.now = t;
     this.state = "running";

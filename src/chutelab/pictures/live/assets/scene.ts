@@ -152,7 +152,7 @@ export interface Scene {
   surface: Surface[];
   streams: Stream[];
   run: { until: "landed" | "settled" | number, max_time: number, dt: number,
-    engine: string };
+    engine: string, loads?: number };
   kinds: number[]; // which of the particles each stream consists of
   crowded: boolean; // whether particles meet
   most: number; // how many particles a page has room for

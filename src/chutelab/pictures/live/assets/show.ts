@@ -3,6 +3,7 @@
 import { html, menuOf } from "./panels.ts";
 import { Legend } from "./legend.ts";
 import type { Hue } from "./balls.ts";
+import type { LoadsPanel } from "./loads.ts";
 import type { Lab } from "./lab.ts";
 import type { Stage } from "./stage.ts";
 import type { Symbols } from "./symbols.ts";
@@ -14,7 +15,8 @@ class Show {
   bar;
   strobe;
 
-  constructor(lab: Lab, readonly stage: Stage, readonly words: Words, symbols: Symbols) {
+  constructor(lab: Lab, readonly stage: Stage, readonly words: Words, symbols: Symbols,
+    loads?: LoadsPanel) {
     const menu = menuOf("show", "eye", words.say("show"));
     menu.classList.add("looks");
     this.bar = menu.lastElementChild;
@@ -24,6 +26,7 @@ class Show {
     this.strobe = this.box("strobe", show.strobe, (on) => { show.strobe = on; });
     this.box("velocity-arrows", show.velocity, (on) => { show.velocity = on; });
     this.box("force-arrows", show.forces, (on) => { show.forces = on; });
+    if (loads) this.box("loads", Boolean(lab.machine?.loads), (on) => loads.show(on));
     this.box("symbols", symbols.shown, (on) => { symbols.shown = on; });
     this.box("grid", true, (on) => { stage.scenery.ground.classList.toggle("off", !on); });
     this.hues();

@@ -69,7 +69,7 @@ function work() {
     type: "chunk", id: job.id, knots: all, tips, events, swings, now: core.get("t"), state,
     books: over ? core.books() : null, reasons: over ? core.reasons() : null,
     gained: core.get("gained"), unsolved: core.get("unsolved_most"),
-    contacts: core.get("impact_count"), steps: core.get("step_count"),
+    contacts: core.get("impact_count"), steps: core.get("step_count"), loads: core.takeLoads(over),
   }, { transfer: [all.buffer, tips.buffer] });
   if (over) job = null;
   else schedule();

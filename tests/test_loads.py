@@ -2,6 +2,7 @@
 
 import csv
 import json
+from itertools import pairwise
 from math import cos, radians, sin
 
 import numpy as np
@@ -178,6 +179,43 @@ def test_a_heap_that_sleeps_presses_by_its_weight():
     assert load.normal[2:] == pytest.approx(13 * 0.1 * G, rel=1e-2)
     assert load.place[-5:, 0] == pytest.approx(0.0, abs=1e-4)
     assert balance(run).holds
+
+
+@pytest.mark.slow
+def test_the_pressure_under_a_heap_follows_its_height():
+    """A floor in tiles: together they bear the weight, each about what lies above it, φ ρ g h(x).
+
+    Poured disks are no fluid: arches carry the weight of the middle to the flanks, so that the
+    pressure is largest beside the middle, not below the top. Three heaps are taken together.
+    """
+    edges = np.linspace(-0.2, 0.2, 11)
+    tiles = [
+        {"name": f"tile{n}", "from": [a, 0.0], "to": [b, 0.0], "restitution": 0.0, "friction": 0.6}
+        for n, (a, b) in enumerate(pairwise(edges.tolist()))
+    ]
+    borne, above = np.zeros((2, len(tiles)))
+    for seed in range(3):
+        run = chutelab.simulate(
+            {"particle": {"radius": [0.004, 0.006], "density": 2500, "spin": True,
+                          "rolling_friction": 0.3},
+             "surface": tiles,
+             "stream": {"count": 200, "rate": 100.0, "at": [-0.005, 0.25], "to": [0.005, 0.25],
+                        "velocity": [0.0, -1.0], "interact": True, "restitution": 0.2,
+                        "friction": 0.5, "seed": seed},
+             "run": {"until": 4.0, "loads": 0.05}}
+        )  # fmt: skip
+        place, mass = run.at([4.0]).position[0], run.mass
+        here = np.isfinite(place[:, 0])
+        own = [run.loads(tile["name"]).part("normal").end for tile in tiles]
+        assert sum(own) == pytest.approx(mass[here].sum() * G, rel=1e-3)
+        borne += own
+        above += np.histogram(place[here, 0], edges, weights=G * mass[here])[0]
+    assert np.corrcoef(borne, above)[0, 1] > 0.8
+    assert borne[:5].sum() == pytest.approx(borne[5:].sum(), rel=0.15)
+    assert borne[[0, 9]].max() < 0.2 * borne[4:6].max()
+    # The dip below the top: the flanks bear a part of the middle.
+    assert 0.6 < borne[4:6].sum() / above[4:6].sum() < 0.95
+    assert borne[[1, 2, 7, 8]].sum() > above[[1, 2, 7, 8]].sum()
 
 
 def test_bins_are_summed_stored_and_refused(tmp_path):

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import chutelab
 from chutelab.cli import main
+from chutelab.results import sensors
 from chutelab.results.sensors import flow, passages, reading, residence
 from chutelab.scene import SceneError
 
@@ -41,6 +42,19 @@ def test_a_flight_passes_where_its_parabola_does():
     top = u * u / (2.0 * g) + 1e-12
     assert len(passages(run, (0.0, top), (2.0, top))) == 0
     assert len(passages(run, (0.3, -2.0), (0.3, 0.0))) == 0
+
+
+def test_a_wrong_curve_is_found(monkeypatch):
+    """Planted: passages are 1e-10 m off their place."""
+    honest = sensors.hermite
+
+    def off(*arguments):
+        place, *rest = honest(*arguments)
+        return place + 1e-10, *rest
+
+    monkeypatch.setattr(sensors, "hermite", off)
+    with pytest.raises(AssertionError):
+        test_a_flight_passes_where_its_parabola_does()
 
 
 def test_counts_are_those_of_a_count_by_hand(stream):
@@ -85,6 +99,7 @@ def test_rates_depth_and_residence(stream):
 def test_width_kinds_and_sizes_are_told():
     wide = chutelab.simulate("stream", {"sensor": [GATE], "stream.width": 0.63, "stream.count": 60})
     one = reading(wide, "gate")
+    assert wide.measure("sensor.gate.whole_rate") == one.whole_rate
     assert one.whole_rate == pytest.approx(3.6 * one.mass_rate * 0.63 / (2 * 0.0063))
     mixed = {"name": "across", "from": [-2.0, -0.2], "to": [2.0, -0.2]}
     run = chutelab.simulate("mixture", {"sensor": [mixed], "run.until": 3.0})
@@ -123,7 +138,7 @@ def test_command_writes_table_and_picture(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("sensors", "said"),
+    ("given", "said"),
     [
         ([{**GATE, "to": GATE["from"]}], "sensor[0].to"),
         ([GATE, GATE], "sensor[1].name"),
@@ -131,9 +146,9 @@ def test_command_writes_table_and_picture(tmp_path):
         ([{**GATE, "width": 1.0}], "sensor[0].width"),
     ],
 )
-def test_bad_sensors_are_refused(sensors, said):
+def test_bad_sensors_are_refused(given, said):
     with pytest.raises(SceneError) as caught:
-        chutelab.load("stream", {"sensor": sensors})
+        chutelab.load("stream", {"sensor": given})
     assert said in str(caught.value)
 
 

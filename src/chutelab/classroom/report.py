@@ -410,7 +410,8 @@ def sensitivities(made: Report) -> Sheet:
     given = dict(_leaves(to_dict(scene)))
     keys = [key for key in TURNED if isinstance(given.get(key), int | float)]
     cost = made.recording.seconds
-    keys = keys[: int(BUDGET / (2.0 * cost))] if cost > 0.0 else keys
+    room = int(BUDGET / (2.0 * cost)) if cost > 0.0 else len(keys)
+    keys, skipped = keys[:room], keys[room:]
     rows = []
     for key in keys:
         value = float(given[key])
@@ -435,6 +436,9 @@ def sensitivities(made: Report) -> Sheet:
         notes = ["Half the difference between the key changed up and down by as much"]
         if made.recording.count > 1:
             notes.append("Same seed: grains meet otherwise in each run, which is noise in it")
+    if skipped:
+        limit = f"they would take more than the {BUDGET:g} s that there are for all"
+        notes.append(f"Left out: {', '.join(skipped)}; {limit}")
     return Sheet("", heads, tuple(rows), notes=tuple(notes))
 
 

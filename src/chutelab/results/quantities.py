@@ -406,6 +406,10 @@ def _at_end(recording: Record, values: Any) -> Floats:
     return found
 
 
+PASSED = ("count", "back", "rate", "mass_rate", "whole_rate", "depth")
+"""What a sensor tells of a run, as in `results.sensors.Reading`."""
+
+
 def measured(recording: Record, name: str) -> Floats:
     """Return a quantity that the scene has of each of V variants, (V,); NaN without one.
 
@@ -433,7 +437,7 @@ def measured(recording: Record, name: str) -> Floats:
             return count(np.isnan(each(recording, "arrival.t")))
         case ["error", "max"]:
             return worst(recording)
-        case ["sensor", sensor, "count" | "back" | "rate" | "mass_rate" | "depth" as key]:
+        case ["sensor", sensor, key] if key in PASSED:
             return np.array([float(getattr(reading(recording, sensor), key))])
         case ["loads", surface, part, statistic]:
             return np.array([getattr(load(recording, surface).part(part), statistic)])

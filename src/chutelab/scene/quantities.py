@@ -191,6 +191,8 @@ REGISTRY: Final = {
         Quantity("sensor.SENSOR.back", "", "passages of SENSOR the other way", "run"),
         Quantity("sensor.SENSOR.rate", "1/s", "particles per time through SENSOR", "run"),
         Quantity("sensor.SENSOR.mass_rate", "kg/s", "mass per time through SENSOR", "run"),
+        Quantity("sensor.SENSOR.whole_rate", "t/h", "flow through SENSOR in all the stream.width",
+                 "run"),
         Quantity("sensor.SENSOR.depth", "m", "depth of the stream at SENSOR", "run"),
         *(
             row

@@ -62,6 +62,7 @@ UNITS: Final = {
     **{f"{prefix}{unit}": (unit, size) for unit in "sJWN" for prefix, size in _PREFIXES.items()},
     **{f"{prefix}g": ("kg", 1e-3 * size) for prefix, size in _PREFIXES.items()},
     **dict.fromkeys(("m/s²", "m/s^2"), ("m/s²", 1.0)),
+    **{unit: (unit, 1.0) for unit in ("1/s", "kg/s", "t/h")},
     "degrees": ("degrees", 1.0),
     "deg": ("degrees", 1.0),
     "°": ("degrees", 1.0),

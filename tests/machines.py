@@ -125,7 +125,14 @@ def bent(machine, *arcs):
     names = tuple(dict.fromkeys([*machine.surfaces, *(row.pop("name") for row in rows)]))
     owner = [names.index(arc.get("name", f"arc {n}")) for n, arc in enumerate(arcs)]
     columns = {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}
-    return boxed(replace(machine, surfaces=names, arcs=Arcs(**columns, surface=np.array(owner))))
+    arcs = Arcs(**columns, surface=np.array(owner))
+    return boxed(loose(replace(machine, surfaces=names, arcs=arcs)))
+
+
+def loose(machine):
+    """Return the machine without cohesion, of its own number of kinds and surfaces."""
+    kinds = len(machine.pair_restitution)
+    return replace(machine, cohesion=np.zeros((kinds, kinds + len(machine.surfaces))))
 
 
 def gated(machine, piece, appears=-inf, vanishes=inf):
@@ -142,7 +149,7 @@ def of_sizes(machine, radius, mass, share=0.0, kind=None, **tables):
     releases = machine.releases
     if kind is not None:
         releases = replace(releases, kind=np.array(kind))
-    return replace(machine, particle=particle, releases=releases, **tables)
+    return loose(replace(machine, particle=particle, releases=releases, **tables))
 
 
 def box(count, seed, side, *, radius=0.02, friction=0.0, spin=False, end=1.0, dt=1e-3):

@@ -342,3 +342,26 @@ def test_several_particles_that_do_not_meet_are_refused():
     scene = machine({"fill": [[0.1, 0.1], [0.3, 0.3]], "count": 3}, mass=1.0)
     with pytest.raises(SceneError, match="couples particles: several of them have to meet"):
         chutelab.load(scene)
+
+
+@pytest.mark.parametrize(
+    ("change", "law"),
+    [
+        ({"spring": 0.6}, "the ledger closes"),
+        ({"mass": 0.25}, "the ledger closes"),
+        ({"damper": 0.02}, "energy rises only by drives"),
+        ({"stops_deg": [-30, 40]}, "nothing inside a surface"),
+        ({"motor": {"speed_deg": 200.0, "torque": 0.01}}, "energy rises only by drives"),
+    ],
+)
+def test_a_hinge_that_is_not_that_of_the_scene_breaks_a_law(change, law):
+    """Its ledger may close in itself: it is judged by the scene and its states."""
+    own = {"mass": 0.3, "spring": 0.5, "damper": 0.015, "stops_deg": [-60, 40]}
+    own["motor"] = {"speed_deg": 200.0, "torque": 0.05}
+    stream = {"at": [0.3, 0.4], "velocity": [0.0, 0.0]}
+    recording = run(stream, **own)
+    other = chutelab.simulate(machine(stream, **own | change)).machine
+    hinges = [replace(m, hinge=replace(m.hinge, states=recording.swings)) for m in other.movers]
+    wrong = replace(recording, machine=replace(other, movers=tuple(hinges)))
+    assert law in {broken.law for broken in judge(wrong)}
+    assert {broken.surface for broken in judge(wrong)} == {"lever"}

@@ -431,3 +431,23 @@ def test_bad_input_is_told_with_key_value_and_what_is_allowed(keys, said):
     with pytest.raises(SceneError) as told:
         chutelab.load(table(**keys))
     assert said in str(told.value)
+
+
+def test_the_drive_of_a_drum_pays_what_is_lost():
+    """Once the slope stands, its work is what bounces and slip take, within 2 %."""
+    drum = {"name": "drum", "center": [0.0, 0.0], "radius": 0.2, "turn": 180.0, "friction": 0.4}
+    box = [[-0.11, -0.11], [0.11, 0.11]]
+    tables = {
+        "particle": {"radius": 0.012, "mass": 0.01, "shape": "sphere"},
+        "surface": [drum],
+        "stream": {"count": 40, "fill": box, "velocity": [0.0, 0.0], "interact": True},
+        "run": {"until": 1.9},
+    }
+    recording = chutelab.simulate(tables)
+    assert not recording.laws
+    totals = recording.totals
+    begin, end = totals[np.searchsorted(totals["t"], 1.2)], totals[-1]
+    work, *losses = end["entries"] - begin["entries"]
+    assert work == pytest.approx(sum(losses), rel=2e-2)
+    # Half a watt and more.
+    assert work > 0.5 * (end["t"] - begin["t"])

@@ -35,6 +35,7 @@ AUTO = {
     "galton": "contact",
     "mixture": "contact",
     "damper-plate": "contact",
+    "flap-gate": "contact",
     "see-saw": "contact",
     "cradle": "pymunk",
     "dominoes": "pymunk",

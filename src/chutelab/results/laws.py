@@ -8,6 +8,7 @@ what comes of it; `chutelab stress` has more laws, which take longer.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot, nan, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -128,7 +129,78 @@ def _tell(recording: Record) -> tuple[Broken, ...]:
             name = "pulley"
         advice, unit = _advice(recording, law, found.figures), UNITS.get(law, "J")
         told.append(Broken(law, particles, particle, t, (x, y), name, amount, bound, unit, advice))
+    if recording.engine == "contact":
+        told += _hinges(recording, found.figures)
     return tuple(told)
+
+
+def _hinges(recording: Record, figures: Any) -> list[Broken]:
+    """Judge what hangs on hinges by its states, and what the scene says acts on it.
+
+    E is its energy, ΔE = worked - given - stopped - damped; damped = ∫ damper rate² dt; stops hold;
+    a motor works no more than its torque times its way.
+    """
+    told = list[Broken]()
+
+    def must(law: str, surface: int, amount: float, bound: float, unit: str = "J") -> None:
+        if not amount <= bound:
+            name, t = recording.surfaces[surface], float(recording.swings["t"].max())
+            advice = _advice(recording, law, figures)
+            told.append(Broken(law, 0, -1, t, (nan, nan), name, amount, bound, unit, advice))
+
+    load = float(np.broadcast_to(recording.machine.particle.mass, recording.count).sum())
+    for mover in recording.machine.movers:
+        hinge, surface = mover.hinge, mover.surface
+        if hinge is None or hinge.steered:
+            continue
+        t, angle, rate = (hinge.states[name] for name in ("t", "angle", "rate"))
+        worked, stopped, damped = recording.hinge_work[surface].tolist()
+        parts = np.stack(hinge.energies(angle, rate, recording.gravity))
+        energy = parts.sum(axis=0)
+        given = float(recording.drives[surface])
+        play = float(np.abs(parts).sum(axis=0).max())
+        play += sum(map(abs, (worked, given, stopped, damped)))
+        off = energy[-1] - energy[0] - (worked - given - stopped - damped)
+        must(LEDGER, surface, abs(off), CLOSES * play + EPS)
+        # Cubics between states, squared, by Gauss's rule of three points.
+        h = np.diff(t)[:, None]
+        share = np.array([0.5 - sqrt(0.15), 0.5, 0.5 + sqrt(0.15)])
+        rates = hinge.at(t[:-1, None] + h * share)[1]
+        lost = hinge.damper * float((h * rates**2 @ np.array([5.0, 8.0, 5.0]) / 18.0).sum())
+        way = hinge.motor[1] * float(np.abs(np.diff(angle)).sum())
+        # rad/s; by which it hops in a step, with what lies on it.
+        moments = hinge.motor[1] + hinge.spring * np.abs(angle - hinge.rest).max()
+        moments += recording.gravity * (hypot(*hinge.moment) + 2.0 * hinge.gyration * load)
+        moments += hinge.damper * np.abs(rate).max()
+        hop = 2.0 * float(moments) * recording.machine.dt / hinge.inertia
+        lasts = float(t[-1] - t[0])
+        must(
+            LOSSES, surface, -min(stopped, damped),
+            0.5 * hinge.inertia * hop**2 + CLOSES * play + EPS,
+        )  # fmt: skip
+        must(
+            ENERGY, surface, abs(damped - lost),
+            HOPS * max(damped, lost) + hinge.damper * hop**2 * lasts + CLOSES * play + EPS,
+        )  # fmt: skip
+        must(
+            ENERGY, surface, abs(worked) - way,
+            HOPS * way + hinge.motor[1] * hop * lasts + CLOSES * play + EPS,
+        )  # fmt: skip
+        low, high = hinge.stops
+        beyond = max(low - float(angle.min()), float(angle.max()) - high)
+        must(INSIDE, surface, beyond, BEYOND, "rad")
+    return told
+
+
+CLOSES, EPS = 1e-9, 1e-15
+"""Share of a hinge's energies, and J, up to which its ledger is closed."""
+
+HOPS = 0.05
+"""Share by which a damper's loss and a motor's work may be off what the states say of them: what is
+pressed hops from step to step, between its states."""
+
+BEYOND = 1e-3
+"""rad; by which a hinge may be beyond its stops."""
 
 
 def examine(recording: Record) -> Findings:

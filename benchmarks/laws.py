@@ -1,11 +1,11 @@
-"""What the laws of every run, and the loads that one may ask for, take, as shares of the run itself.
+"""What the laws of every run, and loads if they are asked for, take as shares of the run itself.
 
     python benchmarks/laws.py [SCENE ...]
 
 By default of all shipped scenes. Processor time of resolving and running a scene, and of the same
 with its laws, in turns; medians. Lone particles are judged in the core's memory as their run ends,
-so that the judging is the difference of the two. Loads are counted in bins of 0.01 s, beside the run
-with its laws. Either share ought to be at most a tenth.
+so that the judging is the difference of the two. Loads are counted in bins of 0.01 s, as a share
+of the run with its laws. Either share ought to be at most a tenth.
 """
 
 import sys
@@ -71,9 +71,8 @@ def measure(name):
 
 
 def main(names):
-    print(
-        f"{'scene':20} {'engine':8} {'knots':>9} {'run, ms':>10} {'laws, ms':>9} {'share':>6} {'loads':>6}"
-    )
+    times = f"{'run, ms':>10} {'laws, ms':>9} {'share':>6} {'loads':>6}"
+    print(f"{'scene':20} {'engine':8} {'knots':>9} {times}")
     for name in names or shipped():
         measure(name)
 

@@ -1,10 +1,11 @@
-"""What the laws that every run is judged by take, as a share of the run itself.
+"""What the laws of every run, and loads if they are asked for, take as shares of the run itself.
 
     python benchmarks/laws.py [SCENE ...]
 
 By default of all shipped scenes. Processor time of resolving and running a scene, and of the same
 with its laws, in turns; medians. Lone particles are judged in the core's memory as their run ends,
-so that the judging is the difference of the two. The share ought to be at most a tenth.
+so that the judging is the difference of the two. Loads are counted in bins of 0.01 s, as a share
+of the run with its laws. Either share ought to be at most a tenth.
 """
 
 import sys
@@ -41,11 +42,14 @@ def unjudged(honest):
 
 
 def measure(name):
-    scene = load(name)
+    scene, counting = load(name), load(name, {"run.loads": 0.01})
 
-    def judged():
+    def judged(scene=scene):
         recording = follow(ahead(scene), None, None)
         return recording, recording.laws
+
+    def counted():
+        judged(counting)
 
     def bare(honest=Module.run):
         Module.run = unjudged(honest)
@@ -55,18 +59,20 @@ def measure(name):
     recording, _ = judged()
     short = len(recording.knots) <= SHORT
     times, turns = (MANY, TURNS) if short and recording.engine != "pymunk" else (1, FEW)
-    pairs = [(timed(bare, times), timed(judged, times)) for _ in range(turns)]
-    ran = median(run for run, _ in pairs)
-    share = median((whole - run) / run for run, whole in pairs)
+    rows = [[timed(each, times) for each in (bare, judged, counted)] for _ in range(turns)]
+    ran = median(run for run, *_ in rows)
+    share = median((whole - run) / run for run, whole, _ in rows)
+    loads = median((more - whole) / whole for _, whole, more in rows)
     print(
         f"{name:20} {recording.engine:8} {len(recording.knots):9,} {1e3 * ran:10.3f}"
-        f" {1e3 * share * ran:9.3f} {share:6.3f}",
+        f" {1e3 * share * ran:9.3f} {share:6.3f} {loads:6.3f}",
         flush=True,
     )
 
 
 def main(names):
-    print(f"{'scene':20} {'engine':8} {'knots':>9} {'run, ms':>10} {'laws, ms':>9} {'share':>6}")
+    times = f"{'run, ms':>10} {'laws, ms':>9} {'share':>6} {'loads':>6}"
+    print(f"{'scene':20} {'engine':8} {'knots':>9} {times}")
     for name in names or shipped():
         measure(name)
 

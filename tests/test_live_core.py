@@ -9,6 +9,7 @@ from chutelab.engines import contact as engine
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
 from chutelab.results.loads import gather
+from chutelab.results.record import EVENT
 from chutelab.scene import from_dict, load, parse
 from live.node import ask, needs_node, page_scene
 
@@ -53,7 +54,7 @@ def same_runs(scenes):
         its = np.array(answer["knots"]).reshape(-1, 10)
         assert np.array_equal(its[:, :9], ours), given
         assert np.array_equal(its[:, 9], knots["disk"]), given
-        events = np.concatenate(job.events)
+        events = np.concatenate(job.events).view(EVENT)
         assert [event["t"] for event in answer["events"]] == events["t"].tolist(), given
         assert [event["kind"] for event in answer["events"]] == events["kind"].tolist(), given
         states = job.module.array("swings", module.dtype("Swing"), job.module.world.swing_count)

@@ -12,6 +12,7 @@ from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
 from chutelab.pictures.live.page import html
 from chutelab.scene import from_dict, load
 from chutelab.scene.conflicts import HINGED, MOTIONS
+from chutelab.util.words import words
 from live.browser import DONE, axe, spot
 
 expect = pytest.importorskip("playwright.sync_api").expect
@@ -453,7 +454,7 @@ def test_the_first_machine_and_the_examples_are_one_click_away(empty):
     page.click("#example-cascade")
     page.evaluate(DONE)
     assert from_dict(given(page)) == from_dict(describe(load("cascade"))["scene"])
-    assert page.inner_text("h1") == load("cascade").title
+    assert page.inner_text("h1") == words("de").say("title-cascade")
 
 
 def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_path):

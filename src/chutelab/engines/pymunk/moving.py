@@ -17,15 +17,17 @@ class Hanging:
     """What hangs on a hinge: a body a face, which pivots there; all of a surface turn together.
 
     Like a particle's place its angle in the Space is half a step behind, and is read so. Chipmunk
-    tells of a joint's impulse its size only: a stop pushes inwards, a motor towards its speed.
+    tells of a joint's impulse its size only: a stop pushes inwards, and a motor, which drives and
+    brakes, as what else acts and the change of momentum ask for.
     """
 
     def __init__(self, space: pymunk.Space, mover: Mover, bodies: list[pymunk.Body]) -> None:
         hinge, still, many = mover.hinge, space.static_body, len(bodies)
         assert hinge is not None
-        self.hinge, self.surface, self.body = hinge, mover.surface, bodies[0]
+        self.hinge, self.surface, self.body, self.bodies = hinge, mover.surface, bodies[0], bodies
         x, y = hinge.moment
         pivot, weighs = Vec2d(*mover.pivot), hinge.mass > 0.0
+        self.pivot = pivot
         # What has no weight has its mass at the hinge, where it does nothing.
         mass = hinge.mass if weighs else hinge.inertia / hinge.gyration**2
         middle = Vec2d(x, y) / mass if weighs else Vec2d.zero()
@@ -58,12 +60,29 @@ class Hanging:
         """Note its state after a step that ended at a time (s), and what acted on it."""
         rate, mean = self.rate, 0.5 * (self.rate + self.before)
         inwards = -1.0 if self.body.angle > 0.5 * sum(np.clip(self.hinge.stops, -1e9, 1e9)) else 1.0
-        turns = 1.0 if self.hinge.motor[0] > mean else -1.0
+        stopped = inwards * self.stop.impulse
         if self.hinge.motor[1] > 0.0:
-            self.work[0] += turns * self.motor.impulse * mean
-        self.work[1] -= inwards * self.stop.impulse * mean
+            asked = self.hinge.inertia * (rate - self.before) - stopped - self._moment(h, mean)
+            self.work[0] += np.sign(asked) * self.motor.impulse * mean
+        self.work[1] -= stopped * mean
         self.work[2] += self.hinge.damper * h * mean * mean
         self.states.append((t, self.body.angle + 0.5 * h * rate, rate, self.surface, 0))
+
+    def _moment(self, h: float, rate: float) -> float:
+        """Sum what weight, spring and contacts gave about the pivot in a step, N m s."""
+        sprung = self.hinge.spring * (self.hinge.rest - self.body.angle) - self.hinge.damper * rate
+        given = [h * sprung]
+
+        def touched(arbiter: pymunk.Arbiter) -> None:
+            for point in arbiter.contact_point_set.points:
+                off, impulse = point.point_a - self.pivot, arbiter.total_impulse
+                given.append(off.cross(impulse) / len(arbiter.contact_point_set.points))
+
+        for body in self.bodies:
+            weight = body.mass * body.space.gravity * h
+            given.append((body.local_to_world(body.center_of_gravity) - self.pivot).cross(weight))
+            body.each_arbiter(touched)
+        return sum(given)
 
 
 class Moving:

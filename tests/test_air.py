@@ -31,12 +31,12 @@ def thrown(engine="contact", dt=1e-3, air=AIR, until=1.2, **more):
     })  # fmt: skip
 
 
-def by_ode(until):
+def by_ode(until, air):
     """Flight, bounce, flight: state at the end with the energy lost to air, and times of blows."""
 
     def rate(_, s):
         _, _, vx, vy, _ = s
-        k = relief(np.hypot(vx, vy))
+        k = relief(np.hypot(vx, vy), air)
         return vx, vy, -k * vx, -k * vy - G, M * k * (vx * vx + vy * vy)
 
     def meets(_, s):
@@ -53,12 +53,14 @@ def by_ode(until):
     return state, blows
 
 
-@pytest.mark.parametrize("until", [0.6, 1.2])
-def test_flights_and_bounces_follow_the_ode_to_second_order(until):
-    (x, y, vx, vy, lost), blows = by_ode(until)
+@pytest.mark.parametrize(("until", "air"), [(0.6, AIR), (1.2, AIR), (0.45, 0.4)])
+def test_flights_and_bounces_follow_the_ode_to_second_order(until, air):
+    (x, y, vx, vy, lost), blows = by_ode(until, air)
+    # In thin air the coefficient is Schiller's and Naumann's, Re < 1000, all the way.
+    assert (2.0 * R * air * np.hypot(vx, vy) / NU < 1000.0) == (air < AIR)
     off = []
     for dt in (1e-3, 5e-4, 2.5e-4):
-        run = simulate(thrown(dt=dt, until=until))
+        run = simulate(thrown(dt=dt, until=until, air=air))
         at, v = run.knots["position"][-1], run.knots["velocity"][-1]
         off.append(max(*np.abs(at - (x, y)), *np.abs(v - (vx, vy))))
         assert run.select("impact")["t"] == pytest.approx(blows, abs=1e-7)
@@ -72,7 +74,16 @@ def test_flights_and_bounces_follow_the_ode_to_second_order(until):
     # A blow comes anywhere in its step, so the error after it has another share of dt² each time.
     assert blows or (off[0] > 3.5 * off[1] > 12.0 * off[2])
     # Without, it would be centimetres further: this is no test of nothing.
-    assert simulate(thrown(air=0.0, until=until)).knots["position"][-1, 0] > x + 0.05 * until
+    without = simulate(thrown(air=0.0, until=until)).knots["position"][-1, 0]
+    assert without > x + 0.05 * until * air / AIR
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("text", "air"), [("return 6 * PI", 0.4), ("return 0.22 *", AIR)])
+def test_a_coefficient_off_by_a_hundred_thousandth_is_seen(text, air, with_fault):
+    with_fault("air.c", text, text.replace("return", "return (1.0 + 1e-5) *"))
+    with pytest.raises(AssertionError):
+        test_flights_and_bounces_follow_the_ode_to_second_order(0.45, air)
 
 
 def test_where_the_coefficient_is_0_44_a_shot_follows_its_closed_form():

@@ -16,7 +16,8 @@ from chutelab.pictures import plots
 from chutelab.pictures.animation import Stage, film, lay_out
 from chutelab.pictures.animation.moments import asked, slowness, span
 from chutelab.pictures.plots import look
-from chutelab.pictures.plots.figure import sensors
+from chutelab.pictures.plots.figure import loads, sensors
+from chutelab.pictures.plots.measures import wear
 from chutelab.util.words import STRINGS
 from handmade import assert_legible
 from shared import lessons, some
@@ -87,10 +88,10 @@ def test_a_lesson_has_a_small_film_in_each_language(number, language):
 def test_german_pictures_have_no_english_in_them(name):
     settings = ["stream.count=60"] if name == "stream-independent" else ["run.until=0.6"]
     settings = [] if name == "slip" else settings
-    recording = simulate(scene.load(name, [*settings, 'title="Bild"']))
+    recording = simulate(scene.load(name, [*settings, "run.loads=0.01", 'title="Bild"']))
     with look(language="de"):
-        figures = [plots.overlay(recording), plots.strobe(recording), sensors(recording)]
-        for figure in figures:
+        for draw in (plots.overlay, plots.strobe, sensors, loads, wear):
+            figure = draw(recording)
             figure.canvas.draw()
             # Names of streams and surfaces are the scene's own.
             assert english_in(texts_of(figure)) == set()

@@ -211,6 +211,7 @@ Texts = tuple[str, ...]
 SceneName = Annotated[str, complete_scene]
 Engine = Literal["auto", "exact", "contact", "pymunk"] | None
 Seconds = Annotated[float, Number(min=0.0, min_open=True)]
+Coefficient = Annotated[float | None, Number(min=0.0, min_open=True)]
 Jobs = Annotated[int, Count(min=0)]
 Repeat = Annotated[int, Count(min=1)]
 Folder = Annotated[Path | None, FolderName()]

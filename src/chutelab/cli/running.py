@@ -14,6 +14,7 @@ from click.shell_completion import CompletionItem
 from chutelab.cli.console import RefusedError, progress, say, show_json, tell
 from chutelab.cli.console import show as show_parts
 from chutelab.cli.options import (
+    Coefficient,
     Count,
     Engine,
     FileName,
@@ -89,6 +90,8 @@ class Output:
         without, the first 5, but no events.csv of more than 100,000 events. May be repeated.
     --format  With --out: the lesson picture as this instead of a GIF; mp4 and webm need the extra
         chutelab[video].
+    --erosion K  With --only wear: Finnie's k, m³/J; wear.csv has volumes, too, in erosion_m3.
+    --abrasion K  With --only wear: Archard's K/H, 1/Pa; the same, in abrasion_m3.
     --no-energy  With --out: the lesson picture without the energy ledger; the machine is larger.
     --dark  With --out: pictures and film on a dark ground, for a dark slide or page.
     --language  With --out: of what pictures and film say; titles and names of the scene stay as
@@ -101,6 +104,8 @@ class Output:
     out: Folder
     only: Annotated[Texts, complete_kinds]
     format_: Literal["gif", "mp4", "webm"] | None
+    erosion: Coefficient
+    abrasion: Coefficient
     no_energy: bool
     dark: bool
     details: bool
@@ -108,6 +113,7 @@ class Output:
     quiet: bool
     language: Literal["en", "de"] = "en"
     kinds: tuple[str, ...] = field(init=False)  # which of `KINDS`
+    coefficients: dict[str, float] = field(init=False)  # of wear, those that are given
 
     def __post_init__(self) -> None:
         chosen = {kind.strip().lower() for value in self.only for kind in value.split(",")}
@@ -127,6 +133,11 @@ class Output:
         if looks and (self.out is None or not PICTURED.intersection(kinds)):
             pictures = ", ".join(kind for kind in KINDS if kind in PICTURED)
             raise click.UsageError(f"{option} is for pictures: give --out DIR, with {pictures}.")
+        given = {"erosion": self.erosion, "abrasion": self.abrasion}
+        self.coefficients = {key: k for key, k in given.items() if k is not None}
+        for key in self.coefficients:
+            if self.out is None or "wear" not in kinds:
+                raise click.UsageError(f"--{key} is for wear.csv: give --out DIR, with wear.")
         if self.format_ is not None:
             others = set(kinds) - set(FILMS)
             if len(others) == len(kinds):
@@ -191,7 +202,7 @@ class Output:
                 elif kind == "wear":
                     from chutelab.pictures.plots.measures import wear
 
-                    recording.to_csv(folder, only=["wear"])
+                    recording.to_csv(folder, only=["wear"], coefficients=self.coefficients)
                     wear(recording).write(folder / "wear.png")
                 elif kind == "npz":
                     recording.save(path)

@@ -20,7 +20,7 @@ asked for: most runs need few of them.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -149,11 +149,12 @@ class Recording(Record):
         *,
         step: float | None = None,
         only: Collection[str] = ("events", "trajectory"),
+        coefficients: Mapping[str, float] | None = None,
     ) -> list[Path]:
         """Write events.csv and trajectory.csv into a folder; see `results.storage.to_csv`."""
         from chutelab.results.storage import to_csv
 
-        return to_csv(self, folder, step=step, only=only)
+        return to_csv(self, folder, step=step, only=only, coefficients=coefficients)
 
     def frame(self, table: str = "trajectory", *, step: float | None = None) -> Any:
         """Return positions over time, or ``"events"``, as a DataFrame; see `storage.frame`."""

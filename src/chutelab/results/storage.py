@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import warnings
 import zipfile
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from errno import EINVAL, ESPIPE
 from math import inf, isnan, prod
@@ -33,7 +33,7 @@ from chutelab.results.record import (
     Record,
 )
 from chutelab.results.sensors import sensed
-from chutelab.results.wear import KEYS, touched
+from chutelab.results.wear import KEYS, check_coefficients, touched
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
@@ -278,6 +278,7 @@ def to_csv(
     *,
     step: float | None = None,
     only: Collection[str] = TABLES[:2],
+    coefficients: Mapping[str, float] | None = None,
 ) -> list[Path]:
     """Write events.csv, trajectory.csv, sensors.csv, loads.csv and wear.csv, each whole or not.
 
@@ -291,14 +292,20 @@ def to_csv(
         Interval of the trajectory, s; by default that of `instants`.
     only : collection of str
         Which of the five; by default the first two.
+    coefficients : mapping, optional
+        Of "erosion", m³/J, and "abrasion", 1/Pa, as `wear.worn` takes them: volumes, m³, stand in
+        columns of their own in wear.csv.
 
     Raises
     ------
+    InputError
+        If a coefficient is out of its range; nothing is written then.
     ValueError
         If `step` is not positive and finite, or so short that the trajectory would have more than
         `MOST_ROWS` rows; nothing is written then.
     """
-    tables = {name: _table(recording, name, step) for name in TABLES if name in only}
+    check_coefficients(coefficients := coefficients or {})
+    tables = {name: _table(recording, name, step, coefficients) for name in TABLES if name in only}
     return [
         write_lines(Path(folder) / f"{name}.csv", csv_lines(rows)) for name, rows in tables.items()
     ]
@@ -326,11 +333,13 @@ def frame(recording: Record, table: str = "trajectory", *, step: float | None = 
     """
     if table not in TABLES:
         raise ValueError(f"table = {table!r}: one of {', '.join(TABLES)}")
-    names, *rows = _table(recording, table, step)
+    names, *rows = _table(recording, table, step, {})
     return data_frame({str(name): [row[i] for row in rows] for i, name in enumerate(names)})
 
 
-def _table(recording: Record, name: str, step: float | None) -> Iterator[Sequence[object]]:
+def _table(
+    recording: Record, name: str, step: float | None, coefficients: Mapping[str, float]
+) -> Iterator[Sequence[object]]:
     """Return the rows of a table, the names of its columns first."""
     if step is not None:
         if not 0.0 < step < inf:
@@ -348,7 +357,7 @@ def _table(recording: Record, name: str, step: float | None) -> Iterator[Sequenc
     if name == "sensors":
         return _passages(recording)
     if name in ("loads", "wear"):
-        return _loads(recording) if name == "loads" else _wear(recording)
+        return _loads(recording) if name == "loads" else _wear(recording, coefficients)
     return _events(recording) if name == "events" else _trajectory(recording, step)
 
 
@@ -414,14 +423,15 @@ def _loads(recording: Record) -> Iterator[Sequence[object]]:
             yield name, t, *(None if isnan(value) else value for value in row)
 
 
-def _wear(recording: Record) -> Iterator[Sequence[object]]:
-    yield "surface", "from", "to", "x", "y", *KEYS
+def _wear(recording: Record, coefficients: Mapping[str, float]) -> Iterator[Sequence[object]]:
+    yield "surface", "from", "to", "x", "y", *KEYS, *(f"{key}_m3" for key in coefficients)
     for name, one in touched(recording).items():
         columns = (
             one.edges[:-1],
             one.edges[1:],
             *one.places[:, 1].T,
             *(getattr(one, key) for key in KEYS),
+            *(k * getattr(one, key) for key, k in coefficients.items()),
         )
         for row in zip(*(column.tolist() for column in columns), strict=True):
             yield name, *(None if isnan(value) else value for value in row)

@@ -9,6 +9,7 @@ one particle leans on several surfaces or rubs on others, that share is an estim
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, nan
 from typing import Final, NamedTuple
@@ -129,9 +130,8 @@ def worn(
         raise InputError("one of a single scene, not of a family", "recording", recording)
     if not 1 <= pieces <= MOST_PIECES:
         raise InputError(f"a whole number from 1 to {MOST_PIECES}", "pieces", pieces)
-    for key, value in (("erosion", erosion), ("abrasion", abrasion)):
-        if value is not None and not 0.0 < value < inf:
-            raise InputError("a finite number above 0", key, value)
+    given = (("erosion", erosion), ("abrasion", abrasion))
+    check_coefficients({key: value for key, value in given if value is not None})
     found = _Face(recording, name, pieces)
     sums = found.blows()
     unplaced = found.rubs(sums)
@@ -146,6 +146,15 @@ def worn(
         abrasion=rubbed if abrasion is None else abrasion * rubbed,
         unplaced=unplaced,
     )
+
+
+def check_coefficients(given: Mapping[str, float]) -> None:
+    """Raise an `InputError` if one of them is no positive number, or of nothing that is known."""
+    for key, value in given.items():
+        if key not in KEYS[2:]:
+            raise InputError(f"one of {', '.join(KEYS[2:])}", "coefficients", key)
+        if not 0.0 < value < inf:
+            raise InputError("a finite number above 0", key, value)
 
 
 class _Face:

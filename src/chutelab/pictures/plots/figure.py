@@ -47,7 +47,7 @@ from chutelab.pictures.plots.scenery import (
     strobe_times,
     window_of,
 )
-from chutelab.pictures.plots.style import Picture, figures, say, spoken
+from chutelab.pictures.plots.style import Picture, figures, named, say, spoken
 from chutelab.results import Kind, Recording
 from chutelab.results.loads import borne
 from chutelab.results.quantities import prediction as predicted
@@ -249,19 +249,21 @@ def loads(recording: Recording) -> Picture:
     told = borne(recording)
     figure, pairs = in_pairs(recording, len(told))
     for (name, one), (left, right) in zip(told.items(), pairs, strict=True):
-        style.dress(left, "time, s", "force, N", name)
-        left.stairs(one.normal, one.edges, fill=True, color=style.STREAM, label="pressing")
-        left.stairs(one.along, one.edges, color=style.STRIKE, lw=1.2, label="along")
+        style.dress(left, say("time"), say("load-force"), named(name))
+        pressing, along = say("load-pressing"), say("load-along")
+        left.stairs(one.normal, one.edges, fill=True, color=style.STREAM, label=pressing)
+        left.stairs(one.along, one.edges, color=style.STRIKE, lw=1.2, label=along)
         mean, peak, *_ = one.part("normal")
-        left.axhline(mean, color=style.INK, lw=1.0, ls="--", label="mean pressing")
-        style.note(left, f"mean {style.quantity(mean, 'N')}, peak {style.quantity(peak, 'N')}")
+        left.axhline(mean, color=style.INK, lw=1.0, ls="--", label=say("load-mean"))
+        size = style.quantity
+        style.note(left, say("load-told", mean=size(mean, "N"), peak=size(peak, "N")))
         if not figure.legends:
             top = 1.0 - 0.15 / figure.get_figheight()
             figure.legend(loc="upper right", bbox_to_anchor=(0.98, top), ncols=3)
-        style.dress(right, "time, s", "torque, N m", "")
+        style.dress(right, say("time"), say("load-torque"), "")
         right.stairs(one.torque, one.edges, color=style.TRACK, lw=1.2)
-        x, y = one.pivot
-        style.note(right, f"about x = {x:.4g} m, y = {y:.4g} m")
+        x, y = (figures(value, ".4g") for value in one.pivot)
+        style.note(right, say("load-pivot", x=x, y=y))
         for ax in (left, right):
             ax.set_xlim(0.0, float(one.edges[-1]))
     return figure

@@ -35,7 +35,7 @@ def wear(recording: Recording, *, curves: bool = True) -> Picture:
     if curves:
         figure.headline(0.04, 1.0 - 0.35 / high, recording.title)
     above = figure.add_gridspec(
-        1, 2, left=0.07, right=0.95, wspace=0.26,
+        1, 2, left=0.07, right=0.94, wspace=0.36,
         top=1.0 - (1.0 if curves else 0.4) / high, bottom=1.0 - 4.6 / high if curves else 0.16,
     )  # fmt: skip
     for n, key in enumerate(BANDS):
@@ -73,7 +73,9 @@ def draw_band(ax: Axes, told: dict[str, Wear], key: str) -> Axes:
     )
     band.set(array=np.array(shares), clim=(0.0, 1.0))
     ax.add_collection(band, autolim=False)
-    bar = ax.figure.canvas.figure.colorbar(band, ax=ax, fraction=0.035, pad=0.02)
+    bar = ax.figure.canvas.figure.colorbar(
+        band, ax=ax, format=style.Digits(), fraction=0.035, pad=0.02
+    )
     bar.set_label(say("share-of-largest"), fontsize=style.SMALL)
     bar.ax.tick_params(labelsize=style.SMALL)
     return ax
@@ -112,7 +114,7 @@ def field(recording: Recording, found: Fields, name: str) -> Picture:
         *edges, values, cmap="RdBu_r" if signed else "viridis", rasterized=True, zorder=0.6,
         vmin=-reach if reach else None, vmax=reach, gid="field",
     )  # fmt: skip
-    bar = figure.colorbar(mesh, ax=ax, fraction=0.03, pad=0.02)
+    bar = figure.colorbar(mesh, ax=ax, format=style.Digits(), fraction=0.03, pad=0.02)
     bar.set_label(f"{say(f'field-{name}')}, {NAMES[name]}", fontsize=style.NORMAL)
     return figure
 

@@ -214,7 +214,7 @@ def plain(text: str) -> str:
     return drawable(text).replace("$", r"\$")
 
 
-class _Local(ScalarFormatter):
+class Digits(ScalarFormatter):
     """Numbers beside ticks in the digits of the language that held as the axes were dressed."""
 
     def __init__(self) -> None:
@@ -222,6 +222,7 @@ class _Local(ScalarFormatter):
         self._words = spoken()
 
     def __call__(self, x: float, pos: int | None = None) -> str:
+        """Return what stands beside a tick."""
         return self._words.local(super().__call__(x, pos))
 
 
@@ -236,7 +237,7 @@ def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
     ax.grid(visible=True, color=now["STEEL_LIGHT"], linewidth=0.6)
     if spoken().language != "en":
         for axis in (ax.xaxis, ax.yaxis):
-            axis.set_major_formatter(_Local())
+            axis.set_major_formatter(Digits())
     ax.set_axisbelow(True)
     for side in ("top", "right"):
         ax.spines[side].set_visible(False)

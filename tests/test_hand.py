@@ -39,6 +39,16 @@ def closes(recording):
     return ledger
 
 
+def test_it_tells_how_far_it_is():
+    run = chutelab.start(scene())
+    assert re.fullmatch(r"<Run of \S+: t = 0 s, 0 particles under way, 0 steps>", repr(run))
+    run.step(0.1)
+    assert re.search(r": t = 0\.1\d* s, 1 particle under way, \d+ steps>$", repr(run))
+    while not run.done:
+        run.step(1.0)
+    assert re.search(r": t = 1 s, 0 particles under way, \d+ steps, done>$", repr(run))
+
+
 @pytest.mark.parametrize(
     ("name", "changes"),
     [

@@ -200,7 +200,7 @@ SHIPPED = (
     "low-speed", "mixture",
     "perpendicular", "perpendicular-fast", "rock-box", "see-saw", "silo", "slip", "spoon",
     "stream",
-    "stream-independent", "two-sizes",
+    "stream-independent", "two-sizes", "vibrating-feeder",
 )  # fmt: skip
 
 

@@ -36,6 +36,7 @@ AUTO = {
     "mixture": "contact",
     "damper-plate": "contact",
     "flap-gate": "contact",
+    "vibrating-feeder": "contact",
     "see-saw": "contact",
     "cradle": "pymunk",
     "dominoes": "pymunk",

@@ -24,6 +24,7 @@ from chutelab.results.recorder import Recorder, StalledError
 from chutelab.scene import AnyScene, Overrides, load
 from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError
+from chutelab.util.tables import many, number
 from chutelab.util.trig import RADIANS
 
 SET = "plate.angle_deg, the speed of a belt, or the speed_deg and torque of a motor"
@@ -98,6 +99,11 @@ class Run:
         self._angles: dict[int, float] = {}
         self._pushed: set[int] = set()
         self._proceed(0)
+
+    def __repr__(self) -> str:
+        way = f"{many(int(self._under_way.sum()), 'particle', ',')} under way"
+        made = many(self._module.world.step_count, "step", ",") + ", done" * self.done
+        return f"<Run of {self.scene.source}: t = {number(self.t)} s, {way}, {made}>"
 
     def _proceed(self, steps: int) -> None:
         status = self._job.proceed(steps)

@@ -22,6 +22,11 @@ function filled(element: any, attributes: Record<string, unknown>, children: (st
   return element;
 }
 
+/** Set an attribute; one that is so already is no work for the browser. */
+function set(element: Element, name: string, value: string) {
+  if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+}
+
 const svg = (
   name: string, attributes: Record<string, unknown> = {}, ...children: (string | Node)[]
 ): any => filled(document.createElementNS(SVG, name), attributes, children);
@@ -55,6 +60,9 @@ class Scenery {
   moving: Moving[] = [];
   gates: Gate[] = [];
   carried: Carried[] = [];
+  /** Drawings of parts by all that they show, with what moves of each; and what the grid shows. */
+  kept: Map<string, { element: any, moving: Moving[] }> = new Map();
+  grid = "";
   layer: any;
   ground: any;
   scale: any;
@@ -75,11 +83,28 @@ class Scenery {
     const bend = machine.arcs.reduce((small, arc) => Math.min(small, arc.radius), Infinity);
     this.wide = Math.max(WALL[0],
       Math.min(WALL[1], WALL[2] * height, WALL[3] * bend * this.view.scale));
-    this.layer.replaceChildren();
+    const { kept, view: { x, y, scale, width, free } } = this, drawn: any[] = [];
+    const seen = [x, y, scale, width, height, free, this.wide];
+    this.kept = new Map();
+    // A part that is as it was stays: the browser has nothing to paint.
+    const part = (name: string, of: unknown, make: () => any) => {
+      const key = JSON.stringify([name, of, seen]), was = kept.get(key), from = this.moving.length;
+      kept.delete(key);
+      const element = was?.element ?? make();
+      if (was) this.moving.push(...was.moving);
+      else {
+        element.setAttribute("data-part", name);
+        element.append(svg("title", {}, this.words.name(name)));
+      }
+      this.kept.set(key, { element, moving: this.moving.slice(from) });
+      drawn.push(element);
+      return element;
+    };
     this.moving = [];
     this.gates = [];
     this.carried = machine.movers.map((mover) => ({ elements: [], mover }));
-    const bodies: [any, Segment | Arc][] = [];
+    const { pulley, releases } = machine;
+    const bodies: [() => any, Segment | Arc, unknown?][] = [];
     const plates = new Set(scene?.plates.map(({ name }) => name ?? "plate") ?? []);
     const round = (arc: Arc) => arc.extent >= 2 * Math.PI && arc.speed !== 0;
     const belts = new Map<number, { lines: Segment[], wheels: Arc[] }>();
@@ -90,40 +115,46 @@ class Scenery {
     }
     for (const arc of machine.arcs) {
       if (round(arc) && belts.has(arc.surface)) belts.get(arc.surface)?.wheels.push(arc);
-      else bodies.push([round(arc) ? this.drum(arc, machine) : this.bend(arc), arc]);
+      else if (round(arc)) {
+        const holds = releases.some((one) => Math.hypot(one.x - arc.x, one.y - arc.y) < arc.radius);
+        bodies.push([() => this.drum(arc, holds), arc, holds]);
+      } else bodies.push([() => this.bend(arc), arc]);
     }
     for (const { lines, wheels } of belts.values()) {
-      if (wheels.length) bodies.push([this.conveyor(wheels), lines[0]]);
-      else if (lines[0].surface === machine.pulley?.surface) {
-        bodies.push([this.incoming(lines[0], machine), lines[0]]);
-      } else for (const line of lines) bodies.push([this.belt(line), line]);
+      if (wheels.length) bodies.push([() => this.conveyor(wheels), lines[0], wheels]);
+      else if (lines[0].surface === pulley?.surface) {
+        bodies.push([() => this.incoming(lines[0], machine), lines[0], pulley]);
+      } else for (const line of lines) bodies.push([() => this.belt(line), line]);
     }
     for (const line of machine.segments.filter(({ speed }) => !speed)) {
       const isPlate = plates.has(machine.surfaces[line.surface]);
-      bodies.push([isPlate ? this.plate(line) : this.wall(line), line]);
+      bodies.push([() => (isPlate ? this.plate(line) : this.wall(line)), line, isPlate]);
     }
     for (const { name, from, to } of scene?.sensor ?? []) {
-      const element = this.sensor(from, to);
-      element.setAttribute("data-part", name);
-      element.append(svg("title", {}, this.words.name(name)));
-      this.layer.append(element);
+      part(name, [from, to], () => this.sensor(from, to));
     }
-    for (const [body, { surface, appears, vanishes }] of bodies) {
+    for (const [make, body, more] of bodies) {
+      const { surface, appears, vanishes } = body;
       const moves = this.carried.find(({ mover }) => mover.surface === surface);
-      const element = moves ? svg("g", {}, body) : body;
+      const element = part(machine.surfaces[surface], [body, more, Boolean(moves)],
+        () => (moves ? svg("g", {}, make()) : make()));
       moves?.elements.push(element);
-      element.setAttribute("data-part", machine.surfaces[surface]);
-      element.append(svg("title", {}, this.words.name(machine.surfaces[surface])));
       if (isFinite(appears) || isFinite(vanishes)) {
         element.classList.add("gate");
         this.gates.push({ element, appears, vanishes });
       }
-      this.layer.append(element);
     }
     for (const { mover } of this.carried) {
       const row = [...scene?.plates ?? [], ...scene?.surface ?? []]
         .find(({ name }) => (name ?? "plate") === machine.surfaces[mover.surface]);
-      this.layer.append(this.motion(mover, machine, row?.travel?.to));
+      drawn.push(this.motion(mover, machine, row?.travel?.to));
+    }
+    const stays = new Set(drawn);
+    for (const old of [...this.layer.children]) if (!stays.has(old)) old.remove();
+    let next = this.layer.firstChild;
+    for (const one of drawn) {
+      if (one === next) next = one.nextSibling;
+      else this.layer.insertBefore(one, next);
     }
   }
 
@@ -187,14 +218,14 @@ class Scenery {
       const pose = poseOf(mover, t, swings?.get(mover.surface)), { pivot: [x, y] } = mover;
       const way = `translate(${(pose.x - x) * scale} ${(y - pose.y) * scale}) rotate(${
         (-pose.turn * 180) / Math.PI} ${view.px(x)} ${view.py(y)})`;
-      for (const element of elements) element.setAttribute("transform", way);
+      for (const element of elements) set(element, "transform", way);
     }
     for (const { element, speed, x, y, radius } of this.calm.matches ? [] : this.moving) {
       if (radius === undefined) {
-        element.setAttribute("stroke-dashoffset", String(-((speed * t * scale) % PITCH)));
+        set(element, "stroke-dashoffset", String(-((speed * t * scale) % PITCH)));
       } else {
         const angle = ((speed * t) / radius) * (180 / Math.PI);
-        element.setAttribute("transform", `rotate(${angle % 360} ${x} ${y})`);
+        set(element, "transform", `rotate(${angle % 360} ${x} ${y})`);
       }
     }
     for (const { element, appears, vanishes } of this.gates) {
@@ -205,6 +236,9 @@ class Scenery {
   /** Lines at round numbers of metres, and a bar that tells how long one is. */
   drawGround(left: number, low: number) {
     const { view, ground } = this, { width, height, scale, mesh: step } = view;
+    const now = JSON.stringify([view.x, view.y, scale, width, height, left, low]);
+    if (now === this.grid) return;
+    this.grid = now;
     const lines = (offset: number) => {
       let path = "";
       for (let n = Math.ceil(view.worldX(0) / step - offset); ; n += 1) {
@@ -359,11 +393,10 @@ class Scenery {
   }
 
   /** A whole circle that turns: a wheel, or round what is inside of it a drum. */
-  drum(arc: Arc, { releases }: Machine) {
+  drum(arc: Arc, holds: boolean) {
     const { view, thick } = this, { x, y, radius, speed } = arc;
     const group = svg("g", { class: "part" });
     const [px, py, r] = [view.px(x), view.py(y), radius * view.scale];
-    const holds = releases.some((one) => Math.hypot(one.x - x, one.y - y) < radius);
     const line = r + (holds ? 0.5 : -0.5) * thick;
     const ring = stadium(px, px, py, line);
     if (!holds) group.append(this.wheel(px, py, Math.max(r - thick - 1, 0.4 * r), speed, radius));
@@ -437,4 +470,4 @@ const stadium = (left: number, right: number, y: number, r: number) =>
   `M${left} ${y - r}H${right}A${r} ${r} 0 0 1 ${right} ${y + r}H${left}`
   + `A${r} ${r} 0 0 1 ${left} ${y - r}`;
 
-export { PLATE, Scenery, filled, svg };
+export { PLATE, Scenery, filled, set, svg };

@@ -6,7 +6,7 @@ import { endsOf } from "./edit.ts";
 import { ARROW, Handles, bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
 import { html } from "./panels.ts";
 import { Balls } from "./balls.ts";
-import { Scenery, svg } from "./scenery.ts";
+import { Scenery, set, svg } from "./scenery.ts";
 import { predict } from "./prediction.ts";
 import { historyOf } from "./stages.ts";
 import { View, boxOf } from "./view.ts";
@@ -433,27 +433,27 @@ class Stage {
 
   describe(grip: any, handle: Handle) {
     const { view, words } = this, x = view.px(handle.x), y = view.py(handle.y);
-    grip.setAttribute("transform", `translate(${x} ${y})`);
+    set(grip, "transform", `translate(${x} ${y})`);
     grip.classList.toggle("own", this.isSeen(handle));
     const [stem, , knob] = grip.children;
-    knob.setAttribute("d", KNOBS[handle.shape]);
+    set(knob, "d", KNOBS[handle.shape]);
     if (handle.from) {
       const [u, v] = [view.px(handle.from[0]) - x, view.py(handle.from[1]) - y];
-      stem.setAttribute("d", `M${u} ${v}L0 0`);
+      set(stem, "d", `M${u} ${v}L0 0`);
       const angle = (Math.atan2(-v, -u) * 180) / Math.PI;
-      knob.setAttribute("transform", u || v ? `rotate(${angle})` : "");
+      set(knob, "transform", u || v ? `rotate(${angle})` : "");
     }
     const [first] = handle.axes;
     const name = `${words.name(handle.surface)}: ${words.say(`handle-${handle.what}`)}`;
     const values = handle.says ? [handle.says]
       : handle.axes.filter(({ step }) => step).map((axis) => words.value(axis));
-    grip.setAttribute("aria-label", name);
+    set(grip, "aria-label", name);
     // Such an attribute has no exponent: a bound above 0 may be the least number that is.
     const plain = (value: number) => String(Math.round(1e6 * value) / 1e6);
-    grip.setAttribute("aria-valuenow", plain(first.value));
-    grip.setAttribute("aria-valuetext", values.join(", "));
-    if (isFinite(first.low)) grip.setAttribute("aria-valuemin", plain(first.low));
-    if (isFinite(first.high)) grip.setAttribute("aria-valuemax", plain(first.high));
+    set(grip, "aria-valuenow", plain(first.value));
+    set(grip, "aria-valuetext", values.join(", "));
+    if (isFinite(first.low)) set(grip, "aria-valuemin", plain(first.low));
+    if (isFinite(first.high)) set(grip, "aria-valuemax", plain(first.high));
     handle.axes.forEach(({ value }, n) => { if (!isFinite(value)) handle.axes[n].value = 0; });
   }
 

@@ -186,6 +186,30 @@ def test_side_by_side_with_a_simulated_stream():
         side_by_side("galton")
 
 
+def test_the_simulated_stream_is_counted_by_hand():
+    """2, 50 and 98 % of where centres pass a height; edges lie r |v| / |v_y| beside."""
+    found = side_by_side(chutelab.load("stream", {"stream.count": 40}), [-0.2])
+    run, x, aside = found.recording, [], []
+    for n in range(40):
+        knots = run.knots[run.offsets[n] : run.offsets[n + 1]]
+        low = np.flatnonzero(knots["position"][:, 1] <= -0.2)[0]
+        before, after = knots["t"][low - 1], knots["t"][low]
+        for _ in range(25):
+            t = 0.5 * (before + after)
+            place, velocity, *_ = (one[0][n] for one in run.at([t]))
+            before, after = (t, after) if place[1] > -0.2 else (before, t)
+        x.append(place[0])
+        aside.append(run.radius[n] * np.hypot(*velocity) / -velocity[1])
+    x, aside = np.array(x), np.array(aside)
+    expected = np.quantile(x - aside, 0.02), np.quantile(x, 0.5), np.quantile(x + aside, 0.98)
+    told = found.lines["simulated"][:, 0]
+    assert told == pytest.approx(expected, abs=1e-4)
+    notes = " ".join(found.sheet().notes)
+    less = 1000.0 * (found.lines["cema"][1, 0] - told[1])
+    assert "cema less simulated, at y = -0.2 m: lower" in notes
+    assert f"centre {less:+.1f}" in notes
+
+
 def test_command(tmp_path):
     def run(*arguments):
         return CliRunner().invoke(main, ["discharge", *arguments])

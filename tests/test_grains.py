@@ -86,12 +86,12 @@ def test_flows_are_those_of_the_table_and_grow_as_the_law_says():
     for width, mean, spread, root in table:
         flows = np.array([flow(bin_of(int(width) / 1000.0, seed)) for seed in SEEDS])
         held = int(np.isnan(flows).sum())
-        assert held == {"24": 4, "30": 1}.get(width, 0)
+        assert held == {"24": 4}.get(width, 0)
         assert f"{np.nanmean(flows):.0f}" == mean
         assert np.nanstd(flows) == pytest.approx(float(spread), abs=0.51)
         widths.append(float(width))
         roots.append(float(root))
-    assert "four of ten bins did not run out, and one of ten through 30 mm" in explained(10)
+    assert "four of ten bins did not run out; through 30 mm all ten did" in explained(10)
     rise, begin = np.polyfit(widths, roots, 1)
     assert f"meets the axis at about {-begin / rise:.0f} mm" in explained(10)
     # The power that fits best, with the same loss at the edges, is 3/2 within its scatter.
@@ -166,12 +166,12 @@ def test_a_single_disk_rolls_from_a_slope_of_c_on(slope, moves):
 
 @pytest.mark.slow
 def test_angles_of_heaps_are_as_the_explanation_says():
-    """Means of 20 heaps have a standard error of 1 degree at most: so well they are told."""
+    """Means of 25 heaps have a standard error of 1 degree at most: so well they are told."""
 
     def poured(*settings):
-        heaps = [heap(seed, *settings) for seed in range(20)]
+        heaps = [heap(seed, *settings) for seed in range(25)]
         angles = np.mean([flanks(one) for one in heaps], axis=1)
-        assert np.std(angles) / np.sqrt(19.0) <= 1.0
+        assert np.std(angles) / np.sqrt(24.0) <= 1.0
         heights = [one.ends()[1]["position"][:, 1].max() for one in heaps]
         return np.mean(angles), np.std(angles), np.mean(heights)
 
@@ -199,7 +199,7 @@ def test_angles_of_heaps_are_as_the_explanation_says():
 @pytest.mark.slow
 def test_about_six_of_ten_disks_that_roll_freely_leave_the_floor():
     assert "About six of ten roll off the floor" in explained(11)
-    heaps = [heap(seed, "particle.rolling_friction=0") for seed in SEEDS]
+    heaps = [heap(seed, "particle.rolling_friction=0") for seed in range(20)]
     gone = [len(one.select(Kind.EXIT)) / one.count for one in heaps]
     assert np.mean(gone) == pytest.approx(0.6, abs=0.06)
-    assert np.std(gone) / 3.0 < 0.04
+    assert np.std(gone) / 19.0**0.5 < 0.04

@@ -190,6 +190,23 @@ def test_the_share_of_an_event_is_its_count_by_the_number_of_particles():
 
 
 @pytest.mark.slow
+def test_a_cluster_finds_the_same_answer(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    file = tmp_path / "crowd.toml"
+    file.write_text(sc.to_toml(CROWD), encoding="utf-8")
+    question = ["solve", str(file), "--vary", "plate.angle_deg=10:35", "--target",
+                "arrival.vx.mean=1.6", "--repeat", "2", "--points", "8", "--json"]  # fmt: skip
+    here = CliRunner().invoke(main, question)
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
+        silence_logs=False,
+    ) as cluster:  # fmt: skip
+        there = CliRunner().invoke(main, [*question, "--scheduler", cluster.scheduler_address])
+    assert here.exit_code == there.exit_code == 0, there.output
+    assert here.stdout == there.stdout
+
+
+@pytest.mark.slow
 def test_two_keys_of_a_crowd_within_a_fifth_of_a_degree(tmp_path):
     """200 particles, two targets, two processors, a minute of each: 120 s of processor time."""
     from os import times

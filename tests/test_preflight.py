@@ -2,6 +2,7 @@
 
 import os
 import re
+import time
 from math import cos, inf, pi, radians
 
 import numpy as np
@@ -13,6 +14,8 @@ from chutelab.engines import pymunk
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results.recorder import StalledError
+from chutelab.results.sensors import readings
+from chutelab.results.wear import touched
 from machines import PERPENDICULAR
 
 LONE = [name for name in sc.shipped() if sc.load(name).count == 1]
@@ -469,3 +472,27 @@ def test_a_fill_that_reaches_through_walls_is_told(name):
     said = f"stream.fill reaches through {name}: {outside} of 400 particles start beyond"
     assert found == ([said] if outside else [])
     assert (outside > 5) == (name in ("slope", "corner", "arc", "wide peg"))
+
+
+def test_what_measuring_costs_is_told_as_it_is():
+    """Against whole runs with and without; a busy machine may be off by twice."""
+
+    def spent(work):
+        work()
+        begin = time.process_time()
+        work()
+        return time.process_time() - begin
+
+    scene = sc.load("stream", ["sensor=[{name='gate', from=[0.7, -0.2], to=[0.9, -0.2]}]"])
+    found = preflight(scene)
+    told = {extra.name: extra for extra in found.effort.extras}
+    assert list(told) == ["loads", "sensors", "wear"]
+    run = simulate(scene, loads=0.01)
+    assert told["loads"].memory == pytest.approx(run.impulses.nbytes, rel=0.01)
+    assert told["loads"].seconds < found.effort.seconds
+    for name, read in (("sensors", readings), ("wear", touched)):
+        took = spent(lambda read=read: (run.found.clear(), read(run)))
+        assert 0.3 * took < told[name].seconds < 3.0 * took
+    rows = {row[0]: row[1] for row in found.sheet().rows if len(row) == 2}
+    assert " more" in rows["wear"]
+    assert "sensors" not in {extra.name for extra in preflight("spoon").effort.extras}

@@ -104,6 +104,25 @@ def test_the_skeleton_asks_and_has_no_answer(tmp_path):
     assert "What is the answer to your question?" in pages[1]
 
 
+@pytest.mark.parametrize("scene", ["perpendicular", "stream"])
+def test_the_skeleton_in_german_has_no_english_left(scene, tmp_path):
+    changes = {"stream.count": 20} if scene == "stream" else {}
+    made = report(scene, changes, view="teacher", language="de")
+    english = report(scene, changes, view="teacher").markdown
+    # What stands in both: keys of the scene, names and units of quantities.
+    both = {line for line in made.markdown.splitlines() if line} & set(english.splitlines())
+    assert all(re.match(r"\||!\[", line) for line in both), both
+    for words in (" the ", "scene file", "default", "bounces"):
+        assert words in english
+        assert words not in made.markdown
+    out = tmp_path / "lab.html"
+    called = ["report", scene, "--view", "teacher", "--language", "de", "-o", str(out)]
+    assert CliRunner().invoke(main, called).exit_code == 0
+    page = out.read_text("utf-8")
+    assert '<html lang="de">' in page
+    assert "Wie lautet die Antwort auf deine Frage?" in page
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -112,6 +131,7 @@ def test_the_skeleton_asks_and_has_no_answer(tmp_path):
         (["report", "slop", "-o", "report.pdf"], "slop"),
         (["report", "stream", "-o", "report.pdf", "--repeat", "0"], "0 is not in the range"),
         (["report", "slip", "-o", "report.pdf", "--view", "boss"], "is not one of"),
+        (["report", "slip", "-o", "report.pdf", "--language", "de"], "is for --view teacher"),
         (["report", "slip", "-o", "no/such/report.pdf"], "there is no folder no/such"),
     ],
 )

@@ -23,7 +23,7 @@ from markdown_it.tree import SyntaxTreeNode
 from chutelab.classroom.lessons.printing import need_typst, pdf, web_page
 from chutelab.classroom.lessons.texts import parser
 from chutelab.engines.simulation import judged, simulate
-from chutelab.pictures.plots import overlay
+from chutelab.pictures.plots import look, overlay
 from chutelab.pictures.plots.figure import loads as draw_loads
 from chutelab.pictures.plots.measures import drawing
 from chutelab.pictures.plots.measures import wear as draw_wear
@@ -39,9 +39,12 @@ from chutelab.scene.overrides import Override, parts_of, unit_of
 from chutelab.scene.quantities import lookup
 from chutelab.studies.repeats import Repeats, repeat
 from chutelab.theory.discharge import loading
+from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
 from chutelab.util.tables import Sheet, number, plus_minus
 from chutelab.util.versions import own_version
+from chutelab.util.words import Words
+from chutelab.util.words import words as words_of
 
 View = Literal["engineer", "teacher"]
 
@@ -80,6 +83,7 @@ class Report:
     repeats: Repeats | None
     view: View
     command: str
+    words: Words
     parts: list[str] = field(default_factory=list)
     tables: dict[str, Sheet] = field(default_factory=dict)
     pictures: dict[str, Any] = field(default_factory=dict)
@@ -129,10 +133,12 @@ class Report:
                 for item in node.children
             ]
             if path.suffix.lower() == ".pdf":
-                kind = "Lab report" if self.view == "teacher" else "Report"
-                content = pdf(tree, folder, asked, kind=kind, dense=True)
+                kind = self.words.say("lab-kind") if self.view == "teacher" else "Report"
+                language = self.words.language
+                content = pdf(tree, folder, asked, kind=kind, language=language, dense=True)
             else:
-                content = web_page(tree, folder, asked).encode("utf-8")
+                page = web_page(tree, folder, asked, self.words.language)
+                content = page.encode("utf-8")
         with whole(path) as unfinished:
             unfinished.write_bytes(content)
         home = path.with_name(f"{path.stem}-tables")
@@ -167,6 +173,7 @@ def report(
     runs: int = 1,
     engine: str | None = None,
     command: str = "",
+    language: str = "en",
 ) -> Report:
     """Run a scene and report on it.
 
@@ -182,15 +189,26 @@ def report(
         Overrides ``run.engine``.
     command : str
         What makes the report again, as it stands in it.
+    language : str
+        Of the teacher's view, such as "de"; the engineer's is in English.
+
+    Raises
+    ------
+    InputError
+        If the view is not there in the language.
     """
+    if language != "en" and view != "teacher":
+        raise InputError("the engineer's view is in English, en", "language", language)
     loaded = load(scene, changes)
     if loaded.run.loads is None:
         loaded = load(loaded, [Override("run.loads", LOADS)])
     recording = judged(loaded, engine=engine)
     repeats = repeat(loaded, runs) if runs > 1 else None
-    made = Report(loaded, recording, repeats, view, command)
-    made.parts.append(f"# {_plain(loaded.title)}")
-    (_for_students if view == "teacher" else _for_engineers)(made)
+    made = Report(loaded, recording, repeats, view, command, words_of(language))
+    title = made.words.titles().get(loaded.title, loaded.title)
+    made.parts.append(f"# {_plain(title)}")
+    with look(language=language):
+        (_for_students if view == "teacher" else _for_engineers)(made)
     return made
 
 
@@ -202,7 +220,7 @@ def _for_engineers(made: Report) -> None:
         broken = "; ".join(str(law) for law in recording.laws)
         made.parts.append(f"**The run breaks laws; do not use its numbers:** {_plain(broken)}.")
     made.add("The machine", made.picture("machine", drawing(recording), "The machine, to scale"))
-    made.add("Inputs", made.table("inputs", inputs(made.scene)), _materials(made))
+    made.add("Inputs", made.table("inputs", inputs(made.scene, made.words)), _materials(made))
     made.add("Assumptions, and what is left out", "\n".join(f"- {one}" for one in left_out(made)))
     together, balance = crowd(recording), made.table("ledger", recording.ledger.sheet())
     made.add("Results", made.table("results", results(made)), balance)
@@ -223,39 +241,38 @@ def _for_engineers(made: Report) -> None:
 
 
 def _for_students(made: Report) -> None:
-    recording, scene = made.recording, made.scene
-    made.parts.append("Name: ______________________  Class: ____________  Date: ____________")
-    made.add("The machine", made.picture("machine", drawing(recording), "The machine, to scale"))
-    made.add("What is given", made.table("inputs", inputs(scene)))
-    made.add("Question and hypothesis", "1. What do you want to find out?\n2. What do you expect,"
-             " and why?")  # fmt: skip
-    made.add("Procedure", "1. What do you change, what do you keep, and what do you measure?")
-    rows = tuple(
-        (f"{name}, {unit}", "", "", "", "") for name, _, unit, _ in _values(recording) if unit
-    )
-    heads = ("quantity", "expected", "calculated", "simulated", "measured")
-    told = "; ".join(
-        f"{_plain(name)}: {said}" for name, said, unit, _ in _values(recording) if unit
-    )
-    made.add("Values", made.table("values", Sheet("", heads, rows)), told)
-    made.add("Evaluation", "1. How far are calculated and measured values apart, in percent?\n"
-             "2. What does the energy ledger say: where did the energy go?")  # fmt: skip
-    made.add("Errors", "1. Which errors has your measurement, and how large is each?\n"
-             "2. What does the model leave out?")  # fmt: skip
-    made.add("Conclusion", "1. What is the answer to your question?")
+    recording, scene, say = made.recording, made.scene, made.words.say
+    made.parts.append(say("lab-name"))
+    made.add(say("lab-machine"), made.picture("machine", drawing(recording), say("lab-scale")))
+    made.add(say("lab-given"), made.table("inputs", inputs(scene, made.words)))
+    for part in ("question", "procedure"):
+        made.add(say(f"lab-{part}"), say(f"lab-{part}-asks"))
+    units = {name: unit for name, _, unit, _ in _values(recording) if unit}
+    rows = tuple((f"{name}, {unit}", "", "", "", "") for name, unit in units.items())
+    heads = tuple(say("lab-values-columns").split(" | "))
+    told = "; ".join(f"{_plain(name)}: {_meaning(made.words, name)}" for name in units)
+    made.add(say("lab-values"), made.table("values", Sheet("", heads, rows)), told)
+    for part in ("evaluation", "errors", "conclusion"):
+        made.add(say(f"lab-{part}"), say(f"lab-{part}-asks"))
 
 
-def inputs(scene: Scene) -> Sheet:
+def _meaning(words: Words, name: str) -> str:
+    """Return what one of `TOLD` is, which may be a mean over the particles."""
+    own = name if name in TOLD else name.removesuffix(".mean")
+    return words.say(f"lab-of-{own}") + f", {words.say('lab-mean')}" * (own != name)
+
+
+def inputs(scene: Scene, words: Words) -> Sheet:
     """Return what the scene file gives, key by key, with unit and where it is from."""
-    rows = []
+    rows, from_file = [], words.say("lab-from-scene")
     for key, value in _leaves(to_dict(scene)):
         if key.split(".")[0].split("[")[0] in ("title", "expect", "live", "view", "sensor"):
             continue
         if key == "run.loads":
             continue
         unit = unit_of(parts_of(key))
-        said = str(value) if not isinstance(value, float) else number(value)
-        rows.append((key, said, unit, "scene file"))
+        said = str(value) if not isinstance(value, float) else words.local(number(value))
+        rows.append((key, said, unit, from_file))
     given = {row[0] for row in rows}
     for key, value, unit in (
         ("gravity", scene.gravity, "m/s²"),
@@ -263,13 +280,12 @@ def inputs(scene: Scene) -> Sheet:
         ("particle.mass", scene.particle.mass, "kg"),
     ):
         if key not in given and isinstance(value, float):
-            rows.append((key, number(value), unit, "default"))
-    notes: tuple[str, ...] = (
-        "Values of the scene file have no stated spread unless a row says so",
-    )
+            rows.append((key, words.local(number(value)), unit, words.say("lab-from-default")))
+    notes: tuple[str, ...] = (words.say("lab-spread"),)
     if len(rows) > MOST:
-        notes = (f"{len(rows) - MOST} more are in the scene file", *notes)
-    return Sheet("", ("key", "value", "unit", "source"), tuple(rows[:MOST]), texts=4, notes=notes)
+        notes = (words.say("lab-more", count=len(rows) - MOST), *notes)
+    heads = tuple(words.say("lab-given-columns").split(" | "))
+    return Sheet("", heads, tuple(rows[:MOST]), texts=4, notes=notes)
 
 
 def _leaves(tables: Any, path: str = "") -> Iterator[tuple[str, Any]]:

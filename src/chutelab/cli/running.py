@@ -506,6 +506,7 @@ def report(
     engine: Engine,
     out: Annotated[Path, FileName(path_type=Path)],
     view: Literal["engineer", "teacher"] = "engineer",
+    language: Literal["en", "de"] = "en",
     repeat: Annotated[int, Count(1, 1000)] = 1,
     quiet: bool,
 ) -> None:
@@ -523,6 +524,7 @@ def report(
     -o, --out, --output FILE  The file to write, .pdf or .html; a PDF needs pip install
         "chutelab[pdf]". [required]
     --view VIEW  For whom: engineer or teacher. [default]
+    --language LANGUAGE  Of the teacher's view, en or de; the engineer's is in English. [default]
     --repeat N  Results as mean ± standard error over N seeds. [default]
     -q, --quiet  Print nothing.
     """
@@ -537,10 +539,14 @@ def report(
         *(f"--set {shlex.quote(one)}" for one in set_),
         *[f"--engine {engine}"] * bool(engine),
     ]
+    if language != "en" and view != "teacher":
+        raise click.UsageError(f"--language {language} is for --view teacher.")
     options += [f"--view {view}"] * (view != "engineer") + [f"--repeat {repeat}"] * (repeat > 1)
     again = " ".join(["chutelab report", shlex.quote(scene), *options, f"-o {out.name}"])
     with progress("simulating", quiet=quiet):
-        made = reports.report(loaded, view=view, runs=repeat, engine=engine, command=again)
+        made = reports.report(
+            loaded, view=view, runs=repeat, engine=engine, command=again, language=language
+        )
     with progress("writing", quiet=quiet), writing(str(out)):
         files = made.write(out)
     if not quiet:

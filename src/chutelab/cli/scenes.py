@@ -280,7 +280,7 @@ def check(scenes: Annotated[Texts, complete_scene], *, set_: Texts, json_: bool)
     cross, a plate that leaves a crowd less than three grains above the belt, a box that is filled
     through walls, a bed that rides a slow belt by adhesion. What a run costs comes from a trial of
     the whole of it, cut off after 1 s: the cost of longer ones is estimated from how far it got, or
-    not given.
+    not given. So does what loads, sensors and wear cost more, if they are asked for.
     """
     from chutelab.checks.preflight import Preflight, preflight
     from chutelab.scene import SceneError, load

@@ -76,8 +76,9 @@ static void bear_since(int surface, double nx, double ny, double depth) {
                    .jy = mass * (A.vy - A.told[4] + A.given->gravity * span) };
         if (span > 0.0) {
             /* The parabola to where the particle is, as fast as it is there. */
-            p.ax = 2.0 * (A.vx - (A.x - A.told[1]) / span) / span;
-            p.ay = 2.0 * (A.vy - (A.y - A.told[2]) / span) / span;
+            double rate = 1.0 / span;
+            p.ax = 2.0 * rate * (A.vx - rate * (A.x - A.told[1]));
+            p.ay = 2.0 * rate * (A.vy - rate * (A.y - A.told[2]));
             p.vx = A.vx - p.ax * span, p.vy = A.vy - p.ay * span;
         }
         if (A.turns && A.given->rolling > 0.0)

@@ -8,7 +8,7 @@ the particle: forward on a belt that lies below what it carries.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, nan
+from math import inf, nan, prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,9 +42,10 @@ def gather(module: Module, surfaces: int) -> NDArray[np.void]:
         return NONE
     if told.overflow:
         raise InputError(OVERFLOW, "run.loads", told.every)
-    size = told.used * told.owner_count * (LOAD.itemsize // REAL.itemsize)
-    rows = module.array("bins", REAL, size, of="Loads").view(LOAD)
-    return rows.reshape(told.used, told.owner_count)[:, :surfaces].copy()
+    shape = told.used, told.owner_count, LOAD.itemsize // REAL.itemsize
+    rows = module.array("bins", REAL, prod(shape), of="Loads").reshape(shape)
+    # Numbers are copied faster than records of them.
+    return rows[:, :surfaces].copy().view(LOAD)[..., 0]
 
 
 class Bins:

@@ -231,13 +231,14 @@ class Recorder:
             released = np.searchsorted(begun[order], self.totals["t"], side="left")
             self.totals["potential"] += lifted[released]
         if self.impulses.size:
-            (x, y), force = self.origin, self.impulses["force"]
-            self.impulses["moment"] += x * force[..., 1] - y * force[..., 0]
-            self.impulses["at"] += self.impulses["normal"][..., None] * self.origin
+            if any(self.origin):
+                (x, y), force = self.origin, self.impulses["force"]
+                self.impulses["moment"] += x * force[..., 1] - y * force[..., 0]
+                self.impulses["at"] += self.impulses["normal"][..., None] * self.origin
             # Rounding may put something just behind the end of the last track.
             bins = max(1, ceil(knots["t"].max() / self.machine.loads - 1e-9))
             self.impulses, beyond = self.impulses[:bins], self.impulses[bins:]
-            for name in LOAD.names or ():
+            for name in LOAD.names or () if len(beyond) else ():
                 self.impulses[name][-1] += beyond[name].sum(axis=0)
         return Record(
             machine=self.machine,

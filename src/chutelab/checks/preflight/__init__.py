@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from math import ceil, cos, floor, inf, isnan, log10, pi, radians
 from time import process_time
 from typing import Any, Final
@@ -29,6 +30,7 @@ from chutelab.checks.preflight.trial import (
     built,
     coverage,
     effort,
+    extras,
     peak,
     skipped,
     stepping,
@@ -453,8 +455,8 @@ def _down(value: float) -> float:
 def preflight(scene: AnyScene) -> Preflight:
     """Look at a scene before it runs.
 
-    Besides the set-up it takes some 1.5 s of processor time at most: a trial run is cut off after
-    1 s.
+    Besides the set-up it takes some 2 s of processor time at most: a trial run is cut off after
+    1 s; loads are counted in shorter ones.
 
     Raises
     ------
@@ -489,6 +491,7 @@ def preflight(scene: AnyScene) -> Preflight:
         ends = f"{what} (or gone), at most {ends}"
     steps = None if engine == "exact" else stepping(machine, engine, tried)
     cost = effort(machine, tried, setup, grown)
+    cost = replace(cost, extras=tuple(extras(machine, tried, cost)))
     return Preflight(
         title=scene.title,
         built=tuple(built(machine)),

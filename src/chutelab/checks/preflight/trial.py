@@ -18,8 +18,11 @@ from chutelab.engines.exact import ROUNDS
 from chutelab.engines.simulation import follow
 from chutelab.machine import Machine, build
 from chutelab.results import EVENT, KNOT, REASONS, Recording
+from chutelab.results.record import LOAD
 from chutelab.results.recorder import EnoughError, StalledError
+from chutelab.results.sensors import readings
 from chutelab.results.summary import air_drag, stopped
+from chutelab.results.wear import touched
 from chutelab.scene import Scene, SceneError
 from chutelab.scene.quantities import THEORY
 from chutelab.scene.units import write_size
@@ -68,6 +71,21 @@ class Stepping:
 
 
 @dataclass(frozen=True)
+class Extra:
+    """What it costs to count something in a run, or to read it off one."""
+
+    name: str  # "loads", "sensors" or "wear"
+    seconds: float  # more of processor time for the whole run, about
+    memory: int  # more bytes at the peak, about
+
+    def row(self) -> tuple[str, str]:
+        """Return it in words."""
+        more = write_size(float(f"{self.seconds:.1g}"), "s", digits=6) if self.seconds else "0 s"
+        memory = f" and {float(f'{self.memory / 1e6:.1g}'):g} MB" if self.memory else ""
+        return self.name, f"about {more}{memory} more"
+
+
+@dataclass(frozen=True)
 class Effort:
     """What a run is expected to cost."""
 
@@ -76,6 +94,7 @@ class Effort:
     at_least: bool  # how much cannot be told: all are lower bounds
     how: str  # what the estimate rests on
     memory: int  # bytes that a run needs at its peak, about
+    extras: tuple[Extra, ...] = ()  # what is measured only if it is asked for
 
 
 @dataclass(frozen=True)
@@ -126,6 +145,7 @@ class Preflight(Shown):
         rows.append(("contacts", f"{about} {contacts:,}"))
         rows.append(("run time", f"{about} {lasts}; {self.effort.how}"))
         rows.append(("memory", f"{about} {float(f'{self.effort.memory / 1e6:.2g}'):,.0f} MB"))
+        rows += [extra.row() for extra in self.effort.extras]
         rows.append(("closed form",))
         if self.theory.covers:
             rows.append(("covers", ", ".join(self.theory.covers)))
@@ -262,6 +282,9 @@ five are over by then."""
 LONE_PATIENCE = 0.1
 """The same for particle 0 by itself."""
 
+BIN, BRIEF, TURNS = 0.01, 0.06, 3
+"""s; bins in which loads are counted to see what that costs, for how long, and how many times."""
+
 MOST = 5000
 """Particles that an engine with steps is tried with, at most: it sets up memory for each."""
 
@@ -313,6 +336,51 @@ def trial_run(machine: Machine, engine: str) -> Trial:
     except SceneError:
         lone = None
     return replace(found, lone=lone)
+
+
+def extras(machine: Machine, tried: Trial, cost: Effort) -> Iterator[Extra]:
+    """Yield what loads, sensors and wear cost: loads are counted in a part of the run, or not.
+
+    The others are read off the trial run, and grow with what is recorded.
+    """
+    if tried.recording is None or tried.trouble:
+        return
+    without, counting = (
+        build(tried.recording.scene.with_values({"run.loads": every, "expect": None}))
+        for every in (None, machine.loads or BIN)
+    )
+    more = []
+    for _ in range(TURNS):
+        runs = [_timed(one, BRIEF) for one in (without, counting)]
+        marks = [
+            np.vstack([(0.0, 0.0), one.marks, *[(one.seconds, 1.0)] * one.whole]) for one in runs
+        ]
+        # How long each took to where the one that got less far is.
+        share = min(one[-1, 1] for one in marks)
+        begin, end = (float(np.interp(share, one[:, 1], one[:, 0])) for one in marks)
+        if begin > 0.0:
+            more.append((end - begin) / begin)
+    if more:
+        part, spent = (
+            max(0.0, float(np.median(more))),
+            tried.seconds if tried.whole else cost.seconds,
+        )
+        last = tried.recording.knots["t"].max(initial=0.0) if tried.whole else machine.end_time
+        bins = ceil(last / (machine.loads or BIN)) * len(machine.surfaces)
+        yield Extra("loads", part * spent, bins * LOAD.itemsize)
+    grown = 1.0 if tried.whole else cost.seconds / tried.seconds
+    for name, read in (("sensors", readings), ("wear", touched)):
+        if name == "sensors" and not machine.scene.sensor:
+            continue
+        spent, before = 0.0, peak()
+        for _ in range(2):
+            # The first time is mostly warming up if it is short.
+            if spent <= WARMING:
+                tried.recording.found.clear()
+                begin = process_time()
+                read(tried.recording)
+                spent = process_time() - begin
+        yield Extra(name, grown * spent, round(grown * (peak() - before)))
 
 
 def _timed(machine: Machine, patience: float) -> Trial:

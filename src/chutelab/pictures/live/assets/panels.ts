@@ -119,4 +119,4 @@ const DRAWINGS: Record<string, string> = {
   flow: "flow", loads: "land", sensors: "sensor",
 };
 
-export { card, eased, follow, grown, html, icon, iconButton, menuOf, slide, style };
+export { CALM, card, eased, follow, grown, html, icon, iconButton, menuOf, slide, style };

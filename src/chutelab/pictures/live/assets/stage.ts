@@ -4,7 +4,7 @@ import { openHandles } from "./controls.ts";
 import { drawOutline, freePlace } from "./callout.ts";
 import { endsOf } from "./edit.ts";
 import { ARROW, Handles, bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
-import { html } from "./panels.ts";
+import { CALM, eased, html } from "./panels.ts";
 import { Balls } from "./balls.ts";
 import { Scenery, set, svg } from "./scenery.ts";
 import { predict } from "./prediction.ts";
@@ -92,8 +92,9 @@ class Stage {
     new ResizeObserver(() => this.resize()).observe(home);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
     lab.on("scene", () => {
-      if (JSON.stringify(lab.scene?.view) === this.chosen) this.rebuild();
-      else this.fit();
+      if (JSON.stringify(lab.scene?.view) !== this.chosen) this.fit();
+      else if (this.held) this.rebuildSoon();
+      else this.rebuild();
     });
     lab.on("run", () => this.traced());
     lab.on("time", () => this.paint());
@@ -184,7 +185,12 @@ class Stage {
     const { recording } = this.lab;
     if (recording && !this.fitted && recording.state !== "running") this.fit();
     this.balls.measure();
-    this.drawTracks();
+    if (this.soon) {
+      this.rebuild();
+      return;
+    }
+    if (this.lab.playing && recording?.machine.interact) this.drawPaths();
+    else this.drawTracks();
     // While it plays, the time brings the next picture.
     if (!this.lab.playing) this.paint();
     for (const draw of this.drawers) draw();
@@ -209,7 +215,18 @@ class Stage {
   /** What tools draw anew when the view, the machine or its run has changed. */
   drawers: (() => void)[] = [];
 
+  /** Of a rebuild that waits for the run, if that comes within a frame; 0 where none does. */
+  soon = 0;
+
+  /** What is dragged is painted once a frame, with its run, which else would be gone meanwhile. */
+  rebuildSoon() {
+    this.placeHandles();
+    this.soon ||= requestAnimationFrame(() => this.rebuild());
+  }
+
   rebuild() {
+    cancelAnimationFrame(this.soon);
+    this.soon = 0;
     if (this.view.width < 2) return;
     const { machine, scene } = this.lab;
     if (machine) this.scenery.draw(machine, scene);
@@ -222,6 +239,9 @@ class Stage {
     this.paint();
     for (const draw of this.drawers) draw();
   }
+
+  /** Those of a crowd that is played, which change little from frame to frame. */
+  drawPaths = eased(() => this.drawTracks(), () => CALM);
 
   drawTracks() {
     const { recording } = this.lab, { view } = this;

@@ -27,7 +27,7 @@ class Hanging:
         self.hinge, self.surface, self.body, self.bodies = hinge, mover.surface, bodies[0], bodies
         x, y = hinge.moment
         pivot, weighs = Vec2d(*mover.pivot), hinge.mass > 0.0
-        self.pivot = pivot
+        self.pivot, self.gravity = pivot, space.gravity
         # What has no weight has its mass at the hinge, where it does nothing.
         mass = hinge.mass if weighs else hinge.inertia / hinge.gyration**2
         middle = Vec2d(x, y) / mass if weighs else Vec2d.zero()
@@ -79,7 +79,7 @@ class Hanging:
                 given.append(off.cross(impulse) / len(arbiter.contact_point_set.points))
 
         for body in self.bodies:
-            weight = body.mass * body.space.gravity * h
+            weight = body.mass * self.gravity * h
             given.append((body.local_to_world(body.center_of_gravity) - self.pivot).cross(weight))
             body.each_arbiter(touched)
         return sum(given)

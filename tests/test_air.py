@@ -150,7 +150,7 @@ def test_without_air_a_run_has_the_bits_that_it_had(scene):
 
 
 def test_pymunk_has_it_by_a_formula_of_its_own():
-    (x, y, *_, lost), _ = by_ode(0.6)  # still in its first flight
+    (x, y, *_, lost), _ = by_ode(0.6, AIR)  # still in its first flight
     run = simulate(thrown("pymunk", dt=5e-4, until=0.6))
     assert run.knots["position"][-1] == pytest.approx((x, y), abs=1e-6)
     assert run.ledger.air_loss == pytest.approx(lost, rel=1e-5)

@@ -52,13 +52,14 @@ def test_what_jams_is_not_pressed_into_each_other(seed, count, until):
     assert laws.judge(found) == ()
 
 
-# Up to 1.35 s column 1 keeps the laws, see above. Its whole run of 4.2 s takes more than 400 s of
-# processor time, and whether it keeps them to the end is not known: blows stall its steps.
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "seed",
-    [pytest.param(n, marks=pytest.mark.xfail(strict=True)) if n == 1 else n for n in range(20)],
+LONG = pytest.mark.skip(
+    reason="1,379 disks that belts press on a floor: 42 % of its 4.2 s take 400 s of processor time;"
+    " its first 1.25 s are above"
 )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [pytest.param(n, marks=LONG) if n == 1 else n for n in range(20)])
 def test_twenty_columns_and_silos_make_no_energy(seed):
     check(seed, 1000 + 379 * seed % 1001)
 

@@ -145,7 +145,7 @@ def test_it_is_played_through(page_of, name, by, kind):
             assert page.evaluate("chutelab.lesson.kept.done").count(n) == 1, step.kind
         if n + 1 < len(lesson.steps):
             hand.press(page.locator("#step-next"))
-    assert page.locator("#step-next").is_hidden()
+    expect(page.locator("#step-next")).to_be_hidden()
 
 
 def apart(page, first, second):
@@ -215,7 +215,7 @@ def exercise_answers(name):
 def test_on_the_projector_hands_are_counted_and_the_run_is_shown(page_of):
     page = page_of("the-parabola", size=(1920, 1080))
     page.locator("#begin").click()
-    assert not page.locator(".vote").first.is_visible()
+    expect(page.locator(".vote").first).to_be_hidden()
     page.evaluate("document.documentElement.requestFullscreen = async () => {}")
     page.locator("#full").click()
     votes = page.locator(".choice").first.locator(".vote")

@@ -65,7 +65,7 @@ def test_on_a_phone_buttons_beside_a_value_step_it_within_its_range(shown):
         tap("restitution ε", "more")
         assert value(page, "plate.restitution") == pytest.approx(wanted, abs=0.006)
     assert value(page, "plate.restitution") == 1.0
-    assert page.locator("#fault").is_hidden()
+    expect(page.locator("#fault")).to_be_hidden()
     page.click("#undo")
     assert value(page, "plate.restitution") < 1.0
     # On a desk a slider does that.
@@ -81,13 +81,13 @@ def test_numbers_are_typed_and_a_wrong_one_says_why(shown):
     angle.fill("12,5")
     angle.press("Enter")
     assert value(page, "plate.angle_deg") == 12.5
-    assert page.locator("#fault").is_hidden()
+    expect(page.locator("#fault")).to_be_hidden()
     for typed, why in (("95", "zwischen −90 und 90"), ("steil", "eine Zahl"), ("0x10", "eine")):
         angle.fill(typed)
         angle.press("Enter")
         said = page.locator(f"[id='{angle.get_attribute('aria-describedby')}']")
         assert why in said.inner_text()
-        assert page.locator("#fault").is_hidden()
+        expect(page.locator("#fault")).to_be_hidden()
         below = said.bounding_box()["y"] - angle.bounding_box()["y"]
         assert 0.0 < below < 60.0
         assert angle.get_attribute("aria-invalid") == "true"
@@ -149,7 +149,7 @@ def test_a_tool_stays_and_what_it_drew_is_chosen_moved_copied_and_deleted(shown)
     page.mouse.click(*above)
     assert value(page, "stream.1.at") == pytest.approx(world(page, *above), abs=near)
     page.click("#done")
-    assert page.locator(".chip").is_hidden()
+    expect(page.locator(".chip")).to_be_hidden()
     page.evaluate(DONE)
     assert page.evaluate("chutelab.lab.recording.tracks.length") == 2
     first, second = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2), ((b[0] + c[0]) / 2, (b[1] + c[1]) / 2)
@@ -196,8 +196,8 @@ def test_a_tile_is_dragged_into_the_picture(shown):
     page.mouse.up()
     pixel = 2.0 / page.evaluate("chutelab.stage.view.scale")
     assert value(page, "plate.1.pivot") == pytest.approx(world(page, *here), abs=pixel)
-    assert page.locator("#chosen").is_visible()
-    assert page.locator("#parts").is_hidden()
+    expect(page.locator("#chosen")).to_be_visible()
+    expect(page.locator("#parts")).to_be_hidden()
 
 
 def test_all_of_that_goes_with_the_keyboard_alone(shown):
@@ -222,9 +222,9 @@ def test_all_of_that_goes_with_the_keyboard_alone(shown):
     page.keyboard.press("Space")
     assert not page.evaluate("chutelab.lab.playing")
     page.keyboard.press("?")
-    assert page.locator("#help").is_visible()
+    expect(page.locator("#help")).to_be_visible()
     page.keyboard.press("Escape")
-    assert page.locator("#help").is_hidden()
+    expect(page.locator("#help")).to_be_hidden()
     page.keyboard.press("Delete")
     assert value(page, "surface") is None
     assert page.evaluate("document.activeElement.id") == "picture"
@@ -287,7 +287,7 @@ def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(
         assert all(page.locator(one).is_hidden() for one in hidden)
         assert page.evaluate(dots) == 0
         assert page.locator("#time").is_disabled()
-        assert page.get_by_text("Table of the run").is_hidden()
+        expect(page.get_by_text("Table of the run")).to_be_hidden()
 
     is_hidden()
     page.click("#play")
@@ -325,8 +325,8 @@ def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(
     assert float(said.split(" by ")[1].split(" cm")[0]) < 200 / scale
     page.click("#show-all")
     page.select_option("#presets", label="Moon")
-    assert page.locator("#numbers").is_visible()
-    assert page.locator("#guess").is_hidden()
+    expect(page.locator("#numbers")).to_be_visible()
+    expect(page.locator("#guess")).to_be_hidden()
 
 
 def test_a_scene_says_what_can_be_changed(shown):
@@ -345,7 +345,7 @@ ranges = { "plate.angle_deg" = [20, 60] }
         ".map((e) => e.id)"
     )
     assert panels == ["numbers", "edit"]
-    assert page.locator(".tools").is_hidden()
+    expect(page.locator(".tools")).to_be_hidden()
     expect(page.locator("#edit input")).to_have_count(1)
     angle = page.locator("#edit input")
     angle.fill("61")
@@ -485,9 +485,9 @@ def test_it_is_printed_on_one_sheet_dark_or_not(shown):
     pdf = page.pdf(format="A4")
     assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == 1
     page.emulate_media(media="print")
-    assert page.locator("#numbers").is_visible()
+    expect(page.locator("#numbers")).to_be_visible()
     for one in (".transport", ".bench", ".grips", "#edit", "#share"):
-        assert page.locator(one).is_hidden()
+        expect(page.locator(one)).to_be_hidden()
     image = np.asarray(Image.open(BytesIO(page.screenshot())).convert("L")).astype(int)
     assert np.median(image) > 250
 

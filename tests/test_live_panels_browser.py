@@ -260,7 +260,7 @@ def test_a_streams_arrivals_fill_up_with_time_and_a_lone_particle_has_none(shown
     page.locator("#numbers summary", has_text="Teilchen 0").click()
     assert "φ₁ Ablösewinkel" in table.inner_text()
     page = shown("stream-independent", ["stream.count=12"], language="de")
-    assert page.locator("#numbers .crowd").is_hidden()
+    playwright.expect(page.locator("#numbers .crowd")).to_be_hidden()
     assert "Mittel von 12" in page.locator("#numbers").inner_text()
 
 

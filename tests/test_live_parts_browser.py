@@ -292,7 +292,7 @@ def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_pa
     assert "pair" not in given(page)
     page.evaluate("chutelab.bench.inspector.choose('material brick')")
     page.click("#part-delete")
-    assert page.locator("#fault").is_visible()
+    expect(page.locator("#fault")).to_be_visible()
     assert given(page)["material"][0]["name"] == "brick"
 
 
@@ -300,10 +300,10 @@ def test_parts_and_the_card_of_what_is_chosen_take_turns_and_what_is_on_looks_so
     page = shown("inclined-40", viewport={"width": 1366, "height": 768})
     page.evaluate("chutelab.bench.inspector.choose('plate')")
     page.click("#tool-add")
-    assert page.locator("#parts").is_visible()
-    assert page.locator("#chosen").is_hidden()
+    expect(page.locator("#parts")).to_be_visible()
+    expect(page.locator("#chosen")).to_be_hidden()
     page.evaluate("chutelab.bench.inspector.choose('plate')")
-    assert page.locator("#parts").is_hidden()
+    expect(page.locator("#parts")).to_be_hidden()
     # Under the pointer, too, a tool that is on can be told from one that is not.
     page.click("#tool-tape")
     ground = "getComputedStyle(document.getElementById('tool-tape')).backgroundColor"
@@ -365,7 +365,7 @@ def test_a_link_and_html_to_embed_open_the_machine_as_it_is(shown, opened, tmp_p
     page.click("#share > summary")
     page.get_by_role("button", name="Link kopieren").click()
     page.get_by_role("button", name="HTML zum Einbetten kopieren").click()
-    assert page.get_by_text("Es ist in der Zwischenablage.").is_visible()
+    expect(page.get_by_text("Es ist in der Zwischenablage.")).to_be_visible()
     link, html = page.evaluate("texts")
     assert link.startswith((tmp_path / "page.html").as_uri() + "#")
     (tmp_path / "blog.html").write_text(f"<!doctype html><title>x</title>{html}", encoding="utf-8")
@@ -442,15 +442,15 @@ def test_a_machine_of_twelve_parts_is_built_by_keyboard_alone(empty, tmp_path):
 
 def test_the_first_machine_and_the_examples_are_one_click_away(empty):
     page = empty("de")
-    assert page.get_by_text("Bau eine Maschine").is_visible()
+    expect(page.get_by_text("Bau eine Maschine")).to_be_visible()
     assert page.locator(".examples button").count() == len(EXAMPLES)
-    assert page.locator("#panels").is_hidden()
+    expect(page.locator("#panels")).to_be_hidden()
     page.click("#begin")
     page.evaluate(DONE)
-    assert page.locator(".hello").is_hidden()
+    expect(page.locator(".hello")).to_be_hidden()
     assert page.evaluate("chutelab.lab.recording.tracks.length") == 1
     page.click("#undo")
-    assert page.locator(".hello").is_visible()
+    expect(page.locator(".hello")).to_be_visible()
     page.click("#example-cascade")
     page.evaluate(DONE)
     assert from_dict(given(page)) == from_dict(describe(load("cascade"))["scene"])

@@ -99,7 +99,7 @@ def test_several_are_chosen_by_a_frame_and_move_together_by_it(shown):
     page.mouse.move(box["x"] + free["left"] + 4, box["y"] + free["top"] + 4)
     page.mouse.down()
     page.mouse.move(box["x"] + free["right"] - 4, box["y"] + free["bottom"] - 4, steps=3)
-    assert page.locator(".band-frame").is_visible()
+    playwright.expect(page.locator(".band-frame")).to_be_visible()
     page.mouse.up()
     page.keyboard.up("Shift")
     many = page.evaluate("chutelab.bench.inspector.parts")
@@ -397,7 +397,7 @@ def test_what_is_dragged_leaves_its_place_faint_and_tells_its_value_at_the_point
         SCREEN, [pivot["x"] + 0.3 * np.sin(angle), pivot["y"] - 0.3 * np.cos(angle)]
     )
     page.mouse.click(x, y)
-    assert page.locator("#chosen").is_visible()
+    playwright.expect(page.locator("#chosen")).to_be_visible()
     turn = page.evaluate("chutelab.stage.handles.find(({ id }) => id === 'turn-plate')")
     start = page.evaluate(SCREEN, [turn["x"], turn["y"]])
     page.mouse.move(*start)
@@ -411,7 +411,7 @@ def test_what_is_dragged_leaves_its_place_faint_and_tells_its_value_at_the_point
     tip = page.locator(".tip")
     assert tip.inner_text().split("\n") == ["angle α = 60.0°", "was 40.0°"]
     playwright.expect(page.locator(".ghost .steel")).to_have_count(1)
-    assert not page.locator("#chosen").is_visible()
+    playwright.expect(page.locator("#chosen")).to_be_hidden()
     # With Alt it is as exact as the pointer.
     page.keyboard.down("Alt")
     page.mouse.move(*[place + 1 for place in page.evaluate(SCREEN, goal)])
@@ -421,7 +421,7 @@ def test_what_is_dragged_leaves_its_place_faint_and_tells_its_value_at_the_point
     assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == pytest.approx(60.8, abs=0.5)
     assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") != 60.0
     playwright.expect(page.locator(".ghost > *")).to_have_count(0)
-    assert page.locator("#chosen").is_visible()
+    playwright.expect(page.locator("#chosen")).to_be_visible()
     page.click("#undo")
     assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 40.0
 
@@ -437,7 +437,7 @@ def test_what_cannot_be_is_said_at_the_pointer_and_nothing_moves(shown):
     page.mouse.move(*page.evaluate(SCREEN, inside))
     page.evaluate("() => new Promise((then) => setTimeout(then, 60))")
     assert "start inside a surface" in page.inner_text(".tip.refused")
-    assert page.locator("#fault").is_hidden()
+    playwright.expect(page.locator("#fault")).to_be_hidden()
     page.mouse.up()
     assert page.evaluate("chutelab.toml()") == before
 
@@ -473,7 +473,7 @@ def the_card_of_what_is_chosen_covers_neither_it_nor_another_card(page, size):
 
 def test_a_badge_says_when_the_engine_is_slower_than_time(shown):
     page = shown("perpendicular")
-    assert page.locator("#slow").is_hidden()
+    playwright.expect(page.locator("#slow")).to_be_hidden()
     # An engine that computes 0.3 s of the machine in each second.
     page.evaluate("""() => {
       const { lab } = chutelab;
@@ -489,7 +489,7 @@ def test_a_badge_says_when_the_engine_is_slower_than_time(shown):
     # In slow motion that is fast enough.
     page.evaluate("chutelab.lab.rate = 0.25")
     badge.wait_for(state="hidden", timeout=5000)
-    assert page.locator("#slow-why").is_hidden()
+    playwright.expect(page.locator("#slow-why")).to_be_hidden()
 
 
 def test_the_projector_shows_the_machine_large_and_little_else(shown):
@@ -498,19 +498,19 @@ def test_the_projector_shows_the_machine_large_and_little_else(shown):
     before = page.evaluate(size)
     page.click("#full")
     assert page.evaluate(size) > 1.15 * before
-    assert page.locator("#bench").is_hidden()
-    assert page.locator("#numbers").is_hidden()
-    assert page.locator("#energy").is_visible()
+    playwright.expect(page.locator("#bench")).to_be_hidden()
+    playwright.expect(page.locator("#numbers")).to_be_hidden()
+    playwright.expect(page.locator("#energy")).to_be_visible()
     # Left alone it shows title, picture and time; the pointer or a key brings the rest.
     page.locator("#energy").wait_for(state="hidden", timeout=6000)
-    assert page.locator("#play").is_visible()
-    assert page.locator("#views").is_hidden()
+    playwright.expect(page.locator("#play")).to_be_visible()
+    playwright.expect(page.locator("#views")).to_be_hidden()
     page.keyboard.press("Tab")
-    assert page.locator("#energy").is_visible()
+    playwright.expect(page.locator("#energy")).to_be_visible()
     page.mouse.move(400, 300)
     page.click("#full")
     assert page.evaluate(size) == before
-    assert page.locator("#bench").is_visible()
+    playwright.expect(page.locator("#bench")).to_be_visible()
 
 
 LABELS = """() => {
@@ -683,24 +683,24 @@ def test_on_a_phone_one_card_or_drawer_lies_under_the_picture(shown, name, size)
     assert page.locator("#numbers" if name == "stream" else "#energy").is_visible()
     for tab in page.locator(".tabs button").all():
         tab.click()
-        assert page.locator(f"#{tab.get_attribute('data-of')}").is_visible()
+        playwright.expect(page.locator(f"#{tab.get_attribute('data-of')}")).to_be_visible()
         playwright.expect(page.locator("#panels > .card:visible")).to_have_count(1)
         look()
     for tool, seen in (("add", "#part-belt"), ("tape", "#tool-tape"), ("eye", "#show-grid"),
                        ("more", "#keys")):  # fmt: skip
         page.click(f"#dock-{tool}")
         page.locator(seen).scroll_into_view_if_needed()
-        assert page.locator(seen).is_visible()
+        playwright.expect(page.locator(seen)).to_be_visible()
         look()
     # What is taken leaves the picture to be measured in; what is chosen has its card.
     page.click("#dock-tape")
     page.click("#tool-tape")
     playwright.expect(page.locator(".measures .tape")).to_have_count(1)
-    assert page.locator(".tabs").is_visible()
+    playwright.expect(page.locator(".tabs")).to_be_visible()
     page.evaluate("chutelab.bench.inspector.choose(chutelab.lab.machine.surfaces[0])")
-    assert page.locator("#chosen").is_visible()
+    playwright.expect(page.locator("#chosen")).to_be_visible()
     look()
     # Turned, or on a wider window, all is where it belongs there.
     page.set_viewport_size({"width": 1366, "height": 768})
-    assert page.locator(".bench #tool-tape").is_visible()
+    playwright.expect(page.locator(".bench #tool-tape")).to_be_visible()
     assert page.locator("#panels > .card:visible").count() > 2

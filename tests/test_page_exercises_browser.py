@@ -55,7 +55,7 @@ def test_the_machine_of_a_student_says_what_is_right(page_of, name):
     for n, value, right in measured:
         assert right == value == pytest.approx(cases[n].right, rel=1e-6, abs=0.0)
         # It can be looked at as soon as all that it shows was answered.
-        assert page.locator("#machine").is_hidden()
+        expect(page.locator("#machine")).to_be_hidden()
         close = f"{0.97 * right:.6g}"
         reply = lesson(name, "Ada").check(n + 1, float(close))
         assert says(page, n + 1, close) == ("off", f"↻ {reply.heading}. {reply.text}")
@@ -105,7 +105,7 @@ def test_a_page_around_it_says_who_it_is_and_hears_what_becomes_of_it(opened, tm
             assert frame.locator(".question").count() == 0
             to_step(frame)
         frame.locator("#exercise h3").wait_for()
-        assert frame.locator("#somebody-else").is_hidden()
+        expect(frame.locator("#somebody-else")).to_be_hidden()
         question = frame.locator(f'[data-question="{done}"]')
         question.locator("input").fill(f"{cases[done - 1].right:.4g}")
         question.locator(".check").click()

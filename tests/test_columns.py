@@ -53,7 +53,7 @@ def test_what_jams_is_not_pressed_into_each_other(seed, count, until):
 
 
 LONG = pytest.mark.skip(
-    reason="1,379 disks that belts press on a floor: 42 % of its 4.2 s take 400 s of processor time;"
+    reason="1,379 disks that belts press on a floor: 42 % of its 4.2 s take 400 s of a processor;"
     " its first 1.25 s are above"
 )
 

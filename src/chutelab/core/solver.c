@@ -30,6 +30,8 @@
 
 /* Whether a surface that moves drives a disk. */
 static int drives(const Contact *c) { return c->j < 0 && c->other[1] - c->moved[1] != 0; }
+/* Whether a surface runs or comes on, as hard as it must. */
+static int presses(const Contact *c) { return drives(c) || c->moved[0] != 0; }
 
 /* Stall the drives, for this step, of disks that do not turn and that block them: contacts that change by
    `least`, m/s, or more, and rough ones that slip by more than `enough` though their friction is not all used.
@@ -76,7 +78,7 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough) {
     double first = INFINITY;
-    int driven = 0;
+    int driven = 0, pressing = 0;
     if (W.swings_too) {
         sweep_hung(list, count, MAX(rounds, 1) * sweeps, enough);
         return;
@@ -84,6 +86,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         driven |= drives(c);
+        pressing |= presses(c);
         /* What may have to stall tells so by how it changes, sweep by sweep. */
         if (drives(c) && c->friction > ROUGH && W.disks[c->i].inertia == 0) plain = sweeps;
     }
@@ -99,7 +102,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
         if (!stalled) {
             if (ended && more < 2) break;
             if (ended) accurate *= 0.1;
-            if (change < INFINITY) worst = driven ? MAX(left_open(), change) : left_open();
+            if (change < INFINITY) worst = pressing ? MAX(left_open(), change) : left_open();
             if (worst <= enough) break;
             if (change < INFINITY && more > 1) {
                 if (more-- == rounds) first = change;
@@ -248,7 +251,7 @@ void solve_contacts(void) {
             const Disk *a = W.disks + c->i, *b = W.disks + (c->j >= 0 ? c->j : c->i);
             least = MIN(least, MIN(a->radius, b->radius));
             heaviest = MAX(heaviest, MAX(a->mass, b->mass));
-            driven |= !c->two && c->other[1] - c->moved[1] != 0;
+            driven |= presses(c);
             W.swings_too |= c->hung > 0;
         }
         swings |= W.swings_too;

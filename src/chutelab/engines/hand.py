@@ -151,7 +151,7 @@ class Run:
         """
         if not 0 <= particle < self._machine.count:
             raise InputError(f"0 to {self._machine.count - 1}", "particle", particle)
-        if len(force) != 2 or not all(map(isfinite, force)):
+        if np.shape(force) != (2,) or not all(map(isfinite, force)):
             raise InputError("two finite numbers, N", "force", force)
         self._module.call("push_disk", particle, *map(float, force))
         self._pushed.add(particle)

@@ -232,11 +232,11 @@ def sensors(recording: Recording) -> Picture:
 
 def in_pairs(recording: Recording, rows: int) -> tuple[Picture, list[tuple[Axes, Axes]]]:
     """Return a figure with the recording's title, and two axes beside each other in each row."""
-    high = 1.4 + 2.6 * max(1, rows)
+    high = 1.7 + 2.6 * max(1, rows)
     figure = Picture((9.6, high))
     figure.headline(0.04, 1.0 - 0.35 / high, recording.title)
     grid = figure.add_gridspec(
-        max(1, rows), 2, left=0.085, right=0.975, top=1.0 - 1.05 / high, bottom=0.6 / high,
+        max(1, rows), 2, left=0.085, right=0.975, top=1.0 - 1.35 / high, bottom=0.6 / high,
         hspace=0.6, wspace=0.24,
     )  # fmt: skip
     return figure, [
@@ -258,8 +258,8 @@ def loads(recording: Recording) -> Picture:
         size = style.quantity
         style.note(left, say("load-told", mean=size(mean, "N"), peak=size(peak, "N")))
         if not figure.legends:
-            top = 1.0 - 0.15 / figure.get_figheight()
-            figure.legend(loc="upper right", bbox_to_anchor=(0.98, top), ncols=3)
+            top = 1.0 - 0.45 / figure.get_figheight()
+            figure.legend(loc="upper left", bbox_to_anchor=(0.03, top), ncols=3)
         style.dress(right, say("time"), say("load-torque"), "")
         right.stairs(one.torque, one.edges, color=style.TRACK, lw=1.2)
         x, y = (figures(value, ".4g") for value in one.pivot)

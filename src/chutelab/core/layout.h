@@ -397,7 +397,7 @@ typedef struct {
 
 typedef struct {
     double kind;            /* which of the particles it consists of */
-    double at[2], to[2], fill[4], velocity[2];
+    double at[2], to[2], fill[4], velocity[2], omega; /* spin at the release, rad/s */
     double count, rate, start, bed_height, speed_spread;
     double seed[2];         /* its lower 32 bits and the others */
     double at_once;         /* whether all are released at once */
@@ -486,7 +486,7 @@ typedef struct {
 /* A particle that meets no other, for the exact engine. */
 typedef struct {
     double release, stop;       /* [in] s; when it starts, and how long after that its run is over */
-    double position[2], velocity[2]; /* [in] at its release */
+    double position[2], velocity[2], omega; /* [in] at its release */
     double radius, mass;        /* [in] a radius of 0 is a mass point */
     double inertia;             /* [in] kg m2; 0: it does not turn */
     double rolling;             /* [in] rolling friction: its arm over the radius */
@@ -545,6 +545,7 @@ typedef struct {
 typedef struct {                                                                         /* [out] */
     double t, position[2], velocity[2], radius;
     double exit_box[4];     /* m; left, bottom, right, top */
+    double omega;           /* rad/s */
 } Start;
 
 /* An earlier particle as one that is drawn sees it: how far it has come (m), and how far apart they
@@ -553,8 +554,8 @@ typedef struct { double dx, dy, reach; int particle, next; } Near;
 
 /* Why releases of a scene cannot be drawn: a box has room for so many of this radius only; one would
    start inside a surface, at this distance from it instead of `reach` (m); or a belt that grips by
-   adhesion lets none be faster than others, or start with another velocity than its own. */
-enum Refused { ACCEPTED, BOX_FULL, RELEASE_INSIDE, SPREAD_ADHERES, VELOCITY_ADHERES };
+   adhesion lets none be faster than others, start with another velocity than its own, or spin. */
+enum Refused { ACCEPTED, BOX_FULL, RELEASE_INSIDE, SPREAD_ADHERES, VELOCITY_ADHERES, SPIN_ADHERES };
 
 typedef struct {                                                                         /* [out] */
     double distance, reach;

@@ -113,13 +113,15 @@ static void begin_stream(void) {
     if (carried) {
         double speed = tables.incoming->speed, near = ALONG * fabs(speed);
         int other = fabs(velocity[0] - speed * belt_x) > near || fabs(velocity[1] - speed * belt_y) > near;
-        int why = stream->speed_spread > 0.0 ? SPREAD_ADHERES : other ? VELOCITY_ADHERES : ACCEPTED;
+        int why = stream->speed_spread > 0.0 ? SPREAD_ADHERES : other ? VELOCITY_ADHERES
+                : stream->omega != 0.0 ? SPIN_ADHERES : ACCEPTED;
         D.refusals[D.member] = (Refusal){ .why = why, .stream = D.stream };
     }
+    int turns = particle->moment > 0.0 || particle->corners > 0.0;
     for (int i = 0; i < count; i++) {
         double t = stream->at_once != 0.0 ? 0.0 : i / stream->rate;
         starts[i] = (Start){ .t = t + stream->start, .velocity = { velocity[0], velocity[1] },
-                             .radius = particle->radius };
+                             .omega = turns ? stream->omega : 0.0, .radius = particle->radius };
     }
     D.next = 1;
     D.near_count = 0;

@@ -144,7 +144,7 @@ class Job:
         disks = module.array("disks", dtype("Disk"), machine.count)
         disks["x"], disks["y"] = releases.position.T
         disks["vx"], disks["vy"] = releases.velocity.T
-        disks["release"] = releases.t
+        disks["spin"], disks["release"] = releases.omega, releases.t
         disks["radius"], disks["mass"] = particle.radius, particle.mass
         disks["inertia"] = particle.inertia
         disks["kind"] = releases.kind

@@ -174,6 +174,7 @@ class _Run:
         self.t0, self.base = float(releases.t[0]), releases.position[0].copy()
         self.state = np.zeros(7)
         self.state[V] = releases.velocity[0]
+        self.state[OMEGA] = releases.omega[0]
         self.things = _surfaces(machine)
         # Whether the left face of a segment was struck last.
         self.sides: dict[int, bool] = {}

@@ -128,7 +128,7 @@ class Lone:
         self.t = float(start.t[particle])
         self.x = Vec2d(*start.position[particle].tolist())
         self.v = Vec2d(*start.velocity[particle].tolist())
-        self.omega = 0.0
+        self.omega = float(start.omega[particle])
         self.body, self.circle = world.disk(particle)
         self.weight = self.body.mass * self.g
         # Rolling friction's arm, m; nothing of what does not turn.

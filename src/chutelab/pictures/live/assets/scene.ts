@@ -54,6 +54,7 @@ interface Stream {
   to?: Point;
   fill?: [Point, Point];
   velocity?: Point;
+  omega: number;
   interact: boolean;
   restitution: number;
   friction: number;

@@ -191,7 +191,8 @@ class Core extends Memory {
     }
     releases.forEach((one, i) => {
       this.fill("disks", "Disk", i, {
-        x: one.x, y: one.y, vx: one.vx, vy: one.vy, spin: machine.spins?.[i] ?? one.omega, release: one.t,
+        x: one.x, y: one.y, vx: one.vx, vy: one.vy,
+        spin: machine.spins?.[i] ?? one.omega, release: one.t,
         radius: machine.radius[i], mass: machine.mass[i], inertia: machine.inertia[i],
         kind: one.kind, rides: Number(one.carried), goes_on: Number(machine.goesOn?.[i] ?? false),
         exit_box: one.exitBox,

@@ -89,6 +89,10 @@ BY_HAND = [
     ("machine", {"material[0].name": GONE}, "material[0].name", "is missing"),
     ("machine", {"plate[1].name": GONE}, "plate[1].name", "a plate with a pivot needs one"),
     # kinds of particles
+    ("machine", {"gravity_deg": 10.0}, "gravity_deg", "0 with [incoming]"),
+    ("alone", {"gravity_deg": 720.5}, "gravity_deg", "720"),
+    ("alone", {"gravity_deg": "left"}, "gravity_deg", "number"),
+    ("alone", {"gravity_deg": 5.0, "run.engine": "exact"}, "gravity_deg", "exact engine"),
     ("alone", {"stream.omega": 3.0}, "stream.omega", "particle.spin true"),
     ("dominoes", {"stream[2].omega": 3.0}, "stream[2].omega", "particle[2].spin true"),
     ("alone", {"particle.spin": True, "stream.omega": "3"}, "stream.omega", "number"),

@@ -86,7 +86,8 @@ def test_what_moves_does_so_as_in_python():
         from_dict({**base, "surface": [{**shape, **keys}]})
         for base in (BALL, crowd) for shape in (LINE, arc) for keys in MOVING
     ]  # fmt: skip
-    assert same_runs([load("see-saw"), load("damper-plate"), *scenes]) > 1000
+    tilted = from_dict({**crowd, "gravity_deg": 55.0, "surface": [{**LINE, **HANGS}]})
+    assert same_runs([tilted, load("see-saw"), load("damper-plate"), *scenes]) > 1000
 
 
 @pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.slow)])

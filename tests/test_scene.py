@@ -44,7 +44,7 @@ speed = 1
 # Design, section 3, copied by hand: what a scene has that names only what it must.
 CONTRACT = {
     "title": "machine",
-    "gravity": 9.81,
+    "gravity": 9.81, "gravity_deg": 0.0,
     "air_density": 0.0,
     "particle": {"name": None, "shape": "disk", "radius": 0.0063, "size": None, "points": None,
      "mass": 0.008, "density": None, "material": None, "spin": False, "rolling_friction": 0.0,

@@ -335,6 +335,7 @@ typedef struct {
     int sweeps;          /* of the contact solver, at most */
     int sleeps;          /* whether islands may fall asleep */
     double gx, gy;       /* m/s2 */
+    double up[2];        /* against gravity */
     double air;          /* [in] kg/m3; density of still air, 0 without */
     double dt;           /* s; longest step */
     double end_time;     /* s */
@@ -365,6 +366,7 @@ typedef struct {
     double again;        /* what lasts needs so many times the impulses of the step before */
     double before;       /* share of this step's impulses that belongs to the one before */
     double g;            /* m/s2; size of gravity */
+    double tilt;         /* rad; by which it is turned from straight down, counterclockwise */
     double haste;        /* m/s2; bound on the acceleration of what moves in this step */
     double fastest;      /* m/s; bound on the speed of all that moves */
     double pace;         /* sqrt(g / EARTH), 1 without gravity: bounds on speeds grow with it, bounds
@@ -383,6 +385,7 @@ enum DropFrom { FROM_IMPACT, FROM_TOP };
 
 typedef struct {
     double gravity;
+    double gravity_deg;     /* 0 is down */
     double air_density;     /* kg/m3; of still air */
     double crowded;         /* whether particles meet each other */
 } SceneKeys;
@@ -691,6 +694,7 @@ typedef struct {
     int contacts, steps;    /* [in] that were made */
     int owned;              /* [in] behind its numbers a knot says whose it is: rows are those of `Knot` */
     int unreal;             /* [in] numbers that are not finite, beside knots and books */
+    double tilt;            /* [in] rad; by which gravity is turned from straight down */
     double dt;              /* [in] s; step, 0 of the exact engine */
     double gained;          /* [in] J; by which solves broke their law of energy */
     double unsolved;        /* [in] radii; the most overlap that the solve of a step left beyond what it asked for */

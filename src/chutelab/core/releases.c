@@ -25,7 +25,7 @@ static const StreamKeys *stream;
 static const ParticleKeys *particle;
 static Start *starts;
 static int count, rides, carried;
-static double belt_x, belt_y; /* the way the belt runs, for what is released on it */
+static double belt_x, belt_y; /* the way the belt runs, for what is released on it; else square to gravity */
 
 static Place handful[HANDFUL];
 
@@ -108,7 +108,7 @@ static void begin_stream(void) {
     release_velocity(&tables, D.stream, velocity);
     rides = is_on_belt(&tables, D.stream);
     carried = rides && tables.incoming->adheres != 0.0;
-    belt_x = 1.0, belt_y = 0.0;
+    sin_cos(tables.scene->gravity_deg * RADIANS, &belt_y, &belt_x);
     if (rides) up_belt(tables.incoming, &belt_x, &belt_y);
     if (carried) {
         double speed = tables.incoming->speed, near = ALONG * fabs(speed);

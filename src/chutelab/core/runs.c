@@ -156,6 +156,7 @@ static int take_up_world(void) {
     w->pulley = P.incoming ? P.segment_count : -1;
     w->ride_incline = P.incoming ? t.incoming->incline_deg * RADIANS : 0.0;
     w->g = t.scene->gravity;
+    w->tilt = t.scene->gravity_deg * RADIANS;
     w->air = t.scene->air_density;
     w->end_time = end_of_run();
     if (!lay_out_world()) return 0;

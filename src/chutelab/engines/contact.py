@@ -135,7 +135,8 @@ class Job:
             ("kind_count", self.kinds), ("owner_count", self.owners),
             ("pulley", -1 if wheel is None else len(machine.segments.length)),
             ("ride_incline", 0.0 if wheel is None else wheel.incline),
-            ("g", machine.gravity), ("air", machine.air), ("end_time", machine.end_time),
+            ("g", machine.gravity), ("tilt", machine.tilt),
+            ("air", machine.air), ("end_time", machine.end_time),
             ("mover_count", len(machine.movers)), ("trigger_count", len(machine.triggers)),
         ):  # fmt: skip
             setattr(module.world, name, value)

@@ -337,6 +337,10 @@ def conflicts(look: Look) -> Iterator[Fault]:
 def _tables(look: Look) -> Iterator[Fault]:
     plates = look.rows("plate")
     damps = look.damps or (look.has("plate") and not plates)
+    turned = look.document.get("gravity_deg")
+    if turned and look.has("incoming") and look.sound("gravity_deg"):
+        text = "must be 0 with [incoming]: the paper's machine stands upright"
+        yield Fault("gravity_deg", turned, text)
     needy = ["[plate]"] * damps + ["[outgoing]"] * look.has("outgoing")
     if needy and not look.has("incoming"):
         need = "needs" if len(needy) == 1 else "need"

@@ -125,7 +125,7 @@ class Shared:
         self.angle = np.zeros(rows) if self.corners else None
         self.g, pace = machine.gravity, world.pace
         self.lasts, self.still = CALM / pace, STILL * pace
-        self.pull = Vec2d(0.0, -self.g)
+        self.pull = Vec2d(*(-self.g * machine.up))
         # A whole number of steps ends the run.
         self.t = self.begin = float(starts.t.min())
         if any(mover.hinge for mover in machine.movers):

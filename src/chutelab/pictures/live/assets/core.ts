@@ -168,7 +168,8 @@ class Core extends Memory {
       mover_count: machine.movers.length,
       until: this.layout.enums.Until[`UNTIL_${machine.until.toUpperCase()}`],
       landing: machine.landing, ride_owner: 0, pulley: pulley ? machine.segments.length : -1,
-      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity, air: machine.air,
+      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity,
+      tilt: machine.tilt, air: machine.air,
       dt: machine.dt, end_time: machine.endTime,
     });
     this.work("lay_out_world");

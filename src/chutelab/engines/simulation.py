@@ -34,8 +34,7 @@ def choose(machine: Machine, engine: str | None = None) -> str:
     if any(outline is not None for outline in machine.outlines) or machine.threads:
         return "pymunk"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
-    stepped = stepped or machine.tilt
-    return "contact" if stepped or machine.scene.clings else "exact"
+    return "contact" if stepped or machine.tilt or machine.scene.clings else "exact"
 
 
 def simulate(

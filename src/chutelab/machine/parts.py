@@ -212,7 +212,8 @@ class Machine:
 
     def height(self, position: Floats) -> Floats:
         """Return how high places (..., 2) are, (...), m: against gravity, from the origin."""
-        return self.up[0] * position[..., 0] + self.up[1] * position[..., 1]
+        found: Floats = self.up[0] * position[..., 0] + self.up[1] * position[..., 1]
+        return found
 
     @cached_property
     def pace(self) -> Any:

@@ -37,6 +37,7 @@ AUTO = {
     "damper-plate": "contact",
     "flap-gate": "contact",
     "vibrating-feeder": "contact",
+    "drum": "contact",
     "see-saw": "contact",
     "cradle": "pymunk",
     "dominoes": "pymunk",

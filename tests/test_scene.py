@@ -68,7 +68,7 @@ CONTRACT = {
      "start": 0.0, "bed_height": 0.0, "speed_spread": 0.0, "seed": 0, "at": None, "to": None,
      "fill": None, "velocity": None, "interact": False, "restitution": 0.5, "friction": 0.3},
     "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001, "align": True,
-     "loads": None},
+     "loads": None, "stress": None},
     "expect": (),
     "view": None,
     "live": {"predict": False, "controls": None, "panels": None, "ranges": {}, "presets": ()},

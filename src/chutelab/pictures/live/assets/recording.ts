@@ -3,6 +3,7 @@
 
 import type { Breach } from "./breaches.ts";
 import { KNOT_ROW, LOAD_ROW, type Machine, type Event } from "./core.ts";
+import { actAt, waiting } from "./machine.ts";
 import { SWING_ROW, Swings, posed } from "./motion.ts";
 
 export type State = { x: number, y: number, vx: number, vy: number, spin: number, ended: boolean };
@@ -266,6 +267,7 @@ class Recording {
   breaches: Breach[] = [];
 
   constructor(public machine: Machine) {
+    waiting(machine);
     this.tracks = machine.releases.map(() => new Track());
     for (const { surface } of machine.movers) this.swings.set(surface, new Swings());
   }
@@ -277,12 +279,12 @@ class Recording {
 
   add({
     knots, tips, events, swings, now, state, books = null, gained = 0, unsolved = 0,
-    contacts = 0, steps = 0, loads,
+    contacts = 0, steps = 0, loads, triggered = [],
   }: {
     knots: Float64Array, tips: Float64Array, events: Event[], swings: number[], now: number,
     state: string,
     books?: number[][] | null, gained?: number, unsolved?: number, contacts?: number,
-    steps?: number, loads?: { from: number, rows: Float64Array },
+    steps?: number, loads?: { from: number, rows: Float64Array }, triggered?: number[],
   }) {
     this.gained = gained;
     this.unsolved = unsolved;
@@ -315,6 +317,7 @@ class Recording {
       this.swings.get(swings[n + 3])?.rows.push(swings.slice(n, n + 3));
     }
     if (loads?.rows.length) this.bear(loads.from, loads.rows);
+    if (triggered.length) actAt(this.machine, triggered);
     this.measure();
     this.state = state;
     this.now = state === "running" ? now + this.shift : Math.max(this.end, now + this.shift);

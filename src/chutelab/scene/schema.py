@@ -32,6 +32,7 @@ from chutelab.scene.units import (
     MOST_KINDS,
     MOST_SURFACES,
     Amount,
+    Angle,
     Gravity,
     Table,
     Text,
@@ -96,7 +97,10 @@ class SceneTables(Table):
     """The tables of a scene, with all defaults that need no geometry."""
 
     title: Text = described("Untitled scene", "What the scene is called", max_length=200)
-    gravity: Gravity = described(9.81, "Gravity g, downward", "m/s²")
+    gravity: Gravity = described(9.81, "Gravity g", "m/s²")
+    gravity_deg: Angle = described(
+        0.0, "Where gravity points: 0 is down, 90 to the right; not with [incoming]", "degrees"
+    )
     air_density: Amount = described(
         0.0,
         "Density of still air, which slows particles down as spheres of their radius"

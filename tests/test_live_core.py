@@ -98,7 +98,8 @@ def test_what_moves_does_so_as_in_python():
         from_dict({**base, "surface": [{**shape, **keys}]})
         for base in (BALL, crowd) for shape in (LINE, arc) for keys in MOVING
     ]  # fmt: skip
-    assert same_runs([load("see-saw"), load("damper-plate"), *scenes]) > 1000
+    tilted = from_dict({**crowd, "gravity_deg": 55.0, "surface": [{**LINE, **HANGS}]})
+    assert same_runs([tilted, load("see-saw"), load("damper-plate"), *scenes]) > 1000
 
 
 def test_what_waits_for_a_touch_acts_as_in_python():

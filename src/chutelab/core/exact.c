@@ -873,8 +873,8 @@ static void begin(void) {
     const Lone *p = E.lones + E.lone;
     double inertia = p->inertia, arm = p->mass * p->radius * p->radius;
     A = (Particle){ .given = p, .x = p->position[0], .y = p->position[1], .vx = p->velocity[0],
-                    .vy = p->velocity[1], .share = 1.0, .way = p->carried ? RIDES_BELT : FLIES, .on = NONE,
-                    .slip = 1.0, .left = NONE, .joint = NONE };
+                    .vy = p->velocity[1], .z = p->omega * p->radius, .share = 1.0,
+                    .way = p->carried ? RIDES_BELT : FLIES, .on = NONE, .slip = 1.0, .left = NONE, .joint = NONE };
     A.turns = inertia > 0.0;
     if (A.turns) A.share = inertia / (inertia + arm);
     /* That of a disk is not to depend on the rounding of its I. */
@@ -934,7 +934,7 @@ EXPORT int lay_out_exact(void) {
 
 /* Run all particles, for at most so many rounds; returns why it came back, see `enum Course`. */
 int follow_all(int rounds) {
-    if (B.every > 0.0 && !B.bins && !lay_out_bins(E.surface_count)) return NO_MEMORY;
+    if (B.every > 0.0 && !B.bins && !lay_out_bins(E.surface_count, 0)) return NO_MEMORY;
     for (; E.lone < E.lone_count; E.lone++, E.begun = 0) {
         int member = E.family ? E.lone : 0;
         if (E.laid != member + 1) {

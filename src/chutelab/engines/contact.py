@@ -26,7 +26,7 @@ from chutelab.core import (
 )
 from chutelab.machine import SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
-from chutelab.results.loads import gather
+from chutelab.results.loads import gather, gather_lasting
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress, unwatched
@@ -118,7 +118,8 @@ class Job:
             ("landing", machine.landing), ("ride_owner", 0), ("dt", machine.dt),
         ):  # fmt: skip
             setattr(module.world, name, value)
-        module.structs["Loads"].every = machine.loads
+        loads = module.structs["Loads"]
+        loads.every, loads.each = machine.loads, machine.stress
         self.begin = "run_world" if machine.is_ahead else "run_and_judge"
         if machine.is_ahead:
             hand_over(module, machine.scene)
@@ -135,7 +136,8 @@ class Job:
             ("kind_count", self.kinds), ("owner_count", self.owners),
             ("pulley", -1 if wheel is None else len(machine.segments.length)),
             ("ride_incline", 0.0 if wheel is None else wheel.incline),
-            ("g", machine.gravity), ("air", machine.air), ("end_time", machine.end_time),
+            ("g", machine.gravity), ("tilt", machine.tilt),
+            ("air", machine.air), ("end_time", machine.end_time),
             ("mover_count", len(machine.movers)), ("trigger_count", len(machine.triggers)),
         ):  # fmt: skip
             setattr(module.world, name, value)
@@ -144,7 +146,7 @@ class Job:
         disks = module.array("disks", dtype("Disk"), machine.count)
         disks["x"], disks["y"] = releases.position.T
         disks["vx"], disks["vy"] = releases.velocity.T
-        disks["release"] = releases.t
+        disks["spin"], disks["release"] = releases.omega, releases.t
         disks["radius"], disks["mass"] = particle.radius, particle.mass
         disks["inertia"] = particle.inertia
         disks["kind"] = releases.kind
@@ -277,3 +279,4 @@ class Job:
         rows = module.array("totals", dtype("Total"), world.total_count)
         recorder.take_totals(rows)
         recorder.impulses = gather(module, self.owners)
+        recorder.lasting = gather_lasting(module)

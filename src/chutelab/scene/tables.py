@@ -449,6 +449,9 @@ class Stream(Resolved):
     velocity: Point | None = described(
         None, "Release velocity [vx, vy]; default: the incoming belt's", "m/s"
     )
+    omega: Number = described(
+        0.0, "Spin at the release, counterclockwise; needs spin", "rad/s", ge=-1e6, le=1e6
+    )
     interact: Switch = described(False, "Particle-particle contacts, of all streams if one says so")
     restitution: Share = pair_restitution(0.5, "particle-particle")
     friction: Amount = pair_friction(0.3, "particle-particle")
@@ -495,6 +498,14 @@ class Run(Table):
     loads: Number | None = described(
         None,
         "Width of the bins of time in which loads on surfaces are counted; default: they are not",
+        "s",
+        ge=1e-5,
+        le=1e3,
+    )
+    stress: Number | None = described(
+        None,
+        "Width of the bins of time in which the contact engine keeps what each lasting contact"
+        " gives, for the stress of fields; default: it does not",
         "s",
         ge=1e-5,
         le=1e3,

@@ -188,6 +188,9 @@ function* beltConflicts(scene: Scene): Generator<Wrong> {
   if (incoming === null && (damps || outgoing !== null)) {
     yield ["incoming", undefined, "needs-incoming"];
   }
+  if (incoming !== null && scene.gravity_deg !== 0.0) {
+    yield ["gravity_deg", scene.gravity_deg, "upright"];
+  }
   if (outgoing?.drop_from === "impact") yield ["outgoing.drop_from", "impact", "drop-from-impact"];
   if (outgoing === null && scene.run.until === "landed") {
     yield ["run.until", "landed", "needs-outgoing"];

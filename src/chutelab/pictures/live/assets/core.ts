@@ -168,7 +168,8 @@ class Core extends Memory {
       mover_count: machine.movers.length, trigger_count: machine.triggers.length,
       until: this.layout.enums.Until[`UNTIL_${machine.until.toUpperCase()}`],
       landing: machine.landing, ride_owner: 0, pulley: pulley ? machine.segments.length : -1,
-      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity, air: machine.air,
+      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity,
+      tilt: machine.tilt, air: machine.air,
       dt: machine.dt, end_time: machine.endTime,
     });
     this.work("lay_out_world");
@@ -196,7 +197,8 @@ class Core extends Memory {
     }
     releases.forEach((one, i) => {
       this.fill("disks", "Disk", i, {
-        x: one.x, y: one.y, vx: one.vx, vy: one.vy, spin: machine.spins?.[i] ?? 0, release: one.t,
+        x: one.x, y: one.y, vx: one.vx, vy: one.vy,
+        spin: machine.spins?.[i] ?? one.omega, release: one.t,
         radius: machine.radius[i], mass: machine.mass[i], inertia: machine.inertia[i],
         kind: one.kind, rides: Number(one.carried), goes_on: Number(machine.goesOn?.[i] ?? false),
         exit_box: one.exitBox,
@@ -204,7 +206,7 @@ class Core extends Memory {
     });
     this.work("prepare");
     this.set("every", machine.loads, "Loads");
-    if (machine.loads) this.work("lay_out_bins", machine.surfaces.length);
+    if (machine.loads) this.work("lay_out_bins", machine.surfaces.length, 0);
   }
 
   pair(

@@ -3,7 +3,7 @@
 import { lay, type Mover } from "./plan.ts";
 import { draw, type Release } from "./releases.ts";
 import { Fault, cohesionOf, met, passes, triggersOf, type Scene } from "./scene.ts";
-import { RADIANS } from "./trig.ts";
+import { RADIANS, sinCos } from "./trig.ts";
 
 export interface Segment {
   x: number; // first end, m
@@ -53,6 +53,8 @@ export interface Trigger {
 export interface Machine {
   surfaces: string[]; // names
   gravity: number;
+  tilt: number; // rad; by which gravity is turned from straight down
+  up: [number, number]; // against gravity
   air: number; // kg/m³, density of still air; 0 without
   landing: number; // index of the outgoing belt, -1 without one
   until: "landed" | "settled" | "time";
@@ -104,10 +106,13 @@ export function build(scene: Scene): Machine {
   let last = -Infinity, unnamed = 0;
   for (const release of releases) last = Math.max(last, release.t);
   const bound = last + run.max_time;
+  const tilt = scene.gravity_deg * RADIANS, [sin, cos] = sinCos(tilt);
   const pairs = every.map((a) => every.map((b) => met(scene, a, b)));
   return waiting({
     surfaces: names,
     gravity: scene.gravity,
+    tilt,
+    up: [-sin, cos],
     air: scene.air_density,
     landing: names.indexOf("outgoing"),
     until: typeof run.until === "string" ? run.until : "time",

@@ -142,6 +142,7 @@ function outsideOf(scene: Scene, belt: Incoming) {
     const [vx, vy] = stream.velocity;
     if (vx !== belt.speed * cos || vy !== belt.speed * sin) return "other-velocity";
   }
+  if (stream.omega !== 0.0) return "spins";
   if (moversOf(scene).length) return "moves";
   if (triggersOf(scene).length) return "waits";
   return scene.crowded ? "interact" : "";

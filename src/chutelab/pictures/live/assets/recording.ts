@@ -20,6 +20,9 @@ const MOST_CHORDS = 500;
 
 /** Knots of one particle, `KNOT_ROW` doubles each. */
 class Track {
+  /** @param up the direction against gravity */
+  constructor(readonly up: [number, number] = [0, 1]) {}
+
   rows = new Float64Array(8 * KNOT_ROW);
 
   count = 0;
@@ -70,13 +73,17 @@ class Track {
 
   /** Lowest place of a knot and of the curve to it, m: where its slope, a quadratic, is 0. */
   lowAt(i: number) {
-    const y = this.at(i, Y), h = i ? this.at(i, T) - this.at(i - 1, T) : 0;
+    const [across, up] = this.up;
+    const of = (knot: number, x: number, y: number) =>
+      across * this.at(knot, x) + up * this.at(knot, y);
+    const y = of(i, X, Y), h = i ? this.at(i, T) - this.at(i - 1, T) : 0;
     if (!(h > 0)) return y;
-    const va = this.at(i - 1, VY), vb = this.at(i, VY), mean = (y - this.at(i - 1, Y)) / h;
+    const va = of(i - 1, VX, VY), vb = of(i, VX, VY), mean = (y - of(i - 1, X, Y)) / h;
     const a = 3 * (va + vb - 2 * mean), b = 3 * mean - 2 * va - vb;
     const q = -(b + Math.sign(b || 1) * Math.sqrt(Math.max(0, b * b - a * va)));
     return [q / a, va / q].reduce((low, s) =>
-      (s > 0 && s < 1 ? Math.min(low, this.placeOn(i - 1, Y, VY, h, s)) : low), y);
+      (s > 0 && s < 1 ? Math.min(low, across * this.placeOn(i - 1, X, VX, h, s)
+        + up * this.placeOn(i - 1, Y, VY, h, s)) : low), y);
   }
 
   /** The lowest of the first so many knots. */
@@ -268,7 +275,7 @@ class Recording {
 
   constructor(public machine: Machine) {
     waiting(machine);
-    this.tracks = machine.releases.map(() => new Track());
+    this.tracks = machine.releases.map(() => new Track(machine.up));
     for (const { surface } of machine.movers) this.swings.set(surface, new Swings());
   }
 
@@ -367,7 +374,7 @@ class Recording {
       return ledger
         ? [ledger.belt_work, ledger.restitution_loss, ledger.friction_loss] : [0, 0, 0];
     });
-    this.tracks = was.map((index) => this.tracks[index] ?? new Track());
+    this.tracks = was.map((index) => this.tracks[index] ?? new Track(machine.up));
     this.events = this.renumbered(t, was, machine.surfaces);
     machine.releases.forEach((release, index) => {
       const track = this.tracks[index], entries = booked[index];
@@ -438,7 +445,8 @@ class Recording {
     const mass = machine.mass[index], inertia = machine.inertia[index];
     const kinetic = ({ vx, vy, spin }: State) =>
       0.5 * mass * (vx * vx + vy * vy) + 0.5 * inertia * spin * spin;
-    const potential = ({ y }: State) => mass * machine.gravity * y;
+    const [across, up] = machine.up;
+    const potential = ({ x, y }: State) => mass * machine.gravity * (across * x + up * y);
     const energy = (one: State) => kinetic(one) + potential(one);
     const first = track.stateOf(0, false);
     const start = energy(first);

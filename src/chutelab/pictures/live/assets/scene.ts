@@ -54,6 +54,7 @@ interface Stream {
   to?: Point;
   fill?: [Point, Point];
   velocity?: Point;
+  omega: number;
   interact: boolean;
   restitution: number;
   friction: number;
@@ -147,6 +148,7 @@ interface Outgoing {
 export interface Scene {
   title: string;
   gravity: number;
+  gravity_deg: number;
   air_density: number;
   particles: Particle[];
   materials: Map<string, Record<string, number>>; // numbers by name, presets too
@@ -240,6 +242,7 @@ export function resolve(given: Given, lab: Lab): Scene {
   const scene: Scene = {
     title: given.title ?? lab.tables.scene.title.default,
     gravity: given.gravity ?? lab.tables.scene.gravity.default,
+    gravity_deg: given.gravity_deg ?? lab.tables.scene.gravity_deg.default,
     air_density: given.air_density ?? lab.tables.scene.air_density.default,
     particles, materials, pair: rows("pair"), incoming, plates, outgoing,
     conveyor: rows("conveyor"), surface, streams, run, kinds, sensor: rows("sensor"),

@@ -8,10 +8,11 @@ import pytest
 from scipy.special import ellipk
 
 from chutelab.engines.pymunk import run
+from chutelab.engines.simulation import simulate
 from chutelab.machine import Thread, build
 from chutelab.results import Kind
 from chutelab.results.recorder import StalledError
-from chutelab.scene import from_dict
+from chutelab.scene import from_dict, load
 from machines import bent, face, gated, scene_of, thrown
 
 G = 9.81
@@ -429,3 +430,10 @@ def test_what_goes_round_without_getting_on_is_told(monkeypatch):
     machine = bent(machine, bowl)
     with pytest.raises(StalledError, match=r"3000 steps gain less than 100 times run\.dt"):
         run(machine)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "most"), [("galton", 0.05), ("heap", 0.02), ("mixture", 0.05)])
+def test_the_ledger_of_a_shipped_crowd_closes_but_for_some_percent(name, most):
+    """Its overlaps are pressed apart, which is in no entry."""
+    assert simulate(load(name), engine="pymunk").ledger.relative_residual < most

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
-from chutelab.scene.conflicts import EITHER, RULES, tree
+from chutelab.scene.conflicts import EITHER, JOINTS, RULES, tree
 from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
@@ -96,7 +96,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     Raises
     ------
     SceneError
-        If the page cannot show it: mass points, boxes, polygons, strings, or too many particles; or
+        If the page cannot show it: mass points, boxes, polygons, joints, or too many particles; or
         if the scene contradicts itself where it is laid out.
     """
     materials = {
@@ -125,9 +125,9 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
             faults.append(Fault(f"{table}.shape", kind.shape, allowed))
         else:
             faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
-    if scene.string:
-        lacks["string"] = len(scene.string)
-        faults.append(Fault("string", None, f"{allowed}, without strings"))
+    joints = Counter(table for table, _ in scene.joints)
+    lacks += joints
+    faults += [Fault(table, None, f"{allowed}, without joints") for table in joints]
     for name, doing, by in scene.triggers:
         where = f"surface.{name}" if name in [one.name for one in scene.surface] else "plate"
         faults.append(Fault(f"{where}.{doing}_when", by, f"{allowed}; none waits to be touched"))
@@ -176,7 +176,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
 
 
 def _leave_out(tables: dict[str, Any], scene: Scene, kinds: set[int]) -> None:
-    """Take kinds of particles out of the keys of a scene, their streams, and all strings."""
+    """Take kinds of particles out of the keys of a scene, their streams, and all joints."""
     names = {scene.particles[n].name for n in kinds}
     for table, gone in (
         ("particle", [n in kinds for n in range(len(scene.particles))]),
@@ -188,7 +188,7 @@ def _leave_out(tables: dict[str, Any], scene: Scene, kinds: set[int]) -> None:
         if kept := [row for row, out in zip(rows, gone, strict=False) if not out]:
             tables[table] = kept
     tables.setdefault("stream", [])
-    for table in ("string", "live"):
+    for table in (*JOINTS, "live"):
         tables.pop(table, None)
 
 
@@ -201,7 +201,7 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             continue
         rules["scene"][key] = _rule([key])
     for table, model in Scene.tables().items():
-        if table in ("string", "expect"):
+        if table in (*JOINTS, "expect"):
             continue
         several = table in LISTS or table in EITHER
         rules[table] = {}

@@ -246,7 +246,8 @@ def test_a_run_writes_the_whole_set():
     with Image.open(out / "lesson.gif") as film:
         assert film.format == "GIF"
         assert film.n_frames > 20
-        assert film.info["loop"] == 0
+        assert (film.info["loop"], film.info["duration"]) == (0, 40)
+    assert (out / "lesson.gif").stat().st_size < 400_000
 
     recording = chutelab.Recording.load(out / "recording.npz")
     assert recording.title == "Perpendicular damping plate, 2 m/s"

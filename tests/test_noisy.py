@@ -130,7 +130,7 @@ def test_a_minimum_of_a_lone_particle_keeps_to_its_bound():
 
 def test_an_answer_of_a_stream_has_no_more_digits_than_its_error_leaves(tmp_path):
     found = solve(
-        CROWD, {"plate.angle_deg": (10.0, 35.0)}, {"arrival.vx.mean": 1.6}, repeat=3, points=14
+        CROWD, {"plate.angle_deg": (10.0, 35.0)}, {"arrival.vx.mean": 1.6}, repeat=3, points=10
     )
     (angle,), (error,) = found.answer.values, found.answer.errors
     assert 0.0 < error < 2.0
@@ -138,10 +138,10 @@ def test_an_answer_of_a_stream_has_no_more_digits_than_its_error_leaves(tmp_path
     assert angle == round(angle, digits)
     assert f"{angle:.{digits}f} ± " in str(found)
     # It is an answer: other seeds have the speed there that was asked for, within their error.
-    seeds = [CROWD.with_values({"plate.angle_deg": angle, "stream.seed": n}) for n in range(3, 9)]
+    seeds = [CROWD.with_values({"plate.angle_deg": angle, "stream.seed": n}) for n in range(3, 7)]
     speeds = [chutelab.simulate(one).measure("arrival.vx.mean") for one in seeds]
     slope = 0.12  # m/s per degree, of the picture
-    allowed = 3.0 * sqrt(np.var(speeds, ddof=1) / 6.0 + (slope * error) ** 2)
+    allowed = 3.0 * sqrt(np.var(speeds, ddof=1) / 4.0 + (slope * error) ** 2)
     assert np.mean(speeds) == pytest.approx(1.6, abs=allowed)
     scan(found).write(tmp_path / "scan.png")
 

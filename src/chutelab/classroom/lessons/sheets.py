@@ -19,9 +19,8 @@ from chutelab.classroom.exercises import EXERCISES, UNNAMED, told
 from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import number_with_unit
 from chutelab.classroom.lessons import Lesson, Page, Teacher, machine_of, picture_of
-from chutelab.classroom.lessons.printing import pdf, web_page
 from chutelab.classroom.lessons.steps import PLACES, Ask, Step
-from chutelab.classroom.lessons.texts import parser
+from chutelab.classroom.lessons.texts import parser, pdf, web_page
 from chutelab.scene import shipped
 from chutelab.scene.overrides import parts_of, unit_of, value_at
 from chutelab.util.words import Words, words

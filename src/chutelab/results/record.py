@@ -181,18 +181,21 @@ def blocks(knots: NDArray[Any], offsets: Ints, times: Floats) -> Iterator[Cells]
 
 def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Floats]:
     """Return places (m) and velocities (m/s) on the cubics between two knots each, (c, 2)."""
-    s, h = share[:, None], (knots["t"][left + 1] - knots["t"][left])[:, None]
-    position, velocity = knots["position"], knots["velocity"]
-    pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
-    dx = pb - pa
-    # Written around the left knot, so that a long flight loses no digits.
-    where = pa + s * (
-        h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
-    )
-    slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
-    pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
+    s, h = share, knots["t"][left + 1] - knots["t"][left]
+    places, velocities = np.empty((2, len(left), 2))
     over = s >= 1.0
-    return np.where(over, pb, where), np.where(over, vb, pace)
+    for axis in (0, 1):
+        position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
+        pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
+        dx = pb - pa
+        # Written around the left knot, so that a long flight loses no digits.
+        where = pa + s * (
+            h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
+        )
+        slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
+        pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
+        places[:, axis], velocities[:, axis] = np.where(over, pb, where), np.where(over, vb, pace)
+    return places, velocities
 
 
 class Motion(tuple[Floats, Floats]):

@@ -9,7 +9,7 @@ from scipy.special import ellipk
 
 from chutelab.engines.pymunk import run
 from chutelab.engines.simulation import simulate
-from chutelab.machine import Thread, build
+from chutelab.machine import Joint, build
 from chutelab.results import Kind
 from chutelab.results.recorder import StalledError
 from chutelab.scene import from_dict, load
@@ -276,8 +276,8 @@ def test_an_inclined_conveyor_lifts_what_grips_it_and_throws_it_off_its_pulley(r
 
 def hung(machine, position, length, anchors):
     machine = thrown(machine, position)
-    threads = (Thread(tuple(a), n, length) for n, a in enumerate(anchors))
-    return replace(machine, threads=tuple(threads))
+    joints = (Joint("string", n, length, tuple(a)) for n, a in enumerate(anchors))
+    return replace(machine, joints=tuple(joints))
 
 
 def test_a_pendulum_swings_as_its_equation_and_its_string_takes_nothing():

@@ -112,7 +112,7 @@ def test_what_it_cannot_follow_is_refused():
         ({"name": "peg", "center": [0.0, 0.0], "radius": 0.1}, {}, "straight surfaces"),
         (floor(opens_at=1.0), {}, "always there"),
         (floor(), {"particle": {"spin": True, "rolling_friction": 0.1}}, "rolling friction"),
-        (floor(), {"string": [{"from": [0.0, 2.0]}]}, "strings"),
+        (floor(), {"string": [{"from": [0.0, 2.0]}]}, "joints"),
     ],
 )
 def test_what_it_has_no_equations_for_is_refused(surface, more, what):

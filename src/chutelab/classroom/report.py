@@ -20,7 +20,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from markdown_it.tree import SyntaxTreeNode
 
-from chutelab.classroom.lessons.texts import need_typst, parser, pdf, web_page
+from chutelab.classroom.lessons.sheets import need_typst, pdf, web_page
+from chutelab.classroom.lessons.texts import parser
 from chutelab.engines.simulation import judged, simulate
 from chutelab.pictures.plots import look, overlay
 from chutelab.pictures.plots.figure import loads as draw_loads

@@ -4,8 +4,8 @@ Here is ``lesson.toml`` as a frozen model, validated with its scenes, all faults
 the shipped lessons, found by number, by name or by folder.
 
 - `steps`: what is asked in each step, what may be changed, which runs a table wants.
-- `texts`: Markdown as HTML, for a terminal and as PDF, and its formulas.
-- `sheets`: the student's sheet, the teacher's and the explanation.
+- `texts`: a lesson's Markdown as HTML and for a terminal, and its formulas.
+- `sheets`: the student's sheet, the teacher's and the explanation, as Markdown, HTML and PDF.
 - `building`: ``lesson.gif``, ``exercise.ipynb``, a new lesson from a template.
 - `pages`: all lessons as web pages, and packages for learning platforms.
 

@@ -76,6 +76,8 @@ BROKEN = {
      ["stream.interact", "particle.radius"], "never meet"),
     "spread on adhesive belt": (IN + "[stream]\nspeed_spread = 0.1",
      ["stream.speed_spread", "incoming.friction"], "Coulomb"),
+    "spin on adhesive belt": (IN + "[particle]\nspin = true\n[stream]\nomega = 3",
+     ["stream.omega", "incoming.friction"], "omega = 0"),
     "velocity on adhesive belt": (IN + "[stream]\nvelocity = [1, 0]",
      ["stream.velocity", "incoming.friction"], "incoming.speed"),
     "point on adhesive belt": (IN + "[stream]\nat = [-0.5, 0.1063]\nvelocity = [2, 0.1]",

@@ -89,6 +89,13 @@ BY_HAND = [
     ("machine", {"material[0].name": GONE}, "material[0].name", "is missing"),
     ("machine", {"plate[1].name": GONE}, "plate[1].name", "a plate with a pivot needs one"),
     # kinds of particles
+    ("machine", {"gravity_deg": 10.0}, "gravity_deg", "0 with [incoming]"),
+    ("alone", {"gravity_deg": 720.5}, "gravity_deg", "720"),
+    ("alone", {"gravity_deg": "left"}, "gravity_deg", "number"),
+    ("alone", {"gravity_deg": 5.0, "run.engine": "exact"}, "gravity_deg", "exact engine"),
+    ("alone", {"stream.omega": 3.0}, "stream.omega", "particle.spin true"),
+    ("dominoes", {"stream[2].omega": 3.0}, "stream[2].omega", "particle[2].spin true"),
+    ("alone", {"particle.spin": True, "stream.omega": "3"}, "stream.omega", "number"),
     ("machine", {"particle[1].mass": 0.1}, "particle[1].density", "particle[1].mass or this"),
     ("alone", {"particle.density": 1000.0}, "particle.density", "particle.mass or this"),
     ("machine", {"particle[0].radius": -0.01}, "particle[0].radius", "from 1e-09"),

@@ -1,7 +1,5 @@
 """A door to the core's arrays, for what no scene file can ask for."""
 
-import numpy as np
-
 from chutelab import core as module
 from chutelab.engines import contact as engine
 from chutelab.results.recorder import Recorder
@@ -43,11 +41,6 @@ class Core:
     @property
     def world(self):
         return self.module.world
-
-    def tilt(self, angle):
-        """Turn gravity counter-clockwise by an angle (rad)."""
-        g = self.world.g
-        self.world.gx, self.world.gy = g * np.sin(angle), -g * np.cos(angle)
 
     def run(self):
         """Run to the end and return the recording; a stall is an error."""

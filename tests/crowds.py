@@ -178,6 +178,7 @@ class _Draw:
                 position=self.r * np.stack([x, y], axis=1),
                 velocity=velocity,
                 carried=np.zeros(self.count, dtype=bool),
+                omega=np.zeros(self.count),
             ),
             end_time=built.end_time - float(built.releases.t[-1])
             if built.until != "time"

@@ -245,6 +245,7 @@ def in_the_way(place, end):
         position=np.array([[-1.0, 0.104], place]),
         velocity=np.array([[2.0, 0.0], [0.0, 0.0]]),
         carried=np.array([True, False]),
+        omega=np.zeros(2),
     )
     return replace(machine, releases=releases)
 

@@ -338,6 +338,16 @@ def test_what_is_taken_from_an_address_is_refused_where_python_refuses_it(count)
     seeds = [sandbox.tables(seed) for seed in range(20)]
     moving = {**THROWN, "run": {"until": 1.0}}
     seeds += [{**moving, "surface": [{**WALL, **keys}]} for keys in MOVING]
+    lid = {"name": "lid", "from": [2.0, 0.0], "to": [3.0, 0.0]}
+    kinds = [{"name": "a"}, {"name": "b"}]
+    two = [{**THROWN["stream"], "particle": name, "interact": True} for name in "ab"]
+    two[1]["at"] = [0.5, 1.0]
+    pairs = [{"between": ["a", "b"], "meet": False}, {"between": ["a", "wall"], "cohesion": 0.1}]
+    crowd = {**moving, "particle": kinds, "stream": two, "pair": pairs}
+    seeds += [
+        {**crowd, "surface": [WALL, {**lid, f"{doing}_when": {"touched": "wall"}, **keys}]}
+        for doing, keys in (("opens", {}), ("closes", {"opens_at": 1.0}), ("starts", {"turn": 9.0}))
+    ]
     documents = [spoilt(rng, seeds[n % len(seeds)]) for n in range(count)]
     refused = 0
     for document, found in zip(documents, in_node(documents), strict=True):

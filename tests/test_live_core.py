@@ -6,6 +6,7 @@ import pytest
 import sandbox
 from chutelab import core as module
 from chutelab.engines import contact as engine
+from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
 from chutelab.results.loads import gather
@@ -35,6 +36,13 @@ MOVING = [
     {**HANGS, "stops_deg": [-30.0, 15.0]}, {**HANGS, "hinge": [0.05, 0.0], "inertia": 0.5},
     {**HANGS, "motor": {"speed_deg": 120.0, "torque": 0.3}},
 ]  # fmt: skip
+BELL = {"touched": "line"}
+WAITING = [
+    {"opens_when": BELL}, {"closes_when": BELL}, {"turn": 90.0, "starts_when": BELL},
+    {"shake": {"by": [0.0, 0.01], "frequency": 9.0}, "starts_when": BELL},
+    {"travel": {"to": [0.0, 1.0], "at": 0.1, "in": 0.3}, "starts_when": BELL},
+    {**HANGS, "motor": {"speed_deg": 200.0, "torque": 1.0}, "starts_when": BELL},
+]  # fmt: skip
 MANY = [("stream", "stream.count=60"), ("hopper", "stream.count=150")]
 
 
@@ -62,6 +70,10 @@ def same_runs(scenes):
         for n, name in enumerate(("t", "angle", "rate", "surface")):
             assert np.array_equal(swings[:, n], states[name]), given
         swung += len(states)
+        triggers = job.module.array(
+            "triggers", module.dtype("Trigger"), job.module.world.trigger_count
+        )
+        assert np.array_equal([float(t) for t in answer["triggered"]], triggers["t"]), given
         loads = gather(job.module, job.owners)
         assert answer["loads"] == loads.view("<f8").ravel().tolist(), given
         books = job.module.array("books", engine.REAL, 3 * (job.owners + 1)).reshape(-1, 3)
@@ -86,7 +98,42 @@ def test_what_moves_does_so_as_in_python():
         from_dict({**base, "surface": [{**shape, **keys}]})
         for base in (BALL, crowd) for shape in (LINE, arc) for keys in MOVING
     ]  # fmt: skip
-    assert same_runs([load("see-saw"), load("damper-plate"), *scenes]) > 1000
+    tilted = from_dict({**crowd, "gravity_deg": 55.0, "surface": [{**LINE, **HANGS}]})
+    assert same_runs([tilted, load("see-saw"), load("damper-plate"), *scenes]) > 1000
+
+
+def test_what_waits_for_a_touch_acts_as_in_python():
+    falls = {"at": [-0.1, 0.5], "velocity": [0.1, 0.0], "interact": True}
+    shelf = {"name": "shelf", "from": [0.05, 0.15], "to": [0.4, 0.15]}
+    scenes = [
+        from_dict({**BALL, "stream": [{**BALL["stream"], "at": [0.2, 0.3], "interact": True},
+                                      falls], "surface": [LINE, {**shelf, **keys}]})
+        for keys in WAITING
+    ]  # fmt: skip
+    for scene in scenes:
+        assert np.isfinite(simulate(scene).triggered).all()
+    same_runs(scenes)
+
+
+def test_what_clings_passes_or_flies_in_air_does_so_as_in_python():
+    kinds = {"particle": [{"name": "a"}, {"name": "b", "radius": [0.005, 0.01], "spin": True}]}
+    two = [
+        {"fill": [[-0.1, 0.1], [0.1, 0.2]], "count": 6, "particle": name, "interact": True}
+        for name in "ab"
+    ]
+    two[1]["fill"] = [[-0.1, 0.22], [0.1, 0.32]]
+    crowd = {**BALL, **kinds, "stream": two, "surface": [LINE]}
+    pairs = [
+        [{"between": ["a", "b"], "cohesion": 0.5}, {"between": ["line", "b"], "cohesion": 0.2}],
+        [{"between": ["b", "b"], "cohesion": 0.5, "friction": 0.2}],
+        [{"between": ["a", "b"], "meet": False}],
+    ]
+    scenes = [from_dict({**crowd, "pair": pair}) for pair in pairs]
+    flying = (crowd, {**crowd, "pair": pairs[0]}, BALL)
+    scenes += [from_dict({**base, "air_density": 40.0}) for base in flying]
+    same_runs(scenes)
+    runs = [simulate(scene).knots.tobytes() for scene in (from_dict(crowd), *scenes[:4])]
+    assert len({*runs}) == 5
 
 
 @pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.slow)])

@@ -1,5 +1,7 @@
 """Machines that are built in the page, from nothing: every part, with pointer and keys, saved."""
 
+import re
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -125,14 +127,14 @@ def test_everything_that_a_part_can_say_has_a_field_and_is_saved(empty, tmp_path
     for name in ["incoming", *(f"{one}1" for one in names)]:
         page.evaluate(f"chutelab.bench.inspector.choose('{name}')")
         keys[name] = {
-            id_.rpartition(".")[2].split("[")[0]
+            id_.removesuffix(".touched").rpartition(".")[2].split("[")[0]
             for id_ in page.evaluate(
                 "[...document.querySelectorAll('#chosen .entry [id^=field-]')].map((e) => e.id)"
             )
         }
     tables = {name: set(rules) for name, rules in describe(None)["tables"].items()}
     arc = {"center", "radius", "from_deg", "to_deg"}
-    moves = {*MOTIONS, *HINGED}
+    moves = {*MOTIONS, *HINGED, "starts_when"}
     still = tables["surface"] - moves - {"pivot"} | {"motion"}
     straight, bent = still - arc - {"from", "to"}, still - {"from", "to", "points"}
     assert keys["incoming"] == tables["incoming"]
@@ -241,6 +243,57 @@ def test_a_line_moves_in_each_way_by_its_card_and_runs_to_the_same_bits(empty, t
     assert moved[0][0] > 0.0
 
 
+def test_what_waits_for_a_touch_is_made_by_its_card_and_runs_to_the_same_bits(empty, tmp_path):
+    """A ball strikes a line: another one goes, comes, or begins to turn, as Python has it."""
+    page = empty()
+    shares = ((0.52, 0.3), (0.4, 0.5), (0.62, 0.55), (0.42, 0.65), (0.6, 0.7))
+    above, *ends = (spot(page, *share) for share in shares)
+    page.click("#part-ball")
+    page.mouse.click(*above)
+    page.click("#part-line")
+    for end in ends:
+        page.mouse.click(*end)
+    page.keyboard.press("Escape")
+    page.evaluate("chutelab.bench.inspector.choose('line2')")
+    page.locator("#chosen .more summary").click()
+
+    def wait_for(doing, name):
+        page.select_option(f"[id='field-own-surface[1].{doing}_when.touched']", name)
+        assert page.evaluate("chutelab.lab.fault") is None
+
+    wait_for("opens", "line1")
+    assert given(page)["surface"][1]["opens_when"] == {"touched": "line1"}
+    assert same_bits(page, tmp_path) > 1
+    struck = page.evaluate("chutelab.lab.recording.events.find(({ kind }) => kind === 3).t")
+    assert page.evaluate("chutelab.lab.machine.segments[1].vanishes") == struck
+    gate = page.locator("[data-part=line2]")
+    page.evaluate(f"chutelab.lab.seek({struck} - 0.01)")
+    expect(gate).not_to_have_class(re.compile("absent"))
+    page.evaluate(f"chutelab.lab.seek({struck} + 0.01)")
+    expect(gate).to_have_class(re.compile("absent"))
+    # What cannot stand beside it goes.
+    wait_for("closes", "line1")
+    assert {"opens_when", "opens_at"}.isdisjoint(given(page)["surface"][1])
+    assert same_bits(page, tmp_path) > 1
+    page.locator("[id='field-own-surface[1].opens_at']").fill("1.2")
+    page.keyboard.press("Enter")
+    wait_for("closes", "")
+    assert {"opens_when", "closes_when"}.isdisjoint(given(page)["surface"][1])
+    page.select_option("[id='field-own-surface[1].motion']", "turns")
+    wait_for("starts", "line1")
+    assert same_bits(page, tmp_path) > 1
+    page.evaluate(f"chutelab.lab.seek({struck} + 0.1)")
+    shown = page.locator("[data-part=line2]").get_attribute("transform")
+    assert float(shown.split("rotate(")[1].split()[0]) == pytest.approx(-9.0)
+    # It is meant by its name, and is no longer waited for when it is gone.
+    page.evaluate("chutelab.bench.inspector.choose('line1')")
+    page.locator("[id='field-own-surface[0].name']").fill("bell")
+    page.keyboard.press("Enter")
+    assert given(page)["surface"][1]["starts_when"] == {"touched": "bell"}
+    page.click("#part-delete")
+    assert "starts_when" not in given(page)["surface"][0]
+
+
 def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_path):
     page = empty()
     page.click("#begin")
@@ -269,6 +322,9 @@ def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_pa
     assert page.inner_text("#chosen h2") == "Pair 1"
     assert page.locator("[id='field-own-pair[0].between[1]']").input_value() == "incoming"
     typed("pair[0].restitution", "0.35")
+    typed("pair[0].cohesion", "0.02")
+    # Only two kinds can pass through each other.
+    expect(page.locator("[id='field-own-pair[0].meet']")).to_have_count(0)
     # Whatever the pair's partner is, it can be another one.
     page.evaluate("chutelab.bench.inspector.choose('run')")
     typed("run.max_time", "12")
@@ -284,7 +340,7 @@ def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_pa
     )
     (pair,) = scene["pair"]
     assert pair["between"][1] == "incoming"
-    assert pair["restitution"] == 0.35
+    assert (pair["restitution"], pair["cohesion"]) == (0.35, 0.02)
     assert same_bits(page, tmp_path) > 1
     # A pair goes by its card; a material that is used cannot, and the page says why.
     page.evaluate("chutelab.bench.inspector.choose('pair 1')")

@@ -41,6 +41,62 @@ def test_particle_i_starts_at_i_over_the_rate_on_the_belt(count, rate, seed):
         found.t[0] = 1.0
 
 
+def spinning(engine, shape, omega, **stream):
+    """Let go at rest on a floor, without restitution."""
+    floor = {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0]}
+    return simulate(
+        {
+            "particle": {"radius": 0.02, "mass": 0.1, "spin": True, "shape": shape},
+            "surface": [floor | {"friction": 0.3, "restitution": 0.0}],
+            "stream": {"at": [0.0, 0.02], "velocity": [0.0, 0.0], "omega": omega, **stream},
+            "run": {"until": 0.6},
+        },
+        engine=engine,
+    )
+
+
+@pytest.mark.parametrize(("shape", "k"), [("disk", 1 / 2), ("sphere", 2 / 5)])
+@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
+def test_what_spins_at_its_release_slips_until_it_rolls(engine, shape, k):
+    # m v = J and k m r² (ω - ω0) = r J until v = -r ω: v = -r ω0 k/(1 + k), after v/(µ g).
+    m, radius, mu, omega = 0.1, 0.02, 0.3, -60.0
+    recording = spinning(engine, shape, omega)
+    v = -radius * omega * k / (1 + k)
+    knots, ledger, about = recording.track(0), recording.ledger, pytest.approx
+    assert knots["omega"][[0, -1]] == about([omega, -v / radius], rel=1e-9)
+    assert knots["velocity"][-1] == about([v, 0.0], rel=1e-9, abs=1e-12)
+    slips = v / (mu * G)
+    close = 1e-5 if engine == "contact" else 1e-9
+    assert knots["position"][-1, 0] == about(v * (0.6 - 0.5 * slips), rel=close)
+    start = 0.5 * k * m * (radius * omega) ** 2
+    assert ledger.friction_loss == about(start / (1 + k), rel=1e-9)
+    assert ledger.kinetic == about((start, start * k / (1 + k)), rel=1e-9)
+    assert not recording.laws
+
+
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+def test_what_spins_among_others_keeps_its_spin_in_flight(engine):
+    recording = spinning(engine, "disk", 7.0, at=[0.0, 2.5], to=[0.1, 2.5], count=2, interact=True)
+    assert recording.select(Kind.RELEASE)["omega_after"].tolist() == [7.0, 7.0]
+    for i in range(2):
+        assert recording.track(i)["omega"].tolist() == [7.0] * len(recording.track(i))
+
+
+def test_on_a_belt_with_friction_a_spin_shifts_the_separation():
+    tables = {
+        "incoming": {"speed": 2.0, "pulley_radius": 0.1, "friction": 0.3, "length": 0.4},
+        "particle": {"radius": 0.02, "spin": True},
+        "stream": {"omega": -20.0},
+    }
+    exact, contact, plain = (
+        simulate({**tables, **more}, engine=engine).select(Kind.SEPARATION)[0]
+        for engine, more in (("exact", {}), ("contact", {}), ("exact", {"stream": {}}))
+    )
+    for field in ("t", "position", "velocity_after", "omega_after"):
+        assert contact[field] == pytest.approx(exact[field], rel=1e-4, abs=1e-6)
+    assert abs(plain["t"] - exact["t"]) > 1e-3
+
+
 def test_a_particle_let_go_from_rest_has_its_spread_forwards():
     found = drawn(count=50, at=[0.0, 1.0], velocity=[0.0, 0.0], speed_spread=0.3)
     assert (found.velocity[:, 1] == 0.0).all()

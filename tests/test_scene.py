@@ -44,7 +44,7 @@ speed = 1
 # Design, section 3, copied by hand: what a scene has that names only what it must.
 CONTRACT = {
     "title": "machine",
-    "gravity": 9.81,
+    "gravity": 9.81, "gravity_deg": 0.0,
     "air_density": 0.0,
     "particle": {"name": None, "shape": "disk", "radius": 0.0063, "size": None, "points": None,
      "mass": 0.008, "density": None, "material": None, "spin": False, "rolling_friction": 0.0,
@@ -66,7 +66,8 @@ CONTRACT = {
     "sensor": (),
     "stream": {"name": "stream", "particle": None, "count": 1, "rate": 200.0, "width": None,
      "start": 0.0, "bed_height": 0.0, "speed_spread": 0.0, "seed": 0, "at": None, "to": None,
-     "fill": None, "velocity": None, "interact": False, "restitution": 0.5, "friction": 0.3},
+     "fill": None, "velocity": None, "omega": 0.0, "interact": False,
+     "restitution": 0.5, "friction": 0.3},
     "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001, "align": True,
      "loads": None},
     "expect": (),

@@ -138,11 +138,9 @@ def test_what_is_never_touched_waits_and_is_saved(tmp_path):
     assert not loaded.laws
 
 
-def test_engines_and_pages_without_it_refuse_it():
+def test_engines_without_it_refuse_it():
     tables = scene({**SHELF, "opens_when": BELL})
     with pytest.raises(SceneError, match="needs contact or pymunk"):
         chutelab.load(tables, {"run.engine": "exact"})
     with pytest.raises(SceneError, match="waits until something is touched"):
         chutelab.simulate(tables, engine="exact")
-    with pytest.raises(SceneError, match="none waits to be touched"):
-        chutelab.live(tables)

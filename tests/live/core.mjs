@@ -1,5 +1,5 @@
 // Runs scenes in node by the page's own host of the core: {lab, scenes} on stdin, on stdout a list
-// of {state, knots (rows of ten numbers), events, swings (rows of four), books, toml}.
+// of {state, knots (rows of ten numbers), events, swings (rows of four), triggered, books, toml}.
 import { readFileSync } from "node:fs";
 
 import { core, load, machineOf } from "./run.mjs";
@@ -19,6 +19,9 @@ const answers = scenes.map((given) => {
     swings.push(...taken.swings);
   }
   const loads = [...core.takeLoads(true).rows];
-  return { state, knots, events, swings, loads, books: core.books(), toml: toToml(given) };
+  // JSON has no Infinity.
+  const triggered = core.triggered().map(String);
+  const books = core.books();
+  return { state, knots, events, swings, triggered, loads, books, toml: toToml(given) };
 });
 process.stdout.write(JSON.stringify(answers));

@@ -114,7 +114,7 @@ def agreement(scene: Scene, max_seconds: float = PATIENCE) -> tuple[Agreement, .
         # None if it never leaves.
         track = track[track["t"] >= each(found[base], "separation.t")[0]]
     time, velocity = np.diff(track["t"]), np.diff(track["velocity"], axis=0)
-    velocity[:, 1] += found[base].gravity * time
+    velocity += found[base].gravity * time[:, None] * found[base].machine.up
     speed = float(np.hypot(*track["velocity"].T).max(initial=0.0))
     blows = not (np.abs(velocity[time > 0.0]) > 1e-9 * speed).any()
     for name, recording in found.items():

@@ -18,6 +18,7 @@ from chutelab.cli import console
 from chutelab.cli.console import RefusedError, progress, tell
 from chutelab.cli.options import (
     PICTURES,
+    Command,
     Count,
     Engine,
     FileName,
@@ -151,7 +152,7 @@ def _halves(text: str, typed: str, form: str) -> tuple[str, str]:
     return left, right
 
 
-class _Listing(click.Command):
+class _Listing(Command):
     """A command whose help ends with the columns of a sweep."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

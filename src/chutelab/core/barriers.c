@@ -10,8 +10,6 @@
 
 #include "laws.h"
 
-#define PI 3.14159265358979323846
-
 /* A flight of 5 m is looked at every millimetre, where it has to be. */
 #define HALVINGS 12
 /* Places of each interval at which it is asked whether a particle has got clear of a gate. */

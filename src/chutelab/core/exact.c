@@ -873,8 +873,8 @@ static void begin(void) {
     const Lone *p = E.lones + E.lone;
     double inertia = p->inertia, arm = p->mass * p->radius * p->radius;
     A = (Particle){ .given = p, .x = p->position[0], .y = p->position[1], .vx = p->velocity[0],
-                    .vy = p->velocity[1], .share = 1.0, .way = p->carried ? RIDES_BELT : FLIES, .on = NONE,
-                    .slip = 1.0, .left = NONE, .joint = NONE };
+                    .vy = p->velocity[1], .z = p->omega * p->radius, .share = 1.0,
+                    .way = p->carried ? RIDES_BELT : FLIES, .on = NONE, .slip = 1.0, .left = NONE, .joint = NONE };
     A.turns = inertia > 0.0;
     if (A.turns) A.share = inertia / (inertia + arm);
     /* That of a disk is not to depend on the rounding of its I. */

@@ -52,7 +52,11 @@ static double kinetic(int i, const double *knot) {
     return 0.5 * L.bodies[i].mass * pace(knot) + 0.5 * L.bodies[i].inertia * square(knot[5]);
 }
 
-static double potential(int i, const double *knot) { return L.bodies[i].mass * L.bodies[i].gravity * knot[2]; }
+static double up[2]; /* the direction against gravity */
+
+static double height(const double *knot) { return up[0] * knot[1] + up[1] * knot[2]; } /* m */
+
+static double potential(int i, const double *knot) { return L.bodies[i].mass * L.bodies[i].gravity * height(knot); }
 
 /* Energy at a knot, less what the books say it got, J: what is unexplained. */
 static double gain(int i, const double *knot) {
@@ -117,6 +121,7 @@ static void tell_group(int law, const Group *group, double amount, double bound)
 
 /* The largest sizes of pieces, and what all particles have together. */
 static void weigh_machine(void) {
+    sin_cos(-L.tilt, up, up + 1);
     double *start = All.size, *length = All.size + 1, *center = All.size + 2, *radius = All.size + 3;
     for (int k = 0; k < L.piece_count * (L.family ? L.particle_count : 1); k++) {
         const Barrier *b = L.barriers + k;
@@ -168,7 +173,7 @@ PAIRED static int weigh(int i) {
         Two at = size_of(two_at(knot + 1)), v = two_at(knot + 3), rest = two_at(knot + 5), losses = two_at(knot + 7);
         Two given = losses - old, squares = v * v, works = size_of(rest), lost = size_of(losses);
         double swift = squares[0] + squares[1], moving = half * swift + turning * square(rest[0]);
-        double now = moving + weight * knot[2] - (rest[1] - losses[0] - losses[1]);
+        double now = moving + weight * height(knot) - (rest[1] - losses[0] - losses[1]);
         double in_play = works[1] + lost[0] + lost[1] + weight * at[1] + moving;
         all += two_at(knot) + at + (v + rest) + losses;
         if (is_nip) given = both(given[0] + given[1]);

@@ -5,6 +5,7 @@
 #include <math.h>
 #include "layout.h"
 #include "memory.h"
+#include "trig.h"
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))

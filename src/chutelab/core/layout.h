@@ -337,6 +337,7 @@ typedef struct {
     int sweeps;          /* of the contact solver, at most */
     int sleeps;          /* whether islands may fall asleep */
     double gx, gy;       /* m/s2 */
+    double up[2];        /* against gravity */
     double air;          /* [in] kg/m3; density of still air, 0 without */
     double dt;           /* s; longest step */
     double end_time;     /* s */
@@ -367,6 +368,7 @@ typedef struct {
     double again;        /* what lasts needs so many times the impulses of the step before */
     double before;       /* share of this step's impulses that belongs to the one before */
     double g;            /* m/s2; size of gravity */
+    double tilt;         /* rad; by which it is turned from straight down, counterclockwise */
     double haste;        /* m/s2; bound on the acceleration of what moves in this step */
     double fastest;      /* m/s; bound on the speed of all that moves */
     double pace;         /* sqrt(g / EARTH), 1 without gravity: bounds on speeds grow with it, bounds
@@ -385,6 +387,7 @@ enum DropFrom { FROM_IMPACT, FROM_TOP };
 
 typedef struct {
     double gravity;
+    double gravity_deg;     /* 0 is down */
     double air_density;     /* kg/m3; of still air */
     double crowded;         /* whether particles meet each other */
 } SceneKeys;
@@ -399,7 +402,7 @@ typedef struct {
 
 typedef struct {
     double kind;            /* which of the particles it consists of */
-    double at[2], to[2], fill[4], velocity[2];
+    double at[2], to[2], fill[4], velocity[2], omega; /* spin at the release, rad/s */
     double count, rate, start, bed_height, speed_spread;
     double seed[2];         /* its lower 32 bits and the others */
     double at_once;         /* whether all are released at once */
@@ -488,7 +491,7 @@ typedef struct {
 /* A particle that meets no other, for the exact engine. */
 typedef struct {
     double release, stop;       /* [in] s; when it starts, and how long after that its run is over */
-    double position[2], velocity[2]; /* [in] at its release */
+    double position[2], velocity[2], omega; /* [in] at its release */
     double radius, mass;        /* [in] a radius of 0 is a mass point */
     double inertia;             /* [in] kg m2; 0: it does not turn */
     double rolling;             /* [in] rolling friction: its arm over the radius */
@@ -547,6 +550,7 @@ typedef struct {
 typedef struct {                                                                         /* [out] */
     double t, position[2], velocity[2], radius;
     double exit_box[4];     /* m; left, bottom, right, top */
+    double omega;           /* rad/s */
 } Start;
 
 /* An earlier particle as one that is drawn sees it: how far it has come (m), and how far apart they
@@ -555,8 +559,8 @@ typedef struct { double dx, dy, reach; int particle, next; } Near;
 
 /* Why releases of a scene cannot be drawn: a box has room for so many of this radius only; one would
    start inside a surface, at this distance from it instead of `reach` (m); or a belt that grips by
-   adhesion lets none be faster than others, or start with another velocity than its own. */
-enum Refused { ACCEPTED, BOX_FULL, RELEASE_INSIDE, SPREAD_ADHERES, VELOCITY_ADHERES };
+   adhesion lets none be faster than others, start with another velocity than its own, or spin. */
+enum Refused { ACCEPTED, BOX_FULL, RELEASE_INSIDE, SPREAD_ADHERES, VELOCITY_ADHERES, SPIN_ADHERES };
 
 typedef struct {                                                                         /* [out] */
     double distance, reach;
@@ -692,6 +696,7 @@ typedef struct {
     int contacts, steps;    /* [in] that were made */
     int owned;              /* [in] behind its numbers a knot says whose it is: rows are those of `Knot` */
     int unreal;             /* [in] numbers that are not finite, beside knots and books */
+    double tilt;            /* [in] rad; by which gravity is turned from straight down */
     double dt;              /* [in] s; step, 0 of the exact engine */
     double gained;          /* [in] J; by which solves broke their law of energy */
     double unsolved;        /* [in] radii; the most overlap that the solve of a step left beyond what it asked for */

@@ -362,7 +362,7 @@ static void note_totals(void) {
             all.entries[0] -= d->mass * (W.gx * (place[0] - track->knot[1]) + W.gy * (place[1] - track->knot[2]));
         } else if (d->mode == GONE && !track->begun) continue;
         all.kinetic += 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
-        all.potential += d->mass * W.g * place[1];
+        all.potential += d->mass * W.g * (W.up[0] * place[0] + W.up[1] * place[1]);
         for (int n = 0; n < 3; n++) all.entries[n] += d->entries[n] - ahead[n];
     }
     W.totals[W.total_count++] = all;

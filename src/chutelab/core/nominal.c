@@ -72,7 +72,8 @@ static void discharge(const Tables *t, Nominal *out) {
     }
     double rho = belt->pulley_radius + t->particle->radius, gravity = t->scene->gravity;
     if (isfinite(belt->friction)) {
-        double phi = 0.0 - belt->incline_deg * RADIANS, z = 0.0, up, across;
+        double phi = 0.0 - belt->incline_deg * RADIANS, up, across;
+        double z = t->streams->omega * t->particle->radius;
         double w = velocity[0] * dx + velocity[1] * dy;
         double gap = 0.0 - (place[0] * dx + place[1] * dy);
         double share = t->particle->moment > 0.0

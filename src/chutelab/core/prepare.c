@@ -2,8 +2,7 @@
 
 #include <string.h>
 #include "core.h"
-
-#define PI 3.14159265358979323846
+#include "trig.h"
 
 /* rad; directions that differ by less are one. */
 #define ALIKE 1e-9
@@ -367,8 +366,9 @@ EXPORT int prepare(void) {
     for (int k = 0; k < W.surface_count; k++)
         if (W.surfaces[k].mover >= 0) prepare_mover(W.surfaces + k);
     W.ledge = INFINITY;
-    W.gx = 0;
-    W.gy = -W.g;
+    sin_cos(-W.tilt, W.up, W.up + 1);
+    W.gx = -W.g * W.up[0];
+    W.gy = -W.g * W.up[1];
     W.sweeps = alone ? SWEEPS_ALONE : SWEEPS;
     W.sleeps = !alone;
     W.smooth_x = alone ? 2e-7 : 1e-4;

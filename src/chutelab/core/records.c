@@ -7,8 +7,6 @@
 #include "laws.h"
 #include "loads.h"
 
-#define PI 3.14159265358979323846
-
 /* What a host may as well call itself. */
 Exact *exact(void);
 int follow_all(int rounds);
@@ -128,7 +126,7 @@ EXPORT int prepare_to_judge(void) {
     const World *w = world();
     const Surface *pulley = w->pulley < 0 ? 0 : w->surfaces + w->pulley;
     L = (Laws){ .particle_count = w->disk_count, .piece_count = w->surface_count, .pulley = pulley != 0,
-                .engine = ENGINE_CONTACT, .dt = w->dt, .surface_count = w->owner_count + 1,
+                .engine = ENGINE_CONTACT, .tilt = w->tilt, .dt = w->dt, .surface_count = w->owner_count + 1,
                 .book_rows = w->owner_count + 1, .interact = w->interact, .movers = w->movers,
                 .mover_count = w->mover_count };
     if (!lay_out_pieces()) return 0;

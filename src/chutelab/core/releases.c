@@ -25,7 +25,7 @@ static const StreamKeys *stream;
 static const ParticleKeys *particle;
 static Start *starts;
 static int count, rides, carried;
-static double belt_x, belt_y; /* the way the belt runs, for what is released on it */
+static double belt_x, belt_y; /* the way the belt runs, for what is released on it; else square to gravity */
 
 static Place handful[HANDFUL];
 
@@ -108,18 +108,20 @@ static void begin_stream(void) {
     release_velocity(&tables, D.stream, velocity);
     rides = is_on_belt(&tables, D.stream);
     carried = rides && tables.incoming->adheres != 0.0;
-    belt_x = 1.0, belt_y = 0.0;
+    sin_cos(tables.scene->gravity_deg * RADIANS, &belt_y, &belt_x);
     if (rides) up_belt(tables.incoming, &belt_x, &belt_y);
     if (carried) {
         double speed = tables.incoming->speed, near = ALONG * fabs(speed);
         int other = fabs(velocity[0] - speed * belt_x) > near || fabs(velocity[1] - speed * belt_y) > near;
-        int why = stream->speed_spread > 0.0 ? SPREAD_ADHERES : other ? VELOCITY_ADHERES : ACCEPTED;
+        int why = stream->speed_spread > 0.0 ? SPREAD_ADHERES : other ? VELOCITY_ADHERES
+                : stream->omega != 0.0 ? SPIN_ADHERES : ACCEPTED;
         D.refusals[D.member] = (Refusal){ .why = why, .stream = D.stream };
     }
+    int turns = particle->moment > 0.0 || particle->corners > 0.0;
     for (int i = 0; i < count; i++) {
         double t = stream->at_once != 0.0 ? 0.0 : i / stream->rate;
         starts[i] = (Start){ .t = t + stream->start, .velocity = { velocity[0], velocity[1] },
-                             .radius = particle->radius };
+                             .omega = turns ? stream->omega : 0.0, .radius = particle->radius };
     }
     D.next = 1;
     D.near_count = 0;

@@ -258,12 +258,17 @@ static void hold_segment(double *box, const Segment *s) {
     hold(box, s->start[0] + s->length * s->tangent[0], s->start[1] + s->length * s->tangent[1]);
 }
 
-/* Give each particle of a member its box. With gravity it has a bottom only: what flies up comes back. What
+/* What pulls a particle to a side by less than this share of gravity is rounding. */
+#define LEVEL 1e-9
+
+/* Give each particle of a member its box. With gravity it has the sides only to which that pulls. What
    is released below all surfaces, or hangs on a string, has not left. Where particles do not meet, each
    one's box holds its own release alone, so that it does the same alone and with others. */
 void box_in(void) {
-    double all[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY };
+    double all[4] = { INFINITY, INFINITY, -INFINITY, -INFINITY }, down[2];
     Start *first = D.starts + (long)D.member * D.count;
+    sin_cos(t->scene->gravity_deg * RADIANS, down, down + 1);
+    down[1] = -down[1];
     for (int n = 0; n < P.segment_count; n++) hold_segment(all, segments + n);
     for (int n = 0; n < P.arc_count; n++) hold_arc(all, arcs + n);
     for (const Mover *m = P.movers; m < P.movers + P.moving; m++) {
@@ -287,8 +292,9 @@ void box_in(void) {
         for (int n = 0; n < 4; n++) o->exit_box[n] = all[n];
         hold(o->exit_box, o->position[0], o->position[1]);
         for (int n = 0; n < 4; n++) o->exit_box[n] += n < 2 ? -EXIT_MARGIN : EXIT_MARGIN;
-        if (t->scene->gravity == 0.0) continue;
-        o->exit_box[0] = -INFINITY;
-        o->exit_box[2] = o->exit_box[3] = INFINITY;
+        for (int n = 0; n < 4 && t->scene->gravity > 0.0; n++) {
+            double side = n < 2 ? -1.0 : 1.0;
+            if (!(side * down[n % 2] > LEVEL)) o->exit_box[n] = side * INFINITY;
+        }
     }
 }

@@ -121,7 +121,7 @@ static int take_up_exact(void) {
         const Start *s = one.start;
         Lone *p = e->lones + i;
         *p = (Lone){ .release = s->t, .stop = end - s->t, .position = { s->position[0], s->position[1] },
-                     .velocity = { s->velocity[0], s->velocity[1] }, .radius = s->radius, .mass = one.mass,
+                     .velocity = { s->velocity[0], s->velocity[1] }, .omega = s->omega, .radius = s->radius, .mass = one.mass,
                      .inertia = one.inertia, .rolling = one.body->rolling, .gravity = g, .pace = pace,
                      .kind = one.kind, .carried = one.carried };
         memcpy(p->exit_box, s->exit_box, sizeof p->exit_box);
@@ -156,6 +156,7 @@ static int take_up_world(void) {
     w->pulley = P.incoming ? P.segment_count : -1;
     w->ride_incline = P.incoming ? t.incoming->incline_deg * RADIANS : 0.0;
     w->g = t.scene->gravity;
+    w->tilt = t.scene->gravity_deg * RADIANS;
     w->air = t.scene->air_density;
     w->end_time = end_of_run();
     if (!lay_out_world()) return 0;
@@ -182,7 +183,7 @@ static int take_up_world(void) {
         const Start *s = one.start;
         Disk *d = w->disks + i;
         *d = (Disk){ .x = s->position[0], .y = s->position[1], .vx = s->velocity[0], .vy = s->velocity[1],
-                     .radius = s->radius, .mass = one.mass, .inertia = one.inertia, .release = s->t,
+                     .spin = s->omega, .radius = s->radius, .mass = one.mass, .inertia = one.inertia, .release = s->t,
                      .kind = one.kind, .rides = one.carried };
         memcpy(d->exit_box, s->exit_box, sizeof d->exit_box);
     }

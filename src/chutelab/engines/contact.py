@@ -135,7 +135,8 @@ class Job:
             ("kind_count", self.kinds), ("owner_count", self.owners),
             ("pulley", -1 if wheel is None else len(machine.segments.length)),
             ("ride_incline", 0.0 if wheel is None else wheel.incline),
-            ("g", machine.gravity), ("air", machine.air), ("end_time", machine.end_time),
+            ("g", machine.gravity), ("tilt", machine.tilt),
+            ("air", machine.air), ("end_time", machine.end_time),
             ("mover_count", len(machine.movers)), ("trigger_count", len(machine.triggers)),
         ):  # fmt: skip
             setattr(module.world, name, value)
@@ -144,7 +145,7 @@ class Job:
         disks = module.array("disks", dtype("Disk"), machine.count)
         disks["x"], disks["y"] = releases.position.T
         disks["vx"], disks["vy"] = releases.velocity.T
-        disks["release"] = releases.t
+        disks["spin"], disks["release"] = releases.omega, releases.t
         disks["radius"], disks["mass"] = particle.radius, particle.mass
         disks["inertia"] = particle.inertia
         disks["kind"] = releases.kind

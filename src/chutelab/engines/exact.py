@@ -148,7 +148,8 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
     materials["falls"] = np.broadcast_to(falls, kinds)[:, None]
     lones, releases = rows("lones", "Lone", count), machine.releases
     lones["release"], lones["stop"] = releases.t, machine.end_time - releases.t
-    lones["position"], lones["velocity"] = releases.position, releases.velocity
+    for field in ("position", "velocity", "omega"):
+        lones[field] = getattr(releases, field)
     for field in ("radius", "mass", "inertia"):
         lones[field] = getattr(machine.particle, field)
     lones["gravity"], lones["pace"] = machine.gravity, machine.pace

@@ -168,12 +168,13 @@ class _Run:
         self.log = log
         self.machine, self.solver, self.root, self.progress = machine, solver, root, progress
         p, releases = machine.particle, machine.releases
-        self.r, self.g = p.radius, np.array([0.0, -machine.gravity])
+        self.r, self.g = p.radius, -machine.gravity * machine.up
         # Spin that a tangential impulse gives at the rim, and its way back on the slip.
         self.lever = p.mass * p.radius**2 / p.inertia if p.inertia else 0.0
         self.t0, self.base = float(releases.t[0]), releases.position[0].copy()
         self.state = np.zeros(7)
         self.state[V] = releases.velocity[0]
+        self.state[OMEGA] = releases.omega[0]
         self.things = _surfaces(machine)
         # Whether the left face of a segment was struck last.
         self.sides: dict[int, bool] = {}

@@ -34,7 +34,7 @@ def choose(machine: Machine, engine: str | None = None) -> str:
     if any(outline is not None for outline in machine.outlines) or machine.threads:
         return "pymunk"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
-    return "contact" if stepped or machine.scene.clings else "exact"
+    return "contact" if stepped or machine.tilt or machine.scene.clings else "exact"
 
 
 def simulate(
@@ -226,6 +226,9 @@ def must_fit(machine: Machine, name: str) -> None:
         if machine.air:
             allowed = "0 with the exact engine: it has no closed form for a flight in air"
             raise refused(scene, "air_density", machine.air, allowed)
+        if machine.tilt:
+            allowed = "0 with the exact engine: contact and pymunk have gravity of any direction"
+            raise refused(scene, "gravity_deg", scene.gravity_deg, allowed)
         return
     for n, kind in enumerate(scene.particles):
         if name == "pymunk" and kind.falls:

@@ -55,13 +55,14 @@ class Hinge:
         pace = np.divide(pace, h, out=np.array(rate[left + 1]), where=h > 0.0)
         return angle[left] + s * (va + s * bent), np.where(s < 1.0, pace, rate[left + 1])
 
-    def energies(self, angle: Any, rate: Any, gravity: float) -> Any:
+    def energies(self, angle: Any, rate: Any, gravity: float, up: Floats) -> Any:
         """Return kinetic energy, that of its weight from its hinge's height, and its spring's, J.
 
-        Of angles, rad, and rates, rad/s, of one shape.
+        Of angles, rad, and rates, rad/s, of one shape; `up` is the direction against gravity, (2,).
         """
         x, y = self.moment
-        lifted = gravity * (x * np.sin(angle) + y * np.cos(angle))
+        sine, cosine = np.sin(angle), np.cos(angle)
+        lifted = gravity * (up[0] * (x * cosine - y * sine) + up[1] * (x * sine + y * cosine))
         return 0.5 * self.inertia * rate**2, lifted, 0.5 * self.spring * (angle - self.rest) ** 2
 
 

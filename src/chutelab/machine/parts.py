@@ -20,6 +20,7 @@ from chutelab.machine.shapes import Arcs, Pieces, Segments, crossings
 from chutelab.scene import Scene
 from chutelab.scene.variants import Family
 from chutelab.util.arrays import Floats, Watch, unwatched
+from chutelab.util.trig import RADIANS, sin_cos
 
 DRIVE_PULLEY = "the drive pulley"
 
@@ -144,7 +145,7 @@ class Machine:
 
     scenes: Scene | Family  # what it was built from
     surfaces: tuple[str, ...]  # names; several segments, or one and the pulley, may share one
-    gravity: float  # m/s², pointing down
+    gravity: float  # m/s², along -`up`
     air: float  # kg/m³, density of still air; 0 without
     particle: Particle
     segments: Segments  # all straight surfaces; the incoming belt is the first if there is one
@@ -198,6 +199,21 @@ class Machine:
     def family(self) -> Family | None:
         """All scenes that it was built from, if there are several."""
         return self.scenes if isinstance(self.scenes, Family) else None
+
+    @property
+    def tilt(self) -> float:
+        """By which gravity is turned from straight down, counterclockwise, rad."""
+        return self.scene.gravity_deg * RADIANS
+
+    @cached_property
+    def up(self) -> Floats:
+        """The direction against gravity, (2,)."""
+        return np.array(sin_cos(-self.tilt))
+
+    def height(self, position: Floats) -> Floats:
+        """Return how high places (..., 2) are, (...), m: against gravity, from the origin."""
+        found: Floats = self.up[0] * position[..., 0] + self.up[1] * position[..., 1]
+        return found
 
     @cached_property
     def pace(self) -> Any:

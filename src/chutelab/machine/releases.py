@@ -32,6 +32,7 @@ class Releases:
     # (N, 2), m and m/s
     position: Floats
     velocity: Floats
+    omega: Floats  # rad/s
     # rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation
     carried: Bools
     stream: Ints  # its number: particles of the first stream come first, then those of the next
@@ -167,6 +168,7 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
         t=starts["t"].copy(),
         position=starts["position"].copy(),
         velocity=starts["velocity"].copy(),
+        omega=starts["omega"].copy(),
         carried=carried if family else carried.repeat(counts),
         stream=np.arange(streams).repeat(members * np.array(counts)),
         kind=np.arange(members) if family else np.array(scene.kinds).repeat(counts),
@@ -202,6 +204,9 @@ def _fault(scenes: Scene | Family, refusal: Any, member: int) -> Fault:
     if why == reasons["VELOCITY_ADHERES"]:
         allowed = f"{advice} coefficient, or leave the velocity out"
         return Fault(f"stream{several}.velocity", own("velocity"), allowed)
+    if why == reasons["SPIN_ADHERES"]:
+        allowed = f"{advice} coefficient, or omega = 0"
+        return Fault(f"stream{several}.omega", own("omega"), allowed)
     if why == reasons["BOX_FULL"]:
         fewer = f", or stream{several}.count = {particle} at most" if particle else ""
         allowed = (

@@ -356,7 +356,7 @@ def _lasting(recording: Record, begin: float, end: float, blows: float) -> float
     within = (np.minimum(knots["t"][1:], end) - np.maximum(knots["t"][:-1], begin)).clip(min=0.0)
     left = np.flatnonzero((owner[1:] == owner[:-1]) & (within > 0.0))
     given = np.diff(knots["velocity"], axis=0)[left]
-    given[:, 1] += recording.gravity * h[left]
+    given += recording.gravity * h[left, None] * recording.machine.up
     sizes = np.hypot(*given.T)
     # Flights give and take rounding.
     fast = np.hypot(*knots["velocity"][left].T) + recording.gravity * h[left]

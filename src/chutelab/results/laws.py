@@ -155,7 +155,7 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
             continue
         t, angle, rate = (hinge.states[name] for name in ("t", "angle", "rate"))
         worked, stopped, damped = recording.hinge_work[surface].tolist()
-        parts = np.stack(hinge.energies(angle, rate, recording.gravity))
+        parts = np.stack(hinge.energies(angle, rate, recording.gravity, recording.machine.up))
         energy = parts.sum(axis=0)
         given = float(recording.drives[surface])
         play = float(np.abs(parts).sum(axis=0).max())
@@ -259,7 +259,8 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("interact", machine.interact or len(recording.swings) + len(recording.totals) > 0),
         ("alike", alike(recording)), ("family", rows.ndim > 1),
         ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
-        ("steps", recording.steps), ("unreal", unreal), ("dt", 0.0 if exact else machine.dt),
+        ("steps", recording.steps), ("unreal", unreal),
+        ("tilt", machine.tilt), ("dt", 0.0 if exact else machine.dt),
         ("mover_count", len(machine.movers)), ("swing_count", len(recording.swings)),
         ("gained", recording.gained), ("unsolved", recording.unsolved.max(initial=0.0)),
         ("largest", np.max(machine.particle.radius)),

@@ -189,7 +189,7 @@ def _hung(
         worked, stopped, damped = recording.hinge_work[mover.surface].tolist()
         states, given = mover.hinge.states[[0, -1]], entries["drive_work"]
         kinetic, lifted, spring = mover.hinge.energies(
-            states["angle"], states["rate"], recording.gravity
+            states["angle"], states["rate"], recording.gravity, recording.machine.up
         )
         energies = {"kinetic": kinetic, "potential": lifted, "spring": spring}
         for name, ends in energies.items():

@@ -595,11 +595,11 @@ class Record(Shown):
     ) -> tuple[Floats, ...]:
         """Return what `energy_at` does, of each cell, (c,)."""
         a, b = self.knots[left], self.knots[left + 1]
-        (_, vx), (y, vy) = (hermite(self.knots, left, share, axis) for axis in (0, 1))
+        (x, vx), (y, vy) = (hermite(self.knots, left, share, axis) for axis in (0, 1))
         omega = a["omega"] + share * (b["omega"] - a["omega"])
         body = self.particle.of(particle)
         kinetic = body.kinetic(vx, vy, omega)
-        potential = body.mass * self.gravity * y
+        potential = body.mass * self.gravity * self.machine.height(np.stack([x, y], axis=-1))
         gain = kinetic + potential - at_release
 
         entries_a, entries_b = a["entries"].T, b["entries"].T
@@ -627,7 +627,7 @@ class Record(Shown):
         """
         body = self.particle if particle is None else self.particle.of(particle)
         vx, vy = knots["velocity"][..., 0], knots["velocity"][..., 1]
-        potential = body.mass * self.gravity * knots["position"][..., 1]
+        potential = body.mass * self.gravity * self.machine.height(knots["position"])
         return body.kinetic(vx, vy, knots["omega"]), potential
 
 

@@ -227,7 +227,8 @@ class Recorder:
             begun = knots["t"][offsets[:-1][sizes > 0]]
             order = np.argsort(begun, kind="stable")
             mass = np.broadcast_to(self.machine.particle.mass, count)[sizes > 0][order]
-            lifted = np.concatenate([[0.0], mass.cumsum()]) * self.machine.gravity * self.origin[1]
+            weight = np.concatenate([[0.0], mass.cumsum()]) * self.machine.gravity
+            lifted = weight * self.machine.height(np.array(self.origin))
             released = np.searchsorted(begun[order], self.totals["t"], side="left")
             self.totals["potential"] += lifted[released]
         if self.impulses.size:

@@ -316,7 +316,7 @@ def conflicts(look: Look) -> Iterator[Fault]:
         yield from _mass(look, kind)
     yield from _engine(look, kinds, streams)
     for stream in streams:
-        yield from _width(stream, kinds)
+        yield from _of_kind(stream, kinds)
     for table in RULES:
         yield from contradictions(look, table, look.rows(table, int(table in ALWAYS)))
     yield from _pieces(look)
@@ -337,6 +337,10 @@ def conflicts(look: Look) -> Iterator[Fault]:
 def _tables(look: Look) -> Iterator[Fault]:
     plates = look.rows("plate")
     damps = look.damps or (look.has("plate") and not plates)
+    turned = look.document.get("gravity_deg")
+    if turned and look.has("incoming") and look.sound("gravity_deg"):
+        text = "must be 0 with [incoming]: the paper's machine stands upright"
+        yield Fault("gravity_deg", turned, text)
     needy = ["[plate]"] * damps + ["[outgoing]"] * look.has("outgoing")
     if needy and not look.has("incoming"):
         need = "needs" if len(needy) == 1 else "need"
@@ -488,10 +492,13 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
         yield run.fault("engine", "string[0] needs pymunk")
 
 
-def _width(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
-    """Say if a stream is narrower than the slice of it that is simulated."""
+def _of_kind(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
+    """Say if a stream is narrower than its slice, or spins though its particles never turn."""
     name = stream["particle"]
     kind = next((kind for kind in kinds if kind["name"] == name), kinds[0])
+    if abs(stream["omega"]) > 0.0 and kind["spin"] is False:
+        text = f"must be 0, or {kind.path('spin')} true: they never turn"
+        yield stream.fault("omega", text)
     radius, width = kind["radius"], stream["width"] if stream.given("width") else math.nan
     if width == width and kind.sound("radius"):
         size = sum(radius) if isinstance(radius, LIST) else 2.0 * radius

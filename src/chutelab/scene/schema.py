@@ -32,6 +32,7 @@ from chutelab.scene.units import (
     MOST_KINDS,
     MOST_SURFACES,
     Amount,
+    Angle,
     Gravity,
     Table,
     Text,
@@ -80,7 +81,12 @@ def _as_either(rule: dict[str, Any]) -> None:
 
 
 def _several(default: Any, **limits: Any) -> Any:
-    return Field(default, json_schema_extra=_as_either, validate_default=False, **limits)
+    return Field(default, json_schema_extra=_as_either, **limits)
+
+
+def _usual() -> Any:
+    """Return a table with its defaults; it is made by the scene's validator, and needs no own."""
+    return Field(default_factory=dict, validate_default=True)
 
 
 Reader = Callable[[Table, str], Any]
@@ -91,7 +97,10 @@ class SceneTables(Table):
     """The tables of a scene, with all defaults that need no geometry."""
 
     title: Text = described("Untitled scene", "What the scene is called", max_length=200)
-    gravity: Gravity = described(9.81, "Gravity g, downward", "m/s²")
+    gravity: Gravity = described(9.81, "Gravity g", "m/s²")
+    gravity_deg: Angle = described(
+        0.0, "Where gravity points: 0 is down, 90 to the right; not with [incoming]", "degrees"
+    )
     air_density: Amount = described(
         0.0,
         "Density of still air, which slows particles down as spheres of their radius"
@@ -99,7 +108,7 @@ class SceneTables(Table):
         "kg/m³",
     )
     particles: Annotated[tuple[Particle, ...], BeforeValidator(_one_or_several)] = _several(
-        (Particle(),), alias="particle", min_length=1, max_length=MOST_KINDS
+        ({},), alias="particle", min_length=1, max_length=MOST_KINDS, validate_default=True
     )
     material: tuple[Material, ...] = Field((), max_length=MOST_KINDS)
     pair: tuple[Pair, ...] = Field((), max_length=MOST_EXPECTATIONS)
@@ -112,13 +121,13 @@ class SceneTables(Table):
     surface: tuple[Surface, ...] = Field((), max_length=MOST_SURFACES)
     string: tuple[String, ...] = Field((), max_length=MOST_SURFACES)
     streams: Annotated[tuple[Stream, ...], BeforeValidator(_one_or_several)] = _several(
-        (Stream(),), alias="stream", min_length=1, max_length=MOST_KINDS
+        ({},), alias="stream", min_length=1, max_length=MOST_KINDS, validate_default=True
     )
-    run: Run = Field(default_factory=Run)
+    run: Run = _usual()
     sensor: tuple[Sensor, ...] = Field((), max_length=MOST_KINDS)
     expect: tuple[Expect, ...] = Field((), max_length=MOST_EXPECTATIONS)
     view: View | None = None
-    live: Live = Field(default_factory=Live)
+    live: Live = _usual()
 
     _source: str = PrivateAttr("<scene>")
     _told: Any = PrivateAttr(None)

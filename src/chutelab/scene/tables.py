@@ -449,6 +449,9 @@ class Stream(Resolved):
     velocity: Point | None = described(
         None, "Release velocity [vx, vy]; default: the incoming belt's", "m/s"
     )
+    omega: Number = described(
+        0.0, "Spin at the release, counterclockwise; needs spin", "rad/s", ge=-1e6, le=1e6
+    )
     interact: Switch = described(False, "Particle-particle contacts, of all streams if one says so")
     restitution: Share = pair_restitution(0.5, "particle-particle")
     friction: Amount = pair_friction(0.3, "particle-particle")

@@ -501,6 +501,7 @@ def not_carried(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
         u, v = value(stream, "velocity")
         other = (u != value(belt, "speed") * cos) | (v != value(belt, "speed") * sin)
         yield other, "the release velocity stream.velocity is not the incoming belt's"
+    yield np.not_equal(value(stream, "omega"), 0.0), "the particle spins at its release"
 
 
 def outside(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:

@@ -166,8 +166,7 @@ def momentum(e: Evidence) -> Verdict | None:
         along = tangent[None]
     first, last = e.recording.ends()
     mass = e.masses[e.recording.released, None]
-    fall = np.zeros((len(first), 2))
-    fall[:, 1] = -m.gravity * (last["t"] - first["t"])
+    fall = -m.gravity * (last["t"] - first["t"])[:, None] * m.up
     change = (mass * (last["velocity"] - first["velocity"] - fall) @ along.T).sum(axis=0)
     size = (mass[:, 0] * (np.hypot(*first["velocity"].T) + np.hypot(*fall.T))).sum()
     figure = float(np.abs(change).max() / size)
@@ -191,7 +190,7 @@ def loads(e: Evidence) -> Verdict | None:
     first, last = e.recording.ends()
     mass = e.masses[e.recording.released, None]
     given = mass * (last["velocity"] - first["velocity"])
-    given[:, 1] += mass[:, 0] * e.machine.gravity * (last["t"] - first["t"])
+    given += mass * e.machine.gravity * (last["t"] - first["t"])[:, None] * e.machine.up
     size = float(np.abs(borne).sum() + (mass * np.abs(first["velocity"])).sum())
     off = float(np.abs(given.sum(axis=0) + borne.sum(axis=(0, 1))).max())
     return Verdict(off / size if size else off, BORNE, "of all impulses")

@@ -124,11 +124,11 @@ class Lone:
         self.recorder, self.particle, self.report = recorder, particle, report
         start = machine.releases
         self.r, self.g, self.dt = world.radius, machine.gravity, machine.dt
-        self.pull, self.pace = Vec2d(0.0, -self.g), world.pace
+        self.pull, self.pace = Vec2d(*(-self.g * machine.up)), world.pace
         self.t = float(start.t[particle])
         self.x = Vec2d(*start.position[particle].tolist())
         self.v = Vec2d(*start.velocity[particle].tolist())
-        self.omega = 0.0
+        self.omega = float(start.omega[particle])
         self.body, self.circle = world.disk(particle)
         self.weight = self.body.mass * self.g
         # Rolling friction's arm, m; nothing of what does not turn.

@@ -74,7 +74,7 @@ class Shapes:
                 sizes[m.releases.kind == kind] = self._faces(outline)[0]
         self.smallest = float(sizes.min())
         self.corners = any(outline is not None for outline in m.outlines)
-        space.gravity, space.collision_bias = Vec2d(0.0, -m.gravity), BIAS
+        space.gravity, space.collision_bias = Vec2d(*(-m.gravity * m.up)), BIAS
         space.collision_slop = SLOP * self.smallest + world.hair
         # What Chipmunk remembers longer it reports in the impulse when two meet again, unapplied.
         space.collision_persistence = 1

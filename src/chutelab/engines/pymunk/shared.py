@@ -125,7 +125,7 @@ class Shared:
         self.angle = np.zeros(rows) if self.corners else None
         self.g, pace = machine.gravity, world.pace
         self.lasts, self.still = CALM / pace, STILL * pace
-        self.pull = Vec2d(0.0, -self.g)
+        self.pull = Vec2d(*(-self.g * machine.up))
         # A whole number of steps ends the run.
         self.t = self.begin = float(starts.t.min())
         if any(mover.hinge for mover in machine.movers):
@@ -238,7 +238,8 @@ class Shared:
                 continue
             self.waiting.remove(i)
             self.inside[i] = True
-            self.recorder.events(Kind.RELEASE, i, t, tuple(x), tuple(v))
+            omega = float(starts.omega[i])
+            self.recorder.events(Kind.RELEASE, i, t, tuple(x), tuple(v), omega)
             body = self.bodies[i][0]
             self.world.space.add(*self.bodies[i])
             if starts.carried[i]:
@@ -250,7 +251,7 @@ class Shared:
                 # A belt that stands holds it for good.
                 self.calm[i] = -inf if ride.speed else inf
             else:
-                self._free(i, t, x, v)
+                self._free(i, t, x, v, omega)
 
     def _taken(self, i: int, x: Vec2d, v: Vec2d, late: float) -> bool:
         """Tell whether the place where a particle starts is taken, now or when it was due."""
@@ -265,18 +266,21 @@ class Shared:
         near = (self.radius[i] * (1.0 - TOUCHING) + self.radius[others]) ** 2
         return any(bool(((d * d).sum(axis=1) < near).any()) for d in apart)
 
-    def _free(self, i: int, t: float, x: Vec2d, v: Vec2d) -> None:
+    def _free(self, i: int, t: float, x: Vec2d, v: Vec2d, omega: float = 0.0) -> None:
         """Let a particle fly from where it is at a time (s) up to now."""
         body = self.bodies[i][0]
-        self.tracks.knot(i, t, x, v)
+        self.tracks.knot(i, t, x, v, omega)
         late = self.t - t
         now = v + late * self.pull
         x += 0.5 * late * (v + now)
         if late > 0.0:
             # A blow in the next step begins at its start.
-            self.tracks.knot(i, self.t, x, now)
+            self.tracks.knot(i, self.t, x, now, omega, late * omega)
         body.position, body.velocity = x - 0.5 * self.h * now, now
-        self.state[1, :, i] = *x, *now, 0.0
+        body.angular_velocity, body.angle = omega, (late - 0.5 * self.h) * omega
+        self.state[1, :, i] = *x, *now, omega
+        if self.angle is not None:
+            self.angle[i] = late * omega
         self.world.space.add(*(string.joint for string in self.strings.get(i, ())))
         self.free[i], self.calm[i] = True, 0.0
 

@@ -248,10 +248,10 @@ class Flight(NamedTuple):
     def leaves(self, box: Floats) -> float:
         """Return the time (s) after which it leaves the exit box, see `Releases`, inf if never."""
         left, bottom, right, top = box.tolist()
-        (x, y), (vx, vy), g = self.x, self.v, self.g.y
+        (x, y), (vx, vy), (gx, gy) = self
         return min(
-            falls(x - left, vx, 0.0), falls(right - x, -vx, 0.0),
-            falls(y - bottom, vy, g), falls(top - y, -vy, -g),
+            falls(x - left, vx, gx), falls(right - x, -vx, -gx),
+            falls(y - bottom, vy, gy), falls(top - y, -vy, -gy),
         )  # fmt: skip
 
 
@@ -263,6 +263,8 @@ def own(values: ArrayLike, particle: int) -> float:
 
 def falls(gap: float, rate: float, pull: float) -> float:
     """Return the first time (s) at which gap + rate τ + pull τ²/2 falls to 0, inf if never."""
+    if gap == inf:
+        return inf
     ahead = max(gap, 0.0)
     square = rate * rate - 2.0 * pull * ahead
     if square >= 0.0 and rate < 0.0:

@@ -121,7 +121,7 @@ def in_flight(recording: Recording, times: Floats, near: float) -> Bools:
     """
     moments = times[:, None] + np.array([-near, 0.0, near])
     velocity = nominal(recording, moments.ravel())[1].reshape(*moments.shape, 2)
-    pulled = np.diff(velocity, axis=1) / near + np.array([0.0, recording.gravity])
+    pulled = np.diff(velocity, axis=1) / near + recording.gravity * recording.machine.up
     least = 1e-6 * max(recording.gravity, float(np.abs(pulled[np.isfinite(pulled)]).max(initial=0)))
     return np.asarray((np.hypot(*np.moveaxis(pulled, 2, 0)) <= least).any(axis=1))
 

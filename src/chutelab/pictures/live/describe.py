@@ -15,9 +15,7 @@ from chutelab.scene.units import LARGEST, SHORTEST
 MOST: Final = 100_000
 """Particles that a page has room for: it keeps their tracks, and draws them in each frame."""
 
-ABSENT: Final = (
-    ("particle", "size"), ("particle", "points"), ("pair", "meet"), ("pair", "cohesion"),
-)  # fmt: skip
+ABSENT: Final = (("particle", "size"), ("particle", "points"))
 """Keys that pages do not have."""
 
 LISTS: Final = ("material", "pair", "conveyor", "surface", "sensor")
@@ -128,17 +126,10 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     if scene.string:
         lacks["string"] = len(scene.string)
         faults.append(Fault("string", None, f"{allowed}, without strings"))
-    for name, doing, by in scene.triggers:
-        where = f"surface.{name}" if name in [one.name for one in scene.surface] else "plate"
-        faults.append(Fault(f"{where}.{doing}_when", by, f"{allowed}; none waits to be touched"))
-        partly = False
     for n, pair in enumerate(scene.pair):
-        if not pair.meet:
-            faults.append(Fault(f"pair[{n}].meet", False, f"true; {allowed}, which all meet"))
-            partly = False
-        if pair.cohesion:
-            fault = Fault(f"pair[{n}].cohesion", pair.cohesion, f"0; {allowed}, which do not cling")
-            faults.append(fault)
+        if pair.cohesion and scene.hinges:
+            text = "0 with what hangs on hinges: the contact engine, which pages run, has not both"
+            faults.append(Fault(f"pair[{n}].cohesion", pair.cohesion, text))
             partly = False
     if partly:
         faults = []
@@ -210,7 +201,7 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             rule = _rule([table, 0, key] if several else [table, key])
             if field.is_required():
                 rule["required"] = True
-            if (table, key) in ABSENT or key.endswith("_when"):
+            if (table, key) in ABSENT:
                 continue
             rules[table][key] = rule
     # Mass points, boxes and polygons are for other engines.

@@ -180,7 +180,7 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     released = np.searchsorted(first["t"][order], times, side="right")
     masses = recording.mass[indices][order]
     weight = np.concatenate([[0.0], np.cumsum(masses)])[released] * recording.gravity
-    heights = recording.knots["position"][:, 1]
+    heights = recording.machine.height(recording.knots["position"])
     stays = recording.ended != REASONS.index("exit")
     staying = heights[np.repeat(stays, np.diff(recording.offsets))]
     lowest = float(heights.min(initial=np.inf))

@@ -134,7 +134,8 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
     stepped = (block.engine or block.scene.run.engine) in ("contact", "pymunk")
     stepped |= block.scene.run.loads is not None
     stepped |= bool(block.scene.string) or any(kind.outline for kind in block.scene.particles)
-    stepped |= block.scene.clings or block.scene.air_density > 0.0 or "air_density" in block.paths
+    stepped |= block.scene.clings or block.scene.air_density > 0.0 or block.scene.gravity_deg != 0.0
+    stepped |= not {"air_density", "gravity_deg"}.isdisjoint(block.paths)
     stepped |= bool(block.scene.movers or block.scene.triggers) or any(
         {"turn", "shake", "travel"} & {*path.split(".")} for path in block.paths
     )

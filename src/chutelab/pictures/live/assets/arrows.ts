@@ -3,6 +3,7 @@
 import { roundUp } from "./chart.ts";
 import { ARROW } from "./handles.ts";
 import { historyOf } from "./stages.ts";
+import type { Machine } from "./machine.ts";
 import type { Track } from "./recording.ts";
 import type { Stage } from "./stage.ts";
 import type { Words } from "./words.ts";
@@ -22,8 +23,10 @@ const SHORTEST = 1.5;
 /** Force other than gravity, N: what the curve of the track says by Newton's second law. The curve
  * between two knots is cubic, so that its acceleration at the share s of the time h between them is
  * (6 Δ/h (1 - 2 s) + va (6 s - 4) + vb (6 s - 2)) / h.
- * @param mass kg @param gravity m/s² */
-function contactForce(track: Track, t: number, mass: number, gravity: number): [number, number] {
+ * @param mass kg @param gravity m/s²; along -up */
+function contactForce(
+  track: Track, t: number, mass: number, { gravity, up }: Machine,
+): [number, number] {
   const i = Math.min(track.knotBefore(t), track.count - 2);
   if (i < 0 || t >= track.end) return [0, 0];
   const [T, X, Y, VX, VY] = [0, 1, 2, 3, 4];
@@ -35,7 +38,8 @@ function contactForce(track: Track, t: number, mass: number, gravity: number): [
     return (6 * slope * (1 - 2 * s) + track.at(i, pace) * (6 * s - 4)
       + track.at(i + 1, pace) * (6 * s - 2)) / h;
   };
-  return [mass * acceleration(X, VX), mass * (acceleration(Y, VY) + gravity)];
+  return [mass * (acceleration(X, VX) + gravity * up[0]),
+    mass * (acceleration(Y, VY) + gravity * up[1])];
 }
 
 class Arrows {
@@ -61,8 +65,9 @@ class Arrows {
       if (show.velocity) velocities.push([x, y, x + k * state.vx, y - k * state.vy]);
       if (!show.forces) return;
       const its = machine.mass[i] * machine.gravity;
-      gravities.push([x, y, x, y + perNewton * its]);
-      const [fx, fy] = contactForce(track, t, machine.mass[i], machine.gravity);
+      const fall = perNewton * its;
+      gravities.push([x, y, x - fall * machine.up[0], y + fall * machine.up[1]]);
+      const [fx, fy] = contactForce(track, t, machine.mass[i], machine);
       // What is left over in flight is rounding.
       if (Math.hypot(fx, fy) > 1e-6 * its) {
         contacts.push([x, y, x + perNewton * fx, y - perNewton * fy]);

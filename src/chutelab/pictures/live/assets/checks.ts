@@ -3,7 +3,9 @@
 import { fits, type Form } from "./forms.ts";
 import { valueOfTree } from "./formula.ts";
 import { RADIANS } from "./trig.ts";
-import { moversOf, type Given, type Lab, type Point, type Scene, type Rule } from "./scene.ts";
+import {
+  moversOf, triggersOf, type Given, type Lab, type Point, type Scene, type Rule,
+} from "./scene.ts";
 
 /** What a `Fault` says: key, value, id of a text, and its words. */
 type Wrong = [string, unknown, string, Record<string, number | string>?];
@@ -14,6 +16,9 @@ const EITHER = ["particle", "plate", "stream"];
 
 /** Names of surfaces that no free one may take. */
 const RESERVED = ["incoming", "plate", "outgoing", "particles"];
+
+/** Keys of what waits until another surface is touched. */
+export const WAITS = ["opens_when", "closes_when", "starts_when"];
 
 /** Least width and height of a view, m. */
 const LEAST_VIEW = 1e-6;
@@ -121,13 +126,25 @@ export function* straysOf(
       yield [pathOf(given, "particle", n, "material"), material, "no-such-material"];
     }
   }
-  for (const [n, { between }] of listOf(given.pair).entries()) {
+  for (const [n, { between, meet }] of listOf(given.pair).entries()) {
     const key = `pair[${n}].between`;
     if (!between.some((name: string) => kinds.includes(name))) {
       yield [key, between, "no-such-kind"];
+    } else if (meet === false && !between.every((name: string) => kinds.includes(name))) {
+      yield [`pair[${n}].meet`, meet, "meet-surface"];
     }
     for (const [place, name] of between.entries()) {
       if (![...kinds, ...surfaces].includes(name)) yield [`${key}[${place}]`, name, "no-such-name"];
+    }
+  }
+  for (const table of ["plate", "surface"]) {
+    for (const [n, row] of listOf(given[table]).entries()) {
+      for (const key of WAITS) {
+        const touched = row[key]?.touched;
+        if (touched !== undefined && !surfaces.includes(touched)) {
+          yield [pathOf(given, table, n, `${key}.touched`), touched, "no-such-name"];
+        }
+      }
     }
   }
 }
@@ -171,6 +188,9 @@ function* beltConflicts(scene: Scene): Generator<Wrong> {
   if (incoming === null && (damps || outgoing !== null)) {
     yield ["incoming", undefined, "needs-incoming"];
   }
+  if (incoming !== null && scene.gravity_deg !== 0.0) {
+    yield ["gravity_deg", scene.gravity_deg, "upright"];
+  }
   if (outgoing?.drop_from === "impact") yield ["outgoing.drop_from", "impact", "drop-from-impact"];
   if (outgoing === null && scene.run.until === "landed") {
     yield ["run.until", "landed", "needs-outgoing"];
@@ -199,12 +219,21 @@ function* pieceConflicts(
   }
 }
 
-/** Yields what cannot hang on a hinge, and what no engine can run that was asked for. */
+/** Yields what cannot hang on a hinge or wait for a touch, and what no engine can run that was
+ * asked for. */
 function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
   const { streams, crowded, run } = scene, movers = moversOf(scene);
   const count = streams.reduce((sum, stream) => sum + stream.count, 0);
-  if (run.engine === "exact" && (movers.length || crowded)) {
+  const waits = triggersOf(scene).length > 0;
+  const clings = scene.pair.findIndex(({ cohesion }) => cohesion > 0);
+  if (run.engine === "exact" && (movers.length || crowded || waits)) {
     yield ["run.engine", run.engine, "not-exact"];
+  }
+  if (waits && count > 1 && !crowded) {
+    yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "hinge-meet"];
+  }
+  if (clings >= 0 && movers.some(([, { hinge }]) => hinge)) {
+    yield [`pair[${clings}].cohesion`, scene.pair[clings].cohesion, "hinge-clings"];
   }
   for (const [, { hinge, stops_deg: stops, given: row }] of movers) {
     const table = scene.surface.some((one) => one.given === row) ? "surface" : "plate";
@@ -232,7 +261,7 @@ function* kindConflicts(scene: Scene, given: Given): Generator<Wrong> {
 function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<Wrong> {
   const tables: Record<string, any[]> = {
     plate: scene.plates, particle: scene.particles, stream: scene.streams,
-    surface: scene.surface, conveyor: scene.conveyor, sensor: scene.sensor,
+    surface: scene.surface, conveyor: scene.conveyor, sensor: scene.sensor, pair: scene.pair,
   };
   for (const [table, rows] of Object.entries(tables)) {
     for (const [n, row] of rows.entries()) {

@@ -120,15 +120,15 @@ const HINGED = ["hinge", "mass", "inertia", "spring", "rest_deg", "damper", "sto
 
 /** Keys of a motion that say nothing while it moves otherwise. */
 function still({ given }: any, table: string): string[] {
-  const motion = motionOf(given);
-  return [...(motion === "hinge" ? ["turn"] : HINGED), ...(given.shake ? [] : ["shake"]),
+  const motion = motionOf(given), canStart = motion === "hinge" ? given.motor : motion !== "still";
+  return [...(canStart ? [] : ["starts_when"]), ...(motion === "hinge" ? ["turn"] : HINGED), ...(given.shake ? [] : ["shake"]),
     ...(given.travel ? [] : ["travel"]), ...(motion === "still" ? ["turn"] : []),
     ...(table === "surface" && (["still", "shakes"].includes(motion) || Array.isArray(given.hinge))
       ? ["pivot"] : [])];
 }
 
 /** Keys that say nothing as the others are. */
-function idle({ incoming }: Scene, table: string, row: any): string[] {
+function idle({ incoming, particles }: Scene, table: string, row: any): string[] {
   const moves = table === "surface" || table === "plate" ? still(row, table) : [];
   if (table === "surface") {
     return [...moves, ...row.center ? ["from", "to", "points"]
@@ -142,6 +142,10 @@ function idle({ incoming }: Scene, table: string, row: any): string[] {
       ...(row.interact ? [] : ["restitution", "friction"]), ...(row.to ? ["bed_height"] : []),
       ...(row.fill ? ["at", "to", "rate", "bed_height", "speed_spread"] : []),
       ...(incoming || row.at ? [] : ["at", "to"]), ...(row.at || row.fill ? [] : ["to"])];
+  }
+  if (table === "pair") {
+    const kinds = row.between.every((name: string) => particles.some((one) => one.name === name));
+    return [...(kinds ? [] : ["meet"]), ...(row.meet ? [] : ["restitution", "friction", "cohesion"])];
   }
   const weighed = table === "particle" && (row.given.density ?? row.given.material) !== undefined;
   return [...(weighed ? ["mass"] : []), ...(table === "outgoing" ? ["drop_from"] : [])];
@@ -200,6 +204,14 @@ function ownFields(page: Page, given: Given, scene: Scene, section: Section): Fi
       fields.push({ key: path, table, owner: section.name, name, part: 0, of: 1, unit: "", low: NaN,
         high: NaN, value: Boolean(valueAt(given, path)), form: { type: "boolean" }, free: false,
         choices: [] });
+    }
+    if (name.endsWith("_when")) {
+      const choices = sectionsOf(scene, {}).filter((one) => SURFACES.includes(one.table)
+        && one.name !== section.name).map((one) => one.name);
+      if (choices.length) fields.push({ key: `${path}.touched`, table, owner: section.name, name,
+        part: 0, of: 1, unit: "", low: NaN, high: NaN, value: valueAt(given, path)?.touched, form: {
+          type: "string" }, free: true, choices });
+      return;
     }
     if (rule.parts) {
       if (!valueAt(given, path)) return;

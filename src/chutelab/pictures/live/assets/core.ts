@@ -165,19 +165,24 @@ class Core extends Memory {
     this.setAll("World", {
       disk_count: releases.length, surface_count: rows.length, kind_count: kinds,
       owner_count: machine.surfaces.length, interact: Number(machine.interact),
-      mover_count: machine.movers.length,
+      mover_count: machine.movers.length, trigger_count: machine.triggers.length,
       until: this.layout.enums.Until[`UNTIL_${machine.until.toUpperCase()}`],
       landing: machine.landing, ride_owner: 0, pulley: pulley ? machine.segments.length : -1,
-      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity, air: machine.air,
+      ride_incline: pulley ? pulley.incline : 0, g: machine.gravity,
+      tilt: machine.tilt, air: machine.air,
       dt: machine.dt, end_time: machine.endTime,
     });
     this.work("lay_out_world");
     machine.movers.forEach((mover, k) => this.fill("movers", "Mover", k, mover));
+    const { GOES, COMES, STARTS } = this.layout.enums.Doing;
+    machine.triggers.forEach(({ surface, doing, by }, k) => this.fill("triggers", "Trigger", k,
+      { surface, doing: { opens: GOES, closes: COMES, starts: STARTS }[doing], by }));
     rows.forEach(({ restitution, friction, ...row }, k) => {
       this.fill("surfaces", "Surface", k, row);
       for (let kind = 0; kind < kinds; kind += 1) {
         this.pair(
           kind, kinds + k, restitution[kind], friction[kind], rolling[kind], falls[kind],
+          machine.cohesion[kind][kinds + row.owner],
         );
       }
     });
@@ -186,12 +191,14 @@ class Core extends Memory {
         const [e, mu] = [machine.pairRestitution[a][b], machine.pairFriction[a][b]];
         this.pair(
           a, b, e, mu, Math.max(rolling[a], rolling[b]), Math.max(falls[a], falls[b]),
+          machine.cohesion[a][b],
         );
       }
     }
     releases.forEach((one, i) => {
       this.fill("disks", "Disk", i, {
-        x: one.x, y: one.y, vx: one.vx, vy: one.vy, spin: machine.spins?.[i] ?? 0, release: one.t,
+        x: one.x, y: one.y, vx: one.vx, vy: one.vy,
+        spin: machine.spins?.[i] ?? one.omega, release: one.t,
         radius: machine.radius[i], mass: machine.mass[i], inertia: machine.inertia[i],
         kind: one.kind, rides: Number(one.carried), goes_on: Number(machine.goesOn?.[i] ?? false),
         exit_box: one.exitBox,
@@ -204,10 +211,10 @@ class Core extends Memory {
 
   pair(
     kind: number, column: number, restitution: number, friction: number, rolling: number,
-    falls: number,
+    falls: number, cohesion: number,
   ) {
     const columns = this.get("kind_count") + this.get("material_count");
-    const row = { restitution, friction: Math.min(friction, GREATEST), rolling, falls };
+    const row = { restitution, friction: Math.min(friction, GREATEST), rolling, falls, cohesion };
     this.fill("pairs", "Pair", kind * columns + column, row);
   }
 
@@ -246,6 +253,11 @@ class Core extends Memory {
         this.ints[(at + fields.surface[0]) >> 2]);
     }
     return rows;
+  }
+
+  /** When what waits for a touch acted, s; Infinity of what still waits. */
+  triggered(): number[] {
+    return this.rows("triggers", "Trigger", this.get("trigger_count")).map(({ t }) => t);
   }
 
   /** Loads of surfaces, `LOAD_ROW` numbers each, in bins from one on: the latest, or at the end

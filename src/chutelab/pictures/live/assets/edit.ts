@@ -1,7 +1,7 @@
 // Parts added, copied and taken away: each a scene made of another.
 
 import { gapToArc, gapToSegment } from "./arrival.ts";
-import { listOf } from "./checks.ts";
+import { WAITS, listOf } from "./checks.ts";
 import { valueAt, withValues } from "./keys.ts";
 import type { Machine } from "./machine.ts";
 import type { Given, Scene } from "./scene.ts";
@@ -174,6 +174,9 @@ function withName(given: Given, key: string, name: string): Given {
   for (const pair of listOf(renamed.pair)) {
     pair.between = pair.between.map((one: string) => (one === old ? name : one));
   }
+  for (const row of [...listOf(renamed.plate), ...listOf(renamed.surface)]) {
+    for (const when of WAITS) if (row[when]?.touched === old) row[when].touched = name;
+  }
   if (key.startsWith("material")) {
     const kinds = listOf(renamed.particle).filter(({ material }) => material === old);
     for (const kind of kinds) kind.material = name;
@@ -211,10 +214,19 @@ function without(given: Given, ...names: string[]): Given {
   }
   for (const table of ["incoming", "outgoing"]) if (names.includes(table)) delete rest[table];
   for (const table of PLAIN) {
-    const rows = listOf(given[table]).filter(({ name }, n) =>
-      !names.includes(`${table} ${name ?? n + 1}`));
+    // What is said of two goes with each of them.
+    const rows = listOf(given[table]).filter(({ name, between = [] }, n) =>
+      ![`${table} ${name ?? n + 1}`, ...between].some((one) => names.includes(one)));
     if (rows.length) rest[table] = rows;
     else delete rest[table];
+  }
+  // Nothing waits for what is gone.
+  const isGone = ({ touched }: Given = {}) => touched && names.includes(touched);
+  const freed = (row: Given) => Object.fromEntries(Object.entries(row)
+    .filter(([key, value]) => !WAITS.includes(key) || !isGone(value)));
+  for (const table of ["plate", "surface"]) {
+    if (!listOf(rest[table]).some((row) => WAITS.some((key) => isGone(row[key])))) continue;
+    rest[table] = Array.isArray(rest[table]) ? rest[table].map(freed) : freed(rest[table]);
   }
   return rest;
 }
@@ -225,7 +237,7 @@ const motionOf = ({ turn, shake, travel, hinge }: Given) => (hinge ? "hinge" : t
 
 /** Keys of motions. */
 const MOVES = ["turn", "shake", "travel", "hinge", "mass", "inertia", "spring", "rest_deg",
-  "damper", "stops_deg", "motor"];
+  "damper", "stops_deg", "motor", "starts_when"];
 
 /** A scene in which a part moves otherwise, by the motion's usual numbers.
  * @param path of its row

@@ -5,9 +5,9 @@ import type { Event } from "./core.ts";
 import type { Machine } from "./machine.ts";
 
 type Chunk = { type: "chunk", id: number, knots: Float64Array, tips: Float64Array,
-  events: Event[], swings: number[], now: number, state: string, books: number[][] | null,
-  reasons: number[] | null, gained: number, unsolved: number, contacts: number, steps: number,
-  loads: { from: number, rows: Float64Array } };
+  events: Event[], swings: number[], triggered: number[], now: number, state: string,
+  books: number[][] | null, reasons: number[] | null, gained: number, unsolved: number,
+  contacts: number, steps: number, loads: { from: number, rows: Float64Array } };
 
 class Engine {
   id = 0;

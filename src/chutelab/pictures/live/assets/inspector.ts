@@ -17,6 +17,13 @@ const PLACES = 100, NARROW = 400;
 /** What is first to be changed of a plate on a hinge. */
 const HUNG = ["spring", "damper", "angle_deg"];
 
+/** Keys that another one takes the place of. */
+const INSTEAD: Record<string, string[]> = {
+  opens_when: ["opens_at", "closes_when"], closes_when: ["closes_at", "opens_when"],
+  opens_at: ["opens_when"], closes_at: ["closes_when"],
+  meet: ["restitution", "friction", "cohesion"],
+};
+
 /** Fields that are not under "More". */
 const FIRST = 3;
 
@@ -206,7 +213,8 @@ class Fields {
     this.asking = input;
     try {
       const value = typeof typed === "boolean" ? typed : checked(field, typed, words);
-      const whole = value === undefined ? key.replace(/(\..*)\[\d+\]$/, "$1") : key;
+      const whole = value === undefined
+        ? key.replace(/(\..*)\[\d+\]$|\.touched$/, "$1") : key;
       if (field.name === "name" && field.value && value) {
         lab.replace(withName(lab.given as Given, key, value));
         const own = field.table === "material" ? `material ${value}` : value;
@@ -219,7 +227,13 @@ class Fields {
         lab.replace(withMotion(lab.given as Given, path, value, [x, y], this.unit()));
       } else if (field.name === "motor") {
         lab.change({ [key]: value ? { speed_deg: 90, torque: 1 } : undefined });
-      } else lab.change({ [whole]: value });
+      } else {
+        // What cannot be given beside it goes.
+        const row = key.slice(0, key.indexOf(".") + 1);
+        const others = value === undefined || value === true ? [] : INSTEAD[field.name] ?? [];
+        lab.change({ ...Object.fromEntries(others.map((one) => [row + one, undefined])),
+          [whole]: value });
+      }
     } catch (error) {
       if (!(error instanceof Fault)) throw error;
       lab.refuse(error);

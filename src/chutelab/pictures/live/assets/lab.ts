@@ -92,7 +92,8 @@ class Lab {
       // In a lesson a run is one machine's from its beginning, so that it can be noted.
       // What moves does so by the run's time, which a change does not begin anew.
       const goesOn = !this.data.lesson && this.machine?.interact && machine.interact && this.t > 0
-        && !machine.movers.length && !this.machine.movers.length;
+        && ![machine, this.machine].some(({ movers, triggers }) =>
+          movers.length || triggers.length);
       const before = this.given;
       this.given = given;
       this.scene = scene;

@@ -2,8 +2,8 @@
 // last bit: the core lays the surfaces and draws the releases.
 import { lay, type Mover } from "./plan.ts";
 import { draw, type Release } from "./releases.ts";
-import { Fault, met, type Scene } from "./scene.ts";
-import { RADIANS } from "./trig.ts";
+import { Fault, cohesionOf, met, passes, triggersOf, type Scene } from "./scene.ts";
+import { RADIANS, sinCos } from "./trig.ts";
 
 export interface Segment {
   x: number; // first end, m
@@ -43,9 +43,18 @@ interface Pulley {
   friction: number[];
 }
 
+/** What a surface does when another one is touched for the first time */
+export interface Trigger {
+  surface: number;
+  doing: "opens" | "closes" | "starts";
+  by: number; // the surface that is touched
+}
+
 export interface Machine {
   surfaces: string[]; // names
   gravity: number;
+  tilt: number; // rad; by which gravity is turned from straight down
+  up: [number, number]; // against gravity
   air: number; // kg/m³, density of still air; 0 without
   landing: number; // index of the outgoing belt, -1 without one
   until: "landed" | "settled" | "time";
@@ -56,6 +65,7 @@ export interface Machine {
   segments: Segment[];
   arcs: Arc[];
   movers: Mover[];
+  triggers: Trigger[];
   pulley: Pulley | null;
   streams: string[]; // what tells them apart: names, or which of those without
   releases: Release[];
@@ -64,6 +74,7 @@ export interface Machine {
   inertia: number[]; // kg m²
   pairRestitution: number[][]; // of two kinds
   pairFriction: number[][];
+  cohesion: number[][]; // N; by which each kind pulls at each kind, and at each surface
   rolling: number[]; // by kind
   falls: number[]; // s/m; 1 over the speed up to which restitution is what it is
 }
@@ -95,10 +106,13 @@ export function build(scene: Scene): Machine {
   let last = -Infinity, unnamed = 0;
   for (const release of releases) last = Math.max(last, release.t);
   const bound = last + run.max_time;
+  const tilt = scene.gravity_deg * RADIANS, [sin, cos] = sinCos(tilt);
   const pairs = every.map((a) => every.map((b) => met(scene, a, b)));
-  return {
+  return waiting({
     surfaces: names,
     gravity: scene.gravity,
+    tilt,
+    up: [-sin, cos],
     air: scene.air_density,
     landing: names.indexOf("outgoing"),
     until: typeof run.until === "string" ? run.until : "time",
@@ -109,6 +123,8 @@ export function build(scene: Scene): Machine {
     segments,
     arcs,
     movers: laid.movers,
+    triggers: triggersOf(scene).map(([name, doing, by]) =>
+      ({ surface: names.indexOf(name), doing, by: names.indexOf(by) })),
     pulley: belt === null ? null : {
       radius: belt.pulley_radius, speed: belt.speed, incline: belt.incline_deg * RADIANS,
       surface: 0, ...values[0],
@@ -117,11 +133,36 @@ export function build(scene: Scene): Machine {
     releases,
     radius,
     ...heft(scene, releases, radius),
-    pairRestitution: pairs.map((row) => row.map(([restitution]) => restitution)),
+    pairRestitution: pairs.map((row, a) => row.map(([restitution], b) =>
+      (passes(scene, a, b) ? PASSES : restitution))),
     pairFriction: pairs.map((row) => row.map(([, friction]) => friction)),
+    cohesion: every.map((kind) => [...every, ...names].map((other) =>
+      cohesionOf(scene, kind, other))),
     rolling: particles.map((kind) => kind.rolling_friction),
     falls: particles.map(({ restitution_speed: v }) => v === undefined ? 0.0 : 1.0 / v),
-  };
+  });
+}
+
+/** Restitution of two kinds that pass through each other. */
+const PASSES = -1.0;
+
+/** Sets the times at which what waits for a touch acts, s; Infinity of what still waits. */
+export function actAt({ triggers, segments, arcs, movers }: Machine, times: number[]) {
+  triggers.forEach(({ surface, doing }, n) => {
+    const own = <T extends { surface: number }>(all: T[]) =>
+      all.filter((one) => one.surface === surface);
+    if (doing === "starts") for (const mover of own(movers)) mover.begins = times[n];
+    else {
+      const clock = doing === "opens" ? "vanishes" : "appears";
+      for (const piece of [...own<Segment | Arc>(segments), ...own(arcs)]) piece[clock] = times[n];
+    }
+  });
+}
+
+/** Returns a machine in which nothing has been touched yet. */
+export function waiting(machine: Machine): Machine {
+  actAt(machine, machine.triggers.map(() => Infinity));
+  return machine;
 }
 
 /** rad/s; shortest times of hinges are at least 1 over it: steps have to be shorter. */

@@ -17,7 +17,7 @@ const KINDS: Record<number, string> = {
 };
 const ICONS: Record<string, string> = {
   separation: "leave", impact: "hit", landing: "land", collision: "hit", settle: "land",
-  opens: "gate", closes: "gate",
+  opens: "gate", closes: "gate", starts: "play",
 };
 
 /** Pixels from one mark to the next at least, and happenings that one mark tells at most. */
@@ -30,14 +30,16 @@ const FINE = matchMedia("(min-width: 720px) and (pointer: fine)"), TICKS = 5;
 /** s by which a time that is shown may miss what happens then. */
 const THEN = 1e-9;
 
-/** When the gates of a machine open and close. */
-function gatesOf({ segments, arcs, surfaces }: Machine): Happening[] {
+/** When the gates of a machine open and close, and what waits for that begins to move. */
+function gatesOf({ segments, arcs, movers, surfaces }: Machine): Happening[] {
   const gates = new Map([...segments, ...arcs].map((one) => [one.surface, one]));
-  return [...gates].flatMap(([surface, { appears, vanishes }]) => {
+  const starts = movers.filter(({ begins }) => begins > 0 && isFinite(begins))
+    .map(({ begins, surface }) => ({ t: begins, kind: "starts", name: surfaces[surface] }));
+  return [...starts, ...[...gates].flatMap(([surface, { appears, vanishes }]) => {
     const name = surfaces[surface], closes = appears > 0 && isFinite(appears);
     return [...(closes ? [{ t: appears, kind: "closes", name }] : []),
       ...(isFinite(vanishes) ? [{ t: vanishes, kind: "opens", name }] : [])];
-  });
+  })];
 }
 
 class Marks {
@@ -76,7 +78,7 @@ class Marks {
     if (!recording || !machine || !isFinite(recording.begin)) return [];
     const { events } = recording, { surfaces } = machine;
     if (this.read.events !== events) {
-      this.read = { events, many: 0, found: gatesOf(machine), down: false };
+      this.read = { events, many: 0, found: [], down: false };
     }
     const { read } = this, isCrowd = machine.releases.length >= FEWEST;
     for (; read.many < events.length; read.many += 1) {
@@ -85,7 +87,7 @@ class Marks {
       read.down ||= said === "landing";
       read.found.push({ t, kind: said, name: surfaces[surface] });
     }
-    return [...read.found].sort((a, b) => a.t - b.t);
+    return [...gatesOf(machine), ...read.found].sort((a, b) => a.t - b.t);
   }
 
   /** What happens, in words. */

@@ -32,13 +32,14 @@ class Swings {
 
 /** Where a mover is at a time, s. It travels with an even acceleration up to the middle, and the
  * same against it from there on. */
-function poseOf(mover: Mover, t: number, swings?: Swings): Pose {
-  const { pivot, by, frequency, phase, way, from, lasts, turn, inertia } = mover;
+function poseOf(mover: Mover, time: number, swings?: Swings): Pose {
+  const { pivot, by, frequency, phase, way, from, lasts, turn, inertia, begins } = mover;
+  const t = Math.max(time - begins, 0);
   const swing = Math.sin(2 * Math.PI * frequency * t + phase);
   const u = lasts ? Math.min(1, Math.max(0, (t - from) / lasts)) : 0;
   const share = u < 0.5 ? 2 * u * u : 1 - 2 * (1 - u) * (1 - u);
   const [x, y] = [0, 1].map((n) => pivot[n] + by[n] * swing + way[n] * share);
-  return { x, y, turn: inertia ? swings?.at(t) ?? 0 : turn * t };
+  return { x, y, turn: inertia ? swings?.at(time) ?? 0 : turn * t };
 }
 
 /** Where a pose carries a place, m, as written. */

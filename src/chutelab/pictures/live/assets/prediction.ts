@@ -7,7 +7,7 @@
 import type { Event } from "./core.ts";
 import type { Segment } from "./machine.ts";
 import type { Recording } from "./recording.ts";
-import { met, moversOf, slices, type Incoming, type Plate, type Scene } from "./scene.ts";
+import { met, moversOf, slices, triggersOf, type Incoming, type Plate, type Scene } from "./scene.ts";
 import {
   because, cutFrom, transfer, unanswered, type Reason, type Stage, type Transfer,
 } from "./transfer.ts";
@@ -127,8 +127,9 @@ function outsideOf(scene: Scene, belt: Incoming) {
   const own = scene.particles[scene.kinds[0]];
   if (belt.friction !== "adhesion") return "belt-friction";
   if (own.spin && own.rolling_friction > 0.0) return "rolling-friction";
-  if (scene.air_density > 0.0) return "air";
   if (own.restitution_speed !== undefined) return "falling-restitution";
+  if (scene.pair.some(({ cohesion }) => cohesion > 0.0)) return "clings";
+  if (scene.air_density > 0.0) return "air";
   if (stream.fill !== undefined || stream.to !== undefined) return "no-point";
   const [sin, cos] = sinCos(belt.incline_deg * RADIANS);
   if (stream.at !== undefined) {
@@ -141,6 +142,8 @@ function outsideOf(scene: Scene, belt: Incoming) {
     const [vx, vy] = stream.velocity;
     if (vx !== belt.speed * cos || vy !== belt.speed * sin) return "other-velocity";
   }
+  if (stream.omega !== 0.0) return "spins";
   if (moversOf(scene).length) return "moves";
+  if (triggersOf(scene).length) return "waits";
   return scene.crowded ? "interact" : "";
 }

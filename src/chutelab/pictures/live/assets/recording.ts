@@ -3,6 +3,7 @@
 
 import type { Breach } from "./breaches.ts";
 import { KNOT_ROW, LOAD_ROW, type Machine, type Event } from "./core.ts";
+import { actAt, waiting } from "./machine.ts";
 import { SWING_ROW, Swings, posed } from "./motion.ts";
 
 export type State = { x: number, y: number, vx: number, vy: number, spin: number, ended: boolean };
@@ -19,6 +20,9 @@ const MOST_CHORDS = 500;
 
 /** Knots of one particle, `KNOT_ROW` doubles each. */
 class Track {
+  /** @param up the direction against gravity */
+  constructor(readonly up: [number, number] = [0, 1]) {}
+
   rows = new Float64Array(8 * KNOT_ROW);
 
   count = 0;
@@ -69,13 +73,17 @@ class Track {
 
   /** Lowest place of a knot and of the curve to it, m: where its slope, a quadratic, is 0. */
   lowAt(i: number) {
-    const y = this.at(i, Y), h = i ? this.at(i, T) - this.at(i - 1, T) : 0;
+    const [across, up] = this.up;
+    const of = (knot: number, x: number, y: number) =>
+      across * this.at(knot, x) + up * this.at(knot, y);
+    const y = of(i, X, Y), h = i ? this.at(i, T) - this.at(i - 1, T) : 0;
     if (!(h > 0)) return y;
-    const va = this.at(i - 1, VY), vb = this.at(i, VY), mean = (y - this.at(i - 1, Y)) / h;
+    const va = of(i - 1, VX, VY), vb = of(i, VX, VY), mean = (y - of(i - 1, X, Y)) / h;
     const a = 3 * (va + vb - 2 * mean), b = 3 * mean - 2 * va - vb;
     const q = -(b + Math.sign(b || 1) * Math.sqrt(Math.max(0, b * b - a * va)));
     return [q / a, va / q].reduce((low, s) =>
-      (s > 0 && s < 1 ? Math.min(low, this.placeOn(i - 1, Y, VY, h, s)) : low), y);
+      (s > 0 && s < 1 ? Math.min(low, across * this.placeOn(i - 1, X, VX, h, s)
+        + up * this.placeOn(i - 1, Y, VY, h, s)) : low), y);
   }
 
   /** The lowest of the first so many knots. */
@@ -266,7 +274,8 @@ class Recording {
   breaches: Breach[] = [];
 
   constructor(public machine: Machine) {
-    this.tracks = machine.releases.map(() => new Track());
+    waiting(machine);
+    this.tracks = machine.releases.map(() => new Track(machine.up));
     for (const { surface } of machine.movers) this.swings.set(surface, new Swings());
   }
 
@@ -277,12 +286,12 @@ class Recording {
 
   add({
     knots, tips, events, swings, now, state, books = null, gained = 0, unsolved = 0,
-    contacts = 0, steps = 0, loads,
+    contacts = 0, steps = 0, loads, triggered = [],
   }: {
     knots: Float64Array, tips: Float64Array, events: Event[], swings: number[], now: number,
     state: string,
     books?: number[][] | null, gained?: number, unsolved?: number, contacts?: number,
-    steps?: number, loads?: { from: number, rows: Float64Array },
+    steps?: number, loads?: { from: number, rows: Float64Array }, triggered?: number[],
   }) {
     this.gained = gained;
     this.unsolved = unsolved;
@@ -315,6 +324,7 @@ class Recording {
       this.swings.get(swings[n + 3])?.rows.push(swings.slice(n, n + 3));
     }
     if (loads?.rows.length) this.bear(loads.from, loads.rows);
+    if (triggered.length) actAt(this.machine, triggered);
     this.measure();
     this.state = state;
     this.now = state === "running" ? now + this.shift : Math.max(this.end, now + this.shift);
@@ -364,7 +374,7 @@ class Recording {
       return ledger
         ? [ledger.belt_work, ledger.restitution_loss, ledger.friction_loss] : [0, 0, 0];
     });
-    this.tracks = was.map((index) => this.tracks[index] ?? new Track());
+    this.tracks = was.map((index) => this.tracks[index] ?? new Track(machine.up));
     this.events = this.renumbered(t, was, machine.surfaces);
     machine.releases.forEach((release, index) => {
       const track = this.tracks[index], entries = booked[index];
@@ -435,7 +445,8 @@ class Recording {
     const mass = machine.mass[index], inertia = machine.inertia[index];
     const kinetic = ({ vx, vy, spin }: State) =>
       0.5 * mass * (vx * vx + vy * vy) + 0.5 * inertia * spin * spin;
-    const potential = ({ y }: State) => mass * machine.gravity * y;
+    const [across, up] = machine.up;
+    const potential = ({ x, y }: State) => mass * machine.gravity * (across * x + up * y);
     const energy = (one: State) => kinetic(one) + potential(one);
     const first = track.stateOf(0, false);
     const start = energy(first);

@@ -10,6 +10,7 @@ export interface Release {
   vx: number; // m/s
   vy: number;
   exitBox: number[]; // left, bottom, right, top beyond which it has left the scene, m
+  omega: number; // rad/s
   carried: boolean; // rides the incoming belt by adhesion
   stream: number;
   kind: number;
@@ -42,7 +43,8 @@ export function draw(scene: Scene, names: string[]): { releases: Release[], radi
     for (let i = 0; i < one.count; i += 1, at += core.layout.structs.Start.size >> 3) {
       releases.push({
         t: doubles[at], x: doubles[at + 1], y: doubles[at + 2], vx: doubles[at + 3],
-        vy: doubles[at + 4], exitBox: [...doubles.subarray(at + 6, at + 10)], ...common,
+        vy: doubles[at + 4], exitBox: [...doubles.subarray(at + 6, at + 10)],
+        omega: doubles[at + 10], ...common,
       });
       radius.push(doubles[at + 5]);
     }
@@ -53,11 +55,13 @@ export function draw(scene: Scene, names: string[]): { releases: Release[], radi
 /** Returns why the releases of a scene cannot be drawn. */
 function faultOf(scene: Scene, refusal: Refusal, names: string[]) {
   const { why, stream, particle, surface, distance, reach } = refusal;
-  const { at, fill, speed_spread: spread, velocity } = scene.streams[stream];
-  const { BOX_FULL, SPREAD_ADHERES, VELOCITY_ADHERES } = memory().layout.enums.Refused;
+  const { at, fill, speed_spread: spread, velocity, omega } = scene.streams[stream];
+  const { BOX_FULL, SPREAD_ADHERES, VELOCITY_ADHERES, SPIN_ADHERES } =
+    memory().layout.enums.Refused;
   const table = scene.streams.length > 1 ? `stream[${stream}]` : "stream";
   if (why === SPREAD_ADHERES) return new Fault(`${table}.speed_spread`, spread, "adhesion-speed");
   if (why === VELOCITY_ADHERES) return new Fault(`${table}.velocity`, velocity, "adhesion-speed");
+  if (why === SPIN_ADHERES) return new Fault(`${table}.omega`, omega, "adhesion-speed");
   if (why === BOX_FULL) {
     return new Fault(`${table}.fill`, fill, "box-full", { count: particle, radius: reach });
   }

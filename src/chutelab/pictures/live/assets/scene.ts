@@ -54,6 +54,7 @@ interface Stream {
   to?: Point;
   fill?: [Point, Point];
   velocity?: Point;
+  omega: number;
   interact: boolean;
   restitution: number;
   friction: number;
@@ -72,7 +73,11 @@ export interface Moves {
   damper: number;
   stops_deg?: Point;
   motor?: { speed_deg: number, torque: number };
+  starts_when?: When;
 }
+
+/** What is to be touched for something to happen */
+type When = { touched: string };
 
 export interface Plate extends Moves {
   name?: string;
@@ -101,6 +106,8 @@ export interface Surface extends Moves {
   speed: number;
   opens_at?: number;
   closes_at?: number;
+  opens_when?: When;
+  closes_when?: When;
   repeat: [number, number, number][];
   given: Given;
 }
@@ -141,10 +148,12 @@ interface Outgoing {
 export interface Scene {
   title: string;
   gravity: number;
+  gravity_deg: number;
   air_density: number;
   particles: Particle[];
   materials: Map<string, Record<string, number>>; // numbers by name, presets too
-  pair: { between: [string, string], restitution?: number, friction?: number }[];
+  pair: { between: [string, string], restitution?: number, friction?: number, cohesion: number,
+    meet: boolean, given: Given }[];
   incoming: Incoming | null;
   plates: Plate[];
   outgoing: Outgoing | null;
@@ -233,8 +242,9 @@ export function resolve(given: Given, lab: Lab): Scene {
   const scene: Scene = {
     title: given.title ?? lab.tables.scene.title.default,
     gravity: given.gravity ?? lab.tables.scene.gravity.default,
+    gravity_deg: given.gravity_deg ?? lab.tables.scene.gravity_deg.default,
     air_density: given.air_density ?? lab.tables.scene.air_density.default,
-    particles, materials, pair: given.pair ?? [], incoming, plates, outgoing,
+    particles, materials, pair: rows("pair"), incoming, plates, outgoing,
     conveyor: rows("conveyor"), surface, streams, run, kinds, sensor: rows("sensor"),
     view: given.view ?? null,
     crowded: count > 1 && streams.some((stream) => stream.interact),
@@ -251,13 +261,39 @@ export function ruleOf(tables: Lab["tables"], path: string): Rule | undefined {
   return part === undefined ? rule : rule?.parts?.[part];
 }
 
+const namedOf = ({ plates, surface }: Scene): [string, Plate | Surface][] => [
+  ...plates.map((one): [string, Plate] => [(one.pivot && one.name) || "plate", one]),
+  ...surface.map((one): [string, Surface] => [one.name, one]),
+];
+
 /** Returns what moves, and the names of these surfaces. */
-export function moversOf({ plates, surface }: Scene): [string, (Plate | Surface)][] {
-  const named: [string, Plate | Surface][] = [
-    ...plates.map((one): [string, Plate] => [(one.pivot && one.name) || "plate", one]),
-    ...surface.map((one): [string, Surface] => [one.name, one]),
-  ];
-  return named.filter(([, { turn, shake, travel, hinge }]) => turn || shake || travel || hinge);
+export function moversOf(scene: Scene): [string, (Plate | Surface)][] {
+  return namedOf(scene).filter(([, { turn, shake, travel, hinge }]) =>
+    turn || shake || travel || hinge);
+}
+
+/** Returns what waits for a touch: a surface, what it then does, and which one is to be touched. */
+export function triggersOf(scene: Scene): [string, "opens" | "closes" | "starts", string][] {
+  return namedOf(scene).flatMap(([name, one]) =>
+    (["opens", "closes", "starts"] as const).flatMap((doing) => {
+      const when: When | undefined = (one as any)[`${doing}_when`];
+      return when ? [[name, doing, when.touched] as [string, typeof doing, string]] : [];
+    }));
+}
+
+/** Returns whether a pair is of a kind of particles and another one, or a surface, by name. */
+const isOf = ({ between: [a, b] }: Scene["pair"][number], one?: string, other?: string) =>
+  (a === one && b === other) || (b === one && a === other);
+
+/** Returns the force (N) that it takes to pull a kind off another, or off a surface. */
+export function cohesionOf({ particles, pair }: Scene, kind: number, other: number | string) {
+  const name = typeof other === "string" ? other : particles[other].name;
+  return pair.find((one) => isOf(one, particles[kind].name, name))?.cohesion ?? 0;
+}
+
+/** Tells whether two kinds pass through each other. */
+export function passes({ particles, pair }: Scene, a: number, b: number) {
+  return pair.some((one) => !one.meet && isOf(one, particles[a].name, particles[b].name));
 }
 
 /** Fills in the mean radius of particles, and the mass that goes with that. */
@@ -323,9 +359,7 @@ export function met(scene: Scene, kind: number, other: number | string): [number
   }
   let [restitution, friction] = values;
   for (const pair of scene.pair.slice().reverse()) {
-    const [a, b] = pair.between;
-    const { name } = particle;
-    if ((a === name && b === partner) || (b === name && a === partner)) {
+    if (isOf(pair, particle.name, partner)) {
       restitution = pair.restitution ?? restitution;
       friction = pair.friction ?? friction;
     }

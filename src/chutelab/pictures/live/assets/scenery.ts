@@ -54,7 +54,7 @@ const SPOKED = 9, ROLLERS = 128;
 type Moving = { element: any, speed: number, x?: number, y?: number, radius?: number };
 /** Drawings of a part that moves itself. */
 type Carried = { elements: any[], mover: Mover };
-type Gate = { element: any, appears: number, vanishes: number };
+type Gate = { element: any, piece: Segment | Arc };
 
 class Scenery {
   moving: Moving[] = [];
@@ -135,13 +135,14 @@ class Scenery {
     }
     for (const [make, body, more] of bodies) {
       const { surface, appears, vanishes } = body;
+      const waits = machine.triggers.some((one) => one.surface === surface && one.doing !== "starts");
       const moves = this.carried.find(({ mover }) => mover.surface === surface);
       const element = part(machine.surfaces[surface], [body, more, Boolean(moves)],
         () => (moves ? svg("g", {}, make()) : make()));
       moves?.elements.push(element);
-      if (isFinite(appears) || isFinite(vanishes)) {
+      if (waits || isFinite(appears) || isFinite(vanishes)) {
         element.classList.add("gate");
-        this.gates.push({ element, appears, vanishes });
+        this.gates.push({ element, piece: body });
       }
     }
     for (const { mover } of this.carried) {
@@ -228,7 +229,7 @@ class Scenery {
         set(element, "transform", `rotate(${angle % 360} ${x} ${y})`);
       }
     }
-    for (const { element, appears, vanishes } of this.gates) {
+    for (const { element, piece: { appears, vanishes } } of this.gates) {
       element.classList.toggle("absent", t < appears || t >= vanishes);
     }
   }

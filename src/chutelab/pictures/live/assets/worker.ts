@@ -3,10 +3,11 @@
 // In:  {type: "load", module, layout}, the core compiled; {type: "run", id, machine, until}
 //      begins a run and ends the one before; {type: "until", id, until} lets it go on to a later
 //      time (s).
-// Out: {type: "chunk", id, knots, tips, events, swings, now, state, books, reasons, gained,
-//      unsolved}, where state is "running", "done", "stalled" or "failed"; books and reasons come
-//      at the end; gained is the energy by which solves broke their law so far, J, and unsolved
-//      the most overlap that one left, radii.
+// Out: {type: "chunk", id, knots, tips, events, swings, triggered, now, state, books, reasons,
+//      gained, unsolved}, where state is "running", "done", "stalled" or "failed"; books and
+//      reasons come at the end; triggered are the times of what waited for a touch, s; gained is
+//      the energy by which solves broke their law so far, J, and unsolved the most overlap that
+//      one left, radii.
 //      {type: "laws", id, breaches}, in answer to {type: "judge", id, run}.
 //      {type: "broken"}, where the core cannot be loaded.
 
@@ -67,6 +68,7 @@ function work() {
   const tips = over || !core.machine?.interact ? new Float64Array() : core.tips();
   postMessage({
     type: "chunk", id: job.id, knots: all, tips, events, swings, now: core.get("t"), state,
+    triggered: core.triggered(),
     books: over ? core.books() : null, reasons: over ? core.reasons() : null,
     gained: core.get("gained"), unsolved: core.get("unsolved_most"),
     contacts: core.get("impact_count"), steps: core.get("step_count"), loads: core.takeLoads(over),

@@ -7,8 +7,8 @@ node; what is missing is left out. Each runs at 1/60, 1/240 and 1/1000 s, on one
 releases; it only steps: seconds are processor time of the steps, of Chutelab of the whole
 `simulate`, with recording, ledger and laws. Box2D and Rapier are made for things of a metre and
 have a slop of 5 mm: they get the scene enlarged until a disk is 1 m across, and gravity with it.
-Their contacts are springs of 30 Hz, under which a heap of disks of 4 mm is pressed flat: they are as
-stiff here as Box2D allows, 1 / step. All else is their default; Box2D takes 4 substeps. Overlaps
+Their contacts are springs of 30 Hz, under which a heap of disks of 4 mm is pressed flat: here they
+are as stiff as Box2D allows, 1 / step. All else is their default; Box2D takes 4 substeps. Overlaps
 are those of pairs every 5 ms, or at each longer step.
 """
 
@@ -19,12 +19,12 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
-from crowds import BOX, LOOK, bare, overlaps, pair_overlaps, told
-from references import Depth
 
 from chutelab import scene
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
+from crowds import BOX, LOOK, bare, overlaps, pair_overlaps, told
+from references import Depth
 
 END = 2.0
 """s."""
@@ -48,7 +48,8 @@ def crowd_of(machine, step):
     rows = np.column_stack([start.t, times * start.position, times * start.velocity])[order]
     return {
         "step": step, "end": END, "every": max(1, round(LOOK / step)), "radius": 0.5,
-        "enlarged": float(times), "mass": float(p.mass), "gravity": times * machine.gravity, "disks": rows.tolist(),
+        "enlarged": float(times), "mass": float(p.mass), "gravity": times * machine.gravity,
+        "disks": rows.tolist(),
         "segments": (times * np.stack([s.start, s.end], axis=1)).tolist(),
         "restitution": float(machine.pair_restitution[0, 0]),
         "friction": float(machine.pair_friction[0, 0]),

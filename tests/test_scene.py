@@ -69,7 +69,7 @@ CONTRACT = {
      "fill": None, "velocity": None, "omega": 0.0, "interact": False,
      "restitution": 0.5, "friction": 0.3},
     "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001, "align": True,
-     "loads": None},
+     "loads": None, "stress": None},
     "expect": (),
     "view": None,
     "live": {"predict": False, "controls": None, "panels": None, "ranges": {}, "presets": ()},

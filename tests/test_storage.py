@@ -23,7 +23,7 @@ from chutelab.util.files import aside, together, whole
 
 ARRAYS = (
     "knots", "offsets", "ended", "events", "by_surface", "angle", "totals", "unsolved", "drives",
-    "impulses", "swings", "hinge_work", "triggered",
+    "impulses", "lasting", "swings", "hinge_work", "triggered",
 )  # fmt: skip
 
 

@@ -268,6 +268,8 @@ void bear_ride(int i);
 void note_force(Disk *d, const Contact *c, double span);
 void bear_asleep(const Disk *d, double until, double more);
 void balance_sleepers(void);
+void keep_impulse(const Contact *c, double share, double from, double to);
+void keep_sleepers(void);
 
 /* contact.c */
 void describe(Contact *c, int i, int j);
@@ -289,6 +291,7 @@ void foresee_all(void);
 void expect(int i, double due, int partner);
 int next_disk(void);
 void shock(int i, int j, double t);
+int is_alone(const Contact *c, const double *before);
 void hold(Disk *d, int k);
 double soft_approach(const Disk *d, double radius);
 double left_over(const Disk *d, int impacts, int surface, double radius, int sunk);

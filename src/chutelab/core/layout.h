@@ -595,6 +595,17 @@ typedef struct { double normal, along, x, y, moment, at[2]; } Load; /* N s, N m 
 
 #define MOST_BINS 1048576
 
+/* Share of its size by which an impulse may differ from the change of momentum that it alone made. */
+#define SAME_IMPULSE 1e-6
+
+/* What a lasting contact gave a disk, in a bin of time or while it slept. */
+typedef struct {
+    int disk, other;        /* the other: a disk, or -1 - a surface's owner */
+    double from, to;        /* s */
+    double x, y;            /* on the disk, N s */
+    double stress[4];       /* (J b) in rows, N m s: b to the disk's centre from the other's, or from its foot */
+} Lasting; /* [out] */
+
 /* Loads of surfaces, if they are asked for. */
 typedef struct {
     double every;           /* [in] s; how long a bin is; 0: nothing is counted */
@@ -602,6 +613,14 @@ typedef struct {
     int owner_count, bin_count;
     int used;               /* [out] bins up to the last in which anything is borne */
     int overflow;           /* [out] there were to be more of them than MOST_BINS, or than memory has room for */
+    double each;            /* [in] s; how long a bin of lasting contacts is; 0: they are not kept */
+    Lasting *lasting;       /* [out] bin by bin */
+    Lasting *asleep;        /* what holds sleepers, each second; in no order */
+    int *seats;             /* rows of this bin by their pairs, + 1 */
+    double *balance;        /* (disks, 4, 2) room for conjugate gradients */
+    int lasting_count;      /* [out] */
+    int lasting_room, asleep_count, asleep_room, seat_count, first;
+    double bin;             /* which one `first` begins */
 } Loads;
 
 /* ---- What a run is judged by: a subject of its own, which shares nothing with the engine's. ---- */

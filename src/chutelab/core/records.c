@@ -146,7 +146,7 @@ EXPORT int prepare_to_judge(void) {
         L.bodies[i] = (Body){ d->radius, d->mass, d->inertia, w->g };
         L.largest = MAX(L.largest, d->radius);
     }
-    return prepare() && (B.every == 0 || lay_out_bins(w->owner_count));
+    return prepare() && lay_out_bins(w->owner_count, w->disk_count);
 }
 
 static int judge_world(void) {

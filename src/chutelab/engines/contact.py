@@ -26,7 +26,7 @@ from chutelab.core import (
 )
 from chutelab.machine import SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
-from chutelab.results.loads import gather
+from chutelab.results.loads import gather, gather_lasting
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress, unwatched
@@ -118,7 +118,8 @@ class Job:
             ("landing", machine.landing), ("ride_owner", 0), ("dt", machine.dt),
         ):  # fmt: skip
             setattr(module.world, name, value)
-        module.structs["Loads"].every = machine.loads
+        loads = module.structs["Loads"]
+        loads.every, loads.each = machine.loads, machine.stress
         self.begin = "run_world" if machine.is_ahead else "run_and_judge"
         if machine.is_ahead:
             hand_over(module, machine.scene)
@@ -278,3 +279,4 @@ class Job:
         rows = module.array("totals", dtype("Total"), world.total_count)
         recorder.take_totals(rows)
         recorder.impulses = gather(module, self.owners)
+        recorder.lasting = gather_lasting(module)

@@ -229,6 +229,11 @@ class Machine:
         """Width of the bins in which loads on surfaces are counted, s; 0 if they are not."""
         return 0.0 if self.family is not None else self.scene.run.loads or 0.0
 
+    @property
+    def stress(self) -> float:
+        """Width of the bins in which lasting contacts are kept, s; 0 if they are not."""
+        return 0.0 if self.family is not None else self.scene.run.stress or 0.0
+
     @cached_property
     def count(self) -> int:
         """Number of particles."""

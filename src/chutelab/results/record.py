@@ -123,6 +123,23 @@ LOAD = np.dtype([
 """
 
 
+LASTING = np.dtype([
+    ("particle", "i4"), ("other", "i4"), ("from", "f8"), ("to", "f8"), ("impulse", "f8", 2),
+    ("stress", "f8", (2, 2)),
+])  # fmt: skip
+"""What a lasting contact gave a particle between two times, in SI units.
+
+So are impulses of blows at one instant that were solved together: their events have the change of
+momentum of all of them, which is not of the size of the event's own impulse.
+
+
+- ``other``: the other particle, which got the opposite; or -1 less the index of a surface.
+- ``impulse``: J, N s.
+- ``stress``: sums of J_a b_b, N m s; b to the particle's centre from the other's, or from the
+  place where it touches the surface.
+"""
+
+
 def balance(entries: NDArray[Any]) -> Floats:
     """Return the energy (J) that entries (..., 3) bring: belt work less both losses."""
     return np.asarray(entries[..., 0] - entries[..., 1] - entries[..., 2])
@@ -287,6 +304,9 @@ class Record(Shown):
     impulses : ndarray, shape (B, len(surfaces) - 1) or (0, 0), dtype `LOAD`
         What each surface bears in bins of ``run.loads`` seconds from 0 s on, up to the last one in
         which anything is borne; empty where that is not asked for.
+    lasting : ndarray, shape (C,) or (0,), dtype `LASTING`
+        What lasting contacts gave in bins of ``run.stress`` seconds, or as long as what they held
+        slept; blows are events. Of the contact engine, where that is asked for.
     swings : ndarray, shape (K,) or (0,), dtype `SWING`
         States of what hangs on hinges, surface by surface, each one's in the order of time.
     hinge_work : ndarray, shape (len(surfaces), 3) or (0, 3)
@@ -314,13 +334,14 @@ class Record(Shown):
     unsolved: Floats = field(default_factory=lambda: np.empty(0))
     drives: Floats = field(default_factory=lambda: np.zeros(0))
     impulses: NDArray[Any] = field(default_factory=lambda: np.empty((0, 0), LOAD))
+    lasting: NDArray[Any] = field(default_factory=lambda: np.empty(0, LASTING))
     swings: NDArray[Any] = field(default_factory=lambda: np.empty(0, SWING))
     hinge_work: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     triggered: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         arrays = "knots offsets ended events by_surface angle totals unsolved drives impulses"
-        for name in (*arrays.split(), "swings", "hinge_work", "triggered"):
+        for name in (*arrays.split(), "lasting", "swings", "hinge_work", "triggered"):
             getattr(self, name).flags.writeable = False
         if len(self.triggered):
             object.__setattr__(self, "machine", self.machine.when(self.triggered))

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import SWING, Machine, moved, origin
 from chutelab.results.loads import Bins
-from chutelab.results.record import EVENT, KNOT, LOAD, REASONS, TOTAL, Kind, Record
+from chutelab.results.record import EVENT, KNOT, LASTING, LOAD, REASONS, TOTAL, Kind, Record
 from chutelab.util.arrays import Floats, Ints
 
 
@@ -81,6 +81,7 @@ class Recorder:
         self.gained = self.air_loss = 0.0
         self.totals, self.unsolved = np.empty(0, TOTAL), np.empty(0)
         self.impulses = np.empty((0, 0), LOAD)
+        self.lasting = np.empty(0, LASTING)
         # Of engines that count loads here, if these are asked for.
         self.bins = Bins(machine) if machine.loads else None
         self._knots: list[NDArray[Any]] = []
@@ -261,6 +262,7 @@ class Recorder:
             totals=self.totals,
             unsolved=self.unsolved,
             impulses=self.impulses,
+            lasting=self.lasting,
         )
 
 

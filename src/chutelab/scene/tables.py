@@ -502,6 +502,14 @@ class Run(Table):
         ge=1e-5,
         le=1e3,
     )
+    stress: Number | None = described(
+        None,
+        "Width of the bins of time in which the contact engine keeps what each lasting contact"
+        " gives, for the stress of fields; default: it does not",
+        "s",
+        ge=1e-5,
+        le=1e3,
+    )
 
 
 class Sensor(Table):

@@ -19,7 +19,7 @@ from chutelab import scene
 from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
-from chutelab.machine.parts import Thread
+from chutelab.machine.parts import Joint
 from chutelab.pictures import animation as video
 from chutelab.pictures.animation import (
     TRAIL,
@@ -576,8 +576,8 @@ def test_a_film_of_many_is_of_all_of_them_to_the_end():
 
 
 def test_strings_end_at_their_particles():
-    threads = (Thread((0.0, 0.9), 0, 0.4), Thread((0.3, 0.9), 1, 0.5))
-    recording = falling(at=[(0.0, 0.5), (0.3, 0.5)], threads=threads)
+    joints = (Joint("string", 0, 0.4, (0.0, 0.9)), Joint("string", 1, 0.5, (0.3, 0.9)))
+    recording = falling(at=[(0.0, 0.5), (0.3, 0.5)], joints=joints)
     path = np.asarray(moved(stage_of(recording, moments_at([0.5])), 0)["strings"].get_xydata())
     first, second, _ = np.split(path, np.flatnonzero(np.isnan(path[:, 0])) + 1)
     assert first[[0, -2]] == pytest.approx(np.array([(0.0, 0.9), (0.0, 0.5)]))

@@ -128,7 +128,7 @@ def test_settings_change_the_run():
     found = json.loads(call("run", "perpendicular", "--json", "--set", "plate.distance=0.3").stdout)
     assert found["impact"]["x"] == [pytest.approx(0.3937, rel=1e-15, abs=0.0)]
     # An option is the setting of its name.
-    words = ("run", "perpendicular", "--json", "--set", "run.align=false")
+    words = ("run", "perpendicular", "--json", "--set", "run.align=false", "--set", "run.until=0.3")
     coarse, fine, again = (
         json.loads(call(*words, *more).stdout) | {"seconds": 0.0}
         for more in (

@@ -576,9 +576,13 @@ def test_labels_of_what_is_pointed_at_and_of_tools_do_not_lie_on_the_machine(sho
                 assert min(apart) <= 4.0
 
 
-@pytest.mark.parametrize("name", ["inclined-40", "low-speed", "damper-plate", "hopper"])
+@pytest.mark.parametrize(
+    "name",
+    ["inclined-40", "damper-plate", "hopper", pytest.param("low-speed", marks=pytest.mark.slow)],
+)
 def test_both_bars_of_the_energy_are_equally_long_at_any_time(shown, name):
-    page = shown(name, viewport={"width": 1366, "height": 768})
+    few = ["stream.count=60"] if name == "hopper" else ()
+    page = shown(name, few, viewport={"width": 1366, "height": 768})
     ends = """(share) => {
       chutelab.lab.seek(chutelab.lab.start + share * (chutelab.lab.end - chutelab.lab.start));
       chutelab.panels.find((one) => one.closes).refresh();

@@ -67,7 +67,7 @@ def test_sensitivities_are_differences_of_two_runs():
 
 
 def test_a_stream_has_its_envelope_and_error_bars(tmp_path):
-    made = report("stream", {"stream.count": 30}, runs=3)
+    made = report("stream", {"stream.count": 15}, runs=3)
     assert {"machine", "stream", "loads", "wear"} <= made.pictures.keys()
     values = [made.repeats.values["landing.x.mean"]]
     told = {row[0]: row[2] for row in made.tables["results"].rows}["landing.x.mean"]

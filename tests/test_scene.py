@@ -63,6 +63,9 @@ CONTRACT = {
     "conveyor": (),
     "surface": (),
     "string": (),
+    "rod": (),
+    "spring": (),
+    "pin": (),
     "sensor": (),
     "stream": {"name": "stream", "particle": None, "count": 1, "rate": 200.0, "width": None,
      "start": 0.0, "bed_height": 0.0, "speed_spread": 0.0, "seed": 0, "at": None, "to": None,
@@ -474,7 +477,7 @@ def test_another_unit_is_refused(text, says):
 
 
 @pytest.mark.parametrize(
-    "table", ["surface", "material", "pair", "conveyor", "string", "sensor", "expect"]
+    "table", ["surface", "material", "pair", "conveyor", "string", "rod", "spring", "pin", "sensor"]
 )
 def test_one_pair_of_brackets_is_answered_with_two(table):
     text = f"{CONVEYOR}\n[{table}]\nname = 'a'\n"

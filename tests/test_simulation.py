@@ -38,7 +38,7 @@ AUTO = {
     "flap-gate": "contact",
     "vibrating-feeder": "contact",
     "see-saw": "contact",
-    "cradle": "pymunk",
+    "cradle": "contact",
     "dominoes": "pymunk",
 }
 

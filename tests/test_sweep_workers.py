@@ -76,6 +76,7 @@ def test_any_executor_will_do():
     assert found.to_csv("there.csv").read_bytes() == here.to_csv("here.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_a_worker_writes_the_same_bytes(stepped):
     distributed = pytest.importorskip("distributed")
     plan, whole = stepped

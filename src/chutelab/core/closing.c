@@ -195,7 +195,8 @@ void close_step(double h) {
         d->lacks = 0;
         if (d->mode == FREE) {
             d->calm += h;
-            d->rest += h;
+            /* What has joints does not fall asleep. */
+            d->rest += is_tied(i) ? 0 : h;
             d->anchor[2] += h * d->radius * d->spin;
         }
         if (W.pushes && (d->kick[0] != 0 || d->kick[1] != 0)) {
@@ -272,7 +273,7 @@ void close_step(double h) {
         if (d->mode != FREE) continue;
         settle_down(d, h);
         if (!d->supports) {
-            d->calm = 0;
+            if (!is_tied(i) || square(d->vx) + square(d->vy) > square(CALM * W.pace)) d->calm = 0;
             if (track->stays >= (W.interact ? LASTS : 3)) tell_separation(i);
             if (track->lasted || track->stays) d->on = -1;
             track->stays = 0;

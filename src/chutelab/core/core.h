@@ -147,6 +147,8 @@ static inline double driven(const Contact *c, double f) {
     double still = (1 - f) * (pressed(c) * c->moved[0] + c->impulse[1] * c->moved[1] + c->impulse[2] * c->moved[2]);
     return c->hung ? still + swung(c, f) : still;
 }
+/* Whether a particle has joints. */
+static inline int is_tied(int i) { return i >= 0 && W.disks[i].tie >= 0; }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
 /* Change of normal velocity that a contact asks for under a normal impulse, m/s. */
@@ -229,6 +231,21 @@ void sweep_hung(Contact *list, int count, int sweeps, double enough);
 void kick_disks(double h);
 double pushed(const Disk *d, double f);
 double steered_to(const Mover *m, double t);
+
+/* joints.c */
+int are_joined(int i, int j);
+void tie_joints(void);
+void pull_joints(double h);
+void agree_with_contacts(double h);
+double missed_by_joints(void);
+void tug_all(int way);
+void drop_tugs(void);
+void cut_step(double t);
+void cut_at_snaps(void);
+void end_pull(void);
+void strike_joints(int i, int j);
+void end_blow(void);
+void share_with_joints(const Contact *c, double wanted, double slip, double *J);
 
 /* trigger.c */
 int is_triggered(int owner, int doing);
@@ -317,7 +334,7 @@ double slip_of(const SolverRow *row);
 /* solver.c */
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough);
-void solve_contacts(void);
+void solve_contacts(int again);
 
 /* closing.c */
 void close_step(double h);

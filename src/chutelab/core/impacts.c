@@ -190,12 +190,18 @@ static void give(Contact *c, double normal) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double *J = c->impulse, u[3], v[3], given[3], most = c->friction * normal;
     double arm = c->arm * normal, more[3] = {normal, 0, 0};
+    int tied = is_tied(c->i) || is_tied(c->j);
     relative(c, 0, u);
     J[0] = normal;
     J[1] = more[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
     if (c->hung) {
         J[0] = more[0] = couple(c, normal / c->mass[0], u[1] + c->drift, J + 1);
         more[1] = J[1];
+    }
+    if (tied) {
+        share_with_joints(c, normal / c->mass[0], u[1] + c->drift, J);
+        memcpy(more, J, 2 * sizeof(double));
+        arm = 0;
     }
     J[2] = 0;
     push(c, more);
@@ -233,7 +239,7 @@ static void support(int i, int k, double t) {
     hold(d, k);
     const Surface *s = surface_at(k, t);
     double press = press_on(d, s, c.nx, c.ny), u[3];
-    if (press <= 0 || !W.interact) return;
+    if (press <= 0 || !W.interact || is_tied(i)) return;
     if (bending(s, d->x, d->y, d->radius) < 0) W.step_end = MIN(W.step_end, t + hop_time(d, press));
     double left = W.step_end - t, pull, weight = pulled(s, d, c.nx, c.ny, &pull) - (W.gx * c.nx + W.gy * c.ny);
     double cosine = follow(&c, 0, chord(&c, 0, left)), normal = 0.5 * press * d->mass * left;
@@ -479,6 +485,7 @@ static void strike(int i, int j, double t) {
     if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);
     describe(&c, i, j);
     c.drift = 0;
+    if (is_tied(i) || is_tied(j)) strike_joints(i, j);
     was_moved(i);
     if (c.two) was_moved(j);
     relative(&c, 0, u);
@@ -509,6 +516,7 @@ static void strike(int i, int j, double t) {
     double before[3] = {a->vx, a->vy, a->spin};
     if (jammed) jam(&c, t);
     else give(&c, c.mass[0] * (back - u[0]));
+    if (is_tied(i) || is_tied(j)) end_blow();
     a->since = t + later;
     if (c.two) b->since = t;
     if (!W.interact) let_fly(a);

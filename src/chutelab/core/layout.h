@@ -105,6 +105,9 @@ typedef struct {
     int wide;                   /* 1 if it is asked by all in this step, see grid.c */
     int far;                    /* 1 if the step's impulses take it further than was foreseen */
     int body;               /* its row of `World.solver_bodies`, if that is of this disk */
+    int tie;                /* first of its ends of joints, 2 n and 2 n + 1 of joint n, or -1 */
+    int pad;
+    double tug[3], tugged[3]; /* m/s, m/s, rad/s; what half of a step's pull of its joints changes, and before */
 } Disk;
 
 /* The track of a disk since the last knot that is written. */
@@ -202,6 +205,36 @@ typedef struct {
     int by, pad;            /* [in] ... when this owner is touched */
 } Trigger;
 
+/* What joins a particle with a fixed point or with another particle: a string pulls only, a rod keeps its
+   length, a spring changes it, a pin keeps a point of both together. */
+enum Tie { STRING, ROD, SPRING, PIN };
+
+typedef struct {
+    double from[2];         /* [in] m; fixed end of what has no other particle; of a pin its place */
+    double length;          /* [in] m; of a spring at rest; NaN: as it is when it is tied */
+    double stiffness, damper; /* [in] N/m, N s/m */
+    double kept[2], damped, given; /* [out] J; in a spring when it was tied and now, what its damper took,
+                               and what it gave to particles */
+    double arm[4];          /* m; of a pin, from both centres in particles that have not turned */
+    int kind, particle, other; /* [in] enum Tie; two particles, or one and -1 */
+    double now;             /* m; as long as it is */
+    int tied, struck;       /* whether both ends move freely; a blow is passed on to it */
+    int taut;               /* a string that pulled in the step before */
+    int row;                /* first of its rows */
+    int next[2];            /* ends of joints of the same particles, as `Disk.tie` */
+} Joint;
+
+/* One equation of a joint: a pin has two. */
+typedef struct {
+    double e[2], lever[2];  /* how its impulse acts: on the particle along e, on the other against it; m */
+    double kick;            /* N s; half of what it gives in a step; apart if above 0 */
+    double struck[2], answer[2]; /* 1/kg, N s; what a blow of 1 N s draws it apart, and how it answers */
+    double off, eases;      /* m, m/(N s); by how much it is missed, and how a spring gives way */
+    double root;            /* of the diagonal matrix of the factors */
+    int joint, on;          /* whether it acts */
+    int first, pad;         /* first column of its row of the matrix that is not 0 */
+} JointRow;
+
 typedef struct { double restitution, friction, rolling, falls, cohesion; } Pair; /* [in] rolling: arm over radius;
                                         falls: 1 over the speed up to which restitution
                                         is that, s/m; 0 for all; cohesion: N */
@@ -290,6 +323,9 @@ typedef struct {
     Pair *pairs;         /* (kinds, kinds + materials) */
     Mover *movers;
     Trigger *triggers;
+    Joint *joints;
+    JointRow *joint_rows;
+    double *joint_matrix; /* (joint rows, joint rows) */
     /* arrays that `prepare` lays out */
     Track *tracks;
     Knot *waits;         /* (disks, WAITS) states of each since its last knot; of one by itself (1, WAITS) */
@@ -320,6 +356,8 @@ typedef struct {
     int disk_count, surface_count, kind_count, owner_count; /* [in] */
     int mover_count;     /* [in] */
     int trigger_count;   /* [in] */
+    int joint_count;     /* [in] */
+    int joint_row_count;
     int material_count;
     int knot_room, event_room, total_room, contact_room, near_room, cell_room, swing_room;
     int full;            /* what `run` makes room for as it goes on: see `Full` */
@@ -427,8 +465,9 @@ typedef struct {
     double repeat[6];       /* up to two of count, dx, dy */
 } SurfaceKeys;
 
-/* A string from a point to a particle; without a length as long as it has to be at the release. */
-typedef struct { double from[2], length, particle; } StringKeys;
+/* A joint, see `Joint`; without a length as long as it has to be at the release, without a point between two
+   particles. */
+typedef struct { double kind, from[2], length, particle, other, stiffness, damper; } JointKeys;
 
 /* How a surface moves; without a pivot about its first point, the centre of an arc, the pivot of a plate. */
 typedef struct {
@@ -479,7 +518,7 @@ typedef struct {
     double *terms;          /* (term_width) of a plan that is run, behind its row: `RunKeys` and what follows */
     int members, width, term_width; /* [in] */
     int owners;             /* [in] of a plan that is run: how many names its surfaces have */
-    int particles, streams, incoming, plates, outgoing, conveyors, surfaces, strings, moving; /* [in] counts */
+    int particles, streams, incoming, plates, outgoing, conveyors, surfaces, joints, moving; /* [in] counts */
     Segment *segments;      /* [out] (members, segment_count) */
     Arc *arcs;
     Mover *movers;          /* [out] (moving) of a scene by itself */
@@ -709,6 +748,7 @@ typedef struct {
     /* the run */
     int engine;             /* [in] */
     int interact;           /* [in] particles meet each other */
+    int joined;             /* [in] some hang on joints */
     int alike;              /* [in] all is left to steps that are all alike, and to Chipmunk */
     int family;             /* [in] each particle has pieces of its own */
     int pulley;             /* [in] piece 0 ends on a drive pulley */

@@ -12,6 +12,8 @@ World W;
 #define ARC_ANGLE 0.024
 /* Knots that one impact may write per disk. */
 #define KNOTS_EACH 6
+/* Of a step: nearer to its beginning or end something counts as there. */
+#define SOON 1e-9
 
 /* ------------------------------------------------------------------------------------------ rides */
 
@@ -399,6 +401,7 @@ static int begin_step(void) {
     /* Impulses stand for half of the step before and half of this one. */
     double span = W.length_before + W.length;
     W.length_before = W.length;
+    if (W.joint_count) tie_joints();
     do {
         W.again = span > 0 ? MIN((W.length + h) / span, MOST_AGAIN) : 1;
         for (int i = W.low; i < W.high; i++) {
@@ -417,8 +420,10 @@ static int begin_step(void) {
                 d->uspin = d->spin;
             }
         }
-        if (!list_near(W.step_end)) return FULL_NEAR;
-        if (!find_contacts(h, &woke)) return FULL_CONTACTS;
+        if (W.joint_count) pull_joints(h);
+        int near = list_near(W.step_end), room = near && find_contacts(h, &woke);
+        if (!room || woke) drop_tugs();
+        if (!room) return near ? FULL_CONTACTS : FULL_NEAR;
         if (stride > W.step && W.contact_count) {
             /* It does not fly: what it touches is solved for a step of usual length. */
             stride = 0;
@@ -431,6 +436,7 @@ static int begin_step(void) {
             set_step(most);
             W.step_end = W.t + most;
             h = W.step_end - W.t;
+            if (!woke) drop_tugs();
             woke = 1;
         }
     } while (woke);
@@ -439,11 +445,16 @@ static int begin_step(void) {
     if (W.hinges) begin_hinges(W.t, h);
     W.swings_too = 0;
     W.unsolved = 0;
-    if (W.contact_count) solve_contacts();
+    if (W.contact_count) solve_contacts(0);
+    if (W.joint_count) {
+        agree_with_contacts(h);
+        W.unsolved = MAX(W.unsolved, missed_by_joints());
+    }
     W.unsolved_most = MAX(W.unsolved_most, W.unsolved);
     /* A fast belt may have thrown a disk further than its list of neighbours foresaw. */
     for (int i = W.low; i < W.high; i++)
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
+    if (W.joint_count) tug_all(-1);
     close_step(h);
     if (W.hinges) {
         leave_hinges(W.t);
@@ -454,6 +465,31 @@ static int begin_step(void) {
     return DONE;
 }
 
+/* Have what is tied go on with the pull that ends the step as it is now. */
+static void foresee_tied(void) {
+    for (int i = W.low; i < W.high; i++)
+        if (is_tied(i) && W.disks[i].mode == FREE) foresee(i);
+}
+
+/* A blow of a particle that has joints ends the step, whose pull is then found anew, and is given as the next one
+   begins, before all else: return the disk, or -1, that has got too many. */
+static int meet_tied(int i, int j, double t) {
+    double soon = SOON * W.step;
+    if (t > W.t + soon && t > W.step_end - soon) expect(i, INFINITY, ALARM);
+    else if (t > W.t + soon) {
+        cut_step(t);
+        foresee_tied();
+    } else {
+        drop_tugs();
+        shock(i, j, W.t);
+        if (W.disks[i].impacts > STALL) return i;
+        cut_step(W.step_end);
+        cut_at_snaps();
+        foresee_tied();
+    }
+    return -1;
+}
+
 /* Resolve what happens within the step, in the order of time. */
 static int go_through(void) {
     int i, count = W.high - W.low;
@@ -462,7 +498,7 @@ static int go_through(void) {
         double t = d->due;
         int j = d->partner;
         /* The step was cut short. */
-        if (t >= W.step_end) return DONE;
+        if (t > W.step_end || (t == W.step_end && !(d->mode == WAITING && is_tied(i)))) return DONE;
         if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
         if (W.event_count + SHOCKS * W.contact_count + 64 > W.event_room)
             return FULL_EVENTS;
@@ -472,6 +508,10 @@ static int go_through(void) {
             continue;
         }
         W.now = t;
+        if (j != ALARM && (is_tied(i) || is_tied(j))) {
+            if ((W.stalled = meet_tied(i, j, t)) < 0) continue;
+            return STALLED;
+        }
         if (j != ALARM) {
             if (W.interact && d->impacts > CROWDED && t > W.t + SHORTEST * W.step) {
                 W.step_end = t;
@@ -485,6 +525,7 @@ static int go_through(void) {
         if (d->mode == WAITING) {
             if (release(i, t)) enter_again(i, W.step_end);
         } else separate(i);
+        if (is_tied(i) && d->mode == FREE) cut_step(t);
         foresee(i);
     }
     return DONE;
@@ -497,7 +538,7 @@ static void end_step(void) {
         if (d->mode != RIDING) leave(i, W.step_end);
         if (d->mode == FREE) {
             advance(d, W.step_end);
-            slow_down(i, W.step_end);
+            if (d->tie < 0) slow_down(i, W.step_end);
         }
         else if (d->mode == ASLEEP) {
             d->x += d->ux * (W.step_end - W.t);
@@ -507,6 +548,9 @@ static void end_step(void) {
             d->t = d->aired = W.step_end;
         }
     }
+    if (W.joint_count) end_pull();
+    for (int i = W.low; i < W.high && W.joint_count; i++)
+        if (is_tied(i) && W.disks[i].mode == FREE) slow_down(i, W.step_end);
     if (W.hinges) end_hinges(W.step_end);
     W.length = W.step_end - W.t;
     W.t = W.step_end;
@@ -638,6 +682,10 @@ static int run_on(int steps) {
                 stop_all(settled ? BY_SETTLING : BY_TIME);
                 W.phase = PART;
                 continue;
+            }
+            if (W.joint_count) {
+                tug_all(1);
+                cut_at_snaps();
             }
             fall_asleep();
             foresee_all();

@@ -237,7 +237,7 @@ static void check_solve(void) {
     W.gained += MAX(gained, 0);
 }
 
-void solve_contacts(void) {
+void solve_contacts(int again) {
     int swings = 0;
     if (W.interact) sort_by_islands();
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
@@ -256,7 +256,7 @@ void solve_contacts(void) {
         swings |= W.swings_too;
         /* A drive presses as hard as it must: there no spring would hold, so that it gives no more than
            what parts, and friction is lowered. */
-        for (int n = from; n < to; n++) {
+        for (int n = from; n < to && !again; n++) {
             W.contacts[n].gives /= heaviest;
             if (!driven) W.contacts[n].parts = INFINITY;
         }

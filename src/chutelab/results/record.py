@@ -312,6 +312,9 @@ class Record(Shown):
     hinge_work : ndarray, shape (len(surfaces), 3) or (0, 3)
         J; of what hangs on hinges the work of its motor, and losses at its stops and in its damper.
         Empty where nothing does.
+    springs : ndarray, shape (S, 4)
+        J; of each ``[[spring]]`` what it kept when it was tied, what it keeps at the end, what its
+        damper took, and what it gave to particles, which is part of their belt work in the knots.
     triggered : ndarray, shape (len(machine.triggers),)
         When what waits for a touch came, went, or began to move, s; inf of what still waits.
     """
@@ -337,11 +340,19 @@ class Record(Shown):
     lasting: NDArray[Any] = field(default_factory=lambda: np.empty(0, LASTING))
     swings: NDArray[Any] = field(default_factory=lambda: np.empty(0, SWING))
     hinge_work: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    springs: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     triggered: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         arrays = "knots offsets ended events by_surface angle totals unsolved drives impulses"
-        for name in (*arrays.split(), "lasting", "swings", "hinge_work", "triggered"):
+        for name in (
+            *arrays.split(),
+            "lasting",
+            "swings",
+            "hinge_work",
+            "springs",
+            "triggered",
+        ):
             getattr(self, name).flags.writeable = False
         if len(self.triggered):
             object.__setattr__(self, "machine", self.machine.when(self.triggered))

@@ -76,6 +76,7 @@ class Recorder:
         self.drives = np.zeros(owners)
         self.swings = np.empty(0, SWING)
         self.hinge_work = np.zeros((owners, 3))
+        self.springs = np.zeros((0, 4))
         self.triggered = np.full(len(machine.triggers), np.inf)
         self.contacts = 0
         self.gained = self.air_loss = 0.0
@@ -253,6 +254,7 @@ class Recorder:
             drives=self.drives if self.machine.movers or len(self.swings) else np.zeros(0),
             swings=self.swings,
             triggered=self.triggered,
+            springs=self.springs,
             hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 3)),
             steps=steps,
             contacts=self.contacts,

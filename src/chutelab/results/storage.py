@@ -58,13 +58,14 @@ ARRAYS = {
     "lasting": LASTING,
     "swings": SWING,
     "hinge_work": np.dtype("f8"),
+    "springs": np.dtype("f8"),
     "triggered": np.dtype("f8"),
 }
 """Arrays of a file and their types."""
 
 MAYBE = (
     "angle", "totals", "unsolved", "drives", "impulses", "lasting", "swings",
-    "hinge_work", "triggered",
+    "hinge_work", "springs", "triggered",
 )  # fmt: skip
 """Those that are left out where they are empty."""
 
@@ -228,7 +229,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         "unsolved": recording.unsolved,
     }  # fmt: skip
     numbers["gained"] = np.array([recording.gained, recording.air_loss], dtype=float)
-    numbers["hinge_work"] = recording.hinge_work
+    numbers |= {"hinge_work": recording.hinge_work, "springs": recording.springs}
     for name in ("knots", "events", "totals", "impulses", "lasting", "swings"):
         array = getattr(recording, name)
         numbers |= {f"{name}.{key}": array[key] for key in array.dtype.names or ()}
@@ -259,6 +260,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
         and recording.drives.shape == ((surfaces,) if recording.machine.movers else (0,))
         and recording.hinge_work.shape == ((surfaces if len(recording.swings) else 0), 3)
+        and recording.springs.shape == (len(recording.scene.spring), 4)
         and recording.triggered.shape == (len(recording.machine.triggers),)
         and not np.any(np.isnan(recording.triggered))
         and recording.swings.ndim == 1

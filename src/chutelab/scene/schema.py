@@ -9,19 +9,23 @@ from typing import Annotated, Any, Final, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
-from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts, stream_name
+from chutelab.scene.conflicts import EITHER, JOINTS, ConflictError, Look, conflicts, stream_name
 from chutelab.scene.materials import PRESETS, Material
 from chutelab.scene.tables import (
     Conveyor,
     Expect,
     Incoming,
+    Joint,
     Live,
     Outgoing,
     Pair,
     Particle,
+    Pin,
     Plate,
+    Rod,
     Run,
     Sensor,
+    Spring,
     Stream,
     String,
     Surface,
@@ -52,6 +56,9 @@ TABLES: Final[dict[str, type[Table]]] = {
     "conveyor": Conveyor,
     "surface": Surface,
     "string": String,
+    "rod": Rod,
+    "spring": Spring,
+    "pin": Pin,
     "stream": Stream,
     "run": Run,
     "sensor": Sensor,
@@ -120,6 +127,9 @@ class SceneTables(Table):
     conveyor: tuple[Conveyor, ...] = Field((), max_length=MOST_SURFACES)
     surface: tuple[Surface, ...] = Field((), max_length=MOST_SURFACES)
     string: tuple[String, ...] = Field((), max_length=MOST_SURFACES)
+    rod: tuple[Rod, ...] = Field((), max_length=MOST_SURFACES)
+    spring: tuple[Spring, ...] = Field((), max_length=MOST_SURFACES)
+    pin: tuple[Pin, ...] = Field((), max_length=MOST_SURFACES)
     streams: Annotated[tuple[Stream, ...], BeforeValidator(_one_or_several)] = _several(
         ({},), alias="stream", min_length=1, max_length=MOST_KINDS, validate_default=True
     )
@@ -351,6 +361,11 @@ class SceneTables(Table):
             for doing in ("opens", "closes", "starts")
             if (when := getattr(one, f"{doing}_when", None)) is not None
         )
+
+    @property
+    def joints(self) -> tuple[tuple[str, Joint], ...]:
+        """All strings, rods, springs and pins, with the names of their tables, in this order."""
+        return tuple((table, joint) for table in JOINTS for joint in getattr(self, table))
 
     @property
     def hinges(self) -> bool:

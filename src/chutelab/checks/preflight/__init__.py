@@ -36,7 +36,7 @@ from chutelab.checks.preflight.trial import (
     stepping,
     trial_run,
 )
-from chutelab.engines.simulation import choose
+from chutelab.engines.simulation import choose, unjoined
 from chutelab.machine import DRIVE_PULLEY, Caution, Machine, build
 from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Recording
@@ -473,7 +473,10 @@ def preflight(scene: AnyScene) -> Preflight:
     if scene.run.engine != "auto":
         why = f'run.engine = "{engine}" asks for it'
     elif engine == "pymunk":
-        why = "boxes, polygons and strings are for no other engine"
+        why = unjoined(machine) if machine.joints else ""
+        why = why or "boxes and polygons are for no other engine"
+    elif machine.joints:
+        why = "strings, rods, springs and pins pull, which the exact engine does not follow"
     elif machine.interact:
         why = "particles meet each other, which the exact engine does not follow"
     elif machine.count == 1:

@@ -401,6 +401,7 @@ typedef struct {
     int swings_too;      /* contacts that are solved act on hinges */
     int stamp, shocks, jams; /* numbers of the latest query, shock and jam, for marks */
     double t, now, step, step_end, cell;
+    double looked;       /* s; for when it is told which surfaces are there */
     double usual;        /* s; the step if nothing slid in a hollow: so long a part of an overlap takes */
     double length, length_before; /* s; of this step and of the one before */
     double again;        /* what lasts needs so many times the impulses of the step before */

@@ -20,7 +20,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from markdown_it.tree import SyntaxTreeNode
 
-from chutelab.classroom.lessons.printing import need_typst, pdf, web_page
+from chutelab.classroom.lessons.sheets import need_typst, pdf, web_page
 from chutelab.classroom.lessons.texts import parser
 from chutelab.engines.simulation import judged, simulate
 from chutelab.pictures.plots import look, overlay
@@ -107,12 +107,13 @@ class Report:
         lines = [sheet.columns, ("---",) * width, *sheet.rows, *sheet.foot]
         # Only what a student fills in is empty, and has room.
         empty = "" if name == "values" else "–"
-        made = "\n".join(
-            f"| {' | '.join(_cell(one) or empty * bool(n) for one in _filled(row, width))} |"
-            for n, row in enumerate(lines)
-        )
+        made = ""
+        for n, row in enumerate(lines):
+            cells = (_plain(cell.replace("\n", ", ")).replace("|", "/") for cell in row)
+            filled = [cell or empty * bool(n) for cell in (*cells, *[""] * (width - len(row)))]
+            made += f"| {' | '.join(filled)} |\n"
         said = " ".join(f"{_plain(note[0].upper() + note[1:])}." for note in sheet.notes)
-        return f"{made}\n\n{said}".rstrip()
+        return f"{made}\n{said}".rstrip()
 
     def picture(self, name: str, figure: Any, said: str) -> str:
         """Keep a picture, and return what shows it."""
@@ -150,14 +151,6 @@ class Report:
                 for name, one in self.tables.items()
             ),
         ]
-
-
-def _filled(row: tuple[str, ...], width: int) -> tuple[str, ...]:
-    return (*row, *[""] * (width - len(row)))
-
-
-def _cell(text: str) -> str:
-    return _plain(text.replace("\n", ", ")).replace("|", "/")
 
 
 def _plain(text: str) -> str:
@@ -237,7 +230,13 @@ def _for_engineers(made: Report) -> None:
         made.add("Power at the loading point", made.table("power", paid))
     shown = made.picture("wear", draw_wear(recording, curves=many), "Where it wears")
     made.add("Wear", made.table("wear", wear(recording)), shown)
-    made.add("How to make it again", _again(made))
+    python = f"{sys.version_info.major}.{sys.version_info.minor}"
+    command = f"`{made.command}`; " if made.command else ""
+    made.add(
+        "How to make it again",
+        f"{command}chutelab {own_version()}, Python {python}, NumPy {np.__version__}. The same"
+        " scene, seed and engine give the same bits. All tables are beside this report as CSV.",
+    )
 
 
 def _for_students(made: Report) -> None:
@@ -462,16 +461,6 @@ def _changed(low: float, high: float) -> str:
     """Return half of a difference, without rounding."""
     half = 0.5 * (high - low)
     return f"{half:.3g}" if abs(half) > 1e-9 * max(abs(low), abs(high)) else "0"
-
-
-def _again(made: Report) -> str:
-    """Return versions and command."""
-    python = f"{sys.version_info.major}.{sys.version_info.minor}"
-    command = f"`{made.command}`; " if made.command else ""
-    return (
-        f"{command}chutelab {own_version()}, Python {python}, NumPy {np.__version__}. The same"
-        " scene, seed and engine give the same bits. All tables are beside this report as CSV."
-    )
 
 
 def check(path: Path) -> None:

@@ -232,8 +232,36 @@ BY_HAND = [
     ("machine", {"stream[0].interact": 1}, "stream[0].interact", "true or false"),
     ("dominoes", {"run.engine": "contact"}, "run.engine", "needs pymunk"),
     ("dominoes", {"run.engine": "exact", "string": GONE}, "run.engine", "needs pymunk"),
-    ("alone", {"string": [{"from": [0.0, 0.5]}], "run.engine": "contact"}, "run.engine",
-     "string[0] needs pymunk"),
+    ("alone", {"string": [{"from": [0.0, 0.5]}], "run.engine": "exact"}, "run.engine",
+     "string[0] needs contact or pymunk"),
+    *(
+        ("alone", {table: [{"from": [0.0, 0.5]} | row]}, f"{table}[0].{key}", said)
+        for table in ("string", "rod", "spring", "pin")
+        for row, key, said in (
+            ({"particle": 7}, "particle", "there are"),
+            ({"particle": True}, "particle", "whole number"),
+            ({"from": [0.0]}, "from", "[x, y]"),
+            ({"other": 7}, "other", "there are"),
+            ({"other": 0}, "other", "another than"),
+            ({"length": 0.0} if table in ("string", "spring") else {"length": 1.0}, "length",
+             "from 1e-09" if table in ("string", "spring") else "unknown"),
+        )
+        if not (key == "other" and table != "pin")
+    ),
+    *(
+        ("alone", {table: [row | ({"stiffness": 9.0} if table == "spring" and key != "stiffness"
+         else {})]}, f"{table}[0].{key}", said)
+        for table in ("string", "rod", "spring")
+        for row, key, said in (
+            ({"particle": 0}, "from", "is missing"),
+            ({"from": [0.0, 0.5], "other": 0}, "other", "another than"),
+            ({"from": [0.0, 0.5], "stiffness": -1.0}, "stiffness",
+             "> 0" if table == "spring" else "unknown"),
+        )
+    ),
+    ("alone", {"spring": [{"from": [0.0, 0.5]}]}, "spring[0].stiffness", "missing"),
+    ("alone", {"spring": [{"from": [0.0, 0.5], "stiffness": 9.0, "damper": -1.0}]},
+     "spring[0].damper", "from 0"),
     ("alone", {"particle.radius": 0.0, "run.engine": "contact"}, "run.engine", "needs disks"),
     ("dominoes", {"string[0].particle": 5}, "string[0].particle", "there are 5 particles"),
     ("dominoes", {"string[0].particle": -1}, "string[0].particle", ">= 0"),

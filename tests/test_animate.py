@@ -19,7 +19,7 @@ from chutelab import scene
 from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
-from chutelab.machine.parts import Thread
+from chutelab.machine.parts import Joint
 from chutelab.pictures import animation as video
 from chutelab.pictures.animation import (
     TRAIL,
@@ -59,6 +59,7 @@ from handmade import (
     t_impact,
     t_landing,
 )
+from shared import some
 
 WIDTH, HEIGHT = 800, 450
 FLOOR = Line("floor", (-0.6, 0.0), (0.6, 0.0))
@@ -576,8 +577,8 @@ def test_a_film_of_many_is_of_all_of_them_to_the_end():
 
 
 def test_strings_end_at_their_particles():
-    threads = (Thread((0.0, 0.9), 0, 0.4), Thread((0.3, 0.9), 1, 0.5))
-    recording = falling(at=[(0.0, 0.5), (0.3, 0.5)], threads=threads)
+    joints = (Joint("string", 0, 0.4, (0.0, 0.9)), Joint("string", 1, 0.5, (0.3, 0.9)))
+    recording = falling(at=[(0.0, 0.5), (0.3, 0.5)], joints=joints)
     path = np.asarray(moved(stage_of(recording, moments_at([0.5])), 0)["strings"].get_xydata())
     first, second, _ = np.split(path, np.flatnonzero(np.isnan(path[:, 0])) + 1)
     assert first[[0, -2]] == pytest.approx(np.array([(0.0, 0.9), (0.0, 0.5)]))
@@ -652,7 +653,7 @@ def assert_readable(stage, index):
             assert min(overlap, above) < 1.5, (text, other)
 
 
-@pytest.mark.parametrize("name", [*EXACT, "free-fall"])
+@pytest.mark.parametrize("name", some([*EXACT, "free-fall"]))
 def test_no_text_is_cut_off_overlapping_or_small(name, runs):
     shots, slow = filmed(runs[name])
     layout = laid_out(runs[name], question="How much of the energy is left when it lands?")
@@ -761,7 +762,10 @@ def test_without_the_energy_the_machine_is_larger(runs):
 
 @pytest.mark.parametrize(
     ("name", "delay"),
-    [("perpendicular", 40), pytest.param("stream", 50, marks=pytest.mark.slow)],
+    [
+        pytest.param("perpendicular", 40, marks=pytest.mark.slow),
+        pytest.param("stream", 50, marks=pytest.mark.slow),
+    ],
 )
 def test_a_film_is_small_and_a_streams_has_fewer_pictures_a_second(name, delay, tmp_path):
     few = scene.load(name, overrides=["stream.count=4"] if name == "stream" else ())

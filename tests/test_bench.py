@@ -55,10 +55,10 @@ def test_errors_are_those_of_the_flight():
     scene = load("perpendicular")
     rows = {
         (one.method, one.value): one
-        for one in measure(scene, ("exact", "contact", "fixed"), (1e-3, 5e-4), repeats=0)
+        for one in measure(scene, ("exact", "contact", "fixed"), (2e-3, 1e-3), repeats=0)
     }
     assert set(rows) == {
-        ("exact", None), ("contact", 1e-3), ("contact", 5e-4), ("fixed", 1e-3), ("fixed", 5e-4)
+        ("exact", None), ("contact", 2e-3), ("contact", 1e-3), ("fixed", 2e-3), ("fixed", 1e-3)
     }  # fmt: skip
     assert all(one.against == "theory" for one in rows.values())
     assert max(one.error for (method, _), one in rows.items() if method != "fixed") < 1e-12
@@ -66,7 +66,7 @@ def test_errors_are_those_of_the_flight():
     t2 = (belt.pulley_radius + plate.distance - r) / belt.speed
     assert belt.speed > sqrt(scene.gravity * (belt.pulley_radius + r))  # it leaves at the top
     y2 = 0.5 * scene.gravity * t2**2
-    for dt in (1e-3, 5e-4):
+    for dt in (2e-3, 1e-3):
         # y2 is measured by itself or by the way to the plate, which is longer.
         size = max(y2, belt.pulley_radius + plate.distance)
         least = 0.5 * scene.gravity * dt * t2 / size
@@ -106,7 +106,7 @@ def test_what_there_is_no_time_for_is_left_out():
 
 
 def test_a_crowd_is_judged_as_a_whole_and_exact_cannot_run_it():
-    scene = load("stream", ["stream.count=5"])
+    scene = load("stream", ["stream.count=3", "run.until=landed"])
     rows = measure(scene, steps=(1e-3,), repeats=0)
     assert [one.method for one in rows] == ["exact", "contact", "pymunk"]
     assert rows[0].failed == "contact or pymunk, because stream.interact = true"

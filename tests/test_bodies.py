@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from chutelab.machine.parts import Thread
+from chutelab.machine.parts import Joint
 from chutelab.pictures.plots import Window, draw_scene, draw_tracks, overlay, style
 from chutelab.pictures.plots.machinery import draw_bodies, placed, stream_colours, strings
 from chutelab.pictures.plots.scenery import energies, places
@@ -154,10 +154,8 @@ def test_tracks_and_particles_have_the_colours_of_their_streams_and_a_legend_nam
 
 def test_a_taut_string_is_straight_and_a_slack_one_sags():
     machine = machine_of(FLOOR, at=[(0.0, 0.5), (0.2, 0.5)])
-    threads = (Thread((0.0, 0.8), 0, 0.3), Thread((0.2, 0.8), 1, 0.5))
-    recording = recording_of(
-        replace(machine, threads=threads), still((0.0, 0.5)), still((0.2, 0.5))
-    )
+    joints = (Joint("string", 0, 0.3, (0.0, 0.8)), Joint("string", 1, 0.5, (0.2, 0.8)))
+    recording = recording_of(replace(machine, joints=joints), still((0.0, 0.5)), still((0.2, 0.5)))
     taut, slack = strings(recording, np.array([0.5]))(0)
     assert taut[:, 0] == pytest.approx(0.0, abs=1e-12)
     assert taut[[0, -1], 1] == pytest.approx([0.8, 0.5])

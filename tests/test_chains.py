@@ -141,7 +141,7 @@ def verdict(seed):
 
 
 @pytest.mark.parametrize(
-    "seeds", [(*range(30), *ONCE), pytest.param(range(MANY), marks=pytest.mark.slow)]
+    "seeds", [(*range(15), *ONCE), pytest.param(range(MANY), marks=pytest.mark.slow)]
 )
 def test_contact_engine_on_chains_and_bowls(seeds):
     assert judged(contact.run, seeds) == {}

@@ -47,7 +47,8 @@ def flow(recording):
 
 
 def test_the_summary_says_when_quarters_fell_out(tmp_path):
-    told = ["run", str(find(10).folder / "slot.toml"), "--out", str(tmp_path), "--only", "npz"]
+    told = ["run", str(find(10).folder / "slot.toml"), "--set", "stream.count=60"]
+    told += ["--out", str(tmp_path), "--only", "npz"]
     said = " ".join(CliRunner().invoke(main, told).output.split())
     emptied = Recording.load(tmp_path / "recording.npz")
     found = re.search(
@@ -56,7 +57,7 @@ def test_the_summary_says_when_quarters_fell_out(tmp_path):
         said,
     )
     times = [float(text) for text in found.groups()[1:]]
-    assert int(found[1]) == emptied.count == 240
+    assert int(found[1]) == emptied.count == 60
     ends = np.sort(emptied.select(Kind.EXIT)["t"])
     assert times == pytest.approx([*quarters(emptied), ends[-1]], abs=5.001e-4)
     assert "fell out" not in CliRunner().invoke(main, ["run", "free-fall"]).output

@@ -236,6 +236,7 @@ def test_bad_calls_are_told():
         chutelab.start("perpendicular", {"particle.radius": 0.0})
 
 
+@pytest.mark.slow
 def test_the_example_of_the_docs_lands_particles_at_the_mark():
     text = (Path(__file__).parents[1] / "docs" / "engineers.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)

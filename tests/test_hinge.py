@@ -169,6 +169,7 @@ def test_a_see_saw_turns_as_its_equation_says(engine):
         assert off[1e-3] < 0.35 * off[2e-3]
 
 
+@pytest.mark.slow
 def test_the_power_of_a_drums_motor_is_what_its_crowd_loses():
     turns = np.linspace(0.0, 2.0 * pi, 17)
     points = np.stack([0.15 * np.cos(turns), 0.15 * np.sin(turns)], axis=-1)

@@ -195,7 +195,7 @@ def check(engine, seed):
     ("engine", "seed"),
     [
         pytest.param(engine, n, marks=() if n < few else pytest.mark.slow)
-        for engine, few in ((contact, 8), (pymunk, 4))
+        for engine, few in ((contact, 8), (pymunk, 2))
         for n in range(500)
     ],
 )

@@ -234,11 +234,16 @@ def drum(turn):
     "scene",
     [
         table(CROWD, {"spin": True}, more=WALLS, shake={"by": [0.0, 0.002], "frequency": 20.0}),
-        table(CROWD, {"spin": True}, more=WALLS, shake={"by": [0.003, 0.001], "frequency": 10.0}),
+        pytest.param(
+            table(
+                CROWD, {"spin": True}, more=WALLS, shake={"by": [0.003, 0.001], "frequency": 10.0}
+            ),
+            marks=pytest.mark.slow,
+        ),
         table(CROWD, more=WALLS, travel={"to": [-0.5, 0.1], "at": 0.4, "in": 0.3}),
         table(CROWD, more=WALLS, shake={"by": [0.0, 0.001], "frequency": 15.0}, speed=0.3),
         drum(60.0),
-        drum(-120.0),
+        pytest.param(drum(-120.0), marks=pytest.mark.slow),
     ],
     ids=["up", "round", "lift", "belt", "drum", "back"],
 )
@@ -297,9 +302,14 @@ def test_a_release_waits_for_what_is_in_its_place():
 @pytest.mark.parametrize(
     ("scene", "bound"),
     [
-        (table(shake={"by": [0.0, 0.004], "frequency": 8.0}, stream={"at": [0.0, 0.1]},
-               run={"until": 0.25}), 2e-3),
-        (table(travel={"to": [-0.4, 0.2], "at": 0.05, "in": 0.4}, run={"until": 0.5}), 3e-4),
+        pytest.param(
+            table(shake={"by": [0.0, 0.004], "frequency": 8.0}, stream={"at": [0.0, 0.1]},
+                  run={"until": 0.25}), 2e-3, marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            table(travel={"to": [-0.4, 0.2], "at": 0.05, "in": 0.4}, run={"until": 0.5}), 3e-4,
+            marks=pytest.mark.slow,
+        ),
         (table(turn=25.0, pivot=[0.0, 0.0], friction=0.8, particle={"spin": True},
                stream={"at": [0.1, R]}, run={"until": 0.3}), 1e-3),
     ],
@@ -316,7 +326,9 @@ def test_pymunk_with_its_own_bodies_agrees_to_the_order_of_its_step(scene, bound
     assert pymunk.ledger.drive_work == pytest.approx(contact.ledger.drive_work, abs=2e-2 * scale)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.05, 0.5])
+@pytest.mark.parametrize(
+    "friction", [0.0, *(pytest.param(mu, marks=pytest.mark.slow) for mu in (0.05, 0.5))]
+)
 def test_an_arm_that_shuts_on_the_floor_drives_a_disk_out(friction):
     """At an angle θ it is at r / tan(θ/2): it comes to the tip at ω (L² + r²) / 2 r.
 

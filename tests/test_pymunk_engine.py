@@ -102,7 +102,7 @@ def test_end_rollers_drive_as_their_faces_do(align):
 def test_steps_all_alike_converge_in_order_one():
     want = exact(machine("perpendicular"))
     errors = []
-    for dt in (4e-3, 2e-3, 1e-3, 5e-4):
+    for dt in (4e-3, 5e-4):
         got = run(machine("perpendicular", "run.align=false", f"run.dt={dt}"))
         errors.append(off(got, want))
     assert errors[-1] < 1e-2
@@ -133,7 +133,7 @@ def test_the_bits_do_not_depend_on_where_shapes_lie_in_memory():
     # Chipmunk keeps contacts by the addresses of their shapes: other ones alive move the next.
     m, alive = machine("stream", "stream.count=5", "run.until=1.0"), []
     first = run(m)
-    for n in range(3):
+    for n in range(2):
         alive += [pymunk.Circle(pymunk.Body(1.0, 1.0), 1.0) for _ in range(37 * n + 1)]
         again = run(m)
         for name in ("knots", "events", "by_surface"):

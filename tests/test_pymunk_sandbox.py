@@ -8,10 +8,11 @@ import pytest
 from scipy.special import ellipk
 
 from chutelab.engines.pymunk import run
-from chutelab.machine import Thread, build
+from chutelab.engines.simulation import simulate
+from chutelab.machine import Joint, build
 from chutelab.results import Kind
 from chutelab.results.recorder import StalledError
-from chutelab.scene import from_dict
+from chutelab.scene import from_dict, load
 from machines import bent, face, gated, scene_of, thrown
 
 G = 9.81
@@ -135,7 +136,7 @@ def test_rolling_friction_shares_a_blow_with_friction(arm):
 STEPPED = {"align": False}
 
 
-@pytest.mark.parametrize("extent", [pi, 2.0 * pi])
+@pytest.mark.parametrize("extent", [pytest.param(pi, marks=pytest.mark.slow), 2.0 * pi])
 def test_a_drum_drives_a_ball_inside_it(extent):
     # The rim runs clockwise at 1 m/s: at the bottom to the left outside of it, seen from the middle
     # the ball is driven against x, and held up where friction and weight agree.
@@ -209,16 +210,16 @@ def test_pairs_have_the_values_of_their_kinds():
 def test_stepped_rolling_friction_stops_and_holds():
     floor = face("floor", (-1.0, 0.0), (9.0, 0.0), restitution=0.0, friction=0.6)
     m = lone(
-        (0.0, 0.01), (0.5, 0.0), until=20.0, particle={"spin": True}, surface=[floor], run=STEPPED
+        (0.0, 0.01), (0.25, 0.0), until=20.0, particle={"spin": True}, surface=[floor], run=STEPPED
     )
     m = replace(m, rolling=np.array([0.02]), until="settled")
     got = run(m)
     # Slides, r dω/dt = 2 g (µ - arm/r), until it rolls, then to rest: a = g arm/r · 2/3. A step
     # that takes 1 mm/s or less is calm, and 0.1 s of that are rest.
-    slides = 0.5 / (G * (3.0 * 0.6 - 2.0 * 0.02))
-    rolls = (0.5 - 0.6 * G * slides) / (0.02 * G / 1.5)
+    slides = 0.25 / (G * (3.0 * 0.6 - 2.0 * 0.02))
+    rolls = (0.25 - 0.6 * G * slides) / (0.02 * G / 1.5)
     assert got.select(Kind.SETTLE)["t"][0] == pytest.approx(slides + rolls + 0.1, abs=0.01)
-    assert got.by_surface[0, 2] == pytest.approx(0.5 * 0.1 * 0.25, rel=1e-6)
+    assert got.by_surface[0, 2] == pytest.approx(0.5 * 0.1 * 0.25**2, rel=1e-6)
     assert residual(got) < 1e-12
     beta = radians(1.0)
     along = np.array([cos(beta), -sin(beta)])
@@ -275,8 +276,8 @@ def test_an_inclined_conveyor_lifts_what_grips_it_and_throws_it_off_its_pulley(r
 
 def hung(machine, position, length, anchors):
     machine = thrown(machine, position)
-    threads = (Thread(tuple(a), n, length) for n, a in enumerate(anchors))
-    return replace(machine, threads=tuple(threads))
+    joints = (Joint("string", n, length, tuple(a)) for n, a in enumerate(anchors))
+    return replace(machine, joints=tuple(joints))
 
 
 def test_a_pendulum_swings_as_its_equation_and_its_string_takes_nothing():
@@ -381,7 +382,7 @@ def test_a_box_tips_where_its_weight_is_beyond_its_edge(degrees, tips):
 def test_a_box_that_falls_flat_bounces_as_a_point_does_and_comes_to_rest():
     floor = face("floor", (-1.0, 0.0), (1.0, 0.0), restitution=0.3, friction=0.5)
     left = []
-    for dt in (2e-3, 1e-3, 5e-4):
+    for dt in (2e-3, 5e-4):
         m = boxed(lone((0.0, 1.0), until=1.0, dt=dt, surface=[floor]), (0.1, 0.06), [(0.0, 0.2)])
         got = run(m)
         hit = got.select(Kind.IMPACT)[0]
@@ -429,3 +430,10 @@ def test_what_goes_round_without_getting_on_is_told(monkeypatch):
     machine = bent(machine, bowl)
     with pytest.raises(StalledError, match=r"3000 steps gain less than 100 times run\.dt"):
         run(machine)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "most"), [("galton", 0.05), ("heap", 0.02), ("mixture", 0.05)])
+def test_the_ledger_of_a_shipped_crowd_closes_but_for_some_percent(name, most):
+    """Its overlaps are pressed apart, which is in no entry."""
+    assert simulate(load(name), engine="pymunk").ledger.relative_residual < most

@@ -112,7 +112,7 @@ def test_what_it_cannot_follow_is_refused():
         ({"name": "peg", "center": [0.0, 0.0], "radius": 0.1}, {}, "straight surfaces"),
         (floor(opens_at=1.0), {}, "always there"),
         (floor(), {"particle": {"spin": True, "rolling_friction": 0.1}}, "rolling friction"),
-        (floor(), {"string": [{"from": [0.0, 2.0]}]}, "strings"),
+        (floor(), {"string": [{"from": [0.0, 2.0]}]}, "joints"),
     ],
 )
 def test_what_it_has_no_equations_for_is_refused(surface, more, what):
@@ -132,7 +132,7 @@ def test_without_scipy_it_says_what_to_install():
     assert done.stdout == 'SciPy is missing: pip install "chutelab[bench]"\n'
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [10, pytest.param(60, marks=pytest.mark.slow)])
 def test_it_and_exact_tell_the_same_of_machines_drawn_at_random(count):
     """Surfaces that cross, fold, move and grip: all answers within 1e-9, but where one refuses."""
     tally = Counter()

@@ -167,7 +167,7 @@ def bed_of_numpy(seeds, count, rate, height, speed, spread, radii, fall, floor):
     return y, u, size
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(
     seed=st.sampled_from([0, 2**32 - 1, 2**32, 2**63 - 1]) | st.integers(0, 2**63 - 1),
     second=st.booleans(), carried=st.booleans(), count=st.integers(2, 100),
@@ -292,7 +292,9 @@ def bed(*overrides):
     return recording, squeeze(found, released["t"], released["position"])
 
 
-@pytest.mark.parametrize("speed", [0.5, 0.7, 0.9])
+@pytest.mark.parametrize(
+    "speed", [0.7, *(pytest.param(v, marks=pytest.mark.slow) for v in (0.5, 0.9))]
+)
 def test_layers_on_a_slow_pulley_ride_into_each_other(speed):
     """As deep as the tracks of a run say, in which riders cannot be pushed."""
     recording, found = bed(f"incoming.speed={speed}")

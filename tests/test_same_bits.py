@@ -13,13 +13,14 @@ from chutelab.cli import main
 HERE = Path(__file__).parent
 
 QUICK = [
-    "run perpendicular --out run --only png,csv,npz,json -q",
+    "run perpendicular --out run --only csv,npz,json -q",
     "live perpendicular -o live.html",
 ]
 
 # The words of one command a line; each may use what those above it have written.
 EVERY = [
     *QUICK,
+    "run perpendicular --out pictures --only png -q",
     "run stream --out film --format mp4 --set stream.count=9 -q",
     "run perpendicular --out film --only gif,webm,strobe -q",
     "run stream --out met --set stream.count=20 --set stream.interact=true --only npz,json,png -q",

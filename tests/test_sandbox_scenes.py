@@ -37,7 +37,7 @@ def test_the_bins_of_the_galton_board_are_binomial(count):
 @pytest.mark.parametrize(
     ("bar", "small", "large", "share"),
     [
-        (0.004, [0.002, 0.003], [0.013, 0.015], 0.8),
+        pytest.param(0.004, [0.002, 0.003], [0.013, 0.015], 0.8, marks=pytest.mark.slow),
         # What is as large as a gap lodges in it, and what is smaller lies on that.
         (0.0055, [0.0015, 0.0035], [0.013, 0.015], 0.3),
         pytest.param(0.0015, [0.002, 0.003], [0.005, 0.0055], 0.8, marks=pytest.mark.slow),

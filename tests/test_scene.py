@@ -63,13 +63,16 @@ CONTRACT = {
     "conveyor": (),
     "surface": (),
     "string": (),
+    "rod": (),
+    "spring": (),
+    "pin": (),
     "sensor": (),
     "stream": {"name": "stream", "particle": None, "count": 1, "rate": 200.0, "width": None,
      "start": 0.0, "bed_height": 0.0, "speed_spread": 0.0, "seed": 0, "at": None, "to": None,
      "fill": None, "velocity": None, "omega": 0.0, "interact": False,
      "restitution": 0.5, "friction": 0.3},
     "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001, "align": True,
-     "loads": None},
+     "loads": None, "stress": None},
     "expect": (),
     "view": None,
     "live": {"predict": False, "controls": None, "panels": None, "ranges": {}, "presets": ()},
@@ -475,7 +478,7 @@ def test_another_unit_is_refused(text, says):
 
 
 @pytest.mark.parametrize(
-    "table", ["surface", "material", "pair", "conveyor", "string", "sensor", "expect"]
+    "table", ["surface", "material", "pair", "conveyor", "string", "rod", "spring", "pin", "sensor"]
 )
 def test_one_pair_of_brackets_is_answered_with_two(table):
     text = f"{CONVEYOR}\n[{table}]\nname = 'a'\n"

@@ -102,7 +102,7 @@ def test_width_kinds_and_sizes_are_told():
     assert wide.measure("sensor.gate.whole_rate") == one.whole_rate
     assert one.whole_rate == pytest.approx(3.6 * one.mass_rate * 0.63 / (2 * 0.0063))
     mixed = {"name": "across", "from": [-2.0, -0.2], "to": [2.0, -0.2]}
-    run = chutelab.simulate("mixture", {"sensor": [mixed], "run.until": 3.0})
+    run = chutelab.simulate("mixture", {"sensor": [mixed], "run.until": 1.5})
     one, found = reading(run, "across"), passages(run, mixed["from"], mixed["to"])
     assert sum(one.kinds.values()) == one.count == (found["way"] == 1).sum()
     assert len(one.kinds) == len(run.scene.particles)

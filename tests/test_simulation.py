@@ -39,7 +39,7 @@ AUTO = {
     "vibrating-feeder": "contact",
     "drum": "contact",
     "see-saw": "contact",
-    "cradle": "pymunk",
+    "cradle": "contact",
     "dominoes": "pymunk",
 }
 

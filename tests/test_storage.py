@@ -23,7 +23,7 @@ from chutelab.util.files import aside, together, whole
 
 ARRAYS = (
     "knots", "offsets", "ended", "events", "by_surface", "angle", "totals", "unsolved", "drives",
-    "impulses", "swings", "hinge_work", "triggered",
+    "impulses", "lasting", "swings", "hinge_work", "springs", "triggered",
 )  # fmt: skip
 
 
@@ -44,6 +44,7 @@ def listing(folder):
         ("perpendicular", ("run.engine=pymunk", 'title="Größe µ, \\"quoted\\""')),
         ("stream-independent", ("stream.count=100", "run.until=0.3")),
         ("dominoes", ("run.until=0.2",)),
+        ("cradle", ("spring=[{from=[0.1,0.0],stiffness=9.0,particle=2}]", "run.until=0.2")),
     ],
 )
 def test_a_recording_comes_back_to_the_last_bit(tmp_path, name, overrides):

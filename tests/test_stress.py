@@ -192,7 +192,7 @@ def interrupted(folder, *arguments, when, sent=(signal.SIGINT,)):
 ENDS = [
     # A second signal does not break off the clean-up of the first.
     ([signal.SIGTERM] * 3, 143, "Terminated."),
-    ([signal.SIGHUP], 129, "Terminated."),
+    pytest.param([signal.SIGHUP], 129, "Terminated.", marks=pytest.mark.slow),
 ]
 
 

@@ -240,7 +240,11 @@ def test_a_full_disk_loses_nothing(interrupted, room):
 
 
 @pytest.mark.parametrize(
-    "signum", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM, signal.SIGKILL]
+    "signum",
+    [
+        signal.SIGTERM,
+        *(pytest.param(n, marks=pytest.mark.slow) for n in (signal.SIGINT, signal.SIGKILL)),
+    ],
 )
 def test_a_signal_keeps_the_finished_rows_and_leaves_no_process(signum):
     sources = str(Path(chutelab.__file__).parent.parent)

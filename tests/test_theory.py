@@ -304,7 +304,7 @@ class TestPredict:
         elif judged in (Reason.SECOND, Reason.MISSES):
             assert np.isfinite(found.v2r)
 
-    @settings(max_examples=150)
+    @settings(max_examples=50)
     @given(
         SPEED, PULLEY, st.one_of(st.just(0.0), st.floats(0.002, 0.02)), st.floats(0.03, 1.0),
         ANGLE, SHARE, st.one_of(st.none(), st.floats(0.3, 1.5)), st.floats(-1.0, 0.5),

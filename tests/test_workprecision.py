@@ -18,7 +18,13 @@ KNOWN = cases()
 MEASURE = import_module("workprecision.measure")
 
 
-@pytest.mark.parametrize("case", ["transfer", "bounce", "belt", "independent"])
+@pytest.mark.parametrize(
+    "case",
+    [
+        "transfer",
+        *(pytest.param(c, marks=pytest.mark.slow) for c in ("bounce", "belt", "independent")),
+    ],
+)
 def test_exact_has_no_error_to_speak_of(case):
     trial = MEASURE.Trial(KNOWN[case], METHODS["exact"], None, patience=0.03)
     trial.repeat()

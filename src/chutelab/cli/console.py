@@ -118,7 +118,7 @@ def show(*parts: RenderableType) -> None:
     """Print tables and texts; in colour on a terminal, unless NO_COLOR is set."""
     from rich.console import Console
 
-    console = Console(highlight=False)
+    console = Console(highlight=False, emoji=False)
     with console.capture() as capture:
         for part in parts:
             # Escaped characters take more room: lines are not cut for that.

@@ -24,7 +24,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import is_dataclass
 from errno import EINVAL, ELOOP, ENAMETOOLONG
-from functools import wraps
+from functools import cached_property
 from inspect import Parameter, cleandoc, signature
 from pathlib import Path
 from types import UnionType
@@ -69,28 +69,48 @@ SHARED = """
 _ENTRY = re.compile(r"^(-.*?)  +(.*(?:\n    .*)*)\n?", re.MULTILINE)
 
 
+class Command(click.Command):
+    """A command of a function; what its docstring says is read when it is first asked for.
+
+    That is so of one command at most, whether it runs or its help is shown.
+    """
+
+    callback: Callable[..., None]
+
+    def __init__(self, function: Callable[..., None], short: str | None) -> None:
+        super().__init__(function.__name__.rstrip("_"), callback=function, short_help=short)
+        self._parts: dict[str, Any] = {}
+        del self.params, self.help
+
+    @cached_property
+    def params(self) -> list[click.Parameter]:  # type: ignore[override]
+        """What the function takes."""
+        return list(_parameters(self.callback, self._parts))
+
+    @cached_property
+    def help(self) -> str:  # type: ignore[override]
+        """What the docstring says besides the options."""
+        text = _ENTRY.sub("", cleandoc(self.callback.__doc__ or ""))
+        return re.sub(r"\n\n+(?=chutelab |.*\n +\S)", "\n\n\b\n", text)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Call the function, with its dataclasses made of their fields."""
+        for name, kind in self._parts.items():
+            fields = {one: ctx.params.pop(one) for one in signature(kind).parameters}
+            ctx.params[name] = kind(**fields)
+        return super().invoke(ctx)
+
+
 def command(
-    short: str | None = None, group: click.Group = main, *, cls: type[click.Command] = click.Command
-) -> Callable[[Callable[..., None]], click.Command]:
+    short: str | None = None, group: click.Group = main, *, cls: type[Command] = Command
+) -> Callable[[Callable[..., None]], Command]:
     """Make a command of a group of a function, whose docstring becomes its help.
 
     Paragraphs that begin with ``chutelab``, or have indented lines, keep their lines.
     """
 
-    def made(function: Callable[..., None]) -> click.Command:
-        parts: dict[str, Any] = {}
-        parameters = list(_parameters(function, parts))
-
-        @wraps(function)
-        def told(**values: Any) -> None:
-            for name, kind in parts.items():
-                values[name] = kind(**{one: values.pop(one) for one in signature(kind).parameters})
-            function(**values)
-
-        text = _ENTRY.sub("", cleandoc(function.__doc__ or ""))
-        text = re.sub(r"\n\n+(?=chutelab |.*\n +\S)", "\n\n\b\n", text)
-        name = function.__name__.rstrip("_")
-        new = cls(name, None, told, parameters, help=text, short_help=short)
+    def made(function: Callable[..., None]) -> Command:
+        new = cls(function, short)
         group.add_command(new)
         return new
 

@@ -370,7 +370,7 @@ def stress(scene: SceneName, *, engine: Engine, dt: float | None, set_: Texts, j
     belt's work; ledger and momentum close. Each law that has something to say about the scene is a
     line, with what was found and what it must not exceed. What the engine does not promise for such
     a scene is listed with the reason. Exit code 1 if a law is broken. For scenes of disks without
-    strings.
+    joints.
     """
     from chutelab.checks.stress import Evidence, judge, need_judged
     from chutelab.engines.simulation import judged

@@ -18,6 +18,7 @@ from chutelab.cli import console
 from chutelab.cli.console import RefusedError, progress, tell
 from chutelab.cli.options import (
     PICTURES,
+    Command,
     Count,
     Engine,
     FileName,
@@ -151,7 +152,7 @@ def _halves(text: str, typed: str, form: str) -> tuple[str, str]:
     return left, right
 
 
-class _Listing(click.Command):
+class _Listing(Command):
     """A command whose help ends with the columns of a sweep."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -454,6 +455,9 @@ def solve(
         click.get_current_context().exit(1)
 
 
+STRESS = 0.01
+"""s; bins of lasting contacts where ``field`` is asked and the scene does not say."""
+
 COMPARED = ("compare.png", "points.csv", "fit.json")
 
 
@@ -591,8 +595,8 @@ def discharge(
     loaded = loaded_as_told(scene, set_)
     names = ("discharge.png", "discharge.json")
     with destination(out, names) as place:
-        with progress("simulating"):
-            found = side_by_side(loaded, wanted)
+        with progress("simulating") as update:
+            found = side_by_side(loaded, wanted, progress=update)
         if place is not None:
             from chutelab.pictures.plots.studies import discharge_figure
 
@@ -625,8 +629,9 @@ def field(
     are taken over a window of time. The table tells the least, mean and largest value of each
     field; pictures show them on the machine. The fields: density, vx, vy, speed, temperature
     (granular), pressure, sxx, sxy, syx, syy (stress; compression is negative). Stress is of the
-    fluctuations and of blows; that of lasting contacts is left out, and the table says how much of
-    all impulses these are.
+    fluctuations, of blows and, in the contact engine, of lasting contacts, kept in bins of
+    run.stress, 0.01 s if the scene says none. Other engines leave these out, and the table says how
+    much of all impulses they are.
 
     chutelab field hopper --between 0.6,1 --of speed --of density --out out
     chutelab field stream --width 4cm --cell 5mm --vtk --out out
@@ -661,7 +666,7 @@ def field(
     names = [*(f"field-{name}.png" for name in wanted), "fields.csv", *["fields.vti"] * vtk]
     with destination(out, names) as place:
         with progress("simulating"):
-            recording = simulate(loaded)
+            recording = simulate(loaded, {"run.stress": loaded.run.stress or STRESS})
         with progress("spreading"):
             found = fields(recording, begin, end, samples=samples, width=width, cell=cell)
         if place is not None:

@@ -14,28 +14,66 @@ static Push on_belt(const Disk *d, double from, double to) {
     return at_foot(d, W.ride_owner, depth, sin(phi), cos(phi), from, to);
 }
 
+/* The impulse on disk i of a contact, N s. */
+static void impulse_of(const Contact *c, double share, double *J) {
+    J[0] = share * (pressed(c) * c->nx + c->impulse[1] * c->ny);
+    J[1] = share * (pressed(c) * c->ny - c->impulse[1] * c->nx);
+}
+
 /* Tell of the impulse on disk i of a contact with a surface, or with a rider, whose belt bears it. */
 void bear_contact(const Contact *c, double share, double from, double to) {
     const Disk *a = W.disks + c->i;
+    double J[2];
     if (B.every == 0 || c->two) return;
     Push p = c->j < 0 ? at_foot(a, c->owner, a->radius, c->nx, c->ny, from, to)
                       : on_belt(W.disks + c->j, from, to);
-    p.jx = share * (pressed(c) * c->nx + c->impulse[1] * c->ny);
-    p.jy = share * (pressed(c) * c->ny - c->impulse[1] * c->nx);
+    impulse_of(c, share, J);
+    p.jx = J[0];
+    p.jy = J[1];
     p.couple = share * c->impulse[2];
     bear(&p);
+}
+
+/* Keep what surfaces gave by a push, from the foot below a disk. */
+static void keep_push(const Disk *d, const Push *p, double depth) {
+    double J[] = {p->jx, p->jy}, b[] = {depth * p->nx, depth * p->ny};
+    keep_contact((int)(d - W.disks), -1 - p->owner, p->from, p->to, J, b);
+}
+
+/* What disk i of a contact is off the other, or off its foot on a surface, m. */
+static void branch_of(const Contact *c, double *b) {
+    const Disk *a = W.disks + c->i, *other = W.disks + MAX(c->j, 0);
+    b[0] = c->j < 0 ? a->radius * c->nx : a->x - other->x;
+    b[1] = c->j < 0 ? a->radius * c->ny : a->y - other->y;
+}
+
+static int other_of(const Contact *c) { return c->j < 0 ? -1 - c->owner : c->j; }
+
+/* The same, kept pair by pair: what goes to a rider, its belt gives it. Blows are events instead. */
+void keep_impulse(const Contact *c, double share, double from, double to) {
+    double J[2], b[2];
+    if (B.each == 0) return;
+    impulse_of(c, share, J);
+    branch_of(c, b);
+    keep_contact(c->i, other_of(c), from, to, J, b);
+    if (c->j < 0 || c->two) return;
+    Push p = on_belt(W.disks + c->j, from, to);
+    p.jx = J[0];
+    p.jy = J[1];
+    keep_push(W.disks + c->j, &p, W.disks[c->j].radius);
 }
 
 /* Tell of an impulse on a disk that the surface which it lies on, or one that bears its island, gives. */
 void bear_disk(const Disk *d, int owner, double jx, double jy, double from, double to) {
     double nx = 0, ny = 1;
-    if (B.every == 0 || (jx == 0 && jy == 0)) return;
+    if ((B.every == 0 && B.each == 0) || (jx == 0 && jy == 0)) return;
     if (d->held_count && W.surfaces[d->held[0]].owner == owner)
         gap_to(W.surfaces + d->held[0], d->x, d->y, d->radius, &nx, &ny);
     Push p = at_foot(d, owner, d->radius, nx, ny, from, to);
     p.jx = jx;
     p.jy = jy;
-    bear(&p);
+    if (B.every > 0) bear(&p);
+    if (B.each > 0) keep_push(d, &p, d->radius);
 }
 
 /* Tell of a ride since the last knot, up to where the disk is now: the belt gives what changes its
@@ -44,7 +82,7 @@ void bear_ride(int i) {
     const Disk *d = W.disks + i;
     const double *last = W.tracks[i].knot;
     double span = d->t - last[0];
-    if (B.every == 0 || !(span > 0)) return;
+    if ((B.every == 0 && B.each == 0) || !(span > 0)) return;
     Push p = on_belt(d, last[0], d->t);
     p.vx = (d->x - last[1]) / span;
     p.vy = (d->y - last[2]) / span;
@@ -52,7 +90,8 @@ void bear_ride(int i) {
     p.y -= d->y - last[2];
     p.jx = d->mass * (d->vx - last[3] - W.gx * span);
     p.jy = d->mass * (d->vy - last[4] - W.gy * span);
-    bear(&p);
+    if (B.every > 0) bear(&p);
+    if (B.each > 0) keep_push(d, &p, d->radius);
 }
 
 /* Note the force by which a surface that is pressed bore a disk in a step; it is the last of `held`. */
@@ -64,6 +103,7 @@ void note_force(Disk *d, const Contact *c, double span) {
 
 /* Tell of what surfaces gave a sleeper since it fell asleep, and for some time more at the end. */
 void bear_asleep(const Disk *d, double until, double more) {
+    if (B.each > 0) keep_awake((int)(d - W.disks), until, until - d->slept + more);
     for (int n = 0; n < d->held_count && B.every > 0; n++) {
         double nx, ny, time = until - d->slept + more;
         const Surface *s = W.surfaces + d->held[n];
@@ -97,4 +137,89 @@ void balance_sleepers(void) {
                 }
             }
     }
+}
+
+/* Rounds of conjugate gradients, and the share of weight that they may leave. */
+#define ROUNDS 200
+#define BALANCED 1e-12
+
+enum { LEFT, AHEAD, CHANGE, RAISED };
+
+/* One of the four vectors of a disk. */
+static double *of(int disk, int which) { return B.balance + 8 * disk + 2 * which; }
+
+/* Raise each contact's force on its disk by how much more of `which` the disk has than the other, and add up at
+   disks what that gives into `to`. */
+static void add_raised(const Lasting *rows, int count, int which, int to) {
+    for (const Lasting *c = rows; c < rows + count; c++)
+        for (int n = 0; n < 2; n++) {
+            double more = of(c->disk, which)[n] - (c->other < 0 ? 0 : of(c->other, which)[n]);
+            of(c->disk, to)[n] += more;
+            if (c->other >= 0) of(c->other, to)[n] -= more;
+        }
+}
+
+/* Change the forces of contacts by the least that has them bear the weight of all sleepers: what the forces of the
+   latest step are off it is a solve's rest. The change is a difference of what disks have, a potential, whose
+   Laplacian on the net of contacts is what weight lacks. */
+static void balance_contacts(Lasting *rows, int count) {
+    double size = 0, weight = 0;
+    for (int i = W.low; i < W.high; i++) {
+        const Disk *d = W.disks + i;
+        int sleeps = d->mode == ASLEEP && d->slept == W.t;
+        for (int n = 0; n < 8; n++) of(i, 0)[n] = 0;
+        of(i, LEFT)[0] = sleeps ? -d->mass * W.gx : 0;
+        of(i, LEFT)[1] = sleeps ? -d->mass * W.gy : 0;
+        for (int n = 0; n < 2; n++) weight += square(of(i, LEFT)[n]);
+    }
+    for (const Lasting *c = rows; c < rows + count; c++)
+        for (int n = 0; n < 2; n++) {
+            of(c->disk, LEFT)[n] -= (&c->x)[n];
+            if (c->other >= 0) of(c->other, LEFT)[n] += (&c->x)[n];
+        }
+    for (int i = W.low; i < W.high; i++)
+        for (int n = 0; n < 2; n++) {
+            of(i, AHEAD)[n] = of(i, LEFT)[n];
+            size += square(of(i, LEFT)[n]);
+        }
+    for (int round = 0; round < ROUNDS && size > square(BALANCED) * weight; round++) {
+        double along = 0, now = 0;
+        for (int i = W.low; i < W.high; i++) of(i, RAISED)[0] = of(i, RAISED)[1] = 0;
+        add_raised(rows, count, AHEAD, RAISED);
+        for (int i = W.low; i < W.high; i++)
+            for (int n = 0; n < 2; n++) along += of(i, AHEAD)[n] * of(i, RAISED)[n];
+        if (!(along > 0)) break;
+        for (int i = W.low; i < W.high; i++)
+            for (int n = 0; n < 2; n++) {
+                of(i, CHANGE)[n] += size / along * of(i, AHEAD)[n];
+                of(i, LEFT)[n] -= size / along * of(i, RAISED)[n];
+                now += square(of(i, LEFT)[n]);
+            }
+        for (int i = W.low; i < W.high; i++)
+            for (int n = 0; n < 2; n++) of(i, AHEAD)[n] = of(i, LEFT)[n] + now / size * of(i, AHEAD)[n];
+        size = now;
+    }
+    for (Lasting *c = rows; c < rows + count; c++) {
+        double *force = &c->x, strong = square(force[0]) + square(force[1]), b[2];
+        for (int n = 0; n < 2; n++) b[n] = (force[0] * c->stress[n] + force[1] * c->stress[2 + n]) / strong;
+        for (int n = 0; n < 2; n++) {
+            force[n] += of(c->disk, CHANGE)[n] - (c->other < 0 ? 0 : of(c->other, CHANGE)[n]);
+            for (int k = 0; k < 2; k++) c->stress[2 * n + k] = force[n] * b[k];
+        }
+    }
+}
+
+/* Keep the forces that hold what has just fallen asleep: those of its latest step, balanced. */
+void keep_sleepers(void) {
+    int first = B.asleep_count;
+    for (int n = 0; n < W.contact_count && B.each > 0; n++) {
+        const Contact *c = W.contacts + n;
+        const Disk *d = W.disks + c->i;
+        double force[2], b[2];
+        if (d->mode != ASLEEP || d->slept != W.t || (c->impulse[0] == 0 && c->clings == 0)) continue;
+        impulse_of(c, 2 / (W.length_before + W.length), force);
+        branch_of(c, b);
+        keep_asleep(c->i, other_of(c), d->slept, force, b);
+    }
+    if (B.asleep_count > first) balance_contacts(B.asleep + first, B.asleep_count - first);
 }

@@ -50,6 +50,14 @@ static void tell_passage(const Contact *c, int kind) {
     write_event(kind, c->i, -1, c->owner, t, then, then + 2, then + 2, 0, 0);
 }
 
+/* Tell of a disk that came to lie on a surface without a blow before: the contact's impulse since then counts as one,
+   and no more among what lasts, if it is all that the disk got. */
+static void tell_arrival(const Contact *c, int kind, double past, double h) {
+    const Disk *d = W.disks + c->i;
+    write_event(kind, c->i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
+    if (is_alone(c, &d->ux)) keep_impulse(c, -1, W.t - past, W.t + 0.5 * h);
+}
+
 /* Note whether a disk that lasts on one surface slips there, sticks, or has come to rest. */
 static void note_grip(Disk *d, const Contact *c, const double *u, const double *v, double h) {
     int i = c->i;
@@ -66,7 +74,7 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     track->load_t[0] = d->t;
     if (d->on < 0) {
         /* It came to lie there without an impact that was told. */
-        write_event(IMPACT, i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
+        tell_arrival(c, IMPACT, past, h);
         d->slips = 1;
     } else if (d->on != c->owner) {
         tell_passage(c, grips ? STICK : SLIP);
@@ -122,7 +130,7 @@ static void settle(int i, const Contact *last, double h) {
     double back = d->t - d->since;
     entries[0] += d->mass * (W.gx * hop.ny - W.gy * hop.nx) * hop.other[1] * back;
     book(d->entries, 0, hop.owner, entries);
-    bear_contact(&hop, 1, d->t, d->t);
+    bear_disk(d, hop.owner, jx, jy, d->t, d->t);
     bear_disk(d, hop.owner, d->mass * W.gx * back, d->mass * W.gy * back, MIN(d->since, d->t), MAX(d->since, d->t));
     d->x -= d->vx * back;
     d->y -= d->vy * back;
@@ -187,7 +195,8 @@ void close_step(double h) {
         d->lacks = 0;
         if (d->mode == FREE) {
             d->calm += h;
-            d->rest += h;
+            /* What has joints does not fall asleep. */
+            d->rest += is_tied(i) ? 0 : h;
             d->anchor[2] += h * d->radius * d->spin;
         }
         if (W.pushes && (d->kick[0] != 0 || d->kick[1] != 0)) {
@@ -220,6 +229,7 @@ void close_step(double h) {
             note_force(a, c, past + 0.5 * h);
         }
         bear_contact(c, 1, W.t - past, W.t + 0.5 * h);
+        keep_impulse(c, 1, W.t - past, W.t + 0.5 * h);
         relative(c, 1, u);
         relative(c, 0, v);
         book(a->gain, c->two ? b->gain : 0, c->owner, c->entries);
@@ -234,8 +244,7 @@ void close_step(double h) {
         if (b) b->supports++;
         else if (c->owner == W.landing && !a->landed && (a->on < 0 || since_passage(c, way) >= 0)) {
             if (a->on >= 0) tell_passage(c, LANDING);
-            else write_event(LANDING, c->i, -1, c->owner, a->t, &a->x, &a->ux, &a->vx, c->impulse[0],
-                             c->impulse[1]);
+            else tell_arrival(c, LANDING, past, h);
             a->landed = 1;
             a->on = c->owner;
             a->slips = 1;
@@ -264,7 +273,7 @@ void close_step(double h) {
         if (d->mode != FREE) continue;
         settle_down(d, h);
         if (!d->supports) {
-            d->calm = 0;
+            if (!is_tied(i) || square(d->vx) + square(d->vy) > square(CALM * W.pace)) d->calm = 0;
             if (track->stays >= (W.interact ? LASTS : 3)) tell_separation(i);
             if (track->lasted || track->stays) d->on = -1;
             track->stays = 0;
@@ -352,6 +361,7 @@ void take_back(int i) {
             else W.books[3 * c->owner + n] -= back;
         }
         if (c->j < 0) W.drives[c->owner] -= driven(c, W.before);
+        keep_impulse(c, (c->two ? 0.5 : c->i == i) * (W.before - 1), W.t, W.t + 0.5 * W.length);
         if (c->i != i) continue;
         W.books[3 * W.ride_owner] -= c->given[1];
         d->entries[0] -= c->given[1];

@@ -3,6 +3,7 @@
 #ifndef CORE_H
 #define CORE_H
 #include <math.h>
+#include <wasm_simd128.h>
 #include "layout.h"
 #include "loads.h"
 #include "memory.h"
@@ -71,6 +72,18 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 
 static inline double square(double a) { return a * a; }
 
+/* Two doubles at once: each rounds as by itself. */
+typedef v128_t Two;
+
+static inline Two two(const double *from) { return wasm_v128_load(from); }
+static inline Two times(double a, Two v) { return wasm_f64x2_mul(wasm_f64x2_splat(a), v); }
+static inline Two plus(Two a, Two b) { return wasm_f64x2_add(a, b); }
+static inline Two minus(Two a, Two b) { return wasm_f64x2_sub(a, b); }
+/* Whether both are at most so far from 0; what is no number is not. */
+static inline int are_within(Two v, double most) {
+    return wasm_i64x2_all_true(wasm_f64x2_le(wasm_f64x2_abs(v), wasm_f64x2_splat(most)));
+}
+
 static inline const Pair *pair_of(int kind, int other) {
     return W.pairs + kind * (W.kind_count + W.material_count) + other;
 }
@@ -134,6 +147,8 @@ static inline double driven(const Contact *c, double f) {
     double still = (1 - f) * (pressed(c) * c->moved[0] + c->impulse[1] * c->moved[1] + c->impulse[2] * c->moved[2]);
     return c->hung ? still + swung(c, f) : still;
 }
+/* Whether a particle has joints. */
+static inline int is_tied(int i) { return i >= 0 && W.disks[i].tie >= 0; }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
 /* Change of normal velocity that a contact asks for under a normal impulse, m/s. */
@@ -217,6 +232,21 @@ void kick_disks(double h);
 double pushed(const Disk *d, double f);
 double steered_to(const Mover *m, double t);
 
+/* joints.c */
+int are_joined(int i, int j);
+void tie_joints(void);
+void pull_joints(double h);
+void agree_with_contacts(double h);
+double missed_by_joints(void);
+void tug_all(int way);
+void drop_tugs(void);
+void cut_step(double t);
+void cut_at_snaps(void);
+void end_pull(void);
+void strike_joints(int i, int j);
+void end_blow(void);
+void share_with_joints(const Contact *c, double wanted, double slip, double *J);
+
 /* trigger.c */
 int is_triggered(int owner, int doing);
 void touch(int owner, double t);
@@ -255,6 +285,8 @@ void bear_ride(int i);
 void note_force(Disk *d, const Contact *c, double span);
 void bear_asleep(const Disk *d, double until, double more);
 void balance_sleepers(void);
+void keep_impulse(const Contact *c, double share, double from, double to);
+void keep_sleepers(void);
 
 /* contact.c */
 void describe(Contact *c, int i, int j);
@@ -276,6 +308,7 @@ void foresee_all(void);
 void expect(int i, double due, int partner);
 int next_disk(void);
 void shock(int i, int j, double t);
+int is_alone(const Contact *c, const double *before);
 void hold(Disk *d, int k);
 double soft_approach(const Disk *d, double radius);
 double left_over(const Disk *d, int impacts, int surface, double radius, int sunk);
@@ -292,16 +325,16 @@ void set_rows(Contact *list, int count);
 void take_rows(Contact *list, int count);
 void begin_anew(void);
 double sweep_rows(int sweeps, int plain, double accurate);
-void lessen(void);
+int lessen(void);
 void keep_bounds(void);
-void drop_noise(void);
+int drop_noise(void);
 double left_open(void);
 double slip_of(const SolverRow *row);
 
 /* solver.c */
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough);
-void solve_contacts(void);
+void solve_contacts(int again);
 
 /* closing.c */
 void close_step(double h);

@@ -50,7 +50,8 @@ static void enter(int i) {
 
 /* Whether two disks meet at all. */
 static int meet(int i, int j) {
-    return !W.passes || pair_of(W.disks[i].kind, W.disks[j].kind)->restitution >= 0;
+    if (!W.passes) return 1;
+    return pair_of(W.disks[i].kind, W.disks[j].kind)->restitution >= 0 && !are_joined(i, j);
 }
 
 static int overlaps(const Disk *a, const double *box) {

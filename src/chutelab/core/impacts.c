@@ -190,12 +190,18 @@ static void give(Contact *c, double normal) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double *J = c->impulse, u[3], v[3], given[3], most = c->friction * normal;
     double arm = c->arm * normal, more[3] = {normal, 0, 0};
+    int tied = is_tied(c->i) || is_tied(c->j);
     relative(c, 0, u);
     J[0] = normal;
     J[1] = more[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
     if (c->hung) {
         J[0] = more[0] = couple(c, normal / c->mass[0], u[1] + c->drift, J + 1);
         more[1] = J[1];
+    }
+    if (tied) {
+        share_with_joints(c, normal / c->mass[0], u[1] + c->drift, J);
+        memcpy(more, J, 2 * sizeof(double));
+        arm = 0;
     }
     J[2] = 0;
     push(c, more);
@@ -233,7 +239,7 @@ static void support(int i, int k, double t) {
     hold(d, k);
     const Surface *s = surface_at(k, t);
     double press = press_on(d, s, c.nx, c.ny), u[3];
-    if (press <= 0 || !W.interact) return;
+    if (press <= 0 || !W.interact || is_tied(i)) return;
     if (bending(s, d->x, d->y, d->radius) < 0) W.step_end = MIN(W.step_end, t + hop_time(d, press));
     double left = W.step_end - t, pull, weight = pulled(s, d, c.nx, c.ny, &pull) - (W.gx * c.nx + W.gy * c.ny);
     double cosine = follow(&c, 0, chord(&c, 0, left)), normal = 0.5 * press * d->mass * left;
@@ -242,6 +248,7 @@ static void support(int i, int k, double t) {
     if (c.turns > 0) normal = d->mass * (0.5 * left * weight / cosine - 2 * u[0]);
     if (normal <= 0) return;
     give(&c, normal);
+    keep_impulse(&c, 1, t, t);
     /* Friction that need not slow it can hold it from now on. */
     if (fabs(u[1]) <= 1e-12 * W.g * W.dt && fabs(c.impulse[1]) < c.friction * c.impulse[0]) {
         d->slips = 0;
@@ -338,11 +345,13 @@ static void jam(Contact *struck, double t) {
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
         double given[3] = {c->given[0], 0, 0};
         if (c->j < 0 && c->impulse[0] > 0) hold(a, -1 - c->j);
+        int was_struck = (c->i == i && c->j == struck->j) || (c->i == struck->j && c->j == i);
         bear_contact(c, 1, t, t);
+        if (!was_struck) keep_impulse(c, 1, t, t);
         book(a->entries, c->two ? b->entries : 0, c->owner, c->entries);
         if (c->j < 0) W.drives[c->owner] += driven(c, 0);
         if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
-        if ((c->i == i && c->j == struck->j) || (c->i == struck->j && c->j == i))
+        if (was_struck)
             for (int k = 0; k < 2; k++) struck->impulse[k] = c->impulse[k];
     }
     if (W.hinges) go_on();
@@ -391,6 +400,7 @@ static void end_hop(int i, double t) {
     book(d->entries, 0, c.owner, entries);
     W.drives[c.owner] += driven(&c, 0);
     bear_contact(&c, 1, t, t);
+    keep_impulse(&c, 1, t, t);
     track->lasted = 0;
 }
 
@@ -451,6 +461,14 @@ static int is_driven(int i, double approach) {
     return 0;
 }
 
+/* Whether a blow's impulse is all that changed the velocity of its disk. */
+int is_alone(const Contact *c, const double *before) {
+    const Disk *d = W.disks + c->i;
+    double size = sqrt(square(c->impulse[0]) + square(c->impulse[1]));
+    double change = d->mass * sqrt(square(d->vx - before[0]) + square(d->vy - before[1]));
+    return fabs(change - size) <= SAME_IMPULSE * size;
+}
+
 /* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, by Newton's restitution
    and Coulomb's friction. */
 static void strike(int i, int j, double t) {
@@ -467,6 +485,7 @@ static void strike(int i, int j, double t) {
     if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);
     describe(&c, i, j);
     c.drift = 0;
+    if (is_tied(i) || is_tied(j)) strike_joints(i, j);
     was_moved(i);
     if (c.two) was_moved(j);
     relative(&c, 0, u);
@@ -497,6 +516,7 @@ static void strike(int i, int j, double t) {
     double before[3] = {a->vx, a->vy, a->spin};
     if (jammed) jam(&c, t);
     else give(&c, c.mass[0] * (back - u[0]));
+    if (is_tied(i) || is_tied(j)) end_blow();
     a->since = t + later;
     if (c.two) b->since = t;
     if (!W.interact) let_fly(a);
@@ -504,9 +524,12 @@ static void strike(int i, int j, double t) {
     int landing = j < 0 && c.owner == W.landing && !a->landed, kind = COLLISION;
     if (j < 0) kind = landing ? LANDING : IMPACT;
     int passes = j < 0 && -u[0] <= W.soft && goes_straight_on(&c);
-    if (!passes && (landing || -u[0] > W.soft || W.g == 0 || (j < 0 && a->on != c.owner)))
+    int told = !passes && (landing || -u[0] > W.soft || W.g == 0 || (j < 0 && a->on != c.owner));
+    if (told)
         write_event(kind, i, j >= 0 ? j : -1, c.owner, t, &a->x, before, &a->vx,
                     c.impulse[0], c.impulse[1]);
+    /* Of a jam, the event does not say from where its impulse came. */
+    if (!told || (jammed && !is_alone(&c, before))) keep_impulse(&c, 1, t, t);
     if (landing && !passes) a->landed = 1;
     if (j < 0 && !passes) {
         a->on = c.owner;

@@ -189,7 +189,8 @@ PAIRED static int weigh(int i) {
     All.place = MAX(All.place, MAX(place[0], place[1]));
     All.fastest = MAX(All.fastest, fastest[0]);
     if (L.interact) {
-        L.energy += kinetic(i, first);
+        /* What swings to and fro may have none at its start. */
+        L.energy += L.joined ? half * fastest[0] : kinetic(i, first);
         All.lifted += potential(i, last) - potential(i, first);
         for (int n = 0; n < 3; n++) All.entries[n] += last[6 + n];
     } else {

@@ -41,11 +41,22 @@ typedef struct {
     int lacks;              /* whether there was too little */
 } Room;
 
+/* What every step asks of every disk stands first, in few lines of the processor's cache. */
 typedef struct {
     double x, y, vx, vy, spin;  /* [in] at time t: centre, velocity, angular velocity */
     double t;
-    double ux, uy, uspin;       /* velocity before the step's impulses; of a sleeper, its own */
+    int mode;                   /* WAITING at first */
+    int mark;                   /* of queries */
+    double left, bottom, right, top; /* box that it can reach in this step */
     double radius, mass;        /* [in] radius > 0 */
+    double due;                 /* s; its next event, INFINITY if none is foreseen in this step */
+    int changes;                /* counts changes of path, so that foreseen events can be outdated */
+    int impacts;                /* in this step */
+    int supports;               /* contacts that pressed in this step or the one before */
+    int partner;                /* of the next event: disk j >= 0, surface k as -1 - k, or ALARM */
+    int partner_changes;
+    int heap_place;
+    double ux, uy, uspin;       /* velocity before the step's impulses; of a sleeper, its own */
     double inertia;             /* [in] kg m2; 0: it does not turn */
     double inv_mass, inv_inertia; /* 1/kg, 1/(kg m2); 0 for one that does not turn */
     double aired;               /* s; until when air has slowed it down, see air.c */
@@ -56,9 +67,7 @@ typedef struct {
     double ride_speed;          /* m/s */
     double ride_from, ride_to;  /* s; when the ride began and ends */
     double exit_box[4];         /* [in] m; left, bottom, right, top; its track ends outside */
-    double left, bottom, right, top; /* box that it can reach in this step */
     double zone[4];             /* the box, and room round it, for which `World.nearby` is right */
-    double due;                 /* s; its next event, INFINITY if none is foreseen in this step */
     double since;               /* s; latest impact */
     double slept;               /* s; since when it is asleep */
     double calm;                /* s; since when nothing at its contacts slips or moves apart */
@@ -77,16 +86,9 @@ typedef struct {
     int kind;                   /* [in] row of the table of pairs */
     int rides;                  /* [in] the incoming belt carries it by adhesion */
     int goes_on;                /* [in] it was under way before: released wherever others are */
-    int mode;                   /* WAITING at first */
-    int changes;                /* counts changes of path, so that foreseen events can be outdated */
-    int impacts;                /* in this step */
-    int supports;               /* contacts that pressed in this step or the one before */
-    int partner;                /* of the next event: disk j >= 0, surface k as -1 - k, or ALARM */
-    int partner_changes;
-    int heap_place;
     int links;                  /* first of its lasting contacts in `World.links`, or -1 */
     int before;                 /* first of those of the step before, or -1 */
-    int queued, moved, mark, jam; /* marks of the shock, of queries, and of the latest jam */
+    int queued, moved, jam;     /* marks of the shock, and of the latest jam */
     int jam_next;               /* the next disk in that jam, or -1 */
     int island;
     int nearby_count;           /* surfaces whose boxes meet its zone; MAX_NEARBY + 1: too many */
@@ -103,6 +105,9 @@ typedef struct {
     int wide;                   /* 1 if it is asked by all in this step, see grid.c */
     int far;                    /* 1 if the step's impulses take it further than was foreseen */
     int body;               /* its row of `World.solver_bodies`, if that is of this disk */
+    int tie;                /* first of its ends of joints, 2 n and 2 n + 1 of joint n, or -1 */
+    int pad;
+    double tug[3], tugged[3]; /* m/s, m/s, rad/s; what half of a step's pull of its joints changes, and before */
 } Disk;
 
 /* The track of a disk since the last knot that is written. */
@@ -200,6 +205,36 @@ typedef struct {
     int by, pad;            /* [in] ... when this owner is touched */
 } Trigger;
 
+/* What joins a particle with a fixed point or with another particle: a string pulls only, a rod keeps its
+   length, a spring changes it, a pin keeps a point of both together. */
+enum Tie { STRING, ROD, SPRING, PIN };
+
+typedef struct {
+    double from[2];         /* [in] m; fixed end of what has no other particle; of a pin its place */
+    double length;          /* [in] m; of a spring at rest; NaN: as it is when it is tied */
+    double stiffness, damper; /* [in] N/m, N s/m */
+    double kept[2], damped, given; /* [out] J; in a spring when it was tied and now, what its damper took,
+                               and what it gave to particles */
+    double arm[4];          /* m; of a pin, from both centres in particles that have not turned */
+    int kind, particle, other; /* [in] enum Tie; two particles, or one and -1 */
+    double now;             /* m; as long as it is */
+    int tied, struck;       /* whether both ends move freely; a blow is passed on to it */
+    int taut;               /* a string that pulled in the step before */
+    int row;                /* first of its rows */
+    int next[2];            /* ends of joints of the same particles, as `Disk.tie` */
+} Joint;
+
+/* One equation of a joint: a pin has two. */
+typedef struct {
+    double e[2], lever[2];  /* how its impulse acts: on the particle along e, on the other against it; m */
+    double kick;            /* N s; half of what it gives in a step; apart if above 0 */
+    double struck[2], answer[2]; /* 1/kg, N s; what a blow of 1 N s draws it apart, and how it answers */
+    double off, eases;      /* m, m/(N s); by how much it is missed, and how a spring gives way */
+    double root;            /* of the diagonal matrix of the factors */
+    int joint, on;          /* whether it acts */
+    int first, pad;         /* first column of its row of the matrix that is not 0 */
+} JointRow;
+
 typedef struct { double restitution, friction, rolling, falls, cohesion; } Pair; /* [in] rolling: arm over radius;
                                         falls: 1 over the speed up to which restitution
                                         is that, s/m; 0 for all; cohesion: N */
@@ -288,6 +323,9 @@ typedef struct {
     Pair *pairs;         /* (kinds, kinds + materials) */
     Mover *movers;
     Trigger *triggers;
+    Joint *joints;
+    JointRow *joint_rows;
+    double *joint_matrix; /* (joint rows, joint rows) */
     /* arrays that `prepare` lays out */
     Track *tracks;
     Knot *waits;         /* (disks, WAITS) states of each since its last knot; of one by itself (1, WAITS) */
@@ -318,6 +356,8 @@ typedef struct {
     int disk_count, surface_count, kind_count, owner_count; /* [in] */
     int mover_count;     /* [in] */
     int trigger_count;   /* [in] */
+    int joint_count;     /* [in] */
+    int joint_row_count;
     int material_count;
     int knot_room, event_room, total_room, contact_room, near_room, cell_room, swing_room;
     int full;            /* what `run` makes room for as it goes on: see `Full` */
@@ -361,6 +401,7 @@ typedef struct {
     int swings_too;      /* contacts that are solved act on hinges */
     int stamp, shocks, jams; /* numbers of the latest query, shock and jam, for marks */
     double t, now, step, step_end, cell;
+    double looked;       /* s; for when it is told which surfaces are there */
     double usual;        /* s; the step if nothing slid in a hollow: so long a part of an overlap takes */
     double length, length_before; /* s; of this step and of the one before */
     double again;        /* what lasts needs so many times the impulses of the step before */
@@ -425,8 +466,9 @@ typedef struct {
     double repeat[6];       /* up to two of count, dx, dy */
 } SurfaceKeys;
 
-/* A string from a point to a particle; without a length as long as it has to be at the release. */
-typedef struct { double from[2], length, particle; } StringKeys;
+/* A joint, see `Joint`; without a length as long as it has to be at the release, without a point between two
+   particles. */
+typedef struct { double kind, from[2], length, particle, other, stiffness, damper; } JointKeys;
 
 /* How a surface moves; without a pivot about its first point, the centre of an arc, the pivot of a plate. */
 typedef struct {
@@ -477,7 +519,7 @@ typedef struct {
     double *terms;          /* (term_width) of a plan that is run, behind its row: `RunKeys` and what follows */
     int members, width, term_width; /* [in] */
     int owners;             /* [in] of a plan that is run: how many names its surfaces have */
-    int particles, streams, incoming, plates, outgoing, conveyors, surfaces, strings, moving; /* [in] counts */
+    int particles, streams, incoming, plates, outgoing, conveyors, surfaces, joints, moving; /* [in] counts */
     Segment *segments;      /* [out] (members, segment_count) */
     Arc *arcs;
     Mover *movers;          /* [out] (moving) of a scene by itself */
@@ -593,6 +635,17 @@ typedef struct { double normal, along, x, y, moment, at[2]; } Load; /* N s, N m 
 
 #define MOST_BINS 1048576
 
+/* Share of its size by which an impulse may differ from the change of momentum that it alone made. */
+#define SAME_IMPULSE 1e-6
+
+/* What a lasting contact gave a disk, in a bin of time or while it slept. */
+typedef struct {
+    int disk, other;        /* the other: a disk, or -1 - a surface's owner */
+    double from, to;        /* s */
+    double x, y;            /* on the disk, N s */
+    double stress[4];       /* (J b) in rows, N m s: b to the disk's centre from the other's, or from its foot */
+} Lasting; /* [out] */
+
 /* Loads of surfaces, if they are asked for. */
 typedef struct {
     double every;           /* [in] s; how long a bin is; 0: nothing is counted */
@@ -600,6 +653,14 @@ typedef struct {
     int owner_count, bin_count;
     int used;               /* [out] bins up to the last in which anything is borne */
     int overflow;           /* [out] there were to be more of them than MOST_BINS, or than memory has room for */
+    double each;            /* [in] s; how long a bin of lasting contacts is; 0: they are not kept */
+    Lasting *lasting;       /* [out] bin by bin */
+    Lasting *asleep;        /* what holds sleepers, each second; in no order */
+    int *seats;             /* rows of this bin by their pairs, + 1 */
+    double *balance;        /* (disks, 4, 2) room for conjugate gradients */
+    int lasting_count;      /* [out] */
+    int lasting_room, asleep_count, asleep_room, seat_count, first;
+    double bin;             /* which one `first` begins */
 } Loads;
 
 /* ---- What a run is judged by: a subject of its own, which shares nothing with the engine's. ---- */
@@ -688,6 +749,7 @@ typedef struct {
     /* the run */
     int engine;             /* [in] */
     int interact;           /* [in] particles meet each other */
+    int joined;             /* [in] some hang on joints */
     int alike;              /* [in] all is left to steps that are all alike, and to Chipmunk */
     int family;             /* [in] each particle has pieces of its own */
     int pulley;             /* [in] piece 0 ends on a drive pulley */

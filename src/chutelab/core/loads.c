@@ -1,4 +1,5 @@
 #include <math.h>
+#include <string.h>
 #include "loads.h"
 #include "memory.h"
 
@@ -9,10 +10,20 @@ Loads B;
 
 EXPORT Loads *loads(void) { return &B; }
 
-EXPORT int lay_out_bins(int owners) {
-    B.owner_count = owners;
-    B.bin_count = FIRST;
-    RESERVE(B.bins, (double)B.bin_count * owners);
+EXPORT int lay_out_bins(int owners, int disks) {
+    if (B.every > 0.0) {
+        B.owner_count = owners;
+        B.bin_count = FIRST;
+        RESERVE(B.bins, (double)B.bin_count * owners);
+    }
+    if (B.each > 0.0) {
+        B.lasting_room = B.asleep_room = FIRST;
+        B.seat_count = 2 * FIRST;
+        RESERVE(B.lasting, FIRST);
+        RESERVE(B.asleep, FIRST);
+        RESERVE(B.seats, B.seat_count);
+        RESERVE(B.balance, 8.0 * disks);
+    }
     return has_room();
 }
 
@@ -63,5 +74,94 @@ void bear(const Push *p) {
         add(p, first, first, begins / span, 0.0, begins);
         add(p, first + 1, last - 1, every / span, begins, every);
         add(p, last, last, ends / span, span - ends, ends);
+    }
+}
+
+/* Where the row of a pair in this bin is told, or is to be: in `seats`. */
+static int *seat_of(int disk, int other) {
+    unsigned at = (unsigned)disk * 2654435761u + (unsigned)other * 40503u;
+    for (;; at++) {
+        int *seat = B.seats + (at & (unsigned)(B.seat_count - 1));
+        const Lasting *row = B.lasting + *seat - 1;
+        if (!*seat || (row->disk == disk && row->other == other)) return seat;
+    }
+}
+
+/* Begin a bin; or, with twice as many seats, seat its rows anew. */
+static void seat_all(void) {
+    memset(B.seats, 0, B.seat_count * sizeof *B.seats);
+    for (int n = B.first; n < B.lasting_count; n++)
+        if (B.lasting[n].from == B.bin * B.each) *seat_of(B.lasting[n].disk, B.lasting[n].other) = n + 1;
+}
+
+/* A further row, all zero; 0 where there is no room. */
+static Lasting *next_row(void) {
+    if (B.overflow || (B.lasting_count == B.lasting_room && !STRETCH(B.lasting, B.lasting_count, B.lasting_room))) {
+        B.overflow = 1;
+        return 0;
+    }
+    B.lasting[B.lasting_count] = (Lasting){0};
+    return B.lasting + B.lasting_count++;
+}
+
+static void add_to(Lasting *row, double share, double x, double y, const double *stress) {
+    row->x += share * x;
+    row->y += share * y;
+    for (int n = 0; n < 4; n++) row->stress[n] += share * stress[n];
+}
+
+/* Keep a row by itself. */
+static void keep_row(int disk, int other, double from, double to, double share, double x, double y, const double *stress) {
+    Lasting *row = next_row();
+    if (!row) return;
+    row->disk = disk;
+    row->other = other;
+    row->from = from;
+    row->to = to;
+    add_to(row, share, x, y, stress);
+}
+
+void keep_contact(int disk, int other, double from, double to, const double *J, const double *b) {
+    double bin = floor(0.5 * (from + to) / B.each);
+    double stress[4] = {J[0] * b[0], J[0] * b[1], J[1] * b[0], J[1] * b[1]};
+    if (to - from > B.each) {
+        keep_row(disk, other, from, to, 1.0, J[0], J[1], stress);
+        return;
+    }
+    if (bin != B.bin || !B.lasting_count) {
+        B.bin = bin;
+        B.first = B.lasting_count;
+        seat_all();
+    }
+    if (4 * (B.lasting_count - B.first) > B.seat_count) {
+        RESERVE(B.seats, 2.0 * B.seat_count);
+        B.overflow |= !B.seats;
+        if (B.overflow) return;
+        B.seat_count *= 2;
+        seat_all();
+    }
+    int *seat = seat_of(disk, other);
+    if (*seat) add_to(B.lasting + *seat - 1, 1.0, J[0], J[1], stress);
+    else {
+        keep_row(disk, other, bin * B.each, (bin + 1.0) * B.each, 1.0, J[0], J[1], stress);
+        *seat = B.overflow ? 0 : B.lasting_count;
+    }
+}
+
+void keep_asleep(int disk, int other, double from, const double *force, const double *b) {
+    if (B.overflow || (B.asleep_count == B.asleep_room && !STRETCH(B.asleep, B.asleep_count, B.asleep_room))) {
+        B.overflow = 1;
+        return;
+    }
+    B.asleep[B.asleep_count++] = (Lasting){ .disk = disk, .other = other, .from = from, .x = force[0], .y = force[1],
+        .stress = {force[0] * b[0], force[0] * b[1], force[1] * b[0], force[1] * b[1]} };
+}
+
+void keep_awake(int disk, double to, double time) {
+    for (int n = B.asleep_count - 1; n >= 0; n--) {
+        const Lasting held = B.asleep[n];
+        if (held.disk != disk) continue;
+        B.asleep[n] = B.asleep[--B.asleep_count];
+        keep_row(disk, held.other, held.from, to, time, held.x, held.y, held.stress);
     }
 }

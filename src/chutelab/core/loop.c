@@ -12,6 +12,8 @@ World W;
 #define ARC_ANGLE 0.024
 /* Knots that one impact may write per disk. */
 #define KNOTS_EACH 6
+/* Of a step: nearer to its beginning or end something counts as there. */
+#define SOON 1e-9
 
 /* ------------------------------------------------------------------------------------------ rides */
 
@@ -247,7 +249,7 @@ static void stop_all(int reason) {
 
 /* Whether everything of a crowd has been calm for long enough, nothing moves, and no gate is still to come or go. */
 static int has_settled(void) {
-    if (W.stirs || next_gate(W.t) < INFINITY) return 0;
+    if (W.stirs || next_gate(W.looked) < INFINITY) return 0;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode == WAITING || d->mode == RIDING || (d->mode == FREE && d->calm < SETTLED / W.pace)) return 0;
@@ -259,6 +261,7 @@ static int has_settled(void) {
 
 /* Tell which surfaces are there; what sleeps wakes when one comes or goes. Next change, s. */
 static double set_gates(double t) {
+    W.looked = t;
     int stirred = stir(t) && W.step_count > 0;
     for (int i = W.low; i < W.high && stirred; i++)
         if (W.disks[i].mode == ASLEEP) wake(i, W.t);
@@ -399,6 +402,7 @@ static int begin_step(void) {
     /* Impulses stand for half of the step before and half of this one. */
     double span = W.length_before + W.length;
     W.length_before = W.length;
+    if (W.joint_count) tie_joints();
     do {
         W.again = span > 0 ? MIN((W.length + h) / span, MOST_AGAIN) : 1;
         for (int i = W.low; i < W.high; i++) {
@@ -417,8 +421,10 @@ static int begin_step(void) {
                 d->uspin = d->spin;
             }
         }
-        if (!list_near(W.step_end)) return FULL_NEAR;
-        if (!find_contacts(h, &woke)) return FULL_CONTACTS;
+        if (W.joint_count) pull_joints(h);
+        int near = list_near(W.step_end), room = near && find_contacts(h, &woke);
+        if (!room || woke) drop_tugs();
+        if (!room) return near ? FULL_CONTACTS : FULL_NEAR;
         if (stride > W.step && W.contact_count) {
             /* It does not fly: what it touches is solved for a step of usual length. */
             stride = 0;
@@ -431,6 +437,7 @@ static int begin_step(void) {
             set_step(most);
             W.step_end = W.t + most;
             h = W.step_end - W.t;
+            if (!woke) drop_tugs();
             woke = 1;
         }
     } while (woke);
@@ -439,11 +446,16 @@ static int begin_step(void) {
     if (W.hinges) begin_hinges(W.t, h);
     W.swings_too = 0;
     W.unsolved = 0;
-    if (W.contact_count) solve_contacts();
+    if (W.contact_count) solve_contacts(0);
+    if (W.joint_count) {
+        agree_with_contacts(h);
+        W.unsolved = MAX(W.unsolved, missed_by_joints());
+    }
     W.unsolved_most = MAX(W.unsolved_most, W.unsolved);
     /* A fast belt may have thrown a disk further than its list of neighbours foresaw. */
     for (int i = W.low; i < W.high; i++)
         W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
+    if (W.joint_count) tug_all(-1);
     close_step(h);
     if (W.hinges) {
         leave_hinges(W.t);
@@ -454,6 +466,31 @@ static int begin_step(void) {
     return DONE;
 }
 
+/* Have what is tied go on with the pull that ends the step as it is now. */
+static void foresee_tied(void) {
+    for (int i = W.low; i < W.high; i++)
+        if (is_tied(i) && W.disks[i].mode == FREE) foresee(i);
+}
+
+/* A blow of a particle that has joints ends the step, whose pull is then found anew, and is given as the next one
+   begins, before all else: return the disk, or -1, that has got too many. */
+static int meet_tied(int i, int j, double t) {
+    double soon = SOON * W.step;
+    if (t > W.t + soon && t > W.step_end - soon) expect(i, INFINITY, ALARM);
+    else if (t > W.t + soon) {
+        cut_step(t);
+        foresee_tied();
+    } else {
+        drop_tugs();
+        shock(i, j, W.t);
+        if (W.disks[i].impacts > STALL) return i;
+        cut_step(W.step_end);
+        cut_at_snaps();
+        foresee_tied();
+    }
+    return -1;
+}
+
 /* Resolve what happens within the step, in the order of time. */
 static int go_through(void) {
     int i, count = W.high - W.low;
@@ -462,7 +499,7 @@ static int go_through(void) {
         double t = d->due;
         int j = d->partner;
         /* The step was cut short. */
-        if (t >= W.step_end) return DONE;
+        if (t > W.step_end || (t == W.step_end && !(d->mode == WAITING && is_tied(i)))) return DONE;
         if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
         if (W.event_count + SHOCKS * W.contact_count + 64 > W.event_room)
             return FULL_EVENTS;
@@ -472,6 +509,10 @@ static int go_through(void) {
             continue;
         }
         W.now = t;
+        if (j != ALARM && (is_tied(i) || is_tied(j))) {
+            if ((W.stalled = meet_tied(i, j, t)) < 0) continue;
+            return STALLED;
+        }
         if (j != ALARM) {
             if (W.interact && d->impacts > CROWDED && t > W.t + SHORTEST * W.step) {
                 W.step_end = t;
@@ -485,6 +526,7 @@ static int go_through(void) {
         if (d->mode == WAITING) {
             if (release(i, t)) enter_again(i, W.step_end);
         } else separate(i);
+        if (is_tied(i) && d->mode == FREE) cut_step(t);
         foresee(i);
     }
     return DONE;
@@ -497,7 +539,7 @@ static void end_step(void) {
         if (d->mode != RIDING) leave(i, W.step_end);
         if (d->mode == FREE) {
             advance(d, W.step_end);
-            slow_down(i, W.step_end);
+            if (d->tie < 0) slow_down(i, W.step_end);
         }
         else if (d->mode == ASLEEP) {
             d->x += d->ux * (W.step_end - W.t);
@@ -507,6 +549,9 @@ static void end_step(void) {
             d->t = d->aired = W.step_end;
         }
     }
+    if (W.joint_count) end_pull();
+    for (int i = W.low; i < W.high && W.joint_count; i++)
+        if (is_tied(i) && W.disks[i].mode == FREE) slow_down(i, W.step_end);
     if (W.hinges) end_hinges(W.step_end);
     W.length = W.step_end - W.t;
     W.t = W.step_end;
@@ -540,7 +585,8 @@ static int is_over(int *reason) {
         *reason = BY_SETTLING;
         return 1;
     }
-    next = MIN(next, next_gate(W.t));
+    /* A run that has been paused where one changes has not looked at it yet. */
+    next = MIN(next, MAX(next_gate(W.looked), W.t));
     int asleep = 0;
     for (int i = W.low; i < W.high; i++) asleep |= W.disks[i].mode == ASLEEP;
     if (next >= W.end_time || next == INFINITY) next = W.end_time;
@@ -572,6 +618,7 @@ static int begin_part(void) {
         W.t = MIN(W.t, d->release);
     }
     if (W.hinges) W.t = MIN(W.t, 0);
+    W.looked = W.t;
     W.room = INFINITY;
     for (int k = 0; k < W.surface_count; k++) {
         double room = W.surfaces[k].radius - W.disks[W.low].radius;
@@ -638,6 +685,10 @@ static int run_on(int steps) {
                 stop_all(settled ? BY_SETTLING : BY_TIME);
                 W.phase = PART;
                 continue;
+            }
+            if (W.joint_count) {
+                tug_all(1);
+                cut_at_snaps();
             }
             fall_asleep();
             foresee_all();

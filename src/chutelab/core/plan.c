@@ -42,7 +42,7 @@ Tables tables_of(int member) {
     NEXT(outgoing, OutgoingKeys, P.outgoing);
     NEXT(conveyors, ConveyorKeys, P.conveyors);
     NEXT(surfaces, SurfaceKeys, P.surfaces);
-    NEXT(strings, StringKeys, P.strings);
+    NEXT(joints, JointKeys, P.joints);
     NEXT(movers, MoverKeys, P.moving);
 #undef NEXT
     t.points = row;

@@ -26,7 +26,7 @@ typedef struct {
     const OutgoingKeys *outgoing; /* or NULL */
     const ConveyorKeys *conveyors;
     const SurfaceKeys *surfaces;
-    const StringKeys *strings;
+    const JointKeys *joints;
     const MoverKeys *movers;
     const double *points;
 } Tables;

@@ -241,6 +241,7 @@ EXPORT int lay_out_world(void) {
     RESERVE(W.pairs, (double)W.kind_count * (W.kind_count + W.material_count));
     RESERVE(W.movers, W.mover_count);
     RESERVE(W.triggers, W.trigger_count);
+    RESERVE(W.joints, W.joint_count);
     return has_room();
 }
 
@@ -279,6 +280,8 @@ static int lay_out_work(void) {
     W.cell_room = crowd ? 12 * n + 64 : 1;
     RESERVE(W.tracks, n);
     RESERVE(W.solver_bodies, n + 1.0);
+    RESERVE(W.joint_rows, W.joint_row_count);
+    RESERVE(W.joint_matrix, (double)W.joint_row_count * W.joint_row_count);
     RESERVE(W.waits, crowd ? (double)WAITS * n : WAITS);
     RESERVE(W.books, 3.0 * (W.owner_count + 1));
     RESERVE(W.drives, W.owner_count);
@@ -325,20 +328,40 @@ void join_surfaces(void) {
     }
 }
 
+/* List the joints of each disk, and their rows. */
+static void join_disks(void) {
+    int row = 0;
+    for (int i = 0; i < W.disk_count; i++) W.disks[i].tie = -1;
+    for (int n = 0; n < W.joint_count; n++) {
+        Joint *j = W.joints + n;
+        j->row = row;
+        W.joint_rows[row++].joint = n;
+        if (j->kind == PIN) W.joint_rows[row++].joint = n;
+        W.passes |= j->kind == ROD || j->kind == PIN;
+        for (int end = 0; end < 1 + (j->other >= 0); end++) {
+            Disk *d = W.disks + (end ? j->other : j->particle);
+            j->next[end] = d->tie;
+            d->tie = 2 * n + end;
+        }
+    }
+}
+
 /* The host has filled in what is marked [in]: fill in what follows. */
 EXPORT int prepare(void) {
-    W.passes = W.hinges = 0;
+    W.passes = W.hinges = W.joint_row_count = 0;
     for (int i = 0; i < W.kind_count * W.kind_count; i++)
         W.passes |= pair_of(i / W.kind_count, i % W.kind_count)->restitution < 0;
     for (int k = 0; k < W.mover_count; k++) W.hinges += W.movers[k].inertia > 0;
     /* What hangs gives what one disk gives it to another. */
-    if (W.hinges || W.trigger_count) W.interact = 1;
+    if (W.hinges || W.trigger_count || W.joint_count) W.interact = 1;
     for (int k = 0; k < W.trigger_count; k++) W.triggers[k].t = INFINITY;
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!m->inertia) m->rate = m->turn;
         m->begins = is_triggered(m->surface, STARTS) ? INFINITY : 0;
     }
+    for (int n = 0; n < W.joint_count; n++) W.joint_row_count += 1 + (W.joints[n].kind == PIN);
     if (!lay_out_work()) return 0;
+    join_disks();
     double least = INFINITY, most = 0, s = sin(W.ride_incline), c = cos(W.ride_incline);
     int alone = !W.interact;
     for (int i = 0; i < W.disk_count; i++) {

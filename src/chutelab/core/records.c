@@ -128,7 +128,7 @@ EXPORT int prepare_to_judge(void) {
     L = (Laws){ .particle_count = w->disk_count, .piece_count = w->surface_count, .pulley = pulley != 0,
                 .engine = ENGINE_CONTACT, .tilt = w->tilt, .dt = w->dt, .surface_count = w->owner_count + 1,
                 .book_rows = w->owner_count + 1, .interact = w->interact, .movers = w->movers,
-                .mover_count = w->mover_count };
+                .mover_count = w->mover_count, .joined = w->joint_count > 0 };
     if (!lay_out_pieces()) return 0;
     Barrier *b = L.barriers;
     for (int k = 0; k < w->surface_count; k++) {
@@ -146,7 +146,7 @@ EXPORT int prepare_to_judge(void) {
         L.bodies[i] = (Body){ d->radius, d->mass, d->inertia, w->g };
         L.largest = MAX(L.largest, d->radius);
     }
-    return prepare() && (B.every == 0 || lay_out_bins(w->owner_count));
+    return prepare() && lay_out_bins(w->owner_count, w->disk_count);
 }
 
 static int judge_world(void) {

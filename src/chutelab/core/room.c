@@ -232,12 +232,28 @@ static void hold_arc(double *box, const Arc *arc) {
     hold_at(box, arc, arc->begin + arc->extent);
 }
 
-/* All that a string's end can reach. */
-static void hold_string(double *box, const StringKeys *string, const Start *held) {
-    double x = string->from[0], y = string->from[1], length = string->length;
-    if (isnan(length)) length = length_of(held->position[0] - x, held->position[1] - y);
-    hold(box, x - length, y - length);
-    hold(box, x + length, y + length);
+/* How far a joint lets a particle go from what holds it, at most; a spring is taken to stretch to so many times
+   what it is. */
+#define STRETCHES 3.0
+static double reach_of(const JointKeys *joint, const Start *first) {
+    const double *at = first[(int)joint->particle].position, *from = joint->from;
+    if (!isnan(joint->other)) from = first[(int)joint->other].position;
+    double away = length_of(at[0] - from[0], at[1] - from[1]);
+    double length = isnan(joint->length) ? away : MAX(joint->length, away);
+    return joint->kind == SPRING ? STRETCHES * length : length;
+}
+
+/* All that joints let particles reach: from a fixed end, or from where they are released, by all of what may
+   lie between. */
+static void hold_joints(double *box, const Start *first) {
+    double all = 0.0;
+    for (int n = 0; n < P.joints; n++) all += reach_of(t->joints + n, first);
+    for (const JointKeys *joint = t->joints; joint < t->joints + P.joints; joint++) {
+        const double *at = isnan(joint->other) ? joint->from : first[(int)joint->particle].position;
+        double reach = isnan(joint->other) ? reach_of(joint, first) : 2.0 * all;
+        hold(box, at[0] - reach, at[1] - reach);
+        hold(box, at[0] + reach, at[1] + reach);
+    }
 }
 
 /* Hold all that the pieces of a surface sweep, which are in a box before it moves. */
@@ -279,8 +295,7 @@ void box_in(void) {
             if (arcs[n].surface == m->surface) hold_arc(box, arcs + n);
         hold_swept(all, box, m);
     }
-    for (int n = 0; n < P.strings; n++)
-        hold_string(all, t->strings + n, first + (int)t->strings[n].particle);
+    hold_joints(all, first);
     if (t->incoming) {
         double radius = t->incoming->pulley_radius;
         hold(all, -radius, -radius);

@@ -153,6 +153,7 @@ static int take_up_world(void) {
     w->kind_count = P.particles;
     w->owner_count = P.owners;
     w->mover_count = P.moving;
+    w->joint_count = P.joints;
     w->pulley = P.incoming ? P.segment_count : -1;
     w->ride_incline = P.incoming ? t.incoming->incline_deg * RADIANS : 0.0;
     w->g = t.scene->gravity;
@@ -161,6 +162,12 @@ static int take_up_world(void) {
     w->end_time = end_of_run();
     if (!lay_out_world()) return 0;
     memcpy(w->movers, P.movers, P.moving * sizeof(Mover));
+    for (int n = 0; n < P.joints; n++) {
+        const JointKeys *keys = t.joints + n;
+        w->joints[n] = (Joint){ .from = { keys->from[0], keys->from[1] }, .length = keys->length,
+                                .stiffness = keys->stiffness, .damper = keys->damper, .kind = (int)keys->kind,
+                                .particle = (int)keys->particle, .other = isnan(keys->other) ? -1 : (int)keys->other };
+    }
     Surface *to = take_segments(w->surfaces);
     if (P.incoming)
         *to++ = (Surface){ .radius = t.incoming->pulley_radius, .extent = 2.0 * PI, .speed = t.incoming->speed,

@@ -125,4 +125,5 @@ void fall_asleep(void) {
         d->vy -= 0.5 * W.gy * W.step;
     }
     balance_sleepers();
+    keep_sleepers();
 }

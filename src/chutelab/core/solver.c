@@ -78,7 +78,7 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough) {
     double first = INFINITY;
-    int driven = 0, pressing = 0;
+    int driven = 0, pressing = 0, lessened = 0;
     if (W.swings_too) {
         sweep_hung(list, count, MAX(rounds, 1) * sweeps, enough);
         return;
@@ -96,7 +96,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
         double change = sweep_rows(sweeps, plain, accurate), worst = change;
         int ended = change <= accurate;
         if (!ended) keep_bounds();
-        if (!ended || W.interact) lessen();
+        if (!ended || W.interact) lessened = lessen();
         if (left == 0) break;
         int stalled = driven && change < INFINITY && stall(list, count, INFINITY, enough);
         if (!stalled) {
@@ -120,8 +120,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
         }
         begin_anew();
     }
-    drop_noise();
-    if (W.interact) lessen();
+    if ((drop_noise() || lessened) && W.interact) lessen();
     take_rows(list, count);
 }
 
@@ -238,7 +237,7 @@ static void check_solve(void) {
     W.gained += MAX(gained, 0);
 }
 
-void solve_contacts(void) {
+void solve_contacts(int again) {
     int swings = 0;
     if (W.interact) sort_by_islands();
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
@@ -257,7 +256,7 @@ void solve_contacts(void) {
         swings |= W.swings_too;
         /* A drive presses as hard as it must: there no spring would hold, so that it gives no more than
            what parts, and friction is lowered. */
-        for (int n = from; n < to; n++) {
+        for (int n = from; n < to && !again; n++) {
             W.contacts[n].gives /= heaviest;
             if (!driven) W.contacts[n].parts = INFINITY;
         }

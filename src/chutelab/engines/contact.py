@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from functools import partial
-from math import inf
+from math import inf, nan
 from time import perf_counter
 from typing import Any
 
@@ -26,9 +26,10 @@ from chutelab.core import (
 )
 from chutelab.machine import SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
-from chutelab.results.loads import gather
+from chutelab.results.loads import gather, gather_lasting
 from chutelab.results.record import REASONS, Record
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
+from chutelab.scene.conflicts import JOINTS
 from chutelab.util.arrays import Progress, unwatched
 
 UNTIL = {name.removeprefix("UNTIL_").lower(): one for name, one in constants("Until").items()}
@@ -118,7 +119,8 @@ class Job:
             ("landing", machine.landing), ("ride_owner", 0), ("dt", machine.dt),
         ):  # fmt: skip
             setattr(module.world, name, value)
-        module.structs["Loads"].every = machine.loads
+        loads = module.structs["Loads"]
+        loads.every, loads.each = machine.loads, machine.stress
         self.begin = "run_world" if machine.is_ahead else "run_and_judge"
         if machine.is_ahead:
             hand_over(module, machine.scene)
@@ -138,6 +140,7 @@ class Job:
             ("g", machine.gravity), ("tilt", machine.tilt),
             ("air", machine.air), ("end_time", machine.end_time),
             ("mover_count", len(machine.movers)), ("trigger_count", len(machine.triggers)),
+            ("joint_count", len(machine.joints)),
         ):  # fmt: skip
             setattr(module.world, name, value)
         module.work("lay_out_world")
@@ -160,6 +163,12 @@ class Job:
         for row, one in zip(rows, machine.triggers, strict=True):
             doing = doings[{"opens": "GOES", "closes": "COMES", "starts": "STARTS"}[one.doing]]
             row["surface"], row["doing"], row["by"] = one.surface, doing, one.by
+        rows = module.array("joints", dtype("Joint"), len(machine.joints))
+        for row, joint in zip(rows, machine.joints, strict=True):
+            row["kind"], row["length"] = JOINTS.index(joint.kind), joint.length
+            row["from"], row["particle"] = joint.anchor or (nan, nan), joint.particle
+            row["other"], row["stiffness"] = joint.other, joint.stiffness
+            row["damper"] = joint.damper
         pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials))
         pairs = pairs.reshape(self.kinds, -1)
         own = pairs[:, : self.kinds]
@@ -271,6 +280,9 @@ class Job:
                 recorder.hinge_work[row["surface"]] = by_hand if row["steered"] else work
             swings = module.array("swings", dtype("Swing"), world.swing_count).view(SWING)
             recorder.swings = swings[np.argsort(swings["surface"], kind="stable")]
+        joints = module.array("joints", dtype("Joint"), world.joint_count)
+        springs = joints[joints["kind"] == JOINTS.index("spring")]
+        recorder.springs = np.column_stack([springs["kept"], springs["damped"], springs["given"]])
         triggers = module.array("triggers", dtype("Trigger"), world.trigger_count)
         recorder.triggered = triggers["t"].copy()
         recorder.contacts = world.impact_count
@@ -278,3 +290,4 @@ class Job:
         rows = module.array("totals", dtype("Total"), world.total_count)
         recorder.take_totals(rows)
         recorder.impulses = gather(module, self.owners)
+        recorder.lasting = gather_lasting(module)

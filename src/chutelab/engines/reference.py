@@ -139,7 +139,7 @@ def _plain(machine: Machine) -> Machine:
     parts, wheel = machine.segments, machine.pulley
     bent = any(len(part.surface) for part in machine.parts[1:])
     for there, what in (
-        (machine.outlines[kind] is not None or machine.threads, "disks without strings"),
+        (machine.outlines[kind] is not None or machine.joints, "disks without joints"),
         (bent, "straight surfaces, and the drive pulley"),
         (np.isfinite([parts.appears, parts.vanishes]).any(), "surfaces that are always there"),
         (machine.movers, "surfaces that stay where they are"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from math import inf
+from math import hypot, inf
 from time import perf_counter
 
 import numpy as np
@@ -31,8 +31,10 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         raise ValueError(f"engine = {wanted!r}: one of {', '.join(ENGINES)}")
     if wanted != "auto":
         return wanted
-    if any(outline is not None for outline in machine.outlines) or machine.threads:
+    if any(outline is not None for outline in machine.outlines):
         return "pymunk"
+    if machine.joints:
+        return "pymunk" if unjoined(machine) else "contact"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
     return "contact" if stepped or machine.tilt or machine.scene.clings else "exact"
 
@@ -207,8 +209,12 @@ def must_fit(machine: Machine, name: str) -> None:
                 key, shape = f"{scene.head('particle', n)}.shape", scene.particles[n].shape
                 allowed = f'a disk or sphere with run.engine = "{name}"; the pymunk engine has it'
                 raise refused(scene, key, shape, allowed)
-        if machine.threads:
-            raise refused(scene, "string", len(machine.threads), "none, or the pymunk engine")
+    if name != "pymunk" and machine.joints:
+        table = machine.joints[0].kind
+        if name == "exact" or (why := unjoined(machine)):
+            engines = "contact or pymunk" if name == "exact" else "pymunk"
+            why = f"because {table}[0] joins what moves" if name == "exact" else f"because {why}"
+            raise refused(scene, "run.engine", name, f"{engines}, {why}")
     if name == "exact":
         if machine.triggers:
             waits = machine.surfaces[machine.triggers[0].surface]
@@ -244,6 +250,24 @@ def must_fit(machine: Machine, name: str) -> None:
         raise refused(scene, "air_density", machine.air, allowed)
     if any(scene.particles[kind].radius == 0.0 for kind in scene.kinds):
         raise refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
+
+
+def unjoined(machine: Machine) -> str:
+    """Return why the contact engine cannot run a machine with joints, or nothing."""
+    scene = machine.scene
+    if machine.count > 1 and not machine.interact:
+        return "several particles that do not meet hang on joints"
+    if scene.hinges:
+        return "joints and hinges are in one scene"
+    for joint in machine.joints:
+        far, own = joint.ends(machine.releases.position)
+        if joint.kind == "string" and hypot(*(own - far)) > (1.0 + TAUT) * joint.length:
+            return "a string is shorter than the distance at the release"
+    return ""
+
+
+TAUT = 1e-9
+"""Share of its length by which a string may be too short: that is rounding."""
 
 
 def refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:

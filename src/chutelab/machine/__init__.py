@@ -13,10 +13,10 @@ from chutelab.machine.movers import SWING, Mover
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
     Caution,
+    Joint,
     Machine,
     Particle,
     Pulley,
-    Thread,
     moved,
     origin,
 )
@@ -29,6 +29,7 @@ __all__ = [
     "SWING",
     "Arcs",
     "Caution",
+    "Joint",
     "Machine",
     "Mover",
     "Particle",
@@ -36,7 +37,6 @@ __all__ = [
     "Pulley",
     "RefusedError",
     "Segments",
-    "Thread",
     "ahead",
     "build",
     "hand_over",

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from chutelab.core import REAL, Module, borrow, constants, dtype, give_back
 from chutelab.machine.movers import Mover
-from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Thread, Trigger
+from chutelab.machine.parts import Caution, Joint, Machine, Particle, Pulley, Trigger
 from chutelab.machine.releases import RefusedError, draw
 from chutelab.machine.shapes import KINDS, Pieces
 from chutelab.scene import Fault, Plate, Scene
+from chutelab.scene.conflicts import JOINTS
 from chutelab.scene.units import polygon_moment
 from chutelab.scene.variants import Family
 from chutelab.util.arrays import Floats, Ints, Numbers, Watch, unwatched
@@ -33,6 +34,9 @@ WORDS = {"adhesion": inf, "impact": 0.0, "top": 1.0}
 
 PASSES = -1.0
 """Restitution of two kinds that pass through each other; `meet` of the core's grid.c."""
+
+LACKS = ("length", "stiffness", "damper")
+"""Keys that not all joints have."""
 
 WORD = 2**32
 """Seeds are handed over as two numbers below it."""
@@ -76,8 +80,9 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
         add("ConveyorKeys", conveyor)
     for surface in scene.surface:
         add("SurfaceKeys", surface, corners=len(surface.points or ()))
-    for string in scene.string:
-        add("StringKeys", string)
+    for table, joint in scene.joints:
+        lacks = {key: None for key in LACKS if not hasattr(joint, key)}
+        add("JointKeys", joint, kind=JOINTS.index(table), **lacks)
     for name, one in scene.movers.items():
         shake, travel, motor = one.shake, one.travel, one.motor
         place = {} if one.hinge in (None, "pivot") else {"pivot": value(one, "hinge")}
@@ -106,7 +111,7 @@ def counts(scene: Scene) -> dict[str, int]:
         "particles": len(scene.particles), "streams": len(scene.streams),
         "incoming": scene.incoming is not None, "outgoing": scene.outgoing is not None,
         "plates": len(scene.plates), "conveyors": len(scene.conveyor),
-        "surfaces": len(scene.surface), "strings": len(scene.string),
+        "surfaces": len(scene.surface), "joints": len(scene.joints),
         "moving": len(scene.movers),
     }  # fmt: skip
 
@@ -264,11 +269,14 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         pairs = np.array([[meeting(a, b) for b in every] for a in every])
         through = [[scene.passes(a, b) for b in every] for a in every]
         pairs[..., 0] = np.where(through, PASSES, pairs[..., 0])
-    threads = []
-    for string in scene.string:
-        x, y = releases.position[string.particle].tolist()
-        reach = float(hypot(x - string.from_[0], y - string.from_[1]))
-        threads.append(Thread(string.from_, string.particle, string.length or reach))
+    joints = []
+    for table, one in () if family else scene.joints:
+        (x, y), other = releases.position[one.particle].tolist(), one.other
+        u, v = releases.position[other].tolist() if one.from_ is None else one.from_
+        rest = getattr(one, "length", None) or float(hypot(x - u, y - v))
+        own = {key: getattr(one, key) for key in LACKS[1:] if hasattr(one, key)}
+        second = -1 if other is None else other
+        joints.append(Joint(table, one.particle, rest, one.from_, second, **own))
     triggers = tuple(
         Trigger(names.index(name), doing, names.index(by)) for name, doing, by in scene.triggers
     )
@@ -295,7 +303,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
             [[scene.cohesion(a, b) for b in (*every, *names)] for a in every], dtype=float
         ),
         outlines=_outlines(scene),
-        threads=() if family else tuple(threads),
+        joints=tuple(joints),
         movers=movers,
         triggers=triggers,
         streams=tuple(str(stream.name) for stream in scene.streams),
@@ -329,7 +337,7 @@ def ahead(scene: Scene) -> Machine:
         engine=scene.run.engine,
         count=scene.count,
         outlines=_outlines(scene),
-        **({} if scene.string else {"threads": ()}),
+        **({} if scene.joints else {"joints": ()}),
         **({} if scene.movers else {"movers": ()}),
         triggers=(),
     )

@@ -112,12 +112,23 @@ class Pulley:
 
 
 @dataclass(frozen=True)
-class Thread:
-    """A string without mass from a point to the centre of a particle; it pulls, but cannot push."""
+class Joint:
+    """A string, rod, spring or pin of a particle, with a point or with another particle."""
 
-    anchor: tuple[float, float]  # m
+    kind: str  # of `JOINTS`
     particle: int
-    length: float  # m
+    length: float  # m; of a spring at rest
+    anchor: tuple[float, float] | None  # m; of a pin where it is at the release
+    other: int = -1  # the other particle
+    stiffness: float = 0.0  # N/m
+    damper: float = 0.0  # N s/m
+
+    def ends(self, positions: Floats) -> Floats:
+        """Return both ends, (..., 2, 2), where particles are at `positions` (..., N, 2)."""
+        own = positions[..., self.particle, :]
+        far = np.broadcast_to(self.anchor or nan, own.shape)
+        far = positions[..., self.other, :] if self.other >= 0 else far
+        return np.stack([far, own], axis=-2)
 
 
 class Trigger(NamedTuple):
@@ -163,7 +174,7 @@ class Machine:
     rolling: Floats  # (K,), rolling friction of a kind on everything: its arm over the radius
     cohesion: Floats  # (K, K + S), N; pulls a kind to another, and to a surface
     outlines: tuple[Floats | None, ...]  # (K); of boxes and polygons corners (n, 2)
-    threads: tuple[Thread, ...]
+    joints: tuple[Joint, ...]
     movers: tuple[Mover, ...]
     triggers: tuple[Trigger, ...]
     streams: tuple[str, ...]  # names; `Releases.stream` tells whose a particle is
@@ -228,6 +239,11 @@ class Machine:
     def loads(self) -> float:
         """Width of the bins in which loads on surfaces are counted, s; 0 if they are not."""
         return 0.0 if self.family is not None else self.scene.run.loads or 0.0
+
+    @property
+    def stress(self) -> float:
+        """Width of the bins in which lasting contacts are kept, s; 0 if they are not."""
+        return 0.0 if self.family is not None else self.scene.run.stress or 0.0
 
     @cached_property
     def count(self) -> int:
@@ -343,9 +359,9 @@ def moved(machine: Machine, x: float, y: float) -> Machine:
             position=releases.position + by,
             exit_box=releases.exit_box + np.tile(by, 2),
         ),
-        threads=tuple(
-            replace(thread, anchor=(thread.anchor[0] + x, thread.anchor[1] + y))
-            for thread in machine.threads
+        joints=tuple(
+            replace(joint, anchor=joint.anchor and (joint.anchor[0] + x, joint.anchor[1] + y))
+            for joint in machine.joints
         ),
         movers=tuple(
             replace(mover, pivot=(mover.pivot[0] + x, mover.pivot[1] + y))

@@ -16,9 +16,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from chutelab.core import number as number_of
 from chutelab.results.record import Kind, Record, hermite
-from chutelab.util.arrays import Floats, Ints
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.errors import InputError, MissingLibraryError
 from chutelab.util.files import whole
 from chutelab.util.tables import Sheet, Shown, number
@@ -39,6 +41,8 @@ CHUNK: Final = 500_000
 
 NODES: Final = 3
 """Of Gauss's rule for the integral of the kernel along a branch, a third of its width: to 1e-4."""
+
+SAME: Final[float] = number_of("SAME_IMPULSE")
 
 NAMES: Final = {
     "density": "kg/m²", "vx": "m/s", "vy": "m/s", "speed": "m/s", "temperature": "m²/s²",
@@ -74,13 +78,14 @@ class Fields(Shown):
     kinetic : ndarray, shape (2, 2, X, Y)
         Kinetic stress, -Σ m w v' v', N/m; negative is compression.
     contact : ndarray, shape (2, 2, X, Y)
-        Of blows, -Σ J b ∫ w over the window's length: J on a particle, b to its centre from that of
-        the other or from where it meets a surface, N/m.
+        Of blows and, with ``run.stress``, of lasting contacts, -Σ J b ∫ w over the window's length:
+        J on a particle, b to its centre from that of the other or from where it meets a surface,
+        N/m.
     traction : ndarray, shape (2, X, Y)
-        What surfaces give by blows, Σ J w at the contact over the window's length, N/m².
-    lasting : float
-        Share of the impulses on particles that lasting contacts gave in the window. The recording
-        has these of each particle, not of each pair: contact stress and traction leave them out.
+        What surfaces give by these, Σ J w at the contact over the window's length, N/m².
+    left_out : float
+        Share of the impulses on particles in the window that are not in contact stress and
+        traction: those of lasting contacts, where the recording does not have them by pairs.
     """
 
     x: Floats
@@ -94,7 +99,7 @@ class Fields(Shown):
     kinetic: Floats
     contact: Floats
     traction: Floats
-    lasting: float
+    left_out: float
 
     def __getitem__(self, name: str) -> Floats:
         """Return one of `NAMES`, (X, Y); stress is kinetic and contact stress together."""
@@ -126,10 +131,10 @@ class Fields(Shown):
             f"Lucy's kernel, width {number(self.width)} m, on cells of {number(self.cell)} m; mean"
             f" from {number(begin)} to {number(end)} s"
         )
-        if self.lasting > 0.0:
+        if self.left_out > 0.0:
             said += (
-                f"; lasting contacts, {100.0 * self.lasting:.0f} % of all impulses there, are not"
-                " in the stress: recordings do not have them by pairs"
+                f"; lasting contacts, {100.0 * self.left_out:.0f} % of all impulses there, are not"
+                " in the stress: the contact engine keeps them with run.stress, such as 0.01 s"
             )
         return said
 
@@ -153,7 +158,7 @@ class Fields(Shown):
         }
         return {
             "window": list(self.window), "kernel": "Lucy", "width": self.width, "cell": self.cell,
-            "mass": self.mass, "lasting": self.lasting, "fields": told,
+            "mass": self.mass, "left_out": self.left_out, "fields": told,
         }  # fmt: skip
 
     def rows(self) -> Iterator[Sequence[object]]:
@@ -301,7 +306,9 @@ def fields(
     kinetic = np.where(some, mean[:, None] * momentum[None] - flow, 0.0)
     heat = (-0.5 * (kinetic[0, 0] + kinetic[1, 1])).clip(min=0.0)
     contact, traction = np.zeros((2, 2, *grid.shape)), np.zeros((2, *grid.shape))
-    blows = _blows(recording, begin, end, grid, contact, traction)
+    blows = _blows(recording, begin, end)
+    for given in (blows, _kept(recording, begin, end, samples)):
+        given.spread(grid, contact, traction)
     return Fields(
         x=grid.low[0] + (np.arange(grid.shape[0]) + 0.5) * cell,
         y=grid.low[1] + (np.arange(grid.shape[1]) + 0.5) * cell,
@@ -314,42 +321,101 @@ def fields(
         kinetic=kinetic,
         contact=contact / (end - begin),
         traction=traction / (end - begin),
-        lasting=_lasting(recording, begin, end, blows),
+        left_out=0.0 if _keeps(recording) else _left_out(recording, begin, end, blows),
     )
 
 
-def _blows(
-    recording: Record, begin: float, end: float, grid: _Grid, contact: Floats, traction: Floats
-) -> float:
-    """Add what blows give to the sums; return the sum of the impulses on particles, N s."""
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What contacts gave: impulses (c, 2), N s, on particles at centers (c, 2), m.
+
+    Branches (c, 2), m, lead to them from the other's, or from places on surfaces (`on_surface`);
+    `stress` (c, 2, 2), N m s, is the sum of J b.
+    """
+
+    center: Floats
+    branch: Floats
+    impulse: Floats
+    stress: Floats
+    on_surface: Bools
+
+    def spread(self, grid: _Grid, contact: Floats, traction: Floats) -> None:
+        """Add it to the sums."""
+        stress, flat = -self.stress.reshape(-1, 4).T, contact.reshape(4, *grid.shape)
+        for node, weight in zip(*np.polynomial.legendre.leggauss(NODES), strict=True):
+            places = self.center - 0.5 * (1.0 + node) * self.branch
+            grid.add(flat, places, 0.5 * weight * stress)
+        borne = self.on_surface
+        grid.add(traction, (self.center - self.branch)[borne], self.impulse[borne].T)
+
+    @property
+    def size(self) -> float:
+        """Sum of the sizes of impulses on particles, N s."""
+        return float((np.hypot(*self.impulse.T) * np.where(self.on_surface, 1.0, 2.0)).sum())
+
+
+def _blows(recording: Record, begin: float, end: float) -> _Given:
+    """Return what blows gave in a window.
+
+    Where all that a particle touches was solved at once, its change is that of several impulses:
+    they are among what is kept of lasting contacts.
+    """
     some = recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
     some = some[(some["t"] >= begin) & (some["t"] < end)]
-    pair = some["other"] >= 0
-    own, other = some["particle"], some["other"]
-    center, radius = some["position"], recording.radius[own]
-    change = recording.mass[own][:, None] * (some["velocity_after"] - some["velocity_before"])
-    # m Δv = J_n n + J_t (n_y, -n_x): as complex numbers n (J_n - i J_t).
-    push = some["normal_impulse"] - 1j * some["tangential_impulse"]
-    turned = np.divide(change[:, 0] + 1j * change[:, 1], push, out=np.ones_like(push),
-                       where=push != 0.0)  # fmt: skip
-    normal = np.stack([turned.real, turned.imag], axis=-1)
-    normal /= np.hypot(*normal.T)[:, None]
-    branch = radius[:, None] * normal
-    branch[pair] = center[pair] - _places(recording, other[pair], some["t"][pair])
-    normal[pair] = branch[pair] / np.hypot(*branch[pair].T)[:, None]
-    impulse = some["normal_impulse"][:, None] * normal
-    impulse += some["tangential_impulse"][:, None] * np.stack(
-        [normal[:, 1], -normal[:, 0]], axis=-1
+    change = recording.mass[some["particle"]][:, None] * (
+        some["velocity_after"] - some["velocity_before"]
     )
-    stress = -(impulse[:, :, None] * branch[:, None]).reshape(-1, 4).T
-    flat = contact.reshape(4, *grid.shape)
-    for node, weight in zip(*np.polynomial.legendre.leggauss(NODES), strict=True):
-        grid.add(flat, center - 0.5 * (1.0 + node) * branch, 0.5 * weight * stress)
-    grid.add(traction, (center - branch)[~pair], impulse[~pair].T)
-    return float((np.hypot(*impulse.T) * np.where(pair, 2.0, 1.0)).sum())
+    # J = J_n n + J_t (n_y, -n_x): as complex numbers n (J_n - i J_t).
+    push = some["normal_impulse"] - 1j * some["tangential_impulse"]
+    alone = np.abs(np.hypot(*change.T) - np.abs(push)) <= SAME * np.abs(push)
+    some, impulse, push = some[alone], change[alone], push[alone]
+    center, pair = some["position"], some["other"] >= 0
+    normal = np.divide(impulse[:, 0] + 1j * impulse[:, 1], push, out=np.ones_like(push),
+                       where=push != 0.0)  # fmt: skip
+    reach = recording.radius[some["particle"]] + np.where(
+        pair, recording.radius[some["other"]], 0.0
+    )
+    branch = reach[:, None] * _plane(normal / np.abs(normal))
+    return _Given(center, branch, impulse, impulse[:, :, None] * branch[:, None], ~pair)
 
 
-def _lasting(recording: Record, begin: float, end: float, blows: float) -> float:
+def _plane(numbers: NDArray[np.complex128]) -> Floats:
+    """Return complex numbers (c,) as vectors (c, 2)."""
+    return np.stack([numbers.real, numbers.imag], axis=-1)
+
+
+def _keeps(recording: Record) -> bool:
+    """Whether a recording has what lasting contacts gave."""
+    return recording.engine == "contact" and recording.machine.stress > 0.0
+
+
+def _kept(recording: Record, begin: float, end: float, samples: int) -> _Given:
+    """Return what lasting contacts gave in a window, where it is kept.
+
+    Bins are evenly of the times in them; longer ones than a sample are seen at several times.
+    """
+    rows = recording.lasting
+    rows = rows[(rows["to"] > begin) & (rows["from"] < end) & rows["impulse"].any(axis=-1)]
+    first, last = rows["from"].clip(begin), rows["to"].clip(max=end)
+    parts = np.maximum(1, np.ceil((last - first) * samples / (end - begin))).astype(np.int64)
+    of = np.repeat(np.arange(len(rows)), parts)
+    nth = np.arange(len(of)) - np.repeat(parts.cumsum() - parts, parts)
+    span = (last - first) / parts
+    times = first[of] + (nth + 0.5) * span[of]
+    share = (span / (rows["to"] - rows["from"]))[of]
+    rows = rows[of]
+    impulse, stress = share[:, None] * rows["impulse"], share[:, None, None] * rows["stress"]
+    own, other = rows["particle"], rows["other"]
+    center = _places(recording, own, times)
+    pair = other >= 0
+    # Along b = Jᵀ (J b) / J².
+    branch = np.einsum("ca,cab->cb", impulse, stress)
+    branch *= (recording.radius[own] / np.hypot(*branch.T))[:, None]
+    branch[pair] = center[pair] - _places(recording, other[pair], times[pair])
+    return _Given(center, branch, impulse, stress, ~pair)
+
+
+def _left_out(recording: Record, begin: float, end: float, blows: _Given) -> float:
     """Return the share of the impulses on particles that lasting contacts gave, 0 to 1."""
     knots, owner = recording.knots, recording.owner
     h = np.diff(knots["t"])
@@ -362,7 +428,7 @@ def _lasting(recording: Record, begin: float, end: float, blows: float) -> float
     fast = np.hypot(*knots["velocity"][left].T) + recording.gravity * h[left]
     borne = recording.mass[owner[left]] * np.where(sizes > 1e-9 * fast, sizes, 0.0)
     lasting = float((borne * within[left] / h[left]).sum())
-    return lasting / (lasting + blows) if lasting > 0.0 else 0.0
+    return lasting / (lasting + blows.size) if lasting > 0.0 else 0.0
 
 
 def _places(recording: Record, particle: Ints, times: Floats) -> Floats:
@@ -375,4 +441,4 @@ def _places(recording: Record, particle: Ints, times: Floats) -> Floats:
         left, right = np.where(passed, middle, left), np.where(passed, right, middle)
     h = t[left + 1] - t[left]
     share = np.divide(times - t[left], h, out=np.ones_like(h), where=h > 0.0).clip(0.0, 1.0)
-    return np.stack([hermite(recording.knots, left, share, axis)[0] for axis in (0, 1)], axis=-1)
+    return hermite(recording.knots, left, share)[0]

@@ -257,7 +257,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("row", recording.knots.dtype.itemsize // 8), ("book_rows", len(books) // 3),
         ("surface_count", len(recording.surfaces)), ("engine", _ENGINES.index(recording.engine)),
         ("interact", machine.interact or len(recording.swings) + len(recording.totals) > 0),
-        ("alike", alike(recording)), ("family", rows.ndim > 1),
+        ("joined", len(machine.joints) > 0), ("alike", alike(recording)), ("family", rows.ndim > 1),
         ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
         ("steps", recording.steps), ("unreal", unreal),
         ("tilt", machine.tilt), ("dt", 0.0 if exact else machine.dt),
@@ -287,7 +287,7 @@ def alike(recording: Record) -> bool:
     """Tell whether all is left to Chipmunk, in steps that are all alike."""
     m = recording.machine
     return recording.engine == "pymunk" and (
-        m.interact or not m.align or len(m.threads) + len(m.movers) > 0 or not _round(m)
+        m.interact or not m.align or len(m.joints) + len(m.movers) > 0 or not _round(m)
     )
 
 
@@ -337,7 +337,7 @@ def _advice(recording: Record, law: str, figures: Any) -> str:
     step = f"a step of less than {number(machine.dt)} s (--dt)"
     if law == STEP or (alike(recording) and law in (THROUGH, INSIDE)):
         fastest = float(np.min(inner_radius(machine))) / figures.speed
-        only = alike(recording) and (machine.threads or not _round(machine))
+        only = alike(recording) and (machine.joints or not _round(machine))
         other = "" if only else ", or --engine contact"
         return f"take a step of less than {number(min(fastest, machine.dt))} s (--dt){other}"
     return f"take {step}; {report}"

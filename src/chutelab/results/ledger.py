@@ -46,10 +46,10 @@ class Ledger(Shown):
         it; of what hangs on a hinge the work of its motor. In the tracks and in `by_stream` it is
         part of the belt work, of a hinge all that it gives to particles.
     spring : tuple of float
-        Energies in the springs of hinges at the start and at the end. Of what hangs on hinges
+        Energies in springs at the start and at the end. Of what hangs on hinges
         kinetic and potential energies are counted, too, the latter with y = 0 at the hinge.
     damper_loss : float
-        What the dampers of hinges take.
+        What dampers take.
     push_work : float
         Work of forces on particles by hand, see `chutelab.start`. In the tracks and in `by_stream`
         it is part of the belt work.
@@ -169,7 +169,20 @@ def ledger(recording: Record) -> Ledger:
         by_surface[AIR] = dict(zip(ENTRIES, (0.0, 0.0, recording.air_loss), strict=True))
     closed, work = _closed(found), float(recording.drives.sum())
     closed["belt_work"] -= work
-    if pushed := by_surface[PARTICLES]["belt_work"]:
+    pushed = by_surface[PARTICLES]["belt_work"]
+    if len(springs := recording.springs):
+        # What springs gave is told as what they keep, and what their dampers took.
+        before, after, damped, given = springs.sum(axis=0).tolist()
+        pushed = pushed - given if abs(pushed - given) > ROUNDING * abs(springs).sum() else 0.0
+        by_surface[PARTICLES] |= {"belt_work": pushed, "damper_loss": damped}
+        closed |= {
+            "belt_work": closed["belt_work"] - given,
+            "spring": (before, after),
+            "damper_loss": damped,
+            "residual": closed["residual"] + after - before + given + damped,
+            "turned_over": closed["turned_over"] + abs(after - before) + damped,
+        }
+    if pushed:
         by_surface[PARTICLES] |= {"belt_work": 0.0, "push_work": pushed}
         closed |= {"belt_work": closed["belt_work"] - pushed, "push_work": pushed}
     return Ledger(

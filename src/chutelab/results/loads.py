@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core import REAL, Module
+from chutelab.core import REAL, Module, dtype
 from chutelab.core import number as constant
 from chutelab.machine import Machine
-from chutelab.results.record import LOAD, Record, kept
+from chutelab.results.record import LASTING, LOAD, Record, kept
 from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.tables import Sheet, Shown, number
@@ -46,6 +46,17 @@ def gather(module: Module, surfaces: int) -> NDArray[np.void]:
     rows = module.array("bins", REAL, prod(shape), of="Loads").reshape(shape)
     # Numbers are copied faster than records of them.
     return rows[:, :surfaces].copy().view(LOAD)[..., 0]
+
+
+def gather_lasting(module: Module) -> NDArray[np.void]:
+    """Return what lasting contacts gave in the core's contact engine, (C,)."""
+    told: Any = module.structs["Loads"]
+    if not told.each:
+        return np.empty(0, LASTING)
+    if told.overflow:
+        raise InputError("so long that all bins have room in memory", "run.stress", told.each)
+    rows = module.array("lasting", dtype("Lasting"), told.lasting_count, of="Loads")
+    return rows.copy().view(LASTING)
 
 
 class Bins:

@@ -123,6 +123,23 @@ LOAD = np.dtype([
 """
 
 
+LASTING = np.dtype([
+    ("particle", "i4"), ("other", "i4"), ("from", "f8"), ("to", "f8"), ("impulse", "f8", 2),
+    ("stress", "f8", (2, 2)),
+])  # fmt: skip
+"""What a lasting contact gave a particle between two times, in SI units.
+
+So are impulses of blows at one instant that were solved together: their events have the change of
+momentum of all of them, which is not of the size of the event's own impulse.
+
+
+- ``other``: the other particle, which got the opposite; or -1 less the index of a surface.
+- ``impulse``: J, N s.
+- ``stress``: sums of J_a b_b, N m s; b to the particle's centre from the other's, or from the
+  place where it touches the surface.
+"""
+
+
 def balance(entries: NDArray[Any]) -> Floats:
     """Return the energy (J) that entries (..., 3) bring: belt work less both losses."""
     return np.asarray(entries[..., 0] - entries[..., 1] - entries[..., 2])
@@ -162,20 +179,23 @@ def blocks(knots: NDArray[Any], offsets: Ints, times: Floats) -> Iterator[Cells]
         yield begin + row, released[column], left, share
 
 
-def hermite(knots: NDArray[Any], left: Ints, share: Floats, axis: int) -> tuple[Floats, Floats]:
-    """Return one coordinate (m) and its velocity (m/s) on the cubic between two knots, (c,)."""
+def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Floats]:
+    """Return places (m) and velocities (m/s) on the cubics between two knots each, (c, 2)."""
     s, h = share, knots["t"][left + 1] - knots["t"][left]
-    position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
-    pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
-    dx = pb - pa
-    # Written around the left knot, so that a long flight loses no digits.
-    where = pa + s * (
-        h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
-    )
-    slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
-    pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
+    places, velocities = np.empty((2, len(left), 2))
     over = s >= 1.0
-    return np.where(over, pb, where), np.where(over, vb, pace)
+    for axis in (0, 1):
+        position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
+        pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
+        dx = pb - pa
+        # Written around the left knot, so that a long flight loses no digits.
+        where = pa + s * (
+            h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
+        )
+        slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
+        pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
+        places[:, axis], velocities[:, axis] = np.where(over, pb, where), np.where(over, vb, pace)
+    return places, velocities
 
 
 class Motion(tuple[Floats, Floats]):
@@ -287,11 +307,17 @@ class Record(Shown):
     impulses : ndarray, shape (B, len(surfaces) - 1) or (0, 0), dtype `LOAD`
         What each surface bears in bins of ``run.loads`` seconds from 0 s on, up to the last one in
         which anything is borne; empty where that is not asked for.
+    lasting : ndarray, shape (C,) or (0,), dtype `LASTING`
+        What lasting contacts gave in bins of ``run.stress`` seconds, or as long as what they held
+        slept; blows are events. Of the contact engine, where that is asked for.
     swings : ndarray, shape (K,) or (0,), dtype `SWING`
         States of what hangs on hinges, surface by surface, each one's in the order of time.
     hinge_work : ndarray, shape (len(surfaces), 3) or (0, 3)
         J; of what hangs on hinges the work of its motor, and losses at its stops and in its damper.
         Empty where nothing does.
+    springs : ndarray, shape (S, 4)
+        J; of each ``[[spring]]`` what it kept when it was tied, what it keeps at the end, what its
+        damper took, and what it gave to particles, which is part of their belt work in the knots.
     triggered : ndarray, shape (len(machine.triggers),)
         When what waits for a touch came, went, or began to move, s; inf of what still waits.
     """
@@ -314,13 +340,22 @@ class Record(Shown):
     unsolved: Floats = field(default_factory=lambda: np.empty(0))
     drives: Floats = field(default_factory=lambda: np.zeros(0))
     impulses: NDArray[Any] = field(default_factory=lambda: np.empty((0, 0), LOAD))
+    lasting: NDArray[Any] = field(default_factory=lambda: np.empty(0, LASTING))
     swings: NDArray[Any] = field(default_factory=lambda: np.empty(0, SWING))
     hinge_work: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    springs: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     triggered: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         arrays = "knots offsets ended events by_surface angle totals unsolved drives impulses"
-        for name in (*arrays.split(), "swings", "hinge_work", "triggered"):
+        for name in (
+            *arrays.split(),
+            "lasting",
+            "swings",
+            "hinge_work",
+            "springs",
+            "triggered",
+        ):
             getattr(self, name).flags.writeable = False
         if len(self.triggered):
             object.__setattr__(self, "machine", self.machine.when(self.triggered))
@@ -497,9 +532,8 @@ class Record(Shown):
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         position, velocity = np.full((2, len(times), self.count, 2), np.nan)
         for row, particle, left, share in self.blocks(times):
-            for axis in (0, 1):
-                where, pace = hermite(self.knots, left, share, axis)
-                position[row, particle, axis], velocity[row, particle, axis] = where, pace
+            where, pace = hermite(self.knots, left, share)
+            position[row, particle], velocity[row, particle] = where, pace
         return Motion(position, velocity, self, times)
 
     def energy_at(self, times: ArrayLike) -> dict[str, Floats]:
@@ -595,11 +629,11 @@ class Record(Shown):
     ) -> tuple[Floats, ...]:
         """Return what `energy_at` does, of each cell, (c,)."""
         a, b = self.knots[left], self.knots[left + 1]
-        (x, vx), (y, vy) = (hermite(self.knots, left, share, axis) for axis in (0, 1))
+        where, pace = hermite(self.knots, left, share)
         omega = a["omega"] + share * (b["omega"] - a["omega"])
         body = self.particle.of(particle)
-        kinetic = body.kinetic(vx, vy, omega)
-        potential = body.mass * self.gravity * self.machine.height(np.stack([x, y], axis=-1))
+        kinetic = body.kinetic(pace[:, 0], pace[:, 1], omega)
+        potential = body.mass * self.gravity * self.machine.height(where)
         gain = kinetic + potential - at_release
 
         entries_a, entries_b = a["entries"].T, b["entries"].T

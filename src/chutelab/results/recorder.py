@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import SWING, Machine, moved, origin
 from chutelab.results.loads import Bins
-from chutelab.results.record import EVENT, KNOT, LOAD, REASONS, TOTAL, Kind, Record
+from chutelab.results.record import EVENT, KNOT, LASTING, LOAD, REASONS, TOTAL, Kind, Record
 from chutelab.util.arrays import Floats, Ints
 
 
@@ -76,11 +76,13 @@ class Recorder:
         self.drives = np.zeros(owners)
         self.swings = np.empty(0, SWING)
         self.hinge_work = np.zeros((owners, 3))
+        self.springs = np.zeros((0, 4))
         self.triggered = np.full(len(machine.triggers), np.inf)
         self.contacts = 0
         self.gained = self.air_loss = 0.0
         self.totals, self.unsolved = np.empty(0, TOTAL), np.empty(0)
         self.impulses = np.empty((0, 0), LOAD)
+        self.lasting = np.empty(0, LASTING)
         # Of engines that count loads here, if these are asked for.
         self.bins = Bins(machine) if machine.loads else None
         self._knots: list[NDArray[Any]] = []
@@ -252,6 +254,7 @@ class Recorder:
             drives=self.drives if self.machine.movers or len(self.swings) else np.zeros(0),
             swings=self.swings,
             triggered=self.triggered,
+            springs=self.springs,
             hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 3)),
             steps=steps,
             contacts=self.contacts,
@@ -261,6 +264,7 @@ class Recorder:
             totals=self.totals,
             unsolved=self.unsolved,
             impulses=self.impulses,
+            lasting=self.lasting,
         )
 
 

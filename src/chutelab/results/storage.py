@@ -26,6 +26,7 @@ from chutelab.results.record import (
     ENTRIES,
     EVENT,
     KNOT,
+    LASTING,
     LOAD,
     REASONS,
     TOTAL,
@@ -54,14 +55,17 @@ ARRAYS = {
     "unsolved": np.dtype("f8"),
     "drives": np.dtype("f8"),
     "impulses": LOAD,
+    "lasting": LASTING,
     "swings": SWING,
     "hinge_work": np.dtype("f8"),
+    "springs": np.dtype("f8"),
     "triggered": np.dtype("f8"),
 }
 """Arrays of a file and their types."""
 
 MAYBE = (
-    "angle", "totals", "unsolved", "drives", "impulses", "swings", "hinge_work", "triggered",
+    "angle", "totals", "unsolved", "drives", "impulses", "lasting", "swings",
+    "hinge_work", "springs", "triggered",
 )  # fmt: skip
 """Those that are left out where they are empty."""
 
@@ -225,8 +229,8 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         "unsolved": recording.unsolved,
     }  # fmt: skip
     numbers["gained"] = np.array([recording.gained, recording.air_loss], dtype=float)
-    numbers["hinge_work"] = recording.hinge_work
-    for name in ("knots", "events", "totals", "impulses", "swings"):
+    numbers |= {"hinge_work": recording.hinge_work, "springs": recording.springs}
+    for name in ("knots", "events", "totals", "impulses", "lasting", "swings"):
         array = getattr(recording, name)
         numbers |= {f"{name}.{key}": array[key] for key in array.dtype.names or ()}
     for name, values in numbers.items():
@@ -245,10 +249,18 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and recording.ended.shape == sizes.shape
         and recording.unsolved.shape in ((0,), recording.totals.shape)
         and (not recording.impulses.size or recording.impulses.shape[1:] == (surfaces - 1,))
+        and recording.lasting.ndim == 1
+        and not np.any(
+            (recording.lasting["particle"] < 0)
+            | (recording.lasting["particle"] >= len(sizes))
+            | (recording.lasting["other"] <= -surfaces)
+            | (recording.lasting["other"] >= len(sizes))
+        )
         and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
         and recording.drives.shape == ((surfaces,) if recording.machine.movers else (0,))
         and recording.hinge_work.shape == ((surfaces if len(recording.swings) else 0), 3)
+        and recording.springs.shape == (len(recording.scene.spring), 4)
         and recording.triggered.shape == (len(recording.machine.triggers),)
         and not np.any(np.isnan(recording.triggered))
         and recording.swings.ndim == 1

@@ -26,7 +26,7 @@ from typing import Any, Final
 import tomli_w
 from pydantic import ValidationError
 
-from chutelab.scene.conflicts import ConflictError, Look, conflicts
+from chutelab.scene.conflicts import JOINTS, ConflictError, Look, conflicts
 from chutelab.scene.messages import faults_of, live_faults
 from chutelab.scene.overrides import Override, apply, joined, schema, sized
 from chutelab.scene.schema import DEFAULTS, SceneTables, plain_number, to_dict
@@ -218,11 +218,13 @@ class Scene(SceneTables):
         tables = to_dict(self)
         streams = tables.get("stream", {})
         first = streams[0] if isinstance(streams, tuple) else streams
-        held = [row for row in tables.get("string", ()) if row.get("particle", 0) == 0]
         one = {**first, "count": 1, "interact": False}
-        return self.with_values(
-            {"stream": one, "expect": None, "live": None, "string": held or None}
-        )
+        changed: dict[str, Any] = {"stream": one, "expect": None, "live": None}
+        for table in JOINTS:
+            rows = tables.get(table, ())
+            own = [row for row in rows if not row.get("particle") and "other" not in row]
+            changed[table] = own or None
+        return self.with_values(changed)
 
 
 AnyScene = Scene | str | Path | Mapping[str, Any]

@@ -51,6 +51,9 @@ EITHER: Final = {"particle": "particles", "plate": "plates", "stream": "streams"
 ALWAYS: Final = ("particle", "stream", "run")
 """Tables that a scene has without writing them."""
 
+JOINTS: Final = ("string", "rod", "spring", "pin")
+"""Tables of what joins particles with points, or with each other; as `Tie` in layout.h."""
+
 MOTIONS: Final = ("turn", "shake", "travel")
 """Keys by which the motion of a surface is prescribed."""
 
@@ -321,10 +324,14 @@ def conflicts(look: Look) -> Iterator[Fault]:
         yield from contradictions(look, table, look.rows(table, int(table in ALWAYS)))
     yield from _pieces(look)
     count = sum(stream["count"] for stream in streams)
-    for string in look.rows("string"):
-        if string["particle"] >= count:
-            text = f"there are {count} particles, from 0; stream.count says how many"
-            yield string.fault("particle", text)
+    for table in JOINTS:
+        for joint in look.rows(table):
+            for key in ("particle", "other"):
+                if joint.given(key) and joint[key] >= count:
+                    text = f"there are {count} particles, from 0; stream.count says how many"
+                    yield joint.fault(key, text)
+            if joint.given("other") and joint["other"] == joint["particle"]:
+                yield joint.fault("other", f"must be another than {joint.path('particle')}")
     yield from _expectations(look, streams)
     view = look.row("view")
     low, high = view["from"], view["to"]
@@ -488,8 +495,13 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
         if row.given("hinge") and count > 1 and not meet:
             text = f"the hinge {row.path('hinge')} couples particles: several of them have to meet"
             yield streams[0].fault("interact", text)
-    if look.rows("string") and engine in ("exact", "contact"):
-        yield run.fault("engine", "string[0] needs pymunk")
+    for table in JOINTS:
+        for joint in look.rows(table):
+            if joint.given("other") and count > 1 and not meet:
+                text = f"{joint.path('other')} couples particles: they have to meet"
+                yield streams[0].fault("interact", text)
+        if look.rows(table) and engine == "exact":
+            yield run.fault("engine", f"{table}[0] needs contact or pymunk")
 
 
 def _of_kind(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:

@@ -32,7 +32,9 @@ from chutelab.util.errors import MISSING, Fault, InputError, nearest
 Location = tuple[str | int, ...]
 """Path of keys and indices, as Pydantic gives it."""
 
-LISTS: Final = ("material", "pair", "conveyor", "surface", "string", "sensor", "expect")
+LISTS: Final = (
+    "material", "pair", "conveyor", "surface", "string", "rod", "spring", "pin", "sensor", "expect",
+)  # fmt: skip
 """Tables that are always lists; of those in `EITHER` there may be one or several."""
 
 _WORDS: Final = {

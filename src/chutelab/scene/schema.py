@@ -9,19 +9,23 @@ from typing import Annotated, Any, Final, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
-from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts, stream_name
+from chutelab.scene.conflicts import EITHER, JOINTS, ConflictError, Look, conflicts, stream_name
 from chutelab.scene.materials import PRESETS, Material
 from chutelab.scene.tables import (
     Conveyor,
     Expect,
     Incoming,
+    Joint,
     Live,
     Outgoing,
     Pair,
     Particle,
+    Pin,
     Plate,
+    Rod,
     Run,
     Sensor,
+    Spring,
     Stream,
     String,
     Surface,
@@ -52,6 +56,9 @@ TABLES: Final[dict[str, type[Table]]] = {
     "conveyor": Conveyor,
     "surface": Surface,
     "string": String,
+    "rod": Rod,
+    "spring": Spring,
+    "pin": Pin,
     "stream": Stream,
     "run": Run,
     "sensor": Sensor,
@@ -81,7 +88,12 @@ def _as_either(rule: dict[str, Any]) -> None:
 
 
 def _several(default: Any, **limits: Any) -> Any:
-    return Field(default, json_schema_extra=_as_either, validate_default=False, **limits)
+    return Field(default, json_schema_extra=_as_either, **limits)
+
+
+def _usual() -> Any:
+    """Return a table with its defaults; it is made by the scene's validator, and needs no own."""
+    return Field(default_factory=dict, validate_default=True)
 
 
 Reader = Callable[[Table, str], Any]
@@ -103,7 +115,7 @@ class SceneTables(Table):
         "kg/m³",
     )
     particles: Annotated[tuple[Particle, ...], BeforeValidator(_one_or_several)] = _several(
-        (Particle(),), alias="particle", min_length=1, max_length=MOST_KINDS
+        ({},), alias="particle", min_length=1, max_length=MOST_KINDS, validate_default=True
     )
     material: tuple[Material, ...] = Field((), max_length=MOST_KINDS)
     pair: tuple[Pair, ...] = Field((), max_length=MOST_EXPECTATIONS)
@@ -115,14 +127,17 @@ class SceneTables(Table):
     conveyor: tuple[Conveyor, ...] = Field((), max_length=MOST_SURFACES)
     surface: tuple[Surface, ...] = Field((), max_length=MOST_SURFACES)
     string: tuple[String, ...] = Field((), max_length=MOST_SURFACES)
+    rod: tuple[Rod, ...] = Field((), max_length=MOST_SURFACES)
+    spring: tuple[Spring, ...] = Field((), max_length=MOST_SURFACES)
+    pin: tuple[Pin, ...] = Field((), max_length=MOST_SURFACES)
     streams: Annotated[tuple[Stream, ...], BeforeValidator(_one_or_several)] = _several(
-        (Stream(),), alias="stream", min_length=1, max_length=MOST_KINDS
+        ({},), alias="stream", min_length=1, max_length=MOST_KINDS, validate_default=True
     )
-    run: Run = Field(default_factory=Run)
+    run: Run = _usual()
     sensor: tuple[Sensor, ...] = Field((), max_length=MOST_KINDS)
     expect: tuple[Expect, ...] = Field((), max_length=MOST_EXPECTATIONS)
     view: View | None = None
-    live: Live = Field(default_factory=Live)
+    live: Live = _usual()
 
     _source: str = PrivateAttr("<scene>")
     _told: Any = PrivateAttr(None)
@@ -346,6 +361,11 @@ class SceneTables(Table):
             for doing in ("opens", "closes", "starts")
             if (when := getattr(one, f"{doing}_when", None)) is not None
         )
+
+    @property
+    def joints(self) -> tuple[tuple[str, Joint], ...]:
+        """All strings, rods, springs and pins, with the names of their tables, in this order."""
+        return tuple((table, joint) for table in JOINTS for joint in getattr(self, table))
 
     @property
     def hinges(self) -> bool:

@@ -39,6 +39,7 @@ from chutelab.scene.units import (
     Share,
     Size,
     Speed,
+    Stiffness,
     Stops,
     Switch,
     Table,
@@ -388,13 +389,44 @@ class Surface(Moving, StillSurface):
         return self
 
 
-class String(Table):
-    """A string without mass from a point to a particle's centre, for the pymunk engine."""
+class Joint(Table):
+    """What joins the centre of a particle with a point, or with that of another; without mass."""
 
-    from_: Point = described(..., "Fixed end [x, y]", "m", alias="from")
+    from_: Point | None = described(None, "Fixed end [x, y]", "m", alias="from")
     particle: Whole = described(0, "Number of the particle, over all streams, from 0", ge=0)
+    other: Whole | None = described(
+        None, "Number of the particle at the other end, instead of a point", ge=0
+    )
+
+
+class String(Joint):
+    """A string: it pulls, and goes slack; what pulls it tight loses its speed along it."""
+
     length: Length | None = described(
         None, "Length; default: the distance at the particle's release", "m"
+    )
+
+
+class Rod(Joint):
+    """A rod, as long as the distance is at the release; particles that it joins do not meet."""
+
+
+class Spring(Joint):
+    """A spring that pulls and pushes, with a damper."""
+
+    length: Length | None = described(
+        None, "Length at rest; default: the distance at the particle's release", "m"
+    )
+    stiffness: Stiffness = described(..., "Force for each m that it is longer", "N/m")
+    damper: Amount = described(0.0, "Force for each m/s that it gets longer by", "N s/m")
+
+
+class Pin(Joint):
+    """A pin that a particle turns about, or that holds two together; they do not meet."""
+
+    from_: Point = described(..., "Where it is at the release [x, y]", "m", alias="from")
+    other: Whole | None = described(
+        None, "Number of the other particle; default: it is pinned where it is", ge=0
     )
 
 
@@ -498,6 +530,14 @@ class Run(Table):
     loads: Number | None = described(
         None,
         "Width of the bins of time in which loads on surfaces are counted; default: they are not",
+        "s",
+        ge=1e-5,
+        le=1e3,
+    )
+    stress: Number | None = described(
+        None,
+        "Width of the bins of time in which the contact engine keeps what each lasting contact"
+        " gives, for the stress of fields; default: it does not",
         "s",
         ge=1e-5,
         le=1e3,

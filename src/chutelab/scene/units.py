@@ -274,6 +274,7 @@ Stops = Annotated[
     _must(lambda stops: stops[0] <= 0.0 <= stops[1] and stops[0] < stops[1],
           "[least, greatest], degrees, round the 0 where it begins"),
 ]  # fmt: skip
+Stiffness = Annotated[Number, Field(gt=0.0, le=LARGEST)]
 Inertia = Annotated[Number, Field(ge=1e-9, le=LARGEST)]
 Torque = Annotated[Number, Field(gt=0.0, le=LARGEST)]
 Frequency = Annotated[Number, Field(ge=1e-6, le=10_000.0)]

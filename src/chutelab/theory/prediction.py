@@ -516,8 +516,8 @@ def outside(scenes: Scene | Family) -> Iterator[tuple[Any, str]]:
     yield yields, "the restitution falls with speed"
     yield scene.clings, "the particle clings to what it touches"
     yield np.greater(scenes.value(scene, "air_density"), 0.0), "air slows the particle down"
-    hangs = any(string.particle == 0 for string in scene.string)
-    yield hangs, "the particle hangs on a string"
+    for table, joint in scene.joints:
+        yield 0 in (joint.particle, joint.other), f"the particle hangs on a {table}"
     for name in scene.movers:
         yield True, f"{name} moves"
     for name, *_ in scene.triggers:

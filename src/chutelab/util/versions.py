@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from contextlib import suppress
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, distribution, requires, version
+from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,9 @@ def library(module: str, what: str, extra: str) -> Any:
         raise MissingLibraryError(f"{what}: {install}", name=error.name) from error
 
 
-_BOUND = re.compile(r"([\w.-]+)[^>;]*>=([\d.]+)(?:.*extra == .([\w-]+))?")
+_BOUND = re.compile(
+    r"^Requires-Dist: ([\w.-]+)[^>;\n]*>=([\d.]+)(?:.*extra == .([\w-]+))?", re.MULTILINE
+)
 _VERSION = re.compile(r"^Version: (.+)$", re.MULTILINE)
 
 
@@ -55,19 +57,20 @@ def too_old(extra: str | None = None) -> list[str]:
     Such as "pydantic>=2.9 (2.7.0 is installed)". By default those that it always needs, else those
     of one extra. Empty where it is not installed itself.
     """
-    lines: list[str] = []
-    with suppress(PackageNotFoundError):
-        lines = requires("chutelab") or []
     found = []
-    for bound in filter(None, map(_BOUND.match, lines)):
-        if bound[3] != extra:
-            continue
-        with suppress(PackageNotFoundError):  # the import says so
-            # Reading all that is said of a package takes five times as long as its version.
-            said = _VERSION.search(distribution(bound[1]).read_text("METADATA") or "")
-            if said is not None and _numbers(said[1]) < _numbers(bound[2]):
-                found.append(f"{bound[1]}>={bound[2]} ({said[1]} is installed)")
+    for bound in _BOUND.finditer(_metadata("chutelab")):
+        # What is not there the import says.
+        said = _VERSION.search(_metadata(bound[1])) if bound[3] == extra else None
+        if said is not None and _numbers(said[1]) < _numbers(bound[2]):
+            found.append(f"{bound[1]}>={bound[2]} ({said[1]} is installed)")
     return found
+
+
+def _metadata(package: str) -> str:
+    """Return what is said of a package, "" of none; to read all of it takes five times as long."""
+    with suppress(PackageNotFoundError):
+        return distribution(package).read_text("METADATA") or ""
+    return ""
 
 
 def _numbers(version: str) -> tuple[int, ...]:

@@ -36,7 +36,7 @@ from chutelab.checks.preflight.trial import (
     stepping,
     trial_run,
 )
-from chutelab.engines.simulation import choose
+from chutelab.engines.simulation import choose, unjoined
 from chutelab.machine import DRIVE_PULLEY, Caution, Machine, build
 from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Recording
@@ -434,7 +434,7 @@ def _at_belt_height(machine: Machine, tried: Recording, particles: Ints) -> list
         track = tried.track(particle)
         times = np.linspace(track["t"][0], track["t"][-1], 2000)
         ((_, _, left, share),) = blocks(track, np.array([0, len(track)]), times)
-        (x, _), (y, _) = (hermite(track, left, share, axis) for axis in (0, 1))
+        x, y = hermite(track, left, share)[0].T
         above = np.flatnonzero(y >= level)
         if len(above):
             found.append(float(x[above[-1]]))
@@ -473,7 +473,10 @@ def preflight(scene: AnyScene) -> Preflight:
     if scene.run.engine != "auto":
         why = f'run.engine = "{engine}" asks for it'
     elif engine == "pymunk":
-        why = "boxes, polygons and strings are for no other engine"
+        why = unjoined(machine) if machine.joints else ""
+        why = why or "boxes and polygons are for no other engine"
+    elif machine.joints:
+        why = "strings, rods, springs and pins pull, which the exact engine does not follow"
     elif machine.interact:
         why = "particles meet each other, which the exact engine does not follow"
     elif machine.count == 1:

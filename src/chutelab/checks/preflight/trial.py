@@ -212,10 +212,12 @@ def built(machine: Machine) -> Iterator[Part]:
                 yield Part(surface, piece.where() + said)
         if machine.pulley is not None and machine.pulley.surface == index:
             yield Part("pulley", f"radius {machine.pulley.radius:.6g} m, axis at (0, 0)")
-    for thread in machine.threads:
-        x, y = thread.anchor
-        held = f"({x:.6g}, {y:.6g}) m to particle {thread.particle}, {thread.length:.6g} m long"
-        yield Part("string", f"from {held}")
+    for joint in machine.joints:
+        begin = f"particle {joint.other}"
+        if joint.anchor is not None:
+            begin = "({:.6g}, {:.6g}) m".format(*joint.anchor)
+        held = f"from {begin} to particle {joint.particle}, {joint.length:.6g} m long"
+        yield Part(joint.kind, held)
     releases = machine.releases
     for n, kind in enumerate(machine.scene.particles):
         which = (releases.kind == n).nonzero()[0]
@@ -317,7 +319,7 @@ def trial_run(machine: Machine, engine: str) -> Trial:
     """
     scene = machine.scene
     few = machine
-    if engine != "exact" and machine.count > MOST and not scene.string:
+    if engine != "exact" and machine.count > MOST and not scene.joints:
         share = MOST / machine.count
         fewer = {
             f"stream[{n}].count": ceil(share * stream.count)

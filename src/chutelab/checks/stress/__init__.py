@@ -228,15 +228,14 @@ def spin(e: Evidence) -> Verdict | None:
 
 def need_judged(scene: Scene) -> None:
     """Raise a `SceneError` unless the laws are about a scene: disks and what stays where it is."""
-    allowed = "not judged: the laws are about disks without strings"
+    allowed = "not judged: the laws are about disks without joints"
     faults = [
         Fault(f"{scene.head('particle', i)}.shape", kind.shape, allowed)
         for i, kind in enumerate(scene.particles)
         if kind.shape not in {"disk", "sphere"}
     ]
     faults += [Fault("surface", name, "not judged: it moves") for name in scene.movers]
-    if scene.string:
-        faults.append(Fault("string", None, allowed))
+    faults += [Fault(table, None, allowed) for table in {table: 0 for table, _ in scene.joints}]
     if faults:
         raise SceneError(scene.source, faults)
 

@@ -6,6 +6,7 @@ outside.
 - `world`: the surfaces as a `pymunk.Space`; rides on the belt that holds; tracks.
 - `lone`: one particle whose steps end at its contacts.
 - `shared`: all particles in one Space, in steps that are all alike.
+- `joints`: strings, rods, springs and pins.
 - `moving`: surfaces that move, as kinematic bodies.
 - `shapes`: their bodies and shapes, chains for arcs, and what Chipmunk is told at a contact.
 """
@@ -34,7 +35,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     `progress` is called now and then with the share of the run that is done, and may end the run.
     With `align`, a lone particle's blows are right to rounding error, its lasting contacts of order
     2 in the step, which is no longer than `dt` and half a radius' way. Particles that meet, boxes,
-    what hangs on strings, surfaces that move, air, and steps that are all alike, are of order 1:
+    what hangs on joints, surfaces that move, air, and steps that are all alike, are of order 1:
     `dt` times the speed should be less than the radius, or half a box's width, or they overlap by
     as much, and pass through surfaces.
 
@@ -57,7 +58,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     world = World(machine)
     try:
         boxes = any(outline is not None for outline in machine.outlines)
-        apart = not (machine.interact or boxes or machine.threads or machine.movers)
+        apart = not (machine.interact or boxes or machine.joints or machine.movers)
         apart = apart and not machine.triggers
         if not (apart and machine.align):
             shared = Shared(machine, world, recorder)

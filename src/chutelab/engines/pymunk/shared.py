@@ -19,7 +19,6 @@ contacts that touch Chipmunk solves all at once, and all balls move.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import ceil, inf
 from typing import Any
 
@@ -27,6 +26,7 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d, batch
 
+from chutelab.engines.pymunk.joints import Ties
 from chutelab.engines.pymunk.moving import Moving
 from chutelab.engines.pymunk.shapes import Shapes
 from chutelab.engines.pymunk.world import (
@@ -77,22 +77,6 @@ _ARBITER = (
 
 TOWARDS = np.array([[1.0], [1.0], [-1.0], [-1.0]])
 """Turns Chipmunk's normal, but not its impulse."""
-
-
-LEFT = 0.9
-"""Share that is left, a step later, of what a string was stretched by when it was pulled tight."""
-
-TAUT, ROUNDING = 1e-9, 1e-13
-"""Shares of its length: by which a string that pulls may seem too short, and is kept stretched."""
-
-
-@dataclass
-class String:
-    """A string, as a joint that pulls; `over` (m) is what it is still stretched by."""
-
-    joint: pymunk.SlideJoint
-    length: float  # m
-    over: float = 0.0
 
 
 class Shared:
@@ -172,14 +156,8 @@ class Shared:
         share[:count] = machine.rolling[starts.kind]
         self.arm = share if share.any() else None
         self.couples: tuple[Any, ...] = (*np.zeros((2, 0), dtype=np.int64), np.zeros(0))
-        self.strings: dict[int, list[String]] = {}
-        for thread in machine.threads:
-            body = self.bodies[thread.particle][0]
-            joint = pymunk.SlideJoint(
-                world.space.static_body, body, thread.anchor, (0.0, 0.0), 0.0, thread.length
-            )
-            joint.error_bias = 0.0
-            self.strings.setdefault(thread.particle, []).append(String(joint, thread.length))
+        bodies = [body for body, _ in self.bodies[:count]]
+        self.ties = Ties(machine, world.space, bodies)
         # Rows by sorted id of the bodies; the Space's own body, of surfaces, is no particle.
         self.surfaces_body = world.space.static_body.id
         self.buffer, ids = batch.Buffer(), np.array(list(self.shapes.rank), dtype=np.uintp)
@@ -281,8 +259,8 @@ class Shared:
         self.state[1, :, i] = *x, *now, omega
         if self.angle is not None:
             self.angle[i] = late * omega
-        self.world.space.add(*(string.joint for string in self.strings.get(i, ())))
         self.free[i], self.calm[i] = True, 0.0
+        self.ties.put(i, free=True)
 
     def _ride(self) -> None:
         """Steer carried particles round the pulley in this step; let go those at its end."""
@@ -312,8 +290,7 @@ class Shared:
         space = self.world.space
         if self.rides:
             self._ride()
-        if self.strings:
-            self._tighten()
+        self.ties.tighten(self.h)
         if self.arm is not None:
             self._turn()
         if self.moving is not None:
@@ -348,7 +325,7 @@ class Shared:
         if self.moving is not None:
             self.moving.swing(self.t, self.h)
         self._contacts()
-        if self.strings:
+        if self.ties.all:
             self._pulled()
         if self.machine.air:
             self._slow_down()
@@ -586,41 +563,17 @@ class Shared:
         change = (turning[1, one] - turning[1, other]) / ease[rolls]
         self.couples = one, other, np.clip(np.array(held)[rolls] - change, -most, most)
 
-    # Strings
-
-    def _tighten(self) -> None:
-        """Set the lengths of strings for the next step.
-
-        Chipmunk lets a string go that is not longer than its length: one that pulls is kept longer
-        by rounding. One that is pulled tight has overshot by up to a step; that is taken back
-        slowly, or what hangs on it would be thrown back.
-        """
-        for i, strings in self.strings.items():
-            if not self.free[i]:
-                continue
-            body = self.bodies[i][0]
-            ahead = body.position + self.h * body.velocity
-            for string in strings:
-                length = (ahead - string.joint.anchor_a).length
-                if string.joint.impulse > 0.0:
-                    string.over *= LEFT
-                else:
-                    string.over = max(length - string.length, 0.0)
-                string.joint.max = string.length + string.over
-                if length > string.length * (1.0 - TAUT):
-                    string.joint.max = min(string.joint.max, length * (1.0 - ROUNDING))
+    # Joints
 
     def _pulled(self) -> None:
-        """Book what strings take: nothing but in a jerk, to the order of the step."""
-        for i, strings in self.strings.items():
-            if not self.free[i]:
-                continue
-            v = Vec2d(*(0.5 * (self.state[0, 2:4, i] + self.state[1, 2:4, i])).tolist())
-            for string in strings:
-                towards = (string.joint.anchor_a - self.bodies[i][0].position).normalized()
-                loss = -string.joint.impulse * float(towards.dot(v))
-                self.entries[1, i] += loss
-                self.recorder.by_surface[-1, 1] += loss
+        """Book what joints do."""
+        pull = self.pull
+        for tie, entries in self.ties.pulled(self.state[..., : self.count], pull, self.h):
+            ends = [n for n in (tie.joint.particle, tie.joint.other) if n >= 0]
+            for i in ends:
+                self.entries[:, i] += entries / len(ends)
+            self.recorder.by_surface[-1] += entries
+        self.recorder.springs = np.array(self.ties.springs).reshape(-1, 4)
 
     def _riding(self, particles: Ints, surface: Ints) -> None:
         """Count pushes of surfaces in a row; tell separations at the last one's time."""
@@ -683,8 +636,8 @@ class Shared:
         else:
             angle = 0.0 if self.angle is None else self.angle[i] + (t - self.t) * omega
             self.tracks.knot(i, t, x, v, omega, angle)
-            # A string is tied once the ride is over.
-            self.world.space.remove(*(string.joint for string in self.strings.get(i, ())))
+            # Joints are tied once the ride is over.
+            self.ties.put(i, free=False)
         if kind is not None:
             surface = self.on[i] if kind == Kind.SETTLE else -1
             self.recorder.events(kind, i, t, x, v, omega, surface=surface)

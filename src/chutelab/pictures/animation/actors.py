@@ -209,8 +209,8 @@ def _trails(ax: Axes, positions: Floats, since: Ints, color: str, gid: str) -> M
 
 
 def strung(ax: Axes, recording: Recording, times: Floats) -> list[Moving]:
-    """Return the strings, if there are any."""
-    if not recording.machine.threads:
+    """Return the joints, if there are any to draw."""
+    if all(joint.kind == "pin" for joint in recording.machine.joints):
         return []
     paths, gap = strings(recording, times), np.full((1, 2), np.nan)
 

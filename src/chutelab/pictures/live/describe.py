@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
-from chutelab.scene.conflicts import EITHER, RULES, tree
+from chutelab.scene.conflicts import EITHER, JOINTS, RULES, tree
 from chutelab.scene.materials import PRESETS, VALUES
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
@@ -94,7 +94,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     Raises
     ------
     SceneError
-        If the page cannot show it: mass points, boxes, polygons, strings, or too many particles; or
+        If the page cannot show it: mass points, boxes, polygons, joints, or too many particles; or
         if the scene contradicts itself where it is laid out.
     """
     materials = {
@@ -123,9 +123,9 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
             faults.append(Fault(f"{table}.shape", kind.shape, allowed))
         else:
             faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
-    if scene.string:
-        lacks["string"] = len(scene.string)
-        faults.append(Fault("string", None, f"{allowed}, without strings"))
+    joints = Counter(table for table, _ in scene.joints)
+    lacks += joints
+    faults += [Fault(table, None, f"{allowed}, without joints") for table in joints]
     for n, pair in enumerate(scene.pair):
         if pair.cohesion and scene.hinges:
             text = "0 with what hangs on hinges: the contact engine, which pages run, has not both"
@@ -167,7 +167,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
 
 
 def _leave_out(tables: dict[str, Any], scene: Scene, kinds: set[int]) -> None:
-    """Take kinds of particles out of the keys of a scene, their streams, and all strings."""
+    """Take kinds of particles out of the keys of a scene, their streams, and all joints."""
     names = {scene.particles[n].name for n in kinds}
     for table, gone in (
         ("particle", [n in kinds for n in range(len(scene.particles))]),
@@ -179,7 +179,7 @@ def _leave_out(tables: dict[str, Any], scene: Scene, kinds: set[int]) -> None:
         if kept := [row for row, out in zip(rows, gone, strict=False) if not out]:
             tables[table] = kept
     tables.setdefault("stream", [])
-    for table in ("string", "live"):
+    for table in (*JOINTS, "live"):
         tables.pop(table, None)
 
 
@@ -192,7 +192,7 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             continue
         rules["scene"][key] = _rule([key])
     for table, model in Scene.tables().items():
-        if table in ("string", "expect"):
+        if table in (*JOINTS, "expect"):
             continue
         several = table in LISTS or table in EITHER
         rules[table] = {}

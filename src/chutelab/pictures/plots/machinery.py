@@ -223,9 +223,8 @@ def draw_scene(
         driven = piece.whole and piece.speed != 0.0
         if driven and isinstance(piece, Arcs) and points_of(ax, float(piece.radius)) > AXIS:
             ax.plot(*piece.center, "+", color=style.STEEL, ms=AXIS, zorder=1.5)
-    if machine.threads:
-        anchors = np.array([thread.anchor for thread in machine.threads])
-        ax.plot(*anchors.T, "o", color=style.WALL, ms=3.0, zorder=2.0, gid="anchors")
+    if anchors := [joint.anchor for joint in machine.joints if joint.anchor is not None]:
+        ax.plot(*np.array(anchors).T, "o", color=style.WALL, ms=3.0, zorder=2.0, gid="anchors")
     if not small:
         names = _Names(ax, machine, found, shown)
         if clear is not None and len(clear):
@@ -557,23 +556,35 @@ def motion(recording: Recording, particles: Ints, times: Floats) -> tuple[Floats
 HANGING = np.linspace(0.0, 1.0, 13)
 """Shares of a slack string's way at which it is drawn."""
 
+COIL = 0.05
+"""Of a spring's length at rest; half of its width."""
+
 
 def strings(recording: Recording, times: Floats) -> Callable[[int], list[Floats]]:
-    """Return the function that gives the strings at the time of an index, (P, 2) each, m.
+    """Return the function that gives the joints at the time of an index, (P, 2) each, m.
 
-    A slack one sags between its ends.
+    A slack string sags between its ends, a spring goes to and fro; pins are left out.
     """
-    threads = recording.machine.threads
-    ends = places(recording, [thread.particle for thread in threads], times)
+    joints = [joint for joint in recording.machine.joints if joint.kind != "pin"]
+    own = places(recording, [joint.particle for joint in joints], times)
+    far = places(recording, [max(joint.other, 0) for joint in joints], times)
+    for n, joint in enumerate(joints):
+        if joint.anchor is not None:
+            far[:, n] = joint.anchor
 
     def drawn(index: int) -> list[Floats]:
         found = []
-        for thread, end in zip(threads, ends[index], strict=True):
-            way = end - thread.anchor
-            # Pulled down at its middle it would be twice as deep there.
-            sag = np.sqrt(max(thread.length**2 - float(way @ way), 0.0))
-            path = thread.anchor + HANGING[:, None] * way
-            path[:, 1] -= 2.0 * HANGING * (1.0 - HANGING) * sag
+        for joint, begin, end in zip(joints, far[index], own[index], strict=True):
+            way = end - begin
+            path = begin + HANGING[:, None] * way
+            if joint.kind == "string":
+                # Pulled down at its middle it would be twice as deep there.
+                sag = np.sqrt(max(joint.length**2 - float(way @ way), 0.0))
+                path[:, 1] -= 2.0 * HANGING * (1.0 - HANGING) * sag
+            elif joint.kind == "spring":
+                across = np.array([-way[1], way[0]]) / (np.hypot(*way) or 1.0)
+                path[2:-2:2] += COIL * joint.length * across
+                path[3:-2:2] -= COIL * joint.length * across
             found.append(path)
         return found
 
@@ -588,7 +599,7 @@ WHITE = 0.8
 
 
 def draw_bodies(ax: Axes, recording: Recording, t: float, *, crowd: bool = False) -> Axes:
-    """Draw all particles and strings as they are at a time (s), in the colour of their stream.
+    """Draw all particles and joints as they are at a time (s), in the colour of their stream.
 
     Unless they are a `crowd`, particle 0 has a colour of its own.
     """

@@ -229,7 +229,7 @@ def bodily(recording: Recording) -> bool:
     """Tell whether all particles are to be seen: `one_of_many`, boxes, polygons, or on strings."""
     machine = recording.machine
     corners = any(outline is not None for outline in machine.outlines)
-    return one_of_many(recording) or corners or bool(machine.threads)
+    return one_of_many(recording) or corners or bool(machine.joints)
 
 
 def stays(recording: Recording) -> Bools:
@@ -349,8 +349,9 @@ def window_of(recording: Recording) -> Window:
         points.append(recording.ends()[1]["position"][stays])
         tracks = [recording.track(i)["position"] for i in drawn_tracks(recording).tolist()]
         fall = np.concatenate([fall, *tracks])
-    for thread in machine.threads:
-        points += [np.array([thread.anchor]), recording.track(thread.particle)["position"]]
+    for joint in machine.joints:
+        anchors = [] if joint.anchor is None else [np.array([joint.anchor])]
+        points += [*anchors, recording.track(joint.particle)["position"]]
     if machine.pulley is not None:
         corner = np.full(2, machine.pulley.radius)
         points.append(np.array([-corner, corner]))

@@ -133,7 +133,7 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
         yield from ((np.array([row]), one_line(why)) for row, why in faults.items())
     stepped = (block.engine or block.scene.run.engine) in ("contact", "pymunk")
     stepped |= block.scene.run.loads is not None
-    stepped |= bool(block.scene.string) or any(kind.outline for kind in block.scene.particles)
+    stepped |= bool(block.scene.joints) or any(kind.outline for kind in block.scene.particles)
     stepped |= block.scene.clings or block.scene.air_density > 0.0 or block.scene.gravity_deg != 0.0
     stepped |= not {"air_density", "gravity_deg"}.isdisjoint(block.paths)
     stepped |= bool(block.scene.movers or block.scene.triggers) or any(

@@ -1,0 +1,561 @@
+/* Joints: strings, rods, springs and pins.
+
+   A joint gives the same force all through a step, along the mean of its directions at both ends of it: half of
+   its impulse before the flight, half after it. So its work is the force times the change of its length, exactly:
+   none for a rod, and what a spring keeps less of it (Gonzalez, J. Nonlinear Sci. 6, 1996). All forces are found
+   together, by Newton's steps, such that lengths are right at the end of the step: they do not drift. What is
+   struck, or pulled tight, gets impulses of its joints at the same instant. */
+
+#include <string.h>
+#include "core.h"
+
+/* Of its length: a string that is shorter by less is tight. */
+#define BAND 1e-9
+/* Newton's steps; times that strings are let go; times that a step is cut for one that is pulled tight. */
+#define NEWTON 40
+#define LETS_GO 20
+#define CUTS 4
+/* Of all lengths: what rounding leaves, and from where on steps that do not help any more are rounding. */
+#define ROUNDS 4e-16
+#define FINE 1e-13
+/* Of the diagonal: a row of which less is left says what others have said. */
+#define DEPENDS 1e-13
+/* Times that joints and contacts are solved for in turn; of the accuracy of the contacts. */
+#define TURNS 50
+#define AGREES 0.1
+
+static double missed;
+
+/* Place and velocity of a particle a span after the step's beginning, and by what it has turned. */
+typedef struct { double x, y, turned; } Pose;
+
+static Pose pose_at(const Disk *d, double h) {
+    return (Pose){ d->x + (d->vx + 0.5 * W.gx * h) * h, d->y + (d->vy + 0.5 * W.gy * h) * h, d->turned + d->spin * h };
+}
+
+/* A pin's arm from the centre of a particle that has turned. */
+static void turn_arm(const double *arm, double turned, double *out) {
+    double c = cos(turned), s = sin(turned);
+    out[0] = c * arm[0] - s * arm[1];
+    out[1] = s * arm[0] + c * arm[1];
+}
+
+/* The vector that a joint keeps or changes the length of: from its other end to its particle. */
+static void between(const Joint *j, double h, double *out) {
+    Pose a = pose_at(W.disks + j->particle, h);
+    const double *fixed = j->from;
+    double arm[2] = {0, 0};
+    if (j->kind == PIN) turn_arm(j->arm, a.turned, arm);
+    out[0] = a.x + arm[0];
+    out[1] = a.y + arm[1];
+    if (j->other >= 0) {
+        Pose b = pose_at(W.disks + j->other, h);
+        if (j->kind == PIN) turn_arm(j->arm + 2, b.turned, arm);
+        out[0] -= b.x + (j->kind == PIN ? arm[0] : 0);
+        out[1] -= b.y + (j->kind == PIN ? arm[1] : 0);
+    } else {
+        out[0] -= fixed[0];
+        out[1] -= fixed[1];
+    }
+}
+
+static double size(const double *v) { return sqrt(v[0] * v[0] + v[1] * v[1]); }
+
+static double kept_in(const Joint *j, double length) { return 0.5 * j->stiffness * square(length - j->length); }
+
+static int rows_of(const Joint *j) { return 1 + (j->kind == PIN); }
+
+/* Whether the string of a joint is as long as it can be. */
+static int is_tight(const Joint *j) {
+    double d[2];
+    between(j, 0, d);
+    return size(d) >= (1 - BAND) * j->length;
+}
+
+/* A particle of an end of a joint, as `Disk.tie` counts them, or NULL. */
+static Disk *at_end(int end) {
+    int i = end % 2 ? W.joints[end / 2].other : W.joints[end / 2].particle;
+    return i < 0 ? 0 : W.disks + i;
+}
+
+/* Have a particle move by an impulse of a row at one of its ends, times so much. */
+static void tug(const JointRow *r, int end, double kick, double *v, double *spin) {
+    const Disk *d = at_end(2 * r->joint + end);
+    double way = end ? -kick : kick;
+    v[0] += way * r->e[0] * d->inv_mass;
+    v[1] += way * r->e[1] * d->inv_mass;
+    *spin += way * r->lever[end] * d->inv_inertia;
+}
+
+/* Whether two particles are parts of one, joined by a rod or a pin: they do not meet. */
+int are_joined(int i, int j) {
+    for (int end = W.disks[i].tie; end >= 0; end = W.joints[end / 2].next[end % 2]) {
+        const Joint *joint = W.joints + end / 2;
+        if (joint->kind != ROD && joint->kind != PIN) continue;
+        if (joint->particle == j || joint->other == j) return 1;
+    }
+    return 0;
+}
+
+/* ------------------------------------------------------------------------------- systems of rows */
+
+static double *cell(int p, int q) { return W.joint_matrix + (long)p * W.joint_row_count + q; }
+
+/* What an impulse of 1 N s of one row changes of the speed of another, by the particle at one end, 1/kg. */
+static double feels(const JointRow *p, int end, const JointRow *q, int with) {
+    const Disk *d = at_end(2 * p->joint + end);
+    double sum = (p->e[0] * q->e[0] + p->e[1] * q->e[1]) * d->inv_mass;
+    sum += p->lever[end] * q->lever[with] * d->inv_inertia;
+    return end == with ? sum : -sum;
+}
+
+/* Fill in the matrix of the rows that act, `scale` times what impulses change, and factor it: L D L^T within the
+   envelope of its rows, which in a chain is as wide as a row or two. */
+static void factor(double scale, int eases) {
+    JointRow *rows = W.joint_rows;
+    for (int p = 0; p < W.joint_row_count; p++) {
+        JointRow *r = rows + p;
+        r->first = p;
+        if (!r->on) continue;
+        for (int pass = 0; pass < 2; pass++) {
+            for (int q = r->first; pass && q <= p; q++) *cell(p, q) = 0;
+            for (int end = 0; end < 2; end++) {
+                const Disk *d = at_end(2 * r->joint + end);
+                for (int other = d ? d->tie : -1; other >= 0; other = W.joints[other / 2].next[other % 2]) {
+                    const Joint *j = W.joints + other / 2;
+                    for (int q = j->row; j->tied && q < j->row + rows_of(j) && q <= p; q++) {
+                        if (!rows[q].on) continue;
+                        if (pass) *cell(p, q) += scale * feels(r, end, rows + q, other % 2);
+                        else r->first = MIN(r->first, q);
+                    }
+                }
+            }
+        }
+        double whole = *cell(p, p) += eases ? r->eases : 0;
+        for (int q = r->first; q <= p; q++) {
+            double sum = *cell(p, q);
+            if (!rows[q].on) continue;
+            for (int k = MAX(r->first, rows[q].first); k < q; k++)
+                if (rows[k].on) sum -= *cell(p, k) * *cell(q, k) * rows[k].root;
+            *cell(p, q) = q < p && rows[q].root != 0 ? sum / rows[q].root : q < p ? 0 : sum;
+        }
+        r->root = *cell(p, p) > DEPENDS * whole ? *cell(p, p) : 0;
+    }
+}
+
+/* Solve for what is in `off` of the rows that act: it becomes the impulses that make as much of it. */
+static void solve(void) {
+    JointRow *rows = W.joint_rows;
+    for (int p = 0; p < W.joint_row_count; p++)
+        for (int q = rows[p].first; q < p && rows[p].on; q++)
+            if (rows[q].on) rows[p].off -= *cell(p, q) * rows[q].off;
+    for (int p = W.joint_row_count - 1; p >= 0; p--) {
+        JointRow *r = rows + p;
+        if (!r->on) continue;
+        r->off = r->root != 0 ? r->off / r->root : 0;
+    }
+    for (int p = W.joint_row_count - 1; p >= 0; p--)
+        for (int q = rows[p].first; q < p && rows[p].on; q++)
+            if (rows[q].on) rows[q].off -= *cell(p, q) * rows[p].off;
+}
+
+/* ----------------------------------------------------------------------------------------- a step */
+
+/* The rows of a joint whose vector goes from d0 to d1 within h: how they act, and by how much they are missed. */
+static void aim(const Joint *j, const double *d0, const double *d1, double h) {
+    JointRow *r = W.joint_rows + j->row;
+    if (j->kind == PIN) {
+        for (int n = 0; n < 2; n++, r++) {
+            r->e[n] = 1;
+            r->e[1 - n] = 0;
+            r->off = d1[n];
+            for (int end = 0; end < 2; end++) {
+                const Disk *d = at_end(2 * (int)(j - W.joints) + end);
+                double arm[2], half = d ? 0.5 * h * d->spin : 0;
+                if (!d) continue;
+                turn_arm(j->arm + 2 * end, d->turned + half, arm);
+                r->lever[end] = (n ? arm[0] : -arm[1]) * (half != 0 ? sin(half) / half : 1);
+            }
+        }
+        return;
+    }
+    double before = size(d0), after = size(d1), sum = before + after;
+    for (int n = 0; n < 2; n++) r->e[n] = sum > 0 ? (d0[n] + d1[n]) / sum : 0;
+    r->off = after - j->length;
+    if (j->kind != SPRING) return;
+    double stiff = 0.5 * j->stiffness + j->damper / h;
+    r->eases = 2 / (h * stiff);
+    r->off = after - (j->stiffness * j->length + (j->damper / h - 0.5 * j->stiffness) * before) / stiff;
+    r->off += r->eases * r->kick;
+}
+
+/* Give the particles half of what the rows pull, instead of what they had of it. */
+static void pull(void) {
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        double v[3] = {0, 0, 0};
+        for (int end = d->tie; end >= 0; end = W.joints[end / 2].next[end % 2]) {
+            const Joint *j = W.joints + end / 2;
+            const JointRow *r = W.joint_rows + j->row;
+            for (int n = 0; j->tied && n < rows_of(j); n++)
+                if (r[n].on) tug(r + n, end % 2, r[n].kick, v, v + 2);
+        }
+        for (int n = 0; d->tie >= 0 && n < 3; n++) {
+            (&d->vx)[n] += v[n] - d->tug[n];
+            (&d->ux)[n] += v[n] - d->tug[n];
+            d->tug[n] = v[n];
+        }
+    }
+}
+
+/* Take half of the step's pull away from the particles, or give it to them: `way` -1 or 1. */
+void tug_all(int way) {
+    for (int i = W.low; i < W.high; i++)
+        for (int n = 0; W.disks[i].tie >= 0 && n < 3; n++) {
+            Disk *d = W.disks + i;
+            (&d->vx)[n] += way * d->tug[n];
+            (&d->ux)[n] += way * d->tug[n];
+        }
+}
+
+/* Take it away, and forget it. */
+void drop_tugs(void) {
+    if (!W.joint_count) return;
+    tug_all(-1);
+    for (int i = W.low; i < W.high; i++) memset(W.disks[i].tug, 0, sizeof W.disks[i].tug);
+}
+
+/* Find the forces of all joints in a step of length h, from the velocities as they are without them. A string
+   that would push is let go. */
+void pull_joints(double h) {
+    int strings = 1;
+    missed = 0;
+    for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
+        JointRow *r = W.joint_rows + j->row;
+        for (int n = 0; n < rows_of(j); n++) {
+            r[n].on = j->tied && h > 0 && (j->kind != STRING || j->taut || is_tight(j));
+            if (!r[n].on) r[n].kick = 0;
+        }
+    }
+    for (int again = 0; strings && again < LETS_GO; again++) {
+        double worst = INFINITY, last;
+        for (int n = 0; n < NEWTON; n++) {
+            double most = 0;
+            pull();
+            for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
+                double d0[2], d1[2];
+                if (!W.joint_rows[j->row].on) continue;
+                /* Where it is now: without the flight. */
+                between(j, 0, d0);
+                between(j, h, d1);
+                aim(j, d0, d1, h);
+                for (int k = 0; k < rows_of(j); k++) {
+                    double reach = MAX(size(d0), j->kind == PIN ? fabs(W.disks[j->particle].x) + fabs(j->from[0]) : 0);
+                    most = MAX(most, fabs(W.joint_rows[j->row + k].off) / (reach > 0 ? reach : 1));
+                }
+            }
+            last = worst;
+            worst = most;
+            if (worst <= ROUNDS || (n > 2 && worst >= 0.5 * last && worst < FINE)) break;
+            factor(h, 1);
+            for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) r->off = -r->off;
+            solve();
+            for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++)
+                if (r->on) r->kick += r->off;
+        }
+        missed = worst > BAND ? worst : 0;
+        strings = 0;
+        for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
+            JointRow *r = W.joint_rows + j->row;
+            if (j->kind != STRING || !r->on || r->kick <= 0) continue;
+            r->on = 0;
+            r->kick = 0;
+            strings = 1;
+        }
+    }
+    pull();
+}
+
+/* The instant within (0, h] at which a string that is slack is pulled tight, INFINITY if it is not. */
+static double snaps(const Joint *j, double h) {
+    double d[2], low = 0, high = h;
+    if (j->kind != STRING || !j->tied || W.joint_rows[j->row].on || is_tight(j)) return INFINITY;
+    between(j, h, d);
+    if (size(d) <= j->length) return INFINITY;
+    while (high - low > 1e-15 * h) {
+        double middle = 0.5 * (low + high);
+        if (middle == low || middle == high) break;
+        between(j, middle, d);
+        if (size(d) <= j->length) low = middle;
+        else high = middle;
+    }
+    return high;
+}
+
+/* End the step at t instead, and find the forces anew. */
+void cut_step(double t) {
+    W.step_end = t;
+    drop_tugs();
+    pull_joints(t - W.t);
+    for (int i = W.low; i < W.high; i++) {
+        if (W.disks[i].tie < 0 || W.disks[i].mode != FREE) continue;
+        W.disks[i].changes++;
+        enter_again(i, t);
+    }
+}
+
+/* End the step where a string is pulled tight. */
+void cut_at_snaps(void) {
+    for (int n = 0; n < CUTS; n++) {
+        double h = W.step_end - W.t, first = INFINITY;
+        for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) first = MIN(first, snaps(j, h));
+        if (!(first < h * (1 - BAND))) return;
+        cut_step(W.t + first);
+    }
+}
+
+/* Give the other half of the step's pull, at its end, and book what springs gave and took. */
+void end_pull(void) {
+    double h = W.step_end - W.t, d[2];
+    for (int i = W.low; i < W.high; i++) {
+        Disk *disk = W.disks + i;
+        for (int n = 0; disk->tie >= 0 && n < 3; n++) {
+            if (disk->mode == FREE) (&disk->vx)[n] += disk->tug[n];
+            disk->tug[n] = 0;
+        }
+    }
+    for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
+        JointRow *r = W.joint_rows + j->row;
+        Disk *a = W.disks + j->particle, *b = j->other < 0 ? 0 : W.disks + j->other;
+        if (!j->tied || h <= 0 || a->mode != FREE || (b && b->mode != FREE)) continue;
+        j->taut = r->on;
+        between(j, 0, d);
+        double length = size(d), grows = length - j->now, entries[3] = {0, 0, 0};
+        j->now = length;
+        if (j->kind == SPRING) {
+            double kept = kept_in(j, length), lost = j->damper * grows * grows / h;
+            entries[0] = j->kept[1] - kept - lost;
+            j->kept[1] = kept;
+            j->damped += lost;
+            j->given += entries[0];
+        } else if (r->on && j->kind != PIN) entries[1] = -2 * r->kick / h * grows;
+        if (entries[0] != 0 || entries[1] != 0) book(a->entries, b ? b->entries : 0, W.owner_count, entries);
+    }
+}
+
+/* ------------------------------------------------------------------------------------------ blows */
+
+/* Let the rows of struck joints act at this instant; of strings those that are tight, or that are `taut`. */
+static void aim_now(int taut) {
+    for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
+        JointRow *r = W.joint_rows + j->row;
+        int acts = j->struck && (j->kind == STRING ? taut ? j->taut : is_tight(j) : j->kind != SPRING);
+        double d[2];
+        for (int n = 0; n < rows_of(j); n++) r[n].on = acts;
+        if (!acts) continue;
+        between(j, 0, d);
+        aim(j, d, d, 0);
+    }
+}
+
+/* How fast a joint is drawn apart, m/s. */
+static double rate_of(const JointRow *r) {
+    double sum = 0;
+    for (int end = 0; end < 2; end++) {
+        const Disk *d = at_end(2 * r->joint + end);
+        if (!d) continue;
+        double speed = d->vx * r->e[0] + d->vy * r->e[1] + r->lever[end] * d->spin;
+        sum += end ? -speed : speed;
+    }
+    return sum;
+}
+
+/* Let go of strings that would push; return whether there is one. */
+static int let_go(void) {
+    int found = 0;
+    for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) {
+        if (!r->on || W.joints[r->joint].kind != STRING || r->off <= 0) continue;
+        r->on = 0;
+        found = 1;
+    }
+    return found;
+}
+
+/* Give all particles what is in `off` of the rows, as impulses. */
+static void give_impulses(void) {
+    for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++)
+        for (int end = 0; end < 2 && r->on; end++) {
+            Disk *d = at_end(2 * r->joint + end);
+            if (!d || r->off == 0) continue;
+            was_moved((int)(d - W.disks));
+            tug(r, end, r->off, &d->vx, &d->spin);
+        }
+}
+
+/* Mark as struck all that is tied to what is struck. */
+static void spread_struck(void) {
+    for (int more = 1; more;) {
+        more = 0;
+        for (int n = 0; n < 2 * W.joint_count; n++) {
+            const Disk *d = at_end(n);
+            if (!d || !W.joints[n / 2].struck) continue;
+            for (int end = d->tie; end >= 0; end = W.joints[end / 2].next[end % 2]) {
+                Joint *j = W.joints + end / 2;
+                if (!j->tied || j->struck) continue;
+                j->struck = more = 1;
+            }
+        }
+    }
+}
+
+/* Stop what draws struck joints apart, or presses them together, without restitution. */
+static void stop(void) {
+    spread_struck();
+    aim_now(0);
+    do {
+        for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) r->off = -rate_of(r);
+        factor(1, 0);
+        solve();
+    } while (let_go());
+    for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) {
+        Joint *j = W.joints + r->joint;
+        double loss[3] = {0, -0.5 * r->off * rate_of(r), 0};
+        if (j->struck && j->kind == STRING) j->taut = r->on;
+        if (!r->on || r->off == 0) continue;
+        book(W.disks[j->particle].entries, j->other < 0 ? 0 : W.disks[j->other].entries, W.owner_count, loss);
+    }
+    give_impulses();
+}
+
+/* Begin a step: tie what has been released, and take up strings that have been pulled tight. What lasts has a rest
+   of second order along its joints, which is left. */
+void tie_joints(void) {
+    int fresh = 0;
+    W.moved_count = 0;
+    W.shocks++;
+    for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
+        const Disk *a = W.disks + j->particle, *b = j->other < 0 ? 0 : W.disks + j->other;
+        int was = j->tied;
+        double d[2];
+        j->struck = 0;
+        j->tied = a->mode == FREE && (!b || b->mode == FREE);
+        if (!j->tied) continue;
+        if (!was && j->kind == PIN) {
+            for (int end = 0; end < 2 && at_end(2 * (int)(j - W.joints) + end); end++) {
+                const Disk *disk = at_end(2 * (int)(j - W.joints) + end);
+                double away[2] = {j->from[0] - disk->x, j->from[1] - disk->y};
+                turn_arm(away, -disk->turned, j->arm + 2 * end);
+            }
+        }
+        if (!was) {
+            between(j, 0, d);
+            j->now = size(d);
+            if (isnan(j->length)) j->length = j->now;
+            j->kept[0] = j->kept[1] = j->kind == SPRING ? kept_in(j, j->now) : 0;
+        }
+        j->struck = !was && j->kind != STRING;
+        if (j->kind == STRING && !j->taut && is_tight(j)) {
+            between(j, 0, d);
+            aim(j, d, d, 0);
+            j->struck = rate_of(W.joint_rows + j->row) > 0;
+        }
+        fresh |= j->struck;
+    }
+    if (fresh) stop();
+    for (int k = 0; k < W.moved_count; k++) {
+        W.disks[W.moved[k]].changes++;
+        knot_after(W.moved[k]);
+    }
+    for (int i = W.low; i < W.high; i++)
+        if (W.disks[i].tie >= 0 && W.disks[i].mode == FREE && !W.tracks[i].lasted) track_flying(i);
+}
+
+/* Begin a blow between two particles, or of one, of which one is tied at least. */
+void strike_joints(int i, int j) {
+    for (Joint *one = W.joints; one < W.joints + W.joint_count; one++)
+        one->struck = one->tied && (one->particle == i || one->other == i
+                                    || (j >= 0 && (one->particle == j || one->other == j)));
+    stop();
+}
+
+/* End such a blow: it may have pulled strings tight. */
+void end_blow(void) {
+    for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
+        if (!j->struck || j->kind != STRING || j->taut || !is_tight(j)) continue;
+        double d[2];
+        between(j, 0, d);
+        aim(j, d, d, 0);
+        if (!(rate_of(W.joint_rows + j->row) > 0)) continue;
+        stop();
+        return;
+    }
+}
+
+/* The impulses of a blow, normal and tangential, that change the normal velocity by so much, where joints pass on
+   their share at the same instant: they give theirs here. */
+void share_with_joints(const Contact *c, double wanted, double slip, double *J) {
+    JointRow *rows = W.joint_rows, *end = rows + W.joint_row_count;
+    const double way[2][2] = {{c->nx, c->ny}, {c->ny, -c->nx}};
+    aim_now(1);
+    do {
+        double feel[2][2] = {{1 / c->mass[0], 0}, {0, 1 / c->mass[1]}};
+        factor(1, 0);
+        for (int n = 0; n < 2; n++) {
+            for (JointRow *r = rows; r < end; r++) {
+                r->struck[n] = 0;
+                for (int side = 0; side < 2 && r->on; side++) {
+                    const Disk *d = at_end(2 * r->joint + side);
+                    int first = d == W.disks + c->i;
+                    if (!d || !(first || (c->two && d == W.disks + c->j))) continue;
+                    double rate = (first ? 1 : -1) * (r->e[0] * way[n][0] + r->e[1] * way[n][1]) * d->inv_mass;
+                    if (n) rate += r->lever[side] * d->radius * d->inv_inertia;
+                    r->struck[n] += side ? -rate : rate;
+                }
+                r->off = -r->struck[n];
+            }
+            solve();
+            for (JointRow *r = rows; r < end; r++) r->answer[n] = r->on ? r->off : 0;
+        }
+        for (JointRow *r = rows; r < end; r++)
+            for (int n = 0; n < 4; n++) feel[n / 2][n % 2] += r->struck[n / 2] * r->answer[n % 2];
+        double less = feel[0][0] * feel[1][1] - feel[0][1] * feel[1][0];
+        J[0] = (wanted * feel[1][1] + slip * feel[0][1]) / less;
+        J[1] = (-slip * feel[0][0] - wanted * feel[1][0]) / less;
+        if (fabs(J[1]) > c->friction * J[0]) {
+            double way = J[1] > 0 ? c->friction : -c->friction;
+            J[0] = wanted / (feel[0][0] + way * feel[0][1]);
+            J[1] = way * J[0];
+        }
+        for (JointRow *r = rows; r < end; r++) r->off = J[0] * r->answer[0] + J[1] * r->answer[1];
+    } while (let_go());
+    give_impulses();
+}
+
+/* Solve for the pull of joints and for what lasts in contact in turn, until they agree. */
+void agree_with_contacts(double h) {
+    int meets = 0;
+    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++)
+        meets |= W.disks[c->i].tie >= 0 || (c->j >= 0 && W.disks[c->j].tie >= 0);
+    for (int n = 0; n < TURNS && meets; n++) {
+        double worst = 0;
+        for (int i = W.low; i < W.high; i++) memcpy(W.disks[i].tugged, W.disks[i].tug, sizeof W.disks[i].tug);
+        pull_joints(h);
+        for (int i = W.low; i < W.high; i++)
+            for (int k = 0; k < 2 && W.disks[i].tie >= 0; k++)
+                worst = MAX(worst, fabs(W.disks[i].tug[k] - W.disks[i].tugged[k]));
+        if (worst <= AGREES * W.accurate) return;
+        for (Contact *c = W.contacts; c < W.contacts + W.contact_count; c++)
+            for (int side = 0; side < 2; side++) {
+                const Disk *d = side ? c->two ? W.disks + c->j : 0 : W.disks + c->i;
+                if (!d || d->tie < 0) continue;
+                double more = (d->tug[0] - d->tugged[0]) * c->nx + (d->tug[1] - d->tugged[1]) * c->ny;
+                c->need -= side ? -more : more;
+                c->most -= side ? -more : more;
+            }
+        solve_contacts(1);
+    }
+    if (meets) pull_joints(h);
+}
+
+/* What of the lengths of joints the step misses, as a share of them. */
+double missed_by_joints(void) { return missed; }

@@ -37,7 +37,6 @@ AUTO = {
     "damper-plate": "contact",
     "flap-gate": "contact",
     "vibrating-feeder": "contact",
-    "drum": "contact",
     "see-saw": "contact",
     "cradle": "contact",
     "dominoes": "pymunk",

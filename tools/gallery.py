@@ -29,7 +29,7 @@ GROUPS = {
     "Streams": ("stream", "stream-independent", "coal-transfer", "rock-box", "spoon"),
     "Bins, heaps, screens": ("hopper", "feeder", "silo", "heap", "mixture", "galton"),
     "Further machines": ("inclined-conveyor", "cascade", "free-fall"),
-    "What moves": ("damper-plate", "see-saw", "flap-gate", "vibrating-feeder", "drum"),
+    "What moves": ("damper-plate", "see-saw", "flap-gate", "vibrating-feeder"),
     "Toys": ("dominoes", "cradle"),
 }
 """The scenes by what one comes for."""

@@ -116,15 +116,15 @@ def space_of(machine):
     return space, own, grip
 
 
-def bare(machine, end, *, looks):
+def bare(machine, end, *, looks, step=STEP):
     """Return the seconds that `space.step` took until a time, and the overlaps if looked at."""
     space, own, grip = space_of(machine)
     p, waiting = machine.particle, moments(machine)
     free = pymunk.ShapeFilter(categories=1)
     held = pymunk.ShapeFilter(categories=2, mask=1)
-    bodies, seconds, found, every = {}, 0.0, [], round(LOOK / STEP)
-    for n in range(round(end / STEP)):
-        while waiting and waiting[-1][0] <= n * STEP:
+    bodies, seconds, found, every = {}, 0.0, [], max(1, round(LOOK / step))
+    for n in range(round(end / step)):
+        while waiting and waiting[-1][0] <= n * step:
             _, k, carried, place, course = waiting.pop()
             if k in bodies:
                 space.remove(bodies[k], *bodies[k].shapes)
@@ -139,7 +139,7 @@ def bare(machine, end, *, looks):
             space.add(body, shape)
             bodies[k] = body
         begin = process_time()
-        space.step(STEP)
+        space.step(step)
         seconds += process_time() - begin
         if looks and n % every == 0:
             moved = [b.position for b in bodies.values() if b.body_type == pymunk.Body.DYNAMIC]

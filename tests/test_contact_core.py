@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from chutelab.core import Status, constants
+from chutelab.machine import build
 from chutelab.results import Kind
 from chutelab.results.laws import SOLVED, judge
+from chutelab.scene import from_dict
 from cores import Core, modes
 from machines import boxed, face, of_sizes, scene_of, thrown
 
@@ -195,6 +197,27 @@ def test_sleepers_on_a_belt_ride_it_and_fall_off_its_end():
         np.testing.assert_allclose(riding["velocity"][:, 0], speed, rtol=0, atol=1e-6)
         x = recording.at([1.0, 1.5])[0][:, n, 0]
         assert x[1] - x[0] == pytest.approx(0.5 * speed, abs=1e-6)
+
+
+@pytest.mark.parametrize("change", ["gate", "travel"])
+@pytest.mark.parametrize("steps", [1, 2, 1000])
+def test_a_run_may_be_paused_anywhere(change, steps):
+    """All sleep until a floor goes, or sets off upwards, at 1.5 s; they settle after that."""
+    keys = {"gate": {"opens_at": 1.5},
+            "travel": {"travel": {"to": [-1.0, 0.5], "at": 1.5, "in": 0.5}}}[change]  # fmt: skip
+    shelf = face("shelf", (-1.0, 0.3), (1.0, 0.3), restitution=0.0, friction=0.5, **keys)
+    stream = {"at": [0.0, 0.35], "to": [0.5, 0.35], "velocity": [0.0, 0.0], "count": 2,
+              "interact": True}  # fmt: skip
+    tables = {"surface": [FLOOR, shelf], "run": {"until": "settled"}, "stream": stream}
+    core = Core(build(from_dict(tables)))
+    slept = 0
+    while not core.step(steps):
+        slept = max(slept, modes(core)["ASLEEP"])
+    assert slept == 2 or steps > 2
+    end = core.recording().ends()[1]["position"][:, 1]
+    level = {"gate": 0.0, "travel": 0.5}[change]
+    assert end == pytest.approx(level + core.disks["radius"], abs=1e-3)
+    assert core.world.t > 1.5 + (0.5 if change == "travel" else 0.2)
 
 
 def test_the_host_knows_the_statuses_of_the_core():

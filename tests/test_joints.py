@@ -319,7 +319,7 @@ def machine_of_joints(seed):
 )
 @pytest.mark.filterwarnings("ignore:LAW BROKEN, no loss is negative")
 def test_random_machines_keep_the_laws(seed):
-    """But for one: what is wedged between joints and surfaces may give back too much, and says so."""
+    """But for one: what is wedged between joints and surfaces may give back too much."""
     run = simulate(machine_of_joints(seed))
     assert {one.law for one in run.laws} <= {"no loss is negative"}
     own = run.ledger

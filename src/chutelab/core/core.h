@@ -3,6 +3,7 @@
 #ifndef CORE_H
 #define CORE_H
 #include <math.h>
+#include <wasm_simd128.h>
 #include "layout.h"
 #include "loads.h"
 #include "memory.h"
@@ -73,6 +74,18 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 #define SHOCKS 4
 
 static inline double square(double a) { return a * a; }
+
+/* Two doubles at once: each rounds as by itself. */
+typedef v128_t Two;
+
+static inline Two two(const double *from) { return wasm_v128_load(from); }
+static inline Two times(double a, Two v) { return wasm_f64x2_mul(wasm_f64x2_splat(a), v); }
+static inline Two plus(Two a, Two b) { return wasm_f64x2_add(a, b); }
+static inline Two minus(Two a, Two b) { return wasm_f64x2_sub(a, b); }
+/* Whether both are at most so far from 0; what is no number is not. */
+static inline int are_within(Two v, double most) {
+    return wasm_i64x2_all_true(wasm_f64x2_le(wasm_f64x2_abs(v), wasm_f64x2_splat(most)));
+}
 
 static inline const Pair *pair_of(int kind, int other) {
     return W.pairs + kind * (W.kind_count + W.material_count) + other;
@@ -315,9 +328,9 @@ void set_rows(Contact *list, int count);
 void take_rows(Contact *list, int count);
 void begin_anew(void);
 double sweep_rows(int sweeps, int plain, double accurate);
-void lessen(void);
+int lessen(void);
 void keep_bounds(void);
-void drop_noise(void);
+int drop_noise(void);
 double left_open(void);
 double slip_of(const SolverRow *row);
 

@@ -247,7 +247,7 @@ static void stop_all(int reason) {
 
 /* Whether everything of a crowd has been calm for long enough, nothing moves, and no gate is still to come or go. */
 static int has_settled(void) {
-    if (W.stirs || next_gate(W.t) < INFINITY) return 0;
+    if (W.stirs || next_gate(W.looked) < INFINITY) return 0;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode == WAITING || d->mode == RIDING || (d->mode == FREE && d->calm < SETTLED / W.pace)) return 0;
@@ -259,6 +259,7 @@ static int has_settled(void) {
 
 /* Tell which surfaces are there; what sleeps wakes when one comes or goes. Next change, s. */
 static double set_gates(double t) {
+    W.looked = t;
     int stirred = stir(t) && W.step_count > 0;
     for (int i = W.low; i < W.high && stirred; i++)
         if (W.disks[i].mode == ASLEEP) wake(i, W.t);
@@ -582,7 +583,8 @@ static int is_over(int *reason) {
         *reason = BY_SETTLING;
         return 1;
     }
-    next = MIN(next, next_gate(W.t));
+    /* A run that has been paused where one changes has not looked at it yet. */
+    next = MIN(next, MAX(next_gate(W.looked), W.t));
     int asleep = 0;
     for (int i = W.low; i < W.high; i++) asleep |= W.disks[i].mode == ASLEEP;
     if (next >= W.end_time || next == INFINITY) next = W.end_time;
@@ -614,6 +616,7 @@ static int begin_part(void) {
         W.t = MIN(W.t, d->release);
     }
     if (W.hinges) W.t = MIN(W.t, 0);
+    W.looked = W.t;
     W.room = INFINITY;
     for (int k = 0; k < W.surface_count; k++) {
         double room = W.surfaces[k].radius - W.disks[W.low].radius;

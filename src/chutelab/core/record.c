@@ -18,30 +18,25 @@ static void emit(const Knot *state) {
    its track leaves that out; blows and bends that are smaller, of a velocity of g h, are left out with it. */
 static int is_followed(const Track *track, const Knot *wait, const Knot *to, const Disk *d) {
     const double *from = track->from;
-    double h = to->t - from[0], fall = W.hops * W.g * W.usual, c[2][4];
+    double h = to->t - from[0], fall = W.hops * W.g * W.usual;
     double close = MAX(W.smooth_x * d->radius, 0.125 * fall * W.usual), slow = MAX(W.smooth_v, fall);
     double little = d->mass * slow * (sqrt(square(from[3]) + square(from[4])) + slow);
-    for (int n = 0; n < 2; n++) {
-        double way = (&to->x)[n] - from[1 + n], first = h * from[3 + n], last = h * (&to->vx)[n];
-        c[n][0] = from[1 + n];
-        c[n][1] = first;
-        c[n][2] = 3 * way - 2 * first - last;
-        c[n][3] = first + last - 2 * way;
-    }
+    Two place = two(from + 1), way = minus(two(&to->x), place);
+    Two first = times(h, two(from + 3)), last = times(h, two(&to->vx));
+    Two bend = minus(minus(times(3, way), times(2, first)), last), turn = minus(plus(first, last), times(2, way));
+    Two entries = two(from + 7), more = minus(two(to->entries + 1), entries);
     for (const Knot *k = wait + track->waits - 1; k >= wait; k--) {
         /* Off by w at both ends of a time T, it bulges by w T / 4 between them: by no more than it is off. */
         double then = k < wait + track->waits - 1 ? k[1].t : to->t, before = k > wait ? k[-1].t : from[0];
         double s = (k->t - from[0]) / h, most = MIN(slow, 4 * close / MAX(then - k->t, k->t - before));
-        for (int n = 0; n < 2; n++) {
-            const double *a = c[n];
-            if (!(fabs(a[0] + s * (a[1] + s * (a[2] + s * a[3])) - (&k->x)[n]) <= close)) return 0;
-            if (!(fabs(a[1] + s * (2 * a[2] + 3 * s * a[3]) - h * (&k->vx)[n]) <= h * most)) return 0;
-        }
+        Two off = minus(plus(place, times(s, plus(first, times(s, plus(bend, times(s, turn)))))), two(&k->x));
+        if (!are_within(off, close)) return 0;
+        off = plus(first, times(s, plus(times(2, bend), times(3 * s, turn))));
+        if (!are_within(minus(off, times(h, two(&k->vx))), h * most)) return 0;
         if (fabs(from[5] + s * (to->spin - from[5]) - k->spin) * d->radius > slow) return 0;
-        for (int n = 0; n < 3 && W.interact; n++) {
-            double entry = from[6 + n] + s * (to->entries[n] - from[6 + n]);
-            if (fabs(entry - k->entries[n]) > little) return 0;
-        }
+        if (!W.interact) continue;
+        if (fabs(from[6] + s * (to->entries[0] - from[6]) - k->entries[0]) > little) return 0;
+        if (!are_within(minus(plus(entries, times(s, more)), two(k->entries + 1)), little)) return 0;
     }
     return 1;
 }

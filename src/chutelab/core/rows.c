@@ -4,7 +4,6 @@
    A row's matrix (normal, tangent) = ((nx, ny), (ny, -nx)) is its own inverse: it makes normal velocity
    and slip of a velocity, and a change of velocity of a normal and a tangential impulse. */
 
-#include <wasm_simd128.h>
 #include "core.h"
 
 /* Sine of the angle between surfaces that count as one: of less nothing is left by rounding. */
@@ -22,8 +21,6 @@
 /* m/s; what a contact is free to open with that asks for nothing: finite, so that it can be multiplied by 0. */
 #define ANY 1e100
 
-typedef v128_t Two;
-
 /* The rows: those between disks, and from `pairs` on those on what does not give way. `clings`: cohesion pulls in one. */
 static int pairs, rows, bodies, clings;
 
@@ -34,10 +31,6 @@ static inline double least(double a, double b) {
 static inline double most(double a, double b) {
     return wasm_f64x2_extract_lane(wasm_f64x2_pmax(wasm_f64x2_splat(b), wasm_f64x2_splat(a)), 0);
 }
-static inline Two two(const double *from) { return wasm_v128_load(from); }
-static inline Two times(double a, Two v) { return wasm_f64x2_mul(wasm_f64x2_splat(a), v); }
-static inline Two plus(Two a, Two b) { return wasm_f64x2_add(a, b); }
-static inline Two minus(Two a, Two b) { return wasm_f64x2_sub(a, b); }
 static inline double first(Two v) { return wasm_f64x2_extract_lane(v, 0); }
 static inline double second(Two v) { return wasm_f64x2_extract_lane(v, 1); }
 /* Of a velocity normal velocity and slip, of impulses their vector. */
@@ -346,36 +339,46 @@ double sweep_rows(int sweeps, int plain, double accurate) {
     return worst;
 }
 
-/* Slope of the cost along all impulses J, at a share of them. The cost is 1/2 J W J + J q, W J their changes
+/* Slopes of the cost along all impulses J, at two shares of them. The cost is 1/2 J W J + J q, W J their changes
    of velocity: what sweeps make least, one contact after the other. W J + q is how far the velocities are
    from what the contacts ask for; see docs/physics.md. */
-static double slope(double share) {
-    double sum = 0;
+static Two slopes(double one, double other) {
+    Two share = wasm_f64x2_make(one, other), sum = wasm_f64x2_splat(0);
     for (const SolverRow *c = W.rows; c < W.rows + rows; c++) {
-        Two v = plus(two(c->free), times(share, minus(moves(c), two(c->free))));
-        sum += c->impulse[0] * above(c, first(v), share * c->impulse[0]) + c->impulse[1] * second(v);
-        if (c->arm > 0) sum += c->moment * (c->spin + share * (rolls(c) - c->spin));
+        Two change = minus(moves(c), two(c->free));
+        Two opens = plus(wasm_f64x2_splat(c->free[0]), times(first(change), share));
+        Two slips = plus(wasm_f64x2_splat(c->free[1]), times(second(change), share));
+        /* As `above`, of both. */
+        Two gives = plus(opens, times(c->gives, times(c->impulse[0], share)));
+        gives = wasm_f64x2_pmax(minus(opens, wasm_f64x2_splat(c->more)), gives);
+        gives = wasm_f64x2_pmin(plus(opens, wasm_f64x2_splat(c->parts)), gives);
+        sum = plus(sum, plus(times(c->impulse[0], gives), times(c->impulse[1], slips)));
+        if (!(c->arm > 0)) continue;
+        Two rolled = times(rolls(c) - c->spin, share);
+        sum = plus(sum, times(c->moment, plus(wasm_f64x2_splat(c->spin), rolled)));
     }
     return sum;
 }
 
-/* Take the share of all impulses at which the cost is least. The slope grows with it: straight from `none` to
-   `all`, below that where what an overlap asks for ends at its most, above where it ends at what keeps it as
-   deep: there the share is halved in on. Where sweeps end, the impulses do no work so on the velocities
-   that they leave, however far the sweeps had come: W J + q times J is at most 0. */
-void lessen(void) {
-    double none = slope(0), all = slope(1), share, less = 0;
-    if (!(all > 0)) return;
+/* Take the share of all impulses at which the cost is least; 0 if that is all of them. The slope grows with it:
+   straight from `none` to `all`, below that where what an overlap asks for ends at its most, above where it ends
+   at what keeps it as deep: there the share is halved in on. Where sweeps end, the impulses do no work so on
+   the velocities that they leave, however far the sweeps had come: W J + q times J is at most 0. */
+int lessen(void) {
+    Two ends = slopes(0, 1);
+    double none = first(ends), all = second(ends), share, less = 0;
+    if (!(all > 0)) return 0;
     share = none < 0 ? none / (none - all) : 0;
-    if (slope(share) > EPS * all) {
+    if (first(slopes(share, share)) > EPS * all) {
         for (int n = 0; n < HALVINGS; n++) {
             double middle = 0.5 * (less + share);
-            if (slope(middle) > 0) share = middle;
+            if (first(slopes(middle, middle)) > 0) share = middle;
             else less = middle;
         }
         share = less;
     }
     scale(share);
+    return 1;
 }
 
 /* Take back friction beyond what contacts allow: sweeps that did not come to an end have pressed less
@@ -392,15 +395,18 @@ void keep_bounds(void) {
     }
 }
 
-/* Take back what rounding presses; with endless friction even that would pull. */
-void drop_noise(void) {
+/* Take back what rounding presses; with endless friction even that would pull. Return whether there was any. */
+int drop_noise(void) {
+    int dropped = 0;
     for (SolverRow *c = W.rows; c < W.rows + rows; c++) {
         const SolverBody *a = W.solver_bodies + c->a;
         const Disk *d = W.disks + a->disk;
         if (c->impulse[0] >= NOISE * c->mass[0] * (fabs(d->ux + a->x) + fabs(d->uy + a->y))) continue;
         push_row(c, minus(wasm_f64x2_splat(0), two(c->impulse)), -c->moment);
+        dropped |= c->impulse[0] != 0 || c->impulse[1] != 0 || c->moment != 0;
         c->impulse[0] = c->impulse[1] = c->moment = 0;
     }
+    return dropped;
 }
 
 /* By how much gaps close faster than they are asked to, at most, m/s. */

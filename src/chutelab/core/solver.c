@@ -78,7 +78,7 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough) {
     double first = INFINITY;
-    int driven = 0, pressing = 0;
+    int driven = 0, pressing = 0, lessened = 0;
     if (W.swings_too) {
         sweep_hung(list, count, MAX(rounds, 1) * sweeps, enough);
         return;
@@ -96,7 +96,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
         double change = sweep_rows(sweeps, plain, accurate), worst = change;
         int ended = change <= accurate;
         if (!ended) keep_bounds();
-        if (!ended || W.interact) lessen();
+        if (!ended || W.interact) lessened = lessen();
         if (left == 0) break;
         int stalled = driven && change < INFINITY && stall(list, count, INFINITY, enough);
         if (!stalled) {
@@ -120,8 +120,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
         }
         begin_anew();
     }
-    drop_noise();
-    if (W.interact) lessen();
+    if ((drop_noise() || lessened) && W.interact) lessen();
     take_rows(list, count);
 }
 

@@ -441,4 +441,4 @@ def _places(recording: Record, particle: Ints, times: Floats) -> Floats:
         left, right = np.where(passed, middle, left), np.where(passed, right, middle)
     h = t[left + 1] - t[left]
     share = np.divide(times - t[left], h, out=np.ones_like(h), where=h > 0.0).clip(0.0, 1.0)
-    return np.stack([hermite(recording.knots, left, share, axis)[0] for axis in (0, 1)], axis=-1)
+    return hermite(recording.knots, left, share)[0]

@@ -179,20 +179,23 @@ def blocks(knots: NDArray[Any], offsets: Ints, times: Floats) -> Iterator[Cells]
         yield begin + row, released[column], left, share
 
 
-def hermite(knots: NDArray[Any], left: Ints, share: Floats, axis: int) -> tuple[Floats, Floats]:
-    """Return one coordinate (m) and its velocity (m/s) on the cubic between two knots, (c,)."""
+def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Floats]:
+    """Return places (m) and velocities (m/s) on the cubics between two knots each, (c, 2)."""
     s, h = share, knots["t"][left + 1] - knots["t"][left]
-    position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
-    pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
-    dx = pb - pa
-    # Written around the left knot, so that a long flight loses no digits.
-    where = pa + s * (
-        h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
-    )
-    slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
-    pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
+    places, velocities = np.empty((2, len(left), 2))
     over = s >= 1.0
-    return np.where(over, pb, where), np.where(over, vb, pace)
+    for axis in (0, 1):
+        position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
+        pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
+        dx = pb - pa
+        # Written around the left knot, so that a long flight loses no digits.
+        where = pa + s * (
+            h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
+        )
+        slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
+        pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
+        places[:, axis], velocities[:, axis] = np.where(over, pb, where), np.where(over, vb, pace)
+    return places, velocities
 
 
 class Motion(tuple[Floats, Floats]):
@@ -529,9 +532,8 @@ class Record(Shown):
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         position, velocity = np.full((2, len(times), self.count, 2), np.nan)
         for row, particle, left, share in self.blocks(times):
-            for axis in (0, 1):
-                where, pace = hermite(self.knots, left, share, axis)
-                position[row, particle, axis], velocity[row, particle, axis] = where, pace
+            where, pace = hermite(self.knots, left, share)
+            position[row, particle], velocity[row, particle] = where, pace
         return Motion(position, velocity, self, times)
 
     def energy_at(self, times: ArrayLike) -> dict[str, Floats]:
@@ -627,11 +629,11 @@ class Record(Shown):
     ) -> tuple[Floats, ...]:
         """Return what `energy_at` does, of each cell, (c,)."""
         a, b = self.knots[left], self.knots[left + 1]
-        (x, vx), (y, vy) = (hermite(self.knots, left, share, axis) for axis in (0, 1))
+        where, pace = hermite(self.knots, left, share)
         omega = a["omega"] + share * (b["omega"] - a["omega"])
         body = self.particle.of(particle)
-        kinetic = body.kinetic(vx, vy, omega)
-        potential = body.mass * self.gravity * self.machine.height(np.stack([x, y], axis=-1))
+        kinetic = body.kinetic(pace[:, 0], pace[:, 1], omega)
+        potential = body.mass * self.gravity * self.machine.height(where)
         gain = kinetic + potential - at_release
 
         entries_a, entries_b = a["entries"].T, b["entries"].T

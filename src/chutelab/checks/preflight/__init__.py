@@ -434,7 +434,7 @@ def _at_belt_height(machine: Machine, tried: Recording, particles: Ints) -> list
         track = tried.track(particle)
         times = np.linspace(track["t"][0], track["t"][-1], 2000)
         ((_, _, left, share),) = blocks(track, np.array([0, len(track)]), times)
-        (x, _), (y, _) = (hermite(track, left, share, axis) for axis in (0, 1))
+        x, y = hermite(track, left, share)[0].T
         above = np.flatnonzero(y >= level)
         if len(above):
             found.append(float(x[above[-1]]))

@@ -3,6 +3,7 @@
 import { PLATE, svg } from "./scenery.ts";
 import type { Inspector } from "./inspector.ts";
 import type { Lab } from "./lab.ts";
+import type { Recording } from "./recording.ts";
 import type { Stage } from "./stage.ts";
 import type { Symbols } from "./symbols.ts";
 
@@ -32,6 +33,9 @@ const BELT = 4.5;
 /** Pixels round a box of the picture, the bar that tells the scale or the legend, that are to be
  * free; and its steps to the right. */
 const CLEAR = 14, ASIDE = 38;
+
+/** Of a crowd: particles and times whose places are kept free, at most. */
+const SOME = 60, TIMES = 16;
 
 /** Pixels from bodies to the frame round several. */
 const FRAME = 12;
@@ -97,6 +101,14 @@ function surfaceLines({ lab, view, scenery, posed: machine }: Stage): Named[] {
   ];
 }
 
+/** Places where particles of a crowd come, px. */
+function passed({ view }: Stage, { tracks, begin, end }: Recording): Point[] {
+  const every = Math.ceil(tracks.length / SOME);
+  return tracks.filter((_, i) => i % every === 0).flatMap((track) =>
+    Array.from({ length: TIMES }, (_, n) => track.state(begin + ((end - begin) * n) / (TIMES - 1)))
+      .flatMap((state): Point[] => (state ? [[view.px(state.x), view.py(state.y)]] : [])));
+}
+
 /** Where a box meets neither surfaces and tracks nor what is taken: from a corner up, then further
  * to the right; null where all is full.
  * @param size width and height, px @param corner its lower left one, px
@@ -107,7 +119,7 @@ function freePlace(stage: Stage, size: Point, corner: Point, taken: Stage["cover
   const path = recording ? stage.trackPoints(recording, 4 / view.scale) : [];
   const there = [...surfaceLines(stage).map(([, line]) => line),
     ...path.map((points) => points.map(({ x, y }) => [view.px(x), view.py(y)] as Point))]
-    .flatMap(along);
+    .flatMap(along).concat(recording?.machine.interact ? passed(stage, recording) : []);
   for (let x = left; x + wide < free.right; x += ASIDE) {
     for (let y = bottom; y - high > free.top + CLEAR; y -= ALONG) {
       const meets = (u: number, v: number) => u > x - CLEAR && u < x + wide + CLEAR

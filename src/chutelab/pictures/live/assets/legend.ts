@@ -19,7 +19,8 @@ class Legend {
 
   constructor(readonly stage: Stage) {
     stage.over.prepend(this.layer);
-    stage.drawers.push(() => this.draw());
+    // Labels keep clear of it.
+    stage.drawers.unshift(() => this.draw());
   }
 
   /** What its lines say, from the top: with the step of colour that it is beside, or a stream. */
@@ -37,18 +38,21 @@ class Legend {
   }
 
   draw() {
-    const { stage, layer, lines } = this, { view, words, balls, held } = stage;
+    const { stage, layer, lines } = this, { view, words, balls, held, lab } = stage;
     const { x, y, scale, width, height } = view;
     const notes = lines.length && stage.isLarger ? [words.say("drawn-larger")] : [];
-    const now = JSON.stringify(
-      [lines, balls.hue, notes, x, y, scale, width, height, stage.scaleAt]);
+    const now = JSON.stringify([lines, balls.hue, notes, x, y, scale, width, height, stage.scaleAt,
+      lab.recording?.state]);
     // Under what is dragged it stays.
     if (held || now === this.drawn) return;
     this.drawn = now;
     layer.replaceChildren();
     stage.legend = null;
     layer.removeAttribute("role");
-    if (!lines.length) return;
+    if (!lines.length) {
+      if (stage.strip) stage.keepFree(0);
+      return;
+    }
     const title = words.say(`hue-${balls.hue}`), ramp = balls.hue !== "kind";
     const wide = Math.max(...[title, ...notes].map(({ length }) => LETTER * length),
       ...lines.map(([, text]) => BESIDE + LETTER * text.length));
@@ -69,14 +73,21 @@ class Legend {
       notes.forEach((note) => this.write(px, py + whole - 4, note, "small"));
       break;
     }
-    if (!stage.legend && ramp) this.flat(title, lines);
+    if (!stage.legend) this.flat(title, lines);
+    // Where a machine fills all of a small picture, it makes room.
+    if (!stage.legend && !stage.strip && !stage.moved) {
+      stage.keepFree(LINE);
+      return;
+    }
     layer.setAttribute("role", "img");
     layer.setAttribute("aria-label", `${title}: ${lines.map(([, text]) => text).join(", ")}`);
   }
 
-  /** Find room for so much, px; its upper left corner. */
+  /** Find room for so much, px, or in the strip that is kept free; its upper left corner. */
   find(wide: number, high: number): [number, number] {
-    const { stage } = this, at = freePlace(stage, [wide, high], stage.corner, [stage.scaleBox]);
+    const { stage } = this, { view: { free }, strip, corner: [x], moved } = stage;
+    const inStrip: [number, number] | null = high <= strip && !moved ? [x, free.top] : null;
+    const at = freePlace(stage, [wide, high], stage.corner, [stage.scaleBox]) ?? inStrip;
     if (!at) return [0, 0];
     const [left, bottom] = at;
     stage.legend = { left, right: left + wide, top: bottom - high, bottom };
@@ -85,6 +96,22 @@ class Legend {
 
   /** All in a line, where there is little room. */
   flat(title: string, lines: [number, string][]) {
+    if (this.stage.balls.hue === "kind") {
+      const long = (text: string) => LETTER * text.length;
+      const each = (text: string) => long(text) + 2 * BESIDE;
+      const wide = lines.reduce((sum, [, text]) => sum + each(text), long(title));
+      const [x, y] = this.find(wide, LINE);
+      if (!this.stage.legend) return;
+      this.write(x, y + 16, title, "title");
+      let from = x + long(title) + BESIDE;
+      for (const [n, text] of lines) {
+        this.layer.append(svg("circle", { cx: from + DOT, cy: y + 11, r: DOT,
+          class: `kind-${n % 5}` }));
+        this.write(from + BESIDE, y + 16, text);
+        from += each(text);
+      }
+      return;
+    }
     const [[, high], , [, low]] = lines, first = `${title} ${low}`;
     const before = LETTER * first.length + 8, long = STEPS * TALL[1];
     const [x, y] = this.find(before + long + 8 + LETTER * high.length, LINE);

@@ -110,7 +110,7 @@ class Stage {
     const style = getComputedStyle(this.home);
     const inset = (side: string) => parseFloat(style.getPropertyValue(`padding-${side}`)) || 0;
     this.view.free = {
-      left: inset("left"), top: inset("top"), right: width - inset("right"),
+      left: inset("left"), top: inset("top") + this.strip, right: width - inset("right"),
       bottom: height - inset("bottom"),
     };
     // In a lesson it stands above, where no belt is.
@@ -209,6 +209,16 @@ class Stage {
   }
 
   legend: Stage["frame"] = null;
+  /** Height of a strip that is kept free of the machine at the top, where else the legend has no
+   * place, px. */
+  strip = 0;
+
+  /** Keep a strip free, or no longer. */
+  keepFree(strip: number) {
+    this.strip = strip;
+    this.resize();
+  }
+
   /** Boxes of the labels that stand in the picture, px. */
   labels: { left: number, right: number, top: number, bottom: number }[] = [];
 

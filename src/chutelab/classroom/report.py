@@ -201,7 +201,7 @@ def report(
     recording = judged(loaded, engine=engine)
     repeats = repeat(loaded, runs) if runs > 1 else None
     made = Report(loaded, recording, repeats, view, command, words_of(language))
-    title = made.words.titles().get(loaded.title, loaded.title)
+    title = made.words.title(loaded.title)
     made.parts.append(f"# {_plain(title)}")
     with look(language=language):
         (_for_students if view == "teacher" else _for_engineers)(made)

@@ -293,9 +293,9 @@ def test_a_particle_inside_what_hangs_breaks_a_law():
     assert "lever" in {one.surface for one in judge(spoilt)}
 
 
-def test_a_film_draws_it_where_it_is():
+def test_a_film_draws_it_where_it_is_and_a_picture_where_it_ends():
     from chutelab.pictures.animation.actors import gates
-    from chutelab.pictures.plots.figure import Picture
+    from chutelab.pictures.plots.figure import Picture, draw_view
 
     recording = run(mass=1.0)
     ax = Picture((6.0, 4.0)).add_axes((0.0, 0.0, 1.0, 1.0))
@@ -304,6 +304,11 @@ def test_a_film_draws_it_where_it_is():
     angle = recording.pose("lever", [0.4])[0, 2]
     expected = [[0.0, 0.0], [0.5 * cos(angle), 0.5 * sin(angle)]]
     assert line.get_xydata() == pytest.approx(np.array(expected), abs=1e-12)
+    ax = Picture((6.0, 4.0)).add_axes((0.1, 0.1, 0.8, 0.8))
+    (line,) = (one for one in draw_view(ax, recording, ()).lines if one.get_gid() == "last lever")
+    angle = recording.pose("lever", [1.0])[0, 2]
+    expected = [[0.0, 0.0], [0.5 * cos(angle), 0.5 * sin(angle)]]
+    assert line.get_xydata() == pytest.approx(np.array(expected), abs=1e-9)
 
 
 def test_the_damping_plate_may_hang():

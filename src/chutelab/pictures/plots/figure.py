@@ -20,7 +20,13 @@ from matplotlib.transforms import Bbox
 
 from chutelab.pictures import BLUE, GREEN, ORANGE, VERMILION
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.machinery import draw_bodies, draw_scene, halo, stream_handles
+from chutelab.pictures.plots.machinery import (
+    draw_bodies,
+    draw_last,
+    draw_scene,
+    halo,
+    stream_handles,
+)
 from chutelab.pictures.plots.panels import (
     Arc,
     analytic_of,
@@ -173,11 +179,14 @@ def draw_view(
 ) -> Axes:
     """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend.
 
-    Of a `crowd` the envelope of the paths instead of what particle 0 does. With `bodies` also the
-    particles, at the last moment at which half of them or more are there.
+    What moves is drawn where it begins, dashed, and where it is in the end. Of a `crowd` the
+    envelope of the paths instead of what particle 0 does. With `bodies` also the particles, at the
+    last moment at which half of them or more are there.
     """
     style.dress(ax, say("x"), say("y"))
-    draw_scene(ax, recording.machine, window_of(recording), clear=path_of_arcs(parts))
+    machine = recording.machine
+    draw_scene(ax, machine, window_of(recording), clear=path_of_arcs(parts))
+    draw_last(ax, machine, recording.t[-1])
     draw_analytic(ax, parts)
     draw_tracks(ax, recording, marks=not crowd)
     if crowd and not one_of_many(recording):

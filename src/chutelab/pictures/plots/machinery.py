@@ -233,6 +233,17 @@ def draw_scene(
     return ax
 
 
+def draw_last(ax: Axes, machine: Machine, t: float) -> Axes:
+    """Draw what moves where it is at a time (s), in thin lines."""
+    movers = {mover.surface: mover for mover in machine.movers}
+    for piece in pieces(machine) if movers else ():
+        if mover := movers.get(int(piece.surface)):
+            gid = f"last {machine.surfaces[mover.surface]}"
+            color = colour_of(machine, piece)
+            ax.plot(*mover.carried(piece.path(), t).T, color=color, lw=1.3, zorder=1.9, gid=gid)
+    return ax
+
+
 Spot = tuple[Floats, tuple[float, float], str, str]
 """Where a name stands: a point (m), the way from there (pt), and how it is aligned to both axes."""
 

@@ -155,30 +155,6 @@ of a track it is the last knot but one); and the share of the interval that has 
 where a track ends with an impact."""
 
 
-def blocks(knots: NDArray[Any], offsets: Ints, times: Floats) -> Iterator[Cells]:
-    """Find the interval of every cell, block by block in the order of `times` (s, any order).
-
-    Knots and offsets are those of a `Recording`.
-    """
-    t = knots["t"]
-    released = np.flatnonzero(offsets[1:] > offsets[:-1])
-    first, last = offsets[released], offsets[released + 1] - 1
-    rows = max(1, CELLS // max(1, len(released)))
-    for begin in range(0, len(times), rows):
-        now = times[begin : begin + rows, None]
-        row, column = np.nonzero((now >= t[first]) & (now <= t[last]))
-        at = times[begin + row]
-        # The last knot in [left, right) whose time is not later, by bisection of all cells at once.
-        left, right = first[column], last[column]
-        while np.any(right - left > 1):
-            middle = (left + right) // 2
-            passed = t[middle] <= at
-            left, right = np.where(passed, middle, left), np.where(passed, right, middle)
-        h = t[left + 1] - t[left]
-        share = np.divide(at - t[left], h, out=np.ones_like(h), where=h > 0.0)
-        yield begin + row, released[column], left, share
-
-
 def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Floats]:
     """Return places (m) and velocities (m/s) on the cubics between two knots each, (c, 2)."""
     s, h = share, knots["t"][left + 1] - knots["t"][left]
@@ -521,8 +497,27 @@ class Record(Shown):
         return movers[name].pose(np.atleast_1d(times))
 
     def blocks(self, times: Floats) -> Iterator[Cells]:
-        """Find the knots before and after every particle's place at times (T,), s: see `Cells`."""
-        return blocks(self.knots, self.offsets, times)
+        """Find the knots before and after every particle's place at times (T,), s, in any order.
+
+        Block by block in the order of the times; see `Cells`.
+        """
+        t, offsets = self.knots["t"], self.offsets
+        released = np.flatnonzero(offsets[1:] > offsets[:-1])
+        first, last = offsets[released], offsets[released + 1] - 1
+        rows = max(1, CELLS // max(1, len(released)))
+        for begin in range(0, len(times), rows):
+            now = times[begin : begin + rows, None]
+            row, column = np.nonzero((now >= t[first]) & (now <= t[last]))
+            at = times[begin + row]
+            # The last knot in [left, right) whose time is not later, by bisection of all at once.
+            left, right = first[column], last[column]
+            while np.any(right - left > 1):
+                middle = (left + right) // 2
+                passed = t[middle] <= at
+                left, right = np.where(passed, middle, left), np.where(passed, right, middle)
+            h = t[left + 1] - t[left]
+            share = np.divide(at - t[left], h, out=np.ones_like(h), where=h > 0.0)
+            yield begin + row, released[column], left, share
 
     def at(self, times: ArrayLike) -> Motion:
         """Return positions (m) and velocities (m/s), (T, N, 2), at times (T,), s, in any order.

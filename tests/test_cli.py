@@ -246,7 +246,8 @@ def test_a_run_writes_the_whole_set():
     with Image.open(out / "lesson.gif") as film:
         assert film.format == "GIF"
         assert film.n_frames > 20
-        assert film.info["loop"] == 0
+        assert (film.info["loop"], film.info["duration"]) == (0, 40)
+    assert (out / "lesson.gif").stat().st_size < 400_000
 
     recording = chutelab.Recording.load(out / "recording.npz")
     assert recording.title == "Perpendicular damping plate, 2 m/s"
@@ -263,6 +264,9 @@ def test_a_run_writes_the_whole_set():
 
 def test_a_table_of_very_many_events_is_written_if_it_is_asked_for(monkeypatch):
     monkeypatch.setattr("chutelab.cli.running.MOST_EVENTS", 3)  # it has 4
+    monkeypatch.setattr(
+        "chutelab.pictures.animation.animate", lambda _run, path, **_how: path.write_bytes(b"")
+    )
     result = call("run", "perpendicular", "--out", "out")
     assert "lesson.gif, trajectory.csv, recording.npz, summary.json\n" in result.stdout
     said = "events.csv is left out: 4 events, about 0 MB; chutelab "

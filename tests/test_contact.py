@@ -202,7 +202,7 @@ LIMIT = 20.0
 
 @pytest.mark.parametrize(
     ("seed", "count"),
-    [*((n, 60) for n in range(3)),
+    [(0, 60), *(pytest.param(n, 60, marks=pytest.mark.slow) for n in (1, 2)),
      *(pytest.param(n, None, marks=pytest.mark.slow) for n in range(300))],
 )  # fmt: skip
 def test_crowds_obey_the_laws(seed, count):

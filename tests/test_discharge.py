@@ -193,7 +193,10 @@ def test_side_by_side_with_a_simulated_stream():
 
 def test_the_simulated_stream_is_counted_by_hand():
     """2, 50 and 98 % of where centres pass a height; edges lie r |v| / |v_y| beside."""
-    found = side_by_side(chutelab.load("stream", {"stream.count": 40}), [-0.2])
+    first = chutelab.scene.to_dict(chutelab.load("stream", {"stream.count": 40}))["stream"]
+    scene = chutelab.load("stream", {"stream": [first, {"count": 7, "start": 5.0}]})
+    found = side_by_side(scene, [-0.2])
+    assert found.scene.count == 40  # of the first stream alone
     run, x, aside = found.recording, [], []
     for n in range(40):
         knots = run.knots[run.offsets[n] : run.offsets[n + 1]]

@@ -104,7 +104,7 @@ def test_picture_has_both_forms_on_the_same_axes(found, number):
         assert text in said
 
 
-@pytest.mark.parametrize("number", [7, 12])
+@pytest.mark.parametrize("number", [7, pytest.param(12, marks=pytest.mark.slow)])
 def test_command_writes_picture_numbers_and_scenes(number, tmp_path):
     result = CliRunner().invoke(main, ["figure", str(number), "--out", str(tmp_path / "out")])
     assert result.exit_code == 0, result.output

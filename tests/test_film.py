@@ -11,7 +11,7 @@ from chutelab.classroom.lessons.sheets import sheet
 from chutelab.classroom.lessons.texts import without_tex
 from chutelab.engines.simulation import simulate
 from chutelab.studies import measured
-from shared import find
+from shared import find, some
 
 TRUTH = {"surface.table.restitution": 0.8, "gravity": 9.81}
 KEYS = ["gravity", "surface.table.restitution", "t0"]
@@ -119,7 +119,7 @@ def in_air(mass, e=0.8, g=9.81, step=1e-5):
 
 @pytest.mark.parametrize(
     ("mass", "said"),
-    [(0.037, "ε = {e:.3f} and g = {g:.2f} m/s²"), (0.0027, "gives {e:.2f} and {g:.1f} m/s²")],
+    some([(0.037, "ε = {e:.3f} and g = {g:.2f} m/s²"), (0.0027, "gives {e:.2f} and {g:.1f} m/s²")]),
 )
 def test_air_is_taken_for_the_tables_fault_as_the_explanation_says(lesson, scene, mass, said):
     y = in_air(mass) + RADIUS

@@ -35,7 +35,11 @@ FUNCTIONS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+# What `minimize` takes goes the way of `solve`.
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.slow) if n == "minimize" else n for n in FUNCTIONS],
+)
 def test_what_takes_a_scene_takes_a_name_a_path_and_tables(name):
     path = shipped()["perpendicular"]
     scene = chutelab.load(path)

@@ -243,7 +243,13 @@ def test_what_has_not_changed_is_not_built_again(copied):
     [
         ("scene.toml", "restitution = 0.5", "restitution = 0.4", True),
         ("scene.toml", "# What to look at.", "# Another comment.", False),
-        ("lesson.toml", "set = []", 'set = ["plate.restitution=0.3"]', True),
+        pytest.param(
+            "lesson.toml",
+            "set = []",
+            'set = ["plate.restitution=0.3"]',
+            True,
+            marks=pytest.mark.slow,
+        ),
         ("lesson.toml", "slow = 2", "slow = 1.5", True),
         ("lesson.toml", "minutes = 45", "minutes = 50", False),
         ("lesson.toml", "Where does the particle land?", "Where will it land?", False),

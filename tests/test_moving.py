@@ -302,9 +302,14 @@ def test_a_release_waits_for_what_is_in_its_place():
 @pytest.mark.parametrize(
     ("scene", "bound"),
     [
-        (table(shake={"by": [0.0, 0.004], "frequency": 8.0}, stream={"at": [0.0, 0.1]},
-               run={"until": 0.25}), 2e-3),
-        (table(travel={"to": [-0.4, 0.2], "at": 0.05, "in": 0.4}, run={"until": 0.5}), 3e-4),
+        pytest.param(
+            table(shake={"by": [0.0, 0.004], "frequency": 8.0}, stream={"at": [0.0, 0.1]},
+                  run={"until": 0.25}), 2e-3, marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            table(travel={"to": [-0.4, 0.2], "at": 0.05, "in": 0.4}, run={"until": 0.5}), 3e-4,
+            marks=pytest.mark.slow,
+        ),
         (table(turn=25.0, pivot=[0.0, 0.0], friction=0.8, particle={"spin": True},
                stream={"at": [0.1, R]}, run={"until": 0.3}), 1e-3),
     ],

@@ -67,7 +67,7 @@ def answers(function, noise, wishes, common, searches, points):
 
 
 def test_a_search_with_noise_finds_where_two_targets_are_met():
-    found, told = answers(bend, (0.02, 0.0, 0.005, 0.0), TWO, 1.0, 2, 24)
+    found, told = answers(bend, (0.02, 0.0, 0.005, 0.0), TWO, 1.0, 2, 12)
     assert np.all(np.abs(found - [30.0, 0.25]) < 4.0 * told)
     assert np.all(told < [1.0, 0.03])
 
@@ -108,7 +108,7 @@ def test_a_limit_or_target_and_a_minimum_without_noise_are_exact():
     assert missed < 1e-6
 
 
-def test_a_target_and_a_minimum_of_a_lone_particle():
+def test_a_target_of_a_lone_particle_is_met_at_its_minimum():
     """A perpendicular plate sends a point back with ε v: of all speeds and ε with ε v = 1 m/s the
     shortest fall is none, the flight to the plate takes d / v: fastest at the end of the range."""
     found = solve(
@@ -119,6 +119,10 @@ def test_a_target_and_a_minimum_of_a_lone_particle():
     assert speed == pytest.approx(4.0, rel=1e-6)
     assert restitution * speed == pytest.approx(1.0, rel=1e-6)
     assert found.answer.place == "end"
+
+
+@pytest.mark.slow
+def test_a_minimum_of_a_lone_particle_keeps_to_its_bound():
     limit = {"incoming.speed": (1.5, 4.0), "plate.restitution": (0.1, 0.9)}
     least = minimize("perpendicular", limit, "impact.t", subject_to={"impact.vx": (None, 2.5)})
     assert least.answer.values[0] == pytest.approx(2.5, rel=1e-6)
@@ -126,7 +130,7 @@ def test_a_target_and_a_minimum_of_a_lone_particle():
 
 def test_an_answer_of_a_stream_has_no_more_digits_than_its_error_leaves(tmp_path):
     found = solve(
-        CROWD, {"plate.angle_deg": (10.0, 35.0)}, {"arrival.vx.mean": 1.6}, repeat=3, points=14
+        CROWD, {"plate.angle_deg": (10.0, 35.0)}, {"arrival.vx.mean": 1.6}, repeat=3, points=10
     )
     (angle,), (error,) = found.answer.values, found.answer.errors
     assert 0.0 < error < 2.0
@@ -134,10 +138,10 @@ def test_an_answer_of_a_stream_has_no_more_digits_than_its_error_leaves(tmp_path
     assert angle == round(angle, digits)
     assert f"{angle:.{digits}f} ± " in str(found)
     # It is an answer: other seeds have the speed there that was asked for, within their error.
-    seeds = [CROWD.with_values({"plate.angle_deg": angle, "stream.seed": n}) for n in range(3, 9)]
+    seeds = [CROWD.with_values({"plate.angle_deg": angle, "stream.seed": n}) for n in range(3, 7)]
     speeds = [chutelab.simulate(one).measure("arrival.vx.mean") for one in seeds]
     slope = 0.12  # m/s per degree, of the picture
-    allowed = 3.0 * sqrt(np.var(speeds, ddof=1) / 6.0 + (slope * error) ** 2)
+    allowed = 3.0 * sqrt(np.var(speeds, ddof=1) / 4.0 + (slope * error) ** 2)
     assert np.mean(speeds) == pytest.approx(1.6, abs=allowed)
     scan(found).write(tmp_path / "scan.png")
 

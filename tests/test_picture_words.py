@@ -18,7 +18,7 @@ from chutelab.pictures.animation.moments import asked, slowness, span
 from chutelab.pictures.plots import look
 from chutelab.pictures.plots.figure import loads, sensors
 from chutelab.pictures.plots.measures import wear
-from chutelab.util.words import STRINGS
+from chutelab.util.words import STRINGS, words
 from handmade import assert_legible
 from shared import lessons, some
 
@@ -55,7 +55,7 @@ def stage_of(recording, title, question):
     return Stage(recording, layout, moments, slow=slow, ask=ask)
 
 
-@pytest.mark.parametrize("name", some([one.name for one in lessons()], 7))
+@pytest.mark.parametrize("name", some([one.name for one in lessons()], 13))
 def test_a_german_film_has_no_english_in_it(name):
     lesson = find(name, "de")
     recording = judged(scene_of(lesson, lesson.picture.scene, lesson.picture.set))
@@ -97,6 +97,16 @@ def test_german_pictures_have_no_english_in_them(name):
             assert english_in(texts_of(figure)) == set()
             assert_legible(figure, 1.5)
         assert english_in(texts_of(plots.overlay(recording, details=name == "slip"))) <= {"exact"}
+
+
+def test_the_titles_of_shipped_scenes_are_german_too():
+    recording = simulate("perpendicular", {"run.loads": 0.01})
+    told = words("de").titles()[recording.title]
+    assert told != recording.title
+    with look(language="de"):
+        assert told in texts_of(stage_of(recording, None, "Wo?").figure)
+        for draw in (plots.overlay, plots.strobe, loads, wear):
+            assert told in texts_of(draw(recording))
 
 
 def test_the_option_chooses_the_language(tmp_path):

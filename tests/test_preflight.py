@@ -97,7 +97,7 @@ def test_the_end_of_the_run_is_told():
 
 
 @pytest.mark.parametrize(("dt", "safe"), [(1.4e-3, True), (1.45e-3, False)])
-def test_a_fixed_step_must_be_shorter_than_what_a_surface_catches(dt, safe):
+def test_a_fixed_step_must_be_shorter_than_what_a_surface_catches(dt, safe, brief):
     found = look("perpendicular", "run.engine=pymunk", "run.align=false", f"run.dt={dt}")
     steps = found.stepping
     assert steps is not None

@@ -210,16 +210,16 @@ def test_pairs_have_the_values_of_their_kinds():
 def test_stepped_rolling_friction_stops_and_holds():
     floor = face("floor", (-1.0, 0.0), (9.0, 0.0), restitution=0.0, friction=0.6)
     m = lone(
-        (0.0, 0.01), (0.5, 0.0), until=20.0, particle={"spin": True}, surface=[floor], run=STEPPED
+        (0.0, 0.01), (0.25, 0.0), until=20.0, particle={"spin": True}, surface=[floor], run=STEPPED
     )
     m = replace(m, rolling=np.array([0.02]), until="settled")
     got = run(m)
     # Slides, r dω/dt = 2 g (µ - arm/r), until it rolls, then to rest: a = g arm/r · 2/3. A step
     # that takes 1 mm/s or less is calm, and 0.1 s of that are rest.
-    slides = 0.5 / (G * (3.0 * 0.6 - 2.0 * 0.02))
-    rolls = (0.5 - 0.6 * G * slides) / (0.02 * G / 1.5)
+    slides = 0.25 / (G * (3.0 * 0.6 - 2.0 * 0.02))
+    rolls = (0.25 - 0.6 * G * slides) / (0.02 * G / 1.5)
     assert got.select(Kind.SETTLE)["t"][0] == pytest.approx(slides + rolls + 0.1, abs=0.01)
-    assert got.by_surface[0, 2] == pytest.approx(0.5 * 0.1 * 0.25, rel=1e-6)
+    assert got.by_surface[0, 2] == pytest.approx(0.5 * 0.1 * 0.25**2, rel=1e-6)
     assert residual(got) < 1e-12
     beta = radians(1.0)
     along = np.array([cos(beta), -sin(beta)])

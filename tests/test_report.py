@@ -67,16 +67,16 @@ def test_sensitivities_are_differences_of_two_runs():
 
 
 def test_a_stream_has_its_envelope_and_error_bars(tmp_path):
-    made = report("stream", {"stream.count": 15}, runs=3)
+    made = report("stream", {"stream.count": 12}, runs=2)
     assert {"machine", "stream", "loads", "wear"} <= made.pictures.keys()
     values = [made.repeats.values["landing.x.mean"]]
     told = {row[0]: row[2] for row in made.tables["results"].rows}["landing.x.mean"]
-    mean, error = np.mean(values), np.std(values, ddof=1) / np.sqrt(3)
+    mean, error = np.mean(values), np.std(values, ddof=1) / np.sqrt(2)
     assert "±" in told
     shown, off = (float(part) for part in told.split("±"))
     assert shown == pytest.approx(mean, abs=error)
     assert off == pytest.approx(error, rel=0.1)
-    assert "3 seeds" in made.markdown
+    assert "2 seeds" in made.markdown
     page = tmp_path / "report.html"
     made.write(page)
     text = page.read_text("utf-8")

@@ -343,7 +343,7 @@ def by_looking(e):
     left = np.flatnonzero(own & (np.diff(knots["t"]) > 0.0))
     for share in np.linspace(0.0, 1.0, 401):
         shares = np.full(len(left), share)
-        place = np.stack([hermite(knots, left, shares, axis)[0] for axis in (0, 1)], axis=-1)
+        place, _ = hermite(knots, left, shares)
         for piece in pieces:
             gap = piece.gap(place, e.radii[e.recording.owner[left]])
             if (gap[piece.there(knots["t"][left])] < -e.bounds.allowed).any():

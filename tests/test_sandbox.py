@@ -49,7 +49,7 @@ def places_of(recording, particle, radius):
     count = np.maximum(PLACES, np.ceil(step * fast / (STRIDE * radius))).astype(int)
     left = np.repeat(np.arange(len(step)), count)
     share = (np.arange(len(left)) - np.repeat(np.cumsum(count) - count, count)) / count[left]
-    place = np.stack([hermite(track, left, share, axis)[0] for axis in (0, 1)], axis=-1)
+    place, _ = hermite(track, left, share)
     t = track["t"][left] + share * step[left]
     return np.append(t, track["t"][-1]), np.append(place, track["position"][-1:], axis=0)
 

@@ -12,7 +12,7 @@ from scipy.special import ellipk
 from chutelab.engines.simulation import simulate
 from chutelab.scene import from_dict
 from chutelab.theory import belt_power, slide
-from shared import seeds
+from shared import seeds, some
 
 G = 9.81
 
@@ -151,16 +151,20 @@ def test_the_power_of_a_belt_is_what_its_load_gains_and_its_slip_heats():
     assert belt_power(rate_t_h=[0.0, 36.0], belt_speed=2.0).tolist() == [0.0, 40.0]
 
 
-@pytest.mark.parametrize(("engine", "off"), [("exact", 1e-12), ("contact", 2e-5), ("pymunk", 2e-5)])
+CHUTES = [
+    (200.0, 265.0, 1.0, 0.3, True, False), (85.0, 60.0, 0.6, 0.1, False, False),
+    (235.0, 300.0, 0.0, 0.4, True, True), (85.0, 30.0, 0.0, 0.4, False, True),
+]  # fmt: skip
+
+
 @pytest.mark.parametrize(
-    ("start", "end", "speed", "mu", "inside", "spin"),
+    ("start", "end", "speed", "mu", "inside", "spin", "engine", "off"),
     [
-        (200.0, 265.0, 1.0, 0.3, True, False),
-        (85.0, 60.0, 0.6, 0.1, False, False),
-        (235.0, 300.0, 0.0, 0.4, True, True),
-        (85.0, 30.0, 0.0, 0.4, False, True),
+        *((*chute, engine, off) for engine, off in (("exact", 1e-12), ("contact", 2e-5))
+          for chute in CHUTES),
+        *some([(*chute, "pymunk", 2e-5) for chute in CHUTES]),
     ],
-)
+)  # fmt: skip
 def test_engines_find_the_same_on_a_chute(
     start, end, speed, mu, inside, spin, engine,
     off,

@@ -49,16 +49,12 @@ def deadly(job):
     return number * number
 
 
-def test_processes_write_the_same_bytes(stepped):
+def test_processes_write_the_same_bytes_and_one_that_dies_costs_time_only(stepped, tmp_path):
     plan, whole = stepped
-    with crew(2) as team:
-        sweep_to(plan, "rows.csv", team)
-    assert Path("rows.csv").read_bytes() == whole
-
-
-def test_a_process_that_dies_costs_time_only(tmp_path):
     jobs = [(number, (number, str(tmp_path / "mark"))) for number in range(8)]
     with crew(2) as team:
+        sweep_to(plan, "rows.csv", team)
+        assert Path("rows.csv").read_bytes() == whole
         assert sorted(team.results(deadly, jobs)) == [(n, n * n) for n in range(8)]
     assert (tmp_path / "mark").exists()
 

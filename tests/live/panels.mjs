@@ -76,7 +76,7 @@ function runOf(scene) {
       return { t, ...ledger, ...stacks(ledger) };
     }),
     samples: samplesOf(recording, 0),
-    forces: times.map((t) => [t, ...contactForce(track, t, machine.mass[0], machine.gravity)]),
+    forces: times.map((t) => [t, ...contactForce(track, t, machine.mass[0], machine)]),
     nearest: [0.1, 0.37, 0.62, 0.9].map((part) => {
       const t = track.begin + part * (track.end - track.begin), { x, y } = track.state(t);
       return { asked: t, ...nearestOn(track, x, y) };

@@ -93,20 +93,14 @@ def value_of(recording: Recording, column: Column) -> float:
     """Return what a column tells of a run; NaN where the machine has none such."""
     formula = of_quantities(column.value or "nan")
     names = quantities_in(column.value or "nan")
-    told = {name: _value(recording, name) for name in names}
+    told = dict.fromkeys(names, nan)
+    for name in names:
+        row = lookup(name, recording.scene.places, recording.machine.streams)
+        if row is not None and not whose(row, recording.count):
+            found = measure(recording, name)
+            # What was not simulated, such as work until no slip, the theory has.
+            told[name] = predicted(recording.prediction, row) if isnan(found) else found
     return float(eval(compile(formula, "<column>", "eval"), KNOWN, told))
-
-
-def _value(recording: Recording, name: str) -> float:
-    """Return a quantity: the theory's if it was not simulated, such as work until no slip.
-
-    NaN where the scene has none, or one for each of several particles.
-    """
-    row = lookup(name, recording.scene.places, recording.machine.streams)
-    if row is None or whose(row, recording.count):
-        return nan
-    found = measure(recording, name)
-    return predicted(recording.prediction, row) if isnan(found) else found
 
 
 class Book:

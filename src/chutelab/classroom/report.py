@@ -20,7 +20,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from markdown_it.tree import SyntaxTreeNode
 
-from chutelab.classroom.lessons.printing import need_typst, pdf, web_page
+from chutelab.classroom.lessons.sheets import need_typst, pdf, web_page
 from chutelab.classroom.lessons.texts import parser
 from chutelab.engines.simulation import judged, simulate
 from chutelab.pictures.plots import look, overlay
@@ -59,6 +59,9 @@ BUDGET: Final = 30.0
 
 CHANGED: Final = 0.01
 """Share by which a key is changed, up and down, for its sensitivity; angles by so many radians."""
+
+ROUNDING: Final = 1e-9
+"""Share of a result by which a change of it is none."""
 
 TURNED: Final = (
     "incoming.speed", "incoming.pulley_radius", "plate.angle_deg", "plate.restitution",
@@ -107,12 +110,13 @@ class Report:
         lines = [sheet.columns, ("---",) * width, *sheet.rows, *sheet.foot]
         # Only what a student fills in is empty, and has room.
         empty = "" if name == "values" else "–"
-        made = "\n".join(
-            f"| {' | '.join(_cell(one) or empty * bool(n) for one in _filled(row, width))} |"
-            for n, row in enumerate(lines)
-        )
+        made = ""
+        for n, row in enumerate(lines):
+            cells = (_plain(cell.replace("\n", ", ")).replace("|", "/") for cell in row)
+            filled = [cell or empty * bool(n) for cell in (*cells, *[""] * (width - len(row)))]
+            made += f"| {' | '.join(filled)} |\n"
         said = " ".join(f"{_plain(note[0].upper() + note[1:])}." for note in sheet.notes)
-        return f"{made}\n\n{said}".rstrip()
+        return f"{made}\n{said}".rstrip()
 
     def picture(self, name: str, figure: Any, said: str) -> str:
         """Keep a picture, and return what shows it."""
@@ -150,14 +154,6 @@ class Report:
                 for name, one in self.tables.items()
             ),
         ]
-
-
-def _filled(row: tuple[str, ...], width: int) -> tuple[str, ...]:
-    return (*row, *[""] * (width - len(row)))
-
-
-def _cell(text: str) -> str:
-    return _plain(text.replace("\n", ", ")).replace("|", "/")
 
 
 def _plain(text: str) -> str:
@@ -205,7 +201,7 @@ def report(
     recording = judged(loaded, engine=engine)
     repeats = repeat(loaded, runs) if runs > 1 else None
     made = Report(loaded, recording, repeats, view, command, words_of(language))
-    title = made.words.titles().get(loaded.title, loaded.title)
+    title = made.words.title(loaded.title)
     made.parts.append(f"# {_plain(title)}")
     with look(language=language):
         (_for_students if view == "teacher" else _for_engineers)(made)
@@ -237,7 +233,13 @@ def _for_engineers(made: Report) -> None:
         made.add("Power at the loading point", made.table("power", paid))
     shown = made.picture("wear", draw_wear(recording, curves=many), "Where it wears")
     made.add("Wear", made.table("wear", wear(recording)), shown)
-    made.add("How to make it again", _again(made))
+    python = f"{sys.version_info.major}.{sys.version_info.minor}"
+    command = f"`{made.command}`; " if made.command else ""
+    made.add(
+        "How to make it again",
+        f"{command}chutelab {own_version()}, Python {python}, NumPy {np.__version__}. The same"
+        " scene, seed and engine give the same bits. All tables are beside this report as CSV.",
+    )
 
 
 def _for_students(made: Report) -> None:
@@ -250,16 +252,15 @@ def _for_students(made: Report) -> None:
     units = {name: unit for name, _, unit, _ in _values(recording) if unit}
     rows = tuple((f"{name}, {unit}", "", "", "", "") for name, unit in units.items())
     heads = tuple(say("lab-values-columns").split(" | "))
-    told = "; ".join(f"{_plain(name)}: {_meaning(made.words, name)}" for name in units)
-    made.add(say("lab-values"), made.table("values", Sheet("", heads, rows)), told)
+    meanings = []
+    for name in units:
+        # It may be the mean over the particles of one of `TOLD`.
+        own = name if name in TOLD else name.removesuffix(".mean")
+        mean = "" if own == name else f", {say('lab-mean')}"
+        meanings.append(f"{_plain(name)}: {say(f'lab-of-{own}')}{mean}")
+    made.add(say("lab-values"), made.table("values", Sheet("", heads, rows)), "; ".join(meanings))
     for part in ("evaluation", "errors", "conclusion"):
         made.add(say(f"lab-{part}"), say(f"lab-{part}-asks"))
-
-
-def _meaning(words: Words, name: str) -> str:
-    """Return what one of `TOLD` is, which may be a mean over the particles."""
-    own = name if name in TOLD else name.removesuffix(".mean")
-    return words.say(f"lab-of-{own}") + f", {words.say('lab-mean')}" * (own != name)
 
 
 def inputs(scene: Scene, words: Words) -> Sheet:
@@ -441,10 +442,13 @@ def sensitivities(made: Report) -> Sheet:
             changed.append({name: found for name, _, _, found in _values(run)})
         if step > 0.0 and len(changed) == 2:
             low, high = changed
-            told = [
-                _changed(low[name], high[name]) if name in low and name in high else "–"
-                for name, *_ in base
-            ]
+            told = []
+            for name, *_ in base:
+                if name not in low or name not in high:
+                    told.append("–")
+                    continue
+                half, size = 0.5 * (high[name] - low[name]), max(abs(low[name]), abs(high[name]))
+                told.append(f"{half:.3g}" if abs(half) > ROUNDING * size else "0")
             rows.append((f"{key} + {number(step)}", *told))
     heads = ("", *(f"{name}, {unit}" if unit else name for name, _, unit, _ in base))
     notes: list[str] = []
@@ -456,22 +460,6 @@ def sensitivities(made: Report) -> Sheet:
         limit = f"they would take more than the {BUDGET:g} s that there are for all"
         notes.append(f"Left out: {', '.join(skipped)}; {limit}")
     return Sheet("", heads, tuple(rows), notes=tuple(notes))
-
-
-def _changed(low: float, high: float) -> str:
-    """Return half of a difference, without rounding."""
-    half = 0.5 * (high - low)
-    return f"{half:.3g}" if abs(half) > 1e-9 * max(abs(low), abs(high)) else "0"
-
-
-def _again(made: Report) -> str:
-    """Return versions and command."""
-    python = f"{sys.version_info.major}.{sys.version_info.minor}"
-    command = f"`{made.command}`; " if made.command else ""
-    return (
-        f"{command}chutelab {own_version()}, Python {python}, NumPy {np.__version__}. The same"
-        " scene, seed and engine give the same bits. All tables are beside this report as CSV."
-    )
 
 
 def check(path: Path) -> None:

@@ -94,8 +94,8 @@ class Output:
     --abrasion K  With --only wear: Archard's K/H, 1/Pa; the same, in abrasion_m3.
     --no-energy  With --out: the lesson picture without the energy ledger; the machine is larger.
     --dark  With --out: pictures and film on a dark ground, for a dark slide or page.
-    --language  With --out: of what pictures and film say; titles and names of the scene stay as
-        they are. [default]
+    --language  With --out: of what pictures and film say; names that the scene gives stay as they
+        are, and so do titles but for those of shipped scenes. [default]
     --details  For experts: engine and steps, errors and residuals down to rounding, in the summary
         and in overlay.png; of a crowd particle 0, too.
     -q, --quiet  Print no summary and no progress bar.

@@ -595,8 +595,8 @@ def discharge(
     loaded = loaded_as_told(scene, set_)
     names = ("discharge.png", "discharge.json")
     with destination(out, names) as place:
-        with progress("simulating"):
-            found = side_by_side(loaded, wanted)
+        with progress("simulating") as update:
+            found = side_by_side(loaded, wanted, progress=update)
         if place is not None:
             from chutelab.pictures.plots.studies import discharge_figure
 

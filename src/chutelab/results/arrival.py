@@ -228,9 +228,7 @@ class Places:
 
     def on(self, particles: Ints, t: Any) -> Floats:
         """Return where particles (n,) are at t, s, one or (n,), while under way, (n, 2), m."""
-        left, share = self._cells(particles, t)
-        sides = (hermite(self.recording.knots, left, share, axis)[0] for axis in (0, 1))
-        return np.stack([*sides], axis=-1)
+        return hermite(self.recording.knots, *self._cells(particles, t))[0]
 
     def belt_work(self, particles: Ints, t: Any) -> Floats:
         """Return the belt work booked of particles (n,) up to t, s, one or (n,), (n,), J."""
@@ -241,12 +239,9 @@ class Places:
 
     def state(self, particle: int, t: float, other: int = -1) -> NDArray[Any]:
         """Return time, place and velocity of a particle just before t, as an event."""
-        left, share = self._cells(np.array([particle]), t, "left")
-        event = never(1)
-        for axis in (0, 1):
-            place, pace = hermite(self.recording.knots, left, share, axis)
-            event["position"][:, axis] = place
-            event["velocity_before"][:, axis] = event["velocity_after"][:, axis] = pace
+        event, cells = never(1), self._cells(np.array([particle]), t, "left")
+        event["position"], event["velocity_before"] = hermite(self.recording.knots, *cells)
+        event["velocity_after"] = event["velocity_before"]
         event["t"], event["particle"], event["other"] = t, particle, other
         event["kind"], event["surface"] = Kind.COLLISION, len(self.recording.surfaces) - 1
         found: NDArray[Any] = event[0]

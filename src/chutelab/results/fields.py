@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core import number as number_of
-from chutelab.results.record import Kind, Record, hermite
-from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.results.arrival import Places
+from chutelab.results.record import Kind, Record
+from chutelab.util.arrays import Bools, Floats
 from chutelab.util.errors import InputError, MissingLibraryError
 from chutelab.util.files import whole
 from chutelab.util.tables import Sheet, Shown, number
@@ -406,12 +407,12 @@ def _kept(recording: Record, begin: float, end: float, samples: int) -> _Given:
     rows = rows[of]
     impulse, stress = share[:, None] * rows["impulse"], share[:, None, None] * rows["stress"]
     own, other = rows["particle"], rows["other"]
-    center = _places(recording, own, times)
-    pair = other >= 0
+    there, pair = Places(recording), other >= 0
+    center = there.on(own, times)
     # Along b = Jᵀ (J b) / J².
     branch = np.einsum("ca,cab->cb", impulse, stress)
     branch *= (recording.radius[own] / np.hypot(*branch.T))[:, None]
-    branch[pair] = center[pair] - _places(recording, other[pair], times[pair])
+    branch[pair] = center[pair] - there.on(other[pair], times[pair])
     return _Given(center, branch, impulse, stress, ~pair)
 
 
@@ -429,16 +430,3 @@ def _left_out(recording: Record, begin: float, end: float, blows: _Given) -> flo
     borne = recording.mass[owner[left]] * np.where(sizes > 1e-9 * fast, sizes, 0.0)
     lasting = float((borne * within[left] / h[left]).sum())
     return lasting / (lasting + blows.size) if lasting > 0.0 else 0.0
-
-
-def _places(recording: Record, particle: Ints, times: Floats) -> Floats:
-    """Return where particles are, each at a time of its own, (c, 2), m."""
-    t, offsets = recording.knots["t"], recording.offsets
-    left, right = offsets[particle], offsets[particle + 1] - 1
-    while np.any(right - left > 1):
-        middle = (left + right) // 2
-        passed = t[middle] <= times
-        left, right = np.where(passed, middle, left), np.where(passed, right, middle)
-    h = t[left + 1] - t[left]
-    share = np.divide(times - t[left], h, out=np.ones_like(h), where=h > 0.0).clip(0.0, 1.0)
-    return np.stack([hermite(recording.knots, left, share, axis)[0] for axis in (0, 1)], axis=-1)

@@ -155,44 +155,23 @@ of a track it is the last knot but one); and the share of the interval that has 
 where a track ends with an impact."""
 
 
-def blocks(knots: NDArray[Any], offsets: Ints, times: Floats) -> Iterator[Cells]:
-    """Find the interval of every cell, block by block in the order of `times` (s, any order).
-
-    Knots and offsets are those of a `Recording`.
-    """
-    t = knots["t"]
-    released = np.flatnonzero(offsets[1:] > offsets[:-1])
-    first, last = offsets[released], offsets[released + 1] - 1
-    rows = max(1, CELLS // max(1, len(released)))
-    for begin in range(0, len(times), rows):
-        now = times[begin : begin + rows, None]
-        row, column = np.nonzero((now >= t[first]) & (now <= t[last]))
-        at = times[begin + row]
-        # The last knot in [left, right) whose time is not later, by bisection of all cells at once.
-        left, right = first[column], last[column]
-        while np.any(right - left > 1):
-            middle = (left + right) // 2
-            passed = t[middle] <= at
-            left, right = np.where(passed, middle, left), np.where(passed, right, middle)
-        h = t[left + 1] - t[left]
-        share = np.divide(at - t[left], h, out=np.ones_like(h), where=h > 0.0)
-        yield begin + row, released[column], left, share
-
-
-def hermite(knots: NDArray[Any], left: Ints, share: Floats, axis: int) -> tuple[Floats, Floats]:
-    """Return one coordinate (m) and its velocity (m/s) on the cubic between two knots, (c,)."""
+def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Floats]:
+    """Return places (m) and velocities (m/s) on the cubics between two knots each, (c, 2)."""
     s, h = share, knots["t"][left + 1] - knots["t"][left]
-    position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
-    pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
-    dx = pb - pa
-    # Written around the left knot, so that a long flight loses no digits.
-    where = pa + s * (
-        h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
-    )
-    slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
-    pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
+    places, velocities = np.empty((2, len(left), 2))
     over = s >= 1.0
-    return np.where(over, pb, where), np.where(over, vb, pace)
+    for axis in (0, 1):
+        position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
+        pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
+        dx = pb - pa
+        # Written around the left knot, so that a long flight loses no digits.
+        where = pa + s * (
+            h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
+        )
+        slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
+        pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
+        places[:, axis], velocities[:, axis] = np.where(over, pb, where), np.where(over, vb, pace)
+    return places, velocities
 
 
 class Motion(tuple[Floats, Floats]):
@@ -518,8 +497,27 @@ class Record(Shown):
         return movers[name].pose(np.atleast_1d(times))
 
     def blocks(self, times: Floats) -> Iterator[Cells]:
-        """Find the knots before and after every particle's place at times (T,), s: see `Cells`."""
-        return blocks(self.knots, self.offsets, times)
+        """Find the knots before and after every particle's place at times (T,), s, in any order.
+
+        Block by block in the order of the times; see `Cells`.
+        """
+        t, offsets = self.knots["t"], self.offsets
+        released = np.flatnonzero(offsets[1:] > offsets[:-1])
+        first, last = offsets[released], offsets[released + 1] - 1
+        rows = max(1, CELLS // max(1, len(released)))
+        for begin in range(0, len(times), rows):
+            now = times[begin : begin + rows, None]
+            row, column = np.nonzero((now >= t[first]) & (now <= t[last]))
+            at = times[begin + row]
+            # The last knot in [left, right) whose time is not later, by bisection of all at once.
+            left, right = first[column], last[column]
+            while np.any(right - left > 1):
+                middle = (left + right) // 2
+                passed = t[middle] <= at
+                left, right = np.where(passed, middle, left), np.where(passed, right, middle)
+            h = t[left + 1] - t[left]
+            share = np.divide(at - t[left], h, out=np.ones_like(h), where=h > 0.0)
+            yield begin + row, released[column], left, share
 
     def at(self, times: ArrayLike) -> Motion:
         """Return positions (m) and velocities (m/s), (T, N, 2), at times (T,), s, in any order.
@@ -529,9 +527,8 @@ class Record(Shown):
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         position, velocity = np.full((2, len(times), self.count, 2), np.nan)
         for row, particle, left, share in self.blocks(times):
-            for axis in (0, 1):
-                where, pace = hermite(self.knots, left, share, axis)
-                position[row, particle, axis], velocity[row, particle, axis] = where, pace
+            where, pace = hermite(self.knots, left, share)
+            position[row, particle], velocity[row, particle] = where, pace
         return Motion(position, velocity, self, times)
 
     def energy_at(self, times: ArrayLike) -> dict[str, Floats]:
@@ -627,11 +624,11 @@ class Record(Shown):
     ) -> tuple[Floats, ...]:
         """Return what `energy_at` does, of each cell, (c,)."""
         a, b = self.knots[left], self.knots[left + 1]
-        (x, vx), (y, vy) = (hermite(self.knots, left, share, axis) for axis in (0, 1))
+        where, pace = hermite(self.knots, left, share)
         omega = a["omega"] + share * (b["omega"] - a["omega"])
         body = self.particle.of(particle)
-        kinetic = body.kinetic(vx, vy, omega)
-        potential = body.mass * self.gravity * self.machine.height(np.stack([x, y], axis=-1))
+        kinetic = body.kinetic(pace[:, 0], pace[:, 1], omega)
+        potential = body.mass * self.gravity * self.machine.height(where)
         gain = kinetic + potential - at_release
 
         entries_a, entries_b = a["entries"].T, b["entries"].T

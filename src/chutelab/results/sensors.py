@@ -79,9 +79,7 @@ def passages(recording: Record, begin: Place, end: Place) -> NDArray[np.void]:
     found["t"] = knots["t"][at] + high * h[i]
     found["particle"] = np.searchsorted(recording.offsets, at, side="right") - 1
     found["way"] = np.where(below, -1, 1)
-    for axis in (0, 1):
-        where, pace = hermite(knots, at, high, axis)
-        found["position"][:, axis], found["velocity"][:, axis] = where, pace
+    found["position"], found["velocity"] = hermite(knots, at, high)
     reach = found["position"] - begin
     found["along"] = reach[:, 0] * ux + reach[:, 1] * uy
     found = found[(found["along"] >= 0.0) & (found["along"] <= long)]

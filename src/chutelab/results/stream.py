@@ -32,6 +32,9 @@ MOST_PATHS = 400
 JUMP = 5.0
 """Largest jump of an edge from one place to the next, in distances between places."""
 
+LATE = 2.0 / 3.0
+"""Share of the places from which on lines end where an edge runs back."""
+
 AHEAD = 1.0 / 60.0
 """Share of the way, ahead and back, over which the direction of a cut is taken."""
 
@@ -130,8 +133,11 @@ def _envelope(recording: Record, own: Ints, end: Floats, places: int) -> Envelop
         offset[:, s] = np.quantile(crossed @ normal[s], QUANTILES)
     found = Envelope(middle, normal, offset)
     jumps = np.hypot(*np.moveaxis(np.diff(found.lines, axis=1), 2, 0)).max(axis=0)
-    # Where half of the particles have come to lie, the cuts go through them, and lines jump.
-    broken = np.flatnonzero(jumps > JUMP * at[1])
+    # Where half of the particles have come to lie, the cuts go through them, and lines jump, or the
+    # way turns round, and an edge runs back.
+    back = np.sum(np.diff(found.lines, axis=1) * tangent[1:], axis=2).min(axis=0) < 0.0
+    late = np.arange(1, places) > LATE * places
+    broken = np.flatnonzero((jumps > JUMP * at[1]) | (back & late))
     offset[:, broken[0] + 1 if len(broken) else places :] = np.nan
     return found
 

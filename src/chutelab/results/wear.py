@@ -346,10 +346,9 @@ class _Face:
         Of centres at shares of the intervals after knots.
         """
         knots = self.recording.knots
-        (x, vx), (y, vy) = (hermite(knots, left, share, axis) for axis in (0, 1))
+        places, velocity = hermite(knots, left, share)
         times = knots["t"][left] + share * (knots["t"][left + 1] - knots["t"][left])
-        places = self.at_rest(np.stack([x, y], axis=-1), times)
-        return np.stack([vx, vy], axis=-1), times, places
+        return velocity, times, self.at_rest(places, times)
 
 
 class _Touching(NamedTuple):

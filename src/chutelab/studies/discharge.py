@@ -110,13 +110,13 @@ def side_by_side(
     if stream.at is not None or own.shape not in ("disk", "sphere"):
         raise DischargeError("must release disks or spheres on the incoming belt", "stream")
     tables = to_dict(whole)
-    first = tables["stream"][0] if isinstance(tables.get("stream"), list) else tables.get("stream")
+    streams = tables.get("stream", {})
     fall = sqrt(2.0 * (belt.pulley_radius - min(heights)) / whole.gravity)
     kept = ("title", "gravity", "material", "incoming", "particle")
     free: dict[str, Any] = {key: tables[key] for key in kept if key in tables}
     rides = (belt.length + 4.0 * belt.pulley_radius) / belt.speed
     last = stream.start + stream.count / whole.rate + rides + 3.0 * fall
-    free["stream"] = first or {}
+    free["stream"] = streams[0] if isinstance(streams, tuple) else streams
     free["run"] = {"until": last, "dt": whole.run.dt}
     alone = from_dict(free)
     radius = float(np.max(own.radius))

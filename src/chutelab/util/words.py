@@ -70,6 +70,10 @@ class Words:
         own = {key: text for key, text in words().catalogue.items() if key.startswith("title-")}
         return {text: self.catalogue[key] for key, text in own.items()}
 
+    def title(self, title: str) -> str:
+        """Return the title of a scene: those of shipped ones are there in each language."""
+        return self.titles().get(title, title)
+
     def unit(self, unit: str) -> str:
         """Return a unit as it is written behind a number."""
         return self.catalogue.get(f"unit-{unit}", unit)

@@ -40,8 +40,7 @@ from chutelab.engines.simulation import choose, unjoined
 from chutelab.machine import DRIVE_PULLEY, Caution, Machine, build
 from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Recording
-from chutelab.results.arrival import arrivals
-from chutelab.results.record import blocks, hermite
+from chutelab.results.arrival import Places, arrivals
 from chutelab.results.summary import waits
 from chutelab.scene import AnyScene, Scene, SceneError, load, shown
 from chutelab.scene.materials import DENSEST, LIGHTEST, PRESETS
@@ -429,12 +428,11 @@ def _ending(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice
 def _at_belt_height(machine: Machine, tried: Recording, particles: Ints) -> list[float]:
     """Return x (m) where particles are at the height of the outgoing belt for the last time."""
     level = _belt_height(machine) + machine.particle.of(0).radius
-    found = []
+    there, found = Places(tried), []
     for particle in particles[:SOME]:
         track = tried.track(particle)
         times = np.linspace(track["t"][0], track["t"][-1], 2000)
-        ((_, _, left, share),) = blocks(track, np.array([0, len(track)]), times)
-        (x, _), (y, _) = (hermite(track, left, share, axis) for axis in (0, 1))
+        x, y = there.on(np.full(len(times), particle), times).T
         above = np.flatnonzero(y >= level)
         if len(above):
             found.append(float(x[above[-1]]))

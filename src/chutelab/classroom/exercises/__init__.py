@@ -255,19 +255,13 @@ def _case(task: Task, number: int, given: Values | None = None) -> Case:
 
 def _of_others(task: Task, number: int) -> Iterator[tuple[str, float]]:
     """Yield the right answers for the other names of this process's tasks, and for no name."""
-    given = {normalized(UNNAMED): (UNNAMED, _unnamed(task.lesson))}
+    given = {normalized(UNNAMED): (UNNAMED, draw(EXERCISES[task.lesson], UNNAMED)[0])}
     for one in list(OPENED):  # another thread may be opening one
         if one.lesson == task.lesson:
             given.setdefault(normalized(one.student), (one.student, one.given))
     given.pop(normalized(task.student), None)
     for name, values in given.values():
         yield name, _case(task, number, values).right
-
-
-@cache
-def _unnamed(name: str) -> Values:
-    """Return the parameters of an exercise for `UNNAMED`."""
-    return draw(EXERCISES[name], UNNAMED)[0]
 
 
 def _asked(case: Case) -> Passage:

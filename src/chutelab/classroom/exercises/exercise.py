@@ -18,8 +18,8 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from functools import cache, cached_property, partial
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 from hashlib import sha256
 from itertools import combinations
 from math import degrees, isclose, isfinite, radians
@@ -85,12 +85,6 @@ def shown(number: float) -> str:
     return f"{mantissa}e{int(power)}" if power else mantissa
 
 
-def _carried(gravity: float, **arguments: Any) -> SimpleNamespace:
-    """Return what `chutelab.theory.transfer` finds, as numbers and lists of numbers."""
-    found = transfer(**arguments, gravity=gravity)
-    return SimpleNamespace(**{f.name: getattr(found, f.name).tolist() for f in fields(found)})
-
-
 _OF_MATH: Final = (
     "acos", "asin", "atan", "atan2", "cos", "degrees", "hypot", "inf", "log", "log10", "radians",
     "sin", "sqrt",
@@ -124,7 +118,13 @@ class Numbers(dict[str, Any]):
         self.language = language
         self.drawn = tuple(drawn)
         self.formulas = formulas
-        self.known = {**FUNCTIONS, "g": gravity, "transfer": partial(_carried, gravity)}
+
+        def carried(**arguments: Any) -> SimpleNamespace:
+            """Return what `chutelab.theory.transfer` finds, as numbers and lists of numbers."""
+            found = vars(transfer(**arguments, gravity=gravity))
+            return SimpleNamespace(**{name: array.tolist() for name, array in found.items()})
+
+        self.known = {**FUNCTIONS, "g": gravity, "transfer": carried}
 
     def __missing__(self, name: str) -> Any:
         # A KeyError sends `eval` on to FUNCTIONS.

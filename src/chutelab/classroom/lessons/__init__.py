@@ -5,7 +5,7 @@ the shipped lessons, found by number, by name or by folder.
 
 - `steps`: what is asked in each step, what may be changed, which runs a table wants.
 - `texts`: a lesson's Markdown as HTML and for a terminal, and its formulas.
-- `sheets`: the student's sheet, the teacher's and the explanation; `printing`: HTML, PDF.
+- `sheets`: the student's sheet, the teacher's and the explanation, as Markdown, HTML and PDF.
 - `building`: ``lesson.gif``, ``exercise.ipynb``, a new lesson from a template.
 - `pages`: all lessons as web pages, and packages for learning platforms.
 

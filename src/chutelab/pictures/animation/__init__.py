@@ -54,7 +54,7 @@ from chutelab.pictures.plots.scenery import (
     strobe_step,
     track_times,
 )
-from chutelab.pictures.plots.style import Picture, figures, say
+from chutelab.pictures.plots.style import Picture, figures, say, spoken
 from chutelab.results import Recording
 from chutelab.util.errors import MissingLibraryError
 from chutelab.util.files import whole
@@ -152,7 +152,7 @@ def lay_out(
     inside = window.holds(position)
     position, velocity = position[inside], velocity[inside]
     fastest = float(np.hypot(*velocity.T).max(initial=0.0))
-    said = recording.title if title is None else title
+    said = spoken().title(recording.title) if title is None else title
     tight = Layout(width, height, said, question, shows, view, window, fastest)
     corners = [(window.left, window.bottom), (window.right, window.top)]
     if pulley is not None:

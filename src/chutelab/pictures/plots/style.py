@@ -111,7 +111,7 @@ def named(text: str) -> str:
 def look(*, dark: bool = False, language: str = "en") -> Iterator[None]:
     """Draw in the light or the dark colours, and in a language, until the end of the block.
 
-    Titles and names that a scene gives stay as they are.
+    Titles of shipped scenes are in that language, too; names that a scene gives stay as they are.
 
     Raises
     ------
@@ -295,7 +295,7 @@ class Picture(Figure):
     def headline(self, x: float, y: float, title: str, longest: int = 80) -> None:
         """Write a title at a place, in shares of the figure, cut at `longest` characters."""
         self.text(
-            x, y, plain(shorten(title, longest, placeholder=" …")),
+            x, y, plain(shorten(spoken().title(title), longest, placeholder=" …")),
             fontsize=LARGE, fontweight="bold", verticalalignment="center",
         )  # fmt: skip
 

@@ -15,6 +15,9 @@ const MOST_PATHS = 400;
 /** Distances between two places by which its lines may go on from one to the next. */
 const JUMP = 5;
 
+/** Share of the cuts from which on lines end where an edge runs back. */
+const LATE = 2 / 3;
+
 /** Share of the way that the direction of a cut looks ahead, and back. */
 const LOOK_AHEAD = 1 / 60;
 
@@ -96,9 +99,11 @@ function envelope(own: { track: Track, end: number }[]): Point[][] | null {
     const offsets = QUANTILES.map((share) => (isPassed ? quantile(crossed, share) : NaN));
     offsets.forEach((off, q) => lines[q].push([x - off * ty, y + off * tx]));
     // Where half of the particles come to lie, the way turns round, and cuts go through the rest.
-    const jumps = n && lines.some((line) =>
-      Math.hypot(line[n][0] - line[n - 1][0], line[n][1] - line[n - 1][1]) > JUMP * at[1]);
-    if (jumps) return lines.map((line) => line.slice(0, n));
+    const ends = n && lines.some((line) => {
+      const [dx, dy] = [line[n][0] - line[n - 1][0], line[n][1] - line[n - 1][1]];
+      return Math.hypot(dx, dy) > JUMP * at[1] || (n > LATE * CUTS && dx * tx + dy * ty < 0);
+    });
+    if (ends) return lines.map((line) => line.slice(0, n));
   }
   return lines;
 }

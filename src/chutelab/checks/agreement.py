@@ -7,7 +7,7 @@ the theory give.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from math import inf, isfinite, log, nan, radians
@@ -279,12 +279,7 @@ def _verdict(row: Finding | Agreement) -> str:
     return "" if row.tolerance is None else "ok" if row.holds else "FAILED"
 
 
-def verify(
-    scene: Scene,
-    progress: Callable[[float], None] | None = None,
-    *,
-    max_seconds: float = PATIENCE,
-) -> Verification:
+def verify(scene: Scene, *, max_seconds: float = PATIENCE) -> Verification:
     """Run a scene on every engine that applies; look at what it is expected to show.
 
     An engine that gets stuck, or takes longer than `max_seconds`, wall time, is left out. Where
@@ -304,7 +299,7 @@ def verify(
             skipped[engine] = "nothing is expected of it"
             continue
         try:
-            recordings[engine] = answer(scene, engine, progress, max_seconds=max_seconds)
+            recordings[engine] = answer(scene, engine, max_seconds=max_seconds)
         except UNABLE as error:
             skipped[engine] = because(error)
     prediction = predict(scene)

@@ -31,7 +31,7 @@ from chutelab.results import Recording
 from chutelab.results.loads import sheet as load_sheet
 from chutelab.results.quantities import compare, measure
 from chutelab.results.stream import crowd
-from chutelab.results.summary import NOTES, air_drag, facts
+from chutelab.results.summary import NOTES, facts
 from chutelab.results.wear import KEYS, touched
 from chutelab.scene import AnyScene, Overrides, Scene, load, to_dict
 from chutelab.scene.materials import PRESETS
@@ -41,7 +41,7 @@ from chutelab.studies.repeats import Repeats, repeat
 from chutelab.theory.discharge import loading
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
-from chutelab.util.tables import Sheet, number, plus_minus
+from chutelab.util.tables import Sheet, number, plus_minus, sentence
 from chutelab.util.versions import own_version
 from chutelab.util.words import Words
 from chutelab.util.words import words as words_of
@@ -115,7 +115,7 @@ class Report:
             cells = (_plain(cell.replace("\n", ", ")).replace("|", "/") for cell in row)
             filled = [cell or empty * bool(n) for cell in (*cells, *[""] * (width - len(row)))]
             made += f"| {' | '.join(filled)} |\n"
-        said = " ".join(f"{_plain(note[0].upper() + note[1:])}." for note in sheet.notes)
+        said = " ".join(f"{_plain(sentence(note))}." for note in sheet.notes)
         return f"{made}\n{said}".rstrip()
 
     def picture(self, name: str, figure: Any, said: str) -> str:
@@ -331,17 +331,12 @@ def left_out(made: Report) -> list[str]:
         f"Numerical error: {100.0 * share:.2g} % of the energy turned over is unexplained by the"
         f" ledger; engine {recording.engine}.",
     ]
-    if (drag := air_drag(recording)) is not None:
-        said.append(f"{_plain(str(drag)[0].upper() + str(drag)[1:])}.")
     if scene.streams[0].width is not None:
         said.append(f"What is told per width is of {number(scene.slices())} slices.")
     if made.repeats is None and recording.count > 1:
         said.append("One seed: results have no error bars; ask for several seeds.")
-    for key, (read, _) in NOTES.items():
-        note = read(recording)
-        if note is not None and key not in ("drag",):
-            said.append(f"{_plain(str(note)[0].upper() + str(note)[1:])}.")
-    return said
+    notes = (read(recording) for read, _ in NOTES.values())
+    return said + [_plain(sentence(str(note))) + "." for note in notes if note is not None]
 
 
 def _values(recording: Recording) -> Iterator[tuple[str, str, str, float]]:

@@ -67,6 +67,9 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 #define HOP 1e-3
 /* rad; steps of a disk by itself turn it by no more inside an arc. */
 #define TURN 0.2
+/* Of a step: what befalls joints nearer to its beginning or end counts as there, else rounding would be taken
+   back in next to no time. */
+#define SOON 1e-6
 /* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
 #define SHOCKS 4
 
@@ -245,7 +248,7 @@ void cut_at_snaps(void);
 void end_pull(void);
 void strike_joints(int i, int j);
 void end_blow(void);
-void share_with_joints(const Contact *c, double wanted, double slip, double *J);
+void share_with_joints(const Contact *c, double wanted, const double *u, double *J);
 
 /* trigger.c */
 int is_triggered(int owner, int doing);

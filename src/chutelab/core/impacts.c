@@ -207,7 +207,7 @@ static void give(Contact *c, double normal) {
         more[1] = J[1];
     }
     if (tied) {
-        share_with_joints(c, normal / c->mass[0], u[1] + c->drift, J);
+        share_with_joints(c, normal / c->mass[0], u, J);
         memcpy(more, J, 2 * sizeof(double));
         arm = 0;
     }
@@ -228,6 +228,12 @@ static void give(Contact *c, double normal) {
         relative(c, 0, v);
     }
     share_out(c, u, v, 0, c->entries, given);
+    /* Joints turn slip into normal velocity, and back: where one seems to gain, only the sum is known. */
+    for (int n = 1; n < 3 && tied; n++) {
+        if (c->entries[n] >= 0) continue;
+        c->entries[3 - n] += c->entries[n];
+        c->entries[n] = 0;
+    }
     book(a->entries, c->two ? b->entries : 0, c->owner, c->entries);
     if (c->j < 0) W.drives[c->owner] += driven(c, 0);
     if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
@@ -296,7 +302,7 @@ static void jam(Contact *struck, double t) {
         for (int n = 0; n < found; n++) {
             int k = W.found[n];
             Disk *b = W.disks + k;
-            if (b->jam == -W.jams) continue;
+            if (b->jam == -W.jams || (t > W.t && is_tied(k))) continue;
             double x = b->x + (b->vx + 0.5 * W.gx * (t - b->t)) * (t - b->t) - a->x;
             double y = b->y + (b->vy + 0.5 * W.gy * (t - b->t)) * (t - b->t) - a->y;
             double reach = a->radius + b->radius + TOUCH * MIN(a->radius, b->radius);
@@ -553,6 +559,8 @@ static int struck_too(const Contact *c, double t, int *j) {
     double nx, ny;
     *j = c->j;
     if (a->mode != FREE || (!W.interact && c->impulse[0] == 0)) return 0;
+    /* What has joints is struck as a step begins. */
+    if (t > W.t && (is_tied(c->i) || is_tied(c->j))) return 0;
     advance(a, t);
     if (c->j < 0) {
         const Surface *s = face_at(surface_at(-1 - c->j, t), a->x, a->y);

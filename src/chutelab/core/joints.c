@@ -164,11 +164,13 @@ static void solve(void) {
 /* The rows of a joint whose vector goes from d0 to d1 within h: how they act, and by how much they are missed. */
 static void aim(const Joint *j, const double *d0, const double *d1, double h) {
     JointRow *r = W.joint_rows + j->row;
+    /* A short step takes back as small a share of what it begins with: else it would do so at any speed. */
+    double share = MIN(h / W.usual, 1);
     if (j->kind == PIN) {
         for (int n = 0; n < 2; n++, r++) {
             r->e[n] = 1;
             r->e[1 - n] = 0;
-            r->off = d1[n];
+            r->off = d1[n] - (1 - share) * d0[n];
             for (int end = 0; end < 2; end++) {
                 const Disk *d = at_end(2 * (int)(j - W.joints) + end);
                 double arm[2], half = d ? 0.5 * h * d->spin : 0;
@@ -181,7 +183,7 @@ static void aim(const Joint *j, const double *d0, const double *d1, double h) {
     }
     double before = size(d0), after = size(d1), sum = before + after;
     for (int n = 0; n < 2; n++) r->e[n] = sum > 0 ? (d0[n] + d1[n]) / sum : 0;
-    r->off = after - j->length;
+    r->off = after - before - share * (j->length - before);
     if (j->kind != SPRING) return;
     double stiff = 0.5 * j->stiffness + j->damper / h;
     r->eases = 2 / (h * stiff);
@@ -250,8 +252,9 @@ void pull_joints(double h) {
                 between(j, h, d1);
                 aim(j, d0, d1, h);
                 for (int k = 0; k < rows_of(j); k++) {
-                    double reach = MAX(size(d0), j->kind == PIN ? fabs(W.disks[j->particle].x) + fabs(j->from[0]) : 0);
-                    most = MAX(most, fabs(W.joint_rows[j->row + k].off) / (reach > 0 ? reach : 1));
+                    const Disk *d = W.disks + j->particle;
+                    double reach = size(d0) + (j->kind == PIN ? fabs(d->x) + fabs(d->y) : 0) + d->radius;
+                    most = MAX(most, fabs(W.joint_rows[j->row + k].off) / reach);
                 }
             }
             last = worst;
@@ -330,15 +333,17 @@ void end_pull(void) {
         if (!j->tied || h <= 0 || a->mode != FREE || (b && b->mode != FREE)) continue;
         j->taut = r->on;
         between(j, 0, d);
-        double length = size(d), grows = length - j->now, entries[3] = {0, 0, 0};
-        j->now = length;
+        double length = size(d), grows = length - size(j->now), entries[3] = {0, 0, 0};
+        double moves[2] = {d[0] - j->now[0], d[1] - j->now[1]};
+        memcpy(j->now, d, sizeof j->now);
         if (j->kind == SPRING) {
             double kept = kept_in(j, length), lost = j->damper * grows * grows / h;
             entries[0] = j->kept[1] - kept - lost;
             j->kept[1] = kept;
             j->damped += lost;
             j->given += entries[0];
-        } else if (r->on && j->kind != PIN) entries[1] = -2 * r->kick / h * grows;
+        } else if (r->on && j->kind == PIN) entries[1] = -2 / h * (r->kick * moves[0] + r[1].kick * moves[1]);
+        else if (r->on) entries[1] = -2 * r->kick / h * grows;
         if (entries[0] != 0 || entries[1] != 0) book(a->entries, b ? b->entries : 0, W.owner_count, entries);
     }
 }
@@ -349,7 +354,8 @@ void end_pull(void) {
 static void aim_now(int taut) {
     for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
         JointRow *r = W.joint_rows + j->row;
-        int acts = j->struck && (j->kind == STRING ? taut ? j->taut : is_tight(j) : j->kind != SPRING);
+        int tight = j->taut || (!taut && is_tight(j));
+        int acts = j->struck && (j->kind == STRING ? tight : j->kind != SPRING);
         double d[2];
         for (int n = 0; n < rows_of(j); n++) r[n].on = acts;
         if (!acts) continue;
@@ -417,11 +423,18 @@ static void stop(void) {
         factor(1, 0);
         solve();
     } while (let_go());
+    /* Of rows that are solved together only the sum is known: those that seem to gain, gain nothing. */
+    double all = 0, losses = 0;
+    for (const JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) {
+        double loss = r->on ? -0.5 * r->off * rate_of(r) : 0;
+        all += loss;
+        losses += MAX(loss, 0);
+    }
     for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) {
         Joint *j = W.joints + r->joint;
-        double loss[3] = {0, -0.5 * r->off * rate_of(r), 0};
+        double loss[3] = {0, losses > 0 ? -0.5 * r->off * rate_of(r) * all / losses : 0, 0};
         if (j->struck && j->kind == STRING) j->taut = r->on;
-        if (!r->on || r->off == 0) continue;
+        if (!r->on || !(loss[1] > 0)) continue;
         book(W.disks[j->particle].entries, j->other < 0 ? 0 : W.disks[j->other].entries, W.owner_count, loss);
     }
     give_impulses();
@@ -448,16 +461,17 @@ void tie_joints(void) {
             }
         }
         if (!was) {
-            between(j, 0, d);
-            j->now = size(d);
-            if (isnan(j->length)) j->length = j->now;
-            j->kept[0] = j->kept[1] = j->kind == SPRING ? kept_in(j, j->now) : 0;
+            between(j, 0, j->now);
+            if (isnan(j->length)) j->length = size(j->now);
+            j->kept[0] = j->kept[1] = j->kind == SPRING ? kept_in(j, size(j->now)) : 0;
         }
         j->struck = !was && j->kind != STRING;
-        if (j->kind == STRING && !j->taut && is_tight(j)) {
+        if (j->kind == STRING && !j->taut) {
             between(j, 0, d);
             aim(j, d, d, 0);
-            j->struck = rate_of(W.joint_rows + j->row) > 0;
+            double rate = rate_of(W.joint_rows + j->row);
+            j->struck = rate > 0 && size(d) + SOON * W.dt * rate >= (1 - BAND) * j->length;
+            j->taut = j->struck;
         }
         fresh |= j->struck;
     }
@@ -492,8 +506,9 @@ void end_blow(void) {
 }
 
 /* The impulses of a blow, normal and tangential, that change the normal velocity by so much, where joints pass on
-   their share at the same instant: they give theirs here. */
-void share_with_joints(const Contact *c, double wanted, double slip, double *J) {
+   their share at the same instant: they give theirs here. Where restitution and friction would give more than
+   is there (Kane, J. Appl. Mech. 51, 1984), there is no friction. `u` are normal velocity and slip before. */
+void share_with_joints(const Contact *c, double wanted, const double *u, double *J) {
     JointRow *rows = W.joint_rows, *end = rows + W.joint_row_count;
     const double way[2][2] = {{c->nx, c->ny}, {c->ny, -c->nx}};
     aim_now(1);
@@ -519,12 +534,24 @@ void share_with_joints(const Contact *c, double wanted, double slip, double *J) 
         for (JointRow *r = rows; r < end; r++)
             for (int n = 0; n < 4; n++) feel[n / 2][n % 2] += r->struck[n / 2] * r->answer[n % 2];
         double less = feel[0][0] * feel[1][1] - feel[0][1] * feel[1][0];
-        J[0] = (wanted * feel[1][1] + slip * feel[0][1]) / less;
-        J[1] = (-slip * feel[0][0] - wanted * feel[1][0]) / less;
+        J[0] = J[1] = 0;
+        /* Joints may hold it as it is. */
+        if (!(feel[0][0] > DEPENDS / c->mass[0])) break;
+        J[0] = wanted / feel[0][0];
+        if (c->friction > 0 && less > DEPENDS * feel[0][0] * feel[1][1]) {
+            J[0] = (wanted * feel[1][1] + u[1] * feel[0][1]) / less;
+            J[1] = (-u[1] * feel[0][0] - wanted * feel[1][0]) / less;
+        }
         if (fabs(J[1]) > c->friction * J[0]) {
             double way = J[1] > 0 ? c->friction : -c->friction;
             J[0] = wanted / (feel[0][0] + way * feel[0][1]);
             J[1] = way * J[0];
+        }
+        double gained = J[0] * (u[0] + 0.5 * (feel[0][0] * J[0] + feel[0][1] * J[1]))
+            + J[1] * (u[1] + 0.5 * (feel[1][0] * J[0] + feel[1][1] * J[1]));
+        if (!(J[0] > 0 && gained <= 0)) {
+            J[0] = wanted / feel[0][0];
+            J[1] = 0;
         }
         for (JointRow *r = rows; r < end; r++) r->off = J[0] * r->answer[0] + J[1] * r->answer[1];
     } while (let_go());

@@ -217,7 +217,7 @@ typedef struct {
                                and what it gave to particles */
     double arm[4];          /* m; of a pin, from both centres in particles that have not turned */
     int kind, particle, other; /* [in] enum Tie; two particles, or one and -1 */
-    double now;             /* m; as long as it is */
+    double now[2];          /* m; from its other end to its particle */
     int tied, struck;       /* whether both ends move freely; a blow is passed on to it */
     int taut;               /* a string that pulled in the step before */
     int row;                /* first of its rows */

@@ -12,8 +12,6 @@ World W;
 #define ARC_ANGLE 0.024
 /* Knots that one impact may write per disk. */
 #define KNOTS_EACH 6
-/* Of a step: nearer to its beginning or end something counts as there. */
-#define SOON 1e-9
 
 /* ------------------------------------------------------------------------------------------ rides */
 

@@ -21,7 +21,7 @@ from chutelab.results.record import ENTRIES, QUANTILES, Record
 from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.units import with_unit
 from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.tables import Sheet, Shown, number
+from chutelab.util.tables import Sheet, Shown, number, sentence
 
 FEWEST = 20
 """Least number of particles whose paths have an envelope."""
@@ -342,7 +342,7 @@ class Crowd(Shown):
             for name, size in self.thick.items()
         ]
         heads = ("", *COLUMNS.values()) if rows else ()
-        written = tuple(f"{note[0].upper()}{note[1:]}." for note in notes)
+        written = tuple(map(sentence, notes))
         return Sheet("All particles", heads, tuple(rows), notes=written)
 
 

@@ -27,7 +27,7 @@ from chutelab.results.sensors import sheet as sensor_sheet
 from chutelab.results.stream import FLOW, crowd, steady
 from chutelab.scene.quantities import REGISTRY, THEORY, Quantity
 from chutelab.theory import Drag, Transfer, drag, predict
-from chutelab.util.tables import Sheet, many, number, plain
+from chutelab.util.tables import Sheet, many, number, plain, sentence
 
 FORMAT = 1
 """Version of the object; keys are only ever added to a version."""
@@ -316,7 +316,7 @@ def sheets(recording: Record, *, details: bool = False) -> list[Sheet]:
     notes = [*map(str, judge(recording)), *notes]
     return [
         *parts,
-        *(Sheet("", (), (), notes=(f"{note[0].upper()}{note[1:]}.",)) for note in notes),
+        *(Sheet("", (), (), notes=(sentence(note),)) for note in notes),
         *(nominal if together is not None else ()),
     ]
 

@@ -166,6 +166,15 @@ def wrapped(text: str) -> list[str]:
     return wrap(text, WIDTH, break_on_hyphens=False)
 
 
+def sentence(text: str) -> str:
+    """Return a text with a capital letter, and a full stop.
+
+    >>> sentence("two of them rest")
+    'Two of them rest.'
+    """
+    return f"{text[0].upper()}{text[1:]}."
+
+
 def number(value: float) -> str:
     """Return a number in six digits, "-" for one that is not finite; no zero has a sign.
 

@@ -107,8 +107,8 @@ def plates(machine: Machine) -> set[str]:
     return {plate.name or "plate" for plate in machine.scene.plates}
 
 
-def _add(ax: Axes, outline: Path, face: str, edge: str, width: float = 0.7) -> None:
-    patch = PathPatch(outline, facecolor=face, edgecolor=edge, linewidth=width, zorder=BEHIND)
+def _add(ax: Axes, outline: Path, face: str, edge: str) -> None:
+    patch = PathPatch(outline, facecolor=face, edgecolor=edge, linewidth=0.7, zorder=BEHIND)
     ax.add_patch(patch)
 
 

@@ -488,3 +488,39 @@ def test_the_drive_of_a_drum_pays_what_is_lost():
     assert work == pytest.approx(sum(losses), rel=2e-2)
     # Half a watt and more.
     assert work > 0.5 * (end["t"] - begin["t"])
+
+
+def test_a_wheel_with_paddles_lifts_balls_and_pays_for_it():
+    """Bent forwards, they fill below the axis and empty above it: by some 0.3 m, at least m g h."""
+    moves = {"pivot": [0.0, 0.0], "turn": -40.0}
+    turn = 2.0 * np.pi * np.arange(9) / 8.0
+    about = [[0.17 * np.cos(a), -0.17 * np.sin(a)] for a in np.append(turn[:-1], 0.0)]
+    paddles = [
+        {"name": f"paddle {k}", "from": [0.17 * np.cos(a), 0.17 * np.sin(a)],
+         "to": [0.3 * np.cos(a - 0.7), 0.3 * np.sin(a - 0.7)], **moves}
+        for k, a in enumerate(turn[:-1])
+    ]  # fmt: skip
+    apron = {"center": [0.0, 0.0], "radius": 0.318, "from_deg": 190.0, "to_deg": 265.0}
+    rough = {"friction": 0.2, "restitution": 0.2}
+    fixed = [
+        {"name": "apron", **apron}, {"name": "chute", "from": [0.32, -0.02], "to": [0.66, -0.2]},
+        {"name": "feeder", "from": [-0.52, 0.0], "to": [-0.3132, -0.0552], "friction": 0.05},
+    ]  # fmt: skip
+    recording = chutelab.simulate({
+        "particle": {"radius": 0.012, "mass": 0.02},
+        "surface": [
+            {**rough, **one}
+            for one in ({"name": "hub", "points": about, **moves}, *paddles, *fixed)
+        ],
+        "stream": {"count": 8, "rate": 4.0, "at": [-0.48, 0.02], "velocity": [0.0, 0.0],
+                   "interact": True},
+        "run": {"until": 7.0},
+    })  # fmt: skip
+    assert not recording.laws
+    _, last = recording.ends()
+    lifted = np.count_nonzero(last["position"][:, 0] > 0.5)
+    assert lifted >= 7
+    assert recording.ledger.drive_work > lifted * 0.02 * 9.81 * 0.3
+    # A grip that takes hold in a step was told as long after it as its friction would have taken.
+    events = recording.events
+    assert (events["t"] <= last["t"][events["particle"]]).all()

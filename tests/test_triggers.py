@@ -1,12 +1,12 @@
 """What waits for a touch: gates that open and shut, motions that begin."""
 
-from math import pi, sin, sqrt
+from math import asin, cos, pi, sin, sqrt
 
 import numpy as np
 import pytest
 
 import chutelab
-from chutelab.results import Recording
+from chutelab.results import Kind, Recording
 from chutelab.scene import SceneError
 
 G, R = 9.81, 0.02
@@ -144,3 +144,47 @@ def test_engines_without_it_refuse_it():
         chutelab.load(tables, {"run.engine": "exact"})
     with pytest.raises(SceneError, match="waits until something is touched"):
         chutelab.simulate(tables, engine="exact")
+
+
+@pytest.mark.parametrize("height", [0.43, 0.45, 0.48, 0.49, 0.55])
+def test_a_marble_stays_in_the_loop_from_five_halves_of_its_radius_up(height):
+    """Else it leaves at sin θ = 2 (H - R)/(3 ρ), where v² = g ρ sin θ, and meets the loop at -3 θ.
+
+    A parabola that osculates a circle meets it four times: the sum of those angles, with the axis
+    upright, is a multiple of 2π, and three of them are θ.
+    """
+    loop, rho, ramp = 0.2, 0.19, 0.69
+    at = [-0.5 - sqrt(ramp**2 - (0.7 - height) ** 2), height]
+    smooth = {"friction": 0.0, "radius": loop, "center": [0.0, loop]}
+    tables = {
+        "particle": {"radius": 0.01, "mass": 0.02},
+        "surface": [
+            {"name": "ramp", "center": [-0.5, 0.7], "radius": 0.7, "from_deg": 180.0,
+             "to_deg": 270.0, "friction": 0.0},
+            {"name": "floor", "from": [-0.5, 0.0], "to": [1.0, 0.0], "friction": 0.0},
+            {"name": "right", **smooth, "from_deg": -90.0, "to_deg": 90.0,
+             "opens_when": {"touched": "left"}},
+            {"name": "left", **smooth, "from_deg": 90.0, "to_deg": 270.0,
+             "closes_when": {"touched": "right"}},
+        ],
+        "stream": {"at": at, "velocity": [0.0, 0.0]},
+        "run": {"until": 1.3, "dt": 2.5e-4},
+    }  # fmt: skip
+    recording = chutelab.simulate(tables)
+    assert not recording.laws
+    names, events = recording.surfaces, recording.events
+    blows = events[(events["kind"] == Kind.IMPACT) & (events["t"] > 0.7)]
+    sine = 2.0 * (height - loop) / (3.0 * rho)
+    if sine >= 1.0:
+        top = recording.select(Kind.SLIP)
+        top = top[top["surface"] == names.index("left")][0]
+        v = sqrt(2.0 * G * (height - loop - rho))
+        assert top["velocity_after"] == pytest.approx([-v, 0.0], abs=2e-4)
+        assert recording.track(0)["position"][-1, 0] > 0.1
+        return
+    theta = asin(sine)
+    left = recording.select(Kind.SEPARATION)
+    left = left[left["surface"] == names.index("right")][0]
+    assert left["position"] == pytest.approx([rho * cos(theta), loop + rho * sine], abs=2e-4)
+    there = [rho * cos(3.0 * theta), loop - rho * sin(3.0 * theta)]
+    assert blows["position"][0] == pytest.approx(there, abs=5e-5)

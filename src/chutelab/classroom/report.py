@@ -34,7 +34,7 @@ from chutelab.results.stream import crowd
 from chutelab.results.summary import NOTES, facts
 from chutelab.results.wear import KEYS, touched
 from chutelab.scene import AnyScene, Overrides, Scene, load, to_dict
-from chutelab.scene.materials import PRESETS
+from chutelab.scene.materials import presets
 from chutelab.scene.overrides import Override, parts_of, unit_of
 from chutelab.scene.quantities import lookup
 from chutelab.studies.repeats import Repeats, repeat
@@ -305,7 +305,7 @@ def _materials(made: Report) -> str:
     """Return a table of the presets that are used, with spread and source."""
     rows = []
     for name in dict.fromkeys(kind.material for kind in made.scene.particles):
-        preset = PRESETS.get(str(name))
+        preset = presets().get(str(name))
         for key, spread in preset.spread.items() if preset else ():
             low, high = (number(value) for value in spread)
             value = number(getattr(preset.material, key)) if preset else ""

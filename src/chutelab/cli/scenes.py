@@ -60,9 +60,9 @@ def scenes(*, json_: bool) -> None:
 
 def complete_material(begun: str) -> list[CompletionItem]:
     """Offer the materials that begin so."""
-    from chutelab.scene.materials import PRESETS
+    from chutelab.scene.materials import presets
 
-    return beginning({name: preset.about for name, preset in PRESETS.items()}, begun)
+    return beginning({name: preset.about for name, preset in presets().items()}, begun)
 
 
 @command("List the materials of particles: density, bounce, friction.")
@@ -79,14 +79,14 @@ def materials(material: Annotated[str | None, complete_material] = None, *, json
     chutelab materials
     chutelab materials coal
     """
-    from chutelab.scene.materials import PRESETS, VALUES
+    from chutelab.scene.materials import VALUES, presets
     from chutelab.util.errors import InputError, did_you_mean
     from chutelab.util.tables import Sheet
 
-    if material is not None and material not in PRESETS:
-        known = f"there are {', '.join(PRESETS)}"
-        raise InputError(did_you_mean(material, PRESETS, known), "material", material)
-    shown = list(PRESETS.values()) if material is None else [PRESETS[material]]
+    if material is not None and material not in presets():
+        known = f"there are {', '.join(presets())}"
+        raise InputError(did_you_mean(material, presets(), known), "material", material)
+    shown = list(presets().values()) if material is None else [presets()[material]]
     texts = dict.fromkeys(text for one in shown for row in one.sources.values() for text in row)
     numbers = {text: number for number, text in enumerate(texts, 1)}
     notes = tuple(f"[{number}] {text}" for text, number in numbers.items())

@@ -85,7 +85,7 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
         /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
         double s = u[1] - c->pull * past, pull = c->pull;
         double rate = most / (c->mass[1] * span) - (s > 0 ? pull : -pull);
-        double t = d->t - past + (rate > 0 ? fabs(s) / rate : 0);
+        double t = d->t - past + (rate > 0 ? MIN(fabs(s) / rate, span) : 0);
         t = MAX(t, d->since);
         double place[2] = {d->x + (t - d->t) * 0.5 * (d->ux + d->vx), d->y + (t - d->t) * 0.5 * (d->uy + d->vy)};
         double after[3] = {d->vx + 0.5 * W.gx * h, d->vy + 0.5 * W.gy * h, d->spin};

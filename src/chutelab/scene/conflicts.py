@@ -19,7 +19,7 @@ from pathlib import Path
 from types import CodeType
 from typing import Any, Final
 
-from chutelab.scene.materials import PRESETS
+from chutelab.scene.materials import presets
 from chutelab.scene.quantities import REGISTRY, lookup, suggestion, whose
 from chutelab.scene.units import (
     LIGHTEST,
@@ -388,8 +388,8 @@ def _names(look: Look) -> Iterator[Fault]:
     own = _texts(look.rows("material"))
     for row in look.rows("particle"):
         name = row["material"]
-        if isinstance(name, str) and name not in (*own, *PRESETS) and look.sound("material"):
-            allowed = did_you_mean(name, [*own, *PRESETS], "`chutelab materials` lists them")
+        if isinstance(name, str) and name not in (*own, *presets()) and look.sound("material"):
+            allowed = did_you_mean(name, [*own, *presets()], "`chutelab materials` lists them")
             yield row.fault("material", f"no such material; {allowed}")
 
 
@@ -447,8 +447,8 @@ def _mass(look: Look, kind: Row) -> Iterator[Fault]:
     key, density, name = "density", kind["density"], kind["material"]
     if density is None and not kind.given("mass") and isinstance(name, str):
         own = [row["density"] for row in look.rows("material") if row["name"] == name]
-        if not own and name in PRESETS:
-            own = [PRESETS[name].material.density]
+        if not own and name in presets():
+            own = [presets()[name].material.density]
         key, density = "material", own[0] if own and look.sound("material") else None
     radius = 0.5 * sum(radius) if isinstance(radius, LIST) else radius
     if density is not None and (mass := sphere_mass(density, radius)) < LIGHTEST:
@@ -500,8 +500,8 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
             if joint.given("other") and count > 1 and not meet:
                 text = f"{joint.path('other')} couples particles: they have to meet"
                 yield streams[0].fault("interact", text)
-        if look.rows(table) and engine == "exact":
-            yield run.fault("engine", f"{table}[0] needs contact or pymunk")
+    if engine == "exact" and (tables := [table for table in JOINTS if look.rows(table)]):
+        yield run.fault("engine", f"{tables[0]}[0] needs contact or pymunk")
 
 
 def _of_kind(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:

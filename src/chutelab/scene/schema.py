@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from chutelab.scene.conflicts import EITHER, JOINTS, ConflictError, Look, conflicts, stream_name
-from chutelab.scene.materials import PRESETS, Material
+from chutelab.scene.materials import Material, presets
 from chutelab.scene.tables import (
     Conveyor,
     Expect,
@@ -312,7 +312,7 @@ class SceneTables(Table):
         if particle.material is None:
             return None
         own = {material.name: material for material in self.material}
-        return own.get(particle.material) or PRESETS[particle.material].material
+        return own.get(particle.material) or presets()[particle.material].material
 
     def head(self, table: str, number: int) -> str:
         """Return the path of a particle, plate or stream: with its number if there are several.

@@ -149,11 +149,13 @@ def write_size(number: float, unit: str, digits: int = 3) -> str:
     --------
     >>> write_size(0.0005, "m"), write_size(4.4e-8, "s"), write_size(1e-16, "m")
     ('0.5 mm', '44 ns', '1e-16 m')
+    >>> write_size(1e-10, "J")
+    '0.1 nJ'
     """
     size = abs(number)
     unit = symbol(unit)
     if unit in ("m", "s", "J", "m/s") and 1e-10 <= size < 0.1:
-        prefix = next(p for p in ("m", "µ", "n") if size >= 0.1 * _PREFIXES[p])
+        prefix = next((p for p in ("m", "µ") if size >= 0.1 * _PREFIXES[p]), "n")
         return f"{number * round(1.0 / _PREFIXES[prefix]):.{digits}g} {prefix}{unit}"
     return f"{number:.{digits}g} {unit}".strip() if unit != "%" else f"{number:.{digits}g}"
 

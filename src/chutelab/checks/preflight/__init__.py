@@ -43,7 +43,7 @@ from chutelab.results import REASONS, Recording
 from chutelab.results.arrival import Places, arrivals
 from chutelab.results.summary import waits
 from chutelab.scene import AnyScene, Scene, SceneError, load, shown
-from chutelab.scene.materials import DENSEST, LIGHTEST, PRESETS
+from chutelab.scene.materials import DENSEST, LIGHTEST, presets
 from chutelab.scene.units import write_size
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -86,7 +86,7 @@ def _densities(scene: Scene) -> Iterator[Advice]:
         if LIGHTEST <= density <= DENSEST:
             continue
         path = scene.head("particle", n)
-        steel = (kind.mass / (4.0 / 3.0 * pi * PRESETS["steel"].material.density)) ** (1.0 / 3.0)
+        steel = (kind.mass / (4.0 / 3.0 * pi * presets()["steel"].material.density)) ** (1.0 / 3.0)
         yield Advice(
             f"{path}: a sphere of {kind.radius:.4g} m radius and {kind.mass:.4g} kg would have a"
             f" density of {density:,.0f} kg/m³, {'less' if density < LIGHTEST else 'more'} than any"

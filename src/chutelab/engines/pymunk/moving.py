@@ -138,15 +138,21 @@ class Moving:
 
     def put(self, t: float, h: float) -> None:
         """Place all for a step that begins at a time (s)."""
+        motion: dict[int, tuple[list[float], ...]] = {}
         for row, one in zip(self.rows, self.faces, strict=True):
             face, body, mover, written, links = one
             if mover.hinge is not None:
                 self.hanging[face.surface].before = self.turn[0, row] = body.angular_velocity
                 continue
-            x, y, angle = mover.pose(t + 0.5 * h).tolist()
-            vx, vy, turn = mover.velocity(t + h).tolist()
-            place = Vec2d(*mover.carried(written, t + 0.5 * h).tolist())
-            off = mover.carried(written, t + h) - mover.pose(t + h)[:2]
+            if face.surface not in motion:
+                poses = mover.pose(t + 0.5 * h), mover.pose(t + h)
+                turned = ([*pose, np.cos(pose[2]), np.sin(pose[2])] for pose in poses)
+                motion[face.surface] = *turned, mover.velocity(t + h).tolist()
+            (x, y, angle, c, s), end, (vx, vy, turn) = motion[face.surface]
+            ox, oy = written[0] - mover.pivot[0], written[1] - mover.pivot[1]
+            place = Vec2d(x + c * ox - s * oy, y + s * ox + c * oy)
+            x1, y1, _, c, s = end
+            off = x1 + c * ox - s * oy - x1, y1 + s * ox + c * oy - y1
             velocity = Vec2d(vx - turn * off[1], vy + turn * off[0])
             body.position, body.angle = place - h * velocity, angle - h * turn
             body.velocity = velocity

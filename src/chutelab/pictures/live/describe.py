@@ -8,7 +8,7 @@ from typing import Any, Final
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
 from chutelab.scene.conflicts import EITHER, JOINTS, RULES, tree
-from chutelab.scene.materials import PRESETS, VALUES
+from chutelab.scene.materials import VALUES, presets
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
 
@@ -99,7 +99,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     """
     materials = {
         name: {key: getattr(preset.material, key) for key in VALUES}
-        for name, preset in PRESETS.items()
+        for name, preset in presets().items()
     }
     rules = {
         table: [[keys.split(), tree(when), *text.split()] for keys, when, text, _ in rows if text]

@@ -62,14 +62,6 @@ double soft_approach(const Disk *d, double radius) {
     return GRAZE * sqrt(d->vx * d->vx + d->vy * d->vy);
 }
 
-/* GROW to a power, at most 1000; the first ones are worked out once. */
-static double grown(int n) {
-    static double known[64];
-    if (n >= 64) return pow(GROW, MIN(n, 1000));
-    if (known[n] == 0) known[n] = pow(GROW, n);
-    return known[n];
-}
-
 /* Approach up to which a contact is left to the next step, m/s. What lies on a surface comes back to
    it at the end of each step, as fast as gravity makes it in one, and on the inside of an arc as the
    curved way does; of what has sunk in hardly anything. */
@@ -86,8 +78,8 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     /* Surfaces do not give way: with them it grows only if jams do not help. */
     int many = sunk ? STUCK : surface >= 0 ? 2 * JAM : MANY;
     if (impacts <= many) return least;
-    double most = skip * (MOST_SKIP / SKIP) * grown(MAX(impacts - STUCK, 0));
-    return MAX(least, MIN(skip * grown(impacts - many), most));
+    double most = skip * (MOST_SKIP / SKIP) * pow(GROW, MIN(MAX(impacts - STUCK, 0), 1000));
+    return MAX(least, MIN(skip * pow(GROW, MIN(impacts - many, 1000)), most));
 }
 
 static void foresee_pair(int i, int j, double *due, int *partner) {

@@ -46,7 +46,7 @@ RUNS = {
     "heap": ["heap", "stream.count=100"],
     "pegs": ["galton", "stream.count=150"],
     "mixture": ["mixture", "run.until=2"],
-    "cradle, pymunk": ["cradle", "run.until=2"],
+    "cradle, pymunk": ["cradle", "run.until=2", "run.engine=pymunk"],
     "boxes, pymunk": ["dominoes", "run.until=1"],
 }
 # Any other command, the words after `chutelab`.

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from chutelab import simulate
+from chutelab import simulate, start
 from chutelab.machine import build
 from chutelab.results.laws import judge as judged
 from chutelab.scene import SceneError, from_dict
@@ -335,6 +335,23 @@ def test_a_rod_that_gives_energy_is_found_out():
     knots["velocity"][-1] *= 1.0 + 1e-6
     assert not judged(run)
     assert [one.law for one in judged(replace(run, knots=knots))] == ["the ledger closes"]
+
+
+def test_what_is_pushed_by_hand_keeps_its_rod():
+    """A push along the circle does the work force times way; one along the rod does none."""
+    run = start(scene(1.0, at=(0.0, -0.5), rod=[{"from": [0.0, 0.0]}], gravity=0.0))
+    run.push(0, (0.0, -5.0))
+    run.step(0.1)
+    assert run.positions[0] == pytest.approx([0.0, -0.5], abs=1e-15)
+    run.push(0, (0.2, 0.0))
+    run.step(0.1)
+    run.push(0, (0.0, 0.0))
+    run.step(0.1)
+    assert np.hypot(*run.positions[0]) == pytest.approx(0.5, rel=1e-13)
+    ledger = run.recording.ledger
+    assert ledger.push_work == pytest.approx(ledger.kinetic[1], rel=1e-11)
+    # 0.2 N for 0.1 s on 0.1 kg: 0.2 m/s, along a way of 10 mm.
+    assert ledger.push_work == pytest.approx(0.2 * 0.01, rel=1e-3)
 
 
 # A cradle, and what is refused

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import chutelab
 from chutelab import core as module
 from chutelab.cli import main
 from chutelab.engines import contact as engine
@@ -292,6 +293,61 @@ def test_what_waits_for_a_touch_is_made_by_its_card_and_runs_to_the_same_bits(em
     assert given(page)["surface"][1]["starts_when"] == {"touched": "bell"}
     page.click("#part-delete")
     assert "starts_when" not in given(page)["surface"][0]
+
+
+def test_a_ball_that_is_under_way_is_caught_and_thrown_as_python_does(shown):
+    """The work of the hand is a row of the ledger; the same pushes in Python give the same bits."""
+    stream = ["stream.at=[0.3, 0.8]", "stream.velocity=[0, 0]", "run.until=2.5"]
+    stream.append("outgoing.drop_from=top")
+    page = shown("belt-landing", stream, viewport={"width": 1366, "height": 768})
+    # It is slow while it is caught, and then is faster.
+    page.select_option("#rate", "0.02")
+    page.click("#play")
+    place = """() => {
+      const { lab, stage: { view } } = chutelab, { x, y } = lab.recording.tracks[0].state(lab.t);
+      const { left, top } = document.getElementById("stage").getBoundingClientRect();
+      return [left + view.px(x), top + view.py(y)];
+    }"""
+    x, y = page.evaluate(place)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    expect(page.locator(".draft .pull")).to_have_count(1)
+    expect(page.locator("#energy tr[data-id=push_work]")).to_be_visible()
+    expect(page.locator("#energy tr[data-id=belt_work] td")).to_have_text("0 mJ")
+    page.evaluate("chutelab.lab.rate = 0.25")
+    for n in range(8):
+        page.mouse.move(x + 10 * n, y - 12 * n)
+        page.wait_for_timeout(40)
+    page.mouse.up()
+    assert page.evaluate("chutelab.lab.hand") is None
+    page.evaluate(DONE)
+    page.evaluate(WHOLE)
+    pushes = page.evaluate("chutelab.lab.pushes")
+    assert len(pushes) > 5
+    run = chutelab.start(load("belt-landing", stream))
+    for push in pushes:
+        while run.t < push["at"]:
+            run.step(push["at"] - run.t)
+        assert run.t == push["at"]
+        run.push(push["disk"], push["force"])
+        run.step(push["due"] - run.t)
+    while not run.done:
+        run.step(0.1)
+    recording = run.recording
+    track = np.array(page.evaluate(TRACKS)[0])
+    found = recording.track(0)
+    assert track[-1, 0] == found["t"][-1]
+    assert track[-1, 1:3].tolist() == found["position"][-1].tolist()
+    ledger = page.evaluate("chutelab.lab.recording.ledger(chutelab.lab.recording.end)")
+    assert ledger["push_work"] == recording.ledger.push_work > 1e-3
+    assert ledger["belt_work"] == pytest.approx(recording.ledger.belt_work, abs=1e-12)
+    assert abs(ledger["residual"]) < 1e-11 * recording.ledger.turned_over
+    assert page.evaluate("chutelab.lab.recording.breaches") == []
+    # From the beginning it runs by itself again.
+    page.click("#restart")
+    page.evaluate(DONE)
+    assert page.evaluate("chutelab.lab.pushes.length") == 0
+    expect(page.locator("#energy tr[data-id=push_work]")).to_be_hidden()
 
 
 def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_path):

@@ -31,7 +31,7 @@ EXPORTS = (
 
 PYTHON = (
     "prepare_to_judge", "run_and_judge", "exact", "lay_out_exact", "follow_and_judge", "run_exact",
-    "run_world", "push_disk", "steer", "pack_events",
+    "run_world", "steer", "pack_events",
 )  # fmt: skip
 """Of these what no page calls."""
 

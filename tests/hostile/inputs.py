@@ -56,7 +56,9 @@ KEYS = (
     "run.engine", "particle.radius", "particle.spin", "surface.0.points", "gravity", "title",
     "plate", "a.b.c", "",
 )  # fmt: skip
-LISTS = ("material", "pair", "conveyor", "surface", "string", "expect")
+LISTS = (
+    "material", "pair", "conveyor", "surface", "string", "rod", "spring", "pin", "expect",
+)  # fmt: skip
 """Tables of which there are several."""
 
 

@@ -581,7 +581,8 @@ void agree_with_contacts(double h) {
             }
         solve_contacts(1);
     }
-    if (meets) pull_joints(h);
+    /* What is pushed by hand is pulled otherwise, too. */
+    if (meets || W.pushes) pull_joints(h);
 }
 
 /* What of the lengths of joints the step misses, as a share of them. */

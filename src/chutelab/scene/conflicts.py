@@ -500,8 +500,8 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
             if joint.given("other") and count > 1 and not meet:
                 text = f"{joint.path('other')} couples particles: they have to meet"
                 yield streams[0].fault("interact", text)
-        if look.rows(table) and engine == "exact":
-            yield run.fault("engine", f"{table}[0] needs contact or pymunk")
+    if engine == "exact" and (tables := [table for table in JOINTS if look.rows(table)]):
+        yield run.fault("engine", f"{tables[0]}[0] needs contact or pymunk")
 
 
 def _of_kind(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:

@@ -181,6 +181,8 @@ class Shapes:
         assert shape.body is not None
         if isinstance(face, Bend):
             assert face.foot.body is not None
+            # Chipmunk frees the body with it: nothing may touch that shape again.
+            del self.world.by_shape[face.foot]
             space.remove(face.foot, face.foot.body)
             return self._chain(face)
         if not isinstance(shape, pymunk.Segment):

@@ -68,6 +68,8 @@ class Bench {
   listeners: (() => void)[] = [];
   free;
   draft = svg("g", { class: "draft" });
+  /** What leads from a ball that is held to the hand. */
+  lead = svg("g", { class: "draft" });
   chip;
   /** Where the next point goes, m: at the pointer, or where keys moved it. */
   cursor: Place | null = null;
@@ -76,7 +78,7 @@ class Bench {
     home: any, readonly stage: Stage, readonly inspector: Inspector, readonly lab: Lab,
     readonly words: Words,
   ) {
-    stage.over.prepend(this.draft);
+    stage.over.prepend(this.draft, this.lead);
     this.free = mayDraw(lab.data);
     inspector.mayDelete = this.free;
     inspector.duplicate = () => this.duplicate();
@@ -153,6 +155,12 @@ class Bench {
       const at = stage.placeOf(event);
       this.fingers.set(event.pointerId, at);
       this.pressed = this.fingers.size === 1 ? at : null;
+      const ball = this.pressed && this.catches ? this.ballAt(at) : -1;
+      if (ball >= 0) {
+        this.lab.grab(ball, this.worldOf(at));
+        this.pressed = null;
+        return;
+      }
       if (this.mode && this.pressed) this.point(at, event.altKey);
       else this.grabbed = this.pressed && this.bodyAt(at, event.pointerType);
       const chooses = this.free && !this.mode && !this.moving;
@@ -166,7 +174,8 @@ class Bench {
     front.addEventListener("pointermove", (event: PointerEvent) => {
       const at = stage.placeOf(event);
       if (this.pressed && distance(at, this.pressed) > STRAY) clearTimeout(this.holding);
-      if (this.mode) this.aim(at, event.altKey);
+      if (this.lab.hand) this.lab.hand.to = this.worldOf(at);
+      else if (this.mode) this.aim(at, event.altKey);
       else if (this.band) this.stretch(at);
       else if (this.grabbed) this.carry(at, event);
       else if (this.fingers.has(event.pointerId)) {
@@ -176,6 +185,11 @@ class Bench {
         else this.look(event.pointerId, at);
       } else if (event.pointerType === "mouse" && !stage.held && !this.moving) this.hover(at);
     });
+    for (const end of ["pointerup", "pointercancel"]) {
+      front.addEventListener(end, () => {
+        if (this.lab.hand) this.lab.drop();
+      });
+    }
     front.addEventListener("pointerup", (event: PointerEvent) => {
       clearTimeout(this.holding);
       if (!this.fingers.delete(event.pointerId) || !this.pressed) return;
@@ -193,7 +207,8 @@ class Bench {
       const { touches } = event, box = front.getBoundingClientRect();
       const at: Place = [touches[0].clientX - box.left, touches[0].clientY - box.top];
       // The page must not scroll away under what is moved.
-      const body = !this.mode && this.bodyAt(at, "touch");
+      const body = !this.mode
+        && (this.bodyAt(at, "touch") || (this.catches && this.ballAt(at) >= 0));
       if (touches.length > 1 || body || this.moving) event.preventDefault();
     }, { passive: false });
     front.addEventListener("pointercancel", (event: PointerEvent) => {
@@ -215,6 +230,9 @@ class Bench {
         event.preventDefault();
       }
     });
+    this.lab.on("time", () => {
+      if (this.lab.hand || this.lead.firstChild) this.pull();
+    });
     stage.grips.addEventListener("focusin", ({ target }: FocusEvent) => {
       const id = (target as Element).getAttribute("data-id");
       const handle = stage.handles.find((one) => one.id === id);
@@ -222,6 +240,17 @@ class Bench {
         this.inspector.choose(handle.surface);
       }
     });
+  }
+
+  /** Draw a line from what is held by hand to the hand. */
+  pull() {
+    const { lead, lab: { hand, recording, t }, stage: { view } } = this;
+    const at = hand && recording?.tracks[hand.disk].state(t);
+    if (!at) lead.replaceChildren();
+    else {
+      lead.replaceChildren(svg("line", { class: "pull", x1: view.px(at.x), y1: view.py(at.y),
+        x2: view.px(hand.to[0]), y2: view.py(hand.to[1]) }));
+    }
   }
 
   holding = 0;
@@ -291,18 +320,37 @@ class Bench {
   /** The body that is grabbed, and moves once the pointer has moved. */
   grabbed: Handle | null = null;
 
-  /** What is at a place, px: a ball, where it starts or is now, or a surface. */
-  nameAt([px, py]: Place) {
-    const { view, handles } = this.stage, { machine, recording, t } = this.lab;
-    if (!machine) return "";
-    const near = (x: number, y: number, r: number) =>
-      Math.hypot(view.px(x) - px, view.py(y) - py) < Math.max(r, BALL_REACH);
-    const start = handles.find(({ what, x, y }) => what === "release" && near(x, y, 0));
-    if (start) return start.surface;
-    const ball = machine.releases.findIndex((_, i) => {
+  /** Whether a ball that is under way is caught, instead of moved where it starts. */
+  get catches() {
+    const { lab } = this;
+    return this.free && lab.playing && !this.mode && !this.moving;
+  }
+
+  worldOf = ([px, py]: Place): [number, number] =>
+    [this.stage.view.worldX(px), this.stage.view.worldY(py)];
+
+  isNear([px, py]: Place, x: number, y: number, r: number) {
+    const { view } = this.stage;
+    return Math.hypot(view.px(x) - px, view.py(y) - py) < Math.max(r, BALL_REACH);
+  }
+
+  /** Which particle is at a place, px; -1 if none is. */
+  ballAt(at: Place) {
+    const { machine, recording, t } = this.lab, { scale } = this.stage.view;
+    return machine?.releases.findIndex((_, i) => {
       const state = recording?.tracks[i]?.state(t);
-      return state && !state.ended && near(state.x, state.y, (machine.radius[i] ?? 0) * view.scale);
-    });
+      return state && !state.ended
+        && this.isNear(at, state.x, state.y, (machine.radius[i] ?? 0) * scale);
+    }) ?? -1;
+  }
+
+  /** What is at a place, px: a ball, where it starts or is now, or a surface. */
+  nameAt(at: Place) {
+    const { view, handles } = this.stage, { machine } = this.lab, [px, py] = at;
+    if (!machine) return "";
+    const start = handles.find(({ what, x, y }) => what === "release" && this.isNear(at, x, y, 0));
+    if (start) return start.surface;
+    const ball = this.ballAt(at);
     const name = surfaceAt(this.stage.posed ?? machine, view.worldX(px), view.worldY(py),
       CLICK_REACH / view.scale, this.lab.scene?.sensor);
     const few = machine.releases.length < MOST_BALLS;

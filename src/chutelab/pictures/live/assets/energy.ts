@@ -8,7 +8,7 @@ import type { Words } from "./words.ts";
 type Entry = [keyof Ledger, number];
 
 const SIGNS: Entry[] = [
-  ["start", 1], ["belt_work", 1], ["kinetic", -1], ["potential", -1], ["restitution_loss", -1],
+  ["start", 1], ["belt_work", 1], ["push_work", 1], ["kinetic", -1], ["potential", -1], ["restitution_loss", -1],
   ["friction_loss", -1], ["residual", 1],
 ];
 
@@ -90,7 +90,8 @@ class EnergyPanel {
       this.words.say("energy-closes", { energy: this.words.energy(size) }));
     SIGNS.forEach(([name], n) => {
       this.cells.get(name).textContent = this.words.energy(ledger[name]);
-      this.rows[n].hidden = name === "residual" && isClosed;
+      this.rows[n].hidden = (name === "residual" && isClosed)
+        || (name === "push_work" && !recording.pushes.length);
     });
   }
 }

@@ -3,11 +3,13 @@
 import type { Breach, Run } from "./breaches.ts";
 import type { Event } from "./core.ts";
 import type { Machine } from "./machine.ts";
+import type { Push } from "./worker.ts";
 
 type Chunk = { type: "chunk", id: number, knots: Float64Array, tips: Float64Array,
-  events: Event[], swings: number[], triggered: number[], now: number, state: string,
-  books: number[][] | null, reasons: number[] | null, gained: number, unsolved: number,
-  contacts: number, steps: number, loads: { from: number, rows: Float64Array } };
+  events: Event[], swings: number[], triggered: number[], given: number[], now: number,
+  state: string, books: number[][] | null, reasons: number[] | null, gained: number,
+  unsolved: number, contacts: number, steps: number,
+  loads: { from: number, rows: Float64Array } };
 
 class Engine {
   id = 0;
@@ -43,18 +45,25 @@ class Engine {
   }
 
   /** Begin a run, and end the one before.
-   * @param until s, to which one whose particles meet runs on */
-  run(machine: Machine, until: number, onChunk: (chunk: Chunk) => void) {
+   * @param until s, to which one whose particles meet runs on
+   * @param pushes that it has had */
+  run(machine: Machine, until: number, onChunk: (chunk: Chunk) => void, pushes: Push[] = []) {
     this.id += 1;
     this.until = until;
     this.onChunk = onChunk;
-    this.worker.postMessage({ type: "run", id: this.id, machine, until });
+    this.worker.postMessage({ type: "run", id: this.id, machine, until, pushes });
   }
 
   /** Have the latest run judged by the laws that every run must keep. */
   judge(run: Run, onLaws: (breaches: Breach[]) => void) {
     this.onLaws = onLaws;
     this.worker.postMessage({ type: "judge", id: this.id, run });
+  }
+
+  /** Go on with the run by hand. */
+  push(push: Push) {
+    this.until = push.due;
+    this.worker.postMessage({ type: "push", id: this.id, push });
   }
 
   /** Let the run go on to a later time. */

@@ -3,10 +3,11 @@
 import { runOf } from "./breaches.ts";
 import { roundUp } from "./chart.ts";
 import { indexed, withValues } from "./keys.ts";
-import { build, type Machine } from "./machine.ts";
+import { PASSES, build, type Machine } from "./machine.ts";
 import { Recording } from "./recording.ts";
 import { Fault, resolve, type Scene, type Given } from "./scene.ts";
 import type { Engine } from "./engine.ts";
+import type { Push } from "./worker.ts";
 
 export type News = "scene" | "run" | "time" | "play";
 
@@ -21,6 +22,10 @@ const RATES = [0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 4];
 
 /** Of a machine without particles yet, which no file can be: one far away, to build it with. */
 const NOWHERE = { at: [9e5, 9e5], velocity: [0, 0] };
+
+/** 1/s², 1/s; by how much a hand hastens what it holds for each metre that it is away, and slows it
+ * down for each m/s: it comes there as fast as it can without swinging. */
+const STIFF = 355, SLOWS = 2 * Math.sqrt(STIFF);
 
 /** Whether a scene has no particles. */
 const isBare = ({ stream }: Given) => Array.isArray(stream) && !stream.length;
@@ -55,6 +60,13 @@ class Lab {
   scene?: Scene;
   machine?: Machine;
   recording?: Recording;
+  /** The particle that is held by hand, and where that is, m. */
+  hand: { disk: number, to: [number, number] } | null = null;
+  /** What was done by hand in this run; and the machine in which particles do not meet. */
+  pushes: Push[] = [];
+  loose: Machine | null = null;
+  /** Whether the engine waits for the hand. */
+  waits = false;
 
   /** @param data of the page */
   constructor(readonly data: any, readonly engine: Engine) {
@@ -95,6 +107,7 @@ class Lab {
         && ![machine, this.machine].some(({ movers, triggers }) =>
           movers.length || triggers.length);
       const before = this.given;
+      this.loose = null;
       this.given = given;
       this.scene = scene;
       this.fault = null;
@@ -123,7 +136,9 @@ class Lab {
    * others begin anew, since they take no time.
    * @param from s */
   run(from: number) {
-    const machine = this.machine as Machine;
+    const machine = this.machine = this.loose ?? this.machine as Machine;
+    this.pushes = [];
+    this.hand = this.loose = null;
     let job = machine;
     if (from > 0 && this.recording) job = this.recording.goOn(from, machine);
     else this.recording = new Recording(machine);
@@ -141,6 +156,58 @@ class Lab {
       // What is dragged is judged where it is let go.
       if (recording.state === "done" && !recording.renamed && !this.before) this.judge(recording);
     });
+  }
+
+  /** Catch a particle of the run that is shown, and go on by hand from there: as Python's
+   * `chutelab.start` all go on together, step by step. */
+  grab(disk: number, to: [number, number]) {
+    const { machine, t } = this, pushes = this.pushes.filter(({ due }) => due <= t);
+    if (!machine) return;
+    if (!machine.interact) this.loose = machine;
+    const own = machine.interact ? machine : { ...machine, interact: true,
+      pairRestitution: machine.pairRestitution.map((row) => row.map(() => PASSES)) };
+    const recording = new Recording(own);
+    this.hand = { disk, to };
+    this.waits = false;
+    this.engine.run(own, t, (chunk) => {
+      recording.add(chunk);
+      const isThere = recording.now >= t || recording.state !== "running";
+      if (this.recording !== recording && !isThere) return;
+      if (this.recording !== recording) {
+        [this.recording, this.machine, this.pushes] = [recording, own, pushes];
+        this.tell("scene");
+      }
+      this.waits = true;
+      this.tellSoon();
+      if (recording.state === "done") this.judge(recording);
+    }, pushes);
+  }
+
+  /** Let go of what is held. */
+  drop() {
+    this.hand = null;
+    this.allow(0);
+  }
+
+  /** Draw what is held to the hand for so many seconds: m (k (to - x) - c v), and its weight. */
+  draw(seconds: number) {
+    const { recording, machine, hand } = this;
+    if (!this.waits || !recording || !machine || !hand) return;
+    const { disk, to } = hand, { now } = recording, state = recording.tracks[disk].state(now);
+    this.t = now;
+    this.tell("time");
+    if (!state || state.ended || recording.state !== "running") {
+      this.drop();
+      return;
+    }
+    const mass = machine.mass[disk], { up, gravity } = machine;
+    const force = [[state.x, state.vx], [state.y, state.vy]].map(([x, v], n) =>
+      mass * (STIFF * (to[n] - x) - SLOWS * v + gravity * up[n])) as [number, number];
+    const due = Math.max(now, this.pushes.at(-1)?.due ?? 0) + seconds;
+    const push = { disk, force, at: now, due };
+    this.pushes.push(push);
+    this.waits = false;
+    this.engine.push(push);
   }
 
   /** Find the laws that a run breaks, which is over. */
@@ -218,7 +285,7 @@ class Lab {
   /** All again from the beginning, with the machine as it is now. */
   restart() {
     this.t = this.start;
-    if (this.recording?.renamed) this.run(0);
+    if (this.recording?.renamed || this.pushes.length) this.run(0);
     this.tell("time");
   }
 
@@ -281,6 +348,10 @@ class Lab {
   /** Go on by a frame of so many seconds of real time. */
   tick(seconds: number) {
     if (!this.playing) return;
+    if (this.hand) {
+      this.draw(seconds * this.rate);
+      return;
+    }
     this.allow(seconds);
     this.t = Math.min(this.t + seconds * this.rate, this.end);
     this.tell("time");

@@ -144,7 +144,7 @@ export function build(scene: Scene): Machine {
 }
 
 /** Restitution of two kinds that pass through each other. */
-const PASSES = -1.0;
+export const PASSES = -1.0;
 
 /** Sets the times at which what waits for a touch acts, s; Infinity of what still waits. */
 export function actAt({ triggers, segments, arcs, movers }: Machine, times: number[]) {

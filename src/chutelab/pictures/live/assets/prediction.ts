@@ -34,7 +34,7 @@ export function predict(scene: Scene, recording: Recording): Transfer {
     const missing = belt === null ? "no-incoming" : "no-plate";
     return cutFrom(unanswered(), "separation", because("outside", missing));
   }
-  const outside = outsideOf(scene, belt);
+  const outside = recording.pushes.length ? "pushed" : outsideOf(scene, belt);
   if (outside) return cutFrom(unanswered(), "separation", because("outside", outside));
   const found = unboundedTransfer(scene, belt, plate);
   if (Number.isNaN(found.numbers.phi1)) return found;

@@ -8,6 +8,7 @@ import { SWING_ROW, Swings, posed } from "./motion.ts";
 
 export type State = { x: number, y: number, vx: number, vy: number, spin: number, ended: boolean };
 export type Ledger = { start: number, kinetic: number, potential: number, belt_work: number,
+  push_work: number,
   restitution_loss: number, friction_loss: number, residual: number };
 
 const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, FRICTION = 8;
@@ -270,6 +271,8 @@ class Recording {
   swings: Map<number, Swings> = new Map();
   /** What surfaces bear, `LOAD_ROW` numbers each, bin by bin. */
   loads = new Float64Array();
+  /** Times, s, and the work of all pushes and of all surfaces up to then, J. */
+  pushes: [number, number, number][] = [];
   /** The laws that it breaks, once it is over and has been judged. */
   breaches: Breach[] = [];
 
@@ -286,12 +289,13 @@ class Recording {
 
   add({
     knots, tips, events, swings, now, state, books = null, gained = 0, unsolved = 0,
-    contacts = 0, steps = 0, loads, triggered = [],
+    contacts = 0, steps = 0, loads, triggered = [], given = [],
   }: {
     knots: Float64Array, tips: Float64Array, events: Event[], swings: number[], now: number,
     state: string,
     books?: number[][] | null, gained?: number, unsolved?: number, contacts?: number,
     steps?: number, loads?: { from: number, rows: Float64Array }, triggered?: number[],
+    given?: number[],
   }) {
     this.gained = gained;
     this.unsolved = unsolved;
@@ -325,6 +329,11 @@ class Recording {
     }
     if (loads?.rows.length) this.bear(loads.from, loads.rows);
     if (triggered.length) actAt(this.machine, triggered);
+    const pushed = given.at(-1) ?? 0, [, before, gave] = this.pushes.at(-1) ?? [0, 0, 0];
+    if (pushed !== before) {
+      const gives = given.slice(0, -1).reduce((sum, work) => sum + work, 0);
+      this.pushes.push([this.now, before, gave], [now, pushed, gives]);
+    }
     this.measure();
     this.state = state;
     this.now = state === "running" ? now + this.shift : Math.max(this.end, now + this.shift);
@@ -467,22 +476,34 @@ class Recording {
     else if (changes(RESTITUTION)) restitution -= missing;
     else residual += missing;
     return {
-      start, kinetic: kinetic(state), potential: potential(state), belt_work: belt,
+      start, kinetic: kinetic(state), potential: potential(state), belt_work: belt, push_work: 0,
       restitution_loss: restitution, friction_loss: friction, residual,
     };
+  }
+
+  /** Work of all pushes up to a time, J: while there is one, what surfaces have not given.
+   * @param work of both, J */
+  pushedAt(t: number, work: number) {
+    const { pushes } = this, n = pushes.findLastIndex(([then]) => then <= t);
+    if (n < 0) return 0;
+    const [from, given, gave] = pushes[n], [to, more, gives] = pushes[n + 1] ?? pushes[n];
+    return more === given ? given : work - gave - ((gives - gave) * (t - from)) / (to - from);
   }
 
   /** The ledger of all particles that have been released. */
   ledger(t: number): Ledger {
     const total: Ledger = {
-      start: 0, kinetic: 0, potential: 0, belt_work: 0, restitution_loss: 0, friction_loss: 0,
-      residual: 0,
+      start: 0, kinetic: 0, potential: 0, belt_work: 0, push_work: 0, restitution_loss: 0,
+      friction_loss: 0, residual: 0,
     };
     const names = Object.keys(total) as (keyof Ledger)[];
     for (let index = 0; index < this.tracks.length; index += 1) {
       const its = this.ledgerOf(index, t);
       if (its) for (const name of names) total[name] += its[name];
     }
+    // A track has what pushes give among what drives give.
+    total.push_work = this.pushedAt(t, total.belt_work);
+    total.belt_work -= total.push_work;
     return total;
   }
 

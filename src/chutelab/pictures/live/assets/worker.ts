@@ -1,18 +1,19 @@
 // The engine's own thread: runs machines, so that the picture never waits for them.
 //
 // In:  {type: "load", module, layout}, the core compiled; {type: "run", id, machine, until}
-//      begins a run and ends the one before; {type: "until", id, until} lets it go on to a later
-//      time (s).
+//      begins a run and ends the one before, with `pushes` done in it already; {type: "until", id,
+//      until} lets it go on to a later time (s); {type: "push", id, push} pushes a particle.
 // Out: {type: "chunk", id, knots, tips, events, swings, triggered, now, state, books, reasons,
 //      gained, unsolved}, where state is "running", "done", "stalled" or "failed"; books and
 //      reasons come at the end; triggered are the times of what waited for a touch, s; gained is
 //      the energy by which solves broke their law so far, J, and unsolved the most overlap that
-//      one left, radii.
+//      one left, radii; given is the work of each surface, J, and at
+//      last that of all pushes.
 //      {type: "laws", id, breaches}, in answer to {type: "judge", id, run}.
 //      {type: "broken"}, where the core cannot be loaded.
 
 import { judge } from "./breaches.ts";
-import { startCore, type Core, type Layout } from "./core.ts";
+import { startCore, type Core, type Event, type Layout } from "./core.ts";
 
 /** ms between two looks at the messages. */
 const TURN = 10;
@@ -23,6 +24,13 @@ const MOST_STEPS = 256;
 let core: Core;
 
 let job: { id: number, until: number, steps: number } | null = null;
+
+/** A force on a particle, N, from a time on to another, s. */
+export type Push = { disk: number, force: [number, number], at: number, due: number };
+type State = "running" | "done" | "stalled" | "failed";
+
+/** What has been written, and not been told yet. */
+let written = { knots: [] as Float64Array[], events: [] as Event[], swings: [] as number[] };
 
 let scheduled = false;
 const channel = new MessageChannel();
@@ -44,17 +52,11 @@ const isAhead = (task: { until: number }) => core.machine?.interact && core.get(
 function work() {
   if (!job || isAhead(job)) return;
   const began = performance.now();
-  const knots = [];
-  const events = [], swings: number[] = [];
-  let state: "running" | "done" | "stalled" | "failed" = "running";
+  let state: State = "running";
   try {
     while (state === "running" && !isAhead(job)) {
       const before = performance.now();
-      state = core.proceed(job.steps);
-      const taken = core.take();
-      knots.push(taken.knots);
-      events.push(...taken.events);
-      swings.push(...taken.swings);
+      state = go(job.steps);
       const now = performance.now();
       const quick = now - before < 1;
       job.steps = quick ? Math.min(2 * job.steps, MOST_STEPS) : Math.max(1, job.steps >> 1);
@@ -63,12 +65,44 @@ function work() {
   } catch {
     state = "failed";
   }
-  const over = state !== "running";
+  tell(state);
+}
+
+function go(steps: number): State {
+  const state = core.proceed(steps), { knots, events, swings } = core.take();
+  written.knots.push(knots);
+  written.events.push(...events);
+  written.swings.push(...swings);
+  return state;
+}
+
+/** Run on to a step that ends no earlier than a time, s. */
+function goTo(t: number): State {
+  let state: State = "running";
+  core.set("pause", t);
+  while (state === "running" && core.get("t") < t) state = go(MOST_STEPS);
+  core.set("pause", 0);
+  return state;
+}
+
+/** Push a particle, as Python's `chutelab.start` does: rounding of a sum of times is no step. */
+function push({ disk, force, due }: Push): State {
+  core.exports.push_disk(disk, ...force);
+  const state = goTo(due * (1 - 1e-12));
+  core.exports.push_disk(disk, 0, 0);
+  return state;
+}
+
+/** Hand on what has been written. */
+function tell(state: State) {
+  if (!job) return;
+  const over = state !== "running", { knots, events, swings } = written;
   const all = joined(knots);
+  written = { knots: [], events: [], swings: [] };
   const tips = over || !core.machine?.interact ? new Float64Array() : core.tips();
   postMessage({
     type: "chunk", id: job.id, knots: all, tips, events, swings, now: core.get("t"), state,
-    triggered: core.triggered(),
+    triggered: core.triggered(), given: core.books().map(([work]) => work),
     books: over ? core.books() : null, reasons: over ? core.reasons() : null,
     gained: core.get("gained"), unsolved: core.get("unsolved_most"),
     contacts: core.get("impact_count"), steps: core.get("step_count"), loads: core.takeLoads(over),
@@ -110,7 +144,14 @@ addEventListener("message", async ({ data }) => {
   } else if (data.type === "run") {
     core.begin(data.machine);
     job = { id: data.id, until: data.until, steps: 1 };
+    for (const one of data.pushes as Push[]) {
+      if (goTo(one.at) === "running") push(one);
+    }
     work();
+  } else if (data.type === "push" && job && data.id === job.id) {
+    const state = push(data.push);
+    job.until = core.get("t");
+    tell(state);
   } else if (data.type === "until" && job && data.id === job.id) {
     job.until = data.until;
     schedule();

@@ -10,6 +10,7 @@ ENGINE is contact or pymunk, by default what `auto` takes. The cases, all by def
     box     2,000 poured into a box 0.5 m wide, until they sleep
     hopper  1,000 grains of the scene `hopper`, of several sizes, run out through its gate
     board   the scene `galton`: 500 balls fall through 12 rows of pegs
+    boxes   only if asked for: 1,000 into each of twenty boxes 0.3 to 0.6 m wide, until they sleep
 
 `stream` and `bed` run in turns with the bare loop, three times each; medians are told. The loop has
 the same solids and disks, each from its release on, carried by a belt that holds it, then free; it
@@ -37,6 +38,7 @@ from chutelab.scene import load
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from references import Depth, inside_surfaces, overlaps, pair_overlaps
 
+ENGINES = ("contact", "pymunk")
 REPEATS = 3
 STEP = 1e-3
 """s; of the bare loop."""
@@ -50,17 +52,22 @@ HALF = 2e-3
 SLOP = 1e-3
 """Overlap that the loop's solver allows, in radii; Pymunk's default, 0.1 m, is meant for pixels."""
 
-BOX = {
-    "title": "2,000 poured into a box 0.5 m wide",
-    "particle": {"radius": 0.004, "mass": 0.0021},
-    "surface": [
-        {"name": "box", "points": [[-0.25, 3.0], [-0.25, 0.0], [0.25, 0.0], [0.25, 3.0]],
-         "restitution": 0.5, "friction": 0.3},
-    ],
-    "stream": {"count": 2000, "rate": 1000.0, "at": [-0.2, 1.0], "velocity": [2.0, 0.0],
-               "bed_height": 0.1, "interact": True},
-    "run": {"until": "settled", "max_time": 60.0},
-}  # fmt: skip
+
+def box(width, count, speed):
+    """Return a scene: so many are poured into a box, at so many m/s, until they sleep."""
+    left, right = -0.5 * width, 0.5 * width
+    return {
+        "title": f"{count:,} poured into a box {width:.2f} m wide",
+        "particle": {"radius": 0.004, "mass": 0.0021},
+        "surface": [
+            {"name": "box", "points": [[left, 3.0], [left, 0.0], [right, 0.0], [right, 3.0]],
+             "restitution": 0.5, "friction": 0.3},
+        ],
+        "stream": {"count": count, "rate": 1000.0, "at": [left + 0.05, 1.0],
+                   "velocity": [speed, 0.0], "bed_height": 0.1, "interact": True},
+        "run": {"until": "settled", "max_time": 60.0},
+    }  # fmt: skip
+
 
 LONG = ["stream.count=3200", "run.max_time=30"]
 BED = ["stream.count=1000", "particle.spin=true"]
@@ -69,11 +76,15 @@ CASES = {
     "stream": lambda: load("stream"),
     "bed": lambda: load("stream", BED),
     "long": lambda: load("stream", LONG),
-    "box": lambda: scene.from_dict(BOX),
+    "box": lambda: scene.from_dict(box(0.5, 2000, 2.0)),
     "hopper": lambda: load("hopper", HOPPER),
     "board": lambda: load("galton"),
 }
 HOPPER = ["stream.count=1000", "stream.fill=[[-0.095, 0.08], [0.095, 1.19]]"]
+BOXES = {
+    f"{width:.4f} m": lambda width=width: scene.from_dict(box(width, 1000, 1.0))
+    for width in np.linspace(0.3, 0.6, 20).tolist()
+}
 COMPARED = ("stream", "bed")
 
 
@@ -152,7 +163,7 @@ def told(depth):
 
 
 def measure(name, engine):
-    drawn = CASES[name]()
+    drawn = (CASES | BOXES)[name]()
     machine = build(drawn)
     ours, theirs, compared = [], [], name in COMPARED
     for _ in range(REPEATS if compared else 1):
@@ -178,14 +189,15 @@ def measure(name, engine):
 
 
 def main(arguments):
-    engine = arguments.pop(0) if arguments and arguments[0] not in CASES else None
+    engine = arguments.pop(0) if arguments and arguments[0] in ENGINES else None
     print(f"{'':32} {'':8} {'pairs, % of r':>15} {'surfaces, % of r':>17}")
     print(
         f"{'case':8} {'engine':8} {'disks':>6} {'until s':>7} {'CPU s':>8} {'worst':>7} {'99 %':>7}"
         f" {'worst':>7} {'99 %':>7} {'residual':>9}"
     )
     for name in arguments or CASES:
-        measure(name, engine)
+        for one in BOXES if name == "boxes" else [name]:
+            measure(one, engine)
 
 
 if __name__ == "__main__":

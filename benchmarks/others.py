@@ -23,7 +23,7 @@ import numpy as np
 from chutelab import scene
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from crowds import BOX, LOOK, bare, overlaps, pair_overlaps, told
+from crowds import LOOK, bare, box, overlaps, pair_overlaps, told
 from references import Depth
 
 END = 2.0
@@ -32,12 +32,10 @@ END = 2.0
 STEPS = (1.0 / 60.0, 1.0 / 240.0, 1e-3)
 """s."""
 
-POURED = BOX | {
-    "title": "1,000 poured into a box 0.5 m wide",
-    "particle": {"radius": 0.004, "mass": 0.0021, "spin": True},
-    "stream": BOX["stream"] | {"count": 1000, "restitution": 0.5, "friction": 0.3},
-    "run": {"until": END},
-}
+POURED = box(0.5, 1000, 2.0)
+POURED["particle"]["spin"] = True
+POURED["stream"] |= {"restitution": 0.5, "friction": 0.3}
+POURED["run"] = {"until": END}
 
 
 def crowd_of(machine, step):

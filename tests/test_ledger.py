@@ -55,6 +55,18 @@ def test_the_entries_are_what_the_impacts_and_the_ride_say():
     )
 
 
+@pytest.mark.parametrize(("share", "shown"), [(0.5, False), (2.0, True)])
+def test_what_is_of_the_size_of_rounding_is_shown_as_none_unless_in_detail(share, shown):
+    """Of what was turned over an entry up to 1e-12, a kinetic energy up to 5e-6."""
+    books = ledger(shipped("perpendicular"))
+    heat, kinetic = (share * size * books.turned_over for size in (1e-12, 5e-6))
+    books = replace(books, friction_loss=heat, kinetic=(kinetic, books.kinetic[1]))
+    for details in (False, True):
+        sheet = books.sheet(details=details)
+        assert (sheet.foot[0][-1] != "0") is (shown or details)
+        assert sheet.notes[0].startswith("kinetic 0 -> ") is not (shown or details)
+
+
 @pytest.mark.parametrize("spins", [False, True])
 def test_a_wrong_end_velocity_moves_the_residual_by_its_kinetic_energy(spins):
     recording = shipped("perpendicular", f"particle.spin={str(spins).lower()}")

@@ -104,7 +104,12 @@ def test_a_new_lesson_has_a_notebook_too(tmp_path):
     assert not {"name", "progress"} & set(cells)
     plan = (folder / "lesson.toml").read_text(encoding="utf-8")
     plan = plan.replace("Where does the particle land?", "Where will it land?")
-    for big, small in (("fps = 25", "fps = 10"), ("800", "320"), ("450", "180")):
+    for big, small in (
+        ("fps = 25", "fps = 10"),
+        ("800", "320"),
+        ("450", "180"),
+        ("# slow = 8 ", "slow = 2 "),
+    ):
         plan = plan.replace(big, small, 1)
     (folder / "lesson.toml").write_text(plan, encoding="utf-8")
     built = CliRunner().invoke(main, ["lesson", "build", str(folder)])

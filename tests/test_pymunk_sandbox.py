@@ -284,7 +284,7 @@ def test_a_pendulum_swings_as_its_equation_and_its_string_takes_nothing():
     # From rest at θ0 it hangs straight down after 5/4 of its period 4 sqrt(L/g) K(sin²(θ0/2)).
     length, angle, errors = 0.5, radians(50.0), []
     end = 5.0 * sqrt(length / G) * ellipk(sin(0.5 * angle) ** 2)
-    for dt in (4e-3, 2e-3, 1e-3):
+    for dt in (4e-3, 1e-3):
         m = lone((0.0, 0.0), until=end, dt=dt)
         m = hung(m, [(length * sin(angle), -length * cos(angle))], length, [(0.0, 0.0)])
         got = run(m)

@@ -10,7 +10,7 @@ from chutelab import scene
 from chutelab.engines.simulation import simulate
 from chutelab.results import REASONS, Kind
 from chutelab.results.quantities import compare
-from chutelab.results.summary import schema, summary
+from chutelab.results.summary import schema, sheets, summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
@@ -241,3 +241,18 @@ def test_the_schema_describes_every_key_with_its_unit(case):
         units = {key: one["x-unit"] for key, one in said["properties"][event]["properties"].items()}
         assert units.items() >= {"t": "s", "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}.items()
     assert said["properties"]["theory"]["properties"]["phi1_deg"]["x-unit"] == "degrees"
+
+
+def test_the_first_six_contacts_are_listed_where_no_theory_speaks_of_them():
+    """From 0.8 m it meets the floor after sqrt(2 h / g), then each 0.8 times as long as before."""
+    floor = {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "restitution": 0.8}
+    run = simulate({
+        "particle": {"radius": 0.0}, "surface": [floor], "run": {"until": 3.5},
+        "stream": {"at": [0.0, 0.8], "velocity": [0.0, 0.0]},
+    })  # fmt: skip
+    assert len(run.select(Kind.IMPACT)) > 6
+    (way,) = [sheet for sheet in sheets(run) if sheet.title == "Particle 0, its first contacts"]
+    fall = np.sqrt(2.0 * 0.8 / 9.81)
+    times = fall + 2.0 * fall * np.cumsum([0.0, *0.8 ** np.arange(1, 6)])
+    assert [row[0] for row in way.rows] == ["meets floor"] * 6
+    assert [float(row[1]) for row in way.rows] == pytest.approx(times, rel=1e-5)

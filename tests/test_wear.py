@@ -152,6 +152,23 @@ def test_sums_over_pieces_are_the_ledgers(scene, engine):
         assert one.unplaced == 0.0
 
 
+def test_what_slides_close_above_a_surface_does_not_wear_it():
+    """One slides on the floor's left, one 0.3 r above its right, on a shelf."""
+    r, grip = 0.01, {"restitution": 0.0, "friction": 0.3}
+    floor = {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], **grip}
+    shelf = {"name": "shelf", "from": [0.3, 0.3 * r], "to": [0.9, 0.3 * r], **grip}
+    run = chutelab.simulate({
+        "particle": {"radius": r}, "surface": [floor, shelf], "run": {"until": 0.2},
+        "stream": [{"at": [-0.9, r], "velocity": [0.8, 0.0]},
+                   {"at": [0.4, 1.3 * r], "velocity": [0.8, 0.0]}],
+    })  # fmt: skip
+    worn_at = run.wear("floor").sliding
+    lost = run.ledger.by_surface["floor"]["friction_loss"]
+    assert run.ledger.by_surface["shelf"]["friction_loss"] == pytest.approx(lost, rel=1e-6)
+    assert worn_at[: len(worn_at) // 2].sum() == pytest.approx(lost, rel=1e-9)
+    assert worn_at[len(worn_at) // 2 :].sum() == 0.0
+
+
 def test_in_a_crowd_they_are_too():
     run = chutelab.simulate("hopper", {"stream.count": 60})
     for name in ("left", "right", "gate"):

@@ -20,9 +20,16 @@ ROOT = Path(__file__).parents[1]
 # What runs in the background of a shell ignores Ctrl-C, and so would the commands that tests start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# The same draws everywhere: a red run is red again, on any machine.
-settings.register_profile("chutelab", derandomize=True, deadline=None, max_examples=50)
+# The same draws everywhere: a red run is red again, on any machine. Runs with slow tests draw more.
+for name, count in (("chutelab", 50), ("many", 200)):
+    settings.register_profile(name, derandomize=True, deadline=None, max_examples=count)
 settings.load_profile("chutelab")
+
+
+def pytest_configure(config):
+    """Draw more where slow tests are asked for."""
+    if "not slow" not in config.option.markexpr:
+        settings.load_profile("many")
 
 
 # Modules and tests stay: no garbage is looked for among them.

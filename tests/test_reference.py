@@ -132,7 +132,7 @@ def test_without_scipy_it_says_what_to_install():
     assert done.stdout == 'SciPy is missing: pip install "chutelab[bench]"\n'
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [20, pytest.param(60, marks=pytest.mark.slow)])
 def test_it_and_exact_tell_the_same_of_machines_drawn_at_random(count):
     """Surfaces that cross, fold, move and grip: all answers within 1e-9, but where one refuses."""
     tally = Counter()

@@ -198,8 +198,8 @@ def test_a_key_takes_the_values_of_its_range_and_no_others(line):
 # The shipped scenes.
 
 SHIPPED = (
-    "belt-landing", "cascade", "coal-transfer", "cradle", "damper-plate", "dominoes", "feeder",
-    "flap-gate", "free-fall", "galton", "heap", "hopper", "inclined-20", "inclined-40",
+    "belt-landing", "cascade", "coal-transfer", "cradle", "damper-plate", "domino-gate", "dominoes",
+    "feeder", "flap-gate", "free-fall", "galton", "heap", "hopper", "inclined-20", "inclined-40",
     "inclined-60", "inclined-conveyor",
     "low-speed", "mixture",
     "perpendicular", "perpendicular-fast", "rock-box", "see-saw", "silo", "slip", "spoon",

@@ -39,6 +39,7 @@ AUTO = {
     "vibrating-feeder": "contact",
     "see-saw": "contact",
     "cradle": "contact",
+    "domino-gate": "pymunk",
     "dominoes": "pymunk",
 }
 

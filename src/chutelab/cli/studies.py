@@ -665,8 +665,9 @@ def field(
     loaded = loaded_as_told(scene, set_, engine)
     names = [*(f"field-{name}.png" for name in wanted), "fields.csv", *["fields.vti"] * vtk]
     with destination(out, names) as place:
-        with progress("simulating"):
-            recording = simulate(loaded, {"run.stress": loaded.run.stress or STRESS})
+        with progress("simulating") as update:
+            bins = {"run.stress": loaded.run.stress or STRESS}
+            recording = simulate(loaded, bins, progress=update)
         with progress("spreading"):
             found = fields(recording, begin, end, samples=samples, width=width, cell=cell)
         if place is not None:

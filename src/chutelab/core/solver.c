@@ -31,7 +31,7 @@
 /* Whether a surface that moves drives a disk. */
 static int drives(const Contact *c) { return c->j < 0 && c->other[1] - c->moved[1] != 0; }
 /* Whether a surface runs or comes on, as hard as it must. */
-static int presses(const Contact *c) { return drives(c) || c->moved[0] != 0; }
+static int presses(const Contact *c) { return drives(c) || c->moved[0] > 0; }
 
 /* Stall the drives, for this step, of disks that do not turn and that block them: contacts that change by
    `least`, m/s, or more, and rough ones that slip by more than `enough` though their friction is not all used.

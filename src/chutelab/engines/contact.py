@@ -76,12 +76,14 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         job.write(recorder)
         record = recorder.finish(engine="contact", steps=module.world.step_count)
         take(module, record)
+        return recorder.whole(record, stalled)
     except AsideError:
-        machine.finish(unwatched if progress is None else partial(progress, 0.0))
-        return run(machine, progress)
+        # What is wrong with a machine is told below, without this around it.
+        pass
     finally:
         give_back(module)
-    return recorder.whole(record, stalled)
+    machine.finish(unwatched if progress is None else partial(progress, 0.0))
+    return run(machine, progress)
 
 
 def parts(machine: Machine) -> dict[str, Pieces]:

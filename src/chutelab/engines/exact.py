@@ -88,12 +88,14 @@ def run(machine: Machine, progress: Progress | None = None, *, apart: bool = Fal
         rounds: int = module.structs["Exact"].rounds
         record = recorder.finish(engine="exact", steps=rounds)
         take(module, record)
+        return recorder.whole(record, stalled)
     except AsideError:
-        machine.finish(unwatched if progress is None else partial(progress, 0.0))
-        return run(machine, progress, apart=apart)
+        # What is wrong with a machine is told below, without this around it.
+        pass
     finally:
         give_back(module)
-    return recorder.whole(record, stalled)
+    machine.finish(unwatched if progress is None else partial(progress, 0.0))
+    return run(machine, progress, apart=apart)
 
 
 def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:

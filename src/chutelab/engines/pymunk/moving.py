@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import exp
+from typing import Final
 
 import numpy as np
 import pymunk
@@ -11,6 +13,9 @@ from pymunk import Vec2d
 from chutelab.engines.pymunk.world import Face, World
 from chutelab.machine import Machine, Mover
 from chutelab.util.arrays import Floats, Ints
+
+COMES_BACK: Final = 0.02
+"""s; in which what has gone beyond a stop within a step comes back to it, but for 1/e."""
 
 
 class Hanging:
@@ -35,7 +40,9 @@ class Hanging:
             body.body_type = pymunk.Body.DYNAMIC
             body.mass = mass / many
             body.moment = (hinge.inertia - mass * middle.dot(middle) * weighs) / many
-            body.center_of_gravity = pivot + middle - body.position
+            place = body.position
+            body.center_of_gravity = pivot + middle - place
+            body.position = place
             joints: list[pymunk.Constraint] = [pymunk.PivotJoint(still, body, pivot)]
             if body is not self.body:
                 joints.append(pymunk.GearJoint(self.body, body, 0.0, 1.0))
@@ -43,7 +50,8 @@ class Hanging:
                 joint.error_bias = 0.0
                 space.add(joint)
         self.stop = pymunk.RotaryLimitJoint(still, self.body, *np.clip(hinge.stops, -1e9, 1e9))
-        self.stop.error_bias = 0.0
+        # What has gone beyond it comes back slowly: a stop that does so at once throws it back.
+        self.stop.error_bias = exp(-1.0 / COMES_BACK)
         self.motor = pymunk.SimpleMotor(self.body, still, hinge.motor[0])
         self.motor.max_force = hinge.motor[1] if mover.begins == 0.0 else 0.0
         spring = pymunk.DampedRotarySpring(self.body, still, hinge.rest, hinge.spring, hinge.damper)

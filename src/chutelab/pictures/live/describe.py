@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
 from typing import Any, Final
 
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
-from chutelab.scene.conflicts import EITHER, RULES, tree
+from chutelab.scene.conflicts import EITHER, JOINTS, RULES, tree
 from chutelab.scene.materials import VALUES, presets
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
@@ -19,7 +18,7 @@ MOST: Final = 100_000
 ABSENT: Final = (("particle", "size"), ("particle", "points"))
 """Keys that pages do not have."""
 
-LISTS: Final = ("material", "pair", "conveyor", "surface", "sensor", "string", "rod", "pin")
+LISTS: Final = ("material", "pair", "conveyor", "surface", "sensor")
 
 EXAMPLES: Final = ("inclined-40", "cascade", "spoon", "hopper", "galton", "free-fall")
 """Scenes that the empty page offers, with the words ``example-NAME`` in its catalogues."""
@@ -95,7 +94,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     Raises
     ------
     SceneError
-        If the page cannot show it: mass points, boxes, polygons, springs, or too many particles; or
+        If the page cannot show it: mass points, boxes, polygons, joints, or too many particles; or
         if the scene contradicts itself where it is laid out.
     """
     materials = {
@@ -124,10 +123,9 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
             faults.append(Fault(f"{table}.shape", kind.shape, allowed))
         else:
             faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
-    # Joints are told by the numbers of particles, of which some would be left out.
-    joints = Counter(table for table, _ in scene.joints if foreign or table == "spring")
+    joints = Counter(table for table, _ in scene.joints)
     lacks += joints
-    faults += [Fault(table, None, f"{allowed}, without this") for table in joints]
+    faults += [Fault(table, None, f"{allowed}, without joints") for table in joints]
     for n, pair in enumerate(scene.pair):
         if pair.cohesion and scene.hinges:
             text = "0 with what hangs on hinges: the contact engine, which pages run, has not both"
@@ -144,7 +142,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         raise SceneError(scene.source, faults)
     tables = to_dict(scene)
     if lacks:
-        _leave_out(tables, scene, foreign, joints)
+        _leave_out(tables, scene, foreign)
         common |= {"lacks": dict(lacks), "source": scene.source}
     machine, out = build(scene), scene.outgoing
     if out is not None and out.drop_from == "impact":
@@ -168,10 +166,8 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     return {"scene": tables, **common}
 
 
-def _leave_out(
-    tables: dict[str, Any], scene: Scene, kinds: set[int], joints: Iterable[str]
-) -> None:
-    """Take kinds of particles out of the keys of a scene, their streams, and tables of joints."""
+def _leave_out(tables: dict[str, Any], scene: Scene, kinds: set[int]) -> None:
+    """Take kinds of particles out of the keys of a scene, their streams, and all joints."""
     names = {scene.particles[n].name for n in kinds}
     for table, gone in (
         ("particle", [n in kinds for n in range(len(scene.particles))]),
@@ -183,7 +179,7 @@ def _leave_out(
         if kept := [row for row, out in zip(rows, gone, strict=False) if not out]:
             tables[table] = kept
     tables.setdefault("stream", [])
-    for table in (*joints, "live"):
+    for table in (*JOINTS, "live"):
         tables.pop(table, None)
 
 
@@ -196,7 +192,7 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             continue
         rules["scene"][key] = _rule([key])
     for table, model in Scene.tables().items():
-        if table in ("spring", "expect"):
+        if table in (*JOINTS, "expect"):
             continue
         several = table in LISTS or table in EITHER
         rules[table] = {}
@@ -227,7 +223,7 @@ def _rule(path: list[str | int]) -> dict[str, Any]:
         found["unit"] = rule["x-unit"]
     limits = limits_of(rule)
     if rule.get("type") == "integer":
-        limits = rule["minimum"], rule.get("maximum", MOST)
+        limits = rule["minimum"], rule["maximum"]
     if limits is not None:
         found["low"], found["high"] = limits
     found["form"] = _form(rule)

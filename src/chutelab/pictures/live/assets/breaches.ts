@@ -48,8 +48,7 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
     book_rows: books.length / 3, surface_count: machine.surfaces.length + 1,
     engine: enums.Engine.ENGINE_CONTACT, interact: Number(interact || states.length > 0),
     mover_count: movers.length, swing_count: states.length, pulley: Number(!!pulley),
-    tilt, dt, joined: Number(machine.joints.length > 0),
-    largest: radius.reduce((most, own) => Math.max(most, own), 0), ...run,
+    tilt, dt, largest: radius.reduce((most, own) => Math.max(most, own), 0), ...run,
   });
   core.work("lay_out_laws");
   core.doubles.set(knots, core.get("knots", "Laws") >> 3);

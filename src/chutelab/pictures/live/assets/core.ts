@@ -166,7 +166,6 @@ class Core extends Memory {
       disk_count: releases.length, surface_count: rows.length, kind_count: kinds,
       owner_count: machine.surfaces.length, interact: Number(machine.interact),
       mover_count: machine.movers.length, trigger_count: machine.triggers.length,
-      joint_count: machine.joints.length,
       until: this.layout.enums.Until[`UNTIL_${machine.until.toUpperCase()}`],
       landing: machine.landing, ride_owner: 0, pulley: pulley ? machine.segments.length : -1,
       ride_incline: pulley ? pulley.incline : 0, g: machine.gravity,
@@ -175,8 +174,6 @@ class Core extends Memory {
     });
     this.work("lay_out_world");
     machine.movers.forEach((mover, k) => this.fill("movers", "Mover", k, mover));
-    machine.joints.forEach(({ kind, from, ...joint }, k) => this.fill("joints", "Joint", k,
-      { ...joint, kind: this.layout.enums.Tie[kind.toUpperCase()], from: from ?? [NaN, NaN] }));
     const { GOES, COMES, STARTS } = this.layout.enums.Doing;
     machine.triggers.forEach(({ surface, doing, by }, k) => this.fill("triggers", "Trigger", k,
       { surface, doing: { opens: GOES, closes: COMES, starts: STARTS }[doing], by }));

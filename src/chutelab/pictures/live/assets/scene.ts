@@ -144,19 +144,6 @@ interface Outgoing {
   given: Given;
 }
 
-/** What a particle hangs on, or two hold each other by, as `machine/parts.py` has it */
-export interface Joint {
-  kind: "string" | "rod" | "pin";
-  from?: Point;
-  particle: number;
-  other?: number;
-  length?: number;
-  given: Given;
-}
-
-/** Tables of joints that a page runs, in Python's order. */
-export const JOINTS = ["string", "rod", "pin"] as const;
-
 /** All defaults filled in; names as in the file, but for three lists */
 export interface Scene {
   title: string;
@@ -172,7 +159,6 @@ export interface Scene {
   outgoing: Outgoing | null;
   conveyor: Conveyor[];
   surface: Surface[];
-  joints: Joint[];
   streams: Stream[];
   run: { until: "landed" | "settled" | number, max_time: number, dt: number,
     engine: string, loads?: number };
@@ -259,8 +245,7 @@ export function resolve(given: Given, lab: Lab): Scene {
     gravity_deg: given.gravity_deg ?? lab.tables.scene.gravity_deg.default,
     air_density: given.air_density ?? lab.tables.scene.air_density.default,
     particles, materials, pair: rows("pair"), incoming, plates, outgoing,
-    conveyor: rows("conveyor"), surface,
-    joints: JOINTS.flatMap((kind) => rows(kind).map((row) => ({ ...row, kind }))), streams, run, kinds, sensor: rows("sensor"),
+    conveyor: rows("conveyor"), surface, streams, run, kinds, sensor: rows("sensor"),
     view: given.view ?? null,
     crowded: count > 1 && streams.some((stream) => stream.interact),
     most: lab.tables.stream.count.high ?? Infinity,

@@ -49,14 +49,21 @@ static void branch_of(const Contact *c, double *b) {
 
 static int other_of(const Contact *c) { return c->j < 0 ? -1 - c->owner : c->j; }
 
-/* The same, kept pair by pair: what goes to a rider, its belt gives it. Blows are events instead. */
+/* The same, kept pair by pair. Blows are events instead. */
 void keep_impulse(const Contact *c, double share, double from, double to) {
     double J[2], b[2];
     if (B.each == 0) return;
     impulse_of(c, share, J);
     branch_of(c, b);
     keep_contact(c->i, other_of(c), from, to, J, b);
-    if (c->j < 0 || c->two) return;
+    keep_carried(c, share, from, to);
+}
+
+/* What a contact takes from a rider its belt gives it, of a blow too: the rider's way stays as it is. */
+void keep_carried(const Contact *c, double share, double from, double to) {
+    double J[2];
+    if (B.each == 0 || c->j < 0 || c->two) return;
+    impulse_of(c, share, J);
     Push p = on_belt(W.disks + c->j, from, to);
     p.jx = J[0];
     p.jy = J[1];

@@ -289,6 +289,7 @@ void note_force(Disk *d, const Contact *c, double span);
 void bear_asleep(const Disk *d, double until, double more);
 void balance_sleepers(void);
 void keep_impulse(const Contact *c, double share, double from, double to);
+void keep_carried(const Contact *c, double share, double from, double to);
 void keep_sleepers(void);
 
 /* contact.c */

@@ -536,6 +536,7 @@ static void strike(int i, int j, double t) {
                     c.impulse[0], c.impulse[1]);
     /* Of a jam, the event does not say from where its impulse came. */
     if (!told || (jammed && !is_alone(&c, before))) keep_impulse(&c, 1, t, t);
+    else keep_carried(&c, 1, t, t);
     if (landing && !passes) a->landed = 1;
     if (j < 0 && !passes) {
         a->on = c.owner;

@@ -239,6 +239,8 @@ def test_what_lasting_contacts_give_is_told_where_it_is_left_out():
     found = run.field(0.1, 0.4)
     assert found.left_out == pytest.approx(1.0)
     assert "lasting contacts, 100 % of all impulses" in found.note
+    assert "strings" not in found.note
+    assert "strings" in chutelab.simulate("cradle", {"run.until": 0.1}).field().note
     assert not found.contact.any()
 
 

@@ -87,6 +87,8 @@ class Fields(Shown):
     left_out : float
         Share of the impulses on particles in the window that are not in contact stress and
         traction: those of lasting contacts, where the recording does not have them by pairs.
+    joined : bool
+        Whether strings, rods, springs or pins pull: what these give is in no stress.
     """
 
     x: Floats
@@ -101,6 +103,7 @@ class Fields(Shown):
     contact: Floats
     traction: Floats
     left_out: float
+    joined: bool
 
     def __getitem__(self, name: str) -> Floats:
         """Return one of `NAMES`, (X, Y); stress is kinetic and contact stress together."""
@@ -137,6 +140,8 @@ class Fields(Shown):
                 f"; lasting contacts, {100.0 * self.left_out:.0f} % of all impulses there, are not"
                 " in the stress: the contact engine keeps them with run.stress, such as 0.01 s"
             )
+        if self.joined:
+            said += "; what strings, rods, springs and pins give is not in the stress"
         return said
 
     def sheet(self, *, details: bool = False) -> Sheet:
@@ -323,6 +328,7 @@ def fields(
         contact=contact / (end - begin),
         traction=traction / (end - begin),
         left_out=0.0 if _keeps(recording) else _left_out(recording, begin, end, blows),
+        joined=bool(recording.machine.joints),
     )
 
 

@@ -75,6 +75,12 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 
 static inline double square(double a) { return a * a; }
 
+/* A place at which a particle with corners is near something: the normal towards it, how near, where; and which corner
+   of both that is, on what, see corners.c. */
+typedef struct { double nx, ny, gap, later, x, y; int which, on; } Touch;
+/* Such places of two, at most. */
+#define MOST_TOUCHES 8
+
 /* Two doubles at once: each rounds as by itself. */
 typedef v128_t Two;
 
@@ -130,7 +136,7 @@ static inline int is_flat(const Surface *s) {
 }
 /* Longest step in which what is pressed on something, by so much (m/s2), hops by no more than HOP radii, s. */
 static inline double hop_time(const Disk *d, double press) {
-    return press > 0 ? sqrt(8 * HOP * d->radius / press) : INFINITY;
+    return press > 0 ? sqrt(8 * HOP * (d->corners ? d->inner : d->radius) / press) : INFINITY;
 }
 /* A surface where it is at t. */
 const Surface *move_to(Surface *s, double t);
@@ -249,6 +255,20 @@ void end_pull(void);
 void strike_joints(int i, int j);
 void end_blow(void);
 void share_with_joints(const Contact *c, double wanted, const double *u, double *J);
+
+/* corners.c */
+int is_cornered(int i, int j);
+double inner_of(int i, int j);
+double whirl_of(const Disk *d);
+int list_touches(int i, int j, double t, double within, double later, Touch *list);
+double gap_of_corners(const Disk *d, double x, double y, int k, double t);
+int would_overlap(int i, double x, double y, int j, double t, double deep);
+double meet_corners(int i, int j, double from, double until, double soft);
+void describe_touch(Contact *c, int i, int j, const Touch *t);
+const Contact *place_before(const Contact *c);
+double opens_by(const Contact *c);
+int list_struck(int i, int j, double t, Contact *list);
+void strike_corners(int i, int j, double t);
 
 /* trigger.c */
 int is_triggered(int owner, int doing);

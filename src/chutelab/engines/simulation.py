@@ -203,7 +203,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
 def must_fit(machine: Machine, name: str) -> None:
     """Raise a `SceneError` if an engine does not have what a machine needs."""
     scene = machine.scene
-    if name in ("exact", "contact"):
+    if name == "exact":
         for n, outline in enumerate(machine.outlines):
             if outline is not None:
                 key, shape = f"{scene.head('particle', n)}.shape", scene.particles[n].shape

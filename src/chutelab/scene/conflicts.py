@@ -463,8 +463,8 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
     for kind, size in zip(kinds, sizes, strict=True):
         shape, path = kind["shape"], kind.path("radius")
         if shape in ("box", "polygon"):
-            if engine in ("exact", "contact"):
-                yield run.fault("engine", f'{kind.path("shape")} = "{shape}" needs pymunk')
+            if engine == "exact":
+                yield run.fault("engine", f'{kind.path("shape")} = "{shape}" needs contact or pymunk')
         elif size == 0.0:
             if any(size != 0.0 for size in sizes if size is not math.nan):
                 text = "more than 0, or 0 of all kinds: no engine has points beside disks"

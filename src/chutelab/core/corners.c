@@ -20,6 +20,8 @@
 #define ENDS 1e-15
 /* Share of it that a blow may give by rounding. */
 #define GAINS 1e-12
+/* Contacts of an island up to which it is brought off its hop before a blow. */
+#define SMALL 32
 /* Candidates for a place: corners of both. */
 #define CANDIDATES (2 * MOST_CORNERS)
 
@@ -497,6 +499,44 @@ int list_struck(int i, int j, double t, Contact *list) {
     return count;
 }
 
+/* Bring what lasts from its hop to its smooth path before a blow: else the hop's velocity, of first order in the step,
+   would enter that. Of the impulses of the step what is not due yet is taken back, or what is due is given. */
+static void end_hops(int i, double t) {
+    const Contact *first = 0;
+    int count = 0;
+    for (int link = W.disks[i].links; link >= 0 && !first; link = W.links[link]) first = W.contacts + link / 2;
+    if (!first || t <= W.t || W.disks[i].smooth == W.shocks) return;
+    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) count += c->island == first->island;
+    if (count > SMALL) return;
+    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
+        Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+        if (c->island != first->island || a->mode != FREE || (c->j >= 0 && b->mode != FREE)) continue;
+        double past = W.tracks[c->i].lasted > 1 ? W.length_before : 0, u[3], v[3], given[3], change[3];
+        Contact last = *c;
+        advance(a, t);
+        if (c->two) advance(b, t);
+        was_moved(c->i);
+        a->smooth = W.shocks;
+        if (c->two) {
+            was_moved(c->j);
+            b->smooth = W.shocks;
+        }
+        if (c->impulse[0] == 0) continue;
+        for (int n = 0; n < 3; n++)
+            last.impulse[n] = change[n] = -c->impulse[n] * (W.length - 2 * (t - W.t)) / (past + W.length);
+        relative(&last, 0, u);
+        push(&last, change);
+        relative(&last, 0, v);
+        share_out(&last, u, v, 0, last.entries, given);
+        book(a->entries, c->two ? b->entries : 0, c->owner, last.entries);
+        if (c->j < 0) W.drives[c->owner] += driven(&last, 0);
+        bear_contact(&last, 1, t, t);
+        keep_impulse(&last, 1, t, t);
+        give_back(&last, 1);
+    }
+    W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
+}
+
 /* Impulses at all places such that gaps do not close, or open as fast as they are to, and that friction, a share of
    it, stops slip as far as it may. */
 static void share_blow(Contact *list, int count, const double *back, double share) {
@@ -559,6 +599,8 @@ void strike_corners(int i, int j, double t) {
     double u[MOST_TOUCHES][3], back[MOST_TOUCHES], fastest = 0, J[2] = {0, 0};
     int impacts = MAX(a->impacts, j >= 0 ? b->impacts : 0), rests = 0;
     if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);
+    end_hops(i, t);
+    if (j >= 0 && b->mode == FREE) end_hops(j, t);
     int count = list_struck(i, j, t, list), two = j >= 0 && b->mode == FREE;
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;

@@ -108,7 +108,8 @@ typedef struct {
     int body;               /* its row of `World.solver_bodies`, if that is of this disk */
     int tie;                /* first of its ends of joints, 2 n and 2 n + 1 of joint n, or -1 */
     int corners;            /* [in] how many it has; 0 of what is round ... */
-    int outline, pad;       /* [in] ... and the first of them in `World.outlines` */
+    int outline;            /* [in] ... and the first of them in `World.outlines` */
+    int smooth;             /* mark of the shock in which it was brought off its hop */
     double inner;           /* m; radius of the circle inside them, or its own */
     double tug[3], tugged[3]; /* m/s, m/s, rad/s; what half of a step's pull of its joints changes, and before */
 } Disk;

@@ -262,7 +262,7 @@ int find_contacts(double h, int *woke) {
         double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least, 0);
         if (cornered) bound = MAX(bound, left_over(b, impacts, -1, least, 0));
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
-            bound = MAX(bound, MAX(W.soft, W.skip * least));
+            bound = MAX(bound, MAX(W.soft, cornered ? 0 : W.skip * least));
         if (a->mode == ASLEEP || b->mode == ASLEEP) {
             wake(a->mode == ASLEEP ? i : j, W.t);
             *woke = 1;
@@ -276,7 +276,7 @@ int find_contacts(double h, int *woke) {
         if (d->mode != FREE) continue;
         int first = W.contact_count;
         double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius, 0);
-        if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
+        if (d->supports) bound = MAX(bound, W.interact && !d->corners ? MAX(W.soft, W.skip * d->radius) : W.soft);
         const int *list;
         int count = surfaces_near(i, &list);
         for (int n = 0; n < count; n++) {

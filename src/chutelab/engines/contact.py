@@ -69,6 +69,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         If a particle does not get on; it has the recording so far.
     """
     if any(kind.outline for kind in machine.scene.particles):
+        machine.finish()
         machine = together(machine)
     if not machine.is_ahead and np.min(machine.particle.radius) <= 0.0:
         raise ValueError("particle.radius = 0: the contact engine needs a radius above 0 m")

@@ -219,8 +219,8 @@ void account(Contact *list, int count) {
     pool(list, count, 1);
 }
 
-/* Hardly ever asked to the end: inline it would slow all that asks. */
-__attribute__((noinline)) int is_one(const Disk *d, int k, int other) {
+/* Hardly ever asked to the end. */
+RARELY int is_one(const Disk *d, int k, int other) {
     return other >= 0 && (goes_on(-1 - k, -1 - other) || same_place(d, k, other));
 }
 

@@ -12,6 +12,9 @@
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 #define ALARM (-1000000) /* partner of a release or of a ride's end; no surface has that number */
 
+/* Of what hardly any scene asks for: inline it would slow all that asks. */
+#define RARELY __attribute__((noinline))
+
 extern World W;
 
 /* What was too small, so that `run` makes more room. */
@@ -111,6 +114,11 @@ static inline int *spared_by(const Surface *s, const Disk *d) {
 static inline int is_spared(const Surface *s, const Disk *d) {
     return s->gate >= 0 && *spared_by(s, d);
 }
+/* Whether a particle has corners, or one of two. */
+static inline int has_corners(const Disk *d) { return W.outline_count && d->corners; }
+static inline int is_cornered(int i, int j) {
+    return W.outline_count && (W.disks[i].corners || (j >= 0 && W.disks[j].corners));
+}
 /* Whether a surface is there and near the box that a disk can reach in this step. */
 static inline int is_near(const Surface *s, const Disk *d) {
     return s->there && s->box[0] < d->right && s->box[2] > d->left && s->box[1] < d->top
@@ -136,7 +144,7 @@ static inline int is_flat(const Surface *s) {
 }
 /* Longest step in which what is pressed on something, by so much (m/s2), hops by no more than HOP radii, s. */
 static inline double hop_time(const Disk *d, double press) {
-    return press > 0 ? sqrt(8 * HOP * (d->corners ? d->inner : d->radius) / press) : INFINITY;
+    return press > 0 ? sqrt(8 * HOP * (has_corners(d) ? d->inner : d->radius) / press) : INFINITY;
 }
 /* A surface where it is at t. */
 const Surface *move_to(Surface *s, double t);
@@ -257,7 +265,6 @@ void end_blow(void);
 void share_with_joints(const Contact *c, double wanted, const double *u, double *J);
 
 /* corners.c */
-int is_cornered(int i, int j);
 double inner_of(int i, int j);
 double whirl_of(const Disk *d);
 int list_touches(int i, int j, double t, double within, double later, Touch *list);

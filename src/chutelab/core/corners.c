@@ -33,8 +33,6 @@ typedef struct {
     const Surface *s;
 } Shape;
 
-int is_cornered(int i, int j) { return W.disks[i].corners || (j >= 0 && W.disks[j].corners); }
-
 static Shape shape_of(int j, double t) {
     Shape out = {.round = -1};
     if (j < 0) {
@@ -226,7 +224,7 @@ double inner_of(int i, int j) { return j < 0 ? W.disks[i].inner : MIN(W.disks[i]
 
 /* List the places at which particle i, which has corners, is nearer than `within` to j at t, and what their gaps are
    at `later`; up to MOST_TOUCHES. */
-int list_touches(int i, int j, double t, double within, double later, Touch *list) {
+RARELY int list_touches(int i, int j, double t, double within, double later, Touch *list) {
     double near = TOUCH * inner_of(i, j);
     Shape a = shape_of(i, t), b = shape_of(j, t);
     int count = 0;
@@ -251,7 +249,7 @@ int list_touches(int i, int j, double t, double within, double later, Touch *lis
 }
 
 /* Gap between a particle with corners, moved to a place, and a surface, m. */
-double gap_of_corners(const Disk *d, double x, double y, int k, double t) {
+RARELY double gap_of_corners(const Disk *d, double x, double y, int k, double t) {
     Shape a = shape_of((int)(d - W.disks), t), b = shape_of(-1 - k, t);
     double least = INFINITY;
     for (int n = 0; n < a.count; n++) {
@@ -268,7 +266,7 @@ double gap_of_corners(const Disk *d, double x, double y, int k, double t) {
 }
 
 /* Whether two particles, one with corners, would overlap by more than `deep`, the first at a place, both at t. */
-int would_overlap(int i, double x, double y, int j, double t, double deep) {
+RARELY int would_overlap(int i, double x, double y, int j, double t, double deep) {
     Shape a = shape_of(i, W.disks[i].t), b = shape_of(j, t);
     double clear = -INFINITY;
     for (int n = 0; n < a.count; n++) {
@@ -422,7 +420,7 @@ double opens_by(const Contact *c) {
 }
 
 /* Fill in a contact at a place of particle i, which has corners, as both partners are now. */
-void describe_touch(Contact *c, int i, int j, const Touch *t) {
+RARELY void describe_touch(Contact *c, int i, int j, const Touch *t) {
     const Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
     const Pair *pair = j < 0 ? surface_pair(a, -1 - j) : pair_of(a->kind, b->kind);
     double feels[2], mass = a->inv_mass, turn = a->inv_inertia;
@@ -466,7 +464,7 @@ void describe_touch(Contact *c, int i, int j, const Touch *t) {
 }
 
 /* The contact of the step before at about the same place of both. */
-const Contact *place_before(const Contact *c) {
+RARELY const Contact *place_before(const Contact *c) {
     const Contact *found = 0;
     double least = INFINITY;
     for (int k = W.disks[c->i].before; k >= 0; k = W.earlier[k].next) {
@@ -482,7 +480,7 @@ const Contact *place_before(const Contact *c) {
 /* ------------------------------------------------------------------------------------------- the blow */
 
 /* The places at which two touch now, as contacts: those of which a gap is closed, and those that last. */
-int list_struck(int i, int j, double t, Contact *list) {
+RARELY int list_struck(int i, int j, double t, Contact *list) {
     Touch places[MOST_TOUCHES];
     double least = inner_of(i, j);
     int lasts = 0, count = 0;
@@ -593,7 +591,7 @@ static double share_out_blow(Contact *list, int count, double *back, const doubl
 }
 
 /* Resolve the blow of particle i, which has corners, and j at all places at which they touch. */
-void strike_corners(int i, int j, double t) {
+RARELY void strike_corners(int i, int j, double t) {
     Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
     Contact list[MOST_TOUCHES], *main = list;
     double u[MOST_TOUCHES][3], back[MOST_TOUCHES], fastest = 0, J[2] = {0, 0};

@@ -67,7 +67,7 @@ double soft_approach(const Disk *d, double radius) {
    curved way does; of what has sunk in hardly anything. */
 double left_over(const Disk *d, int impacts, int surface, double radius, int sunk) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
-    if (d->corners) {
+    if (has_corners(d)) {
         /* A corner that lasts comes back as fast as gravity and its turning make it. */
         double haste = surface >= 0 ? hastes(surface_at(surface, d->t), d) : 0;
         least = MAX(least, 1.000001 * (W.g + whirl_of(d) + haste) * W.step);
@@ -75,7 +75,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     } else if (surface >= 0 && (W.interact || d->held_count))
         sunk = gap_to(surface_at(surface, d->t), d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius;
     if (sunk) least *= HARDLY;
-    for (int n = 0; n < d->held_count && !d->corners; n++) {
+    for (int n = 0; n < d->held_count && !has_corners(d); n++) {
         if (sunk || !is_one(d, d->held[n], surface)) continue;
         double haste = hastes(surface_at(surface, d->t), d);
         least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface) + haste) * W.step);
@@ -88,8 +88,8 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
 }
 
 /* When particle i meets j, of which one has corners, in what is left of the step. */
-static double meet_cornered(int i, int j) {
-    int first = W.disks[i].corners ? i : j, other = first == i ? j : i;
+static RARELY double meet_cornered(int i, int j) {
+    int first = has_corners(W.disks + i) ? i : j, other = first == i ? j : i;
     const Disk *d = W.disks + first, *o = W.disks + MAX(other, 0);
     int impacts = MAX(d->impacts, other >= 0 ? o->impacts : 0);
     double small = inner_of(first, other), soft = left_over(d, impacts, MAX(-1 - other, -1), small, 0);
@@ -130,8 +130,8 @@ static void foresee_surfaces(int i, double *due, int *partner) {
         if (W.surfaces[k].there != THERE || !is_near(W.surfaces + k, d)) continue;
         const Surface *s = surface_at(k, d->t);
         if (s->mover >= 0 && !stirs(s) && d->mode == ASLEEP && d->ux == 0 && d->uy == 0) continue;
-        if (!d->corners && stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0)) continue;
-        double t = d->corners ? meet_cornered(i, -1 - k) : d->t + meet_surface(s, d, W.step_end - d->t, &approach);
+        if (!has_corners(d) && stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0)) continue;
+        double t = has_corners(d) ? meet_cornered(i, -1 - k) : d->t + meet_surface(s, d, W.step_end - d->t, &approach);
         if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius, 0)) {
             *due = MAX(t, W.now);
             *partner = -1 - k;
@@ -290,7 +290,7 @@ static int add_touching(int i, int j, double radius, int *count) {
     if (*count + MOST_TOUCHES >= TOUCHES * (W.high - W.low)) return 0;
     if (is_cornered(i, j)) {
         Touch places[MOST_TOUCHES];
-        int first = W.disks[i].corners ? i : j, other = first == i ? j : i;
+        int first = has_corners(W.disks + i) ? i : j, other = first == i ? j : i;
         int found = list_touches(first, other, W.disks[i].t, TOUCH * inner_of(i, j), W.disks[i].t, places);
         for (int n = 0; n < found; n++) describe_touch(c + n, first, other, places + n);
         *count += found;
@@ -342,7 +342,7 @@ static void jam(Contact *struck, double t) {
         int most = surfaces_near(m, &nearby);
         for (int n = 0; n < most; n++) {
             const Surface *s = surface_at(nearby[n], t);
-            if (s->there == THERE && is_near(s, a) && (a->corners || face_at(s, a->x, a->y) == s))
+            if (s->there == THERE && is_near(s, a) && (has_corners(a) || face_at(s, a->x, a->y) == s))
                 add_touching(m, -1 - nearby[n], a->radius, &count);
         }
     }
@@ -516,7 +516,7 @@ static void strike(int i, int j, double t) {
     if (j >= 0) advance(b, t);
     else if (a->impacts < FEW) end_hop(i, t);
     if (is_cornered(i, j)) {
-        if (a->corners) strike_corners(i, j, t);
+        if (has_corners(a)) strike_corners(i, j, t);
         else strike_corners(j, i, t);
         return;
     }

@@ -34,7 +34,7 @@ static void spare(Disk *d, const Surface *s, double t) {
     if (s->opens != t && (s->opens > t || !is_spared(s, d))) return;
     if (d->mode == RIDING) ride_at(d, t, place);
     s = surface_at((int)(s - W.surfaces), t);
-    double gap = d->corners ? gap_of_corners(d, place[0], place[1], (int)(s - W.surfaces), t)
+    double gap = has_corners(d) ? gap_of_corners(d, place[0], place[1], (int)(s - W.surfaces), t)
         : gap_to(s, place[0], place[1], d->radius, &nx, &ny);
     *spared_by(s, d) = gap < (s->opens == t ? -deep : 0);
 }
@@ -175,7 +175,7 @@ static int release(int i, double t) {
     else {
         take_off(i);
         /* What has corners may touch something: it is held from the next step on, which begins now. */
-        if (d->corners) W.step_end = MIN(W.step_end, MAX(t, W.t));
+        if (has_corners(d)) W.step_end = MIN(W.step_end, MAX(t, W.t));
         else lie_down(i);
         for (int n = 0; n < 2 && W.pushes; n++) d->pushed[n] = 2 * (W.step_end - t) / W.length * d->force[n];
     }
@@ -383,7 +383,7 @@ static int begin_step(void) {
     double next = set_gates(W.t), h = W.dt, stride = 0;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
-        double press = W.g + W.haste + (d->corners && d->mode == FREE ? whirl_of(d) : 0);
+        double press = W.g + W.haste + (has_corners(d) && d->mode == FREE ? whirl_of(d) : 0);
         if (press > 0) h = MIN(h, hop_time(d, press));
     }
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
@@ -505,7 +505,7 @@ static int go_through(void) {
         double t = d->due;
         int j = d->partner;
         /* The step was cut short. */
-        if (t > W.step_end || (t == W.step_end && !(d->mode == WAITING && (is_tied(i) || d->corners)))) return DONE;
+        if (t > W.step_end || (t == W.step_end && !(d->mode == WAITING && (is_tied(i) || has_corners(d))))) return DONE;
         if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
         if (W.event_count + SHOCKS * W.contact_count + 64 > W.event_room)
             return FULL_EVENTS;

@@ -40,7 +40,7 @@ static int is_followed(const Track *track, const Knot *wait, const Knot *to, con
         off = plus(first, times(s, plus(times(2, bend), times(3 * s, turn))));
         if (!are_within(minus(off, times(h, two(&k->vx))), h * most)) return 0;
         if (fabs(from[5] + s * (to->spin - from[5]) - k->spin) * d->radius > slow) return 0;
-        if (d->corners && fabs(turned_by(track, to, s) - k->angle) * d->radius > close) return 0;
+        if (has_corners(d) && fabs(turned_by(track, to, s) - k->angle) * d->radius > close) return 0;
         if (!W.interact) continue;
         if (fabs(from[6] + s * (to->entries[0] - from[6]) - k->entries[0]) > little) return 0;
         if (!are_within(minus(plus(entries, times(s, more)), two(k->entries + 1)), little)) return 0;

@@ -231,13 +231,13 @@ static void carry_to_end(int i, int first, double h) {
     last->need += 0.5 * MAX(press, 0) * until;
 }
 
-static int are_touching(int i, int j) {
+static RARELY int are_touching(int i, int j) {
     Touch places[MOST_TOUCHES];
     return list_touches(i, j, W.t, TOUCH * inner_of(i, j), W.t, places) > 0;
 }
 
 /* The same at all places at which a particle with corners touches j. */
-static int add_places(int i, int j, double bound, double h) {
+static RARELY int add_places(int i, int j, double bound, double h) {
     Touch places[MOST_TOUCHES];
     double least = inner_of(i, j);
     int count = list_touches(i, j, W.t, TOUCH * least, W.t + h, places);
@@ -276,7 +276,7 @@ int find_contacts(double h, int *woke) {
         if (d->mode != FREE) continue;
         int first = W.contact_count;
         double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius, 0);
-        if (d->supports) bound = MAX(bound, W.interact && !d->corners ? MAX(W.soft, W.skip * d->radius) : W.soft);
+        if (d->supports) bound = MAX(bound, W.interact && !has_corners(d) ? MAX(W.soft, W.skip * d->radius) : W.soft);
         const int *list;
         int count = surfaces_near(i, &list);
         for (int n = 0; n < count; n++) {
@@ -284,9 +284,9 @@ int find_contacts(double h, int *woke) {
             if (!is_near(W.surfaces + k, d)) continue;
             double inside = pressed_inside(d, k), most = MAX(bound, inside ? W.soft + 2 * h * inside : 0);
             if (d->supports) most += 2 * h * hastes(surface_at(k, d->t), d);
-            if (d->corners ? !add_places(i, -1 - k, most, h) : !add(i, -1 - k, d->radius, most, h, 0)) return 0;
+            if (has_corners(d) ? !add_places(i, -1 - k, most, h) : !add(i, -1 - k, d->radius, most, h, 0)) return 0;
         }
-        if (W.contact_count > first && !d->corners) carry_to_end(i, first, h);
+        if (W.contact_count > first && !has_corners(d)) carry_to_end(i, first, h);
         for (Contact *c = W.contacts + first; W.interact && c < W.contacts + W.contact_count; c++) {
             if (!c->leaves) continue;
             double speed = sqrt(d->vx * d->vx + d->vy * d->vy), rate = d->vx * c->nx + d->vy * c->ny;

@@ -170,10 +170,11 @@ class Job:
         disks["kind"] = releases.kind
         disks["rides"] = releases.carried
         disks["exit_box"] = releases.exit_box
-        disks["corners"] = np.array(sizes)[releases.kind]
-        disks["outline"] = np.cumsum([0, *sizes[:-1]])[releases.kind]
-        corners = module.array("outlines", REAL, 2 * sum(sizes))
-        corners[:] = np.concatenate(outlines).ravel()
+        if any(sizes):
+            disks["corners"] = np.array(sizes)[releases.kind]
+            disks["outline"] = np.cumsum([0, *sizes[:-1]])[releases.kind]
+            corners = module.array("outlines", REAL, 2 * sum(sizes))
+            corners[:] = np.concatenate(outlines).ravel()
         module.array("surfaces", dtype("Surface"), len(self.pieces))[:] = self.pieces
         rows = module.array("movers", dtype("Mover"), len(machine.movers))
         for row, mover in zip(rows, machine.movers, strict=True):

@@ -48,7 +48,7 @@ def lands_as_in_python(page, file, seed, count):
         file.write_text(answer["toml"], encoding="utf-8")
         scene = load(file)
         ours = chutelab.simulate(scene, engine="contact")
-        its = np.array(answer["knots"]).reshape(-1, 10)
+        its = np.array(answer["knots"]).reshape(-1, 11)
         knots = ours.knots
         columns = np.column_stack([knots["t"], knots["position"], knots["velocity"]])
         assert np.array_equal(its[:, :5], columns), answer["toml"]

@@ -69,7 +69,7 @@ def same_bits(page, folder, until=1.5):
     assert job.run(None) is None
     job.drain()
     knots = np.concatenate(job.knots)
-    ours = knots.view("<f8").reshape(-1, 10)[:, :5]
+    ours = knots.view("<f8").reshape(-1, 11)[:, :5]
     its = page.evaluate(TRACKS)
     for particle, track in enumerate(its):
         found = np.array(track).reshape(-1, 5)

@@ -274,6 +274,7 @@ double meet_corners(int i, int j, double from, double until, double soft);
 void describe_touch(Contact *c, int i, int j, const Touch *t);
 const Contact *place_before(const Contact *c);
 double opens_by(const Contact *c);
+int lies_flat(int i, int k);
 int list_struck(int i, int j, double t, Contact *list);
 void strike_corners(int i, int j, double t);
 

@@ -20,7 +20,7 @@
 #define ENDS 1e-15
 /* Share of it that a blow may give by rounding. */
 #define GAINS 1e-12
-/* Contacts of an island up to which it is brought off its hop before a blow. */
+/* Contacts of an island up to which it is brought off its hop before a blow; none of them on a hinge. */
 #define SMALL 32
 /* Candidates for a place: corners of both. */
 #define CANDIDATES (2 * MOST_CORNERS)
@@ -375,11 +375,10 @@ double meet_corners(int i, int j, double from, double until, double soft) {
             if (!(before > 0 && now.gap <= 0)) continue;
             double then = root_of(i, j, &now, last, t);
             Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
-            int side = now.on, there = find_place(&a3, &b3, near, &now);
-            if (b.s && b.s->shape == SEGMENT && c < a.count) {
-                now.on = side;
-                fill_in(&a3, &b3, &now);
-            }
+            Touch again = now;
+            /* It may have gone over to another edge, of which the gap was closed before. */
+            int there = find_place(&a3, &b3, near, &again);
+            fill_in(&a3, &b3, &now);
             if (there && then < first && closes_at(i, j, &a3, &b3, then, &now) > soft) first = then;
         }
     }
@@ -442,6 +441,7 @@ RARELY void describe_touch(Contact *c, int i, int j, const Touch *t) {
         c->pull -= square(b->spin) * c->others[0];
         c->other[0] = b->vx * c->nx + b->vy * c->ny;
         c->other[1] = b->vx * c->ny - b->vy * c->nx;
+        c->arm = b->corners ? 0 : pair->rolling * b->radius;
         return;
     }
     const Surface *s = surface_at(-1 - j, a->t);
@@ -507,7 +507,8 @@ static void end_hops(int i, double t) {
     int count = 0;
     for (int link = W.disks[i].links; link >= 0 && !first; link = W.links[link]) first = W.contacts + link / 2;
     if (!first || t <= W.t || W.disks[i].smooth == W.shocks) return;
-    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) count += c->island == first->island;
+    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++)
+        if (c->island == first->island) count += c->hung ? SMALL + 1 : 1;
     if (count > SMALL) return;
     for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
@@ -536,6 +537,21 @@ static void end_hops(int i, double t) {
         give_back(&last, 1);
     }
     W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
+}
+
+/* Whether a particle that is released touches a surface, and hardly moves off or on. */
+RARELY int lies_flat(int i, int k) {
+    const Disk *d = W.disks + i;
+    Touch places[MOST_TOUCHES];
+    int found = list_touches(i, -1 - k, d->t, TOUCHING * d->inner, d->t, places), lies = found > 0;
+    for (int n = 0; n < found; n++) {
+        Contact c;
+        double u[3];
+        describe_touch(&c, i, -1 - k, places + n);
+        relative(&c, 0, u);
+        lies &= fabs(u[0]) <= -opens_by(&c) * W.dt;
+    }
+    return lies;
 }
 
 /* Impulses at all places such that gaps do not close, or open as fast as they are to, and that friction, a share of

@@ -677,6 +677,15 @@ void lie_down(int i) {
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = surface_at(k, d->t);
         double nx, ny, v[3];
+        if (has_corners(d)) {
+            /* It is held from the next step on, which begins now. */
+            if (s->there == THERE && !is_spared(s, d) && lies_flat(i, k)) {
+                d->on = s->owner;
+                d->slips = 1;
+            }
+            W.step_end = MIN(W.step_end, MAX(d->t, W.t));
+            continue;
+        }
         if (s->there != THERE || is_spared(s, d) || face_at(s, d->x, d->y) != s || is_held(d, k)) continue;
         if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
         double press = press_on(d, s, nx, ny);

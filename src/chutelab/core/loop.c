@@ -174,9 +174,7 @@ static int release(int i, double t) {
     if (d->ride_rho > 0) ride_on(d, t, MAX(W.step_end, t));
     else {
         take_off(i);
-        /* What has corners may touch something: it is held from the next step on, which begins now. */
-        if (has_corners(d)) W.step_end = MIN(W.step_end, MAX(t, W.t));
-        else lie_down(i);
+        lie_down(i);
         for (int n = 0; n < 2 && W.pushes; n++) d->pushed[n] = 2 * (W.step_end - t) / W.length * d->force[n];
     }
     return 1;

@@ -68,7 +68,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     StalledError
         If a particle does not get on; it has the recording so far.
     """
-    if any(kind.outline for kind in machine.scene.particles):
+    if machine.scene.cornered:
         machine.finish()
         machine = together(machine)
     if not machine.is_ahead and np.min(machine.particle.radius) <= 0.0:

@@ -8,8 +8,9 @@ import type { Words } from "./words.ts";
 type Entry = [keyof Ledger, number];
 
 const SIGNS: Entry[] = [
-  ["start", 1], ["belt_work", 1], ["push_work", 1], ["kinetic", -1], ["potential", -1], ["restitution_loss", -1],
-  ["friction_loss", -1], ["residual", 1],
+  ["start", 1], ["belt_work", 1], ["push_work", 1], ["kinetic", -1], ["potential", -1],
+  ["spring", -1], ["restitution_loss", -1], ["friction_loss", -1], ["damper_loss", -1],
+  ["residual", 1],
 ];
 
 /** A residual below this part of the whole is rounding, and not shown. */
@@ -84,6 +85,7 @@ class EnergyPanel {
         return part;
       }));
     });
+    const springs = recording.machine.joints.filter(({ kind }) => kind === "spring");
     const isClosed = Math.abs(ledger.residual) <= Math.max(UNSEEN, TINY_RESIDUAL * size);
     this.closes.hidden = !isClosed;
     this.closes.replaceChildren(icon("tick"),
@@ -91,7 +93,9 @@ class EnergyPanel {
     SIGNS.forEach(([name], n) => {
       this.cells.get(name).textContent = this.words.energy(ledger[name]);
       this.rows[n].hidden = (name === "residual" && isClosed)
-        || (name === "push_work" && !recording.pushes.length);
+        || (name === "push_work" && !recording.pushes.length)
+        || (name === "spring" && !springs.length)
+        || (name === "damper_loss" && !springs.some(({ damper }) => damper));
     });
   }
 }

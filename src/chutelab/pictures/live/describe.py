@@ -127,9 +127,9 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     # Joints are told by the numbers of particles, of which some would be left out.
     lacks += Counter(table for table, _ in scene.joints if foreign)
     for n, pair in enumerate(scene.pair):
-        if pair.cohesion and scene.hinges:
+        if (key := pair.clings) and scene.hinges:
             text = "0 with what hangs on hinges: the contact engine, which pages run, has not both"
-            faults.append(Fault(f"pair[{n}].cohesion", pair.cohesion, text))
+            faults.append(Fault(f"pair[{n}].{key}", getattr(pair, key), text))
             partly = False
     if partly:
         faults = []
@@ -146,8 +146,8 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         common |= {"lacks": dict(lacks), "source": scene.source}
     machine, out = build(scene), scene.outgoing
     if machine.joints and not lacks and (why := unjoined(machine)):
-        kind = machine.joints[0].kind
-        raise SceneError(scene.source, [Fault(kind, None, f"other than in this scene: {why}")])
+        text = f"other than in this scene: {why}"
+        raise SceneError(scene.source, [Fault(machine.joints[0].kind, None, text)])
     if out is not None and out.drop_from == "impact":
         height = machine.segments.start[machine.segments.surface == machine.landing][0, 1].item()
         assert scene.incoming is not None

@@ -17,8 +17,8 @@ const GREATEST = 1e300;
 const KNOT_ROW = 10;
 
 /** Doubles of what all particles have at a step: t, kinetic, potential, three entries of the
- * ledger, overlap; energy at the releases, and of all springs what they kept when they were tied, keep,
- * lost to dampers and gave. */
+ * ledger, overlap; energy at the releases, and of all springs what they kept when they were tied,
+ * keep, lost to dampers and gave. */
 const TOTAL_ROW = 12;
 
 /** Numbers of a bin of a surface: impulses that press it, along it, of both in x and y, their
@@ -258,9 +258,9 @@ class Core extends Memory {
     const count = this.get("swing_count"), begin = this.get("swings"), rows: number[] = [];
     const { size, fields } = this.layout.structs.Swing;
     for (; this.swung < count; this.swung += 1) {
-      const at = begin + this.swung * size;
+      const at = begin + this.swung * size, work = (this.get("swing_work") >> 3) + 2 * this.swung;
       rows.push(...this.doubles.subarray(at >> 3, (at >> 3) + 3),
-        this.ints[(at + fields.surface[0]) >> 2]);
+        ...this.doubles.subarray(work, work + 2), this.ints[(at + fields.surface[0]) >> 2]);
     }
     return rows;
   }

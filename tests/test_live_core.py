@@ -125,7 +125,8 @@ def test_what_hangs_on_joints_moves_as_in_python():
         ("rod", {**above, "particle": 1}, "rod[0].particle"),
         ("pin", {**above, "other": 0}, "pin[0].other"),
         ("rod", {**above, "other": 0}, "rod[0].other"),
-        ("string", {}, "string[0].from"), ("spring", above, "spring[0].stiffness"),
+        ("string", {}, "string[0].from"),
+        ("spring", above, "spring[0].stiffness"),
     ):
         answer = ask("bits.mjs", {"lab": lab, "scenes": [{**BALL, table: [row]}]})["scenes"][0]
         assert answer["fault"]["key"] == key, table

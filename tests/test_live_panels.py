@@ -93,6 +93,7 @@ def test_with_joints_the_ledger_closes_at_any_time():
     assert ledgers[-1]["damper_loss"] == pytest.approx(ours.damper_loss, rel=1e-12)
     assert ledgers[-1]["spring"] == pytest.approx(ours.spring[1], rel=1e-12)
 
+
 @pytest.mark.parametrize("name", ["damper-plate", "see-saw", "flap-gate"])
 def test_what_hangs_is_in_the_ledger(runs, name):
     """Energies of hinges and springs, what dampers and stops take: as Python's ledger has them.

@@ -6,9 +6,9 @@
 // Out: {type: "chunk", id, knots, tips, events, swings, totals, triggered, now, state, books,
 //      reasons, gained, unsolved, pushed, given}, where state is "running", "done", "stalled" or
 //      "failed"; books and reasons come at the end; triggered are the times of what waited for a
-//      touch, s; gained is the energy by which solves broke their law so far, J, and unsolved the most overlap that
-//      one left, radii; pushed is the work of all pushes, J, and given that of all surfaces;
-//      totals are what all particles of a machine with joints have at each step.
+//      touch, s; gained is the energy by which solves broke their law so far, J, and unsolved the
+//      most overlap that one left, radii; pushed is the work of all pushes, J, and given that of
+//      all surfaces; totals are what all particles of a machine with joints have at each step.
 //      {type: "laws", id, breaches}, in answer to {type: "judge", id, run}.
 //      {type: "broken"}, where the core cannot be loaded.
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.test_hinge import drawn as hung
+from test_hinge import drawn as hung
 
 import chutelab
 from chutelab.results.laws import LEDGER

@@ -343,7 +343,11 @@ def test_what_is_taken_from_an_address_is_refused_where_python_refuses_it(count)
     kinds = [{"name": "a"}, {"name": "b"}]
     two = [{**THROWN["stream"], "particle": name, "interact": True} for name in "ab"]
     two[1]["at"] = [0.5, 1.0]
-    pairs = [{"between": ["a", "b"], "meet": False}, {"between": ["a", "wall"], "cohesion": 0.1}]
+    pairs = [
+        {"between": ["a", "b"], "meet": False},
+        {"between": ["a", "wall"], "cohesion": 0.1},
+        {"between": ["b", "wall"], "bond_number": 1.7},
+    ]
     crowd = {**moving, "particle": kinds, "stream": two, "pair": pairs}
     seeds += [
         {**crowd, "surface": [WALL, {**lid, f"{doing}_when": {"touched": "wall"}, **keys}]}

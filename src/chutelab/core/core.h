@@ -350,6 +350,7 @@ void wake(int i, double t);
 void fall_asleep(void);
 
 /* prepare.c */
+int stretch_swings(void);
 int make_room(int full);
 void join_surfaces(void);
 

@@ -335,6 +335,7 @@ typedef struct {
     Event *events;
     Total *totals;       /* one a step in a crowd */
     Swing *swings;
+    double *swing_work;  /* (swings, 2), J; `stopped` and `damped` of its mover then */
     Contact *contacts;   /* of this step */
     Contact *earlier;    /* of the step before */
     SolverRow *rows;     /* (contacts) of those that are solved together */

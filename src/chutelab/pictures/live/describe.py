@@ -127,9 +127,9 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     lacks += joints
     faults += [Fault(table, None, f"{allowed}, without joints") for table in joints]
     for n, pair in enumerate(scene.pair):
-        if pair.cohesion and scene.hinges:
+        if (key := pair.clings) and scene.hinges:
             text = "0 with what hangs on hinges: the contact engine, which pages run, has not both"
-            faults.append(Fault(f"pair[{n}].cohesion", pair.cohesion, text))
+            faults.append(Fault(f"pair[{n}].{key}", getattr(pair, key), text))
             partly = False
     if partly:
         faults = []

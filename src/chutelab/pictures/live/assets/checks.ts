@@ -4,7 +4,7 @@ import { fits, type Form } from "./forms.ts";
 import { valueOfTree } from "./formula.ts";
 import { RADIANS } from "./trig.ts";
 import {
-  moversOf, triggersOf, type Given, type Lab, type Point, type Scene, type Rule,
+  clinging, moversOf, triggersOf, type Given, type Lab, type Point, type Scene, type Rule,
 } from "./scene.ts";
 
 /** What a `Fault` says: key, value, id of a text, and its words. */
@@ -225,7 +225,11 @@ function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
   const { streams, crowded, run } = scene, movers = moversOf(scene);
   const count = streams.reduce((sum, stream) => sum + stream.count, 0);
   const waits = triggersOf(scene).length > 0;
-  const clings = scene.pair.findIndex(({ cohesion }) => cohesion > 0);
+  const bonds = scene.pair.findIndex(({ bond_number: number }) => number > 0);
+  if (bonds >= 0 && scene.gravity === 0) {
+    yield [`pair[${bonds}].bond_number`, scene.pair[bonds].bond_number, "weightless"];
+  }
+  const clings = scene.pair.findIndex(clinging);
   if (run.engine === "exact" && (movers.length || crowded || waits)) {
     yield ["run.engine", run.engine, "not-exact"];
   }
@@ -233,7 +237,8 @@ function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
     yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "hinge-meet"];
   }
   if (clings >= 0 && movers.some(([, { hinge }]) => hinge)) {
-    yield [`pair[${clings}].cohesion`, scene.pair[clings].cohesion, "hinge-clings"];
+    const pair = scene.pair[clings], key = clinging(pair)!;
+    yield [`pair[${clings}].${key}`, pair[key], "hinge-clings"];
   }
   for (const [, { hinge, stops_deg: stops, given: row }] of movers) {
     const table = scene.surface.some((one) => one.given === row) ? "surface" : "plate";

@@ -10,7 +10,8 @@ type Segment = { start: Point, end: Point, tangent: Point, length: number, speed
 /** How a surface moves, as `Mover` of layout.h */
 export type Mover = { surface: number, pivot: Point, by: Point, frequency: number, phase: number,
   way: Point, from: number, lasts: number, turn: number, inertia: number, mass: number,
-  moment: Point, spring: number, damper: number, stops: Point, motor: Point, begins: number };
+  moment: Point, spring: number, rest: number, damper: number, stops: Point, motor: Point,
+  begins: number };
 type Arc = { center: Point, radius: number, begin: number, extent: number, speed: number,
   appears: number, vanishes: number, surface: number };
 

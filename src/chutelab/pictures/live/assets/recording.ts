@@ -4,12 +4,12 @@
 import type { Breach } from "./breaches.ts";
 import { KNOT_ROW, LOAD_ROW, type Machine, type Event } from "./core.ts";
 import { actAt, waiting } from "./machine.ts";
-import { SWING_ROW, Swings, posed } from "./motion.ts";
+import { SWING_ROW, Swings, posed, type Hung } from "./motion.ts";
 
 export type State = { x: number, y: number, vx: number, vy: number, spin: number, ended: boolean };
 export type Ledger = { start: number, kinetic: number, potential: number, belt_work: number,
-  push_work: number,
-  restitution_loss: number, friction_loss: number, residual: number };
+  push_work: number, restitution_loss: number, friction_loss: number, residual: number,
+  spring: number, damper_loss: number };
 
 const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, FRICTION = 8;
 
@@ -325,7 +325,7 @@ class Recording {
       this.events.push({ ...event, t: event.t + this.shift, disk: index, other });
     }
     for (let n = 0; n < swings.length; n += SWING_ROW) {
-      this.swings.get(swings[n + 3])?.rows.push(swings.slice(n, n + 3));
+      this.swings.get(swings[n + SWING_ROW - 1])?.rows.push(swings.slice(n, n + SWING_ROW - 1));
     }
     if (loads?.rows.length) this.bear(loads.from, loads.rows);
     if (triggered.length) actAt(this.machine, triggered);
@@ -477,7 +477,7 @@ class Recording {
     else residual += missing;
     return {
       start, kinetic: kinetic(state), potential: potential(state), belt_work: belt, push_work: 0,
-      restitution_loss: restitution, friction_loss: friction, residual,
+      restitution_loss: restitution, friction_loss: friction, residual, spring: 0, damper_loss: 0,
     };
   }
 
@@ -490,11 +490,27 @@ class Recording {
     return more === given ? given : work - gave - ((gives - gave) * (t - from)) / (to - from);
   }
 
-  /** The ledger of all particles that have been released. */
+  /** Energies and losses of what hangs on hinges, of all or of one surface; none of a run that was
+   * changed under way. */
+  hung(t: number, surface?: number): Hung {
+    const total: Hung = {
+      kinetic: 0, potential: 0, spring: 0, restitution_loss: 0, damper_loss: 0,
+    };
+    for (const mover of this.machine.movers) {
+      const swings = this.swings.get(mover.surface) as Swings;
+      if (!mover.inertia || !swings.rows.length || this.renamed) continue;
+      if (surface !== undefined && mover.surface !== surface) continue;
+      const its = swings.energies(t, mover, this.machine);
+      for (const name of Object.keys(total) as (keyof Hung)[]) total[name] += its[name];
+    }
+    return total;
+  }
+
+  /** The ledger of all particles that have been released, and of what hangs on hinges. */
   ledger(t: number): Ledger {
     const total: Ledger = {
       start: 0, kinetic: 0, potential: 0, belt_work: 0, push_work: 0, restitution_loss: 0,
-      friction_loss: 0, residual: 0,
+      friction_loss: 0, residual: 0, spring: 0, damper_loss: 0,
     };
     const names = Object.keys(total) as (keyof Ledger)[];
     for (let index = 0; index < this.tracks.length; index += 1) {
@@ -504,6 +520,13 @@ class Recording {
     // A track has what pushes give among what drives give.
     total.push_work = this.pushedAt(t, total.belt_work);
     total.belt_work -= total.push_work;
+    // Particles have what hinges give them among it, too. What those have not of motors came from
+    // what touched them.
+    const [begun, hung] = [0, t].map((then) => this.hung(then));
+    const kept = ({ kinetic, potential, spring }: Hung) => kinetic + potential + spring;
+    total.start += kept(begun);
+    total.belt_work += kept(hung) - kept(begun) + hung.restitution_loss + hung.damper_loss;
+    for (const name of Object.keys(hung) as (keyof Hung)[]) total[name] += hung[name];
     return total;
   }
 

@@ -153,7 +153,7 @@ export interface Scene {
   particles: Particle[];
   materials: Map<string, Record<string, number>>; // numbers by name, presets too
   pair: { between: [string, string], restitution?: number, friction?: number, cohesion: number,
-    meet: boolean, given: Given }[];
+    bond_number: number, meet: boolean, given: Given }[];
   incoming: Incoming | null;
   plates: Plate[];
   outgoing: Outgoing | null;
@@ -285,10 +285,19 @@ export function triggersOf(scene: Scene): [string, "opens" | "closes" | "starts"
 const isOf = ({ between: [a, b] }: Scene["pair"][number], one?: string, other?: string) =>
   (a === one && b === other) || (b === one && a === other);
 
+/** Returns the key by which two pull at each other, if they do. */
+export const clinging = ({ cohesion, bond_number: bonds }: Scene["pair"][number]) =>
+  cohesion > 0 ? "cohesion" : bonds > 0 ? "bond_number" : null;
+
 /** Returns the force (N) that it takes to pull a kind off another, or off a surface. */
-export function cohesionOf({ particles, pair }: Scene, kind: number, other: number | string) {
+export function cohesionOf(
+  { particles, pair, gravity }: Scene, kind: number, other: number | string,
+) {
   const name = typeof other === "string" ? other : particles[other].name;
-  return pair.find((one) => isOf(one, particles[kind].name, name))?.cohesion ?? 0;
+  const one = pair.find((row) => isOf(row, particles[kind].name, name));
+  if (!one?.bond_number) return one?.cohesion ?? 0;
+  const masses = particles.filter((its) => one.between.includes(its.name!)).map(({ mass }) => mass);
+  return one.bond_number * (Math.min(...masses) * gravity);
 }
 
 /** Tells whether two kinds pass through each other. */

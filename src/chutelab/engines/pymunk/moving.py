@@ -158,7 +158,7 @@ class Moving:
                 self.hanging[face.surface].before = self.turn[0, row] = body.angular_velocity
                 continue
             if face.surface not in motion:
-                poses = mover.pose(t + 0.5 * h), mover.pose(t + h)
+                poses = mover.pose([t + 0.5 * h, t + h]).tolist()
                 turned = ([*pose, np.cos(pose[2]), np.sin(pose[2])] for pose in poses)
                 motion[face.surface] = *turned, mover.velocity(t + h).tolist()
             (x, y, angle, c, s), end, (vx, vy, turn) = motion[face.surface]

@@ -254,6 +254,7 @@ void drop_tugs(void);
 void cut_step(double t);
 void cut_at_snaps(void);
 void end_pull(void);
+void add_springs(double *sums);
 void strike_joints(int i, int j);
 void end_blow(void);
 void share_with_joints(const Contact *c, double wanted, const double *u, double *J);
@@ -358,6 +359,7 @@ void wake(int i, double t);
 void fall_asleep(void);
 
 /* prepare.c */
+int stretch_swings(void);
 int make_room(int full);
 void join_surfaces(void);
 

@@ -261,12 +261,18 @@ static void make_contact_room(int room) {
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 
+/* Make twice the room for states of hinges; return whether there is such. */
+int stretch_swings(void) {
+    W.swing_work = stretch(W.swing_work, 2 * W.swing_count, 2 * W.swing_room, sizeof *W.swing_work);
+    return W.swing_work && STRETCH(W.swings, W.swing_count, W.swing_room);
+}
+
 /* Make twice the room for what is full. */
 int make_room(int full) {
     if (full == FULL_NEAR) make_near_room(2 * W.near_room);
     if (full == FULL_CONTACTS) make_contact_room(2 * W.contact_room);
     if (full == FULL_KNOTS) STRETCH(W.knots, W.knot_count, W.knot_room);
-    if (full == FULL_SWINGS) STRETCH(W.swings, W.swing_count, W.swing_room);
+    if (full == FULL_SWINGS) stretch_swings();
     if (full == FULL_TOTALS) STRETCH(W.totals, W.total_count, W.total_room);
     if (full == FULL_EVENTS) STRETCH(W.events, W.event_count, W.event_room);
     return has_room();
@@ -299,6 +305,7 @@ static int lay_out_work(void) {
     W.total_room = crowd ? 1024 : 1;
     W.swing_room = W.hinges ? 1024 + 8 * W.mover_count : 0;
     RESERVE(W.swings, W.swing_room);
+    RESERVE(W.swing_work, 2.0 * W.swing_room);
     RESERVE(W.knots, W.knot_room);
     RESERVE(W.totals, W.total_room);
     RESERVE(W.events, W.event_room);

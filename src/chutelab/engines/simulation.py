@@ -246,9 +246,9 @@ def must_fit(machine: Machine, name: str) -> None:
             key = f"{scene.head('particle', n)}.restitution_speed"
             raise refused(scene, key, kind.restitution_speed, allowed)
     for n, pair in enumerate(scene.pair):
-        if pair.cohesion and (name == "pymunk" or scene.hinges):
+        if (pull := pair.clings) and (name == "pymunk" or scene.hinges):
             what = "the pymunk engine" if name == "pymunk" else "what hangs on hinges"
-            raise refused(scene, f"pair[{n}].cohesion", pair.cohesion, f"0 with {what}")
+            raise refused(scene, f"pair[{n}].{pull}", getattr(pair, pull), f"0 with {what}")
     if name == "pymunk" and machine.air and any(one is not None for one in machine.outlines):
         allowed = "0 with boxes and polygons: drag is that of a sphere"
         raise refused(scene, "air_density", machine.air, allowed)

@@ -414,6 +414,8 @@ def _pairs(look: Look) -> Iterator[Fault]:
         between = pair["between"]
         if not (isinstance(between, LIST) and pair.sound()):
             continue
+        if pair["bond_number"] and look.document.get("gravity") == 0.0:
+            yield pair.fault("bond_number", "0 where gravity is 0: it counts weights")
         if not any(name in kinds for name in between):
             text = f"one of them must be the name of a [[particle]]; {_there_are(kinds)}"
             yield Fault(pair.path("between"), list(between), text)

@@ -90,7 +90,7 @@ class Shapes:
         self.up, self.shut = set[Face](), set[tuple[pymunk.Shape, Face]]()
         # Chains of faces that are solid from one side. Of each particle that touches one, how many
         # of their shapes, and whether it came from the side that lets it through.
-        self.chains = self._one_sided()
+        self.chains: dict[Face | None, tuple[Face, ...]] = {**self._one_sided()}
         self.touching: dict[tuple[pymunk.Shape, tuple[Face, ...]], tuple[int, bool]] = {}
         waits = {one.surface for one in machine.triggers if one.doing != "starts"}
         for face in world.faces:
@@ -264,9 +264,7 @@ class Shapes:
             arbiter.process_collision = beyond
             speed = face.belt(normal.rotated(-met.body.angle))
             arbiter.surface_velocity = speed * Vec2d(normal.y, -normal.x)
-        passes = (
-            face in self.chains and self.touching.get((shape, self.chains[face]), (0, False))[1]
-        )
+        _, passes = self.touching.get((shape, self.chains.get(face, ())), (0, False))
         if passes or (shape, face) in self.shut:
             arbiter.process_collision = False
         if self.table is not None:

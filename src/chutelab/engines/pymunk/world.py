@@ -199,6 +199,7 @@ class Bend(Face):
         return side * distance - self.radius, side * away
 
     def side(self, x: Vec2d) -> float:
+        """Return how far a place is on the solid side (m): outside of it, or inside."""
         return self.one_sided * self.shape.point_query(x).distance
 
     def belt(self, normal: Vec2d) -> float:
@@ -382,7 +383,7 @@ class World:
             crown = self._crown(end, out, way / radius) if about["speed"] else out.perpendicular()
             self._add(Face(
                 point, tangent=out, crowns=(crown, crown),
-                **about | {"speed": way * about["speed"], "one_sided": int(way) * about["one_sided"]},
+                **about | {key: about[key] * int(way) for key in ("speed", "one_sided")},
             ))  # fmt: skip
 
     @cached_property
@@ -500,7 +501,7 @@ class World:
             last, t = t, min(t + tau, span)
 
     def clear(self, path: Flight | Carriage, face: Face, span: float, begin: float = 0.0) -> float:
-        """Return when (s) a disk on a path is off what spares it, on its solid side, at most `span`.
+        """Return when (s) a disk on a path is clear of what spares it, at most `span`.
 
         It is looked for after each tenth of a radius' way.
         """

@@ -145,7 +145,7 @@ function idle({ incoming, particles }: Scene, table: string, row: any): string[]
   }
   if (table === "pair") {
     const kinds = row.between.every((name: string) => particles.some((one) => one.name === name));
-    return [...(kinds ? [] : ["meet"]), ...(row.meet ? [] : ["restitution", "friction", "cohesion"])];
+    return [...(kinds ? [] : ["meet"]), ...(row.meet ? [] : ["restitution", "friction", "cohesion", "bond_number"])];
   }
   const weighed = table === "particle" && (row.given.density ?? row.given.material) !== undefined;
   return [...(weighed ? ["mass"] : []), ...(table === "outgoing" ? ["drop_from"] : [])];

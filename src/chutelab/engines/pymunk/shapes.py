@@ -90,7 +90,7 @@ class Shapes:
         self.up, self.shut = set[Face](), set[tuple[pymunk.Shape, Face]]()
         # Chains of faces that are solid from one side. Of each particle that touches one, how many
         # of their shapes, and whether it came from the side that lets it through.
-        self.chains: dict[Face | None, tuple[Face, ...]] = {**self._one_sided()}
+        self.chains = self._one_sided()
         self.touching: dict[tuple[pymunk.Shape, tuple[Face, ...]], tuple[int, bool]] = {}
         waits = {one.surface for one in machine.triggers if one.doing != "starts"}
         for face in world.faces:
@@ -272,12 +272,12 @@ class Shapes:
             pair = self.table[:, self.kind[shape], column]
             arbiter.restitution, arbiter.friction = pair.tolist()
 
-    def _one_sided(self) -> dict[Face, tuple[Face, ...]]:
+    def _one_sided(self) -> dict[Face | None, tuple[Face, ...]]:
         """Return the chain of each face that is solid from one side: those that follow each other.
 
         The ends of an arc follow it.
         """
-        chains, last = dict[Face, tuple[Face, ...]](), tuple[Face, ...]()
+        chains, last = dict[Face | None, tuple[Face, ...]](), tuple[Face, ...]()
         for face in (face for face in self.world.faces if face.one_sided):
             follows = last and (last[0].surface, last[0].appears) == (face.surface, face.appears)
             if follows and face.ends:

@@ -205,7 +205,8 @@ def draw_scene(
     Names keep clear of a path (P, 2), m, that is drawn later.
 
     What is not always there, a gate, is dashed, and so is what moves, where the scene has it; what
-    is solid from one side has an arrow in the way in which it lets through. The limits of the axes are set to hold the window at equal scales; by default all surfaces.
+    is solid from one side has an arrow in the way in which it lets through. The limits of the axes
+    are set to hold the window at equal scales; by default all surfaces.
     """
     if window is None:
         ends = machine.corners

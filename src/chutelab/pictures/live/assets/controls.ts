@@ -195,7 +195,10 @@ function ownFields(page: Page, given: Given, scene: Scene, section: Section): Fi
       const choices = name === "between" ? scene.particles.flatMap((kind) => kind.name ?? [])
         .concat(sectionsOf(scene, {}).filter((one) => SURFACES.includes(one.table))
           .map((one) => one.name))
-        : name === "particle" && table === "stream" ? scene.particles.map((kind) => String(kind.name))
+        : name === "particle" && table === "stream"
+          ? scene.particles.map((kind) => String(kind.name))
+        : name === "passes" ? rowOf(scene, section).center ? ["in", "out"]
+          : ["up", "down", "left", "right"]
         : name === "material" && table === "particle" ? [...scene.materials.keys()]
           : form.type === "boolean" ? [] : form.enum as string[] | undefined;
       if (choices && form.type !== "boolean" && choices.length < 2) return;

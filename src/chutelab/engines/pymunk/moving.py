@@ -17,6 +17,10 @@ from chutelab.util.arrays import Floats, Ints
 COMES_BACK: Final = 0.02
 """s; in which what has gone beyond a stop within a step comes back to it, but for 1/e."""
 
+SWEEPS: Final = 10
+"""Iterations of Chipmunk for each face that hangs on a hinge with others: each turns with the first
+one alone, so what strikes one takes as many sweeps as there are faces to reach them all."""
+
 
 class Hanging:
     """What hangs on a hinge: a body a face, which pivots there; all of a surface turn together.
@@ -36,6 +40,7 @@ class Hanging:
         # What has no weight has its mass at the hinge, where it does nothing.
         mass = hinge.mass if weighs else hinge.inertia / hinge.gyration**2
         middle = Vec2d(x, y) / mass if weighs else Vec2d.zero()
+        space.iterations = max(space.iterations, SWEEPS * many)
         for body in bodies:
             body.body_type = pymunk.Body.DYNAMIC
             body.mass = mass / many

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from tests.shared import seeds
-from tests.test_hinge import drawn as hung
 
 import chutelab
 from chutelab.results.laws import LEDGER
+from shared import seeds
+from test_hinge import drawn as hung
 
 STEPS = (1e-3, 2.5e-4)
 """s, of Pymunk; its errors are of the order of its step."""

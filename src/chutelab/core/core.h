@@ -246,6 +246,7 @@ void drop_tugs(void);
 void cut_step(double t);
 void cut_at_snaps(void);
 void end_pull(void);
+void add_springs(double *sums);
 void strike_joints(int i, int j);
 void end_blow(void);
 void share_with_joints(const Contact *c, double wanted, const double *u, double *J);

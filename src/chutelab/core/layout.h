@@ -313,7 +313,11 @@ typedef struct {                                                                
 
 /* What all disks of a crowd that were released have together as a step begins: that of those that ended at
    their ends, and of what lasts in contact halfway through its impulses, as their tracks are. */
-typedef struct { double t, kinetic, potential, entries[3], unsolved; } Total; /* s, J, radii */ /* [out] */
+typedef struct {                                                                         /* [out] */
+    double t, kinetic, potential, entries[3], unsolved; /* s, J, radii */
+    double released;        /* J; what they had at their releases */
+    double springs[4];      /* J; of all springs: what they kept when they were tied, keep, lost and gave */
+} Total;
 
 typedef struct { int disk, next, ix, iy; } Cell; /* one disk in one cell of the grid */
 
@@ -390,6 +394,8 @@ typedef struct {
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */
     double air_loss;     /* J; what air has taken */
+    double released;     /* J; what disks had at their releases */
+    double push_work;    /* J; what pushes by hand have given */
     double gained;       /* J; by which solves broke their law of energy, see `check_solve` */
     double unsolved;     /* radii; the most overlap that the solve of this step leaves beyond what it asks for */
     double unsolved_most; /* ... and of all steps so far */

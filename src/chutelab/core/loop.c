@@ -155,6 +155,15 @@ static void take_off(int i) {
     W.tracks[i].lasted = 0;
 }
 
+/* Kinetic and potential energy of a disk with a velocity, a spin and a place, J. */
+static double kinetic_of(const Disk *d, const double *v, double spin) {
+    return 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
+}
+
+static double lifted(const Disk *d, const double *place) {
+    return d->mass * W.g * (W.up[0] * place[0] + W.up[1] * place[1]);
+}
+
 /* Release a disk at t if its place is free; its event is then the end of a ride, or an impact. */
 static int release(int i, double t) {
     Disk *d = W.disks + i;
@@ -169,6 +178,7 @@ static int release(int i, double t) {
     if (d->ride_rho > 0) plan_ride(d, t);
     event_here(RELEASE, i, -1);
     knot_now(i);
+    W.released += kinetic_of(d, &d->vx, d->spin) + lifted(d, &d->x);
     if (d->ride_rho > 0) ride_on(d, t, MAX(W.step_end, t));
     else {
         take_off(i);
@@ -341,7 +351,7 @@ static double in_hollows(void) {
 
 /* Note what all disks have together as a step begins. */
 static void note_totals(void) {
-    Total all = {.t = W.t, .unsolved = W.unsolved};
+    Total all = {.t = W.t, .unsolved = W.unsolved, .released = W.released};
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode == WAITING) continue;
@@ -362,10 +372,11 @@ static void note_totals(void) {
             v = place + 2;
             all.entries[0] -= d->mass * (W.gx * (place[0] - track->knot[1]) + W.gy * (place[1] - track->knot[2]));
         } else if (d->mode == GONE && !track->begun) continue;
-        all.kinetic += 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
-        all.potential += d->mass * W.g * (W.up[0] * place[0] + W.up[1] * place[1]);
+        all.kinetic += kinetic_of(d, v, spin);
+        all.potential += lifted(d, place);
         for (int n = 0; n < 3; n++) all.entries[n] += d->entries[n] - ahead[n];
     }
+    add_springs(all.springs);
     W.totals[W.total_count++] = all;
 }
 
@@ -672,6 +683,8 @@ static int run_on(int steps) {
             if (W.event_count + 4 * count + 64 > W.event_room) return FULL_EVENTS;
             int reason = BY_TIME;
             if (is_over(&reason)) {
+                if (W.joint_count && W.total_count >= W.total_room) return FULL_TOTALS;
+                if (W.joint_count) note_totals();
                 stop_all(reason);
                 W.phase = PART;
                 continue;

@@ -67,6 +67,9 @@ function rowOf(scene: Scene, names: string[]): number[] {
     ...all("OutgoingKeys", outgoing ? [outgoing] : []),
     ...all("ConveyorKeys", scene.conveyor),
     ...all("SurfaceKeys", surface.map((one) => ({ ...one, corners: one.points?.length ?? 0 }))),
+    ...all("JointKeys", scene.joints.map(({ kind: tie, ...one }) => ({
+      ...one, kind: core.layout.enums.Tie[tie.toUpperCase()],
+    }))),
     ...all("MoverKeys", moversOf(scene).map(([name, { hinge, shake, travel, motor, ...one }]) => ({
       ...one, phase_deg: 0, ...shake, to: travel?.to, at: travel?.at, in: travel?.in, ...motor,
       surface: names.indexOf(name), pivot: hinge && hinge !== "pivot" ? hinge : one.pivot,
@@ -90,7 +93,7 @@ export function lay(scene: Scene, names: string[]): {
     streams: scene.streams.length, incoming: Number(scene.incoming !== null),
     plates: scene.plates.length, outgoing: Number(scene.outgoing !== null),
     conveyors: scene.conveyor.length, surfaces: scene.surface.length,
-    moving,
+    joints: scene.joints.length, moving,
   });
   core.work("lay_out_plan");
   core.doubles.set(row, core.get("rows", "Plan") >> 3);

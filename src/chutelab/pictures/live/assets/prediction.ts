@@ -143,6 +143,7 @@ function outsideOf(scene: Scene, belt: Incoming) {
     if (vx !== belt.speed * cos || vy !== belt.speed * sin) return "other-velocity";
   }
   if (stream.omega !== 0.0) return "spins";
+  if (scene.joints.some(({ particle, other }) => !particle || other === 0)) return "hangs";
   if (moversOf(scene).length) return "moves";
   if (triggersOf(scene).length) return "waits";
   return scene.crowded ? "interact" : "";

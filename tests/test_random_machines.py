@@ -84,8 +84,11 @@ def drawn(seed):
 
 @pytest.mark.parametrize("seed", seeds(8, 300))
 def test_a_ball_and_a_machine_go_the_same_way_in_both_engines(seed):
+    goes_alike(drawn(seed))
+
+
+def goes_alike(scene):
     """Where a push of 1e-9 m/s grows to less than fifty times its way: to Pymunk's step."""
-    scene = drawn(seed)
     end = [scene["run"]["until"] - 1e-6]
     mine = chutelab.simulate(scene, engine="contact")
     assert not mine.laws

@@ -516,6 +516,7 @@ STATED = {
         "½ m v'² = {0.3} mJ": 500.0 * 0.008 * yielded(0.002)[0] ** 2,
         "½ M (ω l)² = {8.8} mJ": yielded(0.002)[2],
         "until {1.7} s after the blow": 2.5 - 0.5 - T2,
+        "which is at {0.797} s, is": 0.5 + T2,
     },
     "physics": {
         "up to {1} m/s. A faster": sqrt(G * 0.1),

@@ -253,6 +253,21 @@ def test_a_pair_of_blow_and_friction_that_feel_each_other_gives_no_energy():
         assert recording.ledger.restitution_loss == pytest.approx(0.0, abs=1e-15)
 
 
+@pytest.mark.parametrize("faces", [8, 16, 32])
+def test_a_wheel_of_many_faces_is_struck_in_pymunk_as_in_contact(faces):
+    """Each face is a body of its own there, and a blow on one has to turn them all."""
+    turns = np.arange(faces + 1) % faces * (2.0 * pi / faces)
+    corners = 0.1 * np.stack([np.sin(turns), np.cos(turns)], axis=1)
+    keys = {"points": corners.tolist(), "from": None, "to": None, "mass": 1.0}
+    scene = machine({"at": [0.03, 0.2], "velocity": [0.0, 0.0]}, run={"until": 0.2}, **keys)
+    contact, pymunk = (chutelab.simulate(scene, engine=name) for name in ("contact", "pymunk"))
+    assert not pymunk.laws
+    _, _, angle = contact.pose("lever", [0.2])[0]
+    assert abs(angle) > 5e-4
+    assert pymunk.pose("lever", [0.2])[0][2] == pytest.approx(angle, rel=0.05)
+    assert pymunk.at([0.2])[0][0, 0] == pytest.approx(contact.at([0.2])[0][0, 0], abs=2e-3)
+
+
 def test_pymunk_with_its_own_joints_agrees_to_the_order_of_its_step():
     keys = {"to": [0.0, -0.4], "mass": 0.2, "spring": 2.0, "damper": 0.02, "restitution": 0.6,
             "stops_deg": [-60.0, 8.0]}  # fmt: skip

@@ -109,9 +109,6 @@ def test_a_page_refuses_what_is_no_disk_by_its_key():
         with pytest.raises(SceneError) as caught:
             describe(from_dict({**THROWN, "particle": table}))
         assert [fault.key for fault in caught.value.faults] == [key]
-    for table, more in (("string", {}), ("rod", {}), ("spring", {"stiffness": 9.0}), ("pin", {})):
-        with pytest.raises(SceneError, match=table):
-            describe(from_dict({**THROWN, table: [{"from": [0.0, 2.0]} | more]}))
 
 
 def test_a_belt_below_the_impact_is_told_from_the_top():

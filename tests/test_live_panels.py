@@ -62,6 +62,38 @@ def test_both_bars_are_equally_long_at_any_time(runs, name):
         assert at["potential"] >= -1e-12
 
 
+def test_with_joints_the_ledger_closes_at_any_time():
+    """Springs keep 1/2 k (l - l0)², dampers take c ∫ l'² dt; nothing that is lost is negative."""
+    k, c, rest = 20.0, 0.3, 0.2
+    ball = {"velocity": [0.0, 0.0], "interact": True}
+    scene = from_dict({
+        "particle": {"radius": 0.02, "mass": 0.1}, "gravity_deg": 20.0, "run": {"until": 1.5},
+        "stream": [{**ball, "at": [0.3, 0.0]}, {**ball, "at": [0.6, 0.1]}],
+        "rod": [{"from": [0.0, 0.0]}],
+        "spring": [{"particle": 1, "other": 0, "stiffness": k, "damper": c, "length": rest}],
+    })  # fmt: skip
+    answers = ask(scenes=[page_scene(one)[0] for one in (scene, load("cradle"))])["runs"]
+    for answer in answers:
+        for at in answer["ledgers"]:
+            size = sum(value for _, value in at["putIn"])
+            assert abs(at["residual"]) <= 1e-13 * size, at
+            least = min(at[name] for name in at if name.endswith("_loss") or name == "spring")
+            assert least >= -1e-13 * size
+            assert (at["belt_work"], at["push_work"]) == pytest.approx((0.0, 0.0), abs=1e-13 * size)
+            assert at["potential"] >= -1e-4 * size
+    # Evenly spread times come first.
+    recording, ledgers = chutelab.simulate(scene, engine="contact"), answers[0]["ledgers"][:400]
+    places, _ = recording.at([at["t"] for at in ledgers])
+    length = np.hypot(*(places[:, 0] - places[:, 1]).T)
+    kept = np.array([at["spring"] for at in ledgers])
+    assert np.abs(kept - 0.5 * k * (length - rest) ** 2).max() < 1e-3 * kept.max()
+    lost = c * np.trapezoid(np.gradient(length, ledgers[1]["t"]) ** 2, dx=ledgers[1]["t"])
+    assert ledgers[-1]["damper_loss"] == pytest.approx(lost, rel=1e-3)
+    ours = recording.ledger
+    assert ledgers[-1]["damper_loss"] == pytest.approx(ours.damper_loss, rel=1e-12)
+    assert ledgers[-1]["spring"] == pytest.approx(ours.spring[1], rel=1e-12)
+
+
 @pytest.mark.parametrize("name", ["damper-plate", "see-saw", "flap-gate"])
 def test_what_hangs_is_in_the_ledger(runs, name):
     """Energies of hinges and springs, what dampers and stops take: as Python's ledger has them.

@@ -104,7 +104,7 @@ def side_by_side(
     the first stream with half a particle below and above.
 
     Raises a `DischargeError` for a scene without an incoming belt, or whose first stream is not
-    released on it, and of heights (m) that are no numbers, all above the pulley, or below `DEEPEST`.
+    released on it, and of heights (m) that are no numbers, all above the pulley or below `DEEPEST`.
     """
     whole = load(scene)
     if (belt := whole.incoming) is None:

@@ -8,12 +8,13 @@ import type { Words } from "./words.ts";
 type Entry = [keyof Ledger, number];
 
 const SIGNS: Entry[] = [
-  ["start", 1], ["belt_work", 1], ["push_work", 1], ["kinetic", -1], ["potential", -1], ["spring", -1],
-  ["restitution_loss", -1], ["friction_loss", -1], ["damper_loss", -1], ["residual", 1],
+  ["start", 1], ["belt_work", 1], ["push_work", 1], ["kinetic", -1], ["potential", -1],
+  ["spring", -1], ["restitution_loss", -1], ["friction_loss", -1], ["damper_loss", -1],
+  ["residual", 1],
 ];
 
-/** What there is only with hinges that have such. */
-const HUNG: Record<string, "spring" | "damper"> = { spring: "spring", damper_loss: "damper" };
+/** What there is only with hinges and springs that have such. */
+const KEPT: Record<string, string[]> = { spring: ["spring", "stiffness"], damper_loss: ["damper"] };
 
 /** A residual below this part of the whole is rounding, and not shown. */
 const TINY_RESIDUAL = 1e-12;
@@ -76,7 +77,7 @@ class EnergyPanel {
   longest = 0;
 
   refresh() {
-    const recording = this.lab.recording as Recording;
+    const recording = this.lab.recording as Recording, { machine } = recording;
     const ledger = groundedLedger(recording, this.lab.t);
     const { putIn, isNow, size } = stacks(ledger);
     this.longest ||= stacks(groundedLedger(recording, recording.end)).size;
@@ -97,7 +98,8 @@ class EnergyPanel {
       this.cells.get(name).textContent = this.words.energy(ledger[name]);
       this.rows[n].hidden = (name === "residual" && isClosed)
         || (name === "push_work" && !recording.pushes.length)
-        || (name in HUNG && !recording.machine.movers.some((mover) => mover[HUNG[name]]));
+        || (KEPT[name] && ![...machine.movers, ...machine.joints].some((one: any) =>
+          KEPT[name].some((key) => one[key])));
     });
   }
 }

@@ -60,7 +60,9 @@ function troubleOf(
     const surface = nameOf(event);
     const isGate = scene.surface.some(({ name, opens_at: opens, closes_at: closes }) =>
       name === surface && (opens !== undefined || closes !== undefined));
+    const isOneSided = scene.surface.some(({ name, passes }) => name === surface && passes);
     return [stage, isGate ? because("outside", "gate", { surface })
+      : isOneSided ? because("outside", "one-sided", { surface })
       : because(claim, text, { surface, ...words })];
   };
   const [left, hit, next] = events.filter(({ disk, kind }) =>
@@ -143,6 +145,7 @@ function outsideOf(scene: Scene, belt: Incoming) {
     if (vx !== belt.speed * cos || vy !== belt.speed * sin) return "other-velocity";
   }
   if (stream.omega !== 0.0) return "spins";
+  if (scene.joints.some(({ particle, other }) => !particle || other === 0)) return "hangs";
   if (moversOf(scene).length) return "moves";
   if (triggersOf(scene).length) return "waits";
   return scene.crowded ? "interact" : "";

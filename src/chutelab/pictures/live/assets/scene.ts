@@ -1,6 +1,6 @@
 // A scene as its file has it, and with all defaults: `resolve`. The same rules as in Python's
 // `chutelab.scene`, of which a page needs those about what can be edited. `keys.ts` changes keys.
-import { conflictsOf, listOf, misfitsOf, straysOf } from "./checks.ts";
+import { JOINTS, conflictsOf, listOf, misfitsOf, straysOf } from "./checks.ts";
 import type { Form } from "./forms.ts";
 import type { Tree } from "./formula.ts";
 
@@ -108,6 +108,7 @@ export interface Surface extends Moves {
   closes_at?: number;
   opens_when?: When;
   closes_when?: When;
+  passes?: string;
   repeat: [number, number, number][];
   given: Given;
 }
@@ -144,6 +145,18 @@ interface Outgoing {
   given: Given;
 }
 
+/** What a particle hangs on, or two hold each other by, as `machine/parts.py` has it */
+export interface Joint {
+  kind: typeof JOINTS[number];
+  from?: Point;
+  particle: number;
+  other?: number;
+  length?: number;
+  stiffness?: number; // of a spring, N/m
+  damper?: number;
+  given: Given;
+}
+
 /** All defaults filled in; names as in the file, but for three lists */
 export interface Scene {
   title: string;
@@ -159,6 +172,7 @@ export interface Scene {
   outgoing: Outgoing | null;
   conveyor: Conveyor[];
   surface: Surface[];
+  joints: Joint[];
   streams: Stream[];
   run: { until: "landed" | "settled" | number, max_time: number, dt: number,
     engine: string, loads?: number };
@@ -245,8 +259,9 @@ export function resolve(given: Given, lab: Lab): Scene {
     gravity_deg: given.gravity_deg ?? lab.tables.scene.gravity_deg.default,
     air_density: given.air_density ?? lab.tables.scene.air_density.default,
     particles, materials, pair: rows("pair"), incoming, plates, outgoing,
-    conveyor: rows("conveyor"), surface, streams, run, kinds, sensor: rows("sensor"),
-    view: given.view ?? null,
+    conveyor: rows("conveyor"), surface,
+    joints: JOINTS.flatMap((kind) => rows(kind).map((row) => ({ ...row, kind }))),
+    streams, run, kinds, sensor: rows("sensor"), view: given.view ?? null,
     crowded: count > 1 && streams.some((stream) => stream.interact),
     most: lab.tables.stream.count.high ?? Infinity,
   };

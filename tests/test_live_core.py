@@ -101,7 +101,13 @@ def test_what_moves_does_so_as_in_python():
     arc = {"name": "bowl", "center": [0.0, 0.2], "radius": 0.2, "from_deg": 200, "to_deg": 340}
     scenes = [
         from_dict({**base, "surface": [{**shape, **keys}]})
-        for base, shape in ((BALL, LINE), (crowd, arc)) for keys in MOVING
+        for base, shape in ((BALL, LINE), (crowd, arc))
+        for keys in MOVING
+    ]
+    scenes += [
+        from_dict({**crowd, "surface": [{**shape, "passes": passes, **keys}]})
+        for shape, ways in ((LINE, ("up", "down")), (arc, ("in", "out")))
+        for passes, keys in zip(ways, MOVING[:2], strict=True)
     ]  # fmt: skip
     tilted = from_dict({**crowd, "gravity_deg": 55.0, "surface": [{**LINE, **HANGS}]})
     assert same_runs([tilted, load("see-saw"), load("damper-plate"), *scenes]) > 1000

@@ -129,8 +129,9 @@ def agreement(
     speed = float(np.hypot(*track["velocity"].T).max(initial=0.0))
     blows = not (np.abs(velocity[time > 0.0]) > 1e-9 * speed).any()
     for name, recording in found.items():
-        # Pymunk's steps end at blows only of a lone particle among surfaces that stay.
-        stepped = name == "pymunk" and not (alone.run.align and not alone.movers)
+        # Pymunk's steps end at blows only of a lone particle among two-sided surfaces that stay.
+        apart = alone.run.align and not (alone.movers or alone.one_sided)
+        stepped = name == "pymunk" and not apart
         even = name not in ORDERS or (blows and not stepped)
         allowed = BLOWS[name] * growth if even and isfinite(growth) else None
         compared = compare(recording)

@@ -36,7 +36,8 @@ def choose(machine: Machine, engine: str | None = None) -> str:
     if machine.joints:
         return "pymunk" if unjoined(machine) else "contact"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
-    return "contact" if stepped or machine.tilt or machine.scene.clings else "exact"
+    scene = machine.scene
+    return "contact" if stepped or machine.tilt or scene.clings or scene.one_sided else "exact"
 
 
 def simulate(
@@ -223,6 +224,9 @@ def must_fit(machine: Machine, name: str) -> None:
         if machine.movers:
             moving = machine.surfaces[machine.movers[0].surface]
             allowed = f"contact or pymunk, because {moving} moves: no closed form has its blows"
+            raise refused(scene, "run.engine", "exact", allowed)
+        if scene.one_sided:
+            allowed = f"contact or pymunk, because {scene.one_sided} is solid from one side"
             raise refused(scene, "run.engine", "exact", allowed)
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"

@@ -231,6 +231,11 @@ class SceneTables(Table):
         """Whether any two pull at each other."""
         return any(pair.clings for pair in self.pair)
 
+    @property
+    def one_sided(self) -> str | None:
+        """The name of a surface that is solid from one side, if any is."""
+        return next((one.name for one in self.surface if one.passes), None)
+
     def cohesion(self, kind: int, other: int | str) -> float:
         """Return the force (N) that it takes to pull a kind off another, or off a surface.
 

@@ -348,6 +348,12 @@ class StillSurface(Table):
     closes_when: When | None = described(
         None, 'It comes when another surface is touched: { touched = "bell" }'
     )
+    passes: Literal["up", "down", "left", "right", "in", "out"] | None = described(
+        None,
+        "Way in which it lets particles through, and holds those that come the other way, whichever"
+        ' way it is drawn; of an arc in or out. "up": what comes from below passes, what comes from'
+        " above is carried",
+    )
     pivot: Point | None = described(
         None,
         "What it turns about, and what travels [x, y]; default: its first point, the centre of an"

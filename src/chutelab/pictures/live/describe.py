@@ -51,6 +51,8 @@ PARTS: Final = (
           radius=0.012, repeat=[[6, 0.08, 0.0], [4, 0.04, -0.07]], restitution=0.4),
     _part("gate", "D", "surface", "points points", "opens_at closes_at friction", "opens_at",
           opens_at=1.0),
+    _part("oneway", "O", "surface", "points points", "passes restitution friction", "passes",
+          passes="up"),
     _part("flap", "F", "surface", "points points", "spring damper mass", "hinge",
           hinge="pivot", mass=0.2, spring=0.5, damper=0.01),
     _part("rotor", "M", "surface", "points points", "motor.speed_deg motor.torque mass",

@@ -75,13 +75,14 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
 
 /** All pieces of surfaces as the core's laws take them: straight ones, bent ones, the pulley. */
 function barriersOf({ segments, arcs, pulley, movers }: Machine) {
-  const wheel = { x: 0, y: 0, begin: 0, extent: Infinity, appears: -Infinity, vanishes: Infinity };
+  const wheel = { x: 0, y: 0, begin: 0, extent: Infinity, appears: -Infinity, vanishes: Infinity,
+    one_sided: 0 };
   const straight = segments.map(
-    ({ x, y, tx, ty, length, speed, surface, appears, vanishes }) =>
-      ({ x, y, tx, ty, length, speed, surface, appears, vanishes }));
+    ({ x, y, tx, ty, length, speed, surface, appears, vanishes, one_sided }) =>
+      ({ x, y, tx, ty, length, speed, surface, appears, vanishes, one_sided }));
   const bent = [...arcs, ...(pulley ? [{ ...wheel, ...pulley }] : [])].map(
-    ({ x, y, radius, begin, extent, speed, surface, appears, vanishes }) =>
-      ({ x, y, radius, begin, extent, speed, surface, appears, vanishes }));
+    ({ x, y, radius, begin, extent, speed, surface, appears, vanishes, one_sided }) =>
+      ({ x, y, radius, begin, extent, speed, surface, appears, vanishes, one_sided }));
   return [...straight, ...bent].map((row) =>
     ({ ...row, mover: movers.findIndex(({ surface }) => surface === row.surface) + 1 }));
 }

@@ -211,7 +211,13 @@ function* pieceConflicts(
     if (one.points?.some((point, place) => tooNear(point, one.points?.[place + 1]))) {
       yield [`surface[${n}].points`, one.points, "same-points"];
     }
-    const { points, repeat, opens_at: opens, closes_at: closes } = one;
+    const { points, repeat, opens_at: opens, closes_at: closes, passes } = one;
+    const across = passes === "left" || passes === "right" ? 1 : 0;
+    const steps = (points ?? []).slice(1).map((point, place) =>
+      point[across] - (points ?? [])[place][across]);
+    if (passes && Math.min(...steps) <= 0 && Math.max(...steps) >= 0) {
+      yield [`surface[${n}].passes`, passes, "passes-back"];
+    }
     const twice = opens !== undefined && closes !== undefined && opens < closes;
     count += repeat.reduce((many, [copies]) => many * copies,
       Math.max(1, (points?.length ?? 0) - 1) * (twice ? 2 : 1));
@@ -234,7 +240,8 @@ function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
     yield [`pair[${bonds}].bond_number`, scene.pair[bonds].bond_number, "weightless"];
   }
   const clings = scene.pair.findIndex(clinging);
-  if (run.engine === "exact" && (movers.length || crowded || waits)) {
+  const isOneSided = scene.surface.some(({ passes }) => passes);
+  if (run.engine === "exact" && (movers.length || crowded || waits || isOneSided)) {
     yield ["run.engine", run.engine, "not-exact"];
   }
   if (waits && count > 1 && !crowded) {

@@ -190,6 +190,8 @@ function ownFields(page: Page, given: Given, scene: Scene, section: Section): Fi
         .concat(sectionsOf(scene, {}).filter((one) => SURFACES.includes(one.table))
           .map((one) => one.name))
         : name === "particle" ? scene.particles.map((kind) => String(kind.name))
+        : name === "passes" ? rowOf(scene, section).center ? ["in", "out"]
+          : ["up", "down", "left", "right"]
         : name === "material" && table === "particle" ? [...scene.materials.keys()]
           : form.type === "boolean" ? [] : form.enum as string[] | undefined;
       if (choices && form.type !== "boolean" && choices.length < 2) return;

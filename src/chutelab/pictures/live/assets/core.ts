@@ -334,8 +334,8 @@ class Core extends Memory {
 
 /** All surfaces as rows of the core: segments, the pulley, arcs. */
 function surfaceRows({ segments, arcs, pulley }: Machine, shapes: Record<string, number>) {
-  const gate = ({ appears, vanishes }: { appears: number, vanishes: number }) => ({
-    opens: appears, closes: vanishes,
+  const gate = (piece: { appears: number, vanishes: number, one_sided: number }) => ({
+    opens: piece.appears, closes: piece.vanishes, one_sided: piece.one_sided,
   });
   const flat = segments.map((s) => ({
     shape: shapes.SEGMENT, x: s.x, y: s.y, tx: s.tx, ty: s.ty, length: s.length, speed: s.speed,

@@ -15,6 +15,7 @@ export interface Segment {
   surface: number; // index of the surface it belongs to
   appears: number; // s
   vanishes: number; // s
+  one_sided: number; // solid on its left, of an arc outside, if 1, there not if -1; 0: on both
   restitution: number[]; // by kind of particles
   friction: number[];
   ends: [number, number, number, number]; // x and y of both, m
@@ -30,6 +31,7 @@ export interface Arc {
   surface: number;
   appears: number;
   vanishes: number;
+  one_sided: number;
   restitution: number[];
   friction: number[];
 }

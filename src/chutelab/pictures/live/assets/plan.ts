@@ -6,17 +6,19 @@ import { Fault, met, moversOf, type Point, type Scene } from "./scene.ts";
 import { useCore } from "./trig.ts";
 
 type Segment = { start: Point, end: Point, tangent: Point, length: number, speed: number,
-  appears: number, vanishes: number, surface: number };
+  appears: number, vanishes: number, surface: number, one_sided: number };
 /** How a surface moves, as `Mover` of layout.h */
 export type Mover = { surface: number, pivot: Point, by: Point, frequency: number, phase: number,
   way: Point, from: number, lasts: number, turn: number, inertia: number, mass: number,
   moment: Point, spring: number, rest: number, damper: number, stops: Point, motor: Point,
   begins: number };
 type Arc = { center: Point, radius: number, begin: number, extent: number, speed: number,
-  appears: number, vanishes: number, surface: number };
+  appears: number, vanishes: number, surface: number, one_sided: number };
 
-/** Numbers of what keys may say in words; `drop_from` as in layout.h. */
-const WORDS: Record<string, number> = { adhesion: Infinity, impact: 0.0, top: 1.0 };
+/** Numbers of what keys may say in words; `drop_from` and `passes` as in layout.h. */
+const WORDS: Record<string, number> = {
+  adhesion: Infinity, impact: 0.0, top: 1.0, up: 1, down: -1, right: 2, left: -2, out: 3, in: -3,
+};
 
 /** The core of this thread. */
 let core: Memory;

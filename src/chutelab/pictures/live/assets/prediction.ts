@@ -60,7 +60,9 @@ function troubleOf(
     const surface = nameOf(event);
     const isGate = scene.surface.some(({ name, opens_at: opens, closes_at: closes }) =>
       name === surface && (opens !== undefined || closes !== undefined));
+    const isOneSided = scene.surface.some(({ name, passes }) => name === surface && passes);
     return [stage, isGate ? because("outside", "gate", { surface })
+      : isOneSided ? because("outside", "one-sided", { surface })
       : because(claim, text, { surface, ...words })];
   };
   const [left, hit, next] = events.filter(({ disk, kind }) =>

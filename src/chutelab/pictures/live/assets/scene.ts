@@ -108,6 +108,7 @@ export interface Surface extends Moves {
   closes_at?: number;
   opens_when?: When;
   closes_when?: When;
+  passes?: string;
   repeat: [number, number, number][];
   given: Given;
 }

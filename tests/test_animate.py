@@ -721,6 +721,7 @@ def test_gif_reads_back_frame_by_frame_and_is_the_same_again(tmp_path):
     assert all(frame.width * frame.height < 320 * 180 for frame in frames[1:])
 
 
+@pytest.mark.slow
 def test_colours_are_nearly_the_stages_and_what_stands_still_keeps_its_own(runs, tmp_path):
     recording = runs["free-fall"]
     path = animate(recording, tmp_path / "lesson.gif", fps=2, width=WIDTH, height=HEIGHT)
@@ -832,7 +833,7 @@ def test_failure_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
 # Videos
 
 
-@pytest.mark.parametrize("kind", video.VIDEOS)
+@pytest.mark.parametrize("kind", some(video.VIDEOS, len(video.VIDEOS)))
 def test_video_shows_the_stage_at_its_rate(kind, tmp_path):
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
     recording = by_hand()
@@ -857,6 +858,7 @@ def test_video_shows_the_stage_at_its_rate(kind, tmp_path):
 # The command line
 
 
+@pytest.mark.slow
 def test_films_and_the_still_can_be_chosen(tmp_path):
     pytest.importorskip("imageio_ffmpeg")
     arguments = ["--only", "json,gif,strobe", "--format", "mp4"]

@@ -178,6 +178,7 @@ def test_arrivals_and_envelopes_are_pythons(runs, name):
         assert its == pytest.approx(band.lines[:, :there], abs=1e-12, nan_ok=True)
 
 
+@pytest.mark.slow
 def test_arrivals_in_crowds_drawn_at_random_are_pythons():
     """Those that touch only what lies there, softly or hard, among them."""
     beds = [f"stream.bed_height={0.02 * seed}" for seed in range(6)]

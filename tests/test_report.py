@@ -66,6 +66,7 @@ def test_sensitivities_are_differences_of_two_runs():
     assert row[0] == "incoming.speed + 0.02"
 
 
+@pytest.mark.slow
 def test_a_stream_has_its_envelope_and_error_bars(tmp_path):
     made = report("stream", {"stream.count": 12}, runs=2)
     assert {"machine", "stream", "loads", "wear"} <= made.pictures.keys()

@@ -487,7 +487,7 @@ def test_html_is_whole_and_takes_the_colours_of_the_page():
 def test_lessons_are_found_by_number_or_name():
     for ask in (3, "3", "the-bounce", "03-the-bounce", "The Bounce", "03"):
         assert find(ask).name == "the-bounce"
-    assert [exercise.number for exercise in EXERCISES.values()] == list(range(13))
+    assert [exercise.number for exercise in EXERCISES.values()] == list(range(14))
     assert lesson("the-bounce", "digit").question("2").number == 2
     with pytest.raises(ExerciseError, match="Did you mean 'the-bounce'"):
         lesson("the-bonce", "x")

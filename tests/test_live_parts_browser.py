@@ -491,7 +491,8 @@ def test_a_hinge_is_pushed_in_a_running_run_by_hand_and_by_keys_as_python_does(s
     assert page.evaluate(WHOLE) == "done"
     pushes = page.evaluate("chutelab.lab.pushes")
     assert len(pushes) > by_mouse
-    assert "surface" in pushes[0] and "disk" in pushes[-1]
+    assert "surface" in pushes[0]
+    assert "disk" in pushes[-1]
     recording = pushed_in_python(scene, pushes)
     found, track = recording.track(0), np.array(page.evaluate(TRACKS)[0])
     assert track[-1, 1:3].tolist() == found["position"][-1].tolist()

@@ -209,6 +209,7 @@ def test_lasting_contacts_and_blows_are_all_that_changes_momentum(bin_of_disks):
     assert np.hypot(*off.T) == pytest.approx(0.0, abs=1e-11 * size.max())
 
 
+@pytest.mark.slow
 def test_stress_at_rest_bears_the_weight_above(bin_of_disks, tmp_path):
     """Smooth walls bear no weight: -∫ σ_yy dx = g ∫∫ ρ above; and they are pressed as σ_xx says."""
     box = ((-0.03, -0.03), (0.13, 0.2))

@@ -168,6 +168,7 @@ FAULTS = """() => {
 }"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "size", "scheme", "language"),
     [*QUICK, *(pytest.param(*one, marks=pytest.mark.slow) for one in WHOLE if one not in QUICK)],

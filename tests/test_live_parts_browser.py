@@ -94,6 +94,7 @@ def test_every_part_is_a_row_whose_keys_are_those_of_its_table():
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_each_part_is_drawn_saved_and_runs_to_the_same_bits(empty, tmp_path):
     page = empty()
     for part in PARTS:
@@ -175,6 +176,7 @@ def test_everything_that_a_part_can_say_has_a_field_and_is_saved(empty, tmp_path
     assert same_bits(page, tmp_path) >= 24
 
 
+@pytest.mark.slow
 def test_a_line_moves_in_each_way_by_its_card_and_runs_to_the_same_bits(empty, tmp_path):
     """All keys of each motion have a field; those of another motion are gone."""
     page = empty()
@@ -424,6 +426,7 @@ def test_parts_and_the_card_of_what_is_chosen_take_turns_and_what_is_on_looks_so
     assert under == page.evaluate(ground) == "rgb(0, 100, 157)"
 
 
+@pytest.mark.slow
 def test_the_menu_has_a_new_machine_the_scene_as_it_was_and_light_and_dark(shown):
     page = shown("inclined-40", viewport={"width": 1366, "height": 768})
     ground = "getComputedStyle(document.body).backgroundColor"
@@ -465,6 +468,7 @@ def test_the_menu_has_a_new_machine_the_scene_as_it_was_and_light_and_dark(shown
     assert page.evaluate("document.activeElement.parentElement.id") == "menu"
 
 
+@pytest.mark.slow
 def test_a_link_and_html_to_embed_open_the_machine_as_it_is(shown, opened, tmp_path):
     page = shown("inclined-40", viewport={"width": 1366, "height": 768}, language="de")
     page.evaluate("""() => {
@@ -506,6 +510,7 @@ def test_the_page_turns_to_the_other_language_as_it_is(shown):
     assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 33.0
 
 
+@pytest.mark.slow
 def test_a_machine_of_twelve_parts_is_built_by_keyboard_alone(empty, tmp_path):
     page = empty()
 
@@ -552,6 +557,7 @@ def test_a_machine_of_twelve_parts_is_built_by_keyboard_alone(empty, tmp_path):
     assert same_bits(page, tmp_path, 0.8) > 100
 
 
+@pytest.mark.slow
 def test_the_first_machine_and_the_examples_are_one_click_away(empty):
     page = empty("de")
     expect(page.get_by_text("Bau eine Maschine")).to_be_visible()
@@ -597,6 +603,7 @@ def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_
     expect(page.locator("#lacks")).to_have_count(0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "scheme", "touch"),
     [

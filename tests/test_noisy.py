@@ -66,6 +66,7 @@ def answers(function, noise, wishes, common, searches, points):
     return np.array([one.at for one in runs]), np.array([one.error for one in runs])
 
 
+@pytest.mark.slow
 def test_a_search_with_noise_finds_where_two_targets_are_met():
     found, told = answers(bend, (0.02, 0.0, 0.005, 0.0), TWO, 1.0, 2, 12)
     assert np.all(np.abs(found - [30.0, 0.25]) < 4.0 * told)
@@ -128,6 +129,7 @@ def test_a_minimum_of_a_lone_particle_keeps_to_its_bound():
     assert least.answer.values[0] == pytest.approx(2.5, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_an_answer_of_a_stream_has_no_more_digits_than_its_error_leaves(tmp_path):
     found = solve(
         CROWD, {"plate.angle_deg": (10.0, 35.0)}, {"arrival.vx.mean": 1.6}, repeat=3, points=10

@@ -66,6 +66,7 @@ def test_sensitivities_are_differences_of_two_runs():
     assert row[0] == "incoming.speed + 0.02"
 
 
+@pytest.mark.slow
 def test_a_stream_has_its_envelope_and_error_bars(tmp_path):
     made = report("stream", {"stream.count": 12}, runs=2)
     assert {"machine", "stream", "loads", "wear"} <= made.pictures.keys()
@@ -85,8 +86,9 @@ def test_a_stream_has_its_envelope_and_error_bars(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_shipped_stream_has_four_pages(tmp_path):
-    made = report("stream", command="chutelab report stream -o report.pdf")
+@pytest.mark.parametrize("scene", ["stream", "coal-transfer"])
+def test_a_shipped_stream_has_four_pages(scene, tmp_path):
+    made = report(scene, command=f"chutelab report {scene} -o report.pdf")
     made.write(tmp_path / "report.pdf")
     assert len(PdfReader(tmp_path / "report.pdf").pages) == 4
 

@@ -148,6 +148,7 @@ def test_the_same_student_twice_and_answers_of_another_are_told(returned, monkey
     ]
 
 
+@pytest.mark.slow
 def test_it_is_told_how_likely_a_copied_answer_is_by_chance(returned):
     """v = -ε v0 has few values: one of them is right for many; three answers at once are not.
 

@@ -94,6 +94,8 @@ static void bring(Mover *m, double t) {
 }
 
 static void note(const Mover *m, double t, double rate) {
+    W.swing_work[2 * W.swing_count] = m->stopped;
+    W.swing_work[2 * W.swing_count + 1] = m->damped;
     W.swings[W.swing_count++] = (Swing){ t, m->angle, rate, m->surface, 0 };
 }
 

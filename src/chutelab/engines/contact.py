@@ -102,6 +102,7 @@ def pieces(machine: Machine) -> NDArray[Any]:
         own["shape"] = constants("Shape")[shape]
         own["speed"], own["owner"] = part.speed, part.surface
         own["opens"], own["closes"] = part.appears, part.vanishes
+        own["one_sided"] = part.one_sided
         for name, values in part.told().items():
             own[name] = values
     return rows

@@ -29,8 +29,11 @@ from chutelab.scene.variants import Family
 from chutelab.util.arrays import Floats, Ints, Numbers, Watch, unwatched
 from chutelab.util.trig import RADIANS, hypot
 
-WORDS = {"adhesion": inf, "impact": 0.0, "top": 1.0}
-"""Numbers of what keys may say in words; `drop_from` as in layout.h."""
+WORDS = {
+    "adhesion": inf, "impact": 0.0, "top": 1.0,
+    "up": 1.0, "down": -1.0, "right": 2.0, "left": -2.0, "out": 3.0, "in": -3.0,
+}  # fmt: skip
+"""Numbers of what keys may say in words; `drop_from` and `passes` as in layout.h."""
 
 PASSES = -1.0
 """Restitution of two kinds that pass through each other; `meet` of the core's grid.c."""

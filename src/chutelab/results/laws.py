@@ -290,7 +290,11 @@ def alike(recording: Record) -> bool:
     """Tell whether all is left to Chipmunk, in steps that are all alike."""
     m = recording.machine
     return recording.engine == "pymunk" and (
-        m.interact or not m.align or len(m.joints) + len(m.movers) > 0 or not _round(m)
+        m.interact
+        or not m.align
+        or len(m.joints) + len(m.movers) > 0
+        or not _round(m)
+        or bool(m.scene.one_sided)
     )
 
 
@@ -325,6 +329,7 @@ def barriers(machine: Machine) -> NDArray[Any]:
         own = rows[..., first : (first := first + part.surface.size)]
         own["speed"], own["surface"] = part.speed, part.surface
         own["appears"], own["vanishes"] = part.appears, part.vanishes
+        own["one_sided"] = part.one_sided
         for name, values in part.told().items():
             own[name] = values
         for n, mover in enumerate(machine.movers, 1):

@@ -147,10 +147,12 @@ def drawing(recording: Recording) -> Picture:
         if not seen:
             continue
         ax.annotate("", begin, end, arrowprops={"arrowstyle": "<->", "color": style.MUTED})
+        lies = begin[1] == end[1]
         ax.annotate(
             style.quantity(float(np.hypot(*np.subtract(end, begin))), "m"),
-            tuple(0.5 * np.add(begin, end)), (0.0, 5.0), textcoords="offset points", ha="center",
-            rotation=0 if begin[1] == end[1] else 90, fontsize=style.SMALL, color=style.MUTED,
-            gid="dimension",
+            tuple(0.5 * np.add(begin, end)), (0.0, 4.0) if lies else (-4.0, 0.0),
+            textcoords="offset points", ha="center" if lies else "right",
+            va="bottom" if lies else "center", rotation=0 if lies else 90, fontsize=style.SMALL,
+            color=style.MUTED, gid="dimension",
         )  # fmt: skip
     return figure

@@ -145,7 +145,7 @@ function idle({ incoming, particles }: Scene, table: string, row: any): string[]
   }
   if (table === "pair") {
     const kinds = row.between.every((name: string) => particles.some((one) => one.name === name));
-    return [...(kinds ? [] : ["meet"]), ...(row.meet ? [] : ["restitution", "friction", "cohesion"])];
+    return [...(kinds ? [] : ["meet"]), ...(row.meet ? [] : ["restitution", "friction", "cohesion", "bond_number"])];
   }
   const weighed = table === "particle" && (row.given.density ?? row.given.material) !== undefined;
   return [...(weighed ? ["mass"] : []), ...(table === "outgoing" ? ["drop_from"] : [])];
@@ -190,6 +190,8 @@ function ownFields(page: Page, given: Given, scene: Scene, section: Section): Fi
         .concat(sectionsOf(scene, {}).filter((one) => SURFACES.includes(one.table))
           .map((one) => one.name))
         : name === "particle" ? scene.particles.map((kind) => String(kind.name))
+        : name === "passes" ? rowOf(scene, section).center ? ["in", "out"]
+          : ["up", "down", "left", "right"]
         : name === "material" && table === "particle" ? [...scene.materials.keys()]
           : form.type === "boolean" ? [] : form.enum as string[] | undefined;
       if (choices && form.type !== "boolean" && choices.length < 2) return;

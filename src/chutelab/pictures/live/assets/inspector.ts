@@ -21,7 +21,8 @@ const HUNG = ["spring", "damper", "angle_deg"];
 const INSTEAD: Record<string, string[]> = {
   opens_when: ["opens_at", "closes_when"], closes_when: ["closes_at", "opens_when"],
   opens_at: ["opens_when"], closes_at: ["closes_when"],
-  meet: ["restitution", "friction", "cohesion"],
+  cohesion: ["bond_number"], bond_number: ["cohesion"],
+  meet: ["restitution", "friction", "cohesion", "bond_number"],
 };
 
 /** Fields that are not under "More". */

@@ -133,10 +133,12 @@ class Lab {
   }
 
   /** Run from a time on, with what is there then: a crowd goes on while it is changed, all
-   * others begin anew, since they take no time.
-   * @param from s */
-  run(from: number) {
+   * others begin anew, since they take no time, and what has joints, which are tied at the
+   * release.
+   * @param since s */
+  run(since: number) {
     const machine = this.machine = this.loose ?? this.machine as Machine;
+    const from = machine.joints.length ? 0 : since;
     this.pushes = [];
     this.hand = this.loose = null;
     let job = machine;

@@ -84,7 +84,7 @@ class Words {
 
   /** A unit as it is written behind a number. */
   unit(unit: string) {
-    return unit === "degrees" ? "°" : unit;
+    return unit === "degrees" ? "°" : unit.replace(/m2$/, "m²");
   }
 
   /** A number with so many significant digits, 0 as 0. */

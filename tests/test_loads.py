@@ -218,6 +218,41 @@ def test_the_pressure_under_a_heap_follows_its_height():
     assert borne[[1, 2, 7, 8]].sum() > above[[1, 2, 7, 8]].sum()
 
 
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+def test_torques_are_about_what_a_surface_turns_about(engine):
+    """A free hinge: I Δω is the torque's impulse; at an even pace the drive works -T ω Δt."""
+
+    def struck(moves):
+        flap = {"name": "flap", "from": [0.0, 0.0], "to": [0.2, 0.0], "friction": 0.2, **moves}
+        return chutelab.simulate(
+            {
+                "particle": {"radius": 0.01, "mass": 0.05, "spin": False},
+                "surface": [flap],
+                "stream": {"at": [0.15, 0.1], "velocity": [0.3, 0.0]},
+                "run": {"until": 0.2, "loads": 0.01},
+            },
+            engine=engine,
+        )
+
+    hung = struck({"hinge": [0.1, -0.05], "inertia": 0.01})
+    rate = hung.machine.mover(0).hinge.states["rate"]
+    turned = 0.01 * hung.loads("flap").torque.sum()
+    # Chipmunk's blow takes a step of its weight with it.
+    assert turned == pytest.approx(
+        0.01 * (rate[-1] - rate[0]), rel=1e-9 if engine == "contact" else 2e-4
+    )
+    load = (driven := struck({"pivot": [0.1, -0.05], "turn": 30.0})).loads("flap")
+    assert load.pivot == (0.1, -0.05)
+    work = -radians(30.0) * 0.01 * load.torque.sum()
+    assert work == pytest.approx(driven.ledger.by_surface["flap"]["drive_work"], rel=1e-9)
+    shaken = struck({"shake": {"by": [0.005, 0.0], "frequency": 10.0}}).loads("flap")
+    hit = int(np.argmax(shaken.normal))
+    arm = shaken.place[hit] - [0.005 * sin(20.0 * np.pi * (hit + 0.5) * 0.01), 0.0]
+    assert shaken.torque[hit] == pytest.approx(
+        arm[0] * shaken.force[hit, 1] - arm[1] * shaken.force[hit, 0], rel=1e-9
+    )
+
+
 def test_bins_are_summed_stored_and_refused(tmp_path):
     run = chutelab.simulate("two-sizes", loads=0.01)
     fine, wide = run.loads("outgoing"), run.loads("outgoing", every=0.05)

@@ -169,6 +169,22 @@ def test_a_search_that_is_stopped_tells_what_is_known():
     assert any("interrupted" in note for note in caught.value.solution.notes)
 
 
+def test_one_variant_tells_of_no_other():
+    """Where one alone of the variants has a number: that one, its seeds' error, any other key."""
+
+    class Once(Drawn):
+        def seeds(self, points, count):
+            values = np.full_like(super().seeds(points, count), np.nan)
+            values[2, :, 0], self.place = np.arange(count), points[2]
+            return values
+
+    once = Once(lambda a: (a,), [1.0], 0.0, 0)
+    found = search(once, Wishes(limits=((0, 0.0),)), (A,), 4, 8, 0)
+    assert found.at == pytest.approx(once.place)
+    assert found.error.tolist() == [20.0]
+    assert found.quantities == [(1.5, pytest.approx(np.std(range(4), ddof=1) / 2.0))]
+
+
 @pytest.mark.parametrize(("options", "said"), [
     (["--subject-to", "arrival.share=1"], "QUANTITY>=VALUE"),
     (["--subject-to", "arrival.shar>=1"], "did you mean arrival.share"),

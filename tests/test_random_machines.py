@@ -36,7 +36,10 @@ def test_what_swings_by_itself_does_so_in_both_engines(seed):
 
 
 def drawn(seed):
-    """A ball that falls on to a surface that moves, or hangs, with or without a joint."""
+    """A ball that falls on to a surface that moves, or hangs, with or without a joint.
+
+    One in three is a polygon of up to twenty faces, each of which is a body of its own there.
+    """
     random = np.random.default_rng(seed)
     half = random.uniform(0.06, 0.12) * np.array(
         [np.cos(a := random.uniform(-0.6, 0.6)), np.sin(a)]
@@ -79,6 +82,12 @@ def drawn(seed):
     if "hinge" in motion or kind:
         # Chipmunk finds blows with friction and joints in turn, not by Newton's and Coulomb's laws.
         board["friction"] = floor["friction"] = 0.0
+    if random.random() < 1 / 3 and "travel" not in motion:
+        count = int(random.integers(3, 21))
+        turns = np.arange(count + 1) % count * (2.0 * np.pi / count) + random.uniform(0.0, 1.0)
+        far = random.uniform(0.4, 0.6, count)[np.arange(count + 1) % count] * np.hypot(*half)
+        del board["from"], board["to"]
+        board["points"] = (far * np.array([np.cos(turns), np.sin(turns)])).T.tolist()
     return scene
 
 

@@ -61,6 +61,12 @@ PARTS: Final = (
           shake={"by": [0.0, 0.003], "frequency": 15.0}),
     _part("pusher", "T", "surface", "points points travel.to", "travel.at travel.in friction",
           "travel", travel={"at": 0.5, "in": 1.0}),
+    _part("trigger", "Q", "surface", "points points touched", "opens_when restitution friction",
+          "opens_when"),
+    _part("string", "N", "string", "tie ball", "length particle from"),
+    _part("rod", "X", "rod", "tie ball", "particle other from"),
+    _part("spring", "W", "spring", "tie ball", "stiffness damper length"),
+    _part("pin", "I", "pin", "pin", "particle other from"),
     _part("sensor", "S", "sensor", "from to", "name from to"),
 )  # fmt: skip
 """What can be added to a machine, a row each: its word, the key that begins it, its table, the key

@@ -98,7 +98,10 @@ THIN: Final = 1e-3
 
 
 def field(recording: Recording, found: Fields, name: str) -> Picture:
-    """Draw a field in colours on the machine, with its bar; empty where next to nothing is."""
+    """Draw a field in colours on the machine, with its bar; empty where next to nothing is.
+
+    The bar is of what the picture shows.
+    """
     figure = Picture((11.0, 7.0))
     figure.headline(0.04, 0.955, recording.title)
     figure.remark(0.04, 0.925, fill(found.note, 130), fontsize=style.SMALL)
@@ -106,7 +109,11 @@ def field(recording: Recording, found: Fields, name: str) -> Picture:
     draw_scene(ax, recording.machine, window_of(recording))
     edges = [np.append(one - 0.5 * found.cell, one[-1] + 0.5 * found.cell)
              for one in (found.x, found.y)]  # fmt: skip
-    thin = found.density < THIN * found.density.max()
+    inside = [
+        (one > low - 0.5 * found.cell) & (one < high + 0.5 * found.cell)
+        for one, (low, high) in ((found.x, ax.get_xlim()), (found.y, ax.get_ylim()))
+    ]
+    thin = (found.density < THIN * found.density.max()) | ~np.logical_and.outer(*inside)
     values = np.ma.masked_invalid(np.where(thin, np.nan, found[name])).T
     signed = bool(values.count()) and values.min() < 0.0 < values.max()
     reach = float(np.abs(values).max()) if signed else None

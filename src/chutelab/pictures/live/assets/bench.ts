@@ -1,7 +1,12 @@
 // What is done on the picture itself: look around, choose, move, draw, copy and delete.
 
 import { mayDraw } from "./controls.ts";
-import { endsOf, rowsNamed, surfaceAt, withCopies, withPart, type Part } from "./edit.ts";
+import { isJoint } from "./checks.ts";
+import {
+  endsOf, rowsNamed, surfaceAt, withCopies, withJoint, withPart, withTrigger,
+  type Part,
+} from "./edit.ts";
+import { linesOfJoints, namesOfJoints, pinsOf } from "./joints.ts";
 import { pointsOf } from "./callout.ts";
 import { bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
 import { html, iconButton } from "./panels.ts";
@@ -23,8 +28,8 @@ const HOLD = 450;
 
 const distance = ([x, y]: Place, [u, v]: Place) => Math.hypot(u - x, v - y);
 
-/** How far from a line, or from a ball, it can be clicked, pixels. */
-const CLICK_REACH = 14, BALL_REACH = 22;
+/** How far from a line, from a ball, or from a pin it can be clicked, pixels. */
+const CLICK_REACH = 14, BALL_REACH = 22, PIN_REACH = 7;
 
 /** Balls that can be clicked while they move; more are a crowd. */
 const MOST_BALLS = 100;
@@ -51,8 +56,9 @@ const ASIDE = [28, 28];
 
 /** Where a part has its points if no pointer sets them, in sizes of things that are new. */
 const EXAMPLES: Record<string, Place[]> = {
-  from: [[-0.2, 0], [0.2, 0]], points: [[-0.2, 0.06], [0.2, -0.06]],
+  from: [[-0.2, 0], [0.2, 0]], points: [[-0.2, 0.06], [0.2, -0.06], [0, -0.15]],
   arc: [[-0.2, 0], [0.2, 0], [0, -0.12]], at: [[-0.05, 0], [0.1, 0]], center: [[-0.25, 0.1]],
+  tie: [[0, 0.15], [0.12, -0.05]],
 };
 
 class Bench {
@@ -337,11 +343,16 @@ class Bench {
   /** Which particle is at a place, px; -1 if none is. */
   ballAt(at: Place) {
     const { machine, recording, t } = this.lab, { scale } = this.stage.view;
-    return machine?.releases.findIndex((_, i) => {
+    const { view } = this.stage;
+    let least = Infinity, nearest = -1;
+    machine?.releases.forEach((_, i) => {
       const state = recording?.tracks[i]?.state(t);
-      return state && !state.ended
-        && this.isNear(at, state.x, state.y, (machine.radius[i] ?? 0) * scale);
-    }) ?? -1;
+      if (!state || state.ended) return;
+      const far = Math.hypot(view.px(state.x) - at[0], view.py(state.y) - at[1]);
+      if (far >= Math.max((machine.radius[i] ?? 0) * scale, BALL_REACH) || far >= least) return;
+      [least, nearest] = [far, i];
+    });
+    return nearest;
   }
 
   /** What is at a place, px: a ball, where it starts or is now, or a surface. */
@@ -350,9 +361,13 @@ class Bench {
     if (!machine) return "";
     const start = handles.find(({ what, x, y }) => what === "release" && this.isNear(at, x, y, 0));
     if (start) return start.surface;
-    const ball = this.ballAt(at);
+    const ball = this.ballAt(at), { recording, t } = this.lab;
+    const pin = recording && pinsOf(recording, t).find(({ at: [x, y] }) =>
+      Math.hypot(view.px(x) - px, view.py(y) - py) < PIN_REACH);
+    if (pin) return pin.name;
     const name = surfaceAt(this.stage.posed ?? machine, view.worldX(px), view.worldY(py),
-      CLICK_REACH / view.scale, this.lab.scene?.sensor);
+      CLICK_REACH / view.scale,
+      (this.lab.scene?.sensor ?? []).concat(recording ? linesOfJoints(recording, t) : []));
     const few = machine.releases.length < MOST_BALLS;
     return ball >= 0 && few ? machine.streams[machine.releases[ball].stream] : name;
   }
@@ -439,6 +454,8 @@ class Bench {
   /** The place that is meant, m. @param at pixels */
   meant(at: Place, loose: boolean) {
     const { stage, lab, mode } = this, { view } = stage;
+    const ball = mode && isJoint(mode.table) ? lab.machine?.releases[this.ballAt(at)] : undefined;
+    if (ball) return { at: [ball.x, ball.y] as Place, caught: true };
     if (loose || !lab.machine) {
       const [x, y] = [view.worldX(at[0]), view.worldY(at[1])];
       return { at: [roundTo(x, view.snap), roundTo(y, view.snap)] as Place, caught: false };
@@ -512,8 +529,12 @@ class Bench {
     const { lab } = this, { given, machine } = lab;
     if (!given) return;
     const start = machine?.interact ? roundTo(Math.max(0, lab.t), 1e-3) : 0;
-    const changed = withPart(given, part, points, this.stage.view.unit, this.material, start,
-      lab.data.tables[part.table]);
+    const { unit, scale } = this.stage.view, { parts, tables } = lab.data;
+    const reach = CLICK_REACH / scale, [ball] = parts.filter((one: Part) => one.part === "ball");
+    const changed = isJoint(part.table)
+      ? withJoint(given, part, points, unit, this.material, machine, ball, reach)
+      : part.part === "trigger" ? withTrigger(given, part, points, unit, machine, reach)
+      : withPart(given, part, points, unit, this.material, start, tables[part.table]);
     lab.asked = "";
     // What is shown stays as it is while a machine grows.
     this.stage.fitted = this.stage.moved = true;
@@ -521,7 +542,8 @@ class Bench {
     this.sketch();
     if (lab.fault) return;
     const rows = changed[part.table];
-    this.made = part.table === "incoming" ? "incoming" : rows[rows.length - 1].name;
+    this.made = part.table === "incoming" ? "incoming"
+      : rows.at(-1).name ?? `${part.table} ${rows.length}`;
     if (!this.mode) this.inspector.choose(this.made);
   }
 
@@ -559,7 +581,7 @@ class Bench {
       const [a, b, c] = pixels;
       const turn = c && (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
       let path = `M${a}L${b}`;
-      if (c && Math.abs(turn) > 1) {
+      if (mode.places[0] === "arc" && c && Math.abs(turn) > 1) {
         const radius = (distance(a, b) * distance(b, c) * distance(a, c)) / (2 * Math.abs(turn));
         const wide = (a[0] - c[0]) * (b[0] - c[0]) + (a[1] - c[1]) * (b[1] - c[1]) > 0 ? 1 : 0;
         path = `M${a}A${radius} ${radius} 0 ${wide} ${turn > 0 ? 0 : 1} ${b}`;
@@ -626,7 +648,8 @@ class Bench {
   /** Choose all that has a name of its own. */
   all() {
     const { machine } = this.lab;
-    const names = [...machine?.surfaces ?? [], ...machine?.streams ?? []];
+    const names = [...machine?.surfaces ?? [], ...machine?.streams ?? [],
+      ...(machine ? namesOfJoints(machine) : [])];
     this.inspector.choose(...names.filter(this.movable));
   }
 }

@@ -13,6 +13,8 @@ type Wrong = [string, unknown, string, Record<string, number | string>?];
 /** Tables of joints, in Python's order. */
 export const JOINTS = ["string", "rod", "spring", "pin"] as const;
 
+export const isJoint = (table: string) => (JOINTS as readonly string[]).includes(table);
+
 /** Tables that are always lists, and those that may be one. */
 const LISTS = ["material", "pair", "conveyor", "surface", "sensor", ...JOINTS];
 const EITHER = ["particle", "plate", "stream"];

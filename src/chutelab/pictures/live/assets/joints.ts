@@ -28,6 +28,23 @@ export function endsOfJoint({ particle, other, from }: Tied, { tracks }: Recordi
   return begin && end ? [begin, [end.x, end.y] as Point] as const : null;
 }
 
+/** Joints as lines at a time, s, but for pins. */
+export function linesOfJoints(recording: Recording, t: number) {
+  const names = namesOfJoints(recording.machine);
+  return recording.machine.joints.flatMap((joint, n) => {
+    const ends = joint.kind === "pin" ? null : endsOfJoint(joint, recording, t);
+    const isLine = ends && Math.hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]) > 0;
+    return isLine ? [{ name: names[n], from: ends[0], to: ends[1] }] : [];
+  });
+}
+
+/** Pins with their names at a time, s and m. */
+export function pinsOf(recording: Recording, t: number) {
+  const names = namesOfJoints(recording.machine);
+  return recording.machine.joints.flatMap((joint, n) =>
+    (joint.kind === "pin" ? [{ name: names[n], at: pinAt(joint, recording, t) }] : []));
+}
+
 /** Where a pin is at a time, m: it turns with its particle. */
 function pinAt({ particle, from }: Tied, { tracks, machine }: Recording, t: number): Point {
   const state = tracks[particle].state(t), [x, y] = from as Point;
@@ -82,8 +99,8 @@ export function paintPins(
   context.strokeStyle = colour;
   context.lineWidth = THIN;
   context.beginPath();
-  for (const joint of recording.machine.joints.filter(({ kind }) => kind === "pin")) {
-    const [u, v] = pinAt(joint, recording, t), x = view.px(u), y = view.py(v);
+  for (const { at } of pinsOf(recording, t)) {
+    const x = view.px(at[0]), y = view.py(at[1]);
     context.moveTo(x + PIN, y);
     context.arc(x, y, PIN, 0, 2 * Math.PI);
     context.moveTo(x - PIN, y);

@@ -2,6 +2,7 @@
 
 import { runOf } from "./breaches.ts";
 import { roundUp } from "./chart.ts";
+import { retied } from "./edit.ts";
 import { indexed, withValues } from "./keys.ts";
 import { PASSES, build, type Machine } from "./machine.ts";
 import { Recording } from "./recording.ts";
@@ -241,7 +242,9 @@ class Lab {
   /** Change values of the scene, by key. While something is dragged they are no step of undo
    * yet. */
   change(values: Record<string, unknown>, { done = true }: { done?: boolean } = {}) {
-    this.replace(withValues(this.given as Given, values), { done });
+    const given = this.given as Given, changed = withValues(given, values);
+    const counts = Object.keys(values).some((key) => /^stream.*count$/.test(key));
+    this.replace(counts ? retied(given, changed) : changed, { done });
   }
 
   replace(given: Given, { done = true }: { done?: boolean } = {}) {

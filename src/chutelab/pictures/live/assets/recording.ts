@@ -184,7 +184,7 @@ class Track {
   /** Its velocity there. */
   paceOn(i: number, place: number, pace: number, h: number, s: number) {
     const va = this.at(i, pace), vb = this.at(i + 1, pace);
-    const slope = (this.at(i + 1, place) - this.at(i, place)) / h;
+    const slope = h > 0 ? (this.at(i + 1, place) - this.at(i, place)) / h : vb;
     return va + s * (2 * (3 * slope - 2 * va - vb) + 3 * s * (va + vb - 2 * slope));
   }
 

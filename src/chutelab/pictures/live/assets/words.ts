@@ -30,7 +30,7 @@ class Words {
   /** A surface or stream by its name: ours are translated, a scene's own stand as they are. */
   name(name: string) {
     const [, stem, number] = /^([a-z]+)(\d+)$/.exec(name)
-      ?? /^(material|pair) (.*)$/.exec(name) ?? [];
+      ?? /^(material|pair|string|rod|spring|pin) (.*)$/.exec(name) ?? [];
     const part = this.catalogue[`part-${stem}`];
     return this.catalogue[`name-${name}`] ?? (part ? `${part} ${number}` : name);
   }

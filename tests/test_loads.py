@@ -2,6 +2,7 @@
 
 import csv
 import json
+import tracemalloc
 from itertools import pairwise
 from math import cos, radians, sin
 
@@ -15,6 +16,7 @@ from chutelab.checks.agreement import verify
 from chutelab.checks.stress import Evidence
 from chutelab.cli import main
 from chutelab.results import Recording
+from chutelab.results.loads import Bins
 from chutelab.scene import SceneError
 from chutelab.util.errors import InputError
 
@@ -266,6 +268,13 @@ def test_bins_are_summed_stored_and_refused(tmp_path):
     assert run.measure("loads.plate.torque.rms") > 0.0
     with pytest.raises(InputError, match=r"every = 0\.015: 0\.01 s, or a multiple of it"):
         run.loads("outgoing", every=0.015)
+    # A width that is a whole number of bins but for rounding is one.
+    for off, whole in ((2e-10, True), (5e-8, False)):
+        if whole:
+            assert run.loads("outgoing", every=0.05 * (1.0 + off)).normal == pytest.approx(sums)
+        else:
+            with pytest.raises(InputError, match="multiple"):
+                run.loads("outgoing", every=0.05 * (1.0 + off))
     with pytest.raises(InputError, match="outgoing"):
         run.loads("outgoin")
     with pytest.raises(InputError, match=r"such as 0\.01 s"):
@@ -276,6 +285,18 @@ def test_bins_are_summed_stored_and_refused(tmp_path):
     with pytest.raises(SceneError, match=r"it needs run\.loads"):
         chutelab.load("two-sizes", {"expect": [expect]})
     chutelab.load("two-sizes", {"expect": [expect], "run.loads": 0.01})
+
+
+def test_what_is_counted_is_summed_up_as_it_comes():
+    """A run of many steps needs no more memory for its loads than its bins."""
+    bins = Bins(chutelab.simulate("perpendicular", loads=0.01).machine)
+    ahead = np.array([0.0, 1.0])
+    tracemalloc.start()
+    for n in range(4000):
+        bins.bear(0, 1e-6 * n, 1e-6 * (n + 1), ahead, ahead, ahead)
+    assert tracemalloc.get_traced_memory()[1] < 6e5
+    tracemalloc.stop()
+    assert bins.counted()["normal"].sum() == pytest.approx(4000)
 
 
 def test_command_writes_table_and_picture(tmp_path):

@@ -22,4 +22,7 @@ swift = np.sqrt(spring / inertia - decay**2)
 fig, ax = plt.subplots()
 ax.plot(after, np.degrees(angle), lw=4, color="0.8")
 ax.plot(after, np.degrees(rate / swift * np.exp(-decay * after) * np.sin(swift * after)), "--")
-ax.set(xlabel="t, s", ylabel="θ, °")
+_ = ax.set(xlabel="t, s", ylabel="θ, °")
+
+# %% 4
+run.ledger

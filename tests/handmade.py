@@ -150,6 +150,7 @@ def machine_of(*pieces, at=((0.0, 1.0),), stream=(), radius=0.004, **more):
         every = {key: np.array([float(getattr(one, key)) for one in of])
                  for key in ("speed", "appears", "vanishes")}  # fmt: skip
         every |= {key: np.full(len(of), 0.5) for key in ("restitution", "friction")}
+        every["one_sided"] = np.zeros(len(of), np.int64)
         return every | {"surface": np.array([names.index(one.name) for one in of], np.int64)}
 
     start, end = (np.array([getattr(one, key) for one in lines], float).reshape(-1, 2)

@@ -121,7 +121,10 @@ def bent(machine, *arcs):
     Each is a mapping of center, radius, begin and extent, and maybe name, speed, restitution,
     friction, appears and vanishes.
     """
-    usual = {"speed": 0.0, "restitution": 0.0, "friction": 0.0, "appears": -inf, "vanishes": inf}
+    usual = {
+        "speed": 0.0, "restitution": 0.0, "friction": 0.0, "appears": -inf, "vanishes": inf,
+        "one_sided": 0,
+    }  # fmt: skip
     rows = [{"name": f"arc {n}", **usual, **arc} for n, arc in enumerate(arcs)]
     names = tuple(dict.fromkeys([*machine.surfaces, *(row.pop("name") for row in rows)]))
     owner = [names.index(arc.get("name", f"arc {n}")) for n, arc in enumerate(arcs)]

@@ -105,6 +105,7 @@ def test_what_there_is_no_time_for_is_left_out():
     assert all(row.error is row.first is row.median is None for row in rows)
 
 
+@pytest.mark.slow
 def test_a_crowd_is_judged_as_a_whole_and_exact_cannot_run_it():
     scene = load("stream", ["stream.count=3", "run.until=landed"])
     rows = measure(scene, steps=(1e-3,), repeats=0)
@@ -135,6 +136,7 @@ ABOUT = {"processor": "Some Long Processor Name 9000, 128 cores", "system": "Lin
          "wasmtime": "50.0.1", "scipy": "1.17.1"}  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_picture_shows_every_engine_and_failure(tmp_path):
     figure = draw(ROWS, "A scene", ABOUT)
     figure.write(tmp_path / "a.png")

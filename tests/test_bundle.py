@@ -74,6 +74,7 @@ def test_the_bundle_of_all_lessons_is_whole_and_small(tmp_path):
     assert size < 2_000_000 + 1_300_000 * len(lessons())
 
 
+@pytest.mark.slow
 def test_a_bundle_brings_the_tool_and_says_how_to_install_it(web, tmp_path):
     (wheel,) = web.glob("*.whl")
     index = (web / "index.html").read_text(encoding="utf-8")
@@ -104,7 +105,8 @@ def test_a_bundle_without_the_wheel_says_nothing_of_it(tmp_path):
         assert "#get" not in page.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("scheme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_pages_of_a_bundle_can_be_read_by_everybody(web, opened, scheme):
     for name in ("index.html", "02-letting-go/index.html"):
         page = opened(web / name, color_scheme=scheme)
@@ -147,6 +149,7 @@ def test_worksheets_cannot_smuggle_html_in():
         assert "<img" not in html_of(f"![x]({address})")
 
 
+@pytest.mark.slow
 def test_a_bundle_works_from_a_file_in_a_browser(web, opened):
     page = opened(web / "index.html", viewport={"width": 360, "height": 740})
     page.click("text=When does it let go?")

@@ -140,6 +140,7 @@ def verdict(seed):
     return ("chaotic", f"from {finish:.3g} s on") if len(parted) else ("sound", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "seeds", [(*range(15), *ONCE), pytest.param(range(MANY), marks=pytest.mark.slow)]
 )

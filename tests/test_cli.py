@@ -262,6 +262,7 @@ def test_a_run_writes_the_whole_set():
         assert [float(row[key]) for key in ("x", "y", "vx", "vy")] == [*position, *velocity]
 
 
+@pytest.mark.slow
 def test_a_table_of_very_many_events_is_written_if_it_is_asked_for(monkeypatch):
     monkeypatch.setattr("chutelab.cli.running.MOST_EVENTS", 3)  # it has 4
     monkeypatch.setattr(

@@ -51,6 +51,30 @@ def test_a_chain_hangs_while_its_weight_is_less_than_the_force(count):
     assert run.ledger.relative_residual < 1e-11
 
 
+@pytest.mark.parametrize(("bonds", "holds"), [(2.02, True), (1.8, False)])
+@pytest.mark.parametrize(("light", "gravity"), [(0.5, 9.81), (2.0, 3.7)])
+def test_a_bond_number_counts_weights_of_the_lighter_kind(bonds, holds, light, gravity):
+    """F = Bo g min(m, m'): a disk that hangs below one of its weight and more is let go by Bo."""
+    kinds = [("upper", light * M), ("lower", M)]
+    rows = [("upper", "roof", 20.0), ("upper", "lower", bonds * M / min(M, light * M) / 2.0)]
+    run = simulate(sc.from_dict({
+        "gravity": gravity,
+        "particle": [{"name": name, "radius": R, "mass": mass} for name, mass in kinds],
+        "pair": [{"between": [a, b], "bond_number": number} for a, b, number in rows],
+        "surface": [{"name": "roof", "from": [-0.1, 0.0], "to": [0.1, 0.0], "restitution": 0.0}],
+        "stream": [
+            {"name": name, "particle": name, "at": [0.0, -R - 2.0 * R * n],
+             "velocity": [0.0, 0.0], "interact": True}
+            for n, (name, _) in enumerate(kinds)
+        ],
+        "run": {"until": 0.3},
+    }))  # fmt: skip
+    # The lower one weighs M g, and the force is bonds / 2 of that: it holds from bonds = 2 on.
+    upper, lower = run.at([0.3])[0][0][:, 1]
+    assert upper == pytest.approx(-R, abs=1e-3 * R)
+    assert (abs(lower + 3.0 * R) < 1e-3 * R) == holds
+
+
 @pytest.mark.parametrize("angle", [20.0, 40.0, 50.0, 60.0])
 @pytest.mark.parametrize("force", [0.0, 0.05, 0.1])
 def test_friction_is_that_of_weight_and_cohesion(angle, force):

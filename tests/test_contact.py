@@ -232,6 +232,7 @@ def feeder(count=60):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_whose_place_is_taken_waits_for_it():
     # One leaves the place free for the next when it is 2 r away: |v t + g t²/2| = 2 r.
     machine = feeder()

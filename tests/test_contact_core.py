@@ -248,6 +248,7 @@ def started(*caches):
     return [Path(one) for one in kept], results
 
 
+@pytest.mark.slow
 def test_a_compiled_core_that_is_kept_costs_only_time(tmp_path):
     """What is loaded is machine code: a wrong byte in it once ended Python with a crash."""
     (whole,), (result,) = started(tmp_path / "whole")

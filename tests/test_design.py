@@ -346,6 +346,7 @@ def test_bad_questions_are_refused_before_anything_runs(arguments, said, monkeyp
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_files_of_a_solution(tmp_path):
     out = tmp_path / "out"
     result = CliRunner().invoke(main, [*SOLVE, *VARY, *AIM, "--points", "13", "--out", str(out)])
@@ -377,6 +378,7 @@ def test_no_solution_exits_with_1_and_writes_the_nearest(tmp_path):
     assert not (tmp_path / "out" / "solution.toml").exists()
 
 
+@pytest.mark.slow
 def test_scan_shows_pieces_target_and_answer():
     found = design.solve(chutelab.load("inclined-20"), "plate.angle_deg=0:30", "landing.vx=-0.3",
                          points=41)  # fmt: skip
@@ -542,6 +544,7 @@ def propagate(folder, given, *options, code=0):
     return result
 
 
+@pytest.mark.slow
 def test_sweep_writes_samples_and_picture_of_uncertainties(tmp_path):
     out, plot = tmp_path / "samples.csv", tmp_path / "spread.png"
     shown = propagate(tmp_path, "plate.restitution=0.5±0.05", "--out", out, "--plot", plot).stdout

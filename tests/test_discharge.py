@@ -181,7 +181,7 @@ def test_what_has_no_answer_is_refused_by_name(change, key):
 
 def test_side_by_side_with_a_simulated_stream():
     heights = [0.0, -0.5]
-    found = side_by_side("slip", heights)
+    found = side_by_side("slip", [*heights, -5.0])
     assert found.lines["booth"][1] == pytest.approx(found.lines["simulated"][1], abs=2e-6)
     r = found.scene.particle.radius
     half = (found.lines["simulated"][2] - found.lines["simulated"][0]) / 2.0
@@ -228,9 +228,10 @@ def test_command(tmp_path):
     out = tmp_path / "out"
     assert run("slip", "--out", str(out)).exit_code == 0
     assert sorted(path.name for path in out.iterdir()) == ["discharge.json", "discharge.png"]
-    wrong = run("slip", "--heights", "low")
-    assert wrong.exit_code == 2
-    assert "--heights" in wrong.stderr
+    for heights in ("low", "nan", "-0.1,inf", "99", "-1e9"):
+        wrong = run("slip", "--heights", heights)
+        assert wrong.exit_code == 2
+        assert "heights" in wrong.stderr
 
 
 def test_the_numbers_that_lesson_12_gives_are_those_of_the_methods():

@@ -264,7 +264,7 @@ def test_the_theory_is_asked_for_its_own_symbols_only():
         ("[stream]\ncount = 3\ninteract = true\nrate = 20\n", ["contact", "pymunk"],
          {"exact": "contact or pymunk, because stream.interact = true"}),
         (f"[stream]\ncount = {MOST_ALONE + 1}\n", ["exact", "contact"],
-         {"pymunk": f"{MOST_ALONE + 1} particles that do not meet would take it minutes"}),
+         {"pymunk": f"of {MOST_ALONE + 1} particles that do not meet it runs particle 0 alone"}),
     ],
 )  # fmt: skip
 def test_engines_that_are_not_for_a_scene_are_left_out(more, engines, skipped):

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 import chutelab
 from chutelab.cli import main
+from chutelab.pictures.plots.measures import field as picture
 from chutelab.results.fields import NAMES
 from chutelab.results.fields import _Grid as Grid
 from chutelab.util.errors import InputError
@@ -209,6 +210,7 @@ def test_lasting_contacts_and_blows_are_all_that_changes_momentum(bin_of_disks):
     assert np.hypot(*off.T) == pytest.approx(0.0, abs=1e-11 * size.max())
 
 
+@pytest.mark.slow
 def test_stress_at_rest_bears_the_weight_above(bin_of_disks, tmp_path):
     """Smooth walls bear no weight: -∫ σ_yy dx = g ∫∫ ρ above; and they are pressed as σ_xx says."""
     box = ((-0.03, -0.03), (0.13, 0.2))
@@ -242,6 +244,18 @@ def test_what_lasting_contacts_give_is_told_where_it_is_left_out():
     assert "strings" not in found.note
     assert "strings" in chutelab.simulate("cradle", {"run.until": 0.1}).field().note
     assert not found.contact.any()
+
+
+def test_colours_are_of_what_a_picture_shows():
+    """A hopper's grains fall out of the picture, faster than any that is seen."""
+    run = chutelab.simulate("hopper", {"stream.count": 40, "run.until": 1.0})
+    found = run.field(0.6, 1.0)
+    figure = picture(run, found, "speed")
+    (ax, *_), bottom = figure.axes, figure.axes[0].get_ylim()[0]
+    (mesh,) = (one for one in ax.collections if one.get_gid() == "field")
+    dense = found.density > 1e-3 * found.density.max()
+    seen = dense & (found.y > bottom - 0.5 * found.cell)
+    assert mesh.get_clim()[1] == found["speed"][seen].max() < found["speed"][dense].max()
 
 
 def test_command_files_and_refusals(run, tmp_path):

@@ -84,6 +84,7 @@ def text_of(cell):
     return cell.outputs[-1]["data"]["text/plain"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NOTEBOOKS)
 def test_notebooks_run_as_shipped_and_say_not_attempted(name, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(Path(chutelab.__file__).parent.parent))
@@ -161,6 +162,7 @@ def in_own_tmp(tmp_path, monkeypatch):
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_class_is_graded_whatever_comes_back(tmp_path, in_own_tmp):
     files = [
         # Cells renamed, lost and broken: what was checked counts.
@@ -220,6 +222,7 @@ def test_a_class_is_graded_whatever_comes_back(tmp_path, in_own_tmp):
         assert (rows[name].marks, rows[name].out_of) == ((), 0)
 
 
+@pytest.mark.slow
 def test_the_table_marks_working_that_was_shown_and_others_right_answers(tmp_path, monkeypatch):
     monkeypatch.setattr(grading, "run", lambda cells, _: Ran(json.loads(cells[0]), ""))
     monkeypatch.setattr(grading, "_chance", lambda *_: (0.01, True))
@@ -429,6 +432,7 @@ def test_rows_are_on_the_disk_as_they_come_and_a_full_one_tears_none(tmp_path):
     assert write_csv([row], path).read_bytes().decode() == written
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sent", "code"),
     [

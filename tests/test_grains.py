@@ -46,6 +46,7 @@ def flow(recording):
     return 0.5 * recording.count / (last - first)
 
 
+@pytest.mark.slow
 def test_the_summary_says_when_quarters_fell_out(tmp_path):
     told = ["run", str(find(10).folder / "slot.toml"), "--set", "stream.count=60"]
     told += ["--out", str(tmp_path), "--only", "npz"]

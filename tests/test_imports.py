@@ -84,6 +84,7 @@ def test_a_command_loads_what_it_needs_and_nothing_else(chain, tmp_path):
     assert dict(zip(chain, found, strict=True)) == chain
 
 
+@pytest.mark.slow
 def test_pictures_load_no_engine_and_no_pyplot(tmp_path):
     (loaded,) = loaded_by("run perpendicular -q --out out --only png,gif", cwd=tmp_path)
     assert "matplotlib" in loaded

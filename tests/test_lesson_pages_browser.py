@@ -22,13 +22,13 @@ from shared import find, lessons
 expect = pytest.importorskip("playwright.sync_api").expect
 
 WAYS = [("mouse", "odd"), ("touch", "wrong"), ("keyboard", "right")]
-QUICK = ("landing", "touch"), ("the-bounce", "keyboard")
+QUICK = ("landing", "touch")
 PLAYED = [
-    pytest.param(one.name, *way, marks=() if (one.name, way[0]) in QUICK else pytest.mark.slow)
+    pytest.param(one.name, *way, marks=() if (one.name, way[0]) == QUICK else pytest.mark.slow)
     for one in lessons()
     for way in WAYS
 ]
-"""Each lesson in each way; all but two are slow, and the mouse, which most other tests use."""
+"""Each lesson in each way; all but one are slow, and the mouse, which most other tests use."""
 
 DESK, PHONE = (1366, 768), (390, 844)
 
@@ -212,6 +212,7 @@ def exercise_answers(name):
     return [one.right for one in draw(EXERCISES[name], "Ada")[1]]
 
 
+@pytest.mark.slow
 def test_on_the_projector_hands_are_counted_and_the_run_is_shown(page_of):
     page = page_of("the-parabola", size=(1920, 1080))
     page.locator("#begin").click()
@@ -271,6 +272,7 @@ def test_what_was_done_is_kept_for_its_pupil_only(page_of):
     assert page.evaluate("chutelab.lesson.kept") == kept
 
 
+@pytest.mark.slow
 def test_odd_things_that_were_kept_are_left_out(page_of):
     page = page_of("the-bounce")
     for odd in (
@@ -290,6 +292,7 @@ def test_odd_things_that_were_kept_are_left_out(page_of):
         assert step_of(page) == 0
 
 
+@pytest.mark.slow
 def test_a_number_in_the_text_is_dragged_typed_and_moved_by_keys(page_of):
     page = page_of("the-bounce")
     page.click("#begin")
@@ -329,6 +332,7 @@ def test_a_number_in_the_text_is_dragged_typed_and_moved_by_keys(page_of):
     assert value() == 0.7
 
 
+@pytest.mark.slow
 def test_the_table_is_a_file_for_spreadsheets(page_of):
     page = page_of("the-bounce", "de")
     page.click("#begin")
@@ -346,6 +350,7 @@ def test_the_table_is_a_file_for_spreadsheets(page_of):
     assert re.fullmatch(r"-2,91\d+", first.split(";")[2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("language", "scheme", "size"),
     [
@@ -393,6 +398,7 @@ def test_nothing_but_the_page_itself_is_allowed(page_of, tmp_path):
     assert "unsafe-eval" not in policy.replace("wasm-unsafe-eval", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "language"),
     [

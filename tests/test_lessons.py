@@ -262,6 +262,7 @@ def test_a_picture_is_built_again_when_what_it_shows_has_changed(copied, file, o
     assert build(read(copied)).made is made
 
 
+@pytest.mark.slow
 def test_a_picture_without_a_stamp_or_a_broken_one_is_built_again(copied):
     picture = copied / "lesson.gif"
     whole = picture.read_bytes()
@@ -307,6 +308,7 @@ def test_a_film_has_the_machine_beside_it_and_the_split_if_wanted(copied):
     assert (copied / "split.png").is_file()
 
 
+@pytest.mark.slow
 def test_build_of_the_command_line_writes_elsewhere_too(copied, tmp_path):
     out = tmp_path / "out"
     first = chutelab("lesson", "build", copied, "--out", out)

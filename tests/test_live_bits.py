@@ -109,9 +109,6 @@ def test_a_page_refuses_what_is_no_disk_by_its_key():
         with pytest.raises(SceneError) as caught:
             describe(from_dict({**THROWN, "particle": table}))
         assert [fault.key for fault in caught.value.faults] == [key]
-    for table, more in (("string", {}), ("rod", {}), ("spring", {"stiffness": 9.0}), ("pin", {})):
-        with pytest.raises(SceneError, match=table):
-            describe(from_dict({**THROWN, table: [{"from": [0.0, 2.0]} | more]}))
 
 
 def test_a_belt_below_the_impact_is_told_from_the_top():
@@ -343,7 +340,11 @@ def test_what_is_taken_from_an_address_is_refused_where_python_refuses_it(count)
     kinds = [{"name": "a"}, {"name": "b"}]
     two = [{**THROWN["stream"], "particle": name, "interact": True} for name in "ab"]
     two[1]["at"] = [0.5, 1.0]
-    pairs = [{"between": ["a", "b"], "meet": False}, {"between": ["a", "wall"], "cohesion": 0.1}]
+    pairs = [
+        {"between": ["a", "b"], "meet": False},
+        {"between": ["a", "wall"], "cohesion": 0.1},
+        {"between": ["b", "wall"], "bond_number": 1.7},
+    ]
     crowd = {**moving, "particle": kinds, "stream": two, "pair": pairs}
     seeds += [
         {**crowd, "surface": [WALL, {**lid, f"{doing}_when": {"touched": "wall"}, **keys}]}

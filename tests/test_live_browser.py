@@ -124,6 +124,7 @@ def test_axe_finds_nothing(shown, name, size, scheme):
     assert axe(page) == []
 
 
+@pytest.mark.slow
 def test_the_whole_page_can_be_walked_through_by_keyboard(shown):
     page = shown("perpendicular")
     seen = []

@@ -71,6 +71,7 @@ def test_without_a_file_it_opens_the_page_in_the_browser_and_says_where_it_is(tm
     assert data_of(page)["scene"]["title"] == "Perpendicular damping plate, 2 m/s"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have browsers of their own")
 def test_without_a_browser_it_says_so_and_where_the_page_is(tmp_path):
     result = shown(tmp_path, PATH=str(tmp_path), BROWSER="", DISPLAY="", WAYLAND_DISPLAY="")

@@ -71,8 +71,8 @@ def same_runs(scenes):
         assert [event["t"] for event in answer["events"]] == events["t"].tolist(), given
         assert [event["kind"] for event in answer["events"]] == events["kind"].tolist(), given
         states = job.module.array("swings", module.dtype("Swing"), job.module.world.swing_count)
-        swings = np.array(answer["swings"]).reshape(-1, 4)
-        for n, name in enumerate(("t", "angle", "rate", "surface")):
+        swings = np.array(answer["swings"]).reshape(-1, 7)
+        for n, name in ((0, "t"), (1, "angle"), (2, "rate"), (6, "surface")):
             assert np.array_equal(swings[:, n], states[name]), given
         swung += len(states)
         triggers = job.module.array(
@@ -101,10 +101,41 @@ def test_what_moves_does_so_as_in_python():
     arc = {"name": "bowl", "center": [0.0, 0.2], "radius": 0.2, "from_deg": 200, "to_deg": 340}
     scenes = [
         from_dict({**base, "surface": [{**shape, **keys}]})
-        for base, shape in ((BALL, LINE), (crowd, arc)) for keys in MOVING
+        for base, shape in ((BALL, LINE), (crowd, arc))
+        for keys in MOVING
+    ]
+    scenes += [
+        from_dict({**crowd, "surface": [{**shape, "passes": passes, **keys}]})
+        for shape, ways in ((LINE, ("up", "down")), (arc, ("in", "out")))
+        for passes, keys in zip(ways, MOVING[:2], strict=True)
     ]  # fmt: skip
     tilted = from_dict({**crowd, "gravity_deg": 55.0, "surface": [{**LINE, **HANGS}]})
     assert same_runs([tilted, load("see-saw"), load("damper-plate"), *scenes]) > 1000
+
+
+def test_what_hangs_on_joints_moves_as_in_python():
+    pair = {"fill": [[-0.1, 0.2], [0.1, 0.28]], "count": 6, "interact": True}
+    crowd = {**BALL, "particle": {"radius": 0.008, "spin": True}, "stream": pair, "surface": [LINE]}
+    above = {"from": [-0.2, 0.5]}
+    apart = [{"particle": 1, "other": 4}, {"particle": 2, **above}]
+    soft = {"stiffness": 4.0, "damper": 0.02, "length": 0.1}
+    scenes = [from_dict({**crowd, table: apart}) for table in ("string", "rod")]
+    scenes.append(from_dict({**crowd, "spring": [{**one, **soft} for one in apart]}))
+    long = [{**above, "length": 0.6}]
+    pins = [{"from": [0.0, 0.24], "particle": 0}, {"from": [0.1, 0.2], "particle": 3, "other": 5}]
+    scenes += [from_dict({**crowd, "pin": pins}), from_dict({**BALL, "string": long})]
+    same_runs([load("cradle"), *scenes])
+    lab = describe(load("perpendicular"))
+    for table, row, key in (
+        ("string", {**above, "length": 0.01}, "string[0].length"),
+        ("rod", {**above, "particle": 1}, "rod[0].particle"),
+        ("pin", {**above, "other": 0}, "pin[0].other"),
+        ("rod", {**above, "other": 0}, "rod[0].other"),
+        ("string", {}, "string[0].from"),
+        ("spring", above, "spring[0].stiffness"),
+    ):
+        answer = ask("bits.mjs", {"lab": lab, "scenes": [{**BALL, table: [row]}]})["scenes"][0]
+        assert answer["fault"]["key"] == key, table
 
 
 def test_what_waits_for_a_touch_acts_as_in_python():

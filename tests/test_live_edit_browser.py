@@ -44,6 +44,7 @@ def world(page, x, y):
     )
 
 
+@pytest.mark.slow
 def test_on_a_phone_buttons_beside_a_value_step_it_within_its_range(shown):
     phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
     page = shown("inclined-40", ["plate.restitution=0.985"], **phone)
@@ -185,6 +186,7 @@ def test_a_tool_stays_and_what_it_drew_is_chosen_moved_copied_and_deleted(shown)
     assert value(page, "surface") is None
 
 
+@pytest.mark.slow
 def test_a_tile_is_dragged_into_the_picture(shown):
     page = shown()
     page.click("#tool-add")
@@ -200,6 +202,7 @@ def test_a_tile_is_dragged_into_the_picture(shown):
     expect(page.locator("#parts")).to_be_hidden()
 
 
+@pytest.mark.slow
 def test_all_of_that_goes_with_the_keyboard_alone(shown):
     page = shown()
     for _ in range(80):
@@ -248,6 +251,7 @@ def test_all_of_that_goes_with_the_keyboard_alone(shown):
     assert page.evaluate("chutelab.lab.t") == 0.0
 
 
+@pytest.mark.slow
 def test_the_picture_is_moved_and_zoomed_about_the_place_that_is_held(shown):
     page = shown(has_touch=True)
     here = spot(page, 0.15, 0.25)
@@ -278,6 +282,7 @@ def landing_of(scene):
     return chutelab.simulate(scene).select(Kind.LANDING)[0]["position"][0]
 
 
+@pytest.mark.slow
 def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(shown):
     page = shown("inclined-40", more=PREDICT)
     hidden = ("#numbers", "#energy", "#curves", ".tools", ".symbols")
@@ -388,6 +393,7 @@ def saved(page, name):
     return waiting.value.suggested_filename, waiting.value.path().read_bytes()
 
 
+@pytest.mark.slow
 def test_scene_tables_and_picture_are_saved(shown):
     page = shown(language="de")
     page.evaluate("chutelab.lab.change({ 'plate.angle_deg': 33.5, 'incoming.speed': 1.75 })")
@@ -416,6 +422,7 @@ def test_scene_tables_and_picture_are_saved(shown):
         assert np.mean(np.abs(image - np.array(colour)).max(axis=-1) < 30) > 5e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own_file", [True, False])
 def test_in_a_frame_that_is_hidden_at_first_it_draws_once_it_is_seen_and_tells_changes(
     opened, tmp_path, own_file
@@ -480,6 +487,7 @@ def test_picture_and_play_are_seen_together_and_fingers_hit(shown, size, scheme)
     assert (image[2, 2].mean() > 200.0) == (scheme == "light")
 
 
+@pytest.mark.slow
 def test_it_is_printed_on_one_sheet_dark_or_not(shown):
     page = shown(color_scheme="dark")
     pdf = page.pdf(format="A4")
@@ -492,6 +500,7 @@ def test_it_is_printed_on_one_sheet_dark_or_not(shown):
     assert np.median(image) > 250
 
 
+@pytest.mark.slow
 def test_particles_that_were_dropped_are_taken_back_and_dropped_again(shown):
     """While a crowd runs: no track or event is left of one that is not there any more."""
     page = shown("stream", ["stream.count=30"])
@@ -539,12 +548,15 @@ def test_particles_that_were_dropped_are_taken_back_and_dropped_again(shown):
 @pytest.mark.parametrize(
     ("damage", "place", "said"),
     [
-        (lambda page, at: page[: at + 2000] + "AAAAAAAA" + page[at + 2008 :], "#fault", "engine"),
+        pytest.param(
+            lambda page, at: page[: at + 2000] + "AAAAAAAA" + page[at + 2008 :],
+            "#fault", "engine", marks=pytest.mark.slow,
+        ),
         (lambda page, at: page[: at + 2000] + "!!" + page[at + 2002 :], "#fault", "engine"),
         (lambda page, at: page[: at + 4000], "#broken", "This page does not start"),
     ],
     ids=["core", "no base64", "half a file"],
-)
+)  # fmt: skip
 def test_a_damaged_page_says_so(browser, tmp_path, damage, place, said):
     page = html(load("perpendicular"))
     (tmp_path / "page.html").write_text(damage(page, page.index('"wasm":"')), encoding="utf-8")

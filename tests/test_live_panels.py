@@ -29,6 +29,7 @@ SCENES = [
     ("perpendicular",), ("inclined-20", "plate.angle_deg=-10"), ("inclined-40",), ("slip",),
     ("low-speed",), ("belt-landing",), ("spoon",), (str(THROW),),
     ("stream-independent", "stream.count=50"), ("stream", "stream.count=40"),
+    ("damper-plate", "run.until=1.5"), ("see-saw", "run.until=1.5"), ("flap-gate",),
 ]  # fmt: skip
 
 
@@ -59,6 +60,55 @@ def test_both_bars_are_equally_long_at_any_time(runs, name):
         # Energy by its definition, whatever was put in.
         assert at["kinetic"] >= 0.0
         assert at["potential"] >= -1e-12
+
+
+def test_with_joints_the_ledger_closes_at_any_time():
+    """Springs keep 1/2 k (l - l0)², dampers take c ∫ l'² dt; nothing that is lost is negative."""
+    k, c, rest = 20.0, 0.3, 0.2
+    ball = {"velocity": [0.0, 0.0], "interact": True}
+    scene = from_dict({
+        "particle": {"radius": 0.02, "mass": 0.1}, "gravity_deg": 20.0, "run": {"until": 1.5},
+        "stream": [{**ball, "at": [0.3, 0.0]}, {**ball, "at": [0.6, 0.1]}],
+        "rod": [{"from": [0.0, 0.0]}],
+        "spring": [{"particle": 1, "other": 0, "stiffness": k, "damper": c, "length": rest}],
+    })  # fmt: skip
+    answers = ask(scenes=[page_scene(one)[0] for one in (scene, load("cradle"))])["runs"]
+    for answer in answers:
+        for at in answer["ledgers"]:
+            size = sum(value for _, value in at["putIn"])
+            assert abs(at["residual"]) <= 1e-13 * size, at
+            least = min(at[name] for name in at if name.endswith("_loss") or name == "spring")
+            assert least >= -1e-13 * size
+            assert (at["belt_work"], at["push_work"]) == pytest.approx((0.0, 0.0), abs=1e-13 * size)
+            assert at["potential"] >= -1e-4 * size
+    # Evenly spread times come first.
+    recording, ledgers = chutelab.simulate(scene, engine="contact"), answers[0]["ledgers"][:400]
+    places, _ = recording.at([at["t"] for at in ledgers])
+    length = np.hypot(*(places[:, 0] - places[:, 1]).T)
+    kept = np.array([at["spring"] for at in ledgers])
+    assert np.abs(kept - 0.5 * k * (length - rest) ** 2).max() < 1e-3 * kept.max()
+    lost = c * np.trapezoid(np.gradient(length, ledgers[1]["t"]) ** 2, dx=ledgers[1]["t"])
+    assert ledgers[-1]["damper_loss"] == pytest.approx(lost, rel=1e-3)
+    ours = recording.ledger
+    assert ledgers[-1]["damper_loss"] == pytest.approx(ours.damper_loss, rel=1e-12)
+    assert ledgers[-1]["spring"] == pytest.approx(ours.spring[1], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["damper-plate", "see-saw", "flap-gate"])
+def test_what_hangs_is_in_the_ledger(runs, name):
+    """Energies of hinges and springs, what dampers and stops take: as Python's ledger has them.
+
+    In a crowd a page's tracks leave over what the curves between knots do.
+    """
+    scene, answer = runs[name]
+    ours, its = chutelab.simulate(scene, engine="contact").ledger, answer["ledger"]
+    off = ours.turned_over * (1e-12 if name == "damper-plate" else 2e-5)
+    for entry in ("restitution_loss", "friction_loss", "damper_loss", "belt_work"):
+        assert its[entry] == pytest.approx(getattr(ours, entry), abs=off), entry
+    for entry in ("kinetic", "potential", "spring"):
+        assert its[entry] == pytest.approx(getattr(ours, entry)[1], abs=off), entry
+    assert abs(its["residual"]) < off
+    assert its["damper_loss"] > 0.0 or name == "see-saw"
 
 
 def test_the_numbers_are_those_of_pythons_recordings(runs):
@@ -128,6 +178,7 @@ def test_arrivals_and_envelopes_are_pythons(runs, name):
         assert its == pytest.approx(band.lines[:, :there], abs=1e-12, nan_ok=True)
 
 
+@pytest.mark.slow
 def test_arrivals_in_crowds_drawn_at_random_are_pythons():
     """Those that touch only what lies there, softly or hard, among them."""
     beds = [f"stream.bed_height={0.02 * seed}" for seed in range(6)]

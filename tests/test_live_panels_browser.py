@@ -30,6 +30,7 @@ def middle_of(page, selector):
     return box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
 
 
+@pytest.mark.slow
 def test_tape_and_tracer_with_the_keyboard_alone(shown):
     page = shown("perpendicular")
     page.focus("#undo")
@@ -94,6 +95,7 @@ def test_tape_and_tracer_with_a_pointer(shown):
     )
 
 
+@pytest.mark.slow
 def test_curves_are_read_off_and_set_the_time(shown):
     page = shown("perpendicular")
     page.focus(".curves")
@@ -192,6 +194,7 @@ MARKS = """[...document.querySelectorAll(".marks > *")].map((one) => ({
   left: one.getBoundingClientRect().left, stop: one.tabIndex }))"""
 
 
+@pytest.mark.slow
 def test_marks_on_the_time_tell_what_happens_and_lead_there(shown):
     page = shown("inclined-40", viewport={"width": 1366, "height": 768})
     events = chutelab.simulate("inclined-40", engine="exact").events
@@ -236,6 +239,7 @@ def test_marks_on_the_time_tell_what_happens_and_lead_there(shown):
     playwright.expect(page.locator(".marks > *")).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_a_streams_arrivals_fill_up_with_time_and_a_lone_particle_has_none(shown):
     assert shown("perpendicular").locator("#landing").is_hidden()
     page = shown("stream-independent", ["stream.count=60"], language="de")
@@ -416,6 +420,7 @@ def test_loads_are_those_of_python_with_arrows_where_they_press(shown):
     assert page.evaluate("chutelab.loads.loads") == []
 
 
+@pytest.mark.slow
 def test_sensors_tell_what_python_tells_of_the_same_run(shown):
     options = ["stream.count=60", "run.until=1.2", "surface.gate.opens_at=0.1", "stream.width=0.5"]
     page = shown("hopper", options, more=SENSORS, viewport={"width": 1366, "height": 768})
@@ -533,6 +538,7 @@ def test_impacts_sound_once_asked_louder_the_stronger(shown):
     assert min(heard) < 0.2
 
 
+@pytest.mark.slow
 def test_a_video_of_the_picture_is_saved(shown):
     page = shown("perpendicular")
     with page.expect_download(timeout=30_000) as waiting:

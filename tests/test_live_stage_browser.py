@@ -37,6 +37,7 @@ def drag(page, start, end):
     page.mouse.up()
 
 
+@pytest.mark.slow
 def test_a_plate_is_moved_by_its_body_and_a_line_keeps_its_shape(shown):
     line = '[[surface]]\nname = "chute"\npoints = [[0.7, -0.2], [0.8, -0.25], [0.9, -0.25]]\n'
     page = shown("inclined-40", more=line)
@@ -90,6 +91,7 @@ points = [[-0.4, -0.2], [-0.1, -0.3]]
 """
 
 
+@pytest.mark.slow
 def test_several_are_chosen_by_a_frame_and_move_together_by_it(shown):
     page = shown("free-fall", more=LINES, viewport={"width": 1366, "height": 768})
     box = page.locator("#stage").bounding_box()
@@ -146,6 +148,7 @@ def test_several_are_chosen_by_a_frame_and_move_together_by_it(shown):
     assert moved[0, 1] > 0.0
 
 
+@pytest.mark.slow
 def test_a_finger_that_stays_chooses_a_further_body_and_draws_a_frame(shown):
     phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
     page = shown("free-fall", more=LINES, **phone)
@@ -253,7 +256,7 @@ def over(*names, quick=(0, 1)):
     )
 
 
-@over("inclined-40", "galton", "cascade", "spoon", "perpendicular")
+@over("inclined-40", "galton", "cascade", "spoon", "perpendicular", quick=(1,))
 def test_the_machine_is_fitted_into_what_the_cards_leave_free(shown, name, size):
     page = shown(name, viewport={"width": size[0], "height": size[1]})
     free = page.evaluate("chutelab.stage.view.free")
@@ -345,7 +348,7 @@ LEGEND = """() => {
 }"""
 
 
-@over("inclined-40", "hopper", "mixture", quick=(0, 2))
+@over("inclined-40", "hopper", "mixture", quick=(0,))
 def test_the_legend_tells_colours_and_lies_on_nothing(shown, name, size):
     page = shown(name, viewport={"width": size[0], "height": size[1]}, language="de")
     kinds = page.evaluate("chutelab.lab.machine.streams.length")
@@ -494,6 +497,7 @@ def test_a_badge_says_when_the_engine_is_slower_than_time(shown):
     playwright.expect(page.locator("#slow-why")).to_be_hidden()
 
 
+@pytest.mark.slow
 def test_the_projector_shows_the_machine_large_and_little_else(shown):
     page = shown("perpendicular")
     size = "parseFloat(getComputedStyle(document.documentElement).fontSize)"
@@ -525,6 +529,19 @@ LABELS = """() => {
 }"""
 
 
+# Points along lines that lead to labels and those that show a length.
+LEADERS = """() => {
+  const home = document.querySelector("#stage").getBoundingClientRect();
+  return [...document.querySelectorAll(".symbols :is(.leader, .length)")].flatMap((line) => {
+    const long = line.getTotalLength(), matrix = line.getScreenCTM();
+    return Array.from({ length: Math.ceil(long / 2) + 1 }, (_, n) => {
+      const { x, y } = line.getPointAtLength(Math.min(long, 2 * n)).matrixTransform(matrix);
+      return [x - home.left, y - home.top];
+    });
+  });
+}"""
+
+
 @over("perpendicular", "inclined-60", "inclined-20", "inclined-conveyor", "low-speed", "cascade")
 def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
     page = shown(name, viewport={"width": size[0], "height": size[1]})
@@ -538,6 +555,10 @@ def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
             # A line of text is taller than its letters.
             apart = min(right, right2) - max(left, left2), min(bottom, bottom2) - max(top, top2)
             assert not (own or own2) or min(apart) <= 5.0, (text, other, apart)
+        for x, y in page.evaluate(LEADERS):
+            # Its letters are lower than the line of text.
+            within = left < x < right and top + 5.0 < y < bottom - 5.0
+            assert not (own and within), (text, x, y)
 
 
 # Boxes of texts, and of steel and belts that lie level or upright, so that their boxes are they.
@@ -578,10 +599,7 @@ def test_labels_of_what_is_pointed_at_and_of_tools_do_not_lie_on_the_machine(sho
                 assert min(apart) <= 4.0
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["inclined-40", "damper-plate", "hopper", pytest.param("low-speed", marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize("name", some(["inclined-40", "damper-plate", "hopper", "low-speed"], 4))
 def test_both_bars_of_the_energy_are_equally_long_at_any_time(shown, name):
     few = ["stream.count=60"] if name == "hopper" else ()
     page = shown(name, few, viewport={"width": 1366, "height": 768})
@@ -658,6 +676,7 @@ SMALL = """() => [...document.querySelectorAll(
   .filter(([, width, height]) => width > 0 && (width < 43.9 || height < 43.9))"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "size"), some([("stream", (320, 568)), ("perpendicular", (390, 844))])
 )

@@ -66,6 +66,7 @@ def answers(function, noise, wishes, common, searches, points):
     return np.array([one.at for one in runs]), np.array([one.error for one in runs])
 
 
+@pytest.mark.slow
 def test_a_search_with_noise_finds_where_two_targets_are_met():
     found, told = answers(bend, (0.02, 0.0, 0.005, 0.0), TWO, 1.0, 2, 12)
     assert np.all(np.abs(found - [30.0, 0.25]) < 4.0 * told)
@@ -128,6 +129,7 @@ def test_a_minimum_of_a_lone_particle_keeps_to_its_bound():
     assert least.answer.values[0] == pytest.approx(2.5, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_an_answer_of_a_stream_has_no_more_digits_than_its_error_leaves(tmp_path):
     found = solve(
         CROWD, {"plate.angle_deg": (10.0, 35.0)}, {"arrival.vx.mean": 1.6}, repeat=3, points=10
@@ -165,6 +167,22 @@ def test_a_search_that_is_stopped_tells_what_is_known():
         solve(CROWD, {"plate.angle_deg": (10.0, 35.0)}, {"arrival.vx.mean": 1.6}, repeat=2,
               progress=interrupt)  # fmt: skip
     assert any("interrupted" in note for note in caught.value.solution.notes)
+
+
+def test_one_variant_tells_of_no_other():
+    """Where one alone of the variants has a number: that one, its seeds' error, any other key."""
+
+    class Once(Drawn):
+        def seeds(self, points, count):
+            values = np.full_like(super().seeds(points, count), np.nan)
+            values[2, :, 0], self.place = np.arange(count), points[2]
+            return values
+
+    once = Once(lambda a: (a,), [1.0], 0.0, 0)
+    found = search(once, Wishes(limits=((0, 0.0),)), (A,), 4, 8, 0)
+    assert found.at == pytest.approx(once.place)
+    assert found.error.tolist() == [20.0]
+    assert found.quantities == [(1.5, pytest.approx(np.std(range(4), ddof=1) / 2.0))]
 
 
 @pytest.mark.parametrize(("options", "said"), [

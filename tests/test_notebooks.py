@@ -95,6 +95,7 @@ def test_page_worksheet_and_notebook_ask_the_same(lesson, language):
     assert "import math" in sources["machine"]
 
 
+@pytest.mark.slow
 def test_a_new_lesson_has_a_notebook_too(tmp_path):
     folder = start(tmp_path / "my-lesson")
     cells = cells_of(read(folder))

@@ -85,6 +85,7 @@ addEventListener("message", ({{ data }}) => {{
 </script>"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "sandbox",
     [pytest.param("", marks=pytest.mark.slow), 'sandbox="allow-scripts allow-downloads"'],
@@ -123,6 +124,7 @@ def test_a_page_around_it_says_who_it_is_and_hears_what_becomes_of_it(opened, tm
         assert list(heard[-1]["result"]["answers"]) == ["1", "2"][:done]
 
 
+@pytest.mark.slow
 def test_what_was_kept_in_a_bad_way_is_left_out(page_of):
     page = page_of(3)
     page.evaluate("""() => {

@@ -109,6 +109,7 @@ def test_the_titles_of_shipped_scenes_are_german_too():
             assert told in texts_of(draw(recording))
 
 
+@pytest.mark.slow
 def test_the_option_chooses_the_language(tmp_path):
     def run(*args):
         return CliRunner().invoke(main, ["run", "perpendicular", *map(str, args)])

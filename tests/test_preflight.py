@@ -290,6 +290,7 @@ def test_a_trial_that_is_stuck_is_a_warning_not_a_crash(monkeypatch):
 # What the closed form covers.
 
 
+@pytest.mark.slow
 def test_layers_that_ride_into_each_other_on_a_slow_pulley_are_noticed(brief):
     overrides = ["incoming.speed=0.7"]
     (advice,) = [a for a in look("stream", *overrides).advice if "ride into others" in a.warning]

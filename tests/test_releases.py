@@ -167,6 +167,7 @@ def bed_of_numpy(seeds, count, rate, height, speed, spread, radii, fall, floor):
     return y, u, size
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(
     seed=st.sampled_from([0, 2**32 - 1, 2**32, 2**63 - 1]) | st.integers(0, 2**63 - 1),

@@ -41,6 +41,7 @@ def by_hand(name, seeds, **changes):
     return found, mean, sqrt(sum((found - mean) ** 2) / (n - 1) / n)
 
 
+@pytest.mark.slow
 def test_a_repeat_is_mean_and_standard_error_of_single_runs():
     found = repeat(CROWD, 3)
     for name in ("arrival.vx.mean", "ledger.by_surface.plate.friction_loss", "contacts"):

@@ -66,6 +66,7 @@ def test_sensitivities_are_differences_of_two_runs():
     assert row[0] == "incoming.speed + 0.02"
 
 
+@pytest.mark.slow
 def test_a_stream_has_its_envelope_and_error_bars(tmp_path):
     made = report("stream", {"stream.count": 12}, runs=2)
     assert {"machine", "stream", "loads", "wear"} <= made.pictures.keys()
@@ -85,8 +86,22 @@ def test_a_stream_has_its_envelope_and_error_bars(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_shipped_stream_has_four_pages(tmp_path):
-    made = report("stream", command="chutelab report stream -o report.pdf")
+def test_a_web_page_cuts_no_table_off(opened, tmp_path):
+    report("coal-transfer", {"stream.count": 20}).write(tmp_path / "report.html")
+    page = opened(tmp_path / "report.html")
+    wide = page.evaluate("[...document.querySelectorAll('table')].map("
+                         "(one) => one.scrollWidth - one.clientWidth)")  # fmt: skip
+    assert len(wide) == 9
+    assert max(wide) == 0
+    inputs = page.locator("table").first.inner_text()
+    assert "stream.rate\t800 t/h\t–" in inputs
+    assert "stream.interact\ttrue\t–" in inputs
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["stream", "coal-transfer"])
+def test_a_shipped_stream_has_four_pages(scene, tmp_path):
+    made = report(scene, command=f"chutelab report {scene} -o report.pdf")
     made.write(tmp_path / "report.pdf")
     assert len(PdfReader(tmp_path / "report.pdf").pages) == 4
 

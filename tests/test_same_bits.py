@@ -97,6 +97,7 @@ def written(folder, commands, environment):
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("commands", "kernels"),
     [

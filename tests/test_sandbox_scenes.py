@@ -57,6 +57,7 @@ def test_who_falls_through_the_screen_is_smaller_than_its_gap(bar, small, large,
     assert through[fits].mean() > share
 
 
+@pytest.mark.slow
 def test_the_gallery_page_is_what_its_command_makes(tmp_path):
     root = Path(__file__).parents[1]
     command = [sys.executable, root / "tools" / "gallery.py", tmp_path, "--text"]

@@ -344,7 +344,7 @@ def test_the_schema_describes_every_key_of_the_contract():
     assert set(tables["surface"]["properties"]) == {
         *("name", "from", "to", "points", "center", "radius", "from_deg", "to_deg", "repeat"),
         *("restitution", "friction", "material", "speed", "opens_at", "closes_at"),
-        *("opens_when", "closes_when", "starts_when"),
+        *("opens_when", "closes_when", "starts_when", "passes"),
         *("pivot", "shake", "travel", "turn", "hinge", "mass", "inertia", "spring", "rest_deg"),
         *("damper", "stops_deg", "motor"),
     }

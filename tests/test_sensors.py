@@ -74,6 +74,23 @@ def test_counts_are_those_of_a_count_by_hand(stream):
         assert told.mass == pytest.approx(0.008 * (on - back))
 
 
+@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
+def test_a_line_where_centres_are_struck_counts_what_goes_back(engine):
+    """A bounce's lowest place lies on it: to and fro, or neither; what starts on it goes away."""
+    floor = {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "restitution": 1.0}
+    run = chutelab.simulate(
+        {
+            "particle": {"radius": 0.01},
+            "surface": [{**floor, "friction": 0.0}],
+            "stream": {"at": [0.0, 0.1], "velocity": [0.0, 0.0]},
+            "run": {"until": 1.0},
+        },
+        engine=engine,
+    )
+    assert passages(run, (-0.5, 0.01), (0.5, 0.01))["way"].sum() == 0
+    assert passages(run, (-0.5, 0.05), (0.5, 0.05))["way"].tolist() == 4 * [1, -1]
+
+
 def test_rates_depth_and_residence(stream):
     """200 particles a second of 8 g, thrown off a bed of 50 mm, each carried at 2 m/s."""
     told = reading(stream, "gate")

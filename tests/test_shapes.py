@@ -21,7 +21,7 @@ from chutelab.results.arrival import fates
 from chutelab.scene import from_dict
 from handmade import recording_of
 
-OWN = {"speed": 1.0, "restitution": 0.5, "friction": 0.2, "surface": 0}
+OWN = {"speed": 1.0, "restitution": 0.5, "friction": 0.2, "surface": 0, "one_sided": 0}
 TIMES = {"appears": -inf, "vanishes": inf}
 STEPS = 20_001
 

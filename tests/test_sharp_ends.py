@@ -74,7 +74,9 @@ CASES += [(0.0, *tip) for tip in tips(0.0) if "arc" in tip[0] or tip[0] == "bent
 
 
 @pytest.mark.parametrize(
-    "engine", [*ENGINES, "crowd", pytest.param("pymunk crowd", marks=pytest.mark.slow)]
+    "engine",
+    ["exact", "contact", "crowd"]
+    + [pytest.param(name, marks=pytest.mark.slow) for name in ("pymunk", "pymunk crowd")],
 )
 def test_a_disk_on_the_tip_is_driven_the_way_that_the_rim_runs(engine):
     """Head on, with normal n, it takes J_t = m SPEED where the rim runs to, along (n_y, -n_x)."""

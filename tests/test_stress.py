@@ -217,6 +217,7 @@ def test_a_signal_during_a_run_leaves_nothing(tmp_path, in_the_middle, sent, cod
     assert listed(tmp_path) == ["endless.toml"]
 
 
+@pytest.mark.slow
 def test_ctrl_c_during_a_run_leaves_what_was_recorded(tmp_path, in_the_middle):
     code, said = interrupted(
         tmp_path, "endless.toml", "--out", "out", "--only", "json,npz", when=in_the_middle,

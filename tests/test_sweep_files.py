@@ -51,6 +51,7 @@ def test_parquet_has_them_too():
             )
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(st.lists(st.floats(), min_size=1, max_size=4), st.text(st.characters(codec="utf-8")))
 def test_text_gives_rows_back(numbers, words):

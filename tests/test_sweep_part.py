@@ -239,6 +239,7 @@ def test_a_full_disk_loses_nothing(interrupted, room):
 # signals -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "signum",
     [

@@ -59,6 +59,7 @@ def test_processes_write_the_same_bytes_and_one_that_dies_costs_time_only(steppe
     assert (tmp_path / "mark").exists()
 
 
+@pytest.mark.slow
 def test_processes_that_keep_dying_are_given_up():
     with pytest.raises(LostWorkersError, match="keep dying"), crew(2) as team:
         list(team.results(signal.raise_signal, [(0, signal.SIGKILL)]))

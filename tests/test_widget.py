@@ -60,6 +60,7 @@ def hosted(opened, path, html):
     return opened(path)
 
 
+@pytest.mark.slow
 def test_what_the_page_posts_becomes_the_scene_and_nothing_else_does(opened, tmp_path):
     said = """<script>
     const three = {chutelab: "scene", toml: 3}, a = {chutelab: "scene", toml: "a"};

@@ -306,6 +306,23 @@ def belt(vb, vx=-1.0, m=0.008):
     return 1e3 * m * vb * (vb - vx), 500.0 * m * (vb - vx) ** 2
 
 
+def yielded(inertia, e=0.5, m=0.008, v=2.0):
+    """Velocity after a blow on the plate of lesson 13, m/s; what blow and plate get of it, mJ.
+
+    By the impulse J = (1 + ε) v / (1/m + l²/I).
+    """
+    impulse = (1.0 + e) * v / (1.0 / m + ARM**2 / inertia)
+    after, spin = v - impulse / m, impulse * ARM / inertia
+    given = 500.0 * inertia * spin**2
+    return after, 500.0 * m * (v**2 - after**2) - given, given
+
+
+def half_swing(k, c, inertia=0.002):
+    """Time after which that plate is upright again, s."""
+    return pi / sqrt(k / inertia - (0.5 * c / inertia) ** 2)
+
+
+ARM = 0.5 * G * T2**2 - BALL  # from its hinge to where it is struck, m
 FALL = sqrt(2.0 * 0.8 / G)
 DOWN = sqrt(G**2 * T2**2 + 2.0 * G * 0.5)
 SMALL = 0.004  # radius of the ball of lesson 8, m
@@ -474,6 +491,33 @@ STATED = {
     12: {
         "= {1.76} m/s everything": sqrt(G * 0.315),
     },
+    13: {
+        "strikes the plate l = {0.426} m below the hinge": ARM,
+        "M, g | {5.5} | 11": 1.0 / ARM**2,
+        "| 5.5 | {11} | 16": 2.0 / ARM**2,
+        "| 11 | {16} | 28": 2.9 / ARM**2,
+        "| 16 | {28} | 110": 5.0 / ARM**2,
+        "| 28 | {110} | 551": 20.0 / ARM**2,
+        "| 110 | {551} |": 100.0 / ARM**2,
+        "m/s | {0.78} |": yielded(0.001)[0],
+        "0.78 | {0.26} |": yielded(0.002)[0],
+        "0.26 | {0.00} |": yielded(0.0029)[0],
+        "0.00 | {-0.33} |": yielded(0.005)[0],
+        "-0.33 | {-0.80} |": yielded(0.02)[0],
+        "-0.80 | {-0.96} |": yielded(0.1)[0],
+        "At M = m / ε = {16} g": 8.0 / 0.5,
+        "π / ω_d: {0.201} s": half_swing(0.5, 0.01),
+        "0.201 s, {0.324} s": half_swing(0.2, 0.01),
+        "0.324 s, {0.199} s": half_swing(0.5, 0.005),
+        "0.199 s and {0.257} s": half_swing(0.5, 0.04),
+        "√(k I) = {0.063} N m s": 2.0 * sqrt(0.5 * 0.002),
+        "Where the {16} mJ are": 500.0 * 0.008 * 4.0,
+        "(1 - ε²) = {7.0} mJ": yielded(0.002)[1],
+        "½ m v'² = {0.3} mJ": 500.0 * 0.008 * yielded(0.002)[0] ** 2,
+        "½ M (ω l)² = {8.8} mJ": yielded(0.002)[2],
+        "until {1.7} s after the blow": 2.5 - 0.5 - T2,
+        "which is at {0.797} s, is": 0.5 + T2,
+    },
     "physics": {
         "up to {1} m/s. A faster": sqrt(G * 0.1),
         "20° sends a point back at {0.40} m/s": -plate(20, 0.0)[1],
@@ -562,6 +606,7 @@ GIVEN = {
     9: {"0.1", "0.5", "0.05", "0.3"},
     11: {"0.1", "0.2", "0.3", "0.5", "0.8"},
     12: {"0.315", "0.32", "1.2", "0.3", "0.4", "0.6", "0.8"},
+    13: {"0.001", "0.002", "0.0029", "0.005", "0.01", "0.02", "0.04", "0.1", "0.2", "0.5"},
 }  # fmt: skip
 """Further numbers with decimals: what the scenes set, and what other tests look at."""
 

@@ -59,7 +59,7 @@ def results(kind, seed, count, folder):
 
 
 @pytest.mark.parametrize(
-    ("seed", "cases"), [(0, 20), pytest.param(1, ASKED, marks=pytest.mark.slow)]
+    ("seed", "cases"), [(0, 10), pytest.param(1, ASKED, marks=pytest.mark.slow)]
 )
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_wrong_is_refused_and_nothing_else_happens(kind, seed, cases, tmp_path):

@@ -71,6 +71,7 @@ function runOf(scene) {
     laws: lawsOf(recording),
     points: recording.points(0, 1e-4).map(({ x, y }) => [x, y]),
     landings: landings.map(({ t, x }) => [t, x]),
+    ledger: recording.ledger(end),
     ledgers: times.map((t) => {
       const ledger = groundedLedger(recording, t);
       return { t, ...ledger, ...stacks(ledger) };

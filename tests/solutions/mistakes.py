@@ -226,6 +226,29 @@ def poured(g, left):
     return mass(g) * G * (g.H - left) / 100
 
 
+# Lesson 13
+
+
+def struck(g, e=None, lever=None):
+    """Speed of the particle after the blow, by the impulse J = (1 + e) v / (1/m + l²/I)."""
+    e, lever = g.e if e is None else e, lever or g.l
+    return g.v - 1000 / g.grams * (1 + e) * g.v / (1000 / g.grams + lever**2 / g.I)
+
+
+def yields(g):
+    """Speed of the struck point after it."""
+    return (1 + g.e) * g.v / (1 + 1000 * g.I / g.l**2 / g.grams)
+
+
+def lost(g):
+    """What the particle has less than before, mJ."""
+    return 0.5 * g.grams * (g.v**2 - struck(g) ** 2)
+
+
+def half_a_swing(g, slower):
+    return pi / sqrt(g.k / g.I - slower)
+
+
 MISTAKES = {
     ("film-a-ball", 1): {
         "ratio of heights for ε": lambda g: (g.y1 - g.r) / (g.y0 - g.r),
@@ -587,6 +610,34 @@ MISTAKES = {
         "an incline that stands still": lambda g: degrees(atan(g.mu)),
         "separation for slip": lambda g: layer(g, 0.0, g.v0),
         "pressed on by going round": lambda g: onset(g, start=-u_of_a_point(g)),
+    },
+    ("the-damping-plate", 1): {
+        "distance not squared": lambda g: 1000 * g.I / g.l,
+        "times for divided by": lambda g: 1000 * g.I * g.l**2,
+        "the mass of a bar": lambda g: 3000 * g.I / g.l**2,
+    },
+    ("the-damping-plate", 2): {
+        "a fixed plate": lambda g: -g.e * g.v,
+        "a blow without loss": lambda g: struck(g, e=1.0),
+        "they go on together": lambda g: struck(g, e=0.0),
+        "the plate's speed": lambda g: struck(g) + g.e * g.v,
+        "inertia for mass": lambda g: struck(g, lever=1.0),
+    },
+    ("the-damping-plate", 3): {
+        "the heat of the blow": lambda g: lost(g) - 500 * g.I * (yields(g) / g.l) ** 2,
+        "all that the particle lost": lost,
+        "ε forgotten": lambda g: 500 * g.I * (yields(g) / (1 + g.e) / g.l) ** 2,
+        "the particle's mass": lambda g: 0.5 * g.grams * yields(g) ** 2,
+    },
+    ("the-damping-plate", 4): {
+        "damper forgotten": lambda g: half_a_swing(g, 0.0),
+        "the 2 in c / (2 I) forgotten": lambda g: half_a_swing(g, (g.c / g.I) ** 2),
+        "decay added": lambda g: half_a_swing(g, -((g.c / g.I / 2) ** 2)),
+        "a missing ½": lambda g: 2 * half_a_swing(g, (g.c / g.I / 2) ** 2),
+        "a ½ too many": lambda g: half_a_swing(g, (g.c / g.I / 2) ** 2) / 2,
+        "angular frequency for frequency": lambda g: (
+            half_a_swing(g, (g.c / g.I / 2) ** 2) / (2 * pi)
+        ),
     },
 }
 """By lesson and question: what the mistake is called, and the number that it leads to."""

@@ -141,7 +141,9 @@ class Report:
                 language = self.words.language
                 content = pdf(tree, folder, asked, kind=kind, language=language, dense=True)
             else:
-                page = web_page(tree, folder, asked, self.words.language)
+                page = web_page(
+                    tree, folder, asked, self.words.language, dense=self.view != "teacher"
+                )
                 content = page.encode("utf-8")
         with whole(path) as unfinished:
             unfinished.write_bytes(content)
@@ -271,8 +273,10 @@ def inputs(scene: Scene, words: Words) -> Sheet:
             continue
         if key == "run.loads":
             continue
-        unit = unit_of(parts_of(key))
-        said = str(value) if not isinstance(value, float) else words.local(number(value))
+        unit = "" if isinstance(value, str) else unit_of(parts_of(key))
+        said = str(value).lower() if isinstance(value, bool) else str(value)
+        if isinstance(value, float):
+            said = words.local(number(value))
         rows.append((key, said, unit, from_file))
     given = {row[0] for row in rows}
     for key, value, unit in (
@@ -302,17 +306,21 @@ def _leaves(tables: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _materials(made: Report) -> str:
-    """Return a table of the presets that are used, with spread and source."""
-    rows = []
+    """Return a table of the presets that are used, with spread, and the sources below it."""
+    rows, sources = [], dict[str, int]()
     for name in dict.fromkeys(kind.material for kind in made.scene.particles):
         preset = presets().get(str(name))
         for key, spread in preset.spread.items() if preset else ():
             low, high = (number(value) for value in spread)
             value = number(getattr(preset.material, key)) if preset else ""
-            source = "; ".join(preset.sources[key]) if preset else ""
-            rows.append((f"{name}: {key}", value, f"{low} to {high}", source))
-    heads = ("material", "value", "spread", "source")
-    return made.table("materials", Sheet("", heads, tuple(rows), texts=4))
+            named = preset.sources[key] if preset else ()
+            marks = ", ".join(f"[{sources.setdefault(one, len(sources) + 1)}]" for one in named)
+            rows.append((f"{name}: {key}", value, f"{low} to {high}", marks))
+    heads, notes = (
+        ("material", "value", "spread", "source"),
+        (f"[{n}] {s}" for s, n in sources.items()),
+    )
+    return made.table("materials", Sheet("", heads, tuple(rows), texts=4, notes=tuple(notes)))
 
 
 def left_out(made: Report) -> list[str]:
@@ -448,9 +456,12 @@ def sensitivities(made: Report) -> Sheet:
     heads = ("", *(f"{name}, {unit}" if unit else name for name, _, unit, _ in base))
     notes: list[str] = []
     if rows:
-        notes = ["Half the difference between the key changed up and down by as much"]
+        notes = [
+            "By so much a result changes with a key that is larger by what stands beside it: half"
+            " the difference of a run with the key so much larger and of one with it smaller"
+        ]
         if made.recording.count > 1:
-            notes.append("Same seed: grains meet otherwise in each run, which is noise in it")
+            notes.append("All runs have the same seed, but grains meet differently in each: noise")
     if skipped:
         limit = f"they would take more than the {BUDGET:g} s that there are for all"
         notes.append(f"Left out: {', '.join(skipped)}; {limit}")

@@ -115,6 +115,17 @@ void to_rest(const Barrier *b, double t, double *x, double *y) {
 
 /* Pieces: where they are. */
 
+/* Whether a piece goes on at an end of the one before, of the same surface. */
+static int follows(const Barrier *b) {
+    const Barrier *last = b - 1;
+    if (b->surface != last->surface || b->appears != last->appears || (b->radius > 0) != (last->radius > 0)) return 0;
+    for (int n = 0; n < 4; n++) {
+        const double *one = b->end + n / 2 * 2, *other = last->end + n % 2 * 2;
+        if (hypot(one[0] - other[0], one[1] - other[1]) <= 1e-9 * L.largest) return 1;
+    }
+    return 0;
+}
+
 void shape_barriers(void) {
     int count = L.piece_count * (L.family ? L.particle_count : 1);
     for (int k = 0; k < count; k++) {
@@ -143,6 +154,12 @@ void shape_barriers(void) {
         grow(b->box, b->end[0], b->end[1]);
         grow(b->box, b->end[2], b->end[3]);
         if (b->mover) sweep(b);
+    }
+    for (int k = count - 1, n = 1; k >= 0; k--, n++) {
+        Barrier *b = L.barriers + k;
+        int goes_on = k > 0 && b->one_sided && follows(b);
+        b->chain = goes_on || !b->one_sided ? 0 : n;
+        if (!goes_on) n = 0;
     }
 }
 
@@ -178,6 +195,31 @@ double distance(const Barrier *b, double x, double y) {
     }
     if (b->whole || along(b, x, y) <= b->extent * b->radius) return fabs(beside(b, x, y));
     return MIN(hypot(x - b->end[0], y - b->end[1]), hypot(x - b->end[2], y - b->end[3]));
+}
+
+/* The same, from the straight way on beyond its ends, m. */
+static double aside(const Barrier *b, double x, double y) {
+    if (b->radius == 0 || b->whole || along(b, x, y) <= b->extent * b->radius) return beside(b, x, y);
+    int last = hypot(x - b->end[0], y - b->end[1]) > hypot(x - b->end[2], y - b->end[3]);
+    const double *end = b->end + 2 * last;
+    return ((x - end[0]) * (end[0] - b->x) + (y - end[1]) * (end[1] - b->y)) / b->radius;
+}
+
+/* The nearest of pieces that follow each other and are solid from one side, or the one that moves: its distance, and how
+   far a place is on its solid side, or on its left, m. At a corner the sum of the two counts. */
+static const Barrier *nearest(const Barrier *b, double x, double y, double *gap, double *off) {
+    const Barrier *found = b;
+    *gap = INFINITY;
+    for (int n = 0; n < MAX(b->chain, 1); n++) {
+        double away = distance(b + n, x, y), side = b->one_sided ? b[n].one_sided * aside(b + n, x, y) : beside(b, x, y);
+        int is_corner = fabs(away - *gap) <= EPS * ROUNDINGS * (away + fabs(x) + fabs(y));
+        if (is_corner) *off += side;
+        if (is_corner || away > *gap) continue;
+        *gap = away;
+        *off = side;
+        found = b + n;
+    }
+    return found;
 }
 
 /* Paths: cubics by their control points. */
@@ -436,7 +478,7 @@ typedef struct { Curve path; Box box; int knot; } Interval;
 PAIRED static void look_at_all(const Interval *some, int count, const Box *box, Barrier *pieces) {
     int near = 0;
     for (int k = 0; k < L.piece_count; k++) {
-        if (!pieces[k].mover && !apart(box, pieces[k].box, At.margin)) pieces[near++].near = k;
+        if (!pieces[k].mover && !pieces[k].one_sided && !apart(box, pieces[k].box, At.margin)) pieces[near++].near = k;
     }
     for (int k = 0; k < near; k++) {
         Barrier *b = pieces + pieces[k].near;
@@ -446,48 +488,55 @@ PAIRED static void look_at_all(const Interval *some, int count, const Box *box, 
     }
 }
 
-/* Look at an interval of a track beside a piece that moves, in strides in which the particle cannot come
-   too near, or in which both go by a share of its radius. `spared` is how deep it may be. */
+/* Look at an interval of a track beside a piece that moves, or a chain that is solid from one side, in strides in which
+   the particle cannot come too near, or in which both go by a share of its radius. `spared` is how deep it may be:
+   on the side that lets it through as deep as it is, and until it is clear of it, by more than is allowed, on the other. */
 PAIRED static void look_at_moving(const Interval *now, Barrier *b, int number, double *spared) {
     const double *knot = KNOT(now->knot);
     const Two *p = now->path.p;
     double h = knot[L.row] - knot[0], way = 0, haste, share = 0, before = 0;
     for (int n = 0; n < 3; n++) way = MAX(way, 3 * hypot(p[n + 1][0] - p[n][0], p[n + 1][1] - p[n][1]));
     way += h * swiftest(b, &haste);
-    At.number = number;
     At.deepest = -1;
     for (int last = 0; !last;) {
         Two place = place_on(&now->path, share);
         double t = knot[0] + share * h, x = place[0], y = place[1];
         to_rest(b, t, &x, &y);
-        double gap = distance(b, x, y), off = beside(b, x, y), depth = At.radius - gap;
+        double gap, off;
+        const Barrier *near = nearest(b, x, y, &gap, &off);
+        double depth = At.radius - gap, least = b->one_sided ? -L.allowed : 0;
+        At.number = number + (int)(near - b);
         int there = is_there(b, t) && t >= b->appears + L.dt;
         if (isnan(*spared)) *spared = b->appears > KNOT(L.offsets[At.particle])[0] ? INFINITY : MAX(depth, 0);
-        if (there && depth <= 0) *spared = 0;
-        int passes = before * off < 0 && fabs(off - before) < At.radius && is_within(b, x, y, side_margin());
+        if (there && depth <= least && !(b->one_sided && off < 0)) *spared = 0;
+        int passes = before * off < 0 && fabs(off - before) < At.radius && is_within(near, x, y, side_margin());
         if (there && *spared < INFINITY && (passes || depth > *spared + L.allowed)) {
             int at = passes ? -1 : At.deepest;
             if (passes || at < 0) add_hit(t, place[0], place[1], depth, passes);
             if (!passes && at < 0) At.deepest = L.hit_count - 1;
             if (at >= 0 && at < L.hit_room && depth > L.hits[at].depth)
-                L.hits[at] = (Hit){t, place[0], place[1], depth, At.particle, number, 0, 0};
+                L.hits[at] = (Hit){t, place[0], place[1], depth, At.particle, At.number, 0, 0};
         }
+        if (b->one_sided && off < 0) *spared = INFINITY;
         before = there ? off : 0;
         last = share >= 1;
         share = MIN(share + MAX(gap - At.margin, STRIDE * At.radius) / way, 1);
     }
 }
 
-/* Look at all of a track beside what moves. */
+/* Look at all of a track beside what moves, or is solid from one side. */
 PAIRED static void look_at_movers(int i, Barrier *pieces) {
-    for (int k = 0; k < L.piece_count && L.mover_count; k++) {
+    for (int k = 0; k < L.piece_count; k++) {
         double spared = NAN;
-        for (int n = L.offsets[i]; n < L.offsets[i + 1] - 1 && pieces[k].mover; n++) {
+        if (pieces[k].one_sided ? !pieces[k].chain : !pieces[k].mover) continue;
+        for (int n = L.offsets[i]; n < L.offsets[i + 1] - 1; n++) {
             Interval now = { .path = curve_after(KNOT(n)), .knot = n };
             const Two *p = now.path.p;
             now.box.low = lesser(lesser(p[0], p[1]), lesser(p[2], p[3]));
             now.box.high = larger(larger(p[0], p[1]), larger(p[2], p[3]));
-            if (KNOT(n)[0] == KNOT(n)[L.row] || apart(&now.box, pieces[k].box, At.radius)) continue;
+            int away = 1;
+            for (int m = 0; m < MAX(pieces[k].chain, 1); m++) away &= apart(&now.box, pieces[k + m].box, At.radius);
+            if (KNOT(n)[0] == KNOT(n)[L.row] || away) continue;
             look_at_moving(&now, pieces + k, k, &spared);
         }
     }

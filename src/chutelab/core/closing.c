@@ -203,6 +203,7 @@ void close_step(double h) {
             d->calm = d->rest = 0;
             d->ahead[0] = pushed(d, W.before);
             book(d->gain, 0, W.owner_count, (double[]){pushed(d, 0), 0, 0});
+            W.push_work += pushed(d, 0);
         }
     }
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
@@ -351,6 +352,7 @@ void take_back(int i) {
     double given = W.pushes ? pushed(d, W.before) : 0;
     d->entries[0] -= given;
     W.books[3 * W.owner_count] -= given;
+    W.push_work -= given;
     for (int link = d->links; link >= 0; link = W.links[link]) {
         const Contact *c = W.contacts + link / 2;
         for (int n = 0; n < 3; n++) {

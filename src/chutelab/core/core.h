@@ -107,7 +107,8 @@ static inline double cohesion_of(int i, int j) {
     const Disk *d = W.disks + i;
     return (j < 0 ? surface_pair(d, -1 - j) : pair_of(d->kind, W.disks[j].kind))->cohesion;
 }
-/* Whether a gate shut on a disk that is not clear of it yet. */
+/* Whether a disk is spared: a gate shut on it, or what is solid from one side lets it through, and it is not clear
+   of that yet. */
 static inline int *spared_by(const Surface *s, const Disk *d) {
     return W.spared + (d - W.disks) * W.gate_count + s->gate;
 }
@@ -119,11 +120,13 @@ static inline int has_corners(const Disk *d) { return W.outline_count && d->corn
 static inline int is_cornered(int i, int j) {
     return W.outline_count && (W.disks[i].corners || (j >= 0 && W.disks[j].corners));
 }
-/* Whether a surface is there and near the box that a disk can reach in this step. */
-static inline int is_near(const Surface *s, const Disk *d) {
+/* Whether a surface is there and near the box that a disk can reach in this step ... */
+static inline int is_beside(const Surface *s, const Disk *d) {
     return s->there && s->box[0] < d->right && s->box[2] > d->left && s->box[1] < d->top
-        && s->box[3] > d->bottom && !is_spared(s, d);
+        && s->box[3] > d->bottom;
 }
+/* ... and does not spare it. */
+static inline int is_near(const Surface *s, const Disk *d) { return is_beside(s, d) && !is_spared(s, d); }
 /* The piece that goes on smoothly beyond an end of a surface, of a circle one that leads to it, or -1. */
 static inline int mate_of(const Surface *s, int n) { return s->ledges[n] <= W.ledge ? s->mates[n] : -1; }
 /* Whether two partners of a disk, in the numbers of `Contact.j`, are one or go on smoothly. */
@@ -196,6 +199,8 @@ double gap_to(const Surface *s, double x, double y, double r, double *nx, double
 const Surface *face_at(const Surface *s, double x, double y);
 double surface_speed(const Surface *s, double nx, double ny, double x, double y, double r);
 double bending(const Surface *s, double x, double y, double r);
+double chain_gap(const Surface *s, double x, double y, double r, double t, double *side);
+double clear_after(const Surface *s, const Disk *d, double span);
 double meet_surface(const Surface *s, const Disk *d, double span, double *approach);
 double meet_disk(double x, double y, double u, double v, double reach, double span, double *approach);
 double free_span(const Disk *d, double least);
@@ -214,6 +219,9 @@ void box_around(Surface *s, double more);
 void box_movers(double t, double h);
 int find_mover(const Surface *s);
 void prepare_mover(Surface *s);
+
+/* loop.c */
+void spare(const Disk *d, const Surface *s, double t);
 
 /* hinge.c */
 void set_hinge(Mover *m, double t);
@@ -260,6 +268,7 @@ void drop_tugs(void);
 void cut_step(double t);
 void cut_at_snaps(void);
 void end_pull(void);
+void add_springs(double *sums);
 void strike_joints(int i, int j);
 void end_blow(void);
 void share_with_joints(const Contact *c, double wanted, const double *u, double *J);
@@ -378,6 +387,7 @@ void wake(int i, double t);
 void fall_asleep(void);
 
 /* prepare.c */
+int stretch_swings(void);
 int make_room(int full);
 void join_surfaces(void);
 

@@ -75,6 +75,44 @@ double gap_to(const Surface *s, double x, double y, double r, double *nx, double
     return from_end(s, x, y, nx, ny) - r;
 }
 
+/* How far a point is on the left of a piece, or outside, m; beyond an end, of its straight way on from there. */
+static double beside(const Surface *s, double x, double y) {
+    double dx = x - s->x, dy = y - s->y, nx, ny;
+    if (s->shape == SEGMENT) return dy * s->tx - dx * s->ty;
+    double away = sqrt(dx * dx + dy * dy);
+    if (in_angle(s, dx, dy)) return away - s->radius;
+    double off = from_end(s, x, y, &nx, &ny);
+    return (off * (nx * dx + ny * dy) - off * off) / s->radius;
+}
+
+/* Gap at t between a disk and the nearest piece of a chain, and on which side of it the disk is: its solid one if above
+   0, of what is solid on both 0. At a corner, where two pieces are as near, that is told by the sum of their normals. */
+double chain_gap(const Surface *s, double x, double y, double r, double t, double *side) {
+    int first = (int)(s - W.surfaces), k = first;
+    double least = INFINITY, nx, ny;
+    do {
+        const Surface *piece = surface_at(k, t);
+        double gap = gap_to(piece, x, y, r, &nx, &ny), own = piece->one_sided * beside(piece, x, y);
+        if (gap <= least) *side = gap < least ? own : *side + own;
+        least = MIN(gap, least);
+        k = piece->chain;
+    } while (k != first);
+    return least;
+}
+
+/* Time from d->t until a disk that what is solid from one side lets through is clear of it on that side, INFINITY if not
+   within the span: looked at in strides in which it can come to none of it. */
+double clear_after(const Surface *s, const Disk *d, double span) {
+    double most = sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * span + W.fastest, side;
+    for (double h = 0;;) {
+        double x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h;
+        double gap = chain_gap(s, x, y, d->radius, d->t + h, &side);
+        if (gap >= 0 && side > 0) return h;
+        if (!(h < span && most > 0)) return INFINITY;
+        h = MIN(h + MAX(fabs(gap), TOUCHING * d->radius) / most, span);
+    }
+}
+
 /* Speed of the surface along (ny, -nx) at a contact with normal n of a disk at (x, y), m/s.
 
    One rule for faces, ends and circles: the surface runs along its left side (a circle: its
@@ -290,11 +328,11 @@ double free_span(const Disk *d, double least) {
     double span = INFINITY, v = sqrt(d->vx * d->vx + d->vy * d->vy), r = d->radius;
     for (int k = 0; k < W.surface_count && span > least; k++) {
         const Surface *s = surface_at(k, d->t);
-        double rounds[3][3], dx = d->x - s->x, dy = d->y - s->y;
+        double rounds[3][3], dx = d->x - s->x, dy = d->y - s->y, nx, ny;
         int count = 0;
         if (s->opens > d->t) span = MIN(span, s->opens - d->t);
         if (s->closes > d->t) span = MIN(span, s->closes - d->t);
-        if (is_spared(s, d)) span = 0;
+        if (is_spared(s, d) && (!s->one_sided || gap_to(s, d->x, d->y, r, &nx, &ny) < 0)) span = 0;
         if (stirs(s)) {
             span = MIN(span, box_span(s, d));
             continue;

@@ -49,8 +49,10 @@ EXPORT int steer(int owner, double x, double y, double angle, double until) {
         *m = (Mover){ .pivot = { x, y }, .surface = owner, .steered = 1, .t = NAN };
     }
     while (W.swing_count + 4 * (W.mover_count + 1) > W.swing_room) {
-        if (W.swing_room == 0) RESERVE(W.swings, W.swing_room = 1024);
-        else if (!STRETCH(W.swings, W.swing_count, W.swing_room)) return 0;
+        if (W.swing_room == 0) {
+            RESERVE(W.swings, W.swing_room = 1024);
+            RESERVE(W.swing_work, 3.0 * W.swing_room);
+        } else if (!stretch_swings()) return 0;
         if (!has_room()) return 0;
     }
     double now = steered_to(m, W.t);

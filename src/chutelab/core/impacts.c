@@ -120,6 +120,13 @@ static void foresee_pair(int i, int j, double *due, int *partner) {
     }
 }
 
+/* When a disk meets a surface after a wait, s. */
+static double meet_later(const Surface *s, const Disk *d, double wait, double *approach) {
+    Disk then = *d;
+    advance(&then, d->t + wait);
+    return then.t + meet_surface(surface_at((int)(s - W.surfaces), then.t), &then, W.step_end - then.t, approach);
+}
+
 static void foresee_surfaces(int i, double *due, int *partner) {
     const Disk *d = W.disks + i;
     const int *list;
@@ -127,11 +134,26 @@ static void foresee_surfaces(int i, double *due, int *partner) {
     for (int n = 0; n < count; n++) {
         double approach = INFINITY;
         int k = list[n];
-        if (W.surfaces[k].there != THERE || !is_near(W.surfaces + k, d)) continue;
+        if (W.surfaces[k].there != THERE || !is_beside(W.surfaces + k, d)) continue;
+        double wait = 0, side;
+        if (W.surfaces[k].one_sided) spare(d, W.surfaces + k, d->t);
+        if (is_spared(W.surfaces + k, d)) {
+            if (!W.surfaces[k].one_sided) continue;
+            wait = clear_after(W.surfaces + k, d, W.step_end - d->t);
+            if (wait == INFINITY) continue;
+        }
         const Surface *s = surface_at(k, d->t);
         if (s->mover >= 0 && !stirs(s) && d->mode == ASLEEP && d->ux == 0 && d->uy == 0) continue;
         if (!has_corners(d) && stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0)) continue;
-        double t = has_corners(d) ? meet_cornered(i, -1 - k) : d->t + meet_surface(s, d, W.step_end - d->t, &approach);
+        double t = has_corners(d) ? meet_cornered(i, -1 - k) : wait > 0 ? meet_later(s, d, wait, &approach)
+            : d->t + meet_surface(s, d, W.step_end - d->t, &approach);
+        /* What goes round an end within the step comes to the side that lets it through. */
+        if (s->one_sided && t < W.step_end) {
+            Disk then = *d;
+            advance(&then, t);
+            chain_gap(s, then.x, then.y, d->radius, t, &side);
+            if (side < 0) continue;
+        }
         if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius, 0)) {
             *due = MAX(t, W.now);
             *partner = -1 - k;
@@ -521,6 +543,8 @@ static void strike(int i, int j, double t) {
         return;
     }
     int impacts = j >= 0 ? MAX(a->impacts, b->impacts) : a->impacts;
+    /* It has got clear of what let it through. */
+    if (j < 0 && W.surfaces[-1 - j].one_sided) *spared_by(W.surfaces + (-1 - j), a) = 0;
     Contact c;
     double u[3];
     if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);

@@ -348,6 +348,14 @@ void end_pull(void) {
     }
 }
 
+/* Add up all springs, as `Total` has them. */
+void add_springs(double *sums) {
+    for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
+        const double own[4] = {j->kept[0], j->kept[1], j->damped, j->given};
+        for (int n = 0; n < 4; n++) sums[n] += own[n];
+    }
+}
+
 /* ------------------------------------------------------------------------------------------ blows */
 
 /* Let the rows of struck joints act at this instant; of strings those that are tight, or that are `taut`. */

@@ -148,7 +148,9 @@ typedef struct {
     int mates[2];           /* pieces that go on smoothly beyond its ends, of a circle that lead to it;
                                or -1 */
     double ledges[2];       /* m; how far their ends are apart there */
-    int gate;               /* column of `spared` if it comes and goes, else -1 */
+    int gate;               /* column of `spared` if it comes and goes, or is solid from one side, else -1 */
+    int one_sided;          /* [in] solid on its left, of what is bent outside, if 1, there not if -1; 0: on both */
+    int chain;              /* the next of the pieces that share its column: they go on at its ends */
     int there;              /* whether it is there in this step; LEAVING: until just now */
     int mover;              /* row of `movers` if it moves, else -1 */
     double box[4];          /* m; left, bottom, right, top; of all that it sweeps in this step */
@@ -175,6 +177,7 @@ typedef struct {
     double stops[2];        /* [in] rad; between which it turns */
     double motor[2];        /* [in] rad/s, N m; speed, and the most that it turns with */
     double worked, stopped, damped; /* [out] J; work of its motor, losses at its stops and in its damper */
+    double torque, pushed;  /* N m; by which it is pushed by hand; [out] J; and the work of that */
     double t;               /* s; when it is as follows */
     double place[2], velocity[2], pull[2]; /* m, m/s, m/s2; of the pivot */
     double sine, cosine;    /* of the angle that it has turned by */
@@ -320,7 +323,11 @@ typedef struct {                                                                
 
 /* What all disks of a crowd that were released have together as a step begins: that of those that ended at
    their ends, and of what lasts in contact halfway through its impulses, as their tracks are. */
-typedef struct { double t, kinetic, potential, entries[3], unsolved; } Total; /* s, J, radii */ /* [out] */
+typedef struct {                                                                         /* [out] */
+    double t, kinetic, potential, entries[3], unsolved; /* s, J, radii */
+    double released;        /* J; what they had at their releases */
+    double springs[4];      /* J; of all springs: what they kept when they were tied, keep, lost and gave */
+} Total;
 
 typedef struct { int disk, next, ix, iy; } Cell; /* one disk in one cell of the grid */
 
@@ -343,6 +350,7 @@ typedef struct {
     Event *events;
     Total *totals;       /* one a step in a crowd */
     Swing *swings;
+    double *swing_work;  /* (swings, 3), J; `stopped`, `damped` and `pushed` of its mover then */
     Contact *contacts;   /* of this step */
     Contact *earlier;    /* of the step before */
     SolverRow *rows;     /* (contacts) of those that are solved together */
@@ -359,7 +367,8 @@ typedef struct {
     int *everything;     /* (surfaces) 0, 1, ... */
     int *ends;           /* (2 surfaces) ends of segments and arcs, sorted by place ... */
     int *circles;        /* ... and within, behind them, the circles */
-    int *spared;         /* (disks, gates) 1: what shut on this disk, and does not touch it yet */
+    int *spared;         /* (disks, gates) 1: it shut on this disk, or lets it through, and that is not clear of
+                            it yet */
     /* sizes */
     int disk_count, surface_count, kind_count, owner_count; /* [in] */
     int mover_count;     /* [in] */
@@ -398,6 +407,8 @@ typedef struct {
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */
     double air_loss;     /* J; what air has taken */
+    double released;     /* J; what disks had at their releases */
+    double push_work;    /* J; what pushes by hand have given */
     double gained;       /* J; by which solves broke their law of energy, see `check_solve` */
     double unsolved;     /* radii; the most overlap that the solve of this step leaves beyond what it asks for */
     double unsolved_most; /* ... and of all steps so far */
@@ -462,6 +473,9 @@ typedef struct {
     double adheres;         /* whether adhesion is what the belt's own table says */
 } IncomingKeys;
 
+/* Which way a surface lets through. */
+enum Passes { NEITHER_WAY, PASSES_UP, PASSES_RIGHT, PASSES_OUT };
+
 /* With a pivot it is a further plate, else the damping plate. */
 typedef struct { double distance, pivot_height, pivot[2], angle_deg, above, below; } PlateKeys;
 
@@ -472,6 +486,7 @@ typedef struct { double from[2], to[2], pulley_radius, speed; } ConveyorKeys;
 typedef struct {
     double corners;         /* of `points`, which stand behind all tables, surface by surface; 0: an arc */
     double center[2], radius, from_deg, to_deg, speed, opens_at, closes_at;
+    double passes;          /* enum Passes, below 0 the other way; NaN: solid from both sides */
     double repeat[6];       /* up to two of count, dx, dy */
 } SurfaceKeys;
 
@@ -496,12 +511,13 @@ typedef struct {                                                                
     double start[2], end[2], tangent[2], length, speed;
     double appears, vanishes; /* s; it is there from the one to the other */
     int surface;              /* which it belongs to */
+    int one_sided;            /* as that of `Surface` */
 } Segment;
 
 typedef struct {                                                                         /* [out] */
     double center[2], radius, begin, extent, speed; /* `Surface` says more */
     double appears, vanishes;
-    int surface;
+    int surface, one_sided;
 } Arc;
 
 /* What contradicts itself: no impact to place the outgoing belt by, a plate without a length, or
@@ -710,6 +726,8 @@ typedef struct {
     int whole;              /* whether it is bent all round */
     int near;               /* of a list of pieces that may be met */
     int mover;              /* [in] number of its mover from 1 on, 0 if it stays where it is */
+    int one_sided;          /* [in] as that of `Surface` */
+    int chain;              /* of the first of such pieces that follow each other: how many they are */
 } Barrier;
 
 /* A particle as it is told to the laws. */

@@ -27,16 +27,16 @@ static void ride_at(const Disk *d, double t, double *place) {
     place[3] = 0 - d->ride_speed * s;
 }
 
-/* Note at t whether a gate shuts on a disk, or that it has got clear of one that did. What lasts in a
-   crowd may have sunk into others so far. */
-static void spare(Disk *d, const Surface *s, double t) {
-    double place[4] = {d->x, d->y, 0, 0}, nx, ny, deep = (W.interact ? SUNK : 1e-9) * d->radius;
-    if (s->opens != t && (s->opens > t || !is_spared(s, d))) return;
+/* Note at t whether a disk is spared: a gate shuts on it, or it is on the side from which a surface lets it through; or
+   that it is clear of what spared it. What lasts in a crowd may have sunk into others so far. */
+void spare(const Disk *d, const Surface *s, double t) {
+    double place[4] = {d->x, d->y, 0, 0}, side = 0, deep = (W.interact ? SUNK : 1e-9) * d->radius;
+    int comes = s->opens == t, *spared = spared_by(s, d);
+    if (!comes && !s->one_sided && (s->opens > t || !*spared)) return;
     if (d->mode == RIDING) ride_at(d, t, place);
-    s = surface_at((int)(s - W.surfaces), t);
     double gap = has_corners(d) ? gap_of_corners(d, place[0], place[1], (int)(s - W.surfaces), t)
-        : gap_to(s, place[0], place[1], d->radius, &nx, &ny);
-    *spared_by(s, d) = gap < (s->opens == t ? -deep : 0);
+        : chain_gap(s, place[0], place[1], d->radius, t, &side);
+    *spared = side < 0 || (comes ? gap < -deep : *spared && gap < 0);
 }
 
 /* When the next surface comes or goes, or its travel changes, s. */
@@ -49,15 +49,19 @@ static double next_gate(double t) {
     return next;
 }
 
-/* Gap of a rider at t to the nearest surface that is there and not its own, and that surface. */
-static double ride_gap(const Disk *d, double t, int *which) {
+/* Gap of a rider at t to the nearest surface that is there and not its own, and that surface; `way` is how far it can go
+   before it comes to any, also to one that lets it through. */
+static double ride_gap(const Disk *d, double t, int *which, double *way) {
     double place[4], nx, ny, least = INFINITY;
+    *way = INFINITY;
     ride_at(d, t, place);
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = surface_at(k, t);
-        if (s->owner == W.ride_owner || t < s->opens || t >= s->closes || is_spared(s, d)) continue;
+        if (s->owner == W.ride_owner || t < s->opens || t >= s->closes) continue;
+        if (is_spared(s, d) && !s->one_sided) continue;
         double gap = gap_to(s, place[0], place[1], d->radius, &nx, &ny);
-        if (gap < least) {
+        *way = MIN(*way, fabs(gap));
+        if (gap < least && !is_spared(s, d)) {
             least = gap;
             *which = k;
         }
@@ -72,6 +76,7 @@ static void plan_ride(Disk *d, double from) {
     double v = d->ride_speed, rho = d->ride_rho, c = W.g > 0 ? v * v / (W.g * rho) : 1, t = from;
     double turn = c < cos(W.ride_incline) ? acos(c) + W.ride_incline : 0;
     int which = -1;
+    double way;
     d->ride_from = from;
     d->ride_met = -1;
     d->ride_to = INFINITY;
@@ -80,11 +85,11 @@ static void plan_ride(Disk *d, double from) {
     for (double safe = from; t < d->ride_to;) {
         for (int k = 0; k < W.surface_count; k++)
             if (W.surfaces[k].gate >= 0) spare(d, W.surfaces + k, t);
-        double gap = ride_gap(d, t, &which);
+        double gap = ride_gap(d, t, &which, &way);
         if (gap <= 0) {
             /* Bisect to the last place that is free. */
             for (double mid = 0.5 * (safe + t); mid > safe && mid < t; mid = 0.5 * (safe + t)) {
-                if (ride_gap(d, mid, &which) <= 0) t = mid;
+                if (ride_gap(d, mid, &which, &way) <= 0) t = mid;
                 else safe = mid;
             }
             d->ride_to = safe;
@@ -92,7 +97,7 @@ static void plan_ride(Disk *d, double from) {
             return;
         }
         safe = t;
-        t = MIN(t + MAX(gap, 1e-3 * d->radius) / (v + W.fastest), next_gate(t));
+        t = MIN(t + MAX(way, 1e-3 * d->radius) / (v + W.fastest), next_gate(t));
     }
 }
 
@@ -157,6 +162,15 @@ static void take_off(int i) {
     W.tracks[i].lasted = 0;
 }
 
+/* Kinetic and potential energy of a disk with a velocity, a spin and a place, J. */
+static double kinetic_of(const Disk *d, const double *v, double spin) {
+    return 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
+}
+
+static double lifted(const Disk *d, const double *place) {
+    return d->mass * W.g * (W.up[0] * place[0] + W.up[1] * place[1]);
+}
+
 /* Release a disk at t if its place is free; its event is then the end of a ride, or an impact. */
 static int release(int i, double t) {
     Disk *d = W.disks + i;
@@ -171,9 +185,12 @@ static int release(int i, double t) {
     if (d->ride_rho > 0) plan_ride(d, t);
     event_here(RELEASE, i, -1);
     knot_now(i);
+    W.released += kinetic_of(d, &d->vx, d->spin) + lifted(d, &d->x);
     if (d->ride_rho > 0) ride_on(d, t, MAX(W.step_end, t));
     else {
         take_off(i);
+        for (int k = 0; k < W.surface_count && W.gate_count; k++)
+            if (W.surfaces[k].one_sided) spare(d, W.surfaces + k, t);
         lie_down(i);
         for (int n = 0; n < 2 && W.pushes; n++) d->pushed[n] = 2 * (W.step_end - t) / W.length * d->force[n];
     }
@@ -272,7 +289,9 @@ static double set_gates(double t) {
             for (int i = W.low; i < W.high; i++)
                 if (W.disks[i].mode == ASLEEP) wake(i, W.t);
         s->there = there;
-        for (int i = W.low; i < W.high && s->gate >= 0; i++)
+        /* Pieces that follow each other in a chain share what they spare. */
+        int is_first = s->gate >= 0 && (k == 0 || s->gate != s[-1].gate);
+        for (int i = W.low; i < W.high && is_first; i++)
             if (is_live(W.disks + i)) spare(W.disks + i, s, t);
     }
     return W.gate_count || W.mover_count ? next_gate(t) : INFINITY;
@@ -343,7 +362,7 @@ static double in_hollows(void) {
 
 /* Note what all disks have together as a step begins. */
 static void note_totals(void) {
-    Total all = {.t = W.t, .unsolved = W.unsolved};
+    Total all = {.t = W.t, .unsolved = W.unsolved, .released = W.released};
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode == WAITING) continue;
@@ -364,10 +383,11 @@ static void note_totals(void) {
             v = place + 2;
             all.entries[0] -= d->mass * (W.gx * (place[0] - track->knot[1]) + W.gy * (place[1] - track->knot[2]));
         } else if (d->mode == GONE && !track->begun) continue;
-        all.kinetic += 0.5 * (d->mass * (square(v[0]) + square(v[1])) + d->inertia * square(spin));
-        all.potential += d->mass * W.g * (W.up[0] * place[0] + W.up[1] * place[1]);
+        all.kinetic += kinetic_of(d, v, spin);
+        all.potential += lifted(d, place);
         for (int n = 0; n < 3; n++) all.entries[n] += d->entries[n] - ahead[n];
     }
+    add_springs(all.springs);
     W.totals[W.total_count++] = all;
 }
 
@@ -678,6 +698,8 @@ static int run_on(int steps) {
             if (W.event_count + 4 * count + 64 > W.event_room) return FULL_EVENTS;
             int reason = BY_TIME;
             if (is_over(&reason)) {
+                if (W.joint_count && W.total_count >= W.total_room) return FULL_TOTALS;
+                if (W.joint_count) note_totals();
                 stop_all(reason);
                 W.phase = PART;
                 continue;

@@ -61,21 +61,23 @@ static Arc *arcs;
 static int segment_count, arc_count;
 
 /* Lay a straight piece of a surface. */
-static void lay_segment(int surface, double x, double y, double x1, double y1, double speed,
-                        const double *gate) {
+static Segment *lay_segment(int surface, double x, double y, double x1, double y1, double speed,
+                            const double *gate) {
+    static Segment none;
     if (!segments) {
         segment_count++;
-        return;
+        return &none;
     }
     double dx = x1 - x, dy = y1 - y, length = length_of(dx, dy);
-    segments[segment_count++] = (Segment){
-        { x, y }, { x1, y1 }, { dx / length, dy / length }, length, speed, gate[0], gate[1], surface,
+    segments[segment_count] = (Segment){
+        { x, y }, { x1, y1 }, { dx / length, dy / length }, length, speed, gate[0], gate[1], surface, 0,
     };
+    return segments + segment_count++;
 }
 
 static void lay_arc(int surface, double x, double y, double radius, double begin, double extent,
-                    double speed, const double *gate) {
-    Arc arc = { { x, y }, radius, begin, extent, speed, gate[0], gate[1], surface };
+                    double speed, const double *gate, int one_sided) {
+    Arc arc = { { x, y }, radius, begin, extent, speed, gate[0], gate[1], surface, one_sided };
     if (arcs) arcs[arc_count] = arc;
     arc_count++;
 }
@@ -98,21 +100,25 @@ static void lay_conveyor(int surface, const ConveyorKeys *c) {
     double clockwise = dx >= 0.0 ? 1.0 : -1.0, nx = -clockwise * dy * r, ny = clockwise * dx * r;
     lay_segment(surface, x0 + nx, y0 + ny, x1 + nx, y1 + ny, c->speed, ALWAYS);
     lay_segment(surface, x1 - nx, y1 - ny, x0 - nx, y0 - ny, c->speed, ALWAYS);
-    lay_arc(surface, x0, y0, r, 0.0, 2.0 * PI, clockwise * c->speed, ALWAYS);
-    lay_arc(surface, x1, y1, r, 0.0, 2.0 * PI, clockwise * c->speed, ALWAYS);
+    lay_arc(surface, x0, y0, r, 0.0, 2.0 * PI, clockwise * c->speed, ALWAYS, 0);
+    lay_arc(surface, x1, y1, r, 0.0, 2.0 * PI, clockwise * c->speed, ALWAYS, 0);
 }
 
 /* One copy of a free surface, moved by (dx, dy), from its gate's opening to its closing. */
 static void lay_copy(int surface, const SurfaceKeys *s, const double *points, double dx, double dy,
                      const double *gate) {
     int last = (int)s->corners - 1;
-    for (int n = 0; n < last; n++, points += 2)
+    /* Solid on the side that it lets through to: that is its left, where its normal leads there. */
+    double sense = isnan(s->passes) ? 0.0 : s->passes < 0.0 ? -1.0 : 1.0;
+    for (int n = 0; n < last; n++, points += 2) {
+        double way = fabs(s->passes) == PASSES_UP ? points[2] - points[0] : points[1] - points[3];
         lay_segment(surface, points[0] + dx, points[1] + dy, points[2] + dx, points[3] + dy,
-                    s->speed, gate);
+                    s->speed, gate)->one_sided = sense * way < 0.0 ? -1 : sense * way > 0.0;
+    }
     if (last > 0) return;
     double first = s->from_deg * RADIANS, end = s->to_deg * RADIANS;
     lay_arc(surface, s->center[0] + dx, s->center[1] + dy, s->radius, MIN(first, end),
-            fabs(end - first), s->to_deg < s->from_deg ? s->speed : -s->speed, gate);
+            fabs(end - first), s->to_deg < s->from_deg ? s->speed : -s->speed, gate, (int)sense);
 }
 
 /* A free surface with all its copies, and when they are there. */

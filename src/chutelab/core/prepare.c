@@ -151,7 +151,7 @@ static void find_mate(int k, int end, double r) {
         const Surface *next = W.surfaces + m;
         if (rank(W.ends[row]) > last) break;
         if (m == k || m >= mate || (next->shape == SEGMENT && s->shape == SEGMENT)) continue;
-        if (next->mover != s->mover) continue;
+        if (next->mover != s->mover || (next->one_sided != s->one_sided)) continue;
         at_end(next, W.ends[row] % 2, other, back);
         double off = hypot(other[0] - place[0], other[1] - place[1]);
         if (off > JOINED * r || hypot(back[0] + onward[0], back[1] + onward[1]) > SMOOTH) continue;
@@ -162,7 +162,7 @@ static void find_mate(int k, int end, double r) {
     for (int n = 0; n < W.circle_count; n++) {
         const Surface *next = W.surfaces + W.circles[n];
         double x = place[0] - next->x, y = place[1] - next->y, reach = next->radius + JOINED * r;
-        if (next->mover != s->mover) continue;
+        if (next->mover != s->mover || s->one_sided) continue;
         if (fabs(x) > reach || fabs(y) > reach) continue;
         double d = hypot(x, y), off = fabs(d - next->radius);
         if (off > JOINED * r || fabs(x * onward[0] + y * onward[1]) > SMOOTH * d) continue;
@@ -262,12 +262,18 @@ static void make_contact_room(int room) {
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 
+/* Make twice the room for states of hinges; return whether there is such. */
+int stretch_swings(void) {
+    W.swing_work = stretch(W.swing_work, 3 * W.swing_count, 3 * W.swing_room, sizeof *W.swing_work);
+    return W.swing_work && STRETCH(W.swings, W.swing_count, W.swing_room);
+}
+
 /* Make twice the room for what is full. */
 int make_room(int full) {
     if (full == FULL_NEAR) make_near_room(2 * W.near_room);
     if (full == FULL_CONTACTS) make_contact_room(2 * W.contact_room);
     if (full == FULL_KNOTS) STRETCH(W.knots, W.knot_count, W.knot_room);
-    if (full == FULL_SWINGS) STRETCH(W.swings, W.swing_count, W.swing_room);
+    if (full == FULL_SWINGS) stretch_swings();
     if (full == FULL_TOTALS) STRETCH(W.totals, W.total_count, W.total_room);
     if (full == FULL_EVENTS) STRETCH(W.events, W.event_count, W.event_room);
     return has_room();
@@ -300,6 +306,7 @@ static int lay_out_work(void) {
     W.total_room = crowd ? 1024 : 1;
     W.swing_room = W.hinges ? 1024 + 8 * W.mover_count : 0;
     RESERVE(W.swings, W.swing_room);
+    RESERVE(W.swing_work, 3.0 * W.swing_room);
     RESERVE(W.knots, W.knot_room);
     RESERVE(W.totals, W.total_room);
     RESERVE(W.events, W.event_room);
@@ -326,6 +333,24 @@ void join_surfaces(void) {
         if (W.surfaces[k / 2].shape == CIRCLE || mate < 0 || W.surfaces[mate].shape != CIRCLE) continue;
         W.surfaces[mate].ledges[of[0] >= 0] = W.surfaces[k / 2].ledges[k % 2];
         of[of[0] >= 0] = k / 2;
+    }
+}
+
+/* Have pieces of a surface that is solid from one side share what they spare, where each goes on at an end of the one
+   before. */
+static void chain_pieces(double near) {
+    for (int k = 1; k < W.surface_count; k++) {
+        Surface *s = W.surfaces + k, *last = s - 1;
+        int meets = 0;
+        if (!s->one_sided || s->owner != last->owner || s->opens != last->opens || s->shape != last->shape) continue;
+        for (int n = 0; n < 4; n++) {
+            const double *a = s->end + n / 2 * 2, *b = last->end + n % 2 * 2;
+            meets |= fabs(a[0] - b[0]) <= near && fabs(a[1] - b[1]) <= near;
+        }
+        if (!meets) continue;
+        s->gate = last->gate;
+        s->chain = last->chain;
+        last->chain = k;
     }
 }
 
@@ -393,10 +418,12 @@ EXPORT int prepare(void) {
         Surface *piece = W.surfaces + k;
         derive(piece);
         int goes = piece->closes < INFINITY || is_triggered(piece->owner, GOES);
-        piece->gate = piece->opens > -INFINITY || goes ? W.gate_count++ : -1;
+        piece->gate = piece->opens > -INFINITY || goes || piece->one_sided ? W.gate_count++ : -1;
+        piece->chain = k;
         memcpy(piece->swept, piece->box, sizeof piece->swept);
         W.everything[k] = k;
     }
+    chain_pieces(TOUCHING * least);
     RESERVE(W.spared, (double)W.disk_count * W.gate_count);
     if (!has_room()) return 0;
     join_surfaces();

@@ -137,7 +137,7 @@ EXPORT int prepare_to_judge(void) {
         *own = (Barrier){ .x = s->x, .y = s->y, .tx = s->tx, .ty = s->ty, .length = s->length,
                           .radius = s->radius, .begin = s->begin, .extent = s->extent,
                           .speed = s->speed, .appears = s->opens, .vanishes = s->closes,
-                          .surface = s->owner };
+                          .surface = s->owner, .one_sided = s->one_sided };
         for (int n = 0; n < w->mover_count; n++)
             if (w->movers[n].surface == s->owner) own->mover = n + 1;
     }

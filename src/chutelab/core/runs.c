@@ -140,7 +140,7 @@ static Surface *take_segments(Surface *to) {
     for (const Segment *s = P.segments; s < P.segments + P.segment_count; s++)
         *to++ = (Surface){ .x = s->start[0], .y = s->start[1], .tx = s->tangent[0], .ty = s->tangent[1],
                            .length = s->length, .speed = s->speed, .opens = s->appears, .closes = s->vanishes,
-                           .shape = SEGMENT, .owner = s->surface };
+                           .shape = SEGMENT, .owner = s->surface, .one_sided = s->one_sided };
     return to;
 }
 
@@ -175,7 +175,7 @@ static int take_up_world(void) {
     for (const Arc *a = P.arcs; a < P.arcs + P.arc_count; a++)
         *to++ = (Surface){ .x = a->center[0], .y = a->center[1], .radius = a->radius, .begin = a->begin,
                            .extent = a->extent, .speed = a->speed, .opens = a->appears, .closes = a->vanishes,
-                           .shape = ARC, .owner = a->surface };
+                           .shape = ARC, .owner = a->surface, .one_sided = a->one_sided };
     Pair *pair = w->pairs;
     for (int kind = 0; kind < P.particles; kind++) {
         for (int n = 0; n < own_pairs - P.owners + w->surface_count; n++) {

@@ -143,6 +143,7 @@ def _plain(machine: Machine) -> Machine:
         (bent, "straight surfaces, and the drive pulley"),
         (np.isfinite([parts.appears, parts.vanishes]).any(), "surfaces that are always there"),
         (machine.movers, "surfaces that stay where they are"),
+        (machine.scene.one_sided, "surfaces that are solid from both sides"),
         (machine.rolling[kind] > 0.0, "disks without rolling friction"),
         (machine.air > 0.0, "flights without air"),
         (machine.scene.clings, "surfaces without cohesion"),

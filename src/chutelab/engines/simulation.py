@@ -37,7 +37,8 @@ def choose(machine: Machine, engine: str | None = None) -> str:
     if machine.joints:
         return "pymunk" if unjoined(machine) else "contact"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
-    return "contact" if stepped or machine.tilt or machine.scene.clings else "exact"
+    scene = machine.scene
+    return "contact" if stepped or machine.tilt or scene.clings or scene.one_sided else "exact"
 
 
 def simulate(
@@ -228,6 +229,9 @@ def must_fit(machine: Machine, name: str) -> None:
             moving = machine.surfaces[machine.movers[0].surface]
             allowed = f"contact or pymunk, because {moving} moves: no closed form has its blows"
             raise refused(scene, "run.engine", "exact", allowed)
+        if scene.one_sided:
+            allowed = f"contact or pymunk, because {scene.one_sided} is solid from one side"
+            raise refused(scene, "run.engine", "exact", allowed)
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"
             raise refused(scene, "run.engine", "exact", allowed)
@@ -246,9 +250,9 @@ def must_fit(machine: Machine, name: str) -> None:
             key = f"{scene.head('particle', n)}.restitution_speed"
             raise refused(scene, key, kind.restitution_speed, allowed)
     for n, pair in enumerate(scene.pair):
-        if pair.cohesion and (name == "pymunk" or scene.hinges):
+        if (pull := pair.clings) and (name == "pymunk" or scene.hinges):
             what = "the pymunk engine" if name == "pymunk" else "what hangs on hinges"
-            raise refused(scene, f"pair[{n}].cohesion", pair.cohesion, f"0 with {what}")
+            raise refused(scene, f"pair[{n}].{pull}", getattr(pair, pull), f"0 with {what}")
     if name == "pymunk" and machine.air and any(one is not None for one in machine.outlines):
         allowed = "0 with boxes and polygons: drag is that of a sphere"
         raise refused(scene, "air_density", machine.air, allowed)
@@ -267,6 +271,12 @@ def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
             yield key, kind.rolling_friction, "0 with boxes and polygons: they do not roll"
     if scene.hinges:
         yield "run.engine", "contact", f"pymunk: nothing hangs on a hinge with {why}"
+    if scene.one_sided:
+        yield (
+            "run.engine",
+            "contact",
+            f"pymunk: {scene.one_sided} lets no boxes pass one way in contact",
+        )
     belt = scene.incoming
     if belt is not None and belt.friction == "adhesion":
         yield "incoming.friction", belt.friction, f"a Coulomb coefficient with {why}"

@@ -106,6 +106,7 @@ class Pulley:
     def rim(self) -> Arcs:
         """Its surface, one piece: (1,), or in a family (N, 1)."""
         own = {**vars(self), "begin": 0.0, "extent": 2.0 * pi, "appears": -inf, "vanishes": inf}
+        own["one_sided"] = 0
         del own["incline"]
         arrays = {name: np.asarray(value)[..., None] for name, value in own.items()}
         return Arcs(center=np.zeros((1, 2)), **arrays)

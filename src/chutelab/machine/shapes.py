@@ -46,6 +46,8 @@ class Pieces(ABC):
         Index of the surface a piece belongs to, into `Machine.surfaces`.
     appears, vanishes : ndarray, (..., S)
         From when to when it is there, s; -inf and inf if always.
+    one_sided : ndarray, (S,)
+        1 if it is solid on its left, of an arc outside, -1 on the other side; 0 on both.
     """
 
     speed: Floats
@@ -54,6 +56,7 @@ class Pieces(ABC):
     surface: Ints
     appears: Floats
     vanishes: Floats
+    one_sided: Ints
 
     def __post_init__(self) -> None:
         for array in vars(self).values():

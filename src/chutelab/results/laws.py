@@ -136,9 +136,9 @@ def _tell(recording: Record) -> tuple[Broken, ...]:
 def _hinges(recording: Record, figures: Any) -> list[Broken]:
     """Judge what hangs on hinges by its states, and what the scene says acts on it.
 
-    E is its energy, ΔE = worked - given - stopped - damped; damped = ∫ damper rate² dt; stops hold;
-    a motor works no more than its torque times its way. Pymunk, of the order of its step, is judged
-    by ΔE alone, roughly.
+    E is its energy, ΔE = worked + pushed - given - stopped - damped; damped = ∫ damper rate² dt;
+    stops hold; a motor works no more than its torque times its way. Pymunk, of the order of its
+    step, is judged by ΔE alone, roughly.
     """
     told = list[Broken]()
 
@@ -154,13 +154,13 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
         if hinge is None or hinge.steered:
             continue
         t, angle, rate = (hinge.states[name] for name in ("t", "angle", "rate"))
-        worked, stopped, damped = recording.hinge_work[surface].tolist()
+        worked, stopped, damped, pushed = recording.hinge_work[surface].tolist()
         parts = np.stack(hinge.energies(angle, rate, recording.gravity, recording.machine.up))
         energy = parts.sum(axis=0)
         given = float(recording.drives[surface])
         play = float(np.abs(parts).sum(axis=0).max())
-        play += sum(map(abs, (worked, given, stopped, damped)))
-        off = energy[-1] - energy[0] - (worked - given - stopped - damped)
+        play += sum(map(abs, (worked, given, stopped, damped, pushed)))
+        off = energy[-1] - energy[0] - (worked + pushed - given - stopped - damped)
         if recording.engine == "pymunk":
             must(LEDGER, surface, abs(off), ROUGHLY * play + EPS)
             continue
@@ -290,7 +290,11 @@ def alike(recording: Record) -> bool:
     """Tell whether all is left to Chipmunk, in steps that are all alike."""
     m = recording.machine
     return recording.engine == "pymunk" and (
-        m.interact or not m.align or len(m.joints) + len(m.movers) > 0 or not _round(m)
+        m.interact
+        or not m.align
+        or len(m.joints) + len(m.movers) > 0
+        or not _round(m)
+        or bool(m.scene.one_sided)
     )
 
 
@@ -325,6 +329,7 @@ def barriers(machine: Machine) -> NDArray[Any]:
         own = rows[..., first : (first := first + part.surface.size)]
         own["speed"], own["surface"] = part.speed, part.surface
         own["appears"], own["vanishes"] = part.appears, part.vanishes
+        own["one_sided"] = part.one_sided
         for name, values in part.told().items():
             own[name] = values
         for n, mover in enumerate(machine.movers, 1):

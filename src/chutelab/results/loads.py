@@ -158,10 +158,11 @@ class Load(Shown):
     place : ndarray, shape (T, 2)
         Where it is pressed, m: the mean of places by what presses there; NaN where nothing does.
     pivot : (float, float)
-        What torques are about: a plate's pivot, the axis of the drive pulley, an arc's centre; of
-        others the first end, m.
+        What torques are about, m: the hinge or pivot, as written, of what moves; a plate's pivot,
+        the axis of the drive pulley, an arc's centre; of others the first end.
     torque : ndarray, shape (T,)
-        Of the force about the pivot, counterclockwise, N m.
+        Of the force about the pivot, counterclockwise, N m; about where it is in the middle of the
+        bin, if it travels or shakes.
     filled : int
         How many bins the run went through; later ones than T are without load.
     """
@@ -199,7 +200,9 @@ class Load(Shown):
 
 def pivot_of(machine: Machine, surface: int) -> tuple[float, float]:
     """Return what torques on a surface are about, see `Load`, m."""
-    name, scene = machine.surfaces[surface], machine.scene
+    name, scene, mover = machine.surfaces[surface], machine.scene, machine.mover(surface)
+    if mover is not None:
+        return mover.pivot
     if machine.pulley is not None and surface == machine.pulley.surface:
         return 0.0, 0.0
     for plate in scene.plates:
@@ -256,16 +259,18 @@ def loads(recording: Record, name: str, every: float | None = None) -> Load:
         if len(rows)
     } or {key: np.zeros((0, *LOAD[key].shape)) for key in LOAD.names or ()}
     normal, force = sums["normal"], sums["force"]
-    x, y = pivot_of(machine, surface)
+    edges = machine.loads * many * np.arange(len(first) + 1.0)
+    pivot, mover = pivot_of(machine, surface), machine.mover(surface)
+    x, y = pivot if mover is None else mover.pose(0.5 * (edges[1:] + edges[:-1]))[:, :2].T
     pressed = normal[:, None] > 0.0
     return Load(
         name=name,
-        edges=machine.loads * many * np.arange(len(first) + 1.0),
+        edges=edges,
         normal=normal,
         along=sums["along"],
         force=force,
         place=np.divide(sums["at"], normal[:, None], out=np.full_like(force, nan), where=pressed),
-        pivot=(x, y),
+        pivot=pivot,
         torque=sums["moment"] - x * force[:, 1] + y * force[:, 0],
         filled=int(float(recording.knots["t"].max(initial=0.0)) / width + TOLERANCE),
     )

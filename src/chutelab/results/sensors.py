@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from chutelab.results.record import QUANTILES, Record, hermite, kept
 from chutelab.util.arrays import Floats, Ints
-from chutelab.util.tables import Sheet, Shown, number
+from chutelab.util.tables import Sheet, number
 
 PASSAGE = np.dtype(
     [("t", "f8"), ("particle", "i4"), ("way", "i1"), ("along", "f8"), ("position", "f8", 2),
@@ -47,7 +47,8 @@ def passages(recording: Record, begin: Place, end: Place) -> NDArray[np.void]:
     last = np.zeros(len(knots), dtype=bool)
     last[recording.offsets[1:][recording.released] - 1] = True
     h = np.diff(knots["t"], append=0.0)
-    left = np.flatnonzero(~last & (h > 0.0))
+    # Also between two knots at one time: a blow on the line may move a centre by its rounding.
+    left = np.flatnonzero(~last)
     # The control points of a cubic are on both sides where it crosses.
     third = h[left] / 3.0
     points = [off[left], off[left] + third * rate[left], off[left + 1] - third * rate[left + 1],
@@ -86,8 +87,8 @@ def passages(recording: Record, begin: Place, end: Place) -> NDArray[np.void]:
     return found[np.lexsort((found["particle"], found["t"]))]
 
 
-@dataclass(frozen=True, repr=False)
-class Reading(Shown):
+@dataclass(frozen=True)
+class Reading:
     """What a sensor tells of a run.
 
     Attributes

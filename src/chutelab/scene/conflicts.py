@@ -15,6 +15,7 @@ import tomllib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from types import CodeType
 from typing import Any, Final
@@ -413,6 +414,8 @@ def _pairs(look: Look) -> Iterator[Fault]:
         between = pair["between"]
         if not (isinstance(between, LIST) and pair.sound()):
             continue
+        if pair["bond_number"] and look.document.get("gravity") == 0.0:
+            yield pair.fault("bond_number", "0 where gravity is 0: it counts weights")
         if not any(name in kinds for name in between):
             text = f"one of them must be the name of a [[particle]]; {_there_are(kinds)}"
             yield Fault(pair.path("between"), list(between), text)
@@ -492,6 +495,8 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
         keys = [key for key in motions if row.given(key) and row[key] != 0.0]
         if keys and engine == "exact":
             yield run.fault("engine", f"{row.path(keys[0])} moves it: contact or pymunk has that")
+        if row.given("passes") and engine == "exact":
+            yield run.fault("engine", f"{row.path('passes')} needs contact or pymunk")
         waits = next((key for key in WAITS if row.given(key)), "")
         if waits and engine == "exact":
             yield run.fault("engine", f"{row.path(waits)} needs contact or pymunk")
@@ -536,6 +541,13 @@ def _pieces(look: Look) -> Iterator[Fault]:
         if not surface.sound():
             continue
         points, repeat = surface["points"], surface["repeat"]
+        if (way := surface["passes"]) and not surface.given("center"):
+            across = int(way in ("left", "right"))
+            places = [point[across] for point in points or (surface["from"], surface["to"])]
+            steps = [b - a for a, b in pairwise(places)]
+            if min(steps) <= 0.0 <= max(steps):
+                text = f"another way: each of its points must have {'xy'[across]} beyond that of"
+                yield surface.fault("passes", f"{text} the one before")
         opens, closes = surface["opens_at"], surface["closes_at"]
         pieces = max(1, len(points or ()) - 1) * math.prod(copies[0] for copies in repeat)
         if opens is not None and closes is not None and opens < closes:

@@ -234,13 +234,25 @@ class SceneTables(Table):
     @property
     def clings(self) -> bool:
         """Whether any two pull at each other."""
-        return any(pair.cohesion > 0.0 for pair in self.pair)
+        return any(pair.clings for pair in self.pair)
+
+    @property
+    def one_sided(self) -> str | None:
+        """The name of a surface that is solid from one side, if any is."""
+        return next((one.name for one in self.surface if one.passes), None)
 
     def cohesion(self, kind: int, other: int | str) -> float:
-        """Return the force (N) that it takes to pull a kind off another, or off a surface."""
+        """Return the force (N) that it takes to pull a kind off another, or off a surface.
+
+        A bond number tells it in weights of the lighter kind, of mean radius.
+        """
         name = other if isinstance(other, str) else self.particles[other].name
         names = {self.particles[kind].name, name}
-        return next((pair.cohesion for pair in self.pair if {*pair.between} == names), 0.0)
+        pair = next((pair for pair in self.pair if {*pair.between} == names), None)
+        if pair is None or not pair.bond_number:
+            return 0.0 if pair is None else pair.cohesion
+        mass = min(one.mass for one in self.particles if one.name in names)
+        return pair.bond_number * (mass * self.gravity)
 
     def meetings(self, value: Reader = getattr) -> Callable[[int, int | str], tuple[float, float]]:
         """Return what tells restitution and friction of a kind and another kind, or a surface.

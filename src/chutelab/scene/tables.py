@@ -141,7 +141,15 @@ class Pair(Table):
     cohesion: Amount = described(
         0.0, "Force that it takes to pull them off each other where they touch", "N"
     )
+    bond_number: Amount = described(
+        0.0, "Instead of cohesion: that force over a particle's weight, of two kinds the lighter"
+    )
     meet: Switch = described(True, "Whether two kinds meet; if not, they pass through each other")
+
+    @property
+    def clings(self) -> str | None:
+        """The key by which the two pull at each other, or None."""
+        return next((key for key in ("cohesion", "bond_number") if getattr(self, key)), None)
 
 
 class Incoming(Table):
@@ -339,6 +347,12 @@ class StillSurface(Table):
     )
     closes_when: When | None = described(
         None, 'It comes when another surface is touched: { touched = "bell" }'
+    )
+    passes: Literal["up", "down", "left", "right", "in", "out"] | None = described(
+        None,
+        "Way in which it lets particles through, and holds those that come the other way, whichever"
+        ' way it is drawn; of an arc in or out. "up": what comes from below passes, what comes from'
+        " above is carried",
     )
     pivot: Point | None = described(
         None,

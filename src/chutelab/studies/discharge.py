@@ -26,6 +26,9 @@ from chutelab.util.tables import Sheet, plain
 HEIGHTS = (0.0, -0.2, -0.4, -0.6, -0.8, -1.0)
 """Heights above the pulley's axis at which streams are compared, m."""
 
+DEEPEST = 100.0
+"""Farthest below the axis that a height may be, m."""
+
 LOOK = 1e-3
 """Time between two looks at the simulated paths, s; they are straight between: 1e-6 m."""
 
@@ -101,7 +104,7 @@ def side_by_side(
     the first stream with half a particle below and above.
 
     Raises a `DischargeError` for a scene without an incoming belt, or whose first stream is not
-    released on it.
+    released on it, and of heights (m) that are no numbers, all above the pulley or below `DEEPEST`.
     """
     whole = load(scene)
     if (belt := whole.incoming) is None:
@@ -109,15 +112,23 @@ def side_by_side(
     stream, own = whole.streams[0], whole.particle
     if stream.at is not None or own.shape not in ("disk", "sphere"):
         raise DischargeError("must release disks or spheres on the incoming belt", "stream")
+    wanted = np.array(heights, dtype=np.float64)
+    if not (np.isfinite(wanted).all() and -DEEPEST <= wanted.min() < belt.pulley_radius):
+        allowed = f"must be numbers, the least from -{DEEPEST:g} m to the pulley's top"
+        raise DischargeError(f"{allowed} at {belt.pulley_radius:g} m", "heights", list(heights))
     tables = to_dict(whole)
     streams = tables.get("stream", {})
-    fall = sqrt(2.0 * (belt.pulley_radius - min(heights)) / whole.gravity)
+    fall = sqrt(2.0 * (belt.pulley_radius - float(wanted.min())) / whole.gravity)
     kept = ("title", "gravity", "material", "incoming", "particle")
     free: dict[str, Any] = {key: tables[key] for key in kept if key in tables}
     rides = (belt.length + 4.0 * belt.pulley_radius) / belt.speed
     last = stream.start + stream.count / whole.rate + rides + 3.0 * fall
     free["stream"] = streams[0] if isinstance(streams, tuple) else streams
     free["run"] = {"until": last, "dt": whole.run.dt}
+    if (low := float(wanted.min())) < -1.0:
+        # A run ends 1 m below its lowest surface: this one is behind all that flies.
+        behind = -belt.length - 10.0 * belt.pulley_radius
+        free["surface"] = [{"name": "low", "from": [behind - 1.0, low], "to": [behind, low]}]
     alone = from_dict(free)
     radius = float(np.max(own.radius))
     mass = own.mass if own.mass is not None else nan

@@ -340,6 +340,8 @@ class Course:
         for free in self.scene.surface:
             if free.name == name and (free.opens_at, free.closes_at) != (None, None):
                 claim, how = Reason.OUTSIDE, "it is a gate, and in the way while it is shut"
+            elif free.name == name and free.passes:
+                claim, how = Reason.OUTSIDE, "it is in the way from one side"
         return claim.because(f"{name}: {how}")
 
 

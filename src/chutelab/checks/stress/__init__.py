@@ -235,6 +235,8 @@ def need_judged(scene: Scene) -> None:
         if kind.shape not in {"disk", "sphere"}
     ]
     faults += [Fault("surface", name, "not judged: it moves") for name in scene.movers]
+    if scene.one_sided:
+        faults.append(Fault("surface", scene.one_sided, "not judged: it is solid from one side"))
     faults += [Fault(table, None, allowed) for table in {table: 0 for table, _ in scene.joints}]
     if faults:
         raise SceneError(scene.source, faults)

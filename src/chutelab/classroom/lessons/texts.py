@@ -18,8 +18,8 @@ from markdown_it.tree import SyntaxTreeNode
 
 SYMBOLS: Final = {
     "alpha": "α", "varepsilon": "ε", "mu": "µ", "varphi": "φ", "omega": "ω", "pi": "π",
-    "rho": "ρ", "sigma": "σ", "Delta": "Δ", "cdot": "·", "le": "≤", "ge": "≥", "approx": "≈",
-    "ne": "≠", "to": "→", "infty": "∞", "pm": "±", ",": " ", "sum": "Σ",
+    "rho": "ρ", "sigma": "σ", "theta": "θ", "delta": "δ", "Delta": "Δ", "cdot": "·", "le": "≤",
+    "ge": "≥", "approx": "≈", "ne": "≠", "to": "→", "infty": "∞", "pm": "±", ",": " ", "sum": "Σ",
 }  # fmt: skip
 """The character of each name after a backslash."""
 

@@ -35,7 +35,8 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     `progress` is called now and then with the share of the run that is done, and may end the run.
     With `align`, a lone particle's blows are right to rounding error, its lasting contacts of order
     2 in the step, which is no longer than `dt` and half a radius' way. Particles that meet, boxes,
-    what hangs on joints, surfaces that move, air, and steps that are all alike, are of order 1:
+    what hangs on joints, surfaces that move or are solid from one side, air, and steps that are all
+    alike, are of order 1:
     `dt` times the speed should be less than the radius, or half a box's width, or they overlap by
     as much, and pass through surfaces.
 
@@ -59,7 +60,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     try:
         boxes = any(outline is not None for outline in machine.outlines)
         apart = not (machine.interact or boxes or machine.joints or machine.movers)
-        apart = apart and not machine.triggers
+        apart = apart and not (machine.triggers or machine.scene.one_sided)
         if not (apart and machine.align):
             shared = Shared(machine, world, recorder)
             try:

@@ -242,7 +242,10 @@ class Lone:
             return contacts
         couple, spin, moment = 0.0, contacts[0].face.spin, self.body.moment
         ends = [(couple, self.body.angular_velocity - spin)]
-        while abs(after := ends[-1][1]) * moment > SLACK * abs(couple) and len(ends) < ROLLS:
+        least = self.world.tiny * (self.pace + v.length) / self.r
+        while abs(after := ends[-1][1]) > max(SLACK * abs(couple) / moment, least):
+            if len(ends) == ROLLS:
+                break
             opposite = [end for end in ends if end[1] * after < 0.0]
             if opposite:
                 low, one = opposite[-1]

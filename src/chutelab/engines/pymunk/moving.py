@@ -17,6 +17,10 @@ from chutelab.util.arrays import Floats, Ints
 COMES_BACK: Final = 0.02
 """s; in which what has gone beyond a stop within a step comes back to it, but for 1/e."""
 
+SWEEPS: Final = 10
+"""Iterations of Chipmunk for each face that hangs on a hinge with others: each turns with the first
+one alone, so what strikes one takes as many sweeps as there are faces to reach them all."""
+
 
 class Hanging:
     """What hangs on a hinge: a body a face, which pivots there; all of a surface turn together.
@@ -36,6 +40,7 @@ class Hanging:
         # What has no weight has its mass at the hinge, where it does nothing.
         mass = hinge.mass if weighs else hinge.inertia / hinge.gyration**2
         middle = Vec2d(x, y) / mass if weighs else Vec2d.zero()
+        space.iterations = max(space.iterations, SWEEPS * many)
         for body in bodies:
             body.body_type = pymunk.Body.DYNAMIC
             body.mass = mass / many
@@ -56,7 +61,7 @@ class Hanging:
         self.motor.max_force = hinge.motor[1] if mover.begins == 0.0 else 0.0
         spring = pymunk.DampedRotarySpring(self.body, still, hinge.rest, hinge.spring, hinge.damper)
         space.add(self.stop, spring, *[self.motor] * (hinge.motor[1] > 0.0))
-        self.before, self.work = 0.0, np.zeros(3)
+        self.before, self.work = 0.0, np.zeros(4)
         self.states = [(0.0, 0.0, 0.0, mover.surface, 0)]
 
     @property
@@ -153,7 +158,7 @@ class Moving:
                 self.hanging[face.surface].before = self.turn[0, row] = body.angular_velocity
                 continue
             if face.surface not in motion:
-                poses = mover.pose(t + 0.5 * h), mover.pose(t + h)
+                poses = mover.pose([t + 0.5 * h, t + h]).tolist()
                 turned = ([*pose, np.cos(pose[2]), np.sin(pose[2])] for pose in poses)
                 motion[face.surface] = *turned, mover.velocity(t + h).tolist()
             (x, y, angle, c, s), end, (vx, vy, turn) = motion[face.surface]

@@ -88,6 +88,10 @@ class Shapes:
         self.gates: dict[Face, list[pymunk.Shape]] = {}
         # Gates that are there, and particles that a gate shut on, with the gate.
         self.up, self.shut = set[Face](), set[tuple[pymunk.Shape, Face]]()
+        # Chains of faces that are solid from one side. Of each particle that touches one, how many
+        # of their shapes, and whether it came from the side that lets it through.
+        self.chains = self._one_sided()
+        self.touching: dict[tuple[pymunk.Shape, tuple[Face, ...]], tuple[int, bool]] = {}
         waits = {one.surface for one in machine.triggers if one.doing != "starts"}
         for face in world.faces:
             parts = self._shapes(face)
@@ -107,8 +111,10 @@ class Shapes:
         self.rank = {body.id: row for row, body in enumerate(bodies)}
         self.points: list[tuple[float, ...]] = []
         space.on_collision(PARTICLE, ROLLER, pre_solve=self._met)
-        if self.table is not None or self.gates:
+        if self.table is not None or self.gates or self.chains:
             space.on_collision(PARTICLE, SURFACE, pre_solve=self._met)
+        for kind in (SURFACE, ROLLER) if self.chains else ():
+            space.on_collision(PARTICLE, kind, begin=self._comes, separate=self._goes)
         if self.table is not None:
             space.on_collision(PARTICLE, PARTICLE, pre_solve=self._met)
         if self.corners:
@@ -244,7 +250,7 @@ class Shapes:
         """Give a contact what its shapes do not have: of two particles the values of their kinds.
 
         The end of a belt moves along its rim, and beside the face it is not met; nor does a gate
-        touch a particle that it shut on.
+        touch a particle that it shut on, or what is solid from one side one that it lets through.
         """
         shape, met = arbiter.shapes
         face = self.world.by_shape.get(met)
@@ -258,12 +264,54 @@ class Shapes:
             arbiter.process_collision = beyond
             speed = face.belt(normal.rotated(-met.body.angle))
             arbiter.surface_velocity = speed * Vec2d(normal.y, -normal.x)
-        if (shape, face) in self.shut:
+        _, passes = self.touching.get((shape, self.chains.get(face, ())), (0, False))
+        if passes or (shape, face) in self.shut:
             arbiter.process_collision = False
         if self.table is not None:
             column = self.kind[met] if face is None else self.column[face]
             pair = self.table[:, self.kind[shape], column]
             arbiter.restitution, arbiter.friction = pair.tolist()
+
+    def _one_sided(self) -> dict[Face | None, tuple[Face, ...]]:
+        """Return the chain of each face that is solid from one side: those that follow each other.
+
+        The ends of an arc follow it.
+        """
+        chains, last = dict[Face | None, tuple[Face, ...]](), tuple[Face, ...]()
+        for face in (face for face in self.world.faces if face.one_sided):
+            follows = last and (last[0].surface, last[0].appears) == (face.surface, face.appears)
+            if follows and face.ends:
+                gaps = [(a - b).length for a in face.ends for b in last[-1].ends]
+                follows = min(gaps) <= self.world.hair
+            last = (*last, face) if follows and not isinstance(face, Bend) else (face,)
+            chains |= dict.fromkeys(last, last)
+        return chains
+
+    def _comes(self, arbiter: pymunk.Arbiter, space: pymunk.Space, _data: Any) -> None:
+        """Note from which side of a chain a particle comes that touches the first of its shapes.
+
+        It is where it was a step ago: as far as its radius it may have come since.
+        """
+        shape, met = arbiter.shapes
+        if (chain := self.chains.get(self.world.by_shape[met])) is None:
+            return
+        count, passes = self.touching.get((shape, chain), (0, False))
+        if not count:
+            assert shape.body is not None
+            x = shape.body.position - space.current_time_step * shape.body.velocity
+            gaps = [(face.gap(x)[0], face.side(x)) for face in chain]
+            least = min(gap for gap, _ in gaps) + self.world.hair
+            # At a corner, where two are as near, the sum of their normals counts.
+            passes = sum(side for gap, side in gaps if gap <= least) < 0.0
+        self.touching[shape, chain] = count + 1, passes
+
+    def _goes(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
+        """Note that a particle touches a shape no more; clear of a chain, it is spared no more."""
+        shape, met = arbiter.shapes
+        chain = self.chains.get(self.world.by_shape[met], ())
+        count, passes = self.touching.pop((shape, chain), (0, False))
+        if count > 1:
+            self.touching[shape, chain] = count - 1, passes
 
     def _note(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         """Note what was done at each point of a contact; what Pymunk tells itself are sums."""

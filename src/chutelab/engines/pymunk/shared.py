@@ -109,6 +109,7 @@ class Shared:
         self.angle = np.zeros(rows) if self.corners else None
         self.g, pace = machine.gravity, world.pace
         self.lasts, self.still = CALM / pace, STILL * pace
+        self.last_gate = machine.last_gate
         self.pull = Vec2d(*(-self.g * machine.up))
         # A whole number of steps ends the run.
         self.t = self.begin = float(starts.t.min())
@@ -351,13 +352,19 @@ class Shared:
         a, b, first, values = self._touches()
         # The impulse acts on A, the normal points from A to B.
         push = -values[0] * values[2] - values[1] * values[3]
-        pushing = push > 0.0
-        a, b, first, push, values = (part[..., pushing] for part in (a, b, first, push, values))
+        order = np.flatnonzero(push > 0.0)
         one, other = np.minimum(a, b), np.maximum(a, b)
-        # They come in the order of a hash of addresses, on which no sum may depend.
-        order = np.lexsort((*values[4:], push, other, one))
-        a, one, other, push, first = (part[order] for part in (a, one, other, push, first))
-        values, straight = values[:, order], a == one
+        if len(order) > 1:
+            # They come in the order of a hash of addresses, on which no sum may depend.
+            keys = (*values[4:], push, other, one)
+            order = order[np.lexsort([key.take(order) for key in keys])]
+        a, one, other, push, first = (part.take(order) for part in (a, one, other, push, first))
+        if not len(order) and self.arm is None:
+            # Nothing pushed.
+            self.before, self.calm = one, np.where(self.free, 0.0, self.calm + self.h)
+            self._riding(one, one)
+            return
+        values, straight = values.take(order, axis=1), a == one
         jx, jy, nx, ny = np.where(straight, 1.0, -1.0) * values[:4] * TOWARDS
         rub = jx * ny - jy * nx
         speed = self.speed[other]
@@ -610,7 +617,7 @@ class Shared:
                 self._end(i, "landed")
         calm = self.inside & (self.calm >= self.lasts)
         # Nothing counts as settled before the last gate has opened or closed, or just after.
-        gated = self.t < self.machine.last_gate + self.lasts
+        gated = self.t < self.last_gate + self.lasts
         under_way = gated or bool(self.waiting) or bool((self.inside & ~calm).any())
         together = self.machine.interact and under_way
         together |= gated and self.moving is not None

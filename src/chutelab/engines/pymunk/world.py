@@ -79,6 +79,7 @@ class Face:
     radius: float  # of the particle, m
     appears: float  # from when to when it is there, s
     vanishes: float
+    one_sided: int  # 1 if it is solid on its left, -1 if on its right; of an arc outside, inside
     spin: float  # of a wheel, rad/s: what rolls on it rolls as fast as it turns against this
     crowns: tuple[Vec2d, Vec2d]  # see `World._crown`; at the first end and at the last
 
@@ -108,6 +109,17 @@ class Face:
         found = self.shape.point_query(x)
         normal = found.gradient if self.tangent is None else (x - found.point).normalized()
         return found.distance - self.radius, normal
+
+    def side(self, x: Vec2d) -> float:
+        """Return how far a place is on the solid side (m), less than 0 on the other; 0 if on both.
+
+        Beyond an end that is the side of its straight way on.
+        """
+        if not self.one_sided or self.tangent is None or self.shape.body is None:
+            return 0.0
+        away = x - self.shape.point_query(x).point
+        left = self.tangent.perpendicular().rotated(self.shape.body.angle)
+        return self.one_sided * away.dot(left)
 
     def belt(self, normal: Vec2d) -> float:
         """Return the speed (m/s) of the surface along (n_y, -n_x) where a disk touches it.
@@ -185,6 +197,10 @@ class Bend(Face):
         if (atan2(away.y, away.x) - self.begin) % (2.0 * pi) > self.extent:
             return inf, side * away
         return side * distance - self.radius, side * away
+
+    def side(self, x: Vec2d) -> float:
+        """Return how far a place is on the solid side (m): outside of it, or inside."""
+        return self.one_sided * self.shape.point_query(x).distance
 
     def belt(self, normal: Vec2d) -> float:
         """Return the speed (m/s) along (n_y, -n_x): the surface runs clockwise."""
@@ -323,6 +339,7 @@ class World:
             "friction": min(float(parts.friction[at]), GRIP),
             "radius": self.radius,
             "appears": float(parts.appears[n]), "vanishes": float(parts.vanishes[n]), "spin": 0.0,
+            "one_sided": int(parts.one_sided[n]),
         }  # fmt: skip
 
     def _bend(
@@ -366,7 +383,7 @@ class World:
             crown = self._crown(end, out, way / radius) if about["speed"] else out.perpendicular()
             self._add(Face(
                 point, tangent=out, crowns=(crown, crown),
-                **about | {"speed": way * about["speed"]},
+                **about | {key: about[key] * int(way) for key in ("speed", "one_sided")},
             ))  # fmt: skip
 
     @cached_property
@@ -484,14 +501,14 @@ class World:
             last, t = t, min(t + tau, span)
 
     def clear(self, path: Flight | Carriage, face: Face, span: float, begin: float = 0.0) -> float:
-        """Return when (s) a disk on a path is off a gate that shut on it, at most `span`.
+        """Return when (s) a disk on a path is clear of what spares it, at most `span`.
 
         It is looked for after each tenth of a radius' way.
         """
         t = begin
         while t < span:
             x, v = path.at(t)
-            if face.gap(x)[0] >= -self.hair:
+            if face.gap(x)[0] >= -self.hair and face.side(x) >= 0.0:
                 return t
             t += 0.1 * self.radius / max(v.length, sqrt(path.most * self.radius), self.tiny)
         return span
@@ -501,7 +518,11 @@ class World:
         begin, span = max(face.appears - t, 0.0), min(span, face.vanishes - t)
         if begin > 0.0:
             begin = self.clear(path, face, span, begin)
-        return self.meets(path, face, span, begin=begin) if begin < span else inf
+        met = self.meets(path, face, span, begin=begin) if begin < span else inf
+        while met < inf and face.side(path.at(met)[0]) < 0.0:
+            begin = self.clear(path, face, span, met)
+            met = self.meets(path, face, span, begin=begin) if begin < span else inf
+        return met
 
 
 class Carriage:

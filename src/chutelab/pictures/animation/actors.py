@@ -307,8 +307,10 @@ SIGNS = {
     "belt_work": 1,
     "kinetic": -1,
     "potential": -1,
+    "spring": -1,
     "restitution_loss": -1,
     "friction_loss": -1,
+    "damper_loss": -1,
     "residual": 1,
 }
 """The ledger with everything on one side: start + belt work + residual - K - U - losses = 0."""
@@ -324,7 +326,7 @@ def stacks(balance: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Flo
     sign changes sides: work that a braking belt takes out belongs to where the energy is. Both
     sides add up to the same, see `SIGNS`.
     """
-    signed = {name: sign * balance[name] for name, sign in SIGNS.items()}
+    signed = {name: sign * balance[name] for name, sign in SIGNS.items() if name in balance}
     put_in = {name: np.maximum(values, 0.0) for name, values in signed.items()}
     return put_in, {name: np.maximum(-values, 0.0) for name, values in signed.items()}
 
@@ -359,9 +361,9 @@ def bars(
             moving.append(block(name, left, base, factor * values))
             base = base + factor * values
     table.set_axis_off()
-    table.set(xlim=(0.0, 1.0), ylim=(len(SIGNS), 0.0))
+    table.set(xlim=(0.0, 1.0), ylim=(len(sides[0]), 0.0))
     writings = []
-    for row, name in enumerate(SIGNS):
+    for row, name in enumerate(sides[0]):
         shown = [round(factor * value, 1) + 0.0 for value in balance[name].tolist()]
         if name == "residual" and not any(shown):
             continue

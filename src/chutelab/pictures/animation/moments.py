@@ -71,12 +71,15 @@ def sentence(recording: Recording, event: Any) -> str:
         return text
     normal = contact_normal(recording.machine, event)
     # Relative to the surface, where it is touched.
-    mover, own = recording.machine.mover(int(event["surface"])), np.zeros(2)
+    mover, own = recording.machine.mover(int(event["surface"])), np.zeros((2, 2))
     if mover is not None:
         radius = np.broadcast_to(recording.machine.particle.radius, recording.count)[by]
-        own = mover.velocity_at(event["position"] - radius * normal, float(event["t"]))
+        touched, t = event["position"] - radius * normal, float(event["t"])
+        # What hangs on a hinge has another velocity after the blow.
+        own = np.stack([mover.velocity_at(touched, one) for one in (np.nextafter(t, 0.0), t)])
     into, off = (
-        abs(float((event[v] - own) @ normal)) for v in ("velocity_before", "velocity_after")
+        abs(float((event[v] - one) @ normal))
+        for v, one in zip(("velocity_before", "velocity_after"), own, strict=True)
     )
     if into > 0.0:
         text = say("event-restitution", said=text, value=figures(round(off / into, 3), "g"))
@@ -91,12 +94,15 @@ def sentence(recording: Recording, event: Any) -> str:
     after_it = max(start, end - 1)
     entries = track["entries"]
     belt, restitution, friction = entries[after_it] - entries[max(0, min(start, after_it - 1))]
+    given = "belt" if mover is None else "drive"
+    if mover is not None and mover.hinge:
+        given = "to-swing" if belt < 0.0 else "from-swing"
     said = [
         say(f"loss-{what}", energy=f"{'+' if value > 0.0 else ''}{quantity(value, 'J')}")
         for value, what in (
             (-float(restitution), "rebound"),
             (-float(friction), "friction"),
-            (float(belt), "belt" if mover is None else "drive"),
+            (float(belt), given),
         )
         if abs(value) > 1e-15
     ]

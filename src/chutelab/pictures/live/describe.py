@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any, Final
 
+from chutelab.engines.simulation import unjoined
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
 from chutelab.scene.conflicts import EITHER, JOINTS, RULES, tree
@@ -18,7 +19,7 @@ MOST: Final = 100_000
 ABSENT: Final = (("particle", "size"), ("particle", "points"))
 """Keys that pages do not have."""
 
-LISTS: Final = ("material", "pair", "conveyor", "surface", "sensor")
+LISTS: Final = ("material", "pair", "conveyor", "surface", "sensor", *JOINTS)
 
 EXAMPLES: Final = ("inclined-40", "cascade", "spoon", "hopper", "galton", "free-fall")
 """Scenes that the empty page offers, with the words ``example-NAME`` in its catalogues."""
@@ -50,6 +51,8 @@ PARTS: Final = (
           radius=0.012, repeat=[[6, 0.08, 0.0], [4, 0.04, -0.07]], restitution=0.4),
     _part("gate", "D", "surface", "points points", "opens_at closes_at friction", "opens_at",
           opens_at=1.0),
+    _part("oneway", "O", "surface", "points points", "passes restitution friction", "passes",
+          passes="up"),
     _part("flap", "F", "surface", "points points", "spring damper mass", "hinge",
           hinge="pivot", mass=0.2, spring=0.5, damper=0.01),
     _part("rotor", "M", "surface", "points points", "motor.speed_deg motor.torque mass",
@@ -58,6 +61,12 @@ PARTS: Final = (
           shake={"by": [0.0, 0.003], "frequency": 15.0}),
     _part("pusher", "T", "surface", "points points travel.to", "travel.at travel.in friction",
           "travel", travel={"at": 0.5, "in": 1.0}),
+    _part("trigger", "Q", "surface", "points points touched", "opens_when restitution friction",
+          "opens_when"),
+    _part("string", "N", "string", "tie ball", "length particle from"),
+    _part("rod", "X", "rod", "tie ball", "particle other from"),
+    _part("spring", "W", "spring", "tie ball", "stiffness damper length"),
+    _part("pin", "I", "pin", "pin", "particle other from"),
     _part("sensor", "S", "sensor", "from to", "name from to"),
 )  # fmt: skip
 """What can be added to a machine, a row each: its word, the key that begins it, its table, the key
@@ -94,7 +103,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     Raises
     ------
     SceneError
-        If the page cannot show it: mass points, boxes, polygons, joints, or too many particles; or
+        If the page cannot show it: mass points, boxes, polygons, or too many particles; or
         if the scene contradicts itself where it is laid out.
     """
     materials = {
@@ -123,13 +132,12 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
             faults.append(Fault(f"{table}.shape", kind.shape, allowed))
         else:
             faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
-    joints = Counter(table for table, _ in scene.joints)
-    lacks += joints
-    faults += [Fault(table, None, f"{allowed}, without joints") for table in joints]
+    # Joints are told by the numbers of particles, of which some would be left out.
+    lacks += Counter(table for table, _ in scene.joints if foreign)
     for n, pair in enumerate(scene.pair):
-        if pair.cohesion and scene.hinges:
+        if (key := pair.clings) and scene.hinges:
             text = "0 with what hangs on hinges: the contact engine, which pages run, has not both"
-            faults.append(Fault(f"pair[{n}].cohesion", pair.cohesion, text))
+            faults.append(Fault(f"pair[{n}].{key}", getattr(pair, key), text))
             partly = False
     if partly:
         faults = []
@@ -145,6 +153,9 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
         _leave_out(tables, scene, foreign)
         common |= {"lacks": dict(lacks), "source": scene.source}
     machine, out = build(scene), scene.outgoing
+    if machine.joints and not lacks and (why := unjoined(machine)):
+        text = f"other than in this scene: {why}"
+        raise SceneError(scene.source, [Fault(machine.joints[0].kind, None, text)])
     if out is not None and out.drop_from == "impact":
         height = machine.segments.start[machine.segments.surface == machine.landing][0, 1].item()
         assert scene.incoming is not None
@@ -178,7 +189,10 @@ def _leave_out(tables: dict[str, Any], scene: Scene, kinds: set[int]) -> None:
         rows = [rows] if isinstance(rows, dict) else rows
         if kept := [row for row, out in zip(rows, gone, strict=False) if not out]:
             tables[table] = kept
-    tables.setdefault("stream", [])
+    left = tables.setdefault("stream", [])
+    # That particles meet may have stood at one that is gone.
+    if scene.crowded and sum(stream.get("count", 1) for stream in left) > 1:
+        left[0]["interact"] = True
     for table in (*JOINTS, "live"):
         tables.pop(table, None)
 
@@ -192,7 +206,7 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             continue
         rules["scene"][key] = _rule([key])
     for table, model in Scene.tables().items():
-        if table in (*JOINTS, "expect"):
+        if table == "expect":
             continue
         several = table in LISTS or table in EITHER
         rules[table] = {}
@@ -223,7 +237,7 @@ def _rule(path: list[str | int]) -> dict[str, Any]:
         found["unit"] = rule["x-unit"]
     limits = limits_of(rule)
     if rule.get("type") == "integer":
-        limits = rule["minimum"], rule["maximum"]
+        limits = rule["minimum"], rule.get("maximum", MOST)
     if limits is not None:
         found["low"], found["high"] = limits
     found["form"] = _form(rule)

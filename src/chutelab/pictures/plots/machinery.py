@@ -185,6 +185,9 @@ def points_of(ax: Axes, length: float) -> float:
     return pixels * 72.0 / ax.figure.dpi
 
 
+PASSAGE = 14.0
+"""pt; length of the arrow of what is solid from one side."""
+
 AXIS = 7.0
 """pt; size of the cross on the axis of a pulley."""
 
@@ -201,8 +204,9 @@ def draw_scene(
 
     Names keep clear of a path (P, 2), m, that is drawn later.
 
-    What is not always there, a gate, is dashed, and so is what moves, where the scene has it. The
-    limits of the axes are set to hold the window at equal scales; by default all surfaces.
+    What is not always there, a gate, is dashed, and so is what moves, where the scene has it; what
+    is solid from one side has an arrow in the way in which it lets through. The limits of the axes
+    are set to hold the window at equal scales; by default all surfaces.
     """
     if window is None:
         ends = machine.corners
@@ -220,6 +224,15 @@ def draw_scene(
         if is_passing(machine, piece):
             look |= {**GATE, "color": style.tint(colour_of(machine, piece), 0.5)}
         draw_piece(ax, machine, piece, **look)
+        if piece.one_sided and not small:
+            # An arrow in the way in which it lets through.
+            middle = piece.at(0.5 * piece.way)
+            x, y = -PASSAGE * piece.one_sided * piece.normal(middle)
+            arrow = {"arrowstyle": "->", "color": style.STRIKE, "shrinkA": 0.0, "shrinkB": 0.0}
+            ax.annotate(
+                "", middle.tolist(), (x, y), textcoords="offset points", arrowprops=arrow,
+                gid=f"passage {machine.surfaces[piece.surface]}",
+            )  # fmt: skip
         driven = piece.whole and piece.speed != 0.0
         if driven and isinstance(piece, Arcs) and points_of(ax, float(piece.radius)) > AXIS:
             ax.plot(*piece.center, "+", color=style.STEEL, ms=AXIS, zorder=1.5)

@@ -98,7 +98,10 @@ THIN: Final = 1e-3
 
 
 def field(recording: Recording, found: Fields, name: str) -> Picture:
-    """Draw a field in colours on the machine, with its bar; empty where next to nothing is."""
+    """Draw a field in colours on the machine, with its bar; empty where next to nothing is.
+
+    The bar is of what the picture shows.
+    """
     figure = Picture((11.0, 7.0))
     figure.headline(0.04, 0.955, recording.title)
     figure.remark(0.04, 0.925, fill(found.note, 130), fontsize=style.SMALL)
@@ -106,7 +109,11 @@ def field(recording: Recording, found: Fields, name: str) -> Picture:
     draw_scene(ax, recording.machine, window_of(recording))
     edges = [np.append(one - 0.5 * found.cell, one[-1] + 0.5 * found.cell)
              for one in (found.x, found.y)]  # fmt: skip
-    thin = found.density < THIN * found.density.max()
+    inside = [
+        (one > low - 0.5 * found.cell) & (one < high + 0.5 * found.cell)
+        for one, (low, high) in ((found.x, ax.get_xlim()), (found.y, ax.get_ylim()))
+    ]
+    thin = (found.density < THIN * found.density.max()) | ~np.logical_and.outer(*inside)
     values = np.ma.masked_invalid(np.where(thin, np.nan, found[name])).T
     signed = bool(values.count()) and values.min() < 0.0 < values.max()
     reach = float(np.abs(values).max()) if signed else None
@@ -147,10 +154,12 @@ def drawing(recording: Recording) -> Picture:
         if not seen:
             continue
         ax.annotate("", begin, end, arrowprops={"arrowstyle": "<->", "color": style.MUTED})
+        lies = begin[1] == end[1]
         ax.annotate(
             style.quantity(float(np.hypot(*np.subtract(end, begin))), "m"),
-            tuple(0.5 * np.add(begin, end)), (0.0, 5.0), textcoords="offset points", ha="center",
-            rotation=0 if begin[1] == end[1] else 90, fontsize=style.SMALL, color=style.MUTED,
-            gid="dimension",
+            tuple(0.5 * np.add(begin, end)), (0.0, 4.0) if lies else (-4.0, 0.0),
+            textcoords="offset points", ha="center" if lies else "right",
+            va="bottom" if lies else "center", rotation=0 if lies else 90, fontsize=style.SMALL,
+            color=style.MUTED, gid="dimension",
         )  # fmt: skip
     return figure

@@ -280,7 +280,13 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
     balance = energies(recording, times)
     supplied = balance["start"] + balance["belt_work"]
     factor, unit = style.scaled(supplied, "J")
-    names = ("kinetic", "potential", "restitution_loss", "friction_loss")
+    names = [
+        name
+        for name in (
+            "kinetic", "potential", "spring", "restitution_loss", "friction_loss", "damper_loss",
+        )
+        if name in balance
+    ]  # fmt: skip
     ax.stackplot(
         times,
         [factor * balance[name] for name in names],

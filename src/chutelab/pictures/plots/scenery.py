@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.core import number as layout_number
+from chutelab.machine.movers import Hinge
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.quantities import each
@@ -190,7 +191,35 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
             break
     balance["potential"] = np.maximum(lifted, 0.0)
     balance["start"] = at_release[released] - weight * zero
+    hinges = [one.hinge for one in recording.machine.movers if one.hinge]
+    # What stops take, and motors and hands give, is known of whole runs only.
+    whole = (one.steered or one.motor[1] or np.isfinite(one.stops).any() for one in hinges)
+    if hinges and not any(whole):
+        balance |= {"spring": np.zeros_like(times), "damper_loss": np.zeros_like(times)}
+        for one in hinges:
+            _hang(balance, one, recording, times)
     return balance
+
+
+def _hang(balance: dict[str, Floats], hinge: Hinge, recording: Recording, times: Floats) -> None:
+    """Put what hangs on a hinge into a ledger at times (T,), J; what touches it gives all of it."""
+    own, t = hinge.states, hinge.states["t"]
+    # Gauss's rule of three places is exact for the square of a parabola, the rate between states.
+    places, weights = np.polynomial.legendre.leggauss(3)
+    within = t[:-1, None] + 0.5 * np.diff(t)[:, None] * (1.0 + places)
+    power = hinge.damper * hinge.at(within)[1] ** 2
+    lost = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (power @ weights))])
+    angle, rate = hinge.at(times)
+    up = recording.machine.up
+    now = hinge.energies(angle, rate, recording.gravity, up)
+    begun = hinge.energies(own["angle"][0], own["rate"][0], recording.gravity, up)
+    damped, lowest = np.interp(times, t, lost), -recording.gravity * float(np.hypot(*hinge.moment))
+    for name, energy in zip(("kinetic", "potential", "spring"), now, strict=True):
+        balance[name] = balance[name] + energy
+    balance["potential"] -= lowest
+    balance["damper_loss"] = balance["damper_loss"] + damped
+    balance["start"] = balance["start"] + sum(begun) - lowest
+    balance["belt_work"] = balance["belt_work"] + sum(now) - sum(begun) + damped
 
 
 def flow(recording: Recording) -> dict[str, Floats]:

@@ -68,9 +68,11 @@ def colours() -> dict[str, Any]:
             "start": base["START"],
             "kinetic": ORANGE,
             "potential": SKY,
+            "spring": BLUE,
             "belt_work": GREEN,
             "restitution_loss": VERMILION,
             "friction_loss": PURPLE,
+            "damper_loss": "#8A7A00",
             "residual": ink,
         },
         # How lines known analytically are drawn, under those that are simulated; strobe dots.

@@ -224,8 +224,8 @@ class How(TypedDict, total=False):
     seed : int
         Of the draws of the search, with several keys or seeds.
     jobs, team : int, Crew
-        Processes to spread the runs over, 0 is one for each processor; or who does the work, see
-        `chutelab.studies.sweep.crew`.
+        Processes to spread the runs over, 0 is one for each processor; or what
+        `chutelab.studies.sweep.crew` gives.
     max_seconds : float
         After this time the search ends with what is known.
     progress : callable
@@ -446,17 +446,17 @@ class _Search:
     def known(self, why: str) -> Solution:
         """Return the best of what a search has seen that did not come to its end."""
         if not self.evaluate.seen:
-            return self.solution([], [f"Not finished: {why}; no variant has run."])
+            return self.solution([], [f"Not finished: {why}; no variant has run."], finished=False)
         points, values = (np.concatenate(part) for part in zip(*self.evaluate.seen, strict=True))
         columns = self.wishes.columns(values[:, np.newaxis])
         merit = self.wishes.merit(columns, spreads_of(columns))
         best = int(np.argmin(merit))
         note = f"Not finished: {why}; of {len(points)} variants this one is the nearest."
         if not isfinite(merit[best]):
-            return self.solution([], [note])
+            return self.solution([], [note], finished=False)
         found, wanted = self.told(values[best])
         near = Answer(tuple(points[best].tolist()), found, wanted, "not looked at")
-        return self.solution([], [note], nearest=near)
+        return self.solution([], [note], nearest=near, finished=False)
 
     def told(self, values: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return what an answer has of the quantities, (M,): those that are told, and what for."""
@@ -495,8 +495,9 @@ class _Search:
                 "Other places may be as good: a narrower range, or more seeds, tells them apart."
             )
         solution = self.solution(
-            answers, notes, nearest=near, variants=found.points, outcomes=found.values
-        )
+            answers, notes, nearest=near, variants=found.points, outcomes=found.values,
+            finished=stopped is None,
+        )  # fmt: skip
         if isinstance(stopped, KeyboardInterrupt):
             stopped.solution = solution  # type: ignore[attr-defined]
             raise stopped

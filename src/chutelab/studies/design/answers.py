@@ -91,6 +91,8 @@ class Solution(Shown):
         How many variants were run, each seed counted; of the search over several keys.
     variants : ndarray, (N, K), and outcomes : ndarray, (N, S, M), or None
         Of several seeds, the variants that were run, and all quantities of each seed.
+    finished : bool
+        Whether the search came to its end: else it was interrupted, or its time was up.
     notes : tuple of str
         What else to know.
     base : Scene
@@ -124,6 +126,7 @@ class Solution(Shown):
     best: int = 0
     variants: Floats | None = None
     outcomes: Floats | None = None
+    finished: bool = True
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -261,7 +264,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "everywhere": solution.everywhere,
         "jumps": [change(one) for one in solution.jumps],
         "changes": [change(one) for one in solution.changes],
-        **some(solution, "runs", "seed", "notes"),
+        **some(solution, "runs", "seed", "finished", "notes"),
     }
     return dict(plain(told))
 
@@ -307,7 +310,10 @@ def remarks(solution: Solution) -> Iterator[str]:
                 solution.quantities, solution.units, near.found, strict=True
             )
         ]
-        yield f"No solution in the range. Nearest to one: {', '.join(parts)}."
+        where = "in the range" if solution.finished else "yet"
+        yield f"No solution {where}. Nearest to one: {', '.join(parts)}."
+    elif not count and not solution.finished:
+        yield "No solution yet: no variant that has run has all of this."
     elif not count and solution.goal == "solve":
         yield "No solution: no variant in the range has these quantities."
     elif not count:

@@ -282,12 +282,18 @@ def search(
             ran = evaluate.ran
             shares = np.concatenate([shares, nexts[ran]])
             values = np.concatenate([values, new[ran]])
-            if not len(shares):
-                nothing = np.full(keys, np.nan)
-                return Found(nothing, nothing, shares, values, 0.0, [])
+            known = np.flatnonzero(np.isfinite(wishes.columns(values)).all(axis=1))
+            ends = evaluate.stopped is not None or len(shares) >= most
+            if ends and len(known) < 2:
+                # No fit: the only variant that is known, and nothing of any other.
+                at, error = shares[known].sum(axis=0), np.full(keys, 0.5 if len(known) else np.nan)
+                means = zip(*mean_and_error(values[known].sum(axis=0)), strict=True)
+                points = np.clip(low + shares * width, low, high)
+                told = [(float(mean), float(own)) for mean, own in means]
+                return Found(low + at * width, error * width, points, values, 0.0, told)
             fit = Fit(shares, values, wishes, random)
             at, error, open_ = fit.best(keys)
-            if evaluate.stopped or len(shares) >= most or fit.done:
+            if ends or fit.done:
                 break
             nexts = open_[: min(BATCH, most - len(shares))]
         apart = np.any(np.abs(open_ - at) > 5.0 * error + 0.02, axis=1)

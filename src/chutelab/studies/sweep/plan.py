@@ -136,7 +136,7 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
     stepped |= bool(block.scene.joints) or any(kind.outline for kind in block.scene.particles)
     stepped |= block.scene.clings or block.scene.air_density > 0.0 or block.scene.gravity_deg != 0.0
     stepped |= not {"air_density", "gravity_deg"}.isdisjoint(block.paths)
-    stepped |= bool(block.scene.movers or block.scene.triggers) or any(
+    stepped |= bool(block.scene.movers or block.scene.triggers or block.scene.one_sided) or any(
         {"turn", "shake", "travel"} & {*path.split(".")} for path in block.paths
     )
     groups: list[Ints] = []

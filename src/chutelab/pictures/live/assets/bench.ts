@@ -1,7 +1,13 @@
 // What is done on the picture itself: look around, choose, move, draw, copy and delete.
 
 import { mayDraw } from "./controls.ts";
-import { endsOf, rowsNamed, surfaceAt, withCopies, withPart, type Part } from "./edit.ts";
+import { isJoint } from "./checks.ts";
+import {
+  endsOf, rowsNamed, surfaceAt, withCopies, withJoint, withPart, withTrigger,
+  type Part,
+} from "./edit.ts";
+import { linesOfJoints, namesOfJoints, pinsOf } from "./joints.ts";
+import { carried, poseOf } from "./motion.ts";
 import { pointsOf } from "./callout.ts";
 import { bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
 import { html, iconButton } from "./panels.ts";
@@ -10,7 +16,7 @@ import { boxOf } from "./view.ts";
 import type { Given } from "./scene.ts";
 import type { Stage } from "./stage.ts";
 import type { Inspector } from "./inspector.ts";
-import type { Lab } from "./lab.ts";
+import type { Held, Lab } from "./lab.ts";
 import type { Words } from "./words.ts";
 
 type Place = [number, number];
@@ -23,8 +29,8 @@ const HOLD = 450;
 
 const distance = ([x, y]: Place, [u, v]: Place) => Math.hypot(u - x, v - y);
 
-/** How far from a line, or from a ball, it can be clicked, pixels. */
-const CLICK_REACH = 14, BALL_REACH = 22;
+/** How far from a line, from a ball, or from a pin it can be clicked, pixels. */
+const CLICK_REACH = 14, BALL_REACH = 22, PIN_REACH = 7;
 
 /** Balls that can be clicked while they move; more are a crowd. */
 const MOST_BALLS = 100;
@@ -51,8 +57,9 @@ const ASIDE = [28, 28];
 
 /** Where a part has its points if no pointer sets them, in sizes of things that are new. */
 const EXAMPLES: Record<string, Place[]> = {
-  from: [[-0.2, 0], [0.2, 0]], points: [[-0.2, 0.06], [0.2, -0.06]],
+  from: [[-0.2, 0], [0.2, 0]], points: [[-0.2, 0.06], [0.2, -0.06], [0, -0.15]],
   arc: [[-0.2, 0], [0.2, 0], [0, -0.12]], at: [[-0.05, 0], [0.1, 0]], center: [[-0.25, 0.1]],
+  tie: [[0, 0.15], [0.12, -0.05]],
 };
 
 class Bench {
@@ -155,9 +162,9 @@ class Bench {
       const at = stage.placeOf(event);
       this.fingers.set(event.pointerId, at);
       this.pressed = this.fingers.size === 1 ? at : null;
-      const ball = this.pressed && this.catches ? this.ballAt(at) : -1;
-      if (ball >= 0) {
-        this.lab.grab(ball, this.worldOf(at));
+      const held = this.pressed && this.heldAt(at);
+      if (held) {
+        this.lab.grab(held, this.worldOf(at));
         this.pressed = null;
         return;
       }
@@ -208,7 +215,7 @@ class Bench {
       const at: Place = [touches[0].clientX - box.left, touches[0].clientY - box.top];
       // The page must not scroll away under what is moved.
       const body = !this.mode
-        && (this.bodyAt(at, "touch") || (this.catches && this.ballAt(at) >= 0));
+        && (this.bodyAt(at, "touch") || this.heldAt(at));
       if (touches.length > 1 || body || this.moving) event.preventDefault();
     }, { passive: false });
     front.addEventListener("pointercancel", (event: PointerEvent) => {
@@ -244,13 +251,60 @@ class Bench {
 
   /** Draw a line from what is held by hand to the hand. */
   pull() {
-    const { lead, lab: { hand, recording, t }, stage: { view } } = this;
-    const at = hand && recording?.tracks[hand.disk].state(t);
+    const { lead, lab: { hand }, stage: { view } } = this, at = hand && this.placeOf(hand);
     if (!at) lead.replaceChildren();
     else {
-      lead.replaceChildren(svg("line", { class: "pull", x1: view.px(at.x), y1: view.py(at.y),
+      lead.replaceChildren(svg("line", { class: "pull", x1: view.px(at[0]), y1: view.py(at[1]),
         x2: view.px(hand.to[0]), y2: view.py(hand.to[1]) }));
     }
+  }
+
+  /** Where what is held is, m; null if it is there no more. */
+  placeOf(held: Held): Place | null {
+    const { recording, machine, t } = this.lab;
+    if ("disk" in held) {
+      const state = recording?.tracks[held.disk].state(t);
+      return state && !state.ended ? [state.x, state.y] : null;
+    }
+    const mover = machine?.movers.find(({ surface }) => surface === held.surface);
+    if (!mover || !recording) return null;
+    const { pivot: [x, y] } = mover, [u, v] = held.grip;
+    return carried(poseOf(mover, t, recording.swings.get(held.surface)), mover, [x + u, y + v]);
+  }
+
+  /** What of a run that is played is caught at a place, px: a ball, or what hangs on a hinge. */
+  heldAt(at: Place): Held | null {
+    if (!this.catches) return null;
+    const { machine } = this.lab, disk = this.ballAt(at), [x, y] = this.worldOf(at);
+    if (disk >= 0 || !machine) return disk >= 0 ? { disk } : null;
+    const reach = CLICK_REACH / this.stage.view.scale;
+    return this.hung(surfaceAt(this.stage.posed ?? machine, x, y, reach), [x, y]);
+  }
+
+  /** What hangs on a hinge, by its name, held at a place, m. */
+  hung(name: string, [x, y]: Place): Held | null {
+    const { machine, recording, t } = this.lab, surface = machine?.surfaces.indexOf(name);
+    const mover = machine?.movers.find((one) => one.surface === surface && one.inertia > 0);
+    if (!mover || !recording) return null;
+    const { turn } = poseOf(mover, t, recording.swings.get(mover.surface)), { pivot } = mover;
+    const [u, v, c, s] = [x - pivot[0], y - pivot[1], Math.cos(turn), Math.sin(turn)];
+    return { surface: mover.surface, grip: [c * u + s * v, c * v - s * u] };
+  }
+
+  /** What is chosen of a run that is played, as keys catch it: the first ball of a stream, or what
+   * hangs on a hinge by its end that is farthest from there. */
+  chosenToHold(): Held | null {
+    const { lab: { machine, recording, t }, inspector: { part } } = this;
+    if (!this.catches || !machine || !recording) return null;
+    const disk = machine.releases.findIndex(({ stream }, i) =>
+      machine.streams[stream] === part && this.placeOf({ disk: i }));
+    if (disk >= 0) return { disk };
+    const { segments, surfaces, movers } = recording.posed(t);
+    const own = segments.filter(({ surface }) => surfaces[surface] === part);
+    const pivot = movers.find(({ surface }) => surfaces[surface] === part)?.pivot ?? [0, 0];
+    const [end] = own.flatMap(({ ends: [x, y, u, v] }) => [[x, y], [u, v]] as Place[])
+      .sort((a, b) => distance(b, pivot) - distance(a, pivot));
+    return end ? this.hung(part, end) : null;
   }
 
   holding = 0;
@@ -286,14 +340,21 @@ class Bench {
 
   movable = (name: string) => bodyOf(this.stage.handles, [name], 0, 0) !== null;
 
-  /** Draw with keys: arrows move the point, Enter sets it. Where H was pressed arrows move the
+  /** Draw with keys: arrows move the point, Enter sets it. While it is played Enter catches what is
+   * chosen, and lets go of it; arrows move the hand. Where H was pressed arrows move the
    * view, else all that is chosen if that is several. */
   key({ key, shiftKey }: KeyboardEvent): boolean {
     const ways: Record<string, Place> = {
       ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
     };
     const { stage } = this, { view } = stage, step = shiftKey ? 0.1 * KEY : KEY;
+    const { hand } = this.lab, held = hand || key !== "Enter" ? null : this.chosenToHold();
     if (key.toLowerCase() === "h") this.set(null, !this.moving);
+    else if (hand && key in ways) {
+      hand.to = [hand.to[0] + (ways[key][0] * step) / view.scale,
+        hand.to[1] - (ways[key][1] * step) / view.scale];
+    } else if (hand && key === "Enter") this.lab.drop();
+    else if (held) this.lab.grab(held, this.placeOf(held) as Place);
     else if (key in ways && this.mode) {
       const [x, y] = this.cursor ?? this.points.at(-1) ?? view.middle, [dx, dy] = ways[key];
       const far = shiftKey ? view.snap : roundTo(KEY / view.scale, view.snap) || view.snap;
@@ -337,11 +398,16 @@ class Bench {
   /** Which particle is at a place, px; -1 if none is. */
   ballAt(at: Place) {
     const { machine, recording, t } = this.lab, { scale } = this.stage.view;
-    return machine?.releases.findIndex((_, i) => {
+    const { view } = this.stage;
+    let least = Infinity, nearest = -1;
+    machine?.releases.forEach((_, i) => {
       const state = recording?.tracks[i]?.state(t);
-      return state && !state.ended
-        && this.isNear(at, state.x, state.y, (machine.radius[i] ?? 0) * scale);
-    }) ?? -1;
+      if (!state || state.ended) return;
+      const far = Math.hypot(view.px(state.x) - at[0], view.py(state.y) - at[1]);
+      if (far >= Math.max((machine.radius[i] ?? 0) * scale, BALL_REACH) || far >= least) return;
+      [least, nearest] = [far, i];
+    });
+    return nearest;
   }
 
   /** What is at a place, px: a ball, where it starts or is now, or a surface. */
@@ -350,9 +416,13 @@ class Bench {
     if (!machine) return "";
     const start = handles.find(({ what, x, y }) => what === "release" && this.isNear(at, x, y, 0));
     if (start) return start.surface;
-    const ball = this.ballAt(at);
+    const ball = this.ballAt(at), { recording, t } = this.lab;
+    const pin = recording && pinsOf(recording, t).find(({ at: [x, y] }) =>
+      Math.hypot(view.px(x) - px, view.py(y) - py) < PIN_REACH);
+    if (pin) return pin.name;
     const name = surfaceAt(this.stage.posed ?? machine, view.worldX(px), view.worldY(py),
-      CLICK_REACH / view.scale, this.lab.scene?.sensor);
+      CLICK_REACH / view.scale,
+      (this.lab.scene?.sensor ?? []).concat(recording ? linesOfJoints(recording, t) : []));
     const few = machine.releases.length < MOST_BALLS;
     return ball >= 0 && few ? machine.streams[machine.releases[ball].stream] : name;
   }
@@ -439,6 +509,8 @@ class Bench {
   /** The place that is meant, m. @param at pixels */
   meant(at: Place, loose: boolean) {
     const { stage, lab, mode } = this, { view } = stage;
+    const ball = mode && isJoint(mode.table) ? lab.machine?.releases[this.ballAt(at)] : undefined;
+    if (ball) return { at: [ball.x, ball.y] as Place, caught: true };
     if (loose || !lab.machine) {
       const [x, y] = [view.worldX(at[0]), view.worldY(at[1])];
       return { at: [roundTo(x, view.snap), roundTo(y, view.snap)] as Place, caught: false };
@@ -512,8 +584,12 @@ class Bench {
     const { lab } = this, { given, machine } = lab;
     if (!given) return;
     const start = machine?.interact ? roundTo(Math.max(0, lab.t), 1e-3) : 0;
-    const changed = withPart(given, part, points, this.stage.view.unit, this.material, start,
-      lab.data.tables[part.table]);
+    const { unit, scale } = this.stage.view, { parts, tables } = lab.data;
+    const reach = CLICK_REACH / scale, [ball] = parts.filter((one: Part) => one.part === "ball");
+    const changed = isJoint(part.table)
+      ? withJoint(given, part, points, unit, this.material, machine, ball, reach)
+      : part.part === "trigger" ? withTrigger(given, part, points, unit, machine, reach)
+      : withPart(given, part, points, unit, this.material, start, tables[part.table]);
     lab.asked = "";
     // What is shown stays as it is while a machine grows.
     this.stage.fitted = this.stage.moved = true;
@@ -521,7 +597,8 @@ class Bench {
     this.sketch();
     if (lab.fault) return;
     const rows = changed[part.table];
-    this.made = part.table === "incoming" ? "incoming" : rows[rows.length - 1].name;
+    this.made = part.table === "incoming" ? "incoming"
+      : rows.at(-1).name ?? `${part.table} ${rows.length}`;
     if (!this.mode) this.inspector.choose(this.made);
   }
 
@@ -559,7 +636,7 @@ class Bench {
       const [a, b, c] = pixels;
       const turn = c && (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
       let path = `M${a}L${b}`;
-      if (c && Math.abs(turn) > 1) {
+      if (mode.places[0] === "arc" && c && Math.abs(turn) > 1) {
         const radius = (distance(a, b) * distance(b, c) * distance(a, c)) / (2 * Math.abs(turn));
         const wide = (a[0] - c[0]) * (b[0] - c[0]) + (a[1] - c[1]) * (b[1] - c[1]) > 0 ? 1 : 0;
         path = `M${a}A${radius} ${radius} 0 ${wide} ${turn > 0 ? 0 : 1} ${b}`;
@@ -626,7 +703,8 @@ class Bench {
   /** Choose all that has a name of its own. */
   all() {
     const { machine } = this.lab;
-    const names = [...machine?.surfaces ?? [], ...machine?.streams ?? []];
+    const names = [...machine?.surfaces ?? [], ...machine?.streams ?? [],
+      ...(machine ? namesOfJoints(machine) : [])];
     this.inspector.choose(...names.filter(this.movable));
   }
 }

@@ -37,7 +37,7 @@ function runOf(recording: Recording): Run {
 /** The laws that a run breaks, in the order in which they are told. What the core has in memory
  * stays as it is. */
 function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: Run): Breach[] {
-  const { gravity, tilt, interact, dt, pulley, radius, mass, inertia } = machine;
+  const { gravity, tilt, interact, dt, pulley, radius, mass, inertia, joints } = machine;
   const { enums } = core.layout, end = core.get("end", "Room");
   const pieces = barriersOf(machine), count = radius.length, { movers } = machine;
   const states = movers.flatMap(({ surface }) => (swings.get(surface)?.rows ?? [])
@@ -46,9 +46,11 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
   core.setAll("Laws", {
     particle_count: count, piece_count: pieces.length, knot_count: offsets[count], row: KNOT_ROW,
     book_rows: books.length / 3, surface_count: machine.surfaces.length + 1,
-    engine: enums.Engine.ENGINE_CONTACT, interact: Number(interact || states.length > 0),
+    engine: enums.Engine.ENGINE_CONTACT,
+    interact: Number(interact || states.length + joints.length > 0),
     mover_count: movers.length, swing_count: states.length, pulley: Number(!!pulley),
-    tilt, dt, largest: radius.reduce((most, own) => Math.max(most, own), 0), ...run,
+    tilt, dt, joined: Number(joints.length > 0),
+    largest: radius.reduce((most, own) => Math.max(most, own), 0), ...run,
   });
   core.work("lay_out_laws");
   core.doubles.set(knots, core.get("knots", "Laws") >> 3);
@@ -73,13 +75,14 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
 
 /** All pieces of surfaces as the core's laws take them: straight ones, bent ones, the pulley. */
 function barriersOf({ segments, arcs, pulley, movers }: Machine) {
-  const wheel = { x: 0, y: 0, begin: 0, extent: Infinity, appears: -Infinity, vanishes: Infinity };
+  const wheel = { x: 0, y: 0, begin: 0, extent: Infinity, appears: -Infinity, vanishes: Infinity,
+    one_sided: 0 };
   const straight = segments.map(
-    ({ x, y, tx, ty, length, speed, surface, appears, vanishes }) =>
-      ({ x, y, tx, ty, length, speed, surface, appears, vanishes }));
+    ({ x, y, tx, ty, length, speed, surface, appears, vanishes, one_sided }) =>
+      ({ x, y, tx, ty, length, speed, surface, appears, vanishes, one_sided }));
   const bent = [...arcs, ...(pulley ? [{ ...wheel, ...pulley }] : [])].map(
-    ({ x, y, radius, begin, extent, speed, surface, appears, vanishes }) =>
-      ({ x, y, radius, begin, extent, speed, surface, appears, vanishes }));
+    ({ x, y, radius, begin, extent, speed, surface, appears, vanishes, one_sided }) =>
+      ({ x, y, radius, begin, extent, speed, surface, appears, vanishes, one_sided }));
   return [...straight, ...bent].map((row) =>
     ({ ...row, mover: movers.findIndex(({ surface }) => surface === row.surface) + 1 }));
 }

@@ -1,5 +1,6 @@
 // What shows that something is chosen: dashes round it, and a card beside it, in the best place.
 
+import { linesOfJoints, pinsOf } from "./joints.ts";
 import { PLATE, svg } from "./scenery.ts";
 import type { Inspector } from "./inspector.ts";
 import type { Lab } from "./lab.ts";
@@ -96,8 +97,8 @@ function surfaceLines({ lab, view, scenery, posed: machine }: Stage): Named[] {
     ...arcs.map(({ x, y, radius, begin, extent, surface }): Named =>
       [surfaces[surface], bend(x, y, radius, begin, extent)]),
     ...(pulley ? incoming(pulley).map((line): Named => [surfaces[pulley.surface], line]) : []),
-    ...(lab.scene?.sensor ?? []).map(({ name, from, to }): Named =>
-      [name, [px(...from), px(...to)]]),
+    ...(lab.scene?.sensor ?? []).concat(lab.recording ? linesOfJoints(lab.recording, lab.t) : [])
+      .map(({ name, from, to }): Named => [name, [px(...from), px(...to)]]),
   ];
 }
 
@@ -160,6 +161,15 @@ function drawOutline(stage: Stage) {
       const r = Math.max(LEAST, machine.radius[i] * view.scale);
       bodies.push([svg("circle", { cx: view.px(state.x), cy: view.py(state.y), r }), 0]);
     });
+    for (const line of recording ? linesOfJoints(recording, t) : []) {
+      if (line.name !== name) continue;
+      const [[x1, y1], [x2, y2]] = [line.from, line.to].map(([x, y]) => [view.px(x), view.py(y)]);
+      bodies.push([svg("line", { x1, y1, x2, y2, "stroke-linecap": "round" }), 2]);
+    }
+    for (const pin of recording ? pinsOf(recording, t) : []) {
+      if (pin.name !== name) continue;
+      bodies.push([svg("circle", { cx: view.px(pin.at[0]), cy: view.py(pin.at[1]), r: 4 }), 0]);
+    }
     const layers: [number, string][] = [[AROUND + 1, own], [AROUND - 1, "within"]];
     for (const [add, kind] of layers) {
       for (const [shape, wide] of bodies) {

@@ -4,14 +4,19 @@ import { fits, type Form } from "./forms.ts";
 import { valueOfTree } from "./formula.ts";
 import { RADIANS } from "./trig.ts";
 import {
-  moversOf, triggersOf, type Given, type Lab, type Point, type Scene, type Rule,
+  clinging, moversOf, triggersOf, type Given, type Lab, type Point, type Scene, type Rule,
 } from "./scene.ts";
 
 /** What a `Fault` says: key, value, id of a text, and its words. */
 type Wrong = [string, unknown, string, Record<string, number | string>?];
 
+/** Tables of joints, in Python's order. */
+export const JOINTS = ["string", "rod", "spring", "pin"] as const;
+
+export const isJoint = (table: string) => (JOINTS as readonly string[]).includes(table);
+
 /** Tables that are always lists, and those that may be one. */
-const LISTS = ["material", "pair", "conveyor", "surface", "sensor"];
+const LISTS = ["material", "pair", "conveyor", "surface", "sensor", ...JOINTS];
 const EITHER = ["particle", "plate", "stream"];
 
 /** Names of surfaces that no free one may take. */
@@ -156,6 +161,7 @@ export function* conflictsOf(scene: Scene, given: Given, lab: Lab): Generator<Wr
   yield* contradictions(scene, given, lab);
   yield* pieceConflicts(scene);
   yield* motionConflicts(scene, given);
+  yield* jointConflicts(scene, given);
   for (const n of scene.streams.keys()) yield* rateConflicts(scene, given, n);
   const counts = scene.streams.map(({ count }) => count);
   const most = scene.most;
@@ -207,7 +213,13 @@ function* pieceConflicts(
     if (one.points?.some((point, place) => tooNear(point, one.points?.[place + 1]))) {
       yield [`surface[${n}].points`, one.points, "same-points"];
     }
-    const { points, repeat, opens_at: opens, closes_at: closes } = one;
+    const { points, repeat, opens_at: opens, closes_at: closes, passes } = one;
+    const across = passes === "left" || passes === "right" ? 1 : 0;
+    const steps = (points ?? []).slice(1).map((point, place) =>
+      point[across] - (points ?? [])[place][across]);
+    if (passes && Math.min(...steps) <= 0 && Math.max(...steps) >= 0) {
+      yield [`surface[${n}].passes`, passes, "passes-back"];
+    }
     const twice = opens !== undefined && closes !== undefined && opens < closes;
     count += repeat.reduce((many, [copies]) => many * copies,
       Math.max(1, (points?.length ?? 0) - 1) * (twice ? 2 : 1));
@@ -225,15 +237,21 @@ function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
   const { streams, crowded, run } = scene, movers = moversOf(scene);
   const count = streams.reduce((sum, stream) => sum + stream.count, 0);
   const waits = triggersOf(scene).length > 0;
-  const clings = scene.pair.findIndex(({ cohesion }) => cohesion > 0);
-  if (run.engine === "exact" && (movers.length || crowded || waits)) {
+  const bonds = scene.pair.findIndex(({ bond_number: number }) => number > 0);
+  if (bonds >= 0 && scene.gravity === 0) {
+    yield [`pair[${bonds}].bond_number`, scene.pair[bonds].bond_number, "weightless"];
+  }
+  const clings = scene.pair.findIndex(clinging);
+  const isOneSided = scene.surface.some(({ passes }) => passes);
+  if (run.engine === "exact" && (movers.length || crowded || waits || isOneSided)) {
     yield ["run.engine", run.engine, "not-exact"];
   }
   if (waits && count > 1 && !crowded) {
     yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "hinge-meet"];
   }
   if (clings >= 0 && movers.some(([, { hinge }]) => hinge)) {
-    yield [`pair[${clings}].cohesion`, scene.pair[clings].cohesion, "hinge-clings"];
+    const pair = scene.pair[clings], key = clinging(pair)!;
+    yield [`pair[${clings}].${key}`, pair[key], "hinge-clings"];
   }
   for (const [, { hinge, stops_deg: stops, given: row }] of movers) {
     const table = scene.surface.some((one) => one.given === row) ? "surface" : "plate";
@@ -245,6 +263,26 @@ function* motionConflicts(scene: Scene, given: Given): Generator<Wrong> {
       yield [pathOf(given, table, n, "stops_deg"), stops, "stops"];
     }
   }
+}
+
+/** Yields what joints cannot hold, or the contact engine cannot run with them. */
+function* jointConflicts(scene: Scene, given: Given): Generator<Wrong> {
+  const { joints, streams, crowded, run } = scene;
+  if (!joints.length) return;
+  const count = streams.reduce((sum, stream) => sum + stream.count, 0);
+  for (const { kind, given: row, particle, other } of joints) {
+    const n = listOf(given[kind]).indexOf(row);
+    for (const [key, number] of [["particle", particle], ["other", other ?? 0]] as const) {
+      if (number >= count) yield [`${kind}[${n}].${key}`, number, "range", { low: 0, high: count - 1 }];
+    }
+    if (other === particle) yield [`${kind}[${n}].other`, other, "same-particle"];
+  }
+  if (run.engine === "exact") yield ["run.engine", run.engine, "not-exact"];
+  if (count > 1 && !crowded) {
+    yield [pathOf(given, "stream", 0, "interact"), streams[0].interact, "joint-meet"];
+  }
+  const hinged = [...scene.plates, ...scene.surface].find(({ hinge }) => hinge);
+  if (hinged) yield [`${hinged.name ?? "plate"}.hinge`, hinged.hinge, "joint-hinge"];
 }
 
 function* kindConflicts(scene: Scene, given: Given): Generator<Wrong> {
@@ -262,6 +300,8 @@ function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<
   const tables: Record<string, any[]> = {
     plate: scene.plates, particle: scene.particles, stream: scene.streams,
     surface: scene.surface, conveyor: scene.conveyor, sensor: scene.sensor, pair: scene.pair,
+    ...Object.fromEntries(JOINTS.map((table) =>
+      [table, scene.joints.filter(({ kind }) => kind === table)])),
   };
   for (const [table, rows] of Object.entries(tables)) {
     for (const [n, row] of rows.entries()) {
@@ -271,7 +311,7 @@ function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<
         number: Number.isFinite, given: has(row.given), has: has(given), sound: () => true,
         before: (key: string) => rows.slice(0, n).some((one) => has(one.given)(key)),
       };
-      for (const [keys, when, text, other] of rules[table]) {
+      for (const [keys, when, text, other] of rules[table] ?? []) {
         const wrong = keys.find((key) => valueOfTree(when, (name) =>
           (name === "key" ? key : known[name] ?? row[name.replace(/_$/, "")] ?? NaN)));
         if (wrong === undefined) continue;

@@ -2,7 +2,7 @@
 
 import { motionOf } from "./edit.ts";
 import { valueAt } from "./keys.ts";
-import { listOf, pathOf } from "./checks.ts";
+import { JOINTS, listOf, pathOf } from "./checks.ts";
 import { Fault, met, ruleOf, type Scene, type Given, type Rule } from "./scene.ts";
 import type { Form } from "./forms.ts";
 import type { Handle } from "./handles.ts";
@@ -85,6 +85,10 @@ function sectionsOf(scene: Scene, given: Given): Section[] {
   add("plate", scene.plates.map(({ pivot, name }) => (pivot ? { name } : {})));
   add("outgoing", scene.outgoing ? [{}] : []);
   for (const table of ["conveyor", "surface", "sensor"] as const) add(table, scene[table]);
+  for (const table of JOINTS) {
+    listOf(given[table]).forEach((_, row) =>
+      found.push({ table, row, name: `${table} ${row + 1}` }));
+  }
   add("stream", scene.streams);
   add("particle", scene.particles);
   add("view", scene.view ? [{}] : []);
@@ -99,6 +103,8 @@ function sectionsOf(scene: Scene, given: Given): Section[] {
 function rowOf(scene: Scene, { table, row, name }: Section): any {
   if (table === "scene") return scene;
   if (table === "material") return scene.materials.get(name.slice(table.length + 1));
+  const joints = scene.joints.filter(({ kind }) => kind === table);
+  if (joints.length) return joints[row];
   const rows = { plate: scene.plates, stream: scene.streams, particle: scene.particles }[table]
     ?? (scene as any)[table];
   return Array.isArray(rows) ? rows[row] : rows;
@@ -145,7 +151,7 @@ function idle({ incoming, particles }: Scene, table: string, row: any): string[]
   }
   if (table === "pair") {
     const kinds = row.between.every((name: string) => particles.some((one) => one.name === name));
-    return [...(kinds ? [] : ["meet"]), ...(row.meet ? [] : ["restitution", "friction", "cohesion"])];
+    return [...(kinds ? [] : ["meet"]), ...(row.meet ? [] : ["restitution", "friction", "cohesion", "bond_number"])];
   }
   const weighed = table === "particle" && (row.given.density ?? row.given.material) !== undefined;
   return [...(weighed ? ["mass"] : []), ...(table === "outgoing" ? ["drop_from"] : [])];
@@ -189,7 +195,10 @@ function ownFields(page: Page, given: Given, scene: Scene, section: Section): Fi
       const choices = name === "between" ? scene.particles.flatMap((kind) => kind.name ?? [])
         .concat(sectionsOf(scene, {}).filter((one) => SURFACES.includes(one.table))
           .map((one) => one.name))
-        : name === "particle" ? scene.particles.map((kind) => String(kind.name))
+        : name === "particle" && table === "stream"
+          ? scene.particles.map((kind) => String(kind.name))
+        : name === "passes" ? rowOf(scene, section).center ? ["in", "out"]
+          : ["up", "down", "left", "right"]
         : name === "material" && table === "particle" ? [...scene.materials.keys()]
           : form.type === "boolean" ? [] : form.enum as string[] | undefined;
       if (choices && form.type !== "boolean" && choices.length < 2) return;

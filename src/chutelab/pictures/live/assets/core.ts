@@ -17,6 +17,11 @@ const GREATEST = 1e300;
  * angle, of what has corners. */
 const KNOT_ROW = 11;
 
+/** Doubles of what all particles have at a step: t, kinetic, potential, three entries of the
+ * ledger, overlap; energy at the releases, and of all springs what they kept when they were tied,
+ * keep, lost to dampers and gave. */
+const TOTAL_ROW = 12;
+
 /** Numbers of a bin of a surface: impulses that press it, along it, of both in x and y, their
  * moment (N s, N m s), and places by what presses there (N s m). */
 const LOAD_ROW = 7;
@@ -167,6 +172,7 @@ class Core extends Memory {
       disk_count: releases.length, surface_count: rows.length, kind_count: kinds,
       owner_count: machine.surfaces.length, interact: Number(machine.interact),
       mover_count: machine.movers.length, trigger_count: machine.triggers.length,
+      joint_count: machine.joints.length,
       until: this.layout.enums.Until[`UNTIL_${machine.until.toUpperCase()}`],
       landing: machine.landing, ride_owner: 0, pulley: pulley ? machine.segments.length : -1,
       ride_incline: pulley ? pulley.incline : 0, g: machine.gravity,
@@ -175,6 +181,8 @@ class Core extends Memory {
     });
     this.work("lay_out_world");
     machine.movers.forEach((mover, k) => this.fill("movers", "Mover", k, mover));
+    machine.joints.forEach(({ kind, from, ...joint }, k) => this.fill("joints", "Joint", k,
+      { ...joint, kind: this.layout.enums.Tie[kind.toUpperCase()], from: from ?? [NaN, NaN] }));
     const { GOES, COMES, STARTS } = this.layout.enums.Doing;
     machine.triggers.forEach(({ surface, doing, by }, k) => this.fill("triggers", "Trigger", k,
       { surface, doing: { opens: GOES, closes: COMES, starts: STARTS }[doing], by }));
@@ -229,7 +237,7 @@ class Core extends Memory {
   }
 
   /** Take the knots, `KNOT_ROW` doubles each, and the events that have been written. */
-  take(): { knots: Float64Array, events: Event[], swings: number[] } {
+  take(): { knots: Float64Array, events: Event[], swings: number[], totals: Float64Array } {
     const count = this.get("knot_count");
     const first = this.get("knots") >> 3;
     const knots = this.doubles.slice(first, first + count * KNOT_ROW);
@@ -238,10 +246,12 @@ class Core extends Memory {
       knots[i * KNOT_ROW + 9] = this.ints[(this.get("knots") + i * 8 * KNOT_ROW + disk[0]) >> 2];
     }
     const events: Event[] = this.rows("events", "Event", this.get("event_count"));
+    const sums = this.machine?.joints.length ? this.get("total_count") * TOTAL_ROW : 0;
+    const begin = this.get("totals") >> 3, totals = this.doubles.slice(begin, begin + sums);
     this.set("knot_count", 0);
     this.set("event_count", 0);
     this.set("total_count", 0);
-    return { knots, events, swings: this.takeSwings() };
+    return { knots, events, swings: this.takeSwings(), totals };
   }
 
   /** States of hinges that were not taken yet, `SWING_ROW` numbers each; the core keeps all. */
@@ -249,9 +259,9 @@ class Core extends Memory {
     const count = this.get("swing_count"), begin = this.get("swings"), rows: number[] = [];
     const { size, fields } = this.layout.structs.Swing;
     for (; this.swung < count; this.swung += 1) {
-      const at = begin + this.swung * size;
+      const at = begin + this.swung * size, work = (this.get("swing_work") >> 3) + 3 * this.swung;
       rows.push(...this.doubles.subarray(at >> 3, (at >> 3) + 3),
-        this.ints[(at + fields.surface[0]) >> 2]);
+        ...this.doubles.subarray(work, work + 3), this.ints[(at + fields.surface[0]) >> 2]);
     }
     return rows;
   }
@@ -325,8 +335,8 @@ class Core extends Memory {
 
 /** All surfaces as rows of the core: segments, the pulley, arcs. */
 function surfaceRows({ segments, arcs, pulley }: Machine, shapes: Record<string, number>) {
-  const gate = ({ appears, vanishes }: { appears: number, vanishes: number }) => ({
-    opens: appears, closes: vanishes,
+  const gate = (piece: { appears: number, vanishes: number, one_sided: number }) => ({
+    opens: piece.appears, closes: piece.vanishes, one_sided: piece.one_sided,
   });
   const flat = segments.map((s) => ({
     shape: shapes.SEGMENT, x: s.x, y: s.y, tx: s.tx, ty: s.ty, length: s.length, speed: s.speed,
@@ -345,4 +355,4 @@ function surfaceRows({ segments, arcs, pulley }: Machine, shapes: Record<string,
   return [...flat, ...wheels, ...bent];
 }
 
-export { Core, KNOT_ROW, LOAD_ROW, Memory, bytesOf, compiled, startCore, unpacked };
+export { Core, KNOT_ROW, LOAD_ROW, Memory, TOTAL_ROW, bytesOf, compiled, startCore, unpacked };

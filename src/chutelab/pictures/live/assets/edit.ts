@@ -1,7 +1,7 @@
 // Parts added, copied and taken away: each a scene made of another.
 
 import { gapToArc, gapToSegment } from "./arrival.ts";
-import { WAITS, listOf } from "./checks.ts";
+import { JOINTS, WAITS, isJoint, listOf } from "./checks.ts";
 import { valueAt, withValues } from "./keys.ts";
 import type { Machine } from "./machine.ts";
 import type { Given, Scene } from "./scene.ts";
@@ -79,6 +79,78 @@ function withKind(given: Given, material: string, radius: number): [Given, strin
   return [{ ...given, particle: [...kinds, made] }, name];
 }
 
+/** Of each particle its stream by name, and which of it: what it is called while streams change. */
+const calledOf = (given: Given) => rowsOf(given, "stream").flatMap(({ name, count = 1 }, n) =>
+  Array.from({ length: count }, (_, k) => `${k} ${name ?? (n ? `stream${n + 1}` : "stream")}`));
+
+/** A scene whose joints hold the particles that they held before its streams were changed; joints
+ * of what is gone are gone. */
+function retied(before: Given, after: Given): Given {
+  if (!JOINTS.some((table) => after[table])) return after;
+  const was = calledOf(before), now = new Map(calledOf(after).map((name, i) => [name, i]));
+  return JOINTS.reduce((scene, table) => {
+    const rows = listOf(scene[table]).flatMap((row) => {
+      const held = Object.fromEntries(["particle", "other"].filter((key) => key in row)
+        .map((key) => [key, now.get(was[row[key]])]));
+      const first = now.get(was[row.particle ?? 0]);
+      if (first === undefined || Object.values(held).includes(undefined)) return [];
+      return [{ ...row, ...(first || held.particle ? { particle: first } : {}), ...held }];
+    });
+    const { [table]: _, ...rest } = scene;
+    return rows.length ? { ...rest, [table]: rows } : rest;
+  }, after);
+}
+
+/** The particles that are released at a place, the nearest first.
+ * @param reach m, from the centres of those that are smaller */
+function particlesAt({ releases, radius }: Machine, [px, py]: Point, reach: number): number[] {
+  const far = releases.map(({ x, y }) => Math.hypot(x - px, y - py));
+  return [...far.keys()].filter((i) => far[i] <= Math.max(radius[i], reach))
+    .sort((a, b) => far[a] - far[b]);
+}
+
+/** A scene with one more joint; where it is to hold a particle and none is there, a ball is made.
+ * @param points the end, of a pin its place, m, and that of the particle
+ * @param ball of the palette
+ * @param reach m, from the centre of a particle */
+function withJoint(
+  given: Given, part: Part, points: Point[], unit: number, material: string,
+  machine: Machine | undefined, ball: Part, reach: number,
+): Given {
+  const there = (at: Point) => (machine ? particlesAt(machine, at, reach) : []);
+  const count = machine?.releases.length ?? 0, pin = part.table === "pin", [first, last] = points;
+  const ends = there(first), [other] = ends;
+  const own = pin ? other : there(last).find((i) => i !== other);
+  const at: Point = pin ? [roundOff(first[0] + 0.8 * BALL * unit, 6), first[1]] : last;
+  const made = own !== undefined ? given
+    : withPart(given, ball, [at], unit, material, 0, {});
+  const row: Given = { particle: own ?? count };
+  if (pin) Object.assign(row, { from: first }, ends.length > 1 && { other: ends[1] });
+  else Object.assign(row, other === undefined ? { from: first } : { other });
+  // So that its weight makes it longer by a share of what is seen.
+  const mass = machine?.mass[own ?? 0] ?? 0.26 * unit ** 3;
+  if (part.table === "spring") row.stiffness = Number((60 * mass / unit).toPrecision(1));
+  const streams = rowsOf(made, "stream");
+  const meet = streams.some(({ interact }) => interact) || count < 2;
+  return withRow(meet ? made : { ...made, stream: streams.map((one) =>
+    ({ ...one, interact: true })) }, part.table, row);
+}
+
+/** A scene with a line that goes when a surface is touched; where none is, one is made.
+ * @param points its ends, and one of that surface, m */
+function withTrigger(
+  given: Given, part: Part, [from, to, [x, y]]: Point[], unit: number,
+  machine: Machine | undefined, reach: number,
+): Given {
+  const there = machine ? surfaceAt(machine, x, y, reach) : "";
+  const name = there || freeName(given, "bell");
+  const ends = [-0.06, 0.06].map((share) => [roundOff(x + share * unit, 6), y]);
+  const bell = { name, points: ends };
+  const made = there ? given : withRow(given, "surface", bell);
+  return withRow(made, "surface", { name: freeName(made, part.part), points: [from, to],
+    ...part.row, opens_when: { touched: name } });
+}
+
 /** A scene with one more part.
  * @param points that were set, m
  * @param unit m that a metre of the part's own sizes becomes
@@ -100,6 +172,11 @@ function withPart(
       ? value.map(([n, x, y]: number[]) => [n, roundOff(x * unit, 6), roundOff(y * unit, 6)])
       : rules[key]?.unit === "m" && typeof value === "number" ? roundOff(value * unit, 6)
         : structuredClone(value);
+  }
+  // What stands upright has a left and a right.
+  if (row.passes) {
+    const [dx, dy] = [0, 1].map((n) => Math.abs(points[1][n] - points[0][n]));
+    if (dx < dy) row.passes = "right";
   }
   if (row.travel) row.travel.to = points[part.places.indexOf("travel.to")];
   if (part.table !== "stream") return withRow(given, part.table, row);
@@ -124,23 +201,42 @@ function withRowOf(
   return { ...named, [table]: [...listOf(given[table]), row] };
 }
 
-/** Rows of things by name: what a copy is made of. */
-const rowsNamed = (given: Given, names: string[]): [string, Given][] => NAMED.flatMap((table) =>
-  listOf(given[table]).filter(({ name }) => names.includes(name))
-    .map((row) => [table, row] as [string, Given]));
+/** Rows of things by name: what a copy is made of. Joints have what their particles are called. */
+function rowsNamed(given: Given, names: string[]): [string, Given][] {
+  const own = NAMED.flatMap((table) => listOf(given[table])
+    .filter(({ name }) => names.includes(name)).map((row): [string, Given] => [table, row]));
+  if (!JOINTS.some((table) => given[table])) return own;
+  const called = calledOf(given);
+  return [...own, ...JOINTS.flatMap((table) => listOf(given[table])
+    .filter((_, n) => names.includes(`${table} ${n + 1}`)).map((row): [string, Given] =>
+      [table, { ...row, particle: called[row.particle ?? 0],
+        ...("other" in row && { other: called[row.other] }) }]))];
+}
 
 /** A scene with copies of rows, moved on.
  * @returns it, and the names of the copies */
 function withCopies(given: Given, rows: [string, Given][], [dx, dy]: Point): [Given, string[]] {
   const moved = (value: any): any => (typeof value[0] === "number"
     ? [roundOff(value[0] + dx, 9), roundOff(value[1] + dy, 9)] : value.map(moved));
-  const names: string[] = [];
+  const names: string[] = [], copies = new Map<string, string>();
   const all = rows.reduce((scene, [table, row]) => {
+    if (isJoint(table)) {
+      const called = calledOf(scene), copy = structuredClone(row);
+      for (const key of ["particle", "other"].filter((one) => one in row)) {
+        const [, n, stream] = /^(\d+) (.*)$/.exec(row[key]) as string[];
+        copy[key] = called.indexOf(`${n} ${copies.get(stream) ?? stream}`);
+        if (copy[key] < 0) return scene;
+      }
+      if (copy.from) copy.from = moved(copy.from);
+      names.push(`${table} ${listOf(scene[table]).length + 1}`);
+      return withRow(scene, table, copy);
+    }
     const name = freeName(scene, row.name.replace(/\d+$/, ""));
     const copy: Given = { ...structuredClone(row), name };
     for (const key of PLACES) if (Array.isArray(copy[key])) copy[key] = moved(copy[key]);
     if (copy.travel) copy.travel.to = moved(copy.travel.to);
     names.push(name);
+    copies.set(row.name, name);
     return withRow(scene, table, copy);
   }, given);
   return [all, names];
@@ -213,7 +309,7 @@ function without(given: Given, ...names: string[]): Given {
     else delete rest[table];
   }
   for (const table of ["incoming", "outgoing"]) if (names.includes(table)) delete rest[table];
-  for (const table of PLAIN) {
+  for (const table of [...PLAIN, ...JOINTS]) {
     // What is said of two goes with each of them.
     const rows = listOf(given[table]).filter(({ name, between = [] }, n) =>
       ![`${table} ${name ?? n + 1}`, ...between].some((one) => names.includes(one)));
@@ -228,7 +324,7 @@ function without(given: Given, ...names: string[]): Given {
     if (!listOf(rest[table]).some((row) => WAITS.some((key) => isGone(row[key])))) continue;
     rest[table] = Array.isArray(rest[table]) ? rest[table].map(freed) : freed(rest[table]);
   }
-  return rest;
+  return retied(given, rest);
 }
 
 /** How a row of a plate or a surface moves. */
@@ -262,6 +358,6 @@ const canGo = (given: Given, name: string) =>
   JSON.stringify(without(given, name)) !== JSON.stringify(given);
 
 export {
-  canGo, endsOf, motionOf, rowsNamed, surfaceAt, withCopies, withMotion, withName, withPart,
-  withRowOf, without,
+  canGo, endsOf, motionOf, particlesAt, retied, rowsNamed, surfaceAt, withCopies, withJoint,
+  withMotion, withName, withPart, withRowOf, withTrigger, without,
 };

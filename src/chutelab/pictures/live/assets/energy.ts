@@ -8,9 +8,13 @@ import type { Words } from "./words.ts";
 type Entry = [keyof Ledger, number];
 
 const SIGNS: Entry[] = [
-  ["start", 1], ["belt_work", 1], ["push_work", 1], ["kinetic", -1], ["potential", -1], ["restitution_loss", -1],
-  ["friction_loss", -1], ["residual", 1],
+  ["start", 1], ["belt_work", 1], ["push_work", 1], ["kinetic", -1], ["potential", -1],
+  ["spring", -1], ["restitution_loss", -1], ["friction_loss", -1], ["damper_loss", -1],
+  ["residual", 1],
 ];
+
+/** What there is only with hinges and springs that have such. */
+const KEPT: Record<string, string[]> = { spring: ["spring", "stiffness"], damper_loss: ["damper"] };
 
 /** A residual below this part of the whole is rounding, and not shown. */
 const TINY_RESIDUAL = 1e-12;
@@ -34,7 +38,9 @@ function groundedLedger(recording: Recording, t: number) {
   const ledger = recording.ledger(Math.min(t, recording.end)), { machine } = recording;
   // Only of those that are there: the others have no part in the ledger yet.
   const low = recording.tracks.reduce((sum, track, i) => (track.begin <= t
-    ? sum + machine.mass[i] * machine.gravity * track.lowest : sum), 0);
+    ? sum + machine.mass[i] * machine.gravity * track.lowest : sum),
+  machine.movers.reduce((sum, { moment }) =>
+    sum - machine.gravity * Math.hypot(...moment), 0));
   return { ...ledger, start: ledger.start - low, potential: ledger.potential - low };
 }
 
@@ -71,7 +77,7 @@ class EnergyPanel {
   longest = 0;
 
   refresh() {
-    const recording = this.lab.recording as Recording;
+    const recording = this.lab.recording as Recording, { machine } = recording;
     const ledger = groundedLedger(recording, this.lab.t);
     const { putIn, isNow, size } = stacks(ledger);
     this.longest ||= stacks(groundedLedger(recording, recording.end)).size;
@@ -91,7 +97,9 @@ class EnergyPanel {
     SIGNS.forEach(([name], n) => {
       this.cells.get(name).textContent = this.words.energy(ledger[name]);
       this.rows[n].hidden = (name === "residual" && isClosed)
-        || (name === "push_work" && !recording.pushes.length);
+        || (name === "push_work" && !recording.pushes.length && !ledger.push_work)
+        || (KEPT[name] && ![...machine.movers, ...machine.joints].some((one: any) =>
+          KEPT[name].some((key) => one[key])));
     });
   }
 }

@@ -6,7 +6,8 @@ import type { Machine } from "./machine.ts";
 import type { Push } from "./worker.ts";
 
 type Chunk = { type: "chunk", id: number, knots: Float64Array, tips: Float64Array,
-  events: Event[], swings: number[], triggered: number[], given: number[], now: number,
+  events: Event[], swings: number[], totals: Float64Array, triggered: number[], pushed: number,
+  given: number, now: number,
   state: string, books: number[][] | null, reasons: number[] | null, gained: number,
   unsolved: number, contacts: number, steps: number,
   loads: { from: number, rows: Float64Array } };

@@ -33,7 +33,8 @@ function passagesOf(
 ): Passage[] {
   const long = Math.hypot(bx - ax, by - ay), [ux, uy] = [(bx - ax) / long, (by - ay) / long];
   const t = track.at(i, 0), h = track.at(i + 1, 0) - t;
-  if (!(h > 0 && long > 0)) return [];
+  // No time passes in a blow, which may move a centre by its rounding.
+  if (!(long > 0)) return [];
   // Distance to the left of the line, and its rate, at the knots and on the curve between them.
   const off = (k: number) => (track.at(k, Y) - ay) * ux - (track.at(k, X) - ax) * uy;
   const rate = (k: number) => h * (track.at(k, VY) * ux - track.at(k, VX) * uy);

@@ -1,7 +1,9 @@
 // What can be taken hold of: where it is, which keys of the scene it moves, and how far.
 
+import { particlesAt } from "./edit.ts";
 import type { Machine } from "./machine.ts";
-import { ruleOf, type Moves, type Point, type Scene } from "./scene.ts";
+import { namesOfJoints } from "./joints.ts";
+import { ruleOf, type Joint, type Moves, type Point, type Scene } from "./scene.ts";
 
 /** A number of the scene; `part` of one that is a point */
 type Axis = { key: string, part?: number, value: number, unit: string, step: number,
@@ -25,6 +27,9 @@ const AHEAD_OF_PLATE = 0.1;
 
 const DEGREE = Math.PI / 180;
 
+/** Of the way of a turning handle: so near to a particle it is meant. */
+const NEAR = 0.5;
+
 /** Steps of arrow keys by unit. */
 const STEPS: Record<string, number> = { m: 0.01, degrees: 1, "m/s": 0.1 };
 
@@ -42,6 +47,8 @@ class Handles {
     scene.surface.forEach((_, n) => this.surface(n));
     scene.streams.forEach((_, n) => this.stream(n));
     scene.sensor.forEach((_, n) => this.sensor(n));
+    const names = namesOfJoints(machine);
+    scene.joints.forEach((joint, n) => this.joint(joint, names[n]));
   }
 
   axis(key: string, value: number, unit: string, part?: number) {
@@ -272,6 +279,32 @@ class Handles {
     this.spin(name, [[keys[0], from], [keys[1], to]]);
   }
 
+  /** The ends of a joint: at another particle, or at a place. */
+  joint({ kind, from, particle, other }: Joint, name: string) {
+    const { releases, radius } = this.machine, row = Number(name.split(" ")[1]) - 1;
+    const table = `${kind}[${row}]`, own = releases[particle], far = releases[other ?? -1];
+    const nearest = (x: number, y: number, not?: number) =>
+      particlesAt(this.machine, [x, y], NEAR * this.away).find((i) => i !== not);
+    const begin: Point = from ?? [far.x, far.y];
+    this.list.push({
+      id: `${table}.from`, surface: name, what: from ? "anchor" : "tied", shape: "point",
+      x: begin[0], y: begin[1], axes: this.place(`${table}.from`, begin), drag: (x, y) => [x, y],
+      values: kind === "pin" ? undefined : ([x, y]) => {
+        const found = nearest(x, y, particle);
+        return { [`${table}.from`]: found === undefined ? [x, y] : undefined,
+          [`${table}.other`]: found };
+      },
+    });
+    const most = radius.length - 1;
+    if (most) {
+      this.list.push({
+        id: `${table}.particle`, surface: name, what: "particle", shape: "end", x: own.x, y: own.y,
+        axes: [{ key: `${table}.particle`, value: particle, unit: "", step: 1, low: 0, high: most }],
+        drag: (x, y) => [nearest(x, y, other) ?? particle],
+      });
+    }
+  }
+
   stream(n: number) {
     const { streams } = this.scene, stream = streams[n];
     const table = streams.length > 1 ? `stream[${n}]` : "stream";
@@ -299,7 +332,7 @@ class Handles {
 }
 
 /** What places a body, by the name of the handle. */
-const PLACES = ["pivot", "center", "height", "release", "hinge", "goal"], ENDS = ["begin", "end", "corner"];
+const PLACES = ["pivot", "center", "height", "release", "hinge", "goal", "anchor"], ENDS = ["begin", "end", "corner"];
 
 /** Whether a handle is a place of a body of its own. */
 const isPlace = ({ id, what, axes }: Handle) => PLACES.includes(what)
@@ -311,7 +344,8 @@ function bodyOf(handles: Handle[], names: string[], x: number, y: number): Handl
   const own = handles.filter((one) => names.includes(one.surface) && isPlace(one));
   if (!own.length) return null;
   return {
-    ...own[0], id: `body-${names[0]}`, x, y, axes: own.flatMap(({ axes }) => axes), whole: true,
+    ...own[0], values: undefined, id: `body-${names[0]}`, x, y,
+    axes: own.flatMap(({ axes }) => axes), whole: true,
     places: own.map((one) => [one.x, one.y]),
     drag: (px, py) => own.flatMap((one) => one.drag(one.x + px - x, one.y + py - y)),
   };

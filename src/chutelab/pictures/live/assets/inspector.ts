@@ -21,7 +21,8 @@ const HUNG = ["spring", "damper", "angle_deg"];
 const INSTEAD: Record<string, string[]> = {
   opens_when: ["opens_at", "closes_when"], closes_when: ["closes_at", "opens_when"],
   opens_at: ["opens_when"], closes_at: ["closes_when"],
-  meet: ["restitution", "friction", "cohesion"],
+  from: ["other"], other: ["from"], cohesion: ["bond_number"], bond_number: ["cohesion"],
+  meet: ["restitution", "friction", "cohesion", "bond_number"],
 };
 
 /** Fields that are not under "More". */
@@ -230,7 +231,8 @@ class Fields {
       } else {
         // What cannot be given beside it goes.
         const row = key.slice(0, key.indexOf(".") + 1);
-        const others = value === undefined || value === true ? [] : INSTEAD[field.name] ?? [];
+        const alone = value === undefined || value === true || field.table === "pin";
+        const others = alone ? [] : INSTEAD[field.name] ?? [];
         lab.change({ ...Object.fromEntries(others.map((one) => [row + one, undefined])),
           [whole]: value });
       }

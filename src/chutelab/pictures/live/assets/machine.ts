@@ -2,7 +2,7 @@
 // last bit: the core lays the surfaces and draws the releases.
 import { lay, type Mover } from "./plan.ts";
 import { draw, type Release } from "./releases.ts";
-import { Fault, cohesionOf, met, passes, triggersOf, type Scene } from "./scene.ts";
+import { Fault, cohesionOf, met, passes, triggersOf, type Joint, type Scene } from "./scene.ts";
 import { RADIANS, sinCos } from "./trig.ts";
 
 export interface Segment {
@@ -15,6 +15,7 @@ export interface Segment {
   surface: number; // index of the surface it belongs to
   appears: number; // s
   vanishes: number; // s
+  one_sided: number; // solid on its left, of an arc outside, if 1, there not if -1; 0: on both
   restitution: number[]; // by kind of particles
   friction: number[];
   ends: [number, number, number, number]; // x and y of both, m
@@ -30,6 +31,7 @@ export interface Arc {
   surface: number;
   appears: number;
   vanishes: number;
+  one_sided: number;
   restitution: number[];
   friction: number[];
 }
@@ -50,6 +52,10 @@ export interface Trigger {
   by: number; // the surface that is touched
 }
 
+/** A joint with its numbers, m, N/m and N s/m; `other` is -1 where it has a fixed end */
+export type Tied = Pick<Joint, "kind" | "particle" | "from"> & { other: number, length: number,
+  stiffness: number, damper: number };
+
 export interface Machine {
   surfaces: string[]; // names
   gravity: number;
@@ -66,6 +72,7 @@ export interface Machine {
   arcs: Arc[];
   movers: Mover[];
   triggers: Trigger[];
+  joints: Tied[];
   pulley: Pulley | null;
   streams: string[]; // what tells them apart: names, or which of those without
   releases: Release[];
@@ -123,6 +130,7 @@ export function build(scene: Scene): Machine {
     segments,
     arcs,
     movers: laid.movers,
+    joints: joined(scene, releases),
     triggers: triggersOf(scene).map(([name, doing, by]) =>
       ({ surface: names.indexOf(name), doing, by: names.indexOf(by) })),
     pulley: belt === null ? null : {
@@ -178,6 +186,27 @@ function weigh({ inertia, mass, moment: [x, y], spring, damper }: Mover, name: s
   const key = `${name}.inertia`;
   if (inertia < (1 - 1e-9) * least) throw new Fault(key, inertia, "least-inertia", { least });
   if (inertia < stiff) throw new Fault(key, inertia, "stiff", { least: stiff });
+}
+
+/** Share of its length by which a string may be too short: that is rounding. */
+const TAUT = 1e-9;
+
+/**
+ * Returns the joints, each as long as it is at the release unless its length is given.
+ * @throws {Fault} if a string is shorter than that
+ */
+function joined({ joints }: Scene, releases: Release[]): Machine["joints"] {
+  return joints.map(({ kind, particle, from, other = -1, length, given, ...spring }) => {
+    const own = releases[particle], far = releases[other];
+    const x = own.x - (from ? from[0] : far.x), y = own.y - (from ? from[1] : far.y);
+    const distance = Math.sqrt(x * x + y * y), long = length ?? distance;
+    if (kind === "string" && distance > (1 + TAUT) * long) {
+      const n = joints.filter((one) => one.kind === kind).findIndex((one) => one.given === given);
+      throw new Fault(`string[${n}].length`, length, "too-short", { least: distance });
+    }
+    const { stiffness = 0, damper = 0 } = spring;
+    return { kind, particle, from, other, length: long, stiffness, damper };
+  });
 }
 
 /** Returns the names of all surfaces, in the order of the ledger. */

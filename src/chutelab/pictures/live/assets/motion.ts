@@ -6,28 +6,64 @@ import type { Point } from "./scene.ts";
 
 /** Of the pivot, m, and how far it has turned, rad */
 export type Pose = { x: number, y: number, turn: number };
-/** States of hinges as the core tells them: t (s), angle (rad), rate (rad/s), surface. */
-export const SWING_ROW = 4;
+/** States of hinges as the core tells them: t (s), angle (rad), rate (rad/s); what stops and damper
+ * took and pushes gave so far (J); surface. */
+export const SWING_ROW = 7;
+
+/** J: kinetic energy, that of the weight from the hinge's height, the spring's; and what stops and
+ * damper took and pushes gave so far */
+export type Hung = { kinetic: number, potential: number, spring: number, restitution_loss: number,
+  damper_loss: number, push_work: number };
 
 /** The states of a hinge: cubics between them. */
 class Swings {
   rows: number[][] = [];
 
-  /** Angle at a time, rad. */
-  at(t: number) {
+  /** The states before and after a time, and which share of the way between them it is. */
+  around(t: number): [number[], number[], number] {
     const { rows } = this;
     let low = 0, high = rows.length - 1;
-    if (high < 0) return 0;
     while (high - low > 1) {
       const middle = (low + high) >> 1;
       if (rows[middle][0] <= t) low = middle;
       else high = middle;
     }
-    const [from, a, va] = rows[low], [to, b, vb] = rows[high], h = to - from;
-    const s = h > 0 ? Math.min(1, Math.max(0, (t - from) / h)) : 1;
+    const h = rows[high][0] - rows[low][0];
+    return [rows[low], rows[high],
+      h > 0 ? Math.min(1, Math.max(0, (t - rows[low][0]) / h)) : 1];
+  }
+
+  /** Energies and work at a time, as `Hinge.energies` has them in Python: straight between states,
+   * so that what closes at both closes between them. */
+  energies(
+    t: number, { inertia, moment: [x, y], spring, rest }: Mover, { gravity, up }: Machine,
+  ): Hung {
+    const of = ([, angle, rate, restitution_loss, damper_loss, push_work]: number[]): Hung => {
+      const [c, s] = [Math.cos(angle), Math.sin(angle)];
+      return {
+        kinetic: 0.5 * inertia * rate * rate,
+        potential: gravity * (up[0] * (x * c - y * s) + up[1] * (x * s + y * c)),
+        spring: 0.5 * spring * (angle - rest) ** 2, restitution_loss, damper_loss, push_work,
+      };
+    };
+    const [before, after, s] = this.around(t), [a, b] = [of(before), of(after)];
+    for (const name of Object.keys(a) as (keyof Hung)[]) a[name] += s * (b[name] - a[name]);
+    return a;
+  }
+
+  /** Angle at a time, rad. */
+  at(t: number) {
+    if (!this.rows.length) return 0;
+    const [[from, a, va], [to, b, vb], s] = this.around(t), h = to - from;
     const gone = b - a, [first, last] = [h * va, h * vb];
     return a + s * (first + s * ((3 * gone - 2 * first - last) + s * (first + last - 2 * gone)));
   }
+}
+
+/** The torque of a hinge's weight where it has turned by an angle, N m. */
+export function weightOf({ moment: [x, y] }: Mover, angle: number, { gravity, up }: Machine) {
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  return gravity * (up[0] * (x * s + y * c) - up[1] * (x * c - y * s));
 }
 
 /** Where a mover is at a time, s. It travels with an even acceleration up to the middle, and the

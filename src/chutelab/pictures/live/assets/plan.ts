@@ -6,16 +6,19 @@ import { Fault, met, moversOf, type Point, type Scene } from "./scene.ts";
 import { useCore } from "./trig.ts";
 
 type Segment = { start: Point, end: Point, tangent: Point, length: number, speed: number,
-  appears: number, vanishes: number, surface: number };
+  appears: number, vanishes: number, surface: number, one_sided: number };
 /** How a surface moves, as `Mover` of layout.h */
 export type Mover = { surface: number, pivot: Point, by: Point, frequency: number, phase: number,
   way: Point, from: number, lasts: number, turn: number, inertia: number, mass: number,
-  moment: Point, spring: number, damper: number, stops: Point, motor: Point, begins: number };
+  moment: Point, spring: number, rest: number, damper: number, stops: Point, motor: Point,
+  begins: number };
 type Arc = { center: Point, radius: number, begin: number, extent: number, speed: number,
-  appears: number, vanishes: number, surface: number };
+  appears: number, vanishes: number, surface: number, one_sided: number };
 
-/** Numbers of what keys may say in words; `drop_from` as in layout.h. */
-const WORDS: Record<string, number> = { adhesion: Infinity, impact: 0.0, top: 1.0 };
+/** Numbers of what keys may say in words; `drop_from` and `passes` as in layout.h. */
+const WORDS: Record<string, number> = {
+  adhesion: Infinity, impact: 0.0, top: 1.0, up: 1, down: -1, right: 2, left: -2, out: 3, in: -3,
+};
 
 /** The core of this thread. */
 let core: Memory;
@@ -66,6 +69,9 @@ function rowOf(scene: Scene, names: string[]): number[] {
     ...all("OutgoingKeys", outgoing ? [outgoing] : []),
     ...all("ConveyorKeys", scene.conveyor),
     ...all("SurfaceKeys", surface.map((one) => ({ ...one, corners: one.points?.length ?? 0 }))),
+    ...all("JointKeys", scene.joints.map(({ kind: tie, ...one }) => ({
+      ...one, kind: core.layout.enums.Tie[tie.toUpperCase()],
+    }))),
     ...all("MoverKeys", moversOf(scene).map(([name, { hinge, shake, travel, motor, ...one }]) => ({
       ...one, phase_deg: 0, ...shake, to: travel?.to, at: travel?.at, in: travel?.in, ...motor,
       surface: names.indexOf(name), pivot: hinge && hinge !== "pivot" ? hinge : one.pivot,
@@ -89,7 +95,7 @@ export function lay(scene: Scene, names: string[]): {
     streams: scene.streams.length, incoming: Number(scene.incoming !== null),
     plates: scene.plates.length, outgoing: Number(scene.outgoing !== null),
     conveyors: scene.conveyor.length, surfaces: scene.surface.length,
-    moving,
+    joints: scene.joints.length, moving,
   });
   core.work("lay_out_plan");
   core.doubles.set(row, core.get("rows", "Plan") >> 3);

@@ -7,7 +7,7 @@
 import type { Event } from "./core.ts";
 import type { Segment } from "./machine.ts";
 import type { Recording } from "./recording.ts";
-import { met, moversOf, slices, triggersOf, type Incoming, type Plate, type Scene } from "./scene.ts";
+import { clinging, met, moversOf, slices, triggersOf, type Incoming, type Plate, type Scene } from "./scene.ts";
 import {
   because, cutFrom, transfer, unanswered, type Reason, type Stage, type Transfer,
 } from "./transfer.ts";
@@ -60,7 +60,9 @@ function troubleOf(
     const surface = nameOf(event);
     const isGate = scene.surface.some(({ name, opens_at: opens, closes_at: closes }) =>
       name === surface && (opens !== undefined || closes !== undefined));
+    const isOneSided = scene.surface.some(({ name, passes }) => name === surface && passes);
     return [stage, isGate ? because("outside", "gate", { surface })
+      : isOneSided ? because("outside", "one-sided", { surface })
       : because(claim, text, { surface, ...words })];
   };
   const [left, hit, next] = events.filter(({ disk, kind }) =>
@@ -128,7 +130,7 @@ function outsideOf(scene: Scene, belt: Incoming) {
   if (belt.friction !== "adhesion") return "belt-friction";
   if (own.spin && own.rolling_friction > 0.0) return "rolling-friction";
   if (own.restitution_speed !== undefined) return "falling-restitution";
-  if (scene.pair.some(({ cohesion }) => cohesion > 0.0)) return "clings";
+  if (scene.pair.some(clinging)) return "clings";
   if (scene.air_density > 0.0) return "air";
   if (stream.fill !== undefined || stream.to !== undefined) return "no-point";
   const [sin, cos] = sinCos(belt.incline_deg * RADIANS);
@@ -143,6 +145,7 @@ function outsideOf(scene: Scene, belt: Incoming) {
     if (vx !== belt.speed * cos || vy !== belt.speed * sin) return "other-velocity";
   }
   if (stream.omega !== 0.0) return "spins";
+  if (scene.joints.some(({ particle, other }) => !particle || other === 0)) return "hangs";
   if (moversOf(scene).length) return "moves";
   if (triggersOf(scene).length) return "waits";
   return scene.crowded ? "interact" : "";

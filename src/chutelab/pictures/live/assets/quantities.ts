@@ -117,7 +117,9 @@ function measure(name: string, run: Run): number {
   if (head === "ledger") {
     if (second === "by_surface") {
       const row = [...machine.surfaces, "particles"].indexOf(surface);
-      return paid(row, entry);
+      const its = recording.hung(recording.end, row);
+      return entry === "damper_loss" ? its[entry]
+        : paid(row, entry) + (entry === "restitution_loss" ? its[entry] : 0);
     }
     if (second === "power") {
       return (paid(machine.landing, "belt_work") / tracks.length) * streams[0].rate;
@@ -125,7 +127,8 @@ function measure(name: string, run: Run): number {
     const ledger = recording.ledger(recording.end) as any;
     if (surface !== "start") return ledger[second] ?? NaN;
     return tracks.reduce((sum, track, i) =>
-      sum + ((recording.ledgerOf(i, track.begin) as any)?.[second] ?? 0), 0);
+      sum + ((recording.ledgerOf(i, track.begin) as any)?.[second] ?? 0),
+    (recording.hung(0) as any)[second]);
   }
   if (name === "belt_work") return paid(machine.landing, name);
   if (name === "slip_heat") return paid(machine.landing, "friction_loss");

@@ -2,14 +2,14 @@
 // Between the engine's knots a track is the cubic Hermite curve, as in Python's recordings.
 
 import type { Breach } from "./breaches.ts";
-import { KNOT_ROW, LOAD_ROW, type Machine, type Event } from "./core.ts";
+import { KNOT_ROW, LOAD_ROW, TOTAL_ROW, type Machine, type Event } from "./core.ts";
 import { actAt, waiting } from "./machine.ts";
-import { SWING_ROW, Swings, posed } from "./motion.ts";
+import { SWING_ROW, Swings, posed, type Hung } from "./motion.ts";
 
 export type State = { x: number, y: number, vx: number, vy: number, spin: number, ended: boolean };
 export type Ledger = { start: number, kinetic: number, potential: number, belt_work: number,
-  push_work: number,
-  restitution_loss: number, friction_loss: number, residual: number };
+  push_work: number, restitution_loss: number, friction_loss: number, residual: number,
+  spring: number, damper_loss: number };
 
 const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, FRICTION = 8;
 
@@ -184,7 +184,7 @@ class Track {
   /** Its velocity there. */
   paceOn(i: number, place: number, pace: number, h: number, s: number) {
     const va = this.at(i, pace), vb = this.at(i + 1, pace);
-    const slope = (this.at(i + 1, place) - this.at(i, place)) / h;
+    const slope = h > 0 ? (this.at(i + 1, place) - this.at(i, place)) / h : vb;
     return va + s * (2 * (3 * slope - 2 * va - vb) + 3 * s * (va + vb - 2 * slope));
   }
 
@@ -273,6 +273,8 @@ class Recording {
   loads = new Float64Array();
   /** Times, s, and the work of all pushes and of all surfaces up to then, J. */
   pushes: [number, number, number][] = [];
+  /** Of a machine with joints what all particles have at its steps, `TOTAL_ROW` numbers each. */
+  totals: Float64Array[] = [];
   /** The laws that it breaks, once it is over and has been judged. */
   breaches: Breach[] = [];
 
@@ -289,13 +291,13 @@ class Recording {
 
   add({
     knots, tips, events, swings, now, state, books = null, gained = 0, unsolved = 0,
-    contacts = 0, steps = 0, loads, triggered = [], given = [],
+    contacts = 0, steps = 0, loads, triggered = [], pushed = 0, given = 0, totals,
   }: {
     knots: Float64Array, tips: Float64Array, events: Event[], swings: number[], now: number,
     state: string,
     books?: number[][] | null, gained?: number, unsolved?: number, contacts?: number,
     steps?: number, loads?: { from: number, rows: Float64Array }, triggered?: number[],
-    given?: number[],
+    pushed?: number, given?: number, totals?: Float64Array,
   }) {
     this.gained = gained;
     this.unsolved = unsolved;
@@ -325,15 +327,13 @@ class Recording {
       this.events.push({ ...event, t: event.t + this.shift, disk: index, other });
     }
     for (let n = 0; n < swings.length; n += SWING_ROW) {
-      this.swings.get(swings[n + 3])?.rows.push(swings.slice(n, n + 3));
+      this.swings.get(swings[n + SWING_ROW - 1])?.rows.push(swings.slice(n, n + SWING_ROW - 1));
     }
     if (loads?.rows.length) this.bear(loads.from, loads.rows);
     if (triggered.length) actAt(this.machine, triggered);
-    const pushed = given.at(-1) ?? 0, [, before, gave] = this.pushes.at(-1) ?? [0, 0, 0];
-    if (pushed !== before) {
-      const gives = given.slice(0, -1).reduce((sum, work) => sum + work, 0);
-      this.pushes.push([this.now, before, gave], [now, pushed, gives]);
-    }
+    const [, before, gave] = this.pushes.at(-1) ?? [0, 0, 0];
+    if (pushed !== before) this.pushes.push([this.now, before, gave], [now, pushed, given]);
+    if (totals?.length) this.totals.push(totals);
     this.measure();
     this.state = state;
     this.now = state === "running" ? now + this.shift : Math.max(this.end, now + this.shift);
@@ -477,7 +477,7 @@ class Recording {
     else residual += missing;
     return {
       start, kinetic: kinetic(state), potential: potential(state), belt_work: belt, push_work: 0,
-      restitution_loss: restitution, friction_loss: friction, residual,
+      restitution_loss: restitution, friction_loss: friction, residual, spring: 0, damper_loss: 0,
     };
   }
 
@@ -490,11 +490,56 @@ class Recording {
     return more === given ? given : work - gave - ((gives - gave) * (t - from)) / (to - from);
   }
 
-  /** The ledger of all particles that have been released. */
+  /** The ledger where joints hand energy on from one particle to another: straight from step to
+   * step of the engine. */
+  joinedLedger(t: number): Ledger | null {
+    const n = this.totals.findLastIndex((all) => all[0] <= t), rows = this.totals[n];
+    if (!rows) return null;
+    let low = 0, high = rows.length / TOTAL_ROW;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (rows[middle * TOTAL_ROW] <= t) low = middle;
+      else high = middle;
+    }
+    const row = (all: Float64Array, k: number) => all.subarray(k * TOTAL_ROW, (k + 1) * TOTAL_ROW);
+    const a = row(rows, low);
+    const b = (low + 1) * TOTAL_ROW < rows.length ? row(rows, low + 1)
+      : row(this.totals[n + 1] ?? a, 0);
+    const s = b[0] > a[0] ? Math.min((t - a[0]) / (b[0] - a[0]), 1) : 0;
+    const [, kinetic, potential, work, restitution_loss, friction_loss, , released, kept, spring,
+      damper_loss, gave] = a.map((value, k) => value + s * (b[k] - value));
+    const push_work = this.pushedAt(t, work - gave), start = released + kept;
+    const belt_work = work - gave - push_work;
+    return {
+      start, kinetic, potential, belt_work, push_work, spring, restitution_loss, friction_loss,
+      damper_loss, residual: kinetic + potential + spring - start - belt_work - push_work
+        + restitution_loss + friction_loss + damper_loss,
+    };
+  }
+
+  /** Energies and losses of what hangs on hinges, of all or of one surface; none of a run that was
+   * changed under way. */
+  hung(t: number, surface?: number): Hung {
+    const total: Hung = {
+      kinetic: 0, potential: 0, spring: 0, restitution_loss: 0, damper_loss: 0, push_work: 0,
+    };
+    for (const mover of this.machine.movers) {
+      const swings = this.swings.get(mover.surface) as Swings;
+      if (!mover.inertia || !swings.rows.length || this.renamed) continue;
+      if (surface !== undefined && mover.surface !== surface) continue;
+      const its = swings.energies(t, mover, this.machine);
+      for (const name of Object.keys(total) as (keyof Hung)[]) total[name] += its[name];
+    }
+    return total;
+  }
+
+  /** The ledger of all particles that have been released, and of what hangs on hinges. */
   ledger(t: number): Ledger {
+    const joined = this.joinedLedger(t);
+    if (joined) return joined;
     const total: Ledger = {
       start: 0, kinetic: 0, potential: 0, belt_work: 0, push_work: 0, restitution_loss: 0,
-      friction_loss: 0, residual: 0,
+      friction_loss: 0, residual: 0, spring: 0, damper_loss: 0,
     };
     const names = Object.keys(total) as (keyof Ledger)[];
     for (let index = 0; index < this.tracks.length; index += 1) {
@@ -504,6 +549,14 @@ class Recording {
     // A track has what pushes give among what drives give.
     total.push_work = this.pushedAt(t, total.belt_work);
     total.belt_work -= total.push_work;
+    // Particles have what hinges give them among it, too. What those have not of motors came from
+    // what touched them.
+    const [begun, hung] = [0, t].map((then) => this.hung(then));
+    const kept = ({ kinetic, potential, spring }: Hung) => kinetic + potential + spring;
+    total.start += kept(begun);
+    total.belt_work += kept(hung) - kept(begun) + hung.restitution_loss + hung.damper_loss
+      - hung.push_work;
+    for (const name of Object.keys(hung) as (keyof Hung)[]) total[name] += hung[name];
     return total;
   }
 

@@ -1,6 +1,6 @@
 // A scene as its file has it, and with all defaults: `resolve`. The same rules as in Python's
 // `chutelab.scene`, of which a page needs those about what can be edited. `keys.ts` changes keys.
-import { conflictsOf, listOf, misfitsOf, straysOf } from "./checks.ts";
+import { JOINTS, conflictsOf, listOf, misfitsOf, straysOf } from "./checks.ts";
 import type { Form } from "./forms.ts";
 import type { Tree } from "./formula.ts";
 
@@ -108,6 +108,7 @@ export interface Surface extends Moves {
   closes_at?: number;
   opens_when?: When;
   closes_when?: When;
+  passes?: string;
   repeat: [number, number, number][];
   given: Given;
 }
@@ -144,6 +145,18 @@ interface Outgoing {
   given: Given;
 }
 
+/** What a particle hangs on, or two hold each other by, as `machine/parts.py` has it */
+export interface Joint {
+  kind: typeof JOINTS[number];
+  from?: Point;
+  particle: number;
+  other?: number;
+  length?: number;
+  stiffness?: number; // of a spring, N/m
+  damper?: number;
+  given: Given;
+}
+
 /** All defaults filled in; names as in the file, but for three lists */
 export interface Scene {
   title: string;
@@ -153,12 +166,13 @@ export interface Scene {
   particles: Particle[];
   materials: Map<string, Record<string, number>>; // numbers by name, presets too
   pair: { between: [string, string], restitution?: number, friction?: number, cohesion: number,
-    meet: boolean, given: Given }[];
+    bond_number: number, meet: boolean, given: Given }[];
   incoming: Incoming | null;
   plates: Plate[];
   outgoing: Outgoing | null;
   conveyor: Conveyor[];
   surface: Surface[];
+  joints: Joint[];
   streams: Stream[];
   run: { until: "landed" | "settled" | number, max_time: number, dt: number,
     engine: string, loads?: number };
@@ -245,8 +259,9 @@ export function resolve(given: Given, lab: Lab): Scene {
     gravity_deg: given.gravity_deg ?? lab.tables.scene.gravity_deg.default,
     air_density: given.air_density ?? lab.tables.scene.air_density.default,
     particles, materials, pair: rows("pair"), incoming, plates, outgoing,
-    conveyor: rows("conveyor"), surface, streams, run, kinds, sensor: rows("sensor"),
-    view: given.view ?? null,
+    conveyor: rows("conveyor"), surface,
+    joints: JOINTS.flatMap((kind) => rows(kind).map((row) => ({ ...row, kind }))),
+    streams, run, kinds, sensor: rows("sensor"), view: given.view ?? null,
     crowded: count > 1 && streams.some((stream) => stream.interact),
     most: lab.tables.stream.count.high ?? Infinity,
   };
@@ -285,10 +300,19 @@ export function triggersOf(scene: Scene): [string, "opens" | "closes" | "starts"
 const isOf = ({ between: [a, b] }: Scene["pair"][number], one?: string, other?: string) =>
   (a === one && b === other) || (b === one && a === other);
 
+/** Returns the key by which two pull at each other, if they do. */
+export const clinging = ({ cohesion, bond_number: bonds }: Scene["pair"][number]) =>
+  cohesion > 0 ? "cohesion" : bonds > 0 ? "bond_number" : null;
+
 /** Returns the force (N) that it takes to pull a kind off another, or off a surface. */
-export function cohesionOf({ particles, pair }: Scene, kind: number, other: number | string) {
+export function cohesionOf(
+  { particles, pair, gravity }: Scene, kind: number, other: number | string,
+) {
   const name = typeof other === "string" ? other : particles[other].name;
-  return pair.find((one) => isOf(one, particles[kind].name, name))?.cohesion ?? 0;
+  const one = pair.find((row) => isOf(row, particles[kind].name, name));
+  if (!one?.bond_number) return one?.cohesion ?? 0;
+  const masses = particles.filter((its) => one.between.includes(its.name!)).map(({ mass }) => mass);
+  return one.bond_number * (Math.min(...masses) * gravity);
 }
 
 /** Tells whether two kinds pass through each other. */

@@ -133,7 +133,8 @@ class Scenery {
     for (const { name, from, to } of scene?.sensor ?? []) {
       part(name, [from, to], () => this.sensor(from, to));
     }
-    for (const [make, body, more] of bodies) {
+    for (const [draw, body, more] of bodies) {
+      const make = () => (body.one_sided ? svg("g", {}, draw(), this.passage(body)) : draw());
       const { surface, appears, vanishes } = body;
       const waits = machine.triggers.some((one) => one.surface === surface && one.doing !== "starts");
       const moves = this.carried.find(({ mover }) => mover.surface === surface);
@@ -460,6 +461,22 @@ class Scenery {
     const end = [x + tx * length, y + ty * length];
     group.append(this.line(`M${view.px(x)} ${view.py(y)}L${view.px(end[0])} ${view.py(end[1])}`));
     return group;
+  }
+
+  /** An arrow across what is solid from one side, in the way in which it lets through. */
+  passage(body: Segment | Arc) {
+    const { view } = this, isBent = "begin" in body, { x, y, one_sided: side } = body;
+    const middle = isBent ? body.begin + 0.5 * body.extent : 0;
+    const [u, v] = isBent ? [side * Math.cos(middle), side * Math.sin(middle)]
+      : [-side * body.ty, side * body.tx];
+    const [px, py] = isBent
+      ? [view.px(x + side * body.radius * u), view.py(y + side * body.radius * v)]
+      : [view.px(x + 0.5 * body.length * body.tx), view.py(y + 0.5 * body.length * body.ty)];
+    const at = (ahead: number, aside: number) =>
+      `${px + ahead * u - aside * v} ${py - ahead * v - aside * u}`;
+    return svg("path", {
+      d: `M${at(-11, 0)}L${at(13, 0)}M${at(7, 5)}L${at(13, 0)}L${at(7, -5)}`, class: "passage",
+    });
   }
 
   /** A wall along a path, px. */

@@ -7,6 +7,7 @@ import { ARROW, Handles, bodyOf, roundTo, valuesOf, type Handle } from "./handle
 import { CALM, eased, html } from "./panels.ts";
 import { Balls } from "./balls.ts";
 import { Scenery, set, svg } from "./scenery.ts";
+import { paintJoints, paintPins } from "./joints.ts";
 import { predict } from "./prediction.ts";
 import { historyOf } from "./stages.ts";
 import { View, boxOf } from "./view.ts";
@@ -333,6 +334,7 @@ class Stage {
     this.scenery.turn(t, recording.swings);
     const { least } = this;
     if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
+    paintJoints(context, recording, t, view, this.colour("muted"));
     const spins = machine.inertia.some((value) => value > 0);
     const marks = new Path2D();
     for (let i = 0; i < recording.tracks.length; i += 1) {
@@ -351,6 +353,7 @@ class Stage {
     context.lineWidth = 1;
     context.strokeStyle = this.colour("ink");
     context.stroke(marks);
+    paintPins(context, recording, t, view, this.colour("ink"));
     for (const draw of this.painters) draw(context);
   }
 

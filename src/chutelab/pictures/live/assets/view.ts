@@ -157,6 +157,7 @@ function boxOf(
     }
   }
   if (machine.pulley) widen(0, 0, machine.pulley.radius);
+  for (const { from } of machine.joints) if (from) widen(...from);
   let [west, east, south, north] = [Infinity, -Infinity, Infinity, -Infinity];
   const { EXIT_MARGIN: margin } = memory().layout.constants;
   for (const { exitBox: [left, bottom, right, top] } of machine.releases) {

@@ -2,6 +2,10 @@
 
 import type { Fault } from "./scene.ts";
 
+/** A whole number as an exponent. */
+const raised = (power: number) => String(power).replace(/./g, (sign) =>
+  (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(sign)]));
+
 type Quantity = { unit: string, value: number };
 
 class Words {
@@ -26,7 +30,7 @@ class Words {
   /** A surface or stream by its name: ours are translated, a scene's own stand as they are. */
   name(name: string) {
     const [, stem, number] = /^([a-z]+)(\d+)$/.exec(name)
-      ?? /^(material|pair) (.*)$/.exec(name) ?? [];
+      ?? /^(material|pair|string|rod|spring|pin) (.*)$/.exec(name) ?? [];
     const part = this.catalogue[`part-${stem}`];
     return this.catalogue[`name-${name}`] ?? (part ? `${part} ${number}` : name);
   }
@@ -80,7 +84,7 @@ class Words {
 
   /** A unit as it is written behind a number. */
   unit(unit: string) {
-    return unit === "degrees" ? "°" : unit;
+    return unit === "degrees" ? "°" : unit.replace(/m2$/, "m²");
   }
 
   /** A number with so many significant digits, 0 as 0. */
@@ -88,8 +92,11 @@ class Words {
     if (!isFinite(value)) return "–";
     if (value === 0) return "0";
     const size = Math.abs(value);
-    const text = size >= 1e5 || size < 1e-4 ? value.toExponential(digits - 1)
-      : value.toFixed(Math.max(0, digits - 1 - Math.floor(Math.log10(size))));
+    if (size >= 1e5 || size < 1e-4) {
+      const [mantissa, power] = value.toExponential(digits - 1).split("e");
+      return `${this.local(mantissa)}·10${raised(Number(power))}`;
+    }
+    const text = value.toFixed(Math.max(0, digits - 1 - Math.floor(Math.log10(size))));
     return this.local(text);
   }
 

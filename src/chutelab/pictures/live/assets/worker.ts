@@ -2,13 +2,13 @@
 //
 // In:  {type: "load", module, layout}, the core compiled; {type: "run", id, machine, until}
 //      begins a run and ends the one before, with `pushes` done in it already; {type: "until", id,
-//      until} lets it go on to a later time (s); {type: "push", id, push} pushes a particle.
-// Out: {type: "chunk", id, knots, tips, events, swings, triggered, now, state, books, reasons,
-//      gained, unsolved}, where state is "running", "done", "stalled" or "failed"; books and
-//      reasons come at the end; triggered are the times of what waited for a touch, s; gained is
-//      the energy by which solves broke their law so far, J, and unsolved the most overlap that
-//      one left, radii; given is the work of each surface, J, and at
-//      last that of all pushes.
+//      until} lets it go on to a later time (s); {type: "push", id, push} pushes something.
+// Out: {type: "chunk", id, knots, tips, events, swings, totals, triggered, now, state, books,
+//      reasons, gained, unsolved, pushed, given}, where state is "running", "done", "stalled" or
+//      "failed"; books and reasons come at the end; triggered are the times of what waited for a
+//      touch, s; gained is the energy by which solves broke their law so far, J, and unsolved the
+//      most overlap that one left, radii; pushed is the work of all pushes, J, and given that of
+//      all surfaces; totals are what all particles of a machine with joints have at each step.
 //      {type: "laws", id, breaches}, in answer to {type: "judge", id, run}.
 //      {type: "broken"}, where the core cannot be loaded.
 
@@ -25,12 +25,15 @@ let core: Core;
 
 let job: { id: number, until: number, steps: number } | null = null;
 
-/** A force on a particle, N, from a time on to another, s. */
-export type Push = { disk: number, force: [number, number], at: number, due: number };
+/** A force on a particle, N, or a torque on what hangs on a hinge, N m. */
+export type Given = { disk: number, force: [number, number] } | { surface: number, torque: number };
+/** From a time on to another, s */
+export type Push = Given & { at: number, due: number };
 type State = "running" | "done" | "stalled" | "failed";
 
 /** What has been written, and not been told yet. */
-let written = { knots: [] as Float64Array[], events: [] as Event[], swings: [] as number[] };
+let written = { knots: [] as Float64Array[], events: [] as Event[], swings: [] as number[],
+  totals: [] as Float64Array[] };
 
 let scheduled = false;
 const channel = new MessageChannel();
@@ -69,10 +72,11 @@ function work() {
 }
 
 function go(steps: number): State {
-  const state = core.proceed(steps), { knots, events, swings } = core.take();
+  const state = core.proceed(steps), { knots, events, swings, totals } = core.take();
   written.knots.push(knots);
   written.events.push(...events);
   written.swings.push(...swings);
+  written.totals.push(totals);
   return state;
 }
 
@@ -85,28 +89,32 @@ function goTo(t: number): State {
   return state;
 }
 
-/** Push a particle, as Python's `chutelab.start` does: rounding of a sum of times is no step. */
-function push({ disk, force, due }: Push): State {
-  core.exports.push_disk(disk, ...force);
-  const state = goTo(due * (1 - 1e-12));
-  core.exports.push_disk(disk, 0, 0);
+/** Push something, as Python's `chutelab.start` does: rounding of a sum of times is no step. */
+function push(one: Push): State {
+  const give = (share: number) => ("surface" in one
+    ? core.exports.turn_hinge(one.surface, share * one.torque)
+    : core.exports.push_disk(one.disk, ...one.force.map((force) => share * force)));
+  give(1);
+  const state = goTo(one.due * (1 - 1e-12));
+  give(0);
   return state;
 }
 
 /** Hand on what has been written. */
 function tell(state: State) {
   if (!job) return;
-  const over = state !== "running", { knots, events, swings } = written;
-  const all = joined(knots);
-  written = { knots: [], events: [], swings: [] };
+  const over = state !== "running", { events, swings } = written;
+  const [knots, totals] = [joined(written.knots), joined(written.totals)];
+  written = { knots: [], events: [], swings: [], totals: [] };
   const tips = over || !core.machine?.interact ? new Float64Array() : core.tips();
   postMessage({
-    type: "chunk", id: job.id, knots: all, tips, events, swings, now: core.get("t"), state,
-    triggered: core.triggered(), given: core.books().map(([work]) => work),
+    type: "chunk", id: job.id, knots, tips, events, swings, totals, now: core.get("t"), state,
+    triggered: core.triggered(), pushed: core.get("push_work"),
+    given: core.books().slice(0, -1).reduce((sum, [work]) => sum + work, 0),
     books: over ? core.books() : null, reasons: over ? core.reasons() : null,
     gained: core.get("gained"), unsolved: core.get("unsolved_most"),
     contacts: core.get("impact_count"), steps: core.get("step_count"), loads: core.takeLoads(over),
-  }, { transfer: [all.buffer, tips.buffer] });
+  }, { transfer: [knots.buffer, tips.buffer] });
   if (over) job = null;
   else schedule();
 }

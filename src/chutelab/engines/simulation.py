@@ -275,7 +275,7 @@ def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
         yield (
             "run.engine",
             "contact",
-            f"pymunk: {scene.one_sided} lets no boxes pass one way in contact",
+            f"pymunk: {scene.one_sided} has two sides with {why}",
         )
     belt = scene.incoming
     if belt is not None and belt.friction == "adhesion":

@@ -438,6 +438,7 @@ def test_a_ball_that_is_under_way_is_caught_and_thrown_as_python_does(shown, sce
     expect(page.locator("#energy tr[data-id=push_work]")).to_be_hidden()
 
 
+@pytest.mark.slow
 def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_path):
     page = empty()
     page.click("#begin")

@@ -250,6 +250,7 @@ def test_a_line_moves_in_each_way_by_its_card_and_runs_to_the_same_bits(empty, t
     assert moved[0][0] > 0.0
 
 
+@pytest.mark.slow
 def test_what_waits_for_a_touch_is_made_by_its_card_and_runs_to_the_same_bits(empty, tmp_path):
     """A ball strikes a line: another one goes, comes, or begins to turn, as Python has it."""
     page = empty()

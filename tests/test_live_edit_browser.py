@@ -226,6 +226,7 @@ def test_all_of_that_goes_with_the_keyboard_alone(shown):
     assert not page.evaluate("chutelab.lab.playing")
     page.keyboard.press("?")
     expect(page.locator("#help")).to_be_visible()
+    assert page.evaluate("document.querySelector('#help').scrollTop") == 0
     page.keyboard.press("Escape")
     expect(page.locator("#help")).to_be_hidden()
     page.keyboard.press("Delete")

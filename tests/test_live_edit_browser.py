@@ -101,7 +101,7 @@ def test_numbers_are_typed_and_a_wrong_one_says_why(shown):
     distance.fill("-0,2")
     distance.press("Enter")
     assert "zwischen 1e−9 und" in page.inner_text(".why:visible")
-    distance.fill("0,4")
+    distance.fill("0,4 m")  # with the unit that stands there
     distance.press("Enter")
     expect(page.locator(".why:visible")).to_have_count(0)
     assert value(page, "plate.distance") == 0.4

@@ -9,7 +9,9 @@ import pytest
 from chutelab import scene, theory
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
+from chutelab.results.arrival import never
 from chutelab.results.quantities import compare, relative_error
+from chutelab.results.quantities import from_events as from_recorded
 from chutelab.scene.quantities import THEORY
 
 M, R, r = 0.008, 0.1, 0.0063
@@ -17,6 +19,15 @@ M, R, r = 0.008, 0.1, 0.0063
 
 def run(name, *overrides, **options):
     return simulate(scene.load(scene.find(name), overrides), **options)
+
+
+@pytest.mark.parametrize("away", [-5e-15, 5e-15, 5e-13])
+def test_a_rebound_up_along_the_plate_is_told_as_such_whatever_rounding_does(away):
+    """φ2r = atan2(along, away) of the way down is ±π there; what is no rounding counts."""
+    left, hit, down = (never(1) for _ in range(3))
+    hit["velocity_before"], hit["velocity_after"] = (1.0, 0.0), (-away, 1.0)
+    told = from_recorded(scene.load("perpendicular"), left, hit, down, r, M)["phi2r"][0]
+    assert told == (pi if abs(away) < 1e-14 else pi - away)
 
 
 def first(recording, kind, surface):

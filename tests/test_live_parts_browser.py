@@ -661,6 +661,17 @@ def test_the_first_machine_and_the_examples_are_one_click_away(empty):
     assert page.inner_text("h1") == words("de").say("title-cascade")
 
 
+def test_what_is_left_of_a_scene_without_its_boxes_runs(opened, tmp_path):
+    """That particles meet stands in the scene at the dominoes."""
+    path = tmp_path / "gate.html"
+    done = CliRunner().invoke(main, ["live", "domino-gate", "-o", str(path)])
+    assert done.exit_code == 0, done.output
+    page = opened(path)
+    page.evaluate(DONE)
+    expect(page.locator("#fault")).to_be_hidden()
+    assert page.evaluate("chutelab.lab.recording.tracks.length") == 2
+
+
 def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_path):
     path = tmp_path / "dominoes.html"
     done = CliRunner().invoke(main, ["live", "dominoes", "-o", str(path)])

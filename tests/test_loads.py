@@ -2,6 +2,7 @@
 
 import csv
 import json
+import tracemalloc
 from itertools import pairwise
 from math import cos, radians, sin
 
@@ -15,6 +16,7 @@ from chutelab.checks.agreement import verify
 from chutelab.checks.stress import Evidence
 from chutelab.cli import main
 from chutelab.results import Recording
+from chutelab.results.loads import Bins
 from chutelab.scene import SceneError
 from chutelab.util.errors import InputError
 
@@ -266,6 +268,13 @@ def test_bins_are_summed_stored_and_refused(tmp_path):
     assert run.measure("loads.plate.torque.rms") > 0.0
     with pytest.raises(InputError, match=r"every = 0\.015: 0\.01 s, or a multiple of it"):
         run.loads("outgoing", every=0.015)
+    # A width that is a whole number of bins but for rounding is one.
+    for off, whole in ((2e-10, True), (5e-8, False)):
+        if whole:
+            assert run.loads("outgoing", every=0.05 * (1.0 + off)).normal == pytest.approx(sums)
+        else:
+            with pytest.raises(InputError, match="multiple"):
+                run.loads("outgoing", every=0.05 * (1.0 + off))
     with pytest.raises(InputError, match="outgoing"):
         run.loads("outgoin")
     with pytest.raises(InputError, match=r"such as 0\.01 s"):
@@ -276,6 +285,18 @@ def test_bins_are_summed_stored_and_refused(tmp_path):
     with pytest.raises(SceneError, match=r"it needs run\.loads"):
         chutelab.load("two-sizes", {"expect": [expect]})
     chutelab.load("two-sizes", {"expect": [expect], "run.loads": 0.01})
+
+
+def test_what_is_counted_is_summed_up_as_it_comes():
+    """A run of many steps needs no more memory for its loads than its bins."""
+    bins = Bins(chutelab.simulate("perpendicular", loads=0.01).machine)
+    ahead = np.array([0.0, 1.0])
+    tracemalloc.start()
+    for n in range(4000):
+        bins.bear(0, 1e-6 * n, 1e-6 * (n + 1), ahead, ahead, ahead)
+    assert tracemalloc.get_traced_memory()[1] < 6e5
+    tracemalloc.stop()
+    assert bins.counted()["normal"].sum() == pytest.approx(4000)
 
 
 def test_command_writes_table_and_picture(tmp_path):
@@ -362,3 +383,39 @@ def test_a_silo_follows_janssen_once_its_floor_gives_way():
     assert scatter < 0.1
     # A column that leaned on no wall would press by all of its weight.
     assert share[-3:].max() < 0.6
+
+
+def test_a_gas_presses_by_its_energy_and_shares_it_alike():
+    """A fill with a spread of speeds: p A = E (1 + 2 φ), n m v²/2 for points, as ½ m v² is kT.
+
+    2 φ is the second virial coefficient of disks that cover φ of the area A of their centres.
+    Light and heavy ones start with one spread of speeds, so with 1 : 4 of energy each, and end
+    with 1 : 1; so do both directions.
+    """
+    radius, side, count, end = 0.008, 1.0, 60, 16.0
+    box = {"name": "box", "points": [[0, 0], [side, 0], [side, side], [0, side], [0, 0]],
+           "restitution": 1.0, "friction": 0.0}  # fmt: skip
+    kinds = [{"name": name, "radius": radius, "mass": m} for name, m in (("a", 1e-3), ("b", 4e-3))]
+    streams = [
+        {"particle": kind["name"], "count": count, "fill": [[0.01, 0.01], [0.99, 0.99]],
+         "speed_spread": 1.0, "seed": n, "interact": True, "restitution": 1.0, "friction": 0.0}
+        for n, kind in enumerate(kinds)
+    ]  # fmt: skip
+    run = chutelab.simulate({
+        "gravity": 0.0, "particle": kinds, "surface": [box], "stream": streams,
+        "run": {"until": end, "loads": 1.0},
+    })  # fmt: skip
+    assert not run.laws
+    energy = run.ledger.kinetic[0]
+    assert run.ledger.kinetic[1] == pytest.approx(energy, rel=1e-10)
+    late, room = 4.0, side - 2.0 * radius
+    pushes = run.loads("box").normal[int(late) :].sum() / (end - late)  # N, of four walls
+    covered = 2 * count * np.pi * radius**2 / room**2
+    assert pushes * room / 4.0 == pytest.approx(energy * (1.0 + 2.0 * covered), rel=0.03)
+    v = run.at(np.arange(late, end, 0.1)).velocity
+    mass = np.repeat([1e-3, 4e-3], count)[:, None]
+    (ax, ay), (bx, by) = (
+        (0.5 * mass * v**2)[:, half].mean(axis=(0, 1))
+        for half in (slice(count), slice(count, None))
+    )
+    assert [ax, ay, bx, by] == pytest.approx([energy / (4 * count)] * 4, rel=0.15)

@@ -10,7 +10,7 @@ from chutelab import simulate
 from chutelab.cli import main
 from chutelab.machine import build
 from chutelab.results import REASONS, Kind
-from chutelab.results.arrival import LOOKS, arrivals, fates
+from chutelab.results.arrival import LOOKS, Places, arrivals, fates
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import each, measure
 from chutelab.results.recorder import Recorder
@@ -133,6 +133,15 @@ def connected(recording, t):
             return found
         found = grown
     return found
+
+
+@pytest.mark.parametrize(("gap", "touches"), [(2e-10, True), (2e-8, False)])
+def test_a_mass_point_touches_what_it_lies_on_but_for_rounding(gap, touches):
+    floor = {"name": "floor", "from": [0.0, 0.0], "to": [1.0, 0.0]}
+    stream = {"at": [0.5, 0.1], "velocity": [0.0, 0.0]}
+    tables = {"particle": {"radius": 0.0, "mass": 1.0}, "surface": [floor], "stream": stream}
+    there = Places(simulate({**tables, "run": {"until": 0.1}}))
+    assert there.bare(np.array([0]), np.array([[0.5, gap]]), "floor", 0.0) == [touches]
 
 
 @pytest.mark.parametrize("name", ["stream", pytest.param("jet", marks=pytest.mark.slow)])

@@ -6,11 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+import chutelab
 from chutelab import scene
 from chutelab.engines.simulation import simulate
 from chutelab.results import REASONS, Kind
 from chutelab.results.quantities import compare
-from chutelab.results.summary import schema, sheets, summary
+from chutelab.results.summary import Plug, plugged, schema, sheets, summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
@@ -199,6 +200,25 @@ def test_a_plugged_hopper_is_announced_and_one_that_runs_out_is_not():
     assert stuck["still"] + stuck["through"] == 60
     assert stuck["still"] > 50
     assert printed(run("hopper", "stream.count=60"))["plugged"] is None
+
+
+def test_what_trembles_on_a_floor_is_stuck_and_what_slides_is_not():
+    """Without friction each keeps its speed: 0.5 mm/s, 5 mm/s; a third falls past the floor."""
+    floor = {"name": "floor", "from": [0.0, 0.0], "to": [1.0, 0.0], "friction": 0.0}
+    places = (0.3, 5e-4, 0.01), (0.7, 5e-3, 0.01), (1.5, 0.0, -0.5)
+    streams = [{"name": f"s{n}", "at": [x, y], "velocity": [u, 0.0], "interact": True}
+               for n, (x, u, y) in enumerate(places)]  # fmt: skip
+    run = chutelab.simulate(
+        {
+            "particle": {"radius": 0.01},
+            "surface": [floor],
+            "stream": streams,
+            "run": {"until": 1.0},
+        },
+        engine="pymunk",
+    )
+    assert list(run.ended_by("exit")) == [False, False, True]
+    assert plugged(run) == Plug(1, 1)
 
 
 def test_who_never_finds_a_place_is_counted_and_who_is_not_due_is_not():

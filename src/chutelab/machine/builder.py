@@ -283,6 +283,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     triggers = tuple(
         Trigger(names.index(name), doing, names.index(by)) for name, doing, by in scene.triggers
     )
+    speeds = [value(kind, "restitution_speed") for kind in particles]
     machine = Machine(
         scenes=scenes,
         surfaces=names,
@@ -301,7 +302,7 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         pair_restitution=pairs[..., 0],
         pair_friction=pairs[..., 1],
         rolling=np.array([value(kind, "rolling_friction") for kind in particles]),
-        falls=1.0 / np.array([_speed(value(kind, "restitution_speed")) for kind in particles]),
+        falls=1.0 / np.array([inf if one is None else one for one in speeds]),
         cohesion=np.array(
             [[scene.cohesion(a, b) for b in (*every, *names)] for a in every], dtype=float
         ),
@@ -314,11 +315,6 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         plate_warnings=warnings,
     )
     return machine.when(np.full(len(triggers), inf)) if triggers else machine
-
-
-def _speed(given: Any) -> Any:
-    """Return a speed that may not be given; infinite then."""
-    return inf if given is None else given
 
 
 def ahead(scene: Scene) -> Machine:

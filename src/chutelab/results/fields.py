@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.core import number as number_of
 from chutelab.results.arrival import Places
@@ -315,6 +314,8 @@ def fields(
     blows = _blows(recording, begin, end)
     for given in (blows, _kept(recording, begin, end, samples)):
         given.spread(grid, contact, traction)
+    # What lasting contacts gave is there.
+    kept = recording.engine == "contact" and recording.machine.stress > 0.0
     return Fields(
         x=grid.low[0] + (np.arange(grid.shape[0]) + 0.5) * cell,
         y=grid.low[1] + (np.arange(grid.shape[1]) + 0.5) * cell,
@@ -327,7 +328,7 @@ def fields(
         kinetic=kinetic,
         contact=contact / (end - begin),
         traction=traction / (end - begin),
-        left_out=0.0 if _keeps(recording) else _left_out(recording, begin, end, blows),
+        left_out=0.0 if kept else _left_out(recording, begin, end, blows),
         joined=bool(recording.machine.joints),
     )
 
@@ -382,18 +383,9 @@ def _blows(recording: Record, begin: float, end: float) -> _Given:
     reach = recording.radius[some["particle"]] + np.where(
         pair, recording.radius[some["other"]], 0.0
     )
-    branch = reach[:, None] * _plane(normal / np.abs(normal))
+    normal /= np.abs(normal)
+    branch = reach[:, None] * np.stack([normal.real, normal.imag], axis=-1)
     return _Given(center, branch, impulse, impulse[:, :, None] * branch[:, None], ~pair)
-
-
-def _plane(numbers: NDArray[np.complex128]) -> Floats:
-    """Return complex numbers (c,) as vectors (c, 2)."""
-    return np.stack([numbers.real, numbers.imag], axis=-1)
-
-
-def _keeps(recording: Record) -> bool:
-    """Whether a recording has what lasting contacts gave."""
-    return recording.engine == "contact" and recording.machine.stress > 0.0
 
 
 def _kept(recording: Record, begin: float, end: float, samples: int) -> _Given:

@@ -540,7 +540,7 @@ class Record(Shown):
         force and so the power of the belt is constant on a face; else on the belt work while it is
         driven; else on the restitution loss, which changes between knots in lasting contacts of a
         crowd only. In flight nothing is booked, and what the balance leaves over is the residual.
-        Where several have `totals` the sums are theirs at the steps, and the same holds between two.
+        Where several have `totals` the sums are theirs at the steps; the same holds between two.
 
         Parameters
         ----------

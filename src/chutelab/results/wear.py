@@ -27,14 +27,12 @@ PIECES: Final = 50
 """Of a surface, of equal length."""
 
 MOST_PIECES: Final = 10_000
+"""Of a surface, and parts into which an interval between two knots is cut, at most."""
 
 BLOWS: Final = (Kind.IMPACT, Kind.LANDING)
 
 TOUCH: Final = 0.05
 """Share of the radius up to which a particle that loses energy is taken to touch a surface."""
-
-MOST_LOOKS: Final = 256
-"""Parts into which an interval between two knots is cut, at most."""
 
 
 def finnie(angle: ArrayLike) -> Floats:
@@ -306,7 +304,7 @@ class _Face:
         losses = np.diff(knots["entries"][:, 1:], axis=0).clip(min=0.0)
         left = np.flatnonzero((owner[1:] == owner[:-1]) & (h > 0.0) & losses.any(axis=1))
         way = np.hypot(*(knots["position"][left + 1] - knots["position"][left]).T)
-        looks = np.ceil(way / self.edges[1]).clip(1, MOST_LOOKS).astype(np.int64)
+        looks = np.ceil(way / self.edges[1]).clip(1, MOST_PIECES).astype(np.int64)
         left, looks = np.repeat(left, looks), np.repeat(looks, looks)
         nth = np.arange(len(left)) - np.searchsorted(left, left)
         radius = self.recording.radius[owner[left]]

@@ -159,8 +159,8 @@ def repeat(
     count : int
         Seeds; 0 to `count` - 1 are added to those of the scene's streams.
     jobs, team : int, Crew
-        Processes to spread the runs over, 0 is one for each processor; or who does the work, see
-        `chutelab.studies.sweep.crew`.
+        Processes to spread the runs over, 0 is one for each processor; or what
+        `chutelab.studies.sweep.crew` gives.
     max_seconds : float
         After this time no further seed begins; what has run is returned.
     progress : callable, optional

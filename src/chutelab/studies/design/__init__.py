@@ -224,8 +224,8 @@ class How(TypedDict, total=False):
     seed : int
         Of the draws of the search, with several keys or seeds.
     jobs, team : int, Crew
-        Processes to spread the runs over, 0 is one for each processor; or who does the work, see
-        `chutelab.studies.sweep.crew`.
+        Processes to spread the runs over, 0 is one for each processor; or what
+        `chutelab.studies.sweep.crew` gives.
     max_seconds : float
         After this time the search ends with what is known.
     progress : callable

@@ -259,7 +259,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
         and recording.drives.shape == ((surfaces,) if recording.machine.movers else (0,))
-        and recording.hinge_work.shape == ((surfaces if len(recording.swings) else 0), 3)
+        and recording.hinge_work.shape == ((surfaces if len(recording.swings) else 0), 4)
         and recording.springs.shape == (len(recording.scene.spring), 4)
         and recording.triggered.shape == (len(recording.machine.triggers),)
         and not np.any(np.isnan(recording.triggered))

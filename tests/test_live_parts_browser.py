@@ -250,6 +250,7 @@ def test_a_line_moves_in_each_way_by_its_card_and_runs_to_the_same_bits(empty, t
     assert moved[0][0] > 0.0
 
 
+@pytest.mark.slow
 def test_what_waits_for_a_touch_is_made_by_its_card_and_runs_to_the_same_bits(empty, tmp_path):
     """A ball strikes a line: another one goes, comes, or begins to turn, as Python has it."""
     page = empty()
@@ -507,6 +508,7 @@ def test_a_hinge_is_pushed_in_a_running_run_by_hand_and_by_keys_as_python_does(s
     assert page.evaluate("chutelab.lab.recording.breaches") == []
 
 
+@pytest.mark.slow
 def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_path):
     page = empty()
     page.click("#begin")

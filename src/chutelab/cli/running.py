@@ -351,6 +351,10 @@ def run(
     loaded = loaded_as_told(scene, set_, engine, dt, loads)
     if "loads" in output.kinds and loaded.run.loads is None:
         loaded = loaded_as_told(scene, set_, engine, dt, LOADS)
+    if "sensors" in output.kinds:
+        from chutelab.results.sensors import need_sensors
+
+        need_sensors(loaded)
     if max_seconds is not None:
         # The time limit includes reading the scene.
         max_seconds = max(max_seconds - (perf_counter() - began), 1e-9)

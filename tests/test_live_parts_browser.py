@@ -82,8 +82,9 @@ CLICKED = {"arc", "tie", "ball", "pin", "touched"}
 
 
 def test_every_part_is_a_row_whose_keys_are_those_of_its_table():
-    tables = describe(None)["tables"]
+    tables, page = describe(None)["tables"], html(None)
     for part in PARTS:
+        assert f'<symbol id="i-{part["part"]}"' in page
         rules = tables[part["table"]]
         points = {"center", "radius", "from_deg", "to_deg"} if "arc" in part["places"] else set()
         nested = {f"{key}.{one}" for key, rule in rules.items() for one in rule.get("parts", ())}

@@ -389,6 +389,7 @@ to = [-0.05, 0.3]
 """
 
 
+@pytest.mark.slow
 def test_loads_are_those_of_python_with_arrows_where_they_press(shown):
     options = ["stream.count=40", "run.until=1.2", "run.loads=0.02"]
     page = shown("hopper", options, viewport={"width": 1366, "height": 768}, language="de")

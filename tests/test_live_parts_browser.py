@@ -322,6 +322,7 @@ def drag(page, begin, end):
     page.evaluate(DONE)
 
 
+@pytest.mark.slow
 def test_joints_are_tied_untied_copied_and_undone_by_hand(shown, tmp_path):
     balls = [
         {"name": name, "at": at, "velocity": [0.0, 0.0], "interact": True}

@@ -779,6 +779,7 @@ def test_without_the_energy_the_machine_is_larger(runs):
     assert large.view[2] > 1.4 * small.view[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "delay"),
     [

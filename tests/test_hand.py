@@ -122,6 +122,48 @@ def test_pushes_of_a_crowd_close_the_ledger(air):
     assert closes(run.recording).push_work > 0.1
 
 
+def test_what_hangs_is_pushed_by_a_torque_whose_work_is_torque_times_angle():
+    """I w' = r x F: w = r F t / I, angle = 1/2 w t, W = r F angle; on through a rest of its own."""
+    pivot, inertia, force, span = (0.2, 0.1), 0.02, (0.3, 0.5), 0.4
+    arm = {"name": "arm", "from": list(pivot), "to": [0.7, 0.1], "hinge": "pivot"}
+    run = chutelab.start(scene((3.0, 3.0), [{**arm, "inertia": inertia}], gravity=0.0))
+    at = (0.5, 0.2)
+    torque = (at[0] - pivot[0]) * force[1] - (at[1] - pivot[1]) * force[0]
+    run.step(0.1)
+    begin = run.t
+    run.push("arm", force, at=at)
+    run.step(span)
+    span = run.t - begin
+    rate = torque * span / inertia
+    assert run.pose("arm")[2] == pytest.approx(0.5 * rate * span, rel=1e-12)
+    run.step(0.1)
+    assert run.pose("arm")[2] == pytest.approx(
+        rate * (0.5 * span + run.t - begin - span), rel=1e-12
+    )
+    ledger = closes(run.recording)
+    assert ledger.push_work == pytest.approx(0.5 * inertia * rate**2, rel=1e-12)
+    assert ledger.push_work == pytest.approx(torque * 0.5 * rate * span, rel=1e-12)
+    assert ledger.by_surface["arm"]["push_work"] == ledger.push_work
+    for body, place in (("arm", None), ("arm", (nan, 0.0)), ("floor", at), (0, at)):
+        with pytest.raises(InputError):
+            run.push(body, force, at=place)
+
+
+def test_pushes_of_hinges_under_a_load_close_the_ledger(tmp_path):
+    run, draw = chutelab.start("see-saw", {"run.until": 1.0}), np.random.default_rng(2)
+    (name,) = (one for one, mover in run.scene.movers.items() if mover.hinge)
+    while not run.done:
+        run.push(name, 0.2 * draw.normal(size=2), at=draw.normal(size=2))
+        run.push(0, 0.02 * draw.normal(size=2))
+        run.step(0.01)
+    recording = run.recording
+    ledger = closes(recording)
+    hung = ledger.by_surface[name]["push_work"]
+    assert abs(hung) > 1e-4
+    assert ledger.push_work == pytest.approx(hung + ledger.by_surface["particles"]["push_work"])
+    assert Recording.load(recording.save(tmp_path / "run.npz")).ledger == ledger
+
+
 def test_a_plate_that_is_turned_strikes_as_a_paddle_does():
     """v' = V + e (V - v) with V = w r where it strikes; the drive's work is J V."""
     e, away, rate = 0.5, 0.3, radians(20.0) / 0.2

@@ -44,7 +44,8 @@ STEP = """([n, done]) => {
 
 # What is wrong with what is seen now, in words.
 FAULTS = """() => {
-  const found = [], { innerWidth, innerHeight } = window;
+  // What is too wide for it widens the window of a phone, which shows it smaller.
+  const found = [], { innerHeight } = window, innerWidth = document.documentElement.clientWidth;
   const called = ({ tagName, id, classList, textContent }) => `<${tagName.toLowerCase()}`
     + `${id ? `#${id}` : ""}${classList.length ? `.${classList[0]}` : ""}> `
     + `${(textContent || "").trim().slice(0, 40)}`;

@@ -71,8 +71,8 @@ def same_runs(scenes):
         assert [event["t"] for event in answer["events"]] == events["t"].tolist(), given
         assert [event["kind"] for event in answer["events"]] == events["kind"].tolist(), given
         states = job.module.array("swings", module.dtype("Swing"), job.module.world.swing_count)
-        swings = np.array(answer["swings"]).reshape(-1, 6)
-        for n, name in ((0, "t"), (1, "angle"), (2, "rate"), (5, "surface")):
+        swings = np.array(answer["swings"]).reshape(-1, 7)
+        for n, name in ((0, "t"), (1, "angle"), (2, "rate"), (6, "surface")):
             assert np.array_equal(swings[:, n], states[name]), given
         swung += len(states)
         triggers = job.module.array(

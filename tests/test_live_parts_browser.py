@@ -82,8 +82,9 @@ CLICKED = {"arc", "tie", "ball", "pin", "touched"}
 
 
 def test_every_part_is_a_row_whose_keys_are_those_of_its_table():
-    tables = describe(None)["tables"]
+    tables, page = describe(None)["tables"], html(None)
     for part in PARTS:
+        assert f'<symbol id="i-{part["part"]}"' in page
         rules = tables[part["table"]]
         points = {"center", "radius", "from_deg", "to_deg"} if "arc" in part["places"] else set()
         nested = {f"{key}.{one}" for key, rule in rules.items() for one in rule.get("parts", ())}
@@ -250,6 +251,7 @@ def test_a_line_moves_in_each_way_by_its_card_and_runs_to_the_same_bits(empty, t
     assert moved[0][0] > 0.0
 
 
+@pytest.mark.slow
 def test_what_waits_for_a_touch_is_made_by_its_card_and_runs_to_the_same_bits(empty, tmp_path):
     """A ball strikes a line: another one goes, comes, or begins to turn, as Python has it."""
     page = empty()
@@ -320,6 +322,7 @@ def drag(page, begin, end):
     page.evaluate(DONE)
 
 
+@pytest.mark.slow
 def test_joints_are_tied_untied_copied_and_undone_by_hand(shown, tmp_path):
     balls = [
         {"name": name, "at": at, "velocity": [0.0, 0.0], "interact": True}
@@ -369,6 +372,23 @@ def test_joints_are_tied_untied_copied_and_undone_by_hand(shown, tmp_path):
     assert tied("string")[0]["particle"] == 0
 
 
+def pushed_in_python(scene, pushes):
+    """Return the recording of the same pushes; a torque T about 0 is a force T at (1, 0)."""
+    run = chutelab.start(scene)
+    for push in pushes:
+        while run.t < push["at"]:
+            run.step(push["at"] - run.t)
+        assert run.t == push["at"]
+        if "surface" in push:
+            run.push(run.scene.surfaces[push["surface"]], (0.0, push["torque"]), at=(1.0, 0.0))
+        else:
+            run.push(push["disk"], push["force"])
+        run.step(push["due"] - run.t)
+    while not run.done:
+        run.step(0.1)
+    return run.recording
+
+
 FALLS = load("belt-landing", ["stream.at=[0.3, 0.8]", "stream.velocity=[0, 0]", "run.until=2.5",
                               "outgoing.drop_from=top"])  # fmt: skip
 
@@ -409,16 +429,7 @@ def test_a_ball_that_is_under_way_is_caught_and_thrown_as_python_does(shown, sce
     page.evaluate(WHOLE)
     pushes = page.evaluate("chutelab.lab.pushes")
     assert len(pushes) > 5
-    run = chutelab.start(scene)
-    for push in pushes:
-        while run.t < push["at"]:
-            run.step(push["at"] - run.t)
-        assert run.t == push["at"]
-        run.push(push["disk"], push["force"])
-        run.step(push["due"] - run.t)
-    while not run.done:
-        run.step(0.1)
-    recording = run.recording
+    recording = pushed_in_python(scene, pushes)
     track = np.array(page.evaluate(TRACKS)[0])
     found = recording.track(0)
     assert track[-1, 0] == found["t"][-1]
@@ -438,6 +449,68 @@ def test_a_ball_that_is_under_way_is_caught_and_thrown_as_python_does(shown, sce
     expect(page.locator("#energy tr[data-id=push_work]")).to_be_hidden()
 
 
+def test_a_hinge_is_pushed_in_a_running_run_by_hand_and_by_keys_as_python_does(shown):
+    """Work and heat of a flap with a ball on it are in the ledger, in the bits of Python's run."""
+    flap = {"name": "flap", "from": [0.0, 0.0], "to": [0.4, 0.0], "hinge": [0.0, 0.0],
+            "mass": 0.2, "spring": 2.0, "damper": 0.02}  # fmt: skip
+    scene = from_dict({
+        "particle": {"radius": 0.02, "mass": 0.05}, "run": {"until": 2.0}, "surface": [flap],
+        "stream": {"at": [0.2, 0.1], "velocity": [0.0, 0.0]},
+    })  # fmt: skip
+    page = shown(scene, viewport={"width": 1366, "height": 768})
+    page.select_option("#rate", "0.02")
+    page.click("#play")
+    x, y = page.evaluate(PLACE, [0.38, 0.0])
+    page.mouse.move(x, y)
+    page.mouse.down()
+    expect(page.locator(".draft .pull")).to_have_count(1)
+    page.evaluate("chutelab.lab.rate = 0.25")
+    for n in range(8):
+        page.mouse.move(x - 2 * n, y - 8 * n)
+        page.wait_for_timeout(40)
+    page.mouse.up()
+    expect(page.locator(".draft .pull")).to_have_count(0)
+    expect(page.locator("#energy tr[data-id=push_work]")).to_be_visible()
+    by_mouse = page.evaluate("chutelab.lab.pushes.length")
+    assert by_mouse > 4
+    # The same by keys: what is chosen is caught, moved and let go.
+    page.evaluate("chutelab.lab.rate = 0.05; chutelab.bench.inspector.choose('flap')")
+    page.focus("#picture")
+    page.keyboard.press("Enter")
+    expect(page.locator(".draft .pull")).to_have_count(1)
+    for _ in range(4):
+        page.keyboard.press("ArrowDown")
+        page.wait_for_timeout(40)
+    page.keyboard.press("Enter")
+    expect(page.locator(".draft .pull")).to_have_count(0)
+    page.evaluate("chutelab.bench.inspector.choose('stream')")
+    page.focus("#picture")
+    page.keyboard.press("Enter")
+    page.keyboard.press("ArrowUp")
+    expect(page.locator(".draft .pull")).to_have_count(1)
+    page.wait_for_timeout(100)
+    page.keyboard.press("Escape")
+    expect(page.locator(".draft .pull")).to_have_count(0)
+    assert page.evaluate(WHOLE) == "done"
+    pushes = page.evaluate("chutelab.lab.pushes")
+    assert len(pushes) > by_mouse
+    assert "surface" in pushes[0]
+    assert "disk" in pushes[-1]
+    recording = pushed_in_python(scene, pushes)
+    found, track = recording.track(0), np.array(page.evaluate(TRACKS)[0])
+    assert track[-1, 1:3].tolist() == found["position"][-1].tolist()
+    swings = page.evaluate("chutelab.lab.recording.swings.get(0).rows")
+    assert [row[:3] for row in swings] == [
+        [row["t"], row["angle"], row["rate"]] for row in recording.swings
+    ]
+    ledger = page.evaluate("chutelab.lab.recording.ledger(chutelab.lab.recording.end)")
+    assert ledger["push_work"] == pytest.approx(recording.ledger.push_work, rel=1e-12)
+    assert abs(ledger["push_work"]) > 1e-3
+    assert abs(ledger["residual"]) < 1e-11 * recording.ledger.turned_over
+    assert page.evaluate("chutelab.lab.recording.breaches") == []
+
+
+@pytest.mark.slow
 def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_path):
     page = empty()
     page.click("#begin")
@@ -659,6 +732,17 @@ def test_the_first_machine_and_the_examples_are_one_click_away(empty):
     page.evaluate(DONE)
     assert from_dict(given(page)) == from_dict(describe(load("cascade"))["scene"])
     assert page.inner_text("h1") == words("de").say("title-cascade")
+
+
+def test_what_is_left_of_a_scene_without_its_boxes_runs(opened, tmp_path):
+    """That particles meet stands in the scene at the dominoes."""
+    path = tmp_path / "gate.html"
+    done = CliRunner().invoke(main, ["live", "domino-gate", "-o", str(path)])
+    assert done.exit_code == 0, done.output
+    page = opened(path)
+    page.evaluate(DONE)
+    expect(page.locator("#fault")).to_be_hidden()
+    assert page.evaluate("chutelab.lab.recording.tracks.length") == 2
 
 
 def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_path):

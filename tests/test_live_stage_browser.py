@@ -529,6 +529,19 @@ LABELS = """() => {
 }"""
 
 
+# Points along lines that lead to labels and those that show a length.
+LEADERS = """() => {
+  const home = document.querySelector("#stage").getBoundingClientRect();
+  return [...document.querySelectorAll(".symbols :is(.leader, .length)")].flatMap((line) => {
+    const long = line.getTotalLength(), matrix = line.getScreenCTM();
+    return Array.from({ length: Math.ceil(long / 2) + 1 }, (_, n) => {
+      const { x, y } = line.getPointAtLength(Math.min(long, 2 * n)).matrixTransform(matrix);
+      return [x - home.left, y - home.top];
+    });
+  });
+}"""
+
+
 @over("perpendicular", "inclined-60", "inclined-20", "inclined-conveyor", "low-speed", "cascade")
 def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
     page = shown(name, viewport={"width": size[0], "height": size[1]})
@@ -542,6 +555,10 @@ def test_no_label_lies_on_another_or_is_cut_off(shown, name, size):
             # A line of text is taller than its letters.
             apart = min(right, right2) - max(left, left2), min(bottom, bottom2) - max(top, top2)
             assert not (own or own2) or min(apart) <= 5.0, (text, other, apart)
+        for x, y in page.evaluate(LEADERS):
+            # Its letters are lower than the line of text.
+            within = left < x < right and top + 5.0 < y < bottom - 5.0
+            assert not (own and within), (text, x, y)
 
 
 # Boxes of texts, and of steel and belts that lie level or upright, so that their boxes are they.

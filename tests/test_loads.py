@@ -383,3 +383,39 @@ def test_a_silo_follows_janssen_once_its_floor_gives_way():
     assert scatter < 0.1
     # A column that leaned on no wall would press by all of its weight.
     assert share[-3:].max() < 0.6
+
+
+def test_a_gas_presses_by_its_energy_and_shares_it_alike():
+    """A fill with a spread of speeds: p A = E (1 + 2 φ), n m v²/2 for points, as ½ m v² is kT.
+
+    2 φ is the second virial coefficient of disks that cover φ of the area A of their centres.
+    Light and heavy ones start with one spread of speeds, so with 1 : 4 of energy each, and end
+    with 1 : 1; so do both directions.
+    """
+    radius, side, count, end = 0.008, 1.0, 60, 16.0
+    box = {"name": "box", "points": [[0, 0], [side, 0], [side, side], [0, side], [0, 0]],
+           "restitution": 1.0, "friction": 0.0}  # fmt: skip
+    kinds = [{"name": name, "radius": radius, "mass": m} for name, m in (("a", 1e-3), ("b", 4e-3))]
+    streams = [
+        {"particle": kind["name"], "count": count, "fill": [[0.01, 0.01], [0.99, 0.99]],
+         "speed_spread": 1.0, "seed": n, "interact": True, "restitution": 1.0, "friction": 0.0}
+        for n, kind in enumerate(kinds)
+    ]  # fmt: skip
+    run = chutelab.simulate({
+        "gravity": 0.0, "particle": kinds, "surface": [box], "stream": streams,
+        "run": {"until": end, "loads": 1.0},
+    })  # fmt: skip
+    assert not run.laws
+    energy = run.ledger.kinetic[0]
+    assert run.ledger.kinetic[1] == pytest.approx(energy, rel=1e-10)
+    late, room = 4.0, side - 2.0 * radius
+    pushes = run.loads("box").normal[int(late) :].sum() / (end - late)  # N, of four walls
+    covered = 2 * count * np.pi * radius**2 / room**2
+    assert pushes * room / 4.0 == pytest.approx(energy * (1.0 + 2.0 * covered), rel=0.03)
+    v = run.at(np.arange(late, end, 0.1)).velocity
+    mass = np.repeat([1e-3, 4e-3], count)[:, None]
+    (ax, ay), (bx, by) = (
+        (0.5 * mass * v**2)[:, half].mean(axis=(0, 1))
+        for half in (slice(count), slice(count, None))
+    )
+    assert [ax, ay, bx, by] == pytest.approx([energy / (4 * count)] * 4, rel=0.15)

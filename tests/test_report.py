@@ -86,6 +86,19 @@ def test_a_stream_has_its_envelope_and_error_bars(tmp_path):
 
 
 @pytest.mark.slow
+def test_a_web_page_cuts_no_table_off(opened, tmp_path):
+    report("coal-transfer", {"stream.count": 20}).write(tmp_path / "report.html")
+    page = opened(tmp_path / "report.html")
+    wide = page.evaluate("[...document.querySelectorAll('table')].map("
+                         "(one) => one.scrollWidth - one.clientWidth)")  # fmt: skip
+    assert len(wide) == 9
+    assert max(wide) == 0
+    inputs = page.locator("table").first.inner_text()
+    assert "stream.rate\t800 t/h\t–" in inputs
+    assert "stream.interact\ttrue\t–" in inputs
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["stream", "coal-transfer"])
 def test_a_shipped_stream_has_four_pages(scene, tmp_path):
     made = report(scene, command=f"chutelab report {scene} -o report.pdf")

@@ -165,12 +165,19 @@ def test_it_is_told_how_likely_a_copied_answer_is_by_chance(returned):
     ada = [case.right for case in draw(EXERCISES["the-bounce"], "Ada")[1]]
     share = sum(is_rounded(ada[0], right[0]) for right in rights) / len(names)
     said = told({1: ada[0]})
-    chance = re.search(r"are right for the numbers of Ada \(by chance: (.*)\)", said)[1]
+    chance = re.search(r"are right for the numbers of Ada \((.*)\)", said)[1]
     if chance == "this may be chance":
         assert share > 0.03
     else:
-        assert 1.0 / float(chance.removeprefix("1 in ")) == pytest.approx(share, rel=0.6, abs=0.01)
-    assert "(by chance: at most 1 in 302)" in told({1: ada[0], 2: ada[1], 3: ada[2]})
+        odds = float(chance.removeprefix("by chance: 1 in "))
+        assert 1.0 / odds == pytest.approx(share, rel=0.6, abs=0.01)
+    three = {1: ada[0], 2: ada[1], 3: ada[2]}
+    assert "(by chance: at most 1 in 302)" in told(three)
+    # In a class of thirty the bound for one of the others is 29 times that, and still a bound.
+    thirty = [returned(f"{n}.json", result(f"pupil {n}", answers={})) for n in range(28)]
+    copied = returned("ben.json", result("Ben", answers={str(n): x for n, x in three.items()}))
+    row = list(grade([*thirty, returned("1.json", result("Ada", answers={})), copied]))[-1]
+    assert "(by chance: at most 1 in 11)" in row.reason
     # A mistake with one's own numbers is no sign of copying, whatever it is right for.
     assert told({1: -right("Ben")}) == ""
 
@@ -190,7 +197,9 @@ def test_one_page_tells_of_a_class(returned, tmp_path):
     assert "<td class=none>no answer" in text
     assert "Not counted" in text
     assert "not a result file: not JSON" in text
-    assert "<td>1 of 2" in text
+    assert "<td>1 of 2<small>1 × sign or direction</small>" in text
+    assert "<td>1 of 4" in text
+    assert "<h3>What they wrote</h3>" in text
     for markup in ("<b>", "<i>", "<img", "<script", "\x1b"):
         assert markup not in text
 
@@ -261,5 +270,8 @@ def test_a_folder_stands_for_all_in_it_but_hidden_copies(returned, tmp_path):
     returned("Ben_2/result.json", result("Ben"))
     returned("Ben_2/.ipynb_checkpoints/result.json", result("Ben"))
     marking = ["lesson", "grade", str(tmp_path / "class"), "--json"]
-    found = json.loads(CliRunner().invoke(main, marking).output)["grades"]
+    returned("Ada_1/homework.docx", "")
+    shown = CliRunner().invoke(main, marking)
+    found = json.loads(shown.stdout)["grades"]
     assert [one["student"] for one in found] == ["Ada", "Ben"]
+    assert shown.stderr == "neither notebook (*.ipynb) nor result file (*.json): homework.docx\n"

@@ -25,7 +25,8 @@ EXPORTS = (
     "room", "world", "lay_out_world", "prepare", "prepare_to_judge", "run", "run_and_judge", "plan",
     "lay_out_plan", "build", "drawing", "draw", "exact", "lay_out_exact", "follow_and_judge",
     "run_exact", "run_world", "loads", "lay_out_bins", "laws", "lay_out_laws", "judge", "sine",
-    "cosine", "angle_of", "angle_of_cosine", "push_disk", "steer", "pack_events",
+    "cosine", "angle_of", "angle_of_cosine", "push_disk", "turn_hinge", "steer",
+    "pack_events",
 )  # fmt: skip
 """What a host can call."""
 

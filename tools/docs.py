@@ -231,8 +231,13 @@ def reference(pages: Path) -> None:
             else:
                 said += data(name, words_under(name, title))
         (pages / "api" / f"{title}.rst").write_text("\n".join(said), encoding="utf-8")
+    listed = "".join(
+        f"| [{title}](api/{title}) | {str(getdoc(module)).splitlines()[0]} |\n"
+        for title, module in modules.items()
+    )
     (pages / "api.md").write_text(
         "# Reference\n\nEvery public name, a page for each package.\n\n"
+        f"| package | what it is |\n|---|---|\n{listed}\n"
         + tree(*(f"{title.removeprefix('chutelab.')} <api/{title}>" for title in modules)),
         encoding="utf-8",
     )

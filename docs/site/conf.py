@@ -41,6 +41,7 @@ html_static_path = ["site.css", "site.js"]
 html_css_files = ["site.css"]
 html_js_files = [("site.js", {"defer": "defer"})]
 html_copy_source = False
+html_show_copyright = False
 html_show_sourcelink = False
 html_show_search_summary = False  # it asks for files, which a page that is a file may not
 html_math_renderer = "mathml"

@@ -1,5 +1,5 @@
 // Runs scenes in node by the page's own host of the core: {lab, scenes} on stdin, on stdout a list
-// of {state, knots (rows of ten numbers), events, swings (rows of six), triggered, books, toml}.
+// of {state, knots (rows of ten numbers), events, swings (rows of seven), triggered, books, toml}.
 import { readFileSync } from "node:fs";
 
 import { core, load, machineOf } from "./run.mjs";

@@ -292,10 +292,11 @@ def _copied(row: Grade, before: Sequence[Grade]) -> Iterator[str]:
             ]  # fmt: skip
             if found:
                 chance, seen = _chance(mine, found, len(others))
-                likely = f"{'' if seen else 'at most '}1 in {1.0 / chance:,.0f}"
-                likely = likely if chance < LIKELY else "this may be chance"
+                likely = f"by chance: {'' if seen else 'at most '}1 in {1.0 / chance:,.0f}"
+                # A bound that is not small says that draws were few, not that it happens.
+                likely = "this may be chance" if seen and chance >= LIKELY else likely
                 listed = ", ".join(map(str, found))
-                yield printable(f"answers {listed} {said} (by chance: {likely})")
+                yield printable(f"answers {listed} {said} ({likely})")
 
 
 LIKELY: Final = 0.05
@@ -518,11 +519,11 @@ def page(grades: Iterable[Grade]) -> str:
             f"<th scope=col>{n}. {escape(one.title)}" for n, one in enumerate(exercise.questions, 1)
         )
         right = "".join(
-            f"<td>{sum(marks)} of {len(of_lesson)}"
-            for marks in zip(*(row.marks for row in of_lesson), strict=True)
+            f"<td>{sum(marks)} of {len(of_lesson)}{_most_common(of_lesson, n)}"
+            for n, marks in enumerate(zip(*(row.marks for row in of_lesson), strict=True), 1)
         )
         lines = "".join(
-            f"<tr><th scope=row>{escape(row.student)}<td>{row.total}"
+            f"<tr><th scope=row>{escape(row.student)}<td>{row.total} of {row.out_of}"
             f"{''.join(_cell(row, n) for n in range(1, row.out_of + 1))}<td>{escape(row.reason)}"
             for row in sorted(of_lesson, key=lambda row: normalized(row.student))
         )
@@ -536,7 +537,7 @@ def page(grades: Iterable[Grade]) -> str:
             for row in of_lesson
             for text in row.words.values()
         )
-        parts.append(f"<dl>{said}</dl>" if said else "")
+        parts.append(f"<h3>What they wrote</h3>\n<dl>{said}</dl>" if said else "")
     rest = "".join(
         f"<tr><th scope=row>{escape(row.file)}<td>{escape(row.reason)}"
         for row in rows
@@ -545,6 +546,12 @@ def page(grades: Iterable[Grade]) -> str:
     if rest:
         parts.append(f"<h2>Not counted</h2>\n<table><tr><th>file<th>why{rest}</table>")
     return Template(asset("report.html")).substitute(body="\n".join(parts))
+
+
+def _most_common(rows: Sequence[Grade], number: int) -> str:
+    """Return the mistake that most made in a question, and how many, if any is known."""
+    counted = Counter(row.mistakes[number] for row in rows if number in row.mistakes)
+    return "".join(f"<small>{many} × {escape(one)}</small>" for one, many in counted.most_common(1))
 
 
 def _cell(row: Grade, number: int) -> str:

@@ -141,7 +141,9 @@ class Report:
                 language = self.words.language
                 content = pdf(tree, folder, asked, kind=kind, language=language, dense=True)
             else:
-                page = web_page(tree, folder, asked, self.words.language)
+                page = web_page(
+                    tree, folder, asked, self.words.language, dense=self.view != "teacher"
+                )
                 content = page.encode("utf-8")
         with whole(path) as unfinished:
             unfinished.write_bytes(content)
@@ -271,8 +273,10 @@ def inputs(scene: Scene, words: Words) -> Sheet:
             continue
         if key == "run.loads":
             continue
-        unit = unit_of(parts_of(key))
-        said = str(value) if not isinstance(value, float) else words.local(number(value))
+        unit = "" if isinstance(value, str) else unit_of(parts_of(key))
+        said = str(value).lower() if isinstance(value, bool) else str(value)
+        if isinstance(value, float):
+            said = words.local(number(value))
         rows.append((key, said, unit, from_file))
     given = {row[0] for row in rows}
     for key, value, unit in (

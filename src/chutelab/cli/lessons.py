@@ -22,6 +22,7 @@ from chutelab.cli.options import (
     check_file,
     command,
 )
+from chutelab.util.errors import printable
 from chutelab.util.files import whole, write_lines, writing
 
 if TYPE_CHECKING:
@@ -39,6 +40,9 @@ def complete_lesson(begun: str) -> list[CompletionItem]:
 
 
 HEADS = ("file", "student", "lesson", "marks (*: working shown)", "remarks")
+
+MOST_NAMED = 8
+"""Files of a folder that are told to be left out, at most."""
 
 LessonName = Annotated[str, FileName(), complete_lesson]
 LessonNames = Annotated[Texts, FileName(), complete_lesson]
@@ -408,14 +412,17 @@ def grade(
     from chutelab.util.tables import Sheet
 
     returned: list[Path] = []
+    left_out: list[str] = []
     for file in files:
         found = [file]
         if file.is_dir():
-            inside = [*file.rglob("*.ipynb"), *file.rglob("*.json")]
             # Jupyter keeps copies of its own in hidden folders.
-            found = sorted(
-                one for one in inside if "/." not in f"/{one.relative_to(file).as_posix()}"
-            )
+            inside = sorted(
+                one for one in file.rglob("*.*")
+                if not one.is_dir() and "/." not in f"/{one.relative_to(file).as_posix()}"
+            )  # fmt: skip
+            found = [one for one in inside if one.suffix in (".ipynb", ".json")]
+            left_out += [one.name for one in inside if one not in found]
         if not found:
             said = "there is no notebook (*.ipynb) and no result file (*.json) in this folder"
             raise RefusedError(f"{file}: {said}")
@@ -467,6 +474,12 @@ def grade(
         elif done and not quiet:
             rows = [(one.file, one.student, one.lesson, marks(one), one.reason) for one in done]
             console.show(Sheet("", HEADS, tuple(rows), texts=5))
+        if done and left_out and not quiet:
+            names = ", ".join(sorted(left_out)[:MOST_NAMED]) + ", ..." * (
+                len(left_out) > MOST_NAMED
+            )
+            said = f"neither notebook (*.ipynb) nor result file (*.json): {names}"
+            console.say(printable(said), err=True)
         if out is not None and part.exists():
             count = f"{len(done)} of {len(returned)} files"
             console.say(f"the marks of {count} are in {part}", err=True)

@@ -51,7 +51,7 @@ EXPORT int steer(int owner, double x, double y, double angle, double until) {
     while (W.swing_count + 4 * (W.mover_count + 1) > W.swing_room) {
         if (W.swing_room == 0) {
             RESERVE(W.swings, W.swing_room = 1024);
-            RESERVE(W.swing_work, 2.0 * W.swing_room);
+            RESERVE(W.swing_work, 3.0 * W.swing_room);
         } else if (!stretch_swings()) return 0;
         if (!has_room()) return 0;
     }

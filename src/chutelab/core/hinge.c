@@ -3,7 +3,7 @@
 
    Between impulses the angle follows
 
-       I angle'' = -spring (angle - rest) - damper angle' + weight's moment,
+       I angle'' = -spring (angle - rest) - damper angle' + weight's moment + a torque by hand,
 
    as a series of powers of the time: to rounding, since steps are short beside all of its times. What acts
    by impulses, once a step, are contacts that last, stops and the motor; they are solved together. A blow
@@ -42,7 +42,7 @@ static void lay_path(Mover *m) {
     c[0] = cos(m->angle);
     for (int k = 0; k + 2 < TERMS; k++) {
         double moment = now * c[k] + ahead * s[k] - m->spring * a[k] - m->damper * (k + 1) * a[k + 1];
-        if (k == 0) moment += m->spring * m->rest;
+        if (k == 0) moment += m->spring * m->rest + m->torque;
         a[k + 2] = moment / (m->inertia * (k + 1) * (k + 2));
         s[k + 1] = c[k + 1] = 0;
         for (int j = 0; j <= k; j++) {
@@ -88,20 +88,23 @@ static void bring(Mover *m, double t) {
         for (int j = 1; j < TERMS; j++, power *= h) lost += k * a[k] * j * a[j] * power * h / (k + j - 1);
     }
     m->damped += m->damper * lost;
+    double was = m->angle;
     follow_path(m, h, &m->angle, &m->rate, &change);
+    m->pushed += m->torque * (m->angle - was);
     m->since = t;
     lay_path(m);
 }
 
 static void note(const Mover *m, double t, double rate) {
-    W.swing_work[2 * W.swing_count] = m->stopped;
-    W.swing_work[2 * W.swing_count + 1] = m->damped;
+    W.swing_work[3 * W.swing_count] = m->stopped;
+    W.swing_work[3 * W.swing_count + 1] = m->damped;
+    W.swing_work[3 * W.swing_count + 2] = m->pushed;
     W.swings[W.swing_count++] = (Swing){ t, m->angle, rate, m->surface, 0 };
 }
 
 /* Have a hinge begin to hang as it is written. */
 void prepare_hinge(Mover *m) {
-    m->since = m->angle = m->rate = m->worked = m->stopped = m->damped = 0;
+    m->since = m->angle = m->rate = m->worked = m->stopped = m->damped = m->torque = m->pushed = 0;
     m->impulse[0] = m->impulse[1] = m->impulse[2] = 0;
     m->stirs = m->solved = m->struck = 0;
     lay_path(m);
@@ -113,6 +116,7 @@ double hinge_step(double h) {
     for (const Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!is_hinge(m)) continue;
         double weight = W.g * hypot(m->moment[0], m->moment[1]);
+        weight += fabs(m->torque);
         double fast = MAX(sqrt((m->spring + weight) / m->inertia), MAX(m->damper / m->inertia, fabs(m->rate)));
         if (fast * h > SHARE) h = SHARE / fast;
     }
@@ -415,6 +419,16 @@ double couple(const Contact *c, double wanted, double slip, double *tangent) {
         normal = MAX((wanted - both * *tangent) * c->mass[0], 0);
     }
     return normal;
+}
+
+/* Push what hangs on a hinge, by the owner of its surfaces, with a torque until it is pushed anew. */
+EXPORT void turn_hinge(int owner, double torque) {
+    for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
+        if (m->surface != owner || !is_hinge(m)) continue;
+        bring(m, W.t);
+        m->torque = torque;
+        lay_path(m);
+    }
 }
 
 /* A path begins where a blow has changed the speed of a hinge. */

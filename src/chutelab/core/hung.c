@@ -55,7 +55,13 @@ static void lessen_all(Contact *list, int count) {
         if (J[0] == 0 && J[1] == 0 && J[2] == 0) continue;
         relative(c, 1, u);
         relative(c, 0, v);
-        none += J[1] * (u[1] + c->drift) + J[2] * u[2] - J[0] * asks(c, 0);
+        double pushed[2] = {0, 0};
+        for (int side = 0; side <= c->two; side++) {
+            const double *kick = W.disks[side ? c->j : c->i].kick;
+            pushed[0] += (side ? -1 : 1) * (kick[0] * c->nx + kick[1] * c->ny);
+            pushed[1] += (side ? -1 : 1) * (kick[0] * c->ny - kick[1] * c->nx);
+        }
+        none += J[1] * (u[1] + pushed[1] + c->drift) + J[2] * u[2] + J[0] * (pushed[0] - asks(c, 0));
         all += J[1] * (v[1] + c->drift) + J[2] * v[2] + J[0] * (v[0] - u[0] - asks(c, J[0]));
     }
     lean_on_hinges(&none, &all);

@@ -172,6 +172,7 @@ typedef struct {
     double stops[2];        /* [in] rad; between which it turns */
     double motor[2];        /* [in] rad/s, N m; speed, and the most that it turns with */
     double worked, stopped, damped; /* [out] J; work of its motor, losses at its stops and in its damper */
+    double torque, pushed;  /* N m; by which it is pushed by hand; [out] J; and the work of that */
     double t;               /* s; when it is as follows */
     double place[2], velocity[2], pull[2]; /* m, m/s, m/s2; of the pivot */
     double sine, cosine;    /* of the angle that it has turned by */
@@ -341,7 +342,7 @@ typedef struct {
     Event *events;
     Total *totals;       /* one a step in a crowd */
     Swing *swings;
-    double *swing_work;  /* (swings, 2), J; `stopped` and `damped` of its mover then */
+    double *swing_work;  /* (swings, 3), J; `stopped`, `damped` and `pushed` of its mover then */
     Contact *contacts;   /* of this step */
     Contact *earlier;    /* of the step before */
     SolverRow *rows;     /* (contacts) of those that are solved together */

@@ -263,7 +263,7 @@ static void make_contact_room(int room) {
 
 /* Make twice the room for states of hinges; return whether there is such. */
 int stretch_swings(void) {
-    W.swing_work = stretch(W.swing_work, 2 * W.swing_count, 2 * W.swing_room, sizeof *W.swing_work);
+    W.swing_work = stretch(W.swing_work, 3 * W.swing_count, 3 * W.swing_room, sizeof *W.swing_work);
     return W.swing_work && STRETCH(W.swings, W.swing_count, W.swing_room);
 }
 
@@ -305,7 +305,7 @@ static int lay_out_work(void) {
     W.total_room = crowd ? 1024 : 1;
     W.swing_room = W.hinges ? 1024 + 8 * W.mover_count : 0;
     RESERVE(W.swings, W.swing_room);
-    RESERVE(W.swing_work, 2.0 * W.swing_room);
+    RESERVE(W.swing_work, 3.0 * W.swing_room);
     RESERVE(W.knots, W.knot_room);
     RESERVE(W.totals, W.total_room);
     RESERVE(W.events, W.event_room);

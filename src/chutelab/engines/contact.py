@@ -278,8 +278,8 @@ class Job:
         recorder.drives[: self.owners] = module.array("drives", REAL, self.owners)
         if world.swing_count:
             for row in module.array("movers", dtype("Mover"), world.mover_count):
-                work = row["worked"], row["stopped"], row["damped"]
-                by_hand = recorder.drives[row["surface"]], 0.0, 0.0
+                work = row["worked"], row["stopped"], row["damped"], row["pushed"]
+                by_hand = recorder.drives[row["surface"]], 0.0, 0.0, 0.0
                 recorder.hinge_work[row["surface"]] = by_hand if row["steered"] else work
             swings = module.array("swings", dtype("Swing"), world.swing_count).view(SWING)
             recorder.swings = swings[np.argsort(swings["surface"], kind="stable")]

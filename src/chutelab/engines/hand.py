@@ -98,6 +98,7 @@ class Run:
         self._job = Job(self._module, self._near, whole=not any(recorder.origin))
         self._angles: dict[int, float] = {}
         self._pushed: set[int] = set()
+        self._turned: set[int] = set()
         self._proceed(0)
 
     def __repr__(self) -> str:
@@ -142,19 +143,41 @@ class Run:
             self._proceed(MOST_STEPS)
         for i in self._pushed:
             module.call("push_disk", i, 0.0, 0.0)
+        for surface in self._turned:
+            module.call("turn_hinge", surface, 0.0)
         self._pushed.clear()
+        self._turned.clear()
 
-    def push(self, particle: int, force: Sequence[float]) -> None:
-        """Push a particle with a force (x, y), N, at its centre during the next `step`.
+    def push(
+        self, body: int | str, force: Sequence[float], at: Sequence[float] | None = None
+    ) -> None:
+        """Push with a force (x, y), N, during the next `step`.
 
-        What the incoming belt carries by adhesion is not moved, nor what is not under way.
+        A particle, by its number, at its centre: what the incoming belt carries by adhesion is not
+        moved, nor what is not under way. Or what hangs on a hinge, by its name, at a place `at`, m:
+        the force turns with it, so that its torque stays.
         """
-        if not 0 <= particle < self._machine.count:
-            raise InputError(f"0 to {self._machine.count - 1}", "particle", particle)
         if np.shape(force) != (2,) or not all(map(isfinite, force)):
             raise InputError("two finite numbers, N", "force", force)
-        self._module.call("push_disk", particle, *map(float, force))
-        self._pushed.add(particle)
+        if isinstance(body, str):
+            hung = {self._machine.surfaces[one.surface]: one for one in self._machine.movers
+                    if one.hinge is not None}  # fmt: skip
+            if body not in hung:
+                allowed = f"a particle's number, or what hangs: {', '.join(hung) or 'nothing does'}"
+                raise InputError(allowed, "body", body)
+            if at is None or np.shape(at) != (2,) or not all(map(isfinite, at)):
+                raise InputError("two finite numbers, m: where it is pushed", "at", at)
+            mover, (x, y), (fx, fy) = hung[body], map(float, at), map(float, force)
+            torque = (x - mover.pivot[0]) * fy - (y - mover.pivot[1]) * fx
+            self._module.call("turn_hinge", mover.surface, torque)
+            self._turned.add(mover.surface)
+            return
+        if at is not None:
+            raise InputError("nothing: a particle is pushed at its centre", "at", at)
+        if not 0 <= body < self._machine.count:
+            raise InputError(f"0 to {self._machine.count - 1}", "body", body)
+        self._module.call("push_disk", body, *map(float, force))
+        self._pushed.add(body)
 
     def set(self, key: str, value: Any) -> None:
         """Change a key of the scene from here on.

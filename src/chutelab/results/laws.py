@@ -136,9 +136,9 @@ def _tell(recording: Record) -> tuple[Broken, ...]:
 def _hinges(recording: Record, figures: Any) -> list[Broken]:
     """Judge what hangs on hinges by its states, and what the scene says acts on it.
 
-    E is its energy, ΔE = worked - given - stopped - damped; damped = ∫ damper rate² dt; stops hold;
-    a motor works no more than its torque times its way. Pymunk, of the order of its step, is judged
-    by ΔE alone, roughly.
+    E is its energy, ΔE = worked + pushed - given - stopped - damped; damped = ∫ damper rate² dt;
+    stops hold; a motor works no more than its torque times its way. Pymunk, of the order of its
+    step, is judged by ΔE alone, roughly.
     """
     told = list[Broken]()
 
@@ -154,13 +154,13 @@ def _hinges(recording: Record, figures: Any) -> list[Broken]:
         if hinge is None or hinge.steered:
             continue
         t, angle, rate = (hinge.states[name] for name in ("t", "angle", "rate"))
-        worked, stopped, damped = recording.hinge_work[surface].tolist()
+        worked, stopped, damped, pushed = recording.hinge_work[surface].tolist()
         parts = np.stack(hinge.energies(angle, rate, recording.gravity, recording.machine.up))
         energy = parts.sum(axis=0)
         given = float(recording.drives[surface])
         play = float(np.abs(parts).sum(axis=0).max())
-        play += sum(map(abs, (worked, given, stopped, damped)))
-        off = energy[-1] - energy[0] - (worked - given - stopped - damped)
+        play += sum(map(abs, (worked, given, stopped, damped, pushed)))
+        off = energy[-1] - energy[0] - (worked + pushed - given - stopped - damped)
         if recording.engine == "pymunk":
             must(LEDGER, surface, abs(off), ROUGHLY * play + EPS)
             continue

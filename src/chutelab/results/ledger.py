@@ -51,8 +51,8 @@ class Ledger(Shown):
     damper_loss : float
         What dampers take.
     push_work : float
-        Work of forces on particles by hand, see `chutelab.start`. In the tracks and in `by_stream`
-        it is part of the belt work.
+        Work of forces by hand, see `chutelab.start`. In the tracks and in `by_stream` that on
+        particles is part of the belt work.
     restitution_loss : float
         Normal part of the losses in impacts.
     friction_loss : float
@@ -199,7 +199,7 @@ def _hung(
         if mover.hinge is None:
             continue
         entries = by_surface[recording.surfaces[mover.surface]]
-        worked, stopped, damped = recording.hinge_work[mover.surface].tolist()
+        worked, stopped, damped, pushed = recording.hinge_work[mover.surface].tolist()
         states, given = mover.hinge.states[[0, -1]], entries["drive_work"]
         kinetic, lifted, spring = mover.hinge.energies(
             states["angle"], states["rate"], recording.gravity, recording.machine.up
@@ -210,12 +210,15 @@ def _hung(
             closed[name] = (before[0] + float(ends[0]), before[1] + float(ends[1]))
         entries |= {"drive_work": worked} | ({} if mover.hinge.steered else {"damper_loss": damped})
         entries["restitution_loss"] += stopped
+        if pushed:
+            entries["push_work"] = pushed
+            closed["push_work"] = closed.get("push_work", 0.0) + pushed
         closed["drive_work"] += worked - given
         closed["restitution_loss"] += stopped
         closed["damper_loss"] = closed.get("damper_loss", 0.0) + damped
         gained = float(sum(ends[1] - ends[0] for ends in energies.values()))
-        closed["residual"] += gained + given - worked + stopped + damped
-        sizes = worked, stopped, damped, lifted[1] - lifted[0], spring[1] - spring[0]
+        closed["residual"] += gained + given - worked - pushed + stopped + damped
+        sizes = worked, stopped, damped, pushed, lifted[1] - lifted[0], spring[1] - spring[0]
         closed["turned_over"] += float(sum(map(abs, sizes)) + kinetic[0])
     return closed
 

@@ -288,9 +288,9 @@ class Record(Shown):
         slept; blows are events. Of the contact engine, where that is asked for.
     swings : ndarray, shape (K,) or (0,), dtype `SWING`
         States of what hangs on hinges, surface by surface, each one's in the order of time.
-    hinge_work : ndarray, shape (len(surfaces), 3) or (0, 3)
-        J; of what hangs on hinges the work of its motor, and losses at its stops and in its damper.
-        Empty where nothing does.
+    hinge_work : ndarray, shape (len(surfaces), 4) or (0, 4)
+        J; of what hangs on hinges the work of its motor, losses at its stops and in its damper, and
+        the work of pushes by hand. Empty where nothing does.
     springs : ndarray, shape (S, 4)
         J; of each ``[[spring]]`` what it kept when it was tied, what it keeps at the end, what its
         damper took, and what it gave to particles, which is part of their belt work in the knots.
@@ -318,7 +318,7 @@ class Record(Shown):
     impulses: NDArray[Any] = field(default_factory=lambda: np.empty((0, 0), LOAD))
     lasting: NDArray[Any] = field(default_factory=lambda: np.empty(0, LASTING))
     swings: NDArray[Any] = field(default_factory=lambda: np.empty(0, SWING))
-    hinge_work: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    hinge_work: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     springs: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     triggered: Floats = field(default_factory=lambda: np.zeros(0))
 

@@ -75,7 +75,7 @@ class Recorder:
         self.ended = np.zeros(count, dtype=np.int8)
         self.drives = np.zeros(owners)
         self.swings = np.empty(0, SWING)
-        self.hinge_work = np.zeros((owners, 3))
+        self.hinge_work = np.zeros((owners, 4))
         self.springs = np.zeros((0, 4))
         self.triggered = np.full(len(machine.triggers), np.inf)
         self.contacts = 0
@@ -255,7 +255,7 @@ class Recorder:
             swings=self.swings,
             triggered=self.triggered,
             springs=self.springs,
-            hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 3)),
+            hinge_work=self.hinge_work if len(self.swings) else np.zeros((0, 4)),
             steps=steps,
             contacts=self.contacts,
             angle=angle,

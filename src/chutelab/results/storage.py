@@ -33,7 +33,7 @@ from chutelab.results.record import (
     Kind,
     Record,
 )
-from chutelab.results.sensors import sensed
+from chutelab.results.sensors import need_sensors, sensed
 from chutelab.results.wear import KEYS, check_coefficients, touched
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
@@ -259,7 +259,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
         and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
         and recording.drives.shape == ((surfaces,) if recording.machine.movers else (0,))
-        and recording.hinge_work.shape == ((surfaces if len(recording.swings) else 0), 3)
+        and recording.hinge_work.shape == ((surfaces if len(recording.swings) else 0), 4)
         and recording.springs.shape == (len(recording.scene.spring), 4)
         and recording.triggered.shape == (len(recording.machine.triggers),)
         and not np.any(np.isnan(recording.triggered))
@@ -419,6 +419,7 @@ def _trajectory(recording: Record, step: float | None) -> Iterator[Sequence[obje
 
 
 def _passages(recording: Record) -> Iterator[Sequence[object]]:
+    need_sensors(recording.scene)
     yield "sensor", "t", "particle", "way", "along", "x", "y", "vx", "vy", "radius", "mass"
     for sensor in recording.scene.sensor:
         for t, particle, way, along, place, velocity in sensed(recording, sensor.name).tolist():

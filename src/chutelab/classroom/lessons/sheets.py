@@ -261,9 +261,14 @@ def _pictures(folder: Path, tree: SyntaxTreeNode) -> Iterator[tuple[SyntaxTreeNo
 
 
 def web_page(
-    tree: SyntaxTreeNode, folder: Path, asked: Sequence[SyntaxTreeNode] = (), language: str = "en"
+    tree: SyntaxTreeNode,
+    folder: Path,
+    asked: Sequence[SyntaxTreeNode] = (),
+    language: str = "en",
+    *,
+    dense: bool = False,
 ) -> str:
-    """Return Markdown as a page in one file with its pictures; after `asked` there is room."""
+    """Return Markdown as a page in one file with its pictures; `asked` and `dense` as in `pdf`."""
     for node in asked:
         node.attrs["class"] = "answer"
     for node, path in _pictures(folder, tree):
@@ -273,7 +278,8 @@ def web_page(
     body = str(read.renderer.render(tree.to_tokens(), read.options, {}))
     page = Template(asset("sheet.html"))
     title, version = escape(_title(tree)), escape(own_version())
-    return page.substitute(body=body, title=title, language=language, version=version)
+    look = ' class="dense"' if dense else ""
+    return page.substitute(body=body, title=title, language=language, version=version, look=look)
 
 
 def need_typst() -> None:

@@ -61,7 +61,7 @@ class Hanging:
         self.motor.max_force = hinge.motor[1] if mover.begins == 0.0 else 0.0
         spring = pymunk.DampedRotarySpring(self.body, still, hinge.rest, hinge.spring, hinge.damper)
         space.add(self.stop, spring, *[self.motor] * (hinge.motor[1] > 0.0))
-        self.before, self.work = 0.0, np.zeros(3)
+        self.before, self.work = 0.0, np.zeros(4)
         self.states = [(0.0, 0.0, 0.0, mover.surface, 0)]
 
     @property

@@ -189,7 +189,10 @@ def _leave_out(tables: dict[str, Any], scene: Scene, kinds: set[int]) -> None:
         rows = [rows] if isinstance(rows, dict) else rows
         if kept := [row for row, out in zip(rows, gone, strict=False) if not out]:
             tables[table] = kept
-    tables.setdefault("stream", [])
+    left = tables.setdefault("stream", [])
+    # That particles meet may have stood at one that is gone.
+    if scene.crowded and sum(stream.get("count", 1) for stream in left) > 1:
+        left[0]["interact"] = True
     for table in (*JOINTS, "live"):
         tables.pop(table, None)
 

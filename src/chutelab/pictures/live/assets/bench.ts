@@ -7,6 +7,7 @@ import {
   type Part,
 } from "./edit.ts";
 import { linesOfJoints, namesOfJoints, pinsOf } from "./joints.ts";
+import { carried, poseOf } from "./motion.ts";
 import { pointsOf } from "./callout.ts";
 import { bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
 import { html, iconButton } from "./panels.ts";
@@ -15,7 +16,7 @@ import { boxOf } from "./view.ts";
 import type { Given } from "./scene.ts";
 import type { Stage } from "./stage.ts";
 import type { Inspector } from "./inspector.ts";
-import type { Lab } from "./lab.ts";
+import type { Held, Lab } from "./lab.ts";
 import type { Words } from "./words.ts";
 
 type Place = [number, number];
@@ -161,9 +162,9 @@ class Bench {
       const at = stage.placeOf(event);
       this.fingers.set(event.pointerId, at);
       this.pressed = this.fingers.size === 1 ? at : null;
-      const ball = this.pressed && this.catches ? this.ballAt(at) : -1;
-      if (ball >= 0) {
-        this.lab.grab(ball, this.worldOf(at));
+      const held = this.pressed && this.heldAt(at);
+      if (held) {
+        this.lab.grab(held, this.worldOf(at));
         this.pressed = null;
         return;
       }
@@ -214,7 +215,7 @@ class Bench {
       const at: Place = [touches[0].clientX - box.left, touches[0].clientY - box.top];
       // The page must not scroll away under what is moved.
       const body = !this.mode
-        && (this.bodyAt(at, "touch") || (this.catches && this.ballAt(at) >= 0));
+        && (this.bodyAt(at, "touch") || this.heldAt(at));
       if (touches.length > 1 || body || this.moving) event.preventDefault();
     }, { passive: false });
     front.addEventListener("pointercancel", (event: PointerEvent) => {
@@ -250,13 +251,60 @@ class Bench {
 
   /** Draw a line from what is held by hand to the hand. */
   pull() {
-    const { lead, lab: { hand, recording, t }, stage: { view } } = this;
-    const at = hand && recording?.tracks[hand.disk].state(t);
+    const { lead, lab: { hand }, stage: { view } } = this, at = hand && this.placeOf(hand);
     if (!at) lead.replaceChildren();
     else {
-      lead.replaceChildren(svg("line", { class: "pull", x1: view.px(at.x), y1: view.py(at.y),
+      lead.replaceChildren(svg("line", { class: "pull", x1: view.px(at[0]), y1: view.py(at[1]),
         x2: view.px(hand.to[0]), y2: view.py(hand.to[1]) }));
     }
+  }
+
+  /** Where what is held is, m; null if it is there no more. */
+  placeOf(held: Held): Place | null {
+    const { recording, machine, t } = this.lab;
+    if ("disk" in held) {
+      const state = recording?.tracks[held.disk].state(t);
+      return state && !state.ended ? [state.x, state.y] : null;
+    }
+    const mover = machine?.movers.find(({ surface }) => surface === held.surface);
+    if (!mover || !recording) return null;
+    const { pivot: [x, y] } = mover, [u, v] = held.grip;
+    return carried(poseOf(mover, t, recording.swings.get(held.surface)), mover, [x + u, y + v]);
+  }
+
+  /** What of a run that is played is caught at a place, px: a ball, or what hangs on a hinge. */
+  heldAt(at: Place): Held | null {
+    if (!this.catches) return null;
+    const { machine } = this.lab, disk = this.ballAt(at), [x, y] = this.worldOf(at);
+    if (disk >= 0 || !machine) return disk >= 0 ? { disk } : null;
+    const reach = CLICK_REACH / this.stage.view.scale;
+    return this.hung(surfaceAt(this.stage.posed ?? machine, x, y, reach), [x, y]);
+  }
+
+  /** What hangs on a hinge, by its name, held at a place, m. */
+  hung(name: string, [x, y]: Place): Held | null {
+    const { machine, recording, t } = this.lab, surface = machine?.surfaces.indexOf(name);
+    const mover = machine?.movers.find((one) => one.surface === surface && one.inertia > 0);
+    if (!mover || !recording) return null;
+    const { turn } = poseOf(mover, t, recording.swings.get(mover.surface)), { pivot } = mover;
+    const [u, v, c, s] = [x - pivot[0], y - pivot[1], Math.cos(turn), Math.sin(turn)];
+    return { surface: mover.surface, grip: [c * u + s * v, c * v - s * u] };
+  }
+
+  /** What is chosen of a run that is played, as keys catch it: the first ball of a stream, or what
+   * hangs on a hinge by its end that is farthest from there. */
+  chosenToHold(): Held | null {
+    const { lab: { machine, recording, t }, inspector: { part } } = this;
+    if (!this.catches || !machine || !recording) return null;
+    const disk = machine.releases.findIndex(({ stream }, i) =>
+      machine.streams[stream] === part && this.placeOf({ disk: i }));
+    if (disk >= 0) return { disk };
+    const { segments, surfaces, movers } = recording.posed(t);
+    const own = segments.filter(({ surface }) => surfaces[surface] === part);
+    const pivot = movers.find(({ surface }) => surfaces[surface] === part)?.pivot ?? [0, 0];
+    const [end] = own.flatMap(({ ends: [x, y, u, v] }) => [[x, y], [u, v]] as Place[])
+      .sort((a, b) => distance(b, pivot) - distance(a, pivot));
+    return end ? this.hung(part, end) : null;
   }
 
   holding = 0;
@@ -292,14 +340,21 @@ class Bench {
 
   movable = (name: string) => bodyOf(this.stage.handles, [name], 0, 0) !== null;
 
-  /** Draw with keys: arrows move the point, Enter sets it. Where H was pressed arrows move the
+  /** Draw with keys: arrows move the point, Enter sets it. While it is played Enter catches what is
+   * chosen, and lets go of it; arrows move the hand. Where H was pressed arrows move the
    * view, else all that is chosen if that is several. */
   key({ key, shiftKey }: KeyboardEvent): boolean {
     const ways: Record<string, Place> = {
       ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
     };
     const { stage } = this, { view } = stage, step = shiftKey ? 0.1 * KEY : KEY;
+    const { hand } = this.lab, held = hand || key !== "Enter" ? null : this.chosenToHold();
     if (key.toLowerCase() === "h") this.set(null, !this.moving);
+    else if (hand && key in ways) {
+      hand.to = [hand.to[0] + (ways[key][0] * step) / view.scale,
+        hand.to[1] - (ways[key][1] * step) / view.scale];
+    } else if (hand && key === "Enter") this.lab.drop();
+    else if (held) this.lab.grab(held, this.placeOf(held) as Place);
     else if (key in ways && this.mode) {
       const [x, y] = this.cursor ?? this.points.at(-1) ?? view.middle, [dx, dy] = ways[key];
       const far = shiftKey ? view.snap : roundTo(KEY / view.scale, view.snap) || view.snap;

@@ -5,7 +5,7 @@ import type { Words } from "./words.ts";
 
 type Range = [number, number];
 
-const LEFT = 52, RIGHT = 10, TOP = 10, BOTTOM = 24;
+const NUMBERS = 46, DIGIT = 7, GAP = 6, RIGHT = 10, TOP = 10, BOTTOM = 24;
 
 /** Round numbers within a range, about so many. */
 function ticks(low: number, high: number, many: number): number[] {
@@ -51,6 +51,8 @@ class Chart {
   grid;
   marks;
   cursor;
+  /** Where the axes begin, px: beside the widest number. */
+  left = NUMBERS + GAP;
   x: Range = [0, 1];
   y: Range = [0, 1];
 
@@ -83,6 +85,9 @@ class Chart {
     const name = (value: number, all: number[]) => words.fixed(value, decimals(all));
     const across = ticks(...x, Math.max(2, this.width / 64)), up = ticks(...y, height / 24)
       .filter((value) => !whole || Number.isInteger(value));
+    const widest = Math.max(0, ...up.map((value) => name(value, up).length));
+    this.left = Math.max(NUMBERS, DIGIT * widest) + GAP;
+    const { left } = this;
     for (const value of across) {
       this.grid.append(svg("path", { d: `M${this.px(value)} ${TOP}V${bottom}` }));
       // The axis' own name stands at the right end.
@@ -91,17 +96,18 @@ class Chart {
       }
     }
     for (const value of up) {
-      this.grid.append(svg("path", { d: `M${LEFT} ${this.py(value)}H${right}`,
+      this.grid.append(svg("path", { d: `M${left} ${this.py(value)}H${right}`,
         class: value === 0 ? "zero" : "" }));
       const py = this.py(value);
-      if (!beside || py > TOP + 14) label(LEFT - 6, py + 4, name(value, up), "end");
+      if (!beside || py > TOP + 14) label(left - GAP, py + 4, name(value, up), "end");
     }
     if (below) label(right, bottom + 15, below, "end");
-    if (beside) label(LEFT - 6, TOP + 6, beside, "end");
+    if (beside) label(left - GAP, TOP + 6, beside, "end");
   }
 
   px(x: number) {
-    return LEFT + ((x - this.x[0]) / (this.x[1] - this.x[0] || 1)) * (this.width - LEFT - RIGHT);
+    const { left, width, x: [low, high] } = this;
+    return left + ((x - low) / (high - low || 1)) * (width - left - RIGHT);
   }
 
   py(y: number) {
@@ -113,7 +119,7 @@ class Chart {
   worldX(clientX: number) {
     const box = this.root.getBoundingClientRect();
     const px = (clientX - box.left) * (this.width / box.width);
-    const part = (px - LEFT) / (this.width - LEFT - RIGHT);
+    const part = (px - this.left) / (this.width - this.left - RIGHT);
     return this.x[0] + Math.min(1, Math.max(0, part)) * (this.x[1] - this.x[0]);
   }
 

@@ -258,9 +258,9 @@ class Core extends Memory {
     const count = this.get("swing_count"), begin = this.get("swings"), rows: number[] = [];
     const { size, fields } = this.layout.structs.Swing;
     for (; this.swung < count; this.swung += 1) {
-      const at = begin + this.swung * size, work = (this.get("swing_work") >> 3) + 2 * this.swung;
+      const at = begin + this.swung * size, work = (this.get("swing_work") >> 3) + 3 * this.swung;
       rows.push(...this.doubles.subarray(at >> 3, (at >> 3) + 3),
-        ...this.doubles.subarray(work, work + 2), this.ints[(at + fields.surface[0]) >> 2]);
+        ...this.doubles.subarray(work, work + 3), this.ints[(at + fields.surface[0]) >> 2]);
     }
     return rows;
   }

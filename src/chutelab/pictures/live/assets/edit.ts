@@ -174,8 +174,10 @@ function withPart(
         : structuredClone(value);
   }
   // What stands upright has a left and a right.
-  const [dx, dy] = [0, 1].map((n) => Math.abs((points[1]?.[n] ?? 0) - points[0][n]));
-  if (row.passes && dx < dy) row.passes = "right";
+  if (row.passes) {
+    const [dx, dy] = [0, 1].map((n) => Math.abs(points[1][n] - points[0][n]));
+    if (dx < dy) row.passes = "right";
+  }
   if (row.travel) row.travel.to = points[part.places.indexOf("travel.to")];
   if (part.table !== "stream") return withRow(given, part.table, row);
   const [kinds, kind] = withKind(given, material, BALL * unit);

@@ -97,7 +97,7 @@ class EnergyPanel {
     SIGNS.forEach(([name], n) => {
       this.cells.get(name).textContent = this.words.energy(ledger[name]);
       this.rows[n].hidden = (name === "residual" && isClosed)
-        || (name === "push_work" && !recording.pushes.length)
+        || (name === "push_work" && !recording.pushes.length && !ledger.push_work)
         || (KEPT[name] && ![...machine.movers, ...machine.joints].some((one: any) =>
           KEPT[name].some((key) => one[key])));
     });

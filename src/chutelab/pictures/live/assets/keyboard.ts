@@ -12,7 +12,8 @@ const KEYS: [string, string][] = [
   ["play", "help-space"], ["step", "← →"], ["mark", ", ."], ["ends", "Home End"], ["tab", "Tab"],
   ["handle", "← → ↑ ↓"], ["fine", "help-shift"], ["undo", "help-ctrl-z"], ["redo", "help-ctrl-shift-z"],
   ["taken", "help-delete"], ["copy", "help-ctrl-c"], ["duplicate", "help-ctrl-d"],
-  ["all", "help-ctrl-a"], ["letter", "E … R"], ["draw", "help-arrows"], ["view", "H"],
+  ["all", "help-ctrl-a"], ["letter", "E … R"], ["draw", "help-arrows"],
+  ["hold", "help-arrows"], ["view", "H"],
   ["alt", "Alt"], ["escape", "help-esc"], ["zoom", "+ −"], ["help", "?"],
 ];
 
@@ -29,16 +30,25 @@ function listenToKeys(
       html("dt", {}, words.say(key)), html("dd", {}, words.say(`help-${id}`)),
     ])), html("button", { click: () => dialog.close() }, words.say("close")));
   document.body.append(dialog);
-  document.getElementById("keys")?.addEventListener("click", () => dialog.showModal());
+  const help = () => {
+    dialog.showModal();
+    // The button at its end has the focus.
+    dialog.scrollTop = 0;
+  };
+  document.getElementById("keys")?.addEventListener("click", help);
   const always: Record<string, () => void> = {
     "ctrl+z": () => lab.undo(), "ctrl+shift+z": () => lab.redo(), "ctrl+y": () => lab.redo(),
-    Escape: () => (bench.mode || bench.moving ? bench.set(null) : bench.inspector.choose()),
+    Escape: () => {
+      if (lab.hand) lab.drop();
+      else if (bench.mode || bench.moving) bench.set(null);
+      else bench.inspector.choose();
+    },
   };
   const calm: Record<string, () => void> = {
     " ": () => click("play"), Home: () => click("restart"), End: () => lab.seek(lab.end),
     ArrowLeft: () => click("back"), ArrowRight: () => click("forward"),
     "+": () => click("tool-zoom-in"), "-": () => click("tool-zoom-out"),
-    "?": () => dialog.showModal(), ",": () => marks.jump(-1), ".": () => marks.jump(1),
+    "?": help, ",": () => marks.jump(-1), ".": () => marks.jump(1),
   };
   // Letters count while the picture has the focus.
   const drawn: Record<string, () => void> = {

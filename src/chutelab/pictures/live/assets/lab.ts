@@ -5,10 +5,14 @@ import { roundUp } from "./chart.ts";
 import { retied } from "./edit.ts";
 import { indexed, withValues } from "./keys.ts";
 import { PASSES, build, type Machine } from "./machine.ts";
+import { weightOf } from "./motion.ts";
 import { Recording } from "./recording.ts";
 import { Fault, resolve, type Scene, type Given } from "./scene.ts";
 import type { Engine } from "./engine.ts";
-import type { Push } from "./worker.ts";
+import type { Given as Pull, Push } from "./worker.ts";
+
+/** A particle, or what hangs on a hinge and where, m from there while it has not turned */
+export type Held = { disk: number } | { surface: number, grip: [number, number] };
 
 export type News = "scene" | "run" | "time" | "play";
 
@@ -27,6 +31,9 @@ const NOWHERE = { at: [9e5, 9e5], velocity: [0, 0] };
 /** 1/s², 1/s; by how much a hand hastens what it holds for each metre that it is away, and slows it
  * down for each m/s: it comes there as fast as it can without swinging. */
 const STIFF = 355, SLOWS = 2 * Math.sqrt(STIFF);
+
+/** m²; what is held nearer to its hinge is turned as if it were held there. */
+const NEAR_HINGE = 1e-6;
 
 /** Whether a scene has no particles. */
 const isBare = ({ stream }: Given) => Array.isArray(stream) && !stream.length;
@@ -61,8 +68,8 @@ class Lab {
   scene?: Scene;
   machine?: Machine;
   recording?: Recording;
-  /** The particle that is held by hand, and where that is, m. */
-  hand: { disk: number, to: [number, number] } | null = null;
+  /** What is held by hand, and where that is, m. */
+  hand: (Held & { to: [number, number] }) | null = null;
   /** What was done by hand in this run; and the machine in which particles do not meet. */
   pushes: Push[] = [];
   loose: Machine | null = null;
@@ -161,16 +168,16 @@ class Lab {
     });
   }
 
-  /** Catch a particle of the run that is shown, and go on by hand from there: as Python's
+  /** Catch something of the run that is shown, and go on by hand from there: as Python's
    * `chutelab.start` all go on together, step by step. */
-  grab(disk: number, to: [number, number]) {
+  grab(held: Held, to: [number, number]) {
     const { machine, t } = this, pushes = this.pushes.filter(({ due }) => due <= t);
     if (!machine) return;
     if (!machine.interact) this.loose = machine;
     const own = machine.interact ? machine : { ...machine, interact: true,
       pairRestitution: machine.pairRestitution.map((row) => row.map(() => PASSES)) };
     const recording = new Recording(own);
-    this.hand = { disk, to };
+    this.hand = { ...held, to };
     this.waits = false;
     this.engine.run(own, t, (chunk) => {
       recording.add(chunk);
@@ -192,25 +199,45 @@ class Lab {
     this.allow(0);
   }
 
-  /** Draw what is held to the hand for so many seconds: m (k (to - x) - c v), and its weight. */
+  /** Draw what is held to the hand for so many seconds. */
   draw(seconds: number) {
     const { recording, machine, hand } = this;
     if (!this.waits || !recording || !machine || !hand) return;
-    const { disk, to } = hand, { now } = recording, state = recording.tracks[disk].state(now);
+    const { now } = recording, given = this.pullOn(hand, recording, machine);
     this.t = now;
     this.tell("time");
-    if (!state || state.ended || recording.state !== "running") {
+    if (!given || recording.state !== "running") {
       this.drop();
       return;
     }
-    const mass = machine.mass[disk], { up, gravity } = machine;
-    const force = [[state.x, state.vx], [state.y, state.vy]].map(([x, v], n) =>
-      mass * (STIFF * (to[n] - x) - SLOWS * v + gravity * up[n])) as [number, number];
     const due = Math.max(now, this.pushes.at(-1)?.due ?? 0) + seconds;
-    const push = { disk, force, at: now, due };
+    const push = { ...given, at: now, due };
     this.pushes.push(push);
     this.waits = false;
     this.engine.push(push);
+  }
+
+  /** The force of the hand on what it holds, m (k (to - x) - c v), and its weight; of what hangs on
+   * a hinge their torque, with the mass that it has where it is held. */
+  pullOn(hand: Held & { to: [number, number] }, recording: Recording, machine: Machine):
+    Pull | null {
+    const { to } = hand, { now } = recording, { up, gravity, mass } = machine;
+    const pull = (n: number, x: number, v: number) => STIFF * (to[n] - x) - SLOWS * v;
+    if ("disk" in hand) {
+      const { disk } = hand, state = recording.tracks[disk].state(now);
+      if (!state || state.ended) return null;
+      const { x, y, vx, vy } = state;
+      return { disk, force: [mass[disk] * (pull(0, x, vx) + gravity * up[0]),
+        mass[disk] * (pull(1, y, vy) + gravity * up[1])] };
+    }
+    const { surface, grip: [x, y] } = hand, rows = recording.swings.get(surface)?.rows;
+    const mover = machine.movers.find((one) => one.surface === surface), last = rows?.at(-1);
+    if (!mover || !last) return null;
+    const [, angle, rate] = last, [c, s] = [Math.cos(angle), Math.sin(angle)];
+    const [u, v] = [c * x - s * y, s * x + c * y], { pivot, inertia } = mover;
+    const heavy = inertia / Math.max(x * x + y * y, NEAR_HINGE);
+    return { surface, torque: heavy * (u * pull(1, pivot[1] + v, rate * u)
+      - v * pull(0, pivot[0] + u, -rate * v)) - weightOf(mover, angle, machine) };
   }
 
   /** Find the laws that a run breaks, which is over. */

@@ -7,13 +7,13 @@ import type { Point } from "./scene.ts";
 /** Of the pivot, m, and how far it has turned, rad */
 export type Pose = { x: number, y: number, turn: number };
 /** States of hinges as the core tells them: t (s), angle (rad), rate (rad/s); what stops and damper
- * took so far (J); surface. */
-export const SWING_ROW = 6;
+ * took and pushes gave so far (J); surface. */
+export const SWING_ROW = 7;
 
 /** J: kinetic energy, that of the weight from the hinge's height, the spring's; and what stops and
- * damper took so far */
+ * damper took and pushes gave so far */
 export type Hung = { kinetic: number, potential: number, spring: number, restitution_loss: number,
-  damper_loss: number };
+  damper_loss: number, push_work: number };
 
 /** The states of a hinge: cubics between them. */
 class Swings {
@@ -38,12 +38,12 @@ class Swings {
   energies(
     t: number, { inertia, moment: [x, y], spring, rest }: Mover, { gravity, up }: Machine,
   ): Hung {
-    const of = ([, angle, rate, restitution_loss, damper_loss]: number[]): Hung => {
+    const of = ([, angle, rate, restitution_loss, damper_loss, push_work]: number[]): Hung => {
       const [c, s] = [Math.cos(angle), Math.sin(angle)];
       return {
         kinetic: 0.5 * inertia * rate * rate,
         potential: gravity * (up[0] * (x * c - y * s) + up[1] * (x * s + y * c)),
-        spring: 0.5 * spring * (angle - rest) ** 2, restitution_loss, damper_loss,
+        spring: 0.5 * spring * (angle - rest) ** 2, restitution_loss, damper_loss, push_work,
       };
     };
     const [before, after, s] = this.around(t), [a, b] = [of(before), of(after)];
@@ -58,6 +58,12 @@ class Swings {
     const gone = b - a, [first, last] = [h * va, h * vb];
     return a + s * (first + s * ((3 * gone - 2 * first - last) + s * (first + last - 2 * gone)));
   }
+}
+
+/** The torque of a hinge's weight where it has turned by an angle, N m. */
+export function weightOf({ moment: [x, y] }: Mover, angle: number, { gravity, up }: Machine) {
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  return gravity * (up[0] * (x * s + y * c) - up[1] * (x * c - y * s));
 }
 
 /** Where a mover is at a time, s. It travels with an even acceleration up to the middle, and the

@@ -521,7 +521,7 @@ class Recording {
    * changed under way. */
   hung(t: number, surface?: number): Hung {
     const total: Hung = {
-      kinetic: 0, potential: 0, spring: 0, restitution_loss: 0, damper_loss: 0,
+      kinetic: 0, potential: 0, spring: 0, restitution_loss: 0, damper_loss: 0, push_work: 0,
     };
     for (const mover of this.machine.movers) {
       const swings = this.swings.get(mover.surface) as Swings;
@@ -554,7 +554,8 @@ class Recording {
     const [begun, hung] = [0, t].map((then) => this.hung(then));
     const kept = ({ kinetic, potential, spring }: Hung) => kinetic + potential + spring;
     total.start += kept(begun);
-    total.belt_work += kept(hung) - kept(begun) + hung.restitution_loss + hung.damper_loss;
+    total.belt_work += kept(hung) - kept(begun) + hung.restitution_loss + hung.damper_loss
+      - hung.push_work;
     for (const name of Object.keys(hung) as (keyof Hung)[]) total[name] += hung[name];
     return total;
   }

@@ -9,9 +9,9 @@ import type { Event } from "./core.ts";
 
 /** Its middle, px, and the side of its point that is tried first, rad counterclockwise from the
  * right; one that is asked for may be far away. Its text is the longest of its rows, and `drawn` is
- * what is drawn with it */
+ * what is drawn with it, of which no label may lie on a `line` */
 type Label = { text: string, x: number, y: number, side?: number, asked?: boolean,
-  rows?: number, id?: string, drawn?: Element[] };
+  rows?: number, id?: string, drawn?: Element[], line?: [number, number][] };
 /** Where a label stands, and if that is away from its point, the line to it. */
 type Placed = Label & { from?: [number, number] };
 type Space = { left: number, top: number, right: number, bottom: number };
@@ -22,6 +22,9 @@ const TALL = 18, WIDE = 9;
 /** A label's distance from its point, px, in the order in which they are tried; and from where on a
  * line leads to it. */
 const AWAY = [15, 24, 34, 46, 60], FARTHER = [80, 110, 150, 200], LED = 30;
+
+/** Pixels from a point on within which lines that lead from it may lie on each other. */
+const OPEN = 13;
 
 /** Pixels from one of the boxes to the next that stand for a line, and half the size of one. */
 const ALONG = 9, THIN = 5;
@@ -37,16 +40,31 @@ function spaceOf({ text, x, y, rows = 1 }: Label): Space {
   return { left: x - half, right: x + half, top: y - high, bottom: y + high };
 }
 
+/** Where a line from a point to a label ends: just outside of its text. */
+function leadTo(label: Label, [x, y]: [number, number]): [number, number] {
+  const { right, bottom } = spaceOf(label), [u, v] = [label.x - x, label.y - y];
+  const inside = Math.min((right - label.x + 2) / Math.abs(u || 1e-9),
+    (bottom - label.y + 3) / Math.abs(v || 1e-9));
+  return [label.x - inside * u, label.y - inside * v];
+}
+
 /** Labels near their points, each where nothing is yet; what has no place is left out.
  * @param wanted at their points, the most important first
  * @param most that are placed */
 function placed(wanted: Label[], taken: Space[], most = Infinity): Placed[] {
-  const spaces = [...taken];
-  return wanted.flatMap((label) => {
-    const { text, x, y, side = Math.PI / 4, asked, rows = 1 } = label;
+  const spaces = [...taken], found: Placed[] = [];
+  const meets = (space: Space, all: Space[]) => all.some((other) => overlap(other, space));
+  for (const label of wanted) {
+    if (found.length < most) found.push(...place(label));
+  }
+  return found;
+
+  function place(label: Label): Placed[] {
+    const { text, x, y, side = Math.PI / 4, asked, rows = 1, line = [] } = label;
+    const labels = spaces.slice(taken.length), own = along(line);
+    if (own.some((one) => meets(one, labels))) return [];
     // Of a block the nearest edge is as far away as a letter's.
     const [wide, high] = rows > 1 ? [0.5 * WIDE * text.length, 0.5 * TALL * (rows - 1)] : [0, 0];
-    if (spaces.length - taken.length >= most) return [];
     for (const far of asked ? [...AWAY, ...FARTHER] : AWAY) {
       for (let n = 0; n < 8; n += 1) {
         // The side that is wanted, then those next to it.
@@ -54,13 +72,20 @@ function placed(wanted: Label[], taken: Space[], most = Infinity): Placed[] {
         const [c, s] = [Math.cos(angle), Math.sin(angle)];
         const at = { ...label, x: x + (far + wide) * c, y: y - (far + high) * s };
         const space = spaceOf(at);
-        if (spaces.some((other) => overlap(other, space))) continue;
-        spaces.push(space);
-        return [far < LED ? at : { ...at, from: [x, y] as [number, number] }];
+        if (meets(space, spaces) || meets(space, own)) continue;
+        if (far < LED) {
+          spaces.push(space, ...own);
+          return [at];
+        }
+        // The line to it goes through no label, and none comes on it later.
+        const lead = along([[x + OPEN * c, y - OPEN * s], leadTo(at, [x, y])]);
+        if (lead.some((one) => meets(one, labels))) continue;
+        spaces.push(space, ...own, ...lead);
+        return [{ ...at, from: [x, y] }];
       }
     }
     return [];
-  });
+  }
 }
 
 /** Boxes that fill a disc, px. */
@@ -171,15 +196,10 @@ class Symbols {
     this.wanted.sort((a, b) => rank(a) - rank(b));
     const found = placed(this.wanted, takenBy(stage), MOST_LABELS);
     stage.labels = found.map(spaceOf);
-    for (const { text, x, y, from, drawn = [] } of found) {
+    for (const label of found) {
+      const { text, x, y, from, drawn = [] } = label;
       layer.append(...drawn);
-      if (from) {
-        const far = Math.hypot(x - from[0], y - from[1]), share = 1 - 13 / far;
-        layer.append(svg("path", {
-          d: `M${from[0]} ${from[1]}l${share * (x - from[0])} ${share * (y - from[1])}`,
-          class: "leader",
-        }));
-      }
+      if (from) layer.append(svg("path", { d: `M${from}L${leadTo(label, from)}`, class: "leader" }));
       layer.append(svg("text", { x, y: y + 5, "text-anchor": "middle" }, text));
     }
   }
@@ -188,15 +208,18 @@ class Symbols {
 
   /** Ask for the label of a quantity at a point, px.
    * @param drawn what is drawn with it */
-  want(id: string, x: number, y: number, side: number, drawn: Element[] = []) {
+  want(
+    id: string, x: number, y: number, side: number, drawn: Element[] = [],
+    line: [number, number][] = [],
+  ) {
     const { lab, words } = this.stage, { symbol, unit } = lab.data.quantities[id];
     if (id !== this.pointed) {
-      this.wanted.push({ text: symbol, x, y, side, id, drawn });
+      this.wanted.push({ text: symbol, x, y, side, id, drawn, line });
       return;
     }
     const value = document.querySelector(`#numbers [data-id="${id}"] td`)?.textContent ?? "";
     const text = `${symbol} = ${value} ${words.unit(unit)}`;
-    this.wanted.unshift({ text, x, y, side, asked: true, drawn });
+    this.wanted.unshift({ text, x, y, side, asked: true, drawn, line });
   }
 
   /** @param y m
@@ -216,12 +239,14 @@ class Symbols {
     const { view } = this.stage;
     const far = Math.hypot(left.x, left.y), angle = Math.atan2(left.x, left.y);
     this.dot(left);
-    this.label("v1", left.x, left.y);
     if (angle < LEAST_ANGLE) {
-      const [x, y] = [view.px(left.x), view.py(left.y)];
-      this.wanted.push({ text: "φ₁ = 0", x, y, id: "phi1_deg" });
+      // It leaves at the top: one label says both, unless one of the two is asked for.
+      const id = this.pointed === "phi1_deg" ? "phi1_deg" : "v1";
+      this.label(id, left.x, left.y, [0, 1]);
+      if (this.pointed !== id) this.wanted[this.wanted.length - 1].text += ", φ₁ = 0";
       return;
     }
+    this.label("v1", left.x, left.y);
     const r = 0.6 * far, [x, y] = [view.px(0), view.py(0)];
     const tip = [view.px(r * Math.sin(angle)), view.py(r * Math.cos(angle))];
     this.layer.append(svg("path", {
@@ -242,14 +267,15 @@ class Symbols {
   /** A length, upright or level, between the tips of two arrows.
    * @param from px @param to px
    * @param points px: where the lines from the ends to what is measured begin */
-  measure(id: string, from: number[], to: number[], points: number[]) {
+  measure(id: string, from: [number, number], to: [number, number], points: number[]) {
     const level = from[1] === to[1];
     if (Math.hypot(to[0] - from[0], to[1] - from[1]) < 6) return;
     const ends = [from, to].map(([x, y], n) => (level ? `M${x} ${points[n]}V${y + 4}`
       : `M${points[n]} ${y}H${x + 4}`));
     const drawn = [svg("path", { d: ends.join(""), class: "thin" }),
       svg("path", { d: `M${from[0]} ${from[1]}L${to[0]} ${to[1]}`, class: "length" })];
-    this.want(id, 0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]), level ? Math.PI : 0, drawn);
+    this.want(id, 0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]), level ? Math.PI : 0, drawn,
+      [from, to]);
   }
 }
 

@@ -2,6 +2,10 @@
 
 import type { Fault } from "./scene.ts";
 
+/** A whole number as an exponent. */
+const raised = (power: number) => String(power).replace(/./g, (sign) =>
+  (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(sign)]));
+
 type Quantity = { unit: string, value: number };
 
 class Words {
@@ -88,8 +92,11 @@ class Words {
     if (!isFinite(value)) return "–";
     if (value === 0) return "0";
     const size = Math.abs(value);
-    const text = size >= 1e5 || size < 1e-4 ? value.toExponential(digits - 1)
-      : value.toFixed(Math.max(0, digits - 1 - Math.floor(Math.log10(size))));
+    if (size >= 1e5 || size < 1e-4) {
+      const [mantissa, power] = value.toExponential(digits - 1).split("e");
+      return `${this.local(mantissa)}·10${raised(Number(power))}`;
+    }
+    const text = value.toFixed(Math.max(0, digits - 1 - Math.floor(Math.log10(size))));
     return this.local(text);
   }
 

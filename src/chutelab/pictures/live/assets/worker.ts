@@ -2,7 +2,7 @@
 //
 // In:  {type: "load", module, layout}, the core compiled; {type: "run", id, machine, until}
 //      begins a run and ends the one before, with `pushes` done in it already; {type: "until", id,
-//      until} lets it go on to a later time (s); {type: "push", id, push} pushes a particle.
+//      until} lets it go on to a later time (s); {type: "push", id, push} pushes something.
 // Out: {type: "chunk", id, knots, tips, events, swings, totals, triggered, now, state, books,
 //      reasons, gained, unsolved, pushed, given}, where state is "running", "done", "stalled" or
 //      "failed"; books and reasons come at the end; triggered are the times of what waited for a
@@ -25,8 +25,10 @@ let core: Core;
 
 let job: { id: number, until: number, steps: number } | null = null;
 
-/** A force on a particle, N, from a time on to another, s. */
-export type Push = { disk: number, force: [number, number], at: number, due: number };
+/** A force on a particle, N, or a torque on what hangs on a hinge, N m. */
+export type Given = { disk: number, force: [number, number] } | { surface: number, torque: number };
+/** From a time on to another, s */
+export type Push = Given & { at: number, due: number };
 type State = "running" | "done" | "stalled" | "failed";
 
 /** What has been written, and not been told yet. */
@@ -87,11 +89,14 @@ function goTo(t: number): State {
   return state;
 }
 
-/** Push a particle, as Python's `chutelab.start` does: rounding of a sum of times is no step. */
-function push({ disk, force, due }: Push): State {
-  core.exports.push_disk(disk, ...force);
-  const state = goTo(due * (1 - 1e-12));
-  core.exports.push_disk(disk, 0, 0);
+/** Push something, as Python's `chutelab.start` does: rounding of a sum of times is no step. */
+function push(one: Push): State {
+  const give = (share: number) => ("surface" in one
+    ? core.exports.turn_hinge(one.surface, share * one.torque)
+    : core.exports.push_disk(one.disk, ...one.force.map((force) => share * force)));
+  give(1);
+  const state = goTo(one.due * (1 - 1e-12));
+  give(0);
   return state;
 }
 

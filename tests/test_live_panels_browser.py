@@ -436,6 +436,8 @@ def test_sensors_tell_what_python_tells_of_the_same_run(shown):
     page.evaluate("chutelab.lab.engine.allow(1e9)")
     wait(page, "chutelab.lab.recording.state === 'done'")
     page.evaluate("chutelab.lab.seek(1e9)")
+    table = page.locator("#sensors table")
+    assert table.evaluate("(one) => one.scrollWidth <= one.parentElement.clientWidth")
     for name, its in page.evaluate("chutelab.sensors.readings"):
         wanted = told[name]
         assert (its["count"], its["back"]) == (wanted.count, wanted.back)

@@ -1,6 +1,8 @@
 """Scenes of all parts, each broken in one place: refused by the command, with file and key."""
 
+import copy
 import re
+from math import inf, nan
 
 import pytest
 import tomli_w
@@ -38,3 +40,51 @@ def test_a_broken_scene_is_refused_with_file_key_value_and_what_is_allowed(numbe
     assert "Traceback" not in said + outcome.stdout
     assert not outcome.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["broken.toml"]
+
+
+MOVES = [
+    *("turn", "shake.by", "shake.frequency", "shake.phase_deg", "travel.to", "travel.at"),
+    *("travel.in", "hinge", "mass", "inertia", "spring", "rest_deg", "damper", "stops_deg"),
+    *("motor.speed_deg", "motor.torque", "starts_when.touched"),
+]
+KEYS = {
+    "machine": [
+        *("gravity_deg", "stream[1].omega", "surface[0].pivot", "surface[0].passes"),
+        *("surface[0].opens_when.touched", "surface[0].closes_when.touched", "pair[1].meet"),
+        *(f"{table}.{key}" for table in ("surface[0]", "plate[1]") for key in MOVES),
+    ],
+    "dominoes": [
+        *("particle[1].shape", "particle[1].size", "particle[2].points"),
+        *(f"string[0].{key}" for key in ("from", "particle", "length", "other")),
+        *(f"rod[0].{key}" for key in ("from", "particle", "length", "other")),
+        *(f"spring[0].{key}" for key in ("from", "particle", "length", "stiffness", "damper")),
+        *(f"pin[0].{key}" for key in ("from", "particle", "other")),
+    ],
+}
+"""Keys of what moves, hangs, is joined, waits and lets through, by a scene that has their table."""
+
+
+def test_200_values_that_no_key_of_bodies_and_motion_has_are_refused(tmp_path):
+    """Each with file, key, value and what is allowed instead."""
+    count, file = 0, tmp_path / "broken.toml"
+    for name, keys in KEYS.items():
+        for key in keys:
+            for junk in (nan, -inf, {"a": 1}, [[1.0]], 1e300):
+                tables = copy.deepcopy(BASES[name])
+                place, *path = tables, *re.findall(r"\w+", key)
+                for one in path[:-1]:
+                    place = place[int(one)] if one.isdigit() else place.setdefault(one, {})
+                place[path[-1]] = junk
+                file.write_text(tomli_w.dumps(tables), encoding="utf-8")
+                with pytest.raises(scene.SceneError) as refused:
+                    scene.load(file)
+                said = str(refused.value)
+                assert str(file) in said
+                line = next(line for line in said.splitlines() if key in line)
+                # Of a list it may be an entry that is told, of a table its key.
+                values = (*junk, junk) if isinstance(junk, list) else (junk,)
+                told = any(f"= {scene.shown(value)}: " in line for value in values)
+                assert told or isinstance(junk, dict), (key, junk, line)
+                assert len(line.split(": ", 2)[-1]) > 5
+                count += 1
+    assert count >= 200

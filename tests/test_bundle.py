@@ -120,6 +120,7 @@ def test_pages_of_a_bundle_can_be_read_by_everybody(web, opened, scheme):
     assert lesson.told("alt", "img") == [said]
 
 
+@pytest.mark.slow
 def test_a_bundle_replaces_its_own_files_with_the_same_bytes_and_leaves_others(web, tmp_path):
     again = tmp_path / "web"
     shutil.copytree(web, again)

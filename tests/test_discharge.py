@@ -228,6 +228,9 @@ def test_command(tmp_path):
     out = tmp_path / "out"
     assert run("slip", "--out", str(out)).exit_code == 0
     assert sorted(path.name for path in out.iterdir()) == ["discharge.json", "discharge.png"]
+    rests = run("slip", "--set", "incoming.speed=0")
+    assert rests.exit_code == 2
+    assert "incoming.speed = 0.0: must be > 0 m/s" in rests.stderr
     for heights in ("low", "nan", "-0.1,inf", "99", "-1e9"):
         wrong = run("slip", "--heights", heights)
         assert wrong.exit_code == 2

@@ -237,6 +237,7 @@ def test_on_the_projector_hands_are_counted_and_the_run_is_shown(page_of):
     expect(page.locator(".track")).to_have_count(1)
 
 
+@pytest.mark.slow
 def test_what_was_done_is_kept_for_its_pupil_only(page_of):
     page = page_of("the-bounce")
     hand = Hand(page, "mouse")

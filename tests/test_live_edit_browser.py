@@ -101,7 +101,7 @@ def test_numbers_are_typed_and_a_wrong_one_says_why(shown):
     distance.fill("-0,2")
     distance.press("Enter")
     assert "zwischen 1e−9 und" in page.inner_text(".why:visible")
-    distance.fill("0,4")
+    distance.fill("0,4 m")  # with the unit that stands there
     distance.press("Enter")
     expect(page.locator(".why:visible")).to_have_count(0)
     assert value(page, "plate.distance") == 0.4
@@ -226,6 +226,7 @@ def test_all_of_that_goes_with_the_keyboard_alone(shown):
     assert not page.evaluate("chutelab.lab.playing")
     page.keyboard.press("?")
     expect(page.locator("#help")).to_be_visible()
+    assert page.evaluate("document.querySelector('#help').scrollTop") == 0
     page.keyboard.press("Escape")
     expect(page.locator("#help")).to_be_hidden()
     page.keyboard.press("Delete")

@@ -137,7 +137,8 @@ def test_no_curve_jumps_at_the_end_what_the_landing_leaves_is_a_dot(shown):
     assert max(steps) < 3.0
 
 
-@pytest.mark.parametrize("name", ["hopper", pytest.param("stream", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hopper", "stream"])
 def test_while_a_crowd_runs_no_height_is_below_the_lowest_point(shown, name):
     """m g y from the lowest point of the run so far, of one and of all: never negative."""
     page = shown(name, ["stream.count=60"])
@@ -164,6 +165,7 @@ def test_while_a_crowd_runs_no_height_is_below_the_lowest_point(shown, name):
     assert -1e-6 < least[1] <= 0.0
 
 
+@pytest.mark.slow
 def test_the_numbers_of_a_crowd_lead_and_what_is_computed_is_hatched(shown):
     page = shown("hopper", ["stream.count=60"])
     assert page.locator("#panels > .card:visible").first.get_attribute("id") == "numbers"
@@ -387,6 +389,7 @@ to = [-0.05, 0.3]
 """
 
 
+@pytest.mark.slow
 def test_loads_are_those_of_python_with_arrows_where_they_press(shown):
     options = ["stream.count=40", "run.until=1.2", "run.loads=0.02"]
     page = shown("hopper", options, viewport={"width": 1366, "height": 768}, language="de")
@@ -433,6 +436,8 @@ def test_sensors_tell_what_python_tells_of_the_same_run(shown):
     page.evaluate("chutelab.lab.engine.allow(1e9)")
     wait(page, "chutelab.lab.recording.state === 'done'")
     page.evaluate("chutelab.lab.seek(1e9)")
+    table = page.locator("#sensors table")
+    assert table.evaluate("(one) => one.scrollWidth <= one.parentElement.clientWidth")
     for name, its in page.evaluate("chutelab.sensors.readings"):
         wanted = told[name]
         assert (its["count"], its["back"]) == (wanted.count, wanted.back)

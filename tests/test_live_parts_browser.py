@@ -82,8 +82,9 @@ CLICKED = {"arc", "tie", "ball", "pin", "touched"}
 
 
 def test_every_part_is_a_row_whose_keys_are_those_of_its_table():
-    tables = describe(None)["tables"]
+    tables, page = describe(None)["tables"], html(None)
     for part in PARTS:
+        assert f'<symbol id="i-{part["part"]}"' in page
         rules = tables[part["table"]]
         points = {"center", "radius", "from_deg", "to_deg"} if "arc" in part["places"] else set()
         nested = {f"{key}.{one}" for key, rule in rules.items() for one in rule.get("parts", ())}
@@ -250,6 +251,7 @@ def test_a_line_moves_in_each_way_by_its_card_and_runs_to_the_same_bits(empty, t
     assert moved[0][0] > 0.0
 
 
+@pytest.mark.slow
 def test_what_waits_for_a_touch_is_made_by_its_card_and_runs_to_the_same_bits(empty, tmp_path):
     """A ball strikes a line: another one goes, comes, or begins to turn, as Python has it."""
     page = empty()
@@ -320,6 +322,7 @@ def drag(page, begin, end):
     page.evaluate(DONE)
 
 
+@pytest.mark.slow
 def test_joints_are_tied_untied_copied_and_undone_by_hand(shown, tmp_path):
     balls = [
         {"name": name, "at": at, "velocity": [0.0, 0.0], "interact": True}
@@ -507,6 +510,7 @@ def test_a_hinge_is_pushed_in_a_running_run_by_hand_and_by_keys_as_python_does(s
     assert page.evaluate("chutelab.lab.recording.breaches") == []
 
 
+@pytest.mark.slow
 def test_materials_pairs_and_the_run_are_made_saved_and_taken_away(empty, tmp_path):
     page = empty()
     page.click("#begin")

@@ -303,13 +303,13 @@ def test_uncertainty_of_a_belt_speed_is_the_textbook_one(real):
     assert fitted.freedom == 59
 
 
-@pytest.mark.parametrize("fits", [12, pytest.param(64, marks=pytest.mark.slow)])
-def test_uncertainties_cover_the_truth_as_often_as_they_say(scene, real, fits):
+@pytest.mark.slow
+def test_uncertainties_cover_the_truth_as_often_as_they_say(scene, real):
     """Of the fits to other noise, 68 % and 95 % lie within 1 and 2 standard deviations.
 
     The counts of each parameter lie in the central 99.8 % of their binomial distributions.
     """
-    off = []
+    fits, off = 64, []
     for seed in range(fits):
         track = filmed(real, frames=60.0, seed=1000 + seed, begin=0.4)
         fitted = measured.fit(scene, track, KEYS)

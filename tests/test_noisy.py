@@ -1,6 +1,7 @@
 """Searches among streams: the answer and its error, limits, targets with a minimum, stops."""
 
 import json
+import signal
 from math import sqrt
 from time import monotonic
 
@@ -14,7 +15,7 @@ from chutelab.cli import main
 from chutelab.pictures.plots.studies import scan
 from chutelab.studies.design import constrained, minimize, solve
 from chutelab.studies.design.evaluation import Span, measured
-from chutelab.studies.design.noisy import Wishes, search
+from chutelab.studies.design.noisy import Fit, Wishes, search
 from test_repeats import CROWD
 
 A, B = Span("a", "", 0.0, 40.0, None), Span("b", "", 0.0, 1.0, None)
@@ -167,6 +168,25 @@ def test_a_search_that_is_stopped_tells_what_is_known():
         solve(CROWD, {"plate.angle_deg": (10.0, 35.0)}, {"arrival.vx.mean": 1.6}, repeat=2,
               progress=interrupt)  # fmt: skip
     assert any("interrupted" in note for note in caught.value.solution.notes)
+
+
+def test_ctrl_c_writes_what_is_known(tmp_path, monkeypatch):
+    """It comes while the variants that have run are looked at; the run for the picture goes on."""
+    (tmp_path / "crowd.toml").write_text(sc.to_toml(CROWD), encoding="utf-8")
+    whole = Fit.best
+
+    def interrupted(self, keys):
+        monkeypatch.setattr(Fit, "best", whole)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Fit, "best", interrupted)
+    asked = ["--vary", "plate.angle_deg=10:35", "--target", "arrival.vx.mean=1.6", "--repeat", "2"]
+    called = ["solve", str(tmp_path / "crowd.toml"), *asked, "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(main, called)
+    assert result.exit_code == 130
+    assert "Not finished: interrupted after 8 variants." in result.stdout
+    assert (tmp_path / "out" / "overlay.png").exists()
+    assert not json.loads((tmp_path / "out" / "solve.json").read_text())["finished"]
 
 
 def test_one_variant_tells_of_no_other():

@@ -66,7 +66,7 @@ def test_a_ball_thrown_through_a_line_comes_down_on_it(way, interact, engine):
     assert place == pytest.approx(turned(0.1, R, WAYS[way]), abs=1e-12 if exact else 2e-3 * R)
 
 
-@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+@pytest.mark.parametrize("engine", ["contact", pytest.param("pymunk", marks=pytest.mark.slow)])
 def test_a_ball_lies_there_only_if_all_of_it_has_come_through(engine):
     """Where its centre turns, from the line, in radii; one that is not clear falls back."""
     off, dt = (1e-8, 1e-3) if engine == "contact" else (2e-3, 2.5e-4)

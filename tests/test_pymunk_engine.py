@@ -138,3 +138,31 @@ def test_the_bits_do_not_depend_on_where_shapes_lie_in_memory():
         again = run(m)
         for name in ("knots", "events", "by_surface"):
             assert getattr(again, name).tobytes() == getattr(first, name).tobytes()
+
+
+def stepped(surface, *places, velocity=(0.0, 0.0)):
+    """A run in steps that are all alike of disks of 10 mm from some places."""
+    streams = [
+        {"name": f"s{n}", "at": place, "velocity": velocity, "interact": len(places) > 1}
+        for n, place in enumerate(places)
+    ]
+    tables = {"particle": {"radius": 0.01}, "surface": [surface], "stream": streams}
+    run_table = {"until": 0.4, "align": False}
+    return chutelab.simulate({**tables, "run": run_table}, engine="pymunk")
+
+
+@pytest.mark.parametrize(("share", "waits"), [(5e-10, False), (5e-8, True)])
+def test_disks_that_touch_are_released_together_and_none_inside_another(share, waits):
+    floor = face("floor", (-1.0, 0.0), (1.0, 0.0))
+    begins = stepped(floor, (0.0, 1.0), (0.02 - share * 0.01, 1.0)).select("release")["t"]
+    assert (begins[0], begins[1] > 0.0) == (0.0, waits)
+
+
+def test_a_ride_of_some_steps_ends_in_a_separation_and_a_bounce_in_none():
+    """0.2 m at 2 m/s are 100 steps; the table ends at x = 0."""
+    table = face("table", (-1.0, 0.0), (0.0, 0.0), friction=0.0, restitution=1.0)
+    left = stepped(table, (-0.2, 0.01), velocity=(2.0, 0.0)).select("separation")
+    assert left["position"] == pytest.approx(np.array([[0.0, 0.01]]), abs=1e-12)
+    bounced = stepped(table, (-0.5, 0.06))
+    assert len(bounced.select("impact")) == 2
+    assert not len(bounced.select("separation"))

@@ -115,6 +115,18 @@ def test_seeds_that_tell_nothing_are_refused(name, count, said):
         sweep(name, {"plate.angle_deg": [10.0]}, repeat=count)
 
 
+def test_ctrl_c_tells_what_has_run():
+    def interrupt(share):
+        if share > 0.03:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        repeat(CROWD, 50, progress=interrupt)
+    found = caught.value.repeats
+    assert found.values["contacts"].tolist() == by_hand("contacts", 2)[0].tolist()
+    assert "Stopped: 2 of 50 seeds have run" in str(found)
+
+
 def test_the_command_tells_means_and_writes_its_files(tmp_path):
     file, out = tmp_path / "crowd.toml", tmp_path / "out"
     file.write_text(sc.to_toml(CROWD), encoding="utf-8")

@@ -199,7 +199,8 @@ def test_a_key_takes_the_values_of_its_range_and_no_others(line):
 
 SHIPPED = (
     "belt-landing", "cascade", "coal-transfer", "cradle", "damper-plate", "domino-gate", "dominoes",
-    "feeder", "flap-gate", "free-fall", "galton", "heap", "hopper", "inclined-20", "inclined-40",
+    "drum", "feeder", "flap-gate", "free-fall", "galton", "heap", "hopper", "inclined-20",
+    "inclined-40",
     "inclined-60", "inclined-conveyor",
     "low-speed", "mixture",
     "perpendicular", "perpendicular-fast", "rock-box", "see-saw", "silo", "slip", "spoon",

@@ -152,6 +152,10 @@ def test_command_writes_table_and_picture(tmp_path):
     assert (out / "sensors.png").stat().st_size > 5_000
     told = json.loads(CliRunner().invoke(main, ["run", str(file), "--json"]).stdout)
     assert told["sensors"]["gate"]["count"] == 1
+    none = CliRunner().invoke(main, ["run", "slip", "--out", str(out / "2"), "--only", "sensors"])
+    assert none.exit_code == 2
+    assert "sensor: one [[sensor]] or more" in none.stderr
+    assert not (out / "2").exists()
 
 
 @pytest.mark.parametrize(

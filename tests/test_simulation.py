@@ -35,6 +35,7 @@ AUTO = {
     "galton": "contact",
     "mixture": "contact",
     "damper-plate": "contact",
+    "drum": "contact",
     "flap-gate": "contact",
     "vibrating-feeder": "contact",
     "see-saw": "contact",

@@ -29,7 +29,7 @@ GROUPS = {
     "Streams": ("stream", "stream-independent", "coal-transfer", "rock-box", "spoon"),
     "Bins, heaps, screens": ("hopper", "feeder", "silo", "heap", "mixture", "galton"),
     "Further machines": ("inclined-conveyor", "cascade", "free-fall"),
-    "What moves": ("damper-plate", "see-saw", "flap-gate", "vibrating-feeder"),
+    "What moves": ("damper-plate", "see-saw", "flap-gate", "vibrating-feeder", "drum"),
     "Toys": ("dominoes", "domino-gate", "cradle"),
 }
 """The scenes by what one comes for."""

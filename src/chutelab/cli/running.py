@@ -310,8 +310,8 @@ def run(
     run the same way: with --out its files are written, and the exit code is 130.
 
     With --repeat N seeds run, each quantity is told as mean ± standard error, and --out has
-    repeats.csv, a row for each seed, repeats.png and repeats.json. After --max-seconds no further
-    seed begins.
+    repeats.csv, a row for each seed, repeats.png and repeats.json. After --max-seconds, or
+    Ctrl-C, no further seed begins.
 
     chutelab run stream --repeat 12 --jobs 0
 
@@ -351,6 +351,10 @@ def run(
     loaded = loaded_as_told(scene, set_, engine, dt, loads)
     if "loads" in output.kinds and loaded.run.loads is None:
         loaded = loaded_as_told(scene, set_, engine, dt, LOADS)
+    if "sensors" in output.kinds:
+        from chutelab.results.sensors import need_sensors
+
+        need_sensors(loaded)
     if max_seconds is not None:
         # The time limit includes reading the scene.
         max_seconds = max(max_seconds - (perf_counter() - began), 1e-9)
@@ -403,10 +407,16 @@ def _repeated(
     """Run a scene with many seeds; exit with 1 if some have no numbers that can be believed."""
     from chutelab.studies.repeats import repeat
 
+    interrupted = None
     with destination(output.out, REPEATED) as folder:
         with progress(f"simulating {count} seeds", quiet=output.quiet, left=True) as update:
             limit = inf if max_seconds is None else max_seconds
-            found = repeat(scene, count, jobs=jobs, max_seconds=limit, progress=update)
+            try:
+                found = repeat(scene, count, jobs=jobs, max_seconds=limit, progress=update)
+            except KeyboardInterrupt as error:
+                if not hasattr(error, "repeats"):
+                    raise
+                found, interrupted = error.repeats, error
         if folder is not None:
             from chutelab.pictures.plots import look
             from chutelab.pictures.plots.studies import repeats
@@ -417,6 +427,8 @@ def _repeated(
             write_json(found.as_dict(), folder / REPEATED[2])
     wrote = f"wrote into {output.out}: {', '.join(REPEATED)}" if output.out else ""
     tell(found.as_dict(), found, as_json=output.json_, quiet=output.quiet, wrote=wrote)
+    if interrupted is not None:
+        raise interrupted
     if found.faults:
         click.get_current_context().exit(1)
 
@@ -457,7 +469,7 @@ def live(
     """Show SCENE as a live page: drag the plate, and path, numbers and ledger follow.
 
     Without SCENE it opens an empty picture with parts to build a machine of, and examples. Of a
-    scene with boxes, strings or mass points it says what it cannot show, and opens the rest.
+    scene with boxes, polygons or mass points it says what it cannot show, and opens the rest.
 
     It is one HTML file with the contact engine in it, the same as in `chutelab run --engine
     contact`: any browser opens it, from a memory stick or on a phone, without installation or

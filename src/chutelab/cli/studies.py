@@ -399,6 +399,7 @@ def solve(
     from chutelab.studies import design
     from chutelab.studies.design.answers import as_dict
     from chutelab.studies.sweep import crew
+    from chutelab.util.signals import answer
 
     if (minimize and maximize) or not (target or minimize or maximize):
         raise click.UsageError(
@@ -428,6 +429,7 @@ def solve(
                 if not hasattr(error, "solution"):
                     raise
                 found, interrupted = error.solution, error
+                answer()
         if place is not None:
             from chutelab.pictures.plots import overlay
             from chutelab.pictures.plots.studies import scan

@@ -309,11 +309,13 @@ static void support(int i, int k, double t) {
 /* Add a contact to the list that a jam solves, if it touches now; 0 if not. */
 static int add_touching(int i, int j, double radius, int *count) {
     Contact *c = W.earlier + *count;
-    if (*count + MOST_TOUCHES >= TOUCHES * (W.high - W.low)) return 0;
+    int room = TOUCHES * (W.high - W.low) - *count;
+    if (room <= 0) return 0;
     if (is_cornered(i, j)) {
         Touch places[MOST_TOUCHES];
         int first = has_corners(W.disks + i) ? i : j, other = first == i ? j : i;
         int found = list_touches(first, other, W.disks[i].t, TOUCH * inner_of(i, j), W.disks[i].t, places);
+        found = MIN(found, room);
         for (int n = 0; n < found; n++) describe_touch(c + n, first, other, places + n);
         *count += found;
         return found > 0;

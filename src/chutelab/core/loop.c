@@ -486,7 +486,9 @@ static int begin_step(void) {
         W.step_end = meet_stops(W.t, W.step_end);
         bound_hinges(W.t, W.step_end - W.t);
     }
-    if (W.interact) note_totals();
+    /* What has corners is released in a step of no length. */
+    int again = W.outline_count && W.total_count && W.totals[W.total_count - 1].t == W.t;
+    if (W.interact && !again) note_totals();
     return DONE;
 }
 

@@ -540,7 +540,7 @@ class Record(Shown):
         force and so the power of the belt is constant on a face; else on the belt work while it is
         driven; else on the restitution loss, which changes between knots in lasting contacts of a
         crowd only. In flight nothing is booked, and what the balance leaves over is the residual.
-        Where there are `totals` the sums are theirs at the steps, and the same holds between two.
+        Where several have `totals` the sums are theirs at the steps; the same holds between two.
 
         Parameters
         ----------
@@ -555,7 +555,8 @@ class Record(Shown):
         """
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         found = self._on_tracks(times)
-        if len(self.totals) > 1:
+        # A lone particle's tracks have all; a blow on what hangs on a hinge ends the step.
+        if len(self.totals) > 1 and self.count > 1:
             within = (times >= self.totals["t"][0]) & (times < self.totals["t"][-1])
             found[:, within] = self._as_totals(times[within], found[:, within])
         return dict(zip(("kinetic", "potential", *ENTRIES, "residual"), found, strict=True))

@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.results.record import QUANTILES, Record, hermite, kept
+from chutelab.scene import Scene
 from chutelab.util.arrays import Floats, Ints
+from chutelab.util.errors import InputError
 from chutelab.util.tables import Sheet, number
 
 PASSAGE = np.dtype(
@@ -29,6 +31,13 @@ HALVINGS = 60
 """Bisections of an interval: they exhaust a double's digits."""
 
 Place = Sequence[float]
+
+
+def need_sensors(scene: Scene) -> None:
+    """Raise an `InputError` if a scene has no sensor."""
+    if not scene.sensor:
+        allowed = "one [[sensor]] or more, each with name, from and to: the scene has none"
+        raise InputError(allowed, "sensor", None)
 
 
 def passages(recording: Record, begin: Place, end: Place) -> NDArray[np.void]:

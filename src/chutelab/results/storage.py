@@ -33,7 +33,7 @@ from chutelab.results.record import (
     Kind,
     Record,
 )
-from chutelab.results.sensors import sensed
+from chutelab.results.sensors import need_sensors, sensed
 from chutelab.results.wear import KEYS, check_coefficients, touched
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
@@ -419,6 +419,7 @@ def _trajectory(recording: Record, step: float | None) -> Iterator[Sequence[obje
 
 
 def _passages(recording: Record) -> Iterator[Sequence[object]]:
+    need_sensors(recording.scene)
     yield "sensor", "t", "particle", "way", "along", "x", "y", "vx", "vy", "radius", "mass"
     for sensor in recording.scene.sensor:
         for t, particle, way, along, place, velocity in sensed(recording, sensor.name).tolist():

@@ -109,6 +109,10 @@ def side_by_side(
     whole = load(scene)
     if (belt := whole.incoming) is None:
         raise DischargeError("is needed: it is the pulley that the bed leaves", "incoming")
+    if not belt.speed > 0.0:
+        raise DischargeError(
+            "must be > 0 m/s: a belt at rest throws nothing off", "incoming.speed", belt.speed
+        )
     stream, own = whole.streams[0], whole.particle
     if stream.at is not None or own.shape not in ("disk", "sphere"):
         raise DischargeError("must release disks or spheres on the incoming belt", "stream")

@@ -170,6 +170,8 @@ def repeat(
     ------
     InputError
         If nothing is drawn in the scene, or no run has numbers.
+    KeyboardInterrupt
+        By Ctrl-C, with what has run as its ``repeats``, if any has.
     """
     scene, ends = load(scene), monotonic() + max_seconds
     drawn(scene, count)
@@ -179,20 +181,29 @@ def repeat(
         with crew(jobs) as team:
             return repeat(scene, count, team=team, max_seconds=max_seconds, progress=progress)
     work = ((number, reseeded(scene, number)) for number in range(count))
-    results = team.results(_one, work)
-    with closing(results):
-        for number, one in results:
-            if isinstance(one, str):
-                faults[one] += 1
-            else:
-                found[number] = one
-            if progress is not None:
-                progress((len(found) + faults.total()) / count)
-            if monotonic() >= ends:
-                break
+    results, interrupt = team.results(_one, work), None
+    try:
+        with closing(results):
+            for number, one in results:
+                if isinstance(one, str):
+                    faults[one] += 1
+                else:
+                    found[number] = one
+                if progress is not None:
+                    progress((len(found) + faults.total()) / count)
+                if monotonic() >= ends:
+                    break
+    except KeyboardInterrupt as error:
+        if not found:
+            raise
+        interrupt = error
     if not found:
         raise InputError(f"no seed has numbers: {next(iter(faults))}", f"--repeat {count}")
     numbers = tuple(sorted(found))
     quantities = {row.name: row for row in every(scene.places, scene.count)}
     values = {name: np.array([found[n][name] for n in numbers]) for name in quantities}
-    return Repeats(scene, numbers, quantities, values, dict(faults), count)
+    told = Repeats(scene, numbers, quantities, values, dict(faults), count)
+    if interrupt is not None:
+        interrupt.repeats = told  # type: ignore[attr-defined]
+        raise interrupt
+    return told

@@ -44,6 +44,14 @@ class Terminated(KeyboardInterrupt):
 _obeyed: list[tuple[int, float]] = []
 """The signals that were raised, and when, s."""
 
+_answered: list[tuple[int, float]] = []
+"""Those of them that are answered: what goes on knows of them."""
+
+
+def answer() -> None:
+    """Go on after a signal that was caught: `ctrl_c_waits` raises it no more."""
+    _answered[:] = _obeyed
+
 
 @contextmanager
 def raised(*, last: bool = False) -> Iterator[None]:
@@ -60,6 +68,7 @@ def raised(*, last: bool = False) -> Iterator[None]:
     ignored = sys.unraisablehook
     if before:
         _obeyed.clear()
+        _answered.clear()
         sys.unraisablehook = partial(_ignored, ignored)
     try:
         for number in before:
@@ -112,7 +121,7 @@ def ctrl_c_waits() -> Iterator[Callable[[], None]]:
             came.clear()
             told = True
             before(signal.SIGINT, None)
-        if not told and _obeyed and _obey in (before, signal.getsignal(_obeyed[0][0])):
+        if not told and _obeyed != _answered and _obey in (before, signal.getsignal(_obeyed[0][0])):
             told = True
             raise Terminated(_obeyed[0][0])
 

@@ -353,17 +353,17 @@ class Shared:
         # The impulse acts on A, the normal points from A to B.
         push = -values[0] * values[2] - values[1] * values[3]
         order = np.flatnonzero(push > 0.0)
+        if not len(order) and self.arm is None:
+            # Nothing pushed.
+            self.before, self.calm = order, np.where(self.free, 0.0, self.calm + self.h)
+            self._riding(order, order)
+            return
         one, other = np.minimum(a, b), np.maximum(a, b)
         if len(order) > 1:
             # They come in the order of a hash of addresses, on which no sum may depend.
             keys = (*values[4:], push, other, one)
             order = order[np.lexsort([key.take(order) for key in keys])]
         a, one, other, push, first = (part.take(order) for part in (a, one, other, push, first))
-        if not len(order) and self.arm is None:
-            # Nothing pushed.
-            self.before, self.calm = one, np.where(self.free, 0.0, self.calm + self.h)
-            self._riding(one, one)
-            return
         values, straight = values.take(order, axis=1), a == one
         jx, jy, nx, ny = np.where(straight, 1.0, -1.0) * values[:4] * TOWARDS
         rub = jx * ny - jy * nx
@@ -584,6 +584,8 @@ class Shared:
 
     def _riding(self, particles: Ints, surface: Ints) -> None:
         """Count pushes of surfaces in a row; tell separations at the last one's time."""
+        if not len(particles) and not self.pushes.any():
+            return
         over = self.left[0] < self.t - HOP * self.h
         over[particles[self.on[particles] != surface]] = True
         for i in np.flatnonzero(over & (self.pushes >= STAY)):

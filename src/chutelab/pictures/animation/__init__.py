@@ -260,8 +260,7 @@ class Stage:
             show(index)
             artist.draw(renderer)
         size = self.canvas.get_width_height()
-        shown = Image.frombuffer("RGBA", size, self.canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
-        picture = shown.convert("RGB")
+        picture = Image.frombytes("RGB", size, self.canvas.buffer_rgba(), "raw", "RGBX")
         draw = ImageDraw.Draw(picture)
         for writing in self.writings:
             writing.paint(draw, index)

@@ -291,8 +291,15 @@ def search(
                 points = np.clip(low + shares * width, low, high)
                 told = [(float(mean), float(own)) for mean, own in means]
                 return Found(low + at * width, error * width, points, values, 0.0, told)
-            fit = Fit(shares, values, wishes, random)
-            at, error, open_ = fit.best(keys)
+            try:
+                fit = Fit(shares, values, wishes, random)
+                at, error, open_ = fit.best(keys)
+            except KeyboardInterrupt as interrupt:
+                if evaluate.stopped is not None:
+                    raise
+                # The fit once more: it tells what is known.
+                evaluate.stopped, nexts = interrupt, nexts[:0]
+                continue
             if ends or fit.done:
                 break
             nexts = open_[: min(BATCH, most - len(shares))]

@@ -272,4 +272,4 @@ class Callout {
   }
 }
 
-export { Callout, drawOutline, freePlace, pointsOf, surfaceLines };
+export { Callout, drawOutline, freePlace, passed, pointsOf, surfaceLines };

@@ -253,7 +253,11 @@ function ownFields(page: Page, given: Given, scene: Scene, section: Section): Fi
 /** What was typed or chosen, as the scene has it: nothing takes the key away.
  * @throws {Fault} if it is out of the field's range, or is none of what may be there */
 function checked(field: Field, text: string, words: Words): any {
-  const { key, low, high, form, free } = field, plain = text.trim();
+  const { key, low, high, form, free } = field;
+  // The unit that stands beside the field may be typed with the number.
+  const unit = words.unit(field.unit), typed = text.trim();
+  const plain = unit && /\d/.test(typed) && typed.endsWith(unit)
+    ? typed.slice(0, -unit.length).trim() : typed;
   if (plain === "" && free) return undefined;
   if (field.choices?.includes(plain)) return plain;
   const forms = formsOf(form), takes = (type: string) => forms.some((one) => one.type === type);

@@ -30,7 +30,12 @@ function listenToKeys(
       html("dt", {}, words.say(key)), html("dd", {}, words.say(`help-${id}`)),
     ])), html("button", { click: () => dialog.close() }, words.say("close")));
   document.body.append(dialog);
-  document.getElementById("keys")?.addEventListener("click", () => dialog.showModal());
+  const help = () => {
+    dialog.showModal();
+    // The button at its end has the focus.
+    dialog.scrollTop = 0;
+  };
+  document.getElementById("keys")?.addEventListener("click", help);
   const always: Record<string, () => void> = {
     "ctrl+z": () => lab.undo(), "ctrl+shift+z": () => lab.redo(), "ctrl+y": () => lab.redo(),
     Escape: () => {
@@ -43,7 +48,7 @@ function listenToKeys(
     " ": () => click("play"), Home: () => click("restart"), End: () => lab.seek(lab.end),
     ArrowLeft: () => click("back"), ArrowRight: () => click("forward"),
     "+": () => click("tool-zoom-in"), "-": () => click("tool-zoom-out"),
-    "?": () => dialog.showModal(), ",": () => marks.jump(-1), ".": () => marks.jump(1),
+    "?": help, ",": () => marks.jump(-1), ".": () => marks.jump(1),
   };
   // Letters count while the picture has the focus.
   const drawn: Record<string, () => void> = {

@@ -1,7 +1,7 @@
 // The paper's symbols in the picture, at what they stand for: angle, speeds, times and lengths of
 // the first particle's transfer.
 
-import { surfaceLines } from "./callout.ts";
+import { passed, surfaceLines } from "./callout.ts";
 import { historyOf } from "./stages.ts";
 import { svg } from "./scenery.ts";
 import type { Stage } from "./stage.ts";
@@ -110,7 +110,7 @@ function along(points: [number, number][]): Space[] {
 const MOST_LABELS = 6, ORDER = ["phi1_deg", "v1", "v2", "v2r", "x3", "v3", "d3", "y3", "t2", "t3"];
 
 /** What labels keep clear of: cards, the scale, the legend, handles, speeds on belts, the path of a
- * lone particle and the surfaces, as far as they are seen. */
+ * lone particle or where a crowd comes, and the surfaces, as far as they are seen. */
 function takenBy(stage: Stage): Space[] {
   const { view, view: { free }, lab: { recording, machine } } = stage;
   const all = { left: -1e9, right: 1e9, top: -1e9, bottom: 1e9 };
@@ -126,6 +126,8 @@ function takenBy(stage: Stage): Space[] {
     { ...all, bottom: free.top }, { ...all, top: free.bottom }, { ...all, right: free.left },
     { ...all, left: free.right }, ...stage.covered, stage.scaleBox,
     ...(stage.legend ? [stage.legend] : []), ...along(path), ...speeds,
+    ...(recording?.machine.interact ? passed(stage, recording).map(([x, y]) =>
+      ({ left: x - THIN, right: x + THIN, top: y - THIN, bottom: y + THIN })) : []),
     ...(machine?.pulley
       ? discs(view.px(0), view.py(0), machine.pulley.radius * view.scale) : []),
     // A board of pegs has no room between them.

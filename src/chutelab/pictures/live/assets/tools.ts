@@ -323,7 +323,8 @@ class Tools {
   write(tool: string, [x, y]: Point, lines: string[]) {
     const { stage, lab } = this, { view } = stage, rows = lines.length;
     const long = Math.ceil(Math.max(...lines.map((line) => line.length)) / 4) * 4;
-    const of = JSON.stringify([x, y, rows, long, view.scale, view.width, view.height, lab.given]);
+    const of = JSON.stringify([x, y, rows, long, view.scale, view.width, view.height, lab.given,
+      lab.recording?.state]);
     const known = this.spots.get(tool);
     if (known?.of !== of || stage.held) {
       const wanted = { text: "0".repeat(long), x, y, rows, asked: true, side: -0.25 * Math.PI };

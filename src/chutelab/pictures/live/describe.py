@@ -42,6 +42,9 @@ PARTS: Final = (
     _part("arc", "C", "surface", "arc arc arc", "radius restitution friction", "center"),
     _part("ball", "B", "stream", "at", "velocity start restitution",
           velocity=[0.0, 0.0], interact=True),
+    _part("box", "A", "stream", "at", "size mass omega", "size",
+          velocity=[0.0, 0.0], interact=True, shape="box", size=[0.1, 0.06], mass=0.25, spin=True,
+          material="wood"),
     _part("stream", "R", "stream", "at to", "count rate velocity", "count",
           velocity=[0.0, 0.0], count=60, rate=40.0, interact=True),
     _part("pegs", "G", "surface", "center", "radius repeat restitution", "center repeat",
@@ -68,7 +71,8 @@ PARTS: Final = (
 )  # fmt: skip
 """What can be added to a machine, a row each: its word, the key that begins it, its table, the key
 that each point set in the picture is for, those shown first (three of them), those that tell it
-from another part of its table, and what else it begins with (m: for a picture one metre high)."""
+from another part of its table, and what else it begins with (m and kg: for a picture one metre
+high). What a stream has not is of the kind of its particles."""
 
 
 def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:

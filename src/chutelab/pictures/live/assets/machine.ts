@@ -225,6 +225,12 @@ export function cornersOf(
     [x + c * u - s * v, y + s * u + c * v]);
 }
 
+/** Tells whether a place is inside convex corners, counterclockwise. */
+export const isInside = (corners: Point[], [x, y]: Point) => corners.every(([a, b], n) => {
+  const [u, v] = corners[(n + 1) % corners.length];
+  return (u - a) * (y - b) - (v - b) * (x - a) >= 0;
+});
+
 /** Returns the names of all surfaces, in the order of the ledger. */
 function surfaceNames({ incoming, plates, outgoing, conveyor, surface }: Scene) {
   const hanging = plates.filter(({ pivot }) => pivot !== undefined);

@@ -10,6 +10,8 @@ import chutelab
 from chutelab import SceneError
 from chutelab.engines import simulation
 from chutelab.machine import build
+from chutelab.results.recorder import StalledError
+from chutelab.util.errors import LawWarning
 
 G, M, W, H = 9.81, 0.1, 0.04, 0.02
 """m/s², kg, and width and height of the box, m."""
@@ -255,7 +257,11 @@ def test_a_lever_of_the_wrong_sign_is_seen(with_fault):
     t, theirs = just_after_the_first(tables, "pymunk", 1e-4)
     right = "c->own[0] = x * c->ny - y * c->nx;"
     with_fault("corners.c", right, "c->own[0] = y * c->nx - x * c->ny;")
-    assert np.abs(just_after_the_first(tables, "contact", 1e-3, t)[1] - theirs).max() > 0.1
+    try:
+        mine = just_after_the_first(tables, "contact", 1e-3, t)[1]
+    except (LawWarning, StalledError):
+        return
+    assert np.abs(mine - theirs).max() > 0.1
 
 
 @pytest.mark.parametrize(

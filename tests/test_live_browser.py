@@ -33,7 +33,7 @@ DRAG = """async ([count, seed]) => {
     await done();
     if (lab.recording.state !== "done") throw new Error(lab.recording.state);
     const { rows, count: knots } = lab.recording.tracks[0];
-    answers.push({ toml: chutelab.toml(), knots: Array.from(rows.slice(0, 10 * knots)) });
+    answers.push({ toml: chutelab.toml(), knots: Array.from(rows.slice(0, 11 * knots)) });
   }
   return answers;
 }"""

@@ -157,7 +157,7 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
    wedged between walls impulses of any size hold each other; where one of its gaps opens and another
    closes, one seems to give what the other takes. So where the sum is a loss those that gain
    gain nothing and the others lose so much less; where it is a gain, the other way round. */
-static void pool(Contact *list, int count, int later) {
+void pool(Contact *list, int count, int later) {
     double sums[2] = {0, 0};
     for (int n = 0; n < count; n++) {
         const double *loss = later ? list[n].later : list[n].entries;

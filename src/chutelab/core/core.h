@@ -336,6 +336,7 @@ void push(const Contact *c, const double *impulse);
 int island_of(int i);
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given);
+void pool(Contact *list, int count, int later);
 void account(Contact *list, int count);
 double pressed_inside(const Disk *d, int surface);
 double turning_time(const Disk *d, const Surface *s);

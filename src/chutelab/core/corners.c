@@ -20,7 +20,8 @@
 #define ENDS 1e-15
 /* Share of it that a blow may give by rounding. */
 #define GAINS 1e-12
-/* Contacts of an island up to which it is brought off its hop before a blow; none of them on a hinge. */
+/* Contacts of an island up to which it is brought off its hop before a blow; none of them on what moves, which presses
+   as hard as it must, and none that took a blow as the step began. */
 #define SMALL 32
 /* Candidates for a place: corners of both. */
 #define CANDIDATES (2 * MOST_CORNERS)
@@ -504,16 +505,22 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
    would enter that. Of the impulses of the step what is not due yet is taken back, or what is due is given. */
 static void end_hops(int i, double t) {
     const Contact *first = 0;
-    int count = 0;
+    int count = 0, many = 0;
+    double past = W.tracks[i].lasted > 1 ? W.length_before : 0;
     for (int link = W.disks[i].links; link >= 0 && !first; link = W.links[link]) first = W.contacts + link / 2;
     if (!first || t <= W.t || W.disks[i].smooth == W.shocks) return;
     for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++)
-        if (c->island == first->island) count += c->hung ? SMALL + 1 : 1;
+        if (c->island == first->island) {
+            double u[3], whirl = whirl_of(W.disks + c->i) + (c->j < 0 ? 0 : whirl_of(W.disks + c->j));
+            relative(c, 1, u);
+            int is_blow = u[0] < -W.soft - 2 * whirl * W.step, moves = c->j < 0 && stirs(W.surfaces + (-1 - c->j));
+            count += is_blow || moves ? SMALL + 1 : 1;
+        }
     if (count > SMALL) return;
     for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
         if (c->island != first->island || a->mode != FREE || (c->j >= 0 && b->mode != FREE)) continue;
-        double past = W.tracks[c->i].lasted > 1 ? W.length_before : 0, u[3], v[3], given[3], change[3];
+        double u[3], v[3], given[3], change[3];
         Contact last = *c;
         advance(a, t);
         if (c->two) advance(b, t);
@@ -530,12 +537,15 @@ static void end_hops(int i, double t) {
         push(&last, change);
         relative(&last, 0, v);
         share_out(&last, u, v, 0, last.entries, given);
-        book(a->entries, c->two ? b->entries : 0, c->owner, last.entries);
-        if (c->j < 0) W.drives[c->owner] += driven(&last, 0);
         bear_contact(&last, 1, t, t);
         keep_impulse(&last, 1, t, t);
-        give_back(&last, 1);
+        W.earlier[many++] = last;
     }
+    /* As in a step, only the sum of what is lost is known. */
+    pool(W.earlier, many, 0);
+    for (const Contact *c = W.earlier; c < W.earlier + many; c++)
+        book(W.disks[c->i].entries, c->two ? W.disks[c->j].entries : 0, c->owner, c->entries);
+    give_back(W.earlier, many);
     W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
 }
 

@@ -46,7 +46,7 @@ DOMINOES = {
      "to": [0.4, 0.032], "velocity": [0.0, 0.0]}, {"particle": "wedge", "at": [0.6, 0.1],
      "velocity": [0.0, 0.0]}],
 }  # fmt: skip
-"""What pymunk alone has."""
+"""Boxes with joints, which pymunk alone has."""
 
 ALONE = {
     "particle": {"radius": 0.01, "mass": 0.05},
@@ -253,7 +253,7 @@ BY_HAND = [
     ("machine", {"stream[0].interact": 1}, "stream[0].interact", "true or false"),
     ("dominoes", {"run.engine": "contact"}, "run.engine", "needs pymunk"),
     ("dominoes", {"run.engine": "exact", "string": GONE, "rod": GONE, "spring": GONE, "pin": GONE},
-     "run.engine", "needs pymunk"),
+     "run.engine", "needs contact or pymunk"),
     ("alone", {"string": [{"from": [0.0, 0.5]}], "run.engine": "exact"}, "run.engine",
      "string[0] needs contact or pymunk"),
     *(

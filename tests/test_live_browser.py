@@ -33,7 +33,7 @@ DRAG = """async ([count, seed]) => {
     await done();
     if (lab.recording.state !== "done") throw new Error(lab.recording.state);
     const { rows, count: knots } = lab.recording.tracks[0];
-    answers.push({ toml: chutelab.toml(), knots: Array.from(rows.slice(0, 10 * knots)) });
+    answers.push({ toml: chutelab.toml(), knots: Array.from(rows.slice(0, 11 * knots)) });
   }
   return answers;
 }"""
@@ -48,7 +48,7 @@ def lands_as_in_python(page, file, seed, count):
         file.write_text(answer["toml"], encoding="utf-8")
         scene = load(file)
         ours = chutelab.simulate(scene, engine="contact")
-        its = np.array(answer["knots"]).reshape(-1, 10)
+        its = np.array(answer["knots"]).reshape(-1, 11)
         knots = ours.knots
         columns = np.column_stack([knots["t"], knots["position"], knots["velocity"]])
         assert np.array_equal(its[:, :5], columns), answer["toml"]

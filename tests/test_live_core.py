@@ -63,8 +63,8 @@ def same_runs(scenes):
         job.drain()
         assert answer["state"] == "done"
         knots = np.concatenate(job.knots)
-        ours = knots.view("<f8").reshape(-1, 10)[:, :9]
-        its = np.array(answer["knots"]).reshape(-1, 10)
+        ours = knots.view("<f8").reshape(-1, 11)[:, :9]
+        its = np.array(answer["knots"]).reshape(-1, 11)
         assert np.array_equal(its[:, :9], ours), given
         assert np.array_equal(its[:, 9], knots["disk"]), given
         events = np.concatenate(job.events).view(EVENT)

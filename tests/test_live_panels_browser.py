@@ -154,7 +154,7 @@ def test_while_a_crowd_runs_no_height_is_below_the_lowest_point(shown, name):
         one = Math.min(one, ...curves.samples.map(({ potential }) => potential));
         const { tracks } = lab.recording, index = curves.index;
         low = Math.min(...tracks[index].rows.filter((_, i) =>
-          i % 10 === 2 && i < 10 * tracks[index].count));
+          i % 11 === 2 && i < 11 * tracks[index].count));
         all = Math.min(all, tracks[index].lowest - low);
         lab.engine.allow(0.1 * n);
       }
@@ -301,7 +301,7 @@ def test_the_page_shows_the_machine_not_the_fall_and_what_a_view_says(shown):
 
 
 DAMAGE = """([column, change]) => {
-  const { lab } = chutelab, [{ rows, count }] = lab.recording.tracks, n = (count - 1) * 10 + column;
+  const { lab } = chutelab, [{ rows, count }] = lab.recording.tracks, n = (count - 1) * 11 + column;
   const sound = rows[n];
   rows[n] += change;
   lab.judge(lab.recording);

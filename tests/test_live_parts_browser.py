@@ -22,7 +22,7 @@ expect = pytest.importorskip("playwright.sync_api").expect
 
 # Of a run that is over: knots of each track, as Python has them.
 TRACKS = """chutelab.lab.recording.tracks.map(({ rows, count }) =>
-  Array.from({ length: count }, (_, n) => Array.from(rows.slice(10 * n, 10 * n + 5))))"""
+  Array.from({ length: count }, (_, n) => Array.from(rows.slice(11 * n, 11 * n + 5))))"""
 
 # One whose particles meet runs as far as it is asked to.
 WHOLE = """() => new Promise((resolve) => {
@@ -69,7 +69,7 @@ def same_bits(page, folder, until=1.5):
     assert job.run(None) is None
     job.drain()
     knots = np.concatenate(job.knots)
-    ours = knots.view("<f8").reshape(-1, 10)[:, :5]
+    ours = knots.view("<f8").reshape(-1, 11)[:, :5]
     its = page.evaluate(TRACKS)
     for particle, track in enumerate(its):
         found = np.array(track).reshape(-1, 5)

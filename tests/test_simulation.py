@@ -40,8 +40,8 @@ AUTO = {
     "vibrating-feeder": "contact",
     "see-saw": "contact",
     "cradle": "contact",
-    "domino-gate": "pymunk",
-    "dominoes": "pymunk",
+    "domino-gate": "contact",
+    "dominoes": "contact",
 }
 
 

@@ -47,7 +47,7 @@ function faultyOf({ scene, fault }) {
   const event = recording.events.find(({ kind }) => kind === 4), { disk } = event;
   const track = recording.tracks[disk], radius = recording.machine.radius[disk];
   const set = (knot, column, value) => {
-    const at = knot * 10 + column;
+    const at = knot * 11 + column;
     track.rows[at] = typeof value === "function" ? value(track.rows[at]) : value;
   };
   const touch = Array.from({ length: track.count }, (_, n) => n)

@@ -25,8 +25,12 @@ void bear_contact(const Contact *c, double share, double from, double to) {
     const Disk *a = W.disks + c->i;
     double J[2];
     if (B.every == 0 || c->two) return;
-    Push p = c->j < 0 ? at_foot(a, c->owner, a->radius, c->nx, c->ny, from, to)
+    Push p = c->j < 0 ? at_foot(a, c->owner, c->cornered ? c->own[1] : a->radius, c->nx, c->ny, from, to)
                       : on_belt(W.disks + c->j, from, to);
+    if (c->cornered && c->j < 0) {
+        p.x += c->own[0] * c->ny;
+        p.y -= c->own[0] * c->nx;
+    }
     impulse_of(c, share, J);
     p.jx = J[0];
     p.jy = J[1];
@@ -45,6 +49,9 @@ static void branch_of(const Contact *c, double *b) {
     const Disk *a = W.disks + c->i, *other = W.disks + MAX(c->j, 0);
     b[0] = c->j < 0 ? a->radius * c->nx : a->x - other->x;
     b[1] = c->j < 0 ? a->radius * c->ny : a->y - other->y;
+    if (!c->cornered || c->j >= 0) return;
+    b[0] = c->own[1] * c->nx - c->own[0] * c->ny;
+    b[1] = c->own[1] * c->ny + c->own[0] * c->nx;
 }
 
 static int other_of(const Contact *c) { return c->j < 0 ? -1 - c->owner : c->j; }
@@ -70,17 +77,24 @@ void keep_carried(const Contact *c, double share, double from, double to) {
     keep_push(W.disks + c->j, &p, W.disks[c->j].radius);
 }
 
+/* How far the foot of a disk on a surface is from its centre, m, and the normal there. What has corners is borne
+   below its centre, as far as that is told. */
+static double depth_of(const Disk *d, const Surface *s, double *nx, double *ny) {
+    double gap = gap_to(s, d->x, d->y, d->radius, nx, ny);
+    return has_corners(d) ? gap + d->radius : d->radius;
+}
+
 /* Tell of an impulse on a disk that the surface which it lies on, or one that bears its island, gives. */
 void bear_disk(const Disk *d, int owner, double jx, double jy, double from, double to) {
-    double nx = 0, ny = 1;
+    double nx = 0, ny = 1, depth = d->radius;
     if ((B.every == 0 && B.each == 0) || (jx == 0 && jy == 0)) return;
     if (d->held_count && W.surfaces[d->held[0]].owner == owner)
-        gap_to(W.surfaces + d->held[0], d->x, d->y, d->radius, &nx, &ny);
-    Push p = at_foot(d, owner, d->radius, nx, ny, from, to);
+        depth = depth_of(d, W.surfaces + d->held[0], &nx, &ny);
+    Push p = at_foot(d, owner, depth, nx, ny, from, to);
     p.jx = jx;
     p.jy = jy;
     if (B.every > 0) bear(&p);
-    if (B.each > 0) keep_push(d, &p, d->radius);
+    if (B.each > 0) keep_push(d, &p, depth);
 }
 
 /* Tell of a ride since the last knot, up to where the disk is now: the belt gives what changes its
@@ -114,8 +128,8 @@ void bear_asleep(const Disk *d, double until, double more) {
     for (int n = 0; n < d->held_count && B.every > 0; n++) {
         double nx, ny, time = until - d->slept + more;
         const Surface *s = W.surfaces + d->held[n];
-        gap_to(s, d->x, d->y, d->radius, &nx, &ny);
-        Push p = at_foot(d, s->owner, d->radius, nx, ny, d->slept, until);
+        double depth = depth_of(d, s, &nx, &ny);
+        Push p = at_foot(d, s->owner, depth, nx, ny, d->slept, until);
         p.vx = d->ux;
         p.vy = d->uy;
         p.x -= d->ux * (d->t - d->slept);

@@ -39,7 +39,7 @@ void describe(Contact *c, int i, int j) {
     double spin_mass = turn;
     c->i = i;
     c->j = j;
-    c->two = c->hung = 0;
+    c->two = c->hung = c->cornered = 0;
     c->owner = W.owner_count;
     c->moved[0] = c->moved[1] = c->moved[2] = 0;
     c->mass[1] = mass + r * r * turn;
@@ -101,13 +101,15 @@ void relative(const Contact *c, int earlier, double *out) {
     const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     const double *v = earlier ? &a->ux : &a->vx;
     out[0] = v[0] * c->nx + v[1] * c->ny - c->other[0];
-    out[1] = v[0] * c->ny - v[1] * c->nx + a->radius * v[2] - c->other[1];
+    out[1] = v[0] * c->ny - v[1] * c->nx + (c->cornered ? c->own[1] : a->radius) * v[2] - c->other[1];
     out[2] = v[2] - c->other[2];
+    if (c->cornered) out[0] += c->own[0] * v[2];
     if (c->two) {
         v = earlier ? &b->ux : &b->vx;
         out[0] += c->other[0] - (v[0] * c->nx + v[1] * c->ny);
-        out[1] += c->other[1] - (v[0] * c->ny - v[1] * c->nx) + b->radius * v[2];
+        out[1] += c->other[1] - (v[0] * c->ny - v[1] * c->nx) + (c->cornered ? c->others[1] : b->radius) * v[2];
         out[2] -= v[2];
+        if (c->cornered) out[0] += c->others[0] * v[2];
     }
     if (c->hung) swing_away(c, earlier, out);
 }
@@ -125,12 +127,12 @@ void push(const Contact *c, const double *J) {
     double x = J[0] * c->nx + J[1] * c->ny, y = J[0] * c->ny - J[1] * c->nx;
     a->vx += x * a->inv_mass;
     a->vy += y * a->inv_mass;
-    a->spin += (a->radius * J[1] + J[2]) * a->inv_inertia;
+    a->spin += ((c->cornered ? c->own[0] * J[0] + c->own[1] * J[1] : a->radius * J[1]) + J[2]) * a->inv_inertia;
     if (c->two) {
         Disk *b = W.disks + c->j;
         b->vx -= x * b->inv_mass;
         b->vy -= y * b->inv_mass;
-        b->spin += (b->radius * J[1] - J[2]) * b->inv_inertia;
+        b->spin += ((c->cornered ? c->others[0] * J[0] + c->others[1] * J[1] : b->radius * J[1]) - J[2]) * b->inv_inertia;
     }
     if (c->hung) push_hinge(c, J);
 }
@@ -155,7 +157,7 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
    wedged between walls impulses of any size hold each other; where one of its gaps opens and another
    closes, one seems to give what the other takes. So where the sum is a loss those that gain
    gain nothing and the others lose so much less; where it is a gain, the other way round. */
-static void pool(Contact *list, int count, int later) {
+void pool(Contact *list, int count, int later) {
     double sums[2] = {0, 0};
     for (int n = 0; n < count; n++) {
         const double *loss = later ? list[n].later : list[n].entries;
@@ -217,8 +219,8 @@ void account(Contact *list, int count) {
     pool(list, count, 1);
 }
 
-/* Hardly ever asked to the end: inline it would slow all that asks. */
-__attribute__((noinline)) int is_one(const Disk *d, int k, int other) {
+/* Hardly ever asked to the end. */
+RARELY int is_one(const Disk *d, int k, int other) {
     return other >= 0 && (goes_on(-1 - k, -1 - other) || same_place(d, k, other));
 }
 

@@ -12,6 +12,9 @@
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 #define ALARM (-1000000) /* partner of a release or of a ride's end; no surface has that number */
 
+/* Of what hardly any scene asks for: inline it would slow all that asks. */
+#define RARELY __attribute__((noinline))
+
 extern World W;
 
 /* What was too small, so that `run` makes more room. */
@@ -75,6 +78,12 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 
 static inline double square(double a) { return a * a; }
 
+/* A place at which a particle with corners is near something: the normal towards it, how near, where; and which corner
+   of both that is, on what, see corners.c. */
+typedef struct { double nx, ny, gap, later, x, y; int which, on; } Touch;
+/* Such places of two, at most. */
+#define MOST_TOUCHES 8
+
 /* Two doubles at once: each rounds as by itself. */
 typedef v128_t Two;
 
@@ -106,6 +115,11 @@ static inline int *spared_by(const Surface *s, const Disk *d) {
 static inline int is_spared(const Surface *s, const Disk *d) {
     return s->gate >= 0 && *spared_by(s, d);
 }
+/* Whether a particle has corners, or one of two. */
+static inline int has_corners(const Disk *d) { return W.outline_count && d->corners; }
+static inline int is_cornered(int i, int j) {
+    return W.outline_count && (W.disks[i].corners || (j >= 0 && W.disks[j].corners));
+}
 /* Whether a surface is there and near the box that a disk can reach in this step ... */
 static inline int is_beside(const Surface *s, const Disk *d) {
     return s->there && s->box[0] < d->right && s->box[2] > d->left && s->box[1] < d->top
@@ -133,7 +147,7 @@ static inline int is_flat(const Surface *s) {
 }
 /* Longest step in which what is pressed on something, by so much (m/s2), hops by no more than HOP radii, s. */
 static inline double hop_time(const Disk *d, double press) {
-    return press > 0 ? sqrt(8 * HOP * d->radius / press) : INFINITY;
+    return press > 0 ? sqrt(8 * HOP * (has_corners(d) ? d->inner : d->radius) / press) : INFINITY;
 }
 /* A surface where it is at t. */
 const Surface *move_to(Surface *s, double t);
@@ -259,6 +273,20 @@ void strike_joints(int i, int j);
 void end_blow(void);
 void share_with_joints(const Contact *c, double wanted, const double *u, double *J);
 
+/* corners.c */
+double inner_of(int i, int j);
+double whirl_of(const Disk *d);
+int list_touches(int i, int j, double t, double within, double later, Touch *list);
+double gap_of_corners(const Disk *d, double x, double y, int k, double t);
+int would_overlap(int i, double x, double y, int j, double t, double deep);
+double meet_corners(int i, int j, double from, double until, double soft);
+void describe_touch(Contact *c, int i, int j, const Touch *t);
+const Contact *place_before(const Contact *c);
+double opens_by(const Contact *c);
+int lies_flat(int i, int k);
+int list_struck(int i, int j, double t, Contact *list);
+void strike_corners(int i, int j, double t);
+
 /* trigger.c */
 int is_triggered(int owner, int doing);
 void touch(int owner, double t);
@@ -308,6 +336,7 @@ void push(const Contact *c, const double *impulse);
 int island_of(int i);
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given);
+void pool(Contact *list, int count, int later);
 void account(Contact *list, int count);
 double pressed_inside(const Disk *d, int surface);
 double turning_time(const Disk *d, const Surface *s);

@@ -51,7 +51,7 @@ static void write_knot(void) {
     const double *b = A.entries;
     double spin = A.turns ? A.z / A.given->radius : 0.0;
     E.knots[E.knot_count++] = (Knot){ A.given->release + A.age, A.x, A.y, A.vx, A.vy, spin,
-                                      { b[0], b[1], b[2] }, E.lone, 0 };
+                                      { b[0], b[1], b[2] }, E.lone, 0, 0.0 };
 }
 
 static void write_event(int kind, int surface) {

@@ -177,11 +177,17 @@ int place_is_free(int i, double x, double y, double t) {
     double r = W.disks[i].radius, box[4] = {x - r, y - r, x + r, y + r}, nx, ny;
     for (int k = 0; k < W.surface_count && (W.gate_count || W.mover_count); k++) {
         const Surface *s = surface_at(k, t);
-        if ((s->gate >= 0 || s->mover >= 0) && s->there == THERE && gap_to(s, x, y, r, &nx, &ny) < -TOUCHING * r) return 0;
+        if ((s->gate < 0 && s->mover < 0) || s->there != THERE) continue;
+        double gap = has_corners(W.disks + i) ? gap_of_corners(W.disks + i, x, y, k, t) : gap_to(s, x, y, r, &nx, &ny);
+        if (gap < -TOUCHING * r) return 0;
     }
     if (!W.interact) return 1;
     int n = query(i, box);
     for (int k = 0; k < n; k++) {
+        if (is_cornered(i, W.found[k])) {
+            if (meet(i, W.found[k]) && would_overlap(i, x, y, W.found[k], t, TOUCHING * r)) return 0;
+            continue;
+        }
         Disk o = W.disks[W.found[k]];
         advance(&o, t);
         if (meet(i, W.found[k]) && square(o.x - x) + square(o.y - y) < square(o.radius + (1 - TOUCHING) * r)) return 0;

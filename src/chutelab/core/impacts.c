@@ -67,10 +67,15 @@ double soft_approach(const Disk *d, double radius) {
    curved way does; of what has sunk in hardly anything. */
 double left_over(const Disk *d, int impacts, int surface, double radius, int sunk) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
-    if (surface >= 0 && (W.interact || d->held_count))
+    if (has_corners(d)) {
+        /* A corner that lasts comes back as fast as gravity and its turning make it. */
+        double haste = surface >= 0 ? hastes(surface_at(surface, d->t), d) : 0;
+        least = MAX(least, 1.000001 * (W.g + whirl_of(d) + haste) * W.step);
+        sunk = 0;
+    } else if (surface >= 0 && (W.interact || d->held_count))
         sunk = gap_to(surface_at(surface, d->t), d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius;
     if (sunk) least *= HARDLY;
-    for (int n = 0; n < d->held_count; n++) {
+    for (int n = 0; n < d->held_count && !has_corners(d); n++) {
         if (sunk || !is_one(d, d->held[n], surface)) continue;
         double haste = hastes(surface_at(surface, d->t), d);
         least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface) + haste) * W.step);
@@ -82,8 +87,25 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     return MAX(least, MIN(skip * pow(GROW, MIN(impacts - many, 1000)), most));
 }
 
+/* When particle i meets j, of which one has corners, in what is left of the step. */
+static RARELY double meet_cornered(int i, int j) {
+    int first = has_corners(W.disks + i) ? i : j, other = first == i ? j : i;
+    const Disk *d = W.disks + first, *o = W.disks + MAX(other, 0);
+    int impacts = MAX(d->impacts, other >= 0 ? o->impacts : 0);
+    double small = inner_of(first, other), soft = left_over(d, impacts, MAX(-1 - other, -1), small, 0);
+    if (other >= 0) soft = MAX(soft, left_over(o, impacts, -1, small, 0));
+    return meet_corners(first, other, MAX(W.now, other < 0 ? d->t : W.now), W.step_end, soft);
+}
+
 static void foresee_pair(int i, int j, double *due, int *partner) {
     const Disk *a = W.disks + i, *b = W.disks + j;
+    if (is_cornered(i, j)) {
+        double then = meet_cornered(i, j);
+        if (then >= *due || then >= W.step_end) return;
+        *due = then;
+        *partner = j;
+        return;
+    }
     double ta = W.now - a->t, tb = W.now - b->t, approach;
     double x = a->x + (a->vx + 0.5 * W.gx * ta) * ta - b->x - (b->vx + 0.5 * W.gx * tb) * tb;
     double y = a->y + (a->vy + 0.5 * W.gy * ta) * ta - b->y - (b->vy + 0.5 * W.gy * tb) * tb;
@@ -110,7 +132,7 @@ static void foresee_surfaces(int i, double *due, int *partner) {
     const int *list;
     int count = surfaces_near(i, &list);
     for (int n = 0; n < count; n++) {
-        double approach;
+        double approach = INFINITY;
         int k = list[n];
         if (W.surfaces[k].there != THERE || !is_beside(W.surfaces + k, d)) continue;
         double wait = 0, side;
@@ -122,8 +144,8 @@ static void foresee_surfaces(int i, double *due, int *partner) {
         }
         const Surface *s = surface_at(k, d->t);
         if (s->mover >= 0 && !stirs(s) && d->mode == ASLEEP && d->ux == 0 && d->uy == 0) continue;
-        if (stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0)) continue;
-        double t = wait > 0 ? meet_later(s, d, wait, &approach)
+        if (!has_corners(d) && stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0)) continue;
+        double t = has_corners(d) ? meet_cornered(i, -1 - k) : wait > 0 ? meet_later(s, d, wait, &approach)
             : d->t + meet_surface(s, d, W.step_end - d->t, &approach);
         /* What goes round an end within the step comes to the side that lets it through. */
         if (s->one_sided && t < W.step_end) {
@@ -287,7 +309,17 @@ static void support(int i, int k, double t) {
 /* Add a contact to the list that a jam solves, if it touches now; 0 if not. */
 static int add_touching(int i, int j, double radius, int *count) {
     Contact *c = W.earlier + *count;
-    if (*count >= TOUCHES * (W.high - W.low)) return 0;
+    int room = TOUCHES * (W.high - W.low) - *count;
+    if (room <= 0) return 0;
+    if (is_cornered(i, j)) {
+        Touch places[MOST_TOUCHES];
+        int first = has_corners(W.disks + i) ? i : j, other = first == i ? j : i;
+        int found = list_touches(first, other, W.disks[i].t, TOUCH * inner_of(i, j), W.disks[i].t, places);
+        found = MIN(found, room);
+        for (int n = 0; n < found; n++) describe_touch(c + n, first, other, places + n);
+        *count += found;
+        return found > 0;
+    }
     describe(c, i, j);
     if (c->gap > TOUCH * radius) return 0;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = c->drift = 0;
@@ -334,7 +366,7 @@ static void jam(Contact *struck, double t) {
         int most = surfaces_near(m, &nearby);
         for (int n = 0; n < most; n++) {
             const Surface *s = surface_at(nearby[n], t);
-            if (s->there == THERE && is_near(s, a) && face_at(s, a->x, a->y) == s)
+            if (s->there == THERE && is_near(s, a) && (has_corners(a) || face_at(s, a->x, a->y) == s))
                 add_touching(m, -1 - nearby[n], a->radius, &count);
         }
     }
@@ -344,7 +376,7 @@ static void jam(Contact *struck, double t) {
         Contact *c = list + n;
         const Disk *a = W.disks + c->i;
         double u[3], r = c->j >= 0 ? MIN(a->radius, W.disks[c->j].radius) : a->radius;
-        int sunk = c->gap <= -SUNK * r;
+        int sunk = !c->cornered && c->gap <= -SUNK * r;
         relative(c, 0, u);
         c->need = -u[0] <= left_over(a, 0, -1 - c->j, r, sunk) ? MIN(-u[0], 0) : -u[0];
         if (sunk && c->j < 0) {
@@ -355,7 +387,7 @@ static void jam(Contact *struck, double t) {
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
     W.swings_too = 0;
-    for (int n = 0; n < count; n++) W.swings_too |= list[n].hung > 0;
+    for (int n = 0; n < count; n++) W.swings_too |= list[n].hung > 0 || list[n].cornered;
     /* Not hastened at first: then what rattles may never be as calm as it must be. */
     sweep_contacts(list, count, 0, JAM_SWEEPS, W.sweeps, 0.1 * left, left);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
@@ -507,6 +539,11 @@ static void strike(int i, int j, double t) {
     if (!W.interact) slow_down(i, t);
     if (j >= 0) advance(b, t);
     else if (a->impacts < FEW) end_hop(i, t);
+    if (is_cornered(i, j)) {
+        if (has_corners(a)) strike_corners(i, j, t);
+        else strike_corners(j, i, t);
+        return;
+    }
     int impacts = j >= 0 ? MAX(a->impacts, b->impacts) : a->impacts;
     /* It has got clear of what let it through. */
     if (j < 0 && W.surfaces[-1 - j].one_sided) *spared_by(W.surfaces + (-1 - j), a) = 0;
@@ -579,6 +616,20 @@ static int struck_too(const Contact *c, double t, int *j) {
     /* What has joints is struck as a step begins. */
     if (t > W.t && (is_tied(c->i) || is_tied(c->j))) return 0;
     advance(a, t);
+    if (c->cornered) {
+        Contact list[MOST_TOUCHES];
+        double soft = left_over(a, a->impacts, MAX(-1 - c->j, -1), inner_of(c->i, c->j), 0), u[3], most = 0;
+        if (c->j >= 0 && b->mode != FREE) return 0;
+        if (c->j >= 0) {
+            advance(b, t);
+            soft = MAX(soft, left_over(b, b->impacts, -1, inner_of(c->i, c->j), 0));
+        }
+        for (int n = list_struck(c->i, c->j, t, list) - 1; n >= 0; n--) {
+            relative(list + n, 0, u);
+            most = MAX(most, -u[0]);
+        }
+        return most > soft;
+    }
     if (c->j < 0) {
         const Surface *s = face_at(surface_at(-1 - c->j, t), a->x, a->y);
         int k = (int)(s - W.surfaces);
@@ -652,6 +703,15 @@ void lie_down(int i) {
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = surface_at(k, d->t);
         double nx, ny, v[3];
+        if (has_corners(d)) {
+            /* It is held from the next step on, which begins now. */
+            if (s->there == THERE && !is_spared(s, d) && lies_flat(i, k)) {
+                d->on = s->owner;
+                d->slips = 1;
+            }
+            W.step_end = MIN(W.step_end, MAX(d->t, W.t));
+            continue;
+        }
         if (s->there != THERE || is_spared(s, d) || face_at(s, d->x, d->y) != s || is_held(d, k)) continue;
         if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
         double press = press_on(d, s, nx, ny);

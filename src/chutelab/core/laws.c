@@ -614,7 +614,8 @@ static void judge_all(void) {
     L.hit_count = 0;
     for (int i = 0; i < L.particle_count && again; i++) find_hits(i);
     if (L.hit_count > L.hit_room) return;
-    double bound = L.energy_bound * L.energy;
+    /* What is at rest in a crowd turns nothing over: its heights are rounded all the same. */
+    double bound = L.energy_bound * L.energy + (L.interact ? EPS * All.weight * All.reach : 0);
     tell_hits(1);
     tell_hits(0);
     judge_books(bound);

@@ -11,6 +11,7 @@
 
 #define MAX_HELD 4 /* surfaces that one disk can lie on at a time; a fifth is met as an impact */
 #define MOST_IDLE 400 /* rounds in a row that take no time: with more of them a particle is stuck */
+#define MOST_CORNERS 32 /* of a particle */
 #define WAITS 20 /* states of a track at most that wait to become a knot, or be left out */
 #define MAX_NEARBY 12 /* surfaces that are listed for a disk; where there are more, it asks all */
 
@@ -106,7 +107,10 @@ typedef struct {
     int far;                    /* 1 if the step's impulses take it further than was foreseen */
     int body;               /* its row of `World.solver_bodies`, if that is of this disk */
     int tie;                /* first of its ends of joints, 2 n and 2 n + 1 of joint n, or -1 */
-    int pad;
+    int corners;            /* [in] how many it has; 0 of what is round ... */
+    int outline;            /* [in] ... and the first of them in `World.outlines` */
+    int smooth;             /* mark of the shock in which it was brought off its hop */
+    double inner;           /* m; radius of the circle inside them, or its own */
     double tug[3], tugged[3]; /* m/s, m/s, rad/s; what half of a step's pull of its joints changes, and before */
 } Disk;
 
@@ -118,6 +122,7 @@ typedef struct {
     double after[3];      /* velocity and spin after these impulses */
     double after_entries[3];
     double past[6];       /* the state before `held` */
+    double angles[2];     /* rad; by which it had turned in `from` and in `held` */
     double load[3];       /* normal impulse per time of the last three steps, newest first */
     double load_t[3];
     int begun, waits;     /* it has a first knot; states that wait, see `World.waits` */
@@ -275,7 +280,9 @@ typedef struct {
     int next;               /* of the contacts of disk i in the step before */
     int leaves;             /* it parts in this step */
     int hung;               /* number of the hinge that feels the impulse from 1 on, or 0 */
-    int pad;
+    int cornered;           /* i has corners, and perhaps j */
+    double own[2], others[2]; /* m; of what has corners: levers of a normal and of a tangential impulse, on i and on j */
+    double spot[2];         /* m; ... and the place from the centre of i, as that is turned */
 } Contact;
 
 /* What the impulses of a solve change of a disk, and what one of 1 N s does to it. The first of all is of
@@ -306,7 +313,7 @@ typedef struct {
     int pad;
 } SolverRow;
 
-typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; } Knot;       /* [out] */
+typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; double angle; } Knot; /* [out] */
 
 typedef struct {                                                                         /* [out] */
     double t, x, y, before[3], after[3]; /* velocity and spin */
@@ -331,6 +338,7 @@ typedef struct {
     Mover *movers;
     Trigger *triggers;
     Joint *joints;
+    double *outlines;    /* [in] (outline_count, 2) corners round the centroid, counterclockwise, kind by kind, m */
     JointRow *joint_rows;
     double *joint_matrix; /* (joint rows, joint rows) */
     /* arrays that `prepare` lays out */
@@ -366,6 +374,7 @@ typedef struct {
     int mover_count;     /* [in] */
     int trigger_count;   /* [in] */
     int joint_count;     /* [in] */
+    int outline_count;   /* [in] */
     int joint_row_count;
     int material_count;
     int knot_room, event_room, total_room, contact_room, near_room, cell_room, swing_room;

@@ -34,7 +34,8 @@ void spare(const Disk *d, const Surface *s, double t) {
     int comes = s->opens == t, *spared = spared_by(s, d);
     if (!comes && !s->one_sided && (s->opens > t || !*spared)) return;
     if (d->mode == RIDING) ride_at(d, t, place);
-    double gap = chain_gap(s, place[0], place[1], d->radius, t, &side);
+    double gap = has_corners(d) ? gap_of_corners(d, place[0], place[1], (int)(s - W.surfaces), t)
+        : chain_gap(s, place[0], place[1], d->radius, t, &side);
     *spared = side < 0 || (comes ? gap < -deep : *spared && gap < 0);
 }
 
@@ -398,7 +399,11 @@ static int begin_step(void) {
     if (W.total_count >= W.total_room) return FULL_TOTALS;
     if (W.hinges && W.swing_count + 4 * W.mover_count > W.swing_room) return FULL_SWINGS;
     double next = set_gates(W.t), h = W.dt, stride = 0;
-    for (int i = W.low; i < W.high && W.g + W.haste > 0; i++) h = MIN(h, hop_time(W.disks + i, W.g + W.haste));
+    for (int i = W.low; i < W.high; i++) {
+        const Disk *d = W.disks + i;
+        double press = W.g + W.haste + (has_corners(d) && d->mode == FREE ? whirl_of(d) : 0);
+        if (press > 0) h = MIN(h, hop_time(d, press));
+    }
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     if (W.hinges) h = hinge_step(h);
     W.usual = h;
@@ -481,7 +486,9 @@ static int begin_step(void) {
         W.step_end = meet_stops(W.t, W.step_end);
         bound_hinges(W.t, W.step_end - W.t);
     }
-    if (W.interact) note_totals();
+    /* What has corners is released in a step of no length. */
+    int again = W.outline_count && W.total_count && W.totals[W.total_count - 1].t == W.t;
+    if (W.interact && !again) note_totals();
     return DONE;
 }
 
@@ -518,7 +525,7 @@ static int go_through(void) {
         double t = d->due;
         int j = d->partner;
         /* The step was cut short. */
-        if (t > W.step_end || (t == W.step_end && !(d->mode == WAITING && is_tied(i)))) return DONE;
+        if (t > W.step_end || (t == W.step_end && !(d->mode == WAITING && (is_tied(i) || has_corners(d))))) return DONE;
         if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
         if (W.event_count + SHOCKS * W.contact_count + 64 > W.event_room)
             return FULL_EVENTS;
@@ -582,7 +589,7 @@ static void end_step(void) {
     if (MAX(W.stamp, W.shocks) > 1000000000) {
         W.stamp = W.shocks = W.jams = 0;
         for (int i = 0; i < W.disk_count; i++)
-            W.disks[i].mark = W.disks[i].moved = W.disks[i].jam = 0;
+            W.disks[i].mark = W.disks[i].moved = W.disks[i].jam = W.disks[i].smooth = 0;
     }
 }
 

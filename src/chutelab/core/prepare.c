@@ -242,6 +242,7 @@ EXPORT int lay_out_world(void) {
     RESERVE(W.movers, W.mover_count);
     RESERVE(W.triggers, W.trigger_count);
     RESERVE(W.joints, W.joint_count);
+    RESERVE(W.outlines, 2.0 * W.outline_count);
     return has_room();
 }
 
@@ -371,6 +372,18 @@ static void join_disks(void) {
     }
 }
 
+/* Radius of the circle round the centre of a particle that no edge cuts, m. */
+static double inner_radius(const Disk *d) {
+    const double *p = W.outlines + 2 * d->outline;
+    double least = d->radius;
+    for (int n = 0; n < d->corners; n++) {
+        const double *a = p + 2 * n, *b = p + 2 * ((n + 1) % d->corners);
+        double x = b[0] - a[0], y = b[1] - a[1];
+        least = MIN(least, (a[0] * y - a[1] * x) / sqrt(x * x + y * y));
+    }
+    return least;
+}
+
 /* The host has filled in what is marked [in]: fill in what follows. */
 EXPORT int prepare(void) {
     W.passes = W.hinges = W.joint_row_count = 0;
@@ -378,7 +391,7 @@ EXPORT int prepare(void) {
         W.passes |= pair_of(i / W.kind_count, i % W.kind_count)->restitution < 0;
     for (int k = 0; k < W.mover_count; k++) W.hinges += W.movers[k].inertia > 0;
     /* What hangs gives what one disk gives it to another. */
-    if (W.hinges || W.trigger_count || W.joint_count) W.interact = 1;
+    if (W.hinges || W.trigger_count || W.joint_count || W.outline_count) W.interact = 1;
     for (int k = 0; k < W.trigger_count; k++) W.triggers[k].t = INFINITY;
     for (Mover *m = W.movers; m < W.movers + W.mover_count; m++) {
         if (!m->inertia) m->rate = m->turn;
@@ -393,6 +406,7 @@ EXPORT int prepare(void) {
         Disk *d = W.disks + i;
         least = MIN(least, d->radius);
         most = MAX(most, d->radius);
+        d->inner = inner_radius(d);
         if (!d->rides) continue;
         d->ride_x = d->x * c + d->y * s;
         d->ride_rho = d->y * c - d->x * s;

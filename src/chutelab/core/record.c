@@ -13,6 +13,12 @@ static void emit(const Knot *state) {
     W.knots[W.knot_count++] = *state;
 }
 
+/* The angle at a share of the way to a state: even accelerations, corrected evenly. */
+static double turned_by(const Track *track, const Knot *to, double s) {
+    double h = to->t - track->from[0], spin = track->from[5], even = to->angle - track->angles[0] - 0.5 * h * (spin + to->spin);
+    return track->angles[0] + s * (h * (spin + 0.5 * s * (to->spin - spin)) + even);
+}
+
 /* Whether the cubic from the last knot to a state leads past all that wait: as near in place, velocity and
    entries as a track may be off. In a crowd that is a hop: what lasts hops from step to step, g h2 / 8 high, and
    its track leaves that out; blows and bends that are smaller, of a velocity of g h, are left out with it. */
@@ -34,6 +40,7 @@ static int is_followed(const Track *track, const Knot *wait, const Knot *to, con
         off = plus(first, times(s, plus(times(2, bend), times(3 * s, turn))));
         if (!are_within(minus(off, times(h, two(&k->vx))), h * most)) return 0;
         if (fabs(from[5] + s * (to->spin - from[5]) - k->spin) * d->radius > slow) return 0;
+        if (has_corners(d) && fabs(turned_by(track, to, s) - k->angle) * d->radius > close) return 0;
         if (!W.interact) continue;
         if (fabs(from[6] + s * (to->entries[0] - from[6]) - k->entries[0]) > little) return 0;
         if (!are_within(minus(plus(entries, times(s, more)), two(k->entries + 1)), little)) return 0;
@@ -53,6 +60,7 @@ static void write_waiting(int i) {
     }
     emit(last);
     memcpy(track->from, last, sizeof track->from);
+    track->angles[0] = last->angle;
     track->waits = 0;
 }
 
@@ -66,15 +74,16 @@ static void thin_out(Track *track, Knot *wait) {
 }
 
 /* Note a state of a disk: t, x, y, vx, vy, spin. Of several at one instant the first and the last are kept. */
-static void note(int i, const double *state, const double *entries) {
+static void note(int i, const double *state, double angle, const double *entries) {
     Track *track = W.tracks + i;
-    Knot *wait = waiting(i), now = {.disk = i};
+    Knot *wait = waiting(i), now = {.disk = i, .angle = angle};
     memcpy(&now.t, state, 6 * sizeof(double));
     memcpy(now.entries, entries, sizeof now.entries);
     memcpy(track->knot, state, sizeof track->knot);
     if (!track->begun) {
         emit(&now);
         memcpy(track->from, &now, sizeof track->from);
+        track->angles[0] = angle;
         track->begun = 1;
         return;
     }
@@ -89,7 +98,7 @@ static void note(int i, const double *state, const double *entries) {
 void knot_now(int i) {
     Disk *d = W.disks + i;
     double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
-    note(i, state, d->entries);
+    note(i, state, d->turned, d->entries);
     write_waiting(i);
 }
 
@@ -104,14 +113,14 @@ void knot_before(int i, double t, double vx, double vy, double spin) {
     Disk *d = W.disks + i;
     double state[6] = {t, d->x, d->y, vx, vy, spin};
     flush_track(i);
-    if (memcmp(state, W.tracks[i].knot, sizeof state)) note(i, state, d->entries);
+    if (memcmp(state, W.tracks[i].knot, sizeof state)) note(i, state, d->turned, d->entries);
 }
 
 /* Note the state after a blow; that of a disk by itself is a knot. */
 void knot_after(int i) {
     const Disk *d = W.disks + i;
     double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
-    note(i, state, d->entries);
+    note(i, state, d->turned, d->entries);
     if (!W.interact) write_waiting(i);
 }
 
@@ -122,7 +131,7 @@ void flush_track(int i) {
     double state[6];
     memcpy(state, track->held, sizeof state);
     memcpy(state + 3, track->after, sizeof track->after);
-    note(i, state, track->after_entries);
+    note(i, state, track->angles[1], track->after_entries);
     track->lasted = 0;
 }
 
@@ -147,10 +156,11 @@ void track_lasting(int i) {
     }
     for (int n = 0; n < 3; n++) entries[n] = d->entries[n] + d->gain[n] - d->ahead[n];
     if (!track->lasted) knot_before(i, d->t, d->ux, d->uy, d->uspin);
-    note(i, state, entries);
+    note(i, state, d->turned, entries);
     track->lasted++;
     memcpy(track->past, track->lasted > 1 ? track->held : state, sizeof track->past);
     memcpy(track->held, state, sizeof state);
+    track->angles[1] = d->turned;
     memcpy(track->after, &d->vx, sizeof track->after);
     for (int n = 0; n < 3; n++) track->after_entries[n] = d->entries[n] + d->gain[n];
 }
@@ -159,7 +169,7 @@ void track_lasting(int i) {
 void track_flying(int i) {
     const Disk *d = W.disks + i;
     double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
-    if (memcmp(state, W.tracks[i].knot, sizeof state)) note(i, state, d->entries);
+    if (memcmp(state, W.tracks[i].knot, sizeof state)) note(i, state, d->turned, d->entries);
 }
 
 /* End a track at its last knot. */

@@ -183,7 +183,7 @@ static void sort_by_islands(void) {
         if (W.contacts[n].two) parent[island_of(W.contacts[n].i)] = island_of(W.contacts[n].j);
     /* What touches hinges is one island. */
     for (int n = 0, hung = -1; n < W.contact_count && W.hinges; n++) {
-        if (!W.contacts[n].hung) continue;
+        if (!W.contacts[n].hung && !W.contacts[n].cornered) continue;
         if (hung >= 0) parent[island_of(W.contacts[n].i)] = island_of(hung);
         hung = W.contacts[n].i;
     }
@@ -251,7 +251,7 @@ void solve_contacts(int again) {
             least = MIN(least, MIN(a->radius, b->radius));
             heaviest = MAX(heaviest, MAX(a->mass, b->mass));
             driven |= presses(c);
-            W.swings_too |= c->hung > 0;
+            W.swings_too |= c->hung > 0 || c->cornered;
         }
         swings |= W.swings_too;
         /* A drive presses as hard as it must: there no spring would hold, so that it gives no more than

@@ -6,6 +6,7 @@ The engine itself is in C, in `chutelab.core`; here `run` goes from a machine to
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from math import inf, nan
 from time import perf_counter
@@ -24,7 +25,7 @@ from chutelab.core import (
     dtype,
     give_back,
 )
-from chutelab.machine import SWING, Machine, Pieces, hand_over
+from chutelab.machine import PASSES, SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather, gather_lasting
 from chutelab.results.record import REASONS, Record
@@ -67,6 +68,9 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
     StalledError
         If a particle does not get on; it has the recording so far.
     """
+    if machine.scene.cornered:
+        machine.finish()
+        machine = together(machine)
     if not machine.is_ahead and np.min(machine.particle.radius) <= 0.0:
         raise ValueError("particle.radius = 0: the contact engine needs a radius above 0 m")
     module, recorder = borrow(), Recorder(machine)
@@ -84,6 +88,14 @@ def run(machine: Machine, progress: Progress | None = None) -> Record:
         give_back(module)
     machine.finish(unwatched if progress is None else partial(progress, 0.0))
     return run(machine, progress)
+
+
+def together(machine: Machine) -> Machine:
+    """Return a machine that runs all its particles at a time: those that never meet pass by."""
+    if machine.interact:
+        return machine
+    passing = np.full_like(machine.pair_restitution, PASSES)
+    return replace(machine, interact=True, pair_restitution=passing)
 
 
 def parts(machine: Machine) -> dict[str, Pieces]:
@@ -133,6 +145,8 @@ class Job:
     def fill(self) -> None:
         """Hand the machine over."""
         module, machine = self.module, self.machine
+        outlines = [np.empty((0, 2)) if one is None else one for one in machine.outlines]
+        sizes = [len(one) for one in outlines]
         self.pieces, wheel = pieces(machine), machine.pulley
         self.kinds, self.materials = len(machine.rolling), len(self.pieces)
         for name, value in (
@@ -143,7 +157,7 @@ class Job:
             ("g", machine.gravity), ("tilt", machine.tilt),
             ("air", machine.air), ("end_time", machine.end_time),
             ("mover_count", len(machine.movers)), ("trigger_count", len(machine.triggers)),
-            ("joint_count", len(machine.joints)),
+            ("joint_count", len(machine.joints)), ("outline_count", sum(sizes)),
         ):  # fmt: skip
             setattr(module.world, name, value)
         module.work("lay_out_world")
@@ -157,6 +171,11 @@ class Job:
         disks["kind"] = releases.kind
         disks["rides"] = releases.carried
         disks["exit_box"] = releases.exit_box
+        if any(sizes):
+            disks["corners"] = np.array(sizes)[releases.kind]
+            disks["outline"] = np.cumsum([0, *sizes[:-1]])[releases.kind]
+            corners = module.array("outlines", REAL, 2 * sum(sizes))
+            corners[:] = np.concatenate(outlines).ravel()
         module.array("surfaces", dtype("Surface"), len(self.pieces))[:] = self.pieces
         rows = module.array("movers", dtype("Mover"), len(machine.movers))
         for row, mover in zip(rows, machine.movers, strict=True):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core import Status, borrow, constants, dtype
-from chutelab.engines.contact import MOST_STEPS, Job, pieces
+from chutelab.engines.contact import MOST_STEPS, Job, pieces, together
 from chutelab.engines.simulation import must_fit, refused
-from chutelab.machine import PASSES, build
+from chutelab.machine import build
 from chutelab.results import Recording
 from chutelab.results.recorder import Recorder, StalledError
 from chutelab.scene import AnyScene, Overrides, load
@@ -88,9 +88,7 @@ class Run:
     def __init__(self, scene: Any) -> None:
         machine = build(scene)
         must_fit(machine, "contact")
-        if not machine.interact:
-            passing = np.full_like(machine.pair_restitution, PASSES)
-            machine = replace(machine, interact=True, pair_restitution=passing)
+        machine = together(machine)
         self.scene, self.t, self.done = scene, 0.0, False
         self._machine, self._due = machine, 0.0
         self._module, recorder = borrow(), Recorder(machine)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import replace
 from math import hypot, inf
 from time import perf_counter
@@ -31,8 +32,8 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         raise ValueError(f"engine = {wanted!r}: one of {', '.join(ENGINES)}")
     if wanted != "auto":
         return wanted
-    if any(outline is not None for outline in machine.outlines):
-        return "pymunk"
+    if machine.scene.cornered:
+        return "pymunk" if any(uncornered(machine)) else "contact"
     if machine.joints:
         return "pymunk" if unjoined(machine) else "contact"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
@@ -204,11 +205,14 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
 def must_fit(machine: Machine, name: str) -> None:
     """Raise a `SceneError` if an engine does not have what a machine needs."""
     scene = machine.scene
-    if name in ("exact", "contact"):
+    if name == "contact" and scene.cornered:
+        for key, value, allowed in uncornered(machine):
+            raise refused(scene, key, value, allowed)
+    if name == "exact":
         for n, outline in enumerate(machine.outlines):
             if outline is not None:
                 key, shape = f"{scene.head('particle', n)}.shape", scene.particles[n].shape
-                allowed = f'a disk or sphere with run.engine = "{name}"; the pymunk engine has it'
+                allowed = 'a disk or sphere with run.engine = "exact"; contact and pymunk have it'
                 raise refused(scene, key, shape, allowed)
     if name != "pymunk" and machine.joints:
         table = machine.joints[0].kind
@@ -254,6 +258,33 @@ def must_fit(machine: Machine, name: str) -> None:
         raise refused(scene, "air_density", machine.air, allowed)
     if any(scene.particles[kind].radius == 0.0 for kind in scene.kinds):
         raise refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
+
+
+def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
+    """Yield what the contact engine does not have with boxes: keys, values, and why not."""
+    scene, why = machine.scene, "boxes and polygons; the pymunk engine has them"
+    for joint in machine.joints[:1]:
+        yield f"{joint.kind}[0].particle", joint.particle, f"no joints with {why}"
+    for n, kind in enumerate(scene.particles):
+        if kind.outline and kind.rolling_friction:
+            key = f"{scene.head('particle', n)}.rolling_friction"
+            yield key, kind.rolling_friction, "0 with boxes and polygons: they do not roll"
+    if scene.hinges:
+        yield "run.engine", "contact", f"pymunk: nothing hangs on a hinge with {why}"
+    if scene.one_sided:
+        yield (
+            "run.engine",
+            "contact",
+            f"pymunk: {scene.one_sided} has two sides with {why}",
+        )
+    belt = scene.incoming
+    if belt is not None and belt.friction == "adhesion":
+        yield "incoming.friction", belt.friction, f"a Coulomb coefficient with {why}"
+    if machine.air:
+        yield "air_density", machine.air, "0 with boxes and polygons: drag is that of a sphere"
+    for n, pair in enumerate(scene.pair):
+        if pair.cohesion:
+            yield f"pair[{n}].cohesion", pair.cohesion, "0 with boxes and polygons"
 
 
 def unjoined(machine: Machine) -> str:

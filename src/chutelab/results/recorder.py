@@ -123,7 +123,7 @@ class Recorder:
     def take_knots(self, rows: NDArray[Any]) -> None:
         """Add knots as the core writes them, dtype ``Knot``: a particle's in the order of time."""
         own = _items(rows, "t", KNOT.itemsize).copy().view(KNOT)
-        self.add(rows["disk"].astype(np.int64), own)
+        self.add(rows["disk"].astype(np.int64), own, rows["angle"])
 
     def take_events(self, packed: NDArray[np.uint8]) -> None:
         """Add events as the core hands them over: the bytes of rows of `EVENT`."""

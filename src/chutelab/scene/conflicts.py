@@ -461,13 +461,19 @@ def _mass(look: Look, kind: Row) -> Iterator[Fault]:
 
 def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterator[Fault]:
     run = look.row("run")
+    joined = [table for table in JOINTS if look.rows(table)]
     engine, count = run["engine"], sum(stream["count"] for stream in streams)
     sizes, meet = [kind["radius"] for kind in kinds], [s for s in streams if s["interact"] is True]
     for kind, size in zip(kinds, sizes, strict=True):
         shape, path = kind["shape"], kind.path("radius")
         if shape in ("box", "polygon"):
-            if engine in ("exact", "contact"):
-                yield run.fault("engine", f'{kind.path("shape")} = "{shape}" needs pymunk')
+            if engine == "exact":
+                yield run.fault(
+                    "engine", f'{kind.path("shape")} = "{shape}" needs contact or pymunk'
+                )
+            elif engine == "contact" and joined:
+                text = f'{joined[0]}[0] with {kind.path("shape")} = "{shape}" needs pymunk'
+                yield run.fault("engine", text)
         elif size == 0.0:
             if any(size != 0.0 for size in sizes if size is not math.nan):
                 text = "more than 0, or 0 of all kinds: no engine has points beside disks"
@@ -505,8 +511,8 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
             if joint.given("other") and count > 1 and not meet:
                 text = f"{joint.path('other')} couples particles: they have to meet"
                 yield streams[0].fault("interact", text)
-    if engine == "exact" and (tables := [table for table in JOINTS if look.rows(table)]):
-        yield run.fault("engine", f"{tables[0]}[0] needs contact or pymunk")
+    if engine == "exact" and joined:
+        yield run.fault("engine", f"{joined[0]}[0] needs contact or pymunk")
 
 
 def _of_kind(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:

@@ -227,6 +227,11 @@ class SceneTables(Table):
         return any(not pair.meet and set(pair.between) == names for pair in self.pair)
 
     @property
+    def cornered(self) -> bool:
+        """Whether some kind of particles is a box or a polygon."""
+        return any(kind.outline for kind in self.particles)
+
+    @property
     def clings(self) -> bool:
         """Whether any two pull at each other."""
         return any(pair.clings for pair in self.pair)

@@ -66,7 +66,7 @@ class Particle(Resolved):
     shape: Literal["disk", "sphere", "box", "polygon"] = described(
         "disk",
         "What turns, with spin: a disk has I = m r²/2, a sphere 2/5 m r²; boxes and polygons are"
-        " for the pymunk engine",
+        " for the engines contact and pymunk",
     )
     radius: Radius = described(
         0.0063,

@@ -472,9 +472,11 @@ def preflight(scene: AnyScene) -> Preflight:
         why = f'run.engine = "{engine}" asks for it'
     elif engine == "pymunk":
         why = unjoined(machine) if machine.joints else ""
-        why = why or "boxes and polygons are for no other engine"
+        why = why or "the contact engine does not have all of it with boxes and polygons"
     elif machine.joints:
         why = "strings, rods, springs and pins pull, which the exact engine does not follow"
+    elif scene.cornered:
+        why = "boxes and polygons have corners, which the exact engine does not follow"
     elif machine.interact:
         why = "particles meet each other, which the exact engine does not follow"
     elif machine.count == 1:

@@ -13,8 +13,9 @@ export type Event = { t: number, x: number, y: number, before: number[], after: 
 // Friction without a bound, as a number that can be multiplied by zero.
 const GREATEST = 1e300;
 
-/** Doubles of a knot: t, x, y, vx, vy, spin, three entries of the ledger; and its disk. */
-const KNOT_ROW = 10;
+/** Doubles of a knot: t, x, y, vx, vy, spin, three entries of the ledger; its disk; and its
+ * angle, of what has corners. */
+const KNOT_ROW = 11;
 
 /** Doubles of what all particles have at a step: t, kinetic, potential, three entries of the
  * ledger, overlap; energy at the releases, and of all springs what they kept when they were tied,
@@ -301,7 +302,7 @@ class Core extends Memory {
       const wait = (n: number) => this.get("waits") + (i * WAITS + n) * 8 * KNOT_ROW;
       for (let n = Math.max(0, waits - 2); n < waits; n += 1) {
         const isLatest = this.doubles[wait(n) >> 3] === this.doubles[wait(waits - 1) >> 3];
-        if (isLatest) rows.push(...some(wait(n), 9), i);
+        if (isLatest) rows.push(...some(wait(n), 9), i, 0);
       }
       if (mode === Mode.FREE && this.ints[(track + Track.fields.lasted[0]) >> 2]) continue;
       let state = ["t", "x", "y", "vx", "vy"].map(at);
@@ -312,7 +313,7 @@ class Core extends Memory {
         const straight = Math.min(along, 0);
         state = [now, rho * s + straight * c, rho * c - straight * s, v * c, -v * s];
       }
-      rows.push(...state, at("spin"), ...some(disk + Disk.fields.entries[0], 3), i);
+      rows.push(...state, at("spin"), ...some(disk + Disk.fields.entries[0], 3), i, 0);
     }
     return new Float64Array(rows);
   }

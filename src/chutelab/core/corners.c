@@ -1,0 +1,694 @@
+/* Particles with corners: convex polygons, boxes among them.
+
+   What touches is a corner of one on an edge of the other, or of a particle on a surface, or an end of a surface on an
+   edge; so edge on edge are two places. Each is a contact of its own with levers about the centres. A disk and a rim
+   are a corner with a radius. Gaps are of the corner as it turns: a flight is exact, and a blow is at the instant at
+   which the first gap closes. */
+
+#include <string.h>
+#include "core.h"
+
+/* Strides of a span in which gaps are looked at, at least: a touch that comes and goes within one is left to the
+   next step. */
+#define STRIDES 8
+/* Halvings to the instant of a blow, to its last bit. */
+#define TO_ROOT 200
+/* Cosine of an angle between edge and surface from which on a corner near its end counts as on it. */
+#define FLAT 0.9
+/* Sweeps of a blow at several places, and of its size, at which they end. */
+#define SWEEPS 10000
+#define ENDS 1e-15
+/* Share of it that a blow may give by rounding. */
+#define GAINS 1e-12
+/* Contacts of an island up to which it is brought off its hop before a blow; none of them on what moves, which presses
+   as hard as it must, and none that took a blow as the step began. */
+#define SMALL 32
+/* Candidates for a place: corners of both. */
+#define CANDIDATES (2 * MOST_CORNERS)
+
+/* Something at a time. A segment has two points, an arc its ends and its centre, what is round its centre. */
+typedef struct {
+    double p[MOST_CORNERS][2];
+    double x, y, radius, spin;
+    int count, round;       /* points, of which one may have a radius, or -1 */
+    const Surface *s;
+} Shape;
+
+static Shape shape_of(int j, double t) {
+    Shape out = {.round = -1};
+    if (j < 0) {
+        const Surface *s = out.s = surface_at(-1 - j, t);
+        if (s->shape != CIRCLE) {
+            memcpy(out.p, s->end, sizeof s->end);
+            out.count = 2;
+        }
+        if (s->shape == SEGMENT) return out;
+        out.p[out.count][0] = s->x;
+        out.p[out.count][1] = s->y;
+        out.radius = s->radius;
+        out.round = out.count++;
+        return out;
+    }
+    const Disk *d = W.disks + j;
+    double h = t - d->t, turned = d->turned + d->spin * h, c = cos(turned), s = sin(turned);
+    out.x = d->x + (d->vx + 0.5 * W.gx * h) * h;
+    out.y = d->y + (d->vy + 0.5 * W.gy * h) * h;
+    for (int n = 0; n < d->corners; n++) {
+        const double *corner = W.outlines + 2 * (d->outline + n);
+        out.p[n][0] = out.x + c * corner[0] - s * corner[1];
+        out.p[n][1] = out.y + s * corner[0] + c * corner[1];
+    }
+    out.count = d->corners;
+    if (d->corners) return out;
+    out.p[0][0] = out.x;
+    out.p[0][1] = out.y;
+    out.radius = d->radius;
+    out.round = 0;
+    out.count = 1;
+    return out;
+}
+
+/* Unit vector out of an edge of a polygon, and its length. */
+static double out_of(const Shape *a, int edge, double *n) {
+    const double *p = a->p[edge], *q = a->p[edge + 1 < a->count ? edge + 1 : 0];
+    double x = q[0] - p[0], y = q[1] - p[1], length = sqrt(x * x + y * y);
+    n[0] = y / length;
+    n[1] = -x / length;
+    return length;
+}
+
+static double off_edge(const Shape *a, int edge, const double *q) {
+    double n[2];
+    out_of(a, edge, n);
+    return (q[0] - a->p[edge][0]) * n[0] + (q[1] - a->p[edge][1]) * n[1];
+}
+
+/* The edge that a point is furthest out of, and by how much. */
+static int furthest(const Shape *a, const double *q, double *off) {
+    int found = 0;
+    for (int n = 0; n < a->count; n++) {
+        double one = off_edge(a, n, q);
+        if (n && one <= *off) continue;
+        *off = one;
+        found = n;
+    }
+    return found;
+}
+
+/* By how much all of a shape is out of an edge. */
+static double clear_of(const Shape *a, int edge, const Shape *b) {
+    double least = INFINITY;
+    for (int n = 0; n < b->count; n++)
+        least = MIN(least, off_edge(a, edge, b->p[n]) - (n == b->round ? b->radius : 0));
+    return least;
+}
+
+/* Fill in a place by its candidate, corners of `a` before points of `b`, and what that is on: an edge; a side of a
+   segment; the inside of a rim; of a point with a radius also -1 - a corner. */
+static void fill_in(const Shape *a, const Shape *b, Touch *t) {
+    double n[2];
+    if (t->which < a->count) {
+        const double *q = a->p[t->which];
+        t->x = q[0];
+        t->y = q[1];
+        if (!b->s) {
+            out_of(b, t->on, n);
+            t->gap = off_edge(b, t->on, q);
+        } else if (b->s->shape == SEGMENT) {
+            n[0] = -t->on * b->s->ty;
+            n[1] = t->on * b->s->tx;
+            t->gap = (q[0] - b->s->x) * n[0] + (q[1] - b->s->y) * n[1];
+        } else {
+            double x = b->s->x - q[0], y = b->s->y - q[1], d = sqrt(x * x + y * y);
+            n[0] = x / d;
+            n[1] = y / d;
+            t->gap = b->radius - d;
+        }
+    } else {
+        int m = t->which - a->count;
+        const double *q = b->p[m];
+        double r = m == b->round ? b->radius : 0;
+        if (t->on >= 0) {
+            out_of(a, t->on, n);
+            t->gap = off_edge(a, t->on, q) - r;
+            n[0] = -n[0];
+            n[1] = -n[1];
+        } else {
+            double x = a->p[-1 - t->on][0] - q[0], y = a->p[-1 - t->on][1] - q[1], d = sqrt(x * x + y * y);
+            t->gap = d - r;
+            n[0] = x / d;
+            n[1] = y / d;
+        }
+        t->x = q[0] + r * n[0];
+        t->y = q[1] + r * n[1];
+    }
+    t->nx = n[0];
+    t->ny = n[1];
+}
+
+/* The side of a segment that a corner is on: its own, but if it may have sunk through that of the centre. */
+static int side_of(const Shape *a, const Surface *s, const double *q, double near) {
+    double off = (q[1] - s->y) * s->tx - (q[0] - s->x) * s->ty;
+    double mid = (a->y - s->y) * s->tx - (a->x - s->x) * s->ty, along = (a->x - s->x) * s->tx + (a->y - s->y) * s->ty;
+    int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
+    if (own == centre || fabs(off) > 2 * near) return own;
+    if (along >= 0 && along <= s->length) return centre;
+    double n[2], out, *end = (double *)s->end + (along < 0 ? 0 : 2);
+    int edge = furthest(a, end, &out);
+    out_of(a, edge, n);
+    return out < 0 || fabs(n[1] * s->tx - n[0] * s->ty) > FLAT ? centre : own;
+}
+
+/* Find what a candidate is on; 0 if it is none that touches. Within `near` of corners it is left to one of both, and
+   there of several edges that which separates the two. */
+static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
+    double off, n[2];
+    if (t->which < a->count) {
+        const double *q = a->p[t->which];
+        if (b->s && b->s->shape == SEGMENT) {
+            double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
+            t->on = side_of(a, b->s, q, near);
+            fill_in(a, b, t);
+            return along >= -near && along <= b->s->length + near;
+        }
+        if (b->s) {
+            double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);
+            double mid = hypot(a->x - b->s->x, a->y - b->s->y);
+            t->on = 0;
+            fill_in(a, b, t);
+            if (fabs(d - b->radius) <= 2 * near ? mid >= b->radius : d > b->radius) return 0;
+            return b->s->shape == CIRCLE || x * b->s->tx + y * b->s->ty >= b->s->cos_half * d;
+        }
+        if (b->round >= 0) {
+            t->gap = INFINITY;
+            return 0;
+        }
+        t->on = furthest(b, q, &off);
+        double clear = clear_of(b, t->on, a);
+        for (int e = 0; e < b->count && off < near; e++) {
+            if (off_edge(b, e, q) < off - near) continue;
+            double other = clear_of(b, e, a);
+            if (other <= clear) continue;
+            clear = other;
+            t->on = e;
+        }
+        fill_in(a, b, t);
+        double length = out_of(b, t->on, n), along = n[0] * (q[1] - b->p[t->on][1]) - n[1] * (q[0] - b->p[t->on][0]);
+        return along >= -near && along <= length + near;
+    }
+    int m = t->which - a->count;
+    const double *q = b->p[m];
+    double best = INFINITY;
+    t->on = furthest(a, q, &off);
+    if (m != b->round) {
+        double length = out_of(a, t->on, n), along = n[0] * (q[1] - a->p[t->on][1]) - n[1] * (q[0] - a->p[t->on][0]);
+        fill_in(a, b, t);
+        return along >= near && along <= length - near && !(b->s && mate_of(b->s, m) >= 0);
+    }
+    for (int e = 0; e < a->count && off > 0; e++) {
+        double length = out_of(a, e, n), x = q[0] - a->p[e][0], y = q[1] - a->p[e][1];
+        double along = n[0] * y - n[1] * x, away = x * n[0] + y * n[1];
+        int inside = along >= 0 && along <= length;
+        double d = inside ? fabs(away) : sqrt(x * x + y * y);
+        if (d >= best || (inside && away < 0)) continue;
+        best = d;
+        t->on = inside ? e : -1 - e;
+    }
+    fill_in(a, b, t);
+    if (!b->s) return 1;
+    double x = a->x - b->s->x, y = a->y - b->s->y;
+    if (x * x + y * y < b->radius * b->radius) return 0;
+    return b->s->shape == CIRCLE || t->nx * b->s->tx + t->ny * b->s->ty >= b->s->cos_half;
+}
+
+double inner_of(int i, int j) { return j < 0 ? W.disks[i].inner : MIN(W.disks[i].inner, W.disks[j].inner); }
+
+/* List the places at which particle i, which has corners, is nearer than `within` to j at t, and what their gaps are
+   at `later`; up to MOST_TOUCHES. */
+RARELY int list_touches(int i, int j, double t, double within, double later, Touch *list) {
+    double near = TOUCH * inner_of(i, j);
+    Shape a = shape_of(i, t), b = shape_of(j, t);
+    int count = 0;
+    for (int c = 0; c < a.count + b.count && count < MOST_TOUCHES; c++) {
+        Touch *now = list + count;
+        now->which = c;
+        if (!find_place(&a, &b, near, now) || now->gap > within) continue;
+        int known = 0;
+        for (int n = 0; n < count && c >= a.count; n++)
+            known |= hypot(list[n].x - now->x, list[n].y - now->y) <= near
+                && list[n].nx * now->nx + list[n].ny * now->ny > FLAT;
+        count += !known;
+    }
+    if (!(later > t) || !count) return count;
+    a = shape_of(i, later);
+    b = shape_of(j, later);
+    for (int n = 0; n < count; n++) {
+        Touch then = list[n];
+        /* What is round may go on round a corner. */
+        if (then.which - a.count == b.round) find_place(&a, &b, near, &then);
+        else fill_in(&a, &b, &then);
+        list[n].later = then.gap;
+    }
+    return count;
+}
+
+/* Gap between a particle with corners, moved to a place, and a surface, m. */
+RARELY double gap_of_corners(const Disk *d, double x, double y, int k, double t) {
+    Shape a = shape_of((int)(d - W.disks), t), b = shape_of(-1 - k, t);
+    double least = INFINITY;
+    for (int n = 0; n < a.count; n++) {
+        a.p[n][0] += x - a.x;
+        a.p[n][1] += y - a.y;
+    }
+    a.x = x;
+    a.y = y;
+    for (int c = 0; c < a.count + b.count; c++) {
+        Touch now = {.which = c};
+        if (find_place(&a, &b, TOUCH * d->inner, &now)) least = MIN(least, now.gap);
+    }
+    return least;
+}
+
+/* Whether two particles, one with corners, would overlap by more than `deep`, the first at a place, both at t. */
+RARELY int would_overlap(int i, double x, double y, int j, double t, double deep) {
+    Shape a = shape_of(i, W.disks[i].t), b = shape_of(j, t);
+    double clear = -INFINITY;
+    for (int n = 0; n < a.count; n++) {
+        a.p[n][0] += x - a.x;
+        a.p[n][1] += y - a.y;
+    }
+    a.x = x;
+    a.y = y;
+    const Shape *one = a.round < 0 ? &a : &b, *other = a.round < 0 ? &b : &a;
+    if (other->round >= 0) {
+        Touch now = {.which = one->count};
+        find_place(one, other, 0, &now);
+        return now.gap < -deep;
+    }
+    for (int e = 0; e < a.count; e++) clear = MAX(clear, clear_of(&a, e, &b));
+    for (int e = 0; e < b.count; e++) clear = MAX(clear, clear_of(&b, e, &a));
+    return clear < -deep;
+}
+
+/* Velocity of a particle's place at t, m/s. */
+static void moves_at(const Disk *d, const Shape *a, double t, const Touch *at, double *v) {
+    double h = t - d->t;
+    v[0] = d->vx + W.gx * h - d->spin * (at->y - a->y);
+    v[1] = d->vy + W.gy * h + d->spin * (at->x - a->x);
+}
+
+/* How fast a place closes at t, m/s. */
+static double closes_at(int i, int j, const Shape *a, const Shape *b, double t, const Touch *at) {
+    double u[3], v[3];
+    moves_at(W.disks + i, a, t, at, u);
+    if (j >= 0) moves_at(W.disks + j, b, t, at, v);
+    else carried(b->s, at->x, at->y, v);
+    return (v[0] - u[0]) * at->nx + (v[1] - u[1]) * at->ny;
+}
+
+/* Bound on the acceleration of a corner by turning, m/s2. */
+double whirl_of(const Disk *d) { return d->corners ? d->spin * d->spin * d->radius : 0; }
+
+/* Bound on the speed with which gaps of two close within a span, m/s; INFINITY if they cannot meet in it. */
+static double fastest_of(int i, int j, double t, double span) {
+    const Disk *d = W.disks + i, *o = W.disks + MAX(j, 0);
+    double h = t - d->t, x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h, most, nx, ny;
+    double u = d->vx + W.gx * h, v = d->vy + W.gy * h;
+    if (j < 0) {
+        const Surface *s = surface_at(-1 - j, t);
+        most = sqrt(u * u + v * v) + fabs(d->spin) * d->radius + W.g * span + (stirs(s) ? s->fastest : 0);
+        return gap_to(s, x, y, d->radius, &nx, &ny) > most * span ? INFINITY : most;
+    }
+    h = t - o->t;
+    x -= o->x + (o->vx + 0.5 * W.gx * h) * h;
+    y -= o->y + (o->vy + 0.5 * W.gy * h) * h;
+    u -= o->vx + W.gx * h;
+    v -= o->vy + W.gy * h;
+    double apart = sqrt(x * x + y * y), reach = d->radius + o->radius, speed = sqrt(u * u + v * v);
+    if (apart - reach > speed * span) return INFINITY;
+    return speed + (fabs(d->spin) + fabs(o->spin)) * (apart + speed * span + reach);
+}
+
+/* The instant within (low, high] at which the gap of a place closes. */
+static double root_of(int i, int j, Touch *at, double low, double high) {
+    for (int n = 0; n < TO_ROOT; n++) {
+        double middle = 0.5 * (low + high);
+        if (!(middle > low && middle < high)) break;
+        Shape a = shape_of(i, middle), b = shape_of(j, middle);
+        fill_in(&a, &b, at);
+        if (at->gap > 0) low = middle;
+        else high = middle;
+    }
+    return high;
+}
+
+/* When particle i, which has corners, meets j between two times faster than `soft`: the instant, or INFINITY. */
+double meet_corners(int i, int j, double from, double until, double soft) {
+    double span = until - from, most = fastest_of(i, j, from, span), near = TOUCH * inner_of(i, j), h = 0, first = INFINITY;
+    double gap[CANDIDATES];
+    if (!(span > 0) || most == INFINITY || most <= soft) return INFINITY;
+    Shape a = shape_of(i, from), b = shape_of(j, from);
+    int count = a.count + b.count;
+    for (int c = 0; c < count; c++) {
+        Touch now = {.which = c};
+        int there = find_place(&a, &b, near, &now);
+        gap[c] = now.gap;
+        if (there && now.gap <= 0 && closes_at(i, j, &a, &b, from, &now) > soft) return from;
+    }
+    while (h < span && first == INFINITY) {
+        double least = INFINITY, last = from + h;
+        for (int c = 0; c < count; c++)
+            if (gap[c] > 0) least = MIN(least, gap[c]);
+        h = MIN(h + MAX(least / most, span / STRIDES), span);
+        double t = h < span ? from + h : until;
+        Shape a2 = shape_of(i, t), b2 = shape_of(j, t);
+        for (int c = 0; c < count; c++) {
+            Touch now = {.which = c};
+            find_place(&a2, &b2, near, &now);
+            if (b.s && b.s->shape == SEGMENT && c < a.count) {
+                /* The side that it is on does not change within a step. */
+                now.on = side_of(&a, surface_at(-1 - j, from), a.p[c], near);
+                b2.s = surface_at(-1 - j, t);
+                fill_in(&a2, &b2, &now);
+            }
+            double before = gap[c];
+            gap[c] = now.gap;
+            if (!(before > 0 && now.gap <= 0)) continue;
+            double then = root_of(i, j, &now, last, t);
+            Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
+            Touch again = now;
+            /* It may have gone over to another edge, of which the gap was closed before. */
+            int there = find_place(&a3, &b3, near, &again);
+            fill_in(&a3, &b3, &now);
+            if (there && then < first && closes_at(i, j, &a3, &b3, then, &now) > soft) first = then;
+        }
+    }
+    return first;
+}
+
+/* ------------------------------------------------------------------------------------------ contacts */
+
+/* Have a contact hold the levers of both about its place, and return what an impulse along and across its normal
+   feels of turning, 1/kg. */
+static void take_levers(Contact *c, const Touch *t, double *feels) {
+    const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+    double x = t->x - a->x, y = t->y - a->y, cosine = cos(a->turned), sine = sin(a->turned);
+    c->own[0] = x * c->ny - y * c->nx;
+    c->own[1] = -(x * c->nx + y * c->ny);
+    c->spot[0] = cosine * x + sine * y;
+    c->spot[1] = cosine * y - sine * x;
+    c->others[0] = c->others[1] = 0;
+    if (c->j >= 0) {
+        x = t->x - b->x;
+        y = t->y - b->y;
+        c->others[0] = y * c->nx - x * c->ny;
+        c->others[1] = x * c->nx + y * c->ny;
+    }
+    for (int n = 0; n < 2; n++) {
+        feels[n] = square(c->own[n]) * a->inv_inertia;
+        if (c->two) feels[n] += square(c->others[n]) * b->inv_inertia;
+    }
+}
+
+/* Acceleration along the normal by which a contact opens if nothing holds it, m/s2. */
+double opens_by(const Contact *c) {
+    const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+    double up = square(a->spin) * c->own[1], pull;
+    if (c->j >= 0) return up + square(b->spin) * c->others[1];
+    Disk place = *a;
+    place.x += c->own[0] * c->ny - c->own[1] * c->nx;
+    place.y += -c->own[0] * c->nx - c->own[1] * c->ny;
+    up += W.gx * c->nx + W.gy * c->ny;
+    return up - pulled(surface_at(-1 - c->j, a->t), &place, c->nx, c->ny, &pull);
+}
+
+/* Fill in a contact at a place of particle i, which has corners, as both partners are now. */
+RARELY void describe_touch(Contact *c, int i, int j, const Touch *t) {
+    const Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
+    const Pair *pair = j < 0 ? surface_pair(a, -1 - j) : pair_of(a->kind, b->kind);
+    double feels[2], mass = a->inv_mass, turn = a->inv_inertia;
+    *c = (Contact){.nx = t->nx, .ny = t->ny, .gap = t->gap, .most = INFINITY, .share = 1, .i = i, .j = j, .cornered = 1,
+                   .owner = W.owner_count, .rest = pair->restitution, .falls = pair->falls, .friction = pair->friction};
+    c->two = j >= 0 && b->mode == FREE;
+    take_levers(c, t, feels);
+    if (c->two) {
+        mass += b->inv_mass;
+        turn += b->inv_inertia;
+    }
+    for (int n = 0; n < 2; n++) c->mass[n] = 1 / (mass + feels[n]);
+    c->mass[2] = turn > 0 ? 1 / turn : 0;
+    c->pull = -square(a->spin) * c->own[0];
+    if (j >= 0) {
+        c->pull -= square(b->spin) * c->others[0];
+        c->other[0] = b->vx * c->nx + b->vy * c->ny;
+        c->other[1] = b->vx * c->ny - b->vy * c->nx;
+        c->arm = b->corners ? 0 : pair->rolling * b->radius;
+        return;
+    }
+    const Surface *s = surface_at(-1 - j, a->t);
+    c->owner = s->owner;
+    c->other[1] = surface_speed(s, c->nx, c->ny, t->x, t->y, 0);
+    c->pull += W.gx * c->ny - W.gy * c->nx;
+    if (s->mover < 0) return;
+    Disk place = *a;
+    double v[3], pull;
+    place.x = t->x;
+    place.y = t->y;
+    place.vx -= a->spin * (t->y - a->y);
+    place.vy += a->spin * (t->x - a->x);
+    place.radius = 0;
+    carried(s, t->x - c->gap * c->nx, t->y - c->gap * c->ny, v);
+    c->moved[0] = v[0] * c->nx + v[1] * c->ny;
+    c->moved[1] = v[0] * c->ny - v[1] * c->nx;
+    c->moved[2] = v[2];
+    for (int n = 0; n < 3; n++) c->other[n] += c->moved[n];
+    pulled(s, &place, c->nx, c->ny, &pull);
+    c->pull -= pull;
+    if (is_hung(-1 - j)) hang_on(c, W.movers + s->mover, &place);
+}
+
+/* The contact of the step before at about the same place of both. */
+RARELY const Contact *place_before(const Contact *c) {
+    const Contact *found = 0;
+    double least = INFINITY;
+    for (int k = W.disks[c->i].before; k >= 0; k = W.earlier[k].next) {
+        const Contact *o = W.earlier + k;
+        double off = hypot(o->spot[0] - c->spot[0], o->spot[1] - c->spot[1]);
+        if (o->j != c->j || off >= least) continue;
+        least = off;
+        found = o;
+    }
+    return least <= 0.5 * W.disks[c->i].inner ? found : 0;
+}
+
+/* ------------------------------------------------------------------------------------------- the blow */
+
+/* The places at which two touch now, as contacts: those of which a gap is closed, and those that last. */
+RARELY int list_struck(int i, int j, double t, Contact *list) {
+    Touch places[MOST_TOUCHES];
+    double least = inner_of(i, j);
+    int lasts = 0, count = 0;
+    for (int link = W.disks[i].links; link >= 0; link = W.links[link]) {
+        const Contact *c = W.contacts + link / 2;
+        lasts |= c->i == i && c->j == j && c->impulse[0] > 0;
+    }
+    int found = list_touches(i, j, t, (lasts ? TOUCH : TOUCHING) * least, t, places);
+    for (int n = 0; n < found; n++) {
+        Contact *c = list + count++;
+        describe_touch(c, i, j, places + n);
+        c->drift = 0;
+    }
+    return count;
+}
+
+/* Bring what lasts from its hop to its smooth path before a blow: else the hop's velocity, of first order in the step,
+   would enter that. Of the impulses of the step what is not due yet is taken back, or what is due is given. */
+static void end_hops(int i, double t) {
+    const Contact *first = 0;
+    int count = 0, many = 0;
+    double past = W.tracks[i].lasted > 1 ? W.length_before : 0;
+    for (int link = W.disks[i].links; link >= 0 && !first; link = W.links[link]) first = W.contacts + link / 2;
+    if (!first || t <= W.t || W.disks[i].smooth == W.shocks) return;
+    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++)
+        if (c->island == first->island) {
+            double u[3], whirl = whirl_of(W.disks + c->i) + (c->j < 0 ? 0 : whirl_of(W.disks + c->j));
+            relative(c, 1, u);
+            int is_blow = u[0] < -W.soft - 2 * whirl * W.step, moves = c->j < 0 && stirs(W.surfaces + (-1 - c->j));
+            count += is_blow || moves ? SMALL + 1 : 1;
+        }
+    if (count > SMALL) return;
+    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
+        Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+        if (c->island != first->island || a->mode != FREE || (c->j >= 0 && b->mode != FREE)) continue;
+        double u[3], v[3], given[3], change[3];
+        Contact last = *c;
+        advance(a, t);
+        if (c->two) advance(b, t);
+        was_moved(c->i);
+        a->smooth = W.shocks;
+        if (c->two) {
+            was_moved(c->j);
+            b->smooth = W.shocks;
+        }
+        if (c->impulse[0] == 0) continue;
+        for (int n = 0; n < 3; n++)
+            last.impulse[n] = change[n] = -c->impulse[n] * (W.length - 2 * (t - W.t)) / (past + W.length);
+        relative(&last, 0, u);
+        push(&last, change);
+        relative(&last, 0, v);
+        share_out(&last, u, v, 0, last.entries, given);
+        bear_contact(&last, 1, t, t);
+        keep_impulse(&last, 1, t, t);
+        W.earlier[many++] = last;
+    }
+    /* As in a step, only the sum of what is lost is known. */
+    pool(W.earlier, many, 0);
+    for (const Contact *c = W.earlier; c < W.earlier + many; c++)
+        book(W.disks[c->i].entries, c->two ? W.disks[c->j].entries : 0, c->owner, c->entries);
+    give_back(W.earlier, many);
+    W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
+}
+
+/* Whether a particle that is released touches a surface, and hardly moves off or on. */
+RARELY int lies_flat(int i, int k) {
+    const Disk *d = W.disks + i;
+    Touch places[MOST_TOUCHES];
+    int found = list_touches(i, -1 - k, d->t, TOUCHING * d->inner, d->t, places), lies = found > 0;
+    for (int n = 0; n < found; n++) {
+        Contact c;
+        double u[3];
+        describe_touch(&c, i, -1 - k, places + n);
+        relative(&c, 0, u);
+        lies &= fabs(u[0]) <= -opens_by(&c) * W.dt;
+    }
+    return lies;
+}
+
+/* Impulses at all places such that gaps do not close, or open as fast as they are to, and that friction, a share of
+   it, stops slip as far as it may. */
+static void share_blow(Contact *list, int count, const double *back, double share) {
+    double size = 0;
+    for (int n = 0; n < count; n++) size = MAX(size, back[n]);
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        double worst = 0, v[3];
+        for (int n = 0; n < count; n++) {
+            Contact *c = list + n;
+            double *J = c->impulse, change[3] = {0, 0, 0};
+            relative(c, 0, v);
+            size = MAX(size, fabs(v[0]) + fabs(v[1]));
+            change[0] = MAX(J[0] + c->mass[0] * (back[n] - v[0]), 0) - J[0];
+            push(c, change);
+            J[0] += change[0];
+            worst = MAX(worst, fabs(change[0]) / c->mass[0]);
+            double most = share * MIN(c->friction, share < 1 ? ROUGH : INFINITY) * J[0];
+            relative(c, 0, v);
+            change[0] = 0;
+            change[1] = MIN(MAX(J[1] - c->mass[1] * v[1], -most), most) - J[1];
+            push(c, change);
+            J[1] += change[1];
+            worst = MAX(worst, fabs(change[1]) / c->mass[1]);
+        }
+        if (worst <= ENDS * size) return;
+    }
+}
+
+/* Find the impulses of a blow. Newton's restitution with friction, or at several places, may seem to give energy where
+   one turns what the other does (T. R. Kane, J. Appl. Mech. 51, 1984): then friction is less, and at last there is
+   no restitution, which never gives any. `u` are the velocities before. Return what is lost, J. */
+static double share_out_blow(Contact *list, int count, double *back, const double (*u)[3]) {
+    for (double share = 1;;) {
+        double lost = 0, size = 0, v[3];
+        share_blow(list, count, back, share);
+        for (int n = 0; n < count; n++) {
+            const double *J = list[n].impulse;
+            relative(list + n, 0, v);
+            lost -= 0.5 * (J[0] * (u[n][0] + v[0]) + J[1] * (u[n][1] + v[1]));
+            size += fabs(J[0] * u[n][0]) + fabs(J[1] * u[n][1]);
+        }
+        int is_plastic = 1;
+        for (int n = 0; n < count; n++) is_plastic &= back[n] == 0;
+        if (lost >= -GAINS * size || is_plastic) return lost;
+        for (int n = 0; n < count; n++) {
+            Contact *c = list + n;
+            double none[3] = {-c->impulse[0], -c->impulse[1], 0};
+            push(c, none);
+            c->impulse[0] = c->impulse[1] = 0;
+            if (share == 0) back[n] = 0;
+        }
+        share = share > 0.1 ? 0.5 * share : share > 0 ? 0 : 1;
+    }
+}
+
+/* Resolve the blow of particle i, which has corners, and j at all places at which they touch. */
+RARELY void strike_corners(int i, int j, double t) {
+    Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
+    Contact list[MOST_TOUCHES], *main = list;
+    double u[MOST_TOUCHES][3], back[MOST_TOUCHES], fastest = 0, J[2] = {0, 0};
+    int impacts = MAX(a->impacts, j >= 0 ? b->impacts : 0), rests = 0;
+    if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);
+    end_hops(i, t);
+    if (j >= 0 && b->mode == FREE) end_hops(j, t);
+    int count = list_struck(i, j, t, list), two = j >= 0 && b->mode == FREE;
+    for (int n = 0; n < count; n++) {
+        const Contact *c = list + n;
+        relative(c, 0, u[n]);
+        fastest = MAX(fastest, -u[n][0]);
+        double rest = c->rest, approach = MAX(-u[n][0], 0), press = -opens_by(c);
+        if (c->falls * approach > 1) rest /= sqrt(sqrt(c->falls * approach));
+        back[n] = rest * approach;
+        int calm = j >= 0 ? approach < W.soft && (a->supports || b->supports || !two) : back[n] <= press * W.step;
+        int ends = rest < 1 && (impacts >= JAM || (impacts >= FEW && approach < SLOW * W.g * W.dt));
+        if (approach > 0 && (calm || ends)) back[n] = 0;
+        rests |= approach > 0 && back[n] == 0;
+    }
+    /* What was foreseen, but is not so, counts: it is left to the next step at last. */
+    was_moved(i);
+    if (!(fastest > 0)) return;
+    if (two) was_moved(j);
+    double before[3] = {a->vx, a->vy, a->spin}, lost = share_out_blow(list, count, back, u), normal = 0, slip = 0;
+    for (int n = 0; n < count; n++) {
+        Contact *c = list + n;
+        double v[3], given[3];
+        relative(c, 0, v);
+        share_out(c, u[n], v, 0, c->entries, given);
+        normal += MAX(c->entries[1], 0);
+        slip += MAX(c->entries[2], 0);
+        if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
+    }
+    /* Only the sum is known where one turns what the other does. */
+    double by = normal + slip > 0 ? MAX(lost, 0) / (normal + slip) : 0;
+    for (int n = 0; n < count; n++) {
+        Contact *c = list + n;
+        for (int k = 1; k < 3; k++) c->entries[k] = by * MAX(c->entries[k], 0);
+        book(a->entries, two ? b->entries : 0, c->owner, c->entries);
+        if (j < 0) W.drives[c->owner] += driven(c, 0);
+        if (j < 0 && c->impulse[0] > 0) hold(a, -1 - j);
+        bear_contact(c, 1, t, t);
+        if (c->impulse[0] > main->impulse[0]) main = c;
+        if (c->hung) leave_struck(c->hung - 1);
+    }
+    for (int n = 0; n < count; n++) {
+        const Contact *c = list + n;
+        double x = c->impulse[0] * c->nx + c->impulse[1] * c->ny, y = c->impulse[0] * c->ny - c->impulse[1] * c->nx;
+        J[0] += x * main->nx + y * main->ny;
+        J[1] += x * main->ny - y * main->nx;
+    }
+    a->since = t;
+    if (two) b->since = t;
+    W.impact_count++;
+    int landing = j < 0 && main->owner == W.landing && !a->landed;
+    int told = landing || fastest > W.soft || W.g == 0 || (j < 0 && a->on != main->owner);
+    if (told)
+        write_event(j >= 0 ? COLLISION : landing ? LANDING : IMPACT, i, MAX(j, -1), main->owner, t, &a->x, before,
+                    &a->vx, J[0], J[1]);
+    for (int n = 0; n < count; n++)
+        if (!told || count > 1) keep_impulse(list + n, 1, t, t);
+        else keep_carried(list + n, 1, t, t);
+    if (landing) a->landed = 1;
+    if (j < 0) {
+        a->on = main->owner;
+        a->slips = 1;
+    }
+    /* What comes to rest is held from the next step on, which begins soon. */
+    if (rests) W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
+}

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, PolyCollection
+from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path
@@ -310,7 +311,7 @@ class _Names:
         self.lines = [(Path(ax.transData.transform(line.get_xydata())), False) for line in ax.lines]
         for body in ax.patches:
             outline = body.get_path().transformed(body.get_patch_transform() + ax.transData)
-            filled = body.get_edgecolor()[3] > 0.0
+            filled = to_rgba(body.get_edgecolor())[3] > 0.0
             self.lines += [(Path(corners), filled) for corners in outline.to_polygons()]
         # What a gate lets through falls.
         fall = np.array([[0.0, 0.0], [0.0, -FALL * shown.height]])
@@ -595,7 +596,7 @@ COIL = 0.05
 def strings(recording: Recording, times: Floats) -> Callable[[int], list[Floats]]:
     """Return the function that gives the joints at the time of an index, (P, 2) each, m.
 
-    A slack string sags between its ends, a spring goes to and fro; pins are left out.
+    A slack string sags along gravity between its ends, a spring goes to and fro; pins are left out.
     """
     joints = [joint for joint in recording.machine.joints if joint.kind != "pin"]
     own = places(recording, [joint.particle for joint in joints], times)
@@ -612,7 +613,7 @@ def strings(recording: Recording, times: Floats) -> Callable[[int], list[Floats]
             if joint.kind == "string":
                 # Pulled down at its middle it would be twice as deep there.
                 sag = np.sqrt(max(joint.length**2 - float(way @ way), 0.0))
-                path[:, 1] -= 2.0 * HANGING * (1.0 - HANGING) * sag
+                path -= (2.0 * HANGING * (1.0 - HANGING) * sag)[:, None] * recording.machine.up
             elif joint.kind == "spring":
                 across = np.array([-way[1], way[0]]) / (np.hypot(*way) or 1.0)
                 path[2:-2:2] += COIL * joint.length * across

@@ -15,6 +15,7 @@ from chutelab.machine.parts import Joint
 from chutelab.pictures.plots import Window, draw_scene, draw_tracks, overlay, style
 from chutelab.pictures.plots.machinery import draw_bodies, placed, stream_colours, strings
 from chutelab.pictures.plots.scenery import energies, places
+from chutelab.scene import parse
 from handmade import Line, machine_of, recording_of
 
 FLOOR = Line("floor", (-1.0, 0.0), (1.0, 0.0))
@@ -164,6 +165,13 @@ def test_a_taut_string_is_straight_and_a_slack_one_sags():
     assert slack[:, 1].min() < 0.5
     ax = draw_bodies(view(recording.machine), recording, 0.5)
     assert len([line for line in ax.lines if line.get_gid() == "string"]) == 2
+    # Where gravity points to the right, the slack one sags as far to the right.
+    text = "gravity_deg = 90\n[stream]\nat = [0.0, 1.0]\nvelocity = [0.0, 0.0]\n"
+    aside = replace(machine, joints=joints, scenes=parse(text))
+    turned = strings(recording_of(aside, still((0.0, 0.5)), still((0.2, 0.5))), np.array([0.5]))(0)
+    straight = np.linspace(0.8, 0.5, len(slack))
+    assert turned[1][:, 0] - 0.2 == pytest.approx(straight - slack[:, 1], abs=1e-12)
+    assert turned[1][:, 1] == pytest.approx(straight)
 
 
 # Many

@@ -218,6 +218,23 @@ def test_a_material_s_numbers_are_shown_where_the_scene_says_none():
     assert "mass" not in [field["name"] for field in particle]
 
 
+def test_what_is_copied_with_what_it_waits_for_waits_for_the_copy():
+    rows = [
+        {"name": "gate", "points": [[0, 0], [1, 0]], "opens_when": {"touched": "bell"}},
+        {"name": "bell", "points": [[0, 1], [1, 1]]},
+    ]
+    given = given_of(load("free-fall"))
+    given |= {"surface": rows, "stream": {**given["stream"], "interact": True}}
+    both, alone = ask(*(
+        {"ask": "edited", "given": given, "edits": [["copies", names, [0.0, 0.5]]]}
+        for names in (["gate", "bell"], ["gate"])
+    ))  # fmt: skip
+    first, bell, gate, copied = both["changed"]["surface"]
+    assert (first["opens_when"], bell["name"]) == ({"touched": "bell"}, "bell")
+    assert gate["opens_when"] == {"touched": copied["name"]} != {"touched": "bell"}
+    assert alone["changed"]["surface"][-1]["opens_when"] == {"touched": "bell"}
+
+
 @pytest.mark.parametrize(("language", "comma"), [("en", "."), ("de", ",")])
 def test_what_cannot_be_says_why_in_the_language(language, comma):
     given = given_of(load("perpendicular"))

@@ -758,6 +758,16 @@ def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_
     assert [one["name"] for one in left["surface"]] == ["table", "bell"]
     assert [one["particle"] for one in left["stream"]] == ["ball"]
     assert page.evaluate("chutelab.lab.recording.tracks.length") == 1
+    # A fault stands below it, on a wide screen and on a phone.
+    page.evaluate("chutelab.lab.change({ 'surface[0].points': [[0, 0], [0, 0]] })")
+    for width, height in ((1366, 768), (390, 844)):
+        page.set_viewport_size({"width": width, "height": height})
+        expect(page.locator("#fault")).to_be_visible()
+        notice, fault = (page.locator(one).bounding_box() for one in ("#lacks", "#fault"))
+        assert notice["y"] + notice["height"] <= fault["y"]
+        seen = """([x, y]) => document.elementsFromPoint(x, y)
+          .some((one) => one.closest('#lacks'))"""
+        assert page.evaluate(seen, [notice["x"] + 20, notice["y"] + notice["height"] / 2])
     page.get_by_role("button", name="Close").click()
     expect(page.locator("#lacks")).to_have_count(0)
 

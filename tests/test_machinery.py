@@ -6,9 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.path import Path
 
+from chutelab import scene
 from chutelab.engines.simulation import simulate
-from chutelab.pictures.plots import Window, draw_scene
+from chutelab.machine import build
+from chutelab.pictures.plots import Window, draw_scene, overlay
+from chutelab.pictures.plots.measures import drawing
 from handmade import Line, Round, machine_of
 
 
@@ -82,3 +86,45 @@ def test_thickness_is_drawn_where_no_particle_comes(name):
     for body in bodies:
         outline = body.get_path().transformed(body.get_patch_transform())
         assert not outline.contains_points(places[np.isfinite(places[:, 0])]).any()
+
+
+def struck(ax):
+    """Names with a line of the machine in their box: a surface, a strand of a belt, a wheel."""
+    lines = [
+        Path(ax.transData.transform(one.get_xydata()))
+        for one in ax.lines if str(one.get_gid()).startswith(("surface ", "last "))
+    ]  # fmt: skip
+    for body in (one for one in ax.patches if one.get_zorder() < 2.0):
+        outline = body.get_path().transformed(body.get_patch_transform() + ax.transData)
+        lines += [Path(corners) for corners in outline.to_polygons()]
+    boxes = {text.get_text(): text.get_window_extent() for text in ax.texts if text.get_text()}
+    return {name for name, box in boxes.items() for one in lines if one.intersects_bbox(box, False)}
+
+
+@pytest.mark.parametrize("size", [(7.0, 3.8), (10.0, 3.3)], ids=["overlay", "report"])
+def test_no_name_of_a_shipped_scene_is_struck_through(size):
+    belts = 0
+    for name, file in scene.shipped().items():
+        machine = build(scene.load(file))
+        if not len(machine.corners):
+            continue
+        figure = Figure(figsize=size)
+        FigureCanvasAgg(figure)
+        ax = draw_scene(figure.add_axes((0.0, 0.0, 1.0, 1.0)), machine)
+        assert not struck(ax), name
+        found = {text.split(",")[0] for text in said(ax)}
+        wanted = {one for one in ("incoming", "outgoing") if one in machine.surfaces}
+        assert {f"{one} belt" for one in wanted} <= found, name
+        belts += len(wanted)
+    assert belts > 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", scene.shipped())
+def test_no_name_in_a_picture_of_a_run_is_struck_through(name):
+    recording = simulate(name)
+    # Also without any surface there is a drawing.
+    figure = drawing(recording)
+    if len(recording.machine.corners):
+        assert not struck(figure.axes[0])
+    assert not struck(overlay(recording).axes[0])

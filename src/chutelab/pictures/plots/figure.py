@@ -185,8 +185,8 @@ def draw_view(
     """
     style.dress(ax, say("x"), say("y"))
     machine = recording.machine
-    draw_scene(ax, machine, window_of(recording), clear=path_of_arcs(parts))
     draw_last(ax, machine, recording.t[-1])
+    draw_scene(ax, machine, window_of(recording), clear=path_of_arcs(parts))
     draw_analytic(ax, parts)
     draw_tracks(ax, recording, marks=not crowd)
     if crowd and not one_of_many(recording):

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, PolyCollection
+from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path
@@ -68,9 +69,12 @@ def thickness(ax: Axes) -> float:
     return min(most, max(least, share * ax.get_window_extent().height * 72.0 / ax.figure.dpi))
 
 
-def draw_volumes(ax: Axes, machine: Machine, points: float) -> None:
-    """Draw what lies behind a machine's surfaces, where a length of 1 m is so many pt."""
-    thick = thickness(ax) / points
+def draw_volumes(ax: Axes, machine: Machine, points: float) -> dict[int, float]:
+    """Draw what lies behind a machine's surfaces, where a length of 1 m is so many pt.
+
+    Returns how far the strands of belts are from each other (m), by surfaces.
+    """
+    thick, deep = thickness(ax) / points, {}
     own = [piece for piece in machine.pieces if not is_passing(machine, piece)]
     for surface in sorted({int(piece.surface) for piece in own}):
         parts = [one for one in own if one.surface == surface]
@@ -85,6 +89,7 @@ def draw_volumes(ax: Axes, machine: Machine, points: float) -> None:
         elif flat and len(wheels) > 1:
             radius = float(wheels[0].radius)
         if radius:
+            deep[surface] = 2.0 * radius
             _loop(ax, centers, radius, max(radius - 1.15 * thick, 0.4 * radius), thick, points)
         elif flat and (name == "outgoing" or flat[0].speed):
             # A belt without pulleys of its own: a loop below what it carries.
@@ -93,13 +98,15 @@ def draw_volumes(ax: Axes, machine: Machine, points: float) -> None:
                 ends = ends[np.argsort(ends[:, 0])]
                 way = (ends[1] - ends[0]) / length
                 turn = min(0.5 * (STRANDS + 1.0) * thick, 0.25 * length)
+                deep[surface] = 2.0 * turn
                 axes = ends + turn * np.array([way[1], -way[0]])
                 _loop(ax, axes, turn, max(turn - 1.6 * thick, 0.3 * turn), thick, points)
         for piece in flat if name in plates(machine) else ():
             # The steel lies on the right of the struck face.
-            face, deep = piece.path(), PLATE * thick * piece.normal(piece.at(0.5 * piece.way))
-            outline = _closed(np.concatenate([face, face[::-1] - deep]))
+            face, back = piece.path(), PLATE * thick * piece.normal(piece.at(0.5 * piece.way))
+            outline = _closed(np.concatenate([face, face[::-1] - back]))
             _add(ax, outline, style.STEEL_LIGHT, style.STEEL)
+    return deep
 
 
 def plates(machine: Machine) -> set[str]:
@@ -217,7 +224,7 @@ def draw_scene(
     shown = window.fitted(box.width / box.height)
     ax.set(xlim=(shown.left, shown.right), ylim=(shown.bottom, shown.top))
     ax.set_aspect("equal", adjustable="box")
-    draw_volumes(ax, machine, points_of(ax, 1.0))
+    deep = draw_volumes(ax, machine, points_of(ax, 1.0))
     found = pieces(machine)
     for piece in found:
         look: dict[str, Any] = {"linewidth": 1.3} if small and not piece.whole else {}
@@ -239,7 +246,7 @@ def draw_scene(
     if anchors := [joint.anchor for joint in machine.joints if joint.anchor is not None]:
         ax.plot(*np.array(anchors).T, "o", color=style.WALL, ms=3.0, zorder=2.0, gid="anchors")
     if not small:
-        names = _Names(ax, machine, found, shown)
+        names = _Names(ax, machine, found, shown, deep)
         if clear is not None and len(clear):
             names.lines.append((Path(ax.transData.transform(clear)), False))
         names.write()
@@ -279,11 +286,15 @@ FARTHER = (1.0, 2.5, 4.0)
 class _Names:
     """Writes the name of each surface that is seen, once, where it hides least, and no other name.
 
-    The axes have their limits; `found` are the machine's pieces, `shown` what is in the picture.
+    The axes have their limits and show what lies behind surfaces; `found` are the machine's pieces,
+    `shown` what is in the picture, `deep` how far the strands of belts are apart (m), by surfaces.
     """
 
-    def __init__(self, ax: Axes, machine: Machine, found: Sequence[Pieces], shown: Window) -> None:
-        self.ax, self.machine, self.shown = ax, machine, shown
+    def __init__(
+        self, ax: Axes, machine: Machine, found: Sequence[Pieces], shown: Window,
+        deep: dict[int, float],
+    ) -> None:  # fmt: skip
+        self.ax, self.machine, self.shown, self.deep = ax, machine, shown, deep
         self.parts: dict[int, list[tuple[Pieces, Floats]]] = {}
         for piece in found:
             points = piece.path()
@@ -296,20 +307,18 @@ class _Names:
         self.found = found
         self.plates = plates(machine)
         self.thick = thickness(ax)
-        self.lines = [
-            (Path(ax.transData.transform(piece.path())), bool(piece.whole))
-            for parts in self.parts.values()
-            for piece, _ in parts
-        ]
+        # Of what is drawn, wheels and steel are filled; a belt has room between its strands.
+        self.lines = [(Path(ax.transData.transform(line.get_xydata())), False) for line in ax.lines]
+        for body in ax.patches:
+            outline = body.get_path().transformed(body.get_patch_transform() + ax.transData)
+            filled = to_rgba(body.get_edgecolor())[3] > 0.0
+            self.lines += [(Path(corners), filled) for corners in outline.to_polygons()]
         # What a gate lets through falls.
         fall = np.array([[0.0, 0.0], [0.0, -FALL * shown.height]])
         for piece in found:
             if piece.gate:
                 below = piece.at(0.5 * piece.way) + fall
                 self.lines.append((Path(ax.transData.transform(below)), False))
-        if machine.pulley is not None:
-            rim = Path.circle((0.0, 0.0), machine.pulley.radius)
-            self.lines.append((rim.transformed(ax.transData), True))
         self.starts = ax.transData.transform(machine.releases.position)
         self.taken: list[Bbox] = []
 
@@ -393,13 +402,13 @@ class _Names:
                 where = low + (high - low) * share
             along = "top" if angle <= 0.0 else "bottom"
             yield where, (GAP + PLATE * self.thick, 0.0), "left", along
-        elif name == "incoming" and self.machine.pulley is not None:
-            # Between the strands, beyond the wheel at their end.
-            left = max(self.shown.left, part[0][0] + 1.2 * self.machine.pulley.radius)
-            yield np.array([left, part[0][1]]), (4.0, -GAP - 0.5 * self.thick), "left", "top"
-        elif name == "outgoing":
-            right = np.array([max(part[0][0], part[1][0]), part[0][1]])
-            yield right, (-6.0, -4.0 - self.thick), "right", "top"
+        elif deep := self.deep.get(int(piece.surface)):
+            # Between the strands, or else below the lower one.
+            sides = [next(_beside(piece, part, share)) for share in SHARES]
+            for where, down in sides:
+                yield where + 0.5 * deep * down, (0.0, 0.0), "center", "center"
+            for where, down in sides:
+                yield _spot(where + deep * down, GAP, down)
         for farther in FARTHER:
             for piece, part in parts[:LOOKED_AT]:
                 for share in SHARES:
@@ -441,7 +450,7 @@ def _beside(piece: Pieces, part: Floats, share: float) -> Iterator[tuple[Floats,
 def _spot(where: Floats, gap: float, normal: Floats) -> Spot:
     """Return a spot that far (pt) from a point of a surface along its normal."""
     x, y = normal
-    across = "center" if abs(x) < 0.2 else "right" if x < 0.0 else "left"
+    across = "center" if abs(x) < 0.05 else "right" if x < 0.0 else "left"
     along = "top" if y < -0.2 else "bottom" if y > 0.2 else "center"
     return where, (gap * x, gap * y), across, along
 
@@ -587,7 +596,7 @@ COIL = 0.05
 def strings(recording: Recording, times: Floats) -> Callable[[int], list[Floats]]:
     """Return the function that gives the joints at the time of an index, (P, 2) each, m.
 
-    A slack string sags between its ends, a spring goes to and fro; pins are left out.
+    A slack string sags along gravity between its ends, a spring goes to and fro; pins are left out.
     """
     joints = [joint for joint in recording.machine.joints if joint.kind != "pin"]
     own = places(recording, [joint.particle for joint in joints], times)
@@ -604,7 +613,7 @@ def strings(recording: Recording, times: Floats) -> Callable[[int], list[Floats]
             if joint.kind == "string":
                 # Pulled down at its middle it would be twice as deep there.
                 sag = np.sqrt(max(joint.length**2 - float(way @ way), 0.0))
-                path[:, 1] -= 2.0 * HANGING * (1.0 - HANGING) * sag
+                path -= (2.0 * HANGING * (1.0 - HANGING) * sag)[:, None] * recording.machine.up
             elif joint.kind == "spring":
                 across = np.array([-way[1], way[0]]) / (np.hypot(*way) or 1.0)
                 path[2:-2:2] += COIL * joint.length * across

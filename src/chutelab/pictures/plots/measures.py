@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.machinery import draw_scene
-from chutelab.pictures.plots.scenery import window_of
+from chutelab.pictures.plots.scenery import Window, window_of
 from chutelab.pictures.plots.style import Picture, named, say
 from chutelab.results import Recording
 from chutelab.results.fields import NAMES, Fields
@@ -135,8 +135,13 @@ def drawing(recording: Recording) -> Picture:
     figure = Picture((11.0, 4.0))
     ax = style.dress(figure.add_axes((0.07, 0.14, 0.9, 0.82)), say("x"), say("y"))
     machine = recording.machine
-    draw_scene(ax, machine, window_of(recording))
+    # The lengths stand left of the machine and below it.
+    window = window_of(recording)
+    left, bottom = window.left - 0.06 * window.width, window.bottom - 0.15 * window.height
+    draw_scene(ax, machine, Window(left, window.right, bottom, window.top))
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    if not len(machine.corners):
+        return figure
     low, high = machine.corners.min(axis=0), machine.corners.max(axis=0)
     names, wheel = machine.surfaces, machine.pulley
     if wheel is not None:
@@ -145,8 +150,7 @@ def drawing(recording: Recording) -> Picture:
             low[0], high[0] = 0.0, pivot_of(machine, names.index("plate"))[0]
         if "outgoing" in names:
             low[1] = pivot_of(machine, names.index("outgoing"))[1]
-    x, y = left - 0.03 * (right - left), bottom - 0.09 * (top - bottom)
-    ax.set(xlim=(x - 0.03 * (right - left), right), ylim=(y - 0.04 * (top - bottom), top))
+    x, y = left + 0.03 * (right - left), bottom + 0.03 * (top - bottom)
     for begin, end, seen in (
         ((low[0], y), (high[0], y), left <= low[0] < high[0] <= right),
         ((x, low[1]), (x, high[1]), bottom <= low[1] < high[1] <= top),

@@ -218,7 +218,7 @@ function rowsNamed(given: Given, names: string[]): [string, Given][] {
 function withCopies(given: Given, rows: [string, Given][], [dx, dy]: Point): [Given, string[]] {
   const moved = (value: any): any => (typeof value[0] === "number"
     ? [roundOff(value[0] + dx, 9), roundOff(value[1] + dy, 9)] : value.map(moved));
-  const names: string[] = [], copies = new Map<string, string>();
+  const names: string[] = [], made: Given[] = [], copies = new Map<string, string>();
   const all = rows.reduce((scene, [table, row]) => {
     if (isJoint(table)) {
       const called = calledOf(scene), copy = structuredClone(row);
@@ -237,8 +237,16 @@ function withCopies(given: Given, rows: [string, Given][], [dx, dy]: Point): [Gi
     if (copy.travel) copy.travel.to = moved(copy.travel.to);
     names.push(name);
     copies.set(row.name, name);
+    made.push(copy);
     return withRow(scene, table, copy);
   }, given);
+  // What is copied with what it waits for waits for the copy.
+  for (const copy of made) {
+    for (const when of WAITS) {
+      const touched = copies.get(copy[when]?.touched);
+      if (touched) copy[when].touched = touched;
+    }
+  }
   return [all, names];
 }
 

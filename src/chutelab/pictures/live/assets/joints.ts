@@ -54,7 +54,8 @@ function pinAt({ particle, from }: Tied, { tracks, machine }: Recording, t: numb
   return [state.x + c * u - s * v, state.y + s * u + c * v];
 }
 
-/** Paint all joints but pins at a time, s: a slack string sags between its ends. */
+/** Paint all joints but pins at a time, s: a slack string sags along gravity between its
+ * ends. */
 export function paintJoints(
   context: CanvasRenderingContext2D, recording: Recording, t: number, view: View, colour: string,
 ) {
@@ -79,10 +80,12 @@ export function paintJoints(
       });
       continue;
     }
-    // Pulled down at its middle it would be twice as deep there: a curve whose middle is at half
-    // of what its control point is.
+    // Pulled along gravity at its middle it would be twice as deep there: a curve whose middle
+    // is at half of what its control point is.
     const sag = kind === "string" ? Math.sqrt(Math.max(length * length - far * far, 0)) : 0;
-    line.quadraticCurveTo(view.px(u + dx / 2), view.py(v + dy / 2 - sag), view.px(x), view.py(y));
+    const [across, up] = recording.machine.up;
+    line.quadraticCurveTo(view.px(u + dx / 2 - across * sag), view.py(v + dy / 2 - up * sag),
+      view.px(x), view.py(y));
   }
   context.strokeStyle = context.fillStyle = colour;
   for (const [lines, width] of [[thin, THIN], [thick, THICK]] as const) {

@@ -145,7 +145,7 @@ class Palette {
         html("p", { class: "note" }, words.say("lacks-run"), " ",
           html("code", {}, `chutelab run ${data.source}`))),
       html("button", { click: () => note.remove() }, words.say("close")));
-      home.append(note);
+      home.querySelector(".notes")?.prepend(note);
       return undefined;
     }
     const click = () => this.show({ title: lab.first.title, ...FIRST });

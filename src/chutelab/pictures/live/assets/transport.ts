@@ -147,11 +147,17 @@ class Transport {
   }
 }
 
+/** Whether the card of energies was open before the page was made large. */
+let wasOpen = false;
+
 /** Large and on the full screen, or as before. */
 function project() {
   const { classList } = document.documentElement, on = classList.toggle("projector");
   document.getElementById("full")?.setAttribute("aria-pressed", String(on));
   if (on) wake();
+  // Open, it would hide a part of the machine on a small screen.
+  const energy = document.getElementById("energy") as HTMLDetailsElement | null;
+  if (energy) [wasOpen, energy.open] = [energy.open, !on && wasOpen];
   // Where a page may not take the screen, it is large all the same.
   if (on) document.documentElement.requestFullscreen?.().catch(() => {});
   else if (document.fullscreenElement) document.exitFullscreen();

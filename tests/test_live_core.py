@@ -186,7 +186,8 @@ CORNERED = [
 def test_boxes_and_polygons_move_as_in_python():
     names = [{"name": f"k{n}", **kind} for n, kind in enumerate(CORNERED)]
     boxes = [[[-0.1, 0.05 + 0.1 * n], [0.1, 0.14 + 0.1 * n]] for n in range(3)]
-    crowd = {**BALL, "particle": [*names, {"name": "ball", "radius": 0.01}], "surface": [LINE], "stream": [
+    kinds = [*names, {"name": "ball", "radius": 0.01}]
+    crowd = {**BALL, "particle": kinds, "surface": [LINE], "stream": [
         *({"particle": f"k{n}", "fill": fill, "count": 3, "interact": True, "omega": 3.0 * (n < 2)}
           for n, fill in enumerate(boxes)),
         {"particle": "ball", "at": [0.0, 0.4], "velocity": [0.0, -0.5]},

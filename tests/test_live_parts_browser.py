@@ -457,8 +457,11 @@ def test_a_hinge_is_pushed_in_a_running_run_by_hand_and_by_keys_as_python_does(s
     """Work and heat of a flap with a ball on it are in the ledger, in the bits of Python's run."""
     flap = {"name": "flap", "from": [0.0, 0.0], "to": [0.4, 0.0], "hinge": [0.0, 0.0],
             "mass": 0.2, "spring": 2.0, "damper": 0.02}  # fmt: skip
+    # However late a key comes, the ball is still there: it rolls off the flap into a hollow.
+    hollow = {"name": "hollow", "points": [[-0.2, -0.3], [0.3, -0.5], [0.8, -0.3]]}
     scene = from_dict({
-        "particle": {"radius": 0.02, "mass": 0.05}, "run": {"until": 2.0}, "surface": [flap],
+        "particle": {"radius": 0.02, "mass": 0.05}, "run": {"until": 4.0},
+        "surface": [flap, hollow],
         "stream": {"at": [0.2, 0.1], "velocity": [0.0, 0.0]},
     })  # fmt: skip
     page = shown(scene, viewport={"width": 1366, "height": 768})

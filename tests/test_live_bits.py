@@ -14,7 +14,7 @@ from chutelab.theory import Reason, predict, transfer
 from chutelab.theory.prediction import unbounded
 from chutelab.theory.results import STAGES
 from live.node import ask, needs_node, plain
-from test_live_core import MOVING
+from test_live_core import CORNERED, MOVING
 
 pytestmark = needs_node
 
@@ -103,12 +103,38 @@ def test_what_cannot_be_built_is_refused_by_the_same_key():
         assert found.get("fault", {}).get("key") in keys, (name, keys, found.get("fault"))
 
 
-def test_a_page_refuses_what_is_no_disk_by_its_key():
-    box = {"shape": "box", "size": [0.1, 0.1]}
-    for table, key in ((box, "particle.shape"), ({"radius": 0.0}, "particle.radius")):
-        with pytest.raises(SceneError) as caught:
-            describe(from_dict({**THROWN, "particle": table}))
-        assert [fault.key for fault in caught.value.faults] == [key]
+def test_a_page_refuses_mass_points_by_their_key():
+    with pytest.raises(SceneError) as caught:
+        describe(from_dict({**THROWN, "particle": {"radius": 0.0}}))
+    assert [fault.key for fault in caught.value.faults] == ["particle.radius"]
+
+
+def test_what_boxes_and_polygons_do_not_have_is_refused_by_the_same_key():
+    box, kind = {"shape": "box", "size": [0.1, 0.1], "spin": True}, {"shape": "polygon"}
+    wall = {**THROWN["surface"][0], "passes": "up"}
+    hung = {**THROWN["surface"][0], "hinge": [0.0, 0.0], "mass": 1.0}
+    own = {**THROWN, "particle": box}
+    documents = [
+        {**own, "particle": {**box, **more}}
+        for more in ({"radius": 0.1}, {"density": 900.0}, {"points": [[0, 0], [1, 0], [0, 1]]},
+                     {"rolling_friction": 0.1}, {"shape": "sphere"}, {"size": [0.1]})
+    ]  # fmt: skip
+    documents += [{**own, "particle": one} for one in (
+        {"shape": "box"}, kind, {**kind, "points": [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]},
+        {**kind, "points": [[0, 0], [1, 0]]},
+    )]  # fmt: skip
+    documents += [
+        {**own, "air_density": 1.2}, {**own, "surface": [wall]}, {**own, "surface": [hung]},
+        {**own, "rod": [{"from": [0.0, 2.0]}]}, {**own, "run": {"engine": "exact"}},
+        {**own, "rod": [{"from": [0.0, 2.0]}], "run": {"engine": "contact"}},
+        {**own, "stream": {**own["stream"], "width": 0.5}}, {**BELTS, "particle": box},
+        *({**own, "particle": {"name": "a", **box}, "pair": [{"between": ["a", "wall"], **pulls}]}
+          for pulls in ({"cohesion": 0.1}, {"bond_number": 2.0})),
+    ]  # fmt: skip
+    for document, found in zip(documents, in_node(documents), strict=True):
+        keys = keys_refused(document)
+        assert keys, document
+        assert found.get("fault", {}).get("key") in keys, (document, keys, found.get("fault"))
 
 
 def test_a_belt_below_the_impact_is_told_from_the_top():
@@ -350,6 +376,8 @@ def test_what_is_taken_from_an_address_is_refused_where_python_refuses_it(count)
         {**crowd, "surface": [WALL, {**lid, f"{doing}_when": {"touched": "wall"}, **keys}]}
         for doing, keys in (("opens", {}), ("closes", {"opens_at": 1.0}), ("starts", {"turn": 9.0}))
     ]
+    shapes = [*CORNERED, {**CORNERED[0], "material": "wood"}]
+    seeds += [{**moving, "particle": shape} for shape in shapes]
     documents = [spoilt(rng, seeds[n % len(seeds)]) for n in range(count)]
     refused = 0
     for document, found in zip(documents, in_node(documents), strict=True):

@@ -58,7 +58,9 @@ def same_runs(scenes):
     answers = ask("core.mjs", {"lab": lab, "scenes": [given for given, _ in told]})
     for (given, scene), answer in zip(told, answers, strict=True):
         assert parse(answer["toml"]) == scene, given
-        job = engine.Job(module.Module(), build(scene))
+        machine = build(scene)
+        machine = engine.together(machine) if scene.cornered else machine
+        job = engine.Job(module.Module(), machine)
         assert job.run(None) is None
         job.drain()
         assert answer["state"] == "done"
@@ -67,6 +69,7 @@ def same_runs(scenes):
         its = np.array(answer["knots"]).reshape(-1, 11)
         assert np.array_equal(its[:, :9], ours), given
         assert np.array_equal(its[:, 9], knots["disk"]), given
+        assert np.array_equal(its[:, 10], knots["angle"]), given
         events = np.concatenate(job.events).view(EVENT)
         assert [event["t"] for event in answer["events"]] == events["t"].tolist(), given
         assert [event["kind"] for event in answer["events"]] == events["kind"].tolist(), given
@@ -170,6 +173,30 @@ def test_what_clings_passes_or_flies_in_air_does_so_as_in_python():
     same_runs(scenes)
     runs = [simulate(scene).knots.tobytes() for scene in (from_dict(crowd), *scenes[:4])]
     assert len({*runs}) == 5
+
+
+CORNERED = [
+    {"shape": "box", "size": [0.03, 0.012], "spin": True},
+    {"shape": "polygon", "points": [[0.0, 0.0], [0.01, 0.03], [-0.017, 0.011]], "spin": True},
+    {"shape": "polygon", "points": [[0.0, 0.01], [0.02, 0.0], [0.037, 0.013], [0.03, 0.03],
+                                    [0.01, 0.029]], "mass": 0.03},
+]  # fmt: skip
+
+
+def test_boxes_and_polygons_move_as_in_python():
+    names = [{"name": f"k{n}", **kind} for n, kind in enumerate(CORNERED)]
+    boxes = [[[-0.1, 0.05 + 0.1 * n], [0.1, 0.14 + 0.1 * n]] for n in range(3)]
+    kinds = [*names, {"name": "ball", "radius": 0.01}]
+    crowd = {**BALL, "particle": kinds, "surface": [LINE], "stream": [
+        *({"particle": f"k{n}", "fill": fill, "count": 3, "interact": True, "omega": 3.0 * (n < 2)}
+          for n, fill in enumerate(boxes)),
+        {"particle": "ball", "at": [0.0, 0.4], "velocity": [0.0, -0.5]},
+    ]}  # fmt: skip
+    alone = [{**BALL, "particle": kind, "surface": [LINE]} for kind in CORNERED]
+    row = {"stream": {"at": [-0.1, 0.2], "to": [0.2, 0.2], "velocity": [0.3, 0.0], "count": 4}}
+    moving = [{**base, "surface": [{**LINE, **MOVING[0]}]} for base in (crowd, alone[0])]
+    scenes = [crowd, {**crowd, "gravity_deg": 30.0}, *alone, {**alone[1], **row}, *moving]
+    same_runs([load("dominoes"), load("domino-gate"), *map(from_dict, scenes)])
 
 
 @pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.slow)])

@@ -106,11 +106,10 @@ def overlap(one, other):
         pytest.param(kind, name, marks=() if (kind, name) in SAMPLE else pytest.mark.slow)
         for kind in SIZES
         for name in shipped()
-        if name not in ("damper-plate", "domino-gate", "dominoes", "see-saw")
+        if name not in ("damper-plate", "see-saw")
     ],
 )
 def test_what_is_seen_of_each_scene(shown, kind, name, tmp_path):
-    """One is left out that needs boxes."""
     touch = kind == "phone"
     sizes = SIZES[kind]
     options = {"has_touch": touch, "is_mobile": touch}

@@ -469,7 +469,8 @@ def live(
     """Show SCENE as a live page: drag the plate, and path, numbers and ledger follow.
 
     Without SCENE it opens an empty picture with parts to build a machine of, and examples. Of a
-    scene with boxes, polygons or mass points it says what it cannot show, and opens the rest.
+    scene with mass points, or with boxes and polygons beside what only the pymunk engine has with
+    them, it says what it cannot show, and opens the rest.
 
     It is one HTML file with the contact engine in it, the same as in `chutelab run --engine
     contact`: any browser opens it, from a memory stick or on a phone, without installation or

@@ -283,8 +283,8 @@ def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
     if machine.air:
         yield "air_density", machine.air, "0 with boxes and polygons: drag is that of a sphere"
     for n, pair in enumerate(scene.pair):
-        if pair.cohesion:
-            yield f"pair[{n}].cohesion", pair.cohesion, "0 with boxes and polygons"
+        if pull := pair.clings:
+            yield f"pair[{n}].{pull}", getattr(pair, pull), "0 with boxes and polygons"
 
 
 def unjoined(machine: Machine) -> str:

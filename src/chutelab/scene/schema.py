@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from math import hypot, sqrt
+from math import sqrt
 from typing import Annotated, Any, Final, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
@@ -457,7 +457,7 @@ class SceneTables(Table):
         if isinstance(span, tuple):
             filled._resolve("radius", 0.5 * (span[0] + span[1]))
         if shaped:
-            filled._fill("radius", max(hypot(x, y) for x, y in filled.outline))
+            filled._fill("radius", max(sqrt(x * x + y * y) for x, y in filled.outline))
         if density is not None:
             filled._fill("mass", sphere_mass(density, filled.radius))
         return filled

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
 from itertools import pairwise
 from math import hypot, isfinite, nan, pi
-from operator import lt
+from operator import add, lt
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import (
@@ -392,13 +393,18 @@ def is_convex(points: tuple[Point, ...]) -> bool:
     return all(turn > 0.0 for turn in turns) or all(turn < 0.0 for turn in turns)
 
 
+def _plain_sum(numbers: list[float]) -> float:
+    """Return a sum that is rounded after each number, as pages do; later Pythons' `sum` is not."""
+    return reduce(add, numbers)
+
+
 def about_centroid(points: tuple[Point, ...]) -> tuple[Point, ...]:
     """Return the corners of a polygon, counterclockwise, moved so that its centroid is (0, 0)."""
     following = points[1:] + points[:1]
     crosses = [a[0] * b[1] - a[1] * b[0] for a, b in zip(points, following, strict=True)]
-    twice = sum(crosses)
+    twice = _plain_sum(crosses)
     x, y = (
-        sum((a[n] + b[n]) * c for a, b, c in zip(points, following, crosses, strict=True))
+        _plain_sum([(a[n] + b[n]) * c for a, b, c in zip(points, following, crosses, strict=True)])
         / (3.0 * twice)
         for n in (0, 1)
     )
@@ -414,7 +420,8 @@ def polygon_moment(points: tuple[Point, ...]) -> float:
         a[0] * a[0] + a[0] * b[0] + b[0] * b[0] + a[1] * a[1] + a[1] * b[1] + b[1] * b[1]
         for a, b in zip(points, following, strict=True)
     ]
-    return sum(c * s for c, s in zip(crosses, squares, strict=True)) / (6.0 * sum(crosses))
+    moments = [c * s for c, s in zip(crosses, squares, strict=True)]
+    return _plain_sum(moments) / (6.0 * _plain_sum(crosses))
 
 
 Corners = Annotated[

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any, Final
 
-from chutelab.engines.simulation import unjoined
+from chutelab.engines.simulation import uncornered, unjoined
 from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
 from chutelab.scene.conflicts import EITHER, JOINTS, RULES, tree
@@ -15,9 +15,6 @@ from chutelab.scene.units import LARGEST, SHORTEST
 
 MOST: Final = 100_000
 """Particles that a page has room for: it keeps their tracks, and draws them in each frame."""
-
-ABSENT: Final = (("particle", "size"), ("particle", "points"))
-"""Keys that pages do not have."""
 
 LISTS: Final = ("material", "pair", "conveyor", "surface", "sensor", *JOINTS)
 
@@ -45,6 +42,9 @@ PARTS: Final = (
     _part("arc", "C", "surface", "arc arc arc", "radius restitution friction", "center"),
     _part("ball", "B", "stream", "at", "velocity start restitution",
           velocity=[0.0, 0.0], interact=True),
+    _part("box", "A", "stream", "at", "size mass omega", "size",
+          velocity=[0.0, 0.0], interact=True, shape="box", size=[0.1, 0.06], mass=0.25, spin=True,
+          material="wood"),
     _part("stream", "R", "stream", "at to", "count rate velocity", "count",
           velocity=[0.0, 0.0], count=60, rate=40.0, interact=True),
     _part("pegs", "G", "surface", "center", "radius repeat restitution", "center repeat",
@@ -71,7 +71,8 @@ PARTS: Final = (
 )  # fmt: skip
 """What can be added to a machine, a row each: its word, the key that begins it, its table, the key
 that each point set in the picture is for, those shown first (three of them), those that tell it
-from another part of its table, and what else it begins with (m: for a picture one metre high)."""
+from another part of its table, and what else it begins with (m and kg: for a picture one metre
+high). What a stream has not is of the kind of its particles."""
 
 
 def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
@@ -83,7 +84,7 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     Parameters
     ----------
     scene : Scene, optional
-        One scene, no family; of disks and spheres. None is a machine that is still empty.
+        One scene, no family; without mass points. None is a machine that is still empty.
     partly : bool
         Whether what the page cannot show is left out, instead of refused.
 
@@ -103,8 +104,9 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     Raises
     ------
     SceneError
-        If the page cannot show it: mass points, boxes, polygons, or too many particles; or
-        if the scene contradicts itself where it is laid out.
+        If the page cannot show it: mass points, too many particles, or boxes and polygons with what
+        the contact engine has not beside them; or if the scene contradicts itself where it is
+        laid out.
     """
     materials = {
         name: {key: getattr(preset.material, key) for key in VALUES}
@@ -120,18 +122,21 @@ def describe(scene: Scene | None, *, partly: bool = False) -> dict[str, Any]:
     if scene is None:
         examples = {name: describe(load(name))["scene"] for name in EXAMPLES}
         return {"scene": {"stream": []}, **common, "examples": examples}
-    allowed = "a page that answers shows disks and spheres"
-    faults = []
+    cornered = [*uncornered(build(scene))] if scene.cornered else []
+    faults = [Fault(*why) for why in cornered]
     lacks: Counter[str] = Counter()
-    foreign = {n for n, kind in enumerate(scene.particles) if kind.outline or kind.radius == 0.0}
+    foreign = {
+        n
+        for n, kind in enumerate(scene.particles)
+        if kind.radius == 0.0 or (kind.outline and cornered)
+    }
     for n in sorted(foreign):
         kind, table = scene.particles[n], scene.head("particle", n)
         many = sum(s.count for s, its in zip(scene.streams, scene.kinds, strict=True) if its == n)
         lacks[kind.shape if kind.outline else "point"] += many
-        if kind.outline:
-            faults.append(Fault(f"{table}.shape", kind.shape, allowed))
-        else:
-            faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
+        if not kind.outline:
+            allowed = "more than 0; a page that answers shows what has a size"
+            faults.append(Fault(f"{table}.radius", 0.0, allowed))
     # Joints are told by the numbers of particles, of which some would be left out.
     lacks += Counter(table for table, _ in scene.joints if foreign)
     for n, pair in enumerate(scene.pair):
@@ -215,12 +220,9 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             rule = _rule([table, 0, key] if several else [table, key])
             if field.is_required():
                 rule["required"] = True
-            if (table, key) in ABSENT:
-                continue
             rules[table][key] = rule
-    # Mass points, boxes and polygons are for other engines.
+    # Mass points are for another engine.
     particle = rules["particle"]
-    particle["shape"]["form"] = {"enum": ["disk", "sphere"]}
     particle["radius"]["low"] = SHORTEST
     number, span = particle["radius"]["form"]["anyOf"]
     number = {"type": number["type"], "minimum": SHORTEST, "maximum": number["maximum"]}

@@ -48,7 +48,7 @@ def html(
     Parameters
     ----------
     scene : Scene, optional
-        Of disks or spheres, without strings. None begins with an empty machine.
+        Without mass points. None begins with an empty machine.
     language : {"en", "de"}
         Of all that the page says; what the scene says stands as it is.
     home : tuple of str, optional

@@ -2,6 +2,7 @@
 
 import type { Lab } from "./lab.ts";
 import type { Recording } from "./recording.ts";
+import type { Point } from "./scene.ts";
 
 export type Hue = "material" | "kind" | "speed" | "size";
 
@@ -94,6 +95,32 @@ class Balls {
     const size = Math.min(LARGEST, Math.ceil(r * (globalThis.devicePixelRatio || 1)));
     const picture = this.picture(this.kindOf(i), size), wide = (r * picture.width) / (2 * size);
     context.drawImage(picture, x - wide, y - wide, 2 * wide, 2 * wide);
+  }
+
+  /** Paint a box or polygon by its corners, px; the light comes from where it comes on balls. */
+  paintCorners(
+    context: CanvasRenderingContext2D, i: number, corners: Point[], r: number, speed: number,
+  ) {
+    const ramp = this.hue === "speed" || this.hue === "size";
+    const value = this.hue === "speed" ? speed : 1e3 * (this.lab.machine?.radius[i] ?? 0);
+    const [light, middle, dark] = this.shades(i), [x, y] = [0, 1].map((n) =>
+      corners.reduce((sum, corner) => sum + corner[n], 0) / corners.length);
+    let fill: string | CanvasGradient = ramp ? this.colour(`v${this.step(value)}`) : middle;
+    if (!ramp && r >= SHADED) {
+      fill = context.createLinearGradient(x - 0.6 * r, y - 0.8 * r, x + 0.6 * r, y + 0.8 * r);
+      fill.addColorStop(0, light);
+      fill.addColorStop(0.45, middle);
+      fill.addColorStop(1, dark);
+    }
+    context.fillStyle = fill;
+    context.beginPath();
+    for (const corner of corners) context.lineTo(...corner);
+    context.closePath();
+    context.fill();
+    if (r < SHADED) return;
+    context.lineWidth = Math.min(1, 0.2 * r);
+    context.strokeStyle = ramp ? this.colour("ring") : dark;
+    context.stroke();
   }
 
   /** A shaded ball, made once for each radius, px: to draw a large one small takes long. */

@@ -7,6 +7,7 @@ import {
   type Part,
 } from "./edit.ts";
 import { linesOfJoints, namesOfJoints, pinsOf } from "./joints.ts";
+import { cornersOf, isInside } from "./machine.ts";
 import { carried, poseOf } from "./motion.ts";
 import { pointsOf } from "./callout.ts";
 import { bodyOf, roundTo, valuesOf, type Handle } from "./handles.ts";
@@ -403,7 +404,10 @@ class Bench {
     machine?.releases.forEach((_, i) => {
       const state = recording?.tracks[i]?.state(t);
       if (!state || state.ended) return;
-      const far = Math.hypot(view.px(state.x) - at[0], view.py(state.y) - at[1]);
+      const corners = cornersOf(machine, i, state, recording?.tracks[i].angle(t) ?? 0);
+      const isIn = corners.length > 0
+        && isInside(corners, [view.worldX(at[0]), view.worldY(at[1])]);
+      const far = isIn ? 0 : Math.hypot(view.px(state.x) - at[0], view.py(state.y) - at[1]);
       if (far >= Math.max((machine.radius[i] ?? 0) * scale, BALL_REACH) || far >= least) return;
       [least, nearest] = [far, i];
     });

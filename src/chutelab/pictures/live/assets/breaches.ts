@@ -56,8 +56,8 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
   core.doubles.set(knots, core.get("knots", "Laws") >> 3);
   core.doubles.set(books, core.get("books", "Laws") >> 3);
   core.ints.set(offsets, core.get("offsets", "Laws") >> 2);
-  radius.forEach((own, i) => {
-    const body = { radius: own, mass: mass[i], inertia: inertia[i], gravity };
+  radius.forEach((_, i) => {
+    const body = { radius: innerOf(machine, i), mass: mass[i], inertia: inertia[i], gravity };
     core.fill("bodies", "Body", i, body, "Laws");
   });
   states.forEach((row, n) => core.fill("swings", "Swing", n, row, "Laws"));
@@ -72,6 +72,13 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
   core.set("end", end, "Room");
   return core.rows("breaches", "Breach", core.get("breach_count", "Laws"), "Laws") as Breach[];
 }
+
+/** The radius of a particle, m, or of the circle inside its corners. */
+const innerOf = ({ outlines, releases, radius }: Machine, i: number) =>
+  outlines[releases[i].kind].reduce((least, [x, y], n, all) => {
+    const [u, v] = all[(n + 1) % all.length];
+    return Math.min(least, (x * (v - y) - y * (u - x)) / Math.hypot(u - x, v - y));
+  }, radius[i]);
 
 /** All pieces of surfaces as the core's laws take them: straight ones, bent ones, the pulley. */
 function barriersOf({ segments, arcs, pulley, movers }: Machine) {

@@ -1,6 +1,7 @@
 // What shows that something is chosen: dashes round it, and a card beside it, in the best place.
 
 import { linesOfJoints, pinsOf } from "./joints.ts";
+import { cornersOf } from "./machine.ts";
 import { PLATE, svg } from "./scenery.ts";
 import type { Inspector } from "./inspector.ts";
 import type { Lab } from "./lab.ts";
@@ -159,7 +160,10 @@ function drawOutline(stage: Stage) {
       if (release.stream !== stream || bodies.length > 40) return;
       const state = recording?.tracks[i]?.state(t) ?? release;
       const r = Math.max(LEAST, machine.radius[i] * view.scale);
-      bodies.push([svg("circle", { cx: view.px(state.x), cy: view.py(state.y), r }), 0]);
+      const corners = cornersOf(machine, i, state, recording?.tracks[i]?.angle(t) ?? 0);
+      bodies.push([corners.length ? svg("polygon", { points: corners.map(([x, y]) =>
+        `${view.px(x)},${view.py(y)}`).join(" ") })
+        : svg("circle", { cx: view.px(state.x), cy: view.py(state.y), r }), 0]);
     });
     for (const line of recording ? linesOfJoints(recording, t) : []) {
       if (line.name !== name) continue;

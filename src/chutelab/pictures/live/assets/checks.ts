@@ -162,6 +162,7 @@ export function* conflictsOf(scene: Scene, given: Given, lab: Lab): Generator<Wr
   yield* pieceConflicts(scene);
   yield* motionConflicts(scene, given);
   yield* jointConflicts(scene, given);
+  yield* corneredConflicts(scene, given);
   for (const n of scene.streams.keys()) yield* rateConflicts(scene, given, n);
   const counts = scene.streams.map(({ count }) => count);
   const most = scene.most;
@@ -283,6 +284,42 @@ function* jointConflicts(scene: Scene, given: Given): Generator<Wrong> {
   }
   const hinged = [...scene.plates, ...scene.surface].find(({ hinge }) => hinge);
   if (hinged) yield [`${hinged.name ?? "plate"}.hinge`, hinged.hinge, "joint-hinge"];
+}
+
+/** Yields what the contact engine does not have with boxes and polygons. */
+function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
+  const { particles, run, joints, incoming, pair } = scene, text = "cornered";
+  if (!particles.some(({ outline }) => outline.length)) return;
+  if (run.engine === "exact") yield ["run.engine", run.engine, "not-exact"];
+  if (joints.length) {
+    yield [run.engine === "contact" ? "run.engine" : `${joints[0].kind}[0].particle`,
+      joints[0].particle, text];
+  }
+  for (const [n, { outline, rolling_friction: rolls, points }] of particles.entries()) {
+    if (outline.length && rolls) yield [pathOf(given, "particle", n, "rolling_friction"), rolls, text];
+    if (points && !isConvex(points)) yield [pathOf(given, "particle", n, "points"), points, "convex"];
+  }
+  for (const [n, { width, particle }] of scene.streams.entries()) {
+    const own = particles[scene.kinds[n]];
+    if (own.outline.length && width !== undefined) {
+      yield [pathOf(given, "stream", n, "width"), particle, "other-shape"];
+    }
+  }
+  const movers = moversOf(scene).some(([, { hinge }]) => hinge);
+  if (movers || scene.surface.some(({ passes }) => passes)) yield ["run.engine", run.engine, text];
+  if (incoming?.friction === "adhesion") yield ["incoming.friction", "adhesion", "cornered-grip"];
+  if (scene.air_density) yield ["air_density", scene.air_density, text];
+  const clings = pair.findIndex(clinging);
+  if (clings >= 0) yield [`pair[${clings}].${clinging(pair[clings])}`, undefined, text];
+}
+
+/** Tells whether points are the corners of a convex polygon, in their order. */
+function isConvex(points: Point[]) {
+  const turns = points.map(([x, y], n) => {
+    const [[u, v], [p, q]] = [1, 2].map((k) => points[(n + k) % points.length]);
+    return (u - x) * (q - v) - (v - y) * (p - u);
+  });
+  return turns.every((turn) => turn > 0) || turns.every((turn) => turn < 0);
 }
 
 function* kindConflicts(scene: Scene, given: Given): Generator<Wrong> {

@@ -153,8 +153,11 @@ function idle({ incoming, particles }: Scene, table: string, row: any): string[]
     const kinds = row.between.every((name: string) => particles.some((one) => one.name === name));
     return [...(kinds ? [] : ["meet"]), ...(row.meet ? [] : ["restitution", "friction", "cohesion", "bond_number"])];
   }
+  if (table === "particle" && row.outline.length) {
+    return ["shape", "radius", "density", "rolling_friction", row.size ? "points" : "size"];
+  }
   const weighed = table === "particle" && (row.given.density ?? row.given.material) !== undefined;
-  return [...(weighed ? ["mass"] : []), ...(table === "outgoing" ? ["drop_from"] : [])];
+  return [...(weighed ? ["mass"] : []), ...(table === "particle" ? ["size", "points"] : []), ...(table === "outgoing" ? ["drop_from"] : [])];
 }
 
 function valueOf(scene: Scene, section: Section, key: string) {
@@ -197,6 +200,7 @@ function ownFields(page: Page, given: Given, scene: Scene, section: Section): Fi
           .map((one) => one.name))
         : name === "particle" && table === "stream"
           ? scene.particles.map((kind) => String(kind.name))
+        : name === "shape" ? ["disk", "sphere"]
         : name === "passes" ? rowOf(scene, section).center ? ["in", "out"]
           : ["up", "down", "left", "right"]
         : name === "material" && table === "particle" ? [...scene.materials.keys()]

@@ -4,8 +4,10 @@
 type Struct = { size: number, fields: Record<string, [number, string, number]> };
 export type Layout = { structs: Record<string, Struct>, enums: Record<string, Record<string,
   number>>, constants: Record<string, number> };
-/** Of a run that goes on after a change: spins, rad/s, and which particles are under way already */
-export type Machine = import("./machine.ts").Machine & { spins?: number[], goesOn?: boolean[] };
+/** Of a run that goes on after a change: spins, rad/s, by how much particles have turned, rad, and
+ * which are under way already */
+export type Machine = import("./machine.ts").Machine & { spins?: number[], angles?: number[],
+  goesOn?: boolean[] };
 export type Event = { t: number, x: number, y: number, before: number[], after: number[],
   normal: number, tangent: number, disk: number, other: number, kind: number,
   surface: number };
@@ -166,13 +168,14 @@ class Core extends Memory {
     this.machine = machine;
     this.swung = this.borne = 0;
     this.forget();
-    const { releases, rolling, falls, pulley } = machine, kinds = rolling.length;
+    const { releases, rolling, falls, pulley, outlines } = machine, kinds = rolling.length;
+    const firsts = outlines.map((_, n) => outlines.slice(0, n).flat().length);
     const rows = surfaceRows(machine, this.layout.enums.Shape);
     this.setAll("World", {
       disk_count: releases.length, surface_count: rows.length, kind_count: kinds,
       owner_count: machine.surfaces.length, interact: Number(machine.interact),
       mover_count: machine.movers.length, trigger_count: machine.triggers.length,
-      joint_count: machine.joints.length,
+      joint_count: machine.joints.length, outline_count: outlines.flat().length,
       until: this.layout.enums.Until[`UNTIL_${machine.until.toUpperCase()}`],
       landing: machine.landing, ride_owner: 0, pulley: pulley ? machine.segments.length : -1,
       ride_incline: pulley ? pulley.incline : 0, g: machine.gravity,
@@ -180,6 +183,7 @@ class Core extends Memory {
       dt: machine.dt, end_time: machine.endTime,
     });
     this.work("lay_out_world");
+    this.doubles.set(outlines.flat(2), this.get("outlines") >> 3);
     machine.movers.forEach((mover, k) => this.fill("movers", "Mover", k, mover));
     machine.joints.forEach(({ kind, from, ...joint }, k) => this.fill("joints", "Joint", k,
       { ...joint, kind: this.layout.enums.Tie[kind.toUpperCase()], from: from ?? [NaN, NaN] }));
@@ -210,7 +214,8 @@ class Core extends Memory {
         spin: machine.spins?.[i] ?? one.omega, release: one.t,
         radius: machine.radius[i], mass: machine.mass[i], inertia: machine.inertia[i],
         kind: one.kind, rides: Number(one.carried), goes_on: Number(machine.goesOn?.[i] ?? false),
-        exit_box: one.exitBox,
+        exit_box: one.exitBox, turned: machine.angles?.[i] ?? 0,
+        corners: outlines[one.kind].length, outline: firsts[one.kind],
       });
     });
     this.work("prepare");
@@ -302,7 +307,7 @@ class Core extends Memory {
       const wait = (n: number) => this.get("waits") + (i * WAITS + n) * 8 * KNOT_ROW;
       for (let n = Math.max(0, waits - 2); n < waits; n += 1) {
         const isLatest = this.doubles[wait(n) >> 3] === this.doubles[wait(waits - 1) >> 3];
-        if (isLatest) rows.push(...some(wait(n), 9), i, 0);
+        if (isLatest) rows.push(...some(wait(n), 9), i, this.doubles[(wait(n) >> 3) + 10]);
       }
       if (mode === Mode.FREE && this.ints[(track + Track.fields.lasted[0]) >> 2]) continue;
       let state = ["t", "x", "y", "vx", "vy"].map(at);
@@ -313,7 +318,8 @@ class Core extends Memory {
         const straight = Math.min(along, 0);
         state = [now, rho * s + straight * c, rho * c - straight * s, v * c, -v * s];
       }
-      rows.push(...state, at("spin"), ...some(disk + Disk.fields.entries[0], 3), i, 0);
+      rows.push(...state, at("spin"), ...some(disk + Disk.fields.entries[0], 3), i,
+        at("turned"));
     }
     return new Float64Array(rows);
   }

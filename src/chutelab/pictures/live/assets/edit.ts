@@ -62,21 +62,29 @@ function arcOf(a: Point, c: Point, b: Point): Given {
   };
 }
 
-/** A kind of particles of a material, made where there is none; without one the first kind.
- * @param radius m, of a kind that is made
+/** Keys of a part that are of the kind of its particles. */
+const KIND = ["shape", "size", "mass", "spin", "material"];
+
+/** A kind of balls or boxes of a material, made where there is none; without one the first kind.
+ * @param radius m, of balls that are made
+ * @param box keys of boxes that are made; none of balls
  * @returns the scene, and the name of the kind where there are several */
-function withKind(given: Given, material: string, radius: number): [Given, string | undefined] {
+function withKind(
+  given: Given, material: string, radius: number, box: Given,
+): [Given, string | undefined] {
   const empty = Array.isArray(given.stream) && !given.stream.length && !given.particle;
   let kinds = empty ? [] : listOf(given.particle ?? {});
-  if (!material && kinds.length) return [given, kinds.length > 1 ? kinds[0].name : undefined];
-  const wanted = material || "steel", known = kinds.find((one) => one.material === wanted);
+  const alike = kinds.filter(({ size, points }) => (box.size ? size : !size && !points));
+  if (!material && alike.length) return [given, kinds.length > 1 ? alike[0].name : undefined];
+  const wanted = material || (box.material ?? "steel");
+  const known = alike.find((one) => one.material === wanted);
   if (known) return [given, kinds.length > 1 ? known.name : undefined];
   // Where there are several, each has a name.
   kinds = kinds.map((one) => ({ name: freeName(given, "kind"), ...one }));
   const name = kinds.some((one) => one.name === wanted) ? freeName(given, wanted) : wanted;
-  const size = kinds.length ? kinds[0].radius ?? 0.0063 : radius;
-  const made = { name, material: wanted, shape: "sphere", radius: size, spin: true };
-  return [{ ...given, particle: [...kinds, made] }, name];
+  const size = alike.length ? alike[0].radius ?? 0.0063 : radius;
+  const made = box.size ? box : { shape: "sphere", radius: size, spin: true };
+  return [{ ...given, particle: [...kinds, { ...made, name, material: wanted }] }, name];
 }
 
 /** Of each particle its stream by name, and which of it: what it is called while streams change. */
@@ -180,7 +188,14 @@ function withPart(
   }
   if (row.travel) row.travel.to = points[part.places.indexOf("travel.to")];
   if (part.table !== "stream") return withRow(given, part.table, row);
-  const [kinds, kind] = withKind(given, material, BALL * unit);
+  const box: Given = {};
+  for (const key of KIND) {
+    if (key in row) box[key] = row[key];
+    delete row[key];
+  }
+  if (box.size) box.size = box.size.map((one: number) => roundOff(one * unit, 6));
+  if (box.mass) box.mass = Number((box.mass * unit ** 3).toPrecision(2));
+  const [kinds, kind] = withKind(given, material, BALL * unit, box);
   if (kind) row.particle = kind;
   if (start) row.start = start;
   return withRow(kinds, "stream", row);

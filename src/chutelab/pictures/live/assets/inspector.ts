@@ -334,7 +334,10 @@ class Inspector {
 
   /** The part of the palette that a thing is. */
   kindOf({ table, row }: Section): Part | undefined {
-    const { given, data } = this.lab, keys = listOf(given?.[table])[row] ?? {};
+    const { given, data, scene } = this.lab, own = listOf(given?.[table])[row] ?? {};
+    // A box is told by what it consists of.
+    const { size } = table === "stream" && scene ? scene.particles[scene.kinds[row]] : {} as Given;
+    const keys: Given = size ? { size, ...own } : own;
     const fits = data.parts.filter((part: Part) =>
       part.table === table && part.needs.every((key) => key in keys)) as Part[];
     return fits.sort((a, b) => b.needs.length - a.needs.length)[0];

@@ -2,7 +2,9 @@
 // last bit: the core lays the surfaces and draws the releases.
 import { lay, type Mover } from "./plan.ts";
 import { draw, type Release } from "./releases.ts";
-import { Fault, cohesionOf, met, passes, triggersOf, type Joint, type Scene } from "./scene.ts";
+import {
+  Fault, cohesionOf, met, passes, polygonMoment, triggersOf, type Joint, type Point, type Scene,
+} from "./scene.ts";
 import { RADIANS, sinCos } from "./trig.ts";
 
 export interface Segment {
@@ -79,6 +81,7 @@ export interface Machine {
   radius: number[]; // of each particle, m
   mass: number[]; // kg
   inertia: number[]; // kg m²
+  outlines: Point[][]; // by kind: corners of boxes and polygons, m; none of what is round
   pairRestitution: number[][]; // of two kinds
   pairFriction: number[][];
   cohesion: number[][]; // N; by which each kind pulls at each kind, and at each surface
@@ -115,6 +118,9 @@ export function build(scene: Scene): Machine {
   const bound = last + run.max_time;
   const tilt = scene.gravity_deg * RADIANS, [sin, cos] = sinCos(tilt);
   const pairs = every.map((a) => every.map((b) => met(scene, a, b)));
+  // Boxes run all at a time; those that never meet pass by.
+  const outlines = particles.map(({ outline }) => outline);
+  const isAlone = !scene.crowded && outlines.some(({ length }) => length);
   return waiting({
     surfaces: names,
     gravity: scene.gravity,
@@ -125,7 +131,7 @@ export function build(scene: Scene): Machine {
     until: typeof run.until === "string" ? run.until : "time",
     endTime: typeof run.until === "string" ? bound : Math.min(bound, run.until),
     dt: run.dt,
-    interact: scene.crowded,
+    interact: scene.crowded || isAlone,
     loads: run.loads ?? 0,
     segments,
     arcs,
@@ -141,8 +147,9 @@ export function build(scene: Scene): Machine {
     releases,
     radius,
     ...heft(scene, releases, radius),
+    outlines,
     pairRestitution: pairs.map((row, a) => row.map(([restitution], b) =>
-      (passes(scene, a, b) ? PASSES : restitution))),
+      (isAlone || passes(scene, a, b) ? PASSES : restitution))),
     pairFriction: pairs.map((row) => row.map(([, friction]) => friction)),
     cohesion: every.map((kind) => [...every, ...names].map((other) =>
       cohesionOf(scene, kind, other))),
@@ -209,6 +216,21 @@ function joined({ joints }: Scene, releases: Release[]): Machine["joints"] {
   });
 }
 
+/** The corners of a particle that is at a place and has turned, m; none of what is round. */
+export function cornersOf(
+  { outlines, releases }: Machine, i: number, { x, y }: { x: number, y: number }, angle: number,
+): Point[] {
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  return (outlines[releases[i]?.kind ?? 0] ?? []).map(([u, v]) =>
+    [x + c * u - s * v, y + s * u + c * v]);
+}
+
+/** Tells whether a place is inside convex corners, counterclockwise. */
+export const isInside = (corners: Point[], [x, y]: Point) => corners.every(([a, b], n) => {
+  const [u, v] = corners[(n + 1) % corners.length];
+  return (u - a) * (y - b) - (v - b) * (x - a) >= 0;
+});
+
 /** Returns the names of all surfaces, in the order of the ledger. */
 function surfaceNames({ incoming, plates, outgoing, conveyor, surface }: Scene) {
   const hanging = plates.filter(({ pivot }) => pivot !== undefined);
@@ -231,7 +253,9 @@ function heft(scene: Scene, releases: Release[], radius: number[]) {
     const square = size * size;
     const cube = square * size;
     mass.push(one.mass * cube);
-    inertia.push(moment * one.mass * (one.radius * one.radius) * (cube * square));
+    const turning = !one.outline.length ? moment * one.mass * (one.radius * one.radius)
+      : one.spin ? one.mass * polygonMoment(one.outline) : 0.0;
+    inertia.push(turning * (cube * square));
   }
   return { mass, inertia };
 }

@@ -4,7 +4,7 @@
 import { Balls } from "./balls.ts";
 import { html, icon, iconButton } from "./panels.ts";
 import { Scenery, svg } from "./scenery.ts";
-import { build } from "./machine.ts";
+import { build, cornersOf } from "./machine.ts";
 import { resolve, type Given } from "./scene.ts";
 import { View, boxOf } from "./view.ts";
 import type { Bench } from "./bench.ts";
@@ -195,8 +195,11 @@ class Palette {
     drawn.append(scenery.layer);
     machine.releases.slice(0, MOST_BALLS).forEach(({ x, y, stream, t }, i) => {
       if (t > 0.5) return;
-      drawn.append(svg("circle", { cx: view.px(x), cy: view.py(y), class: `kind-${stream % 5}`,
-        r: Math.max(1.6, machine.radius[i] * view.scale) }));
+      const corners = cornersOf(machine, i, { x, y }, 0), own = { class: `kind-${stream % 5}` };
+      drawn.append(corners.length ? svg("polygon", { ...own, points: corners.map(([u, v]) =>
+        `${view.px(u)},${view.py(v)}`).join(" ") })
+        : svg("circle", { cx: view.px(x), cy: view.py(y), ...own,
+          r: Math.max(1.6, machine.radius[i] * view.scale) }));
     });
     return drawn;
   }

@@ -55,7 +55,8 @@ function rowOf(scene: Scene, names: string[]): number[] {
   return [
     ...numbersOf("SceneKeys", scene),
     ...all("ParticleKeys", scene.particles.map((one) => ({
-      ...one, moment: !one.spin ? 0.0 : one.shape === "sphere" ? 0.4 : 0.5, corners: 0,
+      ...one, moment: !one.spin ? 0.0 : one.shape === "sphere" ? 0.4 : 0.5,
+      corners: one.outline.length,
     }))),
     ...all("StreamKeys", scene.streams.map((one, n) => ({
       ...one, kind: scene.kinds[n], seed: wordsOf(BigInt(one.seed)),

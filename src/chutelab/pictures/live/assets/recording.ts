@@ -11,7 +11,8 @@ export type Ledger = { start: number, kinetic: number, potential: number, belt_w
   push_work: number, restitution_loss: number, friction_loss: number, residual: number,
   spring: number, damper_loss: number };
 
-const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, FRICTION = 8;
+const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, FRICTION = 8,
+  ANGLE = 10;
 
 /** Of events, as in the enum Kind of the core. */
 const RELEASE = 0, SEPARATION = 1;
@@ -21,8 +22,9 @@ const MOST_CHORDS = 500;
 
 /** Knots of one particle, `KNOT_ROW` doubles each. */
 class Track {
-  /** @param up the direction against gravity */
-  constructor(readonly up: [number, number] = [0, 1]) {}
+  /** @param up the direction against gravity
+   * @param tells whether its knots have angles: what has corners is turned to the last bit */
+  constructor(readonly up: [number, number] = [0, 1], readonly tells = false) {}
 
   rows = new Float64Array(8 * KNOT_ROW);
 
@@ -127,14 +129,14 @@ class Track {
       this.tip = 0;
     }
     if (!state || this.end <= t) return;
-    const { x, y, vx, vy, spin } = state;
+    const { x, y, vx, vy, spin } = state, angle = this.angle(t);
     this.count = this.knotBefore(t) + 1;
     this.turns.length = Math.min(this.turns.length, this.count);
     this.low = Infinity;
     this.seen = 0;
     this.near = 0;
     this.tip = 0;
-    this.add([t, x, y, vx, vy, spin, ...entries, 0], 0, 0, null);
+    this.add([t, x, y, vx, vy, spin, ...entries, 0, angle], 0, 0, null);
   }
 
   /** Position, velocity and spin; null before the release, and where the track ended after it. */
@@ -214,6 +216,7 @@ class Track {
   angle(t: number) {
     if (!this.count || t <= this.begin) return 0;
     const i = t >= this.end ? this.count - 1 : this.knotBefore(t);
+    if (this.tells) return this.told(t, i);
     for (let n = this.turns.length; n < this.count; n += 1) {
       const h = n ? this.at(n, T) - this.at(n - 1, T) : 0;
       const mean = n ? 0.5 * (this.at(n, SPIN) + this.at(n - 1, SPIN)) : 0;
@@ -222,6 +225,15 @@ class Track {
     const h = Math.min(t, this.end) - this.at(i, T);
     const spin = (this.state(Math.min(t, this.end)) as State).spin;
     return this.turns[i] + 0.5 * h * (this.at(i, SPIN) + spin);
+  }
+
+  /** The integral of its spin from a knot on, corrected evenly up to the next. */
+  told(t: number, i: number) {
+    const from = this.at(i, ANGLE), spin = this.at(i, SPIN);
+    if (i === this.count - 1) return from;
+    const h = this.at(i + 1, T) - this.at(i, T), s = (t - this.at(i, T)) / h;
+    const even = this.at(i + 1, ANGLE) - from - 0.5 * h * (spin + this.at(i + 1, SPIN));
+    return from + s * (h * (spin + 0.5 * s * (this.at(i + 1, SPIN) - spin)) + even);
   }
 
   /** Angle at each knot, as far as it was asked for. */
@@ -247,6 +259,9 @@ function namesOf({ releases, streams }: Machine) {
     return `${count[stream]} ${streams[stream]}`;
   });
 }
+
+const trackOf = ({ up, outlines, releases }: Machine, i: number) =>
+  new Track(up, outlines[releases[i].kind].length > 0);
 
 /** The tracks and events of a run, which may still go on. */
 class Recording {
@@ -280,7 +295,7 @@ class Recording {
 
   constructor(public machine: Machine) {
     waiting(machine);
-    this.tracks = machine.releases.map(() => new Track(machine.up));
+    this.tracks = machine.releases.map((_, i) => trackOf(machine, i));
     for (const { surface } of machine.movers) this.swings.set(surface, new Swings());
   }
 
@@ -373,7 +388,7 @@ class Recording {
   goOn(t: number, machine: Machine): Machine {
     const renamed: { index: number, entries: number[], goesOn: boolean }[] = [];
     const releases: Machine["releases"] = [];
-    const spins: number[] = [];
+    const spins: number[] = [], angles: number[] = [];
     // Where each is in the run so far: streams that come and go move those after them.
     const earlier = new Map(namesOf(this.machine).map((name, index) => [name, index]));
     const was = namesOf(machine).map((name) => earlier.get(name) ?? -1);
@@ -383,7 +398,7 @@ class Recording {
       return ledger
         ? [ledger.belt_work, ledger.restitution_loss, ledger.friction_loss] : [0, 0, 0];
     });
-    this.tracks = was.map((index) => this.tracks[index] ?? new Track(machine.up));
+    this.tracks = was.map((index, i) => this.tracks[index] ?? trackOf(machine, i));
     this.events = this.renumbered(t, was, machine.surfaces);
     machine.releases.forEach((release, index) => {
       const track = this.tracks[index], entries = booked[index];
@@ -393,6 +408,7 @@ class Recording {
       if (ended) return;
       renamed.push({ index, entries, goesOn: state !== null });
       spins.push(state ? state.spin : 0);
+      angles.push(track.angle(t));
       if (state) {
         const { x, y, vx, vy } = state;
         // A particle that still rides the belt goes on riding.
@@ -414,7 +430,7 @@ class Recording {
       ...piece, appears: piece.appears - t, vanishes: piece.vanishes - t,
     });
     return {
-      ...machine, releases, spins, goesOn: renamed.map((its) => its.goesOn),
+      ...machine, releases, spins, angles, goesOn: renamed.map((its) => its.goesOn),
       radius: some(machine.radius), mass: some(machine.mass), inertia: some(machine.inertia),
       segments: machine.segments.map(gate), arcs: machine.arcs.map(gate),
       endTime: Math.max(0, machine.endTime - t),

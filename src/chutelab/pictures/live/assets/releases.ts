@@ -31,6 +31,8 @@ const LOOKS = 2 ** 31 - 1;
 export function draw(scene: Scene, names: string[]): { releases: Release[], radius: number[] } {
   const core = memory(), { Refused, Status } = core.layout.enums, { streams, kinds } = scene;
   core.set("looks", LOOKS, "Drawing");
+  core.doubles.set(scene.particles.flatMap(({ outline }) => outline.flat()),
+    core.get("corners", "Drawing") >> 3);
   while (core.exports.draw() === Status.PAUSED);
   const [refusal]: Refusal[] = core.rows("refusals", "Refusal", 1, "Drawing");
   if (refusal.why !== Refused.ACCEPTED) throw faultOf(scene, refusal, names);

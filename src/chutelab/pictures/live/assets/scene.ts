@@ -28,8 +28,11 @@ export interface Lab {
 
 interface Particle {
   name?: string;
-  shape: "disk" | "sphere";
-  radius: number; // the mean one where they differ
+  shape: "disk" | "sphere" | "box" | "polygon";
+  radius: number; // the mean one where they differ; of what has corners the furthest one's
+  size?: Point; // of a box, m
+  points?: Point[]; // of a polygon
+  outline: Point[]; // corners about the centroid, counterclockwise, m; none of what is round
   span?: Point; // the least and the largest radius where they differ
   mass: number;
   density?: number;
@@ -320,8 +323,44 @@ export function passes({ particles, pair }: Scene, a: number, b: number) {
   return pair.some((one) => !one.meet && isOf(one, particles[a].name, particles[b].name));
 }
 
+/** Returns the corners of a box or polygon about its centroid, counterclockwise, m. */
+function outlineOf({ size, points }: Particle): Point[] {
+  if (size) {
+    const [x, y] = [0.5 * size[0], 0.5 * size[1]];
+    return [[-x, -y], [x, -y], [x, y], [-x, y]];
+  }
+  if (!points) return [];
+  const crosses = crossesOf(points), twice = plainSum(crosses);
+  const [x, y] = [0, 1].map((n) => plainSum(crosses.map((cross, k) =>
+    (points[k][n] + points[(k + 1) % points.length][n]) * cross)) / (3.0 * twice));
+  const moved = points.map((point): Point => [point[0] - x, point[1] - y]);
+  return twice > 0 ? moved : moved.reverse();
+}
+
+/** Returns the cross product of each corner and the next. */
+const crossesOf = (points: Point[]) => points.map(([x, y], n) => {
+  const [u, v] = points[(n + 1) % points.length];
+  return x * v - y * u;
+});
+
+const plainSum = (numbers: number[]) => numbers.reduce((sum, one) => sum + one);
+
+/** Returns the moment of inertia over the mass of a polygon about its centroid, the origin, m². */
+export function polygonMoment(points: Point[]) {
+  const crosses = crossesOf(points), moments = points.map(([x, y], n) => {
+    const [u, v] = points[(n + 1) % points.length];
+    return crosses[n] * (x * x + x * u + u * u + y * y + y * v + v * v);
+  });
+  return plainSum(moments) / (6.0 * plainSum(crosses));
+}
+
 /** Fills in the mean radius of particles, and the mass that goes with that. */
 function fillMass(kind: any, materials: Map<string, Record<string, number>>) {
+  kind.outline = outlineOf(kind);
+  if (kind.outline.length) {
+    kind.radius = Math.max(...kind.outline.map(([x, y]: Point) => Math.sqrt(x * x + y * y)));
+    return;
+  }
   let density = kind.density;
   if (density === undefined && kind.material !== undefined && !("mass" in kind.given)) {
     density = materials.get(kind.material)?.density;

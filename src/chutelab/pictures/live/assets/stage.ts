@@ -8,6 +8,7 @@ import { CALM, eased, html } from "./panels.ts";
 import { Balls } from "./balls.ts";
 import { Scenery, set, svg } from "./scenery.ts";
 import { paintJoints, paintPins } from "./joints.ts";
+import { cornersOf } from "./machine.ts";
 import { predict } from "./prediction.ts";
 import { historyOf } from "./stages.ts";
 import { View, boxOf } from "./view.ts";
@@ -343,10 +344,18 @@ class Stage {
       const x = view.px(state.x), y = view.py(state.y);
       const r = Math.max(least, (machine.radius[i] ?? 0) * view.scale);
       if (x < -r || x > view.width + r || y < -r || y > view.height + r) continue;
-      this.balls.paint(context, i, x, y, r, Math.hypot(state.vx, state.vy));
+      const angle = spins ? recording.tracks[i].angle(t) : 0;
+      const speed = Math.hypot(state.vx, state.vy);
+      const corners = cornersOf(machine, i, state, angle);
+      if (corners.length) {
+        const larger = r / (machine.radius[i] * view.scale);
+        this.balls.paintCorners(context, i, corners.map(([u, v]): Point =>
+          [x + larger * (view.px(u) - x), y + larger * (view.py(v) - y)]), r, speed);
+        continue;
+      }
+      this.balls.paint(context, i, x, y, r, speed);
       if (!spins || r < SPUN) continue;
       // A radius shows how it turns.
-      const angle = recording.tracks[i].angle(t);
       marks.moveTo(x, y);
       marks.lineTo(x + r * Math.cos(angle), y - r * Math.sin(angle));
     }

@@ -274,6 +274,32 @@ def test_what_was_done_is_kept_for_its_pupil_only(page_of):
 
 
 @pytest.mark.slow
+def test_two_tabs_of_one_pupil_lose_nothing_of_each_other(page_of):
+    page = page_of("the-bounce")
+    page.fill("#student", "Mia")
+    page.click("#begin")
+    other = page.context.new_page()
+    other.goto(page.url)
+    other.evaluate(DONE)
+    other.fill("#student", "Mia")
+    other.click("#begin")
+    answered(Hand(other, "mouse"), find("the-bounce"), "wrong")
+    Hand(other, "mouse").play()
+    other.click("#step-next")
+    done = other.evaluate("chutelab.lesson.kept")
+    assert done["said"]
+    # Back in the first tab, the pupil goes on from there, and what is as it was stays untouched.
+    focus = "() => { dispatchEvent(new Event('focus')); return chutelab.lesson.kept; }"
+    assert page.evaluate(focus) == done
+    page.evaluate("chutelab.lesson.kept.mark = 1")
+    assert page.evaluate(focus)["mark"] == 1
+    page.evaluate("delete chutelab.lesson.kept.mark")
+    page.click("#step-next")
+    expect(page.locator("#step-next")).to_be_visible()
+    assert other.evaluate(focus) == page.evaluate("chutelab.lesson.kept")
+
+
+@pytest.mark.slow
 def test_odd_things_that_were_kept_are_left_out(page_of):
     page = page_of("the-bounce")
     for odd in (

@@ -156,6 +156,7 @@ class Lesson {
     if (again) this.begin(again);
     else this.welcome();
     this.listen();
+    addEventListener("focus", () => this.catchUp());
   }
 
   /** Name all steps where there is room, else the present one. */
@@ -163,6 +164,14 @@ class Lesson {
     const { list, nav } = this;
     list.classList.remove("many");
     list.classList.toggle("many", list.offsetWidth > nav.offsetWidth);
+  }
+
+  /** What was last read or written of what is kept. */
+  known: string | null | undefined;
+
+  /** Go on from where the pupil got in another tab meanwhile. */
+  catchUp() {
+    if (this.student && !this.isHosted && this.stored !== this.known) this.begin(this.student);
   }
 
   place(what: string) {
@@ -231,7 +240,8 @@ class Lesson {
   begin(student: string, suspended?: string) {
     this.student = student.trim().slice(0, LONGEST_NAME);
     const text = this.isHosted ? suspended
-      : this.student ? store("localStorage")?.getItem(this.place(plainName(this.student))) : null;
+      : this.student ? this.stored : null;
+    this.known = text;
     const found = parsed(text), kept = found?.steps ?? {};
     const { steps } = this.lesson, last = steps.length - 1;
     const table = (value: any) => (value && typeof value === "object" ? value : {});
@@ -660,6 +670,12 @@ class Lesson {
     } catch {
       // It is full: what is typed is there all the same, until the page is left.
     }
+    this.known = this.stored;
+  }
+
+  /** What this browser keeps of the pupil. */
+  get stored() {
+    return store("localStorage")?.getItem(this.place(plainName(this.student)));
   }
 }
 

@@ -39,6 +39,7 @@ AUTO = {
     "flap-gate": "contact",
     "vibrating-feeder": "contact",
     "see-saw": "contact",
+    "arch": "contact",
     "cradle": "contact",
     "domino-gate": "contact",
     "dominoes": "contact",

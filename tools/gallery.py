@@ -30,7 +30,7 @@ GROUPS = {
     "Bins, heaps, screens": ("hopper", "feeder", "silo", "heap", "mixture", "galton"),
     "Further machines": ("inclined-conveyor", "cascade", "free-fall"),
     "What moves": ("damper-plate", "see-saw", "flap-gate", "vibrating-feeder", "drum"),
-    "Toys": ("dominoes", "domino-gate", "cradle"),
+    "Toys": ("dominoes", "domino-gate", "cradle", "arch"),
 }
 """The scenes by what one comes for."""
 

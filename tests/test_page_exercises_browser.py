@@ -111,6 +111,8 @@ def test_a_page_around_it_says_who_it_is_and_hears_what_becomes_of_it(opened, tm
         question.locator("input").fill(f"{cases[done - 1].right:.4g}")
         question.locator(".check").click()
         question.locator(".reply.right").wait_for()
+        # It is told by a message, which may come after the reply is seen.
+        page.wait_for_function(f"heard.at(-1).done === {done}")
         heard = page.evaluate("heard")
         assert heard[0] == {"chutelab": "ready", "lesson": "the-bounce"}
         told = {key: heard[-1][key] for key in heard[-1] if key not in ("suspend_data", "result")}

@@ -79,7 +79,7 @@ def test_a_key_that_is_no_text_is_refused(place):
     [
         ("perpendiculer", "no such file, and no shipped scene of this name; did you mean perp"),
         ("scenes/inclined-30.toml", "did you mean inclined-"),
-        ("nothing-like-it", "there are belt-landing, "), ("", '"": no such file'),
+        ("nothing-like-it", "there are arch, belt-landing, "), ("", '"": no such file'),
         ("nul\0byte", "nul\\x00byte: no such file"), ("x" * 5000, "xxx...: no such file"),
     ],
 )  # fmt: skip

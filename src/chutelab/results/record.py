@@ -261,8 +261,8 @@ class Record(Shown):
         that an engine made without `simulate`.
     angle : ndarray, shape (K,), or (0,)
         How far a particle is turned counterclockwise, from as it is written, at each knot, rad,
-        where some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not tell.
-        Empty where all are round: there it is the integral of ω.
+        where some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not
+        tell. Empty where all are round: there it is the integral of ω.
     instead : str
         Where the engine that runs first broke a law of every run, and this one ran instead: which,
         and how; else empty.

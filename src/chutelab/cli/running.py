@@ -190,12 +190,12 @@ class Output:
                     tables = ("events", "trajectory")[self.leaves_out(recording) :]
                     recording.to_csv(folder, only=tables)
                 elif kind == "sensors":
-                    from chutelab.pictures.plots.figure import sensors
+                    from chutelab.pictures.plots.measures import sensors
 
                     recording.to_csv(folder, only=["sensors"])
                     sensors(recording).write(folder / "sensors.png")
                 elif kind == "loads":
-                    from chutelab.pictures.plots.figure import loads
+                    from chutelab.pictures.plots.measures import loads
 
                     recording.to_csv(folder, only=["loads"])
                     loads(recording).write(folder / "loads.png")
@@ -494,7 +494,7 @@ def live(
     import webbrowser
     from tempfile import mkdtemp
 
-    from chutelab.pictures.live.page import write
+    from chutelab.pictures.live import write
 
     check_file("-o", out)
     if set_ and not scene:

@@ -545,7 +545,7 @@ def compare(
             fitted = measured.fit(loaded, film, keys, robust=robust) if keys else None
             found = measured.residuals(loaded, film) if fitted is None else fitted.after
         if place is not None:
-            from chutelab.pictures.plots.studies import measured as draw
+            from chutelab.pictures.plots.measures import measured as draw
 
             with progress("drawing"):
                 draw(found, fitted).write(place / "compare.png")
@@ -563,12 +563,7 @@ def compare(
 
 @command("Lay engineers' discharge methods over the simulated stream.")
 def discharge(
-    scene: SceneName,
-    *,
-    heights: str = "",
-    set_: Texts,
-    out: Folder,
-    json_: bool,
+    scene: SceneName, *, heights: str = "", set_: Texts, out: Folder, json_: bool
 ) -> None:
     """Lay the stream that leaves SCENE's pulley, as five methods have it, over the simulated one.
 

@@ -259,12 +259,7 @@ class Model:
 
 
 def search(
-    evaluate: Evaluator,
-    wishes: Wishes,
-    ranges: Sequence[Span],
-    seeds: int,
-    most: int,
-    seed: int,
+    evaluate: Evaluator, wishes: Wishes, ranges: Sequence[Span], seeds: int, most: int, seed: int
 ) -> Found:
     """Return where the wishes come true, after at most `most` variants or when time is up."""
     library("sklearn.gaussian_process", NEEDS, "design")

@@ -40,10 +40,6 @@ def halo() -> list[withStroke]:
 TWO_LINES = 32.0
 """pt; height of two lines of small text."""
 
-GATE: dict[str, Any] = {"ls": (0, (2.2, 1.1))}
-"""How a piece that is not always there is drawn, in half its colour."""
-
-
 THICK = (3.0, 8.0, 0.0165)
 """Thickness of belts: at least and at most so many pt, and as a share of the axes' height."""
 
@@ -229,7 +225,7 @@ def draw_scene(
     for piece in found:
         look: dict[str, Any] = {"linewidth": 1.3} if small and not piece.whole else {}
         if is_passing(machine, piece):
-            look |= {**GATE, "color": style.tint(colour_of(machine, piece), 0.5)}
+            look |= {"ls": (0, (2.2, 1.1)), "color": style.tint(colour_of(machine, piece), 0.5)}
         draw_piece(ax, machine, piece, **look)
         if piece.one_sided and not small:
             # An arrow in the way in which it lets through.

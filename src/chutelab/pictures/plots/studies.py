@@ -200,8 +200,9 @@ def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
     parts = {name: one[np.isfinite(one)] for name, one in parts.items()}
     parts = {name: one for name, one in parts.items() if len(one)}
     ax.hist(
-        list(parts.values()), 40, color=KINDS[: len(parts)], stacked=True, edgecolor="white", lw=0.3,
-        label=[style.plain(shorten(name, 34, placeholder=" …")) for name in parts], zorder=3.0,
+        list(parts.values()), 40, color=KINDS[: len(parts)], stacked=True, edgecolor="white",
+        label=[style.plain(shorten(name, 34, placeholder=" …")) for name in parts], lw=0.3,
+        zorder=3.0,
     )  # fmt: skip
     if len(parts) > 1:
         ax.legend(loc="best", fontsize=style.SMALL)
@@ -220,9 +221,8 @@ def draw_strongest(ax: Axes, found: Uncertainty, row: int) -> Axes:
     factor, unit = style.scaled(values, found.units[row])
     quantity = with_unit(found.quantities[row], unit)
     style.dress(ax, with_unit(one.key, one.unit), quantity, f"against {one.key}")
-    ax.plot(
-        found.inputs[:, k], factor * values, ".", color=style.TRACK, ms=3.0, alpha=0.5, zorder=3.0
-    )
+    look: dict[str, Any] = {"color": style.TRACK, "ms": 3.0, "alpha": 0.5, "zorder": 3.0}
+    ax.plot(found.inputs[:, k], factor * values, ".", **look)
     return ax
 
 

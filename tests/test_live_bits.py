@@ -128,6 +128,7 @@ def test_what_boxes_and_polygons_do_not_have_is_refused_by_the_same_key():
         {**own, "rod": [{"from": [0.0, 2.0]}]}, {**own, "run": {"engine": "exact"}},
         {**own, "rod": [{"from": [0.0, 2.0]}], "run": {"engine": "contact"}},
         {**own, "stream": {**own["stream"], "width": 0.5}}, {**BELTS, "particle": box},
+        {**THROWN, "stream": {**THROWN["stream"], "angle_deg": 30.0}},
         *({**own, "particle": {"name": "a", **box}, "pair": [{"between": ["a", "wall"], **pulls}]}
           for pulls in ({"cohesion": 0.1}, {"bond_number": 2.0})),
     ]  # fmt: skip

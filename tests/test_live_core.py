@@ -188,7 +188,8 @@ def test_boxes_and_polygons_move_as_in_python():
     boxes = [[[-0.1, 0.05 + 0.1 * n], [0.1, 0.14 + 0.1 * n]] for n in range(3)]
     kinds = [*names, {"name": "ball", "radius": 0.01}]
     crowd = {**BALL, "particle": kinds, "surface": [LINE], "stream": [
-        *({"particle": f"k{n}", "fill": fill, "count": 3, "interact": True, "omega": 3.0 * (n < 2)}
+        *({"particle": f"k{n}", "fill": fill, "count": 3, "interact": True, "omega": 3.0 * (n < 2),
+           "angle_deg": 25.0 * n}
           for n, fill in enumerate(boxes)),
         {"particle": "ball", "at": [0.0, 0.4], "velocity": [0.0, -0.5]},
     ]}  # fmt: skip

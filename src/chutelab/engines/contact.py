@@ -156,7 +156,8 @@ class Job:
         disks = module.array("disks", dtype("Disk"), machine.count)
         disks["x"], disks["y"] = releases.position.T
         disks["vx"], disks["vy"] = releases.velocity.T
-        disks["spin"], disks["release"] = releases.omega, releases.t
+        disks["spin"], disks["turned"] = releases.omega, releases.angle
+        disks["release"] = releases.t
         disks["radius"], disks["mass"] = particle.radius, particle.mass
         disks["inertia"] = particle.inertia
         disks["kind"] = releases.kind

@@ -244,7 +244,7 @@ class Run:
 
     @property
     def angles(self) -> Floats:
-        """How far particles have turned since their releases, (N,), rad; NaN if not under way."""
+        """How far particles are turned, (N,), rad, as `Motion.angle`; NaN if not under way."""
         return np.where(self._under_way, self._disks["turned"], np.nan)
 
     @property

@@ -32,6 +32,7 @@ class Releases:
     position: Floats
     velocity: Floats
     omega: Floats  # rad/s
+    angle: Floats  # rad, from as what has corners is written
     # rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation
     carried: Bools
     stream: Ints  # its number: particles of the first stream come first, then those of the next
@@ -168,6 +169,7 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
         position=starts["position"].copy(),
         velocity=starts["velocity"].copy(),
         omega=starts["omega"].copy(),
+        angle=starts["angle"].copy(),
         carried=carried if family else carried.repeat(counts),
         stream=np.arange(streams).repeat(members * np.array(counts)),
         kind=np.arange(members) if family else np.array(scene.kinds).repeat(counts),

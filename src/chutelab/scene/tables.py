@@ -496,6 +496,11 @@ class Stream(Resolved):
     omega: Number = described(
         0.0, "Spin at the release, counterclockwise; needs spin", "rad/s", ge=-1e6, le=1e6
     )
+    angle_deg: Angle = described(
+        0.0,
+        "Of boxes and polygons: by how much they are turned at the release, counterclockwise",
+        "degrees",
+    )
     interact: Switch = described(False, "Particle-particle contacts, of all streams if one says so")
     restitution: Share = pair_restitution(0.5, "particle-particle")
     friction: Amount = pair_friction(0.3, "particle-particle")

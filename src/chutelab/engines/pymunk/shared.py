@@ -248,18 +248,18 @@ class Shared:
     def _free(self, i: int, t: float, x: Vec2d, v: Vec2d, omega: float = 0.0) -> None:
         """Let a particle fly from where it is at a time (s) up to now."""
         body = self.bodies[i][0]
-        self.tracks.knot(i, t, x, v, omega)
-        late = self.t - t
+        late, angle = self.t - t, float(self.machine.releases.angle[i])
+        self.tracks.knot(i, t, x, v, omega, angle)
         now = v + late * self.pull
         x += 0.5 * late * (v + now)
         if late > 0.0:
             # A blow in the next step begins at its start.
-            self.tracks.knot(i, self.t, x, now, omega, late * omega)
+            self.tracks.knot(i, self.t, x, now, omega, angle + late * omega)
         body.position, body.velocity = x - 0.5 * self.h * now, now
-        body.angular_velocity, body.angle = omega, (late - 0.5 * self.h) * omega
+        body.angular_velocity, body.angle = omega, angle + (late - 0.5 * self.h) * omega
         self.state[1, :, i] = *x, *now, omega
         if self.angle is not None:
-            self.angle[i] = late * omega
+            self.angle[i] = angle + late * omega
         self.free[i], self.calm[i] = True, 0.0
         self.ties.put(i, free=True)
 

@@ -269,11 +269,7 @@ def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
     if scene.hinges:
         yield "run.engine", "contact", f"pymunk: nothing hangs on a hinge with {why}"
     if scene.one_sided:
-        yield (
-            "run.engine",
-            "contact",
-            f"pymunk: {scene.one_sided} has two sides with {why}",
-        )
+        yield ("run.engine", "contact", f"pymunk: {scene.one_sided} has two sides with {why}")
     belt = scene.incoming
     if belt is not None and belt.friction == "adhesion":
         yield "incoming.friction", belt.friction, f"a Coulomb coefficient with {why}"

@@ -99,6 +99,8 @@ BY_HAND = [
     ("alone", {"gravity_deg": 5.0, "run.engine": "exact"}, "gravity_deg", "exact engine"),
     ("alone", {"stream.omega": 3.0}, "stream.omega", "particle.spin true"),
     ("dominoes", {"stream[2].omega": 3.0}, "stream[2].omega", "particle[2].spin true"),
+    ("alone", {"stream.angle_deg": 30.0}, "stream.angle_deg", 'particle.shape is "disk"'),
+    ("dominoes", {"stream[2].angle_deg": "30"}, "stream[2].angle_deg", "number"),
     ("alone", {"particle.spin": True, "stream.omega": "3"}, "stream.omega", "number"),
     ("machine", {"particle[1].mass": 0.1}, "particle[1].density", "particle[1].mass or this"),
     ("alone", {"particle.density": 1000.0}, "particle.density", "particle.mass or this"),

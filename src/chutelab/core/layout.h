@@ -83,7 +83,7 @@ typedef struct {
                                    in a hollow, see `account` */
     double force[2], pushed[2]; /* N; by which it is pushed by hand, in this step and in the one before ... */
     double kick[2];             /* m/s; ... and what that changes of its velocity in this step */
-    double turned;              /* rad; since its release */
+    double turned;              /* [in] rad; from as its corners are written */
     int kind;                   /* [in] row of the table of pairs */
     int rides;                  /* [in] the incoming belt carries it by adhesion */
     int goes_on;                /* [in] it was under way before: released wherever others are */
@@ -461,7 +461,7 @@ typedef struct {
 
 typedef struct {
     double kind;            /* which of the particles it consists of */
-    double at[2], to[2], fill[4], velocity[2], omega; /* spin at the release, rad/s */
+    double at[2], to[2], fill[4], velocity[2], omega, angle_deg; /* spin at the release, rad/s, and turn */
     double count, rate, start, bed_height, speed_spread;
     double seed[2];         /* its lower 32 bits and the others */
     double at_once;         /* whether all are released at once */
@@ -615,7 +615,7 @@ typedef struct {
 typedef struct {                                                                         /* [out] */
     double t, position[2], velocity[2], radius;
     double exit_box[4];     /* m; left, bottom, right, top */
-    double omega;           /* rad/s */
+    double omega, angle;    /* rad/s, rad */
 } Start;
 
 /* An earlier particle as one that is drawn sees it: how far it has come (m), and how far apart they

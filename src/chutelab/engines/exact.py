@@ -15,16 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core import (
-    REAL,
-    AsideError,
-    Module,
-    borrow,
-    constants,
-    dtype,
-    give_back,
-    number,
-)
+from chutelab.core import REAL, AsideError, Module, borrow, constants, dtype, give_back, number
 from chutelab.machine import Machine, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather

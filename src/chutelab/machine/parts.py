@@ -19,8 +19,7 @@ from chutelab.machine.releases import Releases
 from chutelab.machine.shapes import Arcs, Pieces, Segments, crossings
 from chutelab.scene import Scene
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import Floats, Watch, unwatched
-from chutelab.util.trig import RADIANS, sin_cos
+from chutelab.util.arrays import RADIANS, Floats, Watch, sin_cos, unwatched
 
 DRIVE_PULLEY = "the drive pulley"
 

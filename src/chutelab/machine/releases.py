@@ -12,9 +12,8 @@ import numpy as np
 from chutelab.core import INTEGER, Module, Status, constants, dtype
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import Bools, Floats, Ints, Numbers, Watch
+from chutelab.util.arrays import RADIANS, Bools, Floats, Ints, Numbers, Watch, sin_cos
 from chutelab.util.tables import number
-from chutelab.util.trig import RADIANS, sin_cos
 
 LOOKS = 1_000_000
 """Particles and places that the core looks at between two looks at the clock; 10 ms."""
@@ -33,6 +32,7 @@ class Releases:
     position: Floats
     velocity: Floats
     omega: Floats  # rad/s
+    angle: Floats  # rad, from as what has corners is written
     # rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation
     carried: Bools
     stream: Ints  # its number: particles of the first stream come first, then those of the next
@@ -170,6 +170,7 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
         position=starts["position"].copy(),
         velocity=starts["velocity"].copy(),
         omega=starts["omega"].copy(),
+        angle=starts["angle"].copy(),
         carried=carried.reshape(members, streams).repeat(counts, axis=1).reshape(-1),
         stream=np.tile(np.arange(streams).repeat(counts), members),
         kind=np.array(scene.kinds).repeat(counts) if family is None else np.arange(len(family)),

@@ -209,10 +209,10 @@ class Motion(tuple[Floats, Floats]):
 
     @property
     def angle(self) -> Floats:
-        """How far particles have turned counterclockwise since their release, (T, N), rad.
+        """How far particles are turned counterclockwise, from as they are written, (T, N), rad.
 
-        The integral of `omega`; where the recording says more, see `Recording.angle`, it is
-        corrected evenly from knot to knot.
+        The integral of `omega` since the release; where the recording says more, see
+        `Recording.angle`, that, corrected evenly from knot to knot.
         """
         some, found = self._record, np.full(self[0].shape[:2], np.nan)
         t, omega, first = some.knots["t"], some.knots["omega"], some.offsets[:-1]
@@ -222,7 +222,8 @@ class Motion(tuple[Floats, Floats]):
             h = t[left + 1] - t[left]
             gained = h * share * (omega[left] + 0.5 * share * (omega[left + 1] - omega[left]))
             missed = share * (np.diff(told)[left] - np.diff(passed)[left])
-            found[row, particle] = told[left] - told[first[particle]] + gained + missed
+            begun = 0.0 if len(some.angle) else passed[first[particle]]
+            found[row, particle] = told[left] - begun + gained + missed
         return found
 
 
@@ -259,9 +260,9 @@ class Record(Shown):
         Wall time from the validated scene to the recording; NaN in one that was loaded, or
         that an engine made without `simulate`.
     angle : ndarray, shape (K,), or (0,)
-        How far a particle has turned counterclockwise since its release at each knot, rad, where
-        some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not tell.
-        Empty where all are round: there it is the integral of ω.
+        How far a particle is turned counterclockwise, from as it is written, at each knot, rad,
+        where some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not
+        tell. Empty where all are round: there it is the integral of ω.
     instead : str
         Where the engine that runs first broke a law of every run, and this one ran instead: which,
         and how; else empty.

@@ -522,6 +522,9 @@ def _of_kind(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
     if abs(stream["omega"]) > 0.0 and kind["spin"] is False:
         text = f"must be 0, or {kind.path('spin')} true: they never turn"
         yield stream.fault("omega", text)
+    if abs(stream["angle_deg"]) > 0.0 and kind["shape"] in ("disk", "sphere"):
+        text = f'is for boxes and polygons: {kind.path("shape")} is "{kind["shape"]}"'
+        yield stream.fault("angle_deg", text)
     radius, width = kind["radius"], stream["width"] if stream.given("width") else math.nan
     if width == width and kind.sound("radius"):
         size = sum(radius) if isinstance(radius, LIST) else 2.0 * radius

@@ -42,7 +42,7 @@ PARTS: Final = (
     _part("arc", "C", "surface", "arc arc arc", "radius restitution friction", "center"),
     _part("ball", "B", "stream", "at", "velocity start restitution",
           velocity=[0.0, 0.0], interact=True),
-    _part("box", "A", "stream", "at", "size mass omega", "size",
+    _part("box", "A", "stream", "at", "size mass angle_deg", "size",
           velocity=[0.0, 0.0], interact=True, shape="box", size=[0.1, 0.06], mass=0.25, spin=True,
           material="wood"),
     _part("stream", "R", "stream", "at to", "count rate velocity", "count",

@@ -11,8 +11,8 @@ from chutelab import core as module
 from chutelab.cli import main
 from chutelab.engines import contact as engine
 from chutelab.machine import build
+from chutelab.pictures.live import html
 from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
-from chutelab.pictures.live.page import html
 from chutelab.scene import from_dict, load
 from chutelab.scene.conflicts import HINGED, JOINTS, MOTIONS
 from chutelab.util.words import words

@@ -8,7 +8,7 @@ from time import process_time
 import numpy as np
 import pytest
 
-from chutelab.cli.studies import varied
+from chutelab.cli.options import varied
 from chutelab.engines.exact import CornerError, run
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind

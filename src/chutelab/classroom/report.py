@@ -24,8 +24,8 @@ from chutelab.classroom.lessons.sheets import need_typst, pdf, web_page
 from chutelab.classroom.lessons.texts import parser
 from chutelab.engines.simulation import judged, simulate
 from chutelab.pictures.plots import look, overlay
-from chutelab.pictures.plots.figure import loads as draw_loads
 from chutelab.pictures.plots.measures import drawing
+from chutelab.pictures.plots.measures import loads as draw_loads
 from chutelab.pictures.plots.measures import wear as draw_wear
 from chutelab.results import Recording
 from chutelab.results.loads import sheet as load_sheet

@@ -15,16 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core import (
-    REAL,
-    AsideError,
-    Module,
-    Status,
-    borrow,
-    constants,
-    dtype,
-    give_back,
-)
+from chutelab.core import REAL, AsideError, Module, Status, borrow, constants, dtype, give_back
 from chutelab.machine import PASSES, SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather, gather_lasting

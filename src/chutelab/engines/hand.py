@@ -22,10 +22,9 @@ from chutelab.machine import build
 from chutelab.results import Recording
 from chutelab.results.recorder import Recorder, StalledError
 from chutelab.scene import AnyScene, Overrides, load
-from chutelab.util.arrays import Floats
+from chutelab.util.arrays import RADIANS, Floats
 from chutelab.util.errors import InputError
 from chutelab.util.tables import many, number
-from chutelab.util.trig import RADIANS
 
 SET = "plate.angle_deg, the speed of a belt, or the speed_deg and torque of a motor"
 """What can be set while a run goes on."""

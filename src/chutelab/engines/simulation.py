@@ -38,7 +38,7 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         return "pymunk" if unjoined(machine) else "contact"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
     scene = machine.scene
-    return "contact" if stepped or machine.tilt or scene.clings or scene.one_sided else "exact"
+    return "contact" if stepped or scene.clings or scene.one_sided else "exact"
 
 
 def simulate(
@@ -240,9 +240,6 @@ def must_fit(machine: Machine, name: str) -> None:
         if machine.air:
             allowed = "0 with the exact engine: it has no closed form for a flight in air"
             raise refused(scene, "air_density", machine.air, allowed)
-        if machine.tilt:
-            allowed = "0 with the exact engine: contact and pymunk have gravity of any direction"
-            raise refused(scene, "gravity_deg", scene.gravity_deg, allowed)
         return
     for n, kind in enumerate(scene.particles):
         if name == "pymunk" and kind.falls:
@@ -269,14 +266,8 @@ def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
         if kind.outline and kind.rolling_friction:
             key = f"{scene.head('particle', n)}.rolling_friction"
             yield key, kind.rolling_friction, "0 with boxes and polygons: they do not roll"
-    if scene.hinges:
-        yield "run.engine", "contact", f"pymunk: nothing hangs on a hinge with {why}"
     if scene.one_sided:
-        yield (
-            "run.engine",
-            "contact",
-            f"pymunk: {scene.one_sided} has two sides with {why}",
-        )
+        yield ("run.engine", "contact", f"pymunk: {scene.one_sided} has two sides with {why}")
     belt = scene.incoming
     if belt is not None and belt.friction == "adhesion":
         yield "incoming.friction", belt.friction, f"a Coulomb coefficient with {why}"

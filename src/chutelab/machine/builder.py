@@ -26,8 +26,7 @@ from chutelab.scene import Fault, Plate, Scene
 from chutelab.scene.conflicts import JOINTS
 from chutelab.scene.units import polygon_moment
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import Floats, Ints, Numbers, Watch, unwatched
-from chutelab.util.trig import RADIANS, hypot
+from chutelab.util.arrays import RADIANS, Floats, Ints, Numbers, Watch, hypot, unwatched
 
 WORDS = {
     "adhesion": inf, "impact": 0.0, "top": 1.0,

@@ -12,9 +12,8 @@ import numpy as np
 from chutelab.core import INTEGER, Module, Status, constants, dtype
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import Bools, Floats, Ints, Numbers, Watch
+from chutelab.util.arrays import RADIANS, Bools, Floats, Ints, Numbers, Watch, sin_cos
 from chutelab.util.tables import number
-from chutelab.util.trig import RADIANS, sin_cos
 
 LOOKS = 1_000_000
 """Particles and places that the core looks at between two looks at the clock; 10 ms."""

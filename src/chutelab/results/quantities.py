@@ -28,15 +28,7 @@ from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
 from chutelab.results.sensors import first_passages, reading
 from chutelab.results.wear import wear
 from chutelab.scene import Scene
-from chutelab.scene.quantities import (
-    FIRST,
-    NEEDED,
-    THEORY,
-    Quantity,
-    lookup,
-    suggestion,
-    whose,
-)
+from chutelab.scene.quantities import FIRST, NEEDED, THEORY, Quantity, lookup, suggestion, whose
 from chutelab.scene.units import with_unit
 from chutelab.scene.variants import Family
 from chutelab.theory import Transfer, predict, unbounded

@@ -24,8 +24,7 @@ from numpy.typing import ArrayLike
 from chutelab.theory.results import Reason, Transfer, cut, unanswered
 from chutelab.theory.slide import HALVINGS
 from chutelab.theory.transfer import Rebound, transfer
-from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.trig import RADIANS, hypot, sin_cos
+from chutelab.util.arrays import RADIANS, Bools, Floats, Ints, hypot, sin_cos
 
 if TYPE_CHECKING:
     # The paper's tables are there without the model of a scene.

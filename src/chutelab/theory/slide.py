@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.theory.results import Answers, Arrays, Reason
-from chutelab.util.arrays import Bools, Floats, Ints, Numbers
-from chutelab.util.trig import arc_cos, sin_cos
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers, arc_cos, sin_cos
 
 HALVINGS = 64
 """Bisections of an angle: they exhaust a double's digits."""

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 
 from chutelab.theory.results import STAGES, Answers, Reason, Transfer
 from chutelab.theory.slide import FAULTS, separation
-from chutelab.util.arrays import Bools, Floats
-from chutelab.util.trig import atan2, hypot, sin_cos
+from chutelab.util.arrays import Bools, Floats, atan2, hypot, sin_cos
 
 Rebound = Literal["corrected", "as-printed"]
 

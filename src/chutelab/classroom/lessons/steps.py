@@ -173,9 +173,7 @@ def quantities_in(formula: str) -> list[str]:
 
 
 def faults_of(
-    steps: Sequence[Step],
-    machine: Callable[[Mapping[str, Any]], Scene],
-    live: Mapping[str, Any],
+    steps: Sequence[Step], machine: Callable[[Mapping[str, Any]], Scene], live: Mapping[str, Any]
 ) -> Iterator[Fault]:
     """Yield what cannot be done on the page of the steps.
 

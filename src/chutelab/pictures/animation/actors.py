@@ -27,19 +27,19 @@ from chutelab.pictures.plots.machinery import (
     colour_of,
     draw_piece,
     is_passing,
-    motion,
     pieces,
     points_of,
     stream_colours,
     stream_handles,
-    strings,
 )
 from chutelab.pictures.plots.scenery import (
     FINE,
+    motion,
     nominal,
     one_of_many,
     places,
     spread,
+    strings,
     strobe_times,
     track_times,
 )

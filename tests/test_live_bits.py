@@ -112,7 +112,6 @@ def test_a_page_refuses_mass_points_by_their_key():
 def test_what_boxes_and_polygons_do_not_have_is_refused_by_the_same_key():
     box, kind = {"shape": "box", "size": [0.1, 0.1], "spin": True}, {"shape": "polygon"}
     wall = {**THROWN["surface"][0], "passes": "up"}
-    hung = {**THROWN["surface"][0], "hinge": [0.0, 0.0], "mass": 1.0}
     own = {**THROWN, "particle": box}
     documents = [
         {**own, "particle": {**box, **more}}
@@ -124,7 +123,7 @@ def test_what_boxes_and_polygons_do_not_have_is_refused_by_the_same_key():
         {**kind, "points": [[0, 0], [1, 0]]},
     )]  # fmt: skip
     documents += [
-        {**own, "air_density": 1.2}, {**own, "surface": [wall]}, {**own, "surface": [hung]},
+        {**own, "air_density": 1.2}, {**own, "surface": [wall]},
         {**own, "rod": [{"from": [0.0, 2.0]}]}, {**own, "run": {"engine": "exact"}},
         {**own, "rod": [{"from": [0.0, 2.0]}], "run": {"engine": "contact"}},
         {**own, "stream": {**own["stream"], "width": 0.5}}, {**BELTS, "particle": box},

@@ -146,12 +146,21 @@ static void fill_in(const Shape *a, const Shape *b, Touch *t) {
     t->ny = n[1];
 }
 
-/* The side of a segment that a corner is on: its own, but if it may have sunk through that of the centre. */
-static int side_of(const Shape *a, const Surface *s, const double *q, double near) {
-    double off = (q[1] - s->y) * s->tx - (q[0] - s->x) * s->ty;
+/* The side of a segment that a corner is on: its own. If it may have sunk through, that on which both its edges are,
+   else that of the centre. */
+static int side_of(const Shape *a, const Surface *s, int corner, double near) {
+    const double *q = a->p[corner];
+    double off = (q[1] - s->y) * s->tx - (q[0] - s->x) * s->ty, low = INFINITY, high = -INFINITY;
     double mid = (a->y - s->y) * s->tx - (a->x - s->x) * s->ty, along = (a->x - s->x) * s->tx + (a->y - s->y) * s->ty;
     int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
     if (own == centre || fabs(off) > 2 * near) return own;
+    for (int n = 1; n < a->count; n += a->count - 2) {
+        const double *next = a->p[(corner + n) % a->count];
+        double up = (next[1] - q[1]) * s->tx - (next[0] - q[0]) * s->ty;
+        low = MIN(low, up);
+        high = MAX(high, up);
+    }
+    if (low > -2 * near || high < 2 * near) return low + high > 0 ? 1 : -1;
     if (along >= 0 && along <= s->length) return centre;
     double n[2], out, *end = (double *)s->end + (along < 0 ? 0 : 2);
     int edge = furthest(a, end, &out);
@@ -167,7 +176,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
         const double *q = a->p[t->which];
         if (b->s && b->s->shape == SEGMENT) {
             double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
-            t->on = side_of(a, b->s, q, near);
+            t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
             return along >= -near && along <= b->s->length + near;
         }
@@ -367,7 +376,7 @@ double meet_corners(int i, int j, double from, double until, double soft) {
             find_place(&a2, &b2, near, &now);
             if (b.s && b.s->shape == SEGMENT && c < a.count) {
                 /* The side that it is on does not change within a step. */
-                now.on = side_of(&a, surface_at(-1 - j, from), a.p[c], near);
+                now.on = side_of(&a, surface_at(-1 - j, from), c, near);
                 b2.s = surface_at(-1 - j, t);
                 fill_in(&a2, &b2, &now);
             }

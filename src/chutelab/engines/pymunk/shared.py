@@ -379,14 +379,16 @@ class Shared:
         belt = np.where(side < 0.0, -speed, speed)
         # Of the contact points to each other, before and after: (2, k).
         mine, others = (self.state[:, 2:].take(row, axis=2) for row in (one, other))
-        work = self._carry(one, other, np.stack([nx, ny]), np.stack([jx, jy]), others)
+        arms = -self.radius[one] * np.stack((nx, ny))
+        if self.corners:
+            # Both levers, from the centres to the point.
+            arms = np.where(straight, values[4:], values[[6, 7, 4, 5]])
+        work = self._carry(one, other, arms[:2], np.stack([jx, jy]), others)
         u, v = mine[:, 0] - others[:, 0], mine[:, 1] - others[:, 1]
         rate = u * nx + v * ny
         slip = u * ny - v * nx
-        arms = -self.radius[one] * np.stack((nx, ny))
         if self.corners:
-            # Both levers, from the centres to the point: r × n turns into the rate.
-            arms = np.where(straight, values[4:], values[[6, 7, 4, 5]])
+            # r × n turns into the rate.
             for (x, y), spin in ((arms[:2], mine[:, 2]), (arms[2:], -others[:, 2])):
                 rate = rate + spin * (x * ny - y * nx)
                 slip = slip - spin * (x * nx + y * ny)
@@ -477,12 +479,12 @@ class Shared:
         self.entries[2, : self.count] += lost
         self.recorder.air_loss += float(lost.sum())
 
-    def _carry(self, one: Ints, other: Ints, n: Floats, push: Floats, others: Floats) -> Any:
+    def _carry(self, one: Ints, other: Ints, arms: Floats, push: Floats, others: Floats) -> Any:
         """Have surfaces that move do so in `others`, (2, 3, k); book and return their work, J."""
         if self.moving is None:
             return 0.0
         place = 0.5 * (self.state[0, :2] + self.state[1, :2]).take(one, axis=1)
-        velocity = self.moving.at(other, place - self.radius[one] * n)
+        velocity = self.moving.at(other, place + arms)
         others[:, :2] += velocity
         work = np.asarray((push * velocity.mean(axis=0)).sum(axis=0))
         np.add.at(self.recorder.drives, self.surface[other], work)

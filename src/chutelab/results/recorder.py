@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine import SWING, Machine, moved, origin
+from chutelab.machine import SWING, Machine, moved, origin, upright
 from chutelab.results.loads import Bins
 from chutelab.results.record import EVENT, KNOT, LASTING, LOAD, REASONS, TOTAL, Kind, Record
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -55,19 +55,25 @@ class EnoughError(Exception):
     """
 
 
+WAYS = frozenset(("position", "velocity", "velocity_before", "velocity_after", "force", "at"))
+"""Vectors among what is told of knots, events and loads."""
+
+
 class Recorder:
     """Grows by chunks; `finish` turns it into a frozen `Record` of the machine's run.
 
     With `apart`, `by_surface` is kept for each particle, (N, S, 3). What is written down is counted
-    from `origin`, m, see `chutelab.machine.origin`: engines run `near`, the machine moved there.
+    from `origin`, m, see `chutelab.machine.origin`: engines run `near`, the machine moved there;
+    `turned` so that gravity is straight down, if they know it so alone.
     """
 
-    def __init__(self, machine: Machine, *, apart: bool = False) -> None:
+    def __init__(self, machine: Machine, *, apart: bool = False, turned: bool = False) -> None:
         self.machine, self.origin, self.near = machine, (0.0, 0.0), machine
-        self._angular = False
+        self._angular, self._turned = False, turned
         if not machine.is_ahead:
             self.origin = origin(machine)
             self.near = moved(machine, -self.origin[0], -self.origin[1])
+            self.near = upright(self.near) if turned else self.near
             self._angular = any(outline is not None for outline in machine.outlines)
         count, owners = machine.count, len(machine.surfaces) + 1  # and the particles
         self.entries = np.zeros((count, 3))
@@ -180,9 +186,9 @@ class Recorder:
         """Return a run's record; if a particle stalled, raise that with the record instead."""
         if stalled is None:
             return record
-        (x, y), (x0, y0) = stalled.position, self.origin
-        place = x + x0, y + y0
-        raise StalledError(stalled.particle, stalled.t, place, stalled.reason, record)
+        frame = self.machine.frame if self._turned else np.eye(2)
+        x, y = (stalled.position @ frame + self.origin).tolist()
+        raise StalledError(stalled.particle, stalled.t, (x, y), stalled.reason, record)
 
     def finish(self, *, engine: str, steps: int) -> Record:
         """Sort what was collected, and freeze it."""
@@ -222,6 +228,11 @@ class Recorder:
             in_turn = not np.count_nonzero(particle[1:] < particle[:-1])
             order = t.argsort(kind="stable") if in_turn else np.lexsort((particle, t))
             events = events.take(order)
+        if self._turned:
+            knots, frame = knots.copy(), self.machine.frame
+            for rows in (knots, events, *[self.impulses][: self.impulses.size]):
+                for name in WAYS.intersection(rows.dtype.names or ()):
+                    rows[name] = rows[name] @ frame
         if any(self.origin):
             knots = knots.copy()
             for rows in (knots, events):

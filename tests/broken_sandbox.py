@@ -96,7 +96,6 @@ BY_HAND = [
     ("machine", {"gravity_deg": 10.0}, "gravity_deg", "0 with [incoming]"),
     ("alone", {"gravity_deg": 720.5}, "gravity_deg", "720"),
     ("alone", {"gravity_deg": "left"}, "gravity_deg", "number"),
-    ("alone", {"gravity_deg": 5.0, "run.engine": "exact"}, "gravity_deg", "exact engine"),
     ("alone", {"stream.omega": 3.0}, "stream.omega", "particle.spin true"),
     ("dominoes", {"stream[2].omega": 3.0}, "stream[2].omega", "particle[2].spin true"),
     ("alone", {"stream.angle_deg": 30.0}, "stream.angle_deg", 'particle.shape is "disk"'),

@@ -32,10 +32,8 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         raise ValueError(f"engine = {wanted!r}: one of {', '.join(ENGINES)}")
     if wanted != "auto":
         return wanted
-    if machine.scene.cornered:
-        return "pymunk" if any(uncornered(machine)) else "contact"
-    if machine.joints:
-        return "pymunk" if unjoined(machine) else "contact"
+    if machine.scene.cornered or machine.joints:
+        return "pymunk" if any(uncornered(machine)) or unjoined(machine) else "contact"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
     scene = machine.scene
     return "contact" if stepped or machine.tilt or scene.clings or scene.one_sided else "exact"
@@ -263,8 +261,6 @@ def must_fit(machine: Machine, name: str) -> None:
 def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
     """Yield what the contact engine does not have with boxes: keys, values, and why not."""
     scene, why = machine.scene, "boxes and polygons; the pymunk engine has them"
-    for joint in machine.joints[:1]:
-        yield f"{joint.kind}[0].particle", joint.particle, f"no joints with {why}"
     for n, kind in enumerate(scene.particles):
         if kind.outline and kind.rolling_friction:
             key = f"{scene.head('particle', n)}.rolling_friction"

@@ -503,7 +503,11 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
         const Contact *c = W.contacts + link / 2;
         lasts |= c->i == i && c->j == j && c->impulse[0] > 0;
     }
-    int found = list_touches(i, j, t, (lasts ? TOUCH : TOUCHING) * least, t, places);
+    double within = (lasts ? TOUCH : TOUCHING) * least, span = 2 * SOON * W.step, most = 0;
+    /* What has joints is struck as a step begins, if that is so soon. */
+    if (is_tied(i) || is_tied(j)) most = fastest_of(i, j, t, span);
+    if (most < INFINITY) within = MAX(within, most * span);
+    int found = list_touches(i, j, t, within, t, places);
     for (int n = 0; n < found; n++) {
         Contact *c = list + count++;
         describe_touch(c, i, j, places + n);

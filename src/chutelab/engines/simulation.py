@@ -33,7 +33,8 @@ def choose(machine: Machine, engine: str | None = None) -> str:
     if wanted != "auto":
         return wanted
     if machine.scene.cornered or machine.joints:
-        return "pymunk" if any(uncornered(machine)) or unjoined(machine) else "contact"
+        lacks = any(uncornered(machine)) or (machine.joints and unjoined(machine))
+        return "pymunk" if lacks else "contact"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
     scene = machine.scene
     return "contact" if stepped or machine.tilt or scene.clings or scene.one_sided else "exact"
@@ -203,7 +204,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
 def must_fit(machine: Machine, name: str) -> None:
     """Raise a `SceneError` if an engine does not have what a machine needs."""
     scene = machine.scene
-    if name == "contact" and scene.cornered:
+    if name == "contact":
         for key, value, allowed in uncornered(machine):
             raise refused(scene, key, value, allowed)
     if name == "exact":
@@ -261,6 +262,8 @@ def must_fit(machine: Machine, name: str) -> None:
 def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
     """Yield what the contact engine does not have with boxes: keys, values, and why not."""
     scene, why = machine.scene, "boxes and polygons; the pymunk engine has them"
+    if not scene.cornered:
+        return
     for n, kind in enumerate(scene.particles):
         if kind.outline and kind.rolling_friction:
             key = f"{scene.head('particle', n)}.rolling_friction"

@@ -647,11 +647,15 @@ static void drop(void) {
 }
 
 static void fly(void) {
-    const double *box = A.given->exit_box;
+    const double *box = A.given->exit_box, *up = A.given->up;
     Motion m = motion_of(0.0, -A.given->gravity);
     m.joint = A.joint;
-    double leaves = MIN(MIN(when(A.x - box[0], A.vx, 0.0), when(box[2] - A.x, -A.vx, 0.0)),
-                        MIN(when(A.y - box[1], A.vy, m.ay), when(box[3] - A.y, -A.vy, -m.ay)));
+    double leaves = INFINITY;
+    for (int n = 0; n < 2; n++) {
+        double right = n ? -up[0] : up[1], above = up[n], pull = above * m.ay;
+        double place = right * A.x + above * A.y, speed = right * A.vx + above * A.vy;
+        leaves = MIN(leaves, MIN(when(place - box[n], speed, pull), when(box[2 + n] - place, -speed, -pull)));
+    }
     double stops = A.given->stop - A.age, dt = MIN(leaves, stops);
     int obstacle, side, hits = first_contact(&m, &dt, &obstacle, &side);
     count_idle(dt);

@@ -561,7 +561,7 @@ typedef struct {
     double inertia;             /* [in] kg m2; 0: it does not turn */
     double rolling;             /* [in] rolling friction: its arm over the radius */
     double gravity, pace;       /* [in] m/s2; what bounds on speeds are multiplied by */
-    double exit_box[4];         /* [in] m; as of `Start` */
+    double exit_box[4], up[2];  /* [in] m; as of `Start`, in the world's frame, where up is: here it is (0, 1) */
     int kind;                   /* [in] row of the table of pairs */
     int carried;                /* [in] it rides the incoming belt by adhesion */
     int reason;                 /* [out] why its track ended: enum Ending */

@@ -63,11 +63,14 @@ def run(machine: Machine, progress: Progress | None = None, *, apart: bool = Fal
     """
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
+    if machine.tilt:
+        machine.finish(unwatched if progress is None else partial(progress, 0.0))
     ahead = machine.is_ahead
     points = False if ahead else np.equal(machine.particle.radius, 0.0)
     if 0 < np.count_nonzero(points) < np.size(points) and machine.segments.start.ndim == 2:
         raise ValueError("the exact engine has no points beside disks")
-    module, recorder = borrow(), Recorder(machine, apart=apart)
+    module = borrow()
+    recorder = Recorder(machine, apart=apart, turned=machine.tilt != 0.0)
     try:
         if ahead:
             hand_over(module, machine.scene)
@@ -93,7 +96,9 @@ def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:
     """Tell the core how to run, on coordinates that were rounded `far` off (m)."""
     exact: Any = module.structs["Exact"]
     exact.apart, exact.until = apart, UNTIL[machine.until]
-    exact.landing, exact.far, exact.is_whole = machine.landing, far, far == 0.0
+    exact.landing, exact.far = machine.landing, far
+    # The core judges in its own frame.
+    exact.is_whole = far == 0.0 and machine.tilt == 0.0
     exact.most, exact.window, exact.tick = ROUNDS, WINDOW, TICK
     module.structs["Loads"].every = machine.loads
 
@@ -149,7 +154,7 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
     several = len(machine.rolling) > 1
     lones["rolling"] = machine.rolling[releases.kind] if several else machine.rolling[0]
     lones["kind"], lones["carried"] = releases.kind, releases.carried
-    lones["exit_box"] = releases.exit_box
+    lones["exit_box"], lones["up"] = releases.exit_box, machine.up
 
 
 def follow(

@@ -37,7 +37,7 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         return "pymunk" if lacks else "contact"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
     scene = machine.scene
-    return "contact" if stepped or machine.tilt or scene.clings or scene.one_sided else "exact"
+    return "contact" if stepped or scene.clings or scene.one_sided else "exact"
 
 
 def simulate(
@@ -239,9 +239,6 @@ def must_fit(machine: Machine, name: str) -> None:
         if machine.air:
             allowed = "0 with the exact engine: it has no closed form for a flight in air"
             raise refused(scene, "air_density", machine.air, allowed)
-        if machine.tilt:
-            allowed = "0 with the exact engine: contact and pymunk have gravity of any direction"
-            raise refused(scene, "gravity_deg", scene.gravity_deg, allowed)
         return
     for n, kind in enumerate(scene.particles):
         if name == "pymunk" and kind.falls:

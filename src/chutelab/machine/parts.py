@@ -221,6 +221,12 @@ class Machine:
         """The direction against gravity, (2,)."""
         return np.array(sin_cos(-self.tilt))
 
+    @cached_property
+    def frame(self) -> Floats:
+        """Unit vectors of a frame that is upright where gravity points down, rows, (2, 2)."""
+        x, y = self.up
+        return np.array([[y, -x], [x, y]])
+
     def height(self, position: Floats) -> Floats:
         """Return how high places (..., 2) are, (...), m: against gravity, from the origin."""
         found: Floats = self.up[0] * position[..., 0] + self.up[1] * position[..., 1]
@@ -319,6 +325,22 @@ class Machine:
             owners = np.setdiff1d(np.concatenate(into), [0])
             said += [Caution(self.surfaces[owner], DRIVE_PULLEY) for owner in owners]
         return (*self.plate_warnings, *said)
+
+
+def upright(machine: Machine) -> Machine:
+    """Return a machine that stays where it is, turned so that gravity is straight down."""
+    frame = machine.frame.T
+    segments, arcs, releases = machine.segments, machine.arcs, machine.releases
+    return replace(
+        machine,
+        segments=replace(segments, start=segments.start @ frame, tangent=segments.tangent @ frame),
+        arcs=replace(arcs, center=arcs.center @ frame, begin=arcs.begin - machine.tilt),
+        releases=replace(
+            releases,
+            position=releases.position @ frame,
+            velocity=releases.velocity @ frame,
+        ),
+    )
 
 
 REMOTE = 8.0

@@ -127,6 +127,8 @@ def test_what_hangs_on_joints_moves_as_in_python():
     long = [{**above, "length": 0.6}]
     pins = [{"from": [0.0, 0.24], "particle": 0}, {"from": [0.1, 0.2], "particle": 3, "other": 5}]
     scenes += [from_dict({**crowd, "pin": pins}), from_dict({**BALL, "string": long})]
+    boxes = {**crowd, "particle": CORNERED[0]}
+    scenes += [from_dict({**boxes, **joints}) for joints in ({"rod": apart}, {"pin": pins})]
     same_runs([load("cradle"), *scenes])
     lab = describe(load("perpendicular"))
     for table, row, key in (

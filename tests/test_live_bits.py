@@ -12,7 +12,7 @@ from chutelab.scene import SceneError, from_dict, load, parse
 from chutelab.scene.overrides import Override
 from chutelab.theory import Reason, predict, transfer
 from chutelab.theory.prediction import unbounded
-from chutelab.theory.results import STAGES
+from chutelab.theory.transfer import STAGES
 from live.node import ask, needs_node, plain
 from test_live_core import CORNERED, MOVING
 

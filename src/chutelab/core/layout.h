@@ -581,7 +581,7 @@ enum Course { FINISHED, PAUSING, FILLED, NO_MEMORY, NO_PROGRESS, DRIVEN, TOO_LON
 typedef struct { double radius, speed, incline; int surface, pad; } Wheel; /* [in] the drive pulley */
 
 typedef struct {
-    /* arrays; of a family each particle is a member */
+    /* arrays; of a family each scene is a member */
     Segment *segments;      /* [in] (members, segment_count) */
     Arc *arcs;              /* [in] (members, arc_count) */
     Wheel *wheels;          /* [in] (members) or none */
@@ -593,7 +593,7 @@ typedef struct {
     double *room;           /* (room_size) for the obstacles that surfaces are */
     int segment_count, arc_count, wheel_count, lone_count, surface_count, kind_count; /* [in] */
     int knot_room, event_room, room_size;
-    int family, apart;      /* [in] each particle has surfaces, and books, of its own */
+    int each, apart;        /* [in] particles of a member, 0 without a family; each has books of its own */
     int is_whole;           /* [in] all knots and events are still there: the host took none */
     int until, landing;     /* [in] enum Until; surface that a particle lands on, or -1 */
     int most, window;       /* [in] rounds of a particle; rounds after which it is asked whether it gets on */
@@ -761,7 +761,7 @@ typedef struct {
     double *knots;          /* [in] rows of t, x, y, vx, vy, spin, three entries of the ledger */
     int *offsets;           /* (particles + 1) first knot of each, and behind the last: [in], or `owned` */
     Body *bodies;           /* [in] (particles) */
-    Barrier *barriers;      /* [in] (pieces), of a family (particles, pieces) */
+    Barrier *barriers;      /* [in] (pieces), of a family (members, pieces) */
     Mover *movers;          /* [in] (mover_count), as far as they are told */
     Swing *swings;          /* [in] of all hinges, each one's in the order of time */
     double *books;          /* [in] (book_rows, 3) entries of each surface, J */
@@ -779,7 +779,7 @@ typedef struct {
     int interact;           /* [in] particles meet each other */
     int joined;             /* [in] some hang on joints */
     int alike;              /* [in] all is left to steps that are all alike, and to Chipmunk */
-    int family;             /* [in] each particle has pieces of its own */
+    int each;               /* [in] particles that share pieces, of a family; else 0: all */
     int pulley;             /* [in] piece 0 ends on a drive pulley */
     int contacts, steps;    /* [in] that were made */
     int owned;              /* [in] behind its numbers a knot says whose it is: rows are those of `Knot` */

@@ -160,8 +160,9 @@ EARTH = 9.81
 class Machine:
     """Everything an engine needs to run.
 
-    A family of machines, one for each particle, is one machine in which surfaces, gravity, radius
-    and mass of the particle, the pulley's numbers and the end time have a value for each, (N,).
+    A family of machines, a copy of one for each particle, is one machine in which surfaces,
+    gravity, radius and mass of the particle, the pulley's numbers and the end time have a value for
+    each, (N,).
 
     One that `is_ahead` has only what needs no geometry, and `build`; the rest is built when it is
     first asked for. An engine that has the core build it never asks.

@@ -260,7 +260,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("row", recording.knots.dtype.itemsize // 8), ("book_rows", len(books) // 3),
         ("surface_count", len(recording.surfaces)), ("engine", _ENGINES.index(recording.engine)),
         ("interact", machine.interact or len(recording.swings) + len(recording.totals) > 0),
-        ("joined", len(machine.joints) > 0), ("alike", alike(recording)), ("family", rows.ndim > 1),
+        ("joined", len(machine.joints) > 0), ("alike", alike(recording)), ("each", rows.ndim > 1),
         ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
         ("steps", recording.steps), ("unreal", unreal),
         ("tilt", machine.tilt), ("dt", 0.0 if exact else machine.dt),

@@ -349,8 +349,13 @@ class Record(Shown):
 
     @property
     def family(self) -> Family | None:
-        """All scenes that were run at once, if each particle is of another one."""
+        """All scenes that were run at once, if these are several."""
         return self.machine.family
+
+    @property
+    def variants(self) -> int:
+        """Number of scenes V; of a family each has as many of the particles, in turn."""
+        return 1 if self.family is None else self.count // self.family.each
 
     @property
     def title(self) -> str:

@@ -273,6 +273,7 @@ def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, c
     times = np.linspace(clock.min(), clock.max(), 4)
     for t, cell in zip(times, np.ndindex(*grid), strict=True):
         ax = figure.add_subplot(cells[cell])
+        draw_last(ax, recording.machine, t)
         draw_scene(ax, recording.machine, window, small=True)
         draw_bodies(ax, recording, t, crowd=crowd)
         ax.set(xticks=[], yticks=[])

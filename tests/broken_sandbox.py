@@ -252,7 +252,6 @@ BY_HAND = [
     ("machine", {"stream[1].interact": True, "run.engine": "exact"}, "run.engine",
      "stream[1].interact"),
     ("machine", {"stream[0].interact": 1}, "stream[0].interact", "true or false"),
-    ("dominoes", {"run.engine": "contact"}, "run.engine", "needs pymunk"),
     ("dominoes", {"run.engine": "exact", "string": GONE, "rod": GONE, "spring": GONE, "pin": GONE},
      "run.engine", "needs contact or pymunk"),
     ("alone", {"string": [{"from": [0.0, 0.5]}], "run.engine": "exact"}, "run.engine",

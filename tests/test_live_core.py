@@ -132,6 +132,8 @@ def test_what_hangs_on_joints_moves_as_in_python():
         from_dict({**crowd, "string": over}),
         from_dict({**crowd, "string": [{**over[0], "length": 1.2}]}),
     ]
+    boxes = {**crowd, "particle": CORNERED[0]}
+    scenes += [from_dict({**boxes, **joints}) for joints in ({"rod": apart}, {"pin": pins})]
     same_runs([load("cradle"), *scenes])
     lab = describe(load("perpendicular"))
     for table, row, key in (

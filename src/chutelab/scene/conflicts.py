@@ -474,9 +474,6 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
                 yield run.fault(
                     "engine", f'{kind.path("shape")} = "{shape}" needs contact or pymunk'
                 )
-            elif engine == "contact" and joined:
-                text = f'{joined[0]}[0] with {kind.path("shape")} = "{shape}" needs pymunk'
-                yield run.fault("engine", text)
         elif size == 0.0:
             if any(size != 0.0 for size in sizes if size is not math.nan):
                 text = "more than 0, or 0 of all kinds: no engine has points beside disks"

@@ -78,8 +78,9 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough) {
     double first = INFINITY;
-    int driven = 0, pressing = 0, lessened = 0;
-    if (W.swings_too) {
+    int driven = 0, pressing = 0, lessened = 0, one_by_one = W.swings_too;
+    for (int n = 0; n < count; n++) one_by_one |= list[n].cornered;
+    if (one_by_one) {
         sweep_hung(list, count, MAX(rounds, 1) * sweeps, enough);
         return;
     }
@@ -183,7 +184,7 @@ static void sort_by_islands(void) {
         if (W.contacts[n].two) parent[island_of(W.contacts[n].i)] = island_of(W.contacts[n].j);
     /* What touches hinges is one island. */
     for (int n = 0, hung = -1; n < W.contact_count && W.hinges; n++) {
-        if (!W.contacts[n].hung && !W.contacts[n].cornered) continue;
+        if (!W.contacts[n].hung) continue;
         if (hung >= 0) parent[island_of(W.contacts[n].i)] = island_of(hung);
         hung = W.contacts[n].i;
     }
@@ -251,7 +252,7 @@ void solve_contacts(int again) {
             least = MIN(least, MIN(a->radius, b->radius));
             heaviest = MAX(heaviest, MAX(a->mass, b->mass));
             driven |= presses(c);
-            W.swings_too |= c->hung > 0 || c->cornered;
+            W.swings_too |= c->hung > 0;
         }
         swings |= W.swings_too;
         /* A drive presses as hard as it must: there no spring would hold, so that it gives no more than

@@ -199,7 +199,7 @@ double gap_to(const Surface *s, double x, double y, double r, double *nx, double
 const Surface *face_at(const Surface *s, double x, double y);
 double surface_speed(const Surface *s, double nx, double ny, double x, double y, double r);
 double bending(const Surface *s, double x, double y, double r);
-double chain_gap(const Surface *s, double x, double y, double r, double t, double *side);
+double chain_gap(const Surface *s, const Disk *d, double x, double y, double t, double *side);
 double clear_after(const Surface *s, const Disk *d, double span);
 double meet_surface(const Surface *s, const Disk *d, double span, double *approach);
 double meet_disk(double x, double y, double u, double v, double reach, double span, double *approach);
@@ -282,7 +282,7 @@ void share_with_joints(const Contact *c, double wanted, const double *u, double 
 double inner_of(int i, int j);
 double whirl_of(const Disk *d);
 int list_touches(int i, int j, double t, double within, double later, Touch *list);
-double gap_of_corners(const Disk *d, double x, double y, int k, double t);
+double clear_of_corners(const Disk *d, double x, double y, int k, double t);
 int would_overlap(int i, double x, double y, int j, double t, double deep);
 double meet_corners(int i, int j, double from, double until, double soft);
 void describe_touch(Contact *c, int i, int j, const Touch *t);

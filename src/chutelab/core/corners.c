@@ -263,21 +263,46 @@ RARELY int list_touches(int i, int j, double t, double within, double later, Tou
     return count;
 }
 
-/* Gap between a particle with corners, moved to a place, and a surface, m. */
-RARELY double gap_of_corners(const Disk *d, double x, double y, int k, double t) {
+/* By how much a shape is clear of the circle of an arc, or of what is between its ends from an edge's side, m. */
+static double clear_of_bow(const Shape *a, const Surface *s) {
+    double far = 0, near = INFINITY, n[2], out;
+    const double centre[2] = {s->x, s->y};
+    for (int e = 0; e < a->count; e++) {
+        const double *p = a->p[e], *q = a->p[e + 1 < a->count ? e + 1 : 0];
+        double length = out_of(a, e, n), x = s->x - p[0], y = s->y - p[1], along = n[0] * y - n[1] * x;
+        double over = MIN(MAX(along, 0), length) / length;
+        near = MIN(near, hypot(x - over * (q[0] - p[0]), y - over * (q[1] - p[1])));
+        far = MAX(far, hypot(x, y));
+    }
+    furthest(a, centre, &out);
+    double clear = MAX(s->radius - far, (out > 0 ? near : 0) - s->radius);
+    for (int e = 0; e < a->count && s->shape == ARC; e++) {
+        out_of(a, e, n);
+        double least = MIN(off_edge(a, e, s->end), off_edge(a, e, s->end + 2));
+        if (-n[0] * s->tx - n[1] * s->ty >= s->cos_half) least = off_edge(a, e, centre) - s->radius;
+        clear = MAX(clear, least);
+    }
+    return clear;
+}
+
+/* By how much a particle with corners, as it is at t and moved to a place, is clear of a surface, m: along the best of
+   all edges; below 0 it overlaps. */
+RARELY double clear_of_corners(const Disk *d, double x, double y, int k, double t) {
     Shape a = shape_of((int)(d - W.disks), t), b = shape_of(-1 - k, t);
-    double least = INFINITY;
+    double low = INFINITY, high = -INFINITY, clear;
     for (int n = 0; n < a.count; n++) {
         a.p[n][0] += x - a.x;
         a.p[n][1] += y - a.y;
     }
-    a.x = x;
-    a.y = y;
-    for (int c = 0; c < a.count + b.count; c++) {
-        Touch now = {.which = c};
-        if (find_place(&a, &b, TOUCH * d->inner, &now)) least = MIN(least, now.gap);
+    if (b.s->shape != SEGMENT) return clear_of_bow(&a, b.s);
+    for (int n = 0; n < a.count; n++) {
+        double off = (a.p[n][1] - b.s->y) * b.s->tx - (a.p[n][0] - b.s->x) * b.s->ty;
+        low = MIN(low, off);
+        high = MAX(high, off);
     }
-    return least;
+    clear = MAX(low, -high);
+    for (int e = 0; e < a.count; e++) clear = MAX(clear, clear_of(&a, e, &b));
+    return clear;
 }
 
 /* Whether two particles, one with corners, would overlap by more than `deep`, the first at a place, both at t. */

@@ -34,8 +34,7 @@ void spare(const Disk *d, const Surface *s, double t) {
     int comes = s->opens == t, *spared = spared_by(s, d);
     if (!comes && !s->one_sided && (s->opens > t || !*spared)) return;
     if (d->mode == RIDING) ride_at(d, t, place);
-    double gap = has_corners(d) ? gap_of_corners(d, place[0], place[1], (int)(s - W.surfaces), t)
-        : chain_gap(s, place[0], place[1], d->radius, t, &side);
+    double gap = chain_gap(s, d, place[0], place[1], t, &side);
     *spared = side < 0 || (comes ? gap < -deep : *spared && gap < 0);
 }
 

@@ -265,8 +265,6 @@ def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
         if kind.outline and kind.rolling_friction:
             key = f"{scene.head('particle', n)}.rolling_friction"
             yield key, kind.rolling_friction, "0 with boxes and polygons: they do not roll"
-    if scene.one_sided:
-        yield ("run.engine", "contact", f"pymunk: {scene.one_sided} has two sides with {why}")
     belt = scene.incoming
     if belt is not None and belt.friction == "adhesion":
         yield "incoming.friction", belt.friction, f"a Coulomb coefficient with {why}"

@@ -197,8 +197,10 @@ def test_boxes_and_polygons_move_as_in_python():
     ]}  # fmt: skip
     alone = [{**BALL, "particle": kind, "surface": [LINE]} for kind in CORNERED]
     row = {"stream": {"at": [-0.1, 0.2], "to": [0.2, 0.2], "velocity": [0.3, 0.0], "count": 4}}
-    moving = [{**base, "surface": [{**LINE, **keys}]}
-              for base in (crowd, alone[0]) for keys in (MOVING[0], MOVING[4])]  # fmt: skip
+    ways = (MOVING[0], MOVING[4], {"passes": "up"})
+    moving = [
+        {**base, "surface": [{**LINE, **keys}]} for base in (crowd, alone[0]) for keys in ways
+    ]
     scenes = [crowd, {**crowd, "gravity_deg": 30.0}, *alone, {**alone[1], **row}, *moving]
     same_runs([load("dominoes"), load("domino-gate"), *map(from_dict, scenes)])
 

@@ -108,7 +108,8 @@ static inline double cohesion_of(int i, int j) {
     return (j < 0 ? surface_pair(d, -1 - j) : pair_of(d->kind, W.disks[j].kind))->cohesion;
 }
 /* Whether a disk is spared: a gate shut on it, or what is solid from one side lets it through, and it is not clear
-   of that yet. */
+   of that yet; or CLEARS: it will be in this step. */
+#define CLEARS 2
 static inline int *spared_by(const Surface *s, const Disk *d) {
     return W.spared + (d - W.disks) * W.gate_count + s->gate;
 }

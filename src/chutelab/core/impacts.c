@@ -140,6 +140,7 @@ static void foresee_surfaces(int i, double *due, int *partner) {
         if (is_spared(W.surfaces + k, d)) {
             if (!W.surfaces[k].one_sided) continue;
             wait = clear_after(W.surfaces + k, d, W.step_end - d->t);
+            *spared_by(W.surfaces + k, d) = wait < INFINITY ? CLEARS : 1;
             if (wait == INFINITY) continue;
         }
         const Surface *s = surface_at(k, d->t);

@@ -290,8 +290,11 @@ static double set_gates(double t) {
         s->there = there;
         /* Pieces that follow each other in a chain share what they spare. */
         int is_first = s->gate >= 0 && (k == 0 || s->gate != s[-1].gate);
-        for (int i = W.low; i < W.high && is_first; i++)
-            if (is_live(W.disks + i)) spare(W.disks + i, s, t);
+        for (int i = W.low; i < W.high && is_first; i++) {
+            if (!is_live(W.disks + i)) continue;
+            if (*spared_by(s, W.disks + i) == CLEARS) *spared_by(s, W.disks + i) = 0;
+            spare(W.disks + i, s, t);
+        }
     }
     return W.gate_count || W.mover_count ? next_gate(t) : INFINITY;
 }

@@ -112,13 +112,11 @@ class Findings(NamedTuple):
 
 def judge(recording: Record) -> tuple[Broken, ...]:
     """Judge a run: return the laws that it breaks, each once, in the order of `LAWS`."""
-    if _TOLD not in recording.found:
-        recording.found[_TOLD] = _tell(recording) if len(recording.knots) else ()
-    told: tuple[Broken, ...] = recording.found[_TOLD]
-    return told
-
-
-def _tell(recording: Record) -> tuple[Broken, ...]:
+    if _TOLD not in recording.found and not len(recording.knots):
+        recording.found[_TOLD] = ()
+    if _TOLD in recording.found:
+        known: tuple[Broken, ...] = recording.found[_TOLD]
+        return known
     found, machine = examine(recording), recording.machine
     pulley = sum(part.surface.shape[-1] for part in machine.parts)
     told = []
@@ -130,6 +128,7 @@ def _tell(recording: Record) -> tuple[Broken, ...]:
         advice, unit = _advice(recording, law, found.figures), UNITS.get(law, "J")
         told.append(Broken(law, particles, particle, t, (x, y), name, amount, bound, unit, advice))
     told += _hinges(recording, found.figures)
+    recording.found[_TOLD] = tuple(told)
     return tuple(told)
 
 

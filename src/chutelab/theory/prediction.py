@@ -7,6 +7,7 @@ the plate is there, what is touched between rebound and landing, whether the bel
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -375,3 +376,42 @@ def hindrance(course: Course) -> tuple[str, str] | None:
     if lands and not out.start <= x <= out.start + out.length:
         return "landing", Reason.MISSES.because(f"it comes down at x = {x:.4g} m, off the belt")
     return None
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What the closed form has to say of a scene."""
+
+    covers: tuple[str, ...]  # the paper's symbols that it gives
+    leaves_out: tuple[str, ...]  # and those that it does not
+    reason: str  # why it stops, as `chutelab.theory` has it; "" if it does not
+    words: str  # the same for people
+
+
+WORDS = {
+    Reason.OUTSIDE: "The paper's equations are about another machine",
+    Reason.EARLY: "The equations stop short of a contact they know nothing of",
+    Reason.NO_IMPACT: "The particle flies past the plate, and the equations end with the flight",
+    Reason.SECOND: "After the plate it meets something else before it lands",
+    Reason.MISSES: "It does not come down on the outgoing belt",
+}
+"""What a reason means, in words for a first look at the scene."""
+
+
+def coverage(scene: Scene) -> Coverage:
+    """Ask the theory about a scene; it speaks of particle 0."""
+    from chutelab.scene.quantities import THEORY
+
+    found, lone = predict(scene), scene.count == 1
+    given = tuple(name for name in THEORY if np.isfinite(getattr(found, name)))
+    reason = str(found.reason)
+    kind = Reason.of(reason)
+    words = "All of the transfer, belt to belt."
+    if kind is not None:
+        words = f"{WORDS[kind]}: {reason.partition(': ')[2]}."
+    if given and not lone:
+        words += " It speaks of particle 0 only."
+    if "belt_work" in given and not (lone and scene.run.until == "settled"):
+        words += " A simulation has belt_work and slip_heat to compare in a run"
+        words += " until settled." if lone else " of one particle until settled."
+    return Coverage(given, tuple(name for name in THEORY if name not in given), reason, words)

@@ -310,7 +310,12 @@ class Shared:
             self.moving.swing(self.t, self.h)
         self._contacts()
         if self.ties.all:
-            self._pulled()
+            for tie, told in self.ties.pulled(self.state[..., : self.count], self.pull, self.h):
+                ends = [n for n in (tie.joint.particle, tie.joint.other) if n >= 0]
+                for i in ends:
+                    self.entries[:, i] += told / len(ends)
+                self.recorder.by_surface[-1] += told
+            self.recorder.springs = np.array(self.ties.springs).reshape(-1, 4)
         if self.machine.air:
             self._slow_down()
         self.tracks.step(self.free, (t, self.t), self.state[..., : self.count], entries, turned)
@@ -508,17 +513,6 @@ class Shared:
         values = np.frombuffer(self.buffer.float_buf()).reshape(-1, 4).T
         ids = np.frombuffer(self.buffer.int_buf(), dtype=np.uintp).reshape(-1, 3).T
         return *self.row[self.ids.searchsorted(ids[:2])], ids[2] != 0, values
-
-    # Joints
-
-    def _pulled(self) -> None:
-        """Book what joints do."""
-        for tie, entries in self.ties.pulled(self.state[..., : self.count], self.pull, self.h):
-            ends = [n for n in (tie.joint.particle, tie.joint.other) if n >= 0]
-            for i in ends:
-                self.entries[:, i] += entries / len(ends)
-            self.recorder.by_surface[-1] += entries
-        self.recorder.springs = np.array(self.ties.springs).reshape(-1, 4)
 
     def _riding(self, particles: Ints, surface: Ints) -> None:
         """Count pushes of surfaces in a row; tell separations at the last one's time."""

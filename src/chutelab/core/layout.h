@@ -218,14 +218,15 @@ typedef struct {
 enum Tie { STRING, ROD, SPRING, PIN };
 
 typedef struct {
-    double from[2];         /* [in] m; fixed end of what has no other particle; of a pin its place */
+    double from[2];         /* [in] m; fixed end of what has no other particle; of a pin its place; of a string between
+                               two the pulley that it runs over, or NaN */
     double length;          /* [in] m; of a spring at rest; NaN: as it is when it is tied */
     double stiffness, damper; /* [in] N/m, N s/m */
     double kept[2], damped, given; /* [out] J; in a spring when it was tied and now, what its damper took,
                                and what it gave to particles */
     double arm[4];          /* m; of a pin, from both centres in particles that have not turned */
     int kind, particle, other; /* [in] enum Tie; two particles, or one and -1 */
-    double now[2];          /* m; from its other end to its particle */
+    double now[4];          /* m; from its other end to its particle; over a pulley from there to both */
     int tied, struck;       /* whether both ends move freely; a blow is passed on to it */
     int taut;               /* a string that pulled in the step before */
     int row;                /* first of its rows */
@@ -234,7 +235,7 @@ typedef struct {
 
 /* One equation of a joint: a pin has two. */
 typedef struct {
-    double e[2], lever[2];  /* how its impulse acts: on the particle along e, on the other against it; m */
+    double e[4], lever[2];  /* how its impulse acts, on the particle and on the other; m */
     double kick;            /* N s; half of what it gives in a step; apart if above 0 */
     double struck[2], answer[2]; /* 1/kg, N s; what a blow of 1 N s draws it apart, and how it answers */
     double off, eases;      /* m, m/(N s); by how much it is missed, and how a spring gives way */

@@ -178,7 +178,8 @@ def built(machine: Machine) -> Iterator[Part]:
     for joint in machine.joints:
         begin = f"particle {joint.other}"
         if joint.anchor is not None:
-            begin = "({:.6g}, {:.6g}) m".format(*joint.anchor)
+            place = "({:.6g}, {:.6g}) m".format(*joint.anchor)
+            begin = place if joint.over is None else f"{begin} over {place}"
         held = f"from {begin} to particle {joint.particle}, {joint.length:.6g} m long"
         yield Part(joint.kind, held)
     releases = machine.releases

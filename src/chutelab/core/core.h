@@ -7,6 +7,7 @@
 #include "layout.h"
 #include "loads.h"
 #include "memory.h"
+#include "trig.h"
 
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 #define MAX(a, b) ((a) > (b) ? (a) : (b))

@@ -10,7 +10,6 @@
 
 #include "core.h"
 
-#define PI 3.14159265358979323846
 
 /* Pieces that a span is looked at in, at least: a touch that comes and goes within one is left to the next step. */
 #define STRIDES 8

@@ -122,7 +122,6 @@ def test_what_boxes_and_polygons_do_not_have_is_refused_by_the_same_key():
         {**kind, "points": [[0, 0], [1, 0]]},
     )]  # fmt: skip
     documents += [
-        {**own, "air_density": 1.2},
         {**own, "run": {"engine": "exact"}},
         {**own, "stream": {**own["stream"], "width": 0.5}}, {**BELTS, "particle": box},
         {**THROWN, "stream": {**THROWN["stream"], "angle_deg": 30.0}},

@@ -177,6 +177,7 @@ def test_what_clings_passes_or_flies_in_air_does_so_as_in_python():
     ]
     scenes = [from_dict({**crowd, "pair": pair}) for pair in pairs]
     flying = (crowd, {**crowd, "pair": pairs[0]}, BALL)
+    flying = (*flying, {**BALL, "particle": CORNERED[1]})
     scenes += [from_dict({**base, "air_density": 40.0}) for base in flying]
     same_runs(scenes)
     runs = [simulate(scene).knots.tobytes() for scene in (from_dict(crowd), *scenes[:4])]

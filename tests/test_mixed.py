@@ -330,6 +330,34 @@ def test_random_boxes_among_what_lets_them_through_keep_the_laws(seed):
     sound(chutelab.simulate(one_sided(seed), engine="contact"))
 
 
+# What rolls on a box
+
+
+@pytest.mark.parametrize("drop", [0.0, 0.01])
+def test_a_disk_rolls_on_a_box_as_on_a_floor(drop):
+    """Rolling friction c slows it down by 2/3 c g; a blow of m v by as much as v / g of that."""
+    r, c, v, end = 0.01, 0.1, 0.8, 0.5
+    slab = {"name": "slab", "shape": "box", "size": [1.0, H], "mass": 50.0, "spin": True}
+    row = {"interact": True, "friction": 0.6, "restitution": 0.0}
+    scene = {
+        "particle": [slab, {**ROUND, "mass": 0.01, "rolling_friction": c}],
+        "surface": [{"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "friction": 0.6}],
+        "stream": [{"particle": "slab", "at": [0.0, 0.5 * H], "velocity": [0.0, 0.0], **row},
+                   {"particle": "ball", "at": [-0.4, H + r + drop], "velocity": [v, 0.0],
+                    "omega": -v / r}],
+        "run": {"until": end},
+    }  # fmt: skip
+    last = sound(chutelab.simulate(scene)).ends()[1][1]
+    # Falling and resting, it is pressed by its weight times all of the time.
+    assert last["velocity"][0] == pytest.approx(v - 2.0 / 3.0 * c * G * end, abs=1e-8)
+    assert last["omega"] == pytest.approx(-last["velocity"][0] / r, abs=1e-6)
+    if drop == 0.0:
+        theirs = [chutelab.simulate(scene, {"run.dt": dt}, engine="pymunk").ends()[1][1]
+                  for dt in (1e-3, 2.5e-4)]  # fmt: skip
+        off = [abs(one["velocity"][0] - last["velocity"][0]) for one in theirs]
+        assert off[1] < 0.4 * off[0]
+
+
 # Surfaces
 
 

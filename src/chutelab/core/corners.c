@@ -632,7 +632,7 @@ static void feel_joints(Contact *list, int count, double size) {
 }
 
 /* Impulses at all places such that gaps do not close, or open as fast as they are to, and that friction, a share of
-   it, stops slip as far as it may. */
+   it, stops slip as far as it may, and a disk's rolling friction its rolling, unless there are joints. */
 static void share_blow(Contact *list, int count, const double *back, double share) {
     double size = 0;
     for (int n = 0; n < count; n++) size = MAX(size, back[n]);
@@ -654,6 +654,14 @@ static void share_blow(Contact *list, int count, const double *back, double shar
             give_all(c, change);
             J[1] += change[1];
             if (c->mass[1] > 0) worst = MAX(worst, fabs(change[1]) / c->mass[1]);
+            double arm = answers ? 0 : share * c->arm * J[0];
+            if (arm == 0 && J[2] == 0) continue;
+            relative(c, 0, v);
+            change[1] = 0;
+            change[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -arm), arm) - J[2];
+            give_all(c, change);
+            J[2] += change[2];
+            worst = MAX(worst, fabs(change[2]) / c->mass[2] * W.disks[MAX(c->j, 0)].radius);
         }
         if (worst <= ENDS * size) return;
     }
@@ -669,7 +677,7 @@ static double share_out_blow(Contact *list, int count, double *back, const doubl
         for (int n = 0; n < count; n++) {
             const double *J = list[n].impulse;
             relative(list + n, 0, v);
-            lost -= 0.5 * (J[0] * (u[n][0] + v[0]) + J[1] * (u[n][1] + v[1]));
+            lost -= 0.5 * (J[0] * (u[n][0] + v[0]) + J[1] * (u[n][1] + v[1]) + J[2] * (u[n][2] + v[2]));
             size += fabs(J[0] * u[n][0]) + fabs(J[1] * u[n][1]);
         }
         int is_plastic = 1;
@@ -677,9 +685,9 @@ static double share_out_blow(Contact *list, int count, double *back, const doubl
         if (lost >= -GAINS * size || is_plastic) return lost;
         for (int n = 0; n < count; n++) {
             Contact *c = list + n;
-            double none[3] = {-c->impulse[0], -c->impulse[1], 0};
+            double none[3] = {-c->impulse[0], -c->impulse[1], -c->impulse[2]};
             give_all(c, none);
-            c->impulse[0] = c->impulse[1] = 0;
+            c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
             if (share == 0) back[n] = 0;
         }
         share = share > 0.1 ? 0.5 * share : share > 0 ? 0 : 1;

@@ -302,7 +302,6 @@ function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
     }
   }
   if (incoming?.friction === "adhesion") yield ["incoming.friction", "adhesion", "cornered-grip"];
-  if (scene.air_density) yield ["air_density", scene.air_density, text];
   const clings = pair.findIndex(clinging);
   if (clings >= 0) yield [`pair[${clings}].${clinging(pair[clings])}`, undefined, text];
 }

@@ -281,7 +281,6 @@ def test_after_the_first_blow_both_engines_go_the_same_way(seed):
 @pytest.mark.parametrize(
     ("more", "key"),
     [
-        ({"rod": [{"from": [0.0, 0.5]}]}, "rod[0].particle"),
         ({"particle": {"rolling_friction": 0.1}}, "particle.rolling_friction"),
         ({"air_density": 1.2}, "air_density"),
         ({"surface": [{"name": "gate", "from": [0.0, 0.0], "to": [0.2, 0.0], "passes": "up"}]},
@@ -348,3 +347,35 @@ def test_poured_boxes_get_into_each_other_and_into_walls_by_less_than_a_thousand
     # All of them lie by then, on each other or on the floor.
     assert now.position[-1, :, 1].max() < 0.2
     assert np.abs(now.velocity[-1]).max() < 0.05
+
+
+def test_where_boxes_are_in_the_end():
+    """On a board that has turned lie a box and on it a disk; beside it a box is near.
+
+    Its circle reaches into the board: half a diagonal is 58 mm, half its height 30 mm.
+    """
+    scene = {
+        "particle": [
+            {"name": "crate", "shape": "box", "size": [0.1, 0.06], "mass": 0.5, "spin": True},
+            {"name": "coin", "radius": 0.02, "mass": 0.1},
+        ],
+        "pair": [{"between": ["crate", "coin"], "friction": 0.8, "restitution": 0.0}],
+        "surface": [
+            {
+                "name": "board", "from": [-0.5, 0.0], "to": [0.5, 0.0], "hinge": [0.0, 0.0],
+                "mass": 1.0, "stops_deg": [-30.0, 30.0], "restitution": 0.0, "friction": 0.8,
+            }
+        ],
+        "stream": [
+            {"particle": "crate", "at": [0.3, 0.031], "velocity": [0.0, 0.0], "interact": True},
+            {"particle": "coin", "at": [0.3, 0.082], "velocity": [0.0, 0.0]},
+            {"particle": "crate", "at": [-0.488, 0.045], "velocity": [0.0, 2.0], "start": 1.8},
+        ],
+        "run": {"until": 2.0},
+    }  # fmt: skip
+    recording = chutelab.simulate(scene)
+    assert recording.pose("board", [2.0])[0, 2] == pytest.approx(np.radians(-30.0))
+    off = recording.at([2.0]).position[0, 2] - 0.5 * np.array([-cos(pi / 6.0), sin(pi / 6.0)])
+    assert hypot(*off) < hypot(0.05, 0.03)
+    assert off[0] < -0.05
+    assert recording.summary()["fates"] == {"on board": 2, "in the air": 1}

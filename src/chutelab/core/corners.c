@@ -18,6 +18,8 @@
 /* Sweeps of a blow at several places, and of its size, at which they end. */
 #define SWEEPS 10000
 #define ENDS 1e-15
+/* Of the velocity that an impulse would change if there were no joints: what is less, they hold. */
+#define HELD 1e-13
 /* Share of it that a blow may give by rounding. */
 #define GAINS 1e-12
 /* Contacts of an island up to which it is brought off its hop before a blow; none of them on what moves, which presses
@@ -501,7 +503,11 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
         const Contact *c = W.contacts + link / 2;
         lasts |= c->i == i && c->j == j && c->impulse[0] > 0;
     }
-    int found = list_touches(i, j, t, (lasts ? TOUCH : TOUCHING) * least, t, places);
+    double within = (lasts ? TOUCH : TOUCHING) * least, span = 2 * SOON * W.step, most = 0;
+    /* What has joints is struck as a step begins, if that is so soon. */
+    if (is_tied(i) || is_tied(j)) most = fastest_of(i, j, t, span);
+    if (most < INFINITY) within = MAX(within, most * span);
+    int found = list_touches(i, j, t, within, t, places);
     for (int n = 0; n < found; n++) {
         Contact *c = list + count++;
         describe_touch(c, i, j, places + n);
@@ -573,6 +579,33 @@ RARELY int lies_flat(int i, int k) {
     return lies;
 }
 
+/* Whether what is struck has joints, which answer each impulse of the blow. */
+static int answers;
+
+static void give_all(const Contact *c, const double *impulse) {
+    push(c, impulse);
+    if (answers) answer_with_joints();
+}
+
+/* What the places of a blow feel of masses where joints answer: by impulses that change velocities by as much as `size`,
+   m/s, and are taken back. */
+static void feel_joints(Contact *list, int count, double size) {
+    for (Contact *c = list; c < list + count; c++)
+        for (int n = 0; n < 2; n++) {
+            double u[3], v[3], one[3] = {0, 0, 0}, back[3] = {0, 0, 0};
+            one[n] = size * W.disks[c->i].mass;
+            back[n] = -one[n];
+            relative(c, 0, u);
+            give_all(c, one);
+            relative(c, 0, v);
+            give_all(c, back);
+            double gives = v[n] - u[n];
+            /* Joints may hold it as it is. */
+            c->mass[n] = gives > HELD * size ? one[n] / gives : 0;
+        }
+    forget_answers();
+}
+
 /* Impulses at all places such that gaps do not close, or open as fast as they are to, and that friction, a share of
    it, stops slip as far as it may. */
 static void share_blow(Contact *list, int count, const double *back, double share) {
@@ -586,16 +619,16 @@ static void share_blow(Contact *list, int count, const double *back, double shar
             relative(c, 0, v);
             size = MAX(size, fabs(v[0]) + fabs(v[1]));
             change[0] = MAX(J[0] + c->mass[0] * (back[n] - v[0]), 0) - J[0];
-            push(c, change);
+            give_all(c, change);
             J[0] += change[0];
-            worst = MAX(worst, fabs(change[0]) / c->mass[0]);
+            if (c->mass[0] > 0) worst = MAX(worst, fabs(change[0]) / c->mass[0]);
             double most = share * MIN(c->friction, share < 1 ? ROUGH : INFINITY) * J[0];
             relative(c, 0, v);
             change[0] = 0;
             change[1] = MIN(MAX(J[1] - c->mass[1] * v[1], -most), most) - J[1];
-            push(c, change);
+            give_all(c, change);
             J[1] += change[1];
-            worst = MAX(worst, fabs(change[1]) / c->mass[1]);
+            if (c->mass[1] > 0) worst = MAX(worst, fabs(change[1]) / c->mass[1]);
         }
         if (worst <= ENDS * size) return;
     }
@@ -620,7 +653,7 @@ static double share_out_blow(Contact *list, int count, double *back, const doubl
         for (int n = 0; n < count; n++) {
             Contact *c = list + n;
             double none[3] = {-c->impulse[0], -c->impulse[1], 0};
-            push(c, none);
+            give_all(c, none);
             c->impulse[0] = c->impulse[1] = 0;
             if (share == 0) back[n] = 0;
         }
@@ -637,6 +670,8 @@ RARELY void strike_corners(int i, int j, double t) {
     if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);
     end_hops(i, t);
     if (j >= 0 && b->mode == FREE) end_hops(j, t);
+    answers = is_tied(i) || is_tied(j);
+    if (answers) strike_joints(i, j);
     int count = list_struck(i, j, t, list), two = j >= 0 && b->mode == FREE;
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
@@ -654,7 +689,20 @@ RARELY void strike_corners(int i, int j, double t) {
     was_moved(i);
     if (!(fastest > 0)) return;
     if (two) was_moved(j);
-    double before[3] = {a->vx, a->vy, a->spin}, lost = share_out_blow(list, count, back, u), normal = 0, slip = 0;
+    double before[3] = {a->vx, a->vy, a->spin}, lost, normal = 0, slip = 0;
+    if (answers) begin_answers();
+    for (int strings = 1; strings;) {
+        double wanted[MOST_TOUCHES];
+        memcpy(wanted, back, sizeof back);
+        if (answers) feel_joints(list, count, fastest);
+        lost = share_out_blow(list, count, wanted, u);
+        strings = answers && let_go_again();
+        for (int n = 0; n < count && strings; n++) {
+            double none[3] = {-list[n].impulse[0], -list[n].impulse[1], 0};
+            push(list + n, none);
+            list[n].impulse[0] = list[n].impulse[1] = 0;
+        }
+    }
     for (int n = 0; n < count; n++) {
         Contact *c = list + n;
         double v[3], given[3];
@@ -682,6 +730,7 @@ RARELY void strike_corners(int i, int j, double t) {
         J[0] += x * main->nx + y * main->ny;
         J[1] += x * main->ny - y * main->nx;
     }
+    if (answers) end_blow();
     a->since = t;
     if (two) b->since = t;
     W.impact_count++;

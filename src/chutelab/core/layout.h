@@ -218,14 +218,15 @@ typedef struct {
 enum Tie { STRING, ROD, SPRING, PIN };
 
 typedef struct {
-    double from[2];         /* [in] m; fixed end of what has no other particle; of a pin its place */
+    double from[2];         /* [in] m; fixed end of what has no other particle; of a pin its place; of a string between
+                               two the pulley that it runs over, or NaN */
     double length;          /* [in] m; of a spring at rest; NaN: as it is when it is tied */
     double stiffness, damper; /* [in] N/m, N s/m */
     double kept[2], damped, given; /* [out] J; in a spring when it was tied and now, what its damper took,
                                and what it gave to particles */
     double arm[4];          /* m; of a pin, from both centres in particles that have not turned */
     int kind, particle, other; /* [in] enum Tie; two particles, or one and -1 */
-    double now[2];          /* m; from its other end to its particle */
+    double now[4];          /* m; from its other end to its particle; over a pulley from there to both */
     int tied, struck;       /* whether both ends move freely; a blow is passed on to it */
     int taut;               /* a string that pulled in the step before */
     int row;                /* first of its rows */
@@ -234,7 +235,7 @@ typedef struct {
 
 /* One equation of a joint: a pin has two. */
 typedef struct {
-    double e[2], lever[2];  /* how its impulse acts: on the particle along e, on the other against it; m */
+    double e[4], lever[2];  /* how its impulse acts, on the particle and on the other; m */
     double kick;            /* N s; half of what it gives in a step; apart if above 0 */
     double struck[2], answer[2]; /* 1/kg, N s; what a blow of 1 N s draws it apart, and how it answers */
     double off, eases;      /* m, m/(N s); by how much it is missed, and how a spring gives way */
@@ -580,7 +581,7 @@ enum Course { FINISHED, PAUSING, FILLED, NO_MEMORY, NO_PROGRESS, DRIVEN, TOO_LON
 typedef struct { double radius, speed, incline; int surface, pad; } Wheel; /* [in] the drive pulley */
 
 typedef struct {
-    /* arrays; of a family each particle is a member */
+    /* arrays; of a family each scene is a member */
     Segment *segments;      /* [in] (members, segment_count) */
     Arc *arcs;              /* [in] (members, arc_count) */
     Wheel *wheels;          /* [in] (members) or none */
@@ -592,7 +593,7 @@ typedef struct {
     double *room;           /* (room_size) for the obstacles that surfaces are */
     int segment_count, arc_count, wheel_count, lone_count, surface_count, kind_count; /* [in] */
     int knot_room, event_room, room_size;
-    int family, apart;      /* [in] each particle has surfaces, and books, of its own */
+    int each, apart;        /* [in] particles of a member, 0 without a family; each has books of its own */
     int is_whole;           /* [in] all knots and events are still there: the host took none */
     int until, landing;     /* [in] enum Until; surface that a particle lands on, or -1 */
     int most, window;       /* [in] rounds of a particle; rounds after which it is asked whether it gets on */
@@ -760,7 +761,7 @@ typedef struct {
     double *knots;          /* [in] rows of t, x, y, vx, vy, spin, three entries of the ledger */
     int *offsets;           /* (particles + 1) first knot of each, and behind the last: [in], or `owned` */
     Body *bodies;           /* [in] (particles) */
-    Barrier *barriers;      /* [in] (pieces), of a family (particles, pieces) */
+    Barrier *barriers;      /* [in] (pieces), of a family (members, pieces) */
     Mover *movers;          /* [in] (mover_count), as far as they are told */
     Swing *swings;          /* [in] of all hinges, each one's in the order of time */
     double *books;          /* [in] (book_rows, 3) entries of each surface, J */
@@ -778,7 +779,7 @@ typedef struct {
     int interact;           /* [in] particles meet each other */
     int joined;             /* [in] some hang on joints */
     int alike;              /* [in] all is left to steps that are all alike, and to Chipmunk */
-    int family;             /* [in] each particle has pieces of its own */
+    int each;               /* [in] particles that share pieces, of a family; else 0: all */
     int pulley;             /* [in] piece 0 ends on a drive pulley */
     int contacts, steps;    /* [in] that were made */
     int owned;              /* [in] behind its numbers a knot says whose it is: rows are those of `Knot` */

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
-from math import hypot, inf
+from math import inf
 from time import perf_counter
 
 import numpy as np
@@ -32,10 +32,9 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         raise ValueError(f"engine = {wanted!r}: one of {', '.join(ENGINES)}")
     if wanted != "auto":
         return wanted
-    if machine.scene.cornered:
-        return "pymunk" if any(uncornered(machine)) else "contact"
-    if machine.joints:
-        return "pymunk" if unjoined(machine) else "contact"
+    if machine.scene.cornered or machine.joints:
+        lacks = any(uncornered(machine)) or (machine.joints and unjoined(machine))
+        return "pymunk" if lacks else "contact"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
     scene = machine.scene
     return "contact" if stepped or scene.clings or scene.one_sided else "exact"
@@ -205,7 +204,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
 def must_fit(machine: Machine, name: str) -> None:
     """Raise a `SceneError` if an engine does not have what a machine needs."""
     scene = machine.scene
-    if name == "contact" and scene.cornered:
+    if name == "contact":
         for key, value, allowed in uncornered(machine):
             raise refused(scene, key, value, allowed)
     if name == "exact":
@@ -246,6 +245,9 @@ def must_fit(machine: Machine, name: str) -> None:
             allowed = "left out with the pymunk engine: Chipmunk's restitution is one number"
             key = f"{scene.head('particle', n)}.restitution_speed"
             raise refused(scene, key, kind.restitution_speed, allowed)
+    if name == "pymunk" and any(joint.over for joint in machine.joints):
+        allowed = "contact, because a string runs over a pulley: Chipmunk has no such joint"
+        raise refused(scene, "run.engine", "pymunk", allowed)
     for n, pair in enumerate(scene.pair):
         if (pull := pair.clings) and (name == "pymunk" or scene.hinges):
             what = "the pymunk engine" if name == "pymunk" else "what hangs on hinges"
@@ -260,8 +262,8 @@ def must_fit(machine: Machine, name: str) -> None:
 def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
     """Yield what the contact engine does not have with boxes: keys, values, and why not."""
     scene, why = machine.scene, "boxes and polygons; the pymunk engine has them"
-    for joint in machine.joints[:1]:
-        yield f"{joint.kind}[0].particle", joint.particle, f"no joints with {why}"
+    if not scene.cornered:
+        return
     for n, kind in enumerate(scene.particles):
         if kind.outline and kind.rolling_friction:
             key = f"{scene.head('particle', n)}.rolling_friction"
@@ -286,8 +288,8 @@ def unjoined(machine: Machine) -> str:
     if scene.hinges:
         return "joints and hinges are in one scene"
     for joint in machine.joints:
-        far, own = joint.ends(machine.releases.position)
-        if joint.kind == "string" and hypot(*(own - far)) > (1.0 + TAUT) * joint.length:
+        reach = joint.reach(machine.releases.position)
+        if joint.kind == "string" and reach > (1.0 + TAUT) * joint.length:
             return "a string is shorter than the distance at the release"
     return ""
 

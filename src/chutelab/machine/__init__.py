@@ -25,23 +25,7 @@ from chutelab.machine.releases import RefusedError
 from chutelab.machine.shapes import Arcs, Pieces, Segments
 
 __all__ = [
-    "DRIVE_PULLEY",
-    "PASSES",
-    "SWING",
-    "Arcs",
-    "Caution",
-    "Joint",
-    "Machine",
-    "Mover",
-    "Particle",
-    "Pieces",
-    "Pulley",
-    "RefusedError",
-    "Segments",
-    "ahead",
-    "build",
-    "hand_over",
-    "moved",
-    "origin",
-    "upright",
-]
+    "DRIVE_PULLEY", "PASSES", "SWING", "Arcs", "Caution", "Joint", "Machine", "Mover",
+    "Particle", "Pieces", "Pulley", "RefusedError", "Segments", "ahead", "build", "hand_over",
+    "moved", "origin", "upright",
+]  # fmt: skip

@@ -10,6 +10,7 @@ moved out where it is by rounding only.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 from math import ceil, inf, nan, prod
 from typing import Any
@@ -84,7 +85,8 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
         add("SurfaceKeys", surface, corners=len(surface.points or ()))
     for table, joint in scene.joints:
         lacks = {key: None for key in LACKS if not hasattr(joint, key)}
-        add("JointKeys", joint, kind=JOINTS.index(table), **lacks)
+        begin = joint.from_ or getattr(joint, "over", None)
+        add("JointKeys", joint, kind=JOINTS.index(table), from_=begin, **lacks)
     for name, one in scene.movers.items():
         shake, travel, motor = one.shake, one.travel, one.motor
         place = {} if one.hinge in (None, "pivot") else {"pivot": value(one, "hinge")}
@@ -214,8 +216,8 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     Parameters
     ----------
     scenes : Scene or Family
-        Of a family each scene, of one particle, is resolved as it would be by itself; the machine
-        has a particle for each, with surfaces of its own.
+        Of a family each scene is resolved as it would be by itself; the machine has the particles
+        of all, each with surfaces of its own.
     watch : callable, optional
         Called now and then while particles are given their places, which may take long; what it
         raises ends the building.
@@ -227,19 +229,24 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         place the outgoing belt, the impact lies off the finite plate, or a particle starts inside a
         surface.
     """
-    family = isinstance(scenes, Family)
+    family = scenes if isinstance(scenes, Family) else None
     scene, value = scenes.scene, scenes.value
     names, meeting = scene.surfaces, scene.meetings(value)
-    kinds = 1 if family else len(scene.particles)
+    kinds = len(scene.particles) if family is None else 1
     met = [[meeting(kind, name) for kind in range(kinds)] for name in names]
     # Adhesion is friction without a bound.
     met = [[(e, inf if isinstance(mu, str) else mu) for e, mu in pairs] for pairs in met]
     grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
     module = borrow()
     try:
-        rows, nominal, movers = lay(module, scenes, grip)
+        if family is None:
+            rows, nominal, movers = lay(module, scenes, grip)
+        else:
+            firsts = np.ravel(grip)[:: family.each] if np.ndim(grip) else grip
+            rows, nominal, movers = lay(module, family.firsts, firsts)
+            rows = {name: own.repeat(family.each, axis=0) for name, own in rows.items()}
         _weigh_hinges(scene, movers)
-        warnings = _judged(scenes, nominal)
+        warnings = _judged(scenes if family is None else family.firsts, nominal)
         releases, radius = draw(module, scenes, watch)
     finally:
         give_back(module)
@@ -251,7 +258,9 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     until: Any = value(scene.run, "until")
     worded = isinstance(until, str)
     particle = _particle(scenes, releases.kind, radius)
-    latest: Any = releases.t if family else releases.t.max().item()
+    latest: Any = releases.t.max().item()
+    if family is not None:
+        latest = releases.t.reshape(-1, family.each).max(axis=1).repeat(family.each)
     bound = latest + value(scene.run, "max_time")
     pulley = None
     if belt is not None:
@@ -267,18 +276,17 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     # Particles of a family never meet.
     pairs = np.zeros((1, 1, 2))
     every = range(len(particles))
-    if not family:
+    if family is None:
         pairs = np.array([[meeting(a, b) for b in every] for a in every])
         through = [[scene.passes(a, b) for b in every] for a in every]
         pairs[..., 0] = np.where(through, PASSES, pairs[..., 0])
     joints = []
-    for table, one in () if family else scene.joints:
-        (x, y), other = releases.position[one.particle].tolist(), one.other
-        u, v = releases.position[other].tolist() if one.from_ is None else one.from_
-        rest = getattr(one, "length", None) or float(hypot(x - u, y - v))
+    for table, one in scene.joints if family is None else ():
         own = {key: getattr(one, key) for key in LACKS[1:] if hasattr(one, key)}
-        second = -1 if other is None else other
-        joints.append(Joint(table, one.particle, rest, one.from_, second, **own))
+        begin, second = one.from_ or getattr(one, "over", None), one.other
+        joint = Joint(table, one.particle, 0.0, begin, -1 if second is None else second, **own)
+        rest = getattr(one, "length", None) or joint.reach(releases.position)
+        joints.append(replace(joint, length=rest))
     triggers = tuple(
         Trigger(names.index(name), doing, names.index(by)) for name, doing, by in scene.triggers
     )
@@ -389,18 +397,22 @@ def bodies(scenes: Scene | Family) -> tuple[list[Any], list[Any]]:
 def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Particle:
     """Return the particles: numbers if all are alike, else arrays (N,)."""
     scene, (masses, inertias) = scenes.scene, bodies(scenes)
+    nominal: Any
     if isinstance(scenes, Family):
-        first = scene.kinds[0]
-        return Particle(scenes.value(scene.particle, "radius"), masses[first], inertias[first])
-    if radius is None and (len(masses) == 1 or len({*zip(masses, inertias, strict=True)}) == 1):
+        nominal, first = scenes.value(scene.particle, "radius"), scene.kinds[0]
+        mass, inertia = masses[first], inertias[first]
+        if radius is None:
+            return Particle(nominal, mass, inertia)
+    elif radius is None and (len(masses) == 1 or len({*zip(masses, inertias, strict=True)}) == 1):
         return Particle(scene.particle.radius, masses[0], inertias[0])
-    nominal = np.array([one.radius for one in scene.particles])[kind]
+    else:
+        nominal = np.array([one.radius for one in scene.particles])[kind]
+        mass, inertia = np.array(masses)[kind], np.array(inertias)[kind]
     radius = nominal if radius is None else radius
     size = radius / nominal
     # Powers of libraries differ in the last bit.
     square = size * size
     cube = square * size
-    mass, inertia = np.array(masses)[kind], np.array(inertias)[kind]
     return Particle(radius, mass * cube, inertia * (cube * square))
 
 

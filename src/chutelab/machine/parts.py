@@ -19,7 +19,7 @@ from chutelab.machine.releases import Releases
 from chutelab.machine.shapes import Arcs, Pieces, Segments, crossings
 from chutelab.scene import Scene
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import RADIANS, Floats, Watch, sin_cos, unwatched
+from chutelab.util.arrays import RADIANS, Floats, Watch, hypot, sin_cos, unwatched
 
 DRIVE_PULLEY = "the drive pulley"
 
@@ -118,7 +118,8 @@ class Joint:
     kind: str  # of `JOINTS`
     particle: int
     length: float  # m; of a spring at rest
-    anchor: tuple[float, float] | None  # m; of a pin where it is at the release
+    # m; of a pin where it is at the release, of a string between two the pulley that it runs over
+    anchor: tuple[float, float] | None
     other: int = -1  # the other particle
     stiffness: float = 0.0  # N/m
     damper: float = 0.0  # N s/m
@@ -129,6 +130,18 @@ class Joint:
         far = np.broadcast_to(self.anchor or nan, own.shape)
         far = positions[..., self.other, :] if self.other >= 0 else far
         return np.stack([far, own], axis=-2)
+
+    @property
+    def over(self) -> tuple[float, float] | None:
+        """The pulley that a string runs over, m."""
+        return self.anchor if self.kind == "string" and self.other >= 0 else None
+
+    def reach(self, positions: Floats) -> float:
+        """Return how long it is, m, where particles are at `positions` (N, 2)."""
+        far, own = self.ends(positions)
+        if self.over is None:
+            return float(hypot(*(own - far)))
+        return float(hypot(*(own - self.over))) + float(hypot(*(far - self.over)))
 
 
 class Trigger(NamedTuple):
@@ -147,8 +160,9 @@ EARTH = 9.81
 class Machine:
     """Everything an engine needs to run.
 
-    A family of machines, one for each particle, is one machine in which surfaces, gravity, radius
-    and mass of the particle, the pulley's numbers and the end time have a value for each, (N,).
+    A family of machines, a copy of one for each particle, is one machine in which surfaces,
+    gravity, radius and mass of the particle, the pulley's numbers and the end time have a value for
+    each, (N,).
 
     One that `is_ahead` has only what needs no geometry, and `build`; the rest is built when it is
     first asked for. An engine that has the core build it never asks.

@@ -46,17 +46,9 @@ if TYPE_CHECKING:
 
 
 __all__ = [
-    "ENTRIES",
-    "EVENT",
-    "KNOT",
-    "PARTICLES",
-    "REASONS",
-    "Kind",
-    "Motion",
-    "Record",
-    "Recording",
+    "ENTRIES", "EVENT", "KNOT", "PARTICLES", "REASONS", "Kind", "Motion", "Record", "Recording",
     "balance",
-]
+]  # fmt: skip
 
 
 class Recording(Record):

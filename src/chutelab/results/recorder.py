@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from chutelab.machine import SWING, Machine, moved, origin, upright
 from chutelab.results.loads import Bins
 from chutelab.results.record import EVENT, KNOT, LASTING, LOAD, REASONS, TOTAL, Kind, Record
-from chutelab.util.arrays import Floats, Ints
+from chutelab.util.arrays import Bools, Floats, Ints
 
 
 class StalledError(RuntimeError):
@@ -294,3 +294,73 @@ def _joined(chunks: list[NDArray[Any]], dtype: np.dtype[Any]) -> NDArray[Any]:
         np.concatenate([chunk.view(np.uint8) for chunk in chunks], out=whole.view(np.uint8))
     chunks.clear()
     return whole
+
+
+ROUGH = 1e-4
+"""Share of the radius by which a track may be off between two knots."""
+
+
+class Tracks:
+    """Knots of particles that are stepped, only as many as the curve through them needs.
+
+    Between knots a track is a cubic, which a constant acceleration makes exact: a new knot is due
+    when the one of the first step since the last knot does not lead to where the particle is. With
+    `turning` that goes for the angle too, which is what ω, linear between knots, adds up to.
+    """
+
+    def __init__(
+        self, recorder: Recorder, radius: float, particles: range, *, turning: bool = False
+    ) -> None:
+        self.recorder, self.first, count = recorder, particles.start, len(particles)
+        self.turning, self.radius, self.tolerance = turning, radius, ROUGH * radius
+        self.t, self.x, self.v = np.zeros(count), np.zeros((2, count)), np.zeros((2, count))
+        self.pull, self.fresh = np.zeros((2, count)), np.ones(count, dtype=bool)
+        self.omega, self.twist = np.zeros((2, count))
+
+    def knot(
+        self, i: int, t: float, x: ArrayLike, v: ArrayLike, omega: float = 0.0, angle: float = 0.0
+    ) -> None:
+        """Write a knot of the particle in a row, with the entries booked so far."""
+        self.recorder.knots(self.first + i, t, x, v, omega, angle)
+        self.t[i], self.x[:, i], self.v[:, i], self.fresh[i] = t, x, v, True
+        self.omega[i] = omega
+
+    def step(
+        self,
+        rows: Bools,
+        times: tuple[float, float],
+        state: Floats,
+        entries: Floats,
+        angle: Floats | None = None,
+    ) -> None:
+        """Note a step of the particles in some rows; write knots of the states before where due.
+
+        `times` (s) and `state` (2, 5, N), of x, y, vx, vy and ω, are those at both ends; `entries`
+        (3, N) and `angle` (N,), how far all have turned (rad), are those before.
+        """
+        tau = times[1] - self.t
+        x, v = state[1, :2], state[1, 2:4]
+        new = self.fresh & rows
+        if new.any():
+            self.pull[:, new] = (v[:, new] - self.v[:, new]) / tau[new]
+        gain = tau * self.pull
+        off = np.abs(x - self.x - tau * (self.v + 0.5 * gain))
+        # A cubic is off by 4/27 τ of what one of its end velocities is.
+        off += 4.0 / 27.0 * tau * np.abs(v - self.v - gain)
+        apart = off[0] + off[1]
+        if self.turning:
+            omega = state[1, 4]
+            self.twist[new] = (omega[new] - self.omega[new]) / tau[new]
+            apart += 0.5 * self.radius * tau * np.abs(omega - self.omega - tau * self.twist)
+        due = np.flatnonzero((apart > self.tolerance) & rows & ~new)
+        self.fresh &= ~rows
+        if len(due):
+            knots = np.empty(len(due), dtype=KNOT)
+            before = state[0][:, due]
+            knots["t"], knots["position"], knots["velocity"] = times[0], before[:2].T, before[2:4].T
+            knots["omega"], knots["entries"] = before[4], entries[:, due].T
+            self.recorder.add(self.first + due, knots, 0.0 if angle is None else angle[due])
+            self.t[due], self.x[:, due], self.v[:, due] = times[0], before[:2], before[2:4]
+            self.pull[:, due] = (v[:, due] - before[2:4]) / (times[1] - times[0])
+            self.omega[due] = before[4]
+            self.twist[due] = (state[1, 4, due] - before[4]) / (times[1] - times[0])

@@ -331,6 +331,9 @@ def conflicts(look: Look) -> Iterator[Fault]:
                 if joint.given(key) and joint[key] >= count:
                     text = f"there are {count} particles, from 0; stream.count says how many"
                     yield joint.fault(key, text)
+            if joint.given("over") and look.row("run")["engine"] == "pymunk":
+                text = f"{joint.path('over')} needs contact: Chipmunk has no string over a pulley"
+                yield look.row("run").fault("engine", text)
             if joint.given("other") and joint["other"] == joint["particle"]:
                 yield joint.fault("other", f"must be another than {joint.path('particle')}")
     yield from _expectations(look, streams)
@@ -471,9 +474,6 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
                 yield run.fault(
                     "engine", f'{kind.path("shape")} = "{shape}" needs contact or pymunk'
                 )
-            elif engine == "contact" and joined:
-                text = f'{joined[0]}[0] with {kind.path("shape")} = "{shape}" needs pymunk'
-                yield run.fault("engine", text)
         elif size == 0.0:
             if any(size != 0.0 for size in sizes if size is not math.nan):
                 text = "more than 0, or 0 of all kinds: no engine has points beside disks"

@@ -414,8 +414,14 @@ class Joint(Table):
 class String(Joint):
     """A string: it pulls, and goes slack; what pulls it tight loses its speed along it."""
 
+    over: Point | None = described(
+        None,
+        "Of a string between two particles: a pulley [x, y] that it runs over, a point without mass"
+        " and friction; not in Pymunk",
+        "m",
+    )
     length: Length | None = described(
-        None, "Length; default: the distance at the particle's release", "m"
+        None, "Length; default: the distance at the particle's release, over the pulley", "m"
     )
 
 

@@ -157,24 +157,12 @@ def html(
     )
 
 
-def write(
-    scene: Scene | None,
-    path: str | Path,
-    *,
-    language: str = "en",
-    home: tuple[str, str] | None = None,
-    exercise: Mapping[str, Any] | None = None,
-    lesson: Mapping[str, Any] | None = None,
-    partly: bool = False,
-) -> int:
+def write(scene: Scene | None, path: str | Path, **options: Any) -> int:
     """Write the live page of a scene, whole or not at all, and return its size in bytes.
 
-    See `html`; a file that is there is replaced, its folder must be there.
+    Options are those of `html`; a file that is there is replaced, its folder must be there.
     """
-    page = html(
-        scene, language=language, home=home, exercise=exercise, lesson=lesson, partly=partly
-    )
-    data = page.encode("utf-8")
+    data = html(scene, **options).encode("utf-8")
     with whole(Path(path)) as unfinished:
         unfinished.write_bytes(data)
     return len(data)

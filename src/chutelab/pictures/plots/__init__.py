@@ -74,28 +74,11 @@ from chutelab.theory import Transfer
 from chutelab.theory.figures import PaperFigure
 
 __all__ = [
-    "Arc",
-    "Window",
-    "analytic_of",
-    "arcs",
-    "draw_analytic",
-    "draw_arrivals",
-    "draw_envelope",
-    "draw_flow",
-    "draw_ledger",
-    "draw_losses",
-    "draw_power",
-    "draw_residual",
-    "draw_scene",
-    "draw_tracks",
-    "draw_velocity",
-    "flight",
-    "look",
-    "overlay",
-    "paper_figure",
-    "strobe",
+    "Arc", "Window", "analytic_of", "arcs", "draw_analytic", "draw_arrivals", "draw_envelope",
+    "draw_flow", "draw_ledger", "draw_losses", "draw_power", "draw_residual", "draw_scene",
+    "draw_tracks", "draw_velocity", "flight", "look", "overlay", "paper_figure", "strobe",
     "window_of",
-]
+]  # fmt: skip
 
 SIZE = (13.0, 7.6)
 """Width and height of the figure, inches."""
@@ -273,6 +256,7 @@ def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording, *, c
     times = np.linspace(clock.min(), clock.max(), 4)
     for t, cell in zip(times, np.ndindex(*grid), strict=True):
         ax = figure.add_subplot(cells[cell])
+        draw_last(ax, recording.machine, t)
         draw_scene(ax, recording.machine, window, small=True)
         draw_bodies(ax, recording, t, crowd=crowd)
         ax.set(xticks=[], yticks=[])

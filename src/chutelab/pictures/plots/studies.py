@@ -326,7 +326,7 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
                 first[known], second[known], c=z[known], cmap=COLORS, s=16.0
             )
         else:
-            painted = _draw_heat(ax, first, second, z, swept.columns["impact.count"] == 0.0)
+            painted = draw_heat(ax, first, second, z, swept.columns["impact.count"] == 0.0)
         if known.any():
             if bars is not None and np.isfinite(bars).any():
                 label += f" ± {np.nanmedian(bars):.2g}"
@@ -359,7 +359,7 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
     return ax
 
 
-def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> ScalarMappable:
+def draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> ScalarMappable:
     """Draw a heat map; grey where there is nothing to tell, hatched where the plate is missed."""
     (x, across), (y, up) = (np.unique(values, return_inverse=True) for values in (x, y))
     field = np.full((len(y), len(x)), np.nan)

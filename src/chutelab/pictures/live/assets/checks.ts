@@ -288,13 +288,9 @@ function* jointConflicts(scene: Scene, given: Given): Generator<Wrong> {
 
 /** Yields what the contact engine does not have with boxes and polygons. */
 function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
-  const { particles, run, joints, incoming, pair } = scene, text = "cornered";
+  const { particles, run, incoming, pair } = scene, text = "cornered";
   if (!particles.some(({ outline }) => outline.length)) return;
   if (run.engine === "exact") yield ["run.engine", run.engine, "not-exact"];
-  if (joints.length) {
-    yield [run.engine === "contact" ? "run.engine" : `${joints[0].kind}[0].particle`,
-      joints[0].particle, text];
-  }
   for (const [n, { outline, rolling_friction: rolls, points }] of particles.entries()) {
     if (outline.length && rolls) yield [pathOf(given, "particle", n, "rolling_friction"), rolls, text];
     if (points && !isConvex(points)) yield [pathOf(given, "particle", n, "points"), points, "convex"];

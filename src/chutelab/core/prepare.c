@@ -259,6 +259,7 @@ static void make_contact_room(int room) {
     RESERVE(W.earlier, room);
     RESERVE(W.links, 2.0 * room);
     RESERVE(W.rows, room);
+    RESERVE(W.levers, W.outline_count ? room : 0);
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 
@@ -287,6 +288,8 @@ static int lay_out_work(void) {
     W.cell_room = crowd ? 12 * n + 64 : 1;
     RESERVE(W.tracks, n);
     RESERVE(W.solver_bodies, n + 1.0);
+    RESERVE(W.edges, 3.0 * W.outline_count);
+    RESERVE(W.poses, W.outline_count ? 6.0 * n : 0);
     RESERVE(W.joint_rows, W.joint_row_count);
     RESERVE(W.joint_matrix, (double)W.joint_row_count * W.joint_row_count);
     RESERVE(W.waits, crowd ? (double)WAITS * n : WAITS);
@@ -372,14 +375,17 @@ static void join_disks(void) {
     }
 }
 
-/* Radius of the circle round the centre of a particle that no edge cuts, m. */
-static double inner_radius(const Disk *d) {
+/* Note the edges of a particle; return the radius of the circle round its centre that none of them cuts, m. */
+static double measure_edges(const Disk *d) {
     const double *p = W.outlines + 2 * d->outline;
-    double least = d->radius;
-    for (int n = 0; n < d->corners; n++) {
+    double least = d->radius, *edge = W.edges + 3 * d->outline;
+    for (int n = 0; n < d->corners; n++, edge += 3) {
         const double *a = p + 2 * n, *b = p + 2 * ((n + 1) % d->corners);
-        double x = b[0] - a[0], y = b[1] - a[1];
-        least = MIN(least, (a[0] * y - a[1] * x) / sqrt(x * x + y * y));
+        double x = b[0] - a[0], y = b[1] - a[1], length = sqrt(x * x + y * y);
+        least = MIN(least, (a[0] * y - a[1] * x) / length);
+        edge[0] = y / length;
+        edge[1] = -x / length;
+        edge[2] = length;
     }
     return least;
 }
@@ -406,7 +412,7 @@ EXPORT int prepare(void) {
         Disk *d = W.disks + i;
         least = MIN(least, d->radius);
         most = MAX(most, d->radius);
-        d->inner = inner_radius(d);
+        d->inner = measure_edges(d);
         if (!d->rides) continue;
         d->ride_x = d->x * c + d->y * s;
         d->ride_rho = d->y * c - d->x * s;

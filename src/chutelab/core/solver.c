@@ -25,6 +25,8 @@
 /* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
    press harder by as much in each, without end. */
 #define CRAWLS 0.5
+/* m/s on Earth; changes at which sweeps over a few contacts of what has corners end. */
+#define FINE_CORNERS 1e-11
 /* Share of its bound up to which friction is not all used: it holds. */
 #define HOLDS 0.999
 
@@ -183,7 +185,7 @@ static void sort_by_islands(void) {
         if (W.contacts[n].two) parent[island_of(W.contacts[n].i)] = island_of(W.contacts[n].j);
     /* What touches hinges is one island. */
     for (int n = 0, hung = -1; n < W.contact_count && W.hinges; n++) {
-        if (!W.contacts[n].hung && !W.contacts[n].cornered) continue;
+        if (!W.contacts[n].hung) continue;
         if (hung >= 0) parent[island_of(W.contacts[n].i)] = island_of(hung);
         hung = W.contacts[n].i;
     }
@@ -243,7 +245,7 @@ void solve_contacts(int again) {
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0;
-        int driven = 0;
+        int driven = 0, cornered = 0;
         W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
@@ -251,7 +253,8 @@ void solve_contacts(int again) {
             least = MIN(least, MIN(a->radius, b->radius));
             heaviest = MAX(heaviest, MAX(a->mass, b->mass));
             driven |= presses(c);
-            W.swings_too |= c->hung > 0 || c->cornered;
+            W.swings_too |= c->hung > 0;
+            cornered |= c->cornered;
         }
         swings |= W.swings_too;
         /* A drive presses as hard as it must: there no spring would hold, so that it gives no more than
@@ -260,9 +263,10 @@ void solve_contacts(int again) {
             W.contacts[n].gives /= heaviest;
             if (!driven) W.contacts[n].parts = INFINITY;
         }
+        double accurate = cornered && to - from <= FEW_CONTACTS ? FINE_CORNERS * W.pace : W.accurate;
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,
-                           PLAIN, W.accurate, W.skip * least);
+                           PLAIN, accurate, accurate < W.accurate ? accurate : W.skip * least);
         else solve_alone(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);

@@ -20,7 +20,7 @@ from statistics import median
 
 from playwright.sync_api import Page, sync_playwright
 
-from chutelab.pictures.live.page import write
+from chutelab.pictures.live import write
 from chutelab.scene import Scene, from_dict, load
 
 READY = """() => new Promise((resolve) => {

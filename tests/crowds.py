@@ -179,6 +179,7 @@ class _Draw:
                 velocity=velocity,
                 carried=np.zeros(self.count, dtype=bool),
                 omega=np.zeros(self.count),
+                angle=np.zeros(self.count),
             ),
             end_time=built.end_time - float(built.releases.t[-1])
             if built.until != "time"

@@ -171,7 +171,7 @@ def machine_of(*pieces, at=((0.0, 1.0),), stream=(), radius=0.004, **more):
             **common(rounds),
         ),
         releases=Releases(
-            np.zeros(count), np.array(at, float), np.zeros((count, 2)), np.zeros(count),
+            np.zeros(count), np.array(at, float), *np.zeros((1, count, 2)), *np.zeros((2, count)),
             np.zeros(count, bool), which, which.copy(), np.zeros((count, 4)),
         ),
         particle=Particle(radius, 0.008, 0.0),

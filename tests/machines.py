@@ -89,6 +89,7 @@ def thrown(machine, position, velocity=(0.0, 0.0), t=0.0):
         velocity=np.broadcast_to(np.array(velocity, dtype=float), position.shape).copy(),
         carried=np.zeros(count, dtype=bool),
         omega=np.zeros(count),
+        angle=np.zeros(count),
         stream=np.zeros(count, dtype=np.int64),
         kind=np.zeros(count, dtype=np.int64),
     )

@@ -150,6 +150,13 @@ def test_where_contacts_last_a_stepped_engine_converges():
         assert (row.least, row.tolerance, row.holds) == (True, least, True)
 
 
+def test_what_lies_still_stays_where_it_is():
+    """A box of 0.0243 m sinks by the step's g dt² or less, 2.5 µm: no order, 1e-4 of its size."""
+    row = rows_of("dominoes", "run.until=0.1")["pymunk, contact"]
+    assert (row.least, row.tolerance, row.holds) == (False, 1e-4, True)
+    assert 0.0 < row.difference < GRAVITY * 0.0005**2 / 0.0243
+
+
 def test_the_promise_grows_with_what_a_scene_makes_of_a_change():
     """At v0² = g Rc (1 - δ), cos φ1 = 1 - δ: dφ1/dv = -(2/v0) cos φ1 / sin φ1, sin φ1 = √(2 δ)."""
     delta = 1e-8

@@ -448,8 +448,8 @@ def test_what_cannot_be_written_to_is_refused_before_the_work(arguments, monkeyp
     works = (
         "engines.simulation.judged", "studies.sweep.swept_by", "studies.sweep.sweep_to",
         "studies.design.uncertainty", "studies.design.minimize", "studies.measured.residuals",
-        "checks.workprecision.measure", "pictures.live.page.html", "classroom.grading.grade",
-        "pictures.plots.figure.paper_figure", "classroom.lessons.building.judged",
+        "checks.workprecision.measure", "pictures.live.html", "classroom.grading.grade",
+        "pictures.plots.paper_figure", "classroom.lessons.building.judged",
         "classroom.lessons.pages._lesson",
     )  # fmt: skip
     # All imported first: one that is imported later would keep what stands for another's.

@@ -150,6 +150,7 @@ def test_a_heap_falls_asleep_and_costs_nothing_until_it_is_hit():
         velocity=np.vstack([machine.releases.velocity, [0.0, 0.0]]),
         carried=np.zeros(13, dtype=bool),
         omega=np.zeros(13),
+        angle=np.zeros(13),
         stream=np.zeros(13, dtype=np.int64),
         kind=np.zeros(13, dtype=np.int64),
     )

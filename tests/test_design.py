@@ -16,7 +16,7 @@ import chutelab
 import typed as design
 from chutelab import scene
 from chutelab.cli import main
-from chutelab.cli.studies import uncertain
+from chutelab.cli.options import uncertain
 from chutelab.pictures.plots.studies import scan, spread
 from chutelab.studies.design import roots
 from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, target

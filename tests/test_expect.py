@@ -150,12 +150,15 @@ def names_of(scene):
                     yield name
 
 
-def test_each_row_of_the_registry_is_read_alone_in_a_crowd_and_in_a_family():
+@pytest.mark.parametrize(
+    "settings", [[], ["stream.count=3", "stream.speed_spread=0.1", "incoming.friction=0.5"]]
+)
+def test_each_row_of_the_registry_is_read_alone_in_a_crowd_and_in_a_family(settings):
     """A family of variants gives each the numbers that it has alone, but for rounding."""
     _, crowd = shipped("spoon", "stream.count=4")
     for name in names_of(crowd.scene):
         assert isinstance(measure(crowd, name), float), name
-    scene = sc.load("belt-landing")
+    scene = sc.load("belt-landing", settings)
     block = Block(scene, ("plate.restitution",), np.array([[0.3], [0.5]]))
     ((rows, family),) = runs(block)
     alone = [simulate(scene.with_values(block.settings(row))) for row in rows]

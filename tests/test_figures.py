@@ -10,7 +10,7 @@ from PIL import Image
 
 import chutelab
 from chutelab.cli import main
-from chutelab.pictures.plots.figure import paper_figure
+from chutelab.pictures.plots import paper_figure
 from chutelab.results import Kind
 from chutelab.theory.figures import CASES, DRAWINGS, NUMBERS, FigureError, figure, path
 

@@ -389,7 +389,7 @@ def test_a_particle_inside_what_hangs_breaks_a_law():
 
 def test_a_film_draws_it_where_it_is_and_a_picture_where_it_ends():
     from chutelab.pictures.animation.actors import gates
-    from chutelab.pictures.plots.figure import Picture, draw_view
+    from chutelab.pictures.plots import Picture, draw_view
 
     recording = run(mass=1.0)
     ax = Picture((6.0, 4.0)).add_axes((0.0, 0.0, 1.0, 1.0))

@@ -127,6 +127,8 @@ def test_what_hangs_on_joints_moves_as_in_python():
     long = [{**above, "length": 0.6}]
     pins = [{"from": [0.0, 0.24], "particle": 0}, {"from": [0.1, 0.2], "particle": 3, "other": 5}]
     scenes += [from_dict({**crowd, "pin": pins}), from_dict({**BALL, "string": long})]
+    boxes = {**crowd, "particle": CORNERED[0]}
+    scenes += [from_dict({**boxes, **joints}) for joints in ({"rod": apart}, {"pin": pins})]
     same_runs([load("cradle"), *scenes])
     lab = describe(load("perpendicular"))
     for table, row, key in (
@@ -188,13 +190,15 @@ def test_boxes_and_polygons_move_as_in_python():
     boxes = [[[-0.1, 0.05 + 0.1 * n], [0.1, 0.14 + 0.1 * n]] for n in range(3)]
     kinds = [*names, {"name": "ball", "radius": 0.01}]
     crowd = {**BALL, "particle": kinds, "surface": [LINE], "stream": [
-        *({"particle": f"k{n}", "fill": fill, "count": 3, "interact": True, "omega": 3.0 * (n < 2)}
+        *({"particle": f"k{n}", "fill": fill, "count": 3, "interact": True, "omega": 3.0 * (n < 2),
+           "angle_deg": 25.0 * n}
           for n, fill in enumerate(boxes)),
         {"particle": "ball", "at": [0.0, 0.4], "velocity": [0.0, -0.5]},
     ]}  # fmt: skip
     alone = [{**BALL, "particle": kind, "surface": [LINE]} for kind in CORNERED]
     row = {"stream": {"at": [-0.1, 0.2], "to": [0.2, 0.2], "velocity": [0.3, 0.0], "count": 4}}
-    moving = [{**base, "surface": [{**LINE, **MOVING[0]}]} for base in (crowd, alone[0])]
+    moving = [{**base, "surface": [{**LINE, **keys}]}
+              for base in (crowd, alone[0]) for keys in (MOVING[0], MOVING[4])]  # fmt: skip
     scenes = [crowd, {**crowd, "gravity_deg": 30.0}, *alone, {**alone[1], **row}, *moving]
     same_runs([load("dominoes"), load("domino-gate"), *map(from_dict, scenes)])
 

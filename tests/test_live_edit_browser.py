@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 import chutelab
-from chutelab.pictures.live.page import html
+from chutelab.pictures.live import html
 from chutelab.results import Kind
 from chutelab.scene import load, parse
 from live.browser import DONE, spot

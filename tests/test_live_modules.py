@@ -4,7 +4,7 @@ import json
 import re
 
 from chutelab.classroom.exercises import EXERCISES, SAID, data_of
-from chutelab.pictures.live.page import LANGUAGES, html
+from chutelab.pictures.live import LANGUAGES, html
 from chutelab.scene import load
 from chutelab.scene.quantities import REGISTRY
 from live.node import ASSETS

@@ -10,8 +10,8 @@ import chutelab
 import sandbox
 from chutelab.engines.contact import run
 from chutelab.machine import build
+from chutelab.pictures.live import _packed
 from chutelab.pictures.live.describe import describe
-from chutelab.pictures.live.page import _packed
 from chutelab.results import Kind
 from chutelab.results.arrival import arrivals
 from chutelab.results.ledger import ledger

@@ -11,8 +11,8 @@ from chutelab import core as module
 from chutelab.cli import main
 from chutelab.engines import contact as engine
 from chutelab.machine import build
+from chutelab.pictures.live import html
 from chutelab.pictures.live.describe import EXAMPLES, PARTS, describe
-from chutelab.pictures.live.page import html
 from chutelab.scene import from_dict, load
 from chutelab.scene.conflicts import HINGED, JOINTS, MOTIONS
 from chutelab.util.words import words
@@ -776,6 +776,9 @@ def test_dominoes_run_whole_and_a_box_is_made_turned_caught_and_saved(shown, tmp
     page.locator("[id='field-own-particle[0].size[0]']").fill("0.012")
     page.locator("[id='field-own-particle[0].size[0]']").press("Enter")
     assert given(page)["particle"][0]["size"] == [0.012, 0.048]
+    page.locator("[id$='.angle_deg'][id^='field-own-stream']").fill("30")
+    page.locator("[id$='.angle_deg'][id^='field-own-stream']").press("Enter")
+    assert given(page)["stream"][-1]["angle_deg"] == 30
     page.evaluate("chutelab.lab.restart()")
     assert same_bits(page, tmp_path, 0.9) > 100
 

@@ -14,7 +14,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.pictures import plots
 from chutelab.pictures.animation import Stage, animate, film, lay_out
 from chutelab.pictures.plots import look, style
-from chutelab.pictures.plots.figure import sensors
+from chutelab.pictures.plots.measures import sensors
 from chutelab.results import Recording
 from handmade import by_hand
 

@@ -380,7 +380,7 @@ def drawn(seed):
 
 def test_a_picture_holds_what_turns_and_a_film_draws_it_where_it_is():
     from chutelab.pictures.animation.actors import gates
-    from chutelab.pictures.plots.figure import Picture
+    from chutelab.pictures.plots import Picture
     from chutelab.pictures.plots.scenery import window_of
 
     scene = table(turn=90.0, pivot=[0.0, 0.0], stream={"at": [0.3, 0.45]})

@@ -15,7 +15,7 @@ from chutelab.cli import main
 from chutelab.pictures.plots.studies import scan
 from chutelab.studies.design import constrained, minimize, solve
 from chutelab.studies.design.evaluation import Span, measured
-from chutelab.studies.design.noisy import Fit, Wishes, search
+from chutelab.studies.design.searches import Fit, Wishes, search
 from test_repeats import CROWD
 
 A, B = Span("a", "", 0.0, 40.0, None), Span("b", "", 0.0, 1.0, None)

@@ -8,7 +8,8 @@ import pytest
 import judge
 from chains import tables
 from chutelab.scene import from_dict
-from chutelab.theory.prediction import Flight, Obstacles, first_in_flight, free_surfaces
+from chutelab.theory.obstacles import Flight, Obstacles, first_in_flight
+from chutelab.theory.prediction import free_surfaces
 
 
 def arc_points(center, size, begin, extent):

@@ -16,8 +16,7 @@ from chutelab.pictures import plots
 from chutelab.pictures.animation import Stage, film, lay_out
 from chutelab.pictures.animation.moments import asked, slowness, span
 from chutelab.pictures.plots import look
-from chutelab.pictures.plots.figure import loads, sensors
-from chutelab.pictures.plots.measures import wear
+from chutelab.pictures.plots.measures import loads, sensors, wear
 from chutelab.util.words import STRINGS, words
 from handmade import assert_legible
 from shared import lessons, some

@@ -69,7 +69,7 @@ CONTRACT = {
     "sensor": (),
     "stream": {"name": "stream", "particle": None, "count": 1, "rate": 200.0, "width": None,
      "start": 0.0, "bed_height": 0.0, "speed_spread": 0.0, "seed": 0, "at": None, "to": None,
-     "fill": None, "velocity": None, "omega": 0.0, "interact": False,
+     "fill": None, "velocity": None, "omega": 0.0, "angle_deg": 0.0, "interact": False,
      "restitution": 0.5, "friction": 0.3},
     "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001, "align": True,
      "loads": None, "stress": None},

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.text import Annotation
 
 import chutelab
-from chutelab.pictures.plots.figure import split_velocity
+from chutelab.pictures.plots.measures import split_velocity
 
 G, BALL = 9.81, 0.0063
 

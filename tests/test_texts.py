@@ -13,7 +13,8 @@ from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.pictures import plots
 from chutelab.pictures.animation import animate
-from chutelab.pictures.plots.studies import measured, scan, spread, sweep_figure
+from chutelab.pictures.plots.measures import measured
+from chutelab.pictures.plots.studies import scan, spread, sweep_figure
 from chutelab.scene import SceneError, from_dict, parse, to_dict, to_toml
 from chutelab.studies.measured import read, residuals
 from typed import solve, sweep, uncertainty

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chutelab.core import Module
-from chutelab.util.trig import LARGEST_ANGLE, RADIANS, arc_cos, atan2, sin_cos
+from chutelab.util.arrays import LARGEST_ANGLE, RADIANS, arc_cos, atan2, sin_cos
 
 LONG = np.longdouble
 RNG = np.random.default_rng(15)

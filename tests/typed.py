@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from chutelab.cli.studies import targets, uncertain, varied
+from chutelab.cli.options import targets, uncertain, varied
 from chutelab.studies import design
 from chutelab.studies import sweep as sweeps
 

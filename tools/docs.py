@@ -34,7 +34,7 @@ from chutelab.classroom.lessons.pages import LIVE, live_page
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.animation import animate
-from chutelab.pictures.live.page import write
+from chutelab.pictures.live import write
 from chutelab.scene import SceneError, about, load
 from chutelab.scene.overrides import schema
 from chutelab.scene.quantities import REGISTRY, STATISTICS

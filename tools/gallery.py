@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from chutelab.engines.simulation import simulate
-from chutelab.pictures.plots.figure import draw_view
+from chutelab.pictures.plots import draw_view
 from chutelab.pictures.plots.panels import analytic_of
 from chutelab.pictures.plots.scenery import as_crowd, bodily
 from chutelab.pictures.plots.style import Picture

@@ -56,7 +56,7 @@ spread(sure)
 
 # %% 5
 from chutelab import figures
-from chutelab.pictures.plots.figure import paper_figure
+from chutelab.pictures.plots import paper_figure
 
 paper_figure(figures.figure(6))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from chutelab.classroom.lessons.pages import live_page
-from chutelab.pictures.live.page import html
+from chutelab.pictures.live import html
 from chutelab.scene import load, parse, to_toml
 from shared import find
 

@@ -149,9 +149,18 @@ class Book:
         """
         found: dict[str, Recording] = {}
         for one in said:
-            scene, settings, details = _read(one)
+            (scene, *rest), settings = shlex.split(one), list[str]()
+            while rest:
+                option, *rest = rest
+                if option == "--details":
+                    self._details = True
+                elif option in AT_HAND and rest:
+                    value, *rest = rest
+                    settings.append(value if option == "--set" else f"run.{option[2:]}={value}")
+                else:
+                    known = f"a notebook knows {', '.join(AT_HAND)} and --details"
+                    raise InputError(f"{option}: {known}")
             found[one] = simulate(scene_of(self._lesson, scene, settings))
-            self._details = self._details or details
         return Runs(self._lesson, found, self._details)
 
     def scene(self, name: str, *settings: str) -> Scene:
@@ -262,19 +271,3 @@ class Explanation:
             if ask.choices and isinstance(said, int) and 1 <= said <= len(ask.choices):
                 lines[-1] += f" {ask.choices[said - 1]}. *{ask.replies[said - 1]}*"
         return "\n\n".join([*lines, self.then.strip()])
-
-
-def _read(said: str) -> tuple[str, list[str], bool]:
-    """Return scene and settings of a run that is said as on the command line."""
-    name, *words = shlex.split(said)
-    settings, details = [], False
-    while words:
-        option = words.pop(0)
-        if option == "--details":
-            details = True
-        elif option in AT_HAND and words:
-            value = words.pop(0)
-            settings.append(value if option == "--set" else f"run.{option[2:]}={value}")
-        else:
-            raise InputError(f"{option}: a notebook knows {', '.join(AT_HAND)} and --details")
-    return name, settings, details

@@ -291,7 +291,12 @@ def _copied(row: Grade, before: Sequence[Grade]) -> Iterator[str]:
                 and is_rounded(mine.answers[n], cases[n - 1].right)
             ]  # fmt: skip
             if found:
-                chance, seen = _chance(mine, found, len(others))
+                seen = sum(
+                    all(is_rounded(mine.answers[n], right[n - 1]) for n in found)
+                    for right in _drawn(mine.lesson)
+                )
+                # What was never seen may still happen: Laplace's rule of succession, a bound.
+                chance = 1.0 - (1.0 - (seen + 1) / (DRAWS + 2)) ** len(others)
                 likely = f"by chance: {'' if seen else 'at most '}1 in {1.0 / chance:,.0f}"
                 # A bound that is not small says that draws were few, not that it happens.
                 likely = "this may be chance" if seen and chance >= LIKELY else likely
@@ -313,20 +318,6 @@ def _drawn(lesson: str) -> tuple[tuple[float, ...], ...]:
     return tuple(
         tuple(case.right for case in draw(exercise, f"nobody {n}")[1]) for n in range(DRAWS)
     )
-
-
-def _chance(row: Grade, questions: Sequence[int], others: int) -> tuple[float, bool]:
-    """Return how likely these answers are all right for at least one of so many other students.
-
-    And whether that was ever so in all draws: if not, it is a bound.
-    """
-    fits = sum(
-        all(is_rounded(row.answers[n], right[n - 1]) for n in questions)
-        for right in _drawn(row.lesson)
-    )
-    # What was never seen in so many draws may still happen: Laplace's rule of succession.
-    share = (fits + 1) / (DRAWS + 2)
-    return 1.0 - (1.0 - share) ** others, fits > 0
 
 
 def write_csv(grades: Iterable[Grade], path: str | Path, *, decimal_comma: bool = False) -> Path:

@@ -432,7 +432,10 @@ def _work() -> None:
             except BaseException as raised:  # whatever it is, the next cell has its turn
                 error = raised
             if error is not None:
-                tell(error=_said(error))
+                name = type(error).__name__
+                with suppress(BaseException):  # its text may fail, too
+                    name = f"{name}: {error}".removesuffix(": ")[:LONGEST]
+                tell(error=name)
             hand_over()
 
     tell(cell=0)
@@ -443,14 +446,6 @@ def _work() -> None:
     tell(end=True)
     # Threads and what is registered for the end do not keep it.
     os._exit(0)
-
-
-def _said(error: BaseException) -> str:
-    """Return name and text of an error, which may fail too."""
-    try:
-        return f"{type(error).__name__}: {error}".removesuffix(": ")[:LONGEST]
-    except BaseException:
-        return type(error).__name__
 
 
 if __name__ == "__main__":

@@ -24,8 +24,8 @@ from chutelab.classroom.lessons.sheets import need_typst, pdf, web_page
 from chutelab.classroom.lessons.texts import parser
 from chutelab.engines.simulation import judged, simulate
 from chutelab.pictures.plots import look, overlay
-from chutelab.pictures.plots.figure import loads as draw_loads
 from chutelab.pictures.plots.measures import drawing
+from chutelab.pictures.plots.measures import loads as draw_loads
 from chutelab.pictures.plots.measures import wear as draw_wear
 from chutelab.results import Recording
 from chutelab.results.loads import sheet as load_sheet
@@ -218,7 +218,7 @@ def _for_engineers(made: Report) -> None:
         broken = "; ".join(str(law) for law in recording.laws)
         made.parts.append(f"**The run breaks laws; do not use its numbers:** {_plain(broken)}.")
     made.add("The machine", made.picture("machine", drawing(recording), "The machine, to scale"))
-    made.add("Inputs", made.table("inputs", inputs(made.scene, made.words)), _materials(made))
+    made.add("Inputs", made.table("inputs", inputs(made.scene, made.words)), materials(made))
     made.add("Assumptions, and what is left out", "\n".join(f"- {one}" for one in left_out(made)))
     together, balance = crowd(recording), made.table("ledger", recording.ledger.sheet())
     made.add("Results", made.table("results", results(made)), balance)
@@ -305,7 +305,7 @@ def _leaves(tables: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, tables
 
 
-def _materials(made: Report) -> str:
+def materials(made: Report) -> str:
     """Return a table of the presets that are used, with spread, and the sources below it."""
     rows, sources = [], dict[str, int]()
     for name in dict.fromkeys(kind.material for kind in made.scene.particles):

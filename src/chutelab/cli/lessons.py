@@ -284,12 +284,7 @@ def page(
 
 @command("Package lessons for a learning platform (SCORM 1.2).", lesson)
 def scorm(
-    lessons: LessonNames = (),
-    *,
-    all_: bool,
-    out: Path = Path(),
-    language: str = "en",
-    quiet: bool,
+    lessons: LessonNames = (), *, all_: bool, out: Path = Path(), language: str = "en", quiet: bool
 ) -> None:
     """Make a SCORM 1.2 package of each LESSON: its live page with its exercise, for a course.
 

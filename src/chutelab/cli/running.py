@@ -189,21 +189,11 @@ class Output:
                 elif kind == "csv":
                     tables = ("events", "trajectory")[self.leaves_out(recording) :]
                     recording.to_csv(folder, only=tables)
-                elif kind == "sensors":
-                    from chutelab.pictures.plots.figure import sensors
+                elif kind in ("sensors", "loads", "wear"):
+                    from chutelab.pictures.plots import measures
 
-                    recording.to_csv(folder, only=["sensors"])
-                    sensors(recording).write(folder / "sensors.png")
-                elif kind == "loads":
-                    from chutelab.pictures.plots.figure import loads
-
-                    recording.to_csv(folder, only=["loads"])
-                    loads(recording).write(folder / "loads.png")
-                elif kind == "wear":
-                    from chutelab.pictures.plots.measures import wear
-
-                    recording.to_csv(folder, only=["wear"], coefficients=self.coefficients)
-                    wear(recording).write(folder / "wear.png")
+                    recording.to_csv(folder, only=[kind], coefficients=self.coefficients)
+                    getattr(measures, kind)(recording).write(folder / f"{kind}.png")
                 elif kind == "npz":
                     recording.save(path)
                 else:
@@ -494,7 +484,7 @@ def live(
     import webbrowser
     from tempfile import mkdtemp
 
-    from chutelab.pictures.live.page import write
+    from chutelab.pictures.live import write
 
     check_file("-o", out)
     if set_ and not scene:

@@ -213,10 +213,7 @@ def new(
 
 @command("Compute the paper's tables anew, beside what is printed.")
 def tables(
-    number: Literal["1", "3", "4", "5"] | None = None,
-    *,
-    as_printed: bool = True,
-    json_: bool,
+    number: Literal["1", "3", "4", "5"] | None = None, *, as_printed: bool = True, json_: bool
 ) -> None:
     """Compute Table 1, 3, 4 or 5 of the paper anew (all of them without NUMBER).
 
@@ -256,7 +253,7 @@ def figure(number: int, *, out: Folder, json_: bool) -> None:
     files[numbers] = found.csv()
     with destination(out, [picture, *files]) as place:
         if place is not None:
-            from chutelab.pictures.plots.figure import paper_figure
+            from chutelab.pictures.plots import paper_figure
 
             paper_figure(found).write(place / picture)
             for name, text in files.items():

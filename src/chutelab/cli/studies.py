@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import csv
-import re
-from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import click
 from click.shell_completion import CompletionItem
@@ -32,16 +30,16 @@ from chutelab.cli.options import (
     check_file,
     command,
     destination,
+    limits,
     loaded_as_told,
     retitled,
+    targets,
+    uncertain,
+    varied,
     write_json,
 )
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, write_lines, writing
-
-if TYPE_CHECKING:
-    from chutelab.scene.variants import Vary
-    from chutelab.studies.design.uncertainty import Given
 
 
 def complete_column(begun: str) -> list[CompletionItem]:
@@ -49,107 +47,6 @@ def complete_column(begun: str) -> list[CompletionItem]:
     from chutelab.scene.quantities import COLUMNS
 
     return beginning({name: row.meaning for name, row in COLUMNS.items()}, begun)
-
-
-def varied(texts: Sequence[str], *, ranges: bool) -> list[Vary]:
-    """Read what ``--vary`` takes: KEY=FROM:TO:COUNT or KEY=a,b,c; with `ranges` KEY=FROM:TO.
-
-    Numbers may have units, such as 0.5mm. Raises an `InputError`.
-    """
-    from chutelab.scene.variants import Range, Vary, numbers
-
-    form = "must be KEY=FROM:TO, such as plate.angle_deg=-20:70"
-    if not ranges:
-        form = "must be KEY=FROM:TO:COUNT, such as plate.angle_deg=-20:70:46, or KEY=a,b,c"
-    found: list[Vary] = []
-    for text in texts:
-        typed = f"--vary {text}"
-        key, given = _halves(text, typed, form)
-        parts = given.split(":")
-        if ranges and len(parts) != 2:
-            raise InputError(f"a range is between two ends: it {form}", typed)
-        if not ranges and len(parts) not in (1, 3):
-            raise InputError(form, typed)
-        count = parts.pop().strip() if len(parts) == 3 else None
-        if len(parts) == 1:
-            parts = given.split(",")
-            if len(parts) > MOST_VALUES:
-                raise InputError(f"{len(parts)} values, at most {MOST_VALUES} are allowed", typed)
-        values, unit = numbers(typed, parts, form)
-        if count is not None:
-            values = _spaced(values[0], values[1], count, typed)
-        found.append((Range if ranges else Vary)(key, values, typed, unit))
-    return found
-
-
-MOST_VALUES = 10_000
-"""Most values of one key; more would be a typing error."""
-
-
-def _spaced(first: float, last: float, written: str, typed: str) -> tuple[float, ...]:
-    """Return COUNT numbers from one to another."""
-    count = int(written) if written.isdecimal() else 0
-    if not 1 <= count <= MOST_VALUES:
-        found = f"COUNT = {written or 'nothing'}"
-        raise InputError(f"{found}; it must be a whole number from 1 to {MOST_VALUES}", typed)
-    if count == 1:
-        return (first,)
-    if first == last:
-        raise InputError(f"the range is empty: from {first:g} to {last:g}", typed)
-    # Rounded: 0.3 is 0.3, not 0.30000000000000004, and what rounding leaves of a 0 is a 0.
-    nothing = 1e-13 * max(abs(first), abs(last))
-    inside = (first + (last - first) * i / (count - 1) for i in range(1, count - 1))
-    rounded = (0.0 if abs(value) < nothing else float(f"{value:.12g}") for value in inside)
-    return (first, *rounded, last)
-
-
-def targets(texts: Sequence[str]) -> list[tuple[str, str]]:
-    """Read what ``--target`` takes, QUANTITY=VALUE; raises an `InputError`."""
-    form = "must be QUANTITY=VALUE, such as landing.x=1.2 or landing.vx=outgoing.speed"
-    return [_halves(text, f"--target {text}", form) for text in texts]
-
-
-def limits(texts: Sequence[str]) -> dict[str, tuple[str | None, str | None]]:
-    """Read what ``--subject-to`` takes, QUANTITY>=VALUE or <=; raises an `InputError`."""
-    found: dict[str, tuple[str | None, str | None]] = {}
-    for text in texts:
-        match = re.fullmatch(r"\s*([^<>=]+?)\s*([<>])=?\s*([^<>=]+?)\s*", text)
-        if match is None:
-            form = "must be QUANTITY>=VALUE or QUANTITY<=VALUE, such as arrival.share>=0.95"
-            raise InputError(form, f"--subject-to {text}")
-        name, sense, value = match.groups()
-        least, most = found.get(name, (None, None))
-        if (least if sense == ">" else most) is not None:
-            raise InputError(f"{name} has such a limit already", f"--subject-to {text}")
-        found[name] = (value, most) if sense == ">" else (least, value)
-    return found
-
-
-def uncertain(texts: Sequence[str]) -> list[Given]:
-    """Read what ``--uncertainty`` takes, KEY=MEAN±SPREAD:LAW; raises an `InputError`."""
-    from chutelab.studies.design.uncertainty import Given
-
-    found = []
-    for text in texts:
-        match = re.fullmatch(r"([^=]+)=([^:]*?)(?:±|\+/-|\+-)([^:]*?)(?::(.*))?", text)
-        if match is None:
-            raise InputError(
-                "must be KEY=MEAN±SPREAD, such as restitution=0.5±0.05 or incoming.speed=2+-1% (or"
-                " ±SPREAD alone, around the scene's value); :uniform at the end makes SPREAD a"
-                " half-width",
-                f"--uncertainty {text}",
-            )
-        key, mean, spread, law = (part.strip() for part in match.groups(default=""))
-        found.append(Given(key, mean or None, spread, law or "normal"))
-    return found
-
-
-def _halves(text: str, typed: str, form: str) -> tuple[str, str]:
-    """Return what is left and right of the first equals sign."""
-    left, _, right = (part.strip() for part in text.partition("="))
-    if not (left and right):
-        raise InputError(form, typed)
-    return left, right
 
 
 class _Listing(Command):
@@ -545,7 +442,7 @@ def compare(
             fitted = measured.fit(loaded, film, keys, robust=robust) if keys else None
             found = measured.residuals(loaded, film) if fitted is None else fitted.after
         if place is not None:
-            from chutelab.pictures.plots.studies import measured as draw
+            from chutelab.pictures.plots.measures import measured as draw
 
             with progress("drawing"):
                 draw(found, fitted).write(place / "compare.png")
@@ -563,12 +460,7 @@ def compare(
 
 @command("Lay engineers' discharge methods over the simulated stream.")
 def discharge(
-    scene: SceneName,
-    *,
-    heights: str = "",
-    set_: Texts,
-    out: Folder,
-    json_: bool,
+    scene: SceneName, *, heights: str = "", set_: Texts, out: Folder, json_: bool
 ) -> None:
     """Lay the stream that leaves SCENE's pulley, as five methods have it, over the simulated one.
 

@@ -127,7 +127,7 @@ static int follows(const Barrier *b) {
 }
 
 void shape_barriers(void) {
-    int count = L.piece_count * (L.family ? L.particle_count : 1);
+    int count = L.piece_count * members();
     for (int k = 0; k < count; k++) {
         Barrier *b = L.barriers + k;
         b->box[0] = b->box[1] = INFINITY;
@@ -547,7 +547,7 @@ PAIRED static void look_at_movers(int i, Barrier *pieces) {
    shut is spared until it is clear of it; what overlapped at its release may go on doing so, no deeper. */
 PAIRED int find_hits(int i) {
     Interval some[WIDTH];
-    Barrier *pieces = L.barriers + (L.family ? i * L.piece_count : 0);
+    Barrier *pieces = L.barriers + member_of(i) * L.piece_count;
     Box box = all_apart();
     Curve last;
     int count = 0, first = 1, before = L.hit_count;

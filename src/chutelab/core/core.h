@@ -269,11 +269,16 @@ double missed_by_joints(void);
 void tug_all(int way);
 void drop_tugs(void);
 void cut_step(double t);
+int is_cut(void);
 void cut_at_snaps(void);
 void end_pull(void);
 void add_springs(double *sums);
 void strike_joints(int i, int j);
 void end_blow(void);
+void begin_answers(void);
+void forget_answers(void);
+void answer_with_joints(void);
+int let_go_again(void);
 void share_with_joints(const Contact *c, double wanted, const double *u, double *J);
 
 /* corners.c */

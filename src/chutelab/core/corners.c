@@ -21,6 +21,8 @@
 /* Sweeps of a blow at several places, and of its size, at which they end. */
 #define SWEEPS 10000
 #define ENDS 1e-15
+/* Of the velocity that an impulse would change if there were no joints: what is less, they hold. */
+#define HELD 1e-13
 /* Share of it that a blow may give by rounding. */
 #define GAINS 1e-12
 /* Candidates for a place: corners of both. */
@@ -46,7 +48,10 @@ static const double *pose_of(int j, double turned, int later) {
 }
 
 static Shape shape_of(int j, double t) {
-    Shape out = {.round = -1};
+    /* What it does not have is not set. */
+    Shape out;
+    out.round = -1;
+    out.s = 0;
     if (j < 0) {
         const Surface *s = out.s = surface_at(-1 - j, t);
         if (s->shape != CIRCLE) {
@@ -191,12 +196,21 @@ static void fill_in(const Shape *a, const Shape *b, Touch *t) {
     t->ny = n[1];
 }
 
-/* The side of a segment that a corner is on: its own, but if it may have sunk through that of the centre. */
-static int side_of(const Shape *a, const Surface *s, const double *q, double near) {
-    double off = (q[1] - s->y) * s->tx - (q[0] - s->x) * s->ty;
+/* The side of a segment that a corner is on: its own. If it may have sunk through, that on which both its edges are,
+   else that of the centre. */
+static int side_of(const Shape *a, const Surface *s, int corner, double near) {
+    const double *q = a->p[corner];
+    double off = (q[1] - s->y) * s->tx - (q[0] - s->x) * s->ty, low = INFINITY, high = -INFINITY;
     double mid = (a->y - s->y) * s->tx - (a->x - s->x) * s->ty, along = (a->x - s->x) * s->tx + (a->y - s->y) * s->ty;
     int own = off >= 0 ? 1 : -1, centre = mid >= 0 ? 1 : -1;
     if (own == centre || fabs(off) > 2 * near) return own;
+    for (int n = 1; n < a->count; n += a->count - 2) {
+        const double *next = a->p[(corner + n) % a->count];
+        double up = (next[1] - q[1]) * s->tx - (next[0] - q[0]) * s->ty;
+        low = MIN(low, up);
+        high = MAX(high, up);
+    }
+    if (low > -2 * near || high < 2 * near) return low + high > 0 ? 1 : -1;
     if (along >= 0 && along <= s->length) return centre;
     double n[2], out, *end = (double *)s->end + (along < 0 ? 0 : 2);
     int edge = furthest(a, end, &out);
@@ -211,7 +225,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
         const double *q = a->p[t->which];
         if (b->s && b->s->shape == SEGMENT) {
             double along = (q[0] - b->s->x) * b->s->tx + (q[1] - b->s->y) * b->s->ty;
-            t->on = side_of(a, b->s, q, near);
+            t->on = side_of(a, b->s, t->which, near);
             fill_in(a, b, t);
             return along >= -near && along <= b->s->length + near;
         }
@@ -426,7 +440,7 @@ double meet_corners(int i, int j, double from, double until, double soft) {
     for (int c = 0; c < count; c++) {
         Touch now = {.which = c};
         /* The side that it is on does not change within a step. */
-        if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, a.p[c], near);
+        if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
         gap[c] = gap_at(&a, &b, near, &now);
         closed |= gap[c] <= 0;
     }
@@ -558,7 +572,11 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
         const Contact *c = W.contacts + link / 2;
         lasts |= c->i == i && c->j == j && c->impulse[0] > 0;
     }
-    int found = list_touches(i, j, t, (lasts ? TOUCH : TOUCHING) * least, t, places);
+    double within = (lasts ? TOUCH : TOUCHING) * least, span = 2 * SOON * W.step, most = 0;
+    /* What has joints is struck as a step begins, if that is so soon. */
+    if (is_tied(i) || is_tied(j)) most = fastest_of(i, j, t, span);
+    if (most < INFINITY) within = MAX(within, most * span);
+    int found = list_touches(i, j, t, within, t, places);
     for (int n = 0; n < found; n++) {
         Contact *c = list + count++;
         describe_touch(c, i, j, places + n);
@@ -634,6 +652,33 @@ RARELY int lies_flat(int i, int k) {
     return lies;
 }
 
+/* Whether what is struck has joints, which answer each impulse of the blow. */
+static int answers;
+
+static void give_all(const Contact *c, const double *impulse) {
+    push(c, impulse);
+    if (answers) answer_with_joints();
+}
+
+/* What the places of a blow feel of masses where joints answer: by impulses that change velocities by as much as `size`,
+   m/s, and are taken back. */
+static void feel_joints(Contact *list, int count, double size) {
+    for (Contact *c = list; c < list + count; c++)
+        for (int n = 0; n < 2; n++) {
+            double u[3], v[3], one[3] = {0, 0, 0}, back[3] = {0, 0, 0};
+            one[n] = size * W.disks[c->i].mass;
+            back[n] = -one[n];
+            relative(c, 0, u);
+            give_all(c, one);
+            relative(c, 0, v);
+            give_all(c, back);
+            double gives = v[n] - u[n];
+            /* Joints may hold it as it is. */
+            c->mass[n] = gives > HELD * size ? one[n] / gives : 0;
+        }
+    forget_answers();
+}
+
 /* Impulses at all places such that gaps do not close, or open as fast as they are to, and that friction, a share of
    it, stops slip as far as it may. */
 static void share_blow(Contact *list, int count, const double *back, double share) {
@@ -647,16 +692,16 @@ static void share_blow(Contact *list, int count, const double *back, double shar
             relative(c, 0, v);
             size = MAX(size, fabs(v[0]) + fabs(v[1]));
             change[0] = MAX(J[0] + c->mass[0] * (back[n] - v[0]), 0) - J[0];
-            push(c, change);
+            give_all(c, change);
             J[0] += change[0];
-            worst = MAX(worst, fabs(change[0]) / c->mass[0]);
+            if (c->mass[0] > 0) worst = MAX(worst, fabs(change[0]) / c->mass[0]);
             double most = share * MIN(c->friction, share < 1 ? ROUGH : INFINITY) * J[0];
             relative(c, 0, v);
             change[0] = 0;
             change[1] = MIN(MAX(J[1] - c->mass[1] * v[1], -most), most) - J[1];
-            push(c, change);
+            give_all(c, change);
             J[1] += change[1];
-            worst = MAX(worst, fabs(change[1]) / c->mass[1]);
+            if (c->mass[1] > 0) worst = MAX(worst, fabs(change[1]) / c->mass[1]);
         }
         if (worst <= ENDS * size) return;
     }
@@ -681,7 +726,7 @@ static double share_out_blow(Contact *list, int count, double *back, const doubl
         for (int n = 0; n < count; n++) {
             Contact *c = list + n;
             double none[3] = {-c->impulse[0], -c->impulse[1], 0};
-            push(c, none);
+            give_all(c, none);
             c->impulse[0] = c->impulse[1] = 0;
             if (share == 0) back[n] = 0;
         }
@@ -698,6 +743,8 @@ RARELY void strike_corners(int i, int j, double t) {
     if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);
     end_hops(i, t);
     if (j >= 0 && b->mode == FREE) end_hops(j, t);
+    answers = is_tied(i) || is_tied(j);
+    if (answers) strike_joints(i, j);
     int count = list_struck(i, j, t, list), two = j >= 0 && b->mode == FREE;
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
@@ -715,7 +762,20 @@ RARELY void strike_corners(int i, int j, double t) {
     was_moved(i);
     if (!(fastest > 0)) return;
     if (two) was_moved(j);
-    double before[3] = {a->vx, a->vy, a->spin}, lost = share_out_blow(list, count, back, u), normal = 0, slip = 0;
+    double before[3] = {a->vx, a->vy, a->spin}, lost, normal = 0, slip = 0;
+    if (answers) begin_answers();
+    for (int strings = 1; strings;) {
+        double wanted[MOST_TOUCHES];
+        memcpy(wanted, back, sizeof back);
+        if (answers) feel_joints(list, count, fastest);
+        lost = share_out_blow(list, count, wanted, u);
+        strings = answers && let_go_again();
+        for (int n = 0; n < count && strings; n++) {
+            double none[3] = {-list[n].impulse[0], -list[n].impulse[1], 0};
+            push(list + n, none);
+            list[n].impulse[0] = list[n].impulse[1] = 0;
+        }
+    }
     for (int n = 0; n < count; n++) {
         Contact *c = list + n;
         double v[3], given[3];
@@ -743,6 +803,7 @@ RARELY void strike_corners(int i, int j, double t) {
         J[0] += x * main->nx + y * main->ny;
         J[1] += x * main->ny - y * main->nx;
     }
+    if (answers) end_blow();
     a->since = t;
     if (two) b->since = t;
     W.impact_count++;

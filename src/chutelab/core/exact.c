@@ -43,6 +43,8 @@ Particle A;
 
 static int course; /* what a round came to */
 
+static int member_of(int lone) { return E.each ? lone / E.each : 0; }
+
 EXPORT Exact *exact(void) { return &E; }
 
 /* What is recorded. */
@@ -146,7 +148,7 @@ static int rim_side(const Obstacle *o, double nx, double ny) {
 static Touch touch_of(int obstacle, int side) {
     const Obstacle *o = O.all + obstacle;
     int columns = E.segment_count + E.arc_count + (E.wheel_count > 0);
-    const Pair *pair = E.materials + (E.family ? E.lone : A.given->kind) * columns + o->source;
+    const Pair *pair = E.materials + A.given->kind * columns + o->source;
     Touch c;
     normal_at(o, side, &c.nx, &c.ny);
     c.tx = c.ny, c.ty = -c.nx;
@@ -647,11 +649,15 @@ static void drop(void) {
 }
 
 static void fly(void) {
-    const double *box = A.given->exit_box;
+    const double *box = A.given->exit_box, *up = A.given->up;
     Motion m = motion_of(0.0, -A.given->gravity);
     m.joint = A.joint;
-    double leaves = MIN(MIN(when(A.x - box[0], A.vx, 0.0), when(box[2] - A.x, -A.vx, 0.0)),
-                        MIN(when(A.y - box[1], A.vy, m.ay), when(box[3] - A.y, -A.vy, -m.ay)));
+    double leaves = INFINITY;
+    for (int n = 0; n < 2; n++) {
+        double right = n ? -up[0] : up[1], above = up[n], pull = above * m.ay;
+        double place = right * A.x + above * A.y, speed = right * A.vx + above * A.vy;
+        leaves = MIN(leaves, MIN(when(place - box[n], speed, pull), when(box[2 + n] - place, -speed, -pull)));
+    }
     double stops = A.given->stop - A.age, dt = MIN(leaves, stops);
     int obstacle, side, hits = first_contact(&m, &dt, &obstacle, &side);
     count_idle(dt);
@@ -721,7 +727,7 @@ static void carry_round(double start, double pace) {
 
 /* Move the particle, which the belt carries, on to the pulley, or to what is in the way. */
 static void carry(void) {
-    double up, across, incline = E.wheels[E.family ? E.lone : 0].incline;
+    double up, across, incline = E.wheels[member_of(E.lone)].incline;
     sin_cos(incline, &up, &across);
     /* One that was on the pulley when a gate opened or shut. */
     if (O.change_count && A.x * across + A.y * up > O.touch) {
@@ -738,7 +744,7 @@ static void carry(void) {
     count_idle(dt);
     move(&m, dt);
     if (incline != 0.0) book(O.all[0].surface, A.given->mass * A.given->gravity * (A.y - height), 0.0, 0.0);
-    bear_since(O.all[0].surface, -up, across, A.y * across - A.x * up - E.wheels[E.family ? E.lone : 0].radius);
+    bear_since(O.all[0].surface, -up, across, A.y * across - A.x * up - E.wheels[member_of(E.lone)].radius);
     write_knot();
     if (hits) strike(obstacle, side);
     else if (stops < ends) stop_now();
@@ -889,7 +895,7 @@ static void begin(void) {
     }
     write_knot();
     write_event(RELEASE, NONE);
-    if (E.until == UNTIL_SETTLED && p->carried && E.wheels[E.family ? E.lone : 0].speed == 0.0) {
+    if (E.until == UNTIL_SETTLED && p->carried && E.wheels[member_of(E.lone)].speed == 0.0) {
         write_event(SETTLE, O.all[O.pulley].surface);
         end_track(HAS_SETTLED);
     }
@@ -916,7 +922,7 @@ static void proceed(void) {
 
 /* Lay out what the host fills in, and what is written. */
 EXPORT int lay_out_exact(void) {
-    double members = E.family ? E.lone_count : 1, many = MIN(20.0 * E.lone_count, KEPT);
+    double members = E.each ? E.lone_count / E.each : 1, many = MIN(20.0 * E.lone_count, KEPT);
     RESERVE(E.segments, members * E.segment_count);
     RESERVE(E.arcs, members * E.arc_count);
     RESERVE(E.wheels, members * E.wheel_count);
@@ -936,7 +942,7 @@ EXPORT int lay_out_exact(void) {
 int follow_all(int rounds) {
     if (B.every > 0.0 && !B.bins && !lay_out_bins(E.surface_count, 0)) return NO_MEMORY;
     for (; E.lone < E.lone_count; E.lone++, E.begun = 0) {
-        int member = E.family ? E.lone : 0;
+        int member = member_of(E.lone);
         if (E.laid != member + 1) {
             while (!lay_obstacles(member)) {
                 E.room_size *= 2;

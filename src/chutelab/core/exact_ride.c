@@ -21,10 +21,14 @@
 /* Share of the radius by which the cubic Hermite curve between two knots may leave the way: 1e-9, less
    what is missed by looking at three times of a step. */
 #define CURVE 0.9e-9
+/* Share of its first term that a series keeps at least where rounding makes it not negative. */
+#define SURELY 1e-9
 /* Bisections of a step for the time of an event, past the last bit. */
 #define HALVINGS 64
 
 typedef double Series[ORDER + 1];
+/* Two numbers at once: each rounds as by itself. */
+typedef double Two __attribute__((vector_size(16)));
 
 static Series phi, w, z, work, heat, twist, normal, force, couple;
 
@@ -34,6 +38,14 @@ static Series gauges[GAUGES];
 static const int TELLS[GAUGES] = { LIFT, ONSET, ONSET, GRIP, LOW, HIGH, HALT, ROLL, ROLL };
 
 static double at_time(const double *c, double t) { return polynomial(c, ORDER + 1, t); }
+
+/* Whether a series stays at 0 or above up to a time, as the sum of what its terms can take off is less than the
+   first one. */
+static int is_never_negative(const double *c, double t) {
+    double power = 1.0, most = 0.0;
+    for (int n = 1; n <= ORDER; n++) power *= t, most += fabs(c[n]) * power;
+    return c[0] - most > SURELY * c[0] || (c[0] >= 0.0 && most == 0.0);
+}
 
 static int is_held(const Circle *c) { return c->rolling > 0.0 && c->roll == 0.0; }
 
@@ -126,15 +138,22 @@ static double step_of(const Circle *c, double longest, int *parts) {
 static double first_negative(const double *c, double low, double high) {
     for (int n = 0; n < HALVINGS; n++) {
         double middle = 0.5 * (low + high);
+        if (middle == low || middle == high) break;
         if (at_time(c, middle) >= 0.0) low = middle;
         else high = middle;
     }
     return high;
 }
 
+/* The state at a time: two series at once, each by Horner's rule. */
 static Ridden state_at(double t) {
-    return (Ridden){ t, at_time(phi, t), at_time(w, t), at_time(z, t), at_time(work, t), at_time(heat, t),
-                     at_time(twist, t), NOTHING };
+    Two place = { phi[ORDER], w[ORDER] }, spent = { work[ORDER], heat[ORDER] }, turned = { z[ORDER], twist[ORDER] };
+    for (int n = ORDER - 1; n >= 0; n--) {
+        place = place * t + (Two){ phi[n], w[n] };
+        spent = spent * t + (Two){ work[n], heat[n] };
+        turned = turned * t + (Two){ z[n], twist[n] };
+    }
+    return (Ridden){ t, place[0], place[1], turned[0], spent[0], spent[1], turned[1], NOTHING };
 }
 
 /* Move on by one step, or to the first event within it; return how many knots there are before its
@@ -152,9 +171,13 @@ int advance_ride(const Circle *c, double longest, Ridden *end, Ridden *knots) {
         if (at_time(gauges[4], turn) < 0.0 || at_time(gauges[5], turn) < 0.0) dt = turn;
     }
     double whole = dt, low = 0.0;
+    int open[GAUGES], many = 0;
+    for (int k = 0; k < GAUGES; k++)
+        if (!is_never_negative(gauges[k], whole)) open[many++] = k;
     for (int n = 1; n <= parts && outcome == NOTHING; n++) {
         double high = whole * MIN(n / (double)parts, 1.0), first = INFINITY;
-        for (int k = 0; k < GAUGES; k++) {
+        for (int g = 0; g < many; g++) {
+            int k = open[g];
             if (!(at_time(gauges[k], high) < 0.0)) continue;
             double at = first_negative(gauges[k], low, high);
             if (at < first) first = dt = at, outcome = TELLS[k];

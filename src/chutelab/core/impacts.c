@@ -387,7 +387,7 @@ static void jam(Contact *struck, double t) {
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
     W.swings_too = 0;
-    for (int n = 0; n < count; n++) W.swings_too |= list[n].hung > 0 || list[n].cornered;
+    for (int n = 0; n < count; n++) W.swings_too |= list[n].hung > 0;
     /* Not hastened at first: then what rattles may never be as calm as it must be. */
     sweep_contacts(list, count, 0, JAM_SWEEPS, W.sweeps, 0.1 * left, left);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {

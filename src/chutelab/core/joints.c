@@ -25,6 +25,8 @@
 #define AGREES 0.1
 
 static double missed;
+/* End of the step that the pull is found for, s. */
+static double pulled_to;
 
 /* Place and velocity of a particle a span after the step's beginning, and by what it has turned. */
 typedef struct { double x, y, turned; } Pose;
@@ -232,6 +234,7 @@ void drop_tugs(void) {
 void pull_joints(double h) {
     int strings = 1;
     missed = 0;
+    pulled_to = W.step_end;
     for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
         JointRow *r = W.joint_rows + j->row;
         for (int n = 0; n < rows_of(j); n++) {
@@ -305,6 +308,13 @@ void cut_step(double t) {
         W.disks[i].changes++;
         enter_again(i, t);
     }
+}
+
+/* Whether something else has ended the step sooner: then the forces are found anew. */
+int is_cut(void) {
+    if (pulled_to == W.step_end) return 0;
+    cut_step(W.step_end);
+    return 1;
 }
 
 /* End the step where a string is pulled tight. */
@@ -566,6 +576,50 @@ void share_with_joints(const Contact *c, double wanted, const double *u, double 
     give_impulses();
 }
 
+/* Let joints answer blows at several places, which are found one by one, at this instant; see `answer_with_joints`. */
+void begin_answers(void) {
+    aim_now(1);
+    factor(1, 0);
+    for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++)
+        for (int end = 0; end < 2 && r->on; end++) {
+            const Disk *d = at_end(2 * r->joint + end);
+            if (d) was_moved((int)(d - W.disks));
+        }
+}
+
+void forget_answers(void) {
+    for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) r->answer[0] = 0;
+}
+
+/* Have joints give impulses such that nothing is drawn apart by what has been given to particles. */
+void answer_with_joints(void) {
+    for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) r->off = -rate_of(r);
+    solve();
+    for (JointRow *r = W.joint_rows; r < W.joint_rows + W.joint_row_count; r++) {
+        if (r->on) r->answer[0] += r->off;
+        for (int end = 0; end < 2 && r->on; end++) {
+            Disk *d = at_end(2 * r->joint + end);
+            if (d) tug(r, end, r->off, &d->vx, &d->spin);
+        }
+    }
+}
+
+/* Let go of strings that have pushed by their answers, and take all of these back; return whether there is one. */
+int let_go_again(void) {
+    JointRow *rows = W.joint_rows, *last = rows + W.joint_row_count;
+    for (JointRow *r = rows; r < last; r++) r->off = r->answer[0];
+    if (!let_go()) return 0;
+    for (JointRow *r = rows; r < last; r++) {
+        for (int end = 0; end < 2 && r->answer[0] != 0; end++) {
+            Disk *d = at_end(2 * r->joint + end);
+            if (d) tug(r, end, -r->answer[0], &d->vx, &d->spin);
+        }
+        r->answer[0] = 0;
+    }
+    factor(1, 0);
+    return 1;
+}
+
 /* Solve for the pull of joints and for what lasts in contact in turn, until they agree. */
 void agree_with_contacts(double h) {
     int meets = 0;
@@ -576,17 +630,24 @@ void agree_with_contacts(double h) {
         for (int i = W.low; i < W.high; i++) memcpy(W.disks[i].tugged, W.disks[i].tug, sizeof W.disks[i].tug);
         pull_joints(h);
         for (int i = W.low; i < W.high; i++)
-            for (int k = 0; k < 2 && W.disks[i].tie >= 0; k++)
-                worst = MAX(worst, fabs(W.disks[i].tug[k] - W.disks[i].tugged[k]));
+            for (int k = 0; k < 3 && W.disks[i].tie >= 0; k++) {
+                double more = fabs(W.disks[i].tug[k] - W.disks[i].tugged[k]);
+                worst = MAX(worst, k < 2 ? more : has_corners(W.disks + i) ? more * W.disks[i].radius : 0);
+            }
         if (worst <= AGREES * W.accurate) return;
-        for (Contact *c = W.contacts; c < W.contacts + W.contact_count; c++)
+        for (Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
+            /* They begin anew with their impulses. */
+            const double back[3] = {-c->impulse[0], -c->impulse[1], -c->impulse[2]};
+            push(c, back);
             for (int side = 0; side < 2; side++) {
                 const Disk *d = side ? c->two ? W.disks + c->j : 0 : W.disks + c->i;
                 if (!d || d->tie < 0) continue;
                 double more = (d->tug[0] - d->tugged[0]) * c->nx + (d->tug[1] - d->tugged[1]) * c->ny;
+                if (c->cornered) more += (side ? -c->others[0] : c->own[0]) * (d->tug[2] - d->tugged[2]);
                 c->need -= side ? -more : more;
                 c->most -= side ? -more : more;
             }
+        }
         solve_contacts(1);
     }
     /* What is pushed by hand is pulled otherwise, too. */

@@ -123,7 +123,7 @@ static void tell_group(int law, const Group *group, double amount, double bound)
 static void weigh_machine(void) {
     sin_cos(-L.tilt, up, up + 1);
     double *start = All.size, *length = All.size + 1, *center = All.size + 2, *radius = All.size + 3;
-    for (int k = 0; k < L.piece_count * (L.family ? L.particle_count : 1); k++) {
+    for (int k = 0; k < L.piece_count * members(); k++) {
         const Barrier *b = L.barriers + k;
         double *from = b->radius ? center : start;
         *from = MAX(*from, MAX(fabs(b->x), fabs(b->y)));
@@ -353,7 +353,7 @@ static void tell_hits(int passes) {
     if (!first) return;
     Breach *one = tell(passes ? LAW_THROUGH : LAW_INSIDE, passes ? count : deepest,
                        passes ? 0 : L.allowed);
-    int row = first->piece + (L.family ? first->particle * L.piece_count : 0);
+    long row = first->piece + member_of(first->particle) * L.piece_count;
     one->t = first->t;
     one->x = first->x;
     one->y = first->y;
@@ -577,7 +577,7 @@ EXPORT int lay_out_laws(void) {
     RESERVE(L.knots, (double)L.knot_count * L.row);
     RESERVE(L.offsets, L.particle_count + 1);
     RESERVE(L.bodies, L.particle_count);
-    RESERVE(L.barriers, (double)L.piece_count * (L.family ? L.particle_count : 1));
+    RESERVE(L.barriers, (double)L.piece_count * members());
     RESERVE(L.books, 3.0 * L.book_rows);
     RESERVE(L.movers, L.mover_count);
     RESERVE(L.swings, L.swing_count);

@@ -25,6 +25,10 @@ PAIRED static inline int is_all(Truth a) { return __builtin_wasm_all_true_i64x2(
 
 extern Laws L;
 
+/* Machines, and that of a particle. */
+static inline int members(void) { return L.each ? L.particle_count / L.each : 1; }
+static inline long member_of(int i) { return L.each ? i / L.each : 0; }
+
 /* Intervals, or knots, whose common box tells which pieces they may meet: those that follow each other are
    near each other. */
 #define WIDTH 32

@@ -83,7 +83,7 @@ typedef struct {
                                    in a hollow, see `account` */
     double force[2], pushed[2]; /* N; by which it is pushed by hand, in this step and in the one before ... */
     double kick[2];             /* m/s; ... and what that changes of its velocity in this step */
-    double turned;              /* rad; since its release */
+    double turned;              /* [in] rad; from as its corners are written */
     int kind;                   /* [in] row of the table of pairs */
     int rides;                  /* [in] the incoming belt carries it by adhesion */
     int goes_on;                /* [in] it was under way before: released wherever others are */
@@ -468,7 +468,7 @@ typedef struct {
 
 typedef struct {
     double kind;            /* which of the particles it consists of */
-    double at[2], to[2], fill[4], velocity[2], omega; /* spin at the release, rad/s */
+    double at[2], to[2], fill[4], velocity[2], omega, angle_deg; /* spin at the release, rad/s, and turn */
     double count, rate, start, bed_height, speed_spread;
     double seed[2];         /* its lower 32 bits and the others */
     double at_once;         /* whether all are released at once */
@@ -568,7 +568,7 @@ typedef struct {
     double inertia;             /* [in] kg m2; 0: it does not turn */
     double rolling;             /* [in] rolling friction: its arm over the radius */
     double gravity, pace;       /* [in] m/s2; what bounds on speeds are multiplied by */
-    double exit_box[4];         /* [in] m; as of `Start` */
+    double exit_box[4], up[2];  /* [in] m; as of `Start`, in the world's frame, where up is: here it is (0, 1) */
     int kind;                   /* [in] row of the table of pairs */
     int carried;                /* [in] it rides the incoming belt by adhesion */
     int reason;                 /* [out] why its track ended: enum Ending */
@@ -587,7 +587,7 @@ enum Course { FINISHED, PAUSING, FILLED, NO_MEMORY, NO_PROGRESS, DRIVEN, TOO_LON
 typedef struct { double radius, speed, incline; int surface, pad; } Wheel; /* [in] the drive pulley */
 
 typedef struct {
-    /* arrays; of a family each particle is a member */
+    /* arrays; of a family each scene is a member */
     Segment *segments;      /* [in] (members, segment_count) */
     Arc *arcs;              /* [in] (members, arc_count) */
     Wheel *wheels;          /* [in] (members) or none */
@@ -599,7 +599,7 @@ typedef struct {
     double *room;           /* (room_size) for the obstacles that surfaces are */
     int segment_count, arc_count, wheel_count, lone_count, surface_count, kind_count; /* [in] */
     int knot_room, event_room, room_size;
-    int family, apart;      /* [in] each particle has surfaces, and books, of its own */
+    int each, apart;        /* [in] particles of a member, 0 without a family; each has books of its own */
     int is_whole;           /* [in] all knots and events are still there: the host took none */
     int until, landing;     /* [in] enum Until; surface that a particle lands on, or -1 */
     int most, window;       /* [in] rounds of a particle; rounds after which it is asked whether it gets on */
@@ -622,7 +622,7 @@ typedef struct {
 typedef struct {                                                                         /* [out] */
     double t, position[2], velocity[2], radius;
     double exit_box[4];     /* m; left, bottom, right, top */
-    double omega;           /* rad/s */
+    double omega, angle;    /* rad/s, rad */
 } Start;
 
 /* An earlier particle as one that is drawn sees it: how far it has come (m), and how far apart they
@@ -767,7 +767,7 @@ typedef struct {
     double *knots;          /* [in] rows of t, x, y, vx, vy, spin, three entries of the ledger */
     int *offsets;           /* (particles + 1) first knot of each, and behind the last: [in], or `owned` */
     Body *bodies;           /* [in] (particles) */
-    Barrier *barriers;      /* [in] (pieces), of a family (particles, pieces) */
+    Barrier *barriers;      /* [in] (pieces), of a family (members, pieces) */
     Mover *movers;          /* [in] (mover_count), as far as they are told */
     Swing *swings;          /* [in] of all hinges, each one's in the order of time */
     double *books;          /* [in] (book_rows, 3) entries of each surface, J */
@@ -785,7 +785,7 @@ typedef struct {
     int interact;           /* [in] particles meet each other */
     int joined;             /* [in] some hang on joints */
     int alike;              /* [in] all is left to steps that are all alike, and to Chipmunk */
-    int family;             /* [in] each particle has pieces of its own */
+    int each;               /* [in] particles that share pieces, of a family; else 0: all */
     int pulley;             /* [in] piece 0 ends on a drive pulley */
     int contacts, steps;    /* [in] that were made */
     int owned;              /* [in] behind its numbers a knot says whose it is: rows are those of `Knot` */

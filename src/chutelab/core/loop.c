@@ -520,7 +520,9 @@ static int meet_tied(int i, int j, double t) {
 /* Resolve what happens within the step, in the order of time. */
 static int go_through(void) {
     int i, count = W.high - W.low;
-    while ((i = next_disk()) >= 0) {
+    for (;;) {
+        if (W.joint_count && is_cut()) foresee_tied();
+        if ((i = next_disk()) < 0) return DONE;
         Disk *d = W.disks + i;
         double t = d->due;
         int j = d->partner;
@@ -542,7 +544,7 @@ static int go_through(void) {
         if (j != ALARM) {
             if (W.interact && d->impacts > CROWDED && t > W.t + SHORTEST * W.step) {
                 W.step_end = t;
-                return DONE;
+                continue;
             }
             shock(i, j, t);
             if (d->impacts <= STALL) continue;
@@ -555,7 +557,6 @@ static int go_through(void) {
         if (is_tied(i) && d->mode == FREE) cut_step(t);
         foresee(i);
     }
-    return DONE;
 }
 
 static void end_step(void) {

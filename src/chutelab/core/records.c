@@ -62,7 +62,7 @@ EXPORT int pack_events(Event *events, int count) {
 
 static int lay_out_pieces(void) {
     RESERVE(L.bodies, L.particle_count);
-    RESERVE(L.barriers, (double)L.piece_count * (L.family ? L.particle_count : 1));
+    RESERVE(L.barriers, (double)L.piece_count * members());
     return has_room();
 }
 
@@ -96,7 +96,7 @@ static void take_pieces(const Exact *e, int member) {
 
 static int judge_exact(void) {
     const Exact *e = exact();
-    L = (Laws){ .particle_count = e->lone_count, .engine = ENGINE_EXACT, .family = e->family,
+    L = (Laws){ .particle_count = e->lone_count, .engine = ENGINE_EXACT, .each = e->each,
                 .piece_count = e->segment_count + e->arc_count + e->wheel_count,
                 .pulley = e->wheel_count, .books = e->books, .surface_count = e->surface_count,
                 .book_rows = e->surface_count * (e->apart ? e->lone_count : 1),
@@ -109,7 +109,7 @@ static int judge_exact(void) {
         L.bodies[i] = (Body){ p->radius, p->mass, p->inertia, p->gravity };
         L.largest = MAX(L.largest, p->radius);
     }
-    for (int member = 0; member < (e->family ? e->lone_count : 1); member++) take_pieces(e, member);
+    for (int member = 0; member < members(); member++) take_pieces(e, member);
     return end_up();
 }
 

@@ -121,7 +121,8 @@ static void begin_stream(void) {
     for (int i = 0; i < count; i++) {
         double t = stream->at_once != 0.0 ? 0.0 : i / stream->rate;
         starts[i] = (Start){ .t = t + stream->start, .velocity = { velocity[0], velocity[1] },
-                             .omega = turns ? stream->omega : 0.0, .radius = particle->radius };
+                             .omega = turns ? stream->omega : 0.0, .radius = particle->radius,
+                             .angle = stream->angle_deg * RADIANS };
     }
     D.next = 1;
     D.near_count = 0;

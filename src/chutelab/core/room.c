@@ -138,10 +138,12 @@ int take_what_is_in_surfaces(Place *places, int count, double radius) {
     return D.listed_count * count;
 }
 
-/* How far a box or polygon reaches towards (dx, dy), m: as far as its furthest corner. */
-static double reach_of_corners(const double *corners, int many, double dx, double dy) {
-    double most = -INFINITY;
-    for (int n = 0; n < many; n++) most = MAX(most, corners[2 * n] * dx + corners[2 * n + 1] * dy);
+/* How far a box or polygon that is turned reaches towards (dx, dy), m: as far as its furthest corner. */
+static double reach_of_corners(const double *corners, int many, double angle, double dx, double dy) {
+    double most = -INFINITY, sine, cosine;
+    sin_cos(angle, &sine, &cosine);
+    double x = cosine * dx + sine * dy, y = cosine * dy - sine * dx;
+    for (int n = 0; n < many; n++) most = MAX(most, corners[2 * n] * x + corners[2 * n + 1] * y);
     return most;
 }
 
@@ -161,7 +163,7 @@ static void clear_release(const Piece *p, int stream, int i, double *deepest, Re
     if (corners) {
         const double *first = D.corners;
         for (int n = 0; n < kind; n++) first += 2 * (int)t->particles[n].corners;
-        reach += reach_of_corners(first, corners, -dx / distance, -dy / distance)
+        reach += reach_of_corners(first, corners, o->angle, -dx / distance, -dy / distance)
             - t->particles[kind].radius;
     }
     double depth = reach - distance;

@@ -125,6 +125,7 @@ static int take_up_exact(void) {
                      .inertia = one.inertia, .rolling = one.body->rolling, .gravity = g, .pace = pace,
                      .kind = one.kind, .carried = one.carried };
         memcpy(p->exit_box, s->exit_box, sizeof p->exit_box);
+        p->up[1] = 1.0;
     }
     return 1;
 }

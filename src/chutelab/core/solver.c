@@ -67,8 +67,9 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 }
 
 /* Solve contacts by `sweeps` until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
-   will do. A crowd is swept again, up to so many rounds, of which the last is good enough if it crawls,
-   and more finely where small changes leave gaps open. By itself (0 rounds), and where sweeps diverge,
+   will do, but not before the last round if they are to be finer than a crowd's. A crowd is swept again, up to so
+   many rounds, of which the last is good enough if it crawls, and more finely where small changes leave gaps
+   open. By itself (0 rounds), and where sweeps diverge,
    rigid bodies with all of the friction may have no solution, driven into a wedge that locks itself:
    there it is lowered until they have one. Gaps tell nothing of that where a drive presses: it presses
    harder in each sweep, so there the changes have to end, too. A disk that cannot turn is held where
@@ -105,7 +106,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
             if (ended && more < 2) break;
             if (ended) accurate *= 0.1;
             if (change < INFINITY) worst = pressing ? MAX(left_open(), change) : left_open();
-            if (worst <= enough) break;
+            if (worst <= enough && !(accurate < W.accurate && more > 1)) break;
             if (change < INFINITY && more > 1) {
                 if (more-- == rounds) first = change;
                 continue;
@@ -266,7 +267,7 @@ void solve_contacts(int again) {
         double accurate = cornered && to - from <= FEW_CONTACTS ? FINE_CORNERS * W.pace : W.accurate;
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,
-                           PLAIN, accurate, accurate < W.accurate ? accurate : W.skip * least);
+                           PLAIN, accurate, W.skip * least);
         else solve_alone(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);

@@ -15,16 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core import (
-    REAL,
-    AsideError,
-    Module,
-    Status,
-    borrow,
-    constants,
-    dtype,
-    give_back,
-)
+from chutelab.core import REAL, AsideError, Module, Status, borrow, constants, dtype, give_back
 from chutelab.machine import PASSES, SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather, gather_lasting
@@ -165,7 +156,8 @@ class Job:
         disks = module.array("disks", dtype("Disk"), machine.count)
         disks["x"], disks["y"] = releases.position.T
         disks["vx"], disks["vy"] = releases.velocity.T
-        disks["spin"], disks["release"] = releases.omega, releases.t
+        disks["spin"], disks["turned"] = releases.omega, releases.angle
+        disks["release"] = releases.t
         disks["radius"], disks["mass"] = particle.radius, particle.mass
         disks["inertia"] = particle.inertia
         disks["kind"] = releases.kind

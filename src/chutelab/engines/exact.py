@@ -15,16 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.core import (
-    REAL,
-    AsideError,
-    Module,
-    borrow,
-    constants,
-    dtype,
-    give_back,
-    number,
-)
+from chutelab.core import REAL, AsideError, Module, borrow, constants, dtype, give_back, number
 from chutelab.machine import Machine, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather
@@ -72,11 +63,14 @@ def run(machine: Machine, progress: Progress | None = None, *, apart: bool = Fal
     """
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
+    if machine.tilt:
+        machine.finish(unwatched if progress is None else partial(progress, 0.0))
     ahead = machine.is_ahead
     points = False if ahead else np.equal(machine.particle.radius, 0.0)
     if 0 < np.count_nonzero(points) < np.size(points) and machine.segments.start.ndim == 2:
         raise ValueError("the exact engine has no points beside disks")
-    module, recorder = borrow(), Recorder(machine, apart=apart)
+    module = borrow()
+    recorder = Recorder(machine, apart=apart, turned=machine.tilt != 0.0)
     try:
         if ahead:
             hand_over(module, machine.scene)
@@ -102,7 +96,9 @@ def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:
     """Tell the core how to run, on coordinates that were rounded `far` off (m)."""
     exact: Any = module.structs["Exact"]
     exact.apart, exact.until = apart, UNTIL[machine.until]
-    exact.landing, exact.far, exact.is_whole = machine.landing, far, far == 0.0
+    exact.landing, exact.far = machine.landing, far
+    # The core judges in its own frame.
+    exact.is_whole = far == 0.0 and machine.tilt == 0.0
     exact.most, exact.window, exact.tick = ROUNDS, WINDOW, TICK
     module.structs["Loads"].every = machine.loads
 
@@ -110,15 +106,16 @@ def ask(module: Module, machine: Machine, far: float, apart: bool) -> None:
 def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
     """Hand a machine over to the core, whose coordinates were rounded `far` off (m)."""
     count, segments, arcs = machine.count, machine.segments, machine.arcs
-    family, wheel = segments.length.ndim == 2, machine.pulley
-    members = count if family else 1
+    family, wheel = machine.family, machine.pulley
+    each = 0 if family is None else family.each
+    members = count // each if each else 1
     s, a, w = segments.length.shape[-1], len(arcs.surface), int(wheel is not None)
     columns, owners = s + a + w, len(machine.surfaces) + 1
-    kinds = members if family else len(machine.rolling)
+    kinds = members if each else len(machine.rolling)
     exact: Any = module.structs["Exact"]
     for name, value in (
         ("segment_count", s), ("arc_count", a), ("wheel_count", w), ("lone_count", count),
-        ("surface_count", owners), ("kind_count", kinds), ("family", family),
+        ("surface_count", owners), ("kind_count", kinds), ("each", each),
     ):  # fmt: skip
         setattr(exact, name, value)
     ask(module, machine, far, apart)
@@ -128,6 +125,10 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
         found = module.array(name, dtype(kind), prod(shape), of="Exact")
         return found.reshape(shape)
 
+    def shared(numbers: Any) -> Any:
+        """Return what particles of a scene have alike: of a family once for each scene."""
+        return numbers[::each] if each > 1 and np.ndim(numbers) else numbers
+
     materials = rows("materials", "Pair", kinds, columns)
     for name, kind, part, first, many in (
         ("segments", "Segment", segments, 0, s), ("arcs", "Arc", arcs, s, a),
@@ -135,18 +136,18 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
         if not many:
             continue
         own = rows(name, kind, members, many)
-        for field in own.dtype.names or ():
-            if field != "end":
-                own[field] = getattr(part, field)
+        own["surface"] = part.surface
+        for field in {*(own.dtype.names or ())} - {"end", "surface"}:
+            own[field] = shared(getattr(part, field))
         for field in ("restitution", "friction"):
-            materials[field][:, first : first + many] = getattr(part, field)
+            materials[field][:, first : first + many] = shared(getattr(part, field))
     if wheel is not None:
         own = rows("wheels", "Wheel", members)
         for field in ("radius", "speed", "incline", "surface"):
-            own[field] = getattr(wheel, field)
-        materials["restitution"][:, -1] = wheel.restitution
-        materials["friction"][:, -1] = wheel.friction
-    falls = machine.falls[machine.releases.kind[0]] if family else machine.falls
+            own[field] = shared(getattr(wheel, field))
+        materials["restitution"][:, -1] = shared(wheel.restitution)
+        materials["friction"][:, -1] = shared(wheel.friction)
+    falls = shared(machine.falls[machine.releases.kind[0]]) if each else machine.falls
     materials["falls"] = np.broadcast_to(falls, kinds)[:, None]
     lones, releases = rows("lones", "Lone", count), machine.releases
     lones["release"], lones["stop"] = releases.t, machine.end_time - releases.t
@@ -157,8 +158,9 @@ def fill(module: Module, machine: Machine, far: float, apart: bool) -> None:
     lones["gravity"], lones["pace"] = machine.gravity, machine.pace
     several = len(machine.rolling) > 1
     lones["rolling"] = machine.rolling[releases.kind] if several else machine.rolling[0]
-    lones["kind"], lones["carried"] = releases.kind, releases.carried
-    lones["exit_box"] = releases.exit_box
+    lones["kind"] = releases.kind // each if each else releases.kind
+    lones["carried"] = releases.carried
+    lones["exit_box"], lones["up"] = releases.exit_box, machine.up
 
 
 def follow(

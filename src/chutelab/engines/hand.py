@@ -22,10 +22,9 @@ from chutelab.machine import build
 from chutelab.results import Recording
 from chutelab.results.recorder import Recorder, StalledError
 from chutelab.scene import AnyScene, Overrides, load
-from chutelab.util.arrays import Floats
+from chutelab.util.arrays import RADIANS, Floats
 from chutelab.util.errors import InputError
 from chutelab.util.tables import many, number
-from chutelab.util.trig import RADIANS
 
 SET = "plate.angle_deg, the speed of a belt, or the speed_deg and torque of a motor"
 """What can be set while a run goes on."""
@@ -245,7 +244,7 @@ class Run:
 
     @property
     def angles(self) -> Floats:
-        """How far particles have turned since their releases, (N,), rad; NaN if not under way."""
+        """How far particles are turned, (N,), rad, as `Motion.angle`; NaN if not under way."""
         return np.where(self._under_way, self._disks["turned"], np.nan)
 
     @property

@@ -145,6 +145,7 @@ def _plain(machine: Machine) -> Machine:
         (machine.movers, "surfaces that stay where they are"),
         (machine.scene.one_sided, "surfaces that are solid from both sides"),
         (machine.rolling[kind] > 0.0, "disks without rolling friction"),
+        (machine.tilt, "gravity that is straight down"),
         (machine.air > 0.0, "flights without air"),
         (machine.scene.clings, "surfaces without cohesion"),
         (machine.falls[kind] > 0.0, "restitution that is the same at all speeds"),

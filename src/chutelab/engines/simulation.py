@@ -32,13 +32,12 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         raise ValueError(f"engine = {wanted!r}: one of {', '.join(ENGINES)}")
     if wanted != "auto":
         return wanted
-    if machine.scene.cornered:
-        return "pymunk" if any(uncornered(machine)) else "contact"
-    if machine.joints:
-        return "pymunk" if unjoined(machine) else "contact"
+    if machine.scene.cornered or machine.joints:
+        lacks = any(uncornered(machine)) or (machine.joints and unjoined(machine))
+        return "pymunk" if lacks else "contact"
     stepped = machine.interact or machine.movers or machine.triggers or np.any(machine.air)
     scene = machine.scene
-    return "contact" if stepped or machine.tilt or scene.clings or scene.one_sided else "exact"
+    return "contact" if stepped or scene.clings or scene.one_sided else "exact"
 
 
 def simulate(
@@ -205,7 +204,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
 def must_fit(machine: Machine, name: str) -> None:
     """Raise a `SceneError` if an engine does not have what a machine needs."""
     scene = machine.scene
-    if name == "contact" and scene.cornered:
+    if name == "contact":
         for key, value, allowed in uncornered(machine):
             raise refused(scene, key, value, allowed)
     if name == "exact":
@@ -240,9 +239,6 @@ def must_fit(machine: Machine, name: str) -> None:
         if machine.air:
             allowed = "0 with the exact engine: it has no closed form for a flight in air"
             raise refused(scene, "air_density", machine.air, allowed)
-        if machine.tilt:
-            allowed = "0 with the exact engine: contact and pymunk have gravity of any direction"
-            raise refused(scene, "gravity_deg", scene.gravity_deg, allowed)
         return
     for n, kind in enumerate(scene.particles):
         if name == "pymunk" and kind.falls:
@@ -263,20 +259,14 @@ def must_fit(machine: Machine, name: str) -> None:
 def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
     """Yield what the contact engine does not have with boxes: keys, values, and why not."""
     scene, why = machine.scene, "boxes and polygons; the pymunk engine has them"
-    for joint in machine.joints[:1]:
-        yield f"{joint.kind}[0].particle", joint.particle, f"no joints with {why}"
+    if not scene.cornered:
+        return
     for n, kind in enumerate(scene.particles):
         if kind.outline and kind.rolling_friction:
             key = f"{scene.head('particle', n)}.rolling_friction"
             yield key, kind.rolling_friction, "0 with boxes and polygons: they do not roll"
-    if scene.hinges:
-        yield "run.engine", "contact", f"pymunk: nothing hangs on a hinge with {why}"
     if scene.one_sided:
-        yield (
-            "run.engine",
-            "contact",
-            f"pymunk: {scene.one_sided} has two sides with {why}",
-        )
+        yield ("run.engine", "contact", f"pymunk: {scene.one_sided} has two sides with {why}")
     belt = scene.incoming
     if belt is not None and belt.friction == "adhesion":
         yield "incoming.friction", belt.friction, f"a Coulomb coefficient with {why}"

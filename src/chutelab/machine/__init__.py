@@ -19,6 +19,7 @@ from chutelab.machine.parts import (
     Pulley,
     moved,
     origin,
+    upright,
 )
 from chutelab.machine.releases import RefusedError
 from chutelab.machine.shapes import Arcs, Pieces, Segments
@@ -42,4 +43,5 @@ __all__ = [
     "hand_over",
     "moved",
     "origin",
+    "upright",
 ]

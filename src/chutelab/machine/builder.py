@@ -26,8 +26,7 @@ from chutelab.scene import Fault, Plate, Scene
 from chutelab.scene.conflicts import JOINTS
 from chutelab.scene.units import polygon_moment
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import Floats, Ints, Numbers, Watch, unwatched
-from chutelab.util.trig import RADIANS, hypot
+from chutelab.util.arrays import RADIANS, Floats, Ints, Numbers, Watch, hypot, unwatched
 
 WORDS = {
     "adhesion": inf, "impact": 0.0, "top": 1.0,
@@ -215,8 +214,8 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     Parameters
     ----------
     scenes : Scene or Family
-        Of a family each scene, of one particle, is resolved as it would be by itself; the machine
-        has a particle for each, with surfaces of its own.
+        Of a family each scene is resolved as it would be by itself; the machine has the particles
+        of all, each with surfaces of its own.
     watch : callable, optional
         Called now and then while particles are given their places, which may take long; what it
         raises ends the building.
@@ -228,19 +227,24 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         place the outgoing belt, the impact lies off the finite plate, or a particle starts inside a
         surface.
     """
-    family = isinstance(scenes, Family)
+    family = scenes if isinstance(scenes, Family) else None
     scene, value = scenes.scene, scenes.value
     names, meeting = scene.surfaces, scene.meetings(value)
-    kinds = 1 if family else len(scene.particles)
+    kinds = len(scene.particles) if family is None else 1
     met = [[meeting(kind, name) for kind in range(kinds)] for name in names]
     # Adhesion is friction without a bound.
     met = [[(e, inf if isinstance(mu, str) else mu) for e, mu in pairs] for pairs in met]
     grip = meeting(scene.kinds[0], names[0])[1] if scene.incoming is not None else inf
     module = borrow()
     try:
-        rows, nominal, movers = lay(module, scenes, grip)
+        if family is None:
+            rows, nominal, movers = lay(module, scenes, grip)
+        else:
+            firsts = np.ravel(grip)[:: family.each] if np.ndim(grip) else grip
+            rows, nominal, movers = lay(module, family.firsts, firsts)
+            rows = {name: own.repeat(family.each, axis=0) for name, own in rows.items()}
         _weigh_hinges(scene, movers)
-        warnings = _judged(scenes, nominal)
+        warnings = _judged(scenes if family is None else family.firsts, nominal)
         releases, radius = draw(module, scenes, watch)
     finally:
         give_back(module)
@@ -252,7 +256,9 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     until: Any = value(scene.run, "until")
     worded = isinstance(until, str)
     particle = _particle(scenes, releases.kind, radius)
-    latest: Any = releases.t if family else releases.t.max().item()
+    latest: Any = releases.t.max().item()
+    if family is not None:
+        latest = releases.t.reshape(-1, family.each).max(axis=1).repeat(family.each)
     bound = latest + value(scene.run, "max_time")
     pulley = None
     if belt is not None:
@@ -268,12 +274,12 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
     # Particles of a family never meet.
     pairs = np.zeros((1, 1, 2))
     every = range(len(particles))
-    if not family:
+    if family is None:
         pairs = np.array([[meeting(a, b) for b in every] for a in every])
         through = [[scene.passes(a, b) for b in every] for a in every]
         pairs[..., 0] = np.where(through, PASSES, pairs[..., 0])
     joints = []
-    for table, one in () if family else scene.joints:
+    for table, one in scene.joints if family is None else ():
         (x, y), other = releases.position[one.particle].tolist(), one.other
         u, v = releases.position[other].tolist() if one.from_ is None else one.from_
         rest = getattr(one, "length", None) or float(hypot(x - u, y - v))
@@ -390,18 +396,22 @@ def bodies(scenes: Scene | Family) -> tuple[list[Any], list[Any]]:
 def _particle(scenes: Scene | Family, kind: Ints, radius: Floats | None) -> Particle:
     """Return the particles: numbers if all are alike, else arrays (N,)."""
     scene, (masses, inertias) = scenes.scene, bodies(scenes)
+    nominal: Any
     if isinstance(scenes, Family):
-        first = scene.kinds[0]
-        return Particle(scenes.value(scene.particle, "radius"), masses[first], inertias[first])
-    if radius is None and (len(masses) == 1 or len({*zip(masses, inertias, strict=True)}) == 1):
+        nominal, first = scenes.value(scene.particle, "radius"), scene.kinds[0]
+        mass, inertia = masses[first], inertias[first]
+        if radius is None:
+            return Particle(nominal, mass, inertia)
+    elif radius is None and (len(masses) == 1 or len({*zip(masses, inertias, strict=True)}) == 1):
         return Particle(scene.particle.radius, masses[0], inertias[0])
-    nominal = np.array([one.radius for one in scene.particles])[kind]
+    else:
+        nominal = np.array([one.radius for one in scene.particles])[kind]
+        mass, inertia = np.array(masses)[kind], np.array(inertias)[kind]
     radius = nominal if radius is None else radius
     size = radius / nominal
     # Powers of libraries differ in the last bit.
     square = size * size
     cube = square * size
-    mass, inertia = np.array(masses)[kind], np.array(inertias)[kind]
     return Particle(radius, mass * cube, inertia * (cube * square))
 
 

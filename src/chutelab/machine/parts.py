@@ -19,8 +19,7 @@ from chutelab.machine.releases import Releases
 from chutelab.machine.shapes import Arcs, Pieces, Segments, crossings
 from chutelab.scene import Scene
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import Floats, Watch, unwatched
-from chutelab.util.trig import RADIANS, sin_cos
+from chutelab.util.arrays import RADIANS, Floats, Watch, sin_cos, unwatched
 
 DRIVE_PULLEY = "the drive pulley"
 
@@ -148,8 +147,9 @@ EARTH = 9.81
 class Machine:
     """Everything an engine needs to run.
 
-    A family of machines, one for each particle, is one machine in which surfaces, gravity, radius
-    and mass of the particle, the pulley's numbers and the end time have a value for each, (N,).
+    A family of machines, a copy of one for each particle, is one machine in which surfaces,
+    gravity, radius and mass of the particle, the pulley's numbers and the end time have a value for
+    each, (N,).
 
     One that `is_ahead` has only what needs no geometry, and `build`; the rest is built when it is
     first asked for. An engine that has the core build it never asks.
@@ -221,6 +221,12 @@ class Machine:
     def up(self) -> Floats:
         """The direction against gravity, (2,)."""
         return np.array(sin_cos(-self.tilt))
+
+    @cached_property
+    def frame(self) -> Floats:
+        """Unit vectors of a frame that is upright where gravity points down, rows, (2, 2)."""
+        x, y = self.up
+        return np.array([[y, -x], [x, y]])
 
     def height(self, position: Floats) -> Floats:
         """Return how high places (..., 2) are, (...), m: against gravity, from the origin."""
@@ -320,6 +326,22 @@ class Machine:
             owners = np.setdiff1d(np.concatenate(into), [0])
             said += [Caution(self.surfaces[owner], DRIVE_PULLEY) for owner in owners]
         return (*self.plate_warnings, *said)
+
+
+def upright(machine: Machine) -> Machine:
+    """Return a machine that stays where it is, turned so that gravity is straight down."""
+    frame = machine.frame.T
+    segments, arcs, releases = machine.segments, machine.arcs, machine.releases
+    return replace(
+        machine,
+        segments=replace(segments, start=segments.start @ frame, tangent=segments.tangent @ frame),
+        arcs=replace(arcs, center=arcs.center @ frame, begin=arcs.begin - machine.tilt),
+        releases=replace(
+            releases,
+            position=releases.position @ frame,
+            velocity=releases.velocity @ frame,
+        ),
+    )
 
 
 REMOTE = 8.0

@@ -12,9 +12,8 @@ import numpy as np
 from chutelab.core import INTEGER, Module, Status, constants, dtype
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.scene.variants import Family
-from chutelab.util.arrays import Bools, Floats, Ints, Numbers, Watch
+from chutelab.util.arrays import RADIANS, Bools, Floats, Ints, Numbers, Watch, sin_cos
 from chutelab.util.tables import number
-from chutelab.util.trig import RADIANS, sin_cos
 
 LOOKS = 1_000_000
 """Particles and places that the core looks at between two looks at the clock; 10 ms."""
@@ -33,6 +32,7 @@ class Releases:
     position: Floats
     velocity: Floats
     omega: Floats  # rad/s
+    angle: Floats  # rad, from as what has corners is written
     # rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation
     carried: Bools
     stream: Ints  # its number: particles of the first stream come first, then those of the next
@@ -134,9 +134,9 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
     """Have the core draw the releases of a scene; the same scene and seed give the same numbers.
 
     They are of all streams, one after the other, drawn in a module in which the scene's surfaces
-    are laid, see `machine.builder.lay`; of a family each scene has one particle. Also returned are
-    the radii, (N,), m, or None if all particles are alike. `watch` is called now and then; what it
-    raises ends the drawing.
+    are laid, see `machine.builder.lay`; of a family scene by scene. Also returned are the radii,
+    (N,), m, or None if all particles are alike. `watch` is called now and then; what it raises ends
+    the drawing.
 
     Particles that meet start where no other of their stream is, as far as the bed has room: an
     engine lets the others wait until their place is free. None starts in a surface: one that is in
@@ -145,7 +145,7 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
     Raises a `RefusedError` if a box has not room for all, a particle would start inside a surface,
     or a belt that grips by adhesion does not allow its speed.
     """
-    scene, family = scenes.scene, isinstance(scenes, Family)
+    scene, family = scenes.scene, scenes if isinstance(scenes, Family) else None
     counts = [stream.count for stream in scene.streams]
     corners = np.array([corner for kind in scene.particles for corner in kind.outline])
     members, streams = module.structs["Plan"].members, len(counts)
@@ -161,7 +161,8 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
     refused = array("refusals", dtype("Refusal"), 1)
     if np.count_nonzero(refused["why"]):
         which = refused["why"].nonzero()[0].tolist()
-        raise RefusedError(scene.source, {n: _fault(scenes, refused[n], n) for n in which})
+        one_each = scenes if family is None else family.firsts
+        raise RefusedError(scene.source, {n: _fault(one_each, refused[n], n) for n in which})
     starts = array("starts", dtype("Start"), drawing.count)
     carried = array("carried", INTEGER, streams).astype(bool)
     releases = Releases(
@@ -169,13 +170,15 @@ def draw(module: Module, scenes: Scene | Family, watch: Watch) -> tuple[Releases
         position=starts["position"].copy(),
         velocity=starts["velocity"].copy(),
         omega=starts["omega"].copy(),
-        carried=carried if family else carried.repeat(counts),
-        stream=np.arange(streams).repeat(members * np.array(counts)),
-        kind=np.arange(members) if family else np.array(scene.kinds).repeat(counts),
+        angle=starts["angle"].copy(),
+        carried=carried.reshape(members, streams).repeat(counts, axis=1).reshape(-1),
+        stream=np.tile(np.arange(streams).repeat(counts), members),
+        kind=np.array(scene.kinds).repeat(counts) if family is None else np.arange(len(family)),
         exit_box=starts["exit_box"].copy(),
     )
     radius = starts["radius"].copy()
-    alike = family or bool((radius == radius[0]).all())
+    alike = family is not None and family.each == 1
+    alike = alike or bool((radius == radius[0]).all())
     return releases, None if alike else radius
 
 

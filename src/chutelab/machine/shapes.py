@@ -22,8 +22,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.trig import sin_cos
+from chutelab.util.arrays import Bools, Floats, Ints, sin_cos
 
 FINE = radians(3.0)
 """Between two points of a path to draw: it is off by 3e-4 of the radius of curvature at most."""

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.machine import Machine, Pieces, Segments
-from chutelab.results.record import EVENT, PARTICLES, Kind, Record, hermite, kept
+from chutelab.machine import Arcs, Machine, Mover, Pieces, Segments
+from chutelab.results.record import EVENT, PARTICLES, Kind, Record, hermite, kept, turned
 from chutelab.util.arrays import Bools, Floats, Ints
 
 TOUCH = 0.01
@@ -72,7 +72,7 @@ def fates(recording: Record) -> NDArray[Any]:
     for n, name in enumerate(order):
         home[(home < 0) & there.bare(stays, places, name, last["t"][~gone])] = n
     if machine.interact:
-        one, two = there.touching(stays, places)
+        one, two = there.touching(stays, places, last["t"][~gone])
         reached = -1
         while (now := int(np.count_nonzero(home >= 0))) > reached:
             reached, before = now, home.copy()
@@ -204,6 +204,10 @@ class Places:
         self.radius = recording.radius
         knots, corners = recording.knots, recording.machine.corners
         self._pieces: dict[int, list[Pieces]] = {}
+        self._movers = {mover.surface: mover for mover in recording.machine.movers}
+        kinds = recording.machine.releases.kind
+        self._outlines = [recording.machine.outlines[kind] for kind in kinds.tolist()]
+        self._cornered = np.array([one is not None for one in self._outlines], dtype=bool)
         self._point = POINT * float(np.ptp(corners, axis=0).max()) if corners.size else 0.0
         self._t0 = float(knots["t"].min(initial=0.0))
         self._span = 2.0 * (float(knots["t"].max(initial=0.0)) - self._t0) + 1.0
@@ -247,19 +251,69 @@ class Places:
         found: NDArray[Any] = event[0]
         return found
 
+    def edges(self, particle: int, place: Floats, t: float) -> Segments:
+        """Return the edges of a particle that is at a place (2,), m, at t, s; of a disk its centre.
+
+        That is one edge of no length.
+        """
+        corners, angle, some = self._outlines[particle], 0.0, self.recording
+        if corners is None:
+            corners = np.zeros((1, 2))
+        else:
+            angle = float(turned(some.knots, some.angle, *self._cells(np.array([particle]), t))[0])
+        c, s = np.cos(angle), np.sin(angle)
+        start = place + corners @ np.array([[c, s], [-s, c]])
+        along = np.roll(start, -1, axis=0) - start
+        length = np.hypot(*along.T)
+        tangent = along / np.where(length > 0.0, length, 1.0)[:, None]
+        none, owner = np.zeros(len(length)), np.zeros(len(length), dtype=np.int64)
+        return Segments(
+            start=start, tangent=tangent, length=length, speed=none, restitution=none,
+            friction=none, surface=owner, appears=none - np.inf, vanishes=none + np.inf,
+            one_sided=owner,
+        )  # fmt: skip
+
     def bare(self, particles: Ints, places: Floats, surface: str, t: Any) -> Bools:
         """Tell which particles touch a surface itself at t (s, one or (n,)), (n,)."""
         machine, owner = self.recording.machine, self.recording.surface_index(surface)
-        gap = np.full(len(particles), np.inf)
+        gap, mover = np.full(len(particles), np.inf), self._movers.get(owner)
         if owner not in self._pieces:
             self._pieces[owner] = [one for one in machine.pieces if one.surface == owner]
+        times = np.broadcast_to(np.asarray(t, dtype=np.float64), gap.shape)
+        written = places if mover is None else mover.at_rest(places, times)
         for piece in self._pieces[owner]:
-            gap = np.where(piece.there(t), np.minimum(gap, piece.gap(places)), gap)
+            gap = np.where(piece.there(t), np.minimum(gap, piece.gap(written)), gap)
         radius = self.radius[particles]
-        return np.asarray(gap <= np.where(radius > 0.0, radius * (1.0 + TOUCH), self._point))
+        found = np.asarray(gap <= np.where(radius > 0.0, radius * (1.0 + TOUCH), self._point))
+        for n in np.flatnonzero(found & self._cornered[particles]).tolist():
+            edges = self.edges(int(particles[n]), places[n], float(times[n]))
+            found[n] = any(
+                self._between(edges, piece, mover, times[n]) <= TOUCH * radius[n]
+                for piece in self._pieces[owner]
+                if piece.there(times[n])
+            )
+        return found
 
-    def touching(self, particles: Ints, places: Floats) -> tuple[Ints, Ints]:
-        """Return all pairs that touch, by their rows in `particles`, (p,) each."""
+    @staticmethod
+    def _between(edges: Segments, piece: Pieces, mover: Mover | None, t: float) -> float:
+        """Return how far (m) the edges of a particle are from a piece of a surface at t, s."""
+        # Nearest to each other are a corner and the piece, or an edge and an end or a centre.
+        to = np.stack([*piece.ends, *([piece.center] if isinstance(piece, Arcs) else [])])
+        to = to if mover is None else mover.carried(to, t)
+        near = np.concatenate([edges.start, *(edges.nearest(point) for point in to)])
+        return float(piece.gap(near if mover is None else mover.at_rest(near, t)).min())
+
+    def _meet(self, pair: Ints, places: Floats, t: float) -> bool:
+        """Tell whether two that may touch do so, of which one has corners, by places (2, 2), m."""
+        a, b = (self.edges(int(k), place, t) for k, place in zip(pair, places, strict=True))
+        gap = min(
+            float(first.gap(second.start[:, None]).min()) for first, second in ((a, b), (b, a))
+        )
+        radius = self.radius[pair]
+        return bool(gap <= radius[~self._cornered[pair]].sum() + TOUCH * radius.min())
+
+    def touching(self, particles: Ints, places: Floats, t: Any) -> tuple[Ints, Ints]:
+        """Return all pairs that touch at t (s, one or (n,)), by rows of `particles`, (p,) each."""
         radius, order = self.radius[particles], np.argsort(places[:, 0], kind="stable")
         x, reach = places[order, 0], 2.0 * radius.max(initial=0.0) * (1.0 + TOUCH)
         firsts, seconds = [], []
@@ -275,12 +329,18 @@ class Places:
             firsts.append(one[met])
             seconds.append(two[met])
         none = np.zeros(0, dtype=np.int64)
-        return np.concatenate([none, *firsts]), np.concatenate([none, *seconds])
+        one, two = np.concatenate([none, *firsts]), np.concatenate([none, *seconds])
+        times = np.broadcast_to(np.asarray(t, dtype=np.float64), radius.shape)
+        met = ~(self._cornered[particles[one]] | self._cornered[particles[two]])
+        for n in np.flatnonzero(~met).tolist():
+            pair = [one[n], two[n]]
+            met[n] = self._meet(particles[pair], places[pair], times[pair].min())
+        return one[met], two[met]
 
     def lying(self, t: float, particles: Ints, places: Floats, surface: str) -> Bools:
         """Tell which particles lie on a surface at t (s), or on what lies on it, (n,)."""
         lies = self.bare(particles, places, surface, t)
-        one, two = self.touching(particles, places)
+        one, two = self.touching(particles, places, t)
         many = -1
         while (now := int(np.count_nonzero(lies))) > many:
             many = now
@@ -303,6 +363,9 @@ class Places:
                 return True
             room = radius + radius[k] + TOUCH * np.minimum(radius, radius[k])
             next_to = (np.hypot(*(places - places[k]).T) <= room) & ~seen
+            cornered = next_to & (self._cornered[particles] | self._cornered[particles[k]])
+            for m in np.flatnonzero(cornered).tolist():
+                next_to[m] = self._meet(particles[[k, m]], places[[k, m]], t)
             seen |= next_to
             # The lowest one comes first: it is the nearest to the surface.
             near = np.flatnonzero(next_to)

@@ -112,13 +112,11 @@ class Findings(NamedTuple):
 
 def judge(recording: Record) -> tuple[Broken, ...]:
     """Judge a run: return the laws that it breaks, each once, in the order of `LAWS`."""
-    if _TOLD not in recording.found:
-        recording.found[_TOLD] = _tell(recording) if len(recording.knots) else ()
-    told: tuple[Broken, ...] = recording.found[_TOLD]
-    return told
-
-
-def _tell(recording: Record) -> tuple[Broken, ...]:
+    if _TOLD not in recording.found and not len(recording.knots):
+        recording.found[_TOLD] = ()
+    if _TOLD in recording.found:
+        known: tuple[Broken, ...] = recording.found[_TOLD]
+        return known
     found, machine = examine(recording), recording.machine
     pulley = sum(part.surface.shape[-1] for part in machine.parts)
     told = []
@@ -130,6 +128,7 @@ def _tell(recording: Record) -> tuple[Broken, ...]:
         advice, unit = _advice(recording, law, found.figures), UNITS.get(law, "J")
         told.append(Broken(law, particles, particle, t, (x, y), name, amount, bound, unit, advice))
     told += _hinges(recording, found.figures)
+    recording.found[_TOLD] = tuple(told)
     return tuple(told)
 
 
@@ -260,7 +259,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("row", recording.knots.dtype.itemsize // 8), ("book_rows", len(books) // 3),
         ("surface_count", len(recording.surfaces)), ("engine", _ENGINES.index(recording.engine)),
         ("interact", machine.interact or len(recording.swings) + len(recording.totals) > 0),
-        ("joined", len(machine.joints) > 0), ("alike", alike(recording)), ("family", rows.ndim > 1),
+        ("joined", len(machine.joints) > 0), ("alike", alike(recording)), ("each", rows.ndim > 1),
         ("pulley", machine.pulley is not None), ("contacts", recording.contacts),
         ("steps", recording.steps), ("unreal", unreal),
         ("tilt", machine.tilt), ("dt", 0.0 if exact else machine.dt),

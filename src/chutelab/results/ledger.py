@@ -148,6 +148,18 @@ def ledger_of_each(recording: Record) -> dict[str, Floats]:
 
 
 @kept
+def ledger_of_variants(recording: Record) -> dict[str, Floats]:
+    """Return the ledger of each scene of a family, (V,), J; names as in the registry."""
+    found, count = ledger_of_each(recording), recording.variants
+    own = np.flatnonzero(recording.released) // (recording.count // count)
+    entries = dict(zip(ENTRIES, found.pop("entries").T, strict=True))
+    sums = {n: np.bincount(own, one, count) for n, one in (found | entries).items()}
+    sizes = [np.abs(sums[entry]) for entry in ENTRIES]
+    fall = np.abs(sums["potential.end"] - sums["potential.start"])
+    return sums | {"turned_over": sums["kinetic.start"] + sum(sizes) + fall}
+
+
+@kept
 def ledger(recording: Record) -> Ledger:
     """Return the energy ledger of a recording."""
     found, names = ledger_of_each(recording), recording.machine.streams

@@ -22,21 +22,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.results.arrival import arrivals, never
-from chutelab.results.ledger import ledger, ledger_of_each
+from chutelab.results.ledger import ledger, ledger_of_each, ledger_of_variants
 from chutelab.results.loads import load
 from chutelab.results.record import ENTRIES, REASONS, Kind, Record, kept
 from chutelab.results.sensors import first_passages, reading
 from chutelab.results.wear import wear
 from chutelab.scene import Scene
-from chutelab.scene.quantities import (
-    FIRST,
-    NEEDED,
-    THEORY,
-    Quantity,
-    lookup,
-    suggestion,
-    whose,
-)
+from chutelab.scene.quantities import FIRST, NEEDED, THEORY, Quantity, lookup, suggestion, whose
 from chutelab.scene.units import with_unit
 from chutelab.scene.variants import Family
 from chutelab.theory import Transfer, predict, unbounded
@@ -73,9 +65,11 @@ def column(events: NDArray[Any], name: str) -> Floats:
 
 
 def paid(recording: Record, surface: str, entry: str) -> Floats:
-    """Return an entry of a surface of each variant, (V,), J; of a family V = N, else 1."""
-    books = recording.by_surface.reshape(-1, len(recording.surfaces), len(ENTRIES))
-    return np.asarray(books[:, recording.surface_index(surface), ENTRIES.index(entry)])
+    """Return an entry of a surface of each of V variants, (V,), J."""
+    shape = recording.variants, -1, len(recording.surfaces), len(ENTRIES)
+    books = recording.by_surface.reshape(shape)
+    at = recording.surface_index(surface), ENTRIES.index(entry)
+    return np.asarray(books[:, :, *at].sum(axis=1))
 
 
 def symbols(recording: Record) -> dict[str, Floats]:
@@ -90,12 +84,12 @@ def symbols(recording: Record) -> dict[str, Floats]:
 
 
 def until_no_slip(recording: Record, landed: Floats) -> dict[str, Floats]:
-    """Return the theory's belt work and slip heat of each particle that landed then (s), (N,), J.
+    """Return the theory's belt work and slip heat of each particle that landed then (s), J.
 
     Known of a lone particle that slips no more, and met nothing but the belt since it landed.
     """
-    found = np.full((2, recording.count), nan)
-    if (recording.count == 1 or recording.family) and "outgoing" in recording.surfaces:
+    found = np.full((2, len(landed)), nan)
+    if recording.count == recording.variants and "outgoing" in recording.surfaces:
         events = recording.events
         there = np.isfinite(landed) & recording.ended_by("settled")
         away = events["surface"] != recording.surface_index("outgoing")
@@ -287,19 +281,19 @@ OTHER = (Kind.COLLISION, Kind.STICK, Kind.SETTLE)
 def worst(recording: Record) -> Floats:
     """Return the largest relative error of particle 0 of each of V variants, (V,); NaN without one.
 
-    V is 1, or of a family as many as there are particles: `predict` takes one scene at a time, so
-    of a family the events tell how far the equations hold.
+    `predict` takes one scene at a time, so of a family the events tell how far the equations hold.
     """
-    scene, family, count = recording.scene, recording.family, recording.count
-    if family is None:
+    scene, count = recording.scene, recording.variants
+    if recording.family is None:
         found = compare(recording).max
         return np.array([nan if found is None else found])
     if scene.incoming is None or scene.plate is None:
         return np.full(count, nan)
-    begins = recording.released
+    family, each = recording.family.firsts, recording.family.each
+    begins = recording.released[::each]
     for other, _ in outside(family):
         begins = begins & np.logical_not(other)
-    radius, mass = recording.particle.radius, recording.particle.mass
+    radius, mass = recording.radius[::each], recording.mass[::each]
     left, hit, down = _described(recording, begins)
     simulated = from_events(family, left, hit, down, radius, mass)
     simulated |= until_no_slip(recording, down["t"])
@@ -313,18 +307,20 @@ def worst(recording: Record) -> Floats:
 
 
 def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
-    """Return separation, impact and landing of each of N variants of one particle.
+    """Return separation, impact and landing of particle 0 of each of V variants.
 
     The equations hold where these are its first three events, in this order. They did not happen
-    from the first event on that is another one, nor in variants whose `holds`, (N,), is false.
+    from the first event on that is another one, nor in variants whose `holds`, (V,), is false.
     """
-    events = recording.events
+    events, each = recording.events, recording.count // len(holds)
     kinds = [int(kind) for kind in (Kind.SEPARATION, Kind.IMPACT, Kind.LANDING, *OTHER)]
     # Grip and slip on the belt and the pulley are in the equations.
     known = events["kind"] == Kind.STICK
     known &= events["surface"] == recording.surface_index("incoming")
+    known |= events["particle"] % each > 0
     order = (np.isin(events["kind"], kinds) & ~known).nonzero()[0]
     own = events.take(order[np.argsort(events["particle"][order], kind="stable")])
+    own["particle"] //= each
     place = np.arange(len(own)) - np.searchsorted(own["particle"], own["particle"])
     found = []
     for n in range(len(NEEDED)):
@@ -340,7 +336,7 @@ def _described(recording: Record, holds: Bools) -> list[NDArray[Any]]:
     return found
 
 
-_STATISTICS: dict[str, Callable[[Floats], Any]] = {
+_STATISTICS: dict[str, Callable[..., Any]] = {
     "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,
     "q50": np.median,
     **{f"q{percent:02}": partial(np.quantile, q=percent / 100) for percent in (2, 25, 75, 98)},
@@ -351,7 +347,7 @@ def each(recording: Record, name: str) -> Floats:
     """Return a quantity of each particle, (N,), in its unit; NaN without one.
 
     Names are such as ``x2``, ``landing.x``, ``flight.t``, ``impact.hood.t``, ``ended.t`` or
-    ``ledger.belt_work``. Of a family of scenes, each particle is a scene of its own.
+    ``ledger.belt_work``.
 
     Raises
     ------
@@ -389,11 +385,11 @@ def each(recording: Record, name: str) -> Floats:
             return column(arrivals(recording), key)
         case ["belt_work" | "slip_heat" | "power" as what]:
             # What the belt pays until a lone particle does not slip.
-            settled = recording.ended_by("settled") & (
-                recording.count == 1 or bool(recording.family)
-            )
-            entry = "friction_loss" if what == "slip_heat" else "belt_work"
-            work = np.where(settled, paid(recording, "outgoing", entry), nan)
+            work = np.full(recording.count, nan)
+            if recording.count == recording.variants:
+                entry = "friction_loss" if what == "slip_heat" else "belt_work"
+                settled = recording.ended_by("settled")
+                work = np.where(settled, paid(recording, "outgoing", entry), nan)
             return np.asarray(work * (recording.machine.scenes.rate if what == "power" else 1.0))
     values = symbols(recording)[name.removesuffix("_deg")]
     return np.degrees(values) if name.endswith("_deg") else values
@@ -411,11 +407,8 @@ PASSED = ("count", "back", "rate", "mass_rate", "whole_rate", "depth")
 
 
 def measured(recording: Record, name: str) -> Floats:
-    """Return a quantity that the scene has of each of V variants, (V,); NaN without one.
-
-    V is 1, or of a family as many as there are particles.
-    """
-    many = recording.count if recording.family else 1
+    """Return a quantity that the scene has of each of V variants, (V,); NaN without one."""
+    many = recording.variants
     shape = many, recording.count // many
     parts, own = name.split("."), np.ones(recording.count, dtype=bool)
     if name.startswith(FIRST):
@@ -458,9 +451,10 @@ def measured(recording: Record, name: str) -> Floats:
             return paid(recording, surface, entry)
         case ["ledger", "power"]:
             work = paid(recording, "outgoing", "belt_work")
-            return np.asarray(work / shape[1] * recording.machine.scenes.rate)
-        case ["ledger", *_] if recording.family:
-            return each(recording, name)
+            scenes = recording.family.firsts if recording.family else recording.scene
+            return np.asarray(work / shape[1] * scenes.rate)
+        case ["ledger", *rest] if recording.family:
+            return ledger_of_variants(recording)[".".join(rest)]
         case ["ledger", stored, end]:
             return np.array([getattr(ledger(recording), stored)[("start", "end").index(end)]])
         case ["ledger", entry]:
@@ -474,8 +468,12 @@ def measured(recording: Record, name: str) -> Floats:
             if shape[1] == 1:
                 # Of one particle all statistics are its value, but the spread.
                 return values - values if statistic == "spread" else values
-            values = values[own & np.isfinite(values)]
-            return np.array([_STATISTICS[statistic](values) if len(values) else nan])
+            table, known = values.reshape(shape), (own & np.isfinite(values)).reshape(shape)
+            found, whole = np.full(many, nan), known.all(axis=1)
+            found[whole] = _STATISTICS[statistic](table[whole], axis=1)
+            for row in np.flatnonzero(known.any(axis=1) & ~whole).tolist():
+                found[row] = _STATISTICS[statistic](table[row][known[row]])
+            return found
     return each(recording, name)[:: shape[1]]
 
 

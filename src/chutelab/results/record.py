@@ -174,6 +174,18 @@ def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Flo
     return places, velocities
 
 
+def turned(knots: NDArray[Any], angle: Floats, left: Ints, share: Floats) -> Floats:
+    """Return angles (rad) between two knots each, (c,), of those at all knots, (K,).
+
+    The spin is linear there; where its integral is not the difference of the angles, it is
+    corrected evenly.
+    """
+    omega, h = knots["omega"], knots["t"][left + 1] - knots["t"][left]
+    gained = h * share * (omega[left] + 0.5 * share * (omega[left + 1] - omega[left]))
+    missed = angle[left + 1] - angle[left] - 0.5 * h * (omega[left + 1] + omega[left])
+    return np.asarray(angle[left] + gained + share * missed)
+
+
 class Motion(tuple[Floats, Floats]):
     """Positions (m) and velocities (m/s) at some times, (T, N, 2), a pair; and how particles turn.
 
@@ -209,20 +221,19 @@ class Motion(tuple[Floats, Floats]):
 
     @property
     def angle(self) -> Floats:
-        """How far particles have turned counterclockwise since their release, (T, N), rad.
+        """How far particles are turned counterclockwise, from as they are written, (T, N), rad.
 
-        The integral of `omega`; where the recording says more, see `Recording.angle`, it is
-        corrected evenly from knot to knot.
+        The integral of `omega` since the release; where the recording says more, see
+        `Recording.angle`, that, corrected evenly from knot to knot.
         """
         some, found = self._record, np.full(self[0].shape[:2], np.nan)
-        t, omega, first = some.knots["t"], some.knots["omega"], some.offsets[:-1]
-        passed = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
-        told = some.angle if len(some.angle) else passed
+        passed, begun = some.angle, np.zeros(some.count)
+        if not len(passed):
+            t, omega = some.knots["t"], some.knots["omega"]
+            passed = np.append(0.0, np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t)))
+            begun = passed[some.offsets[:-1].clip(max=len(passed) - 1)]
         for row, particle, left, share in some.blocks(self._times):
-            h = t[left + 1] - t[left]
-            gained = h * share * (omega[left] + 0.5 * share * (omega[left + 1] - omega[left]))
-            missed = share * (np.diff(told)[left] - np.diff(passed)[left])
-            found[row, particle] = told[left] - told[first[particle]] + gained + missed
+            found[row, particle] = turned(some.knots, passed, left, share) - begun[particle]
         return found
 
 
@@ -259,9 +270,9 @@ class Record(Shown):
         Wall time from the validated scene to the recording; NaN in one that was loaded, or
         that an engine made without `simulate`.
     angle : ndarray, shape (K,), or (0,)
-        How far a particle has turned counterclockwise since its release at each knot, rad, where
-        some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not tell.
-        Empty where all are round: there it is the integral of ω.
+        How far a particle is turned counterclockwise, from as it is written, at each knot, rad,
+        where some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not
+        tell. Empty where all are round: there it is the integral of ω.
     instead : str
         Where the engine that runs first broke a law of every run, and this one ran instead: which,
         and how; else empty.
@@ -348,8 +359,13 @@ class Record(Shown):
 
     @property
     def family(self) -> Family | None:
-        """All scenes that were run at once, if each particle is of another one."""
+        """All scenes that were run at once, if these are several."""
         return self.machine.family
+
+    @property
+    def variants(self) -> int:
+        """Number of scenes V; of a family each has as many of the particles, in turn."""
+        return 1 if self.family is None else self.count // self.family.each
 
     @property
     def title(self) -> str:

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine import SWING, Machine, moved, origin
+from chutelab.machine import SWING, Machine, moved, origin, upright
 from chutelab.results.loads import Bins
 from chutelab.results.record import EVENT, KNOT, LASTING, LOAD, REASONS, TOTAL, Kind, Record
-from chutelab.util.arrays import Floats, Ints
+from chutelab.util.arrays import Bools, Floats, Ints
 
 
 class StalledError(RuntimeError):
@@ -55,19 +55,25 @@ class EnoughError(Exception):
     """
 
 
+WAYS = frozenset(("position", "velocity", "velocity_before", "velocity_after", "force", "at"))
+"""Vectors among what is told of knots, events and loads."""
+
+
 class Recorder:
     """Grows by chunks; `finish` turns it into a frozen `Record` of the machine's run.
 
     With `apart`, `by_surface` is kept for each particle, (N, S, 3). What is written down is counted
-    from `origin`, m, see `chutelab.machine.origin`: engines run `near`, the machine moved there.
+    from `origin`, m, see `chutelab.machine.origin`: engines run `near`, the machine moved there;
+    `turned` so that gravity is straight down, if they know it so alone.
     """
 
-    def __init__(self, machine: Machine, *, apart: bool = False) -> None:
+    def __init__(self, machine: Machine, *, apart: bool = False, turned: bool = False) -> None:
         self.machine, self.origin, self.near = machine, (0.0, 0.0), machine
-        self._angular = False
+        self._angular, self._turned = False, turned
         if not machine.is_ahead:
             self.origin = origin(machine)
             self.near = moved(machine, -self.origin[0], -self.origin[1])
+            self.near = upright(self.near) if turned else self.near
             self._angular = any(outline is not None for outline in machine.outlines)
         count, owners = machine.count, len(machine.surfaces) + 1  # and the particles
         self.entries = np.zeros((count, 3))
@@ -180,9 +186,9 @@ class Recorder:
         """Return a run's record; if a particle stalled, raise that with the record instead."""
         if stalled is None:
             return record
-        (x, y), (x0, y0) = stalled.position, self.origin
-        place = x + x0, y + y0
-        raise StalledError(stalled.particle, stalled.t, place, stalled.reason, record)
+        frame = self.machine.frame if self._turned else np.eye(2)
+        x, y = (stalled.position @ frame + self.origin).tolist()
+        raise StalledError(stalled.particle, stalled.t, (x, y), stalled.reason, record)
 
     def finish(self, *, engine: str, steps: int) -> Record:
         """Sort what was collected, and freeze it."""
@@ -222,6 +228,11 @@ class Recorder:
             in_turn = not np.count_nonzero(particle[1:] < particle[:-1])
             order = t.argsort(kind="stable") if in_turn else np.lexsort((particle, t))
             events = events.take(order)
+        if self._turned:
+            knots, frame = knots.copy(), self.machine.frame
+            for rows in (knots, events, *[self.impulses][: self.impulses.size]):
+                for name in WAYS.intersection(rows.dtype.names or ()):
+                    rows[name] = rows[name] @ frame
         if any(self.origin):
             knots = knots.copy()
             for rows in (knots, events):
@@ -283,3 +294,73 @@ def _joined(chunks: list[NDArray[Any]], dtype: np.dtype[Any]) -> NDArray[Any]:
         np.concatenate([chunk.view(np.uint8) for chunk in chunks], out=whole.view(np.uint8))
     chunks.clear()
     return whole
+
+
+ROUGH = 1e-4
+"""Share of the radius by which a track may be off between two knots."""
+
+
+class Tracks:
+    """Knots of particles that are stepped, only as many as the curve through them needs.
+
+    Between knots a track is a cubic, which a constant acceleration makes exact: a new knot is due
+    when the one of the first step since the last knot does not lead to where the particle is. With
+    `turning` that goes for the angle too, which is what ω, linear between knots, adds up to.
+    """
+
+    def __init__(
+        self, recorder: Recorder, radius: float, particles: range, *, turning: bool = False
+    ) -> None:
+        self.recorder, self.first, count = recorder, particles.start, len(particles)
+        self.turning, self.radius, self.tolerance = turning, radius, ROUGH * radius
+        self.t, self.x, self.v = np.zeros(count), np.zeros((2, count)), np.zeros((2, count))
+        self.pull, self.fresh = np.zeros((2, count)), np.ones(count, dtype=bool)
+        self.omega, self.twist = np.zeros((2, count))
+
+    def knot(
+        self, i: int, t: float, x: ArrayLike, v: ArrayLike, omega: float = 0.0, angle: float = 0.0
+    ) -> None:
+        """Write a knot of the particle in a row, with the entries booked so far."""
+        self.recorder.knots(self.first + i, t, x, v, omega, angle)
+        self.t[i], self.x[:, i], self.v[:, i], self.fresh[i] = t, x, v, True
+        self.omega[i] = omega
+
+    def step(
+        self,
+        rows: Bools,
+        times: tuple[float, float],
+        state: Floats,
+        entries: Floats,
+        angle: Floats | None = None,
+    ) -> None:
+        """Note a step of the particles in some rows; write knots of the states before where due.
+
+        `times` (s) and `state` (2, 5, N), of x, y, vx, vy and ω, are those at both ends; `entries`
+        (3, N) and `angle` (N,), how far all have turned (rad), are those before.
+        """
+        tau = times[1] - self.t
+        x, v = state[1, :2], state[1, 2:4]
+        new = self.fresh & rows
+        if new.any():
+            self.pull[:, new] = (v[:, new] - self.v[:, new]) / tau[new]
+        gain = tau * self.pull
+        off = np.abs(x - self.x - tau * (self.v + 0.5 * gain))
+        # A cubic is off by 4/27 τ of what one of its end velocities is.
+        off += 4.0 / 27.0 * tau * np.abs(v - self.v - gain)
+        apart = off[0] + off[1]
+        if self.turning:
+            omega = state[1, 4]
+            self.twist[new] = (omega[new] - self.omega[new]) / tau[new]
+            apart += 0.5 * self.radius * tau * np.abs(omega - self.omega - tau * self.twist)
+        due = np.flatnonzero((apart > self.tolerance) & rows & ~new)
+        self.fresh &= ~rows
+        if len(due):
+            knots = np.empty(len(due), dtype=KNOT)
+            before = state[0][:, due]
+            knots["t"], knots["position"], knots["velocity"] = times[0], before[:2].T, before[2:4].T
+            knots["omega"], knots["entries"] = before[4], entries[:, due].T
+            self.recorder.add(self.first + due, knots, 0.0 if angle is None else angle[due])
+            self.t[due], self.x[:, due], self.v[:, due] = times[0], before[:2], before[2:4]
+            self.pull[:, due] = (v[:, due] - before[2:4]) / (times[1] - times[0])
+            self.omega[due] = before[4]
+            self.twist[due] = (state[1, 4, due] - before[4]) / (times[1] - times[0])

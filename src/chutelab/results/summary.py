@@ -270,7 +270,8 @@ def facts(recording: Record, *, details: bool = False) -> str:
         told = [f"engine {recording.engine}", *told, steps]
     if not isnan(recording.seconds):
         told.append(f"computed in {recording.seconds:.3g} s")
-    ended = ", ".join(f"{counted[k]} {REASONS[k]}" for k in sorted(counted))
+    words = {"time": "at the end of the time", "exit": "out of the scene"}
+    ended = ", ".join(f"{counted[k]} {words.get(REASONS[k], REASONS[k])}" for k in sorted(counted))
     return f"{', '.join(told)}\nended: {ended}"
 
 

@@ -471,9 +471,6 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
                 yield run.fault(
                     "engine", f'{kind.path("shape")} = "{shape}" needs contact or pymunk'
                 )
-            elif engine == "contact" and joined:
-                text = f'{joined[0]}[0] with {kind.path("shape")} = "{shape}" needs pymunk'
-                yield run.fault("engine", text)
         elif size == 0.0:
             if any(size != 0.0 for size in sizes if size is not math.nan):
                 text = "more than 0, or 0 of all kinds: no engine has points beside disks"
@@ -522,6 +519,9 @@ def _of_kind(stream: Row, kinds: Sequence[Row]) -> Iterator[Fault]:
     if abs(stream["omega"]) > 0.0 and kind["spin"] is False:
         text = f"must be 0, or {kind.path('spin')} true: they never turn"
         yield stream.fault("omega", text)
+    if abs(stream["angle_deg"]) > 0.0 and kind["shape"] in ("disk", "sphere"):
+        text = f'is for boxes and polygons: {kind.path("shape")} is "{kind["shape"]}"'
+        yield stream.fault("angle_deg", text)
     radius, width = kind["radius"], stream["width"] if stream.given("width") else math.nan
     if width == width and kind.sound("radius"):
         size = sum(radius) if isinstance(radius, LIST) else 2.0 * radius

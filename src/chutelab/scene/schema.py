@@ -78,17 +78,16 @@ def _one_or_several(given: object) -> object:
     return (given,) if isinstance(given, Mapping | Table) else given
 
 
-def _as_either(rule: dict[str, Any]) -> None:
-    """Say in the JSON Schema that one table will do for a list of them."""
-    several = {
-        key: rule.pop(key) for key in ("type", "items", "minItems", "maxItems") if key in rule
-    }
-    rule.pop("default", None)
-    rule["anyOf"] = [several["items"], several]
-
-
 def _several(default: Any, **limits: Any) -> Any:
-    return Field(default, json_schema_extra=_as_either, **limits)
+    """Return a list of tables, for which the JSON Schema says that one table will do."""
+
+    def either(rule: dict[str, Any]) -> None:
+        keys = ("type", "items", "minItems", "maxItems")
+        several = {key: rule.pop(key) for key in keys if key in rule}
+        rule.pop("default", None)
+        rule["anyOf"] = [several["items"], several]
+
+    return Field(default, json_schema_extra=either, **limits)
 
 
 def _usual() -> Any:

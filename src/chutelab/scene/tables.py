@@ -252,9 +252,7 @@ class StillPlate(Table):
     name: Name | None = described(None, "Name of a further plate, for events and the ledger")
     pivot: Point | None = described(None, "Of a further plate: its pivot [x, y]", "m")
     distance: Length = described(
-        None,
-        "Of the damping plate: d_okr, from the pulley's leading edge x = R to the pivot",
-        "m",
+        None, "Of the damping plate: d_okr, from the pulley's leading edge x = R to the pivot", "m"
     )
     angle_deg: Number = described(
         0.0,
@@ -498,6 +496,11 @@ class Stream(Resolved):
     omega: Number = described(
         0.0, "Spin at the release, counterclockwise; needs spin", "rad/s", ge=-1e6, le=1e6
     )
+    angle_deg: Angle = described(
+        0.0,
+        "Of boxes and polygons: by how much they are turned at the release, counterclockwise",
+        "degrees",
+    )
     interact: Switch = described(False, "Particle-particle contacts, of all streams if one says so")
     restitution: Share = pair_restitution(0.5, "particle-particle")
     friction: Amount = pair_friction(0.3, "particle-particle")
@@ -601,8 +604,7 @@ class Live(Table):
     """What the live page of the scene offers. No engine looks at it."""
 
     predict: Switch = described(
-        False,
-        "Whether path, landing and numbers are hidden until a mark is set and play pressed",
+        False, "Whether path, landing and numbers are hidden until a mark is set and play pressed"
     )
     controls: Keys | None = described(
         None, "Keys of the scene that can be changed there; default: all that have a handle"

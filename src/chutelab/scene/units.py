@@ -348,14 +348,7 @@ Keys = Annotated[
 """Full paths of keys of the scene."""
 
 Ranges = Annotated[
-    dict[
-        Text,
-        Annotated[
-            tuple[Number, Number],
-            _ASCENDING,
-            Worded("[from, to] with from < to"),
-        ],
-    ],
+    dict[Text, Annotated[tuple[Number, Number], _ASCENDING, Worded("[from, to] with from < to")]],
     BeforeValidator(flat),
     Field(max_length=MOST_KEYS),
     Worded("a table of keys, each with its [from, to]"),
@@ -367,11 +360,7 @@ Values = Annotated[
     Worded("a table of keys of the scene and their values, such as { gravity = 1.62 }"),
 ]
 
-Span = Annotated[
-    tuple[Length, Length],
-    _ASCENDING,
-    Worded("a range [from, to] with from < to"),
-]
+Span = Annotated[tuple[Length, Length], _ASCENDING, Worded("a range [from, to] with from < to")]
 """A range [from, to]."""
 
 

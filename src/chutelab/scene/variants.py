@@ -269,13 +269,24 @@ class Judge:
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """N scenes that differ in plain numbers only: a batch, of which each is a row of numbers."""
+    """Scenes that differ in plain numbers only: a batch, of which each is a row of numbers.
+
+    There is a row for each of the N particles, in turn of all of a scene.
+    """
 
     scene: Scene  # one of them, validated: what does not vary is its
     columns: Mapping[str, Floats]  # the numbers of each key that varies, by its full path
+    each: int = 1  # particles of a scene, which do not meet and are of one kind
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
+
+    @cached_property
+    def firsts(self) -> Family:
+        """The same with one row a scene."""
+        if self.each == 1:
+            return self
+        return Family(self.scene, {key: rows[:: self.each] for key, rows in self.columns.items()})
 
     @cached_property
     def _own(self) -> dict[tuple[int, str], dict[tuple[int, ...], Floats]]:

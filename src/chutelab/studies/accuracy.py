@@ -148,7 +148,7 @@ def sizes(recording: Recording) -> dict[str, float]:
     """Return what each kind of answer is measured by: as in `results.quantities`, where it can be.
 
     Otherwise by the extent of the way, its duration and the highest speed; energies always by the
-    energy that was turned over.
+    energy that was turned over. Of what hardly moves, by its radius, and by its weight times that.
     """
     known, knots = scales(recording.scene, prediction(recording)), recording.knots
     own = {"length": 0.0, "time": 0.0, "speed": 0.0}
@@ -157,7 +157,10 @@ def sizes(recording: Recording) -> dict[str, float]:
         own["time"] = float(np.ptp(knots["t"]))
         own["speed"] = float(np.hypot(*knots["velocity"].T).max())
     place, time, speed = (known[k] if isfinite(known[k]) else own[k] for k in own)
-    energy = ledger(recording).turned_over
+    radius = np.asarray(recording.particle.radius)
+    place = max(place, float(radius.min()))
+    lift = recording.gravity * float((recording.particle.mass * radius).min())
+    energy = max(ledger(recording).turned_over, lift)
     return {"place": place, "time": time, "speed": speed, "energy": energy, "number": 1.0}
 
 

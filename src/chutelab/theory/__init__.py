@@ -3,13 +3,13 @@
 V. Molnár et al., "Energy calculation model of an outgoing conveyor with application of a transfer
 chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016.
 
-- `results`: `Transfer` and `Reason`: the answer, or why there is none.
-- `transfer`: Eqs. (2)-(16) and their generalisations, vectorised; plain numbers in.
+- `transfer`: Eqs. (2)-(16) and their generalisations, vectorised: of plain numbers a `Transfer`.
 - `slide`: sliding and rolling on a round surface: along a chute, and round the pulley to where it
-  is left, by adhesion, at finite friction, or by bodies that roll.
+  is left, by adhesion, at finite friction, or by bodies that roll; why there is no answer.
 - `discharge`: where a bed leaves its pulley by five methods of engineers; loading points.
 - `prediction`: `predict`, particle 0 of a scene, or the reason why the closed form does not hold
   for it; `unbounded`, the same without looking at the finite machine.
+- `obstacles`: which surface is met first in a flight, or on the ride.
 - `drag`: what air drag, left out everywhere else, would do.
 - `paper`: the paper's tables beside what the equations give.
 - `figures`: its figures.
@@ -20,9 +20,8 @@ Only NumPy, `chutelab.scene` and `chutelab.util` are imported.
 from chutelab.theory.drag import Drag, drag
 from chutelab.theory.paper import TABLES, Table, table
 from chutelab.theory.prediction import predict, unbounded
-from chutelab.theory.results import STAGES, Reason, Transfer
-from chutelab.theory.slide import Slide, slide
-from chutelab.theory.transfer import Rebound, belt_power, transfer
+from chutelab.theory.slide import Reason, Slide, slide
+from chutelab.theory.transfer import STAGES, Rebound, Transfer, belt_power, transfer
 
 __all__ = [
     "STAGES",

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.theory.prediction import Course
-from chutelab.theory.results import Transfer
-from chutelab.theory.transfer import rebounded
+from chutelab.theory.transfer import Transfer, rebounded
 
 if TYPE_CHECKING:
     from chutelab.scene import Scene

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.theory.results import Transfer
-from chutelab.theory.transfer import Rebound, transfer
+from chutelab.theory.transfer import Rebound, Transfer, transfer
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown
 

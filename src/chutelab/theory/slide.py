@@ -11,14 +11,13 @@ slip back at first, then holds or rolls, then slips forward, and leaves where n 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.theory.results import Answers, Arrays, Reason
-from chutelab.util.arrays import Bools, Floats, Ints, Numbers
-from chutelab.util.trig import arc_cos, sin_cos
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers, arc_cos, sin_cos
 
 HALVINGS = 64
 """Bisections of an angle: they exhaust a double's digits."""
@@ -28,6 +27,93 @@ LEAST = 1e-18
 
 LARGEST = 700.0
 """Largest exponent; by then the body has left the surface, or come to rest."""
+
+
+class Reason(StrEnum):
+    """First words of every non-empty `Transfer.reason`, up to its colon.
+
+    What a reason claims, so that a simulation can confirm it:
+
+    OUTSIDE
+        A parameter or the scene is not what the equations describe. Claims nothing about the
+        motion.
+    EARLY
+        The named surface is touched during the ride or in the first flight, and that contact is not
+        the impact on the struck face of the plate. It is the first one after the release.
+    NO_IMPACT
+        Neither the ride nor the free flight from the pulley ever touches the plate; where the
+        impact on its unbounded line should place the outgoing belt, there is no such impact.
+    SECOND
+        After the rebound, and before the landing, the named surface is the first to be touched.
+    MISSES
+        After the rebound the fall does not end on the upper face of the finite belt, and nothing
+        is touched on the way down to its level. Below that, the disk may still clip the belt's end.
+    """
+
+    OUTSIDE = "outside the model"
+    EARLY = "early contact"
+    NO_IMPACT = "no impact"
+    SECOND = "second contact"
+    MISSES = "misses the outgoing belt"
+
+    def because(self, what: str) -> str:
+        """Return the full reason.
+
+        Examples
+        --------
+        >>> Reason.SECOND.because("pulley")
+        'second contact: pulley'
+        """
+        return f"{self.value}: {what}"
+
+    @classmethod
+    def of(cls, reason: object) -> Reason | None:
+        """Return the class of a full reason, None for the empty one.
+
+        Examples
+        --------
+        >>> Reason.of("no impact: passes below")
+        <Reason.NO_IMPACT: 'no impact'>
+        """
+        text = str(reason)
+        return cls(text.partition(":")[0]) if text else None
+
+
+@dataclass(frozen=True, eq=False)
+class Arrays:
+    """An answer of read-only arrays, copies of what it is made of."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            array = np.array(getattr(self, field.name))
+            array.flags.writeable = False
+            object.__setattr__(self, field.name, array)
+
+
+class Answers:
+    """Results of N motions, stage by stage, and the reason where they end."""
+
+    def __init__(self, count: int) -> None:
+        self.values: dict[str, Floats] = {}
+        self.reason = np.full(count, "", dtype=object)
+        self.fine = np.full(count, True)
+
+    def fail(self, where: Bools, reason: str) -> None:
+        """State a reason where there is none yet."""
+        if where.any():
+            self.reason[where & self.fine] = reason
+            self.fine &= ~where
+
+    def require(self, rules: dict[str, Bools]) -> None:
+        """Object to parameters that break a rule; NaN never holds."""
+        for rule, holds in rules.items():
+            if not holds.all():
+                self.fail(~holds, Reason.OUTSIDE.because(f"{rule} is required"))
+
+    def keep(self, **values: Floats) -> None:
+        """Store results of a stage where nothing has gone wrong up to now."""
+        self.values |= {name: np.where(self.fine, v, np.nan) for name, v in values.items()}
+
 
 _x = np.arange(-64, 65) / 16.0
 _share = 1.0 / (1.0 + np.exp(-np.pi * np.sinh(_x)))

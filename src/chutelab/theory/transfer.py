@@ -7,17 +7,103 @@ Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside
 from __future__ import annotations
 
 import warnings
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from chutelab.theory.results import STAGES, Answers, Reason, Transfer
-from chutelab.theory.slide import FAULTS, separation
-from chutelab.util.arrays import Bools, Floats
-from chutelab.util.trig import atan2, hypot, sin_cos
+from chutelab.theory.slide import FAULTS, Answers, Arrays, Reason, separation
+from chutelab.util.arrays import Bools, Floats, atan2, hypot, sin_cos
 
 Rebound = Literal["corrected", "as-printed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Transfer(Arrays):
+    """One transfer from belt to belt, or many: read-only arrays of one shape, SI units, radians.
+
+    NaN where there is no answer; `reason` then says why, see `chutelab.theory.Reason`. Stages
+    that were reached before the trouble keep their values.
+
+    Attributes
+    ----------
+    phi1, v1 : ndarray
+        Angle from the top of the pulley and speed at separation, Eqs. (1), (2).
+    omega1 : ndarray
+        Angular velocity from there on, rad/s, counter-clockwise; 0 unless a free disk slipped or
+        rolled.
+    t2, x2, y2 : ndarray
+        Flight time to the plate; distance forward and *down* from the separation point,
+        Eqs. (3)-(5).
+    v2, v2x, v2y : ndarray
+        Speed at the plate, forward and *down* components, Eq. (6).
+    phi2 : ndarray
+        Angle between the plate and the velocity before the impact, Eq. (7).
+    phi2r, v2r, omega2 : ndarray
+        The same angle, speed and angular velocity after it (the paper's φ2', v2'), Eqs. (8), (9).
+    t3, x3, y3 : ndarray
+        Time from impact to landing; distance *back* from the impact point, fall, Eqs. (10)-(12).
+    v3, v3x, v3y : ndarray
+        Speed at landing, components *back* (world v_x = -v3x) and down, Eq. (13).
+    d3 : ndarray
+        Height of the transfer, Eq. (16).
+    dEk, P : ndarray
+        Energy (J) and power (W) as the paper has them, Eqs. (14), (15). The sign of v3x is lost.
+    belt_work, slip_heat : ndarray
+        What the outgoing belt's drive pays until the particle no longer slips, and the part of it
+        that becomes heat, J.
+    reason : ndarray of str
+        Empty where all is well.
+    """
+
+    phi1: Floats
+    t2: Floats
+    x2: Floats
+    y2: Floats
+    v1: Floats
+    v2: Floats
+    v2x: Floats
+    v2y: Floats
+    phi2: Floats
+    phi2r: Floats
+    v2r: Floats
+    t3: Floats
+    x3: Floats
+    y3: Floats
+    v3x: Floats
+    v3y: Floats
+    v3: Floats
+    d3: Floats
+    dEk: Floats  # noqa: N815 - the paper's symbol
+    P: Floats
+    belt_work: Floats
+    slip_heat: Floats
+    omega1: Floats
+    omega2: Floats
+    reason: NDArray[np.str_]
+
+
+STAGES = {
+    "separation": ("phi1", "v1", "omega1"),
+    "impact": ("t2", "x2", "y2", "v2", "v2x", "v2y", "phi2"),
+    "rebound": ("phi2r", "v2r", "omega2"),
+    "landing": ("t3", "x3", "y3", "v3", "v3x", "v3y", "d3", "dEk", "P", "belt_work", "slip_heat"),
+}
+"""Quantities by the stage that yields them, in the order of events."""
+
+
+def unanswered() -> Transfer:
+    """Return a 0-d transfer that is NaN throughout, with no reason yet."""
+    names = [name for stage in STAGES.values() for name in stage]
+    return Transfer(reason=np.array(""), **dict.fromkeys(names, np.array(np.nan)))
+
+
+def cut(found: Transfer, stage: str, reason: str) -> Transfer:
+    """Return a 0-d transfer without a stage and all later ones, and say why."""
+    order = list(STAGES)
+    lost = [name for later in order[order.index(stage) :] for name in STAGES[later]]
+    return replace(found, reason=np.array(reason), **dict.fromkeys(lost, np.array(np.nan)))
 
 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")

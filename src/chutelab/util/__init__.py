@@ -1,11 +1,10 @@
 """Small things that know nothing of scenes and machines.
 
-- `arrays`: types of arrays, each named once.
+- `arrays`: types of arrays; sine, cosine and arc tangent, the same bits everywhere.
 - `errors`: invalid input: the one error, its faults, what was meant.
 - `files`: files that are written whole or not at all, CSV and TSV in them.
 - `signals`: Ctrl-C, TERM and HUP, all raised as a KeyboardInterrupt.
 - `tables`: tables for people, plain data for JSON, columns as a DataFrame.
-- `trig`: sine, cosine and arc tangent, the same bits everywhere, and as in the core.
 - `versions`: what is installed, and on what figures were measured.
 - `words`: what a learner is told, and what pictures say, in each language (`strings`).
 """

@@ -11,7 +11,6 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 from threading import Timer
 from time import monotonic
 from typing import Any
@@ -66,10 +65,22 @@ def raised(*, last: bool = False) -> Iterator[None]:
     known = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
     before = {number: now for number in known if (now := signal.getsignal(number)) in usual}
     ignored = sys.unraisablehook
+
+    def again(about: Any) -> None:
+        """Raise a signal again that came where Python passes over errors: in a finalizer, say."""
+        if not isinstance(about.exc_value, Terminated):
+            ignored(about)
+            return
+        signum, now = about.exc_value.signum, monotonic()
+        _obeyed[-1:] = [(signum, now - GRACE)]
+        later = Timer(0.01, signal.raise_signal, [signum])
+        later.daemon = True
+        later.start()
+
     if before:
         _obeyed.clear()
         _answered.clear()
-        sys.unraisablehook = partial(_ignored, ignored)
+        sys.unraisablehook = again
     try:
         for number in before:
             with suppress(ValueError):
@@ -153,18 +164,6 @@ def _obey(signum: int, _frame: object) -> None:
         return
     _obeyed.append((signum, now))
     raise Terminated(signum)
-
-
-def _ignored(usual: Callable[[Any], object], about: Any) -> None:
-    """Raise a signal again that came where Python passes over errors: in a finalizer, say."""
-    if not isinstance(about.exc_value, Terminated):
-        usual(about)
-        return
-    signum, now = about.exc_value.signum, monotonic()
-    _obeyed[-1:] = [(signum, now - GRACE)]
-    again = Timer(0.01, signal.raise_signal, [signum])
-    again.daemon = True
-    again.start()
 
 
 def exit_code(error: BaseException | None) -> int | None:

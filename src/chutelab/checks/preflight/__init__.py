@@ -21,14 +21,12 @@ import numpy as np
 
 from chutelab.checks.preflight.trial import (
     Advice,
-    Coverage,
     Effort,
     Part,
     Preflight,
     Stepping,
     Trial,
     built,
-    coverage,
     effort,
     extras,
     peak,
@@ -45,6 +43,7 @@ from chutelab.results.summary import waits
 from chutelab.scene import AnyScene, Scene, SceneError, load, shown
 from chutelab.scene.materials import DENSEST, LIGHTEST, presets
 from chutelab.scene.units import write_size
+from chutelab.theory.prediction import Coverage, coverage
 from chutelab.util.arrays import Bools, Floats, Ints
 
 __all__ = ["Advice", "Coverage", "Effort", "Part", "Preflight", "Stepping", "preflight"]
@@ -400,7 +399,15 @@ def _ending(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice
     out = scene.outgoing
     if gone and out is not None:
         settings: Settings = {}
-        if crossed := _at_belt_height(machine, tried, np.flatnonzero(tried.ended == EXIT)):
+        # Where they are at the height of the belt for the last time, x, m.
+        level, there = _belt_height(machine) + machine.particle.of(0).radius, Places(tried)
+        crossed: list[float] = []
+        for particle in np.flatnonzero(tried.ended == EXIT)[:SOME]:
+            clock = tried.track(particle)["t"]
+            times = np.linspace(clock[0], clock[-1], 2000)
+            x, y = there.on(np.full(len(times), particle), times).T
+            crossed += x[y >= level][-1:].tolist()
+        if crossed:
             first = min(out.start, floor(10.0 * (min(crossed) - LANDING_ROOM)) / 10.0)
             last = max(out.start + out.length, ceil(10.0 * (max(crossed) + LANDING_ROOM)) / 10.0)
             settings = {"outgoing.start": first} if first < out.start else {}
@@ -423,20 +430,6 @@ def _ending(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice
             {"run.max_time": _up(10.0 * scene.run.max_time)},
             after=f", or if it goes on for ever, run.until = {machine.end_time:g}",
         )
-
-
-def _at_belt_height(machine: Machine, tried: Recording, particles: Ints) -> list[float]:
-    """Return x (m) where particles are at the height of the outgoing belt for the last time."""
-    level = _belt_height(machine) + machine.particle.of(0).radius
-    there, found = Places(tried), []
-    for particle in particles[:SOME]:
-        track = tried.track(particle)
-        times = np.linspace(track["t"][0], track["t"][-1], 2000)
-        x, y = there.on(np.full(len(times), particle), times).T
-        above = np.flatnonzero(y >= level)
-        if len(above):
-            found.append(float(x[above[-1]]))
-    return found
 
 
 def _up(value: float) -> float:

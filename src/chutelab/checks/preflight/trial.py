@@ -1,4 +1,4 @@
-"""What a look at a scene finds: what is built and skipped, what the closed form covers, the cost.
+"""What a look at a scene finds: what is built and skipped, and the cost.
 
 The cost is estimated from a trial run, which is cut off after 1 s.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import astuple, dataclass, field, replace
-from math import ceil, inf, isfinite, log, log1p
+from math import ceil, inf, log, log1p
 from time import process_time
 from typing import Any
 
@@ -24,9 +24,9 @@ from chutelab.results.sensors import readings
 from chutelab.results.summary import air_drag, stopped
 from chutelab.results.wear import touched
 from chutelab.scene import Scene, SceneError
-from chutelab.scene.quantities import THEORY
 from chutelab.scene.units import write_size
-from chutelab.theory import Reason, drag, predict
+from chutelab.theory import drag, predict
+from chutelab.theory.prediction import Coverage
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown
 
@@ -98,16 +98,6 @@ class Effort:
 
 
 @dataclass(frozen=True)
-class Coverage:
-    """What the closed form has to say of a scene."""
-
-    covers: tuple[str, ...]  # the paper's symbols that it gives
-    leaves_out: tuple[str, ...]  # and those that it does not
-    reason: str  # why it stops, as `chutelab.theory` has it; "" if it does not
-    words: str  # the same for people
-
-
-@dataclass(frozen=True)
 class Advice:
     """Something that works but may surprise, and what would change it."""
 
@@ -158,33 +148,6 @@ class Preflight(Shown):
         for advice in self.advice:
             rows += [("warning", advice.warning), ("change", advice.change)]
         return Sheet(self.title, ("", ""), tuple(rows), texts=2)
-
-
-WORDS = {
-    Reason.OUTSIDE: "The paper's equations are about another machine",
-    Reason.EARLY: "The equations stop short of a contact they know nothing of",
-    Reason.NO_IMPACT: "The particle flies past the plate, and the equations end with the flight",
-    Reason.SECOND: "After the plate it meets something else before it lands",
-    Reason.MISSES: "It does not come down on the outgoing belt",
-}
-"""What a reason means, in words for a first look at the scene."""
-
-
-def coverage(scene: Scene) -> Coverage:
-    """Ask the theory about a scene; it speaks of particle 0."""
-    found, lone = predict(scene), scene.count == 1
-    given = tuple(name for name in THEORY if isfinite(float(getattr(found, name))))
-    reason = str(found.reason)
-    kind = Reason.of(reason)
-    words = "All of the transfer, belt to belt."
-    if kind is not None:
-        words = f"{WORDS[kind]}: {reason.partition(': ')[2]}."
-    if given and not lone:
-        words += " It speaks of particle 0 only."
-    if "belt_work" in given and not (lone and scene.run.until == "settled"):
-        words += " A simulation has belt_work and slip_heat to compare in a run"
-        words += " until settled." if lone else " of one particle until settled."
-    return Coverage(given, tuple(name for name in THEORY if name not in given), reason, words)
 
 
 MANY = 12
@@ -603,13 +566,11 @@ def _left(times: Floats, end: float) -> tuple[float, float]:
         return 0.0, inf
     places = np.linspace(0.5 * count, count, 9).astype(np.int64)
     each = np.diff(t[places]) / np.diff(places)
-    x = np.arange(8.0) - 3.5
-    slope = float(x @ np.log(each)) / 42.0
-    off = np.log(each) - np.log(each).mean() - slope * x
-    error = 2.0 * float(np.sqrt(off @ off / 6.0 / 42.0))
+    (slope, middle), scatter = np.polyfit(np.arange(8.0) - 3.5, np.log(each), 1, cov=True)
+    error = 2.0 * float(np.sqrt(scatter[0, 0]))
     found = []
     for q in (slope - error, slope + error):
-        last = float(np.exp(np.log(each).mean() + 3.5 * q))
+        last = float(np.exp(middle + 3.5 * q))
         # j further stretches take last (e^q + ... + e^(j q)).
         taken = 16.0 * rest / (last * count)
         j = taken

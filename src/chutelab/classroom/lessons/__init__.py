@@ -251,7 +251,14 @@ def read(folder: str | Path, language: str = "en") -> Lesson:
     elif source.exists():
         raise unusable(source, "cannot be read: it is no regular file")
     untranslated: list[str] = []
-    document = _document(source)
+    try:
+        document = tomllib.loads(source.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise unusable(source, f"cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise unusable(source, "not UTF-8 text; save the file as UTF-8") from None
+    except (ValueError, RecursionError) as error:
+        raise unusable(source, f"not TOML: {error}") from None
     words(language)  # refuses a language that there is not
     document = in_language(document, language, untranslated)
     faults: list[Fault] = []
@@ -273,17 +280,6 @@ def read(folder: str | Path, language: str = "en") -> Lesson:
     if faults:
         raise LessonError(str(source), faults)
     return lesson
-
-
-def _document(source: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise unusable(source, f"cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise unusable(source, "not UTF-8 text; save the file as UTF-8") from None
-    except (ValueError, RecursionError) as error:
-        raise unusable(source, f"not TOML: {error}") from None
 
 
 def _strays(folder: Path) -> list[Fault]:

@@ -95,7 +95,7 @@ def build(
     if made:
         from chutelab.pictures.animation import animate, still
         from chutelab.pictures.plots import look
-        from chutelab.pictures.plots.figure import split_velocity
+        from chutelab.pictures.plots.measures import split_velocity
 
         with aside(path.parent, path):
             refuse_other(path)

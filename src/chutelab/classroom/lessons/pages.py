@@ -208,7 +208,7 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
     an `InputError` if its scene cannot be shown as a live page; an `OSError` if the page cannot be
     written.
     """
-    from chutelab.pictures.live.page import write
+    from chutelab.pictures.live import write
 
     if lesson.page is None:
         text = "is missing: what the lesson's page offers; an empty table offers everything"

@@ -147,10 +147,13 @@ def _for_the_teacher(lesson: Lesson) -> str:
     said = words(lesson.language)
     say, teacher = said.say, lesson.teacher or Teacher()
     lengths = (("sheet-basic", teacher.basic), ("sheet-stretch", teacher.stretch))
-    plan = "".join(
-        f"\n| {n} | {say(f'step-{step.kind}')} | {step.minutes} | {_first(lesson, step)} |"
-        for n, step in enumerate(lesson.steps, 1)
-    )
+    plan = ""
+    for n, step in enumerate(lesson.steps, 1):
+        text = step.text or " ".join(ask.text for ask in step.asks) or say("sheet-numbers")
+        # Of what it says the first sentence.
+        first, *_ = re.split(r"(?<=[.?!:])\s+", with_values(lesson, step, text), maxsplit=1)
+        about = " ".join(first.split())
+        plan += f"\n| {n} | {say(f'step-{step.kind}')} | {step.minutes} | {about} |"
     beliefs = "".join(f"\n| {idea} | {question} |" for idea, question in teacher.misconceptions)
     answers = [
         f"- {n}.{m} {with_values(lesson, step, ask.text)} **{_answer(ask)}**"
@@ -172,14 +175,6 @@ def _for_the_teacher(lesson: Lesson) -> str:
     level = say("sheet-level", level=say(f"level-{lesson.level}"), minutes=lesson.minutes)
     parts = (f"## {say(key)}\n\n{text}" for key, text in sections.items() if text)
     return "\n\n".join([f"{lesson.question}\n\n{level}", *parts])
-
-
-def _first(lesson: Lesson, step: Step) -> str:
-    """Return the first sentence of what a step says, for the plan."""
-    asks = " ".join(ask.text for ask in step.asks)
-    text = step.text or asks or words(lesson.language).say("sheet-numbers")
-    said = with_values(lesson, step, text)
-    return re.split(r"(?<=[.?!:]) ", " ".join(said.split()))[0]
 
 
 def _answer(ask: Ask) -> str:

@@ -19,7 +19,7 @@ from chutelab.scene import MISSING, Fault, Scene, SceneError
 from chutelab.scene.conflicts import of_quantities, tree
 from chutelab.scene.overrides import value_at
 from chutelab.scene.quantities import lookup, suggestion, whose
-from chutelab.scene.units import Table, Text, Whole
+from chutelab.scene.units import Table, Text, Whole, flat
 from chutelab.util.words import LANGUAGES, Words
 
 MOST: Final = 20
@@ -60,18 +60,7 @@ def in_language(value: Any, language: str, untranslated: list[str], path: str = 
     }
 
 
-def _flat(value: Any, path: str = "") -> Any:
-    """Return keys and values by full path: ``{plate = {angle_deg = 20}}`` is `plate.angle_deg`."""
-    if not isinstance(value, dict):
-        return value
-    found: dict[str, Any] = {}
-    for name, one in value.items():
-        below = f"{path}.{name}" if path else name
-        found |= _flat(one, below) if isinstance(one, dict) else {below: one}
-    return found
-
-
-Settings = Annotated[dict[Said, Any], BeforeValidator(_flat), Field(max_length=MOST)]
+Settings = Annotated[dict[Said, Any], BeforeValidator(flat), Field(max_length=MOST)]
 SETTINGS: Final = 'a table of keys of the scene such as { "plate.angle_deg" = 20 }'
 
 
@@ -173,9 +162,7 @@ def quantities_in(formula: str) -> list[str]:
 
 
 def faults_of(
-    steps: Sequence[Step],
-    machine: Callable[[Mapping[str, Any]], Scene],
-    live: Mapping[str, Any],
+    steps: Sequence[Step], machine: Callable[[Mapping[str, Any]], Scene], live: Mapping[str, Any]
 ) -> Iterator[Fault]:
     """Yield what cannot be done on the page of the steps.
 

@@ -215,21 +215,21 @@ def html_of(markdown: str) -> str:
     """
     read = parser()
     worksheet = SyntaxTreeNode(read.parse(markdown))
+
+    def elsewhere(part: SyntaxTreeNode) -> bool:
+        """Tell whether a paragraph is a picture that the page shows elsewhere or leaves out."""
+        inside = [one for line in part.children for one in line.children]
+        if part.type != "paragraph" or [one.type for one in inside] != ["image"]:
+            return False
+        name = str(inside[0].attrs["src"])
+        return name == "machine.png" or not re.fullmatch(r"[\w-]+\.png", name)
+
     worksheet.children = [
-        part for part in worksheet.children if part.tag != "h1" and not _elsewhere(part)
+        part for part in worksheet.children if part.tag != "h1" and not elsewhere(part)
     ]
     made = str(read.renderer.render(worksheet.to_tokens(), read.options, {}))
     # Wide tables and code scroll by themselves, with the keyboard, too.
     return re.sub("<(pre|table)>", r'<\1 tabindex="0">', made)
-
-
-def _elsewhere(part: SyntaxTreeNode) -> bool:
-    """Tell whether a paragraph is a picture that the page shows elsewhere or leaves out."""
-    inside = [one for line in part.children for one in line.children]
-    if part.type != "paragraph" or [one.type for one in inside] != ["image"]:
-        return False
-    name = str(inside[0].attrs["src"])
-    return name == "machine.png" or not re.fullmatch(r"[\w-]+\.png", name)
 
 
 def plain_of(markdown: str) -> str:

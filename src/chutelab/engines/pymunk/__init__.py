@@ -6,8 +6,7 @@ outside.
 - `world`: the surfaces as a `pymunk.Space`; rides on the belt that holds; tracks.
 - `lone`: one particle whose steps end at its contacts.
 - `shared`: all particles in one Space, in steps that are all alike.
-- `joints`: strings, rods, springs and pins.
-- `moving`: surfaces that move, as kinematic bodies.
+- `moving`: surfaces that move; strings, rods, springs and pins; rolling friction.
 - `shapes`: their bodies and shapes, chains for arcs, and what Chipmunk is told at a contact.
 """
 

@@ -26,13 +26,12 @@ from chutelab.engines.pymunk.world import (
     Carriage,
     Face,
     Flight,
-    Tracks,
     World,
     bisected,
 )
 from chutelab.machine import Machine
 from chutelab.results.record import REASONS, Kind
-from chutelab.results.recorder import EnoughError, Recorder, StalledError
+from chutelab.results.recorder import EnoughError, Recorder, StalledError, Tracks
 from chutelab.util.arrays import Progress
 
 WEDGED = 1000

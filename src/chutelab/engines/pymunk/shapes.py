@@ -128,6 +128,7 @@ class Shapes:
         body, shape = self.world.disk(i)
         outline = self.machine.outlines[self.machine.releases.kind[i]]
         if outline is not None:
+            body.angle = float(self.machine.releases.angle[i])
             width, out = self._faces(outline)
             by = ROUND * width
             # Corners of the polygon whose faces are further in by as much as it is rounded.

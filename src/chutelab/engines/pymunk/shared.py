@@ -26,23 +26,13 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d, batch
 
-from chutelab.engines.pymunk.joints import Ties
-from chutelab.engines.pymunk.moving import Moving
+from chutelab.engines.pymunk.moving import Moving, Rolling, Ties
 from chutelab.engines.pymunk.shapes import Shapes
-from chutelab.engines.pymunk.world import (
-    NONE,
-    PARTICLE,
-    SURFACE,
-    Bend,
-    Carriage,
-    Flight,
-    Tracks,
-    World,
-)
+from chutelab.engines.pymunk.world import NONE, PARTICLE, SURFACE, Bend, Carriage, Flight, World
 from chutelab.machine import SWING, Machine
 from chutelab.results.loads import Bins
 from chutelab.results.record import REASONS, Kind
-from chutelab.results.recorder import EnoughError, Recorder
+from chutelab.results.recorder import EnoughError, Recorder, Tracks
 from chutelab.util.arrays import Floats, Ints, Progress
 
 SOON = 1e-9
@@ -150,15 +140,8 @@ class Shared:
             self.moving = Moving(machine, world, count, self.center)
             self.throws[self.moving.rows] = True
             self.spin += self.moving.turn[1]
-        # Of particles that turn: 1/I, and rolling friction's arm over the radius, if any has it.
-        self.ease, share = np.zeros((2, rows))
-        inertia = np.broadcast_to(p.inertia, count)
-        np.divide(1.0, inertia, out=self.ease[:count], where=inertia > 0.0)
-        share[:count] = machine.rolling[starts.kind]
-        self.arm = share if share.any() else None
-        self.couples: tuple[Any, ...] = (*np.zeros((2, 0), dtype=np.int64), np.zeros(0))
-        bodies = [body for body, _ in self.bodies[:count]]
-        self.ties = Ties(machine, world.space, bodies)
+        self.rolling = Rolling(machine, self.radius)
+        self.ties = Ties(machine, world.space, [body for body, _ in self.bodies[:count]])
         # Rows by sorted id of the bodies; the Space's own body, of surfaces, is no particle.
         self.surfaces_body = world.space.static_body.id
         self.buffer, ids = batch.Buffer(), np.array(list(self.shapes.rank), dtype=np.uintp)
@@ -248,18 +231,18 @@ class Shared:
     def _free(self, i: int, t: float, x: Vec2d, v: Vec2d, omega: float = 0.0) -> None:
         """Let a particle fly from where it is at a time (s) up to now."""
         body = self.bodies[i][0]
-        self.tracks.knot(i, t, x, v, omega)
-        late = self.t - t
+        late, angle = self.t - t, float(self.machine.releases.angle[i])
+        self.tracks.knot(i, t, x, v, omega, angle)
         now = v + late * self.pull
         x += 0.5 * late * (v + now)
         if late > 0.0:
             # A blow in the next step begins at its start.
-            self.tracks.knot(i, self.t, x, now, omega, late * omega)
+            self.tracks.knot(i, self.t, x, now, omega, angle + late * omega)
         body.position, body.velocity = x - 0.5 * self.h * now, now
-        body.angular_velocity, body.angle = omega, (late - 0.5 * self.h) * omega
+        body.angular_velocity, body.angle = omega, angle + (late - 0.5 * self.h) * omega
         self.state[1, :, i] = *x, *now, omega
         if self.angle is not None:
-            self.angle[i] = late * omega
+            self.angle[i] = angle + late * omega
         self.free[i], self.calm[i] = True, 0.0
         self.ties.put(i, free=True)
 
@@ -292,8 +275,8 @@ class Shared:
         if self.rides:
             self._ride()
         self.ties.tighten(self.h)
-        if self.arm is not None:
-            self._turn()
+        if self.rolling.acts:
+            self.rolling.turn(self.bodies, self.free)
         if self.moving is not None:
             self.moving.put(self.t, self.h)
         if self.machine.air:
@@ -327,7 +310,12 @@ class Shared:
             self.moving.swing(self.t, self.h)
         self._contacts()
         if self.ties.all:
-            self._pulled()
+            for tie, told in self.ties.pulled(self.state[..., : self.count], self.pull, self.h):
+                ends = [n for n in (tie.joint.particle, tie.joint.other) if n >= 0]
+                for i in ends:
+                    self.entries[:, i] += told / len(ends)
+                self.recorder.by_surface[-1] += told
+            self.recorder.springs = np.array(self.ties.springs).reshape(-1, 4)
         if self.machine.air:
             self._slow_down()
         self.tracks.step(self.free, (t, self.t), self.state[..., : self.count], entries, turned)
@@ -353,7 +341,7 @@ class Shared:
         # The impulse acts on A, the normal points from A to B.
         push = -values[0] * values[2] - values[1] * values[3]
         order = np.flatnonzero(push > 0.0)
-        if not len(order) and self.arm is None:
+        if not len(order) and not self.rolling.acts:
             # Nothing pushed.
             self.before, self.calm = order, np.where(self.free, 0.0, self.calm + self.h)
             self._riding(order, order)
@@ -379,14 +367,16 @@ class Shared:
         belt = np.where(side < 0.0, -speed, speed)
         # Of the contact points to each other, before and after: (2, k).
         mine, others = (self.state[:, 2:].take(row, axis=2) for row in (one, other))
-        work = self._carry(one, other, np.stack([nx, ny]), np.stack([jx, jy]), others)
+        arms = -self.radius[one] * np.stack((nx, ny))
+        if self.corners:
+            # Both levers, from the centres to the point.
+            arms = np.where(straight, values[4:], values[[6, 7, 4, 5]])
+        work = self._carry(one, other, arms[:2], np.stack([jx, jy]), others)
         u, v = mine[:, 0] - others[:, 0], mine[:, 1] - others[:, 1]
         rate = u * nx + v * ny
         slip = u * ny - v * nx
-        arms = -self.radius[one] * np.stack((nx, ny))
         if self.corners:
-            # Both levers, from the centres to the point: r × n turns into the rate.
-            arms = np.where(straight, values[4:], values[[6, 7, 4, 5]])
+            # r × n turns into the rate.
             for (x, y), spin in ((arms[:2], mine[:, 2]), (arms[2:], -others[:, 2])):
                 rate = rate + spin * (x * ny - y * nx)
                 slip = slip - spin * (x * nx + y * ny)
@@ -402,9 +392,9 @@ class Shared:
         sums[3] = (
             (np.abs(rate[1]) < self.still) & (np.abs(slip[1]) < self.still) & ~self.throws[other]
         )
-        if self.arm is not None:
+        if self.rolling.acts:
             rolls = self.radius[one] * np.abs(mine[1, 2] - others[1, 2] - self.spin[other])
-            sums[3] *= (self.arm[one] == 0.0) | (rolls < self.still)
+            sums[3] *= (self.rolling.arm[one] == 0.0) | (rolls < self.still)
         pair = other < self.count
         if self.machine.triggers:
             self._touched({*self.surface[other[~pair]].tolist()})
@@ -426,8 +416,11 @@ class Shared:
         self.entries += added[:3]
         if self.recorder.bins is not None:
             self._bear(self.recorder.bins, one, other, (jx, jy), (nx, ny), arms)
-        if self.arm is not None:
-            self._brake(one, other, push)
+        if self.rolling.acts:
+            turning = self.state[:, 4] - self.spin
+            heat = self.rolling.book(self.entries, turning, self.spin)
+            self.recorder.by_surface[-1, 2] += heat
+            self.rolling.brake(one, other, push, turning)
         calm = (added[4] > 0.0) & (added[3] == added[4])
         self.calm = np.where(calm[: self.count] | ~self.free, self.calm + self.h, 0.0)
         surface = self.surface[other]
@@ -477,12 +470,12 @@ class Shared:
         self.entries[2, : self.count] += lost
         self.recorder.air_loss += float(lost.sum())
 
-    def _carry(self, one: Ints, other: Ints, n: Floats, push: Floats, others: Floats) -> Any:
+    def _carry(self, one: Ints, other: Ints, arms: Floats, push: Floats, others: Floats) -> Any:
         """Have surfaces that move do so in `others`, (2, 3, k); book and return their work, J."""
         if self.moving is None:
             return 0.0
         place = 0.5 * (self.state[0, :2] + self.state[1, :2]).take(one, axis=1)
-        velocity = self.moving.at(other, place - self.radius[one] * n)
+        velocity = self.moving.at(other, place + arms)
         others[:, :2] += velocity
         work = np.asarray((push * velocity.mean(axis=0)).sum(axis=0))
         np.add.at(self.recorder.drives, self.surface[other], work)
@@ -496,7 +489,8 @@ class Shared:
         place = middle[:, one] + arms[:2]
         (x, y), (nx, ny), (px, py) = (np.asarray(of)[:, alone] for of in (place, normal, push))
         bins.bear(self.surface[other[alone]], begin, end, (x, y), (nx, ny), (px, py))
-        last, mate, couple = (of[self.couples[1] >= self.count] for of in self.couples)
+        couples = self.rolling.couples
+        last, mate, couple = (of[couples[1] >= self.count] for of in couples)
         if len(couple):
             none = np.zeros(2)
             bins.bear(self.surface[mate], begin, end, middle[:, last], none, none, couple)
@@ -519,68 +513,6 @@ class Shared:
         values = np.frombuffer(self.buffer.float_buf()).reshape(-1, 4).T
         ids = np.frombuffer(self.buffer.int_buf(), dtype=np.uintp).reshape(-1, 3).T
         return *self.row[self.ids.searchsorted(ids[:2])], ids[2] != 0, values
-
-    # Rolling friction
-
-    def _turn(self) -> None:
-        """Give the couples of rolling friction to those whose contacts of the last step last."""
-        one, other, couple = self.couples
-        kept = self.free[one] & (
-            (other >= self.count) | self.free[np.minimum(other, self.count - 1)]
-        )
-        one, other, couple = self.couples = one[kept], other[kept], couple[kept]
-        turned = self.ease * np.bincount(
-            np.concatenate((one, other)), np.concatenate((couple, -couple)), len(self.ease)
-        )
-        for i in np.flatnonzero(turned).tolist():
-            self.bodies[i][0].angular_velocity += float(turned[i])
-
-    def _brake(self, one: Ints, other: Ints, push: Floats) -> None:
-        """Book the couples of this step; find those of the next.
-
-        They are given before a step, so that friction bears them, and grow from step to step until
-        nothing turns, up to what the pushes of the step before allow.
-        """
-        assert self.arm is not None
-        last, mate, couple = self.couples
-        turning = self.state[:, 4] - self.spin
-        belt, heat = (
-            couple * self.spin[mate],
-            -0.5 * couple * (turning[:, last] - turning[:, mate]).sum(axis=0),
-        )
-        rows, pair = len(self.surface), mate < self.count
-        self.recorder.by_surface[-1, 2] += float(heat[pair].sum())
-        heat = np.where(pair, 0.5 * heat, heat)
-        for entry, part in ((0, belt), (2, heat)):
-            for row in (last, mate):
-                self.entries[entry] += np.bincount(row, part, rows)
-        before = dict(
-            zip(zip(last.tolist(), mate.tolist(), strict=True), couple.tolist(), strict=True)
-        )
-        held = [before.get(key, 0.0) for key in zip(one.tolist(), other.tolist(), strict=True)]
-        # Of two kinds the larger; between two disks on the radius of both together.
-        share = np.maximum(self.arm[one], self.arm[other])
-        r, its = self.radius[one], self.radius[other]
-        most = share * np.where(its > 0.0, r * its / (r + its), r) * push
-        contacts = np.bincount(np.concatenate((one, other)), minlength=rows)
-        contacts[self.count :] = 1
-        ease = (self.ease[one] + self.ease[other]) * np.maximum(contacts[one], contacts[other])
-        rolls = (most > 0.0) & (ease > 0.0)
-        one, other, most = one[rolls], other[rolls], most[rolls]
-        change = (turning[1, one] - turning[1, other]) / ease[rolls]
-        self.couples = one, other, np.clip(np.array(held)[rolls] - change, -most, most)
-
-    # Joints
-
-    def _pulled(self) -> None:
-        """Book what joints do."""
-        pull = self.pull
-        for tie, entries in self.ties.pulled(self.state[..., : self.count], pull, self.h):
-            ends = [n for n in (tie.joint.particle, tie.joint.other) if n >= 0]
-            for i in ends:
-                self.entries[:, i] += entries / len(ends)
-            self.recorder.by_surface[-1] += entries
-        self.recorder.springs = np.array(self.ties.springs).reshape(-1, 4)
 
     def _riding(self, particles: Ints, surface: Ints) -> None:
         """Count pushes of surfaces in a row; tell separations at the last one's time."""

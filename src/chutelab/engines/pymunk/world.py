@@ -1,4 +1,4 @@
-"""The machine as a `pymunk.Space`, paths between contacts, and the tracks."""
+"""The machine as a `pymunk.Space`, and paths between contacts."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ from pymunk import Vec2d
 
 from chutelab.machine import Arcs, Machine, Segments
 from chutelab.results.loads import Bins
-from chutelab.results.record import KNOT
 from chutelab.results.recorder import Recorder
-from chutelab.util.arrays import Bools, Floats
+from chutelab.util.arrays import Floats
 
 PARTICLE, SURFACE = 1, 2
 """Collision types of disks and of everything they meet."""
@@ -41,8 +40,6 @@ LOW = 2.0
 FIRST = 1e-3
 """Share of a step after which a surface just left is looked at again."""
 
-ROUGH = 1e-4
-"""Share of the radius by which a track may be off between two knots."""
 
 CREEP = 1e-7
 """Share of the radius; how finely the ends of an arc are told from what is between them."""
@@ -57,7 +54,6 @@ ALIKE = 1e-9
 
 ARC = 0.025
 """rad between knots round the pulley: ρ Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
-
 
 NONE = (Vec2d.zero(), Vec2d.zero())
 """Crowns of what has no ends."""
@@ -263,18 +259,11 @@ class Flight(NamedTuple):
 
     def leaves(self, box: Floats) -> float:
         """Return the time (s) after which it leaves the exit box, see `Releases`, inf if never."""
-        left, bottom, right, top = box.tolist()
-        (x, y), (vx, vy), (gx, gy) = self
+        (left, bottom, right, top), ((x, y), (vx, vy), (gx, gy)) = box.tolist(), self
         return min(
             falls(x - left, vx, gx), falls(right - x, -vx, -gx),
             falls(y - bottom, vy, gy), falls(top - y, -vy, -gy),
         )  # fmt: skip
-
-
-def own(values: ArrayLike, particle: int) -> float:
-    """Return a particle's own of a property that all share or each has."""
-    values = np.asarray(values)
-    return float(values[particle] if values.ndim else values)
 
 
 def falls(gap: float, rate: float, pull: float) -> float:
@@ -301,7 +290,7 @@ class World:
         self.machine, self.particle = machine, particle
         self.space = pymunk.Space()
         parts, arcs, wheel = machine.segments, machine.arcs, machine.pulley
-        r = self.radius = own(machine.particle.radius, particle)
+        r = self.radius = float(machine.particle.of(particle).radius)
         size = float(np.abs([*machine.corners.ravel(), r]).max())
         self.rounding = DIGITS * size
         self.hair = max(HAIR * r, 4.0 * self.rounding)
@@ -320,9 +309,8 @@ class World:
             turning = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             turning.angular_velocity = -wheel.speed / wheel.radius
             about = self._about(wheel.rim, 0) | {"spin": turning.angular_velocity}
-            self._add(
-                Face(pymunk.Circle(turning, wheel.radius), tangent=None, crowns=NONE, **about)
-            )
+            rim = pymunk.Circle(turning, wheel.radius)
+            self._add(Face(rim, tangent=None, crowns=NONE, **about))
         sides = [zip(*pair, strict=True) for pair in zip(arcs.ends, arcs.inward, strict=True)]
         for n, (center, *ends) in enumerate(zip(arcs.center.tolist(), *sides, strict=True)):
             self._bend(n, Vec2d(*center), ends, self._about(arcs, n))
@@ -347,9 +335,7 @@ class World:
     ) -> None:
         """Add an arc, and its ends (m), each with the way into the arc there."""
         arcs = self.machine.arcs
-        radius, begin, extent = (
-            float(values[n]) for values in (arcs.radius, arcs.begin, arcs.extent)
-        )
+        radius, begin, extent = (float(of[n]) for of in (arcs.radius, arcs.begin, arcs.extent))
         body = pymunk.Body(body_type=pymunk.Body.STATIC)
         body.position = center
         # A shape that is not in the Space does not keep its body.
@@ -446,16 +432,15 @@ class World:
 
     def disk(self, particle: int) -> tuple[pymunk.Body, pymunk.Circle]:
         """Return a new body with its shape, not yet in the Space."""
-        p = self.machine.particle
-        body = pymunk.Body(*self.heft(particle))
-        circle = pymunk.Circle(body, own(p.radius, particle) + self.hair)
+        body, own = pymunk.Body(*self.heft(particle)), self.machine.particle.of(particle)
+        circle = pymunk.Circle(body, float(own.radius) + self.hair)
         circle.collision_type = PARTICLE
         return body, circle
 
     def heft(self, particle: int) -> tuple[float, float]:
         """Return mass (kg) and moment of inertia (kg m²), inf of what does not turn."""
-        p = self.machine.particle
-        return own(p.mass, particle), own(p.inertia, particle) or inf
+        own = self.machine.particle.of(particle)
+        return float(own.mass), float(own.inertia) or inf
 
     def curved(self, face: Face, x: Vec2d) -> bool:
         """Tell whether what is nearest of a surface is an arc, the pulley or the end of a face."""
@@ -537,7 +522,7 @@ class Carriage:
         assert machine.pulley is not None
         start, self.incline = machine.releases, machine.pulley.incline
         self.particle, self.surface, self.t = particle, machine.pulley.surface, t
-        self.mass, self.g = own(machine.particle.mass, particle), machine.gravity
+        self.mass, self.g = float(machine.particle.of(particle).mass), machine.gravity
         self.weight, self.radius = self.mass * self.g, machine.pulley.radius
         # Along the belt and square to it.
         self.along = Vec2d(cos(self.incline), sin(self.incline))
@@ -605,72 +590,6 @@ class Carriage:
         bins.bear(
             surfaces, times[:-1], times[1:], *self.foot(times[:-1] + 0.5 * span), (y, weight - x)
         )
-
-
-class Tracks:
-    """Knots of particles that are stepped, only as many as the curve through them needs.
-
-    Between knots a track is a cubic, which a constant acceleration makes exact: a new knot is due
-    when the one of the first step since the last knot does not lead to where the particle is. With
-    `turning` that goes for the angle too, which is what ω, linear between knots, adds up to.
-    """
-
-    def __init__(
-        self, recorder: Recorder, radius: float, particles: range, *, turning: bool = False
-    ) -> None:
-        self.recorder, self.first, count = recorder, particles.start, len(particles)
-        self.turning, self.radius, self.tolerance = turning, radius, ROUGH * radius
-        self.t, self.x, self.v = np.zeros(count), np.zeros((2, count)), np.zeros((2, count))
-        self.pull, self.fresh = np.zeros((2, count)), np.ones(count, dtype=bool)
-        self.omega, self.twist = np.zeros((2, count))
-
-    def knot(
-        self, i: int, t: float, x: ArrayLike, v: ArrayLike, omega: float = 0.0, angle: float = 0.0
-    ) -> None:
-        """Write a knot of the particle in a row, with the entries booked so far."""
-        self.recorder.knots(self.first + i, t, x, v, omega, angle)
-        self.t[i], self.x[:, i], self.v[:, i], self.fresh[i] = t, x, v, True
-        self.omega[i] = omega
-
-    def step(
-        self,
-        rows: Bools,
-        times: tuple[float, float],
-        state: Floats,
-        entries: Floats,
-        angle: Floats | None = None,
-    ) -> None:
-        """Note a step of the particles in some rows; write knots of the states before where due.
-
-        `times` (s) and `state` (2, 5, N), of x, y, vx, vy and ω, are those at both ends; `entries`
-        (3, N) and `angle` (N,), how far all have turned (rad), are those before.
-        """
-        tau = times[1] - self.t
-        x, v = state[1, :2], state[1, 2:4]
-        new = self.fresh & rows
-        if new.any():
-            self.pull[:, new] = (v[:, new] - self.v[:, new]) / tau[new]
-        gain = tau * self.pull
-        off = np.abs(x - self.x - tau * (self.v + 0.5 * gain))
-        # A cubic is off by 4/27 τ of what one of its end velocities is.
-        off += 4.0 / 27.0 * tau * np.abs(v - self.v - gain)
-        apart = off[0] + off[1]
-        if self.turning:
-            omega = state[1, 4]
-            self.twist[new] = (omega[new] - self.omega[new]) / tau[new]
-            apart += 0.5 * self.radius * tau * np.abs(omega - self.omega - tau * self.twist)
-        due = np.flatnonzero((apart > self.tolerance) & rows & ~new)
-        self.fresh &= ~rows
-        if len(due):
-            knots = np.empty(len(due), dtype=KNOT)
-            before = state[0][:, due]
-            knots["t"], knots["position"], knots["velocity"] = times[0], before[:2].T, before[2:4].T
-            knots["omega"], knots["entries"] = before[4], entries[:, due].T
-            self.recorder.add(self.first + due, knots, 0.0 if angle is None else angle[due])
-            self.t[due], self.x[:, due], self.v[:, due] = times[0], before[:2], before[2:4]
-            self.pull[:, due] = (v[:, due] - before[2:4]) / (times[1] - times[0])
-            self.omega[due] = before[4]
-            self.twist[due] = (state[1, 4, due] - before[4]) / (times[1] - times[0])
 
 
 def bisected(test: Callable[[float], object], low: float, high: float) -> tuple[float, float]:

@@ -201,7 +201,7 @@ class Stage:
         view.set(xticks=[], yticks=[])
         for spine in view.spines.values():
             spine.set_color(style.STEEL_LIGHT)
-        _draw_scale(view)
+        draw_scale(view)
         drawn = len(view.lines)
         draw_analytic(view, parts)
         parabola = view.lines[drawn:]
@@ -351,7 +351,7 @@ def pace_words(slow: float) -> str:
     return say(pace, times=figures(times))
 
 
-def _draw_scale(ax: Axes) -> None:
+def draw_scale(ax: Axes) -> None:
     """Draw a bar of round length in a corner where no name is: the picture has no ticks."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     length = round_step(right - left, 6)

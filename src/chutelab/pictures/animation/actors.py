@@ -27,19 +27,19 @@ from chutelab.pictures.plots.machinery import (
     colour_of,
     draw_piece,
     is_passing,
-    motion,
     pieces,
     points_of,
     stream_colours,
     stream_handles,
-    strings,
 )
 from chutelab.pictures.plots.scenery import (
     FINE,
+    motion,
     nominal,
     one_of_many,
     places,
     spread,
+    strings,
     strobe_times,
     track_times,
 )
@@ -191,11 +191,11 @@ def crowd(
         # Their white edges tell disks apart where they overlap.
         moving += bodies(ax, recording, own, times, gid, color, WHITE)
         if reach and len(particles) < DRAWN:
-            moving.insert(0, _trails(ax, places(recording, own, times), since, color, gid))
+            moving.insert(0, trails(ax, places(recording, own, times), since, color, gid))
     return moving, handles
 
 
-def _trails(ax: Axes, positions: Floats, since: Ints, color: str, gid: str) -> Moving:
+def trails(ax: Axes, positions: Floats, since: Ints, color: str, gid: str) -> Moving:
     """Return the ways of particles from the pictures `since`, (T,), on; positions are (T, n, 2)."""
 
     def behind(index: int) -> Floats:

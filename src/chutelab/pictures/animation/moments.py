@@ -310,11 +310,7 @@ def _gates(machine: Machine, times: Floats, slow: float) -> list[str]:
 
 
 def _words(
-    recording: Recording,
-    own: NDArray[Any],
-    held: Ints,
-    times: Floats,
-    slow: float,
+    recording: Recording, own: NDArray[Any], held: Ints, times: Floats, slow: float
 ) -> list[str]:
     """Return the caption at each time: for a while what happened last, then what goes on.
 

@@ -1,7 +1,9 @@
 """A scene that answers: one page that any browser opens, and the same in a notebook.
 
+`html` and `write` make one HTML file of a scene: data, style, script, the engine's thread and its
+WebAssembly; `live` shows it in a notebook.
+
 - `describe`: what a page knows of a scene, as JSON.
-- `page`: `html` and `write`, the page as one file.
 - `widget`: the page in a notebook; the only module that needs anywidget.
 - ``bundle``: the script of the page and that of the engine's thread, as `tools/build_page.py` makes
   them of the modules.
@@ -15,21 +17,159 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import json
+import zlib
+from base64 import b64encode
+from collections.abc import Mapping
+from functools import cache, lru_cache
+from hashlib import sha256
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, Any
 
-from chutelab.scene import AnyScene, Overrides, load, to_toml
+import numpy as np
+
+from chutelab.pictures.live.describe import describe
+from chutelab.pictures.plots import style
+from chutelab.scene import AnyScene, Overrides, Scene, load, to_toml
+from chutelab.scene.messages import live_of
+from chutelab.scene.quantities import REGISTRY
+from chutelab.scene.tables import Live
 from chutelab.util.errors import MissingLibraryError
+from chutelab.util.files import whole
+from chutelab.util.versions import own_version
+from chutelab.util.words import words
 
 if TYPE_CHECKING:
     from chutelab.pictures.live.widget import LivePage
 
+__all__ = ["live"]
+
+LANGUAGES = ("en", "de")
+
+LETTERS = bytes(code for code in range(33, 127) if code not in b'"<\\')
+"""In a script element's JSON each stands for itself."""
+
+COLOURS = ("track", "analytic", "belt", "strike", "stream")
+
+
+def html(
+    scene: Scene | None,
+    *,
+    language: str = "en",
+    home: tuple[str, str] | None = None,
+    exercise: Mapping[str, Any] | None = None,
+    lesson: Mapping[str, Any] | None = None,
+    partly: bool = False,
+) -> str:
+    """Return the live page of a scene; the same scene and version give the same bytes.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        Without mass points. None begins with an empty machine.
+    language : {"en", "de"}
+        Of all that the page says; what the scene says stands as it is.
+    home : tuple of str, optional
+        Text and address of a link back, for a page that is one of several.
+    exercise : mapping, optional
+        What `chutelab.classroom.exercises.data_of` makes of an exercise.
+    lesson : mapping, optional
+        Title and question of a lesson, and its steps as
+        `chutelab.classroom.lessons.steps.data_of` has them.
+    partly : bool
+        Whether the page says what it cannot show of the scene, and leaves it out.
+
+    Raises
+    ------
+    SceneError
+        If there is something in the scene that the contact engine has not, by its key.
+    """
+    # The colours of every picture; page.css has those for the dark.
+    colours = {
+        **{name: getattr(style, name.upper()) for name in COLOURS},
+        **{f"velocity-{name}": colour for name, colour in style.VELOCITY.items()},
+        **{f"energy-{name}": colour for name, colour in style.ENERGY.items()},
+    }
+    palette = "".join(f"  --{k.replace('_', '-')}: {v};\n" for k, v in colours.items())
+    css = f":root {{\n{palette}}}\n{_file('bundle/page.css')}"
+    css += _file(f"bundle/{'sandbox' if lesson is None else 'lesson'}.css")
+    core = files("chutelab.core")
+    facts = describe(scene, partly=partly)
+    strings = _strings(language)
+    title = strings["new-machine"] if scene is None else scene.title
+    shown_title = strings.get(f"title-{title}", title)
+    if scene is None or "lacks" in facts:
+        facts["scene"]["title"] = title
+        live = Live().model_dump()
+    else:
+        live = live_of(scene, facts["scene"])
+    if given := facts["scene"].get("live"):
+        # As what is saved from the page will have it.
+        facts["scene"]["live"] = {key: live[key] for key in given}
+    shown = [row for row in REGISTRY.values() if row.symbol]
+    # What the page's language has no words for is called as in the registry.
+    meanings = {f"number-{row.name}": row.meaning for row in shown}
+    (other,) = {*LANGUAGES} - {language}
+    # Packed, for it is long: all but the scene; the script, too, which boot.ts puts into the page.
+    script = _file(f"bundle/{'app' if lesson is None else 'lessonpage'}.js")
+    large = {
+        "script": script,
+        "worker": _file("bundle/worker.js"),
+        **{name: facts.pop(name) for name in ("tables", "rules", "presets")},
+        "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
+        "strings": {**meanings, **strings},
+        "quantities": {row.name: {"symbol": row.symbol, "unit": row.unit} for row in shown},
+        **({} if exercise is None else {"exercise": exercise}),
+        **({} if lesson is None else {"lesson": lesson}),
+        # What is handed out with a lesson is in one language throughout.
+        **(
+            {}
+            if lesson or exercise
+            else {"other": {"language": other, "strings": {**meanings, **_strings(other)}}}
+        ),
+    }
+    data = {
+        **facts,
+        "live": live,
+        "version": own_version(),
+        "language": language,
+        "packed": _packed(json.dumps(large, separators=(",", ":")).encode()),
+        "wasm": _packed((core / "page.wasm").read_bytes()),
+    }
+    # Within a script element nothing but an end tag must look like one.
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    boot = _file("bundle/boot.js")
+    return Template(_file("assets/page.html")).substitute(
+        language=language,
+        title=escape(shown_title),
+        version=escape(own_version()),
+        broken=escape(strings["broken-page"]),
+        home=f'<a class="home" href="{escape(home[1])}">{escape(home[0])}</a>' if home else "",
+        css=css,
+        css_hash=_hash(css),
+        boot=boot,
+        boot_hash=_hash(boot),
+        script_hash=_hash(script),
+        data=text.replace("<", "\\u003c"),
+    )
+
+
+def write(scene: Scene | None, path: str | Path, **options: Any) -> int:
+    """Write the live page of a scene, whole or not at all, and return its size in bytes.
+
+    Options are those of `html`; a file that is there is replaced, its folder must be there.
+    """
+    data = html(scene, **options).encode("utf-8")
+    with whole(Path(path)) as unfinished:
+        unfinished.write_bytes(data)
+    return len(data)
+
 
 def live(
-    scene: AnyScene,
-    overrides: Overrides = (),
-    *,
-    height: int = 640,
-    language: str = "en",
+    scene: AnyScene, overrides: Overrides = (), *, height: int = 640, language: str = "en"
 ) -> LivePage:
     """Show a scene in a notebook as a page that answers: drag the plate, and all else follows.
 
@@ -69,11 +209,40 @@ def live(
             raise
         text = 'live pages in a notebook need anywidget: python -m pip install "chutelab[notebook]"'
         raise MissingLibraryError(text) from error
-    from chutelab.pictures.live.page import html
-
     scene = load(scene, overrides)
     page = html(scene, language=language)
     return LivePage(html=page, height=height, title=scene.title, scene=to_toml(scene))
 
 
-__all__ = ["live"]
+@cache
+def _file(name: str) -> str:
+    return (files("chutelab.pictures.live") / name).read_text(encoding="utf-8")
+
+
+def _strings(language: str) -> dict[str, str]:
+    """Return all texts of a page; titles of scenes by what they are in the scene."""
+    titles = words(language).titles().items() if language != "en" else ()
+    said: dict[str, str] = json.loads(_file(f"assets/strings/{language}.json"))
+    return said | {f"title-{own}": title for own, title in titles}
+
+
+@lru_cache(8)
+def _packed(content: bytes) -> str:
+    """Return it compressed, as text: two of 91 letters for 13 bits, and one for at most the last 6.
+
+    In base64 it is a twelfth longer; the page reads it in `bytesOf` of ``core.ts``.
+    """
+    bits = np.unpackbits(np.frombuffer(zlib.compress(content, 9), dtype=np.uint8))
+    rest = len(bits) % 13
+    bits = np.pad(bits, (0, (6 if 0 < rest <= 6 else 13) - rest if rest else 0))
+    pairs = bits[: len(bits) // 13 * 13].reshape(-1, 13) @ (1 << np.arange(12, -1, -1))
+    last = bits[len(pairs) * 13 :]
+    codes = np.stack(np.divmod(pairs, len(LETTERS)), axis=-1).ravel()
+    if len(last):
+        codes = np.append(codes, last @ (1 << np.arange(5, -1, -1)))
+    return str(np.frombuffer(LETTERS, dtype=np.uint8)[codes].tobytes(), "ascii")
+
+
+def _hash(text: str) -> str:
+    """Return what a Content-Security-Policy calls an inline text it allows."""
+    return f"sha256-{b64encode(sha256(text.encode('utf-8')).digest()).decode('ascii')}"

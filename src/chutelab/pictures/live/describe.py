@@ -10,13 +10,12 @@ from chutelab.machine import build
 from chutelab.scene import Fault, Scene, SceneError, load, to_dict
 from chutelab.scene.conflicts import EITHER, JOINTS, RULES, tree
 from chutelab.scene.materials import VALUES, presets
+from chutelab.scene.messages import LISTS
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.scene.units import LARGEST, SHORTEST
 
 MOST: Final = 100_000
 """Particles that a page has room for: it keeps their tracks, and draws them in each frame."""
-
-LISTS: Final = ("material", "pair", "conveyor", "surface", "sensor", *JOINTS)
 
 EXAMPLES: Final = ("inclined-40", "cascade", "spoon", "hopper", "galton", "free-fall")
 """Scenes that the empty page offers, with the words ``example-NAME`` in its catalogues."""
@@ -42,7 +41,7 @@ PARTS: Final = (
     _part("arc", "C", "surface", "arc arc arc", "radius restitution friction", "center"),
     _part("ball", "B", "stream", "at", "velocity start restitution",
           velocity=[0.0, 0.0], interact=True),
-    _part("box", "A", "stream", "at", "size mass omega", "size",
+    _part("box", "A", "stream", "at", "size mass angle_deg", "size",
           velocity=[0.0, 0.0], interact=True, shape="box", size=[0.1, 0.06], mass=0.25, spin=True,
           material="wood"),
     _part("stream", "R", "stream", "at to", "count rate velocity", "count",

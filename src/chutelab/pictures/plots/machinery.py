@@ -9,7 +9,7 @@ of a plate; what is drawn of their thickness lies on the other side, and no engi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from math import atan2, degrees, inf, pi
 from typing import Any
 
@@ -26,7 +26,7 @@ from matplotlib.transforms import Bbox
 from chutelab.machine import Arcs, Machine, Pieces, Segments
 from chutelab.pictures import BLUE, GREEN, ORANGE, PURPLE
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.scenery import Window, around, places, stays, subset
+from chutelab.pictures.plots.scenery import Window, around, motion, strings
 from chutelab.pictures.plots.style import figures, named, say
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats, Ints
@@ -39,10 +39,6 @@ def halo() -> list[withStroke]:
 
 TWO_LINES = 32.0
 """pt; height of two lines of small text."""
-
-GATE: dict[str, Any] = {"ls": (0, (2.2, 1.1))}
-"""How a piece that is not always there is drawn, in half its colour."""
-
 
 THICK = (3.0, 8.0, 0.0165)
 """Thickness of belts: at least and at most so many pt, and as a share of the axes' height."""
@@ -229,7 +225,7 @@ def draw_scene(
     for piece in found:
         look: dict[str, Any] = {"linewidth": 1.3} if small and not piece.whole else {}
         if is_passing(machine, piece):
-            look |= {**GATE, "color": style.tint(colour_of(machine, piece), 0.5)}
+            look |= {"ls": (0, (2.2, 1.1)), "color": style.tint(colour_of(machine, piece), 0.5)}
         draw_piece(ax, machine, piece, **look)
         if piece.one_sided and not small:
             # An arrow in the way in which it lets through.
@@ -571,57 +567,6 @@ def placed(outline: Floats, position: Floats, angle: float) -> Floats:
     """Return the corners of an outline, turned counterclockwise (rad) and moved, (n, 2), m."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.asarray(position + outline @ np.array([[cosine, sine], [-sine, cosine]]))
-
-
-def motion(recording: Recording, particles: Ints, times: Floats) -> tuple[Floats, Floats]:
-    """Return where particles are seen, (T, n, 2), and how far turned, (T, n), if that is seen."""
-    position = places(recording, particles, times)
-    if all(outline is None for outline in recording.machine.outlines):
-        return position, np.zeros(position.shape[:2])
-    some = subset(recording, particles)
-    angle = some.at(times).angle
-    for i in np.flatnonzero(stays(recording)[particles]).tolist():
-        end = some.track(i)["t"][-1]
-        angle[times > end, i] = some.at([end]).angle[0, i]
-    return position, angle
-
-
-HANGING = np.linspace(0.0, 1.0, 13)
-"""Shares of a slack string's way at which it is drawn."""
-
-COIL = 0.05
-"""Of a spring's length at rest; half of its width."""
-
-
-def strings(recording: Recording, times: Floats) -> Callable[[int], list[Floats]]:
-    """Return the function that gives the joints at the time of an index, (P, 2) each, m.
-
-    A slack string sags along gravity between its ends, a spring goes to and fro; pins are left out.
-    """
-    joints = [joint for joint in recording.machine.joints if joint.kind != "pin"]
-    own = places(recording, [joint.particle for joint in joints], times)
-    far = places(recording, [max(joint.other, 0) for joint in joints], times)
-    for n, joint in enumerate(joints):
-        if joint.anchor is not None:
-            far[:, n] = joint.anchor
-
-    def drawn(index: int) -> list[Floats]:
-        found = []
-        for joint, begin, end in zip(joints, far[index], own[index], strict=True):
-            way = end - begin
-            path = begin + HANGING[:, None] * way
-            if joint.kind == "string":
-                # Pulled down at its middle it would be twice as deep there.
-                sag = np.sqrt(max(joint.length**2 - float(way @ way), 0.0))
-                path -= (2.0 * HANGING * (1.0 - HANGING) * sag)[:, None] * recording.machine.up
-            elif joint.kind == "spring":
-                across = np.array([-way[1], way[0]]) / (np.hypot(*way) or 1.0)
-                path[2:-2:2] += COIL * joint.length * across
-                path[3:-2:2] -= COIL * joint.length * across
-            found.append(path)
-        return found
-
-    return drawn
 
 
 LEAST = 1.5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
 from math import floor, isnan, log10
 from typing import Any
@@ -230,11 +230,7 @@ def flow(recording: Recording) -> dict[str, Floats]:
     first, last = recording.ends()
     come = arrivals(recording)["t"]
     gone = recording.ended[recording.released] == REASONS.index("exit")
-    return {
-        "released": first["t"],
-        "arrived": come[np.isfinite(come)],
-        "left": last["t"][gone],
-    }
+    return {"released": first["t"], "arrived": come[np.isfinite(come)], "left": last["t"][gone]}
 
 
 MANY = 60
@@ -461,3 +457,55 @@ def around(points: Floats) -> Window:
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
     least = 0.01 * max(right - left, top - bottom) or 0.1
     return Window(left, max(right, left + least), bottom, max(top, bottom + least))
+
+
+def motion(recording: Recording, particles: Ints, times: Floats) -> tuple[Floats, Floats]:
+    """Return where particles are seen, (T, n, 2), and how far turned, (T, n), if that is seen."""
+    position = places(recording, particles, times)
+    if all(outline is None for outline in recording.machine.outlines):
+        return position, np.zeros(position.shape[:2])
+    some = subset(recording, particles)
+    angle = some.at(times).angle
+    for i in np.flatnonzero(stays(recording)[particles]).tolist():
+        end = some.track(i)["t"][-1]
+        angle[times > end, i] = some.at([end]).angle[0, i]
+    return position, angle
+
+
+HANGING = np.linspace(0.0, 1.0, 13)
+"""Shares of a slack string's way at which it is drawn."""
+
+
+COIL = 0.05
+"""Of a spring's length at rest; half of its width."""
+
+
+def strings(recording: Recording, times: Floats) -> Callable[[int], list[Floats]]:
+    """Return the function that gives the joints at the time of an index, (P, 2) each, m.
+
+    A slack string sags along gravity between its ends, a spring goes to and fro; pins are left out.
+    """
+    joints = [joint for joint in recording.machine.joints if joint.kind != "pin"]
+    own = places(recording, [joint.particle for joint in joints], times)
+    far = places(recording, [max(joint.other, 0) for joint in joints], times)
+    for n, joint in enumerate(joints):
+        if joint.anchor is not None:
+            far[:, n] = joint.anchor
+
+    def drawn(index: int) -> list[Floats]:
+        found = []
+        for joint, begin, end in zip(joints, far[index], own[index], strict=True):
+            way = end - begin
+            path = begin + HANGING[:, None] * way
+            if joint.kind == "string":
+                # Pulled down at its middle it would be twice as deep there.
+                sag = np.sqrt(max(joint.length**2 - float(way @ way), 0.0))
+                path -= (2.0 * HANGING * (1.0 - HANGING) * sag)[:, None] * recording.machine.up
+            elif joint.kind == "spring":
+                across = np.array([-way[1], way[0]]) / (np.hypot(*way) or 1.0)
+                path[2:-2:2] += COIL * joint.length * across
+                path[3:-2:2] -= COIL * joint.length * across
+            found.append(path)
+        return found
+
+    return drawn

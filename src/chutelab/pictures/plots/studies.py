@@ -1,4 +1,4 @@
-"""Pictures of many runs: searches, uncertainty, sweeps, measured points, run time against error.
+"""Pictures of many runs: searches, uncertainty, sweeps, discharge methods, run time against error.
 
 A sweep is drawn as lines over one varied key, a heat map over two, dots for samples.
 """
@@ -23,27 +23,17 @@ from chutelab.checks.workprecision import METHODS, Timing
 from chutelab.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.machinery import draw_scene
-from chutelab.pictures.plots.panels import analytic_of, draw_analytic
-from chutelab.pictures.plots.scenery import (
-    FAR,
-    FINE,
-    around,
-    path_of,
-    struck_by_nominal,
-    window_of,
-)
+from chutelab.pictures.plots.scenery import around
 from chutelab.pictures.plots.style import Picture
-from chutelab.results import Kind
-from chutelab.scene.units import symbol, with_unit, write_size
+from chutelab.scene.units import symbol, with_unit
 from chutelab.studies.design import Solution, Uncertainty
 from chutelab.studies.discharge import SideBySide, stream_at
-from chutelab.studies.measured import Fit, Residuals
 from chutelab.studies.repeats import Repeats
 from chutelab.studies.sweep import COLUMNS, REASON, Sweep, no_column
 from chutelab.studies.sweep.rows import ERROR, RARE, mean_and_error
 from chutelab.theory.discharge import NAMES
 from chutelab.util.arrays import Bools, Floats
-from chutelab.util.tables import many, plus_minus
+from chutelab.util.tables import plus_minus
 from chutelab.util.versions import PACKAGES
 
 BARS = (BLUE, SKY)
@@ -126,7 +116,7 @@ def _searched(solution: Solution) -> Picture:
     best = solution.answer if solution.solved or solution.nearest else None
     if len(keys) > 1:
         known = ax.scatter(points[:, 0], points[:, 1], c=factor * mean[:, 0], cmap=COLORS, s=22.0)
-        figure.colorbar(known, ax=ax, pad=0.02).set_label(label, fontsize=style.NORMAL)
+        style.colour_bar(ax, known, label)
     else:
         look: dict[str, Any] = {"fmt": "o", "ms": 4.0, "color": style.TRACK, "capsize": 2.5}
         ax.errorbar(points[:, 0], factor * mean[:, 0], factor * error[:, 0], **look)
@@ -161,13 +151,7 @@ def repeats(found: Repeats) -> Picture:
         size = 100.0 / abs(one.mean)
         values = size * (found.values[row.name] - one.mean)
         ax.plot(values, np.full(len(values), place), ".", ms=4.0, color=BLUE, alpha=0.45)
-        bar: dict[str, Any] = {
-            "xerr": size * one.error,
-            "fmt": "|",
-            "color": style.INK,
-            "capsize": 3.0,
-        }
-        ax.errorbar(0.0, place, **bar)
+        ax.errorbar(0.0, place, xerr=size * one.error, fmt="|", color=style.INK, capsize=3.0)
     ax.set_yticks(range(len(rows)), [style.plain(row.name) for row, _ in rows])
     ax.tick_params(axis="y", labelsize=style.SMALL)
     ax.set_xscale("symlog", linthresh=1.0)
@@ -215,10 +199,10 @@ def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
     parts["others"] = factor * found.outputs[~np.isin(found.touches, often), row]
     parts = {name: one[np.isfinite(one)] for name, one in parts.items()}
     parts = {name: one for name, one in parts.items() if len(one)}
-    bars: dict[str, Any] = {"bins": 40, "edgecolor": "white", "linewidth": 0.3, "zorder": 3.0}
     ax.hist(
-        list(parts.values()), color=KINDS[: len(parts)], stacked=True,
-        label=[style.plain(shorten(name, 34, placeholder=" …")) for name in parts], **bars,
+        list(parts.values()), 40, color=KINDS[: len(parts)], stacked=True, edgecolor="white",
+        label=[style.plain(shorten(name, 34, placeholder=" …")) for name in parts], lw=0.3,
+        zorder=3.0,
     )  # fmt: skip
     if len(parts) > 1:
         ax.legend(loc="best", fontsize=style.SMALL)
@@ -342,13 +326,11 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
                 first[known], second[known], c=z[known], cmap=COLORS, s=16.0
             )
         else:
-            painted = _draw_heat(ax, first, second, z, swept.columns["impact.count"] == 0.0)
+            painted = draw_heat(ax, first, second, z, swept.columns["impact.count"] == 0.0)
         if known.any():
-            bar = ax.figure.colorbar(painted, ax=ax, pad=0.02)
             if bars is not None and np.isfinite(bars).any():
                 label += f" ± {np.nanmedian(bars):.2g}"
-            bar.set_label(label, fontsize=style.NORMAL)
-            bar.ax.tick_params(labelsize=style.SMALL)
+            style.colour_bar(ax, painted, label)
         return ax
     if sampled:
         ax.errorbar(first, z, bars, fmt="o", ms=3.5, color=style.TRACK, alpha=0.7, capsize=2.5)
@@ -377,7 +359,7 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
     return ax
 
 
-def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> ScalarMappable:
+def draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> ScalarMappable:
     """Draw a heat map; grey where there is nothing to tell, hatched where the plate is missed."""
     (x, across), (y, up) = (np.unique(values, return_inverse=True) for values in (x, y))
     field = np.full((len(y), len(x)), np.nan)
@@ -405,71 +387,6 @@ def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats, missing: Bools) -> Sca
             frameon=False, fontsize=style.SMALL, borderaxespad=0.2,
         )  # fmt: skip
     return mesh
-
-
-PARAMETERS = 6
-"""Fitted parameters that are written into the figure."""
-
-POINTS: dict[str, Any] = {"ls": "none", "marker": "+", "ms": 7.0, "mew": 1.3}
-"""How measured points are drawn."""
-
-
-def measured(found: Residuals, fit: Fit | None = None) -> Picture:
-    """Draw a measured track over the simulation and its analytic parabola, and the residuals.
-
-    With a fit, whose residuals are its `after`, also, dotted, the track that it started from, and
-    the fitted values.
-    """
-    figure = Picture((13.0, 7.6))
-    lines = 0 if fit is None else min(len(fit.parameters), PARAMETERS)
-    top = 0.88 - 0.032 * max(0, lines - 1)
-    ax = figure.add_axes((0.06, 0.08, 0.5, 0.8))
-    recording, position = found.recording, found.track.position
-    window = window_of(recording)
-    far = window.padded(*[FAR] * 4)
-    corners = np.array([[window.left, window.bottom], [window.right, window.top]])
-    style.dress(ax, "x, m", "y, m")
-    shown = far.holds(position)
-    draw_scene(ax, recording.machine, around(np.concatenate([corners, position[shown]])))
-    parts, _ = analytic_of(recording)
-    draw_analytic(ax, parts)
-    before = None if fit is None else fit.before.recording
-    for run, gid, colour, line, label in (
-        (before, "before", style.MUTED, ":", "before the fit"),
-        (recording, "track", style.TRACK, "-", "simulation"),
-    ):
-        if run is not None:
-            path = path_of(run, 0, FINE * float(np.ptp(ax.get_xlim())))
-            ax.plot(*path.T, line, color=colour, lw=1.6, zorder=5.0, gid=gid, label=label)
-    for chosen, colour, label in (
-        (found.used, style.STRIKE, "measured"),
-        (~found.used, style.STEEL, "measured, left out"),
-    ):
-        if chosen.any():
-            points = {**POINTS, "color": colour, "gid": label, "label": label}
-            ax.plot(*position[chosen].T, **points, zorder=8.0)
-    if not shown.all():
-        ax.text(
-            0.5, 0.97, f"{many(int((~shown).sum()), 'point')} outside the picture",
-            transform=ax.transAxes, fontsize=style.NORMAL, color=style.STRIKE,
-            horizontalalignment="center", verticalalignment="top",
-        )  # fmt: skip
-    style.legend_above(ax, 3)
-    grid = figure.add_gridspec(2, 1, left=0.64, right=0.985, top=top, bottom=0.08, hspace=0.3)
-    upper = figure.add_subplot(grid[0])
-    draw_residuals(upper, found, 0)
-    upper.set_xlabel("")
-    draw_residuals(figure.add_subplot(grid[1]), found, 1)
-    figure.headline(0.06, 0.965, found.recording.title, 60)
-    said = [f"{len(found.track)} measured points, nothing fitted"]
-    if fit is not None:
-        fitted = zip(fit.parameters[:PARAMETERS], fit.values, fit.errors, strict=False)
-        said = [
-            f"{one.key} = {plus_minus(x, error)} {one.unit}".rstrip() for one, x, error in fitted
-        ]
-    for i, text in enumerate(said):
-        figure.remark(0.985, 0.965 - 0.032 * i, text, ha="right", va="center")
-    return figure
 
 
 METHOD_COLOURS = (ORANGE, GREEN, VERMILION, PURPLE, GREY)
@@ -524,40 +441,6 @@ def discharge_figure(found: SideBySide) -> Picture:
     said = [f"{name}: {why}" for name, why in found.refused.items()]
     figure.remark(0.04, 0.92, shorten("; ".join(said), 110, placeholder=" …"), va="center")
     return figure
-
-
-def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
-    """Draw measured minus simulated x (axis 0) or y (axis 1) over time, with the impacts."""
-    used = found.used
-    times, values = found.track.t[used], found.values[used, axis]
-    factor, unit = style.scaled(values, "m")
-    name, rms = "xy"[axis], found.rms[axis]
-    style.dress(
-        ax,
-        "time, s",
-        f"residual in {name}, {unit}",
-        f"Measured − simulated {name}: RMS {write_size(rms, 'm')}",
-    )
-    ax.axhspan(-factor * rms, factor * rms, color=style.STEEL_LIGHT, zorder=0.5, gid="rms")
-    ax.axhline(0.0, color=style.TRACK, linewidth=1.6, zorder=2.0)
-    points = {**POINTS, "color": style.STRIKE, "gid": f"residual {name}"}
-    ax.plot(times, factor * values, **points, zorder=3.0)
-    bottom, top = ax.get_ylim()
-    ax.set_ylim(bottom, top + 0.12 * (top - bottom))
-    style.note(ax, "grey: ± RMS")
-    low, high = float(times[0]), float(times[-1])
-    margin = 0.03 * (high - low)
-    ax.set_xlim(low - margin, high + margin)
-    for event in struck_by_nominal(found.recording)[:10]:
-        if low - margin <= event["t"] <= high + margin:
-            ax.axvline(event["t"], color=style.MUTED, linewidth=1.0, linestyle=":", zorder=1.0)
-            ax.annotate(
-                Kind(event["kind"]).name.lower(),
-                (event["t"], 1.0), xycoords=("data", "axes fraction"), xytext=(-3, -3),
-                textcoords="offset points", fontsize=style.SMALL, color=style.MUTED,
-                horizontalalignment="right", verticalalignment="top",
-            )  # fmt: skip
-    return ax
 
 
 WIDTH, PANEL = 8.5, 3.6

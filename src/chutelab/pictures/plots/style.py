@@ -20,6 +20,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ticker import ScalarFormatter
@@ -249,6 +250,13 @@ def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
 def note(ax: Axes, text: str) -> None:
     """Write a remark above axes, at the right."""
     ax.set_title(plain(text), fontsize=SMALL, loc="right", color=colours()["MUTED"])
+
+
+def colour_bar(ax: Axes, drawn: ScalarMappable, label: str) -> None:
+    """Add beside axes what the colours of something drawn on them mean."""
+    bar = ax.figure.canvas.figure.colorbar(drawn, ax=ax, format=Digits(), fraction=0.035, pad=0.02)
+    bar.set_label(label, fontsize=NORMAL)
+    bar.ax.tick_params(labelsize=SMALL)
 
 
 def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> None:

@@ -12,14 +12,14 @@ piece by piece; several keys by a global search with a seed, and a polish.
 
 - `evaluation`: what can be aimed at and varied, the one place where variants are run, and slopes.
 - `roots`: one key: smooth pieces, all roots, all minima.
-- `noisy`: streams, whose numbers differ from seed to seed.
+- `searches`: several keys; streams, whose numbers differ from seed to seed.
 - `answers`: a `Solution`, in numbers and in words.
 - `uncertainty`: how uncertain inputs spread, and which of them matters: an `Uncertainty`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from math import inf, isfinite
@@ -36,7 +36,6 @@ from chutelab.studies.design.answers import Answer, Goal, Solution
 from chutelab.studies.design.evaluation import (
     Evaluator,
     Quantity,
-    Span,
     Stopped,
     measured,
     ranges,
@@ -45,8 +44,16 @@ from chutelab.studies.design.evaluation import (
     value,
 )
 from chutelab.studies.design.evaluation import target as wish
-from chutelab.studies.design.noisy import Found, Wishes, search, spreads_of
 from chutelab.studies.design.roots import CLOSE, Scan, level, minima
+from chutelab.studies.design.searches import (
+    KEPT,
+    Found,
+    Wishes,
+    constrained,
+    least,
+    search,
+    spreads_of,
+)
 from chutelab.studies.design.uncertainty import Uncertainty, uncertainty
 from chutelab.studies.sweep import Crew, crew
 from chutelab.util.arrays import Floats, Progress
@@ -67,127 +74,6 @@ __all__ = [
     "value",
 ]
 
-NOWHERE: Final = 1e30
-"""Stands for a variant without the quantity: worse than any other, but a number still."""
-
-POPULATION: Final = 12
-"""Variants of a generation per key: enough to find a basin of a few per cent of the range."""
-
-GENERATIONS: Final = 60
-"""At most; the polish does the last digits."""
-
-SIMPLEX: Final = {"xatol": 1e-12, "fatol": 1e-15, "maxiter": 600, "adaptive": True}
-
-
-def within(ranges: Sequence[Span], shares: Floats) -> Floats:
-    """Return points (N, K) of ranges at shares of their widths."""
-    low, high = np.array([(one.low, one.high) for one in ranges]).T
-    # low + share * width may pass the end by a rounding, which a scene would refuse.
-    return np.asarray(np.clip(low + shares * (high - low), low, high))
-
-
-def global_least(function: Callable[[Floats], Floats], keys: int, seed: int) -> Any:
-    """Search all of a unit cube for the least value of a function of columns, (K, N) to (N,)."""
-    return scipy("optimize").differential_evolution(
-        function, [(0.0, 1.0)] * keys, seed=seed, popsize=POPULATION, maxiter=GENERATIONS,
-        tol=1e-8, atol=1e-12, init="sobol", polish=False, vectorized=True, updating="deferred",
-    )  # fmt: skip
-
-
-def least(
-    function: Callable[[Floats], Floats], ranges: Sequence[Span], seed: int, *, squares: bool
-) -> tuple[Floats, float]:
-    """Return where a function of several keys is least, shape (K,), and how much it is.
-
-    It takes points (N, K) and gives (N, 1), NaN where there is no value. With `squares` it gives
-    (N, R), and what is least is the sum of their squares: the polish then is a least-squares one,
-    which gets to the last digits.
-    """
-    optimize = scipy("optimize")
-
-    def scaled(shares: Floats) -> Floats:
-        return within(ranges, shares)
-
-    def values(columns: Floats) -> Floats:
-        found = function(scaled(np.atleast_2d(columns.T)))
-        found = np.sum(found**2, axis=1) if squares else found[:, 0]
-        return np.where(np.isfinite(found), found, NOWHERE)
-
-    searched = global_least(values, len(ranges), seed)
-    if searched.fun >= NOWHERE:
-        return searched.x, np.nan
-    if squares:
-        polished = optimize.least_squares(
-            lambda point: np.nan_to_num(function(scaled(point[np.newaxis]))[0], nan=1e6),
-            searched.x, bounds=(0.0, 1.0), xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale=1.0,
-            jac="3-point", diff_step=1e-6, max_nfev=60,
-        )  # fmt: skip
-    else:
-        polished = optimize.minimize(
-            lambda point: float(values(point)[0]), searched.x, method="Nelder-Mead",
-            bounds=[(0.0, 1.0)] * len(ranges), options=SIMPLEX,
-        )  # fmt: skip
-    at = np.clip(polished.x, 0.0, 1.0)
-    value = float(values(at)[0])
-    if value < searched.fun:
-        return scaled(at), value
-    return scaled(searched.x), float(searched.fun)
-
-
-def constrained(
-    columns: Callable[[Floats], Floats], wishes: Wishes, ranges: Sequence[Span], seed: int
-) -> tuple[Floats, float]:
-    """Return where wishes come true that are more than one, (K,), and by how much they do not.
-
-    `columns` takes points (N, K) and gives what `Wishes.columns` does. A global search with
-    penalties is polished by sequential quadratic programming.
-    """
-    optimize = scipy("optimize")
-
-    def scaled(shares: Floats) -> Floats:
-        return within(ranges, shares)
-
-    spread = scipy("stats.qmc").Sobol(len(ranges), seed=seed).random_base2(6)
-    sizes = spreads_of(columns(scaled(spread)))
-
-    def merit(shares: Floats) -> Floats:
-        found = wishes.merit(columns(scaled(np.atleast_2d(shares.T))), sizes)
-        return np.where(np.isfinite(found), found, NOWHERE)
-
-    searched = global_least(merit, len(ranges), seed)
-    if searched.fun >= NOWHERE:
-        return searched.x, np.nan
-    count = len(wishes.targets)
-
-    def part(start: int, stop: int) -> Callable[[Floats], Floats]:
-        def of(shares: Floats) -> Floats:
-            found = columns(scaled(shares[np.newaxis]))[0] / sizes
-            return np.asarray(np.nan_to_num(found[start:stop], nan=NOWHERE))
-
-        return of
-
-    rules = [{"type": "eq", "fun": part(0, count)}] * bool(count)
-    rules += [{"type": "ineq", "fun": part(count, count + len(wishes.limits))}] * bool(
-        wishes.limits
-    )
-    least_of = part(-2, -1)
-    polished = optimize.minimize(
-        lambda shares: float(least_of(shares)[0]) if wishes.objective is not None else 0.0,
-        searched.x, method="SLSQP", bounds=[(0.0, 1.0)] * len(ranges), constraints=rules,
-        options={"ftol": 1e-14, "eps": 1e-7, "maxiter": 200},
-    )  # fmt: skip
-    # What is kept to a rounding is kept; of two points that do, the lower one counts.
-    tried = np.stack([np.clip(polished.x, 0.0, 1.0), searched.x])
-    found = columns(scaled(tried))
-    missed = wishes.missed(found, sizes).max(axis=-1)
-    best = int(np.argmin(np.where(missed <= KEPT, wishes.merit(found, sizes), np.inf)))
-    if missed[best] > KEPT:
-        best = int(np.argmin(np.nan_to_num(missed, nan=np.inf)))
-    return scaled(tried[best]), float(missed[best])
-
-
-KEPT: Final = 1e-6
-"""Miss of a target or limit, in its spread over the range, that is none."""
 
 REPEAT: Final = 8
 """Seeds of a search among streams whose particles meet."""

@@ -42,7 +42,7 @@ from chutelab.scene.variants import (
     varied,
 )
 from chutelab.studies.sweep import Crew
-from chutelab.studies.sweep.plan import Block, runs
+from chutelab.studies.sweep.plan import Block, are_family, runs
 from chutelab.studies.sweep.rows import touches
 from chutelab.util.arrays import Bools, Floats, Ints, Progress
 from chutelab.util.errors import InputError
@@ -82,13 +82,16 @@ LONGEST: Final = 6
 
 
 def courses_of(recording: Recording) -> list[str]:
-    """Return the surfaces that each particle touches up to its landing.
+    """Return the surfaces that particle 0 of each variant touches up to its landing.
 
     Such as ``plate, outgoing``, or ``plate, never lands (exit)``.
     """
-    touched: list[list[int]] = [[] for _ in range(recording.count)]
-    landed = [False] * recording.count
+    each = recording.count // recording.variants
+    touched: list[list[int]] = [[] for _ in range(recording.variants)]
+    landed = [False] * recording.variants
     events = recording.select(Kind.IMPACT, Kind.LANDING)
+    events = events[events["particle"] % each == 0]
+    events["particle"] //= each
     columns = (events[name].tolist() for name in ("particle", "surface", "kind"))
     for particle, surface, kind in zip(*columns, strict=True):
         if not landed[particle]:
@@ -109,7 +112,7 @@ def courses_of(recording: Recording) -> list[str]:
 
     ends = [
         "" if down else f"never lands ({REASONS[reason]})"
-        for down, reason in zip(landed, recording.ended.tolist(), strict=True)
+        for down, reason in zip(landed, recording.ended[::each].tolist(), strict=True)
     ]
     return [course(tuple(one), end) for one, end in zip(touched, ends, strict=True)]
 
@@ -131,7 +134,7 @@ class Quantity:
         value: Any = self.number
         if self.source == "scene":
             family = recording.family if is_plain(self.key) else None
-            value = family.at(self.key) if family else value_at(recording.scene, self.key)
+            value = family.firsts.at(self.key) if family else value_at(recording.scene, self.key)
             return nan if value is None or value is MISSING or isinstance(value, str) else value
         if self.source == "run":
             value = read(recording, self.key)
@@ -297,7 +300,7 @@ def carried_out(task: Task) -> list[tuple[Ints, Floats, list[str], str, NDArray[
             continue
         for column, wanted in enumerate(task.quantities):
             nothing[:, column] = wanted.of(one)
-        found.append((rows, nothing, courses_of(one)[: len(rows)], "", touches(one, len(rows))))
+        found.append((rows, nothing, courses_of(one), "", touches(one, len(rows))))
     return found
 
 
@@ -352,7 +355,8 @@ class Evaluator:
     @property
     def size(self) -> int:
         """Variants of a task: one where each may take long and others could do it meanwhile."""
-        return BLOCK if self.scene.count == 1 else 1
+        together = are_family(self.scene, self.keys, None)
+        return max(1, BLOCK // self.scene.count) if together or self.scene.count == 1 else 1
 
     def seeds(self, points: Floats, count: int) -> Floats:
         """Run variants at points (N, K) with `count` seeds, the same for all; values (N, S, M).

@@ -235,6 +235,21 @@ class Problem:
         moved[k] = np.clip(values[k] + step, self.parameters[k].low, self.parameters[k].high)
         return moved
 
+    def elsewhere(self, values: Floats) -> Floats | None:
+        """Return values with a smaller sum of squares, found by changing one at a time, or None.
+
+        Where the order of events changes, one bounce more before an edge, the sum of squares jumps,
+        and a descent does not get over it.
+        """
+        least, best = float(np.sum(self.tried(values) ** 2)), None
+        for k, size in enumerate(self.sizes):
+            for part in np.linspace(-1.0, 1.0, SEARCHED):
+                other = self.moved(values, k, part * size)
+                cost = float(np.sum(self.tried(other) ** 2))
+                if cost < least * (1.0 - 1e-6):
+                    least, best = cost, other
+        return best
+
 
 def without_effect(derivatives: Floats, parameters: Sequence[Parameter]) -> list[str]:
     """Say which parameters do not move the points at all; see `Problem.derivatives`."""
@@ -324,7 +339,7 @@ def fit(scene: AnyScene, track: Track, keys: Sequence[str], *, robust: bool = Fa
     for _ in range(ROUNDS):
         if not result.alike(problem.residuals(best.values)):
             break
-        other = _elsewhere(problem, best.values)
+        other = problem.elsewhere(best.values)
         found = None if other is None else _descended(problem, other, robust=robust)
         if found is None or found.cost >= best.cost or found.used.sum() < KEPT * best.used.sum():
             problem.use(best.used)
@@ -385,22 +400,6 @@ def _descended(problem: Problem, values: Floats, *, robust: bool) -> _Minimum | 
             break
         used = within
     return _Minimum(values, problem.used, float(np.mean(left**2)), threshold, settled)
-
-
-def _elsewhere(problem: Problem, values: Floats) -> Floats | None:
-    """Return values with a smaller sum of squares, found by changing one at a time, or None.
-
-    Where the order of events changes, one bounce more before an edge, the sum of squares jumps, and
-    a descent does not get over it.
-    """
-    least, best = float(np.sum(problem.tried(values) ** 2)), None
-    for k, size in enumerate(problem.sizes):
-        for part in np.linspace(-1.0, 1.0, SEARCHED):
-            other = problem.moved(values, k, part * size)
-            cost = float(np.sum(problem.tried(other) ** 2))
-            if cost < least * (1.0 - 1e-6):
-                least, best = cost, other
-    return best
 
 
 def _judged(problem: Problem, best: _Minimum, before: Residuals, *, robust: bool) -> Fit:

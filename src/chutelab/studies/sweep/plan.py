@@ -52,7 +52,7 @@ MOST_KEYS: Final = 20
 """Keys varied at once."""
 
 TOGETHER: Final = 8192
-"""Variants in a block that goes through the exact engine at once."""
+"""Particles of the variants in a block that goes through the exact engine at once."""
 
 EXACT: Final = 16
 """The same of variants that go one by one, a millisecond each."""
@@ -117,34 +117,27 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
 def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording | str]]:
     """Run the variants of a block: many at once where that can be, else one by one.
 
-    Many at once, a variant is a particle with a machine of its own; numbers agree with those of the
-    variant alone to 1e-12. `apart` has all of them run one by one.
+    Many at once, a particle has a machine of its own; numbers agree with those of the variant alone
+    to 1e-12. `apart` has all of them run one by one.
 
     Yields
     ------
     which, found
         Rows of the block, (N,), and their recording, which breaks no law: of one variant, or of a
-        family with a particle for each. Or, as text, why they have none.
+        family. Or, as text, why they have none.
     """
     which = np.arange(len(block.values))
     template = None
     if not apart and all(map(is_plain, block.paths)):
         template, which, faults = screened(block)
         yield from ((np.array([row]), one_line(why)) for row, why in faults.items())
-    stepped = (block.engine or block.scene.run.engine) in ("contact", "pymunk")
-    stepped |= block.scene.run.loads is not None
-    stepped |= bool(block.scene.joints) or any(kind.outline for kind in block.scene.particles)
-    stepped |= block.scene.clings or block.scene.air_density > 0.0 or block.scene.gravity_deg != 0.0
-    stepped |= not {"air_density", "gravity_deg"}.isdisjoint(block.paths)
-    stepped |= bool(block.scene.movers or block.scene.triggers or block.scene.one_sided) or any(
-        {"turn", "shake", "travel"} & {*path.split(".")} for path in block.paths
-    )
     groups: list[Ints] = []
-    if template is not None and not (stepped or template.count > 1):
+    if template is not None and are_family(template, block.paths, block.engine):
+        each = template.count
 
         def built(some: Ints) -> Machine:
-            columns = block.values[some].T.copy()
-            return build(Family(template, dict(zip(block.paths, columns, strict=True))))
+            columns = block.values[some].repeat(each, axis=0).T.copy()
+            return build(Family(template, dict(zip(block.paths, columns, strict=True)), each))
 
         while len(which) and not groups:
             try:
@@ -159,7 +152,7 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
     while groups:
         which = groups.pop()
         with suppress(CornerError, StalledError):
-            some = machine if len(which) == machine.count else built(which)
+            some = machine if each * len(which) == machine.count else built(which)
             recording = Recording.of(run(some, apart=True))
             if not recording.laws:
                 yield which, recording
@@ -174,6 +167,24 @@ def runs(block: Block, *, apart: bool = False) -> Iterator[tuple[Ints, Recording
         except SceneError as error:
             found = one_line(reason(error))
         yield np.array([row]), found
+
+
+STEPPED_KEYS: Final = {"air_density", "gravity_deg", "turn", "shake", "travel", "count"}
+"""Parts of keys that no family varies: they are the contact engine's, or the number of particles
+is."""
+
+
+def are_family(scene: Scene, paths: Sequence[str], engine: str | None) -> bool:
+    """Tell whether scenes that differ in some plain numbers go through the exact engine at once.
+
+    Their particles meet no other, and where they are several all are of one kind.
+    """
+    stepped = scene.crowded or scene.clings or scene.air_density > 0.0 or scene.gravity_deg != 0.0
+    stepped |= (engine or scene.run.engine) in ("contact", "pymunk")
+    stepped |= bool(scene.joints or scene.movers or scene.triggers or scene.one_sided)
+    stepped |= scene.run.loads is not None or any(kind.outline for kind in scene.particles)
+    stepped |= scene.count > 1 and len(scene.particles) > 1
+    return not (stepped or any(STEPPED_KEYS & {*path.split(".")} for path in paths))
 
 
 def alone(scene: Scene, engine: str | None = None) -> Recording | str:
@@ -248,14 +259,15 @@ class Plan:
     @property
     def begins(self) -> range:
         """The numbers that blocks begin with; they depend on the plan only, so it can resume."""
-        stream = self.scene.stream
+        stream, paths = self.scene.stream, [quantity.path for quantity in self.quantities]
         one = stream.count == 1 and "stream.count" not in self.keys
         wanted = self.engine or self.scene.run.engine
         if wanted in ("contact", "pymunk") or (stream.interact and not one):
             size = STEPPED
+        elif all(map(is_plain, paths)) and are_family(self.scene, paths, self.engine):
+            size = max(EXACT, TOGETHER // self.scene.count)
         else:
-            plain = all(is_plain(quantity.path) for quantity in self.quantities)
-            size = TOGETHER if one and plain else EXACT
+            size = EXACT
         return range(0, self.count, size)
 
     def block(self, first: int, last: int) -> Block:

@@ -1,9 +1,8 @@
 """The rows of a sweep: what each holds, how it is read off a recording, their table and its files.
 
-A recording is of one variant with all its particles, or of many variants, each of which is one
-particle with a machine of its own: V variants of M particles, where V or M is 1. Both go through
-the same operations, so that a row does not depend on which it came from. Files hold text that gives
-every bit back, in CSV or Parquet, and are written whole or not at all.
+A recording is of one variant with all its particles, or of a family of many: V variants of M
+particles. Both go through the same operations, so that a row does not depend on which it came from.
+Files hold text that gives every bit back, in CSV or Parquet, and are written whole or not at all.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final
@@ -22,6 +21,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chutelab.machine import build
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals, fates
 from chutelab.results.quantities import measured
@@ -139,10 +139,7 @@ FATES = {
 
 
 def rows(recording: Recording, variants: int = 1) -> Columns:
-    """Return the rows of the variants of a recording: of one, or of a family of `variants`.
-
-    Those are as many as there are particles then, each on a machine of its own.
-    """
+    """Return the rows of the variants of a recording: of one, or of a family of `variants`."""
     found, scene = empty(variants), recording.scene
     for name in found:
         if name in COLUMNS and lookup(name, scene.places):
@@ -158,8 +155,8 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
         restless[:] = False
     for row in np.flatnonzero((missed | restless).any(axis=1)).tolist():
         fate = FATES.get(REASONS[ended[row, 0]])
-        if every > 1 and missed[row].any():  # A recording is of one variant then.
-            fate = told_fates(Counter(fates(recording)[missed[row]].tolist()))
+        if every > 1 and missed[row].any():
+            fate = told_fates(Counter(fates(member(recording, row))[missed[row]].tolist()))
         found[REASON][row] = "; ".join(
             f"{f'{some.sum()} of {every} particles' if every > 1 else 'it'} {what}"
             for some, what in (
@@ -172,6 +169,26 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
             if some.any()
         )
     return found
+
+
+def member(recording: Recording, row: int) -> Recording:
+    """Return the recording of one of its variants."""
+    if (family := recording.family) is None:
+        return recording
+    first, last = row * family.each, (row + 1) * family.each
+    offsets = recording.offsets[first : last + 1]
+    events = recording.events[recording.events["particle"] // family.each == row]
+    events["particle"] -= first
+    values = {key: numbers[first].item() for key, numbers in family.columns.items()}
+    return replace(
+        recording,
+        machine=build(family.scene.with_values(values)),
+        knots=recording.knots[offsets[0] : offsets[-1]],
+        offsets=offsets - offsets[0],
+        ended=recording.ended[first:last],
+        events=events,
+        by_surface=recording.by_surface[first:last].sum(axis=0),
+    )
 
 
 LONGEST: Final = 6

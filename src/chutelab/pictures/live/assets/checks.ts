@@ -163,7 +163,7 @@ export function* conflictsOf(scene: Scene, given: Given, lab: Lab): Generator<Wr
   yield* motionConflicts(scene, given);
   yield* jointConflicts(scene, given);
   yield* corneredConflicts(scene, given);
-  for (const n of scene.streams.keys()) yield* rateConflicts(scene, given, n);
+  for (const n of scene.streams.keys()) yield* streamConflicts(scene, given, n);
   const counts = scene.streams.map(({ count }) => count);
   const most = scene.most;
   if (counts.reduce((sum, count) => sum + count, 0) > most) {
@@ -288,13 +288,9 @@ function* jointConflicts(scene: Scene, given: Given): Generator<Wrong> {
 
 /** Yields what the contact engine does not have with boxes and polygons. */
 function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
-  const { particles, run, joints, incoming, pair } = scene, text = "cornered";
+  const { particles, run, incoming, pair } = scene, text = "cornered";
   if (!particles.some(({ outline }) => outline.length)) return;
   if (run.engine === "exact") yield ["run.engine", run.engine, "not-exact"];
-  if (joints.length) {
-    yield [run.engine === "contact" ? "run.engine" : `${joints[0].kind}[0].particle`,
-      joints[0].particle, text];
-  }
   for (const [n, { outline, rolling_friction: rolls, points }] of particles.entries()) {
     if (outline.length && rolls) yield [pathOf(given, "particle", n, "rolling_friction"), rolls, text];
     if (points && !isConvex(points)) yield [pathOf(given, "particle", n, "points"), points, "convex"];
@@ -305,8 +301,7 @@ function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
       yield [pathOf(given, "stream", n, "width"), particle, "other-shape"];
     }
   }
-  const movers = moversOf(scene).some(([, { hinge }]) => hinge);
-  if (movers || scene.surface.some(({ passes }) => passes)) yield ["run.engine", run.engine, text];
+  if (scene.surface.some(({ passes }) => passes)) yield ["run.engine", run.engine, text];
   if (incoming?.friction === "adhesion") yield ["incoming.friction", "adhesion", "cornered-grip"];
   if (scene.air_density) yield ["air_density", scene.air_density, text];
   const clings = pair.findIndex(clinging);
@@ -360,10 +355,12 @@ function* contradictions(scene: Scene, given: Given, { rules }: Lab): Generator<
 }
 
 /** @param n of the stream */
-function* rateConflicts(scene: Scene, given: Given, n: number): Generator<Wrong> {
-  const stream = scene.streams[n];
+function* streamConflicts(scene: Scene, given: Given, n: number): Generator<Wrong> {
+  const stream = scene.streams[n], { outline, spin } = scene.particles[scene.kinds[n]];
   const path = (key: string) => pathOf(given, "stream", n, key);
   if (!Number.isFinite(stream.rate)) yield [path("rate"), stream.given.rate, "form"];
+  if (stream.omega && !spin) yield [path("omega"), stream.omega, "needs-spin"];
+  if (stream.angle_deg && !outline.length) yield [path("angle_deg"), stream.angle_deg, "other-shape"];
   const size = 2.0 * scene.particles[scene.kinds[n]].radius;
   if (stream.width !== undefined && stream.width < size) {
     yield [path("width"), stream.width, "range", { low: size, high: 1e6 }];

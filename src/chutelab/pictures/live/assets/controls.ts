@@ -134,7 +134,7 @@ function still({ given }: any, table: string): string[] {
 }
 
 /** Keys that say nothing as the others are. */
-function idle({ incoming, particles }: Scene, table: string, row: any): string[] {
+function idle({ incoming, particles, streams, kinds }: Scene, table: string, row: any): string[] {
   const moves = table === "surface" || table === "plate" ? still(row, table) : [];
   if (table === "surface") {
     return [...moves, ...row.center ? ["from", "to", "points"]
@@ -145,6 +145,7 @@ function idle({ incoming, particles }: Scene, table: string, row: any): string[]
   }
   if (table === "stream") {
     return [...(row.count === 1 ? ["rate", "width", "bed_height", "speed_spread", "seed"] : []),
+      ...(particles[kinds[streams.indexOf(row)]].outline.length ? [] : ["angle_deg"]),
       ...(row.interact ? [] : ["restitution", "friction"]), ...(row.to ? ["bed_height"] : []),
       ...(row.fill ? ["at", "to", "rate", "bed_height", "speed_spread"] : []),
       ...(incoming || row.at ? [] : ["at", "to"]), ...(row.at || row.fill ? [] : ["to"])];

@@ -214,7 +214,7 @@ class Core extends Memory {
         spin: machine.spins?.[i] ?? one.omega, release: one.t,
         radius: machine.radius[i], mass: machine.mass[i], inertia: machine.inertia[i],
         kind: one.kind, rides: Number(one.carried), goes_on: Number(machine.goesOn?.[i] ?? false),
-        exit_box: one.exitBox, turned: machine.angles?.[i] ?? 0,
+        exit_box: one.exitBox, turned: machine.angles?.[i] ?? one.angle,
         corners: outlines[one.kind].length, outline: firsts[one.kind],
       });
     });

@@ -212,9 +212,9 @@ class Track {
     return points;
   }
 
-  /** By how much it has turned since its release, counterclockwise, rad. */
+  /** By how much it is turned, from as it is written, counterclockwise, rad. */
   angle(t: number) {
-    if (!this.count || t <= this.begin) return 0;
+    if (!this.count || t <= this.begin) return this.count && this.tells ? this.at(0, ANGLE) : 0;
     const i = t >= this.end ? this.count - 1 : this.knotBefore(t);
     if (this.tells) return this.told(t, i);
     for (let n = this.turns.length; n < this.count; n += 1) {

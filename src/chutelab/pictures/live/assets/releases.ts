@@ -11,6 +11,7 @@ export interface Release {
   vy: number;
   exitBox: number[]; // left, bottom, right, top beyond which it has left the scene, m
   omega: number; // rad/s
+  angle: number; // rad
   carried: boolean; // rides the incoming belt by adhesion
   stream: number;
   kind: number;
@@ -46,7 +47,7 @@ export function draw(scene: Scene, names: string[]): { releases: Release[], radi
       releases.push({
         t: doubles[at], x: doubles[at + 1], y: doubles[at + 2], vx: doubles[at + 3],
         vy: doubles[at + 4], exitBox: [...doubles.subarray(at + 6, at + 10)],
-        omega: doubles[at + 10], ...common,
+        omega: doubles[at + 10], angle: doubles[at + 11], ...common,
       });
       radius.push(doubles[at + 5]);
     }

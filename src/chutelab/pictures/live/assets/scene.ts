@@ -58,6 +58,7 @@ interface Stream {
   fill?: [Point, Point];
   velocity?: Point;
   omega: number;
+  angle_deg: number;
   interact: boolean;
   restitution: number;
   friction: number;

@@ -335,7 +335,7 @@ def apart(one, other):
 
 
 def poured(count, until):
-    """Return a run of boxes that are poured into a bin, and half of a box's and of the bin's width."""
+    """Return a run of boxes poured into a bin, and half of a box's and of the bin's width."""
     half, wide = 0.009, 0.1 * max(count / 60.0, 1.0) ** 0.5
     walls = [("left", [[-wide, 0.0], [-wide, 5.0]]), ("right", [[wide, 0.0], [wide, 5.0]]),
              ("floor", [[-wide, 0.0], [wide, 0.0]])]  # fmt: skip

@@ -81,7 +81,7 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough) {
     double first = INFINITY;
-    int driven = 0, pressing = 0, lessened = 0;
+    int driven = 0, pressing = 0, lessened = 0, fine = accurate < W.accurate;
     if (W.swings_too) {
         sweep_hung(list, count, MAX(rounds, 1) * sweeps, enough);
         return;
@@ -106,7 +106,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
             if (ended && more < 2) break;
             if (ended) accurate *= 0.1;
             if (change < INFINITY) worst = pressing ? MAX(left_open(), change) : left_open();
-            if (worst <= enough && !(accurate < W.accurate && more > 1)) break;
+            if (worst <= enough && !(fine && more > 1)) break;
             if (change < INFINITY && more > 1) {
                 if (more-- == rounds) first = change;
                 continue;

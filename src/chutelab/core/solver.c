@@ -27,6 +27,8 @@
 #define CRAWLS 0.5
 /* m/s on Earth; changes at which sweeps over a few contacts of what has corners end. */
 #define FINE_CORNERS 1e-11
+/* ... and over many, of those of disks: a pile of boxes hangs together by more, and else does not come to rest. */
+#define CROWD_CORNERS 0.03
 /* Share of its bound up to which friction is not all used: it holds. */
 #define HOLDS 0.999
 
@@ -103,7 +105,7 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
         if (left == 0) break;
         int stalled = driven && change < INFINITY && stall(list, count, INFINITY, enough);
         if (!stalled) {
-            if (ended && more < 2) break;
+            if (ended && (more < 2 || fine)) break;
             if (ended) accurate *= 0.1;
             if (change < INFINITY) worst = pressing ? MAX(left_open(), change) : left_open();
             if (worst <= enough && !(fine && more > 1)) break;
@@ -264,7 +266,8 @@ void solve_contacts(int again) {
             W.contacts[n].gives /= heaviest;
             if (!driven) W.contacts[n].parts = INFINITY;
         }
-        double accurate = cornered && to - from <= FEW_CONTACTS ? FINE_CORNERS * W.pace : W.accurate;
+        double accurate = W.accurate;
+        if (cornered) accurate = to - from <= FEW_CONTACTS ? FINE_CORNERS * W.pace : CROWD_CORNERS * accurate;
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,
                            PLAIN, accurate, W.skip * least);

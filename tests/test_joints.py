@@ -194,6 +194,98 @@ def test_two_balls_on_one_string_snap_to_one_speed_along_it():
     assert record.by_surface[-1, 1] == pytest.approx(0.1 * (0.5 - 2.0 * 0.125), rel=1e-12)
 
 
+# Over a pulley
+
+
+def atwood(until, heavy, light, places, dt=1e-3, *, down=0.0, **tables):
+    """Two balls that pass each other on a string over the origin, the second let go downwards."""
+    kinds = [{"name": name, "radius": 0.01, "mass": m} for name, m in (("a", heavy), ("b", light))]
+    return simulate({
+        "particle": kinds, "pair": [{"between": ["a", "b"], "meet": False}],
+        "stream": [{"particle": kind, "at": at, "velocity": [0.0, -speed], "interact": True}
+                   for kind, at, speed in zip("ab", places, (0.0, down), strict=True)],
+        "string": [{"other": 1, "over": [0.0, 0.0]}],
+        "run": {"until": until, "dt": dt, **tables.pop("run", {})}, **tables,
+    })  # fmt: skip
+
+
+def test_atwoods_machine_falls_as_it_should_and_bears_what_its_string_does_not():
+    # a = g (m1 - m2)/(m1 + m2); at rest on a floor, that bears m1 g - T with T = m2 g.
+    heavy, light = 0.3, 0.2
+    a = G * (heavy - light) / (heavy + light)
+    run = atwood(0.5, heavy, light, ([0.0, -1.0], [0.0, -1.3]))
+    last = run.ends()[1]
+    assert last["velocity"][:, 1] == pytest.approx([-0.5 * a, 0.5 * a], rel=1e-9)
+    fell = 0.5 * a * 0.5**2
+    assert last["position"] == pytest.approx(np.array([(0, -1 - fell), (0, -1.3 + fell)]), abs=1e-9)
+    assert ledger_closes(run)
+    floor = [{"name": "floor", "from": [-0.1, -1.01], "to": [0.1, -1.01]}]
+    run = atwood(1.0, heavy, light, ([0.0, -1.0], [0.0, -1.3]), surface=floor, run={"loads": 1.0})
+    assert run.impulses["force"][0, 0] == pytest.approx([0.0, -(heavy - light) * G], rel=5e-6)
+    assert ledger_closes(run)
+
+
+def swinging(until, dt):
+    """Run an Atwood's machine of which the lighter ball swings; both of its ways, m, at knots."""
+    run = atwood(until, 2.0, 1.0, ([-0.3, -2.0], [0.8, -1.0]), dt)
+    one, other = run.track(0), run.track(1)
+    _, i, j = np.intersect1d(one["t"], other["t"], return_indices=True)
+    return run, np.hypot(*one["position"][i].T), np.hypot(*other["position"][j].T)
+
+
+def test_a_ball_that_swings_on_atwoods_machine_goes_as_its_equations_say():
+    """By Lagrange's in polar coordinates about the pulley, r and l - r, angles from below."""
+    m1, m2 = 2.0, 1.0
+    x = np.array([-0.3, 0.8]), np.array([-2.0, -1.0])
+    (r1, r2), (p, q) = np.hypot(*x), np.arctan2(x[0], -x[1])
+    whole = r1 + r2
+
+    def change(_, state):
+        r, p, q, v, u, w = state
+        s = whole - r
+        pull = m1 * (r * u * u + G * cos(p)) - m2 * (s * w * w + G * cos(q))
+        return (v, u, w, pull / (m1 + m2), (-G * sin(p) - 2.0 * v * u) / r,
+                (-G * sin(q) + 2.0 * v * w) / s)  # fmt: skip
+
+    r, p, q = solve_ivp(change, (0.0, 1.0), (r1, p, q, 0.0, 0.0, 0.0), rtol=1e-12,
+                        atol=1e-12).y[:3, -1]  # fmt: skip
+    exact = np.array([(r * sin(p), -r * cos(p)), ((whole - r) * sin(q), -(whole - r) * cos(q))])
+    errors = []
+    for dt in (2e-3, 1e-3):
+        run = swinging(1.0, dt)[0]
+        errors.append(np.abs(run.ends()[1]["position"] - exact).max())
+        assert ledger_closes(run)
+    assert errors[1] < 1e-5
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.slow
+def test_after_a_hundred_seconds_a_string_over_a_pulley_is_as_long():
+    run, one, other = swinging(100.0, 1e-3)
+    assert len(one) > 40
+    assert np.abs(one + other - one[0] - other[0]).max() < 1e-9
+    assert abs(run.ledger.residual) < 1e-11 * run.ledger.turned_over
+    assert abs(run.ledger.restitution_loss) < 1e-9
+
+
+def test_what_is_pulled_tight_over_a_pulley_shares_its_speed():
+    """Nothing weighs; one flies off with 1 m/s: tight, both have m2/(m1 + m2) of it along it."""
+    run = atwood(0.5, 0.2, 0.3, ([-0.3, -0.4], [0.0, -0.9]), gravity=0.0, down=1.0,
+                 string=[{"other": 1, "over": [0.0, 0.0], "length": 1.6}])  # fmt: skip
+    last, way = run.ends()[1], np.array([0.6, 0.8])
+    assert last["velocity"] == pytest.approx(np.array([0.6 * way, (0.0, -0.6)]), rel=1e-12)
+    assert last["position"][1] == pytest.approx([0.0, -1.1 - 0.3 * 0.6], rel=1e-12)
+    assert run.ledger.restitution_loss == pytest.approx(0.15 - 0.25 * 0.36, rel=1e-12)
+    assert ledger_closes(run)
+
+
+def test_pymunk_has_no_string_over_a_pulley():
+    with pytest.raises(SceneError, match="no string over a pulley"):
+        atwood(1.0, 0.3, 0.2, ([0.0, -1.0], [0.0, -1.3]), run={"engine": "pymunk"})
+    with pytest.raises(SceneError, match="a pulley"):
+        simulate(atwood(0.1, 0.3, 0.2, ([0.0, -1.0], [0.0, -1.3])).machine.scene, engine="pymunk")
+
+
 # Blows
 
 

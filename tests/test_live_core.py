@@ -127,6 +127,11 @@ def test_what_hangs_on_joints_moves_as_in_python():
     long = [{**above, "length": 0.6}]
     pins = [{"from": [0.0, 0.24], "particle": 0}, {"from": [0.1, 0.2], "particle": 3, "other": 5}]
     scenes += [from_dict({**crowd, "pin": pins}), from_dict({**BALL, "string": long})]
+    over = [{"particle": 1, "other": 4, "over": [0.0, 0.6]}]
+    scenes += [
+        from_dict({**crowd, "string": over}),
+        from_dict({**crowd, "string": [{**over[0], "length": 1.2}]}),
+    ]
     boxes = {**crowd, "particle": CORNERED[0]}
     scenes += [from_dict({**boxes, **joints}) for joints in ({"rod": apart}, {"pin": pins})]
     same_runs([load("cradle"), *scenes])
@@ -137,6 +142,7 @@ def test_what_hangs_on_joints_moves_as_in_python():
         ("pin", {**above, "other": 0}, "pin[0].other"),
         ("rod", {**above, "other": 0}, "rod[0].other"),
         ("string", {}, "string[0].from"),
+        ("string", {**above, "over": [0.0, 0.5]}, "string[0].over"),
         ("spring", above, "spring[0].stiffness"),
     ):
         answer = ask("bits.mjs", {"lab": lab, "scenes": [{**BALL, table: [row]}]})["scenes"][0]

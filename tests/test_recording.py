@@ -15,7 +15,7 @@ from chutelab import machine, scene
 from chutelab.engines import contact, exact
 from chutelab.engines.simulation import choose
 from chutelab.machine import Particle
-from chutelab.results import ENTRIES, Kind
+from chutelab.results import ENTRIES, KNOT, Kind, record
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import Recorder
 from chutelab.util.errors import InputError
@@ -388,6 +388,17 @@ def test_the_energy_of_a_crowd_is_that_of_its_steps_and_closes_at_any_time(name)
     # Tracks alone, as in a file of before, are less near.
     tracks = replace(run, totals=totals[:0]).energy_at(times)["residual"]
     assert np.abs(tracks).max() > 1e-8 * size
+
+
+@pytest.mark.parametrize("apart", [1e-17, 3e-17, 1e-13, 0.1])
+def test_a_velocity_between_two_knots_is_between_theirs_however_near_they_are(apart):
+    """In 3e-17 s nothing goes further than a place at 1 m is rounded: 2e-16 m, or 7 m/s."""
+    knots = np.zeros(2, KNOT)
+    knots["t"], knots["position"][:, 0] = [0.0, apart], [1.0, 1.0 + 2.0 * apart]
+    knots["velocity"][:, 0] = [2.0, 2.0]
+    share = np.linspace(0.1, 0.9, 5)
+    _, found = record.hermite(knots, np.zeros(5, dtype=int), share)
+    assert np.abs(found - [2.0, 0.0]).max() <= 1e-2
 
 
 def test_energy_of_a_crowd_far_from_the_origin_is_counted_from_y_0():

@@ -42,7 +42,11 @@ static void turn_arm(const double *arm, double turned, double *out) {
     out[1] = s * arm[0] + c * arm[1];
 }
 
-/* The vector that a joint keeps or changes the length of: from its other end to its particle. */
+/* Whether a joint is a string between two particles that runs over a pulley, a point without mass or friction. */
+static int has_pulley(const Joint *j) { return j->kind == STRING && j->other >= 0 && !isnan(j->from[0]); }
+
+/* The vectors that a joint keeps or changes the length of: from its other end to its particle, and none; over a
+   pulley from there to both. */
 static void between(const Joint *j, double h, double *out) {
     Pose a = pose_at(W.disks + j->particle, h);
     const double *fixed = j->from;
@@ -50,7 +54,14 @@ static void between(const Joint *j, double h, double *out) {
     if (j->kind == PIN) turn_arm(j->arm, a.turned, arm);
     out[0] = a.x + arm[0];
     out[1] = a.y + arm[1];
-    if (j->other >= 0) {
+    out[2] = out[3] = 0;
+    if (has_pulley(j)) {
+        Pose b = pose_at(W.disks + j->other, h);
+        out[0] -= fixed[0];
+        out[1] -= fixed[1];
+        out[2] = b.x - fixed[0];
+        out[3] = b.y - fixed[1];
+    } else if (j->other >= 0) {
         Pose b = pose_at(W.disks + j->other, h);
         if (j->kind == PIN) turn_arm(j->arm + 2, b.turned, arm);
         out[0] -= b.x + (j->kind == PIN ? arm[0] : 0);
@@ -63,15 +74,18 @@ static void between(const Joint *j, double h, double *out) {
 
 static double size(const double *v) { return sqrt(v[0] * v[0] + v[1] * v[1]); }
 
+/* The length of what `between` gives. */
+static double length_of(const double *d) { return size(d) + size(d + 2); }
+
 static double kept_in(const Joint *j, double length) { return 0.5 * j->stiffness * square(length - j->length); }
 
 static int rows_of(const Joint *j) { return 1 + (j->kind == PIN); }
 
 /* Whether the string of a joint is as long as it can be. */
 static int is_tight(const Joint *j) {
-    double d[2];
+    double d[4];
     between(j, 0, d);
-    return size(d) >= (1 - BAND) * j->length;
+    return length_of(d) >= (1 - BAND) * j->length;
 }
 
 /* A particle of an end of a joint, as `Disk.tie` counts them, or NULL. */
@@ -83,10 +97,9 @@ static Disk *at_end(int end) {
 /* Have a particle move by an impulse of a row at one of its ends, times so much. */
 static void tug(const JointRow *r, int end, double kick, double *v, double *spin) {
     const Disk *d = at_end(2 * r->joint + end);
-    double way = end ? -kick : kick;
-    v[0] += way * r->e[0] * d->inv_mass;
-    v[1] += way * r->e[1] * d->inv_mass;
-    *spin += way * r->lever[end] * d->inv_inertia;
+    v[0] += kick * r->e[2 * end] * d->inv_mass;
+    v[1] += kick * r->e[2 * end + 1] * d->inv_mass;
+    *spin += kick * r->lever[end] * d->inv_inertia;
 }
 
 /* Whether two particles are parts of one, joined by a rod or a pin: they do not meet. */
@@ -106,9 +119,8 @@ static double *cell(int p, int q) { return W.joint_matrix + (long)p * W.joint_ro
 /* What an impulse of 1 N s of one row changes of the speed of another, by the particle at one end, 1/kg. */
 static double feels(const JointRow *p, int end, const JointRow *q, int with) {
     const Disk *d = at_end(2 * p->joint + end);
-    double sum = (p->e[0] * q->e[0] + p->e[1] * q->e[1]) * d->inv_mass;
-    sum += p->lever[end] * q->lever[with] * d->inv_inertia;
-    return end == with ? sum : -sum;
+    const double *e = p->e + 2 * end, *f = q->e + 2 * with;
+    return (e[0] * f[0] + e[1] * f[1]) * d->inv_mass + p->lever[end] * q->lever[with] * d->inv_inertia;
 }
 
 /* Fill in the matrix of the rows that act, `scale` times what impulses change, and factor it: L D L^T within the
@@ -170,21 +182,26 @@ static void aim(const Joint *j, const double *d0, const double *d1, double h) {
     double share = MIN(h / W.usual, 1);
     if (j->kind == PIN) {
         for (int n = 0; n < 2; n++, r++) {
+            memset(r->e, 0, sizeof r->e);
             r->e[n] = 1;
-            r->e[1 - n] = 0;
+            r->e[2 + n] = -1;
             r->off = d1[n] - (1 - share) * d0[n];
             for (int end = 0; end < 2; end++) {
                 const Disk *d = at_end(2 * (int)(j - W.joints) + end);
                 double arm[2], half = d ? 0.5 * h * d->spin : 0;
                 if (!d) continue;
                 turn_arm(j->arm + 2 * end, d->turned + half, arm);
-                r->lever[end] = (n ? arm[0] : -arm[1]) * (half != 0 ? sin(half) / half : 1);
+                r->lever[end] = (n ? arm[0] : -arm[1]) * (half != 0 ? sin(half) / half : 1) * (end ? -1 : 1);
             }
         }
         return;
     }
-    double before = size(d0), after = size(d1), sum = before + after;
-    for (int n = 0; n < 2; n++) r->e[n] = sum > 0 ? (d0[n] + d1[n]) / sum : 0;
+    double before = length_of(d0), after = length_of(d1);
+    for (int n = 0; n < 4; n += 2) {
+        double sum = size(d0 + n) + size(d1 + n);
+        for (int k = n; k < n + 2; k++) r->e[k] = sum > 0 ? (d0[k] + d1[k]) / sum : 0;
+    }
+    if (!has_pulley(j)) r->e[2] = -r->e[0], r->e[3] = -r->e[1];
     r->off = after - before - share * (j->length - before);
     if (j->kind != SPRING) return;
     double stiff = 0.5 * j->stiffness + j->damper / h;
@@ -248,7 +265,7 @@ void pull_joints(double h) {
             double most = 0;
             pull();
             for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
-                double d0[2], d1[2];
+                double d0[4], d1[4];
                 if (!W.joint_rows[j->row].on) continue;
                 /* Where it is now: without the flight. */
                 between(j, 0, d0);
@@ -256,7 +273,7 @@ void pull_joints(double h) {
                 aim(j, d0, d1, h);
                 for (int k = 0; k < rows_of(j); k++) {
                     const Disk *d = W.disks + j->particle;
-                    double reach = size(d0) + (j->kind == PIN ? fabs(d->x) + fabs(d->y) : 0) + d->radius;
+                    double reach = length_of(d0) + (j->kind == PIN ? fabs(d->x) + fabs(d->y) : 0) + d->radius;
                     most = MAX(most, fabs(W.joint_rows[j->row + k].off) / reach);
                 }
             }
@@ -284,15 +301,15 @@ void pull_joints(double h) {
 
 /* The instant within (0, h] at which a string that is slack is pulled tight, INFINITY if it is not. */
 static double snaps(const Joint *j, double h) {
-    double d[2], low = 0, high = h;
+    double d[4], low = 0, high = h;
     if (j->kind != STRING || !j->tied || W.joint_rows[j->row].on || is_tight(j)) return INFINITY;
     between(j, h, d);
-    if (size(d) <= j->length) return INFINITY;
+    if (length_of(d) <= j->length) return INFINITY;
     while (high - low > 1e-15 * h) {
         double middle = 0.5 * (low + high);
         if (middle == low || middle == high) break;
         between(j, middle, d);
-        if (size(d) <= j->length) low = middle;
+        if (length_of(d) <= j->length) low = middle;
         else high = middle;
     }
     return high;
@@ -329,7 +346,7 @@ void cut_at_snaps(void) {
 
 /* Give the other half of the step's pull, at its end, and book what springs gave and took. */
 void end_pull(void) {
-    double h = W.step_end - W.t, d[2];
+    double h = W.step_end - W.t, d[4];
     for (int i = W.low; i < W.high; i++) {
         Disk *disk = W.disks + i;
         for (int n = 0; disk->tie >= 0 && n < 3; n++) {
@@ -343,7 +360,7 @@ void end_pull(void) {
         if (!j->tied || h <= 0 || a->mode != FREE || (b && b->mode != FREE)) continue;
         j->taut = r->on;
         between(j, 0, d);
-        double length = size(d), grows = length - size(j->now), entries[3] = {0, 0, 0};
+        double length = length_of(d), grows = length - length_of(j->now), entries[3] = {0, 0, 0};
         double moves[2] = {d[0] - j->now[0], d[1] - j->now[1]};
         memcpy(j->now, d, sizeof j->now);
         if (j->kind == SPRING) {
@@ -374,7 +391,7 @@ static void aim_now(int taut) {
         JointRow *r = W.joint_rows + j->row;
         int tight = j->taut || (!taut && is_tight(j));
         int acts = j->struck && (j->kind == STRING ? tight : j->kind != SPRING);
-        double d[2];
+        double d[4];
         for (int n = 0; n < rows_of(j); n++) r[n].on = acts;
         if (!acts) continue;
         between(j, 0, d);
@@ -388,8 +405,7 @@ static double rate_of(const JointRow *r) {
     for (int end = 0; end < 2; end++) {
         const Disk *d = at_end(2 * r->joint + end);
         if (!d) continue;
-        double speed = d->vx * r->e[0] + d->vy * r->e[1] + r->lever[end] * d->spin;
-        sum += end ? -speed : speed;
+        sum += d->vx * r->e[2 * end] + d->vy * r->e[2 * end + 1] + r->lever[end] * d->spin;
     }
     return sum;
 }
@@ -467,7 +483,7 @@ void tie_joints(void) {
     for (Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
         const Disk *a = W.disks + j->particle, *b = j->other < 0 ? 0 : W.disks + j->other;
         int was = j->tied;
-        double d[2];
+        double d[4];
         j->struck = 0;
         j->tied = a->mode == FREE && (!b || b->mode == FREE);
         if (!j->tied) continue;
@@ -480,15 +496,15 @@ void tie_joints(void) {
         }
         if (!was) {
             between(j, 0, j->now);
-            if (isnan(j->length)) j->length = size(j->now);
-            j->kept[0] = j->kept[1] = j->kind == SPRING ? kept_in(j, size(j->now)) : 0;
+            if (isnan(j->length)) j->length = length_of(j->now);
+            j->kept[0] = j->kept[1] = j->kind == SPRING ? kept_in(j, length_of(j->now)) : 0;
         }
         j->struck = !was && j->kind != STRING;
         if (j->kind == STRING && !j->taut) {
             between(j, 0, d);
             aim(j, d, d, 0);
             double rate = rate_of(W.joint_rows + j->row);
-            j->struck = rate > 0 && size(d) + SOON * W.dt * rate >= (1 - BAND) * j->length;
+            j->struck = rate > 0 && length_of(d) + SOON * W.dt * rate >= (1 - BAND) * j->length;
             j->taut = j->struck;
         }
         fresh |= j->struck;
@@ -514,7 +530,7 @@ void strike_joints(int i, int j) {
 void end_blow(void) {
     for (const Joint *j = W.joints; j < W.joints + W.joint_count; j++) {
         if (!j->struck || j->kind != STRING || j->taut || !is_tight(j)) continue;
-        double d[2];
+        double d[4];
         between(j, 0, d);
         aim(j, d, d, 0);
         if (!(rate_of(W.joint_rows + j->row) > 0)) continue;
@@ -540,9 +556,10 @@ void share_with_joints(const Contact *c, double wanted, const double *u, double 
                     const Disk *d = at_end(2 * r->joint + side);
                     int first = d == W.disks + c->i;
                     if (!d || !(first || (c->two && d == W.disks + c->j))) continue;
-                    double rate = (first ? 1 : -1) * (r->e[0] * way[n][0] + r->e[1] * way[n][1]) * d->inv_mass;
+                    const double *e = r->e + 2 * side;
+                    double rate = (first ? 1 : -1) * (e[0] * way[n][0] + e[1] * way[n][1]) * d->inv_mass;
                     if (n) rate += r->lever[side] * d->radius * d->inv_inertia;
-                    r->struck[n] += side ? -rate : rate;
+                    r->struck[n] += rate;
                 }
                 r->off = -r->struck[n];
             }

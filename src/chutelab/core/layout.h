@@ -218,14 +218,15 @@ typedef struct {
 enum Tie { STRING, ROD, SPRING, PIN };
 
 typedef struct {
-    double from[2];         /* [in] m; fixed end of what has no other particle; of a pin its place */
+    double from[2];         /* [in] m; fixed end of what has no other particle; of a pin its place; of a string between
+                               two the pulley that it runs over, or NaN */
     double length;          /* [in] m; of a spring at rest; NaN: as it is when it is tied */
     double stiffness, damper; /* [in] N/m, N s/m */
     double kept[2], damped, given; /* [out] J; in a spring when it was tied and now, what its damper took,
                                and what it gave to particles */
     double arm[4];          /* m; of a pin, from both centres in particles that have not turned */
     int kind, particle, other; /* [in] enum Tie; two particles, or one and -1 */
-    double now[2];          /* m; from its other end to its particle */
+    double now[4];          /* m; from its other end to its particle; over a pulley from there to both */
     int tied, struck;       /* whether both ends move freely; a blow is passed on to it */
     int taut;               /* a string that pulled in the step before */
     int row;                /* first of its rows */
@@ -234,7 +235,7 @@ typedef struct {
 
 /* One equation of a joint: a pin has two. */
 typedef struct {
-    double e[2], lever[2];  /* how its impulse acts: on the particle along e, on the other against it; m */
+    double e[4], lever[2];  /* how its impulse acts, on the particle and on the other; m */
     double kick;            /* N s; half of what it gives in a step; apart if above 0 */
     double struck[2], answer[2]; /* 1/kg, N s; what a blow of 1 N s draws it apart, and how it answers */
     double off, eases;      /* m, m/(N s); by how much it is missed, and how a spring gives way */
@@ -310,12 +311,26 @@ typedef struct {
     double change;          /* m/s; by which the last sweep changed its slip */
     int a, b;               /* bodies */
     int from;               /* which contact of the list it is */
+    int colour, four;       /* see `SolverFour`; its place among their numbers */
     int pad;
 } SolverRow;
 
 /* What a row of what has corners has besides: how its impulse turns both bodies, of their radii; and what of its normal
    impulse slips, 1/kg. */
 typedef struct { double own[2], others[2], slips, pad; } RowLever;
+
+/* Four rows as sweeps in single precision see them, of the same names but for those of x and y, and of normal and slip. */
+typedef struct {
+    float nx[4], ny[4], opens[4], slips[4], mass[4], slide_mass[4], light[4], slide_light[4];
+    float gives[4], eases[4], more[4], parts[4], rough[4], arm[4], spin[4], roll_mass[4], roll_light[4];
+    float mass_a[4], mass_b[4], turn_a[4], turn_b[4], twist_a[4], twist_b[4], bend_a[4], bend_b[4];
+    float impulse[4], swept[4], course[4], along[4], slide_swept[4], slide_course[4];
+    float moment[4], roll_swept[4], roll_course[4];
+    int a[4], b[4];
+} SolverFour;
+
+/* ... and what they change of a body. */
+typedef struct { float x, y, rim, pad, swept[4], course[4]; } LightBody;
 
 typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; double angle; } Knot; /* [out] */
 
@@ -362,6 +377,8 @@ typedef struct {
     SolverRow *rows;     /* (contacts) of those that are solved together */
     RowLever *levers;    /* (contacts) ... of particles with corners */
     SolverBody *solver_bodies; /* (disks + 1) ... and their disks */
+    SolverFour *fours;   /* (four_room) the same in single precision */
+    LightBody *light_bodies; /* (disks + 1) */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
     Cell *cells;
@@ -384,7 +401,7 @@ typedef struct {
     int outline_count;   /* [in] */
     int joint_row_count;
     int material_count;
-    int knot_room, event_room, total_room, contact_room, near_room, cell_room, swing_room;
+    int knot_room, event_room, total_room, contact_room, four_room, near_room, cell_room, swing_room;
     int full;            /* what `run` makes room for as it goes on: see `Full` */
     int bucket_count;    /* a power of two */
     int gate_count, end_count, circle_count;

@@ -260,6 +260,8 @@ static void make_contact_room(int room) {
     RESERVE(W.links, 2.0 * room);
     RESERVE(W.rows, room);
     RESERVE(W.levers, W.outline_count ? room : 0);
+    W.four_room = W.interact ? room / 4 : 0;
+    RESERVE(W.fours, W.four_room);
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 
@@ -290,6 +292,7 @@ static int lay_out_work(void) {
     RESERVE(W.solver_bodies, n + 1.0);
     RESERVE(W.edges, 3.0 * W.outline_count);
     RESERVE(W.poses, W.outline_count ? 6.0 * n : 0);
+    RESERVE(W.light_bodies, n + 1.0);
     RESERVE(W.joint_rows, W.joint_row_count);
     RESERVE(W.joint_matrix, (double)W.joint_row_count * W.joint_row_count);
     RESERVE(W.waits, crowd ? (double)WAITS * n : WAITS);

@@ -237,10 +237,18 @@ static void hold_arc(double *box, const Arc *arc) {
 /* How far a joint lets a particle go from what holds it, at most; a spring is taken to stretch to so many times
    what it is. */
 #define STRETCHES 3.0
+static int runs_over(const JointKeys *joint) {
+    return joint->kind == STRING && !isnan(joint->other) && !isnan(joint->from[0]);
+}
+
 static double reach_of(const JointKeys *joint, const Start *first) {
     const double *at = first[(int)joint->particle].position, *from = joint->from;
-    if (!isnan(joint->other)) from = first[(int)joint->other].position;
     double away = length_of(at[0] - from[0], at[1] - from[1]);
+    if (!isnan(joint->other)) {
+        const double *other = first[(int)joint->other].position;
+        if (runs_over(joint)) away += length_of(other[0] - from[0], other[1] - from[1]);
+        else away = length_of(at[0] - other[0], at[1] - other[1]);
+    }
     double length = isnan(joint->length) ? away : MAX(joint->length, away);
     return joint->kind == SPRING ? STRETCHES * length : length;
 }
@@ -251,8 +259,9 @@ static void hold_joints(double *box, const Start *first) {
     double all = 0.0;
     for (int n = 0; n < P.joints; n++) all += reach_of(t->joints + n, first);
     for (const JointKeys *joint = t->joints; joint < t->joints + P.joints; joint++) {
-        const double *at = isnan(joint->other) ? joint->from : first[(int)joint->particle].position;
-        double reach = isnan(joint->other) ? reach_of(joint, first) : 2.0 * all;
+        int fixed = isnan(joint->other) || runs_over(joint);
+        const double *at = fixed ? joint->from : first[(int)joint->particle].position;
+        double reach = fixed ? reach_of(joint, first) : 2.0 * all;
         hold(box, at[0] - reach, at[1] - reach);
         hold(box, at[0] + reach, at[1] + reach);
     }

@@ -83,7 +83,7 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough) {
     double first = INFINITY;
-    int driven = 0, pressing = 0, lessened = 0, fine = accurate < W.accurate;
+    int driven = 0, pressing = 0, lessened = 0, light = W.interact, fine = accurate < W.accurate;
     if (W.swings_too) {
         sweep_hung(list, count, MAX(rounds, 1) * sweeps, enough);
         return;
@@ -98,7 +98,10 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
     set_rows(list, count);
     lessen();
     for (int left = TRIES, more = rounds;;) {
-        double change = sweep_rows(sweeps, plain, accurate), worst = change;
+        double change = light ? sweep_lightly(sweeps, plain, accurate) : INFINITY, worst;
+        if (change == INFINITY) change = sweep_rows(sweeps, plain, accurate);
+        light = 0;
+        worst = change;
         int ended = change <= accurate;
         if (!ended) keep_bounds();
         if (!ended || W.interact) lessened = lessen();

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
-from math import hypot, inf
+from math import inf
 from time import perf_counter
 
 import numpy as np
@@ -245,6 +245,9 @@ def must_fit(machine: Machine, name: str) -> None:
             allowed = "left out with the pymunk engine: Chipmunk's restitution is one number"
             key = f"{scene.head('particle', n)}.restitution_speed"
             raise refused(scene, key, kind.restitution_speed, allowed)
+    if name == "pymunk" and any(joint.over for joint in machine.joints):
+        allowed = "contact, because a string runs over a pulley: Chipmunk has no such joint"
+        raise refused(scene, "run.engine", "pymunk", allowed)
     for n, pair in enumerate(scene.pair):
         if (pull := pair.clings) and (name == "pymunk" or scene.hinges):
             what = "the pymunk engine" if name == "pymunk" else "what hangs on hinges"
@@ -285,8 +288,8 @@ def unjoined(machine: Machine) -> str:
     if scene.hinges:
         return "joints and hinges are in one scene"
     for joint in machine.joints:
-        far, own = joint.ends(machine.releases.position)
-        if joint.kind == "string" and hypot(*(own - far)) > (1.0 + TAUT) * joint.length:
+        reach = joint.reach(machine.releases.position)
+        if joint.kind == "string" and reach > (1.0 + TAUT) * joint.length:
             return "a string is shorter than the distance at the release"
     return ""
 

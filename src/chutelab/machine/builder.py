@@ -10,6 +10,7 @@ moved out where it is by rounding only.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 from math import ceil, inf, nan, prod
 from typing import Any
@@ -18,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core import REAL, Module, borrow, constants, dtype, give_back
-from chutelab.machine.movers import Mover
-from chutelab.machine.parts import Caution, Joint, Machine, Particle, Pulley, Trigger
+from chutelab.machine.parts import Caution, Joint, Machine, Mover, Particle, Pulley, Trigger
 from chutelab.machine.releases import RefusedError, draw
 from chutelab.machine.shapes import KINDS, Pieces
 from chutelab.scene import Fault, Plate, Scene
@@ -84,7 +84,8 @@ def row(scenes: Scene | Family, friction: Numbers) -> list[Numbers]:
         add("SurfaceKeys", surface, corners=len(surface.points or ()))
     for table, joint in scene.joints:
         lacks = {key: None for key in LACKS if not hasattr(joint, key)}
-        add("JointKeys", joint, kind=JOINTS.index(table), **lacks)
+        begin = joint.from_ or getattr(joint, "over", None)
+        add("JointKeys", joint, kind=JOINTS.index(table), from_=begin, **lacks)
     for name, one in scene.movers.items():
         shake, travel, motor = one.shake, one.travel, one.motor
         place = {} if one.hinge in (None, "pivot") else {"pivot": value(one, "hinge")}
@@ -280,12 +281,11 @@ def build(scenes: Scene | Family, watch: Watch = unwatched) -> Machine:
         pairs[..., 0] = np.where(through, PASSES, pairs[..., 0])
     joints = []
     for table, one in scene.joints if family is None else ():
-        (x, y), other = releases.position[one.particle].tolist(), one.other
-        u, v = releases.position[other].tolist() if one.from_ is None else one.from_
-        rest = getattr(one, "length", None) or float(hypot(x - u, y - v))
         own = {key: getattr(one, key) for key in LACKS[1:] if hasattr(one, key)}
-        second = -1 if other is None else other
-        joints.append(Joint(table, one.particle, rest, one.from_, second, **own))
+        begin, second = one.from_ or getattr(one, "over", None), one.other
+        joint = Joint(table, one.particle, 0.0, begin, -1 if second is None else second, **own)
+        rest = getattr(one, "length", None) or joint.reach(releases.position)
+        joints.append(replace(joint, length=rest))
     triggers = tuple(
         Trigger(names.index(name), doing, names.index(by)) for name, doing, by in scene.triggers
     )

@@ -46,17 +46,9 @@ if TYPE_CHECKING:
 
 
 __all__ = [
-    "ENTRIES",
-    "EVENT",
-    "KNOT",
-    "PARTICLES",
-    "REASONS",
-    "Kind",
-    "Motion",
-    "Record",
-    "Recording",
+    "ENTRIES", "EVENT", "KNOT", "PARTICLES", "REASONS", "Kind", "Motion", "Record", "Recording",
     "balance",
-]
+]  # fmt: skip
 
 
 class Recording(Record):
@@ -130,11 +122,15 @@ class Recording(Record):
 
         return summary(self)
 
-    def save(self, path: str | Path) -> Path:
-        """Write an npz file, whole or not at all; `load` gives the recording back bit for bit."""
-        from chutelab.results.storage import save
+    def save(self, path: str | Path, *, tolerance: float | None = None) -> Path:
+        """Write an npz file, whole or not at all; see `results.storage.save`.
 
-        return save(self, path)
+        `load` gives the recording back bit for bit; a crowd of 10,000 knots or more within a
+        tolerance, in radii: 1e-6 if none is given; 0 keeps all bits.
+        """
+        from chutelab.results.storage import TOLERANCE, save
+
+        return save(self, path, tolerance=TOLERANCE if tolerance is None else tolerance)
 
     @classmethod
     def load(cls, path: str | Path) -> Recording:

@@ -148,6 +148,9 @@ def balance(entries: NDArray[Any]) -> Floats:
 CELLS = 2**18
 """Times × particles in one block: some 30 arrays of 2 MB each, near enough to the cache."""
 
+BRIEF = 1e-10
+"""Share of a coordinate: from a way that is less, no velocity is taken."""
+
 Cells = tuple[Ints, Ints, Ints, Floats]
 """Times at which particles are on their way, arrays (c,): index of the time, and of the particle;
 index of the last knot that is not later (``left``; ``left + 1`` closes the interval, so at the end
@@ -168,7 +171,9 @@ def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Flo
         where = pa + s * (
             h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
         )
-        slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
+        # A way that is lost in the digits of the place tells no velocity.
+        told = h * (np.abs(va) + np.abs(vb)) > BRIEF * np.abs(pa)
+        slope = np.divide(dx, h, out=0.5 * (va + vb), where=told)
         pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
         places[:, axis], velocities[:, axis] = np.where(over, pb, where), np.where(over, vb, pace)
     return places, velocities

@@ -331,6 +331,9 @@ def conflicts(look: Look) -> Iterator[Fault]:
                 if joint.given(key) and joint[key] >= count:
                     text = f"there are {count} particles, from 0; stream.count says how many"
                     yield joint.fault(key, text)
+            if joint.given("over") and look.row("run")["engine"] == "pymunk":
+                text = f"{joint.path('over')} needs contact: Chipmunk has no string over a pulley"
+                yield look.row("run").fault("engine", text)
             if joint.given("other") and joint["other"] == joint["particle"]:
                 yield joint.fault("other", f"must be another than {joint.path('particle')}")
     yield from _expectations(look, streams)

@@ -24,19 +24,6 @@ from chutelab.theory.slide import Reason, Slide, slide
 from chutelab.theory.transfer import STAGES, Rebound, Transfer, belt_power, transfer
 
 __all__ = [
-    "STAGES",
-    "TABLES",
-    "Drag",
-    "Reason",
-    "Rebound",
-    "Slide",
-    "Table",
-    "Transfer",
-    "belt_power",
-    "drag",
-    "predict",
-    "slide",
-    "table",
-    "transfer",
-    "unbounded",
-]
+    "STAGES", "TABLES", "Drag", "Reason", "Rebound", "Slide", "Table", "Transfer", "belt_power",
+    "drag", "predict", "slide", "table", "transfer", "unbounded",
+]  # fmt: skip

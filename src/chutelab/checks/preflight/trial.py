@@ -178,7 +178,8 @@ def built(machine: Machine) -> Iterator[Part]:
     for joint in machine.joints:
         begin = f"particle {joint.other}"
         if joint.anchor is not None:
-            begin = "({:.6g}, {:.6g}) m".format(*joint.anchor)
+            place = "({:.6g}, {:.6g}) m".format(*joint.anchor)
+            begin = place if joint.over is None else f"{begin} over {place}"
         held = f"from {begin} to particle {joint.particle}, {joint.length:.6g} m long"
         yield Part(joint.kind, held)
     releases = machine.releases
@@ -196,7 +197,6 @@ def built(machine: Machine) -> Iterator[Part]:
         yield Part(
             kind.name or "particle", f"{many}{size}, {_span(masses, 'mass', 'kg')}, {turning}"
         )
-
     for n, name in enumerate(machine.streams):
         which = (releases.stream == n).nonzero()[0]
         (x, y), (vx, vy) = releases.position[which[0]], releases.velocity[which[0]]

@@ -59,22 +59,9 @@ from chutelab.util.errors import InputError
 from chutelab.util.words import words
 
 __all__ = [
-    "EXERCISES",
-    "Exercise",
-    "ExerciseError",
-    "Mistake",
-    "Parameter",
-    "Passage",
-    "Progress",
-    "Question",
-    "Reply",
-    "Standing",
-    "Task",
-    "Values",
-    "Verdict",
-    "find",
-    "lesson",
-]
+    "EXERCISES", "Exercise", "ExerciseError", "Mistake", "Parameter", "Passage", "Progress",
+    "Question", "Reply", "Standing", "Task", "Values", "Verdict", "find", "lesson",
+]  # fmt: skip
 
 OPENED: Final[deque[Task]] = deque(maxlen=64)
 """The tasks of this process in the order they were opened; grading reads the answers here."""

@@ -60,16 +60,9 @@ from chutelab.util.errors import MissingLibraryError
 from chutelab.util.files import whole
 
 __all__ = [
-    "FORMATS",
-    "SHOWS",
-    "Moment",
-    "Stage",
-    "VideoError",
-    "animate",
-    "film",
-    "need_video",
+    "FORMATS", "SHOWS", "Moment", "Stage", "VideoError", "animate", "film", "need_video",
     "still",
-]
+]  # fmt: skip
 
 SHOWS = ("parabola", "trails", "strobe", "velocity", "energy")
 """What a picture can show besides the machine and the particles."""

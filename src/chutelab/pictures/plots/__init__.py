@@ -74,28 +74,11 @@ from chutelab.theory import Transfer
 from chutelab.theory.figures import PaperFigure
 
 __all__ = [
-    "Arc",
-    "Window",
-    "analytic_of",
-    "arcs",
-    "draw_analytic",
-    "draw_arrivals",
-    "draw_envelope",
-    "draw_flow",
-    "draw_ledger",
-    "draw_losses",
-    "draw_power",
-    "draw_residual",
-    "draw_scene",
-    "draw_tracks",
-    "draw_velocity",
-    "flight",
-    "look",
-    "overlay",
-    "paper_figure",
-    "strobe",
+    "Arc", "Window", "analytic_of", "arcs", "draw_analytic", "draw_arrivals", "draw_envelope",
+    "draw_flow", "draw_ledger", "draw_losses", "draw_power", "draw_residual", "draw_scene",
+    "draw_tracks", "draw_velocity", "flight", "look", "overlay", "paper_figure", "strobe",
     "window_of",
-]
+]  # fmt: skip
 
 SIZE = (13.0, 7.6)
 """Width and height of the figure, inches."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.core import number as layout_number
-from chutelab.machine.movers import Hinge
+from chutelab.machine.parts import Hinge
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.quantities import each
@@ -485,21 +485,31 @@ def strings(recording: Recording, times: Floats) -> Callable[[int], list[Floats]
 
     A slack string sags along gravity between its ends, a spring goes to and fro; pins are left out.
     """
+    # Over a pulley a string is two, each as slack as the other.
     joints = [joint for joint in recording.machine.joints if joint.kind != "pin"]
+    joints += [
+        replace(joint, particle=joint.other, other=joint.particle) for joint in joints if joint.over
+    ]
     own = places(recording, [joint.particle for joint in joints], times)
     far = places(recording, [max(joint.other, 0) for joint in joints], times)
+    length = np.full(own.shape[:2], [joint.length for joint in joints])
     for n, joint in enumerate(joints):
+        if joint.over:
+            one, other = (np.hypot(*(end[:, n] - joint.over).T) for end in (own, far))
+            length[:, n] = 0.5 * (joint.length + one - other)
         if joint.anchor is not None:
             far[:, n] = joint.anchor
 
     def drawn(index: int) -> list[Floats]:
         found = []
-        for joint, begin, end in zip(joints, far[index], own[index], strict=True):
+        for joint, begin, end, long in zip(
+            joints, far[index], own[index], length[index], strict=True
+        ):
             way = end - begin
             path = begin + HANGING[:, None] * way
             if joint.kind == "string":
                 # Pulled down at its middle it would be twice as deep there.
-                sag = np.sqrt(max(joint.length**2 - float(way @ way), 0.0))
+                sag = np.sqrt(max(long**2 - float(way @ way), 0.0))
                 path -= (2.0 * HANGING * (1.0 - HANGING) * sag)[:, None] * recording.machine.up
             elif joint.kind == "spring":
                 across = np.array([-way[1], way[0]]) / (np.hypot(*way) or 1.0)

@@ -62,17 +62,9 @@ from chutelab.util.errors import InputError as DesignError
 from chutelab.util.tables import rounded
 
 __all__ = [
-    "Answer",
-    "DesignError",
-    "How",
-    "Solution",
-    "Uncertainty",
-    "maximize",
-    "minimize",
-    "solve",
-    "uncertainty",
-    "value",
-]
+    "Answer", "DesignError", "How", "Solution", "Uncertainty", "maximize", "minimize", "solve",
+    "uncertainty", "value",
+]  # fmt: skip
 
 
 REPEAT: Final = 8

@@ -52,16 +52,9 @@ from chutelab.util.errors import did_you_mean
 from chutelab.util.versions import library
 
 __all__ = [
-    "Fit",
-    "MeasuredError",
-    "Placement",
-    "Residuals",
-    "Track",
-    "find",
-    "fit",
-    "read",
+    "Fit", "MeasuredError", "Placement", "Residuals", "Track", "find", "fit", "read",
     "residuals",
-]
+]  # fmt: skip
 
 SMALLEST: Final = 1e-6
 """Of its start: the least value at which a number that must be positive is searched. A fit of what

@@ -65,24 +65,10 @@ from chutelab.util.files import writing
 from chutelab.util.versions import library, own_version
 
 __all__ = [
-    "COLUMNS",
-    "DESIGNS",
-    "MOST_VARIANTS",
-    "REASON",
-    "TEXTS",
-    "TOUCHES",
-    "Crew",
-    "LostWorkersError",
-    "Plan",
-    "Sweep",
-    "crew",
-    "no_column",
-    "planned",
-    "row_of",
-    "sweep",
-    "sweep_to",
-    "swept_by",
-]
+    "COLUMNS", "DESIGNS", "MOST_VARIANTS", "REASON", "TEXTS", "TOUCHES", "Crew",
+    "LostWorkersError", "Plan", "Sweep", "crew", "no_column", "planned", "row_of", "sweep",
+    "sweep_to", "swept_by",
+]  # fmt: skip
 
 Job = tuple[int, Any]
 

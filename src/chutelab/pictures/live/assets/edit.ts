@@ -242,7 +242,7 @@ function withCopies(given: Given, rows: [string, Given][], [dx, dy]: Point): [Gi
         copy[key] = called.indexOf(`${n} ${copies.get(stream) ?? stream}`);
         if (copy[key] < 0) return scene;
       }
-      if (copy.from) copy.from = moved(copy.from);
+      for (const key of ["from", "over"]) if (copy[key]) copy[key] = moved(copy[key]);
       names.push(`${table} ${listOf(scene[table]).length + 1}`);
       return withRow(scene, table, copy);
     }

@@ -280,13 +280,17 @@ class Handles {
   }
 
   /** The ends of a joint: at another particle, or at a place. */
-  joint({ kind, from, particle, other }: Joint, name: string) {
+  joint({ kind, from, over, particle, other }: Joint, name: string) {
     const { releases, radius } = this.machine, row = Number(name.split(" ")[1]) - 1;
     const table = `${kind}[${row}]`, own = releases[particle], far = releases[other ?? -1];
     const nearest = (x: number, y: number, not?: number) =>
       particlesAt(this.machine, [x, y], NEAR * this.away).find((i) => i !== not);
     const begin: Point = from ?? [far.x, far.y];
-    this.list.push({
+    if (over) {
+      this.add(`${table}.over`, name, "pulley", "point", over, this.place(`${table}.over`, over),
+        (x, y) => [x, y]);
+    }
+    else this.list.push({
       id: `${table}.from`, surface: name, what: from ? "anchor" : "tied", shape: "point",
       x: begin[0], y: begin[1], axes: this.place(`${table}.from`, begin), drag: (x, y) => [x, y],
       values: kind === "pin" ? undefined : ([x, y]) => {

@@ -21,7 +21,7 @@ const HUNG = ["spring", "damper", "angle_deg"];
 const INSTEAD: Record<string, string[]> = {
   opens_when: ["opens_at", "closes_when"], closes_when: ["closes_at", "opens_when"],
   opens_at: ["opens_when"], closes_at: ["closes_when"],
-  from: ["other"], other: ["from"], cohesion: ["bond_number"], bond_number: ["cohesion"],
+  from: ["other", "over"], other: ["from"], over: ["from"], cohesion: ["bond_number"], bond_number: ["cohesion"],
   meet: ["restitution", "friction", "cohesion", "bond_number"],
 };
 

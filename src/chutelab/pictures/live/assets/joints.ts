@@ -20,22 +20,30 @@ export function namesOfJoints({ joints }: Machine) {
     `${kind} ${joints.slice(0, n + 1).filter((one) => one.kind === kind).length}`);
 }
 
-/** Where a joint begins and ends at a time, s and m; null while one of its particles is not
- * there. */
-export function endsOfJoint({ particle, other, from }: Tied, { tracks }: Recording, t: number) {
+/** Where the ways of a joint begin and end at a time, s and m, and how long they are; none while
+ * one of its particles is not there. Over a pulley a string has two, each as slack as the other. */
+function waysOfJoint(
+  { kind, particle, other, from, length }: Tied, { tracks }: Recording, t: number,
+) {
   const end = tracks[particle]?.state(t), far = tracks[other]?.state(t);
   const begin: Point | null = from ?? (far ? [far.x, far.y] : null);
-  return begin && end ? [begin, [end.x, end.y] as Point] as const : null;
+  if (!begin || !end) return [];
+  if (kind !== "string" || !from || other < 0) {
+    return [{ from: begin, to: [end.x, end.y], length }];
+  }
+  if (!far) return [];
+  const legs = [end, far].map(({ x, y }) => Math.hypot(x - from[0], y - from[1]));
+  return [end, far].map(({ x, y }, n) =>
+    ({ from, to: [x, y], length: (length + legs[n] - legs[1 - n]) / 2 }));
 }
 
 /** Joints as lines at a time, s, but for pins. */
 export function linesOfJoints(recording: Recording, t: number) {
   const names = namesOfJoints(recording.machine);
-  return recording.machine.joints.flatMap((joint, n) => {
-    const ends = joint.kind === "pin" ? null : endsOfJoint(joint, recording, t);
-    const isLine = ends && Math.hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]) > 0;
-    return isLine ? [{ name: names[n], from: ends[0], to: ends[1] }] : [];
-  });
+  return recording.machine.joints.flatMap((joint, n) => (joint.kind === "pin" ? []
+    : waysOfJoint(joint, recording, t).flatMap(({ from, to }) =>
+      (Math.hypot(to[0] - from[0], to[1] - from[1]) > 0
+        ? [{ name: names[n], from, to: to as Point }] : []))));
 }
 
 /** Pins with their names at a time, s and m. */
@@ -61,31 +69,31 @@ export function paintJoints(
 ) {
   const thin = new Path2D(), thick = new Path2D(), dots = new Path2D();
   for (const joint of recording.machine.joints) {
-    const { kind, from, length } = joint;
-    const ends = endsOfJoint(joint, recording, t);
+    const { kind, from } = joint;
     if (kind === "pin") continue;
     if (from) {
       dots.moveTo(view.px(from[0]) + DOT, view.py(from[1]));
       dots.arc(view.px(from[0]), view.py(from[1]), DOT, 0, 2 * Math.PI);
     }
-    if (!ends) continue;
-    const [[u, v], [x, y]] = ends, [dx, dy] = [x - u, y - v], far = Math.hypot(dx, dy);
-    const line = kind === "rod" ? thick : thin;
-    line.moveTo(view.px(u), view.py(v));
-    if (kind === "spring") {
-      const wide = (COIL * length) / (far || 1);
-      TURNS.forEach((share, n) => {
-        const aside = n < 2 || n > 10 ? 0 : n % 2 ? -wide : wide;
-        line.lineTo(view.px(u + share * dx - aside * dy), view.py(v + share * dy + aside * dx));
-      });
-      continue;
+    for (const { from: [u, v], to: [x, y], length } of waysOfJoint(joint, recording, t)) {
+      const [dx, dy] = [x - u, y - v], far = Math.hypot(dx, dy);
+      const line = kind === "rod" ? thick : thin;
+      line.moveTo(view.px(u), view.py(v));
+      if (kind === "spring") {
+        const wide = (COIL * length) / (far || 1);
+        TURNS.forEach((share, n) => {
+          const aside = n < 2 || n > 10 ? 0 : n % 2 ? -wide : wide;
+          line.lineTo(view.px(u + share * dx - aside * dy), view.py(v + share * dy + aside * dx));
+        });
+        continue;
+      }
+      // Pulled along gravity at its middle it would be twice as deep there: a curve whose middle
+      // is at half of what its control point is.
+      const sag = kind === "string" ? Math.sqrt(Math.max(length * length - far * far, 0)) : 0;
+      const [across, up] = recording.machine.up;
+      line.quadraticCurveTo(view.px(u + dx / 2 - across * sag), view.py(v + dy / 2 - up * sag),
+        view.px(x), view.py(y));
     }
-    // Pulled along gravity at its middle it would be twice as deep there: a curve whose middle
-    // is at half of what its control point is.
-    const sag = kind === "string" ? Math.sqrt(Math.max(length * length - far * far, 0)) : 0;
-    const [across, up] = recording.machine.up;
-    line.quadraticCurveTo(view.px(u + dx / 2 - across * sag), view.py(v + dy / 2 - up * sag),
-      view.px(x), view.py(y));
   }
   context.strokeStyle = context.fillStyle = colour;
   for (const [lines, width] of [[thin, THIN], [thick, THICK]] as const) {

@@ -203,10 +203,13 @@ const TAUT = 1e-9;
  * @throws {Fault} if a string is shorter than that
  */
 function joined({ joints }: Scene, releases: Release[]): Machine["joints"] {
-  return joints.map(({ kind, particle, from, other = -1, length, given, ...spring }) => {
+  return joints.map((joint) => {
+    const { kind, particle, over, from = over, other = -1, length, given, ...spring } = joint;
     const own = releases[particle], far = releases[other];
-    const x = own.x - (from ? from[0] : far.x), y = own.y - (from ? from[1] : far.y);
-    const distance = Math.sqrt(x * x + y * y), long = length ?? distance;
+    const away = (x: number, y: number) => Math.sqrt(x * x + y * y);
+    const distance = away(own.x - (from ? from[0] : far.x), own.y - (from ? from[1] : far.y))
+      + (over ? away(far.x - over[0], far.y - over[1]) : 0);
+    const long = length ?? distance;
     if (kind === "string" && distance > (1 + TAUT) * long) {
       const n = joints.filter((one) => one.kind === kind).findIndex((one) => one.given === given);
       throw new Fault(`string[${n}].length`, length, "too-short", { least: distance });

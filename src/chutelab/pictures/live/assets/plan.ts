@@ -71,7 +71,7 @@ function rowOf(scene: Scene, names: string[]): number[] {
     ...all("ConveyorKeys", scene.conveyor),
     ...all("SurfaceKeys", surface.map((one) => ({ ...one, corners: one.points?.length ?? 0 }))),
     ...all("JointKeys", scene.joints.map(({ kind: tie, ...one }) => ({
-      ...one, kind: core.layout.enums.Tie[tie.toUpperCase()],
+      ...one, from: one.from ?? one.over, kind: core.layout.enums.Tie[tie.toUpperCase()],
     }))),
     ...all("MoverKeys", moversOf(scene).map(([name, { hinge, shake, travel, motor, ...one }]) => ({
       ...one, phase_deg: 0, ...shake, to: travel?.to, at: travel?.at, in: travel?.in, ...motor,

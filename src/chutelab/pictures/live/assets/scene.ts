@@ -153,6 +153,7 @@ interface Outgoing {
 export interface Joint {
   kind: typeof JOINTS[number];
   from?: Point;
+  over?: Point; // of a string between two: the pulley that it runs over
   particle: number;
   other?: number;
   length?: number;

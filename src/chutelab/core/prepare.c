@@ -378,19 +378,21 @@ static void join_disks(void) {
     }
 }
 
-/* Note the edges of a particle; return the radius of the circle round its centre that none of them cuts, m. */
-static double measure_edges(const Disk *d) {
+/* Note the edges of a particle, and the radius of the circle round its centre that no edge cuts, and of one of its area. */
+static void measure(Disk *d) {
     const double *p = W.outlines + 2 * d->outline;
-    double least = d->radius, *edge = W.edges + 3 * d->outline;
+    double twice = 0, *edge = W.edges + 3 * d->outline;
+    d->inner = d->broad = d->radius;
     for (int n = 0; n < d->corners; n++, edge += 3) {
         const double *a = p + 2 * n, *b = p + 2 * ((n + 1) % d->corners);
-        double x = b[0] - a[0], y = b[1] - a[1], length = sqrt(x * x + y * y);
-        least = MIN(least, (a[0] * y - a[1] * x) / length);
+        double x = b[0] - a[0], y = b[1] - a[1], cross = a[0] * y - a[1] * x, length = sqrt(x * x + y * y);
+        d->inner = MIN(d->inner, cross / length);
+        twice += cross;
         edge[0] = y / length;
         edge[1] = -x / length;
         edge[2] = length;
     }
-    return least;
+    if (d->corners) d->broad = sqrt(0.5 * twice / PI);
 }
 
 /* The host has filled in what is marked [in]: fill in what follows. */
@@ -415,7 +417,7 @@ EXPORT int prepare(void) {
         Disk *d = W.disks + i;
         least = MIN(least, d->radius);
         most = MAX(most, d->radius);
-        d->inner = measure_edges(d);
+        measure(d);
         if (!d->rides) continue;
         d->ride_x = d->x * c + d->y * s;
         d->ride_rho = d->y * c - d->x * s;

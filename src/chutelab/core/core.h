@@ -373,11 +373,15 @@ void set_rows(Contact *list, int count);
 void take_rows(Contact *list, int count);
 void begin_anew(void);
 double sweep_rows(int sweeps, int plain, double accurate);
+double sweep_lightly(int sweeps, int plain, double accurate);
 int lessen(void);
 void keep_bounds(void);
 int drop_noise(void);
 double left_open(void);
 double slip_of(const SolverRow *row);
+
+/* fours.c */
+double sweep_fours(int rows, int all_bodies, int sweeps, int plain, double accurate, double most);
 
 /* solver.c */
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,

@@ -259,6 +259,8 @@ static void make_contact_room(int room) {
     RESERVE(W.earlier, room);
     RESERVE(W.links, 2.0 * room);
     RESERVE(W.rows, room);
+    W.four_room = W.interact ? room / 4 : 0;
+    RESERVE(W.fours, W.four_room);
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 
@@ -287,6 +289,7 @@ static int lay_out_work(void) {
     W.cell_room = crowd ? 12 * n + 64 : 1;
     RESERVE(W.tracks, n);
     RESERVE(W.solver_bodies, n + 1.0);
+    RESERVE(W.light_bodies, n + 1.0);
     RESERVE(W.joint_rows, W.joint_row_count);
     RESERVE(W.joint_matrix, (double)W.joint_row_count * W.joint_row_count);
     RESERVE(W.waits, crowd ? (double)WAITS * n : WAITS);

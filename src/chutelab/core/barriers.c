@@ -346,7 +346,8 @@ static int corners_at(int knot, double share, double x, double y, const Barrier 
     return body->corners;
 }
 
-/* How far the corner of an edge that is beyond an arc, or the edge itself, is beyond it, m; 0 if it does not cross it. */
+/* How far the corner of an edge that is beyond an arc, or the edge itself, is beyond it, m; 0 if it does not cross it, but
+   where an end may be in the edge. */
 static double across(const Barrier *b, const double *q, const double *r, int inside) {
     double x = q[0] - b->x, y = q[1] - b->y, ex = r[0] - q[0], ey = r[1] - q[1];
     double a = ex * ex + ey * ey, half = x * ex + y * ey, root = half * half - a * (x * x + y * y - b->radius * b->radius);
@@ -355,7 +356,7 @@ static double across(const Barrier *b, const double *q, const double *r, int ins
         double share = (-half + (n ? 1 : -1) * sqrt(root)) / a;
         if (share < 0 || share > 1) continue;
         both++;
-        met |= is_within(b, q[0] + share * ex, q[1] + share * ey, 0);
+        met |= is_within(b, q[0] + share * ex, q[1] + share * ey, L.allowed);
     }
     if (!met) return 0;
     if (both == 2) return inside ? 0 : b->radius - sqrt(MAX(x * x + y * y - half * half / a, 0));

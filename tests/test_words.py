@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from chutelab.classroom import exercises as package
 from chutelab.classroom import lessons
-from chutelab.classroom.exercises import EXERCISES, Verdict, lesson, told
+from chutelab.classroom.exercises import EXERCISES, lesson, told
 from chutelab.classroom.exercises.exercise import draw, translated
 from chutelab.classroom.lessons.sheets import sheet
 from chutelab.cli import main
@@ -43,11 +43,6 @@ def test_every_language_says_all_that_english_says_with_the_same_numbers_in_it()
         assert list(found) == list(english), language
         for key, text in found.items():
             assert names_in(text) == names_in(english[key]), (language, key)
-
-
-def test_verdicts_are_called_what_they_are():
-    for one in Verdict:
-        assert words().say(f"verdict-{one.name.lower()}") == one.value
 
 
 def test_a_reply_says_not_yet_and_never_wrong():

@@ -5,10 +5,10 @@ from knot to knot less that of a flight, in units of 2.5 ε r / dt, or less if k
 for it. Beside intervals longer than a step dt the units are finer, since a cubic bulges by a
 quarter of what they are off times the interval: 0.44 ε r, half a unit off along both axes at both
 ends. The mean of two velocities foretells the way between them, exactly on a parabola. The rest of
-a place is told in units of 0.28 times what that of a velocity is in a step, 0.5 ε r off at most, and
-after an interval much shorter than a step in finer ones: else the velocity *between* two knots
-would be far off. So a track is off by less than ε r at any time. Entries of the ledger have units
-of which all particles together are off by less than ε of the energy turned over. The tracks
+a place is told in units of 0.28 times what that of a velocity is in a step, which is 0.5 ε r off at
+most, and after an interval much shorter than a step in finer ones: else the velocity *between* two
+knots would be far off. So a track is off by less than ε r at any time. Entries of the ledger have
+units of which all particles together are off by less than ε of the energy turned over. The tracks
 foretell the states of events, and these the impulses.
 
 Times, the ends of tracks, and all sums such as the ledger's are kept to the last bit.

@@ -294,9 +294,6 @@ def test_a_lever_of_the_wrong_sign_is_seen(with_fault):
     ("more", "key"),
     [
         ({"particle": {"rolling_friction": 0.1}}, "particle.rolling_friction"),
-        ({"air_density": 1.2}, "air_density"),
-        ({"surface": [{"name": "gate", "from": [0.0, 0.0], "to": [0.2, 0.0], "passes": "up"}]},
-         "run.engine"),
         ({"pair": [{"between": ["stone", "floor"], "cohesion": 0.1}]}, "pair[0].cohesion"),
     ],
 )  # fmt: skip

@@ -177,6 +177,7 @@ def test_what_clings_passes_or_flies_in_air_does_so_as_in_python():
     ]
     scenes = [from_dict({**crowd, "pair": pair}) for pair in pairs]
     flying = (crowd, {**crowd, "pair": pairs[0]}, BALL)
+    flying = (*flying, {**BALL, "particle": CORNERED[1]})
     scenes += [from_dict({**base, "air_density": 40.0}) for base in flying]
     same_runs(scenes)
     runs = [simulate(scene).knots.tobytes() for scene in (from_dict(crowd), *scenes[:4])]
@@ -203,8 +204,10 @@ def test_boxes_and_polygons_move_as_in_python():
     ]}  # fmt: skip
     alone = [{**BALL, "particle": kind, "surface": [LINE]} for kind in CORNERED]
     row = {"stream": {"at": [-0.1, 0.2], "to": [0.2, 0.2], "velocity": [0.3, 0.0], "count": 4}}
-    moving = [{**base, "surface": [{**LINE, **keys}]}
-              for base in (crowd, alone[0]) for keys in (MOVING[0], MOVING[4])]  # fmt: skip
+    ways = (MOVING[0], MOVING[4], {"passes": "up"})
+    moving = [
+        {**base, "surface": [{**LINE, **keys}]} for base in (crowd, alone[0]) for keys in ways
+    ]
     scenes = [crowd, {**crowd, "gravity_deg": 30.0}, *alone, {**alone[1], **row}, *moving]
     same_runs([load("dominoes"), load("domino-gate"), *map(from_dict, scenes)])
 

@@ -110,7 +110,7 @@ typedef struct {
     int corners;            /* [in] how many it has; 0 of what is round ... */
     int outline;            /* [in] ... and the first of them in `World.outlines` */
     int smooth;             /* mark of the shock in which it was brought off its hop */
-    double inner;           /* m; radius of the circle inside them, or its own */
+    double inner, broad;    /* m; radius of the circle inside them, and of one of their area; or its own */
     double tug[3], tugged[3]; /* m/s, m/s, rad/s; what half of a step's pull of its joints changes, and before */
 } Disk;
 

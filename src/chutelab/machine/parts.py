@@ -305,6 +305,16 @@ class Machine:
         return self.segments, self.arcs
 
     @property
+    def broad(self) -> Any:
+        """Radius of each particle's circle of the same area, m, (N,): that of a disk is its own."""
+        found = np.broadcast_to(np.asarray(self.particle.radius, dtype=float), self.count).copy()
+        for kind, corners in enumerate(self.outlines):
+            if corners is not None:
+                (x, y), (u, v) = corners.T, np.roll(corners, -1, axis=0).T
+                found[self.releases.kind == kind] = np.sqrt(0.5 * (x * v - y * u).sum() / np.pi)
+        return found
+
+    @property
     def last_gate(self) -> float:
         """When a surface comes, goes or moves for the last time, s; -inf if none does."""
         times = np.concatenate([[p.appears, p.vanishes] for p in self.parts], axis=1)

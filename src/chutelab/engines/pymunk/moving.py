@@ -363,9 +363,13 @@ class Rolling:
     """
 
     def __init__(self, machine: Machine, radius: Floats) -> None:
-        self.count, self.radius = machine.count, radius
-        # Of particles that turn: 1/I, and rolling friction's arm over the radius, if any has it.
-        self.ease, self.arm = np.zeros((2, len(radius)))
+        self.count = machine.count
+        # Of particles that turn: 1/I, and rolling friction's arm over the radius, if any has it;
+        # and of what is round 1 over the radius.
+        self.ease, self.arm, self.bend = np.zeros((3, len(radius)))
+        outlines = [machine.outlines[kind] for kind in machine.releases.kind]
+        is_round = [outline is None for outline in outlines]
+        np.divide(1.0, radius[: self.count], out=self.bend[: self.count], where=is_round)
         inertia = np.broadcast_to(machine.particle.inertia, self.count)
         np.divide(1.0, inertia, out=self.ease[: self.count], where=inertia > 0.0)
         self.arm[: self.count] = machine.rolling[machine.releases.kind]
@@ -390,7 +394,7 @@ class Rolling:
         """
         last, mate, couple = self.couples
         heat = -0.5 * couple * (turning[:, last] - turning[:, mate]).sum(axis=0)
-        rows, pair = len(self.radius), mate < self.count
+        rows, pair = len(self.bend), mate < self.count
         for entry, part in ((0, couple * spin[mate]), (2, np.where(pair, 0.5 * heat, heat))):
             for row in (last, mate):
                 entries[entry] += np.bincount(row, part, rows)
@@ -398,15 +402,15 @@ class Rolling:
 
     def brake(self, one: Ints, other: Ints, push: Floats, turning: Floats) -> None:
         """Find the couples of the next step from the pushes (k,) of this one."""
-        rows, (last, mate, couple) = len(self.radius), self.couples
+        rows, (last, mate, couple) = len(self.bend), self.couples
         before = dict(
             zip(zip(last.tolist(), mate.tolist(), strict=True), couple.tolist(), strict=True)
         )
         held = [before.get(key, 0.0) for key in zip(one.tolist(), other.tolist(), strict=True)]
-        # Of two kinds the larger; between two disks on the radius of both together.
+        # Of two kinds the larger; between two disks on the radius of both together. Edges are flat.
         share = np.maximum(self.arm[one], self.arm[other])
-        r, its = self.radius[one], self.radius[other]
-        most = share * np.where(its > 0.0, r * its / (r + its), r) * push
+        bends = self.bend[one] + self.bend[other]
+        most = np.divide(share * push, bends, out=np.zeros(len(one)), where=bends > 0.0)
         contacts = np.bincount(np.concatenate((one, other)), minlength=rows)
         contacts[self.count :] = 1
         ease = (self.ease[one] + self.ease[other]) * np.maximum(contacts[one], contacts[other])

@@ -773,32 +773,6 @@ def test_colours_are_nearly_the_stages_and_what_stands_still_keeps_its_own(runs,
     assert (shows[drawn] == shown).all()
 
 
-def test_without_the_energy_the_machine_is_larger(runs):
-    small, large = (
-        lay_out(runs["perpendicular"], width=WIDTH, height=HEIGHT, energy=energy)
-        for energy in (True, False)
-    )
-    assert "energy" in small.shows
-    assert large.shows == small.shows - {"energy"}
-    assert large.view[2] > 1.4 * small.view[2]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "delay"),
-    [
-        pytest.param("perpendicular", 40, marks=pytest.mark.slow),
-        pytest.param("stream", 50, marks=pytest.mark.slow),
-    ],
-)
-def test_a_film_is_small_and_a_streams_has_fewer_pictures_a_second(name, delay, tmp_path):
-    few = scene.load(name, overrides=["stream.count=4"] if name == "stream" else ())
-    path = animate(simulate(few), tmp_path / "lesson.gif")
-    with Image.open(path) as gif:
-        assert gif.info["duration"] == delay
-    assert path.stat().st_size < 400_000
-
-
 def written(pictures, delays):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "written.gif"

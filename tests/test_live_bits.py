@@ -111,7 +111,6 @@ def test_a_page_refuses_mass_points_by_their_key():
 
 def test_what_boxes_and_polygons_do_not_have_is_refused_by_the_same_key():
     box, kind = {"shape": "box", "size": [0.1, 0.1], "spin": True}, {"shape": "polygon"}
-    wall = {**THROWN["surface"][0], "passes": "up"}
     own = {**THROWN, "particle": box}
     documents = [
         {**own, "particle": {**box, **more}}
@@ -123,7 +122,6 @@ def test_what_boxes_and_polygons_do_not_have_is_refused_by_the_same_key():
         {**kind, "points": [[0, 0], [1, 0]]},
     )]  # fmt: skip
     documents += [
-        {**own, "air_density": 1.2}, {**own, "surface": [wall]},
         {**own, "run": {"engine": "exact"}},
         {**own, "stream": {**own["stream"], "width": 0.5}}, {**BELTS, "particle": box},
         {**THROWN, "stream": {**THROWN["stream"], "angle_deg": 30.0}},

@@ -13,6 +13,7 @@ from test_joints import machine_of_joints
 
 pytest.importorskip("scipy")
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.special import ellipk
 
 G, M, W, H = 9.81, 0.1, 0.04, 0.02
@@ -252,6 +253,109 @@ def test_random_boxes_on_random_joints_keep_the_laws(seed):
     own = run.ledger
     play = own.turned_over + max(abs(e) for e in (*own.potential, *own.spring))
     assert abs(own.residual) < 1e-9 * play
+
+
+# Surfaces that are solid from one side
+
+
+def thrown_box(height, omega=0.0, dt=1e-3):
+    """A box thrown so high, m, from 0.3 m below a line that lets it through from there."""
+    line = {"name": "line", "from": [-0.5, 0.0], "to": [0.5, 0.0], "passes": "up"}
+    return {
+        "particle": BOX, "surface": [{**line, "restitution": 0.0, "friction": 0.3}],
+        "stream": {"at": [0.1, -0.3], "velocity": [0.0, sqrt(2.0 * G * height)], "omega": omega},
+        "run": {"until": 0.9, "dt": dt},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("omega", [0.0, 3.0, -8.0])
+def test_a_box_thrown_through_a_line_comes_down_on_its_lowest_corner(omega):
+    """Where -0.3 + v t - g t²/2 = w/2 |sin| + h/2 |cos| of the angle omega t, as it falls."""
+    v = sqrt(2.0 * G * 0.6)
+
+    def low(t):
+        reach = 0.5 * W * abs(sin(omega * t)) + 0.5 * H * abs(cos(omega * t))
+        return -0.3 + v * t - 0.5 * G * t * t - reach
+
+    recording = sound(chutelab.simulate(thrown_box(0.6, omega)))
+    t = recording.select("impact")["t"][0]
+    assert t == pytest.approx(brentq(low, v / G, 0.9, xtol=1e-15), abs=1e-12)
+    hits = chutelab.simulate(thrown_box(0.6, omega, 2.5e-4), engine="pymunk").select("impact")
+    assert hits["t"][0] == pytest.approx(t, abs=1e-3)
+
+
+def test_a_box_lies_on_such_a_line_only_if_all_of_it_has_come_through():
+    for more in (-1e-8, 1e-8):
+        recording = chutelab.simulate(thrown_box(0.3 + 0.5 * H + more))
+        assert not recording.laws
+        y = recording.at(np.array([0.6])).position[0, 0, 1]
+        assert y == pytest.approx(0.5 * H, rel=1e-3) if more > 0.0 else y < -0.5
+
+
+def one_sided(seed):
+    """Boxes or polygons thrown among lines and bows that are solid from one side, some moving."""
+    random = np.random.default_rng(seed + 777)
+    walls = [[-0.6, 0.6], [-0.6, -0.4], [0.6, -0.4], [0.6, 0.6]]
+    surfaces = [{"name": "box", "points": walls}]
+    for n in range(3):
+        x, y = 0.35 * (n - 1), random.uniform(-0.2, 0.2)
+        run = np.sort(random.uniform(-0.15, 0.15, int(random.integers(2, 5))))
+        off, kind = random.uniform(-0.05, 0.05, len(run)), random.integers(3)
+        own = {"points": [[x + a, y + b] for a, b in zip(run, off, strict=True)],
+               "passes": str(random.choice(["up", "down"]))}  # fmt: skip
+        if kind == 0:
+            own = {"points": [[x + b, y + a] for a, b in zip(run, off, strict=True)],
+                   "passes": str(random.choice(["left", "right"]))}  # fmt: skip
+        elif kind == 1:
+            own = {"center": [x, y], "radius": random.uniform(0.05, 0.12),
+                   "from_deg": 20.0, "to_deg": 20.0 + random.uniform(60.0, 300.0),
+                   "passes": str(random.choice(["in", "out"]))}  # fmt: skip
+        if random.random() < 0.25:
+            by = random.uniform(-0.01, 0.01, 2).tolist()
+            own["shake"] = {"by": by, "frequency": random.uniform(1.0, 8.0)}
+        surfaces.append({"name": f"s{n}", **own})
+    pair = {"restitution": float(random.choice([0.0, 0.4])), "friction": random.uniform(0.0, 1.0)}
+    stream = {"fill": [[-0.45, 0.25], [0.45, 0.55]], "count": int(random.integers(2, 10)),
+              "velocity": random.uniform(-1.0, 1.0, 2).tolist(), "omega": random.uniform(-10, 10),
+              "interact": True}  # fmt: skip
+    return {
+        "particle": {"mass": 0.05, **a_shape(random, 0.035), "spin": True},
+        "surface": [{**one, **pair} for one in surfaces], "stream": {**stream, **pair},
+        "run": {"until": 1.2},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", seeds(5, 10))
+def test_random_boxes_among_what_lets_them_through_keep_the_laws(seed):
+    sound(chutelab.simulate(one_sided(seed), engine="contact"))
+
+
+# What rolls on a box
+
+
+@pytest.mark.parametrize("drop", [0.0, 0.01])
+def test_a_disk_rolls_on_a_box_as_on_a_floor(drop):
+    """Rolling friction c slows it down by 2/3 c g; a blow of m v by as much as v / g of that."""
+    r, c, v, end = 0.01, 0.1, 0.8, 0.5
+    slab = {"name": "slab", "shape": "box", "size": [1.0, H], "mass": 50.0, "spin": True}
+    row = {"interact": True, "friction": 0.6, "restitution": 0.0}
+    scene = {
+        "particle": [slab, {**ROUND, "mass": 0.01, "rolling_friction": c}],
+        "surface": [{"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "friction": 0.6}],
+        "stream": [{"particle": "slab", "at": [0.0, 0.5 * H], "velocity": [0.0, 0.0], **row},
+                   {"particle": "ball", "at": [-0.4, H + r + drop], "velocity": [v, 0.0],
+                    "omega": -v / r}],
+        "run": {"until": end},
+    }  # fmt: skip
+    last = sound(chutelab.simulate(scene)).ends()[1][1]
+    # Falling and resting, it is pressed by its weight times all of the time.
+    assert last["velocity"][0] == pytest.approx(v - 2.0 / 3.0 * c * G * end, abs=1e-8)
+    assert last["omega"] == pytest.approx(-last["velocity"][0] / r, abs=1e-6)
+    if drop == 0.0:
+        theirs = [chutelab.simulate(scene, {"run.dt": dt}, engine="pymunk").ends()[1][1]
+                  for dt in (1e-3, 2.5e-4)]  # fmt: skip
+        off = [abs(one["velocity"][0] - last["velocity"][0]) for one in theirs]
+        assert off[1] < 0.4 * off[0]
 
 
 # Surfaces

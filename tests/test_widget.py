@@ -6,9 +6,10 @@ import sys
 import pytest
 
 import chutelab
+from chutelab.pictures.live import SHOWN, widget
 from chutelab.scene import SceneError, load, parse
 
-widget = pytest.importorskip("chutelab.pictures.live.widget")
+pytest.importorskip("anywidget")
 
 HOST = """<!doctype html><title>a notebook</title><div id="cell"></div><script type="module">
 const values = VALUES;
@@ -45,7 +46,7 @@ def test_it_takes_scenes_names_and_files(tmp_path):
 
 def test_without_anywidget_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "anywidget", None)
-    monkeypatch.delitem(sys.modules, "chutelab.pictures.live.widget")
+    widget.cache_clear()
     with pytest.raises(ImportError, match=r'pip install "chutelab\[notebook\]"'):
         chutelab.live("perpendicular")
 
@@ -53,7 +54,7 @@ def test_without_anywidget_it_says_what_to_install(monkeypatch):
 def hosted(opened, path, html):
     """Open a page that shows the widget as Jupyter does."""
     values = {"html": html, "height": 600, "title": "A scene", "scene": ""}
-    module = widget.SHOWN.replace("export default", "const shown =")
+    module = SHOWN.replace("export default", "const shown =")
     text = HOST.replace("MODULE", module)
     packed = json.dumps(values).replace("<", "\\u003c")
     path.write_text(text.replace("VALUES", packed), encoding="utf-8")

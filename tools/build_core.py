@@ -57,7 +57,7 @@ SMALL = """#pragma clang attribute push(__attribute__((minsize)), apply_to = fun
 #pragma clang attribute pop
 """
 
-SIZES = {"double": 8, "int": 4, "pointer": 4}
+SIZES = {"double": 8, "float": 4, "int": 4, "pointer": 4}
 
 
 def layout(text: str) -> dict[str, object]:

@@ -509,10 +509,12 @@ def page(grades: Iterable[Grade]) -> str:
         heads = "".join(
             f"<th scope=col>{n}. {escape(one.title)}" for n, one in enumerate(exercise.questions, 1)
         )
-        right = "".join(
-            f"<td>{sum(marks)} of {len(of_lesson)}{_most_common(of_lesson, n)}"
-            for n, marks in enumerate(zip(*(row.marks for row in of_lesson), strict=True), 1)
-        )
+        right = ""
+        for n, marks in enumerate(zip(*(row.marks for row in of_lesson), strict=True), 1):
+            right += f"<td>{sum(marks)} of {len(of_lesson)}"
+            made = Counter(row.mistakes[n] for row in of_lesson if n in row.mistakes)
+            for mistake, many in made.most_common(1):
+                right += f"<small>{many} × {escape(mistake)}</small>"
         lines = "".join(
             f"<tr><th scope=row>{escape(row.student)}<td>{row.total} of {row.out_of}"
             f"{''.join(_cell(row, n) for n in range(1, row.out_of + 1))}<td>{escape(row.reason)}"
@@ -537,12 +539,6 @@ def page(grades: Iterable[Grade]) -> str:
     if rest:
         parts.append(f"<h2>Not counted</h2>\n<table><tr><th>file<th>why{rest}</table>")
     return Template(asset("report.html")).substitute(body="\n".join(parts))
-
-
-def _most_common(rows: Sequence[Grade], number: int) -> str:
-    """Return the mistake that most made in a question, and how many, if any is known."""
-    counted = Counter(row.mistakes[number] for row in rows if number in row.mistakes)
-    return "".join(f"<small>{many} × {escape(one)}</small>" for one, many in counted.most_common(1))
 
 
 def _cell(row: Grade, number: int) -> str:

@@ -34,7 +34,7 @@ LARGE = 64 * 2**20
 SUBJECTS = ("Room", "World", "Plan", "Drawing", "Laws", "Exact", "Loads")
 """Structs of layout.h of which the core has one each."""
 
-TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}
+TYPES = {"double": "<f8", "float": "<f4", "int": "<i4", "pointer": "<u4"}
 
 REAL, INTEGER = np.dtype(TYPES["double"]), np.dtype(TYPES["int"])
 

@@ -1,5 +1,5 @@
-/* Drag of still air on disks, which count as spheres: with Schiller's and Naumann's coefficient, as in
-   `theory.drag`. What rides or sleeps is held against it.
+/* Drag of still air on disks, which count as spheres, and on boxes and polygons, which count as spheres whose disk has
+   their area: with Schiller's and Naumann's coefficient, as in `theory.drag`. What rides or sleeps is held against it.
 
    A step is split (Strang): half of what air does in it comes before the flight, half after it. So paths are
    parabolas between two steps, and of second order in the step. A blow on a disk by itself comes with
@@ -12,9 +12,9 @@
 
 /* Deceleration over speed, 1/s. */
 static double relief(const Disk *d, double speed) {
-    double reynolds = 2 * d->radius * speed * W.air / VISCOSITY, area = PI * d->radius * d->radius;
+    double r = d->broad, reynolds = 2 * r * speed * W.air / VISCOSITY, area = PI * r * r;
     if (reynolds >= 1000) return 0.22 * W.air * area * speed * d->inv_mass;
-    return 6 * PI * VISCOSITY * d->radius * (1 + 0.15 * pow(reynolds, 0.687)) * d->inv_mass;
+    return 6 * PI * VISCOSITY * r * (1 + 0.15 * pow(reynolds, 0.687)) * d->inv_mass;
 }
 
 /* Have air slow a disk down for the time up to t since it did last; before that, take it back. */

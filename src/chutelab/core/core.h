@@ -108,7 +108,8 @@ static inline double cohesion_of(int i, int j) {
     return (j < 0 ? surface_pair(d, -1 - j) : pair_of(d->kind, W.disks[j].kind))->cohesion;
 }
 /* Whether a disk is spared: a gate shut on it, or what is solid from one side lets it through, and it is not clear
-   of that yet. */
+   of that yet; or CLEARS: it will be in this step. */
+#define CLEARS 2
 static inline int *spared_by(const Surface *s, const Disk *d) {
     return W.spared + (d - W.disks) * W.gate_count + s->gate;
 }
@@ -199,7 +200,7 @@ double gap_to(const Surface *s, double x, double y, double r, double *nx, double
 const Surface *face_at(const Surface *s, double x, double y);
 double surface_speed(const Surface *s, double nx, double ny, double x, double y, double r);
 double bending(const Surface *s, double x, double y, double r);
-double chain_gap(const Surface *s, double x, double y, double r, double t, double *side);
+double chain_gap(const Surface *s, const Disk *d, double x, double y, double t, double *side);
 double clear_after(const Surface *s, const Disk *d, double span);
 double meet_surface(const Surface *s, const Disk *d, double span, double *approach);
 double meet_disk(double x, double y, double u, double v, double reach, double span, double *approach);
@@ -282,7 +283,7 @@ void share_with_joints(const Contact *c, double wanted, const double *u, double 
 double inner_of(int i, int j);
 double whirl_of(const Disk *d);
 int list_touches(int i, int j, double t, double within, double later, Touch *list);
-double gap_of_corners(const Disk *d, double x, double y, int k, double t);
+double clear_of_corners(const Disk *d, double x, double y, int k, double t);
 int would_overlap(int i, double x, double y, int j, double t, double deep);
 double meet_corners(int i, int j, double from, double until, double soft);
 void describe_touch(Contact *c, int i, int j, const Touch *t);
@@ -372,11 +373,15 @@ void set_rows(Contact *list, int count);
 void take_rows(Contact *list, int count);
 void begin_anew(void);
 double sweep_rows(int sweeps, int plain, double accurate);
+double sweep_lightly(int sweeps, int plain, double accurate);
 int lessen(void);
 void keep_bounds(void);
 int drop_noise(void);
 double left_open(void);
 double slip_of(const SolverRow *row);
+
+/* fours.c */
+double sweep_fours(int rows, int all_bodies, int sweeps, int plain, double accurate, double most);
 
 /* solver.c */
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,

@@ -263,21 +263,46 @@ RARELY int list_touches(int i, int j, double t, double within, double later, Tou
     return count;
 }
 
-/* Gap between a particle with corners, moved to a place, and a surface, m. */
-RARELY double gap_of_corners(const Disk *d, double x, double y, int k, double t) {
+/* By how much a shape is clear of the circle of an arc, or of what is between its ends from an edge's side, m. */
+static double clear_of_bow(const Shape *a, const Surface *s) {
+    double far = 0, near = INFINITY, n[2], out;
+    const double centre[2] = {s->x, s->y};
+    for (int e = 0; e < a->count; e++) {
+        const double *p = a->p[e], *q = a->p[e + 1 < a->count ? e + 1 : 0];
+        double length = out_of(a, e, n), x = s->x - p[0], y = s->y - p[1], along = n[0] * y - n[1] * x;
+        double over = MIN(MAX(along, 0), length) / length;
+        near = MIN(near, hypot(x - over * (q[0] - p[0]), y - over * (q[1] - p[1])));
+        far = MAX(far, hypot(x, y));
+    }
+    furthest(a, centre, &out);
+    double clear = MAX(s->radius - far, (out > 0 ? near : 0) - s->radius);
+    for (int e = 0; e < a->count && s->shape == ARC; e++) {
+        out_of(a, e, n);
+        double least = MIN(off_edge(a, e, s->end), off_edge(a, e, s->end + 2));
+        if (-n[0] * s->tx - n[1] * s->ty >= s->cos_half) least = off_edge(a, e, centre) - s->radius;
+        clear = MAX(clear, least);
+    }
+    return clear;
+}
+
+/* By how much a particle with corners, as it is at t and moved to a place, is clear of a surface, m: along the best of
+   all edges; below 0 it overlaps. */
+RARELY double clear_of_corners(const Disk *d, double x, double y, int k, double t) {
     Shape a = shape_of((int)(d - W.disks), t), b = shape_of(-1 - k, t);
-    double least = INFINITY;
+    double low = INFINITY, high = -INFINITY, clear;
     for (int n = 0; n < a.count; n++) {
         a.p[n][0] += x - a.x;
         a.p[n][1] += y - a.y;
     }
-    a.x = x;
-    a.y = y;
-    for (int c = 0; c < a.count + b.count; c++) {
-        Touch now = {.which = c};
-        if (find_place(&a, &b, TOUCH * d->inner, &now)) least = MIN(least, now.gap);
+    if (b.s->shape != SEGMENT) return clear_of_bow(&a, b.s);
+    for (int n = 0; n < a.count; n++) {
+        double off = (a.p[n][1] - b.s->y) * b.s->tx - (a.p[n][0] - b.s->x) * b.s->ty;
+        low = MIN(low, off);
+        high = MAX(high, off);
     }
-    return least;
+    clear = MAX(low, -high);
+    for (int e = 0; e < a.count; e++) clear = MAX(clear, clear_of(&a, e, &b));
+    return clear;
 }
 
 /* Whether two particles, one with corners, would overlap by more than `deep`, the first at a place, both at t. */
@@ -607,7 +632,7 @@ static void feel_joints(Contact *list, int count, double size) {
 }
 
 /* Impulses at all places such that gaps do not close, or open as fast as they are to, and that friction, a share of
-   it, stops slip as far as it may. */
+   it, stops slip as far as it may, and a disk's rolling friction its rolling, unless there are joints. */
 static void share_blow(Contact *list, int count, const double *back, double share) {
     double size = 0;
     for (int n = 0; n < count; n++) size = MAX(size, back[n]);
@@ -629,6 +654,14 @@ static void share_blow(Contact *list, int count, const double *back, double shar
             give_all(c, change);
             J[1] += change[1];
             if (c->mass[1] > 0) worst = MAX(worst, fabs(change[1]) / c->mass[1]);
+            double arm = answers ? 0 : share * c->arm * J[0];
+            if (arm == 0 && J[2] == 0) continue;
+            relative(c, 0, v);
+            change[1] = 0;
+            change[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -arm), arm) - J[2];
+            give_all(c, change);
+            J[2] += change[2];
+            worst = MAX(worst, fabs(change[2]) / c->mass[2] * W.disks[MAX(c->j, 0)].radius);
         }
         if (worst <= ENDS * size) return;
     }
@@ -644,7 +677,7 @@ static double share_out_blow(Contact *list, int count, double *back, const doubl
         for (int n = 0; n < count; n++) {
             const double *J = list[n].impulse;
             relative(list + n, 0, v);
-            lost -= 0.5 * (J[0] * (u[n][0] + v[0]) + J[1] * (u[n][1] + v[1]));
+            lost -= 0.5 * (J[0] * (u[n][0] + v[0]) + J[1] * (u[n][1] + v[1]) + J[2] * (u[n][2] + v[2]));
             size += fabs(J[0] * u[n][0]) + fabs(J[1] * u[n][1]);
         }
         int is_plastic = 1;
@@ -652,9 +685,9 @@ static double share_out_blow(Contact *list, int count, double *back, const doubl
         if (lost >= -GAINS * size || is_plastic) return lost;
         for (int n = 0; n < count; n++) {
             Contact *c = list + n;
-            double none[3] = {-c->impulse[0], -c->impulse[1], 0};
+            double none[3] = {-c->impulse[0], -c->impulse[1], -c->impulse[2]};
             give_all(c, none);
-            c->impulse[0] = c->impulse[1] = 0;
+            c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
             if (share == 0) back[n] = 0;
         }
         share = share > 0.1 ? 0.5 * share : share > 0 ? 0 : 1;

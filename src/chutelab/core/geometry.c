@@ -85,28 +85,30 @@ static double beside(const Surface *s, double x, double y) {
     return (off * (nx * dx + ny * dy) - off * off) / s->radius;
 }
 
-/* Gap at t between a disk and the nearest piece of a chain, and on which side of it the disk is: its solid one if above
+/* Gap at t between a disk at a place and the nearest piece of a chain, and on which side of it its centre is: its solid one if above
    0, of what is solid on both 0. At a corner, where two pieces are as near, that is told by the sum of their normals. */
-double chain_gap(const Surface *s, double x, double y, double r, double t, double *side) {
+double chain_gap(const Surface *s, const Disk *d, double x, double y, double t, double *side) {
     int first = (int)(s - W.surfaces), k = first;
-    double least = INFINITY, nx, ny;
+    double least = INFINITY, clear = INFINITY, nx, ny;
     do {
         const Surface *piece = surface_at(k, t);
-        double gap = gap_to(piece, x, y, r, &nx, &ny), own = piece->one_sided * beside(piece, x, y);
+        double gap = gap_to(piece, x, y, d->radius, &nx, &ny), own = piece->one_sided * beside(piece, x, y);
         if (gap <= least) *side = gap < least ? own : *side + own;
         least = MIN(gap, least);
+        if (has_corners(d)) clear = MIN(clear, clear_of_corners(d, x, y, k, t));
         k = piece->chain;
     } while (k != first);
-    return least;
+    return has_corners(d) ? clear : least;
 }
 
 /* Time from d->t until a disk that what is solid from one side lets through is clear of it on that side, INFINITY if not
    within the span: looked at in strides in which it can come to none of it. */
 double clear_after(const Surface *s, const Disk *d, double span) {
     double most = sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * span + W.fastest, side;
+    if (has_corners(d)) most += fabs(d->spin) * d->radius;
     for (double h = 0;;) {
         double x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h;
-        double gap = chain_gap(s, x, y, d->radius, d->t + h, &side);
+        double gap = chain_gap(s, d, x, y, d->t + h, &side);
         if (gap >= 0 && side > 0) return h;
         if (!(h < span && most > 0)) return INFINITY;
         h = MIN(h + MAX(fabs(gap), TOUCHING * d->radius) / most, span);

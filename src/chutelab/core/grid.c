@@ -178,7 +178,7 @@ int place_is_free(int i, double x, double y, double t) {
     for (int k = 0; k < W.surface_count && (W.gate_count || W.mover_count); k++) {
         const Surface *s = surface_at(k, t);
         if ((s->gate < 0 && s->mover < 0) || s->there != THERE) continue;
-        double gap = has_corners(W.disks + i) ? gap_of_corners(W.disks + i, x, y, k, t) : gap_to(s, x, y, r, &nx, &ny);
+        double gap = has_corners(W.disks + i) ? clear_of_corners(W.disks + i, x, y, k, t) : gap_to(s, x, y, r, &nx, &ny);
         if (gap < -TOUCHING * r) return 0;
     }
     if (!W.interact) return 1;

@@ -87,20 +87,20 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     return MAX(least, MIN(skip * pow(GROW, MIN(impacts - many, 1000)), most));
 }
 
-/* When particle i meets j, of which one has corners, in what is left of the step. */
-static RARELY double meet_cornered(int i, int j) {
+/* When particle i meets j, of which one has corners, in what is left of the step after a time. */
+static RARELY double meet_cornered(int i, int j, double from) {
     int first = has_corners(W.disks + i) ? i : j, other = first == i ? j : i;
     const Disk *d = W.disks + first, *o = W.disks + MAX(other, 0);
     int impacts = MAX(d->impacts, other >= 0 ? o->impacts : 0);
     double small = inner_of(first, other), soft = left_over(d, impacts, MAX(-1 - other, -1), small, 0);
     if (other >= 0) soft = MAX(soft, left_over(o, impacts, -1, small, 0));
-    return meet_corners(first, other, MAX(W.now, other < 0 ? d->t : W.now), W.step_end, soft);
+    return meet_corners(first, other, from, W.step_end, soft);
 }
 
 static void foresee_pair(int i, int j, double *due, int *partner) {
     const Disk *a = W.disks + i, *b = W.disks + j;
     if (is_cornered(i, j)) {
-        double then = meet_cornered(i, j);
+        double then = meet_cornered(i, j, W.now);
         if (then >= *due || then >= W.step_end) return;
         *due = then;
         *partner = j;
@@ -140,18 +140,19 @@ static void foresee_surfaces(int i, double *due, int *partner) {
         if (is_spared(W.surfaces + k, d)) {
             if (!W.surfaces[k].one_sided) continue;
             wait = clear_after(W.surfaces + k, d, W.step_end - d->t);
+            *spared_by(W.surfaces + k, d) = wait < INFINITY ? CLEARS : 1;
             if (wait == INFINITY) continue;
         }
         const Surface *s = surface_at(k, d->t);
         if (s->mover >= 0 && !stirs(s) && d->mode == ASLEEP && d->ux == 0 && d->uy == 0) continue;
         if (!has_corners(d) && stirs(s) && closing(s, d, W.step_end - d->t) <= left_over(d, d->impacts, k, d->radius, 0)) continue;
-        double t = has_corners(d) ? meet_cornered(i, -1 - k) : wait > 0 ? meet_later(s, d, wait, &approach)
+        double t = has_corners(d) ? meet_cornered(i, -1 - k, MAX(W.now, d->t + wait)) : wait > 0 ? meet_later(s, d, wait, &approach)
             : d->t + meet_surface(s, d, W.step_end - d->t, &approach);
         /* What goes round an end within the step comes to the side that lets it through. */
         if (s->one_sided && t < W.step_end) {
             Disk then = *d;
             advance(&then, t);
-            chain_gap(s, then.x, then.y, d->radius, t, &side);
+            chain_gap(s, d, then.x, then.y, t, &side);
             if (side < 0) continue;
         }
         if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius, 0)) {
@@ -539,14 +540,14 @@ static void strike(int i, int j, double t) {
     if (!W.interact) slow_down(i, t);
     if (j >= 0) advance(b, t);
     else if (a->impacts < FEW) end_hop(i, t);
+    /* It has got clear of what let it through. */
+    if (j < 0 && W.surfaces[-1 - j].one_sided) *spared_by(W.surfaces + (-1 - j), a) = 0;
     if (is_cornered(i, j)) {
         if (has_corners(a)) strike_corners(i, j, t);
         else strike_corners(j, i, t);
         return;
     }
     int impacts = j >= 0 ? MAX(a->impacts, b->impacts) : a->impacts;
-    /* It has got clear of what let it through. */
-    if (j < 0 && W.surfaces[-1 - j].one_sided) *spared_by(W.surfaces + (-1 - j), a) = 0;
     Contact c;
     double u[3];
     if (j < 0 && is_hung(-1 - j)) strike_hinge(W.surfaces[-1 - j].mover, t);

@@ -110,7 +110,7 @@ typedef struct {
     int corners;            /* [in] how many it has; 0 of what is round ... */
     int outline;            /* [in] ... and the first of them in `World.outlines` */
     int smooth;             /* mark of the shock in which it was brought off its hop */
-    double inner;           /* m; radius of the circle inside them, or its own */
+    double inner, broad;    /* m; radius of the circle inside them, and of one of their area; or its own */
     double tug[3], tugged[3]; /* m/s, m/s, rad/s; what half of a step's pull of its joints changes, and before */
 } Disk;
 
@@ -311,8 +311,22 @@ typedef struct {
     double change;          /* m/s; by which the last sweep changed its slip */
     int a, b;               /* bodies */
     int from;               /* which contact of the list it is */
+    int colour, four;       /* see `SolverFour`; its place among their numbers */
     int pad;
 } SolverRow;
+
+/* Four rows as sweeps in single precision see them, of the same names but for those of x and y, and of normal and slip. */
+typedef struct {
+    float nx[4], ny[4], opens[4], slips[4], mass[4], slide_mass[4], light[4], slide_light[4];
+    float gives[4], eases[4], more[4], parts[4], rough[4], arm[4], spin[4], roll_mass[4], roll_light[4];
+    float mass_a[4], mass_b[4], turn_a[4], turn_b[4], twist_a[4], twist_b[4], bend_a[4], bend_b[4];
+    float impulse[4], swept[4], course[4], along[4], slide_swept[4], slide_course[4];
+    float moment[4], roll_swept[4], roll_course[4];
+    int a[4], b[4];
+} SolverFour;
+
+/* ... and what they change of a body. */
+typedef struct { float x, y, rim, pad, swept[4], course[4]; } LightBody;
 
 typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; double angle; } Knot; /* [out] */
 
@@ -356,6 +370,8 @@ typedef struct {
     Contact *earlier;    /* of the step before */
     SolverRow *rows;     /* (contacts) of those that are solved together */
     SolverBody *solver_bodies; /* (disks + 1) ... and their disks */
+    SolverFour *fours;   /* (four_room) the same in single precision */
+    LightBody *light_bodies; /* (disks + 1) */
     int *links;          /* (2 contacts) */
     int *near;           /* (2 near) pairs that may meet in this step */
     Cell *cells;
@@ -378,7 +394,7 @@ typedef struct {
     int outline_count;   /* [in] */
     int joint_row_count;
     int material_count;
-    int knot_room, event_room, total_room, contact_room, near_room, cell_room, swing_room;
+    int knot_room, event_room, total_room, contact_room, four_room, near_room, cell_room, swing_room;
     int full;            /* what `run` makes room for as it goes on: see `Full` */
     int bucket_count;    /* a power of two */
     int gate_count, end_count, circle_count;

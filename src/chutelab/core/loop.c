@@ -34,8 +34,7 @@ void spare(const Disk *d, const Surface *s, double t) {
     int comes = s->opens == t, *spared = spared_by(s, d);
     if (!comes && !s->one_sided && (s->opens > t || !*spared)) return;
     if (d->mode == RIDING) ride_at(d, t, place);
-    double gap = has_corners(d) ? gap_of_corners(d, place[0], place[1], (int)(s - W.surfaces), t)
-        : chain_gap(s, place[0], place[1], d->radius, t, &side);
+    double gap = chain_gap(s, d, place[0], place[1], t, &side);
     *spared = side < 0 || (comes ? gap < -deep : *spared && gap < 0);
 }
 
@@ -291,8 +290,11 @@ static double set_gates(double t) {
         s->there = there;
         /* Pieces that follow each other in a chain share what they spare. */
         int is_first = s->gate >= 0 && (k == 0 || s->gate != s[-1].gate);
-        for (int i = W.low; i < W.high && is_first; i++)
-            if (is_live(W.disks + i)) spare(W.disks + i, s, t);
+        for (int i = W.low; i < W.high && is_first; i++) {
+            if (!is_live(W.disks + i)) continue;
+            if (*spared_by(s, W.disks + i) == CLEARS) *spared_by(s, W.disks + i) = 0;
+            spare(W.disks + i, s, t);
+        }
     }
     return W.gate_count || W.mover_count ? next_gate(t) : INFINITY;
 }

@@ -259,6 +259,8 @@ static void make_contact_room(int room) {
     RESERVE(W.earlier, room);
     RESERVE(W.links, 2.0 * room);
     RESERVE(W.rows, room);
+    W.four_room = W.interact ? room / 4 : 0;
+    RESERVE(W.fours, W.four_room);
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
 }
 
@@ -287,6 +289,7 @@ static int lay_out_work(void) {
     W.cell_room = crowd ? 12 * n + 64 : 1;
     RESERVE(W.tracks, n);
     RESERVE(W.solver_bodies, n + 1.0);
+    RESERVE(W.light_bodies, n + 1.0);
     RESERVE(W.joint_rows, W.joint_row_count);
     RESERVE(W.joint_matrix, (double)W.joint_row_count * W.joint_row_count);
     RESERVE(W.waits, crowd ? (double)WAITS * n : WAITS);
@@ -372,16 +375,18 @@ static void join_disks(void) {
     }
 }
 
-/* Radius of the circle round the centre of a particle that no edge cuts, m. */
-static double inner_radius(const Disk *d) {
+/* Find the radius of the circle round the centre of a particle that no edge cuts, and of one of its area. */
+static void measure(Disk *d) {
     const double *p = W.outlines + 2 * d->outline;
-    double least = d->radius;
+    double twice = 0;
+    d->inner = d->broad = d->radius;
     for (int n = 0; n < d->corners; n++) {
         const double *a = p + 2 * n, *b = p + 2 * ((n + 1) % d->corners);
-        double x = b[0] - a[0], y = b[1] - a[1];
-        least = MIN(least, (a[0] * y - a[1] * x) / sqrt(x * x + y * y));
+        double x = b[0] - a[0], y = b[1] - a[1], cross = a[0] * y - a[1] * x;
+        d->inner = MIN(d->inner, cross / sqrt(x * x + y * y));
+        twice += cross;
     }
-    return least;
+    if (d->corners) d->broad = sqrt(0.5 * twice / PI);
 }
 
 /* The host has filled in what is marked [in]: fill in what follows. */
@@ -406,7 +411,7 @@ EXPORT int prepare(void) {
         Disk *d = W.disks + i;
         least = MIN(least, d->radius);
         most = MAX(most, d->radius);
-        d->inner = inner_radius(d);
+        measure(d);
         if (!d->rides) continue;
         d->ride_x = d->x * c + d->y * s;
         d->ride_rho = d->y * c - d->x * s;

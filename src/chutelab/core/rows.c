@@ -12,10 +12,8 @@
 #define DIVERGES 1e3
 /* Of momentum. */
 #define NOISE 1e-11
-/* Rows between disks from which on they are swept colour by colour: those of one colour share no disk, so
-   that the processor need not wait for one to begin with the next. A disk among equal ones has six. */
-#define LARGE 200
-#define COLOURS 12
+/* Rows from which on they are swept by fours first. */
+#define LARGE 32
 /* Of an interval, to where it ends in rounding. */
 #define HALVINGS 50
 /* m/s; what a contact is free to open with that asks for nothing: finite, so that it can be multiplied by 0. */
@@ -96,29 +94,19 @@ static void cling(const Contact *list) {
 /* Make rows of contacts, whose disks have got no impulses yet, and give them those that they begin with. What
    cohesion pulls is no row's to choose: it is in the velocities that these begin with. */
 void set_rows(Contact *list, int count) {
-    int begin[COLOURS + 2] = {0}, many = 0;
     W.solver_bodies[0] = (SolverBody){.disk = -1};
     bodies = 1;
-    clings = 0;
-    for (int n = 0; n < count; n++) many += list[n].two;
+    clings = pairs = 0;
     for (int n = 0; n < count; n++) {
-        Contact *c = list + n;
-        SolverBody *a = W.solver_bodies + body_of(c->i), *b = W.solver_bodies + (c->two ? body_of(c->j) : 0);
-        int colour = c->two ? 0 : COLOURS;
-        if (c->two && many >= LARGE) {
-            while (colour < COLOURS - 1 && (a->used | b->used) >> colour & 1) colour++;
-            a->used |= 1 << colour;
-            b->used |= 1 << colour;
-        }
-        c->next = colour;
-        begin[colour + 1]++;
+        body_of(list[n].i);
+        if (list[n].two) body_of(list[n].j);
+        pairs += list[n].two;
     }
-    for (int k = 0; k <= COLOURS; k++) begin[k + 1] += begin[k];
-    pairs = begin[COLOURS];
     rows = count;
+    SolverRow *pair = W.rows, *other = W.rows + pairs;
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
-        SolverRow *r = W.rows + begin[c->next]++;
+        SolverRow *r = c->two ? pair++ : other++;
         double u[3];
         relative(c, 1, u);
         r->normal[0] = c->nx;
@@ -336,6 +324,15 @@ double sweep_rows(int sweeps, int plain, double accurate) {
         if (worst <= accurate) return worst;
         if (!(worst <= DIVERGES * (begins + W.soft + W.skip * radius))) return INFINITY;
     }
+    return worst;
+}
+
+/* The same by fours, if there are enough of them; INFINITY, too, where that is left to `sweep_rows`. */
+double sweep_lightly(int sweeps, int plain, double accurate) {
+    double most = DIVERGES * (W.soft + W.skip / W.solver_bodies[1].bend);
+    if (rows < LARGE) return INFINITY;
+    double worst = sweep_fours(rows, bodies, sweeps, plain, accurate, most);
+    if (worst < INFINITY) scale(1);
     return worst;
 }
 

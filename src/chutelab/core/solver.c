@@ -78,7 +78,7 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough) {
     double first = INFINITY;
-    int driven = 0, pressing = 0, lessened = 0, one_by_one = W.swings_too;
+    int driven = 0, pressing = 0, lessened = 0, light = W.interact, one_by_one = W.swings_too;
     for (int n = 0; n < count; n++) one_by_one |= list[n].cornered;
     if (one_by_one) {
         sweep_hung(list, count, MAX(rounds, 1) * sweeps, enough);
@@ -94,7 +94,10 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
     set_rows(list, count);
     lessen();
     for (int left = TRIES, more = rounds;;) {
-        double change = sweep_rows(sweeps, plain, accurate), worst = change;
+        double change = light ? sweep_lightly(sweeps, plain, accurate) : INFINITY, worst;
+        if (change == INFINITY) change = sweep_rows(sweeps, plain, accurate);
+        light = 0;
+        worst = change;
         int ended = change <= accurate;
         if (!ended) keep_bounds();
         if (!ended || W.interact) lessened = lessen();

@@ -185,11 +185,8 @@ class _Run:
     def result(self) -> Record:
         self.tell(Kind.RELEASE, -1)
         self.knot()
-        lasting: _Lasting | None
-        if self.machine.releases.carried[0]:
-            lasting = self.lasting(0, carried=True)
-        else:
-            lasting = self.contact()
+        carried = self.machine.releases.carried[0]
+        lasting = self.lasting(0, carried=True) if carried else self.contact()
         for _ in range(MOST_PHASES):
             if self.reason:
                 break

@@ -252,9 +252,6 @@ def must_fit(machine: Machine, name: str) -> None:
         if (pull := pair.clings) and (name == "pymunk" or scene.hinges):
             what = "the pymunk engine" if name == "pymunk" else "what hangs on hinges"
             raise refused(scene, f"pair[{n}].{pull}", getattr(pair, pull), f"0 with {what}")
-    if name == "pymunk" and machine.air and any(one is not None for one in machine.outlines):
-        allowed = "0 with boxes and polygons: drag is that of a sphere"
-        raise refused(scene, "air_density", machine.air, allowed)
     if any(scene.particles[kind].radius == 0.0 for kind in scene.kinds):
         raise refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
 
@@ -268,13 +265,9 @@ def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
         if kind.outline and kind.rolling_friction:
             key = f"{scene.head('particle', n)}.rolling_friction"
             yield key, kind.rolling_friction, "0 with boxes and polygons: they do not roll"
-    if scene.one_sided:
-        yield ("run.engine", "contact", f"pymunk: {scene.one_sided} has two sides with {why}")
     belt = scene.incoming
     if belt is not None and belt.friction == "adhesion":
         yield "incoming.friction", belt.friction, f"a Coulomb coefficient with {why}"
-    if machine.air:
-        yield "air_density", machine.air, "0 with boxes and polygons: drag is that of a sphere"
     for n, pair in enumerate(scene.pair):
         if pull := pair.clings:
             yield f"pair[{n}].{pull}", getattr(pair, pull), "0 with boxes and polygons"

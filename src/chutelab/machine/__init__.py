@@ -1,7 +1,6 @@
 """A scene resolved to world-frame arrays: what the engines take, and all they take.
 
-- `parts`: `Machine`, its particle and its pulley.
-- `movers`: where surfaces are that move, and how fast.
+- `parts`: `Machine`, its particle and its pulley; where surfaces are that move, and how fast.
 - `shapes`: straight and bent pieces of surfaces: nearest point, gap, ends, box, path to draw.
 - `releases`: where, when and how fast each particle starts.
 - `builder`: `build`, from a validated scene, as rows of numbers, to a machine; `ahead`, to one that
@@ -9,12 +8,13 @@
 """
 
 from chutelab.machine.builder import PASSES, ahead, build, hand_over
-from chutelab.machine.movers import SWING, Mover
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
+    SWING,
     Caution,
     Joint,
     Machine,
+    Mover,
     Particle,
     Pulley,
     moved,

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.core import REAL, Module, borrow, constants, dtype, give_back
-from chutelab.machine.movers import Mover
-from chutelab.machine.parts import Caution, Joint, Machine, Particle, Pulley, Trigger
+from chutelab.machine.parts import Caution, Joint, Machine, Mover, Particle, Pulley, Trigger
 from chutelab.machine.releases import RefusedError, draw
 from chutelab.machine.shapes import KINDS, Pieces
 from chutelab.scene import Fault, Plate, Scene

@@ -148,6 +148,9 @@ def balance(entries: NDArray[Any]) -> Floats:
 CELLS = 2**18
 """Times × particles in one block: some 30 arrays of 2 MB each, near enough to the cache."""
 
+BRIEF = 1e-10
+"""Share of a coordinate: from a way that is less, no velocity is taken."""
+
 Cells = tuple[Ints, Ints, Ints, Floats]
 """Times at which particles are on their way, arrays (c,): index of the time, and of the particle;
 index of the last knot that is not later (``left``; ``left + 1`` closes the interval, so at the end
@@ -168,7 +171,9 @@ def hermite(knots: NDArray[Any], left: Ints, share: Floats) -> tuple[Floats, Flo
         where = pa + s * (
             h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
         )
-        slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
+        # A way that is lost in the digits of the place tells no velocity.
+        told = h * (np.abs(va) + np.abs(vb)) > BRIEF * np.abs(pa)
+        slope = np.divide(dx, h, out=0.5 * (va + vb), where=told)
         pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
         places[:, axis], velocities[:, axis] = np.where(over, pb, where), np.where(over, vb, pace)
     return places, velocities
@@ -546,123 +551,6 @@ class Record(Shown):
             where, pace = hermite(self.knots, left, share)
             position[row, particle], velocity[row, particle] = where, pace
         return Motion(position, velocity, self, times)
-
-    def energy_at(self, times: ArrayLike) -> dict[str, Floats]:
-        """Return the energy ledger of all released particles up to each time.
-
-        A particle that has ended keeps its last state. Between two knots the entries and the
-        residual go straight from the one to the other, and what the energy balance asks for besides
-        is booked on what goes on there: on the friction loss while a particle slips, where the
-        force and so the power of the belt is constant on a face; else on the belt work while it is
-        driven; else on the restitution loss, which changes between knots in lasting contacts of a
-        crowd only. In flight nothing is booked, and what the balance leaves over is the residual.
-        Where several have `totals` the sums are theirs at the steps; the same holds between two.
-
-        Parameters
-        ----------
-        times : array_like, shape (T,)
-            s, in any order.
-
-        Returns
-        -------
-        dict of ndarray, shape (T,)
-            ``kinetic``, ``potential`` (y = 0 is the zero), the three `ENTRIES`, and ``residual``:
-            what the balance since each release leaves over. J.
-        """
-        times = np.atleast_1d(np.asarray(times, dtype=np.float64))
-        found = self._on_tracks(times)
-        # A lone particle's tracks have all; a blow on what hangs on a hinge ends the step.
-        if len(self.totals) > 1 and self.count > 1:
-            within = (times >= self.totals["t"][0]) & (times < self.totals["t"][-1])
-            found[:, within] = self._as_totals(times[within], found[:, within])
-        return dict(zip(("kinetic", "potential", *ENTRIES, "residual"), found, strict=True))
-
-    def _on_tracks(self, times: Floats) -> Floats:
-        """Return what `energy_at` does as the tracks have it, (6, T), J."""
-        firsts, lasts = self.ends()
-        at_release = np.zeros(self.count)
-        particles = np.flatnonzero(self.released)
-        at_release[particles] = sum(self.energies(firsts, particles))
-
-        final = np.empty((6, len(lasts)))
-        final[:2] = self.energies(lasts, particles)
-        final[2:5] = lasts["entries"].T
-        final[5] = final[:2].sum(axis=0) - at_release[particles] - balance(lasts["entries"])
-        order = np.argsort(lasts["t"], kind="stable")
-        sums = np.concatenate([np.zeros((6, 1)), final[:, order].cumsum(axis=1)], axis=1)
-        out = sums[:, np.searchsorted(lasts["t"][order], times, side="left")]
-
-        for row, particle, left, share in self.blocks(times):
-            values = self._under_way(particle, left, share, at_release[particle])
-            for total, value in zip(out, values, strict=True):
-                np.add.at(total, row, value)
-        return out
-
-    def _as_totals(self, times: Floats, found: Floats) -> Floats:
-        """Return what tracks have (6, T), J, with what they are off the totals of all steps.
-
-        That goes straight from just after one step to just before the next. What the balance then
-        asks for besides within a step is booked on what goes on there.
-        """
-        t, particles, firsts = self.totals["t"], np.flatnonzero(self.released), self.ends()[0]
-        order = np.argsort(firsts["t"], kind="stable")
-        begun, at_release = firsts["t"][order], np.stack(self.energies(firsts, particles))[:, order]
-        sums = np.concatenate([np.zeros((2, 1)), at_release.cumsum(axis=1)], axis=1)
-        before, after = (
-            sums[:, np.searchsorted(begun, t, side=side)] for side in ("left", "right")
-        )
-        told = np.stack(
-            [self.totals["kinetic"], self.totals["potential"], *self.totals["entries"].T]
-        )
-        residual = told[:2].sum(axis=0) - before.sum(axis=0) - balance(self.totals["entries"])
-        told = np.concatenate([told, residual[None]])
-
-        late = np.searchsorted(t, times, side="right") - 1
-        step, own = np.unique(np.clip(late, 0, len(t) - 2), return_inverse=True)
-        first = told[:, step] - self._on_tracks(t[step])
-        # What is released as a step begins is in its tracks, and not yet in its totals.
-        first[:2] += (after - before)[:, step]
-        last = told[:, step + 1] - self._on_tracks(np.nextafter(t[step + 1], -np.inf))
-        share = ((times - t[step][own]) / (t[step + 1] - t[step])[own]).clip(0.0, 1.0)
-        found = found + first[:, own] + share * (last - first)[:, own]
-
-        belt, restitution, friction = told[2:5, step + 1][:, own] != told[2:5, step][:, own]
-        goes_on = belt | restitution | friction
-        straight = residual[step][own] + share * (residual[step + 1] - residual[step])[own]
-        missing = np.where(goes_on, found[5] - straight, 0.0)
-        found[5] -= missing
-        found[4] -= np.where(friction, missing, 0.0)
-        found[2] += np.where(belt & ~friction, missing, 0.0)
-        found[3] -= np.where(~belt & ~friction, missing, 0.0)
-        return found
-
-    def _under_way(
-        self, particle: Ints, left: Ints, share: Floats, at_release: Floats
-    ) -> tuple[Floats, ...]:
-        """Return what `energy_at` does, of each cell, (c,)."""
-        a, b = self.knots[left], self.knots[left + 1]
-        where, pace = hermite(self.knots, left, share)
-        omega = a["omega"] + share * (b["omega"] - a["omega"])
-        body = self.particle.of(particle)
-        kinetic = body.kinetic(pace[:, 0], pace[:, 1], omega)
-        potential = body.mass * self.gravity * self.machine.height(where)
-        gain = kinetic + potential - at_release
-
-        entries_a, entries_b = a["entries"].T, b["entries"].T
-        residual_a, residual_b = (
-            sum(self.energies(knot, particle)) - at_release - balance(knot["entries"])
-            for knot in (a, b)
-        )
-        belt, restitution, friction = entries_a + share * (entries_b - entries_a)
-        residual = residual_a + share * (residual_b - residual_a)
-        # The straight lines of the totals leave a rest, which is booked on what goes on.
-        missing = gain - (belt - restitution - friction) - residual
-        driven, struck, slips = entries_a != entries_b
-        friction -= np.where(slips, missing, 0.0)
-        belt += np.where(driven & ~slips, missing, 0.0)
-        restitution -= np.where(struck & ~slips & ~driven, missing, 0.0)
-        residual += np.where(slips | driven | struck, 0.0, missing)
-        return kinetic, potential, belt, restitution, friction, residual
 
     def energies(
         self, knots: NDArray[Any], particle: Ints | int | None = None

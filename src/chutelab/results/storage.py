@@ -1,6 +1,7 @@
-"""Recordings on disk: one npz file that round-trips to the last bit, and CSV for spreadsheets.
+"""Recordings on disk: one npz file, and CSV for spreadsheets.
 
-How long the run took is not in them: the same run makes the same bytes.
+The file round-trips to the last bit, that of a large crowd within a tolerance, see `packing`. How
+long the run took is not in it: the same run makes the same bytes.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import json
 import warnings
 import zipfile
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from errno import EINVAL, ESPIPE
 from math import inf, isnan, prod
@@ -20,6 +22,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from chutelab.machine import SWING, build
+from chutelab.results import packing
 from chutelab.results.loads import borne, need_loads
 from chutelab.results.record import (
     ENGINES,
@@ -41,8 +44,14 @@ from chutelab.util.files import csv_lines, whole, write_lines
 from chutelab.util.tables import frame as data_frame
 from chutelab.util.tables import plain
 
-FORMAT = 1
-"""Version of the file; a reader refuses what it does not know."""
+FORMAT, PACKED = 1, 2
+"""Versions of the file, the second of large crowds; a reader refuses what it does not know."""
+
+TOLERANCE = 1e-6
+"""Share of the radius by which tracks of a large crowd may be off in a file."""
+
+MANY = 10_000
+"""Knots from which on a crowd is large."""
 
 ARRAYS = {
     "knots": KNOT,
@@ -62,6 +71,12 @@ ARRAYS = {
     "triggered": np.dtype("f8"),
 }
 """Arrays of a file and their types."""
+
+TYPES = ARRAYS | packing.COLUMNS
+"""Types of all arrays that a file may have."""
+
+UNPACKED = ("knots", "angle", "events")
+"""Arrays that stand in a packed file as `packing.COLUMNS`."""
 
 MAYBE = (
     "angle", "totals", "unsolved", "drives", "impulses", "lasting", "swings",
@@ -99,18 +114,57 @@ class RecordingError(InputError):
     """A file is not a recording that this version can read."""
 
 
-def save(recording: Record, path: str | Path) -> Path:
-    """Write a recording to an npz file, whole or not at all."""
+def save(recording: Record, path: str | Path, *, tolerance: float = TOLERANCE) -> Path:
+    """Write a recording to an npz file, whole or not at all.
+
+    Parameters
+    ----------
+    recording : Record
+        What to write.
+    path : path
+        The file.
+    tolerance : float
+        By how many radii of the smallest particle tracks of a crowd of `MANY` knots or more may be
+        off, up to 0.01; all other recordings, and all with 0, are kept to the last bit.
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is out of its range.
+    """
+    if not 0.0 <= tolerance <= 0.01:
+        raise ValueError(f"tolerance = {tolerance!r}: from 0 to 0.01 radii")
     path = Path(path)
-    header = json.dumps(_about(recording))
     arrays = {
         name: getattr(recording, name)
         for name in ARRAYS
         if name not in MAYBE or getattr(recording, name).size
     }
-    with whole(path) as unfinished, unfinished.open("wb") as file:
-        np.savez_compressed(file, about=np.array(header), **arrays)
+    packed: dict[str, Any] = {}
+    if tolerance and recording.machine.interact and len(recording.knots) >= MANY:
+        # Too far off for whole numbers of what may be off: as it is.
+        with suppress(OverflowError):
+            packed = packing.pack(recording, tolerance)
+    with whole(path) as unfinished:
+        if packed:
+            few = {name: array for name, array in arrays.items() if name not in UNPACKED}
+            _write(unfinished, _about(recording, PACKED), few | packed)
+        # What is packed so well that it would be refused is left as it is.
+        if not packed or not _fits(unfinished, packed):
+            _write(unfinished, _about(recording), arrays)
     return path
+
+
+def _write(path: Path, about: dict[str, Any], arrays: dict[str, Any]) -> None:
+    with path.open("wb") as file:
+        np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
+
+
+def _fits(path: Path, packed: Mapping[str, NDArray[Any]]) -> bool:
+    """Return whether a file is not too small for what is unpacked of it."""
+    knots, events = packed["when"].shape[-1], packed["whose"].shape[-1]
+    most = max(KNOT.itemsize * knots, EVENT.itemsize * events, packed["sizes"].size)
+    return bool(most <= max(SMALL, MOST_UNPACKED * path.stat().st_size))
 
 
 def load(path: str | Path) -> Record:
@@ -132,7 +186,7 @@ def load(path: str | Path) -> Record:
             raise OSError(ESPIPE, "it is no regular file")  # noqa: TRY301
         with zipfile.ZipFile(path) as archive:
             about = json.loads(str(_array(archive, "about")))
-            if about.get("format") == FORMAT:
+            if about.get("format") in (FORMAT, PACKED):
                 return _recording(about, archive)
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
@@ -167,7 +221,7 @@ def _array(archive: zipfile.ZipFile, name: str, room: int = 0) -> NDArray[Any]:
         size = prod(shape) * dtype.itemsize
         if entry.tell() + size != info.file_size:
             raise _UnfitError(f"{name} has another size than it says")
-    if dtype != ARRAYS.get(name, dtype) or (name == "about" and (dtype.kind, shape) != ("U", ())):
+    if dtype != TYPES.get(name, dtype) or (name == "about" and (dtype.kind, shape) != ("U", ())):
         raise _UnfitError(f"{name} is of another type")
     packed = min(info.compress_size, Path(str(archive.filename)).stat().st_size)
     if size > max(SMALL, room, MOST_UNPACKED * packed):
@@ -179,10 +233,10 @@ def _array(archive: zipfile.ZipFile, name: str, room: int = 0) -> NDArray[Any]:
     return array
 
 
-def _about(recording: Record) -> dict[str, Any]:
+def _about(recording: Record, form: int = FORMAT) -> dict[str, Any]:
     """Return the header of the file."""
     return {
-        "format": FORMAT,
+        "format": form,
         # Only what was given: whether a key is there may mean something.
         "scene": recording.scene.model_dump_json(by_alias=True, exclude_unset=True),
         "title": recording.title,
@@ -211,18 +265,27 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Record:
     scene = from_dict(json.loads(about["scene"]), about["title"])
     # Of particles that were never released, any number is packed into next to nothing.
     room = 8 * (scene.count + 1)
+    machine, is_packed = build(scene), about["format"] == PACKED
     arrays: dict[str, Any] = {
         name: _array(archive, name, room)
         for name in ARRAYS
-        if name not in MAYBE or f"{name}.npy" in archive.namelist()
+        if name not in (UNPACKED if is_packed else ())
+        and (name not in MAYBE or f"{name}.npy" in archive.namelist())
     }
+    if is_packed:
+        path = Path(str(archive.filename))
+        room = MOST_UNPACKED * path.stat().st_size
+        packed = {name: _array(archive, name, room) for name in packing.COLUMNS}
+        if not _fits(path, packed):
+            raise _UnfitError("tracks or events would be too large for the file")
+        arrays |= packing.unpack(packed, arrays["offsets"], machine.particle)
     about.pop("seconds", None)  # earlier files tell how long the run took
     about.setdefault("gained", 0.0)  # ... and not this
     told = {name: about[name] for name in ("engine", "steps", "contacts", "gained")}
     told["air_loss"] = about.get("air_loss", 0.0)
     instead = str(about.get("instead", ""))
-    recording = Record(machine=build(scene), instead=instead, **told, **arrays)
-    if _about(recording) | {"scene": about["scene"]} != about:
+    recording = Record(machine=machine, instead=instead, **told, **arrays)
+    if _about(recording, about["format"]) | {"scene": about["scene"]} != about:
         raise _UnfitError("the header is of another scene")
     numbers = {
         "by_surface": arrays["by_surface"], "angle": recording.angle, "drives": recording.drives,

@@ -3,7 +3,7 @@
 Here are `Scene`, what reads, overrides, validates and writes it, and the shipped scenes.
 
 - `units`: sizes with their units, and what a key may hold: strict types and ranges.
-- `materials`: ``[[material]]``, and presets with their spread and sources.
+- `materials`: particles and what they are made of; presets with their spread and sources.
 - `quantities`: the registry of a run's quantities, from which all that names them comes.
 - `conflicts`: what no single key can answer for.
 - `tables`: the tables of a scene as frozen Pydantic models, with the defaults.
@@ -27,20 +27,11 @@ import tomli_w
 from pydantic import ValidationError
 
 from chutelab.scene.conflicts import JOINTS, ConflictError, Look, conflicts
+from chutelab.scene.materials import Particle
 from chutelab.scene.messages import faults_of, live_faults
 from chutelab.scene.overrides import Override, apply, joined, schema, sized
 from chutelab.scene.schema import DEFAULTS, SceneTables, plain_number, to_dict
-from chutelab.scene.tables import (
-    Conveyor,
-    Expect,
-    Incoming,
-    Outgoing,
-    Particle,
-    Plate,
-    Run,
-    Stream,
-    Surface,
-)
+from chutelab.scene.tables import Conveyor, Expect, Incoming, Outgoing, Plate, Run, Stream, Surface
 from chutelab.scene.units import RESERVED_NAMES, flat
 from chutelab.util.errors import (
     MISSING,

@@ -1,4 +1,4 @@
-"""What particles are made of: a scene's ``[[material]]``, and presets with spread and sources.
+"""Particles and what they are made of: ``[[material]]``, and presets with spread and sources.
 
 A coefficient of restitution or friction belongs to a pair. A material has three: with itself, with
 steel (chutes, plates) and with the rubber of a belt.
@@ -11,11 +11,30 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Final, Self
+from typing import Any, Final, Literal, Self
 
 from pydantic import model_validator
 
-from chutelab.scene.units import Amount, Density, Name, Share, Table, described
+from chutelab.scene.units import (
+    Amount,
+    Corners,
+    Density,
+    Mass,
+    Name,
+    Pace,
+    Radius,
+    Resolved,
+    Share,
+    Size,
+    Switch,
+    Table,
+    Text,
+    Two,
+    about_centroid,
+    described,
+    pair_friction,
+    pair_restitution,
+)
 
 LIGHTEST: Final = 100.0
 """kg/m³: about expanded polystyrene; balsa has 110 to 140, cork 220."""
@@ -55,6 +74,99 @@ class Material(Table):
 
 VALUES: Final = tuple(key for key in Material.model_fields if key != "name")
 """The numbers of a material, by key."""
+
+
+class Particle(Resolved):
+    """One kind of particles: disks, or mass points with radius 0; boxes and polygons."""
+
+    name: Name | None = described(None, "Name of this kind; needed where there are several")
+    shape: Literal["disk", "sphere", "box", "polygon"] = described(
+        "disk",
+        "What turns, with spin: a disk has I = m r²/2, a sphere 2/5 m r²; boxes and polygons are"
+        " for the engines contact and pymunk",
+    )
+    radius: Radius = described(
+        0.0063,
+        "Radius r, 0 is a mass point; or [from, to], drawn evenly for each particle, of which the"
+        " first has the mean",
+        "m",
+    )
+    size: Size | None = described(None, "Of a box: [width, height]", "m")
+    points: Corners | None = described(
+        None, "Of a polygon, convex: [[x, y], ...]; it turns about its centroid", "m"
+    )
+    mass: Mass = described(0.008, "Mass m; or a density, or a material that has one", "kg")
+    density: Density | None = described(
+        None, "Instead of a mass: that of a solid sphere of the radius", "kg/m³"
+    )
+    material: Text | None = described(
+        None,
+        "Where density, restitution and friction come from, if not given: a name of `chutelab"
+        " materials`, or of a [[material]]",
+        max_length=40,
+    )
+    spin: Switch = described(False, "true: it turns freely; false: never turns")
+    rolling_friction: Amount = described(
+        0.0, "Rolling friction on everything, as the arm of the load over the radius; needs spin"
+    )
+    restitution_speed: Pace | None = described(
+        None,
+        "Speed of approach up to which restitution is as it is given; above, the contact yields and"
+        " restitution falls as speed^(-1/4). Without it is the same at all speeds",
+        "m/s",
+    )
+
+    @property
+    def falls(self) -> float:
+        """1 over `restitution_speed`, s/m; 0 without."""
+        return 0.0 if self.restitution_speed is None else 1.0 / self.restitution_speed
+
+    @property
+    def outline(self) -> tuple[tuple[float, float], ...]:
+        """Corners of a box or polygon about its centroid, m; () of what is round."""
+        if self.size is not None:
+            x, y = 0.5 * self.size[0], 0.5 * self.size[1]
+            return ((-x, -y), (x, -y), (x, y), (-x, y))
+        return about_centroid(self.points) if self.points is not None else ()
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """The range of its radii, m; None if all are alike."""
+        span: tuple[float, float] | None = self._typed.get("radius")  # type: ignore[assignment]
+        return span
+
+    def mean_of(self, mass: Any) -> Any:
+        """Return the mean mass, kg, if one of the mean radius has a mass (kg): it goes with r³."""
+        if self.span is None:
+            return mass
+        low, high = self.span
+        cube = self.radius * self.radius * self.radius
+        return mass * 0.25 * (low + high) * (low * low + high * high) / cube
+
+    @property
+    def moment(self) -> float:
+        """I/(m r²) of a disk or sphere that turns, 0 of one that does not."""
+        return 0.0 if not self.spin else 0.4 if self.shape == "sphere" else 0.5
+
+
+class Pair(Table):
+    """What two meet with, instead of what their tables or materials say."""
+
+    between: Two = described(..., "Two kinds of particles by name, or one and a surface")
+    restitution: Share | None = pair_restitution(None, "of these two")
+    friction: Amount | None = pair_friction(None, "of these two")
+    cohesion: Amount = described(
+        0.0, "Force that it takes to pull them off each other where they touch", "N"
+    )
+    bond_number: Amount = described(
+        0.0, "Instead of cohesion: that force over a particle's weight, of two kinds the lighter"
+    )
+    meet: Switch = described(True, "Whether two kinds meet; if not, they pass through each other")
+
+    @property
+    def clings(self) -> str | None:
+        """The key by which the two pull at each other, or None."""
+        return next((key for key in ("cohesion", "bond_number") if getattr(self, key)), None)
 
 
 @dataclass(frozen=True)

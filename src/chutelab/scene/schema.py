@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from chutelab.scene.conflicts import EITHER, JOINTS, ConflictError, Look, conflicts, stream_name
-from chutelab.scene.materials import Material, presets
+from chutelab.scene.materials import Material, Pair, Particle, presets
 from chutelab.scene.tables import (
     Conveyor,
     Expect,
@@ -18,8 +18,6 @@ from chutelab.scene.tables import (
     Joint,
     Live,
     Outgoing,
-    Pair,
-    Particle,
     Pin,
     Plate,
     Rod,

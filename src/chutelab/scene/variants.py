@@ -16,7 +16,7 @@ import numpy as np
 
 from chutelab.scene import Scene, SceneError, from_dict, plain, to_dict
 from chutelab.scene.conflicts import EITHER, NO_MACHINE, Look, conflicts
-from chutelab.scene.materials import Material
+from chutelab.scene.materials import Material, Particle
 from chutelab.scene.overrides import (
     Override,
     apply,
@@ -28,7 +28,7 @@ from chutelab.scene.overrides import (
     unit_of,
 )
 from chutelab.scene.schema import DEFAULTS, plain_number
-from chutelab.scene.tables import Particle, Stream
+from chutelab.scene.tables import Stream
 from chutelab.scene.units import Table, read_any, sphere_mass
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.errors import MISSING, InputError, about_comma

@@ -197,7 +197,6 @@ def built(machine: Machine) -> Iterator[Part]:
         yield Part(
             kind.name or "particle", f"{many}{size}, {_span(masses, 'mass', 'kg')}, {turning}"
         )
-
     for n, name in enumerate(machine.streams):
         which = (releases.stream == n).nonzero()[0]
         (x, y), (vx, vy) = releases.position[which[0]], releases.velocity[which[0]]

@@ -17,7 +17,7 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.world import Face, World
+from chutelab.engines.pymunk.world import DIGITS, Face, World
 from chutelab.machine import Joint, Machine, Mover
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -220,9 +220,6 @@ class Moving:
 LEFT = 0.9
 """Share that is left, a step later, of what a string was stretched by when it was pulled tight."""
 
-TAUT, ROUNDING = 1e-9, 1e-13
-"""Shares of its length: by which a string that pulls may seem too short, and is kept stretched."""
-
 
 @dataclass
 class Tie:
@@ -246,13 +243,13 @@ class Ties:
     Parameters
     ----------
     machine : Machine
-    space : pymunk.Space
+    world : World
     bodies : list of pymunk.Body
         Of each particle.
     """
 
-    def __init__(self, machine: Machine, space: pymunk.Space, bodies: list[pymunk.Body]) -> None:
-        self.space, self.all = space, list[Tie]()
+    def __init__(self, machine: Machine, world: World, bodies: list[pymunk.Body]) -> None:
+        self.space, self.rounding, self.all = world.space, world.rounding, list[Tie]()
         self.free = np.zeros(machine.count, dtype=bool)
         for joint in machine.joints:
             held = self._held(joint, bodies, machine.releases.position)
@@ -309,8 +306,9 @@ class Ties:
             else:
                 tie.over = max(length - whole, 0.0)
             held.max = whole + tie.over
-            if length > whole * (1.0 - TAUT):
-                held.max = min(held.max, length * (1.0 - ROUNDING))
+            rounding = max(self.rounding, DIGITS * whole)
+            if length > whole - rounding:
+                held.max = min(held.max, length - rounding)
 
     def pulled(self, state: Floats, pull: Vec2d, h: float) -> list[tuple[Tie, Floats]]:
         """Return what each joint did in the last step to the ledger: entries of the particles, J.
@@ -363,9 +361,13 @@ class Rolling:
     """
 
     def __init__(self, machine: Machine, radius: Floats) -> None:
-        self.count, self.radius = machine.count, radius
-        # Of particles that turn: 1/I, and rolling friction's arm over the radius, if any has it.
-        self.ease, self.arm = np.zeros((2, len(radius)))
+        self.count = machine.count
+        # Of particles that turn: 1/I, and rolling friction's arm over the radius, if any has it;
+        # and of what is round 1 over the radius.
+        self.ease, self.arm, self.bend = np.zeros((3, len(radius)))
+        outlines = [machine.outlines[kind] for kind in machine.releases.kind]
+        is_round = [outline is None for outline in outlines]
+        np.divide(1.0, radius[: self.count], out=self.bend[: self.count], where=is_round)
         inertia = np.broadcast_to(machine.particle.inertia, self.count)
         np.divide(1.0, inertia, out=self.ease[: self.count], where=inertia > 0.0)
         self.arm[: self.count] = machine.rolling[machine.releases.kind]
@@ -390,7 +392,7 @@ class Rolling:
         """
         last, mate, couple = self.couples
         heat = -0.5 * couple * (turning[:, last] - turning[:, mate]).sum(axis=0)
-        rows, pair = len(self.radius), mate < self.count
+        rows, pair = len(self.bend), mate < self.count
         for entry, part in ((0, couple * spin[mate]), (2, np.where(pair, 0.5 * heat, heat))):
             for row in (last, mate):
                 entries[entry] += np.bincount(row, part, rows)
@@ -398,15 +400,15 @@ class Rolling:
 
     def brake(self, one: Ints, other: Ints, push: Floats, turning: Floats) -> None:
         """Find the couples of the next step from the pushes (k,) of this one."""
-        rows, (last, mate, couple) = len(self.radius), self.couples
+        rows, (last, mate, couple) = len(self.bend), self.couples
         before = dict(
             zip(zip(last.tolist(), mate.tolist(), strict=True), couple.tolist(), strict=True)
         )
         held = [before.get(key, 0.0) for key in zip(one.tolist(), other.tolist(), strict=True)]
-        # Of two kinds the larger; between two disks on the radius of both together.
+        # Of two kinds the larger; between two disks on the radius of both together. Edges are flat.
         share = np.maximum(self.arm[one], self.arm[other])
-        r, its = self.radius[one], self.radius[other]
-        most = share * np.where(its > 0.0, r * its / (r + its), r) * push
+        bends = self.bend[one] + self.bend[other]
+        most = np.divide(share * push, bends, out=np.zeros(len(one)), where=bends > 0.0)
         contacts = np.bincount(np.concatenate((one, other)), minlength=rows)
         contacts[self.count :] = 1
         ease = (self.ease[one] + self.ease[other]) * np.maximum(contacts[one], contacts[other])

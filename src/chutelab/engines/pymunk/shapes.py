@@ -308,7 +308,8 @@ class Shapes:
 
     def _goes(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         """Note that a particle touches a shape no more; clear of a chain, it is spared no more."""
-        shape, met = arbiter.shapes
+        # As its Space goes the two may come the other way round.
+        shape, met = sorted(arbiter.shapes, key=self.world.by_shape.__contains__)
         chain = self.chains.get(self.world.by_shape[met], ())
         count, passes = self.touching.pop((shape, chain), (0, False))
         if count > 1:

@@ -87,7 +87,7 @@ class Shared:
         p, starts, faces = machine.particle, machine.releases, world.faces
         rows = count + len(faces)
         self.radius = np.zeros(rows)
-        self.radius[:count] = p.radius
+        self.radius[:count], self.broad = p.radius, machine.broad
         self.shapes = Shapes(machine, world)
         self.bodies, self.corners = self.shapes.bodies, self.shapes.corners
         # The same for all, or each one's own.
@@ -141,7 +141,7 @@ class Shared:
             self.throws[self.moving.rows] = True
             self.spin += self.moving.turn[1]
         self.rolling = Rolling(machine, self.radius)
-        self.ties = Ties(machine, world.space, [body for body, _ in self.bodies[:count]])
+        self.ties = Ties(machine, world, [body for body, _ in self.bodies[:count]])
         # Rows by sorted id of the bodies; the Space's own body, of surfaces, is no particle.
         self.surfaces_body = world.space.static_body.id
         self.buffer, ids = batch.Buffer(), np.array(list(self.shapes.rank), dtype=np.uintp)
@@ -451,15 +451,15 @@ class Shared:
 
     def _slow_down(self) -> None:
         """Have air slow all that are free down for half a step, as spheres; book what it takes."""
-        air, p = self.machine.air, self.machine.particle
+        air, p, r = self.machine.air, self.machine.particle, self.broad
 
         def relief(speed: Floats) -> Any:
             # Schiller and Naumann (1933); deceleration over speed, 1/s.
-            reynolds = 2.0 * p.radius * speed * air / VISCOSITY
+            reynolds = 2.0 * r * speed * air / VISCOSITY
             coefficient = np.where(
                 reynolds < 1000.0, 24.0 * (1.0 + 0.15 * reynolds**0.687), 0.44 * reynolds
             )
-            return coefficient * np.pi * p.radius * VISCOSITY / (4.0 * p.mass)
+            return coefficient * np.pi * r * VISCOSITY / (4.0 * p.mass)
 
         v = self.state[1, 2:4, : self.count]
         speed = np.hypot(*v)

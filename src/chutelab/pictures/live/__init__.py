@@ -1,10 +1,9 @@
 """A scene that answers: one page that any browser opens, and the same in a notebook.
 
 `html` and `write` make one HTML file of a scene: data, style, script, the engine's thread and its
-WebAssembly; `live` shows it in a notebook.
+WebAssembly; `live` shows it in a notebook, and alone needs anywidget.
 
 - `describe`: what a page knows of a scene, as JSON.
-- `widget`: the page in a notebook; the only module that needs anywidget.
 - ``bundle``: the script of the page and that of the engine's thread, as `tools/build_page.py` makes
   them of the modules.
 - ``assets``: HTML, CSS, the catalogues of words, and the modules of TypeScript; each says at its
@@ -27,7 +26,7 @@ from html import escape
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -37,13 +36,9 @@ from chutelab.scene import AnyScene, Overrides, Scene, load, to_toml
 from chutelab.scene.messages import live_of
 from chutelab.scene.quantities import REGISTRY
 from chutelab.scene.tables import Live
-from chutelab.util.errors import MissingLibraryError
 from chutelab.util.files import whole
-from chutelab.util.versions import own_version
+from chutelab.util.versions import library, own_version
 from chutelab.util.words import words
-
-if TYPE_CHECKING:
-    from chutelab.pictures.live.widget import LivePage
 
 __all__ = ["live"]
 
@@ -170,7 +165,7 @@ def write(scene: Scene | None, path: str | Path, **options: Any) -> int:
 
 def live(
     scene: AnyScene, overrides: Overrides = (), *, height: int = 640, language: str = "en"
-) -> LivePage:
+) -> Any:
     """Show a scene in a notebook as a page that answers: drag the plate, and all else follows.
 
     Parameters
@@ -202,16 +197,78 @@ def live(
     >>> import chutelab
     >>> chutelab.live("perpendicular", ["plate.angle_deg=20"])  # doctest: +SKIP
     """
-    try:
-        from chutelab.pictures.live.widget import LivePage
-    except ModuleNotFoundError as error:
-        if error.name not in ("anywidget", "traitlets"):
-            raise
-        text = 'live pages in a notebook need anywidget: python -m pip install "chutelab[notebook]"'
-        raise MissingLibraryError(text) from error
-    scene = load(scene, overrides)
+    kind, scene = widget(), load(scene, overrides)
     page = html(scene, language=language)
-    return LivePage(html=page, height=height, title=scene.title, scene=to_toml(scene))
+    return kind(html=page, height=height, title=scene.title, scene=to_toml(scene))
+
+
+SHOWN = """
+export default {
+  render({ model, el }) {
+    const frame = document.createElement("iframe");
+    frame.title = model.get("title");
+    // An origin of its own: the page has no way to the notebook but its messages.
+    frame.setAttribute("sandbox", "allow-scripts allow-downloads");
+    frame.style.cssText = "display: block; width: 100%; border: 0";
+    const fill = () => { frame.srcdoc = model.get("html"); };
+    const grow = () => { frame.style.height = `${model.get("height")}px`; };
+    const hear = ({ source, data }) => {
+      if (source !== frame.contentWindow || data?.chutelab !== "scene") return;
+      if (typeof data.toml !== "string") return;
+      model.set("scene", data.toml);
+      model.save_changes();
+    };
+    fill();
+    grow();
+    model.on("change:html", fill);
+    model.on("change:height", grow);
+    addEventListener("message", hear);
+    el.append(frame);
+    return () => {
+      removeEventListener("message", hear);
+      model.off("change:html", fill);
+      model.off("change:height", grow);
+    };
+  },
+};
+"""
+"""The widget's module, which browsers run."""
+
+
+@cache
+def widget() -> Any:
+    """Return the class of live pages in a notebook: a frame with the page in it.
+
+    The page tells what it changed by ``parent.postMessage({chutelab: "scene", toml}, "*")``. It is
+    made when it is first asked for, since only notebooks need anywidget.
+    """
+    library("anywidget", "live pages in a notebook need anywidget", "notebook")
+    from anywidget import AnyWidget
+    from traitlets import Int, Unicode
+
+    class LivePage(AnyWidget):
+        """A live page in a notebook.
+
+        Attributes
+        ----------
+        html : str
+            The page.
+        height : int
+            Of the frame, in pixels.
+        title : str
+            What the frame is called for those who do not see it.
+        scene : str
+            The scene as it is in the page now, TOML text; `chutelab.scene.parse` makes a scene of
+            it.
+        """
+
+        _esm = SHOWN
+        html = Unicode().tag(sync=True)
+        height = Int(min=1).tag(sync=True)
+        title = Unicode().tag(sync=True)
+        scene = Unicode().tag(sync=True)
+
+    return LivePage
 
 
 @cache

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.core import number as layout_number
-from chutelab.machine.movers import Hinge
+from chutelab.machine.parts import Hinge
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.arrival import arrivals
 from chutelab.results.quantities import each

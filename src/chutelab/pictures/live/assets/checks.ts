@@ -301,9 +301,7 @@ function* corneredConflicts(scene: Scene, given: Given): Generator<Wrong> {
       yield [pathOf(given, "stream", n, "width"), particle, "other-shape"];
     }
   }
-  if (scene.surface.some(({ passes }) => passes)) yield ["run.engine", run.engine, text];
   if (incoming?.friction === "adhesion") yield ["incoming.friction", "adhesion", "cornered-grip"];
-  if (scene.air_density) yield ["air_density", scene.air_density, text];
   const clings = pair.findIndex(clinging);
   if (clings >= 0) yield [`pair[${clings}].${clinging(pair[clings])}`, undefined, text];
 }

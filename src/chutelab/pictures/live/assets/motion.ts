@@ -1,4 +1,4 @@
-// Where what moves is: what `machine/movers.py` is in Python. The core has its own.
+// Where what moves is: what `Mover` in `machine/parts.py` is in Python. The core has its own.
 
 import type { Arc, Machine, Segment } from "./machine.ts";
 import type { Mover } from "./plan.ts";

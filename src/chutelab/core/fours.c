@@ -1,0 +1,236 @@
+/* Sweeps over the rows of a crowd four at a time, in single precision: what ends them are changes of 1e-5 of the
+   velocities. Rows of one colour share no disk, so four of them are one to the processor. What they find is taken
+   up in double precision; see rows.c for what a row is given. */
+
+#include "core.h"
+
+/* Of rows that share a disk each has its own: up to so many, a disk among equal ones has six; the rest are one by one. */
+#define COLOURS 24
+/* Of the normal impulse, and of a moment's bound: less is what is left where sums fade away, with ever fewer digits. */
+#define NOTHING 1e-12
+/* Stands for numbers without a bound: finite, so that it can be multiplied by 0. */
+#define ANY 1e30f
+
+static int fours, bodies;
+
+typedef v128_t Four;
+
+static inline Four all(float a) { return wasm_f32x4_splat(a); }
+static inline Four get(const float *from) { return wasm_v128_load(from); }
+static inline void set(float *to, Four v) { wasm_v128_store(to, v); }
+static inline Four by(Four a, Four b) { return wasm_f32x4_mul(a, b); }
+static inline Four sum(Four a, Four b) { return wasm_f32x4_add(a, b); }
+static inline Four less(Four a, Four b) { return wasm_f32x4_sub(a, b); }
+static inline Four low(Four a, Four b) { return wasm_f32x4_pmin(b, a); }
+static inline Four high(Four a, Four b) { return wasm_f32x4_pmax(b, a); }
+static inline Four within(Four a, Four bound) { return low(high(a, wasm_f32x4_neg(bound)), bound); }
+
+static float total(Four v) {
+    return (wasm_f32x4_extract_lane(v, 0) + wasm_f32x4_extract_lane(v, 1))
+        + (wasm_f32x4_extract_lane(v, 2) + wasm_f32x4_extract_lane(v, 3));
+}
+
+static float greatest(Four v) {
+    float one = MAX(wasm_f32x4_extract_lane(v, 0), wasm_f32x4_extract_lane(v, 1));
+    return MAX(one, MAX(wasm_f32x4_extract_lane(v, 2), wasm_f32x4_extract_lane(v, 3)));
+}
+
+/* Rows for columns. */
+static inline void transpose(Four *v) {
+    Four a = wasm_i32x4_shuffle(v[0], v[1], 0, 4, 1, 5), b = wasm_i32x4_shuffle(v[2], v[3], 0, 4, 1, 5);
+    Four c = wasm_i32x4_shuffle(v[0], v[1], 2, 6, 3, 7), d = wasm_i32x4_shuffle(v[2], v[3], 2, 6, 3, 7);
+    v[0] = wasm_i64x2_shuffle(a, b, 0, 2);
+    v[1] = wasm_i64x2_shuffle(a, b, 1, 3);
+    v[2] = wasm_i64x2_shuffle(c, d, 0, 2);
+    v[3] = wasm_i64x2_shuffle(c, d, 1, 3);
+}
+
+/* x, y and rim of the bodies of four rows. */
+static inline void gather(const int *which, Four *v) {
+    for (int k = 0; k < 4; k++) v[k] = get(&W.light_bodies[which[k]].x);
+    transpose(v);
+}
+static inline void scatter(const int *which, Four *v) {
+    v[3] = all(0);
+    transpose(v);
+    for (int k = 0; k < 4; k++) set(&W.light_bodies[which[k]].x, v[k]);
+}
+
+/* As `give`, of four rows. */
+static inline Four give(SolverFour *f, int rolls) {
+    Four a[4], b[4], nx = get(f->nx), ny = get(f->ny), J = get(f->impulse), T = get(f->along), mass = get(f->mass);
+    gather(f->a, a);
+    gather(f->b, b);
+    Four x = less(a[0], b[0]), y = less(a[1], b[1]);
+    Four opens = sum(sum(by(x, nx), by(y, ny)), get(f->opens));
+    Four slips = sum(less(by(x, ny), by(y, nx)), sum(sum(a[2], b[2]), get(f->slips)));
+    Four given = low(by(less(get(f->more), opens), mass),
+                     by(wasm_f32x4_neg(sum(opens, by(get(f->gives), J))), get(f->eases)));
+    given = high(given, by(wasm_f32x4_neg(sum(opens, get(f->parts))), mass));
+    Four normal = high(sum(J, given), all(0));
+    Four along = within(less(T, by(get(f->slide_mass), slips)), by(get(f->rough), normal));
+    Four more = less(normal, J), push = less(along, T);
+    Four change = high(wasm_f32x4_abs(by(more, get(f->light))), wasm_f32x4_abs(by(push, get(f->slide_light))));
+    Four px = sum(by(more, nx), by(push, ny)), py = less(by(more, ny), by(push, nx));
+    Four ra = by(push, get(f->turn_a)), rb = by(push, get(f->turn_b));
+    set(f->impulse, normal);
+    set(f->along, along);
+    if (rolls) {
+        Four M = get(f->moment), turns = less(by(a[2], get(f->bend_a)), by(b[2], get(f->bend_b)));
+        turns = by(get(f->roll_mass), sum(turns, get(f->spin)));
+        Four moment = within(less(M, turns), by(get(f->arm), normal)), twist = less(moment, M);
+        change = high(change, wasm_f32x4_abs(by(twist, get(f->roll_light))));
+        ra = sum(ra, by(twist, get(f->twist_a)));
+        rb = less(rb, by(twist, get(f->twist_b)));
+        set(f->moment, moment);
+    }
+    a[0] = sum(a[0], by(get(f->mass_a), px));
+    a[1] = sum(a[1], by(get(f->mass_a), py));
+    a[2] = sum(a[2], ra);
+    b[0] = less(b[0], by(get(f->mass_b), px));
+    b[1] = less(b[1], by(get(f->mass_b), py));
+    b[2] = sum(b[2], rb);
+    scatter(f->a, a);
+    scatter(f->b, b);
+    return change;
+}
+
+/* What four impulses have gone since the last time that they were hastened, times how they were hastened then. */
+static inline Four went(const float *now, const float *swept, const float *course, const float *light) {
+    return by(by(less(get(now), get(swept)), get(course)), get(light));
+}
+
+/* Have four numbers go on so much of where two sweeps and what hastened them have led to. */
+static inline void go_on_by(float *now, float *swept, float *course, Four go, int begun) {
+    Four more = begun ? by(go, sum(less(get(now), get(swept)), get(course))) : all(0), to = sum(get(now), more);
+    set(course, more);
+    set(swept, to);
+    set(now, to);
+}
+
+/* As `hasten` of rows.c. Velocities are sums of impulses: they go on as these do. */
+static inline int hasten(int age, int rolls) {
+    Four along = all(0);
+    for (SolverFour *f = W.fours; f < W.fours + fours && age > 1; f++) {
+        along = sum(along, went(f->impulse, f->swept, f->course, f->light));
+        along = sum(along, went(f->along, f->slide_swept, f->slide_course, f->slide_light));
+        if (rolls) along = sum(along, went(f->moment, f->roll_swept, f->roll_course, f->roll_light));
+    }
+    if (total(along) < 0) age = 1;
+    Four go = all(age > 1 ? (age - 1) / (age + 2.0f) : 0);
+    for (SolverFour *f = W.fours; f < W.fours + fours; f++) {
+        go_on_by(f->impulse, f->swept, f->course, go, age > 0);
+        go_on_by(f->along, f->slide_swept, f->slide_course, go, age > 0);
+        if (rolls) go_on_by(f->moment, f->roll_swept, f->roll_course, go, age > 0);
+    }
+    for (LightBody *b = W.light_bodies; b < W.light_bodies + bodies; b++)
+        go_on_by(&b->x, &b->swept[0], &b->course[0], go, age > 0);
+    return age + 1;
+}
+
+/* As `sweep_rows`. */
+static inline double sweep(int sweeps, int plain, double accurate, double most, int rolls) {
+    double worst = 0;
+    int age = 0;
+    for (int n = 0; n < sweeps; n++) {
+        Four change = all(0);
+        if (n >= plain && (n - plain) % 2 == 0) age = hasten(n == plain ? 0 : age, rolls);
+        if ((sweeps - n) % 2)
+            for (SolverFour *f = W.fours; f < W.fours + fours; f++) change = high(change, give(f, rolls));
+        else
+            for (SolverFour *f = W.fours + fours - 1; f >= W.fours; f--) change = high(change, give(f, rolls));
+        worst = greatest(change);
+        W.sweep_count++;
+        if (worst <= accurate) return worst;
+        if (!(worst <= most)) return INFINITY;
+    }
+    return worst;
+}
+
+static inline float bounded(double a) { return (float)MIN(a, ANY); }
+
+/* Sort rows into fours; return whether there is room for them, and whether one rolls. */
+static int set_fours(int rows, int *rolls) {
+    int begin[COLOURS + 1] = {0};
+    fours = 0;
+    for (int n = 0; n < rows; n++) {
+        SolverRow *r = W.rows + n;
+        SolverBody *a = W.solver_bodies + r->a, *b = W.solver_bodies + r->b;
+        int used = r->b ? a->used | b->used : a->used, colour = 0;
+        while (colour < COLOURS && used >> colour & 1) colour++;
+        a->used |= 1 << colour;
+        b->used |= 1 << colour;
+        r->colour = colour;
+        begin[colour]++;
+        *rolls |= r->arm > 0;
+    }
+    for (int k = 0; k <= COLOURS; k++) {
+        int many = begin[k];
+        begin[k] = 4 * fours;
+        fours += k < COLOURS ? (many + 3) / 4 : many;
+    }
+    if (fours > W.four_room) return 0;
+    for (int n = 0; n < fours; n++) W.fours[n] = (SolverFour){.nx = {0}};
+    for (int n = 0; n < rows; n++) {
+        SolverRow *r = W.rows + n;
+        const SolverBody *a = W.solver_bodies + r->a, *b = W.solver_bodies + r->b;
+        int *at = begin + r->colour, k = *at % 4;
+        SolverFour *f = W.fours + *at / 4;
+        r->four = *at;
+        *at += r->colour < COLOURS ? 1 : 4;
+        f->a[k] = r->a;
+        f->b[k] = r->b;
+        f->nx[k] = (float)r->normal[0];
+        f->ny[k] = (float)r->normal[1];
+        f->opens[k] = bounded(r->free[0]);
+        f->slips[k] = (float)r->free[1];
+        f->mass[k] = (float)r->mass[0];
+        f->slide_mass[k] = (float)r->mass[1];
+        f->light[k] = (float)r->light[0];
+        f->slide_light[k] = (float)r->light[1];
+        f->gives[k] = (float)r->gives;
+        f->eases[k] = (float)r->eases;
+        f->more[k] = bounded(r->more);
+        f->parts[k] = bounded(r->parts);
+        f->rough[k] = bounded(r->rough);
+        f->mass_a[k] = (float)a->mass;
+        f->mass_b[k] = (float)b->mass;
+        f->turn_a[k] = (float)a->turn;
+        f->turn_b[k] = (float)b->turn;
+        f->impulse[k] = (float)r->impulse[0];
+        f->along[k] = (float)r->impulse[1];
+        if (!*rolls) continue;
+        f->arm[k] = (float)r->arm;
+        f->spin[k] = (float)r->spin;
+        f->twist_a[k] = (float)a->twist;
+        f->twist_b[k] = (float)b->twist;
+        f->bend_a[k] = (float)a->bend;
+        f->bend_b[k] = (float)b->bend;
+        f->roll_mass[k] = (float)r->roll_mass;
+        f->roll_light[k] = (float)r->roll_light;
+        f->moment[k] = (float)r->moment;
+    }
+    return 1;
+}
+
+/* Sweep over so many rows by fours, as `sweep_rows` does, up to changes of `most`; the rows have what was found, which is
+   for `scale` to take up, unless the sweeps diverge. */
+double sweep_fours(int rows, int all_bodies, int sweeps, int plain, double accurate, double most) {
+    int rolls = 0;
+    if (!set_fours(rows, &rolls)) return INFINITY;
+    bodies = all_bodies;
+    for (int n = 0; n < bodies; n++) {
+        const SolverBody *b = W.solver_bodies + n;
+        W.light_bodies[n] = (LightBody){.x = (float)b->x, .y = (float)b->y, .rim = (float)b->rim};
+    }
+    double worst = rolls ? sweep(sweeps, plain, accurate, most, 1) : sweep(sweeps, plain, accurate, most, 0);
+    for (SolverRow *r = W.rows; r < W.rows + rows && worst < INFINITY; r++) {
+        const SolverFour *f = W.fours + r->four / 4;
+        double normal = f->impulse[r->four % 4], bound = r->rough * normal, arm = r->arm * normal;
+        double along = f->along[r->four % 4], moment = f->moment[r->four % 4];
+        r->impulse[0] = normal;
+        r->impulse[1] = fabs(along) > NOTHING * normal ? MIN(MAX(along, -bound), bound) : 0;
+        r->moment = fabs(moment) > NOTHING * arm ? MIN(MAX(moment, -arm), arm) : 0;
+    }
+    return worst;
+}

@@ -1,0 +1,391 @@
+"""Large crowds on disk: whole numbers of what a track may be off, less what is foretold.
+
+A share ε of the radius r of the smallest particle is allowed. Velocities are told by their change
+from knot to knot less that of a flight, in units of 2 ε r / dt, or less if kinetic energies ask for
+it. Beside intervals longer than a step dt the units are finer, since a cubic bulges by a quarter of
+what they are off times the interval. The mean of two velocities foretells the way between them,
+exactly on a parabola. The rest of a place is told in units of ε r / 2, and after an interval much
+shorter than a step in finer ones: else the velocity *between* two knots would be far off. So a
+track is off by less than ε r at any time. Entries of the ledger have units of which all particles
+together are off by less than ε of the energy turned over. The tracks foretell the states of events,
+and these the impulses.
+
+Times, the ends of tracks, and all sums such as the ledger's are kept to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import prod, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.machine import Particle
+from chutelab.results.ledger import ledger
+from chutelab.results.record import EVENT, KNOT, Record, hermite
+from chutelab.util.arrays import Bools, Floats, Ints
+
+COLUMNS = {
+    "units": np.dtype("f8"),
+    "ends": KNOT,
+    "times": np.dtype("u1"),
+    "when": np.dtype("u1"),
+    "whose": np.dtype("u1"),
+    "sizes": np.dtype("u1"),
+    "bits": np.dtype("u1"),
+}
+"""Arrays that `pack` makes of knots, angles and events, and their types."""
+
+LONG = 0.25
+"""Steps that an interval has at least after which a place is told by itself."""
+
+FINEST = 20
+"""Units of places are halved so often at most: those of intervals of a millionth of a step."""
+
+MOST = 2.0**52
+"""Bound on all whole numbers that are rounded."""
+
+LEAST = 2.0**-30
+"""Share of a unit by which an entry changes at least that changes by less than one."""
+
+WHOLE = ("particle", "other", "kind", "surface")
+"""Fields of an event that are whole numbers."""
+
+STATE: tuple[tuple[str, Any], ...] = (
+    ("position", (..., 0)), ("position", (..., 1)),
+    ("velocity_before", (..., 0)), ("velocity_before", (..., 1)), ("omega_before", ...),
+    ("velocity_after", (..., 0)), ("velocity_after", (..., 1)), ("omega_after", ...),
+    ("normal_impulse", ...), ("tangential_impulse", ...),
+)  # fmt: skip
+"""Its other fields but the time, and which part of them."""
+
+ROWS = (0, 0, 1, 1, 2, 1, 1, 2, 4, 4)
+"""Which of the units these have."""
+
+Give = Callable[[slice, Floats], Floats]
+"""Takes some rows of `STATE` and what is foretold of them, (c, E), and returns what is the case."""
+
+
+def rounded(values: Floats) -> Ints:
+    """Return the nearest whole numbers; `OverflowError` if there are none."""
+    if not np.all(np.abs(values) < MOST):
+        raise OverflowError("numbers are too far apart")
+    return np.rint(values).astype(np.int64)
+
+
+def fold(numbers: Ints) -> NDArray[np.uint8]:
+    """Return what numbers (c, n) change by along n as bytes (k, c, n), the lowest first."""
+    change = np.diff(numbers, prepend=0)
+    told = ((change << 1) ^ (change >> 63)).view(np.uint8).reshape(*numbers.shape, 8)
+    few = max((n + 1 for n in range(8) if told[..., n].any()), default=1)
+    return np.ascontiguousarray(np.moveaxis(told[..., :few], -1, 0))
+
+
+def unfold(told: NDArray[np.uint8]) -> Ints:
+    """Return what `fold` was given."""
+    found = np.zeros((*told.shape[1:], 8), dtype=np.uint8)
+    found[..., : len(told)] = np.moveaxis(told, 0, -1)
+    bits = found.view(np.int64)[..., 0]
+    return np.cumsum((bits >> 1 & np.iinfo(np.int64).max) ^ -(bits & 1), axis=-1)
+
+
+class Writer:
+    """Whole numbers as how many binary digits they have, and all digits but the first."""
+
+    def __init__(self) -> None:
+        self.sizes: list[NDArray[np.uint8]] = []
+        self.bits: list[NDArray[np.uint8]] = []
+
+    def write(self, *arrays: Ints) -> None:
+        """Write arrays of any shapes."""
+        for numbers in map(np.ravel, arrays):
+            size = np.abs(numbers)
+            digits = np.frexp(size.astype(np.float64))[1].astype(np.uint8)
+            self.sizes.append(digits)
+            self.bits.append(np.packbits(numbers[digits > 0] < 0))
+            for n in range(1, int(digits.max(initial=0))):
+                size, digits = size[digits > n], digits[digits > n]
+                self.bits.append(np.packbits(size >> (n - 1) & 1))
+
+    def columns(self) -> dict[str, NDArray[np.uint8]]:
+        """Return what was written."""
+        return {"sizes": np.concatenate(self.sizes), "bits": np.concatenate(self.bits)}
+
+
+class Reader:
+    """What a `Writer` wrote, in the same order."""
+
+    def __init__(self, sizes: NDArray[np.uint8], bits: NDArray[np.uint8]) -> None:
+        self.sizes, self.bits = sizes, bits
+
+    def digits(self, count: int) -> Ints:
+        """Return the next binary digit of so many numbers."""
+        many = (count + 7) // 8
+        bits, self.bits = self.bits[:many], self.bits[many:]
+        return np.unpackbits(bits)[:count].astype(np.int64)
+
+    def read(self, *shape: int) -> Ints:
+        """Return the next numbers."""
+        sizes, self.sizes = np.split(self.sizes, [prod(shape)])
+        if len(sizes) < prod(shape):
+            raise ValueError("too few numbers")
+        at = some = np.flatnonzero(sizes)
+        numbers = np.zeros(shape, dtype=np.int64)
+        signs, found = 1 - 2 * self.digits(len(some)), numbers.ravel()
+        found[some] = 1 << (sizes[some].astype(np.int64) - 1)
+        for n in range(1, int(sizes.max(initial=0))):
+            at = at[sizes[at] > n]
+            found[at] |= self.digits(len(at)) << (n - 1)
+        found[some] *= signs
+        return numbers
+
+
+class Intervals:
+    """What comes before each knot: from times of knots (K,), offsets of tracks, and units.
+
+    Attributes
+    ----------
+    first, last : ndarray, shape (n,)
+        The first and last knot of each track.
+    h : ndarray, shape (K,)
+        Time since the knot before, s; 0 at the first one.
+    long : ndarray, shape (K,)
+        Whether that is half a step or more, or the knot the first one: there a chain begins.
+    chain : ndarray, shape (K,)
+        The knot where the chain begins that this one is in.
+    share : ndarray, shape (K,)
+        Along a chain places are told in so small a share of their unit.
+    finer : ndarray, shape (K,)
+        How often units of velocities are halved.
+    """
+
+    def __init__(self, t: Floats, offsets: Ints, units: Floats) -> None:
+        released = offsets[1:] > offsets[:-1]
+        self.first, self.last = offsets[:-1][released], offsets[1:][released] - 1
+        self.h = np.diff(t, prepend=t[:1])
+        self.h[self.first] = 0.0
+        # A step may be rounded up; of what is from 2^(k - 1) to 2^k, k is the exponent.
+        steps = self.h / (1.001 * units[6])
+        self.long = steps >= LONG
+        self.long[self.first] = True
+        begin = np.flatnonzero(self.long)
+        self.chain = begin[np.cumsum(self.long) - 1]
+        exponent = np.where(steps > 0.0, np.frexp(steps)[1], -FINEST)
+        # Chains are short, but not always: what adds up along one has to stay small.
+        self.share = np.ldexp(0.25, exponent.clip(-FINEST, 0))
+        self.finer = np.maximum(exponent, np.append(exponent[1:], 0)).clip(0)
+        self.some, self.speeds = self.finer > 0, units[[1, 1, 2], None]
+        self.fall = rounded(np.outer(np.append(units[7:9], 0.0), self.h) / self.speeds)
+
+    def rates(self, motion: Ints, more: Ints) -> Floats:
+        """Return velocities and spins, (3, K), of what is told of them, and more of some."""
+        rates = self.speeds * np.cumsum(motion + self.fall, axis=1)
+        rates[:, self.some] += np.ldexp(self.speeds * more, -self.finer[self.some])
+        return np.asarray(rates)
+
+    def tell_rates(self, rates: Floats) -> tuple[Ints, Ints]:
+        """Return what `rates` takes."""
+        motion = rounded(rates / self.speeds)
+        more = np.ldexp((rates / self.speeds - motion)[:, self.some], self.finer[self.some])
+        return np.diff(motion, prepend=0, axis=1) - self.fall, rounded(more)
+
+    def passed(self, rate: Floats) -> Floats:
+        """Return how far the means of a rate lead from the first of all knots, (K,)."""
+        return np.cumsum(0.5 * self.h * (np.append(rate[:1], rate[:-1]) + rate))
+
+    def places(self, told: Ints, rate: Floats, unit: float) -> Floats:
+        """Return places, or angles, (K,): what is told of where chains begin, and along them."""
+        begin = unit * np.cumsum(np.where(self.long, told, 0))
+        along = np.cumsum(np.where(self.long, 0.0, unit * self.share * told))
+        return np.asarray(begin + (along - along[self.chain]) + self.passed(rate))
+
+    def tell_places(self, places: Floats, rate: Floats, unit: float) -> Ints:
+        """Return what `places` takes."""
+        left = places - self.passed(rate)
+        along = np.where(self.long, 0.0, np.diff(left, prepend=0.0))
+        told = rounded(along / (unit * self.share))
+        told[self.long] = np.diff(rounded(left[self.long] / unit), prepend=0)
+        return told
+
+    def end_at(self, places: Floats, ends: Floats) -> None:
+        """Move the chains in which tracks begin and end so that they do so at places (2, n)."""
+        moved = np.zeros(len(places))
+        moved[self.chain[self.last]] = ends[1] - places[self.last]
+        moved[self.first] = ends[0] - places[self.first]
+        places += moved[self.chain]
+
+
+def tell_entries(entries: Floats, unit: float) -> Ints:
+    """Return how many units entries (3, K) change by, and one more: one is for what is less.
+
+    What goes on between two knots is read from which of them change at all.
+    """
+    change = np.diff(rounded(entries / unit), prepend=0)
+    changes = np.diff(entries, prepend=0.0) != 0.0
+    return np.asarray(change + (change > 0) + (changes & (change == 0)))
+
+
+def entries_of(told: Ints, unit: float) -> Floats:
+    """Return entries of which `tell_entries` told, (3, K)."""
+    few = told == 1
+    return np.asarray(
+        unit * (np.cumsum(told - (told > 0), axis=1) + LEAST * np.cumsum(few, axis=1))
+    )
+
+
+@dataclass
+class Tracks:
+    """What `COLUMNS` hold but for the states of events, which follow in `reader`.
+
+    `still` (E,) are events that change nothing; `keys` (K,) of knots and `when` (E,) of events are
+    in the order of particles and times.
+    """
+
+    knots: NDArray[Any]
+    angle: Floats
+    events: NDArray[Any]
+    still: Bools
+    keys: Ints
+    when: Ints
+    steps: Floats
+    reader: Reader
+
+    @classmethod
+    def of(cls, packed: dict[str, NDArray[Any]], offsets: Ints) -> Tracks:
+        """Return them; `ValueError` or `IndexError` if the columns do not fit together."""
+        units, ends, reader = (
+            packed["units"],
+            packed["ends"],
+            Reader(packed["sizes"], packed["bits"]),
+        )
+        times = unfold(packed["times"])[0].view(np.float64)
+        at, (when, still, *whole) = unfold(packed["when"])[0], unfold(packed["whose"])
+        if min(at.min(), when.min(initial=0)) < 0:
+            raise ValueError("a time is out of range")
+        knots, events = np.zeros(len(at), KNOT), np.zeros(len(when), EVENT)
+        knots["t"], events["t"] = times[at], times[when]
+        for name, told in zip(WHOLE, whole, strict=True):
+            events[name] = told
+        intervals = Intervals(knots["t"], offsets, units)
+        motion = reader.read(3, len(knots))
+        rates = intervals.rates(motion, reader.read(3, int(intervals.some.sum())))
+        knots["velocity"], knots["omega"] = rates[:2].T, rates[2]
+        for axis in (0, 1):
+            place = intervals.places(reader.read(len(knots)), rates[axis], units[0])
+            intervals.end_at(place, ends["position"][..., axis])
+            knots["position"][:, axis] = place
+        angle = (
+            intervals.places(reader.read(len(knots)), rates[2], units[5])
+            if units[9]
+            else np.zeros(0)
+        )
+        knots["entries"] = entries_of(reader.read(3, len(knots)), units[3]).T
+        knots[[intervals.first, intervals.last]] = ends
+        owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+        keys, when = at + len(times) * owner, when + len(times) * whole[0]
+        return cls(knots, angle, events, still > 0, keys, when, units[ROWS, None], reader)
+
+    def states(self, particle: Particle, give: Give) -> Floats:
+        """Return all rows of `STATE`, as they are foretold from the tracks and from those before.
+
+        `particle` has radii, masses and inertias.
+        """
+        knots, events = self.knots, self.events
+        begin, end = (np.searchsorted(self.keys, self.when, side) for side in ("left", "right"))
+        # Where the track has knots at that time, they are the states; else it leads past them.
+        there, left = end > begin, np.clip(begin - 1, 0, len(knots) - 2)
+        a, b = knots[np.where(there, begin, left)], knots[np.where(there, end - 1, left)]
+        t, h = knots["t"][left], knots["t"][left + 1] - knots["t"][left]
+        share = np.divide(events["t"] - t, h, out=np.ones(len(t)), where=h > 0.0).clip(0.0, 1.0)
+        before = np.stack([*a["position"].T, *a["velocity"].T, a["omega"]])
+        before[:4] = np.where(there, before[:4], np.hstack(hermite(knots, left, share)).T)
+        before = give(np.s_[:5], before)
+        changes, same = ~self.still, before[2:]
+        after = np.where(there, np.stack([*b["velocity"].T, b["omega"]]), same)
+        after = np.where(changes, give(np.s_[5:8], np.where(changes, after, same)), same)
+        # An impulse is the change of momentum; what of it is along the surface changes the spin.
+        body = particle.of(events["particle"])
+        along = body.inertia / body.radius * (after[2] - before[4])
+        square = body.mass**2 * ((after[:2] - before[2:4]) ** 2).sum(axis=0) - along**2
+        impulse = give(np.s_[8:], np.stack([np.sqrt(np.maximum(square, 0.0)), along]))
+        return np.concatenate([before, after, impulse])
+
+
+def units_of(record: Record, tolerance: float) -> Floats:
+    """Return the units of places, speeds, spins, energies, impulses and angles; and other numbers.
+
+    These are dt, the acceleration of gravity, and 1 if there are angles.
+    """
+    machine, dt = record.machine, float(record.machine.dt)
+    radius, mass = float(record.radius.min()), float(record.mass.min())
+    turned = ledger(record).turned_over
+    fastest = sqrt((record.knots["velocity"] ** 2).sum(axis=1).max())
+    speed = 2.0 * tolerance * radius / dt
+    # Half of it changes kinetic energies by no more than the tolerance of what is turned over.
+    if turned * fastest > 0.0:
+        speed = min(speed, 2.0 * tolerance * turned / (record.mass.sum() * fastest))
+    energy = tolerance * turned / sqrt(record.count)
+    return np.array([
+        0.5 * tolerance * radius, speed, 2.0 * speed / radius, energy or 1.0, mass * speed,
+        tolerance, dt, *(-machine.gravity * machine.up), len(record.angle) > 0,
+    ])  # fmt: skip
+
+
+def pack(record: Record, tolerance: float) -> dict[str, NDArray[Any]]:
+    """Return `COLUMNS` of a crowd of an engine that takes steps, within a tolerance, in radii.
+
+    Raises
+    ------
+    OverflowError
+        If whole numbers of what may be off do not reach as far as the particles.
+    """
+    knots, events, units = record.knots, record.events, units_of(record, tolerance)
+    intervals, writer = Intervals(knots["t"], record.offsets, units), Writer()
+    motion, more = intervals.tell_rates(np.stack([*knots["velocity"].T, knots["omega"]]))
+    writer.write(motion, more)
+    rates = intervals.rates(motion, more)
+    places = [*knots["position"].T, *([record.angle] if units[9] else [])]
+    for place, rate, unit in zip(places, rates, units[[0, 0, 5]], strict=False):
+        writer.write(intervals.tell_places(place, rate, unit))
+    writer.write(tell_entries(knots["entries"].T, units[3]))
+    exact = np.stack([events[name][part] for name, part in STATE])
+    still = ~exact[8:].any(axis=0) & np.all(exact[2:5] == exact[5:8], axis=0)
+    times, index = np.unique(np.append(knots["t"], events["t"]), return_inverse=True)
+    when = index[len(knots) :]
+    packed = {
+        "units": units,
+        "ends": knots[[intervals.first, intervals.last]],
+        "times": fold(times.view(np.int64)[None]),
+        "when": fold(index[None, : len(knots)]),
+        "whose": fold(np.stack([when, still, *(events[name] for name in WHOLE)])),
+        **writer.columns(),
+    }
+    tracks = Tracks.of(packed, record.offsets)
+
+    def give(rows: slice, foretold: Floats) -> Floats:
+        told = rounded((exact[rows] - foretold) / tracks.steps[rows])
+        writer.write(told)
+        return np.asarray(foretold + tracks.steps[rows] * told)
+
+    tracks.states(record.particle, give)
+    return packed | writer.columns()
+
+
+def unpack(
+    packed: dict[str, NDArray[Any]], offsets: Ints, particle: Particle
+) -> dict[str, NDArray[Any]]:
+    """Return the knots, angles and events that `pack` was given, within its tolerance."""
+    tracks = Tracks.of(packed, offsets)
+
+    def give(rows: slice, foretold: Floats) -> Floats:
+        told = tracks.reader.read(*foretold.shape)
+        return np.asarray(foretold + tracks.steps[rows] * told)
+
+    for (name, part), values in zip(STATE, tracks.states(particle, give), strict=True):
+        tracks.events[name][part] = values
+    if len(tracks.reader.sizes) or len(tracks.reader.bits):
+        raise ValueError("too many numbers")
+    return {"knots": tracks.knots, "angle": tracks.angle, "events": tracks.events}

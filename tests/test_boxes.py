@@ -320,7 +320,7 @@ def apart(one, other):
 
 
 def test_poured_boxes_get_into_each_other_and_into_walls_by_less_than_a_thousandth():
-    """Separating axes, of all that are near: the laws know the circle inside a box alone."""
+    """Separating axes, of all that are near: of each other the laws know the circle inside."""
     half, wide = 0.009, 0.1
     walls = [("left", [[-wide, 0.0], [-wide, 1.0]]), ("right", [[wide, 0.0], [wide, 1.0]]),
              ("floor", [[-wide, 0.0], [wide, 0.0]])]  # fmt: skip

@@ -1,11 +1,13 @@
 """Boxes and polygons with all else of a machine, by closed forms; and Pymunk at its order."""
 
+from dataclasses import replace
 from math import atan2, cos, pi, sin, sqrt
 
 import numpy as np
 import pytest
 
 import chutelab
+from chutelab.results.laws import judge
 from shared import seeds
 from test_hinge import drawn as hung
 from test_hinge import sound
@@ -325,7 +327,7 @@ def one_sided(seed):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", seeds(5, 10))
+@pytest.mark.parametrize("seed", seeds(5, 40))
 def test_random_boxes_among_what_lets_them_through_keep_the_laws(seed):
     sound(chutelab.simulate(one_sided(seed), engine="contact"))
 
@@ -356,6 +358,42 @@ def test_a_disk_rolls_on_a_box_as_on_a_floor(drop):
                   for dt in (1e-3, 2.5e-4)]  # fmt: skip
         off = [abs(one["velocity"][0] - last["velocity"][0]) for one in theirs]
         assert off[1] < 0.4 * off[0]
+
+
+# The laws
+
+
+def lying(surface, at):
+    """Run a box that lies on a surface."""
+    scene = {"particle": BOX, "surface": [{"name": "bed", **surface, "friction": 0.5}],
+             "stream": {"at": at, "velocity": [0.0, 0.0]}, "run": {"until": 0.2}}  # fmt: skip
+    return sound(chutelab.simulate(scene))
+
+
+BED = {"from": [-1.0, 0.0], "to": [1.0, 0.0]}
+BOW = {"center": [0.0, -0.5], "radius": 0.5, "from_deg": 30.0, "to_deg": 150.0}
+BOWL = {"center": [0.0, 0.5], "radius": 0.5, "from_deg": -150.0, "to_deg": -30.0}
+
+
+@pytest.mark.parametrize("angle", [0.02, 0.3, 0.5])
+@pytest.mark.parametrize(
+    ("surface", "y", "deep"),
+    [(BED, 0.5 * H, lambda x, y: -y), (BOW, 0.5 * H, lambda x, y: 0.5 - np.hypot(x, y + 0.5)),
+     (BOWL, 0.5 + 0.5 * H - sqrt(0.25 - 0.25 * W * W), lambda x, y: np.hypot(x, y - 0.5) - 0.5)],
+)  # fmt: skip
+def test_a_corner_that_has_gone_through_a_wall_is_told(surface, y, deep, angle):
+    """A fault: a box that lies flat is said to be turned. The circle inside it is where it was."""
+    run = lying(surface, [0.0, y])
+    told = judge(replace(run, angle=run.angle + angle * (run.knots["t"] > 0.05)))
+    u, v = 0.5 * W * np.array([1, 1, -1, -1]), 0.5 * H * np.array([1, -1, 1, -1])
+    x, y = run.track(0)[-1]["position"]
+    corners = x + u * cos(angle) - v * sin(angle), y + u * sin(angle) + v * cos(angle)
+    least = deep(*corners).max()
+    # A twentieth of its largest radius is allowed in a crowd.
+    assert bool(told) == (least > 0.05 * np.hypot(0.5 * W, 0.5 * H))
+    assert [(one.law, one.amount) for one in told] == [
+        ("nothing inside a surface", pytest.approx(least, abs=1e-6))
+    ] * len(told)
 
 
 # Surfaces

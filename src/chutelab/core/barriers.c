@@ -27,9 +27,12 @@ static struct {
     Barrier *piece;
     int particle, number, knot; /* of the piece; of the knot before */
     double radius, limit;       /* m; how near a centre may come, where it is not to be looked at ... */
+    double reach;               /* m; of its corners, or its radius */
     double begin, margin;       /* ... to begin with; how far a box may be from a piece that is met */
     int deepest;                /* the hit of this interval that passes nothing, or -1 */
 } At;
+
+static int is_cornered(void) { return L.outline_count && L.bodies[At.particle].corners; }
 
 /* Have the box of a piece hold a place. */
 static void grow(double *box, double x, double y) {
@@ -323,6 +326,68 @@ PAIRED static int is_clear(const Curve *c, const Barrier *b, double limit) {
     return b->radius == 0 ? is_clear_of_line(c, b, limit) : is_clear_of_bow(c, b, limit);
 }
 
+/* What has corners. */
+
+/* Have the corners of a particle be where they are at a share of the interval after a knot, as the centre is told, in
+   the frame of a piece: between knots a spin is even, but for what turning leaves. Return how many. */
+static int corners_at(int knot, double share, double x, double y, const Barrier *b, double (*p)[2]) {
+    const Body *body = L.bodies + At.particle;
+    const double *now = KNOT(knot), *next = now + L.row;
+    double h = next[0] - now[0], t = now[0] + share * h, gone = L.angles[knot + 1] - L.angles[knot];
+    double missed = gone - 0.5 * h * (now[5] + next[5]);
+    double angle = L.angles[knot] + share * (h * (now[5] + 0.5 * share * (next[5] - now[5])) + missed);
+    double c = cos(angle), s = sin(angle);
+    for (int n = 0; n < body->corners; n++) {
+        const double *q = L.outlines + 2 * (body->outline + n);
+        p[n][0] = x + c * q[0] - s * q[1];
+        p[n][1] = y + s * q[0] + c * q[1];
+        to_rest(b, t, p[n], p[n] + 1);
+    }
+    return body->corners;
+}
+
+/* How far the corner of an edge that is beyond an arc, or the edge itself, is beyond it, m; 0 if it does not cross it, but
+   where an end may be in the edge. */
+static double across(const Barrier *b, const double *q, const double *r, int inside) {
+    double x = q[0] - b->x, y = q[1] - b->y, ex = r[0] - q[0], ey = r[1] - q[1];
+    double a = ex * ex + ey * ey, half = x * ex + y * ey, root = half * half - a * (x * x + y * y - b->radius * b->radius);
+    int met = 0, both = 0;
+    for (int n = 0; n < 2 && root > 0; n++) {
+        double share = (-half + (n ? 1 : -1) * sqrt(root)) / a;
+        if (share < 0 || share > 1) continue;
+        both++;
+        met |= is_within(b, q[0] + share * ex, q[1] + share * ey, L.allowed);
+    }
+    if (!met) return 0;
+    if (both == 2) return inside ? 0 : b->radius - sqrt(MAX(x * x + y * y - half * half / a, 0));
+    double one = hypot(x, y) - b->radius, other = hypot(r[0] - b->x, r[1] - b->y) - b->radius;
+    return inside ? MAX(one, other) : MAX(-one, -other);
+}
+
+/* How deep a polygon, whose centre is at a place, is in a piece, m: of a straight one along the best of all edges, below
+   0 if it is clear. Of a bent one what of it is on the other side, or how deep an end is in it, if that is less; else 0. */
+static double deep_in(const Barrier *b, double (*p)[2], int count, double x, double y) {
+    double clear = -INFINITY, low = INFINITY, high = -INFINITY, far = 0, ends[2] = {INFINITY, INFINITY};
+    int inside = hypot(x - b->x, y - b->y) < b->radius;
+    for (int n = 0; n < count; n++) {
+        const double *q = p[n], *r = p[n + 1 < count ? n + 1 : 0];
+        double ex = r[0] - q[0], ey = r[1] - q[1], size = hypot(ex, ey), off[2];
+        for (int k = 0; k < 2; k++) {
+            off[k] = ((b->end[2 * k] - q[0]) * ey - (b->end[2 * k + 1] - q[1]) * ex) / size;
+            ends[k] = MIN(ends[k], -off[k]);
+        }
+        clear = MAX(clear, MIN(off[0], off[1]));
+        if (b->radius > 0) far = MAX(far, across(b, q, r, inside));
+        else {
+            low = MIN(low, beside(b, q[0], q[1]));
+            high = MAX(high, beside(b, q[0], q[1]));
+        }
+    }
+    if (b->radius == 0) return -MAX(clear, MAX(low, -high));
+    double end = b->whole ? 0 : MAX(ends[0], ends[1]);
+    return end > 0 ? far > 0 ? MIN(far, end) : end : far;
+}
+
 /* Hits. */
 
 static double side_margin(void) { return MAX(L.rounding, ON_ARCS * L.largest); }
@@ -494,9 +559,10 @@ PAIRED static void look_at_all(const Interval *some, int count, const Box *box, 
 PAIRED static void look_at_moving(const Interval *now, Barrier *b, int number, double *spared) {
     const double *knot = KNOT(now->knot);
     const Two *p = now->path.p;
-    double h = knot[L.row] - knot[0], way = 0, haste, share = 0, before = 0;
+    double h = knot[L.row] - knot[0], way = 0, haste, share = 0, before = 0, corners[MOST_CORNERS][2];
     for (int n = 0; n < 3; n++) way = MAX(way, 3 * hypot(p[n + 1][0] - p[n][0], p[n + 1][1] - p[n][1]));
     way += h * swiftest(b, &haste);
+    if (is_cornered()) way += h * At.reach * MAX(fabs(knot[5]), fabs(knot[L.row + 5]));
     At.deepest = -1;
     for (int last = 0; !last;) {
         Two place = place_on(&now->path, share);
@@ -506,6 +572,12 @@ PAIRED static void look_at_moving(const Interval *now, Barrier *b, int number, d
         const Barrier *near = nearest(b, x, y, &gap, &off);
         double depth = At.radius - gap, least = b->one_sided ? -L.allowed : 0;
         At.number = number + (int)(near - b);
+        if (is_cornered()) {
+            int count = corners_at(now->knot, share, place[0], place[1], b, corners);
+            depth = -INFINITY;
+            for (int n = 0; n < MAX(b->chain, 1); n++) depth = MAX(depth, deep_in(b + n, corners, count, x, y));
+            gap -= At.reach - At.margin;
+        }
         int there = is_there(b, t) && t >= b->appears + L.dt;
         if (isnan(*spared)) *spared = b->appears > KNOT(L.offsets[At.particle])[0] ? INFINITY : MAX(depth, 0);
         if (there && depth <= least && !(b->one_sided && off < 0)) *spared = 0;
@@ -524,18 +596,18 @@ PAIRED static void look_at_moving(const Interval *now, Barrier *b, int number, d
     }
 }
 
-/* Look at all of a track beside what moves, or is solid from one side. */
+/* Look at all of a track beside what moves, or is solid from one side, and of what has corners beside all. */
 PAIRED static void look_at_movers(int i, Barrier *pieces) {
     for (int k = 0; k < L.piece_count; k++) {
         double spared = NAN;
-        if (pieces[k].one_sided ? !pieces[k].chain : !pieces[k].mover) continue;
+        if (pieces[k].one_sided ? !pieces[k].chain : !(pieces[k].mover || is_cornered())) continue;
         for (int n = L.offsets[i]; n < L.offsets[i + 1] - 1; n++) {
             Interval now = { .path = curve_after(KNOT(n)), .knot = n };
             const Two *p = now.path.p;
             now.box.low = lesser(lesser(p[0], p[1]), lesser(p[2], p[3]));
             now.box.high = larger(larger(p[0], p[1]), larger(p[2], p[3]));
             int away = 1;
-            for (int m = 0; m < MAX(pieces[k].chain, 1); m++) away &= apart(&now.box, pieces[k + m].box, At.radius);
+            for (int m = 0; m < MAX(pieces[k].chain, 1); m++) away &= apart(&now.box, pieces[k + m].box, At.reach);
             if (KNOT(n)[0] == KNOT(n)[L.row] || away) continue;
             look_at_moving(&now, pieces + k, k, &spared);
         }
@@ -556,8 +628,9 @@ PAIRED int find_hits(int i) {
     At.radius = L.bodies[i].radius;
     At.margin = MAX(At.radius - L.allowed, 0);
     At.begin = At.radius > 0 ? At.margin : -L.allowed;
+    At.reach = is_cornered() ? L.largest : At.radius;
     for (int k = 0; k < L.piece_count; k++) pieces[k].clear = NAN;
-    for (int k = L.offsets[i]; k < L.offsets[i + 1] - 1; k++) {
+    for (int k = L.offsets[i]; k < L.offsets[i + 1] - 1 && !is_cornered(); k++) {
         const double *a = KNOT(k), *b = a + L.row;
         if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) continue;
         Interval *now = some + count++;

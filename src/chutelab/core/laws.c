@@ -79,13 +79,14 @@ static double given_back(const double *now) {
 typedef struct { int particles, particle, latest, knot; } Group;
 
 /* What all particles have together, and the largest and least of one; of pieces the largest coordinate and
-   length of straight ones, coordinate and radius of bent ones, and speed; `reach` is the largest coordinate
+   length of straight ones, coordinate and radius of bent ones, and speed; `whirl` is the largest speed by which a corner
+   turns, m/s, and `reach` the largest coordinate
    or length of all that is anywhere, m. Of particles that do not meet also
    what is unexplained at their ends, J, the most that changes of it between two knots, and the least of
    what `given_back` says. */
 static struct {
     double mass, weight, heaviest, smallest, gravity, size[4], belts;
-    double t, knot_t, place, reach, fastest, lifted, entries[3], residual, change, back;
+    double t, knot_t, place, reach, fastest, whirl, lifted, entries[3], residual, change, back;
     Group bad;
     int unreal;
 } All;
@@ -141,6 +142,8 @@ static void weigh_machine(void) {
         All.heaviest = MAX(All.heaviest, body->mass);
         All.gravity = MAX(All.gravity, body->gravity);
         All.smallest = i ? MIN(All.smallest, body->radius) : body->radius;
+        for (int k = L.offsets[i]; k < L.offsets[i + 1] && body->corners; k++)
+            All.whirl = MAX(All.whirl, fabs(KNOT(k)[5]) * L.largest);
     }
 }
 
@@ -259,7 +262,7 @@ PAIRED static double bent_inside(void) {
    does not lift off; inside an arc it may be more. In a crowd of the contact engine disks are pressed. */
 static double lateness(void) {
     if (L.engine == ENGINE_EXACT) return 0;
-    if (L.alike) return L.speed * L.dt + SLOP * L.largest;
+    if (L.alike) return (L.speed + All.whirl) * L.dt + SLOP * L.largest;
     if (L.interact) return PRESSED * L.largest;
     return (2 * (All.gravity + L.haste) + L.bent) * square(L.dt);
 }
@@ -575,6 +578,8 @@ static void judge_steps(void) {
 EXPORT int lay_out_laws(void) {
     int crowd = L.interact && L.engine == ENGINE_CONTACT;
     RESERVE(L.knots, (double)L.knot_count * L.row);
+    RESERVE(L.angles, L.outline_count ? L.knot_count : 1);
+    RESERVE(L.outlines, 2.0 * L.outline_count);
     RESERVE(L.offsets, L.particle_count + 1);
     RESERVE(L.bodies, L.particle_count);
     RESERVE(L.barriers, (double)L.piece_count * members());

@@ -752,6 +752,7 @@ typedef struct {                                                                
     double radius;          /* m; of one with corners that of the circle inside */
     double mass, inertia;   /* kg, kg m2 */
     double gravity;         /* m/s2 */
+    int corners, outline;   /* how many it has, 0 of what is round, and the first in `Laws.outlines` */
 } Body;
 
 /* A place where a particle is deeper in a piece than it may be, or passes it. */
@@ -775,6 +776,8 @@ typedef struct {                                                                
 
 typedef struct {
     double *knots;          /* [in] rows of t, x, y, vx, vy, spin, three entries of the ledger */
+    double *angles;         /* [in] (knots), rad, if some have corners */
+    double *outlines;       /* [in] (outline_count, 2) corners round the centroid, counterclockwise, m */
     int *offsets;           /* (particles + 1) first knot of each, and behind the last: [in], or `owned` */
     Body *bodies;           /* [in] (particles) */
     Barrier *barriers;      /* [in] (pieces), of a family (members, pieces) */
@@ -787,7 +790,7 @@ typedef struct {
     double *places;         /* (particles, 2) there, too */
     /* sizes */
     int particle_count, piece_count, knot_count, row; /* [in] row: doubles from knot to knot */
-    int mover_count, swing_count; /* [in] */
+    int mover_count, swing_count, outline_count; /* [in] */
     int book_rows, surface_count; /* [in] with the particles' own, which is the last */
     int hit_room;
     /* the run */

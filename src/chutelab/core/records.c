@@ -106,7 +106,7 @@ static int judge_exact(void) {
     if (!lay_out_pieces()) return 0;
     for (int i = 0; i < e->lone_count; i++) {
         const Lone *p = e->lones + i;
-        L.bodies[i] = (Body){ p->radius, p->mass, p->inertia, p->gravity };
+        L.bodies[i] = (Body){ .radius = p->radius, .mass = p->mass, .inertia = p->inertia, .gravity = p->gravity };
         L.largest = MAX(L.largest, p->radius);
     }
     for (int member = 0; member < members(); member++) take_pieces(e, member);
@@ -143,7 +143,7 @@ EXPORT int prepare_to_judge(void) {
     }
     for (int i = 0; i < w->disk_count; i++) {
         const Disk *d = w->disks + i;
-        L.bodies[i] = (Body){ d->radius, d->mass, d->inertia, w->g };
+        L.bodies[i] = (Body){ .radius = d->radius, .mass = d->mass, .inertia = d->inertia, .gravity = w->g };
         L.largest = MAX(L.largest, d->radius);
     }
     return prepare() && lay_out_bins(w->owner_count, w->disk_count);

@@ -37,7 +37,7 @@ function runOf(recording: Recording): Run {
 /** The laws that a run breaks, in the order in which they are told. What the core has in memory
  * stays as it is. */
 function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: Run): Breach[] {
-  const { gravity, tilt, interact, dt, pulley, radius, mass, inertia, joints } = machine;
+  const { gravity, tilt, interact, dt, pulley, radius, mass, inertia, joints, outlines } = machine;
   const { enums } = core.layout, end = core.get("end", "Room");
   const pieces = barriersOf(machine), count = radius.length, { movers } = machine;
   const states = movers.flatMap(({ surface }) => (swings.get(surface)?.rows ?? [])
@@ -49,6 +49,7 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
     engine: enums.Engine.ENGINE_CONTACT,
     interact: Number(interact || states.length + joints.length > 0),
     mover_count: movers.length, swing_count: states.length, pulley: Number(!!pulley),
+    outline_count: outlines.flat().length,
     tilt, dt, joined: Number(joints.length > 0),
     largest: radius.reduce((most, own) => Math.max(most, own), 0), ...run,
   });
@@ -56,8 +57,14 @@ function judge(core: Core, { machine, knots, offsets, books, swings, ...run }: R
   core.doubles.set(knots, core.get("knots", "Laws") >> 3);
   core.doubles.set(books, core.get("books", "Laws") >> 3);
   core.ints.set(offsets, core.get("offsets", "Laws") >> 2);
+  core.doubles.set(outlines.flat(2), core.get("outlines", "Laws") >> 3);
+  if (outlines.flat().length) {
+    core.doubles.set(knots.filter((_, n) => n % KNOT_ROW === KNOT_ROW - 1), core.get("angles", "Laws") >> 3);
+  }
   radius.forEach((_, i) => {
-    const body = { radius: innerOf(machine, i), mass: mass[i], inertia: inertia[i], gravity };
+    const { kind } = machine.releases[i], outline = outlines.slice(0, kind).flat().length;
+    const body = { radius: innerOf(machine, i), mass: mass[i], inertia: inertia[i], gravity,
+      corners: outlines[kind].length, outline };
     core.fill("bodies", "Body", i, body, "Laws");
   });
   states.forEach((row, n) => core.fill("swings", "Swing", n, row, "Laws"));

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.patches import Rectangle
@@ -16,7 +15,6 @@ from matplotlib.transforms import Bbox
 from PIL import Image, ImageDraw
 
 from chutelab import scene
-from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
 from chutelab.machine.parts import Joint
@@ -59,7 +57,7 @@ from handmade import (
     t_impact,
     t_landing,
 )
-from shared import some
+from shared import call, some
 
 WIDTH, HEIGHT = 800, 450
 FLOOR = Line("floor", (-0.6, 0.0), (0.6, 0.0))
@@ -861,7 +859,6 @@ def test_films_and_the_still_can_be_chosen(tmp_path):
     arguments = ["--only", "json,gif,strobe", "--format", "mp4"]
     files, out = ["lesson.mp4", "strobe.png", "summary.json"], tmp_path / "out"
     short = ["run", "perpendicular", "--set", "run.until=0.2"]
-    result = CliRunner().invoke(main, [*short, "--out", str(out), *arguments])
-    assert result.exit_code == 0, result.output
+    result = call(*short, "--out", str(out), *arguments)
     assert all(name in result.output.partition("wrote into")[2] for name in files)
     assert sorted(path.name for path in out.iterdir()) == files

@@ -10,6 +10,7 @@ from scipy.special import ellipk
 from chutelab import simulate, start
 from chutelab.machine import build
 from chutelab.scene import SceneError, from_dict
+from shared import seeds
 
 G = 9.81
 BOTH = ("contact", "pymunk")
@@ -404,9 +405,7 @@ def machine_of_joints(seed):
     return scene(1.5, at=(0.0, 0.5), velocity=rng.normal(size=2).tolist(), **tables)
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(n, marks=[pytest.mark.slow] * (n > 5)) for n in range(60)]
-)
+@pytest.mark.parametrize("seed", seeds(6, 60))
 @pytest.mark.filterwarnings("ignore:LAW BROKEN, no loss is negative")
 def test_random_machines_keep_the_laws(seed):
     """But for one: what is wedged between joints and surfaces may give back too much."""

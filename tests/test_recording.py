@@ -325,7 +325,7 @@ CROWDS = {
     "hopper": ("stream.count=80",),
     "galton": ("stream.count=12",),
     "stream": ("stream.count=30",),
-    "dominoes": (),
+    "dominoes": ("run.until=0.25",),
     "drum": (),
 }
 

@@ -201,8 +201,8 @@ SHIPPED = (
     "arch", "belt-landing", "cascade", "coal-transfer", "cradle", "damper-plate", "domino-gate",
     "dominoes", "drum", "feeder", "flap-gate", "free-fall", "galton", "heap", "hopper",
     "inclined-20", "inclined-40", "inclined-60", "inclined-conveyor", "loop", "low-speed",
-    "mixture", "perpendicular", "perpendicular-fast", "rock-box", "see-saw", "silo", "slip", "spoon", "stream",
-    "stream-independent", "two-sizes", "vibrating-feeder",
+    "mixture", "perpendicular", "perpendicular-fast", "rock-box", "see-saw", "silo", "slip",
+    "spoon", "stream", "stream-independent", "two-sizes", "vibrating-feeder",
 )  # fmt: skip
 
 

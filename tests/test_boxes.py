@@ -406,3 +406,16 @@ def test_where_boxes_are_in_the_end():
     assert hypot(*off) < hypot(0.05, 0.03)
     assert off[0] < -0.05
     assert recording.summary()["fates"] == {"on board": 2, "in the air": 1}
+
+
+@pytest.mark.parametrize(("x", "speed"), [(-0.122, 0.76), (0.041, -0.76)])
+def test_a_box_strikes_the_end_of_a_bowl(x, speed):
+    """Near one of its corners, from above; the other end of the bowl is out of another edge."""
+    bowl = {"center": [0.0, 0.0], "radius": 0.25, "from_deg": 180.0, "to_deg": 360.0}
+    thrown = scene((x, 0.8), (speed, 0.18), size=(0.13, 0.13), e=0.8, mu=0.6, surface=bowl)
+    del thrown["surface"][0]["from"], thrown["surface"][0]["to"]
+    recording = chutelab.simulate(thrown, {"run.until": 1.5}, engine="contact")
+    (blow, *_) = recording.events[recording.events["kind"] == 3]
+    # Its lower edge is at the height of the ends then.
+    assert blow["position"][1] == pytest.approx(0.065, abs=1e-9)
+    assert not recording.laws

@@ -123,12 +123,22 @@ static double clear_of(const Shape *a, int edge, const Shape *b) {
 }
 
 /* The edge that a corner of `b` is on: the one that it is furthest out of, and inside, or within `near`, the one that
-   most of `b` is out of: else what is deep by more than its corners are apart would be pressed aside. */
+   most of `b` is out of: else what is deep by more than its corners are apart would be pressed aside. Of an arc
+   counts how it goes on from its end. */
 static int edge_under(const Shape *a, const Shape *b, const double *q, double near) {
     double off, best = -INFINITY;
     int found = furthest(a, q, &off);
+    Shape end = *b;
+    if (b->s && b->s->shape == ARC) {
+        double x = (q[1] - b->s->y) / b->radius, y = (b->s->x - q[0]) / b->radius, on = near / TOUCH;
+        if (x * b->s->tx + y * b->s->ty < 0) on = -on;
+        memcpy(end.p[0], q, sizeof end.p[0]);
+        end.p[1][0] = q[0] + on * x;
+        end.p[1][1] = q[1] + on * y;
+        end.count = 2;
+    }
     for (int e = 0; e < a->count && off < near; e++) {
-        double clear = clear_of(a, e, b);
+        double clear = clear_of(a, e, &end);
         if (clear <= best) continue;
         best = clear;
         found = e;

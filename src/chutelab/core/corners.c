@@ -52,6 +52,7 @@ static Shape shape_of(int j, double t) {
     Shape out;
     out.round = -1;
     out.s = 0;
+    out.count = 0;
     if (j < 0) {
         const Surface *s = out.s = surface_at(-1 - j, t);
         if (s->shape != CIRCLE) {
@@ -481,6 +482,8 @@ double meet_corners(int i, int j, double from, double until, double soft) {
             Touch now = {.which = c};
             if (on_segment && c < a.count) now.on = sides[c];
             double before = gap[c];
+            /* It may have been moved on to another's root. */
+            if (j < 0) b2.s = surface_at(-1 - j, t);
             gap[c] = gap_at(&a2, &b2, near, &now);
             if (!(before > 0 && gap[c] <= 0)) continue;
             double then = root_of(i, j, &now, last, t, before, gap[c]);

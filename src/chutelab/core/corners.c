@@ -252,7 +252,8 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
     const double *q = b->p[m];
     double best = INFINITY;
     if (m != b->round) {
-        t->on = edge_under(a, b, q, near);
+        /* An end that sinks in goes back the shortest way: the surface may be anywhere else. */
+        t->on = b->s ? furthest(a, q, &off) : edge_under(a, b, q, near);
         double length = out_of(a, t->on, n), along = n[0] * (q[1] - a->p[t->on][1]) - n[1] * (q[0] - a->p[t->on][0]);
         fill_in(a, b, t);
         return along >= 0 && along <= length && !(b->s && mate_of(b->s, m) >= 0);

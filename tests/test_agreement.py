@@ -157,6 +157,18 @@ def test_what_lies_still_stays_where_it_is():
     assert 0.0 < row.difference < GRAVITY * 0.0005**2 / 0.0243
 
 
+@pytest.mark.parametrize(("growth", "compared"), [(1e5, True), (1e7, False)])
+def test_beyond_a_million_times_a_change_no_order_is_looked_for(growth, compared, monkeypatch):
+    """Made up: how far runs are apart, of one engine and of two."""
+
+    def apart(one, other):
+        return (1e-9 * growth if one.engine == other.engine else 1e-3), "all"
+
+    monkeypatch.setattr("chutelab.checks.agreement.distance", apart)
+    said = rows_of("slip", "run.until=0.6")["contact, exact"].quantity
+    assert said.startswith("order" if compared else "a change of the inputs comes out 1e+07")
+
+
 def test_the_promise_grows_with_what_a_scene_makes_of_a_change():
     """At v0² = g Rc (1 - δ), cos φ1 = 1 - δ: dφ1/dv = -(2/v0) cos φ1 / sin φ1, sin φ1 = √(2 δ)."""
     delta = 1e-8

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.patches import Rectangle
@@ -16,7 +15,6 @@ from matplotlib.transforms import Bbox
 from PIL import Image, ImageDraw
 
 from chutelab import scene
-from chutelab.cli import main
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
 from chutelab.machine.parts import Joint
@@ -59,7 +57,7 @@ from handmade import (
     t_impact,
     t_landing,
 )
-from shared import some
+from shared import call, some
 
 WIDTH, HEIGHT = 800, 450
 FLOOR = Line("floor", (-0.6, 0.0), (0.6, 0.0))
@@ -773,32 +771,6 @@ def test_colours_are_nearly_the_stages_and_what_stands_still_keeps_its_own(runs,
     assert (shows[drawn] == shown).all()
 
 
-def test_without_the_energy_the_machine_is_larger(runs):
-    small, large = (
-        lay_out(runs["perpendicular"], width=WIDTH, height=HEIGHT, energy=energy)
-        for energy in (True, False)
-    )
-    assert "energy" in small.shows
-    assert large.shows == small.shows - {"energy"}
-    assert large.view[2] > 1.4 * small.view[2]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "delay"),
-    [
-        pytest.param("perpendicular", 40, marks=pytest.mark.slow),
-        pytest.param("stream", 50, marks=pytest.mark.slow),
-    ],
-)
-def test_a_film_is_small_and_a_streams_has_fewer_pictures_a_second(name, delay, tmp_path):
-    few = scene.load(name, overrides=["stream.count=4"] if name == "stream" else ())
-    path = animate(simulate(few), tmp_path / "lesson.gif")
-    with Image.open(path) as gif:
-        assert gif.info["duration"] == delay
-    assert path.stat().st_size < 400_000
-
-
 def written(pictures, delays):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "written.gif"
@@ -887,7 +859,6 @@ def test_films_and_the_still_can_be_chosen(tmp_path):
     arguments = ["--only", "json,gif,strobe", "--format", "mp4"]
     files, out = ["lesson.mp4", "strobe.png", "summary.json"], tmp_path / "out"
     short = ["run", "perpendicular", "--set", "run.until=0.2"]
-    result = CliRunner().invoke(main, [*short, "--out", str(out), *arguments])
-    assert result.exit_code == 0, result.output
+    result = call(*short, "--out", str(out), *arguments)
     assert all(name in result.output.partition("wrote into")[2] for name in files)
     assert sorted(path.name for path in out.iterdir()) == files

@@ -129,11 +129,6 @@ def test_streams_and_particle_0_can_be_told_apart_by_all_eyes(eyes):
         assert np.hypot.reduce(one - other) > 12.0
 
 
-def test_ten_streams_have_ten_colours():
-    assert len(set(stream_colours(10))) == 10
-    assert stream_colours(1) == [style.STREAM]
-
-
 def test_tracks_and_particles_have_the_colours_of_their_streams_and_a_legend_names_them():
     spots = [(-0.2, 0.3), (0.0, 0.3), (0.2, 0.3)]
     machine = machine_of(FLOOR, at=spots, stream=[0, 0, 1], streams=("coarse", "fine"))

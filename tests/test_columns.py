@@ -65,15 +65,6 @@ def test_twenty_columns_and_silos_make_no_energy(seed):
 
 
 @pytest.mark.slow
-def test_without_the_line_searches_columns_make_energy_and_a_law_tells(with_fault):
-    """The planted fault: impulses of the step before are taken as they are, and none are eased."""
-    with_fault("rows.c", "if (!(all > 0)) return 0;", "if (rows >= 0) return 0;")
-    spoilt = [run(build(from_dict(column(seed, 60)))) for seed in (8, 16, 20, 22, 24)]
-    assert all(found.gained > 1e-9 * ledger(found).turned_over for found in spoilt)
-    assert all(laws.ENERGY in {broken.law for broken in laws.judge(found)} for found in spoilt)
-
-
-@pytest.mark.slow
 def test_where_blows_make_energy_a_law_tells(with_fault):
     """The planted fault: two disks part 1.2 times as fast as they met."""
     with_fault("impacts.c", "-c.rest * u[0]", "-(c.two ? 1.2 : c.rest) * u[0]")

@@ -22,6 +22,7 @@ from chutelab.studies.design import roots
 from chutelab.studies.design.evaluation import Evaluator, Outcomes, measured, target
 from chutelab.studies.design.uncertainty import as_dict, indices, sampled, spreads
 from chutelab.util.errors import InputError
+from shared import call
 
 G, V, R, D, DROP, M = 9.81, 2.0, 0.1, 0.5, 0.5, 0.008
 
@@ -340,8 +341,7 @@ def test_bad_questions_are_refused_before_anything_runs(arguments, said, monkeyp
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("chutelab.studies.sweep.plan.judged", None)
     monkeypatch.setattr("chutelab.studies.sweep.plan.run", None)
-    result = CliRunner().invoke(main, [*SOLVE, *arguments, "--out", "out"])
-    assert result.exit_code == 2, result.output
+    result = call(*SOLVE, *arguments, "--out", "out", code=2)
     assert said in " ".join(result.output.split())
     assert not list(tmp_path.iterdir())
 
@@ -349,8 +349,7 @@ def test_bad_questions_are_refused_before_anything_runs(arguments, said, monkeyp
 @pytest.mark.slow
 def test_files_of_a_solution(tmp_path):
     out = tmp_path / "out"
-    result = CliRunner().invoke(main, [*SOLVE, *VARY, *AIM, "--points", "13", "--out", str(out)])
-    assert result.exit_code == 0, result.output
+    result = call(*SOLVE, *VARY, *AIM, "--points", "13", "--out", str(out))
     assert sorted(file.name for file in out.iterdir()) == [
         "overlay.png", "scan.png", "solution.toml", "solve.json",
     ]  # fmt: skip
@@ -369,8 +368,7 @@ def test_files_of_a_solution(tmp_path):
 
 def test_no_solution_exits_with_1_and_writes_the_nearest(tmp_path):
     arguments = (*SOLVE, *VARY, "--target", "landing.vx=9", "--points", "5")
-    result = CliRunner().invoke(main, [*arguments, "--out", str(tmp_path / "out"), "--json"])
-    assert result.exit_code == 1
+    result = call(*arguments, "--out", str(tmp_path / "out"), "--json", code=1)
     told = json.loads(result.output)
     assert told["solved"] is False
     assert told["nearest"]["values"]["plate.angle_deg"] == 60.0

@@ -11,7 +11,7 @@ from chutelab.engines import exact, reference
 from chutelab.machine.releases import Releases
 from chutelab.results import Kind
 from chutelab.results.laws import judge
-from chutelab.results.ledger import ledger
+from chutelab.results.ledger import energy_at, ledger
 from chutelab.results.recorder import StalledError
 from chutelab.studies.accuracy import apart, each, sizes
 
@@ -78,7 +78,7 @@ def test_from_belt_to_wall_it_stays_in_the_corner_and_the_belt_pays_for_heat():
     wall = {"name": "wall", "from": [1, -0.5], "to": [1, 1], "restitution": 0.3, "friction": 0.0}
     recording = thrown([0.0, 0.02], [2.0, 0.0], belt, wall, until=10.0, radius=0.02)
     np.testing.assert_allclose(recording.track(0)[-1]["position"], [0.98, 0.02], rtol=0, atol=1e-12)
-    resting = recording.energy_at([8.0, 9.0])["belt_work"]
+    resting = energy_at(recording, [8.0, 9.0])["belt_work"]
     assert np.diff(resting) == pytest.approx(0.3 * 0.1 * G * 2.0, rel=1e-12, abs=0.0)
     assert ledger(recording).relative_residual < 1e-12
 

@@ -5,14 +5,13 @@ import io
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from PIL import Image
 
 import chutelab
-from chutelab.cli import main
 from chutelab.pictures.plots import paper_figure
 from chutelab.results import Kind
 from chutelab.theory.figures import CASES, DRAWINGS, NUMBERS, FigureError, figure, path
+from shared import call
 
 G, EPSILON, FALL, MASS = 9.81, 0.5, 0.5, 0.008
 
@@ -106,8 +105,7 @@ def test_picture_has_both_forms_on_the_same_axes(found, number):
 
 @pytest.mark.parametrize("number", [7, pytest.param(12, marks=pytest.mark.slow)])
 def test_command_writes_picture_numbers_and_scenes(number, tmp_path):
-    result = CliRunner().invoke(main, ["figure", str(number), "--out", str(tmp_path / "out")])
-    assert result.exit_code == 0, result.output
+    result = call("figure", str(number), "--out", str(tmp_path / "out"))
     assert "misprint" in result.output
     names = {7: ["figure-7"], 12: ["figure-12-left", "figure-12-right"]}[number]
     assert sorted(file.name for file in (tmp_path / "out").iterdir()) == sorted(
@@ -128,8 +126,7 @@ def test_command_writes_picture_numbers_and_scenes(number, tmp_path):
 
 @pytest.mark.parametrize("number", [10, 1, 14, -3])
 def test_figures_without_results_are_refused_with_a_reason(number):
-    result = CliRunner().invoke(main, ["figure", "--", str(number)])
-    assert result.exit_code == 2
+    result = call("figure", "--", str(number), code=2)
     assert DRAWINGS.get(number, "the paper has no figure") in result.output
     assert "6, 7, 8, 9, 11, 12, 13" in result.output
     with pytest.raises(FigureError):

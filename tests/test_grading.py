@@ -22,6 +22,7 @@ from chutelab.classroom.grading import LARGEST, Grade, grade, write_csv
 from chutelab.classroom.kernel import Ran
 from chutelab.classroom.lessons import find as find_lesson
 from chutelab.cli import main
+from shared import call
 
 pytest.importorskip("nbclient")
 psutil = pytest.importorskip("psutil")
@@ -485,12 +486,10 @@ def test_no_marks_and_no_notebook_are_written_over(tmp_path):
     assert (refused.exit_code, book.read_bytes()) == (2, before)
     assert "one of the files that were returned" in refused.stderr
     longest = str(tmp_path / ("x" * 252))  # one more than leaves room for .part
-    refused = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path), "--out", longest])
-    assert refused.exit_code == 2
+    refused = call("lesson", "grade", str(tmp_path), "--out", longest, code=2)
     assert "name too long" in refused.stderr
     (tmp_path / "class.csv.part").write_text("marks", encoding="utf-8")
     out = ["--out", str(tmp_path / "class.csv")]
-    refused = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path), *out])
-    assert refused.exit_code == 2
+    refused = call("lesson", "grade", str(tmp_path), *out, code=2)
     assert "class.csv.part" in refused.stderr
     assert (tmp_path / "class.csv.part").read_text(encoding="utf-8") == "marks"

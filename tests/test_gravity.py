@@ -8,6 +8,7 @@ import pytest
 
 import chutelab
 from chutelab.results import Kind
+from chutelab.results.ledger import energy_at
 from chutelab.scene import SceneError
 
 G, R = 9.81, 0.02
@@ -88,7 +89,7 @@ def test_a_scene_turned_with_its_gravity_does_the_same_turned(engine, angle):
     # Between knots a track of a crowd is off by up to 1e-4 of a radius.
     times = np.linspace(0.0, 0.9, 40)
     np.testing.assert_allclose(other.at(times)[0] @ back, plain.at(times)[0], atol=4e-6)
-    energy = [one.energy_at(times)["potential"] for one in (other, plain)]
+    energy = [energy_at(one, times)["potential"] for one in (other, plain)]
     np.testing.assert_allclose(*energy, atol=4e-6)
 
 

@@ -14,6 +14,7 @@ from chutelab.classroom.lessons import find, machine_of
 from chutelab.results.laws import judge
 from chutelab.scene import SceneError
 from machines import in_a_box
+from shared import seeds
 
 pytest.importorskip("scipy")
 from scipy.integrate import quad, solve_ivp
@@ -311,14 +312,8 @@ def drawn(seed):
     return in_a_box(random, surfaces)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(12, 300))
 def test_random_machines_keep_the_laws(seed):
-    sound(chutelab.simulate(drawn(seed), engine="contact"))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12, 300))
-def test_more_random_machines_keep_the_laws(seed):
     sound(chutelab.simulate(drawn(seed), engine="contact"))
 
 

@@ -4,11 +4,9 @@ import re
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import chutelab
 from chutelab import core as module
-from chutelab.cli import main
 from chutelab.engines import contact as engine
 from chutelab.machine import build
 from chutelab.pictures.live import html
@@ -17,6 +15,7 @@ from chutelab.scene import from_dict, load
 from chutelab.scene.conflicts import HINGED, JOINTS, MOTIONS
 from chutelab.util.words import words
 from live.browser import DONE, axe, spot
+from shared import call
 
 expect = pytest.importorskip("playwright.sync_api").expect
 
@@ -787,8 +786,7 @@ def test_what_is_left_of_a_scene_without_its_boxes_runs(opened, tmp_path):
     """That particles meet stands in the scene at the dominoes."""
     path = tmp_path / "gate.html"
     air = ["--set", "air_density=1.2"]
-    done = CliRunner().invoke(main, ["live", "domino-gate", *air, "-o", str(path)])
-    assert done.exit_code == 0, done.output
+    call("live", "domino-gate", *air, "-o", str(path))
     page = opened(path)
     page.evaluate(DONE)
     expect(page.locator("#fault")).to_be_hidden()
@@ -798,8 +796,7 @@ def test_what_is_left_of_a_scene_without_its_boxes_runs(opened, tmp_path):
 def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_path):
     path = tmp_path / "dominoes.html"
     air = ["--set", "air_density=1.2"]
-    done = CliRunner().invoke(main, ["live", "dominoes", *air, "-o", str(path)])
-    assert done.exit_code == 0, done.output
+    call("live", "dominoes", *air, "-o", str(path))
     page = opened(path)
     page.evaluate(DONE)
     said = page.inner_text("#lacks")

@@ -8,17 +8,16 @@ from math import cos, radians, sin
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import chutelab
 from chutelab.checks import stress as laws
 from chutelab.checks.agreement import verify
 from chutelab.checks.stress import Evidence
-from chutelab.cli import main
 from chutelab.results import Recording
 from chutelab.results.loads import Bins
 from chutelab.scene import SceneError
 from chutelab.util.errors import InputError
+from shared import call
 
 G = 9.81
 ENGINES = ("exact", "contact", "pymunk")
@@ -301,8 +300,7 @@ def test_what_is_counted_is_summed_up_as_it_comes():
 
 def test_command_writes_table_and_picture(tmp_path):
     called = ["run", "perpendicular", "--out", str(tmp_path), "--only", "loads"]
-    result = CliRunner().invoke(main, called)
-    assert result.exit_code == 0, result.output
+    result = call(*called)
     assert "Loads" in result.stdout
     rows = list(csv.DictReader((tmp_path / "loads.csv").read_text("utf-8").splitlines()))
     assert {row["surface"] for row in rows} == {"incoming", "plate", "outgoing"}
@@ -310,7 +308,7 @@ def test_command_writes_table_and_picture(tmp_path):
     # One impact: m (1 + ε) v = 8 g × 1.5 × 2 m/s in 10 ms.
     assert max(on_plate) == pytest.approx(0.008 * 1.5 * 2.0 / 0.01)
     assert (tmp_path / "loads.png").stat().st_size > 5_000
-    told = json.loads(CliRunner().invoke(main, ["run", "slip", "--loads", "0.1", "--json"]).stdout)
+    told = json.loads(call("run", "slip", "--loads", "0.1", "--json").stdout)
     assert told["loads"]["incoming"]["normal"]["mean"] > 0.0
 
 

@@ -101,7 +101,11 @@ def struck(ax):
     return {name for name, box in boxes.items() for one in lines if one.intersects_bbox(box, False)}
 
 
-@pytest.mark.parametrize("size", [(7.0, 3.8), (10.0, 3.3)], ids=["overlay", "report"])
+@pytest.mark.parametrize(
+    "size",
+    [(7.0, 3.8), pytest.param((10.0, 3.3), marks=pytest.mark.slow)],
+    ids=["overlay", "report"],
+)
 def test_no_name_of_a_shipped_scene_is_struck_through(size):
     belts = 0
     for name, file in scene.shipped().items():

@@ -16,6 +16,7 @@ from chutelab.pictures.plots.studies import scan
 from chutelab.studies.design import constrained, minimize, solve
 from chutelab.studies.design.evaluation import Span, measured
 from chutelab.studies.design.searches import Fit, Wishes, search
+from shared import call
 from test_repeats import CROWD
 
 A, B = Span("a", "", 0.0, 40.0, None), Span("b", "", 0.0, 1.0, None)
@@ -220,8 +221,7 @@ def test_questions_that_make_no_sense_are_refused(options, said, tmp_path, monke
     file = tmp_path / "crowd.toml"
     file.write_text(sc.to_toml(CROWD), encoding="utf-8")
     question = ["--vary", "plate.angle_deg=10:30", "--target", "arrival.vx.mean=1.6"]
-    result = CliRunner().invoke(main, ["solve", str(file), *question, *options])
-    assert result.exit_code == 2
+    result = call("solve", str(file), *question, *options, code=2)
     assert said in " ".join(result.output.split())
 
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-import judge
 from chains import tables
+from chutelab.machine import build
 from chutelab.scene import from_dict
 from chutelab.theory.obstacles import Flight, Obstacles, first_in_flight
 from chutelab.theory.prediction import free_surfaces
@@ -33,15 +33,19 @@ def flown(seed):
     flight = Flight(np.array(start["at"]), np.array(start["velocity"]), drawn["gravity"])
     obstacles = Obstacles.of(*free_surfaces(from_dict(drawn, "chain")))
     time, index = first_in_flight(flight, obstacles, r, until)
-    pieces = judge.pieces(drawn)
+    machine = build(from_dict(drawn, "chain"))
     way = flight.at(np.linspace(0.0, min(time, until), 3001))
-    for piece in pieces:
-        assert (piece.distance(way) > r - 1e-9).all(), (seed, piece.name)
-        assert not piece.crossed(way[:-1], way[1:]).any(), (seed, piece.name)
+    for piece, name in zip(machine.pieces, machine.names, strict=True):
+        assert (piece.gap(way, r) > -1e-9).all(), (seed, name)
     if time < math.inf:
         # It touches, and a little earlier was further away, or is nearer a little later.
-        (piece,) = (p for p in pieces if p.name == obstacles.names[index])
-        before, now, after = piece.distance(flight.at(time + np.array([-1e-6, 0.0, 1e-6]))) - r
+        near = flight.at(time + np.array([-1e-6, 0.0, 1e-6]))
+        gaps = [
+            piece.gap(near, r)
+            for piece, name in zip(machine.pieces, machine.names, strict=True)
+            if name == obstacles.names[index]
+        ]
+        before, now, after = min(gaps, key=lambda gap: abs(gap[1]))
         assert abs(now) < 1e-9, seed
         assert before > now if time > 1e-6 else after < now, seed
 

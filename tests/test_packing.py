@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chutelab.results import Recording, packing, storage
-from chutelab.results.ledger import ledger
+from chutelab.results.ledger import energy_at, ledger
 from chutelab.results.storage import RecordingError
 from test_recording import crowded
 
@@ -63,12 +63,12 @@ def test_ends_times_and_sums_come_back_to_the_last_bit_and_energies_nearly(name)
     for field in ("t", *packing.WHOLE):
         assert np.array_equal(other.events[field], record.events[field])
     size, times = ledger(record).turned_over, times_of(record)
-    told, found = record.energy_at(times), other.energy_at(times)
+    told, found = energy_at(record, times), energy_at(other, times)
     for entry, values in told.items():
         assert np.abs(found[entry] - values).max() <= 1e-6 * size
     steps = record.totals["t"][1:-1]
-    for entry, values in record.energy_at(steps).items():
-        assert np.abs(other.energy_at(steps)[entry] - values).max() <= 1e-12 * size
+    for entry, values in energy_at(record, steps).items():
+        assert np.abs(energy_at(other, steps)[entry] - values).max() <= 1e-12 * size
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -49,8 +49,11 @@ def told(recording):
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("interact", [False, True])
-@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+@pytest.mark.parametrize(
+    ("engine", "interact"),
+    [("contact", False), ("contact", True), ("pymunk", False),
+     pytest.param("pymunk", True, marks=pytest.mark.slow)],
+)  # fmt: skip
 def test_a_ball_thrown_through_a_line_comes_down_on_it(way, interact, engine):
     """From d below at √(2 g h) it is r above again, from above, at (v + √(v² - 2 g (d + r)))/g."""
     d, h, dt = 0.3, 0.6, 2.5e-4 if engine == "pymunk" else 1e-3

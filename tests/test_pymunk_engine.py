@@ -78,7 +78,7 @@ def test_a_ride_round_the_pulley_converges(case):
 
 def dropped(at, velocity, *surfaces, **tables):
     particle = {"radius": 0.01} | tables.pop("particle", {})
-    stream = {"at": list(at), "velocity": list(velocity)}
+    stream = {"at": list(at), "velocity": list(velocity)} | tables.pop("stream", {})
     given = {"particle": particle, "stream": stream, "surface": list(surfaces), **tables}
     return build(from_dict(given))
 
@@ -166,3 +166,106 @@ def test_a_ride_of_some_steps_ends_in_a_separation_and_a_bounce_in_none():
     bounced = stepped(table, (-0.5, 0.06))
     assert len(bounced.select("impact")) == 2
     assert not len(bounced.select("separation"))
+
+
+# Bounds of a lone particle: what counts, and what is rounding.
+
+
+def sliding(turn):
+    """At 1 m/s over a joint of two smooth floors, of which the second one rises by an angle."""
+    floors = [face("a", (-1.0, 0.0), (0.0, 0.0)), face("b", (0.0, 0.0), (1.0, turn))]
+    smooth = [floor | {"friction": 0.0, "restitution": 0.5} for floor in floors]
+    return dropped((-0.02, 0.01), (1.0, 0.0), *smooth, run={"until": 0.04})
+
+
+def on_a_slope(rise, friction=0.0, **run_table):
+    floor = face("slope", (-1.0, rise), (1.0, -rise), friction=friction, restitution=0.0)
+    size = np.hypot(1.0, rise)
+    return dropped(0.01 / size * np.array([rise, 1.0]), (0.0, 0.0), floor, run=run_table)
+
+
+def touching(speed, radius=0.01, gravity=0.0):
+    """Into a small floor that it touches."""
+    floor = face("floor", (-2.0 * radius, 0.0), (2.0 * radius, 0.0), friction=0.0, restitution=0.5)
+    return dropped(
+        (0.0, radius), (0.0, -speed), floor, gravity=gravity, particle={"radius": radius},
+        run={"until": 0.01},
+    )  # fmt: skip
+
+
+def in_a_ring(speed, size=1.0, friction=0.0, **run_table):
+    """Inside a ring at its lowest place, where nothing weighs."""
+    ring = {"name": "ring", "center": [0.0, 0.0], "radius": size, "restitution": 0.0}
+    return dropped(
+        (0.0, 0.1 - size), (speed, 0.0), ring | {"friction": friction}, gravity=0.0,
+        particle={"radius": 0.1}, run=run_table,
+    )  # fmt: skip
+
+
+def rebound(height):
+    """Speed (m/s) from which ε = 0.5 lifts a ball of 1 m by some of its hairs, of 2e-11 m."""
+    return sqrt(2.0 * 9.81 * height * 2e-11) / 0.5
+
+
+SETTLES = {"until": "settled", "max_time": 0.02}
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        # A bend of 1e-5 rad is a blow, one of 1e-7 is gone over.
+        (sliding(1e-5), ["IMPACT", "SEPARATION", "IMPACT"]), (sliding(1e-7), ["SLIP"]),
+        # A slope of 1e-5 is slid down, one of 3e-7 is level.
+        (on_a_slope(1e-5, **SETTLES), []), (on_a_slope(3e-7, **SETTLES), ["STICK", "SETTLE"]),
+        # Friction of 1e-8 more than it takes holds, of 1e-10 more it is used up.
+        (on_a_slope(0.5 * (1.0 - 1e-8), 0.5, until=0.01), ["STICK"]),
+        (on_a_slope(0.5 * (1.0 - 1e-10), 0.5, until=0.01), []),
+        # 1e-11 m/s into a surface is a blow, 2e-13 m/s is rounding.
+        (touching(1e-11), ["IMPACT"]), (touching(2e-13), ["SEPARATION"]),
+        # Where nothing weighs, in a ring a load of 1e-11 of the momentum counts, so that it goes
+        # round; along a floor there is none.
+        (in_a_ring(1e-6, friction=0.5, until=1e-4, dt=1e-5), []),
+        (dropped((-0.3, 0.01), (2.0, 0.0), face("floor", (-2.0, 0.0), (2.0, 0.0)), gravity=0.0,
+                 run={"until": 0.02}), []),
+    ],
+)  # fmt: skip
+def test_what_is_rounding_is_no_event(given, told):
+    assert [Kind(kind).name for kind in run(given).events["kind"]][1:] == told
+
+
+@pytest.mark.parametrize(("height", "lifts"), [(10.0, True), (0.5, False)])
+def test_a_bounce_of_some_hairs_is_one_and_a_lower_one_is_rest(height, lifts):
+    hit = run(touching(rebound(height), radius=1.0, gravity=9.81)).events[1]
+    assert (hit["velocity_after"][1] > 0.0) == lifts
+
+
+@pytest.mark.parametrize(("slip", "at"), [(0.0, 0.0), (1e-9, 1e-3)])
+def test_in_little_gravity_it_is_the_rim_that_is_off_by_a_hair(slip, at):
+    """What rolls at 1 m/s rolls but for 4e-11 m/s of rounding; what slips grips within a step."""
+    floor = face("floor", (-0.1, 0.0), (100.0, 0.0), friction=0.5, restitution=0.0)
+    m = dropped(
+        (0.0, 0.01), (1.0, 0.0), floor, gravity=1e-3, particle={"radius": 0.01, "spin": True},
+        stream={"omega": -(1.0 - slip) / 0.01}, run=SETTLES,
+    )  # fmt: skip
+    assert run(m).select(Kind.SETTLE)["t"].tolist() == [at]
+
+
+def test_a_ride_on_a_curve_takes_two_steps_a_radius_and_few_knots():
+    """Long steps are half a radius. A knot's parabola is left by 1e-4 r: v³/ρ² (1/6 + 2/27) τ³."""
+    coarse = run(in_a_ring(1.0, until=5.0, dt=0.1))
+    assert coarse.steps == pytest.approx(4 * 5.0 / (0.5 * 0.1), rel=0.05)
+    fine = run(in_a_ring(1.0, until=2.0, dt=0.005))
+    jerk = 1.0**3 / 0.9**2
+    every = (1e-4 * 0.1 / (jerk * (1.0 / 6.0 + 2.0 / 27.0))) ** (1.0 / 3.0)
+    assert len(fine.knots) == pytest.approx(2.0 / every, rel=0.25)
+
+
+def test_a_contact_ends_within_a_hundred_thousandth_of_a_step():
+    """Off the end of a rough table: 20 mm from 1 m/s on, at -µ g; and over a post, in few steps."""
+    table = face("table", (-1.0, 0.0), (0.0, 0.0), friction=0.3, restitution=0.0)
+    left = run(dropped((-0.02, 0.01), (1.0, 0.0), table, run={"until": 0.03, "dt": 0.004}))
+    slows = 0.3 * 9.81
+    t = (1.0 - sqrt(1.0 - 2.0 * slows * 0.02)) / slows
+    assert left.select(Kind.SEPARATION)["t"] == pytest.approx([t], abs=5e-8)
+    post = face("post", (0.0, 0.0), (0.0, -1.0), friction=0.0, restitution=0.0)
+    assert run(dropped((0.001, 0.2), (0.0, 0.0), post, run={"until": 0.5})).steps < 600

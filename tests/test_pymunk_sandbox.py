@@ -298,19 +298,6 @@ def test_a_pendulum_swings_as_its_equation_and_its_string_takes_nothing():
     assert errors[0] / errors[-1] > 12.0
 
 
-def test_a_string_that_is_pulled_tight_takes_the_speed_along_it():
-    # Thrown across under its point, slack: v = (1, 0) 0.3 m below it, tight 0.5 m from it.
-    m = hung(lone((0.0, -0.3), gravity=0.0, until=1.0), [(0.0, -0.3)], 0.5, [(0.0, 0.0)])
-    velocity = np.array([[1.0, 0.0]])
-    got = run(replace(m, releases=replace(m.releases, velocity=velocity)))
-    last = got.track(0)[-1]
-    # Left of v is what is square to (0.4, -0.3)/0.5: 0.6.
-    assert hypot(*last["velocity"]) == pytest.approx(0.6, rel=0.01)
-    assert hypot(*last["position"]) == pytest.approx(0.5, abs=1e-5)
-    assert got.by_surface[-1, 1] == pytest.approx(0.05 * (1.0 - 0.36), rel=0.01)
-    assert residual(got) < 1e-13
-
-
 def test_a_string_whose_particle_still_rides_the_belt_is_not_tied_when_time_ends():
     """Tied once the ride is over, after 0.5 s: a run that ends before has a track to its end."""
     tables = {
@@ -351,26 +338,6 @@ def ramp_of(slope, friction):
     along = np.array([cos(slope), -sin(slope)])
     surface = face("ramp", (-along).tolist(), (9.0 * along).tolist(), friction=friction)
     return surface | {"restitution": 0.0}, along, np.array([sin(slope), cos(slope)])
-
-
-@pytest.mark.parametrize(
-    ("degrees", "friction"),
-    [(30.0, 0.3), (20.0, 0.5), pytest.param(30.0, 0.5, marks=pytest.mark.slow)],
-)
-def test_a_box_slides_down_an_incline_where_it_is_steeper_than_friction(degrees, friction):
-    # a = g (sin β - µ cos β), or nothing where µ > tan β.
-    slope, errors = radians(degrees), []
-    surface, along, normal = ramp_of(slope, friction)
-    way = 0.5 * G * max(sin(slope) - friction * cos(slope), 0.0)
-    for dt in (2e-3, 1e-3):
-        m = lone((0.0, 1.0), until=1.0, dt=dt, surface=[surface])
-        got = run(boxed(m, (0.1, 0.06), [0.03 * normal], slope=slope))
-        track = got.track(0)
-        errors.append(abs((track["position"][-1] - track["position"][0]) @ along - way))
-        assert abs(turned(got, 0)) < 5e-4
-        assert residual(got) < 1e-5
-    assert errors[-1] < 2e-5
-    assert errors[0] / errors[-1] > 1.9 or errors[0] < 1e-12
 
 
 @pytest.mark.parametrize(("degrees", "tips"), [(25.0, False), (28.0, True)])

@@ -18,6 +18,7 @@ from chutelab.results.quantities import measure
 from chutelab.studies.repeats import repeat
 from chutelab.studies.sweep import sweep
 from chutelab.util.errors import InputError
+from shared import call
 
 CROWD = sc.from_dict({
     "title": "Crowd transfer",
@@ -98,8 +99,7 @@ def test_an_interrupted_sweep_of_another_number_of_seeds_is_refused(tmp_path):
     assert head[-1] == "reason"
     part = tmp_path / "rows.csv.part"
     part.write_text('{"format": 5, "repeat": 3}\n', encoding="utf-8")
-    found = CliRunner().invoke(main, [*options, "2", "--resume"])
-    assert found.exit_code == 2
+    found = call(*options, "2", "--resume", code=2)
     assert "--repeat" in found.output
 
 

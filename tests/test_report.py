@@ -12,6 +12,7 @@ import chutelab
 from chutelab.classroom.report import report
 from chutelab.cli import main
 from chutelab.util.tables import number
+from shared import call
 
 
 def rows_of(folder, name):
@@ -21,8 +22,7 @@ def rows_of(folder, name):
 
 def test_a_particle_has_two_pages_with_the_numbers_of_its_run(tmp_path):
     out = tmp_path / "report.pdf"
-    result = CliRunner().invoke(main, ["report", "inclined-40", "-o", str(out)])
-    assert result.exit_code == 0, result.output
+    call("report", "inclined-40", "-o", str(out))
     pages = [page.extract_text() for page in PdfReader(out).pages]
     assert len(pages) == 2
     text = "\n".join(pages)
@@ -152,7 +152,6 @@ def test_the_skeleton_in_german_has_no_english_left(scene, tmp_path):
 )
 def test_bad_calls_are_refused_and_leave_nothing(arguments, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(main, arguments)
-    assert result.exit_code == 2
+    result = call(*arguments, code=2)
     assert said in result.output
     assert not list(tmp_path.iterdir())

@@ -12,7 +12,6 @@ from math import hypot, isnan, nan
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import chains
 import chutelab
@@ -23,7 +22,6 @@ import sandbox
 from chutelab import core as module
 from chutelab import scene
 from chutelab.checks.stress.barriers import Evidence
-from chutelab.cli import main
 from chutelab.engines import contact, exact, simulation
 from chutelab.engines.simulation import judged, simulate
 from chutelab.machine import build
@@ -33,6 +31,7 @@ from chutelab.results.record import hermite
 from chutelab.results.recorder import Recorder, StalledError
 from chutelab.scene import SceneError
 from chutelab.studies.sweep import sweep
+from shared import call
 from stress.case import TRANSFER, merged, surface, thrown
 
 FLOOR = surface("floor", (-1.0, 0.0), (2.0, 0.0), restitution=0.5, friction=0.3)
@@ -302,11 +301,9 @@ def test_the_command_says_it_ends_with_1_and_writes_marked_files(faulty, tmp_pat
     faulty("exact")
     monkeypatch.chdir(tmp_path)
     arguments = ["run", "perpendicular", "--engine", "exact"]
-    plain = CliRunner().invoke(main, arguments)
-    assert plain.exit_code == 1
+    plain = call(*arguments, code=1)
     assert "LAW BROKEN, nothing through a surface" in " ".join(plain.stdout.split())
-    asked = CliRunner().invoke(main, [*arguments, "--json", "--out", "out", "--only", "npz,json"])
-    assert asked.exit_code == 1
+    asked = call(*arguments, "--json", "--out", "out", "--only", "npz,json", code=1)
     assert "LAW BROKEN" in asked.stderr
     for text in (asked.stdout, (tmp_path / "out" / "summary.json").read_text()):
         first = json.loads(text)["laws"][0]
@@ -314,11 +311,9 @@ def test_the_command_says_it_ends_with_1_and_writes_marked_files(faulty, tmp_pat
             "law", "particles", "particle", "t", "position", "surface", "amount", "bound", "unit",
             "advice",
         }  # fmt: skip
-    shown = CliRunner().invoke(main, ["show", "out/recording.npz"])
-    assert shown.exit_code == 1
+    shown = call("show", "out/recording.npz", code=1)
     assert "LAW BROKEN" in shown.stdout
-    sound = CliRunner().invoke(main, ["run", "perpendicular", "--json"])
-    assert sound.exit_code == 0
+    sound = call("run", "perpendicular", "--json")
     told = json.loads(sound.stdout)
     assert (told["laws"], told["engine"]) == ([], "contact")
     assert "exact did not keep" in told["instead"]

@@ -6,9 +6,7 @@ from math import inf
 import numpy as np
 import pytest
 import tomli_w
-from click.testing import CliRunner
 
-from chutelab.cli import main
 from chutelab.engines import contact, exact
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
@@ -19,7 +17,7 @@ from chutelab.results.record import hermite
 from chutelab.scene import from_dict
 from references import surface_gaps
 from sandbox import draw, tables
-from shared import seeds
+from shared import call, seeds
 
 INSIDE = 0.03
 """Radii that no particle may be in a surface or in another."""
@@ -180,8 +178,7 @@ def check(seed, folder):
         file = folder / "scene.toml"
         file.write_text(tomli_w.dumps(tables(seed)), encoding="utf-8")
         words = ["run", str(file), "--out", str(folder / "out"), "--only", "npz", "-q"]
-        outcome = CliRunner().invoke(main, words)
-        assert outcome.exit_code == 0, outcome.output
+        call(*words)
         assert same(Recording.load(folder / "out" / "recording.npz"), simulate(drawn))
     machine = build(drawn)
     run = contact.run(machine)

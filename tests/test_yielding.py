@@ -8,6 +8,7 @@ import pytest
 from chutelab import scene as sc
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
+from chutelab.results.ledger import energy_at
 from chutelab.scene import SceneError
 from chutelab.studies.sweep import sweep
 from chutelab.theory import predict
@@ -40,7 +41,7 @@ def test_a_bounce_follows_the_power_law_and_the_ledger_has_its_loss(engine, heig
     for v, w in list(zip(before, after, strict=True))[:5]:
         assert w == pytest.approx(law(v) * v, rel=1e-9)
     lost = 0.5 * M * before[0] ** 2 * (1.0 - law(before[0]) ** 2)
-    energy = run.energy_at([np.sqrt(2.0 * height / 9.81) + 0.01])
+    energy = energy_at(run, [np.sqrt(2.0 * height / 9.81) + 0.01])
     assert energy["restitution_loss"][0] == pytest.approx(lost, rel=1e-9)
 
 

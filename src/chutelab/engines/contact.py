@@ -20,9 +20,9 @@ from chutelab.machine import PASSES, SWING, Machine, Pieces, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather, gather_lasting
 from chutelab.results.record import REASONS, Record
-from chutelab.results.recorder import EnoughError, Recorder, StalledError
+from chutelab.results.recorder import EnoughError, Recorder, StalledError, read_knots
 from chutelab.scene.conflicts import JOINTS
-from chutelab.util.arrays import Progress, unwatched
+from chutelab.util.arrays import Floats, Ints, Progress, unwatched
 
 UNTIL = {name.removeprefix("UNTIL_").lower(): one for name, one in constants("Until").items()}
 
@@ -116,7 +116,7 @@ class Job:
 
     def __init__(self, module: Module, machine: Machine, *, whole: bool = True) -> None:
         self.module, self.machine = module, machine
-        self.knots: list[NDArray[Any]] = []
+        self.knots: list[tuple[Ints, NDArray[Any], Floats]] = []
         self.events: list[NDArray[Any]] = []
         # First disk of the part in which the run was stopped: from it on disks have not ended.
         self.stopped_from, self.owners = machine.count, len(machine.surfaces)
@@ -252,7 +252,8 @@ class Job:
         """Take what was written, so that there is room for more."""
         world, module = self.module.world, self.module
         if world.knot_count:
-            self.knots.append(module.array("knots", dtype("Knot"), world.knot_count).copy())
+            rows = module.array("knots", dtype("Knot"), world.knot_count)
+            self.knots.append(read_knots(rows))
             world.knot_count = 0
         if world.event_count:
             self.events.append(module.take_events())
@@ -277,7 +278,7 @@ class Job:
         self.knots.reverse()
         self.events.reverse()
         while self.knots:
-            recorder.take_knots(self.knots.pop())
+            recorder.add(*self.knots.pop())
         while self.events:
             recorder.take_events(self.events.pop())
         recorder.ended[:] = module.array("disks", dtype("Disk"), self.machine.count)["reason"]

@@ -20,7 +20,7 @@ from chutelab.machine import Machine, hand_over
 from chutelab.results.laws import take
 from chutelab.results.loads import gather
 from chutelab.results.record import REASONS, Record
-from chutelab.results.recorder import EnoughError, Recorder, StalledError
+from chutelab.results.recorder import EnoughError, Recorder, StalledError, read_knots
 from chutelab.util.arrays import Progress, unwatched
 
 ROUNDS = 500_000
@@ -220,7 +220,8 @@ def drain(module: Module, recorder: Recorder) -> None:
     """Take what was written, so that there is room for more."""
     exact: Any = module.structs["Exact"]
     if exact.knot_count:
-        recorder.take_knots(module.array("knots", dtype("Knot"), exact.knot_count, of="Exact"))
+        rows = module.array("knots", dtype("Knot"), exact.knot_count, of="Exact")
+        recorder.add(*read_knots(rows))
         exact.knot_count = 0
     if exact.event_count:
         recorder.take_events(module.take_events("Exact"))

@@ -2,7 +2,7 @@
 
 - `record`: `Record`, a finished run: knots, events, and the ledger entries they carry.
 - `recorder`: what engines write a run into.
-- `ledger`: where the energy went, in total and by surface.
+- `ledger`: where the energy went, in total and by surface, up to any time.
 - `arrival`: which particles have come to a surface, or to what lies on it.
 - `quantities`: the readers of the registry, a run's numbers by name and by particle; the paper's
   symbols; particle 0 and the theory.
@@ -24,6 +24,8 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import ArrayLike
+
 from chutelab.results.record import (
     ENTRIES,
     EVENT,
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from chutelab.results.loads import Load
     from chutelab.results.wear import Wear
     from chutelab.theory import Transfer
+    from chutelab.util.arrays import Floats
 
 
 __all__ = [
@@ -84,6 +87,12 @@ class Recording(Record):
         from chutelab.results.ledger import ledger
 
         return ledger(self)
+
+    def energy_at(self, times: ArrayLike) -> dict[str, Floats]:
+        """Return the ledger of all particles at times (T,), s; see `results.ledger.energy_at`."""
+        from chutelab.results.ledger import energy_at
+
+        return energy_at(self, times)
 
     def measure(self, quantity: str) -> float:
         """Return a quantity by its name, such as ``landing.x.mean``; see `chutelab.measure`."""

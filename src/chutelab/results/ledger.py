@@ -1,4 +1,4 @@
-"""The energy ledger of a recording: where every joule came from and where it went.
+"""The energy ledger of a recording, at the end or any time: where every joule came from and went.
 
 (K + U) at the end - (K + U) at the start
 = belt_work + drive_work - restitution_loss - friction_loss + residual,
@@ -15,9 +15,10 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from chutelab.results.record import ENTRIES, PARTICLES, Record, balance, kept
-from chutelab.util.arrays import Floats
+from chutelab.results.record import ENTRIES, PARTICLES, Record, balance, hermite, kept
+from chutelab.util.arrays import Floats, Ints
 from chutelab.util.tables import Sheet, Shown, number
 
 ROUNDING = 1e-12
@@ -250,3 +251,129 @@ def _closed(found: dict[str, Floats]) -> dict[str, Any]:
         "residual": float(found["residual"].sum()),
         "turned_over": sum(sizes, kinetic[0]),
     }
+
+
+def energy_at(recording: Record, times: ArrayLike) -> dict[str, Floats]:
+    """Return the energy ledger of all released particles up to each time.
+
+    A particle that has ended keeps its last state. Between two knots the entries and the
+    residual go straight from the one to the other, and what the energy balance asks for besides
+    is booked on what goes on there: on the friction loss while a particle slips, where the
+    force and so the power of the belt is constant on a face; else on the belt work while it is
+    driven; else on the restitution loss, which changes between knots in lasting contacts of a
+    crowd only. In flight nothing is booked, and what the balance leaves over is the residual.
+    Where several have `totals` the sums are theirs at the steps; the same holds between two.
+
+    Parameters
+    ----------
+    times : array_like, shape (T,)
+        s, in any order.
+
+    Returns
+    -------
+    dict of ndarray, shape (T,)
+        ``kinetic``, ``potential`` (y = 0 is the zero), the three `ENTRIES`, and ``residual``:
+        what the balance since each release leaves over. J.
+    """
+    times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    found = _on_tracks(recording, times)
+    # A lone particle's tracks have all; a blow on what hangs on a hinge ends the step.
+    if len(recording.totals) > 1 and recording.count > 1:
+        within = (times >= recording.totals["t"][0]) & (times < recording.totals["t"][-1])
+        found[:, within] = _as_totals(recording, times[within], found[:, within])
+    return dict(zip(("kinetic", "potential", *ENTRIES, "residual"), found, strict=True))
+
+
+def _on_tracks(recording: Record, times: Floats) -> Floats:
+    """Return what `energy_at` does as the tracks have it, (6, T), J."""
+    firsts, lasts = recording.ends()
+    at_release = np.zeros(recording.count)
+    particles = np.flatnonzero(recording.released)
+    at_release[particles] = sum(recording.energies(firsts, particles))
+
+    final = np.empty((6, len(lasts)))
+    final[:2] = recording.energies(lasts, particles)
+    final[2:5] = lasts["entries"].T
+    final[5] = final[:2].sum(axis=0) - at_release[particles] - balance(lasts["entries"])
+    order = np.argsort(lasts["t"], kind="stable")
+    sums = np.concatenate([np.zeros((6, 1)), final[:, order].cumsum(axis=1)], axis=1)
+    out = sums[:, np.searchsorted(lasts["t"][order], times, side="left")]
+
+    for row, particle, left, share in recording.blocks(times):
+        values = _under_way(recording, particle, left, share, at_release[particle])
+        for total, value in zip(out, values, strict=True):
+            np.add.at(total, row, value)
+    return out
+
+
+def _as_totals(recording: Record, times: Floats, found: Floats) -> Floats:
+    """Return what tracks have (6, T), J, with what they are off the totals of all steps.
+
+    That goes straight from just after one step to just before the next. What the balance then
+    asks for besides within a step is booked on what goes on there.
+    """
+    t, particles, firsts = (
+        recording.totals["t"],
+        np.flatnonzero(recording.released),
+        recording.ends()[0],
+    )
+    order = np.argsort(firsts["t"], kind="stable")
+    begun, at_release = (
+        firsts["t"][order],
+        np.stack(recording.energies(firsts, particles))[:, order],
+    )
+    sums = np.concatenate([np.zeros((2, 1)), at_release.cumsum(axis=1)], axis=1)
+    before, after = (sums[:, np.searchsorted(begun, t, side=side)] for side in ("left", "right"))
+    told = np.stack(
+        [recording.totals["kinetic"], recording.totals["potential"], *recording.totals["entries"].T]
+    )
+    residual = told[:2].sum(axis=0) - before.sum(axis=0) - balance(recording.totals["entries"])
+    told = np.concatenate([told, residual[None]])
+
+    late = np.searchsorted(t, times, side="right") - 1
+    step, own = np.unique(np.clip(late, 0, len(t) - 2), return_inverse=True)
+    first = told[:, step] - _on_tracks(recording, t[step])
+    # What is released as a step begins is in its tracks, and not yet in its totals.
+    first[:2] += (after - before)[:, step]
+    last = told[:, step + 1] - _on_tracks(recording, np.nextafter(t[step + 1], -np.inf))
+    share = ((times - t[step][own]) / (t[step + 1] - t[step])[own]).clip(0.0, 1.0)
+    found = found + first[:, own] + share * (last - first)[:, own]
+
+    belt, restitution, friction = told[2:5, step + 1][:, own] != told[2:5, step][:, own]
+    goes_on = belt | restitution | friction
+    straight = residual[step][own] + share * (residual[step + 1] - residual[step])[own]
+    missing = np.where(goes_on, found[5] - straight, 0.0)
+    found[5] -= missing
+    found[4] -= np.where(friction, missing, 0.0)
+    found[2] += np.where(belt & ~friction, missing, 0.0)
+    found[3] -= np.where(~belt & ~friction, missing, 0.0)
+    return found
+
+
+def _under_way(
+    recording: Record, particle: Ints, left: Ints, share: Floats, at_release: Floats
+) -> tuple[Floats, ...]:
+    """Return what `energy_at` does, of each cell, (c,)."""
+    a, b = recording.knots[left], recording.knots[left + 1]
+    where, pace = hermite(recording.knots, left, share)
+    omega = a["omega"] + share * (b["omega"] - a["omega"])
+    body = recording.particle.of(particle)
+    kinetic = body.kinetic(pace[:, 0], pace[:, 1], omega)
+    potential = body.mass * recording.gravity * recording.machine.height(where)
+    gain = kinetic + potential - at_release
+
+    entries_a, entries_b = a["entries"].T, b["entries"].T
+    residual_a, residual_b = (
+        sum(recording.energies(knot, particle)) - at_release - balance(knot["entries"])
+        for knot in (a, b)
+    )
+    belt, restitution, friction = entries_a + share * (entries_b - entries_a)
+    residual = residual_a + share * (residual_b - residual_a)
+    # The straight lines of the totals leave a rest, which is booked on what goes on.
+    missing = gain - (belt - restitution - friction) - residual
+    driven, struck, slips = entries_a != entries_b
+    friction -= np.where(slips, missing, 0.0)
+    belt += np.where(driven & ~slips, missing, 0.0)
+    restitution -= np.where(struck & ~slips & ~driven, missing, 0.0)
+    residual += np.where(slips | driven | struck, 0.0, missing)
+    return kinetic, potential, belt, restitution, friction, residual

@@ -471,9 +471,8 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
         shape, path = kind["shape"], kind.path("radius")
         if shape in ("box", "polygon"):
             if engine == "exact":
-                yield run.fault(
-                    "engine", f'{kind.path("shape")} = "{shape}" needs contact or pymunk'
-                )
+                text = f'{kind.path("shape")} = "{shape}" needs contact or pymunk'
+                yield run.fault("engine", text)
         elif size == 0.0:
             if any(size != 0.0 for size in sizes if size is not math.nan):
                 text = "more than 0, or 0 of all kinds: no engine has points beside disks"
@@ -482,11 +481,10 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
                 yield run.fault("engine", f"{path} is 0, and {engine} needs disks (> 0)")
             for stream in meet:
                 yield stream.fault("interact", f"{path} is 0, and mass points never meet")
-    for stream in meet:
-        if engine == "exact" and count > 1:
-            many = f"{stream.path('count')} = {stream['count']}"
-            text = f"{stream.path('interact')} with {many} needs contact or pymunk"
-            yield run.fault("engine", text)
+    for stream in meet if engine == "exact" and count > 1 else ():
+        many = f"{stream.path('count')} = {stream['count']}"
+        text = f"{stream.path('interact')} with {many} needs contact or pymunk"
+        yield run.fault("engine", text)
     if count > MOST_PARTICLES:
         text = f"at most {MOST_PARTICLES} particles in all streams together, not {count}"
         yield max(streams, key=lambda stream: stream["count"]).fault("count", text)
@@ -495,22 +493,16 @@ def _engine(look: Look, kinds: Sequence[Row], streams: Sequence[Row]) -> Iterato
         keys = [key for key in motions if row.given(key) and row[key] != 0.0]
         if keys and engine == "exact":
             yield run.fault("engine", f"{row.path(keys[0])} moves it: contact or pymunk has that")
-        if row.given("passes") and engine == "exact":
-            yield run.fault("engine", f"{row.path('passes')} needs contact or pymunk")
-        waits = next((key for key in WAITS if row.given(key)), "")
-        if waits and engine == "exact":
-            yield run.fault("engine", f"{row.path(waits)} needs contact or pymunk")
-        if waits and count > 1 and not meet:
-            text = f"{row.path(waits)} couples particles: several of them have to meet"
+        waits = [*filter(row.given, WAITS)][:1]
+        for key in [*filter(row.given, ["passes"]), *waits] if engine == "exact" else ():
+            yield run.fault("engine", f"{row.path(key)} needs contact or pymunk")
+        for key in [*waits, *filter(row.given, ["hinge"])] if count > 1 and not meet else ():
+            text = f"{row.path(key)} couples particles: several of them have to meet"
             yield streams[0].fault("interact", text)
-        if row.given("hinge") and count > 1 and not meet:
-            text = f"the hinge {row.path('hinge')} couples particles: several of them have to meet"
+    for joint in (joint for table in joined for joint in look.rows(table)):
+        if joint.given("other") and count > 1 and not meet:
+            text = f"{joint.path('other')} couples particles: they have to meet"
             yield streams[0].fault("interact", text)
-    for table in JOINTS:
-        for joint in look.rows(table):
-            if joint.given("other") and count > 1 and not meet:
-                text = f"{joint.path('other')} couples particles: they have to meet"
-                yield streams[0].fault("interact", text)
     if engine == "exact" and joined:
         yield run.fault("engine", f"{joined[0]}[0] needs contact or pymunk")
 

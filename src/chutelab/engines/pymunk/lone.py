@@ -22,6 +22,7 @@ from pymunk import Vec2d
 from chutelab.engines.pymunk.world import (
     LOW,
     PARTICLE,
+    SHORT,
     SURFACE,
     Carriage,
     Face,
@@ -63,15 +64,9 @@ TILT = 2e-13
 ROLLS = 20
 """Steps in search of the couple that stops the turning: three, unless friction starts to slip."""
 
-SHORT = 1e-5
-"""Share of a step; a contact that lasts less has ended."""
-
 WINDOW, GAINED = 30_000, 100
 """Steps of Chipmunk's, and rounds of the loop, in which a particle must get on by so many `run.dt`.
 They take 2 to 8 s. A ride round 1/1000 of the radius at 1 m/s needs a third of them."""
-
-TICK = 1e-12
-"""s, over `Machine.pace`; what is closer to each other is at one instant."""
 
 TURNS = 200
 """Blows at one instant, one surface after the other, before all are solved together."""
@@ -316,7 +311,7 @@ class Lone:
         struck = min(touching, key=lambda face: self.v.dot(touching[face]))
         gap, normal = struck.gap(self.x)
         self.x -= gap * normal
-        self.blows = self.blows + 1 if self.t - self.struck < TICK / self.pace else 0
+        self.blows = self.blows + 1 if self.t == self.struck else 0
         self.struck = self.t
         self.restitution = {struck: self._rebound(struck, normal)}
         if self.blows > TURNS:

@@ -17,7 +17,7 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.world import Face, World
+from chutelab.engines.pymunk.world import DIGITS, Face, World
 from chutelab.machine import Joint, Machine, Mover
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -220,9 +220,6 @@ class Moving:
 LEFT = 0.9
 """Share that is left, a step later, of what a string was stretched by when it was pulled tight."""
 
-TAUT, ROUNDING = 1e-9, 1e-13
-"""Shares of its length: by which a string that pulls may seem too short, and is kept stretched."""
-
 
 @dataclass
 class Tie:
@@ -246,13 +243,13 @@ class Ties:
     Parameters
     ----------
     machine : Machine
-    space : pymunk.Space
+    world : World
     bodies : list of pymunk.Body
         Of each particle.
     """
 
-    def __init__(self, machine: Machine, space: pymunk.Space, bodies: list[pymunk.Body]) -> None:
-        self.space, self.all = space, list[Tie]()
+    def __init__(self, machine: Machine, world: World, bodies: list[pymunk.Body]) -> None:
+        self.space, self.rounding, self.all = world.space, world.rounding, list[Tie]()
         self.free = np.zeros(machine.count, dtype=bool)
         for joint in machine.joints:
             held = self._held(joint, bodies, machine.releases.position)
@@ -309,8 +306,9 @@ class Ties:
             else:
                 tie.over = max(length - whole, 0.0)
             held.max = whole + tie.over
-            if length > whole * (1.0 - TAUT):
-                held.max = min(held.max, length * (1.0 - ROUNDING))
+            rounding = max(self.rounding, DIGITS * whole)
+            if length > whole - rounding:
+                held.max = min(held.max, length - rounding)
 
     def pulled(self, state: Floats, pull: Vec2d, h: float) -> list[tuple[Tie, Floats]]:
         """Return what each joint did in the last step to the ledger: entries of the particles, J.

@@ -141,7 +141,7 @@ class Shared:
             self.throws[self.moving.rows] = True
             self.spin += self.moving.turn[1]
         self.rolling = Rolling(machine, self.radius)
-        self.ties = Ties(machine, world.space, [body for body, _ in self.bodies[:count]])
+        self.ties = Ties(machine, world, [body for body, _ in self.bodies[:count]])
         # Rows by sorted id of the bodies; the Space's own body, of surfaces, is no particle.
         self.surfaces_body = world.space.static_body.id
         self.buffer, ids = batch.Buffer(), np.array(list(self.shapes.rank), dtype=np.uintp)

@@ -37,12 +37,10 @@ TINY = 1e-12
 LOW = 2.0
 """Hairs; bounces lower than this cannot be told from lying on the surface."""
 
-FIRST = 1e-3
-"""Share of a step after which a surface just left is looked at again."""
+SHORT = 1e-5
+"""Share of a step; a contact that lasts less has ended, and a surface just left is looked at again
+after that."""
 
-
-CREEP = 1e-7
-"""Share of the radius; how finely the ends of an arc are told from what is between them."""
 
 JOINT = 0.0625
 """Hairs. Where another piece goes on from its end, an arc reaches past it, and what slides on to it
@@ -228,7 +226,7 @@ class Bend(Face):
             # Past the line, or it might take itself to be on either side of it.
             pace = max(v.length, sqrt(path.most * self.radius))
             # What lies still where nothing pulls never gets there.
-            return ahead + CREEP * self.radius / pace if pace else inf
+            return ahead + HAIR * self.radius / pace if pace else inf
         if not (hollow := self.hollow(x)):
             return falls(gap, rate, pull)
         rho, c = 1.0 / hollow, away.length
@@ -478,7 +476,7 @@ class World:
                 leaving = True
             tau = face.free(path, x, v, gap, rate, path.pull(normal))
             if leaving and (speed := v.length + g * self.machine.dt) > 0.0:
-                tau = max(tau, min(0.5 * t + FIRST * self.machine.dt, r / speed))
+                tau = max(tau, min(0.5 * t + SHORT * self.machine.dt, r / speed))
             if t + tau == t:
                 return t
             if t == span:

@@ -73,6 +73,9 @@ enum Full { FULL_KNOTS = 100, FULL_EVENTS, FULL_TOTALS, FULL_NEAR, FULL_CONTACTS
 /* Of a step: what befalls joints nearer to its beginning or end counts as there, else rounding would be taken
    back in next to no time. */
 #define SOON 1e-6
+/* Contacts of what has corners up to which they are solved to rounding, and blows on them are no hops: more are
+   a crowd. */
+#define FEW_CONTACTS 32
 /* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
 #define SHOCKS 4
 

@@ -7,12 +7,15 @@
 
 #include <string.h>
 #include "core.h"
+#include "trig.h"
 
 /* Strides of a span in which gaps are looked at, at least: a touch that comes and goes within one is left to the
    next step. */
 #define STRIDES 8
 /* Halvings to the instant of a blow, to its last bit. */
 #define TO_ROOT 200
+/* ... and quicker steps before them. */
+#define QUICK 20
 /* Cosine of an angle between edge and surface from which on a corner near its end counts as on it. */
 #define FLAT 0.9
 /* Sweeps of a blow at several places, and of its size, at which they end. */
@@ -22,22 +25,33 @@
 #define HELD 1e-13
 /* Share of it that a blow may give by rounding. */
 #define GAINS 1e-12
-/* Contacts of an island up to which it is brought off its hop before a blow; none of them on what moves, which presses
-   as hard as it must, and none that took a blow as the step began. */
-#define SMALL 32
 /* Candidates for a place: corners of both. */
 #define CANDIDATES (2 * MOST_CORNERS)
 
 /* Something at a time. A segment has two points, an arc its ends and its centre, what is round its centre. */
 typedef struct {
     double p[MOST_CORNERS][2];
-    double x, y, radius, spin;
-    int count, round;       /* points, of which one may have a radius, or -1 */
+    double n[MOST_CORNERS][2]; /* of a polygon, unit vectors out of its edges */
+    double x, y, radius;
+    const double *edges;    /* of a polygon, see `World.edges` */
     const Surface *s;
+    int count, round;       /* points, of which one may have a radius, or -1 */
 } Shape;
 
+/* Cosine and sine of the angle of a particle; of two angles each they are kept. */
+static const double *pose_of(int j, double turned, int later) {
+    double *pose = W.poses + 6 * j + 3 * later;
+    if (pose[0] == turned && pose[1] != pose[2]) return pose + 1;
+    pose[0] = turned;
+    sin_cos(fabs(turned) < 1e6 ? turned : fmod(turned, 2 * PI), pose + 2, pose + 1);
+    return pose + 1;
+}
+
 static Shape shape_of(int j, double t) {
-    Shape out = {.round = -1};
+    /* What it does not have is not set. */
+    Shape out;
+    out.round = -1;
+    out.s = 0;
     if (j < 0) {
         const Surface *s = out.s = surface_at(-1 - j, t);
         if (s->shape != CIRCLE) {
@@ -52,16 +66,22 @@ static Shape shape_of(int j, double t) {
         return out;
     }
     const Disk *d = W.disks + j;
-    double h = t - d->t, turned = d->turned + d->spin * h, c = cos(turned), s = sin(turned);
+    double h = t - d->t;
     out.x = d->x + (d->vx + 0.5 * W.gx * h) * h;
     out.y = d->y + (d->vy + 0.5 * W.gy * h) * h;
-    for (int n = 0; n < d->corners; n++) {
-        const double *corner = W.outlines + 2 * (d->outline + n);
-        out.p[n][0] = out.x + c * corner[0] - s * corner[1];
-        out.p[n][1] = out.y + s * corner[0] + c * corner[1];
-    }
     out.count = d->corners;
-    if (d->corners) return out;
+    if (d->corners) {
+        const double *pose = pose_of(j, d->turned + d->spin * h, h != 0), *corner = W.outlines + 2 * d->outline;
+        const double *edge = out.edges = W.edges + 3 * d->outline;
+        double c = pose[0], s = pose[1];
+        for (int n = 0; n < d->corners; n++, corner += 2, edge += 3) {
+            out.p[n][0] = out.x + c * corner[0] - s * corner[1];
+            out.p[n][1] = out.y + s * corner[0] + c * corner[1];
+            out.n[n][0] = c * edge[0] - s * edge[1];
+            out.n[n][1] = s * edge[0] + c * edge[1];
+        }
+        return out;
+    }
     out.p[0][0] = out.x;
     out.p[0][1] = out.y;
     out.radius = d->radius;
@@ -72,17 +92,13 @@ static Shape shape_of(int j, double t) {
 
 /* Unit vector out of an edge of a polygon, and its length. */
 static double out_of(const Shape *a, int edge, double *n) {
-    const double *p = a->p[edge], *q = a->p[edge + 1 < a->count ? edge + 1 : 0];
-    double x = q[0] - p[0], y = q[1] - p[1], length = sqrt(x * x + y * y);
-    n[0] = y / length;
-    n[1] = -x / length;
-    return length;
+    n[0] = a->n[edge][0];
+    n[1] = a->n[edge][1];
+    return a->edges[3 * edge + 2];
 }
 
 static double off_edge(const Shape *a, int edge, const double *q) {
-    double n[2];
-    out_of(a, edge, n);
-    return (q[0] - a->p[edge][0]) * n[0] + (q[1] - a->p[edge][1]) * n[1];
+    return (q[0] - a->p[edge][0]) * a->n[edge][0] + (q[1] - a->p[edge][1]) * a->n[edge][1];
 }
 
 /* The edge that a point is furthest out of, and by how much. */
@@ -103,6 +119,38 @@ static double clear_of(const Shape *a, int edge, const Shape *b) {
     for (int n = 0; n < b->count; n++)
         least = MIN(least, off_edge(a, edge, b->p[n]) - (n == b->round ? b->radius : 0));
     return least;
+}
+
+/* The edge that a corner of `b` is on: the one that it is furthest out of, and inside, or within `near`, the one that
+   most of `b` is out of: else what is deep by more than its corners are apart would be pressed aside. */
+static int edge_under(const Shape *a, const Shape *b, const double *q, double near) {
+    double off, best = -INFINITY;
+    int found = furthest(a, q, &off);
+    for (int e = 0; e < a->count && off < near; e++) {
+        double clear = clear_of(a, e, b);
+        if (clear <= best) continue;
+        best = clear;
+        found = e;
+    }
+    return found;
+}
+
+/* Whether a polygon and something else are apart by more than that: along an edge of one, or within a rim. */
+static int are_apart(const Shape *a, const Shape *b, double by) {
+    for (int e = 0; e < a->count; e++)
+        if (clear_of(a, e, b) > by) return 1;
+    for (int e = 0; e < b->count && b->round < 0 && !b->s; e++)
+        if (clear_of(b, e, a) > by) return 1;
+    if (!b->s) return 0;
+    double low = INFINITY, high = -INFINITY;
+    for (int n = 0; n < a->count; n++) {
+        double x = a->p[n][0] - b->s->x, y = a->p[n][1] - b->s->y;
+        double off = b->round < 0 ? y * b->s->tx - x * b->s->ty : x * x + y * y;
+        low = MIN(low, off);
+        high = MAX(high, off);
+    }
+    if (b->round < 0) return low > by || high < -by;
+    return by < b->radius && high < square(b->radius - by);
 }
 
 /* Fill in a place by its candidate, corners of `a` before points of `b`, and what that is on: an edge; a side of a
@@ -170,8 +218,7 @@ static int side_of(const Shape *a, const Surface *s, int corner, double near) {
     return out < 0 || fabs(n[1] * s->tx - n[0] * s->ty) > FLAT ? centre : own;
 }
 
-/* Find what a candidate is on; 0 if it is none that touches. Within `near` of corners it is left to one of both, and
-   there of several edges that which separates the two. */
+/* Find what a candidate is on; 0 if it is none that touches. */
 static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
     double off, n[2];
     if (t->which < a->count) {
@@ -184,7 +231,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
         }
         if (b->s) {
             double x = q[0] - b->s->x, y = q[1] - b->s->y, d = sqrt(x * x + y * y);
-            double mid = hypot(a->x - b->s->x, a->y - b->s->y);
+            double mid = length_of(a->x - b->s->x, a->y - b->s->y);
             t->on = 0;
             fill_in(a, b, t);
             if (fabs(d - b->radius) <= 2 * near ? mid >= b->radius : d > b->radius) return 0;
@@ -194,15 +241,7 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
             t->gap = INFINITY;
             return 0;
         }
-        t->on = furthest(b, q, &off);
-        double clear = clear_of(b, t->on, a);
-        for (int e = 0; e < b->count && off < near; e++) {
-            if (off_edge(b, e, q) < off - near) continue;
-            double other = clear_of(b, e, a);
-            if (other <= clear) continue;
-            clear = other;
-            t->on = e;
-        }
+        t->on = edge_under(b, a, q, near);
         fill_in(a, b, t);
         double length = out_of(b, t->on, n), along = n[0] * (q[1] - b->p[t->on][1]) - n[1] * (q[0] - b->p[t->on][0]);
         return along >= -near && along <= length + near;
@@ -210,12 +249,13 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
     int m = t->which - a->count;
     const double *q = b->p[m];
     double best = INFINITY;
-    t->on = furthest(a, q, &off);
     if (m != b->round) {
+        t->on = edge_under(a, b, q, near);
         double length = out_of(a, t->on, n), along = n[0] * (q[1] - a->p[t->on][1]) - n[1] * (q[0] - a->p[t->on][0]);
         fill_in(a, b, t);
-        return along >= near && along <= length - near && !(b->s && mate_of(b->s, m) >= 0);
+        return along >= 0 && along <= length && !(b->s && mate_of(b->s, m) >= 0);
     }
+    t->on = furthest(a, q, &off);
     for (int e = 0; e < a->count && off > 0; e++) {
         double length = out_of(a, e, n), x = q[0] - a->p[e][0], y = q[1] - a->p[e][1];
         double along = n[0] * y - n[1] * x, away = x * n[0] + y * n[1];
@@ -240,14 +280,15 @@ RARELY int list_touches(int i, int j, double t, double within, double later, Tou
     double near = TOUCH * inner_of(i, j);
     Shape a = shape_of(i, t), b = shape_of(j, t);
     int count = 0;
+    if (are_apart(&a, &b, within + near)) return 0;
     for (int c = 0; c < a.count + b.count && count < MOST_TOUCHES; c++) {
         Touch *now = list + count;
         now->which = c;
         if (!find_place(&a, &b, near, now) || now->gap > within) continue;
         int known = 0;
         for (int n = 0; n < count && c >= a.count; n++)
-            known |= hypot(list[n].x - now->x, list[n].y - now->y) <= near
-                && list[n].nx * now->nx + list[n].ny * now->ny > FLAT;
+            known |= length_of(list[n].x - now->x, list[n].y - now->y) <= near
+                && (c - a.count != b.round || list[n].nx * now->nx + list[n].ny * now->ny > FLAT);
         count += !known;
     }
     if (!(later > t) || !count) return count;
@@ -345,14 +386,15 @@ static double closes_at(int i, int j, const Shape *a, const Shape *b, double t, 
 /* Bound on the acceleration of a corner by turning, m/s2. */
 double whirl_of(const Disk *d) { return d->corners ? d->spin * d->spin * d->radius : 0; }
 
-/* Bound on the speed with which gaps of two close within a span, m/s; INFINITY if they cannot meet in it. */
+/* Bound on the speed with which places of two come nearer within a span, m/s; INFINITY if they cannot meet in it. */
 static double fastest_of(int i, int j, double t, double span) {
     const Disk *d = W.disks + i, *o = W.disks + MAX(j, 0);
-    double h = t - d->t, x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h, most, nx, ny;
-    double u = d->vx + W.gx * h, v = d->vy + W.gy * h;
+    double h = t - d->t, x = d->x + (d->vx + 0.5 * W.gx * h) * h, y = d->y + (d->vy + 0.5 * W.gy * h) * h, nx, ny;
+    double u = d->vx + W.gx * h, v = d->vy + W.gy * h, turns = fabs(d->spin) * d->radius;
     if (j < 0) {
         const Surface *s = surface_at(-1 - j, t);
-        most = sqrt(u * u + v * v) + fabs(d->spin) * d->radius + W.g * span + (stirs(s) ? s->fastest : 0);
+        double then = square(u + W.gx * span) + square(v + W.gy * span);
+        double most = sqrt(MAX(u * u + v * v, then)) + turns + (stirs(s) ? s->fastest : 0);
         return gap_to(s, x, y, d->radius, &nx, &ny) > most * span ? INFINITY : most;
     }
     h = t - o->t;
@@ -360,37 +402,74 @@ static double fastest_of(int i, int j, double t, double span) {
     y -= o->y + (o->vy + 0.5 * W.gy * h) * h;
     u -= o->vx + W.gx * h;
     v -= o->vy + W.gy * h;
-    double apart = sqrt(x * x + y * y), reach = d->radius + o->radius, speed = sqrt(u * u + v * v);
-    if (apart - reach > speed * span) return INFINITY;
-    return speed + (fabs(d->spin) + fabs(o->spin)) * (apart + speed * span + reach);
+    double speed = sqrt(u * u + v * v);
+    if (x * x + y * y > square(d->radius + o->radius + speed * span)) return INFINITY;
+    return speed + turns + fabs(o->spin) * o->radius;
 }
 
-/* The instant within (low, high] at which the gap of a place closes. */
-static double root_of(int i, int j, Touch *at, double low, double high) {
-    for (int n = 0; n < TO_ROOT; n++) {
-        double middle = 0.5 * (low + high);
+/* The gap of a candidate: of a corner of a polygon or an end that by which it is out of all edges, of one on a segment
+   that on its side; of what is round that of the place where it is. */
+static double gap_at(const Shape *a, const Shape *b, double near, Touch *at) {
+    int m = at->which - a->count;
+    if (m < 0 && b->round < 0 && !b->s) furthest(b, a->p[at->which], &at->gap);
+    else if (m >= 0 && m != b->round) furthest(a, b->p[m], &at->gap);
+    else if (m < 0 && b->s && b->s->shape == SEGMENT) fill_in(a, b, at);
+    else find_place(a, b, near, at);
+    return at->gap;
+}
+
+/* The instant within (low, high] at which the gap of a candidate closes, from `above` 0 to `below`: by false position,
+   where an end that stays counts half (the Illinois rule), to the last bit. */
+static double root_of(int i, int j, Touch *at, double low, double high, double above, double below) {
+    double near = TOUCH * inner_of(i, j);
+    for (int n = 0, side = 0; n < TO_ROOT && below < 0; n++) {
+        double middle = n < QUICK ? high + (high - low) * below / (above - below) : 0.5 * (low + high);
+        if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
         if (!(middle > low && middle < high)) break;
         Shape a = shape_of(i, middle), b = shape_of(j, middle);
-        fill_in(&a, &b, at);
-        if (at->gap > 0) low = middle;
-        else high = middle;
+        double gap = gap_at(&a, &b, near, at);
+        if (gap > 0) {
+            low = middle;
+            above = gap;
+            if (side > 0) below *= 0.5;
+            side = 1;
+        } else {
+            high = middle;
+            below = gap;
+            if (side < 0) above *= 0.5;
+            side = -1;
+        }
     }
     return high;
 }
 
+/* Whether a place at which two touch at t closes faster than `soft`. */
+static int closes_faster(int i, int j, double t, double within, double soft) {
+    Touch places[MOST_TOUCHES];
+    int count = list_touches(i, j, t, within, t, places);
+    Shape a = shape_of(i, t), b = shape_of(j, t);
+    for (int n = 0; n < count; n++)
+        if (closes_at(i, j, &a, &b, t, places + n) > soft) return 1;
+    return 0;
+}
+
 /* When particle i, which has corners, meets j between two times faster than `soft`: the instant, or INFINITY. */
 double meet_corners(int i, int j, double from, double until, double soft) {
-    double span = until - from, most = fastest_of(i, j, from, span), near = TOUCH * inner_of(i, j), h = 0, first = INFINITY;
-    double gap[CANDIDATES];
+    double span = until - from, most = fastest_of(i, j, from, span), small = inner_of(i, j), near = TOUCH * small;
+    double h = 0, first = INFINITY, gap[CANDIDATES];
+    int sides[MOST_CORNERS], closed = 0;
     if (!(span > 0) || most == INFINITY || most <= soft) return INFINITY;
     Shape a = shape_of(i, from), b = shape_of(j, from);
-    int count = a.count + b.count;
+    int count = a.count + b.count, on_segment = b.s && b.s->shape == SEGMENT;
+    if (are_apart(&a, &b, most * span + near)) return INFINITY;
     for (int c = 0; c < count; c++) {
         Touch now = {.which = c};
-        int there = find_place(&a, &b, near, &now);
-        gap[c] = now.gap;
-        if (there && now.gap <= 0 && closes_at(i, j, &a, &b, from, &now) > soft) return from;
+        /* The side that it is on does not change within a step. */
+        if (on_segment && c < a.count) now.on = sides[c] = side_of(&a, b.s, c, near);
+        gap[c] = gap_at(&a, &b, near, &now);
+        closed |= gap[c] <= 0;
     }
+    if (closed && closes_faster(i, j, from, 0, soft)) return from;
     while (h < span && first == INFINITY) {
         double least = INFINITY, last = from + h;
         for (int c = 0; c < count; c++)
@@ -400,23 +479,12 @@ double meet_corners(int i, int j, double from, double until, double soft) {
         Shape a2 = shape_of(i, t), b2 = shape_of(j, t);
         for (int c = 0; c < count; c++) {
             Touch now = {.which = c};
-            find_place(&a2, &b2, near, &now);
-            if (b.s && b.s->shape == SEGMENT && c < a.count) {
-                /* The side that it is on does not change within a step. */
-                now.on = side_of(&a, surface_at(-1 - j, from), c, near);
-                b2.s = surface_at(-1 - j, t);
-                fill_in(&a2, &b2, &now);
-            }
+            if (on_segment && c < a.count) now.on = sides[c];
             double before = gap[c];
-            gap[c] = now.gap;
-            if (!(before > 0 && now.gap <= 0)) continue;
-            double then = root_of(i, j, &now, last, t);
-            Shape a3 = shape_of(i, then), b3 = shape_of(j, then);
-            Touch again = now;
-            /* It may have gone over to another edge, of which the gap was closed before. */
-            int there = find_place(&a3, &b3, near, &again);
-            fill_in(&a3, &b3, &now);
-            if (there && then < first && closes_at(i, j, &a3, &b3, then, &now) > soft) first = then;
+            gap[c] = gap_at(&a2, &b2, near, &now);
+            if (!(before > 0 && gap[c] <= 0)) continue;
+            double then = root_of(i, j, &now, last, t, before, gap[c]);
+            if (then < first && closes_faster(i, j, then, TOUCHING * small, soft)) first = then;
         }
     }
     return first;
@@ -428,7 +496,8 @@ double meet_corners(int i, int j, double from, double until, double soft) {
    feels of turning, 1/kg. */
 static void take_levers(Contact *c, const Touch *t, double *feels) {
     const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-    double x = t->x - a->x, y = t->y - a->y, cosine = cos(a->turned), sine = sin(a->turned);
+    const double *pose = pose_of(c->i, a->turned, 0);
+    double x = t->x - a->x, y = t->y - a->y, cosine = pose[0], sine = pose[1];
     c->own[0] = x * c->ny - y * c->nx;
     c->own[1] = -(x * c->nx + y * c->ny);
     c->spot[0] = cosine * x + sine * y;
@@ -509,7 +578,7 @@ RARELY const Contact *place_before(const Contact *c) {
     double least = INFINITY;
     for (int k = W.disks[c->i].before; k >= 0; k = W.earlier[k].next) {
         const Contact *o = W.earlier + k;
-        double off = hypot(o->spot[0] - c->spot[0], o->spot[1] - c->spot[1]);
+        double off = length_of(o->spot[0] - c->spot[0], o->spot[1] - c->spot[1]);
         if (o->j != c->j || off >= least) continue;
         least = off;
         found = o;
@@ -542,33 +611,37 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
 }
 
 /* Bring what lasts from its hop to its smooth path before a blow: else the hop's velocity, of first order in the step,
-   would enter that. Of the impulses of the step what is not due yet is taken back, or what is due is given. */
+   would enter that. Of the impulses of the step what is not due yet is taken back, or what is due is given: once a
+   step, since that is over soon. Not in a crowd, which is not solved anew at each blow, nor with contacts on what
+   moves, which presses as hard as it must, or that took a blow as the step began. */
 static void end_hops(int i, double t) {
-    const Contact *first = 0;
-    int count = 0, many = 0;
+    const Contact *first = 0, *end = W.contacts + W.contact_count;
+    int count = 0, many = 0, stamp = W.step_count + 1;
     double past = W.tracks[i].lasted > 1 ? W.length_before : 0;
     for (int link = W.disks[i].links; link >= 0 && !first; link = W.links[link]) first = W.contacts + link / 2;
-    if (!first || t <= W.t || W.disks[i].smooth == W.shocks) return;
-    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++)
-        if (c->island == first->island) {
-            double u[3], whirl = whirl_of(W.disks + c->i) + (c->j < 0 ? 0 : whirl_of(W.disks + c->j));
-            relative(c, 1, u);
-            int is_blow = u[0] < -W.soft - 2 * whirl * W.step, moves = c->j < 0 && stirs(W.surfaces + (-1 - c->j));
-            count += is_blow || moves ? SMALL + 1 : 1;
-        }
-    if (count > SMALL) return;
-    for (const Contact *c = W.contacts; c < W.contacts + W.contact_count; c++) {
+    if (!first || t <= W.t || W.contact_count > FEW_CONTACTS || W.disks[i].smooth == stamp) return;
+    W.disks[i].smooth = stamp;
+    int island = first->island;
+    while (first > W.contacts && first[-1].island == island) first--;
+    for (const Contact *c = first; c < end && c->island == island; c++) {
+        double u[3], whirl = whirl_of(W.disks + c->i) + (c->j < 0 ? 0 : whirl_of(W.disks + c->j));
+        relative(c, 1, u);
+        int is_blow = u[0] < -W.soft - 2 * whirl * W.step, moves = c->j < 0 && stirs(W.surfaces + (-1 - c->j));
+        count += is_blow || moves ? FEW_CONTACTS + 1 : 1;
+    }
+    if (count > FEW_CONTACTS) return;
+    for (const Contact *c = first; c < first + count; c++) {
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-        if (c->island != first->island || a->mode != FREE || (c->j >= 0 && b->mode != FREE)) continue;
+        if (a->mode != FREE || (c->j >= 0 && b->mode != FREE)) continue;
         double u[3], v[3], given[3], change[3];
         Contact last = *c;
         advance(a, t);
         if (c->two) advance(b, t);
         was_moved(c->i);
-        a->smooth = W.shocks;
+        a->smooth = stamp;
         if (c->two) {
             was_moved(c->j);
-            b->smooth = W.shocks;
+            b->smooth = stamp;
         }
         if (c->impulse[0] == 0) continue;
         for (int n = 0; n < 3; n++)
@@ -780,6 +853,6 @@ RARELY void strike_corners(int i, int j, double t) {
         a->on = main->owner;
         a->slips = 1;
     }
-    /* What comes to rest is held from the next step on, which begins soon. */
-    if (rests) W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
+    /* What comes to rest is held from the next step on, which begins soon; in a crowd it may hop until then. */
+    if (rests && W.contact_count <= FEW_CONTACTS) W.step_end = MIN(W.step_end, MAX(t, W.t + SHORTEST * W.step));
 }

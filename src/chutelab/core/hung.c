@@ -1,5 +1,5 @@
-/* Contacts that last of what has corners, or with what hangs on hinges: projected Gauss-Seidel over contacts, stops and
-   motors, as the solver's, but one by one on the bodies themselves. */
+/* Contacts that last, with what hangs on hinges: projected Gauss-Seidel over contacts, stops and motors, as the
+   solver's, but one by one on the bodies themselves. */
 
 #include "core.h"
 
@@ -64,10 +64,10 @@ static void lessen_all(Contact *list, int count) {
         none += J[1] * (u[1] + pushed[1] + c->drift) + J[2] * u[2] + J[0] * (pushed[0] - asks(c, 0));
         all += J[1] * (v[1] + c->drift) + J[2] * v[2] + J[0] * (v[0] - u[0] - asks(c, J[0]));
     }
-    if (W.swings_too) lean_on_hinges(&none, &all);
+    lean_on_hinges(&none, &all);
     if (!(all > 0)) return;
     double less = none < 0 ? all / (all - none) : 1;
-    if (W.swings_too) lessen_hinges(less);
+    lessen_hinges(less);
     for (int n = 0; n < count; n++) {
         for (int k = 0; k < 3; k++) list[n].impulse[k] += more[k] = -less * list[n].impulse[k];
         push(list + n, more);
@@ -84,7 +84,7 @@ static double sweep(Contact *list, int count, int sweeps) {
             double change = press(c), rubbed = rub(c);
             worst = MAX(worst, MAX(change, rubbed));
         }
-        if (W.swings_too) worst = MAX(worst, turn_hinges());
+        worst = MAX(worst, turn_hinges());
         W.sweep_count++;
         if (n == 0) first = worst;
         if (worst <= ENDS * W.pace) return worst;
@@ -104,7 +104,7 @@ static void take_beyond(Contact *c, int n, double most) {
 
 /* Solve contacts of which some act on hinges, from the impulses of the step before; see `sweep_contacts`. */
 void sweep_hung(Contact *list, int count, int sweeps, double enough) {
-    if (W.swings_too) start_hinges(0);
+    start_hinges(0);
     for (int n = 0; n < count; n++) push(list + n, list[n].impulse);
     lessen_all(list, count);
     for (int left = TRIES;; left--) {
@@ -119,7 +119,7 @@ void sweep_hung(Contact *list, int count, int sweeps, double enough) {
             c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
             c->share = left > 1 ? 0.25 * c->share : 0;
         }
-        if (W.swings_too) start_hinges(1);
+        start_hinges(1);
     }
     for (int n = 0; n < count; n++) {
         /* Rounding does not press. */

@@ -109,7 +109,7 @@ typedef struct {
     int tie;                /* first of its ends of joints, 2 n and 2 n + 1 of joint n, or -1 */
     int corners;            /* [in] how many it has; 0 of what is round ... */
     int outline;            /* [in] ... and the first of them in `World.outlines` */
-    int smooth;             /* mark of the shock in which it was brought off its hop */
+    int smooth;             /* step, from 1 on, in which it was brought off its hop, if it was to be */
     double inner, broad;    /* m; radius of the circle inside them, and of one of their area; or its own */
     double tug[3], tugged[3]; /* m/s, m/s, rad/s; what half of a step's pull of its joints changes, and before */
 } Disk;
@@ -315,6 +315,10 @@ typedef struct {
     int pad;
 } SolverRow;
 
+/* What a row of what has corners has besides: how its impulse turns both bodies, of their radii; and what of its normal
+   impulse slips, 1/kg. */
+typedef struct { double own[2], others[2], slips, pad; } RowLever;
+
 /* Four rows as sweeps in single precision see them, of the same names but for those of x and y, and of normal and slip. */
 typedef struct {
     float nx[4], ny[4], opens[4], slips[4], mass[4], slide_mass[4], light[4], slide_light[4];
@@ -354,6 +358,8 @@ typedef struct {
     Trigger *triggers;
     Joint *joints;
     double *outlines;    /* [in] (outline_count, 2) corners round the centroid, counterclockwise, kind by kind, m */
+    double *edges;       /* (outline_count, 3) unit vectors out of their edges, each from its corner on, and m */
+    double *poses;       /* (disks, 2, 3) an angle of each, with its cosine and sine, now and later in a step */
     JointRow *joint_rows;
     double *joint_matrix; /* (joint rows, joint rows) */
     /* arrays that `prepare` lays out */
@@ -369,6 +375,7 @@ typedef struct {
     Contact *contacts;   /* of this step */
     Contact *earlier;    /* of the step before */
     SolverRow *rows;     /* (contacts) of those that are solved together */
+    RowLever *levers;    /* (contacts) ... of particles with corners */
     SolverBody *solver_bodies; /* (disks + 1) ... and their disks */
     SolverFour *fours;   /* (four_room) the same in single precision */
     LightBody *light_bodies; /* (disks + 1) */

@@ -592,7 +592,7 @@ static void end_step(void) {
     if (MAX(W.stamp, W.shocks) > 1000000000) {
         W.stamp = W.shocks = W.jams = 0;
         for (int i = 0; i < W.disk_count; i++)
-            W.disks[i].mark = W.disks[i].moved = W.disks[i].jam = W.disks[i].smooth = 0;
+            W.disks[i].mark = W.disks[i].moved = W.disks[i].jam = 0;
     }
 }
 

@@ -259,6 +259,7 @@ static void make_contact_room(int room) {
     RESERVE(W.earlier, room);
     RESERVE(W.links, 2.0 * room);
     RESERVE(W.rows, room);
+    RESERVE(W.levers, W.outline_count ? room : 0);
     W.four_room = W.interact ? room / 4 : 0;
     RESERVE(W.fours, W.four_room);
     if (has_room() && W.earlier_count) memcpy(W.earlier, old, W.earlier_count * sizeof(Contact));
@@ -289,6 +290,8 @@ static int lay_out_work(void) {
     W.cell_room = crowd ? 12 * n + 64 : 1;
     RESERVE(W.tracks, n);
     RESERVE(W.solver_bodies, n + 1.0);
+    RESERVE(W.edges, 3.0 * W.outline_count);
+    RESERVE(W.poses, W.outline_count ? 6.0 * n : 0);
     RESERVE(W.light_bodies, n + 1.0);
     RESERVE(W.joint_rows, W.joint_row_count);
     RESERVE(W.joint_matrix, (double)W.joint_row_count * W.joint_row_count);
@@ -375,16 +378,19 @@ static void join_disks(void) {
     }
 }
 
-/* Find the radius of the circle round the centre of a particle that no edge cuts, and of one of its area. */
+/* Note the edges of a particle, and the radius of the circle round its centre that no edge cuts, and of one of its area. */
 static void measure(Disk *d) {
     const double *p = W.outlines + 2 * d->outline;
-    double twice = 0;
+    double twice = 0, *edge = W.edges + 3 * d->outline;
     d->inner = d->broad = d->radius;
-    for (int n = 0; n < d->corners; n++) {
+    for (int n = 0; n < d->corners; n++, edge += 3) {
         const double *a = p + 2 * n, *b = p + 2 * ((n + 1) % d->corners);
-        double x = b[0] - a[0], y = b[1] - a[1], cross = a[0] * y - a[1] * x;
-        d->inner = MIN(d->inner, cross / sqrt(x * x + y * y));
+        double x = b[0] - a[0], y = b[1] - a[1], cross = a[0] * y - a[1] * x, length = sqrt(x * x + y * y);
+        d->inner = MIN(d->inner, cross / length);
         twice += cross;
+        edge[0] = y / length;
+        edge[1] = -x / length;
+        edge[2] = length;
     }
     if (d->corners) d->broad = sqrt(0.5 * twice / PI);
 }

@@ -19,8 +19,9 @@
 /* m/s; what a contact is free to open with that asks for nothing: finite, so that it can be multiplied by 0. */
 #define ANY 1e100
 
-/* The rows: those between disks, and from `pairs` on those on what does not give way. `clings`: cohesion pulls in one. */
-static int pairs, rows, bodies, clings;
+/* The rows: those between disks, and from `pairs` on those on what does not give way. `clings`: cohesion pulls in one;
+   `cornered`: one is of a particle with corners. */
+static int pairs, rows, bodies, clings, cornered;
 
 /* A choice between doubles is a jump in what is made of WebAssembly, between vectors it is not. */
 static inline double least(double a, double b) {
@@ -36,10 +37,16 @@ static inline Two turned(const SolverRow *c, Two v) {
     return plus(times(first(v), two(c->normal)), times(second(v), two(c->tangent)));
 }
 
+static inline RowLever *lever_of(const SolverRow *c) { return W.levers + (c - W.rows); }
+
 /* Normal velocity less what is asked for, and slip, with the impulses so far. */
 static inline Two moves(const SolverRow *c) {
     const SolverBody *a = W.solver_bodies + c->a, *b = W.solver_bodies + c->b;
     Two v = plus(turned(c, minus(two(&a->x), two(&b->x))), two(c->free));
+    if (cornered) {
+        const RowLever *l = lever_of(c);
+        return plus(v, plus(times(a->rim, two(l->own)), times(b->rim, two(l->others))));
+    }
     return plus(v, wasm_f64x2_make(0, a->rim + b->rim));
 }
 
@@ -58,11 +65,16 @@ static inline double above(const SolverRow *c, double opens, double impulse) {
 static inline void push_row(const SolverRow *c, Two impulse, double moment) {
     SolverBody *a = W.solver_bodies + c->a, *b = W.solver_bodies + c->b;
     Two v = turned(c, impulse);
-    double along = second(impulse);
+    double along = second(impulse), others = along;
+    if (cornered) {
+        const RowLever *l = lever_of(c);
+        along = l->own[0] * first(impulse) + l->own[1] * second(impulse);
+        others = l->others[0] * first(impulse) + l->others[1] * second(impulse);
+    }
     wasm_v128_store(&a->x, plus(two(&a->x), times(a->mass, v)));
     a->rim += a->turn * along + a->twist * moment;
     wasm_v128_store(&b->x, minus(two(&b->x), times(b->mass, v)));
-    b->rim += b->turn * along - b->twist * moment;
+    b->rim += b->turn * others - b->twist * moment;
 }
 
 static int body_of(int i) {
@@ -73,6 +85,17 @@ static int body_of(int i) {
     W.solver_bodies[bodies] = (SolverBody){.mass = d->inv_mass, .turn = square(d->radius) * d->inv_inertia,
                               .twist = d->radius * d->inv_inertia, .bend = 1 / d->radius, .disk = i};
     return bodies++;
+}
+
+/* The levers of a row: what has no corners turns by friction alone. */
+static void set_lever(const SolverRow *r, const Contact *c) {
+    const SolverBody *a = W.solver_bodies + r->a, *b = W.solver_bodies + r->b;
+    RowLever *l = lever_of(r);
+    for (int n = 0; n < 2; n++) {
+        l->own[n] = c->cornered ? c->own[n] * a->bend : n;
+        l->others[n] = c->cornered ? c->others[n] * b->bend : n;
+    }
+    l->slips = a->turn * l->own[0] * l->own[1] + b->turn * l->others[0] * l->others[1];
 }
 
 /* Have all rows so much of their impulses. */
@@ -96,11 +119,12 @@ static void cling(const Contact *list) {
 void set_rows(Contact *list, int count) {
     W.solver_bodies[0] = (SolverBody){.disk = -1};
     bodies = 1;
-    clings = pairs = 0;
+    clings = pairs = cornered = 0;
     for (int n = 0; n < count; n++) {
         body_of(list[n].i);
         if (list[n].two) body_of(list[n].j);
         pairs += list[n].two;
+        cornered |= list[n].cornered;
     }
     rows = count;
     SolverRow *pair = W.rows, *other = W.rows + pairs;
@@ -139,6 +163,7 @@ void set_rows(Contact *list, int count) {
         r->a = W.disks[c->i].body;
         r->b = c->two ? W.disks[c->j].body : 0;
         r->from = n;
+        if (cornered) set_lever(r, c);
         clings |= c->clings > 0;
         if (!clings) push_row(r, two(r->impulse), r->moment);
     }
@@ -181,8 +206,9 @@ static inline Two give(SolverRow *c, int in_corner) {
         double given = least((c->more - r) * c->mass[0], -(r + c->gives * normal) * c->eases);
         normal = most(normal + most(given, -(r + c->parts) * c->mass[0]), 0);
     }
-    double bound = c->rough * normal;
-    double along = least(most(c->impulse[1] - c->mass[1] * second(v), -bound), bound);
+    double bound = c->rough * normal, slip = second(v);
+    if (cornered) slip += lever_of(c)->slips * (normal - first(J));
+    double along = least(most(c->impulse[1] - c->mass[1] * slip, -bound), bound);
     Two to = wasm_f64x2_make(normal, along), change = minus(to, J);
     Two speed = wasm_f64x2_mul(wasm_f64x2_abs(change), two(c->light));
     c->change = second(speed);
@@ -306,7 +332,7 @@ double sweep_rows(int sweeps, int plain, double accurate) {
             for (int m = 0; m < pairs; m++) change = wasm_f64x2_pmax(change, give(W.rows + m, 0));
         for (int m = pairs, many; m < rows; m += many) {
             SolverRow *c = W.rows + (to ? m : rows - 1 - (m - pairs));
-            for (many = 1; m + many < rows && c[to ? many : -many].a == c->a;) many++;
+            for (many = 1; m + many < rows && !cornered && c[to ? many : -many].a == c->a;) many++;
             if (!to) c -= many - 1;
             if (many == 1) {
                 change = wasm_f64x2_pmax(change, give(c, 0));
@@ -330,7 +356,7 @@ double sweep_rows(int sweeps, int plain, double accurate) {
 /* The same by fours, if there are enough of them; INFINITY, too, where that is left to `sweep_rows`. */
 double sweep_lightly(int sweeps, int plain, double accurate) {
     double most = DIVERGES * (W.soft + W.skip / W.solver_bodies[1].bend);
-    if (rows < LARGE) return INFINITY;
+    if (rows < LARGE || cornered) return INFINITY;
     double worst = sweep_fours(rows, bodies, sweeps, plain, accurate, most);
     if (worst < INFINITY) scale(1);
     return worst;

@@ -25,6 +25,10 @@
 /* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
    press harder by as much in each, without end. */
 #define CRAWLS 0.5
+/* m/s on Earth; changes at which sweeps over a few contacts of what has corners end. */
+#define FINE_CORNERS 1e-11
+/* ... and over many, of those of disks: a pile of boxes hangs together by more, and else does not come to rest. */
+#define CROWD_CORNERS 0.03
 /* Share of its bound up to which friction is not all used: it holds. */
 #define HOLDS 0.999
 
@@ -65,8 +69,9 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 }
 
 /* Solve contacts by `sweeps` until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
-   will do. A crowd is swept again, up to so many rounds, of which the last is good enough if it crawls,
-   and more finely where small changes leave gaps open. By itself (0 rounds), and where sweeps diverge,
+   will do, but not before the last round if they are to be finer than a crowd's. A crowd is swept again, up to so
+   many rounds, of which the last is good enough if it crawls, and more finely where small changes leave gaps
+   open. By itself (0 rounds), and where sweeps diverge,
    rigid bodies with all of the friction may have no solution, driven into a wedge that locks itself:
    there it is lowered until they have one. Gaps tell nothing of that where a drive presses: it presses
    harder in each sweep, so there the changes have to end, too. A disk that cannot turn is held where
@@ -78,9 +83,8 @@ static void ease_friction(Contact *list, int count, double least, double by) {
 void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain, double accurate,
                     double enough) {
     double first = INFINITY;
-    int driven = 0, pressing = 0, lessened = 0, light = W.interact, one_by_one = W.swings_too;
-    for (int n = 0; n < count; n++) one_by_one |= list[n].cornered;
-    if (one_by_one) {
+    int driven = 0, pressing = 0, lessened = 0, light = W.interact, fine = accurate < W.accurate;
+    if (W.swings_too) {
         sweep_hung(list, count, MAX(rounds, 1) * sweeps, enough);
         return;
     }
@@ -104,10 +108,10 @@ void sweep_contacts(Contact *list, int count, int rounds, int sweeps, int plain,
         if (left == 0) break;
         int stalled = driven && change < INFINITY && stall(list, count, INFINITY, enough);
         if (!stalled) {
-            if (ended && more < 2) break;
+            if (ended && (more < 2 || fine)) break;
             if (ended) accurate *= 0.1;
             if (change < INFINITY) worst = pressing ? MAX(left_open(), change) : left_open();
-            if (worst <= enough) break;
+            if (worst <= enough && !(fine && more > 1)) break;
             if (change < INFINITY && more > 1) {
                 if (more-- == rounds) first = change;
                 continue;
@@ -247,7 +251,7 @@ void solve_contacts(int again) {
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
         double least = INFINITY, heaviest = 0;
-        int driven = 0;
+        int driven = 0, cornered = 0;
         W.swings_too = 0;
         for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
             const Contact *c = W.contacts + to;
@@ -256,6 +260,7 @@ void solve_contacts(int again) {
             heaviest = MAX(heaviest, MAX(a->mass, b->mass));
             driven |= presses(c);
             W.swings_too |= c->hung > 0;
+            cornered |= c->cornered;
         }
         swings |= W.swings_too;
         /* A drive presses as hard as it must: there no spring would hold, so that it gives no more than
@@ -264,9 +269,11 @@ void solve_contacts(int again) {
             W.contacts[n].gives /= heaviest;
             if (!driven) W.contacts[n].parts = INFINITY;
         }
+        double accurate = W.accurate;
+        if (cornered) accurate = to - from <= FEW_CONTACTS ? FINE_CORNERS * W.pace : CROWD_CORNERS * accurate;
         if (W.interact)
             sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), W.sweeps,
-                           PLAIN, W.accurate, W.skip * least);
+                           PLAIN, accurate, W.skip * least);
         else solve_alone(list, to - from);
     }
     if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);

@@ -228,9 +228,25 @@ void was_moved(int i) {
 }
 
 
-/* Give a contact a normal impulse, with the friction that it allows, and book what it does. Rolling
-   friction stops the turning as far as its arm allows, and friction the slip that then is left: each
-   changes what the other has to stop, by a share of 5/7 at most in turn. */
+/* How much more friction, and which moment of rolling friction, stop slip and turning, v, of a contact that has got
+   its impulse: each changes what the other has to stop, so both at once, and where one is bounded the other again. */
+static void stop_turning(const Contact *c, double most, double arm, const double *v, double *more) {
+    const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+    double slip = v[1] + c->drift, shared = (c->cornered ? c->own[1] : a->radius) * a->inv_inertia;
+    if (c->two) shared -= (c->cornered ? c->others[1] : b->radius) * b->inv_inertia;
+    if (c->hung) shared += c->lever[1] / W.movers[c->hung - 1].inertia;
+    double both = 1 - square(shared) * c->mass[1] * c->mass[2];
+    double moment = both > 0 ? c->mass[2] * (shared * c->mass[1] * slip - v[2]) / both : 0;
+    more[0] = 0;
+    for (int n = 0; n < 2; n++) {
+        more[2] = MIN(MAX(moment, -arm), arm);
+        double along = c->impulse[1] - c->mass[1] * (slip + shared * more[2]);
+        more[1] = MIN(MAX(along, -most), most) - c->impulse[1];
+        moment = -c->mass[2] * (v[2] + shared * more[1]);
+    }
+}
+
+/* Give a contact a normal impulse, with the friction and rolling friction that it allows, and book what it does. */
 static void give(Contact *c, double normal) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double *J = c->impulse, u[3], v[3], given[3], most = c->friction * normal;
@@ -251,18 +267,12 @@ static void give(Contact *c, double normal) {
     J[2] = 0;
     push(c, more);
     relative(c, 0, v);
-    for (int n = 0; n < 100 && arm > 0; n++) {
-        more[0] = more[1] = 0;
-        more[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -arm), arm) - J[2];
+    if (arm > 0) {
+        stop_turning(c, most, arm, v, more);
         push(c, more);
         relative(c, 0, v);
-        more[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most) - J[1];
         J[1] += more[1];
-        J[2] += more[2];
-        if (more[1] == 0) break;
-        more[2] = 0;
-        push(c, more);
-        relative(c, 0, v);
+        J[2] = more[2];
     }
     share_out(c, u, v, 0, c->entries, given);
     /* Joints turn slip into normal velocity, and back: where one seems to gain, only the sum is known. */

@@ -338,6 +338,26 @@ def test_a_cart_of_two_rolls_down_as_one():
 # Springs
 
 
+@pytest.mark.parametrize("kind", ["string", "rod", "spring", "pin"])
+def test_what_leaves_the_scene_one_after_the_other_leaves_no_energy_over(kind):
+    """Until the one has left, a joint's pull is that of both; then the other flies on freely."""
+    more = {"spring": {"stiffness": 5.0, "damper": 0.1}, "pin": {"from": [0.15, 0.1]}}.get(kind, {})
+    joined = {
+        "particle": [{"mass": 0.1, "radius": 0.04, "spin": True}],
+        "stream": [
+            {"at": [0.0, 0.0], "velocity": [0.4, 0.5], "interact": True},
+            {"at": [0.3, 0.2], "velocity": [0.0, 0.0]},
+        ],
+        kind: [{"particle": 0, "other": 1, **more}],
+        "run": {"until": 2.0, "engine": "contact"},
+    }
+    recording = simulate(joined)
+    assert recording.ended_by("exit").all()
+    first, last = np.sort(recording.ends()[1]["t"])
+    assert last > first + 3e-3
+    assert ledger_closes(recording)
+
+
 @pytest.mark.parametrize("engine", ["contact", pytest.param("pymunk", marks=pytest.mark.slow)])
 def test_a_spring_with_a_damper_swings_as_its_equation_says(engine):
     k, m, c = 40.0, 0.1, 0.3

@@ -565,7 +565,8 @@ static void end_step(void) {
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         if (!is_live(d)) continue;
-        if (d->mode != RIDING) leave(i, W.step_end);
+        /* What is tied ends with the step, as its joints' pull does. */
+        if (d->mode != RIDING && !is_tied(i)) leave(i, W.step_end);
         if (d->mode == FREE) {
             advance(d, W.step_end);
             if (d->tie < 0) slow_down(i, W.step_end);
@@ -580,7 +581,10 @@ static void end_step(void) {
     }
     if (W.joint_count) end_pull();
     for (int i = W.low; i < W.high && W.joint_count; i++)
-        if (is_tied(i) && W.disks[i].mode == FREE) slow_down(i, W.step_end);
+        if (is_tied(i) && W.disks[i].mode == FREE) {
+            slow_down(i, W.step_end);
+            leave(i, W.step_end);
+        }
     if (W.hinges) end_hinges(W.step_end);
     W.length = W.step_end - W.t;
     W.t = W.step_end;

@@ -6,10 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from chutelab import scene
+from chutelab.engines.simulation import simulate
 from chutelab.results import Recording, packing, storage
 from chutelab.results.ledger import energy_at, ledger
 from chutelab.results.storage import RecordingError
-from test_recording import crowded
+from test_recording import DRUM, crowded
 
 NAMES = [
     *("galton", "dominoes", "drum"),
@@ -48,7 +50,7 @@ def test_a_track_in_a_file_is_off_by_less_than_the_tolerance_at_any_time(name):
     far, fast = off(loaded(name))
     assert far <= 1e-6
     assert fast <= 1.6e-5
-    assert off(loaded(name, 1e-5))[0] > 1e-6
+    assert off(loaded(name, 0.01))[0] > 1e-6
     turned = loaded(name).at(times).angle - record.at(times).angle
     assert np.nanmax(np.abs(turned)) <= 1e-3
 
@@ -75,8 +77,8 @@ def test_ends_times_and_sums_come_back_to_the_last_bit_and_energies_nearly(name)
 def test_states_and_impulses_of_events_are_as_near_as_tracks(name):
     record, other = run(name), loaded(name)
     radius, dt, mass = record.radius.min(), record.machine.dt, record.mass.min()
-    speed = 1e-6 * radius / dt * (1.0 + 1e-6)
-    most = {"position": 0.251e-6 * radius, "velocity": speed, "omega": 2.0 * speed / radius}
+    speed = 1.25e-6 * radius / dt * (1.0 + 1e-6)
+    most = {"position": 0.351e-6 * radius, "velocity": speed, "omega": 2.0 * speed / radius}
     most["normal"] = most["tangential"] = mass * speed
     for field in ("position", "velocity_before", "velocity_after", "omega_before", "omega_after",
                   "normal_impulse", "tangential_impulse"):  # fmt: skip
@@ -99,9 +101,7 @@ def test_states_and_impulses_of_events_are_as_near_as_tracks(name):
 def test_whole_numbers_of_any_size_come_back(far):
     numbers = np.rint(far * np.random.default_rng(1).uniform(size=(3, 50))).astype(np.int64)
     numbers[0, 0] = int(far)
-    writer = packing.Writer()
-    writer.write(numbers, -numbers[:1])
-    reader = packing.Reader(*writer.columns().values())
+    reader = packing.Reader(**packing.write([numbers, -numbers[0]]))
     assert np.array_equal(reader.read(3, 50), numbers)
     assert np.array_equal(reader.read(50), -numbers[0])
     assert np.array_equal(packing.unfold(packing.fold(numbers)), numbers)
@@ -165,3 +165,20 @@ def test_a_packed_file_that_is_damaged_or_made_to_fill_the_memory_is_refused(tmp
             np.savez_compressed(path, **{**arrays, name: value})
             with pytest.raises(RecordingError, match="not a recording as"):
                 storage.load(path)
+
+
+FULL = {
+    "surface": [{**DRUM["surface"][0], "radius": 0.165}],
+    "stream": {**DRUM["stream"], "count": 300, "fill": [[-0.1, -0.1], [0.1, 0.1]]},
+    "run": {"until": 8.0},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("told", "most"),
+    [(scene.load("hopper"), 4e6), (scene.from_dict(DRUM | FULL), 25e6)],
+    ids=["hopper", "drum"],
+)
+def test_files_of_crowds_are_as_small_as_it_is_said(tmp_path, told, most):
+    assert simulate(told).save(tmp_path / "short.npz").stat().st_size <= most

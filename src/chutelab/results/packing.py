@@ -1,21 +1,22 @@
 """Large crowds on disk: whole numbers of what a track may be off, less what is foretold.
 
 A share ε of the radius r of the smallest particle is allowed. Velocities are told by their change
-from knot to knot less that of a flight, in units of 2 ε r / dt, or less if kinetic energies ask for
-it. Beside intervals longer than a step dt the units are finer, since a cubic bulges by a quarter of
-what they are off times the interval. The mean of two velocities foretells the way between them,
-exactly on a parabola. The rest of a place is told in units of ε r / 2, and after an interval much
-shorter than a step in finer ones: else the velocity *between* two knots would be far off. So a
-track is off by less than ε r at any time. Entries of the ledger have units of which all particles
-together are off by less than ε of the energy turned over. The tracks foretell the states of events,
-and these the impulses.
+from knot to knot less that of a flight, in units of 2.5 ε r / dt, or less if kinetic energies ask
+for it. Beside intervals longer than a step dt the units are finer, since a cubic bulges by a
+quarter of what they are off times the interval: 0.44 ε r, half a unit off along both axes at both
+ends. The mean of two velocities foretells the way between them, exactly on a parabola. The rest of
+a place is told in units of 0.28 times what that of a velocity is in a step, which is 0.5 ε r off at
+most, and after an interval much shorter than a step in finer ones: else the velocity *between* two
+knots would be far off. So a track is off by less than ε r at any time. Entries of the ledger have
+units of which all particles together are off by less than ε of the energy turned over. The tracks
+foretell the states of events, and these the impulses.
 
 Times, the ends of tracks, and all sums such as the ledger's are kept to the last bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import prod, sqrt
 from typing import Any
@@ -92,31 +93,22 @@ def unfold(told: NDArray[np.uint8]) -> Ints:
     return np.cumsum((bits >> 1 & np.iinfo(np.int64).max) ^ -(bits & 1), axis=-1)
 
 
-class Writer:
-    """Whole numbers as how many binary digits they have, and all digits but the first."""
-
-    def __init__(self) -> None:
-        self.sizes: list[NDArray[np.uint8]] = []
-        self.bits: list[NDArray[np.uint8]] = []
-
-    def write(self, *arrays: Ints) -> None:
-        """Write arrays of any shapes."""
-        for numbers in map(np.ravel, arrays):
-            size = np.abs(numbers)
-            digits = np.frexp(size.astype(np.float64))[1].astype(np.uint8)
-            self.sizes.append(digits)
-            self.bits.append(np.packbits(numbers[digits > 0] < 0))
-            for n in range(1, int(digits.max(initial=0))):
-                size, digits = size[digits > n], digits[digits > n]
-                self.bits.append(np.packbits(size >> (n - 1) & 1))
-
-    def columns(self) -> dict[str, NDArray[np.uint8]]:
-        """Return what was written."""
-        return {"sizes": np.concatenate(self.sizes), "bits": np.concatenate(self.bits)}
+def write(arrays: Iterable[Ints]) -> dict[str, NDArray[np.uint8]]:
+    """Return whole numbers as how many binary digits they have, and all digits but the first."""
+    sizes, bits = [], []
+    for numbers in map(np.ravel, arrays):
+        size = np.abs(numbers)
+        digits = np.frexp(size.astype(np.float64))[1].astype(np.uint8)
+        sizes.append(digits)
+        bits.append(np.packbits(numbers[digits > 0] < 0))
+        for n in range(1, int(digits.max(initial=0))):
+            size, digits = size[digits > n], digits[digits > n]
+            bits.append(np.packbits(size >> (n - 1) & 1))
+    return {"sizes": np.concatenate(sizes), "bits": np.concatenate(bits)}
 
 
 class Reader:
-    """What a `Writer` wrote, in the same order."""
+    """Gives back what `write` was given, in the same order."""
 
     def __init__(self, sizes: NDArray[np.uint8], bits: NDArray[np.uint8]) -> None:
         self.sizes, self.bits = sizes, bits
@@ -153,7 +145,7 @@ class Intervals:
     h : ndarray, shape (K,)
         Time since the knot before, s; 0 at the first one.
     long : ndarray, shape (K,)
-        Whether that is half a step or more, or the knot the first one: there a chain begins.
+        Whether that is `LONG`, or the knot the first one: there a chain begins.
     chain : ndarray, shape (K,)
         The knot where the chain begins that this one is in.
     share : ndarray, shape (K,)
@@ -230,15 +222,13 @@ def tell_entries(entries: Floats, unit: float) -> Ints:
 
 def entries_of(told: Ints, unit: float) -> Floats:
     """Return entries of which `tell_entries` told, (3, K)."""
-    few = told == 1
-    return np.asarray(
-        unit * (np.cumsum(told - (told > 0), axis=1) + LEAST * np.cumsum(few, axis=1))
-    )
+    change = told - (told > 0) + LEAST * (told == 1)
+    return np.asarray(unit * np.cumsum(change, axis=1))
 
 
 @dataclass
 class Tracks:
-    """What `COLUMNS` hold but for the states of events, which follow in `reader`.
+    """What `COLUMNS` hold but for the states of events.
 
     `still` (E,) are events that change nothing; `keys` (K,) of knots and `when` (E,) of events are
     in the order of particles and times.
@@ -251,16 +241,16 @@ class Tracks:
     keys: Ints
     when: Ints
     steps: Floats
-    reader: Reader
 
     @classmethod
-    def of(cls, packed: dict[str, NDArray[Any]], offsets: Ints) -> Tracks:
-        """Return them; `ValueError` or `IndexError` if the columns do not fit together."""
-        units, ends, reader = (
-            packed["units"],
-            packed["ends"],
-            Reader(packed["sizes"], packed["bits"]),
-        )
+    def of(
+        cls, packed: dict[str, NDArray[Any]], offsets: Ints, read: Callable[..., Ints]
+    ) -> Tracks:
+        """Return them; `ValueError` or `IndexError` if the columns do not fit together.
+
+        `read` returns the next whole numbers, of the shape that it is given.
+        """
+        units, ends = packed["units"], packed["ends"]
         times = unfold(packed["times"])[0].view(np.float64)
         at, (when, still, *whole) = unfold(packed["when"])[0], unfold(packed["whose"])
         if min(at.min(), when.min(initial=0)) < 0:
@@ -270,23 +260,21 @@ class Tracks:
         for name, told in zip(WHOLE, whole, strict=True):
             events[name] = told
         intervals = Intervals(knots["t"], offsets, units)
-        motion = reader.read(3, len(knots))
-        rates = intervals.rates(motion, reader.read(3, int(intervals.some.sum())))
+        motion = read(3, len(knots))
+        rates = intervals.rates(motion, read(3, int(intervals.some.sum())))
         knots["velocity"], knots["omega"] = rates[:2].T, rates[2]
         for axis in (0, 1):
-            place = intervals.places(reader.read(len(knots)), rates[axis], units[0])
+            place = intervals.places(read(len(knots)), rates[axis], units[0])
             intervals.end_at(place, ends["position"][..., axis])
             knots["position"][:, axis] = place
-        angle = (
-            intervals.places(reader.read(len(knots)), rates[2], units[5])
-            if units[9]
-            else np.zeros(0)
-        )
-        knots["entries"] = entries_of(reader.read(3, len(knots)), units[3]).T
+        angle = np.zeros(0)
+        if units[9]:
+            angle = intervals.places(read(len(knots)), rates[2], units[5])
+        knots["entries"] = entries_of(read(3, len(knots)), units[3]).T
         knots[[intervals.first, intervals.last]] = ends
         owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
         keys, when = at + len(times) * owner, when + len(times) * whole[0]
-        return cls(knots, angle, events, still > 0, keys, when, units[ROWS, None], reader)
+        return cls(knots, angle, events, still > 0, keys, when, units[ROWS, None])
 
     def states(self, particle: Particle, give: Give) -> Floats:
         """Return all rows of `STATE`, as they are foretold from the tracks and from those before.
@@ -323,13 +311,13 @@ def units_of(record: Record, tolerance: float) -> Floats:
     radius, mass = float(record.radius.min()), float(record.mass.min())
     turned = ledger(record).turned_over
     fastest = sqrt((record.knots["velocity"] ** 2).sum(axis=1).max())
-    speed = 2.0 * tolerance * radius / dt
+    speed = 2.5 * tolerance * radius / dt
     # Half of it changes kinetic energies by no more than the tolerance of what is turned over.
     if turned * fastest > 0.0:
         speed = min(speed, 2.0 * tolerance * turned / (record.mass.sum() * fastest))
     energy = tolerance * turned / sqrt(record.count)
     return np.array([
-        0.5 * tolerance * radius, speed, 2.0 * speed / radius, energy or 1.0, mass * speed,
+        0.28 * speed * dt, speed, 2.0 * speed / radius, energy or 1.0, mass * speed,
         tolerance, dt, *(-machine.gravity * machine.up), len(record.angle) > 0,
     ])  # fmt: skip
 
@@ -343,14 +331,12 @@ def pack(record: Record, tolerance: float) -> dict[str, NDArray[Any]]:
         If whole numbers of what may be off do not reach as far as the particles.
     """
     knots, events, units = record.knots, record.events, units_of(record, tolerance)
-    intervals, writer = Intervals(knots["t"], record.offsets, units), Writer()
-    motion, more = intervals.tell_rates(np.stack([*knots["velocity"].T, knots["omega"]]))
-    writer.write(motion, more)
-    rates = intervals.rates(motion, more)
+    intervals = Intervals(knots["t"], record.offsets, units)
+    told = [*intervals.tell_rates(np.stack([*knots["velocity"].T, knots["omega"]]))]
+    rates = intervals.rates(*told)
     places = [*knots["position"].T, *([record.angle] if units[9] else [])]
-    for place, rate, unit in zip(places, rates, units[[0, 0, 5]], strict=False):
-        writer.write(intervals.tell_places(place, rate, unit))
-    writer.write(tell_entries(knots["entries"].T, units[3]))
+    told += map(intervals.tell_places, places, rates, units[[0, 0, 5]])
+    told.append(tell_entries(knots["entries"].T, units[3]))
     exact = np.stack([events[name][part] for name, part in STATE])
     still = ~exact[8:].any(axis=0) & np.all(exact[2:5] == exact[5:8], axis=0)
     times, index = np.unique(np.append(knots["t"], events["t"]), return_inverse=True)
@@ -361,31 +347,31 @@ def pack(record: Record, tolerance: float) -> dict[str, NDArray[Any]]:
         "times": fold(times.view(np.int64)[None]),
         "when": fold(index[None, : len(knots)]),
         "whose": fold(np.stack([when, still, *(events[name] for name in WHOLE)])),
-        **writer.columns(),
     }
-    tracks = Tracks.of(packed, record.offsets)
+    later = iter(told)
+    tracks = Tracks.of(packed, record.offsets, lambda *_shape: next(later))
 
     def give(rows: slice, foretold: Floats) -> Floats:
-        told = rounded((exact[rows] - foretold) / tracks.steps[rows])
-        writer.write(told)
-        return np.asarray(foretold + tracks.steps[rows] * told)
+        told.append(rounded((exact[rows] - foretold) / tracks.steps[rows]))
+        return np.asarray(foretold + tracks.steps[rows] * told[-1])
 
     tracks.states(record.particle, give)
-    return packed | writer.columns()
+    return packed | write(told)
 
 
 def unpack(
     packed: dict[str, NDArray[Any]], offsets: Ints, particle: Particle
 ) -> dict[str, NDArray[Any]]:
     """Return the knots, angles and events that `pack` was given, within its tolerance."""
-    tracks = Tracks.of(packed, offsets)
+    reader = Reader(packed["sizes"], packed["bits"])
+    tracks = Tracks.of(packed, offsets, reader.read)
 
     def give(rows: slice, foretold: Floats) -> Floats:
-        told = tracks.reader.read(*foretold.shape)
+        told = reader.read(*foretold.shape)
         return np.asarray(foretold + tracks.steps[rows] * told)
 
     for (name, part), values in zip(STATE, tracks.states(particle, give), strict=True):
         tracks.events[name][part] = values
-    if len(tracks.reader.sizes) or len(tracks.reader.bits):
+    if len(reader.sizes) or len(reader.bits):
         raise ValueError("too many numbers")
     return {"knots": tracks.knots, "angle": tracks.angle, "events": tracks.events}

@@ -40,6 +40,7 @@ AUTO = {
     "vibrating-feeder": "contact",
     "see-saw": "contact",
     "arch": "contact",
+    "loop": "contact",
     "cradle": "contact",
     "domino-gate": "contact",
     "dominoes": "contact",

@@ -30,7 +30,7 @@ GROUPS = {
     "Bins, heaps, screens": ("hopper", "feeder", "silo", "heap", "mixture", "galton"),
     "Further machines": ("inclined-conveyor", "cascade", "free-fall"),
     "What moves": ("damper-plate", "see-saw", "flap-gate", "vibrating-feeder", "drum"),
-    "Toys": ("dominoes", "domino-gate", "cradle", "arch"),
+    "Toys": ("dominoes", "domino-gate", "cradle", "arch", "loop"),
 }
 """The scenes by what one comes for."""
 

@@ -202,6 +202,11 @@ def distance(one: Recording, other: Recording, unit: str = "relative") -> tuple[
     return apart(list(each(one)), list(each(other)), sizes(other), unit)
 
 
+def whole_distance(one: Recording, other: Recording) -> tuple[float, str]:
+    """Return what `apart` does, of what two runs are `together`: where they end, and the ledger."""
+    return apart(list(together(one)), list(together(other)), sizes(other), "relative")
+
+
 class LateError(RuntimeError):
     """An answer takes longer than it may."""
 

@@ -11,7 +11,7 @@
 - `sensors`: what passes lines across a stream; `loads`: what surfaces bear, in bins of time;
   `wear`: what strikes and rubs them, piece by piece; `fields`: a crowd as a continuum, on a grid.
 - `summary`: notes, tables, and the JSON object of ``chutelab run --json``.
-- `storage`: recordings as files.
+- `storage`: recordings as files; `packing`: those of large crowds.
 
 A `Recording` is a record with all that is read off it as its own properties and methods. The
 readers import `Record`, so that no circle of imports arises, and are imported when they are first

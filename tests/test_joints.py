@@ -466,9 +466,13 @@ def test_the_cradle_hands_on_a_blow_ten_times_nearer_than_its_scene_allows_pymun
 
 
 def test_what_no_engine_joins_is_refused_by_its_key():
-    hung = {"string": [{"from": [0.0, 0.0], "length": 0.1}]}
-    with pytest.raises(SceneError, match="a string is shorter"):
-        simulate(scene(1.0, at=(0.3, 0.0), **hung))
+    for short in (0.7, 1e-8):
+        hung = {"string": [{"from": [0.0, 0.0], "length": 0.3 * (1.0 - short)}]}
+        with pytest.raises(SceneError, match="a string is shorter"):
+            simulate(scene(1.0, at=(0.3, 0.0), **hung))
+    # Short by rounding of a length that was typed.
+    hung = {"string": [{"from": [0.0, 0.0], "length": 0.3 * (1.0 - 1e-10)}]}
+    assert not simulate(scene(0.01, at=(0.3, 0.0), **hung)).laws
     two = {"stream": {"count": 2, "at": [0.3, 0.0], "to": [0.6, 0.0]}}
     with pytest.raises(SceneError, match="do not meet"):
         simulate(scene(1.0, **two, string=[{"from": [0.0, 0.0]}]))

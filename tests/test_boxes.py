@@ -234,8 +234,9 @@ def drawn(seed):
         0: {"from": (-ends).tolist(), "to": ends.tolist()},
         1: {"from": [0.0, 0.0], "to": (9.0 * ends).tolist()},
         2: {"center": [0.0, -0.08], "radius": 0.08, "from_deg": 0.0, "to_deg": 180.0},
+        3: {"center": [0.0, -0.05], "radius": 0.05, "from_deg": 0.0, "to_deg": 360.0},
     }
-    surface = {"name": "board", **surfaces[int(random.integers(3))], **pair}
+    surface = {"name": "board", **surfaces[int(random.integers(4))], **pair}
     scene = {
         "particle": [kind, {"name": "ball", "radius": 0.012, "mass": 0.05}],
         "surface": [surface],

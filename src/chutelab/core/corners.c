@@ -51,6 +51,7 @@ static Shape shape_of(int j, double t) {
     /* What it does not have is not set. */
     Shape out;
     out.round = -1;
+    out.count = 0;
     out.s = 0;
     if (j < 0) {
         const Surface *s = out.s = surface_at(-1 - j, t);

@@ -33,6 +33,7 @@ from chutelab.pictures.animation import (
 from chutelab.pictures.animation.actors import SIGNS
 from chutelab.pictures.animation.moments import sentence, slowness, span
 from chutelab.pictures.plots import Window, style, window_of
+from chutelab.pictures.plots.scenery import paid_by
 from chutelab.results import Kind
 from chutelab.results.recorder import Recorder
 from handmade import (
@@ -862,3 +863,10 @@ def test_films_and_the_still_can_be_chosen(tmp_path):
     result = call(*short, "--out", str(out), *arguments)
     assert all(name in result.output.partition("wrote into")[2] for name in files)
     assert sorted(path.name for path in out.iterdir()) == files
+
+
+@pytest.mark.parametrize(
+    ("name", "by"), [("see-saw", "hinges"), ("damper-plate", "drives"), ("slip", "belt_work")]
+)
+def test_hinges_whose_energy_is_known_of_whole_runs_only_are_told_as_what_gives_it(name, by):
+    assert paid_by(simulate(name)) == by

@@ -53,6 +53,7 @@ static Shape shape_of(int j, double t) {
     out.round = -1;
     out.count = 0;
     out.s = 0;
+    out.count = 0;
     if (j < 0) {
         const Surface *s = out.s = surface_at(-1 - j, t);
         if (s->shape != CIRCLE) {
@@ -261,7 +262,8 @@ static int find_place(const Shape *a, const Shape *b, double near, Touch *t) {
     const double *q = b->p[m];
     double best = INFINITY;
     if (m != b->round) {
-        t->on = edge_under(a, b, q, near);
+        /* An end that sinks in goes back the shortest way: the surface may be anywhere else. */
+        t->on = b->s ? furthest(a, q, &off) : edge_under(a, b, q, near);
         double length = out_of(a, t->on, n), along = n[0] * (q[1] - a->p[t->on][1]) - n[1] * (q[0] - a->p[t->on][0]);
         fill_in(a, b, t);
         return along >= 0 && along <= length && !(b->s && mate_of(b->s, m) >= 0);
@@ -492,6 +494,8 @@ double meet_corners(int i, int j, double from, double until, double soft) {
             Touch now = {.which = c};
             if (on_segment && c < a.count) now.on = sides[c];
             double before = gap[c];
+            /* It may have been moved on to another's root. */
+            if (j < 0) b2.s = surface_at(-1 - j, t);
             gap[c] = gap_at(&a2, &b2, near, &now);
             if (!(before > 0 && gap[c] <= 0)) continue;
             double then = root_of(i, j, &now, last, t, before, gap[c]);

@@ -30,17 +30,24 @@ static int cell_at(double x) {
     return n < -1e9 ? -1000000000 : n > 1e9 ? 1000000000 : (int)n;
 }
 
-static void enter(int i) {
+/* The first and last columns and rows of a box, and how many cells it has. */
+typedef struct { int x0, x1, y0, y1; double cells; } Span;
+
+static Span span_of(const double *box) {
+    Span s = {cell_at(box[0]), cell_at(box[2]), cell_at(box[1]), cell_at(box[3]), 0};
+    s.cells = ((double)s.x1 - s.x0 + 1) * ((double)s.y1 - s.y0 + 1);
+    return s;
+}
+
+static void enter(int i, Span s) {
     Disk *d = W.disks + i;
-    int x0 = cell_at(d->left), x1 = cell_at(d->right), y0 = cell_at(d->bottom), y1 = cell_at(d->top);
-    double cells = ((double)x1 - x0 + 1) * ((double)y1 - y0 + 1);
-    if (cells > MOST_CELLS || W.cell_count + cells > W.cell_room) {
+    if (s.cells > MOST_CELLS || W.cell_count + s.cells > W.cell_room) {
         if (!d->wide) W.found[2 * W.disk_count - ++W.wide_count] = i;
         d->wide = 1;
         return;
     }
-    for (int ix = x0; ix <= x1; ix++)
-        for (int iy = y0; iy <= y1; iy++) {
+    for (int ix = s.x0; ix <= s.x1; ix++)
+        for (int iy = s.y0; iy <= s.y1; iy++) {
             int b = bucket(ix, iy);
             Cell *c = W.cells + W.cell_count;
             c->disk = i; c->ix = ix; c->iy = iy; c->next = W.heads[b];
@@ -58,18 +65,17 @@ static int overlaps(const Disk *a, const double *box) {
     return a->left < box[2] && a->right > box[0] && a->bottom < box[3] && a->top > box[1];
 }
 
-/* Put the disks whose boxes overlap a box into `W.found`; return how many. */
-static int query(int i, const double *box) {
-    int x0 = cell_at(box[0]), x1 = cell_at(box[2]), y0 = cell_at(box[1]), y1 = cell_at(box[3]), n = 0;
-    int stamp = ++W.stamp;
+/* Put the disks whose boxes overlap a box, which spans these cells, into `W.found`; return how many. */
+static int query(int i, const double *box, Span s) {
+    int n = 0, stamp = ++W.stamp;
     W.disks[i].mark = stamp;
-    if (((double)x1 - x0 + 1) * ((double)y1 - y0 + 1) > MOST_CELLS) {
+    if (s.cells > MOST_CELLS) {
         for (int j = W.low; j < W.high; j++)
             if (j != i && is_live(W.disks + j) && overlaps(W.disks + j, box)) W.found[n++] = j;
         return n;
     }
-    for (int ix = x0; ix <= x1; ix++)
-        for (int iy = y0; iy <= y1; iy++)
+    for (int ix = s.x0; ix <= s.x1; ix++)
+        for (int iy = s.y0; iy <= s.y1; iy++)
             for (int c = W.heads[bucket(ix, iy)]; c >= 0; c = W.cells[c].next) {
                 int j = W.cells[c].disk;
                 Disk *o = W.disks + j;
@@ -107,18 +113,19 @@ int list_near(double end) {
     memset(W.heads, 0xff, (unsigned long)W.bucket_count * sizeof(int));
     /* What follows a prescribed path meets free disks only: it is entered first, and asks for no others. */
     for (int i = W.low; i < W.high; i++)
-        if (is_live(W.disks + i) && W.disks[i].mode != FREE) enter(i);
+        if (is_live(W.disks + i) && W.disks[i].mode != FREE) enter(i, span_of(&W.disks[i].left));
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
-        int n = query(i, &d->left);
+        Span span = span_of(&d->left);
+        int n = query(i, &d->left, span);
         for (int k = 0; k < n; k++) {
             if (!meet(i, W.found[k])) continue;
             if (W.near_count >= W.near_room) return 0;
             W.near[2 * W.near_count] = W.found[k];
             W.near[2 * W.near_count++ + 1] = i;
         }
-        enter(i);
+        enter(i, span);
     }
     return 1;
 }
@@ -133,13 +140,13 @@ int enter_again(int i, double end) {
     d->bottom = MIN(d->bottom, box[1]);
     d->right = MAX(d->right, box[2]);
     d->top = MAX(d->top, box[3]);
-    if (W.interact) enter(i);
+    if (W.interact) enter(i, span_of(&d->left));
     return 1;
 }
 
 /* Put the disks that disk i may meet in what is left of the step into `W.found`. */
 int reachable(int i) {
-    int n = W.interact ? query(i, &W.disks[i].left) : 0, kept = 0;
+    int n = W.interact ? query(i, &W.disks[i].left, span_of(&W.disks[i].left)) : 0, kept = 0;
     if (!W.passes) return n;
     for (int k = 0; k < n; k++)
         if (meet(i, W.found[k])) W.found[kept++] = W.found[k];
@@ -182,7 +189,7 @@ int place_is_free(int i, double x, double y, double t) {
         if (gap < -TOUCHING * r) return 0;
     }
     if (!W.interact) return 1;
-    int n = query(i, box);
+    int n = query(i, box, span_of(box));
     for (int k = 0; k < n; k++) {
         if (is_cornered(i, W.found[k])) {
             if (meet(i, W.found[k]) && would_overlap(i, x, y, W.found[k], t, TOUCHING * r)) return 0;

@@ -75,7 +75,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius, int sun
     } else if (surface >= 0 && (W.interact || d->held_count))
         sunk = gap_to(surface_at(surface, d->t), d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius;
     if (sunk) least *= HARDLY;
-    for (int n = 0; n < d->held_count && !has_corners(d); n++) {
+    for (int n = 0; n < d->held_count && surface >= 0 && !has_corners(d); n++) {
         if (sunk || !is_one(d, d->held[n], surface)) continue;
         double haste = hastes(surface_at(surface, d->t), d);
         least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface) + haste) * W.step);
@@ -111,10 +111,10 @@ static void foresee_pair(int i, int j, double *due, int *partner) {
     double y = a->y + (a->vy + 0.5 * W.gy * ta) * ta - b->y - (b->vy + 0.5 * W.gy * tb) * tb;
     double u = a->vx + W.gx * ta - b->vx - W.gx * tb, v = a->vy + W.gy * ta - b->vy - W.gy * tb;
     double small = MIN(a->radius, b->radius), reach = a->radius + b->radius;
-    int sunk = x * x + y * y < square(reach - SUNK * small);
     double t = W.now + meet_disk(x, y, u, v, reach, W.step_end - W.now, &approach);
-    double least = left_over(a, MAX(a->impacts, b->impacts), -1, small, sunk);
-    if (t < *due && t < W.step_end && approach > least) {
+    if (!(t < *due && t < W.step_end)) return;
+    int sunk = x * x + y * y < square(reach - SUNK * small);
+    if (approach > left_over(a, MAX(a->impacts, b->impacts), -1, small, sunk)) {
         *due = t;
         *partner = j;
     }

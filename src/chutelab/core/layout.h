@@ -405,6 +405,7 @@ typedef struct {
     int full;            /* what `run` makes room for as it goes on: see `Full` */
     int bucket_count;    /* a power of two */
     int gate_count, end_count, circle_count;
+    int smallest;        /* disk of the least radius in this part of the run */
     /* the run */
     int interact;        /* disks meet each other */
     int is_whole;        /* [in] all knots and events are still there: the host took none */

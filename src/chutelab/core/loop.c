@@ -278,6 +278,7 @@ static int has_settled(void) {
 /* Tell which surfaces are there; what sleeps wakes when one comes or goes. Next change, s. */
 static double set_gates(double t) {
     W.looked = t;
+    if (!W.gate_count && !W.mover_count && W.step_count > 0) return INFINITY;
     int stirred = stir(t) && W.step_count > 0;
     for (int i = W.low; i < W.high && stirred; i++)
         if (W.disks[i].mode == ASLEEP) wake(i, W.t);
@@ -401,10 +402,11 @@ static int begin_step(void) {
     if (W.total_count >= W.total_room) return FULL_TOTALS;
     if (W.hinges && W.swing_count + 4 * W.mover_count > W.swing_room) return FULL_SWINGS;
     double next = set_gates(W.t), h = W.dt, stride = 0;
-    for (int i = W.low; i < W.high; i++) {
+    h = MIN(h, hop_time(W.disks + W.smallest, W.g + W.haste));
+    for (int i = W.low; i < W.high && W.outline_count; i++) {
         const Disk *d = W.disks + i;
         double press = W.g + W.haste + (has_corners(d) && d->mode == FREE ? whirl_of(d) : 0);
-        if (press > 0) h = MIN(h, hop_time(d, press));
+        h = MIN(h, hop_time(d, press));
     }
     if (!W.interact && W.disks[W.low].mode == FREE) h = hollow_step(W.disks + W.low, h);
     if (W.hinges) h = hinge_step(h);
@@ -639,8 +641,10 @@ static int begin_part(void) {
     W.high = W.interact ? W.disk_count : W.low + 1;
     W.contact_count = W.earlier_count = 0;
     W.t = W.disks[W.low].release;
+    W.smallest = W.low;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
+        if (d->radius < W.disks[W.smallest].radius) W.smallest = i;
         d->left = d->bottom = INFINITY;
         d->right = d->top = -INFINITY;
         d->before = d->links = -1;

@@ -283,7 +283,7 @@ int find_contacts(double h, int *woke) {
             int k = list[n];
             if (!is_near(W.surfaces + k, d)) continue;
             double inside = pressed_inside(d, k), most = MAX(bound, inside ? W.soft + 2 * h * inside : 0);
-            if (d->supports) most += 2 * h * hastes(surface_at(k, d->t), d);
+            if (d->supports && W.stirs) most += 2 * h * hastes(surface_at(k, d->t), d);
             if (has_corners(d)) most = MAX(most, left_over(d, d->impacts, k, d->radius, 0));
             if (has_corners(d) ? !add_places(i, -1 - k, most, h) : !add(i, -1 - k, d->radius, most, h, 0)) return 0;
         }

@@ -270,7 +270,8 @@ def uncornered(machine: Machine) -> Iterator[tuple[str, object, str]]:
         yield "incoming.friction", belt.friction, f"a Coulomb coefficient with {why}"
     for n, pair in enumerate(scene.pair):
         if pull := pair.clings:
-            yield f"pair[{n}].{pull}", getattr(pair, pull), "0 with boxes and polygons"
+            allowed = "0 with boxes and polygons: it pulls at the one point where round ones touch"
+            yield f"pair[{n}].{pull}", getattr(pair, pull), allowed
 
 
 def unjoined(machine: Machine) -> str:

@@ -247,10 +247,12 @@ def _lay_out(module: core.Module, recording: Record) -> None:
     bodies = np.empty(count, core.dtype("Body"))
     bodies["radius"], bodies["mass"] = inner_radius(machine), machine.particle.mass
     bodies["inertia"], bodies["gravity"] = machine.particle.inertia, machine.gravity
-    outlines = [np.empty((0, 2)) if one is None else one for one in machine.outlines]
-    sizes = np.array([len(one) for one in outlines])
-    bodies["corners"] = sizes[machine.releases.kind]
-    bodies["outline"] = (np.cumsum(sizes) - sizes)[machine.releases.kind]
+    bodies["corners"], outlines = 0, np.empty((0, 2))
+    if not _round(machine):
+        every = [np.empty((0, 2)) if one is None else one for one in machine.outlines]
+        sizes, outlines = np.array([len(one) for one in every]), np.concatenate(every)
+        bodies["corners"] = sizes[machine.releases.kind]
+        bodies["outline"] = (np.cumsum(sizes) - sizes)[machine.releases.kind]
     rows = barriers(machine)
     books = recording.by_surface.reshape(-1)
     events = recording.events.view(_NUMBERS)
@@ -269,7 +271,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         ("tilt", machine.tilt), ("dt", 0.0 if exact else machine.dt),
         ("mover_count", len(machine.movers)), ("swing_count", len(recording.swings)),
         ("gained", recording.gained), ("unsolved", recording.unsolved.max(initial=0.0)),
-        ("largest", np.max(machine.particle.radius)), ("outline_count", int(sizes.sum())),
+        ("largest", np.max(machine.particle.radius)), ("outline_count", len(outlines)),
     ):  # fmt: skip
         setattr(laws, name, value)
     module.work("lay_out_laws")
@@ -282,8 +284,7 @@ def _lay_out(module: core.Module, recording: Record) -> None:
         "Laws", knots=recording.knots, offsets=recording.offsets.astype(INTEGER), bodies=bodies,
         barriers=rows.reshape(-1), books=books,
         **({"swings": recording.swings} if len(recording.swings) else {}),
-        **({} if _round(machine) else {
-            "angles": recording.angle, "outlines": np.concatenate(outlines).ravel()}),
+        **({"angles": recording.angle, "outlines": outlines.ravel()} if len(outlines) else {}),
     )  # fmt: skip
 
 

@@ -50,6 +50,7 @@ from chutelab.pictures.plots.scenery import (
     energies,
     nominal,
     one_of_many,
+    paid_by,
     round_step,
     strobe_step,
     track_times,
@@ -238,7 +239,7 @@ class Stage:
             axes = self.figure.add_axes((0.765, 0.43, 0.225, top - 0.43))
             table = self.figure.add_axes((0.73, 0.125, 0.26, 0.245))
             blocks, column = bars(
-                axes, table, energies(recording, times), moves=bool(recording.machine.movers)
+                axes, table, energies(recording, times), drives=paid_by(recording)
             )
             self.moving += blocks
             self.writings += column

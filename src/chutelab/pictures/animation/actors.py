@@ -332,12 +332,12 @@ def stacks(balance: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Flo
 
 
 def bars(
-    ax: Axes, table: Axes, balance: dict[str, Floats], *, moves: bool = False
+    ax: Axes, table: Axes, balance: dict[str, Floats], *, drives: str = "belt_work"
 ) -> tuple[list[Moving], list[Writing]]:
     """Return the blocks of two stacked bars on `ax`, and a column of figures on `table`.
 
-    The ledger is as for `stacks`; the highest bar sets the scale. Where a surface `moves`, what
-    belts and drives do is one block.
+    The ledger is as for `stacks`; the highest bar sets the scale. What belts,
+    drives and hinges do is one block, called as `drives` says.
     """
     sides = stacks(balance)
     highest = float(np.max(sum(sides[0].values())))
@@ -367,7 +367,7 @@ def bars(
         shown = [round(factor * value, 1) + 0.0 for value in balance[name].tolist()]
         if name == "residual" and not any(shown):
             continue
-        told = "drives" if moves and name == "belt_work" else name
+        told = drives if name == "belt_work" else name
         said = [figures(value, ".1f") for value in shown]
         table.add_patch(Rectangle((0.0, row + 0.2), 0.05, 0.6, color=style.ENERGY[name]))
         table.text(0.08, row + BASE, say(f"ledger-{told}"), fontsize=style.SMALL)

@@ -23,6 +23,7 @@ from chutelab.pictures.plots.scenery import (
     energies,
     flow,
     nominal,
+    paid_by,
     path_of,
     strobe_step,
     strobe_times,
@@ -297,7 +298,7 @@ def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes
     (line,) = ax.plot(times, factor * supplied, color=style.INK, lw=1.6, gid="supplied")
     line.set(
         linestyle=(0, (4, 1.5)),
-        label=say("supplied-drives" if recording.machine.movers else "supplied"),
+        label=say("supplied" if (by := paid_by(recording)) == "belt_work" else f"supplied-{by}"),
     )
     residual = float(balance["residual"][-1])
     title = say("ledger")

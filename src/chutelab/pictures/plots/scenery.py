@@ -192,9 +192,7 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     balance["potential"] = np.maximum(lifted, 0.0)
     balance["start"] = at_release[released] - weight * zero
     hinges = [one.hinge for one in recording.machine.movers if one.hinge]
-    # What stops take, and motors and hands give, is known of whole runs only.
-    whole = (one.steered or one.motor[1] or np.isfinite(one.stops).any() for one in hinges)
-    if hinges and not any(whole):
+    if hinges and paid_by(recording) == "drives":
         balance |= {"spring": np.zeros_like(times), "damper_loss": np.zeros_like(times)}
         for one in hinges:
             _hang(balance, one, recording, times)
@@ -280,6 +278,18 @@ def drawn_tracks(recording: Recording) -> Ints:
     """Return the particles whose tracks are drawn; particle 0 is the first."""
     chosen = spread(recording.count, FEW_TRACKS if one_of_many(recording) else STREAM_TRACKS)
     return chosen[recording.released[chosen]]
+
+
+def paid_by(recording: Recording) -> str:
+    """Return what gives the energy that pictures show: "belt_work", "drives", or "hinges", too.
+
+    What stops take, and motors and hands give, is known of whole runs only: there it is what hangs
+    on a hinge that gives energy, or takes it, and has none of its own.
+    """
+    hinges = [one.hinge for one in recording.machine.movers if one.hinge]
+    if any(one.steered or one.motor[1] or np.isfinite(one.stops).any() for one in hinges):
+        return "hinges"
+    return "drives" if recording.machine.movers else "belt_work"
 
 
 POSES = 61

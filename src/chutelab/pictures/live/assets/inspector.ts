@@ -35,6 +35,8 @@ class Fields {
   home = html("div", { class: "fields" });
   entries: Map<string, Entry> = new Map();
   built = "";
+  /** The rest of what is shown: that of the next thing is open where this is. */
+  more = html("details", {});
 
   /** @param sliders whether numbers have one, too
    * @param owned whether it is told whose they are */
@@ -65,13 +67,10 @@ class Fields {
     const more = html("details", { class: "more" },
       html("summary", {}, html("span", {}, words.say("more-keys", { keys: named })), icon("down")),
       ...rest);
-    more.open = this.isOpen;
-    more.addEventListener("toggle", () => { this.isOpen = more.open; });
+    more.open = this.more.open;
+    this.more = more;
     home.append(more);
   }
-
-  /** Whether the rest is shown, of one thing after the other. */
-  isOpen = false;
 
   row(field: Field): any {
     const { key, table, owner, name, part, of, unit, low, high, choices, form } = field;

@@ -371,7 +371,7 @@ def poured(count, until):
 
 
 @pytest.mark.parametrize(
-    ("count", "until"), [(25, 0.8), pytest.param(300, 1.2, marks=pytest.mark.slow)]
+    ("count", "until"), [(25, 0.8), pytest.param(300, 2.0, marks=pytest.mark.slow)]
 )
 def test_poured_boxes_get_into_each_other_and_into_walls_as_little_as_disks_do(count, until):
     """Half a percent of the radius inside, 99 of 100; one and a half at most.

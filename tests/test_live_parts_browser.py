@@ -19,9 +19,9 @@ from shared import call
 
 expect = pytest.importorskip("playwright.sync_api").expect
 
-# Of a run that is over: knots of each track, as Python has them.
+# Of a run that is over: knots of each track as Python has them, states and entries.
 TRACKS = """chutelab.lab.recording.tracks.map(({ rows, count }) =>
-  Array.from({ length: count }, (_, n) => Array.from(rows.slice(11 * n, 11 * n + 5))))"""
+  Array.from({ length: count }, (_, n) => Array.from(rows.slice(11 * n, 11 * n + 9))))"""
 
 # One whose particles meet runs as far as it is asked to.
 WHOLE = """() => new Promise((resolve) => {
@@ -53,6 +53,13 @@ def given(page):
     return page.evaluate("chutelab.lab.given")
 
 
+def shown_keys(page):
+    """Return the keys that have a field in the card of what is chosen."""
+    found = "[...document.querySelectorAll('#chosen .entry [id^=field-]')].map((e) => e.id)"
+    ids = (one.removesuffix(".touched") for one in page.evaluate(found))
+    return {one.rpartition(".")[2].split("[")[0] for one in ids}
+
+
 def same_bits(page, folder, until=1.5):
     """Save the scene, run the file in Python, and compare all knots with the page's."""
     page.evaluate(f"chutelab.lab.change({{ 'run.until': {until} }})")
@@ -67,12 +74,12 @@ def same_bits(page, folder, until=1.5):
     job = engine.Job(module.Module(), build(load(file)))
     assert job.run(None) is None
     job.drain()
-    knots = np.concatenate(job.knots)
-    ours = knots.view("<f8").reshape(-1, 11)[:, :5]
+    owners, knots, _ = map(np.concatenate, zip(*job.knots, strict=True))
+    ours = knots.view("<f8").reshape(-1, 9)
     its = page.evaluate(TRACKS)
     for particle, track in enumerate(its):
-        found = np.array(track).reshape(-1, 5)
-        assert np.array_equal(found, ours[knots["disk"] == particle])
+        found = np.array(track).reshape(-1, 9)
+        assert np.array_equal(found, ours[owners == particle])
     return sum(map(len, its))
 
 
@@ -136,12 +143,7 @@ def test_everything_that_a_part_can_say_has_a_field_and_is_saved(empty, tmp_path
     keys = {}
     for name in ["incoming", *(f"{one}1" for one in names)]:
         page.evaluate(f"chutelab.bench.inspector.choose('{name}')")
-        keys[name] = {
-            id_.removesuffix(".touched").rpartition(".")[2].split("[")[0]
-            for id_ in page.evaluate(
-                "[...document.querySelectorAll('#chosen .entry [id^=field-]')].map((e) => e.id)"
-            )
-        }
+        keys[name] = shown_keys(page)
     tables = {name: set(rules) for name, rules in describe(None)["tables"].items()}
     arc = {"center", "radius", "from_deg", "to_deg"}
     moves = {*MOTIONS, *HINGED, "starts_when"}
@@ -152,9 +154,11 @@ def test_everything_that_a_part_can_say_has_a_field_and_is_saved(empty, tmp_path
     assert keys["plate1"] == tables["plate"] - moves - {"distance", "pivot_height"} | {"motion"}
     assert keys["line1"] == keys["gate1"] == straight
     assert keys["arc1"] == keys["pegs1"] == bent
-    # It has a line already, on which it is released: no box, and no height of a bed.
+    # It has a line already, on which it is released: no box, and no height of a bed. What is round
+    # begins at no angle.
     grain = tables["particle"] - {"mass", "size", "points"}
-    assert keys["stream1"] == (tables["stream"] | grain) - {"bed_height", "particle"}
+    lacks = {"particle", "angle_deg", "bed_height"}
+    assert keys["stream1"] == (tables["stream"] | grain) - lacks
     page.evaluate("chutelab.bench.inspector.choose('line1')")
     page.locator("#chosen .more summary").click()
 
@@ -764,6 +768,12 @@ def test_dominoes_run_whole_and_a_box_is_made_turned_caught_and_saved(shown, tmp
     page.focus("#part-box")
     page.keyboard.press("Enter")
     expect(page.locator("#chosen h2")).to_have_text("Box 1")
+    # One has no rate, width or spread, and what has corners is no disk that rolls.
+    tables = describe(None)["tables"]
+    single = {"rate", "width", "bed_height", "speed_spread", "seed"}
+    cornered = {"shape", "radius", "points", "density", "rolling_friction"}
+    every = {*tables["stream"], *tables["particle"]}
+    assert shown_keys(page) == every - single - cornered
     box = given(page)["stream"][-1]
     # Those under way go on as they lie.
     assert page.evaluate(WHOLE) == "done"
@@ -782,11 +792,14 @@ def test_dominoes_run_whole_and_a_box_is_made_turned_caught_and_saved(shown, tmp
     assert same_bits(page, tmp_path, 0.9) > 100
 
 
+ROLLS = ["--set", "particle.domino.rolling_friction=0.1"]
+"""With this boxes are left out of a page: what has corners does not roll."""
+
+
 def test_what_is_left_of_a_scene_without_its_boxes_runs(opened, tmp_path):
     """That particles meet stands in the scene at the dominoes."""
     path = tmp_path / "gate.html"
-    air = ["--set", "air_density=1.2"]
-    call("live", "domino-gate", *air, "-o", str(path))
+    call("live", "domino-gate", *ROLLS, "-o", str(path))
     page = opened(path)
     page.evaluate(DONE)
     expect(page.locator("#fault")).to_be_hidden()
@@ -795,8 +808,7 @@ def test_what_is_left_of_a_scene_without_its_boxes_runs(opened, tmp_path):
 
 def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_path):
     path = tmp_path / "dominoes.html"
-    air = ["--set", "air_density=1.2"]
-    call("live", "dominoes", *air, "-o", str(path))
+    call("live", "dominoes", *ROLLS, "-o", str(path))
     page = opened(path)
     page.evaluate(DONE)
     said = page.inner_text("#lacks")

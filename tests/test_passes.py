@@ -209,6 +209,8 @@ def test_random_machines_go_alike_in_both_engines(seed):
     scene = drawn(seed)
     for table in ("string", "rod", "spring", "pin"):
         scene.pop(table, None)
+    if "points" in scene["surface"][0]:
+        pytest.skip("a polygon goes there and back: no way is through all of it")
     scene["surface"][0]["passes"] = ("up", "down")[seed % 2]
     if seed % 4 > 1:
         x, y = scene["stream"]["at"]

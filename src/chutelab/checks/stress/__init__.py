@@ -40,7 +40,7 @@ from chutelab.checks.stress.barriers import (
     worst,
 )
 from chutelab.machine import Segments
-from chutelab.results.ledger import ledger
+from chutelab.results.ledger import energy_at, ledger
 from chutelab.scene import Fault, Scene, SceneError
 
 __all__ = ["A_CONTACT", "EPS", "LAWS", "ROUNDINGS", "Evidence", "Verdict", "judge", "need_judged"]
@@ -122,7 +122,7 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
         times = times[np.abs(share - np.rint(share)) < 1e-6]
     if len(times) > BALANCES:
         times = times[np.linspace(0, len(times) - 1, BALANCES).astype(int)]
-    balance = e.recording.energy_at(times)
+    balance = energy_at(e.recording, times)
     first, _ = e.recording.ends()
     index = np.flatnonzero(e.recording.released)
     brought = np.sum(e.recording.energies(first, index), axis=0)

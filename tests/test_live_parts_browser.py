@@ -843,7 +843,7 @@ def test_a_scene_that_is_not_shown_whole_says_so_and_opens_the_rest(opened, tmp_
 )
 def test_the_empty_page_and_the_card_are_accessible_and_fingers_hit(empty, size, scheme, touch):
     viewport = {"width": size[0], "height": size[1]}
-    page = empty(viewport=viewport, color_scheme=scheme, has_touch=touch, is_mobile=touch)
+    page = empty("de", viewport=viewport, color_scheme=scheme, has_touch=touch, is_mobile=touch)
     assert axe(page) == []
     page.click("#begin")
     page.evaluate(DONE)
@@ -861,3 +861,14 @@ def test_the_empty_page_and_the_card_are_accessible_and_fingers_hit(empty, size,
       .map((e) => e.getBoundingClientRect().width)""")
     assert len(sizes) > 2
     assert min(sizes) >= least
+    # Of words, however long, no field is pushed out of the card.
+    page.evaluate("chutelab.lab.change({ 'stream.at': [0, 1], 'stream.velocity': [0, 0] })")
+    page.evaluate("chutelab.bench.inspector.choose('stream')")
+    page.locator("#chosen .more summary").click()
+    expect(page.locator("[id^=field-own-stream][id*=velocity]")).to_have_count(2)
+    room = page.evaluate("""() => {
+      const right = (e) => e.getBoundingClientRect().right;
+      const fields = [...document.querySelectorAll("#chosen .entry > *")].map(right);
+      return right(document.getElementById("chosen")) - Math.max(...fields);
+    }""")
+    assert room >= 8.0

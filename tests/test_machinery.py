@@ -89,7 +89,7 @@ def test_thickness_is_drawn_where_no_particle_comes(name):
 
 
 def struck(ax):
-    """Names with a line of the machine in their box: a surface, a strand of a belt, a wheel."""
+    """Names with a line of the machine in their box: a surface, a strand, a wheel, an arrow."""
     lines = [
         Path(ax.transData.transform(one.get_xydata()))
         for one in ax.lines if str(one.get_gid()).startswith(("surface ", "last "))
@@ -97,6 +97,9 @@ def struck(ax):
     for body in (one for one in ax.patches if one.get_zorder() < 2.0):
         outline = body.get_path().transformed(body.get_patch_transform() + ax.transData)
         lines += [Path(corners) for corners in outline.to_polygons()]
+    for arrow in (one for one in ax.texts if str(one.get_gid()).startswith("passage ")):
+        tip = ax.transData.transform(arrow.xy)
+        lines.append(Path([tip, tip + np.array(arrow.xyann) * ax.figure.dpi / 72.0]))
     boxes = {text.get_text(): text.get_window_extent() for text in ax.texts if text.get_text()}
     return {name for name, box in boxes.items() for one in lines if one.intersects_bbox(box, False)}
 

@@ -186,9 +186,10 @@ def _with_base(
     if allowed is not None or name not in ORDERS:
         what = "largest relative difference" if isfinite(error) else f"they differ in {which}"
         return Agreement(pair, what, error if isfinite(error) else None, allowed)
-    found = _order(scene, name, recording, base, max_seconds, distance)
+    runs = {scene.run.dt: recording}
+    found = _order(scene, name, runs, base, max_seconds, distance)
     if wide and isinstance(found, tuple) and not found[1] >= ORDERS[name] - CHANCE[name]:
-        found = _order(scene, name, recording, base, max_seconds, whole_distance)
+        found = _order(scene, name, runs, base, max_seconds, whole_distance)
     if isinstance(found, str):
         return Agreement(pair, found)
     seen = ", ".join(f"{error:.0e}" for error in found[0])
@@ -196,10 +197,14 @@ def _with_base(
 
 
 def _order(
-    scene: Scene, name: str, recording: Recording, base: Recording, max_seconds: float,
+    scene: Scene, name: str, runs: dict[float, Recording], base: Recording, max_seconds: float,
     off: Callable[[Recording, Recording], tuple[float, str]],
 ) -> tuple[list[float], float] | str:  # fmt: skip
-    """Return the errors of an engine at its steps and their order; or why there is none."""
+    """Return the errors of an engine at its steps and their order; or why there is none.
+
+    `runs`, by step, are taken where they are there, and added to. An error that is not finite ends
+    the search: its order is NaN, and those of longer steps are not looked for.
+    """
     ratio, least = REFINED[name][1], ORDERS[name] - CHANCE[name]
     errors, found = [0.0 for _ in REFINED[name]], nan
     # The longest steps last: as soon as one of their errors shows the order, larger ones show more.
@@ -210,14 +215,13 @@ def _order(
                 break
             finer = scene.with_values({"run.dt": step, "expect": None})
             try:
-                run = (
-                    recording
-                    if step == scene.run.dt
-                    else answer(finer, name, max_seconds=max_seconds)
-                )
+                if step not in runs:
+                    runs[step] = answer(finer, name, max_seconds=max_seconds)
             except UNABLE as why:
                 return f"no order, with steps of {step:.2g} s: {because(why)}"
-            errors[level] = max(errors[level], off(run, base)[0])
+            errors[level] = max(errors[level], off(runs[step], base)[0])
+            if not isfinite(errors[level]):
+                return errors[level:], nan
             if not level:
                 found = order(errors, ratio, BLOWS[name])
     return errors, found

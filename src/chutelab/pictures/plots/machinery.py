@@ -228,12 +228,10 @@ def draw_scene(
             look |= {"ls": (0, (2.2, 1.1)), "color": style.tint(colour_of(machine, piece), 0.5)}
         draw_piece(ax, machine, piece, **look)
         if piece.one_sided and not small:
-            # An arrow in the way in which it lets through.
-            middle = piece.at(0.5 * piece.way)
-            x, y = -PASSAGE * piece.one_sided * piece.normal(middle)
             arrow = {"arrowstyle": "->", "color": style.STRIKE, "shrinkA": 0.0, "shrinkB": 0.0}
+            middle, tail = _passage(piece)
             ax.annotate(
-                "", middle.tolist(), (x, y), textcoords="offset points", arrowprops=arrow,
+                "", middle.tolist(), tail.tolist(), textcoords="offset points", arrowprops=arrow,
                 gid=f"passage {machine.surfaces[piece.surface]}",
             )  # fmt: skip
         driven = piece.whole and piece.speed != 0.0
@@ -247,6 +245,12 @@ def draw_scene(
             names.lines.append((Path(ax.transData.transform(clear)), False))
         names.write()
     return ax
+
+
+def _passage(piece: Pieces) -> tuple[Floats, Floats]:
+    """Return the arrow of the way in which a piece lets through: tip (m), tail from there (pt)."""
+    middle = piece.at(0.5 * piece.way)
+    return middle, -PASSAGE * piece.one_sided * piece.normal(middle)
 
 
 def draw_last(ax: Axes, machine: Machine, t: float) -> Axes:
@@ -315,6 +319,10 @@ class _Names:
             if piece.gate:
                 below = piece.at(0.5 * piece.way) + fall
                 self.lines.append((Path(ax.transData.transform(below)), False))
+            if piece.one_sided:
+                middle, tail = _passage(piece)
+                tip = ax.transData.transform(middle)
+                self.lines.append((Path([tip, tip + tail * ax.figure.dpi / 72.0]), False))
         self.starts = ax.transData.transform(machine.releases.position)
         self.taken: list[Bbox] = []
 

@@ -628,7 +628,8 @@ RARELY int list_struck(int i, int j, double t, Contact *list) {
 /* Bring what lasts from its hop to its smooth path before a blow: else the hop's velocity, of first order in the step,
    would enter that. Of the impulses of the step what is not due yet is taken back, or what is due is given: once a
    step, since that is over soon. Not in a crowd, which is not solved anew at each blow, nor with contacts on what
-   moves, which presses as hard as it must, or that took a blow as the step began. */
+   moves, which presses as hard as it must, or that took a blow as the step began, nor with what has joints, whose pull
+   is the same all through the step. */
 static void end_hops(int i, double t) {
     const Contact *first = 0, *end = W.contacts + W.contact_count;
     int count = 0, many = 0, stamp = W.step_count + 1;
@@ -642,7 +643,8 @@ static void end_hops(int i, double t) {
         double u[3], whirl = whirl_of(W.disks + c->i) + (c->j < 0 ? 0 : whirl_of(W.disks + c->j));
         relative(c, 1, u);
         int is_blow = u[0] < -W.soft - 2 * whirl * W.step, moves = c->j < 0 && stirs(W.surfaces + (-1 - c->j));
-        count += is_blow || moves ? FEW_CONTACTS + 1 : 1;
+        int tied = is_tied(c->i) || is_tied(c->j);
+        count += is_blow || moves || tied ? FEW_CONTACTS + 1 : 1;
     }
     if (count > FEW_CONTACTS) return;
     for (const Contact *c = first; c < first + count; c++) {

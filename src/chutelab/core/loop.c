@@ -541,7 +541,8 @@ static int go_through(void) {
             continue;
         }
         W.now = t;
-        if (j != ALARM && (is_tied(i) || is_tied(j))) {
+        /* A blow as the step begins may go on to what is tied. */
+        if (j != ALARM && (is_tied(i) || is_tied(j) || (W.joint_count && t <= W.t))) {
             if ((W.stalled = meet_tied(i, j, t)) < 0) continue;
             return STALLED;
         }

@@ -9,6 +9,7 @@ import pytest
 
 import chutelab
 from chutelab.results import Recording
+from chutelab.results.recorder import StalledError
 from chutelab.scene import SceneError
 from chutelab.util.errors import InputError
 
@@ -288,3 +289,12 @@ def test_the_example_of_the_docs_lands_particles_at_the_mark():
     assert abs(places[0] - 0.4) > 0.1
     assert places[-10:] == pytest.approx(0.4, abs=2e-5)
     closes(found["run"].recording)
+
+
+def test_what_becomes_too_fast_for_any_step_is_told():
+    """A stone that turns so fast passes all others in less than a rounding of the time."""
+    run = chutelab.start("arch")
+    run.step(0.01)
+    run._disks["spin"][1] = 1e22
+    with pytest.raises(StalledError, match=r"particle 1 .*too fast for any step"):
+        run.step(0.01)

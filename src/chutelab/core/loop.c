@@ -691,6 +691,21 @@ static int begin_alone(void) {
     return 1;
 }
 
+/* The fastest of all, once no step is short enough for it; else -1. */
+static int too_fast(void) {
+    int found = W.low;
+    double most = 0;
+    if (W.t + W.step > W.t) return -1;
+    for (int i = W.low; i < W.high; i++) {
+        const Disk *d = W.disks + i;
+        double speed = fabs(d->vx) + fabs(d->vy) + fabs(d->spin) * d->radius;
+        if (d->mode != FREE || speed <= most) continue;
+        most = speed;
+        found = i;
+    }
+    return found;
+}
+
 /* Run on for at most so many steps: a `Status`, or what is `Full`. */
 static int run_on(int steps) {
     int status;
@@ -720,6 +735,10 @@ static int run_on(int steps) {
             }
             if (steps-- <= 0 || (W.pause > 0 && W.t >= W.pause)) return PAUSED;
             if ((status = begin_step()) != DONE) return status;
+            if ((W.stalled = too_fast()) >= 0) {
+                W.now = W.t;
+                return STALLED;
+            }
             int settled = W.interact && W.until == UNTIL_SETTLED && has_settled();
             if (settled || W.t >= W.end_time) {
                 stop_all(settled ? BY_SETTLING : BY_TIME);

@@ -215,12 +215,18 @@ class Job:
             status = self.stop()
         if status is Status.DONE:
             return None
+        return self.stalled()
+
+    def stalled(self) -> StalledError:
+        """Return where the run has stalled, and why."""
         world = self.module.world
         disk = self.module.array("disks", dtype("Disk"), self.machine.count)[world.stalled]
         reason = (
             "too many impacts in one step; make run.dt shorter, move the surfaces there apart, or"
             " lower their restitution or speed"
         )
+        if world.t + world.step == world.t:
+            reason = "it has become too fast for any step; make run.dt shorter"
         return StalledError(world.stalled, world.now, (float(disk["x"]), float(disk["y"])), reason)
 
     def stop(self) -> Status:

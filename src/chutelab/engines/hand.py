@@ -110,10 +110,9 @@ class Run:
         self.done = self.done or status in (Status.DONE, Status.STALLED)
         self.t = float(self._module.world.t)
         if status is Status.STALLED:
-            world = self._module.world
-            x, y = self._disks[world.stalled][["x", "y"]].tolist()
-            place = x + self._origin[0], y + self._origin[1]
-            raise StalledError(world.stalled, world.now, place, "too many impacts in one step")
+            found = self._job.stalled()
+            place = tuple(np.add(found.position, self._origin).tolist())
+            raise StalledError(found.particle, found.t, place, found.reason)
 
     @property
     def _disks(self) -> NDArray[Any]:

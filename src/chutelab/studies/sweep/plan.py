@@ -39,8 +39,7 @@ from chutelab.scene.variants import (
 )
 from chutelab.studies.sweep.rows import ERROR, REASON, TEXTS, Columns, averaged, empty, rows
 from chutelab.util.arrays import Floats, Ints
-from chutelab.util.errors import InputError
-from chutelab.util.versions import library
+from chutelab.util.errors import InputError, library
 
 DESIGNS: Final = {"lhs": "LatinHypercube", "sobol": "Sobol"}
 """Names of the designs, and of the classes of `scipy.stats.qmc` that draw them."""

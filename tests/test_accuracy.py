@@ -1,4 +1,4 @@
-"""An accuracy that can be asked for: what is said to be reached has been, and who says so."""
+"""An accuracy that can be asked for: what is said to be reached is, and the reference is named."""
 
 from dataclasses import replace
 
